@@ -1,0 +1,34 @@
+#pragma once
+#include <memory>
+
+#include "render/scene.h"
+
+namespace render {
+
+/// Draws a scene off screen with OSMesa. Owns the one context of its thread: construct, use and destroy it on one thread.
+/// Throws std::runtime_error ("FILE: error: found ..., expected ...") for a mesh that is missing, malformed or too large, and when no context can be had.
+class Renderer {
+public:
+    explicit Renderer(const SceneDescription& scene);
+    ~Renderer();
+    Renderer(const Renderer&) = delete;
+    Renderer& operator=(const Renderer&) = delete;
+
+    /// Draws one frame. The same state gives the same bytes.
+    void draw(const FrameState& frame, Image& image);
+
+    /// "OSMesa 22.3.6, llvmpipe ..." for reports.
+    [[nodiscard]] std::string version() const;
+    [[nodiscard]] std::size_t triangles() const;
+
+private:
+    struct Implementation;
+    std::unique_ptr<Implementation> implementation_;
+};
+
+/// PNG file bytes of an image (fast setting: level 1, SUB filter).
+[[nodiscard]] std::vector<std::uint8_t> encode_png(const Image& image);
+/// The inverse, for tests and reports; throws std::runtime_error.
+[[nodiscard]] Image decode_png(const std::vector<std::uint8_t>& bytes);
+
+}  // namespace render

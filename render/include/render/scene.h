@@ -1,0 +1,63 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace render {
+
+/// How a surface looks. Colour is linear RGB in [0, 1].
+struct Appearance {
+    Eigen::Vector3f color = Eigen::Vector3f(0.7f, 0.7f, 0.7f);
+    float metallic = 0;     ///< 0 dielectric (skin, lacquer, wood), 1 metal (bronze)
+    float roughness = 0.5f;
+};
+
+/// A part of a mesh file names its material; `parts` gives the look of each name ("shell", "head", "hoop", ...); others use `body`.
+struct Look {
+    Appearance body;
+    std::vector<std::pair<std::string, Appearance>> parts;
+};
+
+/// One drawn object: a mesh, drawn with one 4x4 matrix a frame.
+struct SceneObject {
+    std::string name;
+    std::filesystem::path mesh;  ///< OBJ, GLB or glTF, STL
+    Look look;
+};
+
+struct Camera {
+    Eigen::Vector3f eye = Eigen::Vector3f(0, 1.6f, 1.6f);     ///< [m], world
+    Eigen::Vector3f target = Eigen::Vector3f(0, 0.8f, -0.3f);
+    float vertical_fov_deg = 45;
+};
+
+struct Room {
+    Eigen::Vector3f floor_color = Eigen::Vector3f(0.35f, 0.27f, 0.2f);
+    Eigen::Vector3f wall_color = Eigen::Vector3f(0.18f, 0.2f, 0.25f);
+    float floor_height = 0;      ///< world y [m]
+};
+
+struct SceneDescription {
+    std::vector<SceneObject> objects;
+    Camera camera;
+    Room room;
+    int width = 640, height = 480;
+    int samples = 4;          ///< of MSAA, 0 or 1: off
+    int shadow_size = 1024;   ///< texels a side, 0: no shadow
+};
+
+/// One frame: a matrix an object in the order of the description (w row 0 0 0 1; scale and shear allowed), and whether it is drawn.
+struct FrameState {
+    std::vector<Eigen::Matrix4f> world_from_object;
+    std::vector<bool> visible;
+};
+
+/// Top row first, RGB, 8 bits, sRGB.
+struct Image {
+    int width = 0, height = 0;
+    std::vector<std::uint8_t> rgb;
+};
+
+}  // namespace render
