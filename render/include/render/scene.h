@@ -11,7 +11,8 @@ namespace render {
 struct Appearance {
     Eigen::Vector3f color = Eigen::Vector3f(0.7f, 0.7f, 0.7f);
     float metallic = 0;     ///< 0 dielectric (skin, lacquer, wood), 1 metal (bronze)
-    float roughness = 0.5f;
+    float roughness = 0.5f;  ///< 0 mirror, 1 chalk
+    float lathed = 0;        ///< 0 to 1: fine grooves around the object's y axis, as on cymbals: highlights become spokes
 };
 
 /// A part of a mesh file names its material; `parts` gives the look of each name ("shell", "head", "hoop", ...); others use `body`.
@@ -39,10 +40,19 @@ struct Room {
     float floor_height = 0;      ///< world y [m]
 };
 
+/// Parallel light with a shadow, its strength falling off softly around the camera's target like a spot's. The shadow covers what the camera
+/// sees at the target's distance.
+struct KeyLight {
+    Eigen::Vector3f towards_light = Eigen::Vector3f(-0.55f, 1.0f, 0.45f);  ///< world, any length but 0
+    Eigen::Vector3f color = Eigen::Vector3f(1.0f, 0.86f, 0.68f);
+    float strength = 1;  ///< 0: fill light only
+};
+
 struct SceneDescription {
     std::vector<SceneObject> objects;
     Camera camera;
     Room room;
+    KeyLight key_light;
     int width = 640, height = 480;
     int samples = 4;          ///< of MSAA, 0 or 1: off
     int shadow_size = 1024;   ///< texels a side, 0: no shadow

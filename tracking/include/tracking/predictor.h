@@ -16,7 +16,9 @@ struct PosePrediction {
     Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< world frame [rad/s]
 };
 
-enum class SampleStatus { accepted, not_newer, not_finite, reinitialised };
+/// What became of a sample. `outlier`: only with a gate (`auto`, `gate=`); the sample was ignored, but the third in a row is taken
+/// as real and answers `reinitialised`.
+enum class SampleStatus { accepted, not_newer, not_finite, reinitialised, outlier };
 
 /// A causal estimator of one stick's pose. One thread at a time; correct() and predict() allocate nothing.
 class Predictor {

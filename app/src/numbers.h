@@ -1,0 +1,16 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+
+namespace app {
+
+/// "0.01", "1e-3" or a fraction "1/15" of an option. Throws BadInput naming the option.
+[[nodiscard]] double parse_number(const std::string& text, const std::string& option);
+/// "X,Y,Z". Throws BadInput naming the option.
+[[nodiscard]] Eigen::Vector3d parse_vector(const std::string& text, const std::string& option);
+/// A body axis: "-z", "+y", "x". Throws BadInput naming the option.
+[[nodiscard]] Eigen::Vector3d parse_axis(const std::string& text, const std::string& option);
+/// "640x480" as width and height. Throws BadInput naming the option.
+[[nodiscard]] Eigen::Vector2i parse_size(const std::string& text, const std::string& option);
+
+}  // namespace app

@@ -1,0 +1,190 @@
+#include "offline_run.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "notes.h"
+
+namespace app {
+namespace {
+
+constexpr double kSlackS = 1e-9;  // of the causality rules
+
+/// Adds the time of its life to a sum.
+class Stopwatch {
+public:
+    explicit Stopwatch(double& sum) : sum_(sum), start_(std::chrono::steady_clock::now()) {}
+    ~Stopwatch() { sum_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    Stopwatch(const Stopwatch&) = delete;
+    Stopwatch& operator=(const Stopwatch&) = delete;
+
+private:
+    double& sum_;
+    std::chrono::steady_clock::time_point start_;
+};
+
+StrikeRules rules_of(const PlayOptions& options, double t0_s) {
+    StrikeRules rules;
+    rules.t0_s = t0_s;
+    rules.release_margin_s = options.release_margin_s;
+    rules.cancelling = options.cancelling;
+    return rules;
+}
+
+}  // namespace
+
+OfflineRun::OfflineRun(const tracking::Trace& trace, const Kit& kit, const PlayOptions& options, const StickGeometry& stick,
+                       sim::Simulation& simulation, const Stage& stage, FrameWriter* frames, audio::Performance* performance)
+    : trace_(trace),
+      kit_(kit),
+      options_(options),
+      simulation_(simulation),
+      stage_(stage),
+      frames_(frames),
+      performance_(performance),
+      t0_s_(trace.t0_s()),
+      t_end_s_(trace.t_end_s()),
+      scheduler_(rules_of(options, trace.t0_s()), trace.sticks.size(), kit.instruments.size()) {
+    for (std::uint32_t i = 0; i < trace.sticks.size(); ++i)
+        sticks_.emplace_back(i, stick, options.picture_predictor, options.sound_predictor);
+}
+
+std::vector<OfflineRun::Tick> OfflineRun::ticks() const {
+    struct Entry {
+        double t_s;
+        std::uint32_t stick;
+        std::size_t index;
+    };
+    std::vector<Entry> entries;
+    for (std::uint32_t stick = 0; stick < trace_.sticks.size(); ++stick)
+        for (std::size_t i = 0; i < trace_.sticks[stick].samples.size(); ++i)
+            entries.push_back({trace_.sticks[stick].samples[i].t_s, stick, i});
+    std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.t_s < b.t_s; });
+    std::vector<Tick> result;
+    for (const Entry& entry : entries) {
+        if (result.empty() || entry.t_s > result.back().t_s) result.push_back({entry.t_s, {}});
+        result.back().samples.emplace_back(entry.stick, entry.index);
+    }
+    return result;
+}
+
+void OfflineRun::run(const std::function<void(double)>& progress) {
+    const std::vector<Tick> all = ticks();
+    draw_frames(-std::numeric_limits<double>::infinity(), all.front().t_s);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        take(all[i]);
+        draw_frames(all[i].t_s, i + 1 < all.size() ? all[i + 1].t_s : std::numeric_limits<double>::infinity());
+        if (i % 64 == 0) progress(static_cast<double>(i) / static_cast<double>(all.size()));
+    }
+    scheduler_.finish();
+    send_notes();
+}
+
+void OfflineRun::feed(const Tick& tick, std::vector<std::uint32_t>& moved, std::vector<sim::TipPath>& paths) {
+    const Stopwatch watch(times_.tracking);
+    for (const auto& [stick, index] : tick.samples) {
+        const tracking::SampleStatus status = sticks_[stick].correct(trace_.sticks[stick].samples[index]);
+        if (status == tracking::SampleStatus::not_newer || status == tracking::SampleStatus::not_finite) {
+            ++refused_;
+            continue;
+        }
+        if (status == tracking::SampleStatus::reinitialised) scheduler_.restart(stick);
+        moved.push_back(stick);
+        paths.push_back(sticks_[stick].predicted_path(options_.sound_lead_s));
+        paths.push_back(sticks_[stick].measured_path());
+        paths.back().stick += static_cast<std::uint32_t>(sticks_.size());  // so that its contacts are told apart
+    }
+}
+
+void OfflineRun::settle_impulses(double s, sim::StepRequest& request) {
+    for (const std::uint64_t id : scheduler_.take_released()) unfolded_.push_back(id);
+    std::vector<std::uint64_t> ahead;
+    for (const std::uint64_t id : unfolded_) {
+        const sim::Impulse impulse = impulse_of(scheduler_.strikes()[id - 1]);
+        if (impulse.t_s <= s) {
+            request.folded.push_back(impulse);
+            drawn_.folded(id);
+        } else {
+            request.confirmed.push_back(impulse);
+            ahead.push_back(id);
+        }
+    }
+    unfolded_ = std::move(ahead);
+}
+
+void OfflineRun::take(const Tick& tick) {
+    const double s = tick.t_s;
+    scheduler_.advance_to(s);
+    if (performance_) {
+        // Notes before this are fixed; those that this sample may still change lie at or after it.
+        const double fixed = (s + options_.release_margin_s - t0_s_) * audio::kSampleRate;
+        performance_->advance_to(static_cast<std::int64_t>(std::floor(fixed)));
+    }
+    sim::StepRequest request;
+    request.t_s = s;
+    std::vector<std::uint32_t> moved;
+    feed(tick, moved, request.paths);
+    settle_impulses(s, request);
+    sim::StepReply reply;
+    {
+        const Stopwatch watch(times_.simulation);
+        reply = simulation_.step(request);
+    }
+    const Stopwatch watch(times_.strikes);
+    take_contacts(s, moved, reply);
+    send_notes();
+}
+
+void OfflineRun::take_contacts(double s, const std::vector<std::uint32_t>& moved, const sim::StepReply& reply) {
+    const std::size_t bodies = kit_.instruments.size();
+    std::vector<sim::Contact> own;
+    for (std::size_t i = 0; i < moved.size(); ++i) {
+        // Two paths a stick: the predicted one, and the measured tip, which stands still and makes no contact but by starting inside.
+        const std::span<const double> filtered(reply.clearance_m.data() + 2 * i * bodies, bodies);
+        const std::span<const double> measured(reply.clearance_m.data() + (2 * i + 1) * bodies, bodies);
+        own.clear();
+        for (const sim::Contact& contact : reply.contacts)
+            if (contact.stick == moved[i]) own.push_back(contact);
+        scheduler_.sample(moved[i], s, own, measured, filtered);
+    }
+}
+
+void OfflineRun::send_notes() {
+    for (const NoteChange& change : scheduler_.take_changes()) {
+        if (!performance_ || (options_.solo && *options_.solo != change.id)) continue;
+        const Strike& strike = scheduler_.strikes()[change.id - 1];
+        if (change.scheduled) performance_->schedule(note_of(strike, kit_.instruments[strike.instrument]));
+        else performance_->cancel(change.id);
+    }
+}
+
+void OfflineRun::draw_frames(double s, double next) {
+    if (!frames_) return;
+    for (;; ++next_frame_) {
+        const double elapsed = static_cast<double>(next_frame_) / options_.fps;
+        const double T = t0_s_ + elapsed;
+        if (!(elapsed < t_end_s_ - t0_s_) || T - options_.render_lead_s + kSlackS >= next) return;
+        draw_frame(s, T);
+    }
+}
+
+void OfflineRun::draw_frame(double s, double T) {
+    std::vector<std::optional<tracking::PosePrediction>> poses(sticks_.size());
+    std::vector<sim::ModalState> bodies;
+    if (std::isfinite(s)) {
+        for (std::size_t i = 0; i < sticks_.size(); ++i)
+            if (sticks_[i].started()) poses[i] = sticks_[i].pose_at(T);
+        sim::StepRequest request;
+        request.t_s = s;
+        settle_impulses(s, request);
+        request.pictures.push_back({T, drawn_.frame(T, scheduler_.strikes())});
+        const Stopwatch watch(times_.simulation);
+        bodies = std::move(simulation_.step(request).pictures.front());
+    }
+    const Stopwatch watch(times_.waiting_for_frames);
+    frames_->push(stage_.frame(bodies, poses));
+}
+
+}  // namespace app

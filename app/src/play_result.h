@@ -1,0 +1,58 @@
+#pragma once
+#include <Eigen/Core>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "strike.h"
+
+namespace app {
+
+/// How the notes of a run compare with the true contacts.
+struct StrikeScore {
+    int true_contacts = 0, released = 0, cancelled = 0, moved = 0, false_notes = 0, missed = 0;
+    int false_turned_early = 0;  ///< false notes whose true path turned back at least 25 ms before the release point
+    int false_turned_late = 0;   ///< the other false notes
+    double timing_median_ms = 0, timing_p95_ms = 0;  ///< of |onset - true contact|, matched notes
+};
+
+/// The recorded path of one stick's tip, for the report's plots.
+struct TipTrack {
+    std::string stick;
+    std::vector<double> t_s;
+    std::vector<Eigen::Vector3d> tip;  ///< [m], world
+};
+
+struct InputFile {
+    std::string file, sha256;
+};
+
+/// Everything that `play` found out, for the summary, the tables and the report.
+struct PlayResult {
+    std::string trace, kit, kit_name, trace_source;
+    std::string picture_predictor, sound_predictor;
+    double t0_s = 0, t_end_s = 0;
+    double fps = 30, render_lead_s = 0, sound_lead_s = 0, release_margin_s = 0;
+    bool cancelling = true;
+    int width = 640, height = 480;
+    std::size_t frames = 0;             ///< drawn
+    std::vector<std::string> sticks;       ///< names, by index
+    std::vector<std::string> instruments;  ///< names, by index
+    std::vector<Strike> strikes;           ///< by id
+    std::vector<TrueContact> contacts;     ///< by time
+    StrikeScore score;
+    std::vector<TipTrack> tracks;
+    std::vector<float> audio;           ///< interleaved stereo, 48 kHz; empty with --no-audio
+    std::size_t samples_refused = 0;    ///< reports that the filters ignored
+    std::size_t clipped_samples = 0;
+    double wall_s = 0;
+    std::vector<std::pair<std::string, double>> stages_s;  ///< name, seconds
+    int workers = 0, workers_lost = 0, bodies_reowned = 0;
+    std::vector<InputFile> inputs;
+    std::string fingerprint;
+    std::vector<std::pair<std::string, std::string>> versions;
+    std::vector<std::filesystem::path> report_frames;  ///< a few frames (PNG files on disk) that the report shows
+};
+
+}  // namespace app

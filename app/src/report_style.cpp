@@ -1,0 +1,54 @@
+#include "report_style.h"
+
+#include "report_svg.h"
+
+namespace app {
+namespace {
+
+constexpr const char* kRules = R"css(
+*{box-sizing:border-box}
+body{margin:0;background:var(--page);color:var(--ink);font:15px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
+main{max-width:1120px;margin:0 auto;padding:28px 24px 56px}
+header p{margin:2px 0;color:var(--axis)}
+h1{font-size:26px;line-height:1.25;margin:0 0 4px;overflow-wrap:anywhere}
+h2{font-size:18px;margin:40px 0 6px}
+h3{font-size:15px;margin:0 0 4px}
+p.note{color:var(--axis);margin:0 0 10px;max-width:80ch}
+.facts{display:grid;grid-template-columns:repeat(auto-fit,minmax(230px,1fr));gap:8px 28px;margin:18px 0 0}
+.facts div{border-top:1px solid var(--grid);padding-top:5px;overflow-wrap:anywhere}
+.facts dt{color:var(--axis);font-size:12.5px}
+.facts dd{margin:0}
+.figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(106px,1fr));gap:10px;margin:24px 0 8px}
+.figures div{background:var(--card);border:1px solid var(--grid);border-top:3px solid var(--tone,var(--axis));border-radius:6px;padding:9px 12px}
+.figures b{display:block;font-size:24px;line-height:1.2;font-weight:650;font-variant-numeric:tabular-nums}
+.figures span{color:var(--axis);font-size:12.5px}
+.frames{display:grid;grid-template-columns:repeat(auto-fill,minmax(240px,1fr));gap:12px}
+figure{margin:0}
+.frames img{width:100%;height:auto;display:block;border-radius:6px;border:1px solid var(--grid)}
+figcaption{color:var(--axis);font-size:12.5px;padding-top:3px}
+.plot{background:var(--card);border:1px solid var(--grid);border-radius:6px;padding:8px 10px 4px}
+.plot svg{display:block;width:100%;height:auto}
+.pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:12px}
+.legend{display:flex;flex-wrap:wrap;gap:4px 18px;margin:0 0 8px;padding:0;list-style:none;font-size:13px}
+.legend svg{width:22px;height:12px;vertical-align:-1px;margin-right:5px}
+.scroll{overflow-x:auto}
+table{border-collapse:collapse;font-variant-numeric:tabular-nums}
+th,td{padding:4px 14px 4px 0;text-align:left;border-bottom:1px solid var(--grid);vertical-align:top;overflow-wrap:anywhere}
+th{color:var(--axis);font-weight:500;font-size:13px}
+td.n,th.n{text-align:right}
+td.bar{min-width:180px;vertical-align:middle}
+td.bar i{display:block;height:9px;border-radius:3px;background:var(--wave)}
+code{font:12.5px/1.5 ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;overflow-wrap:anywhere}
+@media(max-width:520px){.pair{grid-template-columns:1fr}main{padding:20px 14px}}
+@media print{body{font-size:12px}.plot,figure,tr{break-inside:avoid}}
+)css";
+
+}  // namespace
+
+std::string report_style() {
+    return ":root{color-scheme:light dark;--page:#f6f8fa;--card:#ffffff;--ink:#1b2027;" + css_colours(false) +
+           "}\n@media screen and (prefers-color-scheme:dark){:root{--page:#12161b;--card:#1a2027;--ink:#e3e8ee;" +
+           css_colours(true) + "}}" + kRules;
+}
+
+}  // namespace app

@@ -1,0 +1,152 @@
+#include "report_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "report_plots.h"
+#include "report_svg.h"
+#include "score_strikes.h"
+
+namespace app {
+namespace {
+
+std::string fact(std::string_view name, std::string_view value) {
+    return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", html(name), html(value));
+}
+
+std::string figure(std::string_view value, std::string_view name, std::string_view tone) {
+    return fmt::format("<div style=\"--tone:var(--{})\"><b>{}</b><span>{}</span></div>\n", tone, html(value),
+                       html(name));
+}
+
+std::string percent(int part, int whole) {
+    return whole > 0 ? fmt::format("{:.1f} %", 100.0 * part / whole) : "none";
+}
+
+struct InstrumentRow {
+    int contacts = 0, released = 0, cancelled = 0, wrong = 0, missed = 0;
+    std::vector<double> errors_ms;
+};
+
+std::vector<InstrumentRow> count_by_instrument(const PlayResult& result) {
+    std::vector<InstrumentRow> rows(result.instruments.size());
+    const std::vector<Mark> marks = strike_marks(result);
+    for (std::size_t i = 0; i < marks.size(); ++i) {
+        InstrumentRow& row = rows.at(result.strikes[i].instrument);
+        row.cancelled += marks[i] == Mark::cancelled;
+        row.released += marks[i] != Mark::cancelled;
+        row.wrong += marks[i] == Mark::wrong;
+    }
+    for (const TrueContact& contact : result.contacts) {
+        InstrumentRow& row = rows.at(contact.instrument);
+        ++row.contacts;
+        row.missed += contact.matched_id == 0;
+    }
+    for (const MatchedNote& note : matched_notes(result)) rows.at(note.instrument).errors_ms.push_back(note.error_ms);
+    return rows;
+}
+
+/// Median of the absolute and of the signed errors, as two cells.
+std::string error_cells(const std::vector<double>& errors_ms) {
+    if (errors_ms.empty()) return "<td class=n>&ndash;</td><td class=n>&ndash;</td>";
+    std::vector<double> sizes;
+    for (const double error : errors_ms) sizes.push_back(std::abs(error));
+    return fmt::format("<td class=n>{:.1f}</td><td class=n>{:+.1f}</td>", median(sizes), median(errors_ms));
+}
+
+std::string stages_table(const PlayResult& result) {
+    double longest = 1e-9;
+    for (const auto& [name, seconds] : result.stages_s) longest = std::max(longest, seconds);
+    std::string text = "<table><tr><th>stage<th class=n>seconds<th></tr>\n";
+    for (const auto& [name, seconds] : result.stages_s)
+        fmt::format_to(std::back_inserter(text),
+                       "<tr><td>{}<td class=n>{:.3f}<td class=bar><i style=\"width:{:.1f}%\"></i></tr>\n", html(name),
+                       seconds, 100 * std::clamp(seconds / longest, 0.0, 1.0));
+    fmt::format_to(std::back_inserter(text), "<tr><td>whole run<td class=n>{:.3f}<td></tr></table>\n", result.wall_s);
+    return text;
+}
+
+}  // namespace
+
+std::string report_heading(const PlayResult& r) {
+    std::string text = fmt::format("<header><h1>{}</h1>\n<p>played on {} by MusicWorld</p>\n<dl class=facts>\n",
+                                   html(std::filesystem::path(r.trace).filename().string()), html(r.kit_name));
+    text += fact("trace", r.trace);
+    if (!r.trace_source.empty()) text += fact("recorded from", r.trace_source);
+    text += fact("kit", r.kit);
+    text += fact("duration", fmt::format("{:.3f} s ({:.3f} s to {:.3f} s)", r.t_end_s - r.t0_s, r.t0_s, r.t_end_s));
+    text += fact("pictures predicted by", fmt::format("{}, {:.1f} ms ahead", r.picture_predictor, r.render_lead_s * 1e3));
+    text += fact("sounds predicted by", fmt::format("{}, up to {:.1f} ms ahead", r.sound_predictor, r.sound_lead_s * 1e3));
+    text += fact("sounds are fixed", fmt::format("{:.1f} ms before their onset; cancelling is {}",
+                                                 r.release_margin_s * 1e3, r.cancelling ? "on" : "off"));
+    text += fact("frames", fmt::format("{} of {} x {}, {:g} a second", r.frames, r.width, r.height, r.fps));
+    return text + "</dl></header>\n";
+}
+
+std::string report_figures(const PlayResult& r) {
+    const StrikeScore& s = r.score;
+    const bool matched = s.released > s.false_notes;
+    const auto ms = [&](double value) { return matched ? fmt::format("{:.1f} ms", value) : std::string("none"); };
+    std::string text = "<section class=figures>\n";
+    text += figure(fmt::format("{}", s.true_contacts), "true contacts", "contact");
+    text += figure(fmt::format("{}", s.released), "notes released", "released");
+    text += figure(fmt::format("{}", s.cancelled), "cancelled in time", "cancelled");
+    text += figure(fmt::format("{}", s.moved), "moved before release", "axis");
+    text += figure(fmt::format("{}", s.false_notes), "false", "wrong");
+    text += figure(fmt::format("{}", s.missed), "missed", "missed");
+    text += figure(ms(s.timing_median_ms), "timing, median", "axis");
+    text += figure(ms(s.timing_p95_ms), "timing, 95 %", "axis");
+    const std::string factor = r.wall_s > 0 ? fmt::format("{:.3g} x", (r.t_end_s - r.t0_s) / r.wall_s) : "none";
+    text += figure(factor, "real time", "axis");
+    text += "</section>\n";
+    text += fmt::format(
+        "<p class=note>Heard: {} of the true contacts. False: {} of the notes, {} after a stroke that turned back at "
+        "least 25 ms before the release point, {} later. Timing is |onset - true contact| of the notes that belong to "
+        "a contact (same stick and instrument, within 30 ms).</p>\n",
+        percent(s.true_contacts - s.missed, s.true_contacts), percent(s.false_notes, s.released), s.false_turned_early,
+        s.false_turned_late);
+    return text;
+}
+
+std::string report_instruments(const PlayResult& result) {
+    const std::vector<InstrumentRow> rows = count_by_instrument(result);
+    std::string text =
+        "<div class=scroll><table><tr><th>instrument<th class=n>true<th class=n>released<th class=n>cancelled"
+        "<th class=n>false<th class=n>missed<th class=n>median |ms|<th class=n>median ms</tr>\n";
+    int silent = 0;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        const InstrumentRow& row = rows[i];
+        if (row.contacts + row.released + row.cancelled == 0) {
+            ++silent;
+            continue;
+        }
+        fmt::format_to(std::back_inserter(text),
+                       "<tr><td>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}{}</tr>\n",
+                       html(result.instruments[i]), row.contacts, row.released, row.cancelled, row.wrong, row.missed,
+                       error_cells(row.errors_ms));
+    }
+    text += "</table></div>\n";
+    if (silent > 0) text += fmt::format("<p class=note>{} more of the kit were not struck.</p>\n", silent);
+    return text;
+}
+
+std::string report_provenance(const PlayResult& r) {
+    std::string text = "<h2>Where the time went</h2>\n" + stages_table(r);
+    text += fmt::format("<p class=note>Stages may overlap. Workers: {} ({} lost, {} bodies taken over).</p>\n",
+                        r.workers, r.workers_lost, r.bodies_reowned);
+    text += "<h2>Inputs</h2>\n<table><tr><th>file<th>SHA-256</tr>\n";
+    for (const InputFile& input : r.inputs)
+        fmt::format_to(std::back_inserter(text), "<tr><td>{}<td><code>{}</code></tr>\n", html(input.file),
+                       html(input.sha256));
+    text += "</table>\n<h2>Versions</h2>\n<table>\n";
+    for (const auto& [name, version] : r.versions)
+        fmt::format_to(std::back_inserter(text), "<tr><td>{}<td>{}</tr>\n", html(name), html(version));
+    fmt::format_to(std::back_inserter(text),
+                   "<tr><td>fingerprint of this machine and build<td><code>{}</code></tr></table>\n", html(r.fingerprint));
+    return text;
+}
+
+}  // namespace app

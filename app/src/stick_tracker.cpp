@@ -1,0 +1,57 @@
+#include "stick_tracker.h"
+
+#include <algorithm>
+
+namespace app {
+namespace {
+
+// Cubic Hermite pieces of 8.3 ms: exact for the filters' parabolas; for a stick turning at 20 rad/s within 1 um.
+constexpr int kPathPieces = 8;
+constexpr double kLongestPredictionS = 0.15;
+constexpr double kStandstillS = 1e-6;
+
+}  // namespace
+
+StickTracker::StickTracker(std::uint32_t stick, const StickGeometry& geometry, const std::string& picture_predictor,
+                           const std::string& sound_predictor)
+    : stick_(stick),
+      geometry_(geometry),
+      picture_(tracking::make_predictor(picture_predictor)),
+      sound_(tracking::make_predictor(sound_predictor)) {}
+
+tracking::SampleStatus StickTracker::correct(const tracking::PoseSample& sample) {
+    (void)picture_->correct(sample);
+    const tracking::SampleStatus status = sound_->correct(sample);
+    if (status == tracking::SampleStatus::accepted || status == tracking::SampleStatus::reinitialised) {
+        measured_tip_ = sample.position + sample.orientation * geometry_.tip;
+        started_ = true;
+    }
+    return status;
+}
+
+tracking::PosePrediction StickTracker::pose_at(double T) const {
+    return picture_->predict(std::clamp(T - picture_->time_s(), 0.0, kLongestPredictionS));
+}
+
+sim::TipPath StickTracker::predicted_path(double lead_s) const {
+    sim::TipPath path;
+    path.stick = stick_;
+    path.tip_radius_m = geometry_.radius_m;
+    for (int i = 0; i <= kPathPieces; ++i) {
+        const double h = lead_s * i / kPathPieces;
+        const tracking::PointMotion tip = tracking::point_of(sound_->predict(h), geometry_.tip);
+        path.nodes.push_back({sound_->time_s() + h, tip.position, tip.velocity});
+    }
+    return path;
+}
+
+sim::TipPath StickTracker::measured_path() const {
+    sim::TipPath path;
+    path.stick = stick_;
+    path.tip_radius_m = geometry_.radius_m;
+    const double t = sound_->time_s();
+    path.nodes = {{t, measured_tip_, Eigen::Vector3d::Zero()}, {t + kStandstillS, measured_tip_, Eigen::Vector3d::Zero()}};
+    return path;
+}
+
+}  // namespace app

@@ -1,0 +1,35 @@
+#pragma once
+#include <sim/simulation.h>
+#include <tracking/predictor.h>
+
+#include <memory>
+#include <string>
+
+#include "tip_track.h"
+
+namespace app {
+
+/// One stick's filters: one predictor for pictures, one for sound, fed the same samples.
+class StickTracker {
+public:
+    StickTracker(std::uint32_t stick, const StickGeometry& geometry, const std::string& picture_predictor,
+                 const std::string& sound_predictor);
+
+    /// What the sound's filter made of the sample; refused samples change nothing.
+    [[nodiscard]] tracking::SampleStatus correct(const tracking::PoseSample& sample);
+    [[nodiscard]] bool started() const { return started_; }
+    /// Pose for a picture shown at T >= the newest sample's time; a prediction is carried at most 0.15 s beyond that, then held.
+    [[nodiscard]] tracking::PosePrediction pose_at(double T) const;
+    /// The path that the sound's filter predicts over [0, lead] from its newest sample, and the measured tip as a path that stands still.
+    [[nodiscard]] sim::TipPath predicted_path(double lead_s) const;
+    [[nodiscard]] sim::TipPath measured_path() const;
+
+private:
+    std::uint32_t stick_;
+    StickGeometry geometry_;
+    std::unique_ptr<tracking::Predictor> picture_, sound_;
+    Eigen::Vector3d measured_tip_ = Eigen::Vector3d::Zero();
+    bool started_ = false;
+};
+
+}  // namespace app

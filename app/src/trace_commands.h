@@ -1,0 +1,9 @@
+#pragma once
+#include <CLI/CLI.hpp>
+
+namespace app {
+
+/// `musicworld trace info|check|synth`.
+void add_trace_command(CLI::App& program);
+
+}  // namespace app

@@ -1,0 +1,46 @@
+#pragma once
+#include <atomic>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+namespace audio {
+
+/// Bounded first-in first-out queue between one writing and one reading thread. Both sides wait where they cannot go on
+/// (an offline performance loses nothing); neither takes a lock nor allocates after construction.
+/// Positions only grow; element i lies in slot i mod capacity. The writer owns the slots from written_ on, the reader
+/// those from read_ to written_; the release of a position by its owner hands the slot over.
+template <class T>
+class CommandQueue {
+public:
+    explicit CommandQueue(std::size_t capacity) : slots_(capacity) {}
+
+    /// Writing thread only; waits while the queue is full.
+    void push(T value) {
+        const std::size_t at = written_.load(std::memory_order_relaxed);
+        for (std::size_t read = read_.load(std::memory_order_acquire); at - read == slots_.size();
+             read = read_.load(std::memory_order_acquire)) {
+            read_.wait(read, std::memory_order_acquire);
+        }
+        slots_[at % slots_.size()] = std::move(value);
+        written_.store(at + 1, std::memory_order_release);
+        written_.notify_one();
+    }
+
+    /// Reading thread only; waits while the queue is empty.
+    [[nodiscard]] T pop() {
+        const std::size_t at = read_.load(std::memory_order_relaxed);
+        written_.wait(at, std::memory_order_acquire);
+        T value = std::move(slots_[at % slots_.size()]);
+        read_.store(at + 1, std::memory_order_release);
+        read_.notify_one();
+        return value;
+    }
+
+private:
+    std::vector<T> slots_;
+    std::atomic<std::size_t> written_{0};
+    std::atomic<std::size_t> read_{0};
+};
+
+}  // namespace audio

@@ -1,0 +1,110 @@
+#include "csound_engine.h"
+
+#include <csound.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <string_view>
+
+#include "audio/performance.h"
+
+namespace audio {
+namespace {
+
+static_assert(sizeof(MYFLT) == sizeof(double), "the 64-bit Csound library is expected");
+
+constexpr std::size_t kMessageLimit = 4000;
+
+/// Once a process, before its first instance: no signal handlers, no exit handler, no plugin folder.
+void prepare_library() {
+    static const bool prepared = [] {
+        return csoundInitialize(CSOUNDINIT_NO_SIGNAL_HANDLER | CSOUNDINIT_NO_ATEXIT) >= 0 &&
+               csoundSetGlobalEnv("OPCODE6DIR64", "") == 0;
+    }();
+    if (!prepared) throw std::runtime_error("Csound: the library could not be initialised");
+}
+
+bool is_error(std::string_view text) {
+    // "INIT ERROR in instr", "PERF ERROR in instr", "error: syntax error", "note deleted": not "0 errors in performance".
+    return text.find("ERROR") != text.npos || text.find("rror:") != text.npos ||
+           text.find("note deleted") != text.npos;
+}
+
+}  // namespace
+
+void CsoundEngine::Destroy::operator()(CSOUND_* csound) const noexcept { csoundDestroy(csound); }
+
+CsoundEngine::CsoundEngine(const std::string& orchestra, const std::string& source) : source_(source) {
+    prepare_library();
+    csound_.reset(csoundCreate(this));
+    if (!csound_) throw std::runtime_error("Csound: no instance could be created");
+    csoundSetMessageStringCallback(csound_.get(), &CsoundEngine::receive_message);
+    for (const char* option : {"-n", "-d", "-m0", "--sample-accurate"}) {
+        if (csoundSetOption(csound_.get(), option) != 0) {
+            throw std::runtime_error(std::string("Csound refuses its option ") + option);
+        }
+    }
+    if (csoundCompileOrc(csound_.get(), orchestra.c_str()) != 0 || csoundStart(csound_.get()) != 0) failed_ = true;
+    check_messages();
+    check_format();
+    block_size_ = static_cast<int>(csoundGetKsmps(csound_.get()));
+}
+
+void CsoundEngine::receive_message(CSOUND* csound, int, const char* text) {
+    auto* engine = static_cast<CsoundEngine*>(csoundGetHostData(csound));
+    if (is_error(text)) engine->failed_ = true;
+    if (engine->messages_.size() < kMessageLimit) engine->messages_ += text;
+}
+
+void CsoundEngine::check_messages() const {
+    if (!failed_) return;
+    std::string text = messages_;
+    std::ranges::replace(text, '\n', ' ');
+    throw std::runtime_error(source_ + ": Csound reports: " + text);
+}
+
+void CsoundEngine::check_format() const {
+    CSOUND* csound = csound_.get();
+    if (csoundGetSr(csound) != kSampleRate || csoundGetNchnls(csound) != 2 || csoundGet0dBFS(csound) != 1) {
+        throw std::runtime_error(source_ + ": found sr " + std::to_string(csoundGetSr(csound)) + ", nchnls " +
+                                 std::to_string(csoundGetNchnls(csound)) + ", 0dbfs " +
+                                 std::to_string(csoundGet0dBFS(csound)) + ", expected 48000, 2, 1");
+    }
+}
+
+double CsoundEngine::instrument_number(const std::string& name) {
+    const double number = csoundEvalCode(csound_.get(), ("return nstrnum(\"" + name + "\")\n").c_str());
+    if (!(number > 0)) throw std::runtime_error(source_ + ": found no `instr " + name + "`, expected one");
+    return number;
+}
+
+std::span<double> CsoundEngine::table(int number) {
+    MYFLT* values = nullptr;
+    const int length = csoundGetTable(csound_.get(), &values, number);
+    if (length <= 0 || values == nullptr) {
+        throw std::runtime_error(source_ + ": found no function table " + std::to_string(number) +
+                                 ", expected one");
+    }
+    return {values, static_cast<std::size_t>(length)};
+}
+
+void CsoundEngine::start_note(std::span<const double> p_fields) {
+    if (csoundScoreEvent(csound_.get(), 'i', p_fields.data(), static_cast<long>(p_fields.size())) != 0) {
+        failed_ = true;
+    }
+}
+
+std::span<const double> CsoundEngine::render_block() {
+    messages_.clear();
+    if (csoundPerformKsmps(csound_.get()) != 0) failed_ = true;
+    check_messages();
+    return {csoundGetSpout(csound_.get()), static_cast<std::size_t>(2 * block_size_)};
+}
+
+std::string CsoundEngine::version() {
+    const int version = csoundGetVersion();
+    return "Csound " + std::to_string(version / 1000) + "." + std::to_string(version / 10 % 100) + "." +
+           std::to_string(version % 10);
+}
+
+}  // namespace audio

@@ -1,0 +1,70 @@
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "audio/performance.h"
+#include "csound_engine.h"
+#include "onset_rule.h"
+
+namespace audio {
+
+/// A voice as the orchestra wants it.
+struct RenderedVoice {
+    double instrument = 0;  ///< number in Csound
+    double left = 0, right = 0;  ///< gains: constant power pan times the voice's gain
+    int choke_group = -1;
+    std::vector<double> parameters;  ///< in the declared order, p12 on
+};
+
+/// Constant power: left^2 + right^2 = gain^2, pan 0 left ... 1 right.
+struct PanGains {
+    double left = 0, right = 0;
+};
+[[nodiscard]] PanGains pan_gains(double pan, double gain_db);
+
+/// Turns notes into samples, block by block; everything on one thread.
+///
+/// A note is handed to Csound just before the block that holds its onset, so Csound never knows a note that can still be
+/// cancelled. Choking: before a block the host writes into table 901 the group's first onset within it; every older
+/// note of the group fades from that very sample; a note started in the same block gets the group's next later onset there
+/// as p11. Equal onsets do not choke each other.
+class Renderer {
+public:
+    /// Throws std::runtime_error: orchestra, instrument, parameter, pan or gain that is not valid.
+    Renderer(const std::filesystem::path& orchestra, const std::vector<Voice>& voices);
+
+    [[nodiscard]] int block_size() const { return engine_.block_size(); }
+    [[nodiscard]] std::string version() const;
+
+    /// Notes come in order of onset, each before render_to passes its block.
+    void add(const Note& note) { due_.push_back(note); }
+    /// Renders whole blocks up to `sample`, a multiple of the block size.
+    void render_to(std::int64_t sample);
+    /// Performance::finish.
+    [[nodiscard]] std::vector<float> finish(std::int64_t minimum_samples, std::int64_t tail_samples);
+
+private:
+    Renderer(const std::string& text, const std::string& source, const std::vector<Voice>& voices);
+    void render_block();
+    void start_due_notes();
+    void mark_chokes(std::span<const Note> notes);
+    void start(const Note& note, std::span<const Note> block_notes);
+    [[nodiscard]] bool sounding() const;
+
+    CsoundEngine engine_;
+    OnsetRule rule_;
+    std::vector<RenderedVoice> voices_;
+    std::span<double> chokes_;  ///< table 901
+    std::span<double> ends_;    ///< table 902
+    std::deque<Note> due_;
+    std::vector<Note> block_notes_;
+    std::vector<double> p_fields_;
+    std::int64_t position_ = 0;  ///< first sample of the coming block
+    std::vector<float> output_;
+};
+
+}  // namespace audio

@@ -1,0 +1,139 @@
+#include "render/renderer.h"
+
+#include <stdexcept>
+
+#include "gl_functions.h"
+#include "gl_program.h"
+#include "osmesa_context.h"
+#include "render_targets.h"
+#include "scene_geometry.h"
+#include "shaders.h"
+#include "stage.h"
+#include "view.h"
+
+namespace render {
+namespace {
+
+constexpr GLuint kMatrixUnit = 0, kShadowUnit = 1;
+constexpr int kMaxSide = 8192;  // pixels
+
+SceneDescription checked(const SceneDescription& scene) {
+    if (scene.width < 1 || scene.height < 1 || scene.width > kMaxSide || scene.height > kMaxSide) {
+        throw std::runtime_error("picture: error: found a size of " + std::to_string(scene.width) + "x" + std::to_string(scene.height) +
+                                 ", expected 1x1 to 8192x8192");
+    }
+    if (scene.shadow_size < 0 || scene.shadow_size > kMaxSide) {
+        throw std::runtime_error("shadow: error: found a size of " + std::to_string(scene.shadow_size) + ", expected 0 to 8192");
+    }
+    const Camera& camera = scene.camera;
+    const bool looks = camera.eye.allFinite() && camera.target.allFinite() && (camera.target - camera.eye).norm() > 1e-6f;
+    if (!looks || !(camera.vertical_fov_deg >= 1 && camera.vertical_fov_deg <= 150)) {
+        throw std::runtime_error("camera: error: found eye, target or field of view out of range, expected two places and 1 to 150 degrees");
+    }
+    if (!scene.key_light.towards_light.allFinite() || scene.key_light.towards_light.norm() < 1e-6f) {
+        throw std::runtime_error("key light: error: found no direction, expected one");
+    }
+    return scene;
+}
+
+}  // namespace
+
+struct Renderer::Implementation {
+    explicit Implementation(const SceneDescription& description);
+
+    void draw(const FrameState& frame, Image& image);
+    void set_uniforms(const GlProgram& program) const;
+
+    SceneDescription scene;
+    OsmesaContext context;
+    GlFunctions gl;
+    Eigen::Matrix4f clip, light;  ///< clip space of the camera and of the light, from world
+    float texel;                  ///< of the shadow map [m]
+    PictureTarget picture;
+    ShadowTarget shadow;
+    GlProgram shadow_program, object_program;
+    Stage stage;
+    SceneGeometry geometry;
+};
+
+Renderer::Implementation::Implementation(const SceneDescription& description)
+    : scene(checked(description)),
+      picture(gl, scene.width, scene.height, scene.samples),
+      shadow(gl, scene.shadow_size),
+      shadow_program(gl, shaders::shadow_vertex(), shaders::shadow_fragment()),
+      object_program(gl, shaders::object_vertex(), shaders::object_fragment()),
+      stage(gl, scene),
+      geometry(gl, scene.objects) {
+    const float aspect = static_cast<float>(scene.width) / static_cast<float>(scene.height);
+    const float reach = shadow_reach(scene.camera, aspect);
+    clip = clip_from_world(scene.camera, aspect);
+    light = light_from_world(scene.key_light, scene.camera.target, reach);
+    texel = scene.shadow_size > 0 ? 2 * reach / static_cast<float>(scene.shadow_size) : 0;
+    gl.Enable(GL_DEPTH_TEST);
+    gl.Enable(GL_CULL_FACE);
+    gl.Enable(GL_DEPTH_CLAMP);
+    gl.DepthFunc(GL_LEQUAL);
+    set_uniforms(object_program);
+    set_uniforms(stage.floor_program());
+    set_uniforms(stage.backdrop_program());
+    shadow_program.use();
+    shadow_program.set("matrices", static_cast<int>(kMatrixUnit));
+    shadow_program.set("clip_from_light_world", light);
+}
+
+void Renderer::Implementation::set_uniforms(const GlProgram& program) const {
+    const Room& room = scene.room;
+    const KeyLight& key = scene.key_light;
+    const auto width = static_cast<float>(scene.width), height = static_cast<float>(scene.height);
+    const Eigen::Affine3f to_texture = Eigen::Translation3f(0.5f, 0.5f, 0.5f) * Eigen::Scaling(0.5f);
+    const Eigen::Vector3f key_light = 2.4f * key.strength * key.color;
+    program.use();
+    program.set("picture", Eigen::Vector3f(width, height, 4 / (width * width + height * height)));
+    program.set("clip_from_world", clip);
+    program.set("shadow_from_world", Eigen::Matrix4f(to_texture.matrix() * light));
+    program.set("shadow_map", static_cast<int>(kShadowUnit));
+    program.set("shadow_texel", scene.shadow_size > 0 ? 1 / static_cast<float>(scene.shadow_size) : 0.0f);
+    program.set("shadow_offset", 1.5f * texel);
+    program.set("matrices", static_cast<int>(kMatrixUnit));
+    program.set("eye", scene.camera.eye);
+    program.set("towards_light", Eigen::Vector3f(key.towards_light.normalized()));
+    program.set("key_light", key_light);
+    program.set("sky_light", Eigen::Vector3f(0.16f, 0.17f, 0.20f));
+    program.set("ground_light", Eigen::Vector3f(0.03f * Eigen::Vector3f::Ones() + 0.10f * room.floor_color.cwiseProduct(key_light)));
+    program.set("fill_light", Eigen::Vector3f(0.10f, 0.13f, 0.20f));
+}
+
+void Renderer::Implementation::draw(const FrameState& frame, Image& image) {
+    context.make_current();
+    geometry.update(frame, scene.camera.eye);
+    if (scene.shadow_size > 0) {
+        shadow.begin();
+        gl.Enable(GL_POLYGON_OFFSET_FILL);
+        gl.PolygonOffset(1.5f, 2.0f);
+        shadow_program.use();
+        geometry.draw(kMatrixUnit);
+        gl.PolygonOffset(0, 0);
+    }
+    picture.begin();
+    shadow.bind(kShadowUnit);
+    object_program.use();
+    geometry.draw(kMatrixUnit);
+    stage.draw(geometry.volume_balls(shaders::kMaxBalls));
+    picture.read(image);
+}
+
+Renderer::Renderer(const SceneDescription& scene) : implementation_(std::make_unique<Implementation>(scene)) {}
+
+Renderer::~Renderer() = default;
+
+void Renderer::draw(const FrameState& frame, Image& image) { implementation_->draw(frame, image); }
+
+std::string Renderer::version() const {
+    implementation_->context.make_current();
+    const auto text = [this](GLenum name) { return std::string(reinterpret_cast<const char*>(implementation_->gl.GetString(name))); };
+    return "OSMesa, OpenGL " + text(GL_VERSION) + ", " + text(GL_RENDERER);
+}
+
+std::size_t Renderer::triangles() const { return implementation_->geometry.triangles(); }
+
+}  // namespace render

@@ -1,0 +1,168 @@
+#include "scene_geometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <numbers>
+#include <stdexcept>
+
+namespace render {
+namespace {
+
+struct Vertex {
+    float position[3], normal[3], color_metallic[4], roughness_lathed_object[3];
+};
+
+const Appearance& appearance_of(const Look& look, const std::string& material) {
+    for (const auto& [name, appearance] : look.parts) {
+        if (name == material) return appearance;
+    }
+    return look.body;
+}
+
+/// Volume by signed tetrahedra; of an open mesh, of its closure towards the bounds' centre.
+float volume_of(const Mesh& mesh, const Eigen::Vector3f& center) {
+    double six_volumes = 0;
+    for (const MeshPart& part : mesh.parts) {
+        for (std::size_t i = 0; i < part.indices.size(); i += 3) {
+            const Eigen::Vector3d a = (part.positions[part.indices[i]] - center).cast<double>();
+            const Eigen::Vector3d b = (part.positions[part.indices[i + 1]] - center).cast<double>();
+            const Eigen::Vector3d c = (part.positions[part.indices[i + 2]] - center).cast<double>();
+            six_volumes += a.dot(b.cross(c));
+        }
+    }
+    return static_cast<float>(std::abs(six_volumes) / 6);
+}
+
+void append_object(const Mesh& mesh, const Look& look, std::size_t object, std::vector<Vertex>& vertices, std::vector<GLuint>& indices) {
+    for (const MeshPart& part : mesh.parts) {
+        const Appearance& a = appearance_of(look, part.material);
+        const auto base = static_cast<GLuint>(vertices.size());
+        for (std::size_t i = 0; i < part.positions.size(); ++i) {
+            const Eigen::Vector3f &p = part.positions[i], &n = part.normals[i];
+            vertices.push_back({{p.x(), p.y(), p.z()},
+                                {n.x(), n.y(), n.z()},
+                                {a.color.x(), a.color.y(), a.color.z(), a.metallic},
+                                {a.roughness, a.lathed, static_cast<float>(object)}});
+        }
+        for (const std::uint32_t index : part.indices) indices.push_back(base + index);
+    }
+}
+
+/// The cofactor matrix: the inverse transpose times the determinant, defined for flattened bodies too.
+Eigen::Matrix3f cofactors(const Eigen::Matrix3f& m) {
+    Eigen::Matrix3f result;
+    result.col(0) = m.col(1).cross(m.col(2));
+    result.col(1) = m.col(2).cross(m.col(0));
+    result.col(2) = m.col(0).cross(m.col(1));
+    return result;
+}
+
+const void* offset(std::size_t bytes) { return reinterpret_cast<const void*>(bytes); }
+
+}  // namespace
+
+SceneGeometry::SceneGeometry(const GlFunctions& gl, const std::vector<SceneObject>& objects) : gl_(gl) {
+    std::vector<std::filesystem::path> files;
+    std::map<std::filesystem::path, std::size_t> number_of_file;
+    std::vector<std::size_t> mesh_of_object;
+    for (const SceneObject& object : objects) {
+        const auto [place, is_new] = number_of_file.try_emplace(object.mesh, files.size());
+        if (is_new) files.push_back(object.mesh);
+        mesh_of_object.push_back(place->second);
+    }
+    make_buffers(objects, load_meshes(files), mesh_of_object);
+}
+
+void SceneGeometry::make_buffers(const std::vector<SceneObject>& objects, const std::vector<Mesh>& meshes,
+                                 const std::vector<std::size_t>& mesh_of_object) {
+    std::vector<Vertex> vertices;
+    std::vector<GLuint> indices;
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+        const Mesh& mesh = meshes[mesh_of_object[i]];
+        const Eigen::Vector3f center = mesh.bounds().center();
+        objects_.push_back({static_cast<GLsizei>(indices.size()), static_cast<GLsizei>(3 * mesh.triangles()), center, volume_of(mesh, center)});
+        append_object(mesh, objects[i].look, i, vertices, indices);
+    }
+    gl_.GenVertexArrays(1, &vertex_array_);
+    gl_.BindVertexArray(vertex_array_);
+    GLuint buffers[3];
+    gl_.GenBuffers(3, buffers);
+    gl_.BindBuffer(GL_ARRAY_BUFFER, buffers[0]);
+    gl_.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(Vertex)), vertices.data(), GL_STATIC_DRAW);
+    gl_.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, buffers[1]);
+    gl_.BufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(indices.size() * sizeof(GLuint)), indices.data(), GL_STATIC_DRAW);
+    const auto attribute = [&](GLuint location, GLint size, std::size_t at) {
+        gl_.EnableVertexAttribArray(location);
+        gl_.VertexAttribPointer(location, size, GL_FLOAT, GL_FALSE, sizeof(Vertex), offset(at));
+    };
+    attribute(kPosition, 3, offsetof(Vertex, position));
+    attribute(kNormal, 3, offsetof(Vertex, normal));
+    attribute(kColorMetallic, 4, offsetof(Vertex, color_metallic));
+    attribute(kRoughnessLathedObject, 3, offsetof(Vertex, roughness_lathed_object));
+    matrix_buffer_ = buffers[2];
+    gl_.GenTextures(1, &matrix_texture_);
+}
+
+void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye) {
+    if (frame.world_from_object.size() != objects_.size() || frame.visible.size() != objects_.size()) {
+        throw std::invalid_argument("Renderer::draw: found a frame of " + std::to_string(frame.world_from_object.size()) +
+                                    " matrices, expected " + std::to_string(objects_.size()));
+    }
+    drawn_.clear();
+    matrix_rows_.assign(6 * objects_.size(), Eigen::Vector4f::Zero());
+    for (std::size_t i = 0; i < objects_.size(); ++i) {
+        if (!frame.visible[i]) continue;
+        const Eigen::Matrix4f& world_from_object = frame.world_from_object[i];
+        if (!world_from_object.allFinite()) {
+            throw std::invalid_argument("Renderer::draw: found a matrix that is not finite for object " + std::to_string(i));
+        }
+        const Eigen::Matrix3f linear = world_from_object.topLeftCorner<3, 3>();
+        const float determinant = linear.determinant();
+        const Eigen::Matrix3f normals = determinant < 0 ? Eigen::Matrix3f(-cofactors(linear)) : cofactors(linear);
+        for (int row = 0; row < 3; ++row) {
+            matrix_rows_[6 * i + static_cast<std::size_t>(row)] = world_from_object.row(row).transpose();
+            matrix_rows_[6 * i + 3 + static_cast<std::size_t>(row)].head<3>() = normals.row(row).transpose();
+        }
+        Drawn drawn{i, 0, determinant < 0, Eigen::Vector4f::Zero()};
+        drawn.ball.head<3>() = linear * objects_[i].center + world_from_object.topRightCorner<3, 1>();
+        drawn.ball.w() = std::cbrt(objects_[i].volume * std::abs(determinant) * 0.75f / std::numbers::pi_v<float>);
+        drawn.distance = (drawn.ball.head<3>() - eye).norm();
+        drawn_.push_back(drawn);
+    }
+    std::stable_sort(drawn_.begin(), drawn_.end(), [](const Drawn& a, const Drawn& b) { return a.distance < b.distance; });
+    gl_.BindBuffer(GL_TEXTURE_BUFFER, matrix_buffer_);
+    gl_.BufferData(GL_TEXTURE_BUFFER, static_cast<GLsizeiptr>(matrix_rows_.size() * sizeof(Eigen::Vector4f)), matrix_rows_.data(),
+                   GL_STREAM_DRAW);
+}
+
+void SceneGeometry::draw(GLuint matrix_unit) const {
+    gl_.ActiveTexture(GL_TEXTURE0 + matrix_unit);
+    gl_.BindTexture(GL_TEXTURE_BUFFER, matrix_texture_);
+    gl_.TexBuffer(GL_TEXTURE_BUFFER, GL_RGBA32F, matrix_buffer_);
+    gl_.BindVertexArray(vertex_array_);
+    for (const Drawn& drawn : drawn_) {
+        const Object& object = objects_[drawn.object];
+        gl_.FrontFace(drawn.mirrored ? GL_CW : GL_CCW);
+        gl_.DrawElements(GL_TRIANGLES, object.index_count, GL_UNSIGNED_INT,
+                         offset(static_cast<std::size_t>(object.first_index) * sizeof(GLuint)));
+    }
+    gl_.FrontFace(GL_CCW);
+}
+
+std::vector<Eigen::Vector4f> SceneGeometry::volume_balls(std::size_t limit) const {
+    std::vector<Eigen::Vector4f> balls;
+    for (const Drawn& drawn : drawn_) balls.push_back(drawn.ball);
+    std::stable_sort(balls.begin(), balls.end(), [](const Eigen::Vector4f& a, const Eigen::Vector4f& b) { return a.w() > b.w(); });
+    balls.resize(std::min(limit, balls.size()));
+    return balls;
+}
+
+std::size_t SceneGeometry::triangles() const {
+    std::size_t count = 0;
+    for (const Object& object : objects_) count += static_cast<std::size_t>(object.index_count) / 3;
+    return count;
+}
+
+}  // namespace render

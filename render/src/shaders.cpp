@@ -1,0 +1,208 @@
+#include "shaders.h"
+
+namespace render::shaders {
+namespace {
+
+const char* const kVersion = "#version 330 core\n";
+
+/// World position of a vertex from the matrices' buffer: six texels an object.
+const char* const kObjectMatrices = R"(
+uniform samplerBuffer matrices;
+vec3 to_world(vec3 position, int object) {
+    vec4 p = vec4(position, 1.0);
+    return vec3(dot(texelFetch(matrices, object), p), dot(texelFetch(matrices, object + 1), p), dot(texelFetch(matrices, object + 2), p));
+}
+)";
+
+/// From linear light to the 8-bit picture: vignette, filmic curve (Narkowicz's fit of ACES), sRGB transfer (roots fit, error below 0.002).
+const char* const kPicture = R"(
+uniform vec3 picture;  // width, height, 1 / half diagonal squared [pixels]
+out vec4 fragment;
+float vignette() {
+    vec2 from_center = gl_FragCoord.xy - 0.5 * picture.xy;
+    return 1.0 - 0.42 * dot(from_center, from_center) * picture.z;
+}
+void write_picture(vec3 light) {
+    vec3 x = light * vignette();
+    x = clamp(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0.0, 1.0);
+    vec3 s1 = sqrt(x), s2 = sqrt(s1), s3 = sqrt(s2);
+    fragment = vec4(0.662002687 * s1 + 0.684122060 * s2 - 0.323583601 * s3 - 0.022541147 * x, 1.0);
+}
+)";
+
+/// The wall: a gradient with a soft glow behind the kit.
+const char* const kBackdrop = R"(
+uniform vec3 wall_color;
+vec3 backdrop() {
+    vec2 at = gl_FragCoord.xy / picture.xy - vec2(0.5, 0.72);
+    float glow = 1.0 / (1.0 + 5.0 * dot(at, at));
+    return wall_color * (0.22 + 1.1 * glow * glow);
+}
+)";
+
+/// Key light reaching a point: shadow map (4 comparisons of 2x2 texels) and the spot's soft edge.
+const char* const kKeyLight = R"(
+uniform sampler2DShadow shadow_map;
+uniform float shadow_texel;  // 1 / size, 0: no shadow
+float key_visibility(vec3 at) {
+    vec2 d = vec2(0.75, 1.75) * shadow_texel;
+    float lit = texture(shadow_map, at + vec3(d.x, d.y, 0.0)) + texture(shadow_map, at + vec3(-d.y, d.x, 0.0)) +
+                texture(shadow_map, at + vec3(-d.x, -d.y, 0.0)) + texture(shadow_map, at + vec3(d.y, -d.x, 0.0));
+    vec2 from_center = 2.0 * at.xy - 1.0;
+    float outside = dot(from_center, from_center);
+    float inside_map = step(max(abs(from_center.x), abs(from_center.y)), 0.99);
+    float spot = 1.0 / (1.0 + 0.55 * outside * outside);
+    return mix(1.0, 0.25 * lit, inside_map) * spot;
+}
+)";
+
+}  // namespace
+
+std::string shadow_vertex() {
+    return std::string(kVersion) + R"(
+layout(location = 0) in vec3 position;
+layout(location = 3) in vec3 roughness_lathed_object;
+uniform mat4 clip_from_light_world;
+)" + kObjectMatrices + R"(
+void main() { gl_Position = clip_from_light_world * vec4(to_world(position, 6 * int(roughness_lathed_object.z)), 1.0); }
+)";
+}
+
+std::string shadow_fragment() { return std::string(kVersion) + "void main() {}\n"; }
+
+std::string object_vertex() {
+    return std::string(kVersion) + R"(
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec4 color_metallic;
+layout(location = 3) in vec3 roughness_lathed_object;
+uniform mat4 clip_from_world;
+uniform mat4 shadow_from_world;  // texture coordinates and depth, all in [0, 1]
+uniform float shadow_offset;     // along the normal [m]
+out vec3 v_world, v_normal, v_groove, v_shadow;
+flat out vec4 v_color_metallic;
+flat out vec2 v_roughness_lathed;
+)" + kObjectMatrices + R"(
+void main() {
+    int object = 6 * int(roughness_lathed_object.z);
+    v_world = to_world(position, object);
+    v_normal = normalize(vec3(dot(texelFetch(matrices, object + 3).xyz, normal), dot(texelFetch(matrices, object + 4).xyz, normal),
+                              dot(texelFetch(matrices, object + 5).xyz, normal)));
+    vec3 around = vec3(-position.z, 0.0, position.x);
+    v_groove = vec3(dot(texelFetch(matrices, object).xyz, around), dot(texelFetch(matrices, object + 1).xyz, around),
+                    dot(texelFetch(matrices, object + 2).xyz, around));
+    v_shadow = (shadow_from_world * vec4(v_world + shadow_offset * v_normal, 1.0)).xyz;
+    v_color_metallic = color_metallic;
+    v_roughness_lathed = roughness_lathed_object.xy;
+    gl_Position = clip_from_world * vec4(v_world, 1.0);
+}
+)";
+}
+
+/// Key light: GGX with roughness across the grooves raised for lathed metal (Burley 2012), visibility and Fresnel by the fit of Karis and
+/// Lagarde for one light. Surroundings: hemisphere for diffuse; for reflections a warm stage floor, a dark room, and two soft boxes.
+std::string object_fragment() {
+    return std::string(kVersion) + R"(
+in vec3 v_world, v_normal, v_groove, v_shadow;
+flat in vec4 v_color_metallic;
+flat in vec2 v_roughness_lathed;
+uniform vec3 eye, towards_light, key_light, sky_light, ground_light, fill_light;
+)" + kPicture + kKeyLight + R"(
+vec3 surroundings(vec3 r, float roughness) {
+    float blur = 0.08 + 0.8 * roughness;
+    vec3 light = mix(ground_light, sky_light, smoothstep(-blur, blur, r.y));
+    float over = dot(r, vec3(-0.42, 0.74, -0.53)), side = dot(r, vec3(0.82, 0.36, 0.45));
+    light += vec3(1.9, 1.75, 1.5) * smoothstep(0.86 - 0.5 * blur, 0.90 + 0.3 * blur, over) * (1.0 - 0.75 * roughness);
+    light += vec3(0.55, 0.7, 1.0) * smoothstep(0.88 - 0.5 * blur, 0.93 + 0.3 * blur, side) * (1.0 - 0.75 * roughness);
+    return light;
+}
+void main() {
+    vec3 color = v_color_metallic.rgb, n = normalize(v_normal), v = normalize(eye - v_world), h = normalize(v + towards_light);
+    vec3 groove = v_groove * inversesqrt(dot(v_groove, v_groove) + 1e-12);
+    float metallic = v_color_metallic.a, roughness = v_roughness_lathed.x, lathed = v_roughness_lathed.y;
+    float nl = max(dot(n, towards_light), 0.0), nv = clamp(dot(n, v), 0.0, 1.0), nh = max(dot(n, h), 0.0), lh = dot(towards_light, h);
+    vec3 f0 = mix(vec3(0.04), color, metallic), diffuse = color * (1.0 - metallic);
+
+    float along = max(roughness * roughness, 0.004), across = mix(along, min(1.0, 2.5 * along + 0.25), lathed);
+    float th = dot(groove, h), bh2 = max(1.0 - nh * nh - th * th, 0.0);
+    float d = th * th / (along * along) + bh2 / (across * across) + nh * nh;
+    float highlight = min(1.0 / (along * across * d * d * max(lh * lh, 0.1) * (4.0 * roughness + 2.0)), 30.0);
+    vec3 key = key_light * (key_visibility(v_shadow) * nl);
+
+    vec3 grooved = normalize(mix(n, v - groove * dot(groove, v), 0.45 * lathed));
+    float grazing = 1.0 - nv, grazing2 = grazing * grazing;
+    vec3 f = f0 + (max(vec3(1.0 - roughness), f0) - f0) * (grazing2 * grazing2 * grazing);
+    float towards_fill = 0.5 + 0.5 * dot(n, vec3(0.62, 0.25, 0.74));
+    vec3 around = mix(ground_light, sky_light, 0.5 + 0.5 * n.y) + fill_light * (towards_fill * towards_fill);
+    vec3 light = diffuse * (around + key) + f0 * key * highlight + f * surroundings(reflect(-v, grooved), roughness);
+    write_picture(light);
+}
+)";
+}
+
+std::string floor_vertex() {
+    return std::string(kVersion) + R"(
+layout(location = 0) in vec3 position;  // world
+uniform mat4 clip_from_world, shadow_from_world;
+uniform vec4 balls[)" +
+           std::to_string(kMaxBalls) + R"(];  // centre and radius of what stands above the floor
+uniform int ball_count;
+out vec3 v_world, v_shadow;
+out float v_open;  // part of the sky that the floor sees
+void main() {
+    v_world = position;
+    v_shadow = (shadow_from_world * vec4(position, 1.0)).xyz;
+    float covered = 0.0;
+    for (int i = 0; i < ball_count; ++i) {
+        vec3 to_ball = balls[i].xyz - position;
+        float distance2 = dot(to_ball, to_ball) + balls[i].w * balls[i].w * 0.25;
+        covered += max(to_ball.y, 0.0) * inversesqrt(distance2) * balls[i].w * balls[i].w / distance2;
+    }
+    v_open = 1.0 / (1.0 + 2.2 * covered);
+    gl_Position = clip_from_world * vec4(position, 1.0);
+}
+)";
+}
+
+std::string floor_fragment() {
+    return std::string(kVersion) + R"(
+in vec3 v_world, v_shadow;
+in float v_open;
+uniform vec3 eye, towards_light, key_light, sky_light, floor_color, center;
+)" + kPicture + kBackdrop + kKeyLight + R"(
+float random(vec2 cell) { return fract(sin(dot(cell, vec2(12.9898, 78.233))) * 43758.547); }
+void main() {
+    vec2 plank = vec2(v_world.x / 0.14, v_world.z / 1.7);
+    float row = floor(plank.x);
+    plank.y += 0.37 * row;
+    float tone = random(vec2(row, floor(plank.y)));
+    vec2 from_edge = 0.5 - abs(fract(plank) - 0.5);
+    float distance_eye = length(eye - v_world);
+    float seam = smoothstep(0.0, 0.012 + 0.012 * distance_eye, from_edge.x) * smoothstep(0.0, 0.004 + 0.002 * distance_eye, from_edge.y);
+    vec3 color = floor_color * (0.82 + 0.3 * tone) * (0.72 + 0.28 * seam);
+    vec3 v = (eye - v_world) / distance_eye, h = normalize(v + towards_light);
+    float visible = key_visibility(v_shadow);
+    float gloss = h.y * h.y; gloss *= gloss; gloss *= gloss; gloss *= gloss; gloss *= gloss;
+    vec3 light = color * (key_light * (visible * towards_light.y) + sky_light * v_open) + key_light * (visible * gloss * 0.10 * (0.6 + 0.4 * tone));
+    float far = smoothstep(1.6, 6.0, length(v_world.xz - center.xz));
+    write_picture(mix(light, backdrop(), far));
+}
+)";
+}
+
+std::string backdrop_vertex() {
+    return std::string(kVersion) + R"(
+void main() {
+    vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+    gl_Position = vec4(corner, 1.0, 1.0);
+}
+)";
+}
+
+std::string backdrop_fragment() {
+    return std::string(kVersion) + kPicture + kBackdrop + R"(
+void main() { write_picture(backdrop()); }
+)";
+}
+
+}  // namespace render::shaders

@@ -1,0 +1,162 @@
+// `musicworld play` on the bundled traces: what it must show, byte for byte where that is promised.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+
+#include "program.h"
+
+namespace end_to_end {
+namespace {
+
+using Json = nlohmann::json;
+
+std::vector<std::string> play(const std::filesystem::path& trace, const std::filesystem::path& out,
+                              std::vector<std::string> more = {}) {
+    std::vector<std::string> all = {"play", trace.string(), "--out", out.string(), "--size", "160x120"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+}
+
+/// A shorter trace, so that the sanitizers finish in time too.
+std::filesystem::path short_trace(const Folder& folder, const std::string& name, double until, double from = -1e9) {
+    const std::filesystem::path file = folder / ("cut_" + name + ".csv");
+    write(file, cut_trace(read(bundled("traces/" + name + ".csv")), until, from));
+    return file;
+}
+
+Json summary(const std::filesystem::path& out) { return Json::parse(read(out / "summary.json")); }
+
+void expect_same_products(const std::filesystem::path& a, const std::filesystem::path& b) {
+    const auto left = read_tree(a, {"summary.json", "report.html"});
+    const auto right = read_tree(b, {"summary.json", "report.html"});
+    ASSERT_GT(left.size(), 4U);
+    ASSERT_EQ(left.size(), right.size());
+    for (const auto& [name, bytes] : left) EXPECT_TRUE(right.contains(name) && right.at(name) == bytes) << name;
+}
+
+TEST(Play, TwoRunsAndZeroOneAndThreeWorkersGiveTheSameBytes) {
+    const Folder folder;
+    const auto trace = short_trace(folder, "flourish", 2);
+    const std::vector<std::string> workers = {"0", "0", "1", "3"};
+    for (std::size_t i = 0; i < workers.size(); ++i) {
+        const Ended ended = run(play(trace, folder / std::to_string(i), {"--workers", workers[i]}));
+        ASSERT_EQ(ended.status, 0) << ended.err;
+        EXPECT_EQ(ended.err, "");
+    }
+    for (const char* other : {"1", "2", "3"}) expect_same_products(folder / "0", folder / other);
+}
+
+TEST(Play, EventsAndSoundDoNotDependOnWhetherFramesAreDrawn) {
+    const Folder folder;
+    const auto trace = short_trace(folder, "flourish", 2);
+    ASSERT_EQ(run(play(trace, folder / "a", {"--workers", "0"})).status, 0);
+    ASSERT_EQ(run(play(trace, folder / "b", {"--workers", "0", "--no-frames"})).status, 0);
+    for (const char* name : {"events.csv", "audio.wav", "hits.mid", "contacts.csv"})
+        EXPECT_EQ(read(folder / (std::string("a/") + name)), read(folder / (std::string("b/") + name))) << name;
+}
+
+TEST(Play, CuttingTheTraceLeavesEveryEarlierFrameAndSampleAsItWas) {
+    const Folder folder;
+    const double cut = 1.203;  // between samples, in the middle of strokes
+    const auto whole = short_trace(folder, "feints", 2.2);
+    const std::filesystem::path part = folder / "part.csv";
+    write(part, cut_trace(read(whole), cut));
+    ASSERT_EQ(run(play(whole, folder / "whole", {"--workers", "0"})).status, 0);
+    ASSERT_EQ(run(play(part, folder / "part", {"--workers", "0"})).status, 0);
+
+    // Frames are shown only up to the last sample; audio goes on.
+    const auto [t0, t_end] = time_span(read(part));
+    int frames = 0;
+    for (int k = 0; k / 30.0 < t_end - t0; ++k, ++frames) {
+        char name[32];
+        std::snprintf(name, sizeof name, "/frames/%06d.png", k);
+        ASSERT_EQ(read(folder / ("part" + std::string(name))), read(folder / ("whole" + std::string(name)))) << k;
+    }
+    EXPECT_GE(frames, 30);
+
+    int channels = 0;
+    const std::vector<int> a = read_wav(folder / "part/audio.wav", channels);
+    const std::vector<int> b = read_wav(folder / "whole/audio.wav", channels);
+    const auto samples = static_cast<std::size_t>((t_end + 0.010 - t0) * 48000);
+    ASSERT_GT(a.size(), samples * 2);
+    bool same = true, sounding = false;
+    for (std::size_t i = 0; i < samples * 2; ++i) same = same && a[i] == b[i], sounding = sounding || a[i] != 0;
+    EXPECT_TRUE(same);
+    EXPECT_TRUE(sounding) << "silence would prove nothing";
+}
+
+TEST(Play, EachInstrumentsFirstNoteSoundsAtItsPlannedSample) {
+    const Folder folder;
+    ASSERT_EQ(run(play(bundled("traces/flourish.csv"), folder / "all", {"--no-frames"})).status, 0);
+    std::set<std::string> done;
+    for (const auto& row : read_csv(folder / "all/events.csv")) {
+        if (row.at("outcome") != "released" || !done.insert(row.at("instrument")).second) continue;
+        const std::string solo = "solo" + row.at("id");
+        ASSERT_EQ(run(play(bundled("traces/flourish.csv"), folder / solo, {"--no-frames", "--solo", row.at("id")})).status, 0);
+        int channels = 0;
+        const std::vector<int> samples = read_wav(folder / (solo + "/audio.wav"), channels);
+        ASSERT_EQ(channels, 2);
+        std::size_t first = 0;
+        while (first < samples.size() && std::abs(samples[first] / 2147483648.0) <= 1e-4) ++first;
+        const double t0 = summary(folder / solo).at("t0_s").get<double>();
+        const auto planned = std::llround((std::stod(row.at("onset_s")) - t0) * 48000);
+        EXPECT_EQ(static_cast<long long>(first / 2), planned) << row.at("instrument");
+    }
+    EXPECT_GE(done.size(), 5U) << "the flourish goes over the whole kit";
+}
+
+TEST(Play, OnTheFlourishAtLeast95PercentOfTheTrueContactsSoundWithin30Ms) {
+    const Folder folder;
+    ASSERT_EQ(run(play(bundled("traces/flourish.csv"), folder / "out", {"--no-frames"})).status, 0);
+    const Json strikes = summary(folder / "out").at("strikes");
+    const int contacts = strikes.at("true").get<int>();
+    EXPECT_GE(contacts, 40);
+    EXPECT_LE(strikes.at("missed").get<int>(), 0.05 * contacts);
+}
+
+TEST(Play, NoFeintThatTurns25MsBeforeTheReleasePointSoundsAndWithoutCancellingSomeDo) {
+    const Folder folder;
+    ASSERT_EQ(run(play(bundled("traces/feints.csv"), folder / "with", {"--no-frames"})).status, 0);
+    ASSERT_EQ(run(play(bundled("traces/feints.csv"), folder / "without", {"--no-frames", "--no-cancel"})).status, 0);
+    const Json with = summary(folder / "with").at("strikes"), without = summary(folder / "without").at("strikes");
+    EXPECT_EQ(with.at("false_turned_early").get<int>(), 0);
+    EXPECT_GT(with.at("cancelled").get<int>(), 0);
+    EXPECT_EQ(without.at("cancelled").get<int>(), 0);
+    EXPECT_GT(without.at("false").get<int>(), with.at("false").get<int>() + 3);
+}
+
+TEST(Play, AWorkerThatIsKilledChangesNothingButTheSummary) {
+    const Folder folder;
+    const auto trace = bundled("traces/roll.csv");
+    ASSERT_EQ(run(play(trace, folder / "undisturbed", {"--workers", "2", "--no-frames"})).status, 0);
+    bool lost = false;
+    for (int attempt = 0; attempt < 20 && !lost; ++attempt) {
+        Started started(play(trace, folder / "killed", {"--workers", "2", "--no-frames"}), folder / "");
+        const std::string find = "pgrep -P " + std::to_string(started.pid()) + " -f 'worker --connect' > " +
+                                 (folder / "pids").string();
+        // Kill as soon as one is there, later at every attempt, so that one falls into the run whatever the machine's speed.
+        for (int i = 0; i < 400 && read(folder / "pids").empty(); ++i) {
+            if (std::system(find.c_str()) != 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(15 * attempt));
+        const int victim = std::atoi(read(folder / "pids").c_str());
+        if (victim > 0) kill(victim, SIGKILL);
+        write(folder / "pids", "");
+        const Ended ended = started.wait();
+        ASSERT_EQ(ended.status, 0) << ended.err;
+        const Json workers = summary(folder / "killed").at("workers");
+        lost = workers.at("lost").get<int>() > 0;
+        if (lost) EXPECT_GT(workers.at("bodies_reowned").get<int>(), 0);
+        expect_same_products(folder / "undisturbed", folder / "killed");
+    }
+    EXPECT_TRUE(lost);
+}
+
+}  // namespace
+}  // namespace end_to_end

@@ -1,0 +1,62 @@
+#pragma once
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+/// Runs the built program as a user would, and reads what it wrote.
+namespace end_to_end {
+
+struct Ended {
+    int status = -1;     ///< exit status; 128 + signal when killed
+    std::string out, err;
+};
+
+/// Runs `musicworld ARGS...` and waits. `environment`: NAME=VALUE added to this process's own.
+Ended run(const std::vector<std::string>& arguments, const std::vector<std::string>& environment = {});
+
+/// Starts it; for tests that meddle with it while it runs.
+class Started {
+public:
+    Started(const std::vector<std::string>& arguments, const std::filesystem::path& folder);
+    [[nodiscard]] int pid() const { return pid_; }
+    Ended wait();
+
+private:
+    int pid_ = -1;
+    std::filesystem::path out_, err_;
+};
+
+/// A folder of its own that goes away with the object.
+class Folder {
+public:
+    Folder();
+    ~Folder();
+    Folder(const Folder&) = delete;
+    Folder& operator=(const Folder&) = delete;
+    std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+private:
+    std::filesystem::path path_;
+};
+
+std::string read(const std::filesystem::path& file);
+void write(const std::filesystem::path& file, const std::string& text);
+/// All files below a folder, by relative path, but those in `except`.
+std::map<std::string, std::string> read_tree(const std::filesystem::path& folder, const std::vector<std::string>& except);
+
+/// Rows of a CSV file by column name (no quoting).
+std::vector<std::map<std::string, std::string>> read_csv(const std::filesystem::path& file);
+/// Interleaved samples of a WAV file.
+std::vector<int> read_wav(const std::filesystem::path& file, int& channels);
+
+/// The part of a native trace with t < until, and with t >= from.
+std::string cut_trace(const std::string& text, double until, double from = -1e9);
+
+/// Earliest and latest sample time of a native trace.
+std::pair<double, double> time_span(const std::string& text);
+
+std::filesystem::path bundled(const std::string& name);  ///< a file of assets/
+
+}  // namespace end_to_end

@@ -1,0 +1,61 @@
+#include "rotation_filter.h"
+
+#include <cmath>
+
+#include "rotation.h"
+
+namespace tracking {
+
+void RotationFilter::restart() noexcept {
+    started_ = false;
+    q_ = Eigen::Quaterniond::Identity();
+    rates_.setZero();
+}
+
+void RotationFilter::start(const Eigen::Quaterniond& measured) noexcept {
+    covariance_.restart();
+    gate_.restart();
+    started_ = true;
+    q_ = measured.normalized();
+    last_measured_ = q_;
+    since_measured_ = 0;
+    rates_.setZero();
+}
+
+void RotationFilter::propagate(double dt) noexcept {
+    if (!started_) return;
+    since_measured_ += dt;
+    rates_ = (covariance_.propagate(dt) * rates_).eval();
+    q_ = exponential(rates_.row(0).transpose()) * q_;
+    rates_.row(0).setZero();
+}
+
+void RotationFilter::correct(const Eigen::Quaterniond& measured) noexcept {
+    if (!started_) return start(measured);
+    const Eigen::Quaterniond z = measured.normalized();
+    const Eigen::Vector3d innovation = logarithm(z * q_.conjugate());
+    const Surprise surprise{since_measured_, z.angularDistance(last_measured_), rates_.row(1).norm(), innovation.norm(),
+                            std::sqrt(covariance_.innovation_variance())};
+    switch (gate_.judge(surprise)) {
+        case OutlierGate::Verdict::refuse: return;
+        case OutlierGate::Verdict::persists: return start(measured);
+        case OutlierGate::Verdict::pass: break;
+    }
+    rates_ += covariance_.correct() * innovation.transpose();
+    q_ = (exponential(rates_.row(0).transpose()) * q_).normalized();
+    rates_.row(0).setZero();
+    last_measured_ = z;
+    since_measured_ = 0;
+}
+
+Eigen::Quaterniond RotationFilter::orientation_after(double lead_s) const noexcept {
+    const Eigen::RowVector3d rho = covariance_.model().transition(lead_s).row(0) * rates_;
+    return (exponential(rho.transpose()) * q_).normalized();
+}
+
+Eigen::Vector3d RotationFilter::velocity_after(double lead_s) const noexcept {
+    const Eigen::RowVector3d w = covariance_.model().transition(lead_s).row(1) * rates_;
+    return w.transpose();
+}
+
+}  // namespace tracking
