@@ -29,12 +29,14 @@ struct Descriptor {
 };
 
 [[noreturn]] void fail_to_read(const std::filesystem::path& file, int error) {
-    throw BadInput(fmt::format("{}: error: found {}, expected a readable file; check the path and its permissions",
-                               file.string(), std::strerror(error)));
+    throw BadInput(
+        fmt::format("{}: error: found {}, expected a readable file; check the path and its permissions",
+                    file.string(), std::strerror(error)));
 }
 
 void expect(int openssl_status) {
-    if (openssl_status != 1) throw std::runtime_error("error: found libcrypto without SHA-256, expected OpenSSL 3");
+    if (openssl_status != 1)
+        throw std::runtime_error("error: found libcrypto without SHA-256, expected OpenSSL 3");
 }
 
 /// FNV-1a over the bits of numbers.
@@ -47,23 +49,27 @@ public:
 private:
     void add_bits(std::uint64_t bits, int count) {
         std::array<std::uint8_t, 8> bytes{};
-        for (int i = 0; i < count; ++i) bytes[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(bits >> (8 * i));
+        for (int i = 0; i < count; ++i)
+            bytes[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(bits >> (8 * i));
         state_ = fnv1a_64(std::span(bytes.data(), static_cast<std::size_t>(count)), state_);
     }
     std::uint64_t state_ = kFnvOffset;
 };
 
-/// The functions are called at run time: the compiler may not know the arguments, or it would put in results of its own.
+/// The functions are called at run time: the compiler may not know the arguments, or it would put in results
+/// of its own.
 void probe_libm(BitHash& hash) {
     for (int i = 1; i <= 64; ++i) {
         volatile double hidden = 0.1875 * i;
         const double x = hidden;
-        for (const double y : {std::sin(x), std::cos(x), std::tan(x), std::exp(-x), std::log(x), std::pow(x, 0.3 * x),
-                               std::atan2(x, 3 - x), std::asin(x / 16), std::cbrt(x), std::tgamma(x), std::erf(x / 4),
-                               std::sinh(x), std::expm1(x / 64), std::log1p(x), std::hypot(x, 2.5)})
+        for (const double y :
+             {std::sin(x), std::cos(x), std::tan(x), std::exp(-x), std::log(x), std::pow(x, 0.3 * x),
+              std::atan2(x, 3 - x), std::asin(x / 16), std::cbrt(x), std::tgamma(x), std::erf(x / 4),
+              std::sinh(x), std::expm1(x / 64), std::log1p(x), std::hypot(x, 2.5)})
             hash.add(y);
         const float f = static_cast<float>(x);
-        for (const float y : {std::sin(f), std::cos(f), std::exp(-f), std::log(f), std::pow(f, 0.3f * f)}) hash.add(y);
+        for (const float y : {std::sin(f), std::cos(f), std::exp(-f), std::log(f), std::pow(f, 0.3f * f)})
+            hash.add(y);
     }
 }
 

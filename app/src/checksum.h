@@ -12,10 +12,12 @@ namespace app {
 inline constexpr std::uint64_t kFnvOffset = 0xcbf29ce484222325ULL;
 
 /// FNV-1a, 64 bits (Fowler, Noll, Vo). `state` continues an earlier hash.
-[[nodiscard]] std::uint64_t fnv1a_64(std::span<const std::uint8_t> bytes, std::uint64_t state = kFnvOffset) noexcept;
+[[nodiscard]] std::uint64_t fnv1a_64(std::span<const std::uint8_t> bytes,
+                                     std::uint64_t state = kFnvOffset) noexcept;
 
-/// What this machine and build compute: FNV-1a 64, 16 hex digits, over the exact bits (little-endian) of libm's results at fixed arguments
-/// and then over `test_frame`, the bytes of a picture drawn for the purpose. Two runs whose fingerprints differ need not agree to the bit.
+/// What this machine and build compute: FNV-1a 64, 16 hex digits, over the exact bits (little-endian) of
+/// libm's results at fixed arguments and then over `test_frame`, the bytes of a picture drawn for the
+/// purpose. Two runs whose fingerprints differ need not agree to the bit.
 [[nodiscard]] std::string fingerprint(std::span<const std::uint8_t> test_frame);
 
 }  // namespace app

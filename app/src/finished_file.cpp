@@ -14,10 +14,12 @@ void write_finished_file(const fs::path& file, std::span<const std::uint8_t> byt
     const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
     std::error_code error;
     if (!file.has_filename() || fs::is_directory(file, error))
-        throw BadInput(fmt::format("{}: error: found a folder, expected the name of a file to write", file.string()));
+        throw BadInput(
+            fmt::format("{}: error: found a folder, expected the name of a file to write", file.string()));
     if (!fs::is_directory(folder, error))
-        throw BadInput(fmt::format("{}: error: found no such folder, expected one to write {} into; make it first",
-                                   folder.string(), file.filename().string()));
+        throw BadInput(
+            fmt::format("{}: error: found no such folder, expected one to write {} into; make it first",
+                        folder.string(), file.filename().string()));
     fs::path partial = file;
     partial += ".partial";
     try {

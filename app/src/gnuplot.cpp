@@ -59,7 +59,8 @@ std::string read_text(const fs::path& file) {
 int wait_for(pid_t child) {
     int status = 0;
     while (waitpid(child, &status, 0) < 0)
-        if (errno != EINTR) throw std::runtime_error(fmt::format("error: lost gnuplot: {}", std::strerror(errno)));
+        if (errno != EINTR)
+            throw std::runtime_error(fmt::format("error: lost gnuplot: {}", std::strerror(errno)));
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
@@ -68,13 +69,15 @@ void run_gnuplot(const fs::path& script, const fs::path& messages) {
     files.open(STDIN_FILENO, "/dev/null", O_RDONLY);
     files.open(STDOUT_FILENO, messages, O_WRONLY | O_CREAT | O_TRUNC);
     files.open(STDERR_FILENO, messages, O_WRONLY | O_CREAT | O_APPEND);
-    std::string program = "gnuplot", defaults = "--default-settings", file = script.string(), locale = "LC_ALL=C";
+    std::string program = "gnuplot", defaults = "--default-settings", file = script.string(),
+                locale = "LC_ALL=C";
     char* arguments[] = {program.data(), defaults.data(), file.data(), nullptr};
     std::vector<char*> environment = plain_environment(locale);
     pid_t child = 0;
     const int error = posix_spawnp(&child, "gnuplot", files.get(), nullptr, arguments, environment.data());
     if (error == ENOENT) fail_missing();
-    if (error != 0) throw std::runtime_error(fmt::format("error: cannot start gnuplot: {}", std::strerror(error)));
+    if (error != 0)
+        throw std::runtime_error(fmt::format("error: cannot start gnuplot: {}", std::strerror(error)));
     const int status = wait_for(child);
     if (status == kCommandNotFound) fail_missing();
     if (status != 0)
@@ -89,7 +92,7 @@ std::vector<std::string> draw_svg(const std::vector<PlotScript>& scripts, const 
     std::string commands;
     for (std::size_t i = 0; i < scripts.size(); ++i)
         commands += fmt::format(
-            "reset\nset encoding utf8\nset terminal svg size {},{} noenhanced font 'sans-serif,12'\nset output {}\n{}\n"
+            "reset\nset terminal svg size {},{} noenhanced font 'sans-serif,12'\nset output {}\n{}\n"
             "set output\n",
             scripts[i].width, scripts[i].height, gnuplot_string(svg_file(i).string()), scripts[i].commands);
     const fs::path script = scratch / "plots.gp";
@@ -99,9 +102,10 @@ std::vector<std::string> draw_svg(const std::vector<PlotScript>& scripts, const 
     for (std::size_t i = 0; i < scripts.size(); ++i) {
         pictures.push_back(read_text(svg_file(i)));
         if (pictures.back().find("</svg>") == std::string::npos)
-            throw std::runtime_error(fmt::format("{}: error: found an unfinished plot, expected a whole one; is the "
-                                                 "disk full?",
-                                                 svg_file(i).string()));
+            throw std::runtime_error(
+                fmt::format("{}: error: found an unfinished plot, expected a whole one; is the "
+                            "disk full?",
+                            svg_file(i).string()));
     }
     return pictures;
 }

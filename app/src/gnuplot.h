@@ -11,8 +11,9 @@ struct PlotScript {
     std::string commands;
 };
 
-/// Draws every script with one gnuplot process in the C locale and without the user's start-up files; returns an SVG document a script.
-/// Files lie in `scratch`, an existing folder. Throws std::runtime_error when gnuplot is missing or fails.
+/// Draws every script with one gnuplot process in the C locale and without the user's start-up files; returns
+/// an SVG document a script. Files lie in `scratch`, an existing folder. Throws std::runtime_error when
+/// gnuplot is missing or fails.
 [[nodiscard]] std::vector<std::string> draw_svg(const std::vector<PlotScript>& scripts,
                                                 const std::filesystem::path& scratch);
 

@@ -11,23 +11,27 @@
 namespace app {
 namespace {
 
-constexpr double kKernelM = 0.20;         // of the mean shift
-constexpr double kSeparateM = 0.20;       // nearer clusters are one
-constexpr std::size_t kSeeds = 1000;      // of the mean shift
-constexpr std::size_t kFewestLows = 3;    // of a cluster
+constexpr double kKernelM = 0.20;       // of the mean shift
+constexpr double kSeparateM = 0.20;     // nearer clusters are one
+constexpr std::size_t kSeeds = 1000;    // of the mean shift
+constexpr std::size_t kFewestLows = 3;  // of a cluster
 constexpr std::size_t kMostInstruments = 16;
 constexpr double kNearLowestM = 0.05;
-constexpr double kStruckShare = 0.15;     // a tenth of a swinging saber's lows can lie near its lowest, a third of a mallet's do
-constexpr double kStruckSpreadM = 0.030;  // inter-quartile range
-constexpr double kStruckTurningS = 0.020; // mallets 7-14 ms, sabers 20-120 ms
+constexpr double kStruckShare =
+    0.15;  // a tenth of a swinging saber's lows can lie near its lowest, a third of a mallet's do
+constexpr double kStruckSpreadM = 0.030;   // inter-quartile range
+constexpr double kStruckTurningS = 0.020;  // mallets 7-14 ms, sabers 20-120 ms
+constexpr double kOverHandM = 0.10;
 constexpr double kAboveContactM = 0.025;
 constexpr double kEnterM = 0.003;
-constexpr double kHeadShare = 0.9;        // of the radius: the rest is rim
+constexpr double kHeadShare = 0.9;  // of the radius: the rest is rim
 constexpr double kMarginM = 0.02, kSmallestRadiusM = 0.10, kLargestRadiusM = 0.30, kGapBetweenM = 0.02;
 
 using Lows = std::vector<Low>;
 
-Eigen::Vector2d plan(const Eigen::Vector3d& p) { return {p.x(), p.z()}; }
+Eigen::Vector2d plan(const Eigen::Vector3d& p) {
+    return {p.x(), p.z()};
+}
 
 struct Mode {
     Eigen::Vector2d place;
@@ -59,7 +63,8 @@ std::vector<Eigen::Vector2d> find_places(const Lows& lows) {
     std::vector<Mode> modes;
     const std::size_t stride = 1 + (lows.size() - 1) / kSeeds;
     for (std::size_t i = 0; i < lows.size(); i += stride) modes.push_back(climb(plan(lows[i].tip), lows));
-    std::stable_sort(modes.begin(), modes.end(), [](const Mode& a, const Mode& b) { return a.support > b.support; });
+    std::stable_sort(modes.begin(), modes.end(),
+                     [](const Mode& a, const Mode& b) { return a.support > b.support; });
     std::vector<Eigen::Vector2d> places;
     for (const Mode& mode : modes)
         if (std::all_of(places.begin(), places.end(),
@@ -87,13 +92,16 @@ std::vector<double> heights_of(const Lows& lows) {
     return heights;
 }
 
-/// The lows that a head stopped: within 50 mm of the lowest that is no stray, if they agree and turn sharply; else none.
+/// The lows that a head stopped: within 50 mm of the lowest that is no stray, if they agree and turn sharply;
+/// else none.
 Lows stopped_lows(const Lows& lows) {
     const std::vector<double> heights = heights_of(lows);
-    const auto needed = std::max(std::min(kFewestLows, lows.size()),
-                                 static_cast<std::size_t>(std::ceil(kStruckShare * static_cast<double>(lows.size()))));
+    const auto needed =
+        std::max(std::min(kFewestLows, lows.size()),
+                 static_cast<std::size_t>(std::ceil(kStruckShare * static_cast<double>(lows.size()))));
     std::size_t lowest = 0;  // of a group large enough: a stray low beneath it does not hide a head
-    while (lowest + needed < heights.size() && heights[lowest + needed - 1] > heights[lowest] + kNearLowestM) ++lowest;
+    while (lowest + needed < heights.size() && heights[lowest + needed - 1] > heights[lowest] + kNearLowestM)
+        ++lowest;
     Lows near;
     std::vector<double> turning;
     for (const Low& low : lows)
@@ -103,7 +111,8 @@ Lows stopped_lows(const Lows& lows) {
         }
     const std::vector<double> near_heights = heights_of(near);
     const double spread = quantile(near_heights, 0.75) - quantile(near_heights, 0.25);
-    if (near.size() < needed || spread > kStruckSpreadM || quantile(turning, 0.5) > kStruckTurningS) return {};
+    if (near.size() < needed || spread > kStruckSpreadM || quantile(turning, 0.5) > kStruckTurningS)
+        return {};
     return near;
 }
 
@@ -161,9 +170,51 @@ void make_room(std::vector<FittedInstrument>& instruments) {
         }
 }
 
-Eigen::Vector3d direction_to_hands(std::span<const tracking::Trace> traces, const Eigen::Vector3d& shaft) {
+/// The lows of all sticks, but for those with the tip over the hand: there a stick swings back overhead, it
+/// does not strike.
+Lows find_strokes(std::span<const tracking::Trace> traces, const StickGeometry& geometry) {
+    StickGeometry hand_geometry = geometry;
+    hand_geometry.tip.setZero();
+    Lows strokes;
+    for (const tracking::Trace& trace : traces) {
+        const std::vector<TipTrack> tips = tip_tracks(trace, geometry),
+                                    hands = tip_tracks(trace, hand_geometry);
+        for (std::size_t stick = 0; stick < tips.size(); ++stick)
+            for (const Low& low : find_lows(tips[stick])) {
+                const std::vector<double>& times = hands[stick].t_s;
+                const auto at = std::lower_bound(times.begin(), times.end(), low.t_s) - times.begin();
+                if (low.tip.y() <= hands[stick].tip[static_cast<std::size_t>(at)].y() + kOverHandM)
+                    strokes.push_back(low);
+            }
+    }
+    return strokes;
+}
+
+Eigen::Vector3d mean_place(const tracking::StickTrace& stick) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    double count = 0;
+    for (const tracking::PoseSample& sample : stick.samples) sum += sample.position;
+    return sum / static_cast<double>(stick.samples.size());
+}
+
+/// From the left stick to the right one, by their names; 0 if they have none.
+Eigen::Vector3d left_to_right(std::span<const tracking::Trace> traces) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const tracking::Trace& trace : traces) {
+        const auto named = [&](const char* name) {
+            return std::find_if(trace.sticks.begin(), trace.sticks.end(),
+                                [&](const auto& stick) { return stick.name == name; });
+        };
+        const auto left = named("left"), right = named("right");
+        if (left != trace.sticks.end() && right != trace.sticks.end())
+            sum += mean_place(*right) - mean_place(*left);
+    }
+    return sum;
+}
+
+/// From the tips to the hands, on the mean.
+Eigen::Vector3d against_shafts(std::span<const tracking::Trace> traces, const Eigen::Vector3d& shaft) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double count = 1;
     for (const tracking::Trace& trace : traces)
         for (const tracking::StickTrace& stick : trace.sticks)
             for (const tracking::PoseSample& sample : stick.samples) {
@@ -171,48 +222,59 @@ Eigen::Vector3d direction_to_hands(std::span<const tracking::Trace> traces, cons
                 sum -= sample.orientation * shaft;
                 ++count;
             }
-    const Eigen::Vector3d level(sum.x(), 0, sum.z());
-    if (count == 0 || level.norm() < 0.1 * count) return Eigen::Vector3d::UnitZ();
-    return level.normalized();
+    return sum / count;
+}
+
+/// The player stands where the left stick is on the left; unnamed sticks have the hands on the player's side.
+Eigen::Vector3d direction_to_player(std::span<const tracking::Trace> traces, const Eigen::Vector3d& shaft) {
+    constexpr double kClearM = 0.05, kClearShaft = 0.1;
+    const Eigen::Vector3d by_name = left_to_right(traces).cross(Eigen::Vector3d::UnitY());
+    if (by_name.norm() > kClearM) return by_name.normalized();
+    Eigen::Vector3d by_shaft = against_shafts(traces, shaft);
+    by_shaft.y() = 0;
+    return by_shaft.norm() > kClearShaft ? Eigen::Vector3d(by_shaft.normalized())
+                                         : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
 }
 
 }  // namespace
 
 KitFit fit_kit(std::span<const tracking::Trace> traces, const StickGeometry& geometry) {
-    Lows lows;
-    for (const tracking::Trace& trace : traces)
-        for (const TipTrack& track : tip_tracks(trace, geometry)) {
-            const Lows found = find_lows(track);
-            lows.insert(lows.end(), found.begin(), found.end());
-        }
+    const Lows lows = find_strokes(traces, geometry);
     if (lows.empty())
-        throw BadInput(fmt::format("{}: error: found no stroke (the tip never falls and rises by 25 mm), expected strokes to fit a kit to",
-                                   traces.empty() ? "the trace" : traces.front().file));
+        throw BadInput(
+            fmt::format("{}: error: found no stroke (the tip never falls and rises by 25 mm), expected "
+                        "strokes to fit a kit to",
+                        traces.empty() ? "the trace" : traces.front().file));
     std::vector<Lows> clusters = assign(lows, find_places(lows));
-    std::stable_sort(clusters.begin(), clusters.end(), [](const Lows& a, const Lows& b) { return a.size() > b.size(); });
+    std::stable_sort(clusters.begin(), clusters.end(),
+                     [](const Lows& a, const Lows& b) { return a.size() > b.size(); });
     const std::size_t fewest = std::min(kFewestLows, clusters.front().size());
     std::erase_if(clusters, [&](const Lows& cluster) { return cluster.size() < fewest; });
     if (clusters.size() > kMostInstruments) clusters.resize(kMostInstruments);
 
     KitFit fit;
-    fit.towards_player = direction_to_hands(traces, geometry.shaft);
+    fit.towards_player = direction_to_player(traces, geometry.shaft);
     fit.instruments = place_instruments(std::move(clusters));
     make_room(fit.instruments);
     const Eigen::Vector3d right = Eigen::Vector3d::UnitY().cross(fit.towards_player);
-    std::stable_sort(fit.instruments.begin(), fit.instruments.end(), [&](const auto& a, const auto& b) {
-        return a.met.dot(right) < b.met.dot(right);
-    });
+    std::stable_sort(fit.instruments.begin(), fit.instruments.end(),
+                     [&](const auto& a, const auto& b) { return a.met.dot(right) < b.met.dot(right); });
     return fit;
 }
 
 std::string describe(const FittedInstrument& instrument) {
     const Eigen::Vector3d& met = instrument.met;
-    const std::string strokes = fmt::format("{} of {} strokes go 3 mm deep or more", instrument.entering, instrument.strokes);
+    const std::string strokes =
+        fmt::format("{} of {} strokes go 3 mm deep or more", instrument.entering, instrument.strokes);
     if (instrument.struck)
-        return fmt::format("struck: {} of {} lows agree on a head at y = {:.3f} m; tips meet the instrument 25 mm above it; {}",
-                           instrument.strokes, instrument.lows, instrument.contact_height_m, strokes);
-    return fmt::format("passed through: {} lows with no head under them; tips meet the instrument at y = {:.3f} m, below which 80 % of them lie; {}",
-                       instrument.lows, met.y(), strokes);
+        return fmt::format(
+            "struck: {} of {} lows agree on a head at y = {:.3f} m; tips meet the instrument 25 mm above it; "
+            "{}",
+            instrument.strokes, instrument.lows, instrument.contact_height_m, strokes);
+    return fmt::format(
+        "passed through: {} lows with no head under them; tips meet the instrument at y = {:.3f} m, below "
+        "which 80 % of them lie; {}",
+        instrument.lows, met.y(), strokes);
 }
 
 }  // namespace app

@@ -21,7 +21,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view kSummary = "summary.json";
-/// The summary leads: it goes first, so that a folder whose products are being exchanged does not look finished.
+/// The summary leads: it goes first, so that a folder whose products are being exchanged does not look
+/// finished.
 constexpr std::array<std::string_view, 7> kProducts = {kSummary,       "frames",   "audio.wav",  "events.csv",
                                                        "contacts.csv", "hits.mid", "report.html"};
 
@@ -32,9 +33,10 @@ constexpr std::array<std::string_view, 7> kProducts = {kSummary,       "frames",
 
 void check_moved(const std::error_code& error, const fs::path& path) {
     if (error)
-        throw std::runtime_error(fmt::format("{}: error: found {}, expected to put the run's results there; "
-                                             "the run is not complete",
-                                             path.string(), error.message()));
+        throw std::runtime_error(
+            fmt::format("{}: error: found {}, expected to put the run's results there; "
+                        "the run is not complete",
+                        path.string(), error.message()));
 }
 
 bool is_frame_name(const std::string& name) {
@@ -49,18 +51,20 @@ void check_frames(const fs::path& frames) {
     for (fs::directory_iterator entry(frames, error), end; !error && entry != end; entry.increment(error)) {
         const std::string name = entry->path().filename().string();
         if (!is_frame_name(name))
-            throw BadInput(fmt::format("{}: error: found {}, expected only pictures of an earlier run (they are "
-                                       "replaced); choose another --out or move the file away",
-                                       frames.string(), name));
+            throw BadInput(
+                fmt::format("{}: error: found {}, expected only pictures of an earlier run (they are "
+                            "replaced); choose another --out or move the file away",
+                            frames.string(), name));
     }
     if (error) refuse(frames, error.message());
 }
 
 void write_all(const fs::path& file, const void* data, std::size_t size) {
     const auto fail = [&](int error) {
-        throw std::runtime_error(fmt::format("{}: error: found \"{}\", expected to write {} bytes; free some space "
-                                             "or choose another --out",
-                                             file.string(), std::strerror(error), size));
+        throw std::runtime_error(
+            fmt::format("{}: error: found \"{}\", expected to write {} bytes; free some space "
+                        "or choose another --out",
+                        file.string(), std::strerror(error), size));
     };
     const int out = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
     if (out < 0) fail(errno);
@@ -82,7 +86,8 @@ void write_all(const fs::path& file, const void* data, std::size_t size) {
 OutputFolder::OutputFolder(const fs::path& folder) : folder_(folder), staging_(folder / ".unfinished") {
     std::error_code error;
     made_folder_ = fs::create_directories(folder_, error);
-    if (fs::exists(folder_) && !fs::is_directory(folder_)) refuse(folder_, "a file");
+    std::error_code none;  // a path that cannot even be looked at has failed above
+    if (fs::exists(folder_, none) && !fs::is_directory(folder_, none)) refuse(folder_, "a file");
     if (error) refuse(folder_, error.message());
     lock();
     try {
@@ -100,9 +105,10 @@ void OutputFolder::lock() {
     // File systems without locks are used without.
     if (::flock(lock_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
     ::close(lock_);
-    throw BadInput(fmt::format("{}: error: found another run writing into it, expected one run a folder; "
-                               "wait for it or choose another --out",
-                               folder_.string()));
+    throw BadInput(
+        fmt::format("{}: error: found another run writing into it, expected one run a folder; "
+                    "wait for it or choose another --out",
+                    folder_.string()));
 }
 
 void OutputFolder::make_staging() {
@@ -149,6 +155,8 @@ void write_file(const fs::path& file, std::span<const std::uint8_t> bytes) {
     write_all(file, bytes.data(), bytes.size());
 }
 
-void write_file(const fs::path& file, std::string_view text) { write_all(file, text.data(), text.size()); }
+void write_file(const fs::path& file, std::string_view text) {
+    write_all(file, text.data(), text.size());
+}
 
 }  // namespace app

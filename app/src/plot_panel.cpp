@@ -14,7 +14,9 @@ void PlotPanel::add(std::string data, std::string_view style) {
     data_ += std::move(data) + "e\n";
 }
 
-std::string PlotPanel::text() const { return clauses_.empty() ? "plot NaN\n" : "plot " + clauses_ + "\n" + data_; }
+std::string PlotPanel::text() const {
+    return clauses_.empty() ? "plot NaN\n" : "plot " + clauses_ + "\n" + data_;
+}
 
 std::string plot_axes() {
     return fmt::format(
@@ -43,10 +45,12 @@ void ThinnedMarks::add(double x, double y, std::string_view rest) {
     if (!(x >= area_.x_low && x <= area_.x_high)) return;
     const std::pair<int, int> place = {pixel(x, area_.x_low, area_.x_high, area_.width),
                                        pixel(y, area_.y_low, area_.y_high, area_.height)};
-    if (taken_.insert(place).second) fmt::format_to(std::back_inserter(text_), "{:.4f} {:.4f} {}\n", x, y, rest);
+    if (taken_.insert(place).second)
+        fmt::format_to(std::back_inserter(text_), "{:.4f} {:.4f} {}\n", x, y, rest);
 }
 
-std::string sound_envelope(std::span<const float> stereo, double t0_s, double from_s, double to_s, int columns) {
+std::string sound_envelope(std::span<const float> stereo, double t0_s, double from_s, double to_s,
+                           int columns) {
     constexpr double kRate = 48000;
     const double count = static_cast<double>(stereo.size() / 2), column_s = (to_s - from_s) / columns;
     const auto sample_at = [&](double t_s) {
@@ -54,11 +58,13 @@ std::string sound_envelope(std::span<const float> stereo, double t0_s, double fr
     };
     std::string text;
     for (int i = 0; i < columns; ++i) {
-        const std::size_t begin = sample_at(from_s + i * column_s), end = sample_at(from_s + (i + 1) * column_s);
+        const std::size_t begin = sample_at(from_s + i * column_s),
+                          end = sample_at(from_s + (i + 1) * column_s);
         if (begin == end) continue;
         const auto [low, high] = std::minmax_element(stereo.begin() + static_cast<std::ptrdiff_t>(begin),
                                                      stereo.begin() + static_cast<std::ptrdiff_t>(end));
-        fmt::format_to(std::back_inserter(text), "{:.4f} {:.4f} {:.4f}\n", from_s + (i + 0.5) * column_s, *low, *high);
+        fmt::format_to(std::back_inserter(text), "{:.4f} {:.4f} {:.4f}\n", from_s + (i + 0.5) * column_s,
+                       *low, *high);
     }
     return text;
 }

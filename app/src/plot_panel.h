@@ -24,7 +24,8 @@ private:
 /// Axes and grid as all plots have them, no key.
 [[nodiscard]] std::string plot_axes();
 
-/// Tics every `step`, a round number of which about `count` fit into `span`, with as many decimals as they need.
+/// Tics every `step`, a round number of which about `count` fit into `span`, with as many decimals as they
+/// need.
 [[nodiscard]] std::string round_tics(std::string_view axis, double span, int count);
 [[nodiscard]] double round_step(double span, int count);
 
@@ -34,8 +35,8 @@ struct PlotArea {
     int width = 1, height = 1;
 };
 
-/// Marks of one kind, as lines of numbers: those outside of the range in x and those within a pixel of an earlier one are left out, so that
-/// the number of marks is bounded however long the recording.
+/// Marks of one kind, as lines of numbers: those outside of the range in x and those within a pixel of an
+/// earlier one are left out, so that the number of marks is bounded however long the recording.
 class ThinnedMarks {
 public:
     explicit ThinnedMarks(const PlotArea& area) : area_(area) {}
@@ -49,9 +50,10 @@ private:
     std::string text_;
 };
 
-/// Lowest and highest sample of the columns of a stretch of interleaved stereo sound, as lines "x low high"; x runs over [from_s, to_s] with the
-/// sound's first sample at t0_s. Columns outside of the sound are left out.
-[[nodiscard]] std::string sound_envelope(std::span<const float> stereo, double t0_s, double from_s, double to_s,
-                                         int columns);
+/// Lowest and highest sample of the columns of a stretch of interleaved stereo sound, as lines "x low high";
+/// x runs over [from_s, to_s] with the sound's first sample at t0_s. Columns outside of the sound are left
+/// out.
+[[nodiscard]] std::string sound_envelope(std::span<const float> stereo, double t0_s, double from_s,
+                                         double to_s, int columns);
 
 }  // namespace app

@@ -13,14 +13,15 @@ header p{margin:2px 0;color:var(--axis)}
 h1{font-size:26px;line-height:1.25;margin:0 0 4px;overflow-wrap:anywhere}
 h2{font-size:18px;margin:40px 0 6px}
 h3{font-size:15px;margin:0 0 4px}
-p.note{color:var(--axis);margin:0 0 10px;max-width:80ch}
+p.note{color:var(--axis);margin:0 0 10px;max-width:95ch}
+.scroll+p.note,table+p.note{margin-top:8px}
 .facts{display:grid;grid-template-columns:repeat(auto-fit,minmax(230px,1fr));gap:8px 28px;margin:18px 0 0}
 .facts div{border-top:1px solid var(--grid);padding-top:5px;overflow-wrap:anywhere}
 .facts dt{color:var(--axis);font-size:12.5px}
 .facts dd{margin:0}
-.figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(106px,1fr));gap:10px;margin:24px 0 8px}
-.figures div{background:var(--card);border:1px solid var(--grid);border-top:3px solid var(--tone,var(--axis));border-radius:6px;padding:9px 12px}
-.figures b{display:block;font-size:24px;line-height:1.2;font-weight:650;font-variant-numeric:tabular-nums}
+.figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(106px,1fr));gap:9px;margin:24px 0 8px}
+.figures div{background:var(--card);border:1px solid var(--grid);border-top:3px solid var(--tone,var(--axis));border-radius:6px;padding:8px 11px}
+.figures b{display:block;white-space:nowrap;font-size:20px;line-height:1.2;font-weight:650;font-variant-numeric:tabular-nums}
 .figures span{color:var(--axis);font-size:12.5px}
 .frames{display:grid;grid-template-columns:repeat(auto-fill,minmax(240px,1fr));gap:12px}
 figure{margin:0}
@@ -47,7 +48,8 @@ code{font:12.5px/1.5 ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;overfl
 
 std::string report_style() {
     return ":root{color-scheme:light dark;--page:#f6f8fa;--card:#ffffff;--ink:#1b2027;" + css_colours(false) +
-           "}\n@media screen and (prefers-color-scheme:dark){:root{--page:#12161b;--card:#1a2027;--ink:#e3e8ee;" +
+           "}\n@media screen and "
+           "(prefers-color-scheme:dark){:root{--page:#12161b;--card:#1a2027;--ink:#e3e8ee;" +
            css_colours(true) + "}}" + kRules;
 }
 

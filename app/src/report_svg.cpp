@@ -12,7 +12,9 @@ struct Rgb {
     unsigned red, green, blue;
 };
 
-Rgb parts(std::uint32_t rgb) { return {(rgb >> 16) & 255U, (rgb >> 8) & 255U, rgb & 255U}; }
+Rgb parts(std::uint32_t rgb) {
+    return {(rgb >> 16) & 255U, (rgb >> 8) & 255U, rgb & 255U};
+}
 
 void replace_all(std::string& text, std::string_view from, std::string_view to) {
     std::string replaced;
@@ -29,16 +31,20 @@ std::string_view span_of(std::string_view text, std::string_view from, std::stri
     const std::size_t begin = text.find(from);
     const std::size_t end = begin == std::string_view::npos ? begin : text.find(to, begin + from.size());
     if (end == std::string_view::npos)
-        throw std::runtime_error(fmt::format("error: found a plot without {}, expected one of gnuplot 5", from));
+        throw std::runtime_error(
+            fmt::format("error: found a plot without {}, expected one of gnuplot 5", from));
     return text.substr(begin, end + to.size() - begin);
 }
 
-/// gnuplot writes its colours as attributes: what it drew in one of ours follows the page, black is the page's text.
+/// gnuplot writes its colours as attributes: what it drew in one of ours follows the page, black is the
+/// page's text.
 void follow_page(std::string& svg) {
     const auto follow = [&](const ReportColour& colour) {
         const Rgb rgb = parts(colour.light);
+        const std::string variable = fmt::format("var(--{})", colour.name);
         replace_all(svg, fmt::format("rgb({:3}, {:3}, {:3})", rgb.red, rgb.green, rgb.blue),
-                    fmt::format("var(--{})", colour.name));
+                    variable);                                                                   // lines
+        replace_all(svg, fmt::format("rgb({},{},{})", rgb.red, rgb.green, rgb.blue), variable);  // text
     };
     for (const ReportColour& colour : colours::marks) follow(colour);
     for (const ReportColour& colour : colours::sticks) follow(colour);
@@ -75,9 +81,13 @@ std::string without_ballast(std::string_view svg) {
 
 }  // namespace
 
-const ReportColour& stick_colour(std::size_t stick) { return colours::sticks[stick % colours::sticks.size()]; }
+const ReportColour& stick_colour(std::size_t stick) {
+    return colours::sticks[stick % colours::sticks.size()];
+}
 
-std::string gnuplot_colour(const ReportColour& colour) { return fmt::format("rgb '#{:06x}'", colour.light); }
+std::string gnuplot_colour(const ReportColour& colour) {
+    return fmt::format("rgb '#{:06x}'", colour.light);
+}
 
 std::string css_colours(bool dark) {
     std::string css;
@@ -99,20 +109,32 @@ std::string inline_svg(std::string_view svg, std::string_view label) {
 
 std::string svg_symbols(std::string_view svg) {
     const std::string_view definitions = span_of(svg, "<defs>", "</defs>");
-    return fmt::format("<svg width=\"0\" height=\"0\" style=\"position:absolute\" aria-hidden=\"true\">{}</svg>\n",
-                       definitions);
+    return fmt::format(
+        "<svg width=\"0\" height=\"0\" style=\"position:absolute\" aria-hidden=\"true\">{}</svg>\n",
+        definitions);
 }
 
 std::string html(std::string_view text) {
     std::string out;
     for (const char c : text) {
         switch (c) {
-            case '&': out += "&amp;"; break;
-            case '<': out += "&lt;"; break;
-            case '>': out += "&gt;"; break;
-            case '"': out += "&quot;"; break;
-            case '\'': out += "&#39;"; break;
-            default: out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
+            case '&':
+                out += "&amp;";
+                break;
+            case '<':
+                out += "&lt;";
+                break;
+            case '>':
+                out += "&gt;";
+                break;
+            case '"':
+                out += "&quot;";
+                break;
+            case '\'':
+                out += "&#39;";
+                break;
+            default:
+                out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
         }
     }
     return out;

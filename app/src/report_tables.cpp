@@ -45,7 +45,8 @@ std::vector<InstrumentRow> count_by_instrument(const PlayResult& result) {
         ++row.contacts;
         row.missed += contact.matched_id == 0;
     }
-    for (const MatchedNote& note : matched_notes(result)) rows.at(note.instrument).errors_ms.push_back(note.error_ms);
+    for (const MatchedNote& note : matched_notes(result))
+        rows.at(note.instrument).errors_ms.push_back(note.error_ms);
     return rows;
 }
 
@@ -63,23 +64,28 @@ std::string stages_table(const PlayResult& result) {
     std::string text = "<table><tr><th>stage<th class=n>seconds<th></tr>\n";
     for (const auto& [name, seconds] : result.stages_s)
         fmt::format_to(std::back_inserter(text),
-                       "<tr><td>{}<td class=n>{:.3f}<td class=bar><i style=\"width:{:.1f}%\"></i></tr>\n", html(name),
-                       seconds, 100 * std::clamp(seconds / longest, 0.0, 1.0));
-    fmt::format_to(std::back_inserter(text), "<tr><td>whole run<td class=n>{:.3f}<td></tr></table>\n", result.wall_s);
+                       "<tr><td>{}<td class=n>{:.3f}<td class=bar><i style=\"width:{:.1f}%\"></i></tr>\n",
+                       html(name), seconds, 100 * std::clamp(seconds / longest, 0.0, 1.0));
+    fmt::format_to(std::back_inserter(text), "<tr><td>whole run<td class=n>{:.3f}<td></tr></table>\n",
+                   result.wall_s);
     return text;
 }
 
 }  // namespace
 
 std::string report_heading(const PlayResult& r) {
-    std::string text = fmt::format("<header><h1>{}</h1>\n<p>played on {} by MusicWorld</p>\n<dl class=facts>\n",
-                                   html(std::filesystem::path(r.trace).filename().string()), html(r.kit_name));
+    std::string text =
+        fmt::format("<header><h1>{}</h1>\n<p>played on {} by MusicWorld</p>\n<dl class=facts>\n",
+                    html(std::filesystem::path(r.trace).filename().string()), html(r.kit_name));
     text += fact("trace", r.trace);
     if (!r.trace_source.empty()) text += fact("recorded from", r.trace_source);
     text += fact("kit", r.kit);
-    text += fact("duration", fmt::format("{:.3f} s ({:.3f} s to {:.3f} s)", r.t_end_s - r.t0_s, r.t0_s, r.t_end_s));
-    text += fact("pictures predicted by", fmt::format("{}, {:.1f} ms ahead", r.picture_predictor, r.render_lead_s * 1e3));
-    text += fact("sounds predicted by", fmt::format("{}, up to {:.1f} ms ahead", r.sound_predictor, r.sound_lead_s * 1e3));
+    text += fact("duration",
+                 fmt::format("{:.3f} s ({:.3f} s to {:.3f} s)", r.t_end_s - r.t0_s, r.t0_s, r.t_end_s));
+    text += fact("pictures predicted by",
+                 fmt::format("{}, {:.1f} ms ahead", r.picture_predictor, r.render_lead_s * 1e3));
+    text += fact("sounds predicted by",
+                 fmt::format("{}, up to {:.1f} ms ahead", r.sound_predictor, r.sound_lead_s * 1e3));
     text += fact("sounds are fixed", fmt::format("{:.1f} ms before their onset; cancelling is {}",
                                                  r.release_margin_s * 1e3, r.cancelling ? "on" : "off"));
     text += fact("frames", fmt::format("{} of {} x {}, {:g} a second", r.frames, r.width, r.height, r.fps));
@@ -89,25 +95,30 @@ std::string report_heading(const PlayResult& r) {
 std::string report_figures(const PlayResult& r) {
     const StrikeScore& s = r.score;
     const bool matched = s.released > s.false_notes;
-    const auto ms = [&](double value) { return matched ? fmt::format("{:.1f} ms", value) : std::string("none"); };
+    const auto ms = [&](double value) {
+        return matched ? fmt::format("{:.1f} ms", value) : std::string("none");
+    };
     std::string text = "<section class=figures>\n";
     text += figure(fmt::format("{}", s.true_contacts), "true contacts", "contact");
-    text += figure(fmt::format("{}", s.released), "notes released", "released");
-    text += figure(fmt::format("{}", s.cancelled), "cancelled in time", "cancelled");
-    text += figure(fmt::format("{}", s.moved), "moved before release", "axis");
+    text += figure(fmt::format("{}", s.released), "released", "released");
+    text += figure(fmt::format("{}", s.cancelled), "cancelled", "cancelled");
+    text += figure(fmt::format("{}", s.moved), "moved", "axis");
     text += figure(fmt::format("{}", s.false_notes), "false", "wrong");
     text += figure(fmt::format("{}", s.missed), "missed", "missed");
-    text += figure(ms(s.timing_median_ms), "timing, median", "axis");
-    text += figure(ms(s.timing_p95_ms), "timing, 95 %", "axis");
-    const std::string factor = r.wall_s > 0 ? fmt::format("{:.3g} x", (r.t_end_s - r.t0_s) / r.wall_s) : "none";
+    text += figure(ms(s.timing_median_ms), "median error", "axis");
+    text += figure(ms(s.timing_p95_ms), "95 % error", "axis");
+    const std::string factor =
+        r.wall_s > 0 ? fmt::format("{:.3g} x", (r.t_end_s - r.t0_s) / r.wall_s) : "none";
     text += figure(factor, "real time", "axis");
     text += "</section>\n";
     text += fmt::format(
-        "<p class=note>Heard: {} of the true contacts. False: {} of the notes, {} after a stroke that turned back at "
-        "least 25 ms before the release point, {} later. Timing is |onset - true contact| of the notes that belong to "
+        "<p class=note>Heard: {} of the true contacts. False: {} of the notes, {} after a stroke that turned "
+        "back at "
+        "least 25 ms before the release point, {} later. The error is |onset - true contact| of the notes "
+        "that belong to "
         "a contact (same stick and instrument, within 30 ms).</p>\n",
-        percent(s.true_contacts - s.missed, s.true_contacts), percent(s.false_notes, s.released), s.false_turned_early,
-        s.false_turned_late);
+        percent(s.true_contacts - s.missed, s.true_contacts), percent(s.false_notes, s.released),
+        s.false_turned_early, s.false_turned_late);
     return text;
 }
 
@@ -123,10 +134,11 @@ std::string report_instruments(const PlayResult& result) {
             ++silent;
             continue;
         }
-        fmt::format_to(std::back_inserter(text),
-                       "<tr><td>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}{}</tr>\n",
-                       html(result.instruments[i]), row.contacts, row.released, row.cancelled, row.wrong, row.missed,
-                       error_cells(row.errors_ms));
+        fmt::format_to(
+            std::back_inserter(text),
+            "<tr><td>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}<td class=n>{}{}</tr>\n",
+            html(result.instruments[i]), row.contacts, row.released, row.cancelled, row.wrong, row.missed,
+            error_cells(row.errors_ms));
     }
     text += "</table></div>\n";
     if (silent > 0) text += fmt::format("<p class=note>{} more of the kit were not struck.</p>\n", silent);
@@ -135,8 +147,9 @@ std::string report_instruments(const PlayResult& result) {
 
 std::string report_provenance(const PlayResult& r) {
     std::string text = "<h2>Where the time went</h2>\n" + stages_table(r);
-    text += fmt::format("<p class=note>Stages may overlap. Workers: {} ({} lost, {} bodies taken over).</p>\n",
-                        r.workers, r.workers_lost, r.bodies_reowned);
+    text +=
+        fmt::format("<p class=note>Stages may overlap. Workers: {} ({} lost, {} bodies taken over).</p>\n",
+                    r.workers, r.workers_lost, r.bodies_reowned);
     text += "<h2>Inputs</h2>\n<table><tr><th>file<th>SHA-256</tr>\n";
     for (const InputFile& input : r.inputs)
         fmt::format_to(std::back_inserter(text), "<tr><td>{}<td><code>{}</code></tr>\n", html(input.file),
@@ -145,7 +158,8 @@ std::string report_provenance(const PlayResult& r) {
     for (const auto& [name, version] : r.versions)
         fmt::format_to(std::back_inserter(text), "<tr><td>{}<td>{}</tr>\n", html(name), html(version));
     fmt::format_to(std::back_inserter(text),
-                   "<tr><td>fingerprint of this machine and build<td><code>{}</code></tr></table>\n", html(r.fingerprint));
+                   "<tr><td>fingerprint of this machine and build<td><code>{}</code></tr></table>\n",
+                   html(r.fingerprint));
     return text;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numeric>
 
 #include "plot_panel.h"
 #include "report_plots.h"
@@ -14,10 +15,11 @@ namespace {
 
 constexpr int kWidth = 1040, kColumns = 980;  // of the drawing, of the panels
 constexpr int kHeightPanel = 170, kSoundPanel = 56, kFrame = 34;
-constexpr int kMostRows = 12;
+constexpr std::size_t kMostRows = 12;
 constexpr double kGap_s = 0.25;  // a line is not drawn across a longer gap in the data
 
-/// The heights that most of the paths keep to (a glitch of the tracker may not flatten them), and all contacts.
+/// The heights that most of the paths keep to (a glitch of the tracker may not flatten them), and all
+/// contacts.
 std::pair<double, double> height_range(const PlayResult& result) {
     std::vector<double> heights;
     for (const TipTrack& track : result.tracks)
@@ -31,7 +33,8 @@ std::pair<double, double> height_range(const PlayResult& result) {
     return {low - border, high + border};
 }
 
-/// The samples of one column of pixels as "x y" lines: all of a few, the first, lowest, highest and last of many.
+/// The samples of one column of pixels as "x y" lines: all of a few, the first, lowest, highest and last of
+/// many.
 void write_column(std::string& text, const TipTrack& track, std::size_t begin, std::size_t end) {
     std::vector<std::size_t> kept;
     if (end - begin <= 4) {
@@ -77,14 +80,16 @@ struct MarkStyle {
     double size;
 };
 
-/// In the order of drawing; gnuplot's point types: 2 cross, 4 frame, 6 ring, 7 disc, 11 triangle pointing down.
-constexpr MarkStyle kMarkStyles[] = {{Mark::cancelled, colours::cancelled, 2, 0.65},
+/// In the order of drawing; gnuplot's point types: 2 cross, 4 frame, 6 ring, 7 disc, 11 triangle pointing
+/// down.
+constexpr MarkStyle kMarkStyles[] = {{Mark::cancelled, colours::cancelled, 2, 0.85},
                                      {Mark::contact, colours::contact, 6, 0.95},
                                      {Mark::released, colours::released, 7, 0.55},
                                      {Mark::missed, colours::missed, 4, 1.0},
                                      {Mark::wrong, colours::wrong, 11, 0.8}};
 
-std::string mark_points(const PlayResult& result, const std::vector<Mark>& kinds, Mark wanted, const PlotArea& area) {
+std::string mark_points(const PlayResult& result, const std::vector<Mark>& kinds, Mark wanted,
+                        const PlotArea& area) {
     ThinnedMarks points(area);
     for (const TrueContact& contact : result.contacts) {
         const bool shown = wanted == Mark::contact || (wanted == Mark::missed && contact.matched_id == 0);
@@ -109,15 +114,18 @@ std::string height_panel(const PlayResult& result, const std::vector<Mark>& kind
            panel.text();
 }
 
-std::string sound_panel(const PlayResult& result, const std::vector<Mark>& kinds, const PlotArea& area, double peak) {
+std::string sound_panel(const PlayResult& result, const std::vector<Mark>& kinds, const PlotArea& area,
+                        double peak) {
     PlotPanel panel;
     panel.add(sound_envelope(result.audio, result.t0_s, area.x_low, area.x_high, kColumns),
               "with filledcurves fs solid 1 noborder lc " + gnuplot_colour(colours::wave));
     const PlotArea strip = {area.x_low, area.x_high, -peak, peak, kColumns, 1};
-    for (const auto& [kind, colour] : {std::pair{Mark::released, colours::released}, {Mark::wrong, colours::wrong}}) {
+    for (const auto& [kind, colour] :
+         {std::pair{Mark::released, colours::released}, {Mark::wrong, colours::wrong}}) {
         ThinnedMarks onsets(strip);
         for (std::size_t i = 0; i < kinds.size(); ++i)
-            if (kinds[i] == kind) onsets.add(result.strikes[i].onset_s, -peak, fmt::format("0 {:.4f}", 2 * peak));
+            if (kinds[i] == kind)
+                onsets.add(result.strikes[i].onset_s, -peak, fmt::format("0 {:.4f}", 2 * peak));
         panel.add(onsets.text(), "with vectors nohead lw 0.8 lc " + gnuplot_colour(colour));
     }
     return fmt::format("set yrange [{}:{}]\nset ytics ({} 0)\nset ylabel 'sound' offset 1\n", -peak, peak,
@@ -125,7 +133,8 @@ std::string sound_panel(const PlayResult& result, const std::vector<Mark>& kinds
            panel.text();
 }
 
-PlotScript row_plot(const PlayResult& result, const std::vector<Mark>& kinds, const PlotArea& area, double peak) {
+PlotScript row_plot(const PlayResult& result, const std::vector<Mark>& kinds, const PlotArea& area,
+                    double peak) {
     const bool sound = !result.audio.empty();
     const int height = kHeightPanel + kFrame + (sound ? kSoundPanel : 0);
     const auto margins = [&](int top, int bottom) {
@@ -134,7 +143,7 @@ PlotScript row_plot(const PlayResult& result, const std::vector<Mark>& kinds, co
     };
     std::string commands = plot_axes();
     commands += fmt::format("set xrange [{}:{}]\n", area.x_low, area.x_high);
-    commands += "set multiplot\nset lmargin at screen 0.058\nset rmargin at screen 0.995\n";
+    commands += "set multiplot\nset lmargin at screen 0.058\nset rmargin at screen 0.984\n";
     const std::string time_axis = round_tics("x", area.x_high - area.x_low, 8);
     commands += margins(8, kHeightPanel) + time_axis;
     if (sound) {
@@ -149,25 +158,43 @@ PlotScript row_plot(const PlayResult& result, const std::vector<Mark>& kinds, co
 
 }  // namespace
 
-double timeline_row_s(double duration_s) {
-    constexpr double kRow_s = 4;
-    if (duration_s <= kRow_s) return std::max(duration_s, 1e-3);
-    return duration_s <= kRow_s * kMostRows ? kRow_s : round_step(duration_s, kMostRows);
+Timeline timeline_of(const PlayResult& result) {
+    const double duration_s = std::max(result.t_end_s - result.t0_s, 1e-3);
+    Timeline timeline;
+    timeline.row_s = std::min(timeline.row_s, duration_s);
+    const auto rows = static_cast<std::size_t>(std::ceil(duration_s / timeline.row_s - 1e-9));
+    std::vector<int> errors(rows);
+    const auto count = [&](double t_s) {
+        const double row = std::floor((t_s - result.t0_s) / timeline.row_s);
+        ++errors[std::min(static_cast<std::size_t>(std::max(row, 0.0)), rows - 1)];
+    };
+    const std::vector<Mark> marks = strike_marks(result);
+    for (std::size_t i = 0; i < marks.size(); ++i)
+        if (marks[i] == Mark::wrong) count(result.strikes[i].onset_s);
+    for (const TrueContact& contact : result.contacts)
+        if (contact.matched_id == 0) count(contact.t_s);
+    std::vector<std::size_t> shown(rows);
+    std::iota(shown.begin(), shown.end(), 0);
+    timeline.whole = rows <= kMostRows;
+    if (!timeline.whole) {
+        std::stable_sort(shown.begin(), shown.end(), [&](auto a, auto b) { return errors[a] > errors[b]; });
+        shown.resize(kMostRows);
+        std::sort(shown.begin(), shown.end());
+    }
+    for (const std::size_t row : shown)
+        timeline.starts_s.push_back(result.t0_s + static_cast<double>(row) * timeline.row_s);
+    return timeline;
 }
 
-std::vector<PlotScript> timeline_plots(const PlayResult& result) {
-    const double duration_s = result.t_end_s - result.t0_s, row_s = timeline_row_s(duration_s);
+std::vector<PlotScript> timeline_plots(const PlayResult& result, const Timeline& timeline) {
     const auto [low, high] = height_range(result);
     const std::vector<Mark> kinds = strike_marks(result);
     double peak = 1e-3;
     for (const float sample : result.audio) peak = std::max(peak, std::abs(static_cast<double>(sample)));
-    const int rows = std::max(1, static_cast<int>(std::ceil(duration_s / row_s - 1e-9)));
     std::vector<PlotScript> scripts;
-    for (int row = 0; row < rows; ++row) {
-        const double from_s = result.t0_s + row * row_s;
-        scripts.push_back(
-            row_plot(result, kinds, {from_s, from_s + row_s, low, high, kColumns, kHeightPanel}, peak));
-    }
+    for (const double from_s : timeline.starts_s)
+        scripts.push_back(row_plot(
+            result, kinds, {from_s, from_s + timeline.row_s, low, high, kColumns, kHeightPanel}, peak));
     return scripts;
 }
 

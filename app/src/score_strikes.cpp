@@ -18,7 +18,8 @@ struct Pair {
     [[nodiscard]] auto order() const { return std::tie(distance_s, contact_s, id, contact, strike); }
 };
 
-std::vector<Pair> candidate_pairs(const std::vector<Strike>& strikes, const std::vector<TrueContact>& contacts) {
+std::vector<Pair> candidate_pairs(const std::vector<Strike>& strikes,
+                                  const std::vector<TrueContact>& contacts) {
     const double window_s = kMatchWindow_s + kTimeSlack_s;
     std::vector<Pair> pairs;
     for (std::size_t i = 0; i < strikes.size(); ++i) {

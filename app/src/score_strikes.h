@@ -6,24 +6,28 @@
 
 namespace app {
 
-/// A note and a true contact of the same stick and instrument belong together when they lie within this time [s] of each other.
+/// A note and a true contact of the same stick and instrument belong together when they lie within this time
+/// [s] of each other.
 inline constexpr double kMatchWindow_s = 0.030;
 
-/// Compares the released notes with the true contacts: closest pairs first (equally close ones by contact time, then by id), each note and
-/// each contact used once. Fills matched_id of every contact (0: missed) and counts
+/// Compares the released notes with the true contacts: closest pairs first (equally close ones by contact
+/// time, then by id), each note and each contact used once. Fills matched_id of every contact (0: missed) and
+/// counts
 ///   moved   released strikes with moves > 0          false   released strikes without a contact
 ///   missed  contacts without a released strike
-///   timing  median and 95th percentile of |onset - contact| [ms] over the matched notes; 0 when nothing matched
+///   timing  median and 95th percentile of |onset - contact| [ms] over the matched notes; 0 when nothing
+///   matched
 /// The false_turned_* counts are left at 0: they need the recorded path.
-/// `contacts` must be sorted by time. A pure function of its input; O((n + m) log n) for n contacts and m strikes that are not denser than
-/// a few in the window.
-[[nodiscard]] StrikeScore score_strikes(const std::vector<Strike>& strikes, std::vector<TrueContact>& contacts);
+/// `contacts` must be sorted by time. A pure function of its input; O((n + m) log n) for n contacts and m
+/// strikes that are not denser than a few in the window.
+[[nodiscard]] StrikeScore score_strikes(const std::vector<Strike>& strikes,
+                                        std::vector<TrueContact>& contacts);
 
 /// The middle value; the mean of the two middle ones for an even count. 0 for no values.
 [[nodiscard]] double median(std::vector<double> values);
 
-/// Nearest-rank percentile: the smallest value that at least percent % of the values do not exceed, i.e. the ceil(percent/100 n)-th.
-/// 0 for no values; percent in (0, 100].
+/// Nearest-rank percentile: the smallest value that at least percent % of the values do not exceed, i.e. the
+/// ceil(percent/100 n)-th. 0 for no values; percent in (0, 100].
 [[nodiscard]] double nearest_rank(std::vector<double> values, double percent);
 
 }  // namespace app

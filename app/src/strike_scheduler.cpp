@@ -95,6 +95,8 @@ std::vector<const sim::Contact*> StrikeScheduler::candidates(const Approach& a, 
     for (std::size_t i = 0; i < contacts.size(); ++i) {
         const sim::Contact& contact = contacts[i];
         if (i == 0 && !a.armed) continue;  // still the stroke that was released
+        // A path that goes right through a thin body and turns back into it from behind is no second stroke.
+        if (i > 0 && contact.normal_world.dot(contacts[0].normal_world) <= 0) continue;
         if (contact.zone < 0 || contact.speed_mps < rules_.minimum_speed_mps) continue;
         const double onset = std::max(contact.t_s, s + rules_.release_margin_s);
         const double happened = i == 0 && a.entered_s ? std::min(*a.entered_s, contact.t_s) : contact.t_s;

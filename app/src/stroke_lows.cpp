@@ -27,12 +27,14 @@ Low low_at(const TipTrack& track, std::size_t at, std::size_t first, std::size_t
     while (after < last && track.t_s[after] - low.t_s < kTurnWindowS) ++after;
     const double acceleration =
         (slope(track, at, after) - slope(track, before, at)) / (0.5 * (track.t_s[after] - track.t_s[before]));
-    low.turning_s = acceleration > 0 ? low.descent_mps / acceleration : std::numeric_limits<double>::infinity();
+    low.turning_s =
+        acceleration > 0 ? low.descent_mps / acceleration : std::numeric_limits<double>::infinity();
     return low;
 }
 
 /// The lows of the piece [first, last]: falls and rises of at least the prominence alternate.
-void find_in_piece(const TipTrack& track, std::size_t first, std::size_t last, double prominence, std::vector<Low>& lows) {
+void find_in_piece(const TipTrack& track, std::size_t first, std::size_t last, double prominence,
+                   std::vector<Low>& lows) {
     std::size_t highest = first, lowest = first;
     bool falling = false;
     for (std::size_t i = first; i <= last; ++i) {

@@ -11,18 +11,21 @@ namespace app {
 struct Low {
     double t_s = 0;
     Eigen::Vector3d tip = Eigen::Vector3d::Zero();  ///< [m], world
-    double descent_mps = 0;  ///< fastest fall on the way down
-    double turning_s = 0;    ///< descent_mps over the upward acceleration at the low (across +-9 ms): how long that acceleration takes to
-                             ///< stop the fall. About 10 ms on a head, 20-100 ms where an arm swings through.
+    double descent_mps = 0;                         ///< fastest fall on the way down
+    double turning_s = 0;  ///< descent_mps over the upward acceleration at the low (across +-9 ms): how long
+                           ///< that acceleration takes to stop the fall. About 10 ms on a head, 20-100 ms
+                           ///< where an arm swings through.
 };
 
 /// The lows of one tip, by time. Nothing is joined across a gap of more than tracking::kGapS.
 [[nodiscard]] std::vector<Low> find_lows(const TipTrack& track, double prominence_m = 0.025);
 
-/// Height at which a surface stops the tips: the median of the lows within 50 mm of the lowest. `lows` is not empty.
+/// Height at which a surface stops the tips: the median of the lows within 50 mm of the lowest. `lows` is not
+/// empty.
 [[nodiscard]] double contact_height(std::span<const Low> lows);
 
-/// Value below which the share `p` of the values lies (the nearest of them, no interpolation). `values` is not empty.
+/// Value below which the share `p` of the values lies (the nearest of them, no interpolation). `values` is
+/// not empty.
 [[nodiscard]] double quantile(std::vector<double> values, double p);
 
 }  // namespace app

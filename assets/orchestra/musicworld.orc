@@ -90,19 +90,162 @@ opcode Corner, i, ii
   xout 150 * 2^(6.5 * ihardness) * (limit(ispeed, 0.05, 16) / 2)^0.55
 endop
 
-; The blow: 1 at the note's first sample, 0 elsewhere.
-opcode Blow, a, 0
+; Onsets within a block: in Csound 6.18 the opcodes of an instrument start at the note's own sample, those of an opcode
+; definition (UDO) at the block's first. So whatever runs with time from the onset is a macro, which stands in the
+; instrument itself; the opcode definitions hold filters and initialisation only.
+
+; ablow: 1 at the note's first sample, 0 elsewhere.
+#define BLOW #
   ablow linseg 1, 1 / sr, 0, 1, 0
-  xout ablow
+#
+
+; Noise aN that rises from 0 in RISE seconds and falls by 60 dB in T60; stroke and place choose where the table is read.
+#define BURST(N'PLACE'RISE'T60) #
+  iphase$N = frac(7.3137 * p7 + 3.7711 * $PLACE + 61.8033989 * $T60)
+  aenv$N expseg 1, $T60, 0.001, $T60, 0.000001, 1, 0.000001
+  arise$N linseg 0, $RISE, 1, 1, 1
+  a$N oscil 1, sr / 65536, giNoise, iphase$N
+  a$N = a$N * arise$N * aenv$N
+#
+
+; Ends a note's asound (at level 1; ilevel, iduration): fades to 0 over its last 50 ms; choked, fades within 15 ms from
+; the very sample; notes its end in table 902; pans.
+#define CLOSE #
+  p3 = iduration
+  ilast tab_i 0, giEnds
+  tabw_i max(ilast, p4 + iduration * sr + 2 * ksmps), 0, giEnds
+  afade linseg 1, iduration - 0.05, 1, 0.05, 0, 1, 0
+  asample linseg 0, 1000, 1000 * sr
+  asound = asound * ilevel * afade
+  kchoke init (p11 < 0 ? -1 : p11 - p4)
+  kover init 0
+  if kchoke < 0 && p10 >= 0 then
+    klatest tab p10, giChokes
+    kchoke = (klatest > p4 ? klatest - p4 : -1)
+  endif
+  if kchoke >= 0 then
+    aleft limit 1 - (asample - kchoke) / (0.015 * sr), 0, 1
+    asound = asound * aleft * aleft * (3 - 2 * aleft)
+    kover = (k(asample) > kchoke + 0.015 * sr + ksmps ? 1 : 0)
+  endif
+  outs asound * p5, asound * p6
+  if kover == 1 then
+    turnoff
+  endif
+#
+
+; A bank of up to 32 damped modes. Before it, in the same instrument, Put_mode fills the scratch tables; the bank reads them
+; as it is initialised, at once, so that notes do not meet there. Each mode answers the blow with
+;   weight r^n sin(theta (n + 1)),  theta = 2 pi f / sr,  r = 0.001^(1 / (t60 sr)):
+; poles at r e^(+-i theta), exact in pitch and decay. A mode rests once it is 100 dB below full scale.
+giFrequency ftgen 930, 0, -32, -2, 0
+giT60       ftgen 931, 0, -32, -2, 0
+giWeight    ftgen 932, 0, -32, -2, 0
+
+opcode Put_mode, 0, iiii
+  index, ifrequency, it60, iweight xin
+  tabw_i min(ifrequency, 20000), index, giFrequency
+  tabw_i it60, index, giT60
+  tabw_i (ifrequency < 20000 ? iweight : 0), index, giWeight
 endop
 
-; One mode: the blow's answer is iamp r^n sin(theta (n + 1)), exact in pitch and decay (poles at r e^(+-i theta)).
-opcode Mode, a, aiii
-  ablow, ifrequency, it60, iamp xin
-  itheta = 2 * $M_PI * ifrequency / sr
-  ir = exp(log(0.001) / (it60 * sr))
-  amode biquad ablow, iamp * sin(itheta), 0, 0, 1, -2 * ir * cos(itheta), ir * ir
-  xout amode
+; Blocks until mode index has fallen from ilevel to -100 dBFS; 0 where there is no such mode.
+opcode Resting_block, i, iii
+  index, icount, ilevel xin
+  it60 tab_i index, giT60
+  xout (index < icount ? 2 + it60 * limit(105 + 20 * log10(ilevel), 20, 130) / 60 * kr : 0)
+endop
+
+#define MODE(I) #
+  if$I tab_i $I, giFrequency
+  it$I tab_i $I, giT60
+  iw$I tab_i $I, giWeight
+  io$I = 2 * $M_PI * if$I / sr
+  ir$I = exp(log(0.001) / (max(it$I, 0.001) * sr))
+  ib$I = iw$I * sin(io$I)
+  ic$I = -2 * ir$I * cos(io$I)
+  id$I = ir$I * ir$I
+  ie$I Resting_block $I, icount, ilevel
+  if kblock < ie$I then
+    am$I biquad ablow, ib$I, 0, 0, 1, ic$I, id$I
+    asum += am$I
+  endif
+#
+#define BENDING_MODE(I) #
+  if$I tab_i $I, giFrequency
+  it$I tab_i $I, giT60
+  iw$I tab_i $I, giWeight
+  io$I = 2 * $M_PI * if$I / sr
+  ir$I = exp(log(0.001) / (max(it$I, 0.001) * sr))
+  ib$I = iw$I * sin(io$I)
+  id$I = ir$I * ir$I
+  ie$I Resting_block $I, icount, ilevel
+  if kblock < ie$I then
+    kc$I = -2 * ir$I * cos(min(io$I * kbend, 3))
+    am$I biquad ablow, ib$I, 0, 0, 1, kc$I, id$I
+    asum += am$I
+  endif
+#
+
+opcode Bank, a, aii
+  ablow, icount, ilevel xin
+  kblock init 0
+  asum = 0
+  $MODE(0)
+  $MODE(1)
+  $MODE(2)
+  $MODE(3)
+  $MODE(4)
+  $MODE(5)
+  $MODE(6)
+  $MODE(7)
+  $MODE(8)
+  $MODE(9)
+  $MODE(10)
+  $MODE(11)
+  $MODE(12)
+  $MODE(13)
+  $MODE(14)
+  $MODE(15)
+  $MODE(16)
+  $MODE(17)
+  $MODE(18)
+  $MODE(19)
+  $MODE(20)
+  $MODE(21)
+  $MODE(22)
+  $MODE(23)
+  $MODE(24)
+  $MODE(25)
+  $MODE(26)
+  $MODE(27)
+  $MODE(28)
+  $MODE(29)
+  $MODE(30)
+  $MODE(31)
+  kblock += 1
+  xout asum
+endop
+
+; The same for at most 12 modes, their frequencies multiplied by kbend.
+opcode Bending_bank, a, akii
+  ablow, kbend, icount, ilevel xin
+  kblock init 0
+  asum = 0
+  $BENDING_MODE(0)
+  $BENDING_MODE(1)
+  $BENDING_MODE(2)
+  $BENDING_MODE(3)
+  $BENDING_MODE(4)
+  $BENDING_MODE(5)
+  $BENDING_MODE(6)
+  $BENDING_MODE(7)
+  $BENDING_MODE(8)
+  $BENDING_MODE(9)
+  $BENDING_MODE(10)
+  $BENDING_MODE(11)
+  kblock += 1
+  xout asum
 endop
 
 ; A tick that starts at its largest sample, has no DC and is gone within 0.3 ms.
@@ -110,39 +253,6 @@ opcode Tick, a, ai
   ablow, iamp xin
   atick biquad ablow, iamp, -iamp, 0, 1, -0.6, 0
   xout atick
-endop
-
-; Noise that rises from 0 in irise seconds and falls by 60 dB in it60; the stroke chooses where the table is read.
-opcode Burst, a, iiii
-  ispeed, iplace, irise, it60 xin
-  iphase = frac(7.3137 * ispeed + 3.7711 * iplace + 0.6180339887 * it60 * 100)
-  aenv expseg 1, it60, 0.001, it60, 0.000001, 1, 0.000001
-  arise linseg 0, irise, 1, 1, 1
-  anoise oscil 1, sr / 65536, giNoise, iphase
-  xout anoise * arise * aenv
-endop
-
-; Ends a note: fades to 0 over its last 50 ms, fades within 15 ms from the sample at which it is choked, notes its end.
-opcode Close, a, aiiii
-  asound, iduration, ionset, igroup, ichoke xin
-  ipast tab_i 0, giEnds
-  tabw_i max(ipast, ionset + iduration * sr + 2 * ksmps), 0, giEnds
-  afade linseg 1, iduration - 0.05, 1, 0.05, 0, 1, 0
-  asample linseg 0, 1000, 1000 * sr
-  asound = asound * afade
-  kchoke init (ichoke < 0 ? -1 : ichoke - ionset)
-  if kchoke < 0 && igroup >= 0 then
-    klatest tab igroup, giChokes
-    kchoke = (klatest > ionset ? klatest - ionset : -1)
-  endif
-  if kchoke >= 0 then
-    aleft limit 1 - (asample - kchoke) / (0.015 * sr), 0, 1
-    asound = asound * aleft * aleft * (3 - 2 * aleft)
-    if k(asample) > kchoke + 0.015 * sr + ksmps then
-      turnoff
-    endif
-  endif
-  xout asound
 endop
 
 ; Seconds until a sound of peak ilevel that falls by 60 dB in it60 lies below -100 dBFS.
@@ -170,33 +280,26 @@ opcode Bessel, i, ii
   xout abs(isum)
 endop
 
-; Membrane modes iindex...11, struck at radius iradius of 1; kbend multiplies their frequencies. Also the sum of squared weights.
-opcode Membrane, ai, akiiiiiii
-  ablow, kbend, iindex, ifrequency, it60, idamping, icorner, ikettle, iradius xin
-  iroot tab_i iindex, giRoots
-  im tab_i iindex, giDiameters
-  ipeak tab_i iindex, giPeaks
-  iair tab_i iindex, giKettle
-  iratio = (iroot / 2.404826)^(1 - ikettle) * iair^ikettle
-  if (im == 0) then
-    iaxial = ikettle
-  else
-    iaxial = 0
-  endif
-  ishape Bessel im, iroot * iradius
-  iweight = ishape / ipeak / sqrt(iratio) / (1 + (ifrequency * iratio / icorner)^2) * 0.35^iaxial
-  imode_t60 = it60 * limit(iratio, 1, 100)^(-idamping) * 0.3^iaxial
-  itheta = 2 * $M_PI * ifrequency * iratio / sr
-  ir = exp(log(0.001) / (imode_t60 * sr))
-  kcos = cos(limit(itheta * kbend, 0, 3))
-  amodes biquad ablow, iweight * sin(itheta), 0, 0, 1, -2 * ir * kcos, ir * ir
-  isquares = iweight * iweight
-  if (iindex < 11) then
-    arest, irest Membrane ablow, kbend, iindex + 1, ifrequency, it60, idamping, icorner, ikettle, iradius
-    amodes = amodes + arest
-    isquares = isquares + irest
-  endif
-  xout amodes, isquares
+; Puts the 12 membrane modes, struck at radius iradius of 1; gives the root of the sum of squared weights.
+opcode Put_membrane, i, iiiiii
+  ifrequency, it60, idamping, icorner, ikettle, iradius xin
+  index = 0
+  isquares = 0
+  while index < 12 do
+    iroot tab_i index, giRoots
+    im tab_i index, giDiameters
+    ipeak tab_i index, giPeaks
+    iair tab_i index, giKettle
+    iratio = (iroot / 2.404826)^(1 - ikettle) * iair^ikettle
+    ; A kettledrum's axisymmetric modes radiate well: weak and short.
+    iaxial = (im == 0 ? ikettle : 0)
+    ishape Bessel im, iroot * iradius
+    iweight = ishape / ipeak / sqrt(iratio) / (1 + (ifrequency * iratio / icorner)^2) * 0.35^iaxial
+    Put_mode index, ifrequency * iratio, it60 * limit(iratio, 1, 100)^(-idamping) * 0.3^iaxial, iweight
+    isquares += iweight * iweight
+    index += 1
+  od
+  xout sqrt(isquares)
 endop
 
 ; Zone 0: head. Zone 1: rim shot (the head near its edge, less of it, with rim and shell).
@@ -209,65 +312,64 @@ instr drum
   isnare_t60 = p21
   ilevel Level ispeed
   icorner Corner ihardness, ispeed
-  ablow Blow
+  $BLOW
   ; The pitch follows the membrane's tension, which grows with the stroke.
   kfall expon 1, p17, exp(-1)
   kbend = cent(p16 * limit(ispeed, 0, 16) / 8 * kfall)
-  ahead, isquares Membrane ablow, kbend, 0, p12, p13, p14, icorner, p18, 0.04 + 0.8 * (irim == 1 ? 1 : iplace)
-  asound = ahead * (irim == 1 ? 0.3 : 0.62) / sqrt(isquares)
+  inorm Put_membrane p12, p13, p14, icorner, p18, 0.04 + 0.8 * (irim == 1 ? 1 : iplace)
+  asound Bending_bank ablow, kbend, 12, ilevel
+  asound = asound * (irim == 1 ? 0.2 : 0.39) / inorm
   if p19 > 0 then
-    aburst Burst ispeed, iplace, 0.0002, 0.012 + 0.02 * (1 - ihardness)
-    aburst butterlp aburst, limit(2.5 * icorner, 300, 15000)
-    asound = asound + aburst * p19 * 0.9
+    iburst_t60 = 0.012 + 0.02 * (1 - ihardness)
+    $BURST(burst'iplace'0.0002'iburst_t60)
+    aburst butterlp aburst, limit(4 * icorner, 300, 15000)
+    asound = asound + aburst * p19 * 0.55
   endif
   if isnare > 0 then
-    awires Burst ispeed, 1 - iplace, 0.0015, isnare_t60
+    $BURST(wires'iplace'0.0015'isnare_t60)
     awires butterhp awires, 700
     awires butterlp awires, limit(4500 * sqrt(ispeed / 2), 1500, 16000)
-    asound = asound + awires * isnare * 0.75
+    asound = asound + awires * isnare * 0.85
   endif
   if irim == 1 then
-    arim1 Mode ablow, p22, 0.09, 0.4
-    arim2 Mode ablow, p22 * 1.72, 0.07, 0.3
-    arim3 Mode ablow, p22 * 2.61, 0.05, 0.4 * limit(sqrt(ispeed / 8), 0, 1)
-    asound = asound + arim1 + arim2 + arim3
+    Put_mode 0, p22, 0.09, 0.3
+    Put_mode 1, p22 * 1.72, 0.07, 0.22
+    Put_mode 2, p22 * 2.61, 0.05, 0.3 * limit(sqrt(ispeed / 8), 0, 1)
+    arim Bank ablow, 3, ilevel
+    asound = asound + arim
   endif
   atick Tick ablow, 0.2
+  asound += atick
   iduration Duration ilevel, max(p13, isnare > 0 ? isnare_t60 : 0, 0.1)
-  p3 = iduration
-  asound Close (asound + atick) * ilevel, iduration, p4, p10, p11
-  outs asound * p5, asound * p6
+  $CLOSE
 endin
 
-; Partials iindex...9 of set iset; place 1 brings out the high ones. Each is two modes iwarble apart.
-opcode Partials, ai, aiiiiiiii
-  ablow, iindex, iset, ifrequency, it60, idamping, icorner, iplace, iwarble xin
-  iratio tab_i iset * 10 + iindex, giRatios
-  iweight tab_i iset * 10 + iindex, giWeights
-  ilasting tab_i iset * 10 + iindex, giLasting
-  iat = ifrequency * iratio
-  iweight = iweight * iratio^(0.6 * iplace - 0.2) / (1 + (iat / icorner)^2)
-  iweight = (iat < 18000 ? iweight : 0)
-  iat = (iat < 18000 ? iat : 18000)
-  ipartial_t60 = it60 * ilasting * limit(iratio / (iset == 0 ? 0.5 : 1), 1, 100)^(-idamping)
-  if iwarble > 0 then
-    alow Mode ablow, iat - iwarble / 2, ipartial_t60, iweight * 0.55
-    ahigh Mode ablow, iat + iwarble / 2, ipartial_t60, iweight * 0.45
-    apartials = alow + ahigh
-  else
-    apartials Mode ablow, iat, ipartial_t60, iweight
-  endif
-  isquares = iweight * iweight
-  inext = 0
-  if iindex < 9 then
-    inext tab_i iset * 10 + iindex + 1, giWeights
-  endif
-  if inext > 0 then
-    arest, irest Partials ablow, iindex + 1, iset, ifrequency, it60, idamping, icorner, iplace, iwarble
-    apartials = apartials + arest
-    isquares = isquares + irest
-  endif
-  xout apartials, isquares
+; Puts the partials of set iset; place 1 brings out the high ones. With iwarble each is two modes that far apart.
+; Gives the number of modes and the root of the sum of squared weights.
+opcode Put_partials, ii, iiiiiii
+  iset, ifrequency, it60, idamping, icorner, iplace, iwarble xin
+  index = 0
+  icount = 0
+  isquares = 0
+  while index < 10 do
+    iratio tab_i iset * 10 + index, giRatios
+    iweight tab_i iset * 10 + index, giWeights
+    ilasting tab_i iset * 10 + index, giLasting
+    iat = ifrequency * iratio
+    if iweight > 0 then
+      iweight = iweight * iratio^(0.6 * iplace - 0.2) / (1 + (iat / icorner)^2)
+      isquares += iweight * iweight
+      ipartial_t60 = it60 * ilasting * limit(iratio / (iset == 0 ? 0.5 : 1), 1, 100)^(-idamping)
+      Put_mode icount, max(iat - iwarble / 2, 1), ipartial_t60, (iwarble > 0 ? 0.5 : 1) * iweight
+      icount += 1
+      if iwarble > 0 then
+        Put_mode icount, iat + iwarble / 2, ipartial_t60, 0.45 * iweight
+        icount += 1
+      endif
+    endif
+    index += 1
+  od
+  xout icount, sqrt(isquares)
 endop
 
 ; Zone 0: body. Zone 1: shoulder (brighter, as place 1, and half as loud).
@@ -278,36 +380,35 @@ instr bell
   iset = int(p14 + 0.5)
   ilevel Level ispeed
   icorner Corner p16, ispeed
-  ablow Blow
-  asound, isquares Partials ablow, 0, iset, p12, p13, p15, max(icorner, p12), iplace, p17
-  asound = asound * 0.58 / sqrt(isquares) * (ishoulder == 1 ? 0.5 : 1)
+  $BLOW
+  icount, inorm Put_partials iset, p12, p13, p15, max(icorner, p12), iplace, p17
+  asound Bank ablow, icount, ilevel
+  asound = asound * 0.53 / inorm * (ishoulder == 1 ? 0.5 : 1)
   if p18 > 0 then
-    aburst Burst ispeed, iplace, 0.0002, 0.02
+    $BURST(burst'iplace'0.0002'0.02)
     aburst butterlp aburst, limit(2 * icorner, 500, 16000)
     asound = asound + aburst * p18 * 0.8
   endif
   atick Tick ablow, 0.2
+  asound += atick
   iduration Duration ilevel, max(p13, 0.05)
-  p3 = iduration
-  asound Close (asound + atick) * ilevel, iduration, p4, p10, p11
-  outs asound * p5, asound * p6
+  $CLOSE
 endin
 
-; Partials n = iindex...icount of a stiff string struck at ipoint of its length: weight sin(n pi ipoint), the comb of the
-; struck place.
-opcode StringPartials, ai, aiiiiiiiii
-  ablow, iindex, icount, ifrequency, it60, idamping, icorner, iinharmonicity, ipoint, ipluck xin
-  iat = iindex * ifrequency * sqrt((1 + iinharmonicity * iindex * iindex) / (1 + iinharmonicity))
-  iweight = sin(iindex * $M_PI * ipoint) * iindex^(-0.3 - ipluck) / (1 + (iat / icorner)^2)
-  iweight = (iat < 18000 ? abs(iweight) : 0)
-  apartials Mode ablow, min(iat, 18000), it60 * iindex^(-idamping), iweight
-  isquares = iweight * iweight
-  if iindex < icount then
-    arest, irest StringPartials ablow, iindex + 1, icount, ifrequency, it60, idamping, icorner, iinharmonicity, ipoint, ipluck
-    apartials = apartials + arest
-    isquares = isquares + irest
-  endif
-  xout apartials, isquares
+; Puts icount partials of a stiff string struck at ipoint of its length: weight sin(n pi ipoint), the comb of the struck
+; place. Gives the root of the sum of squared weights.
+opcode Put_string, i, iiiiiiii
+  icount, ifrequency, it60, idamping, icorner, iinharmonicity, ipoint, ipluck xin
+  index = 1
+  isquares = 0
+  while index <= icount do
+    iat = index * ifrequency * sqrt((1 + iinharmonicity * index * index) / (1 + iinharmonicity))
+    iweight = abs(sin(index * $M_PI * ipoint)) * index^(-0.3 - ipluck) / (1 + (iat / icorner)^2)
+    isquares += iweight * iweight
+    Put_mode index - 1, iat, it60 * index^(-idamping), iweight
+    index += 1
+  od
+  xout sqrt(isquares)
 endop
 
 ; place 1 strikes a fifth as far from the bridge as place 0. All zones sound alike.
@@ -315,38 +416,42 @@ instr string
   ispeed = p7
   ilevel Level ispeed
   icorner Corner p15, ispeed
-  ablow Blow
+  $BLOW
   icount = limit(int(12000 / p12), 1, 32)
-  asound, isquares StringPartials ablow, 1, icount, p12, p13, p14, max(icorner, p12), p16, p17 * (1 - 0.8 * p8), p18
-  asound = asound * 0.5 / sqrt(isquares)
+  inorm Put_string icount, p12, p13, p14, max(icorner, p12), p16, p17 * (1 - 0.8 * p8), p18
+  asound Bank ablow, icount, ilevel
+  asound = asound * 0.38 / inorm
   if p19 > 0 then
-    aburst Burst ispeed, p8, 0.0002, 0.025
+    $BURST(burst'p8'0.0002'0.025)
     aburst butterlp aburst, limit(1.5 * icorner, 300, 12000)
     asound = asound + aburst * p19 * 0.8
   endif
   atick Tick ablow, 0.2
+  asound += atick
   iduration Duration ilevel, max(p13, 0.05)
-  p3 = iduration
-  asound Close (asound + atick) * ilevel, iduration, p4, p10, p11
-  outs asound * p5, asound * p6
+  $CLOSE
 endin
 
-; Plate modes iindex...29, spread evenly in log frequency with a fixed irregularity (golden-ratio sequence).
-opcode Plate, ai, aiiiiiiii
-  ablow, iindex, ifrequency, ispan, it60, idamping, icorner, iplace, icup xin
-  ijitter = frac(iindex * 0.6180339887 + 0.37) - 0.5
-  iat = ifrequency * ispan^(limit((iindex + 0.9 * ijitter) / 29, 0, 1))
-  iweight = (iat / ifrequency)^(0.15 + 0.3 * iplace) / (1 + (iat / icorner)^2) * (0.6 + 0.8 * frac(iindex * 0.7548776662))
-  ; The cup rings on every fifth partial, the rest little.
-  iweight = iweight * (icup == 1 && iindex % 5 != 2 ? 0.15 : 1)
-  aplate Mode ablow, iat, it60 * (1000 / iat)^idamping, iweight
-  isquares = iweight * iweight
-  if iindex < 29 then
-    arest, irest Plate ablow, iindex + 1, ifrequency, ispan, it60, idamping, icorner, iplace, icup
-    aplate = aplate + arest
-    isquares = isquares + irest
-  endif
-  xout aplate, isquares
+; Puts 32 plate modes, spread evenly in log frequency with a fixed irregularity (golden-ratio sequence). The cup rings on
+; every fifth one. Signs alternate, or all modes would meet in a click. Gives the root of the sum of squared weights and the sign of the
+; modes' first sample, which the tick takes, so that they do not cancel.
+opcode Put_plate, ii, iiiiiii
+  ifrequency, ispan, it60, idamping, icorner, iplace, icup xin
+  index = 0
+  isquares = 0
+  ifirst = 0
+  while index < 32 do
+    ijitter = frac(index * 0.6180339887 + 0.37) - 0.5
+    iat = ifrequency * ispan^(limit((index + 0.9 * ijitter) / 31, 0, 1))
+    iweight = (iat / ifrequency)^(0.35 + 0.3 * iplace) / (1 + (iat / icorner)^2) * (0.6 + 0.8 * frac(index * 0.7548776662))
+    iweight = iweight * (icup == 1 && index % 5 != 2 ? 0.15 : 1)
+    iweight = (index % 2 == 0 ? iweight : -iweight)
+    isquares += iweight * iweight
+    ifirst += iweight * sin(2 * $M_PI * iat / sr)
+    Put_mode index, iat, it60 * (1000 / iat)^idamping, iweight
+    index += 1
+  od
+  xout sqrt(isquares), (ifirst < 0 ? -1 : 1)
 endop
 
 ; Zone 0: bow and edge. Zone 1: cup (clearer, less noise).
@@ -361,24 +466,27 @@ instr cymbal
   icorner Corner p15, ispeed
   icorner = max(icorner, 2 * p12)
   ispan = limit(36^p17, 2, 15000 / p12)
-  ablow Blow
-  aplate, isquares Plate ablow, 0, p12, ispan, it60, idamping, icorner, iplace, icup
-  asound = aplate * 0.42 / sqrt(isquares) * (1 - 0.8 * inoise)
+  $BLOW
+  inorm, isign Put_plate p12, ispan, it60, idamping, icorner, iplace, icup
+  aplate Bank ablow, 32, ilevel
+  asound = aplate * 0.42 / inorm * (1 - 0.8 * inoise)
   if inoise > 0 then
     ; Three bands of noise stand for the modes too dense to tell apart; the high ones come up last and go first.
-    alow Burst ispeed, iplace, 0.0005, it60 * (1000 / 1200)^idamping
+    ilow_t60 = it60 * (1000 / 1200)^idamping
+    $BURST(low'iplace'0.0005'ilow_t60)
     alow butterbp alow, 1200, 1500
-    amid Burst ispeed, 1 - iplace, 0.001, it60 * (1000 / 4000)^idamping
+    imid_t60 = it60 * (1000 / 4000)^idamping
+    $BURST(mid'iplace'0.001'imid_t60)
     amid butterbp amid, 4000, 4000
-    ahigh Burst ispeed, 0.5 * iplace, 0.003, it60 * (1000 / 9000)^idamping
+    ihigh_t60 = it60 * (1000 / 9000)^idamping
+    $BURST(high'iplace'0.003'ihigh_t60)
     ahigh butterbp ahigh, 9000, 8000
     ibright = 1 / (1 + (9000 / icorner)^1.5)
     imiddle = 1 / (1 + (4000 / icorner)^1.5)
-    asound = asound + inoise * (alow * 0.5 + amid * imiddle * 1.2 + ahigh * ibright * 1.6) / (0.6 + imiddle + ibright)
+    asound = asound + inoise * (alow * 0.6 + amid * imiddle * 2 + ahigh * ibright * 3.2) / (0.6 + imiddle + ibright)
   endif
-  atick Tick ablow, 0.2
+  atick Tick ablow, 0.2 * isign
+  asound += atick
   iduration Duration ilevel, max(it60 * (1000 / limit(p12, 60, 1000))^idamping, 0.05)
-  p3 = iduration
-  asound Close (asound + atick) * ilevel, iduration, p4, p10, p11
-  outs asound * p5, asound * p6
+  $CLOSE
 endin

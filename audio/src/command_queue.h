@@ -6,10 +6,10 @@
 
 namespace audio {
 
-/// Bounded first-in first-out queue between one writing and one reading thread. Both sides wait where they cannot go on
-/// (an offline performance loses nothing); neither takes a lock nor allocates after construction.
-/// Positions only grow; element i lies in slot i mod capacity. The writer owns the slots from written_ on, the reader
-/// those from read_ to written_; the release of a position by its owner hands the slot over.
+/// Bounded first-in first-out queue between one writing and one reading thread. Both sides wait where they
+/// cannot go on (an offline performance loses nothing); neither takes a lock. Positions only grow; element i
+/// lies in slot i mod capacity. The writer owns the slots from written_ on, the reader those from read_ to
+/// written_; the release of a position by its owner hands the slot over.
 template <class T>
 class CommandQueue {
 public:

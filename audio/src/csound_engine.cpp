@@ -13,7 +13,7 @@ namespace {
 
 static_assert(sizeof(MYFLT) == sizeof(double), "the 64-bit Csound library is expected");
 
-constexpr std::size_t kMessageLimit = 4000;
+constexpr std::size_t kMessageLimit = 600;
 
 /// Once a process, before its first instance: no signal handlers, no exit handler, no plugin folder.
 void prepare_library() {
@@ -25,14 +25,17 @@ void prepare_library() {
 }
 
 bool is_error(std::string_view text) {
-    // "INIT ERROR in instr", "PERF ERROR in instr", "error: syntax error", "note deleted": not "0 errors in performance".
+    // "INIT ERROR in instr", "PERF ERROR in instr", "error: syntax error", "note deleted": not "0 errors in
+    // performance".
     return text.find("ERROR") != text.npos || text.find("rror:") != text.npos ||
            text.find("note deleted") != text.npos;
 }
 
 }  // namespace
 
-void CsoundEngine::Destroy::operator()(CSOUND_* csound) const noexcept { csoundDestroy(csound); }
+void CsoundEngine::Destroy::operator()(CSOUND_* csound) const noexcept {
+    csoundDestroy(csound);
+}
 
 CsoundEngine::CsoundEngine(const std::string& orchestra, const std::string& source) : source_(source) {
     prepare_library();
@@ -44,7 +47,8 @@ CsoundEngine::CsoundEngine(const std::string& orchestra, const std::string& sour
             throw std::runtime_error(std::string("Csound refuses its option ") + option);
         }
     }
-    if (csoundCompileOrc(csound_.get(), orchestra.c_str()) != 0 || csoundStart(csound_.get()) != 0) failed_ = true;
+    if (csoundCompileOrc(csound_.get(), orchestra.c_str()) != 0 || csoundStart(csound_.get()) != 0)
+        failed_ = true;
     check_messages();
     check_format();
     block_size_ = static_cast<int>(csoundGetKsmps(csound_.get()));
@@ -53,12 +57,15 @@ CsoundEngine::CsoundEngine(const std::string& orchestra, const std::string& sour
 void CsoundEngine::receive_message(CSOUND* csound, int, const char* text) {
     auto* engine = static_cast<CsoundEngine*>(csoundGetHostData(csound));
     if (is_error(text)) engine->failed_ = true;
-    if (engine->messages_.size() < kMessageLimit) engine->messages_ += text;
+    engine->messages_ += text;
+    // What matters stands last, after what the preprocessor says of macros.
+    if (engine->messages_.size() > 2 * kMessageLimit)
+        engine->messages_.erase(0, engine->messages_.size() - kMessageLimit);
 }
 
 void CsoundEngine::check_messages() const {
     if (!failed_) return;
-    std::string text = messages_;
+    std::string text = messages_.substr(messages_.size() - std::min(messages_.size(), kMessageLimit));
     std::ranges::replace(text, '\n', ' ');
     throw std::runtime_error(source_ + ": Csound reports: " + text);
 }

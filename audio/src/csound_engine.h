@@ -7,15 +7,15 @@ struct CSOUND_;  // Csound's own handle; csound.h stays out of this header
 
 namespace audio {
 
-/// One Csound instance: 48 kHz, stereo, sample-accurate, no device, rendered block by block. The one owner of Csound.
-/// To be created, used and destroyed on one thread, which Csound leaves with denormals off (DAZ, FTZ).
-/// Plugin opcodes are not loaded (none is needed, and a process that loads them dies after some hundred instances): the
-/// first instance of the process points Csound's own OPCODE6DIR64 to no folder, once, under the language's guard; the
-/// process's environment is left alone.
+/// One Csound instance: 48 kHz, stereo, sample-accurate, no device, rendered block by block. The one owner of
+/// Csound. To be created, used and destroyed on one thread, which Csound leaves with denormals off (DAZ,
+/// FTZ). Plugin opcodes are not loaded (none is needed, and a process that loads them dies after some hundred
+/// instances): the first instance of the process points Csound's own OPCODE6DIR64 to no folder, once, under
+/// the language's guard; the process's environment is left alone.
 class CsoundEngine {
 public:
-    /// Compiles and starts an orchestra; `source` names it in messages. Throws std::runtime_error with Csound's own
-    /// message where it does not compile, or where it is not 48 kHz stereo at 0dbfs = 1.
+    /// Compiles and starts an orchestra; `source` names it in messages. Throws std::runtime_error with
+    /// Csound's own message where it does not compile, or where it is not 48 kHz stereo at 0dbfs = 1.
     CsoundEngine(const std::string& orchestra, const std::string& source);
 
     [[nodiscard]] int block_size() const { return block_size_; }  ///< ksmps [samples]

@@ -1,6 +1,5 @@
 // smf.h includes glib.h within extern "C", which glib's C++ parts do not bear: glib comes first.
 #include <glib.h>
-
 #include <smf.h>
 
 #include <algorithm>
@@ -32,6 +31,24 @@ struct Delete {
     void operator()(smf_t* file) const noexcept { smf_delete(file); }
 };
 
+/// Holds back what libsmf would print on standard error while it lives (glib's handlers belong to the
+/// process: kept short).
+class LogCatcher {
+public:
+    LogCatcher() : id_(g_log_set_handler("libsmf", G_LOG_LEVEL_MASK, &LogCatcher::receive, this)) {}
+    ~LogCatcher() { g_log_remove_handler("libsmf", id_); }
+    LogCatcher(const LogCatcher&) = delete;
+    LogCatcher& operator=(const LogCatcher&) = delete;
+    [[nodiscard]] const std::string& text() const { return text_; }
+
+private:
+    static void receive(const gchar*, GLogLevelFlags, const gchar* message, gpointer self) {
+        static_cast<LogCatcher*>(self)->text_ = message;
+    }
+    std::string text_;
+    guint id_;
+};
+
 [[noreturn]] void fail(const std::filesystem::path& file, const std::string& what) {
     throw std::runtime_error(file.string() + ": " + what);
 }
@@ -40,11 +57,12 @@ std::vector<Stroke> strokes_of(const std::vector<Note>& notes, const std::filesy
     std::vector<Stroke> strokes;
     for (const Note& note : notes) {
         const std::int64_t tick = (note.onset_sample + kSamplesPerTick / 2) / kSamplesPerTick;
-        if (note.midi_note < 0 || note.midi_note > 127 || note.midi_velocity < 1 || note.midi_velocity > 127 ||
-            note.onset_sample < 0 || tick > kLastTick - kNoteTicks) {
+        if (note.midi_note < 0 || note.midi_note > 127 || note.midi_velocity < 1 ||
+            note.midi_velocity > 127 || note.onset_sample < 0 || tick > kLastTick - kNoteTicks) {
             fail(file, "note " + std::to_string(note.id) + ": found key " + std::to_string(note.midi_note) +
                            ", velocity " + std::to_string(note.midi_velocity) + ", onset " +
-                           std::to_string(note.onset_sample) + ", expected key 0-127, velocity 1-127, onset >= 0");
+                           std::to_string(note.onset_sample) +
+                           ", expected key 0-127, velocity 1-127, onset >= 0");
         }
         strokes.push_back({static_cast<int>(tick), true, note.midi_note, note.midi_velocity});
         strokes.push_back({static_cast<int>(tick) + kNoteTicks, false, note.midi_note, 0});
@@ -72,10 +90,13 @@ void write_midi(const std::filesystem::path& file, const std::vector<Note>& note
     std::array<unsigned char, 6> tempo = kTempo;
     append(track, smf_event_new_from_pointer(tempo.data(), static_cast<int>(tempo.size())), 0, file);
     for (const Stroke& stroke : strokes) {
-        append(track, smf_event_new_from_bytes(stroke.on ? kNoteOn : kNoteOff, stroke.key, stroke.velocity), stroke.tick,
-               file);
+        append(track, smf_event_new_from_bytes(stroke.on ? kNoteOn : kNoteOff, stroke.key, stroke.velocity),
+               stroke.tick, file);
     }
-    if (smf_save(midi.get(), file.c_str()) != 0) fail(file, "writing failed, expected a writable file with room for it");
+    const LogCatcher log;
+    if (smf_save(midi.get(), file.c_str()) != 0) {
+        fail(file, "writing failed (" + log.text() + "), expected a writable file with room for it");
+    }
 }
 
 }  // namespace audio

@@ -10,7 +10,8 @@
 namespace audio {
 namespace {
 
-// A note shorter than a block makes Csound 6.18 copy a negative number of samples (and die): four blocks are safe.
+// A note shorter than a block makes Csound 6.18 copy a negative number of samples (and die): four blocks are
+// safe.
 constexpr int kNoteBlocks = 4;
 constexpr int kBlocksHeard = 8;  // an impulse that comes later is as wrong as one that never comes
 
@@ -20,7 +21,8 @@ std::string impulse_orchestra(int block_size) {
            "instr impulse\n ablow linseg 1, 1 / sr, 0, 1, 0\n outs ablow, ablow\nendin\n";
 }
 
-/// Whether an impulse asked for `offset` samples into the coming block is one sample of 1 there and nothing else.
+/// Whether an impulse asked for `offset` samples into the coming block is one sample of 1 there and nothing
+/// else.
 bool sounds_at(CsoundEngine& engine, double instrument, OnsetRule rule, int offset) {
     const double duration = static_cast<double>(kNoteBlocks * engine.block_size()) / kSampleRate;
     const std::array p_fields{instrument, onset_p2(rule, offset, engine.block_size()), duration};
@@ -60,7 +62,8 @@ OnsetRule probe_onset_rule(int block_size) {
 }
 
 std::string describe(OnsetRule rule) {
-    return rule == OnsetRule::exact ? "sample-accurate: exact" : "sample-accurate: second half of a block corrected";
+    return rule == OnsetRule::exact ? "sample-accurate: exact"
+                                    : "sample-accurate: second half of a block corrected";
 }
 
 }  // namespace audio

@@ -129,11 +129,12 @@ std::vector<double> resolve_parameters(const Instrument& instrument,
         const auto place = static_cast<std::size_t>(parameter - instrument.parameters.begin());
         if (parameter == instrument.parameters.end() || seen[place]) {
             throw std::runtime_error(owner + ": found parameter " + in_ticks(name) + " of instrument " +
-                                     in_ticks(instrument.name) + ", expected each at most once of: " + known_names(instrument));
+                                     in_ticks(instrument.name) +
+                                     ", expected each at most once of: " + known_names(instrument));
         }
         if (!(value >= parameter->minimum && value <= parameter->maximum)) {
-            throw std::runtime_error(owner + ": found " + name + " = " + std::to_string(value) + ", expected " +
-                                     std::to_string(parameter->minimum) + " to " +
+            throw std::runtime_error(owner + ": found " + name + " = " + std::to_string(value) +
+                                     ", expected " + std::to_string(parameter->minimum) + " to " +
                                      std::to_string(parameter->maximum));
         }
         values[place] = value;

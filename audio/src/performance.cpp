@@ -41,11 +41,12 @@ double thread_seconds() {
 void check_note(const Note& note, std::size_t voices) {
     if (note.id == 0 || note.voice >= voices || note.onset_sample < 0 || !std::isfinite(note.speed_mps) ||
         note.speed_mps < 0 || !(note.place >= 0 && note.place <= 1) || note.zone < 0) {
-        throw std::logic_error("note " + std::to_string(note.id) + ": found voice " + std::to_string(note.voice) +
-                               ", onset " + std::to_string(note.onset_sample) + ", speed " +
-                               std::to_string(note.speed_mps) + ", place " + std::to_string(note.place) + ", zone " +
-                               std::to_string(note.zone) + ", expected a positive id, a voice below " +
-                               std::to_string(voices) + ", none negative, place at most 1");
+        throw std::logic_error("note " + std::to_string(note.id) + ": found voice " +
+                               std::to_string(note.voice) + ", onset " + std::to_string(note.onset_sample) +
+                               ", speed " + std::to_string(note.speed_mps) + ", place " +
+                               std::to_string(note.place) + ", zone " + std::to_string(note.zone) +
+                               ", expected a positive id, a voice below " + std::to_string(voices) +
+                               ", none negative, place at most 1");
     }
 }
 
@@ -66,7 +67,8 @@ public:
     void remove(std::uint64_t id, std::int64_t reached) {
         const auto onset = onsets_.find(id);
         if (onset == onsets_.end() || onset->second < reached) {
-            throw std::logic_error("note " + std::to_string(id) + ": found it unknown or already reached by sample " +
+            throw std::logic_error("note " + std::to_string(id) +
+                                   ": found it unknown or already reached by sample " +
                                    std::to_string(reached) + ", expected a note ahead");
         }
         notes_.erase(std::pair(onset->second, id));
@@ -122,7 +124,8 @@ struct Performance::Implementation {
 
     // The audio thread: Csound lives and dies here.
     void run(const std::filesystem::path& orchestra, const std::vector<Voice>& voices) {
-        _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);  // decayed modes must not cost; this thread's own register
+        _MM_SET_FLUSH_ZERO_MODE(
+            _MM_FLUSH_ZERO_ON);  // decayed modes must not cost; this thread's own register
         try {
             Renderer renderer(orchestra, voices);
             start_up.set_value({renderer.block_size(), renderer.version()});
@@ -233,8 +236,12 @@ std::vector<float> Performance::finish(std::int64_t minimum_samples, std::int64_
     return self.result.get();
 }
 
-std::string Performance::version() const { return implementation_->start.version; }
+std::string Performance::version() const {
+    return implementation_->start.version;
+}
 
-double Performance::busy_s() const { return implementation_->busy.load(std::memory_order_relaxed); }
+double Performance::busy_s() const {
+    return implementation_->busy.load(std::memory_order_relaxed);
+}
 
 }  // namespace audio

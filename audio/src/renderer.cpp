@@ -24,8 +24,8 @@ public:
         const int next = static_cast<int>(numbers_.size());
         const int found = numbers_.try_emplace(name, next).first->second;
         if (numbers_.size() > capacity_) {
-            throw std::runtime_error("choke group `" + name + "`: found more than " + std::to_string(capacity_) +
-                                     " groups, expected at most as many");
+            throw std::runtime_error("choke group `" + name + "`: found more than " +
+                                     std::to_string(capacity_) + " groups, expected at most as many");
         }
         return found;
     }
@@ -37,8 +37,9 @@ private:
 
 void check_mix(const Voice& voice) {
     if (!(voice.pan >= 0 && voice.pan <= 1) || !std::isfinite(voice.gain_db) || voice.gain_db > 60) {
-        throw std::runtime_error("voice " + voice.name + ": found pan " + std::to_string(voice.pan) + ", gain " +
-                                 std::to_string(voice.gain_db) + " dB, expected pan 0 to 1, gain up to 60 dB");
+        throw std::runtime_error("voice " + voice.name + ": found pan " + std::to_string(voice.pan) +
+                                 ", gain " + std::to_string(voice.gain_db) +
+                                 " dB, expected pan 0 to 1, gain up to 60 dB");
     }
 }
 
@@ -145,13 +146,15 @@ void Renderer::start(const Note& note, std::span<const Note> block_notes) {
     engine_.start_note(p_fields_);
 }
 
-bool Renderer::sounding() const { return !due_.empty() || ends_.front() > static_cast<double>(position_); }
+bool Renderer::sounding() const {
+    return !due_.empty() || ends_.front() > static_cast<double>(position_);
+}
 
 std::vector<float> Renderer::finish(std::int64_t minimum_samples, std::int64_t tail_samples) {
     const std::int64_t limit = minimum_samples + tail_samples;
     while (position_ < minimum_samples || (position_ < limit && sounding())) render_block();
-    const auto last_loud =
-        std::find_if(output_.rbegin(), output_.rend(), [](float value) { return std::abs(value) >= kSilence; });
+    const auto last_loud = std::find_if(output_.rbegin(), output_.rend(),
+                                        [](float value) { return std::abs(value) >= kSilence; });
     const std::int64_t loud_frames = (output_.rend() - last_loud + 1) / 2;
     const std::int64_t frames = std::clamp(loud_frames, minimum_samples, limit);
     output_.resize(static_cast<std::size_t>(2 * frames));

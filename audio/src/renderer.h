@@ -14,7 +14,7 @@ namespace audio {
 
 /// A voice as the orchestra wants it.
 struct RenderedVoice {
-    double instrument = 0;  ///< number in Csound
+    double instrument = 0;       ///< number in Csound
     double left = 0, right = 0;  ///< gains: constant power pan times the voice's gain
     int choke_group = -1;
     std::vector<double> parameters;  ///< in the declared order, p12 on
@@ -28,10 +28,10 @@ struct PanGains {
 
 /// Turns notes into samples, block by block; everything on one thread.
 ///
-/// A note is handed to Csound just before the block that holds its onset, so Csound never knows a note that can still be
-/// cancelled. Choking: before a block the host writes into table 901 the group's first onset within it; every older
-/// note of the group fades from that very sample; a note started in the same block gets the group's next later onset there
-/// as p11. Equal onsets do not choke each other.
+/// A note is handed to Csound just before the block that holds its onset, so Csound never knows a note that
+/// can still be cancelled. Choking: before a block the host writes into table 901 the group's first onset
+/// within it; every older note of the group fades from that very sample; a note started in the same block
+/// gets the group's next later onset there as p11. Equal onsets do not choke each other.
 class Renderer {
 public:
     /// Throws std::runtime_error: orchestra, instrument, parameter, pan or gain that is not valid.

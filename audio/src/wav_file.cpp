@@ -10,9 +10,9 @@
 namespace audio {
 namespace {
 
-constexpr double kFullScale = 8388607;         // 2^23 - 1: the largest 24-bit sample
-constexpr std::size_t kChunk = 8192;           // samples a write
-constexpr std::uintmax_t kHeaderBytes = 44;    // RIFF, fmt and data headers: the least a WAV file has
+constexpr double kFullScale = 8388607;       // 2^23 - 1: the largest 24-bit sample
+constexpr std::size_t kChunk = 8192;         // samples a write
+constexpr std::uintmax_t kHeaderBytes = 44;  // RIFF, fmt and data headers: the least a WAV file has
 
 struct Close {
     void operator()(SNDFILE* file) const noexcept { sf_close(file); }
@@ -22,17 +22,20 @@ struct Close {
     throw std::runtime_error(file.string() + ": " + what + ", expected a writable file with room for it");
 }
 
-/// The sample as libsndfile wants it for 24-bit files: in the upper three bytes. NaN counts as clipped silence.
+/// The sample as libsndfile wants it for 24-bit files: in the upper three bytes. NaN counts as clipped
+/// silence.
 int to_pcm(float value, std::size_t& clipped) {
     if (!(value >= -1 && value <= 1)) ++clipped;
-    const double bounded = std::isnan(value) ? 0.0 : std::fmin(1.0, std::fmax(-1.0, static_cast<double>(value)));
+    const double bounded =
+        std::isnan(value) ? 0.0 : std::fmin(1.0, std::fmax(-1.0, static_cast<double>(value)));
     return static_cast<int>(std::lround(bounded * kFullScale)) * 256;
 }
 
 }  // namespace
 
 std::size_t write_wav(const std::filesystem::path& file, const std::vector<float>& interleaved) {
-    if (interleaved.size() % 2 != 0) throw std::logic_error("write_wav: found an odd number of samples, expected pairs");
+    if (interleaved.size() % 2 != 0)
+        throw std::logic_error("write_wav: found an odd number of samples, expected pairs");
     SF_INFO format{};
     format.samplerate = kSampleRate;
     format.channels = 2;

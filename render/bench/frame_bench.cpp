@@ -59,12 +59,12 @@ void start_and_first_frame(benchmark::State& state) {
     }
 }
 
-BENCHMARK(frame_640x480_with_png)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(frame_640x480)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(frame_640x480_without_antialiasing)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(frame_640x480_without_shadow)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(frame_640x480_empty_room)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(frame_1280x720_with_png)->Unit(benchmark::kMillisecond)->UseRealTime();
-BENCHMARK(start_and_first_frame)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(frame_640x480_with_png)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(frame_640x480)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(frame_640x480_without_antialiasing)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(frame_640x480_without_shadow)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(frame_640x480_empty_room)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(frame_1280x720_with_png)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(start_and_first_frame)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
 
 }  // namespace

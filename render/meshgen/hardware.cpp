@@ -26,9 +26,9 @@ ObjMesh beater(const char* name, const Profile& handle, double tip_radius, int t
 void add_leg(ObjMesh& mesh, double angle) {
     const Eigen::Vector3d out(std::cos(angle), 0, std::sin(angle)), up = Eigen::Vector3d::UnitY();
     Part& metal = mesh.part("metal");
-    tube(metal, 0.014 * out - 0.55 * up, 0.236 * out - 0.982 * up, {0.007, 0.007}, 8);
-    tube(metal, 0.010 * out - 0.86 * up, 0.145 * out - 0.807 * up, {0.005, 0.005}, 6);
-    sphere(mesh.part("rubber"), 0.236 * out - 0.986 * up, 0.014, 10);
+    tube(metal, 0.014 * out - 0.55 * up, 0.236 * out - 0.982 * up, {0.007, 0.007}, 6);
+    tube(metal, 0.010 * out - 0.86 * up, 0.145 * out - 0.807 * up, {0.005, 0.005}, 5);
+    sphere(mesh.part("rubber"), 0.236 * out - 0.986 * up, 0.014, 8);
 }
 
 }  // namespace
@@ -36,12 +36,12 @@ void add_leg(ObjMesh& mesh, double angle) {
 ObjMesh stand() {
     ObjMesh mesh{"stand", {}};
     Part& metal = mesh.part("metal");
-    tube(metal, {0, 0, 0}, {0, -0.45, 0}, {0.006, 0.006}, 12);
-    tube(metal, {0, -0.42, 0}, {0, -0.88, 0}, {0.0105, 0.0105}, 14);
+    tube(metal, {0, 0, 0}, {0, -0.45, 0}, {0.006, 0.006}, 8);
+    tube(metal, {0, -0.42, 0}, {0, -0.88, 0}, {0.0105, 0.0105}, 8);
     for (const double height : {-0.41, -0.545, -0.845}) {  // clamps
-        lathe(metal, {{0, height + 0.02}, {0.014, height + 0.02}, {0.019, height + 0.012}, {0.019, height - 0.012}, {0.014, height - 0.02}, {0, height - 0.02}}, 14);
+        lathe(metal, {{0, height + 0.02}, {0.014, height + 0.02}, {0.019, height + 0.012}, {0.019, height - 0.012}, {0.014, height - 0.02}, {0, height - 0.02}}, 8);
     }
-    lathe(metal, {{0, 0}, {0.008, -0.002}, {0.014, -0.012}, {0.014, -0.018}, {0.006, -0.03}, {0, -0.03}}, 14);
+    lathe(metal, {{0, 0}, {0.008, -0.002}, {0.014, -0.012}, {0.014, -0.018}, {0.006, -0.03}, {0, -0.03}}, 10);
     for (int i = 0; i < 3; ++i) add_leg(mesh, 2 * kPi * (i + 0.25) / 3);
     return mesh;
 }

@@ -8,13 +8,13 @@ namespace meshgen {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr int kDrumSegments = 40, kLugs = 6, kCymbalSegments = 48, kBellSegments = 36;
+constexpr int kDrumSegments = 36, kLugs = 6, kCymbalSegments = 44, kBellSegments = 30;
 
 /// A lug of the shell and its rod up to the hoops, turned to its place around the drum.
 void add_lug(Part& lug, double angle) {
     Part upright;
-    lathe(upright, {{0, 0.34}, {0.026, 0.30}, {0.032, 0.18}, {0.032, -0.18}, {0.026, -0.30}, {0, -0.34}}, 6);
-    tube(upright, {0.012, 0.99, 0}, {0.012, -0.99, 0}, {0.011, 0.011}, 5);
+    lathe(upright, {{0, 0.34}, {0.030, 0.25}, {0.030, -0.25}, {0, -0.34}}, 6);
+    tube(upright, {0.012, 0.99, 0}, {0.012, -0.99, 0}, {0.011, 0.011}, 4);
     Eigen::Affine3d placed(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()));
     placed.translate(Eigen::Vector3d(0.955, 0, 0));
     append_transformed(lug, upright, placed);
@@ -25,7 +25,7 @@ double bow(double radius) { return 0.42 - 1.36 * std::pow((radius - 0.2) / 0.8, 
 
 void add_hoop(Part& hoop, double top, double bottom) {
     const double middle = (top + bottom) / 2;
-    lathe_ring(hoop, {{0.955, top}, {0.985, top}, {1.0, middle}, {0.985, bottom}, {0.955, bottom}}, kDrumSegments);
+    lathe_ring(hoop, {{0.957, top}, {0.985, top}, {1.0, middle}, {0.985, bottom}, {0.957, bottom}}, kDrumSegments);
 }
 
 }  // namespace
@@ -48,9 +48,9 @@ ObjMesh drum() {
 }
 
 ObjMesh cymbal() {
-    Profile top{{0, 1.0}, {0.06, 0.97}, {0.115, 0.86}, {0.16, 0.66}, {0.19, 0.49}, {0.225, 0.42}};
-    for (const double radius : {0.38, 0.55, 0.72, 0.88, 1.0}) top.emplace_back(radius, bow(radius));
-    const Profile bottom{{1.0, -1.0}, {0.75, bow(0.75) - 0.06}, {0.45, bow(0.45) - 0.06}, {0.22, 0.34}, {0.14, 0.68}, {0, 0.9}};
+    Profile top{{0, 1.0}, {0.075, 0.955}, {0.14, 0.77}, {0.185, 0.51}, {0.23, 0.42}};
+    for (const double radius : {0.48, 0.74, 1.0}) top.emplace_back(radius, bow(radius));
+    const Profile bottom{{1.0, -1.0}, {0.62, bow(0.62) - 0.06}, {0.21, 0.36}, {0, 0.9}};
     ObjMesh mesh{"cymbal", {}};
     lathe_with_edges(mesh.part("bronze"), {top, {top.back(), bottom.front()}, bottom}, kCymbalSegments);
     return mesh;

@@ -18,12 +18,13 @@ namespace render {
     X(PFNGLBUFFERSUBDATAPROC, BufferSubData)                          \
     X(PFNGLCHECKFRAMEBUFFERSTATUSPROC, CheckFramebufferStatus)        \
     X(PFNGLCLEARPROC, Clear)                                          \
-    X(PFNGLCOLORMASKPROC, ColorMask)                                  \
+    X(PFNGLCLEARCOLORPROC, ClearColor)                                \
     X(PFNGLCOMPILESHADERPROC, CompileShader)                          \
     X(PFNGLCREATEPROGRAMPROC, CreateProgram)                          \
     X(PFNGLCREATESHADERPROC, CreateShader)                            \
     X(PFNGLDEPTHFUNCPROC, DepthFunc)                                  \
     X(PFNGLDEPTHMASKPROC, DepthMask)                                  \
+    X(PFNGLDISABLEPROC, Disable)                                      \
     X(PFNGLDRAWARRAYSPROC, DrawArrays)                                \
     X(PFNGLDRAWBUFFERPROC, DrawBuffer)                                \
     X(PFNGLDRAWELEMENTSPROC, DrawElements)                            \

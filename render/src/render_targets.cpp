@@ -5,7 +5,6 @@
 #include <string>
 
 namespace render {
-namespace {
 
 void require_complete(const GlFunctions& gl, const char* what, int width, int height) {
     if (gl.CheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE) return;
@@ -20,44 +19,65 @@ GLuint make_framebuffer(const GlFunctions& gl) {
     return framebuffer;
 }
 
-}  // namespace
+GLuint make_color_texture(const GlFunctions& gl, int width, int height) {
+    GLuint texture = 0;
+    gl.GenTextures(1, &texture);
+    gl.BindTexture(GL_TEXTURE_2D, texture);
+    gl.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+    gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    return texture;
+}
 
 PictureTarget::PictureTarget(const GlFunctions& gl, int width, int height, int samples)
-    : gl_(gl), width_(width), height_(height), rgba_(std::size_t{4} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+    : gl_(gl),
+      width_(width),
+      height_(height),
+      rgba_(std::size_t{4} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
     GLint most = 0;
     gl_.GetIntegerv(GL_MAX_SAMPLES, &most);
     const GLsizei used = samples <= 1 ? 0 : std::min(samples, most);
-    const auto attach = [&](GLenum point, GLenum format, GLsizei count) {
+    const auto attach_buffer = [&](GLenum point, GLenum format, GLsizei count) {
         GLuint buffer = 0;
         gl_.GenRenderbuffers(1, &buffer);
         gl_.BindRenderbuffer(GL_RENDERBUFFER, buffer);
         gl_.RenderbufferStorageMultisample(GL_RENDERBUFFER, count, format, width_, height_);
         gl_.FramebufferRenderbuffer(GL_FRAMEBUFFER, point, GL_RENDERBUFFER, buffer);
     };
-    drawn_ = make_framebuffer(gl_);
-    attach(GL_COLOR_ATTACHMENT0, GL_RGBA8, used);
-    attach(GL_DEPTH_ATTACHMENT, GL_DEPTH_COMPONENT32F, used);
+    picture_ = make_framebuffer(gl_);
+    attach_buffer(GL_COLOR_ATTACHMENT0, GL_RGBA8, 0);
     require_complete(gl_, "picture", width, height);
-    resolved_ = drawn_;
-    if (used == 0) return;
-    resolved_ = make_framebuffer(gl_);
-    attach(GL_COLOR_ATTACHMENT0, GL_RGBA8, 0);
+    objects_texture_ = make_color_texture(gl_, width, height);
+    sampled_ = objects_ = make_framebuffer(gl_);
+    gl_.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, objects_texture_, 0);
+    if (used > 0) {
+        sampled_ = make_framebuffer(gl_);
+        attach_buffer(GL_COLOR_ATTACHMENT0, GL_RGBA8, used);
+    }
+    attach_buffer(GL_DEPTH_ATTACHMENT, GL_DEPTH_COMPONENT32F, used);
     require_complete(gl_, "picture", width, height);
 }
 
-void PictureTarget::begin() const {
-    gl_.BindFramebuffer(GL_FRAMEBUFFER, drawn_);
+void PictureTarget::begin_objects() const {
+    gl_.BindFramebuffer(GL_FRAMEBUFFER, sampled_);
     gl_.Viewport(0, 0, width_, height_);
-    gl_.Clear(GL_DEPTH_BUFFER_BIT);
+    gl_.ClearColor(0, 0, 0, 0);
+    gl_.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+}
+
+void PictureTarget::begin_background(GLuint objects_unit) const {
+    if (objects_ != sampled_) {
+        gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, sampled_);
+        gl_.BindFramebuffer(GL_DRAW_FRAMEBUFFER, objects_);
+        gl_.BlitFramebuffer(0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    }
+    gl_.ActiveTexture(GL_TEXTURE0 + objects_unit);
+    gl_.BindTexture(GL_TEXTURE_2D, objects_texture_);
+    gl_.BindFramebuffer(GL_FRAMEBUFFER, picture_);
 }
 
 void PictureTarget::read(Image& image) {
-    if (resolved_ != drawn_) {
-        gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, drawn_);
-        gl_.BindFramebuffer(GL_DRAW_FRAMEBUFFER, resolved_);
-        gl_.BlitFramebuffer(0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT, GL_NEAREST);
-    }
-    gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, resolved_);
+    gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, picture_);
     gl_.ReadPixels(0, 0, width_, height_, GL_RGBA, GL_UNSIGNED_BYTE, rgba_.data());
     image.width = width_;
     image.height = height_;

@@ -14,7 +14,7 @@
 namespace render {
 namespace {
 
-constexpr GLuint kMatrixUnit = 0, kShadowUnit = 1;
+constexpr GLuint kMatrixUnit = 0, kShadowUnit = 1, kObjectsUnit = 2, kLitUnit = 3, kDarkUnit = 4;
 constexpr int kMaxSide = 8192;  // pixels
 
 SceneDescription checked(const SceneDescription& scene) {
@@ -69,13 +69,14 @@ Renderer::Implementation::Implementation(const SceneDescription& description)
     clip = clip_from_world(scene.camera, aspect);
     light = light_from_world(scene.key_light, scene.camera.target, reach);
     texel = scene.shadow_size > 0 ? 2 * reach / static_cast<float>(scene.shadow_size) : 0;
-    gl.Enable(GL_DEPTH_TEST);
     gl.Enable(GL_CULL_FACE);
     gl.Enable(GL_DEPTH_CLAMP);
     gl.DepthFunc(GL_LEQUAL);
+    gl.PolygonOffset(1.5f, 2.0f);  // shadow map only
     set_uniforms(object_program);
-    set_uniforms(stage.floor_program());
-    set_uniforms(stage.backdrop_program());
+    for (const GlProgram* program : stage.programs()) set_uniforms(*program);
+    gl.Disable(GL_DEPTH_TEST);
+    stage.bake(kLitUnit, kDarkUnit);
     shadow_program.use();
     shadow_program.set("matrices", static_cast<int>(kMatrixUnit));
     shadow_program.set("clip_from_light_world", light);
@@ -86,7 +87,7 @@ void Renderer::Implementation::set_uniforms(const GlProgram& program) const {
     const KeyLight& key = scene.key_light;
     const auto width = static_cast<float>(scene.width), height = static_cast<float>(scene.height);
     const Eigen::Affine3f to_texture = Eigen::Translation3f(0.5f, 0.5f, 0.5f) * Eigen::Scaling(0.5f);
-    const Eigen::Vector3f key_light = 2.4f * key.strength * key.color;
+    const Eigen::Vector3f key_light = 1.9f * key.strength * key.color;
     program.use();
     program.set("picture", Eigen::Vector3f(width, height, 4 / (width * width + height * height)));
     program.set("clip_from_world", clip);
@@ -95,29 +96,36 @@ void Renderer::Implementation::set_uniforms(const GlProgram& program) const {
     program.set("shadow_texel", scene.shadow_size > 0 ? 1 / static_cast<float>(scene.shadow_size) : 0.0f);
     program.set("shadow_offset", 1.5f * texel);
     program.set("matrices", static_cast<int>(kMatrixUnit));
+    program.set("objects", static_cast<int>(kObjectsUnit));
+    program.set("lit_floor", static_cast<int>(kLitUnit));
+    program.set("dark_floor", static_cast<int>(kDarkUnit));
+    program.set("floor_color", room.floor_color);
+    program.set("wall_color", room.wall_color);
     program.set("eye", scene.camera.eye);
     program.set("towards_light", Eigen::Vector3f(key.towards_light.normalized()));
     program.set("key_light", key_light);
-    program.set("sky_light", Eigen::Vector3f(0.16f, 0.17f, 0.20f));
+    program.set("sky_light", Eigen::Vector3f(0.13f, 0.13f, 0.15f));
     program.set("ground_light", Eigen::Vector3f(0.03f * Eigen::Vector3f::Ones() + 0.10f * room.floor_color.cwiseProduct(key_light)));
-    program.set("fill_light", Eigen::Vector3f(0.10f, 0.13f, 0.20f));
+    program.set("fill_light", Eigen::Vector3f(0.07f, 0.085f, 0.13f));
 }
 
 void Renderer::Implementation::draw(const FrameState& frame, Image& image) {
     context.make_current();
     geometry.update(frame, scene.camera.eye);
+    gl.Enable(GL_DEPTH_TEST);
     if (scene.shadow_size > 0) {
         shadow.begin();
         gl.Enable(GL_POLYGON_OFFSET_FILL);
-        gl.PolygonOffset(1.5f, 2.0f);
         shadow_program.use();
         geometry.draw(kMatrixUnit);
-        gl.PolygonOffset(0, 0);
+        gl.Disable(GL_POLYGON_OFFSET_FILL);
     }
-    picture.begin();
     shadow.bind(kShadowUnit);
+    picture.begin_objects();
     object_program.use();
     geometry.draw(kMatrixUnit);
+    gl.Disable(GL_DEPTH_TEST);
+    picture.begin_background(kObjectsUnit);
     stage.draw(geometry.volume_balls(shaders::kMaxBalls));
     picture.read(image);
 }

@@ -22,11 +22,11 @@ float vignette() {
     vec2 from_center = gl_FragCoord.xy - 0.5 * picture.xy;
     return 1.0 - 0.42 * dot(from_center, from_center) * picture.z;
 }
-void write_picture(vec3 light) {
+void write_picture(vec3 light, float coverage) {
     vec3 x = light * vignette();
     x = clamp(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0.0, 1.0);
     vec3 s1 = sqrt(x), s2 = sqrt(s1), s3 = sqrt(s2);
-    fragment = vec4(0.662002687 * s1 + 0.684122060 * s2 - 0.323583601 * s3 - 0.022541147 * x, 1.0);
+    fragment = vec4(0.662002687 * s1 + 0.684122060 * s2 - 0.323583601 * s3 - 0.022541147 * x, coverage);
 }
 )";
 
@@ -40,19 +40,31 @@ vec3 backdrop() {
 }
 )";
 
-/// Key light reaching a point: shadow map (4 comparisons of 2x2 texels) and the spot's soft edge.
-const char* const kKeyLight = R"(
-uniform sampler2DShadow shadow_map;
-uniform float shadow_texel;  // 1 / size, 0: no shadow
-float key_visibility(vec3 at) {
-    vec2 d = vec2(0.75, 1.75) * shadow_texel;
-    float lit = texture(shadow_map, at + vec3(d.x, d.y, 0.0)) + texture(shadow_map, at + vec3(-d.y, d.x, 0.0)) +
-                texture(shadow_map, at + vec3(-d.x, -d.y, 0.0)) + texture(shadow_map, at + vec3(d.y, -d.x, 0.0));
+/// The spot's soft edge: a factor from the place in the shadow map.
+const char* const kSpot = R"(
+float spot(vec3 at) {
     vec2 from_center = 2.0 * at.xy - 1.0;
     float outside = dot(from_center, from_center);
-    float inside_map = step(max(abs(from_center.x), abs(from_center.y)), 0.99);
-    float spot = 1.0 / (1.0 + 0.55 * outside * outside);
-    return mix(1.0, 0.25 * lit, inside_map) * spot;
+    return 1.0 / (1.0 + 1.1 * outside + 1.6 * outside * outside);
+}
+)";
+
+/// Part of the key light that the shadow map lets through: the mean of comparisons of 2x2 texels at one or two pairs of opposite places;
+/// 1 outside the map. Look-ups are the dearest part of the fragment shaders, so the objects make do with one pair.
+const char* const kShadow = R"(
+uniform sampler2DShadow shadow_map;
+uniform float shadow_texel;  // 1 / size
+float shadow_pair(vec3 at, vec2 apart) {
+    return 0.5 * (textureLod(shadow_map, at + vec3(apart, 0.0), 0.0) + textureLod(shadow_map, at - vec3(apart, 0.0), 0.0));
+}
+float within_map(vec3 at) {
+    vec2 from_center = abs(at.xy - 0.5);
+    return step(max(from_center.x, from_center.y), 0.495);
+}
+float shadow_light_sharp(vec3 at) { return mix(1.0, shadow_pair(at, shadow_texel * vec2(0.6, 1.0)), within_map(at)); }
+float shadow_light_soft(vec3 at) {
+    float lit = shadow_pair(at, shadow_texel * vec2(0.75, 1.75)) + shadow_pair(at, shadow_texel * vec2(-1.75, 0.75));
+    return mix(1.0, 0.5 * lit, within_map(at));
 }
 )";
 
@@ -79,7 +91,9 @@ layout(location = 3) in vec3 roughness_lathed_object;
 uniform mat4 clip_from_world;
 uniform mat4 shadow_from_world;  // texture coordinates and depth, all in [0, 1]
 uniform float shadow_offset;     // along the normal [m]
+uniform vec3 sky_light, ground_light, fill_light;
 out vec3 v_world, v_normal, v_groove, v_shadow;
+out vec3 v_around;  // diffuse light of the surroundings
 flat out vec4 v_color_metallic;
 flat out vec2 v_roughness_lathed;
 )" + kObjectMatrices + R"(
@@ -92,6 +106,8 @@ void main() {
     v_groove = vec3(dot(texelFetch(matrices, object).xyz, around), dot(texelFetch(matrices, object + 1).xyz, around),
                     dot(texelFetch(matrices, object + 2).xyz, around));
     v_shadow = (shadow_from_world * vec4(v_world + shadow_offset * v_normal, 1.0)).xyz;
+    float towards_fill = 0.5 + 0.5 * dot(v_normal, vec3(0.62, 0.25, 0.74));
+    v_around = mix(ground_light, sky_light, 0.5 + 0.5 * v_normal.y) + fill_light * (towards_fill * towards_fill);
     v_color_metallic = color_metallic;
     v_roughness_lathed = roughness_lathed_object.xy;
     gl_Position = clip_from_world * vec4(v_world, 1.0);
@@ -103,11 +119,11 @@ void main() {
 /// Lagarde for one light. Surroundings: hemisphere for diffuse; for reflections a warm stage floor, a dark room, and two soft boxes.
 std::string object_fragment() {
     return std::string(kVersion) + R"(
-in vec3 v_world, v_normal, v_groove, v_shadow;
+in vec3 v_world, v_normal, v_groove, v_shadow, v_around;
 flat in vec4 v_color_metallic;
 flat in vec2 v_roughness_lathed;
-uniform vec3 eye, towards_light, key_light, sky_light, ground_light, fill_light;
-)" + kPicture + kKeyLight + R"(
+uniform vec3 eye, towards_light, key_light, sky_light, ground_light;
+)" + kPicture + kSpot + kShadow + R"(
 vec3 surroundings(vec3 r, float roughness) {
     float blur = 0.08 + 0.8 * roughness;
     vec3 light = mix(ground_light, sky_light, smoothstep(-blur, blur, r.y));
@@ -127,19 +143,18 @@ void main() {
     float th = dot(groove, h), bh2 = max(1.0 - nh * nh - th * th, 0.0);
     float d = th * th / (along * along) + bh2 / (across * across) + nh * nh;
     float highlight = min(1.0 / (along * across * d * d * max(lh * lh, 0.1) * (4.0 * roughness + 2.0)), 30.0);
-    vec3 key = key_light * (key_visibility(v_shadow) * nl);
+    vec3 key = key_light * (shadow_light_sharp(v_shadow) * spot(v_shadow) * nl);
 
     vec3 grooved = normalize(mix(n, v - groove * dot(groove, v), 0.45 * lathed));
     float grazing = 1.0 - nv, grazing2 = grazing * grazing;
     vec3 f = f0 + (max(vec3(1.0 - roughness), f0) - f0) * (grazing2 * grazing2 * grazing);
-    float towards_fill = 0.5 + 0.5 * dot(n, vec3(0.62, 0.25, 0.74));
-    vec3 around = mix(ground_light, sky_light, 0.5 + 0.5 * n.y) + fill_light * (towards_fill * towards_fill);
-    vec3 light = diffuse * (around + key) + f0 * key * highlight + f * surroundings(reflect(-v, grooved), roughness);
-    write_picture(light);
+    vec3 light = diffuse * (v_around + key) + f0 * key * highlight + f * surroundings(reflect(-v, grooved), roughness);
+    write_picture(light, 1.0);
 }
 )";
 }
 
+/// Where a point of the floor lies in the picture and in the shadow map, and how much of the sky the balls above leave open to it.
 std::string floor_vertex() {
     return std::string(kVersion) + R"(
 layout(location = 0) in vec3 position;  // world
@@ -148,7 +163,7 @@ uniform vec4 balls[)" +
            std::to_string(kMaxBalls) + R"(];  // centre and radius of what stands above the floor
 uniform int ball_count;
 out vec3 v_world, v_shadow;
-out float v_open;  // part of the sky that the floor sees
+out float v_open;  // root of the part of the sky that the floor sees: darkening in display values
 void main() {
     v_world = position;
     v_shadow = (shadow_from_world * vec4(position, 1.0)).xyz;
@@ -158,18 +173,19 @@ void main() {
         float distance2 = dot(to_ball, to_ball) + balls[i].w * balls[i].w * 0.25;
         covered += max(to_ball.y, 0.0) * inversesqrt(distance2) * balls[i].w * balls[i].w / distance2;
     }
-    v_open = 1.0 / (1.0 + 2.2 * covered);
+    v_open = inversesqrt(1.0 + 2.2 * covered);
     gl_Position = clip_from_world * vec4(position, 1.0);
 }
 )";
 }
 
-std::string floor_fragment() {
+/// The floor in the key light (key_part 1) or in its shadow (0), for baking: planks with seams, a gloss, fading into the wall with distance.
+std::string floor_bake_fragment() {
     return std::string(kVersion) + R"(
 in vec3 v_world, v_shadow;
-in float v_open;
 uniform vec3 eye, towards_light, key_light, sky_light, floor_color, center;
-)" + kPicture + kBackdrop + kKeyLight + R"(
+uniform float key_part;
+)" + kPicture + kBackdrop + kSpot + R"(
 float random(vec2 cell) { return fract(sin(dot(cell, vec2(12.9898, 78.233))) * 43758.547); }
 void main() {
     vec2 plank = vec2(v_world.x / 0.14, v_world.z / 1.7);
@@ -179,13 +195,13 @@ void main() {
     vec2 from_edge = 0.5 - abs(fract(plank) - 0.5);
     float distance_eye = length(eye - v_world);
     float seam = smoothstep(0.0, 0.012 + 0.012 * distance_eye, from_edge.x) * smoothstep(0.0, 0.004 + 0.002 * distance_eye, from_edge.y);
-    vec3 color = floor_color * (0.82 + 0.3 * tone) * (0.72 + 0.28 * seam);
+    vec3 color = floor_color * (0.82 + 0.3 * tone) * (0.6 + 0.4 * seam);
     vec3 v = (eye - v_world) / distance_eye, h = normalize(v + towards_light);
-    float visible = key_visibility(v_shadow);
-    float gloss = h.y * h.y; gloss *= gloss; gloss *= gloss; gloss *= gloss; gloss *= gloss;
-    vec3 light = color * (key_light * (visible * towards_light.y) + sky_light * v_open) + key_light * (visible * gloss * 0.10 * (0.6 + 0.4 * tone));
-    float far = smoothstep(1.6, 6.0, length(v_world.xz - center.xz));
-    write_picture(mix(light, backdrop(), far));
+    vec3 key = key_light * (key_part * spot(v_shadow));
+    float gloss = pow(max(h.y, 0.0), 40.0) * 0.07 * (0.6 + 0.4 * tone) * seam;
+    vec3 light = color * (key * towards_light.y + sky_light) + key * gloss;
+    float far = smoothstep(1.2, 5.5, length(v_world.xz - center.xz));
+    write_picture(mix(light, backdrop(), far), 1.0);
 }
 )";
 }
@@ -194,14 +210,43 @@ std::string backdrop_vertex() {
     return std::string(kVersion) + R"(
 void main() {
     vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
-    gl_Position = vec4(corner, 1.0, 1.0);
+    gl_Position = vec4(corner, 0.0, 1.0);
+}
+)";
+}
+
+std::string backdrop_bake_fragment() {
+    return std::string(kVersion) + kPicture + kBackdrop + R"(
+void main() { write_picture(backdrop(), 1.0); }
+)";
+}
+
+/// The objects' picture (colour times coverage, coverage) over the baked floor, which the shadow map and the balls darken.
+std::string floor_fragment() {
+    return std::string(kVersion) + R"(
+in vec3 v_shadow;
+in float v_open;
+uniform sampler2D objects, lit_floor, dark_floor;
+out vec4 fragment;
+)" + kShadow + R"(
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    vec4 object = texelFetch(objects, at, 0);
+    vec3 lit = texelFetch(lit_floor, at, 0).rgb * (0.7 + 0.3 * v_open), dark = texelFetch(dark_floor, at, 0).rgb * v_open;
+    fragment = vec4(object.rgb + (1.0 - object.a) * mix(dark, lit, shadow_light_soft(v_shadow)), 1.0);
 }
 )";
 }
 
 std::string backdrop_fragment() {
-    return std::string(kVersion) + kPicture + kBackdrop + R"(
-void main() { write_picture(backdrop()); }
+    return std::string(kVersion) + R"(
+uniform sampler2D objects, lit_floor;
+out vec4 fragment;
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    vec4 object = texelFetch(objects, at, 0);
+    fragment = vec4(object.rgb + (1.0 - object.a) * texelFetch(lit_floor, at, 0).rgb, 1.0);
+}
 )";
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "render_targets.h"
 #include "shaders.h"
 
 namespace render {
@@ -10,10 +11,10 @@ namespace {
 
 constexpr int kRings = 30, kSpokes = 56;
 
-/// Radii [m] of the floor's circles: 7 cm apart where things stand, then growing to 40 m.
+/// Radii [m] of the floor's circles: 7 cm apart where things stand, then growing to 7 m, where the floor has faded into the wall.
 float ring_radius(int ring) {
     const float x = static_cast<float>(ring) / kRings;
-    return 2.1f * x + 37.9f * std::pow(x, 7.0f);
+    return 2.1f * x + 4.9f * std::pow(x, 7.0f);
 }
 
 std::vector<Eigen::Vector3f> floor_vertices(const Eigen::Vector3f& center) {
@@ -44,9 +45,21 @@ std::vector<GLuint> floor_triangles() {
 
 Stage::Stage(const GlFunctions& gl, const SceneDescription& scene)
     : gl_(gl),
-      floor_program_(gl, shaders::floor_vertex(), shaders::floor_fragment()),
-      backdrop_program_(gl, shaders::backdrop_vertex(), shaders::backdrop_fragment()) {
+      width_(scene.width),
+      height_(scene.height),
+      floor_bake_(gl, shaders::floor_vertex(), shaders::floor_bake_fragment()),
+      backdrop_bake_(gl, shaders::backdrop_vertex(), shaders::backdrop_bake_fragment()),
+      floor_(gl, shaders::floor_vertex(), shaders::floor_fragment()),
+      backdrop_(gl, shaders::backdrop_vertex(), shaders::backdrop_fragment()),
+      lit_texture_(make_color_texture(gl, width_, height_)),
+      dark_texture_(make_color_texture(gl, width_, height_)) {
     const Eigen::Vector3f center(scene.camera.target.x(), scene.room.floor_height, scene.camera.target.z());
+    make_floor(center);
+    floor_bake_.use();
+    floor_bake_.set("center", center);
+}
+
+void Stage::make_floor(const Eigen::Vector3f& center) {
     const std::vector<Eigen::Vector3f> vertices = floor_vertices(center);
     const std::vector<GLuint> indices = floor_triangles();
     floor_indices_ = static_cast<GLsizei>(indices.size());
@@ -61,23 +74,43 @@ Stage::Stage(const GlFunctions& gl, const SceneDescription& scene)
     gl_.BufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(indices.size() * sizeof indices[0]), indices.data(), GL_STATIC_DRAW);
     gl_.EnableVertexAttribArray(0);
     gl_.VertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof vertices[0], nullptr);
-    floor_program_.use();
-    floor_program_.set("floor_color", scene.room.floor_color);
-    floor_program_.set("center", center);
-    floor_program_.set("wall_color", scene.room.wall_color);
-    backdrop_program_.use();
-    backdrop_program_.set("wall_color", scene.room.wall_color);
+}
+
+std::vector<const GlProgram*> Stage::programs() const { return {&floor_bake_, &backdrop_bake_, &floor_, &backdrop_}; }
+
+void Stage::bake(GLuint lit_unit, GLuint dark_unit) {
+    bake_one(lit_texture_, 1);
+    bake_one(dark_texture_, 0);
+    gl_.ActiveTexture(GL_TEXTURE0 + lit_unit);
+    gl_.BindTexture(GL_TEXTURE_2D, lit_texture_);
+    gl_.ActiveTexture(GL_TEXTURE0 + dark_unit);
+    gl_.BindTexture(GL_TEXTURE_2D, dark_texture_);
+}
+
+void Stage::bake_one(GLuint texture, float key_part) const {
+    (void)make_framebuffer(gl_);
+    gl_.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, texture, 0);
+    require_complete(gl_, "background", width_, height_);
+    gl_.Viewport(0, 0, width_, height_);
+    floor_bake_.use();
+    floor_bake_.set("key_part", key_part);
+    draw_shapes(backdrop_bake_, floor_bake_);
 }
 
 void Stage::draw(const std::vector<Eigen::Vector4f>& balls) const {
-    floor_program_.use();
-    floor_program_.set("balls", balls);
-    floor_program_.set("ball_count", static_cast<int>(balls.size()));
-    gl_.BindVertexArray(floor_array_);
-    gl_.DrawElements(GL_TRIANGLES, floor_indices_, GL_UNSIGNED_INT, nullptr);
-    backdrop_program_.use();
+    floor_.use();
+    floor_.set("balls", balls);
+    floor_.set("ball_count", static_cast<int>(balls.size()));
+    draw_shapes(backdrop_, floor_);
+}
+
+void Stage::draw_shapes(const GlProgram& backdrop, const GlProgram& floor) const {
+    backdrop.use();
     gl_.BindVertexArray(empty_array_);
     gl_.DrawArrays(GL_TRIANGLES, 0, 3);
+    floor.use();
+    gl_.BindVertexArray(floor_array_);
+    gl_.DrawElements(GL_TRIANGLES, floor_indices_, GL_UNSIGNED_INT, nullptr);
 }
 
 }  // namespace render

@@ -9,7 +9,7 @@ namespace {
 using Tangents = Eigen::Matrix<double, 3, 2>;
 
 constexpr int kMaxSteps = 60;
-constexpr double kSettled_m = 1e-8;  // a Newton step this short leaves an error of its square
+constexpr double kSettled_m = 1e-8;    // a Newton step this short leaves an error of its square
 constexpr double kAtSurface_m = 1e-5;  // nearer, the direction to the foot is lost in rounding
 
 struct Foot {
@@ -17,7 +17,8 @@ struct Foot {
     double squared;  // |x - y|^2
 };
 
-Foot foot_at(const Gauge& gauge, const Deformation& d, const Eigen::Vector3d& x, const Eigen::Vector3d& near) {
+Foot foot_at(const Gauge& gauge, const Deformation& d, const Eigen::Vector3d& x,
+             const Eigen::Vector3d& near) {
     const Eigen::Vector3d r = gauge.onto_surface(near);
     const Eigen::Vector3d y = d.matrix * r;
     return {r, y, (x - y).squaredNorm()};
@@ -35,11 +36,12 @@ Tangents tangents_to(const Eigen::Vector3d& n) {
 struct TangentProblem {
     Eigen::Vector3d normal;
     Tangents tangents;
-    Eigen::Vector2d pull;      // T^T (x - y)
+    Eigen::Vector2d pull;       // T^T (x - y)
     Eigen::Matrix2d curvature;  // T^T (I + lambda H) T
 };
 
-TangentProblem tangent_problem(const Gauge& gauge, const Deformation& d, const Eigen::Vector3d& x, const Foot& foot) {
+TangentProblem tangent_problem(const Gauge& gauge, const Deformation& d, const Eigen::Vector3d& x,
+                               const Foot& foot) {
     const GaugeDerivatives g = gauge.derivatives(foot.r);
     const Eigen::Vector3d gradient = d.inverse.transpose() * g.gradient;
     const double length = gradient.norm();
@@ -57,10 +59,12 @@ TangentProblem tangent_problem(const Gauge& gauge, const Deformation& d, const E
 
 // Step of the damped 2x2 system; false when it is not positive definite.
 bool solve_step(const TangentProblem& problem, double mu, Eigen::Vector2d& step) {
-    const double a = problem.curvature(0, 0) + mu, c = problem.curvature(1, 1) + mu, b = problem.curvature(0, 1);
+    const double a = problem.curvature(0, 0) + mu, c = problem.curvature(1, 1) + mu,
+                 b = problem.curvature(0, 1);
     const double det = a * c - b * b;
     if (!(a > 0 && det > 1e-12 * a * c)) return false;
-    step << (c * problem.pull.x() - b * problem.pull.y()) / det, (a * problem.pull.y() - b * problem.pull.x()) / det;
+    step << (c * problem.pull.x() - b * problem.pull.y()) / det,
+        (a * problem.pull.y() - b * problem.pull.x()) / det;
     return true;
 }
 
@@ -85,9 +89,11 @@ Foot refine(const Gauge& gauge, const Deformation& d, const Eigen::Vector3d& x, 
     return foot;
 }
 
-Foot nearest_from_inside(const Gauge& gauge, const Deformation& d, const Eigen::Vector3d& x, const Eigen::Vector3d& r) {
+Foot nearest_from_inside(const Gauge& gauge, const Deformation& d, const Eigen::Vector3d& x,
+                         const Eigen::Vector3d& r) {
     std::array<Foot, 4> feet = {foot_at(gauge, d, x, r), foot_at(gauge, d, x, gauge.along_axis(r, 0)),
-                                foot_at(gauge, d, x, gauge.along_axis(r, 1)), foot_at(gauge, d, x, gauge.along_axis(r, 2))};
+                                foot_at(gauge, d, x, gauge.along_axis(r, 1)),
+                                foot_at(gauge, d, x, gauge.along_axis(r, 2))};
     for (int i = 0; i < 2; ++i) {
         for (int j = i + 1; j < 4; ++j) {
             if (feet[j].squared < feet[i].squared) std::swap(feet[i], feet[j]);
@@ -112,7 +118,8 @@ ClosestPoint closest_point(const Gauge& gauge, const Deformation& d, const Eigen
         foot = refine(gauge, d, x, foot_at(gauge, d, x, r));
     }
     const double distance = std::sqrt(foot.squared);
-    // Outside, the direction to the foot is the normal also where an exponent above 1 makes the surface a kink.
+    // Outside, the direction to the foot is the normal also where an exponent above 1 makes the surface a
+    // kink.
     const Eigen::Vector3d normal =
         !inside && distance > kAtSurface_m
             ? ((x - foot.y) / distance).eval()

@@ -18,16 +18,18 @@ struct ClosestPoint {
     Eigen::Vector3d rest_point;  ///< the same material point in the rest shape [m]
 };
 
-/// Signed distance of `x` to the surface {D r : N(r) = 1}, in the deformed body's metric. Because the body is convex, the surface
-/// grown by a radius is at this distance less the radius.
+/// Signed distance of `x` to the surface {D r : N(r) = 1}, in the deformed body's metric. Because the body is
+/// convex, the surface grown by a radius is at this distance less the radius.
 ///
 /// Minimises |x - D r|^2 over the surface by Newton steps in the tangent plane with Levenberg damping,
 ///   (I + lambda T^T D^-T H D^-1 T + mu I) s = T^T (x - y),  y = D r,  lambda = n.(x - y) / |D^-T grad N|,
-/// each step carried back to the surface along the ray (r / N(r)) and taken only if the distance falls. Outside, the minimum is unique.
-/// Inside there may be one a face: the two nearest of the four feet (along the ray and along each axis) are refined.
-/// `start`, a surface point of the rest shape near the answer, replaces that search; the answer is then a local one when x is inside.
-/// Pure, no allocation, never NaN for finite x; 3-6 steps of about 0.1 us each.
-[[nodiscard]] ClosestPoint closest_point(const Gauge& gauge, const Deformation& deformation, const Eigen::Vector3d& x,
+/// each step carried back to the surface along the ray (r / N(r)) and taken only if the distance falls.
+/// Outside, the minimum is unique. Inside there may be one a face: the two nearest of the four feet (along
+/// the ray and along each axis) are refined. `start`, a surface point of the rest shape near the answer,
+/// replaces that search; the answer is then a local one when x is inside. Pure, no allocation, never NaN for
+/// finite x; 3-6 steps of about 0.1 us each.
+[[nodiscard]] ClosestPoint closest_point(const Gauge& gauge, const Deformation& deformation,
+                                         const Eigen::Vector3d& x,
                                          const Eigen::Vector3d* start = nullptr) noexcept;
 
 }  // namespace sim

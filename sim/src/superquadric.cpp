@@ -32,8 +32,11 @@ double complement(double first, double p) {
     return std::pow(std::max(0.0, 1 - power(first, p)), 1 / p);
 }
 
-// Bounds the Euclidean norm on the surface: a p-norm of two numbers is at most 2^max(0, 1/2 - 1/p) short of the 2-norm.
-double growth(double p) { return std::pow(2.0, std::max(0.0, 0.5 - 1 / p)); }
+// Bounds the Euclidean norm on the surface: a p-norm of two numbers is at most 2^max(0, 1/2 - 1/p) short of
+// the 2-norm.
+double growth(double p) {
+    return std::pow(2.0, std::max(0.0, 0.5 - 1 / p));
+}
 
 }  // namespace
 
@@ -44,7 +47,8 @@ Gauge::Gauge(const Superquadric& shape)
       p1_(2 / e1_),
       p2_(2 / e2_) {
     const double flat = growth(p2_) * std::max(semi_axes_.x(), semi_axes_.z());
-    bounding_radius_ = std::min(std::hypot(flat, semi_axes_.y()), growth(p1_) * std::max(flat, semi_axes_.y()));
+    bounding_radius_ =
+        std::min(std::hypot(flat, semi_axes_.y()), growth(p1_) * std::max(flat, semi_axes_.y()));
 }
 
 double Gauge::value(const Eigen::Vector3d& r) const noexcept {
@@ -52,7 +56,9 @@ double Gauge::value(const Eigen::Vector3d& r) const noexcept {
     return pair_norm(pair_norm(u.x(), u.z(), p2_).value, u.y(), p1_).value;
 }
 
-double Gauge::inside_outside(const Eigen::Vector3d& r) const noexcept { return power(value(r), p1_); }
+double Gauge::inside_outside(const Eigen::Vector3d& r) const noexcept {
+    return power(value(r), p1_);
+}
 
 GaugeDerivatives Gauge::derivatives(const Eigen::Vector3d& r) const noexcept {
     const Eigen::Vector3d exact = r.cwiseAbs().cwiseQuotient(semi_axes_);

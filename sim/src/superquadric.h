@@ -15,10 +15,11 @@ struct GaugeDerivatives {
 ///
 ///   rho = (|x/a|^p2 + |z/c|^p2)^(1/p2),  N = (rho^p1 + |y/b|^p1)^(1/p1),  p1 = 2/e1, p2 = 2/e2,  F = N^p1
 ///
-/// For exponents below 2 both p are above 1, so N is a norm: N(s r) = s N(r), the body {N <= 1} is convex, and r / N(r) lies on
-/// the surface. (1 - N) / |grad N| is the first-order distance (1 - F^(e1/2)) / |grad F^(e1/2)|.
-/// Near a coordinate plane (|x/a| below 1e-7 of the largest coordinate) the derivatives are those at that height, the
-/// gradient made linear across zero: with e > 1 the surface has a kink there, and the derivatives stay finite.
+/// For exponents below 2 both p are above 1, so N is a norm: N(s r) = s N(r), the body {N <= 1} is convex,
+/// and r / N(r) lies on the surface. (1 - N) / |grad N| is the first-order distance (1 - F^(e1/2)) / |grad
+/// F^(e1/2)|. Near a coordinate plane (|x/a| below 1e-7 of the largest coordinate) the derivatives are those
+/// at that height, the gradient made linear across zero: with e > 1 the surface has a kink there, and the
+/// derivatives stay finite.
 class Gauge {
 public:
     explicit Gauge(const Superquadric& shape);
@@ -29,7 +30,8 @@ public:
     [[nodiscard]] double inside_outside(const Eigen::Vector3d& r) const noexcept;
     /// The surface point on the ray from the centre through r; the upper pole for the centre.
     [[nodiscard]] Eigen::Vector3d onto_surface(const Eigen::Vector3d& r) const noexcept;
-    /// The surface point with all coordinates of r but one, for r inside (N < 1); the sign of the replaced one is kept.
+    /// The surface point with all coordinates of r but one, for r inside (N < 1); the sign of the replaced
+    /// one is kept.
     [[nodiscard]] Eigen::Vector3d along_axis(const Eigen::Vector3d& r, int axis) const noexcept;
 
     [[nodiscard]] const Eigen::Vector3d& semi_axes() const noexcept { return semi_axes_; }

@@ -49,7 +49,7 @@ void require_within(double value, double least, double most, const std::string& 
 }
 
 void check(const DrummerParameters& p, double duration_s) {
-    require_within(p.rate_hz, 1, 1e4, "rate_hz");
+    require_within(p.rate_hz, 1, 1e5, "rate_hz");
     require_within(duration_s, 1 / p.rate_hz, 36000, "duration");
     require_within(p.stick_length_m, 0.05, 2, "stick_length_m");
     require_within(p.rise_m, 0.01, 0.9 * p.stick_length_m, "rise_m");
@@ -64,8 +64,10 @@ void check(const Stroke& stroke, double duration_s, const DrummerParameters& p) 
                       first_unprintable(stroke.stick) == std::string::npos;
     require(word, "stick name " + in_quotes(stroke.stick), "a word");
     require_within(stroke.t_s, 0, duration_s, "stroke time");
-    require(stroke.target.allFinite() && stroke.target.norm() <= 100, "a target far away", "one within 100 m");
-    require(std::abs(stroke.normal.norm() - 1) < 1e-6, "a normal of length " + std::to_string(stroke.normal.norm()), "length 1");
+    require(stroke.target.allFinite() && stroke.target.norm() <= 100, "a target far away",
+            "one within 100 m");
+    require(std::abs(stroke.normal.norm() - 1) < 1e-6,
+            "a normal of length " + std::to_string(stroke.normal.norm()), "length 1");
     require_within(stroke.speed_mps, 0.2, 25, "stroke speed");
     if (stroke.kind == StrokeKind::feint)
         require_within(stroke.turn_height_m, 0.001, 0.9 * p.stick_length_m - p.rise_m / 2, "turn_height_m");
@@ -75,7 +77,8 @@ std::map<std::string, std::vector<Stroke>> by_stick(const std::vector<Stroke>& s
     std::map<std::string, std::vector<Stroke>> sticks;
     for (const Stroke& stroke : score) sticks[stroke.stick].push_back(stroke);
     for (auto& [name, strokes] : sticks) {
-        std::stable_sort(strokes.begin(), strokes.end(), [](const Stroke& a, const Stroke& b) { return a.t_s < b.t_s; });
+        std::stable_sort(strokes.begin(), strokes.end(),
+                         [](const Stroke& a, const Stroke& b) { return a.t_s < b.t_s; });
         for (std::size_t i = 1; i < strokes.size(); ++i)
             require(strokes[i].t_s - strokes[i - 1].t_s >= kClosest,
                     "strokes of stick '" + name + "' at " + std::to_string(strokes[i - 1].t_s) + " and " +
@@ -85,8 +88,9 @@ std::map<std::string, std::vector<Stroke>> by_stick(const std::vector<Stroke>& s
     return sticks;
 }
 
-/// The hand stays behind (+z) and slightly above the foot of the tip, a stick's length away; the stick turns about it. What the
-/// turn changes in the distance the hand makes up along the stick, so that the tip is exactly where it should be.
+/// The hand stays behind (+z) and slightly above the foot of the tip, a stick's length away; the stick turns
+/// about it. What the turn changes in the distance the hand makes up along the stick, so that the tip is
+/// exactly where it should be.
 PoseSample pose_at(const TipPath& path, double t, double length) {
     const Eigen::Vector3d behind = Eigen::Vector3d(0, 0.25, 1).normalized();
     const Eigen::Vector3d tip = path.at(t);
@@ -102,13 +106,15 @@ PoseSample pose_at(const TipPath& path, double t, double length) {
     return sample;
 }
 
-StickTrace play(const std::string& name, const TipPath& path, double duration_s, const DrummerParameters& parameters,
-                Gaussian& noise) {
+StickTrace play(const std::string& name, const TipPath& path, double duration_s,
+                const DrummerParameters& parameters, Gaussian& noise) {
     StickTrace trace{name, {}};
-    const auto count = static_cast<std::size_t>(std::floor(duration_s * parameters.rate_hz * (1 + 1e-12))) + 1;
+    const auto count =
+        static_cast<std::size_t>(std::floor(duration_s * parameters.rate_hz * (1 + 1e-12))) + 1;
     trace.samples.reserve(count);
     for (std::size_t k = 0; k < count; ++k) {
-        PoseSample sample = pose_at(path, static_cast<double>(k) / parameters.rate_hz, parameters.stick_length_m);
+        PoseSample sample =
+            pose_at(path, static_cast<double>(k) / parameters.rate_hz, parameters.stick_length_m);
         sample.position += noise.vector(parameters.noise_m);
         const Eigen::Vector3d turn = noise.vector(parameters.noise_rad);
         sample.orientation = (exponential(turn) * sample.orientation).normalized();
@@ -135,8 +141,9 @@ Trace synthesise(const std::vector<Stroke>& score, double duration_s, const Drum
         trace.sticks.push_back(play(name, path, duration_s, parameters, noise));
     }
     trace.file = "synthetic";
-    trace.source = "synthetic: drummer model, " + std::to_string(score.size()) + " strokes, " + std::to_string(lowered) +
-                   " with less rise for lack of time, seed " + std::to_string(parameters.seed);
+    trace.source = "synthetic: drummer model, " + std::to_string(score.size()) + " strokes, " +
+                   std::to_string(lowered) + " with less rise for lack of time, seed " +
+                   std::to_string(parameters.seed);
     return trace;
 }
 

@@ -28,7 +28,8 @@ PosePrediction ConstantRates::after(double lead_s) const noexcept {
     return pose;
 }
 
-void ConstantRates::step_to(const Eigen::Vector3d& position, const Eigen::Quaterniond& orientation, double dt) noexcept {
+void ConstantRates::step_to(const Eigen::Vector3d& position, const Eigen::Quaterniond& orientation,
+                            double dt) noexcept {
     now.velocity = (position - now.position) / dt;
     now.angular_velocity = logarithm(orientation * now.orientation.conjugate()) / dt;
     now.position = position;
@@ -45,21 +46,25 @@ SampleStatus Hold::correct(const PoseSample& sample) noexcept {
     return status;
 }
 
-PosePrediction Hold::predict(double /*lead_s*/) const noexcept { return pose_; }
+PosePrediction Hold::predict(double /*lead_s*/) const noexcept {
+    return pose_;
+}
 
 SampleStatus Difference::correct(const PoseSample& sample) noexcept {
     const SampleStatus status = clock_.judge(sample);
     if (status == SampleStatus::reinitialised)
         rates_.now = at_rest(sample);
     else if (status == SampleStatus::accepted)
-        rates_.step_to(sample.position, orientation_of(sample, rates_.now.orientation), sample.t_s - clock_.time_s());
+        rates_.step_to(sample.position, orientation_of(sample, rates_.now.orientation),
+                       sample.t_s - clock_.time_s());
     else
         return status;
     clock_.advance(sample.t_s);
     return status;
 }
 
-MovingAverage::MovingAverage(std::size_t count, double window_s) : count_(count), window_s_(window_s), ring_(kCapacity) {}
+MovingAverage::MovingAverage(std::size_t count, double window_s)
+    : count_(count), window_s_(window_s), ring_(kCapacity) {}
 
 std::unique_ptr<MovingAverage> MovingAverage::of_count(std::size_t count) {
     return std::unique_ptr<MovingAverage>(new MovingAverage(count, 0));

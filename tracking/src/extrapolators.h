@@ -31,7 +31,9 @@ private:
 class Difference : public Predictor {
 public:
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
-    [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override { return rates_.after(lead_s); }
+    [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override {
+        return rates_.after(lead_s);
+    }
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
 
 private:
@@ -39,9 +41,10 @@ private:
     ConstantRates rates_;
 };
 
-/// The method that the thesis compares with (its introduction to chapter 3 and figure 3-3): a moving average as the position,
-/// the difference of successive averages over the newest dt as the velocity. The average lags by half the window.
-/// Rotations are averaged as rotation vectors about the newest one. At most kCapacity samples are averaged.
+/// The method that the thesis compares with (its introduction to chapter 3 and figure 3-3): a moving average
+/// as the position, the difference of successive averages over the newest dt as the velocity. The average
+/// lags by half the window. Rotations are averaged as rotation vectors about the newest one. At most
+/// kCapacity samples are averaged.
 class MovingAverage : public Predictor {
 public:
     static constexpr std::size_t kCapacity = 256;
@@ -52,7 +55,9 @@ public:
     static std::unique_ptr<MovingAverage> of_window(double window_s);
 
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
-    [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override { return rates_.after(lead_s); }
+    [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override {
+        return rates_.after(lead_s);
+    }
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
 
 private:

@@ -15,19 +15,27 @@ double HeightPiece::at(double t) const {
 double HeightPiece::slope_at(double t) const {
     const double u = (t - begin) / span;
     double sum = 0;
-    for (std::size_t i = coefficients.size(); i-- > 1;) sum = sum * u + static_cast<double>(i) * coefficients[i];
+    for (std::size_t i = coefficients.size(); i-- > 1;)
+        sum = sum * u + static_cast<double>(i) * coefficients[i];
     return sum / span + amplitude * rate * std::cos(rate * (t - begin) + phase);
 }
 
-HeightPiece quintic(double begin, double duration, double h0, double v0, double h1, double v1) {
-    const double rise = h1 - h0;
-    const double a = v0 * duration;
-    const double b = v1 * duration;
+HeightPiece quintic(double begin, double duration, const HeightEnd& from, const HeightEnd& to) {
+    const double way = to.height - from.height;
+    const double v0 = from.slope * duration;
+    const double v1 = to.slope * duration;
+    const double a0 = from.curvature * duration * duration / 2;
+    const double a1 = to.curvature * duration * duration / 2;
     HeightPiece piece;
     piece.begin = begin;
     piece.end = begin + duration;
     piece.span = duration;
-    piece.coefficients = {h0, a, 0, 10 * rise - 6 * a - 4 * b, -15 * rise + 8 * a + 7 * b, 6 * rise - 3 * a - 3 * b};
+    piece.coefficients = {from.height,
+                          v0,
+                          a0,
+                          10 * way - 6 * v0 - 4 * v1 - 3 * a0 + a1,
+                          -15 * way + 8 * v0 + 7 * v1 + 3 * a0 - 2 * a1,
+                          6 * way - 3 * v0 - 3 * v1 - a0 + a1};
     return piece;
 }
 
@@ -44,8 +52,9 @@ void HeightCurve::hold(double begin, double end, double height) {
 }
 
 double HeightCurve::at(double t) const {
-    const auto later = std::upper_bound(pieces_.begin(), pieces_.end(), t,
-                                        [](double time, const HeightPiece& piece) { return time < piece.begin; });
+    const auto later =
+        std::upper_bound(pieces_.begin(), pieces_.end(), t,
+                         [](double time, const HeightPiece& piece) { return time < piece.begin; });
     const HeightPiece& piece = later == pieces_.begin() ? pieces_.front() : *(later - 1);
     return piece.at(std::clamp(t, piece.begin, piece.end));
 }

@@ -5,9 +5,9 @@
 namespace tracking {
 namespace {
 
-constexpr double kLever = 0.4;        // m, a stick's length: turns rad into metres at the tip
-constexpr double kFastest = 25;       // m/s, of a tracked hand or tip
-constexpr double kStrongest = 3000;   // m/s^2, apart from contacts
+constexpr double kLever = 0.4;       // m, a stick's length: turns rad into metres at the tip
+constexpr double kFastest = 25;      // m/s, of a tracked hand or tip
+constexpr double kStrongest = 3000;  // m/s^2, apart from contacts
 
 }  // namespace
 
@@ -34,10 +34,11 @@ SampleStatus KalmanPredictor::start(const PoseSample& sample) noexcept {
     return SampleStatus::reinitialised;
 }
 
-OutlierGate::Verdict KalmanPredictor::judge(const PoseSample& sample, double dt, const AxisStates& x) noexcept {
-    const double variance = covariance_.innovation_variance();
-    return gate_.judge({dt, (sample.position - last_measured_).norm(), x.row(1).norm(),
-                        (sample.position.transpose() - x.row(0)).norm(), std::sqrt(variance)});
+OutlierGate::Verdict KalmanPredictor::judge(const PoseSample& sample, double dt,
+                                            const AxisStates& x) noexcept {
+    const double innovation = (sample.position.transpose() - x.row(0)).norm();
+    return gate_.judge(sample.position - last_measured_, dt, innovation,
+                       std::sqrt(covariance_.innovation_variance()));
 }
 
 SampleStatus KalmanPredictor::update(const PoseSample& sample) noexcept {
@@ -45,9 +46,13 @@ SampleStatus KalmanPredictor::update(const PoseSample& sample) noexcept {
     const AxisCovariance before = covariance_;
     const AxisStates predicted = covariance_.propagate(dt) * x_;
     switch (judge(sample, dt, predicted)) {
-        case OutlierGate::Verdict::refuse: covariance_ = before; return SampleStatus::outlier;
-        case OutlierGate::Verdict::persists: return start(sample);
-        case OutlierGate::Verdict::pass: break;
+        case OutlierGate::Verdict::refuse:
+            covariance_ = before;
+            return SampleStatus::outlier;
+        case OutlierGate::Verdict::persists:
+            return start(sample);
+        case OutlierGate::Verdict::pass:
+            break;
     }
     const Eigen::RowVector3d innovation = sample.position.transpose() - predicted.row(0);
     x_ = predicted + covariance_.correct() * innovation;

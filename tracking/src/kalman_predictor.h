@@ -13,12 +13,13 @@ namespace tracking {
 ///   a sample at dt after the state: x <- F(dt) x, P <- F P F^T + Q(dt), then x <- x + K (z - H x)
 ///   a prediction at lead L:         F(L) x, its velocity the second row
 ///
-/// The rotation runs the same model (RotationFilter), scaled as if it moved the tip of a stick of kLever: its gains are those of
-/// the position. predict() extrapolates it with F(L) too.
-/// A state that is not finite after a sample starts anew from it. No allocation.
+/// The rotation runs the same model (RotationFilter), scaled as if it moved the tip of a stick of kLever: its
+/// gains are those of the position. predict() extrapolates it with F(L) too. A state that is not finite after
+/// a sample starts anew from it. No allocation.
 class KalmanPredictor : public Predictor {
 public:
-    /// gate_sigmas <= 0: no gate. Otherwise impossible samples (OutlierGate: 25 m/s, 3000 m/s^2) answer `outlier`.
+    /// gate_sigmas <= 0: no gate. Otherwise impossible samples (OutlierGate: 25 m/s, 3000 m/s^2) answer
+    /// `outlier`.
     KalmanPredictor(const MotionModel& model, double gate_sigmas);
 
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
@@ -28,7 +29,8 @@ public:
 private:
     SampleStatus start(const PoseSample& sample) noexcept;
     SampleStatus update(const PoseSample& sample) noexcept;
-    [[nodiscard]] OutlierGate::Verdict judge(const PoseSample& sample, double dt, const AxisStates& x) noexcept;
+    [[nodiscard]] OutlierGate::Verdict judge(const PoseSample& sample, double dt,
+                                             const AxisStates& x) noexcept;
 
     SampleClock clock_;
     AxisCovariance covariance_;

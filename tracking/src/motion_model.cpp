@@ -27,18 +27,21 @@ Eigen::Vector3d singer_response(double alpha, double s) {
     return {decayed_displacement(u) / (alpha * alpha), -std::expm1(-u) / alpha, std::exp(-u)};
 }
 
-/// Integral of response * response^T over [0, dt]: exact discretisation, by Gauss-Legendre quadrature with 8 nodes on
-/// pieces of alpha * length <= 1, where its error is below the rounding (the integrand is analytic).
+/// Integral of response * response^T over [0, dt]: exact discretisation, by Gauss-Legendre quadrature with 8
+/// nodes on pieces of alpha * length <= 1, where its error is below the rounding (the integrand is analytic).
 Eigen::Matrix3d singer_noise(const MotionModel::Singer& model, double dt) {
-    constexpr double kNode[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363};
-    constexpr double kWeight[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763};
+    constexpr double kNode[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267,
+                                 0.9602898564975363};
+    constexpr double kWeight[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
+                                   0.1012285362903763};
     const int pieces = 1 + static_cast<int>(model.alpha * dt);
     const double half = dt / (2 * pieces);
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
     for (int piece = 0; piece < pieces; ++piece)
         for (int node = 0; node < 4; ++node)
             for (const double side : {-1.0, 1.0}) {
-                const Eigen::Vector3d r = singer_response(model.alpha, (2 * piece + 1 + side * kNode[node]) * half);
+                const Eigen::Vector3d r =
+                    singer_response(model.alpha, (2 * piece + 1 + side * kNode[node]) * half);
                 sum += kWeight[node] * half * (r * r.transpose());
             }
     return model.q * sum;
@@ -87,9 +90,13 @@ struct ScaledBy {
 
 }  // namespace
 
-Transition MotionModel::transition(double dt) const noexcept { return std::visit(TransitionOver{dt}, kind); }
+Transition MotionModel::transition(double dt) const noexcept {
+    return std::visit(TransitionOver{dt}, kind);
+}
 
-Eigen::Matrix3d MotionModel::process_noise(double dt) const noexcept { return std::visit(NoiseOver{dt}, kind); }
+Eigen::Matrix3d MotionModel::process_noise(double dt) const noexcept {
+    return std::visit(NoiseOver{dt}, kind);
+}
 
 MotionModel MotionModel::scaled(double factor) const {
     MotionModel other = *this;

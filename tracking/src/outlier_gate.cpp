@@ -5,27 +5,33 @@
 namespace tracking {
 namespace {
 constexpr int kPersisting = 3;
-constexpr int kSettled = 2;  // measurements after the first until the speed is known
+constexpr int kSettled = 2;
 }  // namespace
 
-bool OutlierGate::possible(const Surprise& s) const noexcept {
-    if (s.displacement > fastest_ * s.dt) return false;
-    const double explained = 2 * s.speed * s.dt + strongest_ * s.dt * s.dt / 2;
-    return passed_ < kSettled || s.innovation <= std::max(sigmas_ * s.sigma, explained);
+bool OutlierGate::possible(const Eigen::Vector3d& step, double dt, double innovation,
+                           double sigma) const noexcept {
+    if (step.norm() > fastest_ * dt) return false;
+    if (steps_ < kSettled || innovation <= sigmas_ * sigma) return true;
+    const double speed = std::max(velocity_.norm(), speed_before_);
+    return (step - velocity_ * dt).norm() <= 2 * speed * dt + strongest_ * dt * dt / 2;
 }
 
-OutlierGate::Verdict OutlierGate::judge(const Surprise& surprise) noexcept {
-    if (sigmas_ <= 0 || possible(surprise)) {
-        refused_ = 0;
-        passed_ = std::min(passed_ + 1, kSettled);
-        return Verdict::pass;
-    }
-    return ++refused_ < kPersisting ? Verdict::refuse : Verdict::persists;
+OutlierGate::Verdict OutlierGate::judge(const Eigen::Vector3d& step, double dt, double innovation,
+                                        double sigma) noexcept {
+    if (sigmas_ > 0 && !possible(step, dt, innovation, sigma))
+        return ++refused_ < kPersisting ? Verdict::refuse : Verdict::persists;
+    refused_ = 0;
+    steps_ = std::min(steps_ + 1, kSettled);
+    speed_before_ = velocity_.norm();
+    velocity_ = step / dt;
+    return Verdict::pass;
 }
 
 void OutlierGate::restart() noexcept {
     refused_ = 0;
-    passed_ = 0;
+    steps_ = 0;
+    velocity_.setZero();
+    speed_before_ = 0;
 }
 
 }  // namespace tracking

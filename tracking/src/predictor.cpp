@@ -25,10 +25,13 @@ double density(Specification& specification, double otherwise) {
 
 std::unique_ptr<Predictor> make_auto(Specification&) {
     constexpr double kGateSigmas = 5;
-    return std::make_unique<KalmanPredictor>(MotionModel{MotionModel::ConstantAcceleration{1e9 * kSquareMetres}}, kGateSigmas);
+    return std::make_unique<KalmanPredictor>(
+        MotionModel{MotionModel::ConstantAcceleration{1e9 * kSquareMetres}}, kGateSigmas);
 }
 
-std::unique_ptr<Predictor> make_hold(Specification&) { return std::make_unique<Hold>(); }
+std::unique_ptr<Predictor> make_hold(Specification&) {
+    return std::make_unique<Hold>();
+}
 
 std::unique_ptr<Predictor> make_naive(Specification& specification) {
     constexpr double kWindow = 1.0 / 15;
@@ -37,7 +40,9 @@ std::unique_ptr<Predictor> make_naive(Specification& specification) {
     return n > 0 ? MovingAverage::of_count(static_cast<std::size_t>(n)) : MovingAverage::of_window(kWindow);
 }
 
-std::unique_ptr<Predictor> make_difference(Specification&) { return std::make_unique<Difference>(); }
+std::unique_ptr<Predictor> make_difference(Specification&) {
+    return std::make_unique<Difference>();
+}
 
 std::unique_ptr<Predictor> make_thesis(Specification& specification) {
     const Eigen::Vector3d xi = Eigen::Vector3d(1, 20, 63) * 1e-3;  // (3.18)

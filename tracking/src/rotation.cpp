@@ -16,8 +16,9 @@ Eigen::Vector3d logarithm(const Eigen::Quaterniond& q) noexcept {
     const double sine = q.vec().norm();
     const double cosine = sign * q.w();
     // atan2(s, c)/s = 1/c - s^2/(3 c^3) + ..., next term below 1e-16 for s < 1e-4.
-    const double half_angle_over_sine =
-        sine < 1e-4 ? 1 / cosine - sine * sine / (3 * cosine * cosine * cosine) : std::atan2(sine, cosine) / sine;
+    const double half_angle_over_sine = sine < 1e-4
+                                            ? 1 / cosine - sine * sine / (3 * cosine * cosine * cosine)
+                                            : std::atan2(sine, cosine) / sine;
     return 2 * sign * half_angle_over_sine * q.vec();
 }
 

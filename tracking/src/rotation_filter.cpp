@@ -34,12 +34,15 @@ void RotationFilter::correct(const Eigen::Quaterniond& measured) noexcept {
     if (!started_) return start(measured);
     const Eigen::Quaterniond z = measured.normalized();
     const Eigen::Vector3d innovation = logarithm(z * q_.conjugate());
-    const Surprise surprise{since_measured_, z.angularDistance(last_measured_), rates_.row(1).norm(), innovation.norm(),
-                            std::sqrt(covariance_.innovation_variance())};
-    switch (gate_.judge(surprise)) {
-        case OutlierGate::Verdict::refuse: return;
-        case OutlierGate::Verdict::persists: return start(measured);
-        case OutlierGate::Verdict::pass: break;
+    const Eigen::Vector3d step = logarithm(z * last_measured_.conjugate());
+    const double sigma = std::sqrt(covariance_.innovation_variance());
+    switch (gate_.judge(step, since_measured_, innovation.norm(), sigma)) {
+        case OutlierGate::Verdict::refuse:
+            return;
+        case OutlierGate::Verdict::persists:
+            return start(measured);
+        case OutlierGate::Verdict::pass:
+            break;
     }
     rates_ += covariance_.correct() * innovation.transpose();
     q_ = (exponential(rates_.row(0).transpose()) * q_).normalized();

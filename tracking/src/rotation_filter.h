@@ -6,15 +6,16 @@
 
 namespace tracking {
 
-/// Kalman filter of an orientation (Friedmann 1992, section 3.2): an absolute unit quaternion q outside the filter, and inside it
-/// a small rotation rho about it with velocity w and acceleration, all in world axes. rho is 0 between samples.
+/// Kalman filter of an orientation (Friedmann 1992, section 3.2): an absolute unit quaternion q outside the
+/// filter, and inside it a small rotation rho about it with velocity w and acceleration, all in world axes.
+/// rho is 0 between samples.
 ///
 ///   propagate  q <- exp(rho) q with [rho, w, a] <- F(dt) [0, w, a]
 ///   innovate   log(z q^-1), the shorter way round, so the sign of z does not matter
 ///   correct    [rho, w, a] += K innovation, then q <- exp(rho) q and rho = 0
 ///
-/// Valid while the turn between two samples is small against pi. The covariance is the axes' own (the noise is alike in all
-/// directions, so turning rho's frame leaves it alone). No allocation.
+/// Valid while the turn between two samples is small against pi. The covariance is the axes' own (the noise
+/// is alike in all directions, so turning rho's frame leaves it alone). No allocation.
 class RotationFilter {
 public:
     RotationFilter(const MotionModel& model, const OutlierGate& gate) : covariance_(model), gate_(gate) {}

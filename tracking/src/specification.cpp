@@ -63,7 +63,8 @@ void Specification::require_no_others() const {
 }
 
 void Specification::fail(const std::string& found, const std::string& expected) const {
-    throw std::invalid_argument("predictor " + in_quotes(text_) + ": found " + found + ", expected " + expected);
+    throw std::invalid_argument("predictor " + in_quotes(text_) + ": found " + found + ", expected " +
+                                expected);
 }
 
 }  // namespace tracking

@@ -12,7 +12,8 @@ public:
 
     [[nodiscard]] const std::string& name() const { return name_; }
 
-    /// The number given for `key`, or `otherwise`; throws unless least <= number <= most. The key counts as known from here on.
+    /// The number given for `key`, or `otherwise`; throws unless least <= number <= most. The key counts as
+    /// known from here on.
     [[nodiscard]] double number(const std::string& key, double otherwise, double least, double most);
     /// The word given for `key`, or empty; throws unless it is `only`.
     [[nodiscard]] bool word(const std::string& key, const std::string& only);

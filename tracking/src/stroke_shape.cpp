@@ -13,7 +13,8 @@ constexpr double kLeastApex = 0.002;  // m above the turn of a feint or the surf
 
 }  // namespace
 
-StrokeShape::StrokeShape(const Stroke& stroke, const DrummerParameters& parameters, double gap_before, double gap_after)
+StrokeShape::StrokeShape(const Stroke& stroke, const DrummerParameters& parameters, double gap_before,
+                         double gap_after)
     : feint_(stroke.kind == StrokeKind::feint),
       t_(stroke.t_s),
       speed_(stroke.speed_mps),
@@ -28,46 +29,43 @@ StrokeShape::StrokeShape(const Stroke& stroke, const DrummerParameters& paramete
     departure_ = t_ + kQuarter * depth_ / rebound_;
 }
 
-double StrokeShape::least_apex() const { return (feint_ ? turn_height_ : 0) + kLeastApex; }
+double StrokeShape::least_apex() const {
+    return (feint_ ? turn_height_ : 0) + kLeastApex;
+}
 
-double StrokeShape::brake_start(const HeightPiece& downstroke) const {
-    double low = 0;
-    double high = downstroke.span;
-    for (int i = 0; i < 60; ++i) {
-        const double middle = (low + high) / 2;
-        const double v = downstroke.slope_at(middle);
-        const double way = 0.75 * v * v / kBrake;
-        (downstroke.at(middle) - turn_height_ > way ? low : high) = middle;
-    }
-    return low;
+HeightPiece StrokeShape::downstroke(double apex) const {
+    HeightPiece piece;
+    piece.span = 2 * apex / speed_;
+    piece.coefficients = {apex, 0, -apex, 0, 0, 0};
+    return piece;
+}
+
+double StrokeShape::brake_speed(double apex) const {
+    // v^2 / 2a has been fallen when braking starts, 0.75 v^2 / kBrake is left then.
+    const double way = apex - turn_height_;
+    return std::sqrt(way / (0.5 / descent_acceleration(apex) + 0.75 / kBrake));
 }
 
 double StrokeShape::descent_duration(double apex) const {
-    const double full = 2 * apex / speed_;
-    if (!feint_) return full;
-    const HeightPiece downstroke = quintic(0, full, apex, 0, 0, -speed_);
-    const double start = brake_start(downstroke);
-    return start + 1.5 * std::abs(downstroke.slope_at(start)) / kBrake;
+    if (!feint_) return 2 * apex / speed_;
+    const double v = brake_speed(apex);
+    return v / descent_acceleration(apex) + 1.5 * v / kBrake;
 }
 
-double StrokeShape::descent_acceleration(double apex) const { return 0.75 * speed_ * speed_ / apex; }
+double StrokeShape::descent_acceleration(double apex) const {
+    return speed_ * speed_ / (2 * apex);
+}
 
 void StrokeShape::append_descent(HeightCurve& curve, double apex) const {
-    const double begin = arrival_ - descent_duration(apex);
-    HeightPiece downstroke = quintic(begin, 2 * apex / speed_, apex, 0, 0, -speed_);
-    if (!feint_) {
-        downstroke.end = arrival_;
-        curve.append(downstroke);
-        return;
-    }
-    HeightPiece local = downstroke;
-    local.begin = 0;
-    const double start = brake_start(local);
-    const double v = local.slope_at(start);
-    downstroke.end = begin + start;
-    curve.append(downstroke);
-    if (downstroke.end < arrival_)
-        curve.append(quintic(downstroke.end, arrival_ - downstroke.end, local.at(start), v, turn_height_, 0));
+    HeightPiece down = downstroke(apex);
+    down.begin = arrival_ - descent_duration(apex);
+    const double v = feint_ ? brake_speed(apex) : 0;
+    const double brake_begin = arrival_ - 1.5 * v / kBrake;
+    down.end = brake_begin;
+    curve.append(down);
+    if (feint_)
+        curve.append(quintic(brake_begin, arrival_ - brake_begin, {down.at(brake_begin), -v, 0},
+                             {turn_height_, 0, 0}));
 }
 
 void StrokeShape::append_contact(HeightCurve& curve) const {

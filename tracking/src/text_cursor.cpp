@@ -9,9 +9,13 @@
 namespace tracking {
 namespace {
 
-bool is_continuation(char c) { return (static_cast<unsigned char>(c) & 0xC0u) == 0x80u; }
+bool is_continuation(char c) {
+    return (static_cast<unsigned char>(c) & 0xC0u) == 0x80u;
+}
 
-bool is_blank(char c) { return c == ' ' || c == '\t'; }
+bool is_blank(char c) {
+    return c == ' ' || c == '\t';
+}
 
 std::string printable(std::string_view text) {
     std::string out(text);
@@ -27,12 +31,19 @@ std::string byte_name(char c) {
     return std::string("byte 0x") + kHex[byte >> 4] + kHex[byte & 15];
 }
 
-/// Bytes of the UTF-8 character at the start of `text`; 0 if there is none (overlong forms, surrogates included).
+/// Bytes of the UTF-8 character at the start of `text`; 0 if there is none (overlong forms, surrogates
+/// included).
 std::size_t utf8_length(std::string_view text) {
     const auto lead = static_cast<unsigned char>(text[0]);
-    const std::size_t length = lead < 0x80 ? 1 : lead < 0xC2 ? 0 : lead < 0xE0 ? 2 : lead < 0xF0 ? 3 : lead < 0xF5 ? 4 : 0;
+    const std::size_t length = lead < 0x80   ? 1
+                               : lead < 0xC2 ? 0
+                               : lead < 0xE0 ? 2
+                               : lead < 0xF0 ? 3
+                               : lead < 0xF5 ? 4
+                                             : 0;
     if (length == 0 || length > text.size()) return 0;
-    if (!std::all_of(text.begin() + 1, text.begin() + static_cast<std::ptrdiff_t>(length), is_continuation)) return 0;
+    if (!std::all_of(text.begin() + 1, text.begin() + static_cast<std::ptrdiff_t>(length), is_continuation))
+        return 0;
     if (length < 3) return length;
     const auto second = static_cast<unsigned char>(text[1]);
     const bool overlong = (lead == 0xE0 && second < 0xA0) || (lead == 0xF0 && second < 0x90);
@@ -75,8 +86,8 @@ void Line::fail(std::size_t offset, const std::string& found, const std::string&
     const std::string_view before = text_.substr(0, std::min(offset, text_.size()));
     const auto inside = std::count_if(before.begin(), before.end(), is_continuation);
     const std::size_t column = before.size() - static_cast<std::size_t>(inside) + 1;
-    throw TraceError(printable(*file_) + ":" + std::to_string(number_) + ":" + std::to_string(column) + ": error: found " +
-                     found + ", expected " + expected + "; " + remedy);
+    throw TraceError(printable(*file_) + ":" + std::to_string(number_) + ":" + std::to_string(column) +
+                     ": error: found " + found + ", expected " + expected + "; " + remedy);
 }
 
 void Line::require_text() const {

@@ -28,8 +28,8 @@ public:
     /// Throws for control characters, DEL and what is not UTF-8.
     void require_text() const;
 
-    /// The field that starts at byte `offset` and ends at the next comma; `offset` moves behind that comma, or to npos at
-    /// the line's end.
+    /// The field that starts at byte `offset` and ends at the next comma; `offset` moves behind that comma,
+    /// or to npos at the line's end.
     [[nodiscard]] Field next_field(std::size_t& offset) const;
 
     /// The finite number in a field with |number| <= limit; `what` names it in messages.

@@ -9,37 +9,46 @@
 namespace tracking {
 namespace {
 
-constexpr double kRestShare = 0.6;      // of the apex: where a stick waits
-constexpr double kPreparation = 0.2;    // s, the rise from there to the apex
-constexpr double kLift = 100;           // m/s^2, the most that a lift without rebound accelerates
-constexpr double kMinimumJerk = 5.7735; // largest second derivative of the minimum-jerk curve, distance / duration^2
+constexpr double kRestShare = 0.6;                                // of the apex: where a stick waits
+constexpr double kRestShares[] = {kRestShare, 0.7, 0.8, 0.9, 1};  // with little time it waits higher
+constexpr double kPreparation = 0.2;                              // s, the rise from there to the apex
+constexpr double kLift = 100;  // m/s^2, the most that a lift without rebound accelerates
+constexpr double kMinimumJerk =
+    5.7735;  // largest second derivative of the minimum-jerk curve, distance / duration^2
 constexpr double kStrongestHeight = 0.75 * TipPath::kStrongest;  // shares of the whole
 constexpr double kStrongestTravel = 0.2 * TipPath::kStrongest;
-constexpr double kBefore = 2;           // s before the first stroke at which the path begins, at rest
+constexpr double kBefore = 2;  // s before the first stroke at which the path begins, at rest
 
-double lift_duration(double way) { return std::sqrt(kMinimumJerk * std::max(way, 0.0) / kLift); }
+/// Longest duration of a lift from rest that ends with acceleration -curvature without dipping first. At
+/// curvature duration^2 <= 20 way the quintic rises all the way: its slope is proportional to u^2 (1 - u) (30
+/// (1 - u) - k (3 - 5u)) with k = curvature duration^2 / 2 way.
+double longest_lift(double way, double curvature) {
+    return std::sqrt(20 * way / curvature);
+}
 
-/// Where a way up begins.
-struct Departure {
-    double height, speed;
-};
+double lift_duration(double way, double curvature) {
+    const double brisk = std::sqrt(kMinimumJerk * way / kLift);
+    return curvature > 0 ? std::min(brisk, longest_lift(way, curvature)) : brisk;
+}
 
 /// The rebound carries the tip up by itself, or the hand lifts it, whichever is quicker.
-double rise_duration(const Departure& from, double apex) {
-    const double way = std::max(apex - from.height, 0.0);
-    const double lift = lift_duration(way);
+double rise_duration(const TipPath::Departure& from, double top, double curvature) {
+    const double way = std::max(top - from.height, 0.0);
+    const double lift = lift_duration(way, curvature);
     return from.speed > 0 ? std::min(2 * way / from.speed, lift) : lift;
 }
 
 /// Bound of the acceleration on that way.
-double rise_acceleration(const Departure& from, double apex) {
+double rise_acceleration(const TipPath::Departure& from, double apex) {
     const double way = apex - from.height;
     return way > 0 ? std::max(kLift, 0.75 * from.speed * from.speed / way) : kLift;
 }
 
 /// Highest apex up to `rise` from which the stroke is reached in `time`; below least_apex() if none.
-double highest_apex(const Departure& from, const StrokeShape& to, double time, double rise) {
-    const auto needed = [&](double apex) { return rise_duration(from, apex) + to.descent_duration(apex); };
+double highest_apex(const TipPath::Departure& from, const StrokeShape& to, double time, double rise) {
+    const auto needed = [&](double apex) {
+        return rise_duration(from, apex, to.descent_acceleration(apex)) + to.descent_duration(apex);
+    };
     double high = std::max(rise, to.least_apex() + rise / 2);
     if (needed(high) <= time) return high;
     double low = std::max(to.least_apex(), from.height);
@@ -51,7 +60,9 @@ double highest_apex(const Departure& from, const StrokeShape& to, double time, d
     return low;
 }
 
-double minimum_jerk(double u) { return u * u * u * (10 + u * (-15 + 6 * u)); }
+double minimum_jerk(double u) {
+    return u * u * u * (10 + u * (-15 + 6 * u));
+}
 
 [[noreturn]] void refuse(const Stroke& stroke, const char* why) {
     std::ostringstream message;
@@ -84,52 +95,70 @@ TipPath::TipPath(const std::vector<Stroke>& strokes, const DrummerParameters& pa
     finish(shapes.back(), parameters.rise_m);
 }
 
-void TipPath::connect(const StrokeShape* from, const StrokeShape& to, double begin, double rise, const Stroke& stroke) {
+void TipPath::connect(const StrokeShape* from, const StrokeShape& to, double begin, double rise,
+                      const Stroke& stroke) {
     const double time = to.arrival() - begin;
-    const Departure departure{from ? from->departure_height() : kRestShare * rise, from ? from->departure_speed() : 0};
+    const Departure departure{from ? from->departure_height() : kRestShare * rise,
+                              from ? from->departure_speed() : 0};
     const double apex = highest_apex(departure, to, time, rise);
     if (apex <= 0) refuse(stroke, "too soon after the one before");
     if (to.descent_acceleration(apex) > kStrongestHeight) refuse(stroke, "whose speed its rise cannot give");
     if (rise_acceleration(departure, apex) > kStrongestHeight) refuse(stroke, "too soon after a faster one");
     if (apex < rise) ++lowered_;
-    const double down_begin = to.arrival() - to.descent_duration(apex);
-    const double rest = std::max(kRestShare * apex, departure.height);
-    const double to_rest = rise_duration(departure, rest);
-    const bool rests = begin + to_rest + kPreparation < down_begin && rest < apex;
-    const double top = rests ? rest : apex;
-    const double up_end = begin + rise_duration(departure, top);
-    if (up_end > begin) height_.append(quintic(begin, up_end - begin, departure.height, departure.speed, top, 0));
-    const double lift_begin = rests ? down_begin - kPreparation : down_begin;
-    height_.hold(up_end, lift_begin, top);
-    if (rests) height_.append(quintic(lift_begin, kPreparation, rest, 0, apex, 0));
+    rise_to(departure, begin, apex, to);
     to.append_descent(height_, apex);
+}
+
+void TipPath::rise_to(const Departure& from, double begin, double apex, const StrokeShape& to) {
+    const double end = to.arrival() - to.descent_duration(apex);
+    const double curvature = to.descent_acceleration(apex);
+    for (const double share : kRestShares) {
+        const double rest = std::max(share * apex, from.height);
+        const double rest_begin = begin + rise_duration(from, rest, 0);
+        const double lift_begin = end - std::min(kPreparation, longest_lift(apex - rest, curvature));
+        if (rest > apex || rest_begin > lift_begin) continue;
+        height_.append(quintic(begin, rest_begin - begin, {from.height, from.speed, 0}, {rest, 0, 0}));
+        height_.hold(rest_begin, lift_begin, rest);
+        height_.append(quintic(lift_begin, end - lift_begin, {rest, 0, 0}, {apex, 0, -curvature}));
+        return;
+    }
+    const double time = end - begin;
+    const double bend = std::min(
+        curvature, 20 * (apex - from.height) / (time * time));  // or the way would dip, see longest_lift
+    height_.append(quintic(begin, time, {from.height, from.speed, 0}, {apex, 0, -bend}));
 }
 
 void TipPath::finish(const StrokeShape& last, double rise) {
     const Departure departure{last.departure_height(), last.departure_speed()};
     const double rest = std::max(kRestShare * rise, departure.height);
-    const double duration = rise_duration(departure, rest);
-    if (duration > 0) height_.append(quintic(last.departure(), duration, departure.height, departure.speed, rest, 0));
+    const double duration = rise_duration(departure, rest, 0);
+    if (duration > 0)
+        height_.append(
+            quintic(last.departure(), duration, {departure.height, departure.speed, 0}, {rest, 0, 0}));
 }
 
 void TipPath::add_travels(const std::vector<Stroke>& strokes, const std::vector<StrokeShape>& shapes) {
     const Stroke& first = strokes.front();
     const double start = shapes.front().arrival() - kBefore;
-    travels_.push_back({start, shapes.front().arrival(), first.target, first.target, first.normal, first.normal});
+    travels_.push_back(
+        {start, shapes.front().arrival(), first.target, first.target, first.normal, first.normal});
     for (std::size_t i = 1; i < strokes.size(); ++i) {
         const double begin = shapes[i - 1].departure();
         const double end = shapes[i].arrival();
         const double way = (strokes[i].target - strokes[i - 1].target).norm();
         if (!(end > begin) || kMinimumJerk * way > kStrongestTravel * (end - begin) * (end - begin))
             refuse(strokes[i], "too far from the one before for the time between");
-        if (strokes[i].normal.dot(strokes[i - 1].normal) < -0.5) refuse(strokes[i], "facing away from the one before");
-        travels_.push_back({begin, end, strokes[i - 1].target, strokes[i].target, strokes[i - 1].normal, strokes[i].normal});
+        if (strokes[i].normal.dot(strokes[i - 1].normal) < -0.5)
+            refuse(strokes[i], "facing away from the one before");
+        travels_.push_back(
+            {begin, end, strokes[i - 1].target, strokes[i].target, strokes[i - 1].normal, strokes[i].normal});
     }
 }
 
 const TipPath::Travel& TipPath::travel_at(double t) const {
-    const auto later = std::upper_bound(travels_.begin(), travels_.end(), t,
-                                        [](double time, const Travel& travel) { return time < travel.begin; });
+    const auto later =
+        std::upper_bound(travels_.begin(), travels_.end(), t,
+                         [](double time, const Travel& travel) { return time < travel.begin; });
     return later == travels_.begin() ? travels_.front() : *(later - 1);
 }
 

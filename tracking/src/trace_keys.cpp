@@ -15,7 +15,9 @@ bool one_edit_apart(std::string_view a, std::string_view b) {
     if (a.size() > b.size()) std::swap(a, b);
     if (b.size() - a.size() > 1) return false;
     const auto differing = static_cast<std::size_t>(
-        std::mismatch(a.begin(), a.end(), b.begin(), b.begin() + static_cast<std::ptrdiff_t>(a.size())).first - a.begin());
+        std::mismatch(a.begin(), a.end(), b.begin(), b.begin() + static_cast<std::ptrdiff_t>(a.size()))
+            .first -
+        a.begin());
     const std::size_t skip = a.size() == b.size() ? 1 : 0;
     return a.substr(std::min(differing + skip, a.size())) == b.substr(std::min(differing + 1, b.size()));
 }
@@ -49,27 +51,32 @@ void TraceKeys::read(const Line& line) {
     if (std::find(kKeys.begin(), kKeys.end(), key) == kKeys.end()) {
         const std::string_view meant = near_miss(key);
         if (!meant.empty())
-            line.fail(name.offset, "key " + in_quotes(key), "key '" + std::string(meant) + "'", "rename the key or drop its colon");
+            line.fail(name.offset, "key " + in_quotes(key), "key '" + std::string(meant) + "'",
+                      "rename the key or drop its colon");
         return;
     }
     if (!seen_.insert(key).second)
-        line.fail(name.offset, "key '" + key + "' a second time", "each key once", "delete one of the two lines");
+        line.fail(name.offset, "key '" + key + "' a second time", "each key once",
+                  "delete one of the two lines");
     set(line, key, field_at(line, text.substr(colon + 1)));
 }
 
 void TraceKeys::set(const Line& line, const std::string& key, const Field& value) {
     if (key == "units") {
         if (value.text != "m" && value.text != "mm")
-            line.fail(value.offset, "units " + in_quotes(value.text), "m or mm", "convert the positions and say which");
+            line.fail(value.offset, "units " + in_quotes(value.text), "m or mm",
+                      "convert the positions and say which");
         metres_per_unit_ = value.text == "mm" ? 1e-3 : 1;
     } else if (key == "up") {
         if (value.text != "y" && value.text != "z")
-            line.fail(value.offset, "up " + in_quotes(value.text), "y or z", "turn the coordinates and say which axis is up");
+            line.fail(value.offset, "up " + in_quotes(value.text), "y or z",
+                      "turn the coordinates and say which axis is up");
         z_up_ = value.text == "z";
     } else if (key == "rate_hz") {
         rate_hz_ = line.number_in(value, "a rate", kHighestRate, "100000 Hz");
         if (!(rate_hz_ > 0))
-            line.fail(value.offset, "rate " + in_quotes(value.text), "a rate above 0 Hz", "correct the rate or delete the line");
+            line.fail(value.offset, "rate " + in_quotes(value.text), "a rate above 0 Hz",
+                      "correct the rate or delete the line");
     } else if (key == "source") {
         source_ = value.text;
     } else if (key == "tip_m") {
@@ -84,17 +91,21 @@ void TraceKeys::set_tip(const Line& line, const Field& value) {
     std::size_t offset = value.offset;
     for (int axis = 0; axis < 3; ++axis) {
         if (offset == std::string_view::npos)
-            line.fail(line.text().size(), "the line's end", "three numbers x,y,z", "write the tip as `# tip_m: 0,0,-0.35`");
-        tip[axis] = line.number_in(line.next_field(offset), "a coordinate of the tip in metres", kFarthestTip, "3 m");
+            line.fail(line.text().size(), "the line's end", "three numbers x,y,z",
+                      "write the tip as `# tip_m: 0,0,-0.35`");
+        tip[axis] =
+            line.number_in(line.next_field(offset), "a coordinate of the tip in metres", kFarthestTip, "3 m");
     }
     if (offset != std::string_view::npos)
-        line.fail(offset - 1, "more than three numbers", "three numbers x,y,z", "write the tip as `# tip_m: 0,0,-0.35`");
+        line.fail(offset - 1, "more than three numbers", "three numbers x,y,z",
+                  "write the tip as `# tip_m: 0,0,-0.35`");
     tip_ = tip;
 }
 
 void TraceKeys::set_shaft(const Line& line, const Field& value) {
     const bool signed_axis = value.text.size() == 2 && (value.text[0] == '+' || value.text[0] == '-');
-    const std::size_t axis = signed_axis ? std::string_view("xyz").find(value.text[1]) : std::string_view::npos;
+    const std::size_t axis =
+        signed_axis ? std::string_view("xyz").find(value.text[1]) : std::string_view::npos;
     if (axis == std::string_view::npos)
         line.fail(value.offset, "shaft " + in_quotes(value.text), "one of +x, -x, +y, -y, +z, -z",
                   "name the body axis that points from hand to tip");

@@ -11,7 +11,8 @@ namespace tracking {
 /// What the `# key: value` lines of a trace say.
 class TraceKeys {
 public:
-    /// Takes one line that starts with '#'. Throws TraceError for a bad value, a repeated key, or a near miss of a key.
+    /// Takes one line that starts with '#'. Throws TraceError for a bad value, a repeated key, or a near miss
+    /// of a key.
     void read(const Line& line);
 
     [[nodiscard]] double metres_per_unit() const { return metres_per_unit_; }

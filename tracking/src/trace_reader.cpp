@@ -15,7 +15,8 @@ constexpr double kFarthest = 1000;         // m
 constexpr double kLargestAngle = 1e6;      // degrees
 constexpr double kLargestIncrement = 100;  // rad
 constexpr double kNormTolerance = 0.01;
-constexpr double kUnitTolerance = 1e-14;  // of the squared norm: left as it is, so that written traces read back exactly
+constexpr double kUnitTolerance =
+    1e-14;  // of the squared norm: left as it is, so that written traces read back exactly
 constexpr std::size_t kLongestName = 64;
 
 enum class Orientation { absent, quaternion, increment, euler };
@@ -30,12 +31,15 @@ struct Reading {
     std::size_t first_offset = 0;
     std::string_view first_text;
     std::size_t last_line = 0;
-    Eigen::Quaterniond file_orientation = Eigen::Quaterniond::Identity();  ///< in the file's world, for increments
+    Eigen::Quaterniond file_orientation =
+        Eigen::Quaterniond::Identity();  ///< in the file's world, for increments
 };
 
 class Reader {
 public:
-    Reader(std::string_view text, const std::string& name) : name_(name), lines_(text, name) { trace_.file = name; }
+    Reader(std::string_view text, const std::string& name) : name_(name), lines_(text, name) {
+        trace_.file = name;
+    }
 
     Trace read() {
         read_head();
@@ -89,11 +93,13 @@ private:
     void split(const Line& line) {
         std::size_t offset = 0;
         std::size_t count = 0;
-        while (offset != std::string_view::npos && count < columns_) fields_[count++] = line.next_field(offset);
+        while (offset != std::string_view::npos && count < columns_)
+            fields_[count++] = line.next_field(offset);
         if (count == columns_ && offset == std::string_view::npos) return;
         const std::string expected = std::to_string(columns_) + " fields, as in the header";
         if (count == columns_)
-            line.fail(offset - 1, "more than " + std::to_string(columns_) + " fields", expected, "delete what is too much");
+            line.fail(offset - 1, "more than " + std::to_string(columns_) + " fields", expected,
+                      "delete what is too much");
         line.fail(line.text().size(), std::to_string(count) + (count == 1 ? " field" : " fields"), expected,
                   "complete or delete the line");
     }
@@ -116,20 +122,28 @@ private:
         if (!sticks_.empty() && sticks_[latest_].trace.name == field.text) return sticks_[latest_];
         const auto known = index_.find(field.text);
         if (known != index_.end()) return sticks_[latest_ = known->second];
-        if (field.text.empty() || field.text.size() > kLongestName || field.text.find_first_of(" \t\"'") != std::string_view::npos)
+        if (field.text.empty() || field.text.size() > kLongestName ||
+            field.text.find_first_of(" \t\"'") != std::string_view::npos)
             line.fail(field.offset, "stick name " + in_quotes(field.text),
                       "a word of at most 64 bytes without blanks or quotes", "rename the stick");
         latest_ = sticks_.size();
         index_.emplace(field.text, latest_);
-        sticks_.push_back({{std::string(field.text), {}}, line.number(), field.offset, line.text(), 0, Eigen::Quaterniond::Identity()});
+        sticks_.push_back({{std::string(field.text), {}},
+                           line.number(),
+                           field.offset,
+                           line.text(),
+                           0,
+                           Eigen::Quaterniond::Identity()});
         return sticks_.back();
     }
 
     void require_later(const Line& line, const Reading& stick, double t) const {
         if (stick.trace.samples.empty() || t > stick.trace.samples.back().t_s) return;
-        line.fail(fields_[0].offset, "sample time " + std::string(fields_[0].text) + " s of stick " + in_quotes(stick.trace.name),
-                  "later than that of line " + std::to_string(stick.last_line),
-                  "sort the file or delete the repeated sample");
+        line.fail(
+            fields_[0].offset,
+            "sample time " + std::string(fields_[0].text) + " s of stick " + in_quotes(stick.trace.name),
+            "later than that of line " + std::to_string(stick.last_line),
+            "sort the file or delete the repeated sample");
     }
 
     Eigen::Vector3d read_position(const Line& line) const {
@@ -137,8 +151,9 @@ private:
         const char* limit = scale == 1 ? "1000 m" : "1000000 mm";
         Eigen::Vector3d p;
         for (int axis = 0; axis < 3; ++axis)
-            p[axis] = line.number_in(fields_[static_cast<std::size_t>(axis) + 2], "a coordinate", kFarthest / scale, limit);
-        if (scale != 1) p /= 1000;  // dividing rounds once: 123.4 mm becomes exactly the double 0.1234
+            p[axis] = line.number_in(fields_[static_cast<std::size_t>(axis) + 2], "a coordinate",
+                                     kFarthest / scale, limit);
+        if (scale != 1) p /= 1000;  // 0.001 is no double: dividing keeps whole mm exact
         return keys_.z_up() ? Eigen::Vector3d(p.x(), p.z(), -p.y()) : p;
     }
 
@@ -177,11 +192,12 @@ private:
     Eigen::Quaterniond read_quaternion(const Line& line) const {
         double c[4];
         for (std::size_t i = 0; i < 4; ++i)
-            c[i] = line.number_in(fields_[5 + i], "a component of a unit quaternion", 1 + kNormTolerance, "1.01");
+            c[i] = line.number_in(fields_[5 + i], "a component of a unit quaternion", 1 + kNormTolerance,
+                                  "1.01");
         const Eigen::Quaterniond q(c[0], c[1], c[2], c[3]);
         if (std::abs(q.norm() - 1) > kNormTolerance)
-            line.fail(fields_[5].offset, "a quaternion of norm " + std::to_string(q.norm()), "norm 1 within 1 %",
-                      "correct the quaternion, or leave its four fields empty");
+            line.fail(fields_[5].offset, "a quaternion of norm " + std::to_string(q.norm()),
+                      "norm 1 within 1 %", "correct the quaternion, or leave its four fields empty");
         return q;
     }
 
@@ -189,26 +205,29 @@ private:
         const bool euler = orientation_ == Orientation::euler;
         Eigen::Vector3d v;
         for (int axis = 0; axis < 3; ++axis)
-            v[axis] = line.number_in(fields_[static_cast<std::size_t>(axis) + 5],
-                                     euler ? "an Euler angle in degrees" : "an incremental rotation in rad",
-                                     euler ? kLargestAngle : kLargestIncrement, euler ? "1e6 degrees" : "100 rad");
+            v[axis] =
+                line.number_in(fields_[static_cast<std::size_t>(axis) + 5],
+                               euler ? "an Euler angle in degrees" : "an incremental rotation in rad",
+                               euler ? kLargestAngle : kLargestIncrement, euler ? "1e6 degrees" : "100 rad");
         return v;
     }
 
     static Eigen::Quaterniond from_euler(const Eigen::Vector3d& degrees) {
         const Eigen::Vector3d rad = degrees * (std::numbers::pi / 180);
-        return exponential(rad.x() * Eigen::Vector3d::UnitX()) * exponential(rad.y() * Eigen::Vector3d::UnitY()) *
+        return exponential(rad.x() * Eigen::Vector3d::UnitX()) *
+               exponential(rad.y() * Eigen::Vector3d::UnitY()) *
                exponential(rad.z() * Eigen::Vector3d::UnitZ());
     }
 
     Trace finish() {
         if (sticks_.empty())
-            Line(name_, lines_.lines_read() + 1, "").fail(0, "the end of the file", "at least two samples", "check that the trace is complete");
+            Line(name_, lines_.lines_read() + 1, "")
+                .fail(0, "the end of the file", "at least two samples", "check that the trace is complete");
         for (Reading& stick : sticks_) {
             if (stick.trace.samples.size() < 2)
                 Line(name_, stick.first_line, stick.first_text)
-                    .fail(stick.first_offset, "one sample of stick " + in_quotes(stick.trace.name), "at least two samples a stick",
-                          "delete the line or complete the trace");
+                    .fail(stick.first_offset, "one sample of stick " + in_quotes(stick.trace.name),
+                          "at least two samples a stick", "delete the line or complete the trace");
             trace_.sticks.push_back(std::move(stick.trace));
         }
         return std::move(trace_);

@@ -25,12 +25,14 @@ std::string axis_name(const Eigen::Vector3d& shaft) {
         if (shaft == Eigen::Vector3d::Unit(axis)) return std::string("+") + "xyz"[axis];
         if (shaft == -Eigen::Vector3d::Unit(axis)) return std::string("-") + "xyz"[axis];
     }
-    throw std::invalid_argument("found a shaft that is not an axis of the body, expected one of +x, -x, +y, -y, +z, -z");
+    throw std::invalid_argument(
+        "found a shaft that is not an axis of the body, expected one of +x, -x, +y, -y, +z, -z");
 }
 
 std::string keys_of(const Trace& trace) {
     if (first_unprintable(trace.source) != std::string::npos)
-        throw std::invalid_argument("found control characters in a trace's source, expected one line of text");
+        throw std::invalid_argument(
+            "found control characters in a trace's source, expected one line of text");
     std::string out = "# units: m\n# up: y\n";
     if (trace.rate_hz > 0) {
         out += "# rate_hz: ";
@@ -63,8 +65,10 @@ void append_row(std::string& out, const std::string& stick, const PoseSample& sa
 }
 
 void require_word(const std::string& name) {
-    if (name.empty() || name.find_first_of(" \t,\"'") != std::string::npos || first_unprintable(name) != std::string::npos)
-        throw std::invalid_argument("found stick name " + in_quotes(name) + ", expected a word without blanks, commas or quotes");
+    if (name.empty() || name.find_first_of(" \t,\"'") != std::string::npos ||
+        first_unprintable(name) != std::string::npos)
+        throw std::invalid_argument("found stick name " + in_quotes(name) +
+                                    ", expected a word without blanks, commas or quotes");
 }
 
 }  // namespace

@@ -22,15 +22,17 @@ struct Instrument {
     std::vector<Parameter> parameters;
 };
 
-/// The instruments that an orchestra's text declares by lines `;@ instrument parameter default minimum maximum text`.
-/// Throws std::runtime_error "FILE:LINE: found ..., expected ..." for a line that is not of that form.
+/// The instruments that an orchestra's text declares by lines `;@ instrument parameter default minimum
+/// maximum text`. Throws std::runtime_error "FILE:LINE: found ..., expected ..." for a line that is not of
+/// that form.
 [[nodiscard]] std::vector<Instrument> parse_instruments(std::string_view orchestra, const std::string& file);
 
 /// The same, of a file; throws std::runtime_error where it cannot be read.
 [[nodiscard]] std::vector<Instrument> read_instruments(const std::filesystem::path& orchestra);
 
-/// The instrument's parameters in its order: the given ones, the declared defaults elsewhere. Throws std::runtime_error for
-/// an unknown or repeated name or a value that is not finite or out of range, naming `owner` (the kit's voice).
+/// The instrument's parameters in its order: the given ones, the declared defaults elsewhere. Throws
+/// std::runtime_error for an unknown or repeated name or a value that is not finite or out of range, naming
+/// `owner` (the kit's voice).
 [[nodiscard]] std::vector<double> resolve_parameters(const Instrument& instrument,
                                                      const std::vector<std::pair<std::string, double>>& given,
                                                      const std::string& owner);

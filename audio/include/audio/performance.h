@@ -13,30 +13,31 @@ inline constexpr int kSampleRate = 48000;
 
 /// A playable voice: an instrument of the orchestra with its parameters.
 struct Voice {
-    std::string name;         ///< the kit's name of it
-    std::string instrument;   ///< named instr of the orchestra: "drum", "bell", "string", "cymbal"
+    std::string name;        ///< the kit's name of it
+    std::string instrument;  ///< named instr of the orchestra: "drum", "bell", "string", "cymbal"
     /// Parameters by name, as the orchestra documents them (frequency_hz, decay_s, ...). Unknown names throw.
     std::vector<std::pair<std::string, double>> parameters;
-    double pan = 0.5;         ///< 0 left, 1 right; constant power
+    double pan = 0.5;  ///< 0 left, 1 right; constant power
     double gain_db = 0;
     std::string choke_group;  ///< a new note fades the group's older ones within 20 ms; empty: none
 };
 
 /// One strike as the audio hears it.
 struct Note {
-    std::uint64_t id = 0;      ///< unique, positive
-    std::uint32_t voice = 0;   ///< index into the voices
+    std::uint64_t id = 0;           ///< unique, positive
+    std::uint32_t voice = 0;        ///< index into the voices
     std::int64_t onset_sample = 0;  ///< first sample, counted from the start of the performance; >= 0
-    double speed_mps = 1;      ///< strike speed: loudness and brightness
-    double place = 0;          ///< 0 centre of the struck zone ... 1 its edge
-    int zone = 0;              ///< 0 head, 1 rim, ... (the voice's zones in the kit's order)
+    double speed_mps = 1;           ///< strike speed: loudness and brightness
+    double place = 0;               ///< 0 centre of the struck zone ... 1 its edge
+    int zone = 0;                   ///< 0 head, 1 rim, ... (the voice's zones in the kit's order)
     int midi_note = 38;
-    int midi_velocity = 64;    ///< 1-127
+    int midi_velocity = 64;  ///< 1-127
 };
 
-/// An offline performance: notes are scheduled, moved and cancelled ahead of the sample up to which audio has been asked for; sound is rendered
-/// by Csound on a thread of its own. The samples are a pure function of the notes that stood when their onset was rendered:
-/// a cancelled note leaves no trace. Throws std::runtime_error for an orchestra that does not compile or an unknown instrument or parameter.
+/// An offline performance: notes are scheduled, moved and cancelled ahead of the sample up to which audio has
+/// been asked for; sound is rendered by Csound on a thread of its own. The samples are a pure function of the
+/// notes that stood when their onset was rendered: a cancelled note leaves no trace. Throws
+/// std::runtime_error for an orchestra that does not compile or an unknown instrument or parameter.
 class Performance {
 public:
     /// `orchestra`: the .orc file.
@@ -45,14 +46,17 @@ public:
     Performance(const Performance&) = delete;
     Performance& operator=(const Performance&) = delete;
 
-    /// Adds or replaces (same id) a note. Its onset must not lie before the sample given to advance_to: such a call throws std::logic_error.
+    /// Adds or replaces (same id) a note. Its onset must not lie before the sample given to advance_to: such
+    /// a call throws std::logic_error.
     void schedule(const Note& note);
     /// Removes a note that has not been reached by advance_to; throws std::logic_error for another id.
     void cancel(std::uint64_t id);
-    /// Everything before `sample` is fixed and may be rendered. Returns at once; rendering happens on the audio thread (bounded queue).
+    /// Everything before `sample` is fixed and may be rendered. Returns at once; rendering happens on the
+    /// audio thread (bounded queue).
     void advance_to(std::int64_t sample);
-    /// Renders to `minimum_samples`, then on until the output stays below -80 dBFS, at most `tail_samples` more; returns all samples, interleaved
-    /// stereo in [-1, 1] nominal (not normalised, not clipped). Ends the performance.
+    /// Renders to `minimum_samples`, then on until the output stays below -80 dBFS, at most `tail_samples`
+    /// more; returns all samples, interleaved stereo in [-1, 1] nominal (not normalised, not clipped). Ends
+    /// the performance.
     [[nodiscard]] std::vector<float> finish(std::int64_t minimum_samples, std::int64_t tail_samples);
 
     /// "Csound 6.18.1, sample-accurate: ..." for reports.
@@ -65,10 +69,12 @@ private:
     std::unique_ptr<Implementation> implementation_;
 };
 
-/// 48 kHz, stereo, 24-bit PCM; values beyond [-1, 1] are clipped and counted in the return value. Throws std::runtime_error (disk full, no permission).
+/// 48 kHz, stereo, 24-bit PCM; values beyond [-1, 1] are clipped and counted in the return value. Throws
+/// std::runtime_error (disk full, no permission).
 std::size_t write_wav(const std::filesystem::path& file, const std::vector<float>& interleaved);
 
-/// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, so 1920 ticks a second), channel 10, one note-on per note and its note-off 0.1 s later.
+/// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, so 1920 ticks a second), channel 10,
+/// one note-on per note and its note-off 0.1 s later.
 void write_midi(const std::filesystem::path& file, const std::vector<Note>& notes);
 
 }  // namespace audio

@@ -35,8 +35,8 @@ struct Camera {
 };
 
 struct Room {
-    Eigen::Vector3f floor_color = Eigen::Vector3f(0.35f, 0.27f, 0.2f);
-    Eigen::Vector3f wall_color = Eigen::Vector3f(0.18f, 0.2f, 0.25f);
+    Eigen::Vector3f floor_color = Eigen::Vector3f(0.20f, 0.115f, 0.06f);
+    Eigen::Vector3f wall_color = Eigen::Vector3f(0.075f, 0.07f, 0.09f);
     float floor_height = 0;      ///< world y [m]
 };
 

@@ -11,6 +11,8 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 /// Scale and shear of (2.12) as modal coordinates, with their rates; all zero at rest.
 ///   D = I + [[q0, q5, q4], [q5, q1, q3], [q4, q3, q2]]    (scale x, y, z; shear yz, xz, xy), dimensionless strains
+/// The state is linear in the impulses, so responses add up exactly. body_matrix and contacts limit it smoothly, each scale to 0.4, each
+/// shear to 0.15, the swing to 1 rad (exact up to half of that): the eigenvalues of D stay within 0.3 to 1.7.
 struct ModalState {
     Vector6d q = Vector6d::Zero();        ///< [-]
     Vector6d q_dot = Vector6d::Zero();    ///< [1/s]
@@ -35,8 +37,10 @@ struct Material {
 };
 
 /// The modes that are seen (and touched): softer than what is heard. The six uniform-strain modes keep their shapes and the
-/// ratios of their frequencies; the lowest becomes `frequency_hz`; amplitudes are scaled so that a reference strike of 5 m/s by the
-/// stick's mass along the body's shortest axis displaces the struck point by `displacement` times the largest extent.
+/// ratios of their (undamped) frequencies; the lowest becomes `frequency_hz`; amplitudes are scaled so that a reference strike of 5 m/s
+/// by the stick's mass along the body's shortest axis displaces the struck point by `displacement` times the largest extent. Of three
+/// such strikes, at the pole and near the edge along either other axis, the one that moves its point most is the reference: on a
+/// thin body the pole hardly yields.
 struct VisualModes {
     bool enabled = true;          ///< false: the body stays rigid
     double frequency_hz = 6;      ///< of the lowest mode, 4-10

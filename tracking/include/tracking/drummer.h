@@ -20,25 +20,27 @@ struct Stroke {
     std::string stick;
     Eigen::Vector3d target = Eigen::Vector3d::Zero();  ///< point of the struck surface, tip's radius included
     Eigen::Vector3d normal = Eigen::Vector3d::UnitY();  ///< outward unit normal there
-    double speed_mps = 4;        ///< tip's speed towards the surface at contact (of the unfeinted stroke)
+    double speed_mps = 4;  ///< tip's speed towards the surface at contact (of the unfeinted stroke)
     StrokeKind kind = StrokeKind::hit;
-    double turn_height_m = 0.03; ///< feints only
+    double turn_height_m = 0.03;  ///< feints only
 };
 
 /// The drummer's body and sensor. See drummer.cpp for the model and its sources.
 struct DrummerParameters {
     double rate_hz = 120;
-    double stick_length_m = 0.40;    ///< hand (tracked point) to tip, along body -z
-    double rise_m = 0.18;            ///< how far the tip rises before a full stroke
-    double restitution = 0.6;        ///< share of the speed that a hit gives back
-    double depth_m = 0.006;          ///< how deep a hit goes into the resting surface
-    double noise_m = 0.00025;        ///< standard deviation of position noise, each axis
-    double noise_rad = 0.001;        ///< of orientation noise, each axis
+    double stick_length_m = 0.40;  ///< hand (tracked point) to tip, along body -z
+    double rise_m = 0.18;          ///< how far the tip rises before a full stroke
+    double restitution = 0.6;      ///< share of the speed that a hit gives back
+    double depth_m = 0.006;        ///< how deep a hit goes into the resting surface
+    double noise_m = 0.00025;      ///< standard deviation of position noise, each axis
+    double noise_rad = 0.001;      ///< of orientation noise, each axis
     std::uint64_t seed = 1;
 };
 
-/// Synthesises a trace of the strokes (any order; each stick's sorted by time). Samples are the tracked hand's poses with tip
-/// at (0, 0, -stick_length). The result's source says that it is synthetic. Throws std::invalid_argument for an impossible score.
-[[nodiscard]] Trace synthesise(const std::vector<Stroke>& score, double duration_s, const DrummerParameters& parameters);
+/// Synthesises a trace of the strokes (any order; each stick's sorted by time). Samples are the tracked
+/// hand's poses with tip at (0, 0, -stick_length). The result's source says that it is synthetic. Throws
+/// std::invalid_argument for an impossible score.
+[[nodiscard]] Trace synthesise(const std::vector<Stroke>& score, double duration_s,
+                               const DrummerParameters& parameters);
 
 }  // namespace tracking

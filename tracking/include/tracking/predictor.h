@@ -11,22 +11,22 @@ namespace tracking {
 /// The pose expected a lead after the newest sample. World frame, SI.
 struct PosePrediction {
     Eigen::Vector3d position = Eigen::Vector3d::Zero();
-    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< d position / d lead [m/s]
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< d position / d lead [m/s]
     Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
     Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< world frame [rad/s]
 };
 
-/// What became of a sample. `outlier`: only with a gate (`auto`, `gate=`); the sample was ignored, but the third in a row is taken
-/// as real and answers `reinitialised`.
+/// What became of a sample. `outlier`: only with a gate (`auto`, `gate=`); the sample was ignored, but the
+/// third in a row is taken as real and answers `reinitialised`.
 enum class SampleStatus { accepted, not_newer, not_finite, reinitialised, outlier };
 
 /// A causal estimator of one stick's pose. One thread at a time; correct() and predict() allocate nothing.
 class Predictor {
 public:
     virtual ~Predictor() = default;
-    /// Takes the next sample. Samples that are not newer than the state, or not finite, are ignored and counted by the caller.
-    /// After a gap longer than `gap_s` (see make_predictor) the state starts anew from this sample: `reinitialised`
-    /// (the very first sample answers `reinitialised` too).
+    /// Takes the next sample. Samples that are not newer than the state, or not finite, are ignored and
+    /// counted by the caller. After a gap longer than `gap_s` (see make_predictor) the state starts anew from
+    /// this sample: `reinitialised` (the very first sample answers `reinitialised` too).
     [[nodiscard]] virtual SampleStatus correct(const PoseSample& sample) noexcept = 0;
     /// Pose `lead_s` >= 0 after the newest accepted sample; leaves the state alone.
     [[nodiscard]] virtual PosePrediction predict(double lead_s) const noexcept = 0;
@@ -37,9 +37,9 @@ public:
 /// Longest pause between samples that an estimator bridges; after a longer one it starts anew.
 inline constexpr double kGapS = 0.1;
 
-/// Makes a predictor from its name and parameters in mm and s: `naive`, `naive:n=4`, `thesis`, `thesis:q=outer`, `ca:q=1e9`,
-/// `cv:q=1e8`, `singer:alpha=3,q=1e10`, `hold`, `difference`, `auto`.
-/// Throws std::invalid_argument with one line (found, expected) for an unknown name, key or value.
+/// Makes a predictor from its name and parameters in mm and s: `naive`, `naive:n=4`, `thesis`,
+/// `thesis:q=outer`, `ca:q=1e9`, `cv:q=1e8`, `singer:alpha=3,q=1e10`, `hold`, `difference`, `auto`. Throws
+/// std::invalid_argument with one line (found, expected) for an unknown name, key or value.
 [[nodiscard]] std::unique_ptr<Predictor> make_predictor(const std::string& specification);
 
 /// The names make_predictor knows, in the order of the documentation.

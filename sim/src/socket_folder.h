@@ -1,0 +1,26 @@
+#pragma once
+#include <string>
+
+namespace sim {
+
+/// A private folder (0700, under TMPDIR or /tmp) for the workers' ipc socket; removed with the socket at the
+/// end.
+class SocketFolder {
+public:
+    SocketFolder();  ///< throws std::runtime_error
+    ~SocketFolder();
+    SocketFolder(const SocketFolder&) = delete;
+    SocketFolder& operator=(const SocketFolder&) = delete;
+
+    [[nodiscard]] std::string endpoint() const { return "ipc://" + path_ + "/workers"; }
+    [[nodiscard]] const std::string& path() const { return path_; }
+
+private:
+    std::string path_;
+};
+
+/// Removes what an application that ended abnormally left at `endpoint`: the socket and its folder, if
+/// SocketFolder made them.
+void remove_left_socket(const std::string& endpoint) noexcept;
+
+}  // namespace sim

@@ -1,0 +1,29 @@
+#include "command_queue.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <thread>
+
+namespace {
+
+TEST(CommandQueue, HundredThousandValuesPassThroughFourSlotsInOrder) {
+    audio::CommandQueue<int> queue(4);
+    std::thread writer([&] {
+        for (int i = 0; i < 100000; ++i) queue.push(i);
+    });
+    int wrong = 0;
+    for (int i = 0; i < 100000; ++i) wrong += queue.pop() != i;
+    writer.join();
+    EXPECT_EQ(wrong, 0);
+}
+
+TEST(CommandQueue, OwnershipPassesWithTheValue) {
+    audio::CommandQueue<std::unique_ptr<int>> queue(2);
+    queue.push(std::make_unique<int>(5));
+    queue.push(std::make_unique<int>(6));
+    EXPECT_EQ(*queue.pop(), 5);
+    EXPECT_EQ(*queue.pop(), 6);
+}
+
+}  // namespace

@@ -1,0 +1,43 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "audio/performance.h"
+
+/// Shared by the tests of the sound: short ways to voices, notes and their samples.
+namespace rendering {
+
+inline const std::string kOrchestra = MUSICWORLD_SOURCE_DIR "/assets/orchestra/musicworld.orc";
+inline const std::vector<std::string> kInstruments{"drum", "bell", "string", "cymbal"};
+inline constexpr std::int64_t kLongTail = 10 * audio::kSampleRate;
+
+using Parameters = std::vector<std::pair<std::string, double>>;
+
+inline audio::Voice voice(const std::string& instrument, Parameters parameters = {}, double pan = 0.5,
+                          const std::string& choke_group = "") {
+    return {instrument, instrument, std::move(parameters), pan, 0, choke_group};
+}
+
+inline audio::Note note(std::uint64_t id, std::int64_t onset, double speed_mps = 3, std::uint32_t voice = 0,
+                        double place = 0.3, int zone = 0) {
+    return {id, voice, onset, speed_mps, place, zone, 38, 64};
+}
+
+inline std::vector<float> render(const std::vector<audio::Voice>& voices,
+                                 const std::vector<audio::Note>& notes, std::int64_t minimum = 0,
+                                 std::int64_t tail = kLongTail) {
+    audio::Performance performance(kOrchestra, voices);
+    for (const audio::Note& each : notes) performance.schedule(each);
+    return performance.finish(minimum, tail);
+}
+
+/// Left channel.
+inline std::vector<double> left(const std::vector<float>& interleaved) {
+    std::vector<double> samples;
+    for (std::size_t i = 0; i < interleaved.size(); i += 2) samples.push_back(interleaved[i]);
+    return samples;
+}
+
+}  // namespace rendering

@@ -1,0 +1,87 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <new>
+
+#include "tracking/predictor.h"
+
+namespace {
+
+std::atomic<long> allocations{0};
+
+void* counted(std::size_t size, std::size_t alignment) {
+    ++allocations;
+    const std::size_t rounded = (size + alignment - 1) / alignment * alignment;
+    void* memory = std::aligned_alloc(alignment, rounded == 0 ? alignment : rounded);
+    if (memory == nullptr) throw std::bad_alloc();
+    return memory;
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+    return counted(size, alignof(std::max_align_t));
+}
+void* operator new[](std::size_t size) {
+    return counted(size, alignof(std::max_align_t));
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+    return counted(size, static_cast<std::size_t>(alignment));
+}
+void* operator new[](std::size_t size, std::align_val_t alignment) {
+    return counted(size, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* memory) noexcept {
+    std::free(memory);
+}
+void operator delete[](void* memory) noexcept {
+    std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+    std::free(memory);
+}
+void operator delete[](void* memory, std::size_t) noexcept {
+    std::free(memory);
+}
+void operator delete(void* memory, std::align_val_t) noexcept {
+    std::free(memory);
+}
+void operator delete[](void* memory, std::align_val_t) noexcept {
+    std::free(memory);
+}
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+    std::free(memory);
+}
+void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept {
+    std::free(memory);
+}
+
+namespace tracking {
+namespace {
+
+TEST(Allocation, CorrectAndPredictOfEveryPredictorAllocateNothing) {
+    for (const std::string& name : predictor_names()) {
+        const long before_making = allocations;
+        const auto predictor = make_predictor(name);
+        EXPECT_GT(allocations, before_making);  // the counter counts
+        double sum = 0;
+        const long before = allocations;
+        for (int i = 0; i < 2000; ++i) {
+            PoseSample sample;
+            sample.t_s = i * 0.008 + (i % 500 == 0 ? 0.2 : 0.0);  // with gaps and samples that are not newer
+            sample.position = {std::sin(i * 0.1), i % 97 == 0 ? 30.0 : 1.0, 0};
+            sample.orientation =
+                Eigen::Quaterniond(Eigen::AngleAxisd(std::sin(i * 0.05), Eigen::Vector3d::UnitX()));
+            sample.has_orientation = i % 5 != 0;
+            (void)predictor->correct(sample);
+            sum += predictor->predict(1.0 / 15).position.x();
+        }
+        EXPECT_EQ(allocations, before) << name;
+        EXPECT_TRUE(std::isfinite(sum));
+    }
+}
+
+}  // namespace
+}  // namespace tracking
