@@ -1,4 +1,5 @@
-/// Time of one picture of the kit in kit_scene.cpp, by stage. The first frame (shaders are compiled in it) is drawn before measuring.
+/// Time of one picture of the kit in kit_scene.cpp, by stage. The first frame (shaders are compiled in it) is
+/// drawn before measuring.
 #include <benchmark/benchmark.h>
 
 #include "kit_scene.h"
@@ -20,9 +21,13 @@ void draw_kit(benchmark::State& state, render::SceneDescription scene, bool png)
     state.SetLabel(std::to_string(renderer.triangles()) + " triangles");
 }
 
-void frame_640x480_with_png(benchmark::State& state) { draw_kit(state, render_bench::kit_scene(kMeshes), true); }
+void frame_640x480_with_png(benchmark::State& state) {
+    draw_kit(state, render_bench::kit_scene(kMeshes), true);
+}
 
-void frame_640x480(benchmark::State& state) { draw_kit(state, render_bench::kit_scene(kMeshes), false); }
+void frame_640x480(benchmark::State& state) {
+    draw_kit(state, render_bench::kit_scene(kMeshes), false);
+}
 
 void frame_640x480_without_antialiasing(benchmark::State& state) {
     render::SceneDescription scene = render_bench::kit_scene(kMeshes);
@@ -61,8 +66,14 @@ void start_and_first_frame(benchmark::State& state) {
 
 BENCHMARK(frame_640x480_with_png)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK(frame_640x480)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
-BENCHMARK(frame_640x480_without_antialiasing)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
-BENCHMARK(frame_640x480_without_shadow)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
+BENCHMARK(frame_640x480_without_antialiasing)
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
+BENCHMARK(frame_640x480_without_shadow)
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime();
 BENCHMARK(frame_640x480_empty_room)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK(frame_1280x720_with_png)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();
 BENCHMARK(start_and_first_frame)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime()->UseRealTime();

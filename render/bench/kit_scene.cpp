@@ -51,7 +51,8 @@ render::Look look_of(const std::string& mesh) {
     if (mesh == "drum") return drum_look();
     if (mesh == "cymbal") look.body = {{0.78f, 0.50f, 0.18f}, 1, 0.32f, 0.8f};
     if (mesh == "bell") look.body = {{0.90f, 0.68f, 0.32f}, 1, 0.14f};
-    if (mesh == "stand") look = {{{0.72f, 0.73f, 0.75f}, 1, 0.20f}, {{"rubber", {{0.02f, 0.02f, 0.02f}, 0, 0.7f}}}};
+    if (mesh == "stand")
+        look = {{{0.72f, 0.73f, 0.75f}, 1, 0.20f}, {{"rubber", {{0.02f, 0.02f, 0.02f}, 0, 0.7f}}}};
     if (mesh == "stick") look.body = {{0.62f, 0.40f, 0.20f}, 0, 0.38f};
     return look;
 }
@@ -63,7 +64,8 @@ render::SceneDescription kit_scene(const std::string& meshes) {
     for (const Placed& piece : pieces()) {
         scene.objects.push_back({piece.name, meshes + "/" + piece.mesh + ".obj", look_of(piece.mesh)});
     }
-    for (const char* hand : {"left", "right"}) scene.objects.push_back({hand, meshes + "/stick.obj", look_of("stick")});
+    for (const char* hand : {"left", "right"})
+        scene.objects.push_back({hand, meshes + "/stick.obj", look_of("stick")});
     return scene;
 }
 

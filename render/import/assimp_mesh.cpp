@@ -1,10 +1,10 @@
 #include "assimp_mesh.h"
 
+#include <assimp/BaseImporter.h>
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
-#include <assimp/BaseImporter.h>
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <map>
@@ -30,7 +30,9 @@ void keep_allowed_readers(Assimp::Importer& importer) {
     }
 }
 
-bool is_finite(const aiVector3D& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool is_finite(const aiVector3D& v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
 
 /// Before any post-processing: that trusts what the file said.
 void check_raw(const aiMesh& mesh, std::size_t& faces) {
@@ -56,7 +58,8 @@ void check_raw(const aiMesh& mesh, std::size_t& faces) {
 Eigen::Vector3f unit_or_up(const aiVector3D& v) {
     const Eigen::Vector3f normal(v.x, v.y, v.z);
     const float length = normal.norm();
-    return std::isfinite(length) && length > 1e-12f ? Eigen::Vector3f(normal / length) : Eigen::Vector3f::UnitY();
+    return std::isfinite(length) && length > 1e-12f ? Eigen::Vector3f(normal / length)
+                                                    : Eigen::Vector3f::UnitY();
 }
 
 void append_mesh(const aiMesh& mesh, MeshPart& part) {
@@ -95,8 +98,8 @@ Mesh import_with_assimp(const std::filesystem::path& file) {
 
     importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
     const aiScene* scene = require(importer.ApplyPostProcessing(
-        aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_GenSmoothNormals | aiProcess_PreTransformVertices |
-        aiProcess_JoinIdenticalVertices));
+        aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_GenSmoothNormals |
+        aiProcess_PreTransformVertices | aiProcess_JoinIdenticalVertices));
     std::map<std::string, MeshPart> parts;  // one a name, in the names' order
     for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
         append_mesh(*scene->mMeshes[m], parts[material_name(*scene, *scene->mMeshes[m])]);

@@ -1,5 +1,6 @@
-/// musicworld_mesh_import FILE: reads a mesh file with assimp under limits on memory and processor time and writes it to standard output as
-/// the stream of mesh_stream.h. Started by load_mesh(); ends with 0 also when the stream tells of a failure.
+/// musicworld_mesh_import FILE: reads a mesh file with assimp under limits on memory and processor time and
+/// writes it to standard output as the stream of mesh_stream.h. Started by load_mesh(); ends with 0 also when
+/// the stream tells of a failure.
 #include <sys/resource.h>
 
 #include <cstdio>
@@ -41,6 +42,7 @@ int main(int count, char** arguments) {
     }
     limit_this_process();
     const std::string stream = import_stream(arguments[1]);
-    const bool written = std::fwrite(stream.data(), 1, stream.size(), stdout) == stream.size() && std::fflush(stdout) == 0;
+    const bool written =
+        std::fwrite(stream.data(), 1, stream.size(), stdout) == stream.size() && std::fflush(stdout) == 0;
     return written ? 0 : 1;
 }

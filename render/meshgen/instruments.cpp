@@ -21,11 +21,14 @@ void add_lug(Part& lug, double angle) {
 }
 
 /// Height of the cymbal's upper side outside its bell.
-double bow(double radius) { return 0.42 - 1.36 * std::pow((radius - 0.2) / 0.8, 1.5); }
+double bow(double radius) {
+    return 0.42 - 1.36 * std::pow((radius - 0.2) / 0.8, 1.5);
+}
 
 void add_hoop(Part& hoop, double top, double bottom) {
     const double middle = (top + bottom) / 2;
-    lathe_ring(hoop, {{0.957, top}, {0.985, top}, {1.0, middle}, {0.985, bottom}, {0.957, bottom}}, kDrumSegments);
+    lathe_ring(hoop, {{0.957, top}, {0.985, top}, {1.0, middle}, {0.985, bottom}, {0.957, bottom}},
+               kDrumSegments);
 }
 
 }  // namespace
@@ -37,9 +40,10 @@ ObjMesh drum() {
                      kDrumSegments);
     for (const double top : {0.985, -0.90}) {  // a collar of film under the hoop, then the playing face
         const double bottom = top - 0.085;
-        lathe_with_edges(mesh.part("head"),
-                         {{{0, top}, {0.96, top}}, {{0.96, top}, {0.96, bottom}}, {{0.96, bottom}, {0, bottom}}},
-                         kDrumSegments);
+        lathe_with_edges(
+            mesh.part("head"),
+            {{{0, top}, {0.96, top}}, {{0.96, top}, {0.96, bottom}}, {{0.96, bottom}, {0, bottom}}},
+            kDrumSegments);
     }
     add_hoop(mesh.part("hoop"), 1.0, 0.80);
     add_hoop(mesh.part("hoop"), -0.80, -1.0);
@@ -75,7 +79,8 @@ ObjMesh bell() {
     lathe_with_edges(metal, {outside, {outside.back(), inside.front()}, inside}, kBellSegments);
     Part loop;  // upright ring on the crown
     Profile section;
-    for (int i = 0; i < 6; ++i) section.emplace_back(0.075 + 0.025 * std::cos(kPi / 3 * i), -0.025 * std::sin(kPi / 3 * i));
+    for (int i = 0; i < 6; ++i)
+        section.emplace_back(0.075 + 0.025 * std::cos(kPi / 3 * i), -0.025 * std::sin(kPi / 3 * i));
     lathe_ring(loop, section, 12);
     Eigen::Affine3d upright(Eigen::Translation3d(0, 0.90, 0));
     upright.rotate(Eigen::AngleAxisd(kPi / 2, Eigen::Vector3d::UnitX()));
@@ -87,7 +92,8 @@ ObjMesh bell() {
 
 ObjMesh bar() {
     ObjMesh mesh{"bar", {}};
-    rounded_box(mesh.part("bar"), Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones(), Eigen::Vector3d::Constant(0.1), 2);
+    rounded_box(mesh.part("bar"), Eigen::Vector3d::Zero(), Eigen::Vector3d::Ones(),
+                Eigen::Vector3d::Constant(0.1), 2);
     return mesh;
 }
 
@@ -104,7 +110,8 @@ ObjMesh string_frame() {
     ObjMesh mesh{"string_frame", {}};
     Part& wood = mesh.part("wood");
     rounded_box(wood, {0, -0.4, 0}, {1, 0.6, 1}, {0.04, 0.25, 0.04}, 2);
-    for (const double x : {-0.9, 0.9}) rounded_box(wood, {x, 0.55, 0}, {0.025, 0.45, 0.92}, {0.012, 0.2, 0.03}, 1);
+    for (const double x : {-0.9, 0.9})
+        rounded_box(wood, {x, 0.55, 0}, {0.025, 0.45, 0.92}, {0.012, 0.2, 0.03}, 1);
     return mesh;
 }
 

@@ -15,7 +15,8 @@ int main(int count, char** arguments) {
         std::ofstream out(file, std::ios::binary);
         out << mesh.text() << std::flush;
         if (!out) {
-            std::fprintf(stderr, "%s: error: found no way to write it, expected a writable folder\n", file.c_str());
+            std::fprintf(stderr, "%s: error: found no way to write it, expected a writable folder\n",
+                         file.c_str());
             return 1;
         }
     }

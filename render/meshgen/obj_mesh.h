@@ -6,7 +6,8 @@
 
 namespace meshgen {
 
-/// Triangles of one named material. Counter-clockwise seen from outside; shared vertices have shared (smooth) normals.
+/// Triangles of one named material. Counter-clockwise seen from outside; shared vertices have shared (smooth)
+/// normals.
 struct Part {
     std::string name;
     std::vector<Eigen::Vector3d> positions, normals;

@@ -50,14 +50,16 @@ void join_circles(Part& part, int upper, bool upper_pole, int lower, bool lower_
 void revolve(Part& part, const Profile& profile, bool closed, int segments) {
     const std::vector<Eigen::Vector2d> normals = profile_normals(profile, closed);
     std::vector<int> circles;
-    for (std::size_t i = 0; i < profile.size(); ++i) circles.push_back(add_circle(part, profile[i], normals[i], segments));
+    for (std::size_t i = 0; i < profile.size(); ++i)
+        circles.push_back(add_circle(part, profile[i], normals[i], segments));
     for (std::size_t i = 0; i + 1 < profile.size() || (closed && i < profile.size()); ++i) {
         const std::size_t next = (i + 1) % profile.size();
         join_circles(part, circles[i], profile[i].x() == 0, circles[next], profile[next].x() == 0, segments);
     }
 }
 
-/// Positions along an axis of a rounded box: an arc, the flat piece, an arc; as pairs (inner box, offset direction in [-1, 1]).
+/// Positions along an axis of a rounded box: an arc, the flat piece, an arc; as pairs (inner box, offset
+/// direction in [-1, 1]).
 std::vector<double> arc_positions(int arc_steps) {
     std::vector<double> sines;
     for (int i = 0; i <= arc_steps; ++i) sines.push_back(-std::tan(kPi / 4 * (arc_steps - i) / arc_steps));
@@ -67,15 +69,20 @@ std::vector<double> arc_positions(int arc_steps) {
 
 }  // namespace
 
-void lathe(Part& part, const Profile& profile, int segments) { revolve(part, profile, false, segments); }
+void lathe(Part& part, const Profile& profile, int segments) {
+    revolve(part, profile, false, segments);
+}
 
-void lathe_ring(Part& part, const Profile& loop, int segments) { revolve(part, loop, true, segments); }
+void lathe_ring(Part& part, const Profile& loop, int segments) {
+    revolve(part, loop, true, segments);
+}
 
 void lathe_with_edges(Part& part, const std::vector<Profile>& profiles, int segments) {
     for (const Profile& profile : profiles) lathe(part, profile, segments);
 }
 
-void tube(Part& part, const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Eigen::Vector2d& radii, int segments) {
+void tube(Part& part, const Eigen::Vector3d& from, const Eigen::Vector3d& to, const Eigen::Vector2d& radii,
+          int segments) {
     const double length = (to - from).norm();
     Part upright;
     lathe_with_edges(upright,
@@ -84,7 +91,8 @@ void tube(Part& part, const Eigen::Vector3d& from, const Eigen::Vector3d& to, co
                       {{radii.y(), -length}, {0, -length}}},
                      segments);
     Eigen::Affine3d placed = Eigen::Affine3d::Identity();
-    placed.linear() = Eigen::Quaterniond::FromTwoVectors(-Eigen::Vector3d::UnitY(), to - from).toRotationMatrix();
+    placed.linear() =
+        Eigen::Quaterniond::FromTwoVectors(-Eigen::Vector3d::UnitY(), to - from).toRotationMatrix();
     placed.translation() = from;
     append_transformed(part, upright, placed);
 }
@@ -101,7 +109,8 @@ void sphere(Part& part, const Eigen::Vector3d& center, double radius, int segmen
     append_transformed(part, ball, Eigen::Affine3d(Eigen::Translation3d(center)));
 }
 
-void rounded_box(Part& part, const Eigen::Vector3d& center, const Eigen::Vector3d& half, const Eigen::Vector3d& rounding, int arc_steps) {
+void rounded_box(Part& part, const Eigen::Vector3d& center, const Eigen::Vector3d& half,
+                 const Eigen::Vector3d& rounding, int arc_steps) {
     const std::vector<double> grid = arc_positions(arc_steps);
     const int side = static_cast<int>(grid.size());
     const Eigen::Vector3d inner = half - rounding;
@@ -113,7 +122,8 @@ void rounded_box(Part& part, const Eigen::Vector3d& center, const Eigen::Vector3
             const int iu = i % side, iv = i / side;
             Eigen::Vector3d direction;
             direction[axis] = sign;
-            direction[u] = sign * grid[static_cast<std::size_t>(iu)];  // u mirrored on the far face keeps the winding
+            direction[u] =
+                sign * grid[static_cast<std::size_t>(iu)];  // u mirrored on the far face keeps the winding
             direction[v] = grid[static_cast<std::size_t>(iv)];
             direction.normalize();
             Eigen::Vector3d corner;

@@ -3,66 +3,67 @@
 
 namespace render {
 
-/// The OpenGL functions the renderer calls, with the names of the specification less their gl prefix. No OpenGL library is linked (libGL beside
-/// OSMesa would answer with functions of another context): OSMesa is asked for each.
-#define RENDER_GL_FUNCTIONS(X)                                        \
-    X(PFNGLACTIVETEXTUREPROC, ActiveTexture)                          \
-    X(PFNGLATTACHSHADERPROC, AttachShader)                            \
-    X(PFNGLBINDBUFFERPROC, BindBuffer)                                \
-    X(PFNGLBINDFRAMEBUFFERPROC, BindFramebuffer)                      \
-    X(PFNGLBINDRENDERBUFFERPROC, BindRenderbuffer)                    \
-    X(PFNGLBINDTEXTUREPROC, BindTexture)                              \
-    X(PFNGLBINDVERTEXARRAYPROC, BindVertexArray)                      \
-    X(PFNGLBLITFRAMEBUFFERPROC, BlitFramebuffer)                      \
-    X(PFNGLBUFFERDATAPROC, BufferData)                                \
-    X(PFNGLBUFFERSUBDATAPROC, BufferSubData)                          \
-    X(PFNGLCHECKFRAMEBUFFERSTATUSPROC, CheckFramebufferStatus)        \
-    X(PFNGLCLEARPROC, Clear)                                          \
-    X(PFNGLCLEARCOLORPROC, ClearColor)                                \
-    X(PFNGLCOMPILESHADERPROC, CompileShader)                          \
-    X(PFNGLCREATEPROGRAMPROC, CreateProgram)                          \
-    X(PFNGLCREATESHADERPROC, CreateShader)                            \
-    X(PFNGLDEPTHFUNCPROC, DepthFunc)                                  \
-    X(PFNGLDEPTHMASKPROC, DepthMask)                                  \
-    X(PFNGLDISABLEPROC, Disable)                                      \
-    X(PFNGLDRAWARRAYSPROC, DrawArrays)                                \
-    X(PFNGLDRAWBUFFERPROC, DrawBuffer)                                \
-    X(PFNGLDRAWELEMENTSPROC, DrawElements)                            \
-    X(PFNGLENABLEPROC, Enable)                                        \
-    X(PFNGLENABLEVERTEXATTRIBARRAYPROC, EnableVertexAttribArray)      \
-    X(PFNGLFRAMEBUFFERRENDERBUFFERPROC, FramebufferRenderbuffer)      \
-    X(PFNGLFRAMEBUFFERTEXTURE2DPROC, FramebufferTexture2D)            \
-    X(PFNGLFRONTFACEPROC, FrontFace)                                  \
-    X(PFNGLGENBUFFERSPROC, GenBuffers)                                \
-    X(PFNGLGENFRAMEBUFFERSPROC, GenFramebuffers)                      \
-    X(PFNGLGENRENDERBUFFERSPROC, GenRenderbuffers)                    \
-    X(PFNGLGENTEXTURESPROC, GenTextures)                              \
-    X(PFNGLGENVERTEXARRAYSPROC, GenVertexArrays)                      \
-    X(PFNGLGETERRORPROC, GetError)                                    \
-    X(PFNGLGETINTEGERVPROC, GetIntegerv)                              \
-    X(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)                  \
-    X(PFNGLGETPROGRAMIVPROC, GetProgramiv)                            \
-    X(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)                    \
-    X(PFNGLGETSHADERIVPROC, GetShaderiv)                              \
-    X(PFNGLGETSTRINGPROC, GetString)                                  \
-    X(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)                \
-    X(PFNGLLINKPROGRAMPROC, LinkProgram)                              \
-    X(PFNGLPIXELSTOREIPROC, PixelStorei)                              \
-    X(PFNGLPOLYGONOFFSETPROC, PolygonOffset)                          \
-    X(PFNGLREADBUFFERPROC, ReadBuffer)                                \
-    X(PFNGLREADPIXELSPROC, ReadPixels)                                \
+/// The OpenGL functions the renderer calls, with the names of the specification less their gl prefix. No
+/// OpenGL library is linked (libGL beside OSMesa would answer with functions of another context): OSMesa is
+/// asked for each.
+#define RENDER_GL_FUNCTIONS(X)                                                 \
+    X(PFNGLACTIVETEXTUREPROC, ActiveTexture)                                   \
+    X(PFNGLATTACHSHADERPROC, AttachShader)                                     \
+    X(PFNGLBINDBUFFERPROC, BindBuffer)                                         \
+    X(PFNGLBINDFRAMEBUFFERPROC, BindFramebuffer)                               \
+    X(PFNGLBINDRENDERBUFFERPROC, BindRenderbuffer)                             \
+    X(PFNGLBINDTEXTUREPROC, BindTexture)                                       \
+    X(PFNGLBINDVERTEXARRAYPROC, BindVertexArray)                               \
+    X(PFNGLBLITFRAMEBUFFERPROC, BlitFramebuffer)                               \
+    X(PFNGLBUFFERDATAPROC, BufferData)                                         \
+    X(PFNGLBUFFERSUBDATAPROC, BufferSubData)                                   \
+    X(PFNGLCHECKFRAMEBUFFERSTATUSPROC, CheckFramebufferStatus)                 \
+    X(PFNGLCLEARPROC, Clear)                                                   \
+    X(PFNGLCLEARCOLORPROC, ClearColor)                                         \
+    X(PFNGLCOMPILESHADERPROC, CompileShader)                                   \
+    X(PFNGLCREATEPROGRAMPROC, CreateProgram)                                   \
+    X(PFNGLCREATESHADERPROC, CreateShader)                                     \
+    X(PFNGLDEPTHFUNCPROC, DepthFunc)                                           \
+    X(PFNGLDEPTHMASKPROC, DepthMask)                                           \
+    X(PFNGLDISABLEPROC, Disable)                                               \
+    X(PFNGLDRAWARRAYSPROC, DrawArrays)                                         \
+    X(PFNGLDRAWBUFFERPROC, DrawBuffer)                                         \
+    X(PFNGLDRAWELEMENTSPROC, DrawElements)                                     \
+    X(PFNGLENABLEPROC, Enable)                                                 \
+    X(PFNGLENABLEVERTEXATTRIBARRAYPROC, EnableVertexAttribArray)               \
+    X(PFNGLFRAMEBUFFERRENDERBUFFERPROC, FramebufferRenderbuffer)               \
+    X(PFNGLFRAMEBUFFERTEXTURE2DPROC, FramebufferTexture2D)                     \
+    X(PFNGLFRONTFACEPROC, FrontFace)                                           \
+    X(PFNGLGENBUFFERSPROC, GenBuffers)                                         \
+    X(PFNGLGENFRAMEBUFFERSPROC, GenFramebuffers)                               \
+    X(PFNGLGENRENDERBUFFERSPROC, GenRenderbuffers)                             \
+    X(PFNGLGENTEXTURESPROC, GenTextures)                                       \
+    X(PFNGLGENVERTEXARRAYSPROC, GenVertexArrays)                               \
+    X(PFNGLGETERRORPROC, GetError)                                             \
+    X(PFNGLGETINTEGERVPROC, GetIntegerv)                                       \
+    X(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)                           \
+    X(PFNGLGETPROGRAMIVPROC, GetProgramiv)                                     \
+    X(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)                             \
+    X(PFNGLGETSHADERIVPROC, GetShaderiv)                                       \
+    X(PFNGLGETSTRINGPROC, GetString)                                           \
+    X(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)                         \
+    X(PFNGLLINKPROGRAMPROC, LinkProgram)                                       \
+    X(PFNGLPIXELSTOREIPROC, PixelStorei)                                       \
+    X(PFNGLPOLYGONOFFSETPROC, PolygonOffset)                                   \
+    X(PFNGLREADBUFFERPROC, ReadBuffer)                                         \
+    X(PFNGLREADPIXELSPROC, ReadPixels)                                         \
     X(PFNGLRENDERBUFFERSTORAGEMULTISAMPLEPROC, RenderbufferStorageMultisample) \
-    X(PFNGLSHADERSOURCEPROC, ShaderSource)                            \
-    X(PFNGLTEXBUFFERPROC, TexBuffer)                                  \
-    X(PFNGLTEXIMAGE2DPROC, TexImage2D)                                \
-    X(PFNGLTEXPARAMETERIPROC, TexParameteri)                          \
-    X(PFNGLUNIFORM1FPROC, Uniform1f)                                  \
-    X(PFNGLUNIFORM1IPROC, Uniform1i)                                  \
-    X(PFNGLUNIFORM3FVPROC, Uniform3fv)                                \
-    X(PFNGLUNIFORM4FVPROC, Uniform4fv)                                \
-    X(PFNGLUNIFORMMATRIX4FVPROC, UniformMatrix4fv)                    \
-    X(PFNGLUSEPROGRAMPROC, UseProgram)                                \
-    X(PFNGLVERTEXATTRIBPOINTERPROC, VertexAttribPointer)              \
+    X(PFNGLSHADERSOURCEPROC, ShaderSource)                                     \
+    X(PFNGLTEXBUFFERPROC, TexBuffer)                                           \
+    X(PFNGLTEXIMAGE2DPROC, TexImage2D)                                         \
+    X(PFNGLTEXPARAMETERIPROC, TexParameteri)                                   \
+    X(PFNGLUNIFORM1FPROC, Uniform1f)                                           \
+    X(PFNGLUNIFORM1IPROC, Uniform1i)                                           \
+    X(PFNGLUNIFORM3FVPROC, Uniform3fv)                                         \
+    X(PFNGLUNIFORM4FVPROC, Uniform4fv)                                         \
+    X(PFNGLUNIFORMMATRIX4FVPROC, UniformMatrix4fv)                             \
+    X(PFNGLUSEPROGRAMPROC, UseProgram)                                         \
+    X(PFNGLVERTEXATTRIBPOINTERPROC, VertexAttribPointer)                       \
     X(PFNGLVIEWPORTPROC, Viewport)
 
 struct GlFunctions {

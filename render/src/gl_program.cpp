@@ -15,12 +15,14 @@ GLuint compile(const GlFunctions& gl, GLenum kind, const std::string& source) {
     if (compiled == GL_TRUE) return shader;
     std::string log(4096, '\0');
     gl.GetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), nullptr, log.data());
-    throw std::runtime_error("OSMesa: error: found a shader it cannot compile, expected GLSL 3.30: " + std::string(log.c_str()));
+    throw std::runtime_error("OSMesa: error: found a shader it cannot compile, expected GLSL 3.30: " +
+                             std::string(log.c_str()));
 }
 
 }  // namespace
 
-GlProgram::GlProgram(const GlFunctions& gl, const std::string& vertex_source, const std::string& fragment_source)
+GlProgram::GlProgram(const GlFunctions& gl, const std::string& vertex_source,
+                     const std::string& fragment_source)
     : gl_(gl), program_(gl.CreateProgram()) {
     gl_.AttachShader(program_, compile(gl, GL_VERTEX_SHADER, vertex_source));
     gl_.AttachShader(program_, compile(gl, GL_FRAGMENT_SHADER, fragment_source));
@@ -30,14 +32,21 @@ GlProgram::GlProgram(const GlFunctions& gl, const std::string& vertex_source, co
     if (linked == GL_TRUE) return;
     std::string log(4096, '\0');
     gl_.GetProgramInfoLog(program_, static_cast<GLsizei>(log.size()), nullptr, log.data());
-    throw std::runtime_error("OSMesa: error: found shaders it cannot link, expected GLSL 3.30: " + std::string(log.c_str()));
+    throw std::runtime_error("OSMesa: error: found shaders it cannot link, expected GLSL 3.30: " +
+                             std::string(log.c_str()));
 }
 
-void GlProgram::use() const { gl_.UseProgram(program_); }
+void GlProgram::use() const {
+    gl_.UseProgram(program_);
+}
 
-void GlProgram::set(const char* name, int value) const { gl_.Uniform1i(gl_.GetUniformLocation(program_, name), value); }
+void GlProgram::set(const char* name, int value) const {
+    gl_.Uniform1i(gl_.GetUniformLocation(program_, name), value);
+}
 
-void GlProgram::set(const char* name, float value) const { gl_.Uniform1f(gl_.GetUniformLocation(program_, name), value); }
+void GlProgram::set(const char* name, float value) const {
+    gl_.Uniform1f(gl_.GetUniformLocation(program_, name), value);
+}
 
 void GlProgram::set(const char* name, const Eigen::Vector3f& value) const {
     gl_.Uniform3fv(gl_.GetUniformLocation(program_, name), 1, value.data());
@@ -49,7 +58,8 @@ void GlProgram::set(const char* name, const Eigen::Matrix4f& value) const {
 
 void GlProgram::set(const char* name, const std::vector<Eigen::Vector4f>& values) const {
     if (values.empty()) return;
-    gl_.Uniform4fv(gl_.GetUniformLocation(program_, name), static_cast<GLsizei>(values.size()), values.front().data());
+    gl_.Uniform4fv(gl_.GetUniformLocation(program_, name), static_cast<GLsizei>(values.size()),
+                   values.front().data());
 }
 
 }  // namespace render

@@ -42,7 +42,8 @@ private:
 ImportProcess::ImportProcess(const std::filesystem::path& file) {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0) {
-        throw std::runtime_error(std::string("found no pipe (") + std::strerror(errno) + "), expected one to the importer");
+        throw std::runtime_error(std::string("found no pipe (") + std::strerror(errno) +
+                                 "), expected one to the importer");
     }
     pipe_ = ends[0];
     const SpawnActions actions(ends[1]);
@@ -53,7 +54,8 @@ ImportProcess::ImportProcess(const std::filesystem::path& file) {
     if (error != 0) {
         child_ = -1;
         close(pipe_);
-        throw std::runtime_error("found no mesh importer (" + std::string(std::strerror(error)) + "), expected " + program);
+        throw std::runtime_error("found no mesh importer (" + std::string(std::strerror(error)) +
+                                 "), expected " + program);
     }
 }
 
@@ -73,7 +75,9 @@ std::string ImportProcess::output() {
         throw std::runtime_error("found a file on which the importer ended with signal " +
                                  std::to_string(WTERMSIG(status)) + ", expected a sound mesh file");
     }
-    if (status != 0) throw std::runtime_error("found a file that the importer cannot hold in its limits, expected a sound mesh file");
+    if (status != 0)
+        throw std::runtime_error(
+            "found a file that the importer cannot hold in its limits, expected a sound mesh file");
     return bytes;
 }
 
@@ -85,15 +89,19 @@ void ImportProcess::read_until_closed(std::string& bytes) {
         const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now());
         pollfd ready{pipe_, POLLIN, 0};
         const int events = left.count() > 0 ? poll(&ready, 1, static_cast<int>(left.count())) : 0;
-        if (events == 0) throw std::runtime_error("found a file that takes over 20 s to import, expected a sound mesh file");
+        if (events == 0)
+            throw std::runtime_error(
+                "found a file that takes over 20 s to import, expected a sound mesh file");
         const ssize_t count = events > 0 ? read(pipe_, block.data(), block.size()) : -1;
         if (count == 0) return;
         if (count < 0) {
             if (errno == EINTR || errno == EAGAIN) continue;
-            throw std::runtime_error(std::string("found a broken pipe (") + std::strerror(errno) + "), expected a mesh");
+            throw std::runtime_error(std::string("found a broken pipe (") + std::strerror(errno) +
+                                     "), expected a mesh");
         }
         bytes.append(block.data(), static_cast<std::size_t>(count));
-        if (bytes.size() > kMostBytes) throw std::runtime_error("found over 64 MB of mesh, expected 1 to 500000 triangles");
+        if (bytes.size() > kMostBytes)
+            throw std::runtime_error("found over 64 MB of mesh, expected 1 to 500000 triangles");
     }
 }
 

@@ -6,8 +6,9 @@
 
 namespace render {
 
-/// One run of musicworld_mesh_import on one file: started by the constructor (posix_spawn, so safe beside other threads), killed by the
-/// destructor if it still runs. The child limits its own memory and processor time; the parent limits bytes and waiting.
+/// One run of musicworld_mesh_import on one file: started by the constructor (posix_spawn, so safe beside
+/// other threads), killed by the destructor if it still runs. The child limits its own memory and processor
+/// time; the parent limits bytes and waiting.
 class ImportProcess {
 public:
     /// Throws std::runtime_error ("found ..., expected ...") when the program cannot be started.
@@ -16,8 +17,9 @@ public:
     ImportProcess(const ImportProcess&) = delete;
     ImportProcess& operator=(const ImportProcess&) = delete;
 
-    /// All that the child wrote, once it has ended well. Throws std::runtime_error ("found ..., expected ...") when it crashed, took
-    /// longer than 20 s from this call on, or wrote more than any allowed mesh needs. Call once.
+    /// All that the child wrote, once it has ended well. Throws std::runtime_error ("found ..., expected
+    /// ...") when it crashed, took longer than 20 s from this call on, or wrote more than any allowed mesh
+    /// needs. Call once.
     [[nodiscard]] std::string output();
 
 private:

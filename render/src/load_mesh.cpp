@@ -19,7 +19,8 @@ void check_file(const std::filesystem::path& file) {
     if (!std::filesystem::is_regular_file(status)) {
         throw std::runtime_error("found what is not a regular file, expected a mesh");
     }
-    if (std::filesystem::file_size(file, error) == 0) throw std::runtime_error("found an empty file, expected a mesh");
+    if (std::filesystem::file_size(file, error) == 0)
+        throw std::runtime_error("found an empty file, expected a mesh");
     std::string extension = file.extension().string();
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -52,12 +53,15 @@ std::vector<Mesh> load_meshes(const std::vector<std::filesystem::path>& files) {
             }));
         }
         for (std::size_t i = first; i < last; ++i) {
-            meshes.push_back(naming_file(files[i], [&] { return decode_mesh_stream(children[i - first]->output()); }));
+            meshes.push_back(
+                naming_file(files[i], [&] { return decode_mesh_stream(children[i - first]->output()); }));
         }
     }
     return meshes;
 }
 
-Mesh load_mesh(const std::filesystem::path& file) { return std::move(load_meshes({file}).front()); }
+Mesh load_mesh(const std::filesystem::path& file) {
+    return std::move(load_meshes({file}).front());
+}
 
 }  // namespace render

@@ -27,7 +27,8 @@ public:
     explicit StreamReader(std::string_view bytes) : rest_(bytes) {}
 
     std::string_view take(std::size_t length) {
-        if (length > rest_.size()) throw std::runtime_error("found an incomplete import, expected a whole mesh");
+        if (length > rest_.size())
+            throw std::runtime_error("found an incomplete import, expected a whole mesh");
         const std::string_view taken = rest_.substr(0, length);
         rest_.remove_prefix(length);
         return taken;
@@ -56,7 +57,8 @@ private:
 
 void check_vectors(const MeshPart& part) {
     for (const Eigen::Vector3f& position : part.positions) {
-        if (!position.allFinite()) throw std::runtime_error("found a coordinate that is not finite, expected numbers");
+        if (!position.allFinite())
+            throw std::runtime_error("found a coordinate that is not finite, expected numbers");
         if (position.cwiseAbs().maxCoeff() > kMaxCoordinate) {
             throw std::runtime_error("found a coordinate beyond 100000 m, expected a mesh in metres");
         }
@@ -69,7 +71,8 @@ void check_vectors(const MeshPart& part) {
 }
 
 void check_indices(const MeshPart& part) {
-    if (part.indices.size() % 3 != 0) throw std::runtime_error("found a broken triangle, expected three indices each");
+    if (part.indices.size() % 3 != 0)
+        throw std::runtime_error("found a broken triangle, expected three indices each");
     for (const std::uint32_t index : part.indices) {
         if (index >= part.positions.size()) {
             throw std::runtime_error("found vertex index " + std::to_string(index) + ", expected less than " +
@@ -116,7 +119,9 @@ std::string encode_mesh_stream(const Mesh& mesh) {
     return out.append(kEnd);
 }
 
-std::string encode_mesh_failure(const std::string& reason) { return std::string(kFailMagic) + reason; }
+std::string encode_mesh_failure(const std::string& reason) {
+    return std::string(kFailMagic) + reason;
+}
 
 Mesh decode_mesh_stream(const std::string& bytes) {
     StreamReader reader(bytes);
@@ -128,10 +133,12 @@ Mesh decode_mesh_stream(const std::string& bytes) {
     Mesh mesh;
     mesh.parts.resize(reader.take_count(kMaxParts, "materials"));
     for (MeshPart& part : mesh.parts) part = read_part(reader);
-    if (reader.take(kEnd.size()) != kEnd) throw std::runtime_error("found a broken import stream, expected its end");
+    if (reader.take(kEnd.size()) != kEnd)
+        throw std::runtime_error("found a broken import stream, expected its end");
     if (mesh.triangles() == 0) throw std::runtime_error("found no triangles, expected 1 to 500000");
     if (mesh.triangles() > kMaxTriangles) {
-        throw std::runtime_error("found " + std::to_string(mesh.triangles()) + " triangles, expected 1 to 500000");
+        throw std::runtime_error("found " + std::to_string(mesh.triangles()) +
+                                 " triangles, expected 1 to 500000");
     }
     return mesh;
 }

@@ -7,23 +7,41 @@
 namespace render {
 
 OsmesaContext::OsmesaContext() {
-    const int attributes[] = {OSMESA_FORMAT, OSMESA_RGBA, OSMESA_DEPTH_BITS, 0, OSMESA_STENCIL_BITS, 0,
-                              OSMESA_ACCUM_BITS, 0, OSMESA_PROFILE, OSMESA_CORE_PROFILE,
-                              OSMESA_CONTEXT_MAJOR_VERSION, 3, OSMESA_CONTEXT_MINOR_VERSION, 3, 0};
+    const int attributes[] = {OSMESA_FORMAT,
+                              OSMESA_RGBA,
+                              OSMESA_DEPTH_BITS,
+                              0,
+                              OSMESA_STENCIL_BITS,
+                              0,
+                              OSMESA_ACCUM_BITS,
+                              0,
+                              OSMESA_PROFILE,
+                              OSMESA_CORE_PROFILE,
+                              OSMESA_CONTEXT_MAJOR_VERSION,
+                              3,
+                              OSMESA_CONTEXT_MINOR_VERSION,
+                              3,
+                              0};
     context_ = OSMesaCreateContextAttribs(attributes, nullptr);
-    if (context_ == nullptr) throw std::runtime_error("OSMesa: error: found no context, expected OpenGL 3.3 core");
+    if (context_ == nullptr)
+        throw std::runtime_error("OSMesa: error: found no context, expected OpenGL 3.3 core");
     make_current();
 }
 
-OsmesaContext::~OsmesaContext() { OSMesaDestroyContext(context_); }
+OsmesaContext::~OsmesaContext() {
+    OSMesaDestroyContext(context_);
+}
 
 void OsmesaContext::make_current() {
     if (OSMesaGetCurrentContext() == context_) return;
     if (OSMesaMakeCurrent(context_, front_buffer_, GL_UNSIGNED_BYTE, 1, 1) != GL_TRUE) {
-        throw std::runtime_error("OSMesa: error: found a context that cannot be made current, expected one that can");
+        throw std::runtime_error(
+            "OSMesa: error: found a context that cannot be made current, expected one that can");
     }
 }
 
-OsmesaContext::Function OsmesaContext::function(const char* name) { return OSMesaGetProcAddress(name); }
+OsmesaContext::Function OsmesaContext::function(const char* name) {
+    return OSMesaGetProcAddress(name);
+}
 
 }  // namespace render

@@ -14,7 +14,9 @@ using Context = std::unique_ptr<spng_ctx, void (*)(spng_ctx*)>;
 constexpr std::uint32_t kMaxSide = 16384;
 
 void require(int error) {
-    if (error != 0) throw std::runtime_error(std::string("PNG: error: found ") + spng_strerror(error) + ", expected an image");
+    if (error != 0)
+        throw std::runtime_error(std::string("PNG: error: found ") + spng_strerror(error) +
+                                 ", expected an image");
 }
 
 Context make_context(int flags) {
@@ -27,7 +29,8 @@ Context make_context(int flags) {
 
 std::vector<std::uint8_t> encode_png(const Image& image) {
     if (image.width <= 0 || image.height <= 0 ||
-        image.rgb.size() != std::size_t{3} * static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)) {
+        image.rgb.size() !=
+            std::size_t{3} * static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)) {
         throw std::invalid_argument("encode_png: the image has not width x height x 3 bytes");
     }
     const Context context = make_context(SPNG_CTX_ENCODER);
@@ -40,10 +43,12 @@ std::vector<std::uint8_t> encode_png(const Image& image) {
     header.bit_depth = 8;
     header.color_type = SPNG_COLOR_TYPE_TRUECOLOR;
     require(spng_set_ihdr(context.get(), &header));
-    require(spng_encode_image(context.get(), image.rgb.data(), image.rgb.size(), SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE));
+    require(spng_encode_image(context.get(), image.rgb.data(), image.rgb.size(), SPNG_FMT_PNG,
+                              SPNG_ENCODE_FINALIZE));
     std::size_t length = 0;
     int error = 0;
-    const std::unique_ptr<void, void (*)(void*)> bytes(spng_get_png_buffer(context.get(), &length, &error), std::free);
+    const std::unique_ptr<void, void (*)(void*)> bytes(spng_get_png_buffer(context.get(), &length, &error),
+                                                       std::free);
     require(error);
     const auto* first = static_cast<const std::uint8_t*>(bytes.get());
     return {first, first + length};
@@ -57,7 +62,8 @@ Image decode_png(const std::vector<std::uint8_t>& bytes) {
     require(spng_get_ihdr(context.get(), &header));
     std::size_t length = 0;
     require(spng_decoded_image_size(context.get(), SPNG_FMT_RGB8, &length));
-    Image image{static_cast<int>(header.width), static_cast<int>(header.height), std::vector<std::uint8_t>(length)};
+    Image image{static_cast<int>(header.width), static_cast<int>(header.height),
+                std::vector<std::uint8_t>(length)};
     require(spng_decode_image(context.get(), image.rgb.data(), length, SPNG_FMT_RGB8, 0));
     return image;
 }

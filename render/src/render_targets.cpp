@@ -8,8 +8,9 @@ namespace render {
 
 void require_complete(const GlFunctions& gl, const char* what, int width, int height) {
     if (gl.CheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE) return;
-    throw std::runtime_error(std::string("OSMesa: error: found no framebuffer for a ") + what + " of " + std::to_string(width) + "x" +
-                             std::to_string(height) + ", expected a smaller one");
+    throw std::runtime_error(std::string("OSMesa: error: found no framebuffer for a ") + what + " of " +
+                             std::to_string(width) + "x" + std::to_string(height) +
+                             ", expected a smaller one");
 }
 
 GLuint make_framebuffer(const GlFunctions& gl) {
@@ -93,7 +94,8 @@ void PictureTarget::read(Image& image) {
 ShadowTarget::ShadowTarget(const GlFunctions& gl, int size) : gl_(gl), size_(std::max(size, 1)) {
     gl_.GenTextures(1, &texture_);
     gl_.BindTexture(GL_TEXTURE_2D, texture_);
-    gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, size_, size_, 0, GL_DEPTH_COMPONENT, GL_FLOAT, nullptr);
+    gl_.TexImage2D(GL_TEXTURE_2D, 0, GL_DEPTH_COMPONENT32F, size_, size_, 0, GL_DEPTH_COMPONENT, GL_FLOAT,
+                   nullptr);
     gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
     gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
     gl_.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);

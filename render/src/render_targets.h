@@ -10,17 +10,19 @@ namespace render {
 /// Throws std::runtime_error unless the bound framebuffer is complete.
 void require_complete(const GlFunctions& gl, const char* what, int width, int height);
 
-/// The framebuffers of one picture. The objects are drawn with several samples a pixel over nothing (0, 0, 0, 0), resolved into a texture,
-/// and a second pass with one sample a pixel puts them before the background: the background costs no samples.
-/// End with their context.
+/// The framebuffers of one picture. The objects are drawn with several samples a pixel over nothing (0, 0, 0,
+/// 0), resolved into a texture, and a second pass with one sample a pixel puts them before the background:
+/// the background costs no samples. End with their context.
 class PictureTarget {
 public:
-    /// Samples above what the device has are cut to that. Throws std::runtime_error when the framebuffer cannot be made.
+    /// Samples above what the device has are cut to that. Throws std::runtime_error when the framebuffer
+    /// cannot be made.
     PictureTarget(const GlFunctions& gl, int width, int height, int samples);
 
     /// Cleared; objects are drawn from now on.
     void begin_objects() const;
-    /// Resolves the objects' samples into the texture of this unit; from now on the background is drawn (every pixel, no depth).
+    /// Resolves the objects' samples into the texture of this unit; from now on the background is drawn
+    /// (every pixel, no depth).
     void begin_background(GLuint objects_unit) const;
     /// Copies the picture out, top row first.
     void read(Image& image);
@@ -28,7 +30,8 @@ public:
 private:
     const GlFunctions& gl_;
     int width_, height_;
-    GLuint sampled_ = 0, objects_ = 0, picture_ = 0;  ///< framebuffers; the first two are the same without multisampling
+    GLuint sampled_ = 0, objects_ = 0,
+           picture_ = 0;  ///< framebuffers; the first two are the same without multisampling
     GLuint objects_texture_ = 0;
     std::vector<std::uint8_t> rgba_;  ///< bottom row first
 };

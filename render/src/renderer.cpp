@@ -19,16 +19,20 @@ constexpr int kMaxSide = 8192;  // pixels
 
 SceneDescription checked(const SceneDescription& scene) {
     if (scene.width < 1 || scene.height < 1 || scene.width > kMaxSide || scene.height > kMaxSide) {
-        throw std::runtime_error("picture: error: found a size of " + std::to_string(scene.width) + "x" + std::to_string(scene.height) +
-                                 ", expected 1x1 to 8192x8192");
+        throw std::runtime_error("picture: error: found a size of " + std::to_string(scene.width) + "x" +
+                                 std::to_string(scene.height) + ", expected 1x1 to 8192x8192");
     }
     if (scene.shadow_size < 0 || scene.shadow_size > kMaxSide) {
-        throw std::runtime_error("shadow: error: found a size of " + std::to_string(scene.shadow_size) + ", expected 0 to 8192");
+        throw std::runtime_error("shadow: error: found a size of " + std::to_string(scene.shadow_size) +
+                                 ", expected 0 to 8192");
     }
     const Camera& camera = scene.camera;
-    const bool looks = camera.eye.allFinite() && camera.target.allFinite() && (camera.target - camera.eye).norm() > 1e-6f;
+    const bool looks =
+        camera.eye.allFinite() && camera.target.allFinite() && (camera.target - camera.eye).norm() > 1e-6f;
     if (!looks || !(camera.vertical_fov_deg >= 1 && camera.vertical_fov_deg <= 150)) {
-        throw std::runtime_error("camera: error: found eye, target or field of view out of range, expected two places and 1 to 150 degrees");
+        throw std::runtime_error(
+            "camera: error: found eye, target or field of view out of range, expected two places and 1 to "
+            "150 degrees");
     }
     if (!scene.key_light.towards_light.allFinite() || scene.key_light.towards_light.norm() < 1e-6f) {
         throw std::runtime_error("key light: error: found no direction, expected one");
@@ -105,7 +109,8 @@ void Renderer::Implementation::set_uniforms(const GlProgram& program) const {
     program.set("towards_light", Eigen::Vector3f(key.towards_light.normalized()));
     program.set("key_light", key_light);
     program.set("sky_light", Eigen::Vector3f(0.13f, 0.13f, 0.15f));
-    program.set("ground_light", Eigen::Vector3f(0.03f * Eigen::Vector3f::Ones() + 0.10f * room.floor_color.cwiseProduct(key_light)));
+    program.set("ground_light", Eigen::Vector3f(0.03f * Eigen::Vector3f::Ones() +
+                                                0.10f * room.floor_color.cwiseProduct(key_light)));
     program.set("fill_light", Eigen::Vector3f(0.07f, 0.085f, 0.13f));
 }
 
@@ -130,18 +135,25 @@ void Renderer::Implementation::draw(const FrameState& frame, Image& image) {
     picture.read(image);
 }
 
-Renderer::Renderer(const SceneDescription& scene) : implementation_(std::make_unique<Implementation>(scene)) {}
+Renderer::Renderer(const SceneDescription& scene)
+    : implementation_(std::make_unique<Implementation>(scene)) {}
 
 Renderer::~Renderer() = default;
 
-void Renderer::draw(const FrameState& frame, Image& image) { implementation_->draw(frame, image); }
+void Renderer::draw(const FrameState& frame, Image& image) {
+    implementation_->draw(frame, image);
+}
 
 std::string Renderer::version() const {
     implementation_->context.make_current();
-    const auto text = [this](GLenum name) { return std::string(reinterpret_cast<const char*>(implementation_->gl.GetString(name))); };
+    const auto text = [this](GLenum name) {
+        return std::string(reinterpret_cast<const char*>(implementation_->gl.GetString(name)));
+    };
     return "OSMesa, OpenGL " + text(GL_VERSION) + ", " + text(GL_RENDERER);
 }
 
-std::size_t Renderer::triangles() const { return implementation_->geometry.triangles(); }
+std::size_t Renderer::triangles() const {
+    return implementation_->geometry.triangles();
+}
 
 }  // namespace render

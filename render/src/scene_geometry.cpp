@@ -35,7 +35,8 @@ float volume_of(const Mesh& mesh, const Eigen::Vector3f& center) {
     return static_cast<float>(std::abs(six_volumes) / 6);
 }
 
-void append_object(const Mesh& mesh, const Look& look, std::size_t object, std::vector<Vertex>& vertices, std::vector<GLuint>& indices) {
+void append_object(const Mesh& mesh, const Look& look, std::size_t object, std::vector<Vertex>& vertices,
+                   std::vector<GLuint>& indices) {
     for (const MeshPart& part : mesh.parts) {
         const Appearance& a = appearance_of(look, part.material);
         const auto base = static_cast<GLuint>(vertices.size());
@@ -59,7 +60,9 @@ Eigen::Matrix3f cofactors(const Eigen::Matrix3f& m) {
     return result;
 }
 
-const void* offset(std::size_t bytes) { return reinterpret_cast<const void*>(bytes); }
+const void* offset(std::size_t bytes) {
+    return reinterpret_cast<const void*>(bytes);
+}
 
 }  // namespace
 
@@ -82,7 +85,8 @@ void SceneGeometry::make_buffers(const std::vector<SceneObject>& objects, const 
     for (std::size_t i = 0; i < objects.size(); ++i) {
         const Mesh& mesh = meshes[mesh_of_object[i]];
         const Eigen::Vector3f center = mesh.bounds().center();
-        objects_.push_back({static_cast<GLsizei>(indices.size()), static_cast<GLsizei>(3 * mesh.triangles()), center, volume_of(mesh, center)});
+        objects_.push_back({static_cast<GLsizei>(indices.size()), static_cast<GLsizei>(3 * mesh.triangles()),
+                            center, volume_of(mesh, center)});
         append_object(mesh, objects[i].look, i, vertices, indices);
     }
     gl_.GenVertexArrays(1, &vertex_array_);
@@ -90,9 +94,11 @@ void SceneGeometry::make_buffers(const std::vector<SceneObject>& objects, const 
     GLuint buffers[3];
     gl_.GenBuffers(3, buffers);
     gl_.BindBuffer(GL_ARRAY_BUFFER, buffers[0]);
-    gl_.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(Vertex)), vertices.data(), GL_STATIC_DRAW);
+    gl_.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(Vertex)),
+                   vertices.data(), GL_STATIC_DRAW);
     gl_.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, buffers[1]);
-    gl_.BufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(indices.size() * sizeof(GLuint)), indices.data(), GL_STATIC_DRAW);
+    gl_.BufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(indices.size() * sizeof(GLuint)),
+                   indices.data(), GL_STATIC_DRAW);
     const auto attribute = [&](GLuint location, GLint size, std::size_t at) {
         gl_.EnableVertexAttribArray(location);
         gl_.VertexAttribPointer(location, size, GL_FLOAT, GL_FALSE, sizeof(Vertex), offset(at));
@@ -107,8 +113,9 @@ void SceneGeometry::make_buffers(const std::vector<SceneObject>& objects, const 
 
 void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye) {
     if (frame.world_from_object.size() != objects_.size() || frame.visible.size() != objects_.size()) {
-        throw std::invalid_argument("Renderer::draw: found a frame of " + std::to_string(frame.world_from_object.size()) +
-                                    " matrices, expected " + std::to_string(objects_.size()));
+        throw std::invalid_argument("Renderer::draw: found a frame of " +
+                                    std::to_string(frame.world_from_object.size()) + " matrices, expected " +
+                                    std::to_string(objects_.size()));
     }
     drawn_.clear();
     matrix_rows_.assign(6 * objects_.size(), Eigen::Vector4f::Zero());
@@ -116,25 +123,29 @@ void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye) 
         if (!frame.visible[i]) continue;
         const Eigen::Matrix4f& world_from_object = frame.world_from_object[i];
         if (!world_from_object.allFinite()) {
-            throw std::invalid_argument("Renderer::draw: found a matrix that is not finite for object " + std::to_string(i));
+            throw std::invalid_argument("Renderer::draw: found a matrix that is not finite for object " +
+                                        std::to_string(i));
         }
         const Eigen::Matrix3f linear = world_from_object.topLeftCorner<3, 3>();
         const float determinant = linear.determinant();
-        const Eigen::Matrix3f normals = determinant < 0 ? Eigen::Matrix3f(-cofactors(linear)) : cofactors(linear);
+        const Eigen::Matrix3f normals =
+            determinant < 0 ? Eigen::Matrix3f(-cofactors(linear)) : cofactors(linear);
         for (int row = 0; row < 3; ++row) {
             matrix_rows_[6 * i + static_cast<std::size_t>(row)] = world_from_object.row(row).transpose();
             matrix_rows_[6 * i + 3 + static_cast<std::size_t>(row)].head<3>() = normals.row(row).transpose();
         }
         Drawn drawn{i, 0, determinant < 0, Eigen::Vector4f::Zero()};
         drawn.ball.head<3>() = linear * objects_[i].center + world_from_object.topRightCorner<3, 1>();
-        drawn.ball.w() = std::cbrt(objects_[i].volume * std::abs(determinant) * 0.75f / std::numbers::pi_v<float>);
+        drawn.ball.w() =
+            std::cbrt(objects_[i].volume * std::abs(determinant) * 0.75f / std::numbers::pi_v<float>);
         drawn.distance = (drawn.ball.head<3>() - eye).norm();
         drawn_.push_back(drawn);
     }
-    std::stable_sort(drawn_.begin(), drawn_.end(), [](const Drawn& a, const Drawn& b) { return a.distance < b.distance; });
+    std::stable_sort(drawn_.begin(), drawn_.end(),
+                     [](const Drawn& a, const Drawn& b) { return a.distance < b.distance; });
     gl_.BindBuffer(GL_TEXTURE_BUFFER, matrix_buffer_);
-    gl_.BufferData(GL_TEXTURE_BUFFER, static_cast<GLsizeiptr>(matrix_rows_.size() * sizeof(Eigen::Vector4f)), matrix_rows_.data(),
-                   GL_STREAM_DRAW);
+    gl_.BufferData(GL_TEXTURE_BUFFER, static_cast<GLsizeiptr>(matrix_rows_.size() * sizeof(Eigen::Vector4f)),
+                   matrix_rows_.data(), GL_STREAM_DRAW);
 }
 
 void SceneGeometry::draw(GLuint matrix_unit) const {
@@ -154,7 +165,8 @@ void SceneGeometry::draw(GLuint matrix_unit) const {
 std::vector<Eigen::Vector4f> SceneGeometry::volume_balls(std::size_t limit) const {
     std::vector<Eigen::Vector4f> balls;
     for (const Drawn& drawn : drawn_) balls.push_back(drawn.ball);
-    std::stable_sort(balls.begin(), balls.end(), [](const Eigen::Vector4f& a, const Eigen::Vector4f& b) { return a.w() > b.w(); });
+    std::stable_sort(balls.begin(), balls.end(),
+                     [](const Eigen::Vector4f& a, const Eigen::Vector4f& b) { return a.w() > b.w(); });
     balls.resize(std::min(limit, balls.size()));
     return balls;
 }

@@ -7,15 +7,17 @@
 
 namespace render {
 
-/// All objects of a scene in one vertex buffer (each object's copy of its mesh carries its colours and its number) and, a frame, one small
-/// buffer of matrices that the vertex shader reads by that number: a draw changes no state. Ends with its context.
+/// All objects of a scene in one vertex buffer (each object's copy of its mesh carries its colours and its
+/// number) and, a frame, one small buffer of matrices that the vertex shader reads by that number: a draw
+/// changes no state. Ends with its context.
 class SceneGeometry {
 public:
     /// Loads the meshes, each file once. Throws std::runtime_error as load_mesh does.
     SceneGeometry(const GlFunctions& gl, const std::vector<SceneObject>& objects);
 
-    /// Takes the frame's matrices, drops hidden objects and sorts the rest by distance from the eye, nearest first.
-    /// Throws std::invalid_argument for a frame that does not fit the scene or a visible object's matrix that is not finite.
+    /// Takes the frame's matrices, drops hidden objects and sorts the rest by distance from the eye, nearest
+    /// first. Throws std::invalid_argument for a frame that does not fit the scene or a visible object's
+    /// matrix that is not finite.
     void update(const FrameState& frame, const Eigen::Vector3f& eye);
 
     /// Draws what update() kept, with the program in use; the matrices are bound to the given texture unit.
@@ -47,7 +49,8 @@ private:
     const GlFunctions& gl_;
     std::vector<Object> objects_;
     std::vector<Drawn> drawn_;
-    std::vector<Eigen::Vector4f> matrix_rows_;  ///< six an object: three of world_from_object, three of the normals' matrix
+    std::vector<Eigen::Vector4f>
+        matrix_rows_;  ///< six an object: three of world_from_object, three of the normals' matrix
     GLuint vertex_array_ = 0, matrix_buffer_ = 0, matrix_texture_ = 0;
 };
 

@@ -14,7 +14,8 @@ vec3 to_world(vec3 position, int object) {
 }
 )";
 
-/// From linear light to the 8-bit picture: vignette, filmic curve (Narkowicz's fit of ACES), sRGB transfer (roots fit, error below 0.002).
+/// From linear light to the 8-bit picture: vignette, filmic curve (Narkowicz's fit of ACES), sRGB transfer
+/// (roots fit, error below 0.002).
 const char* const kPicture = R"(
 uniform vec3 picture;  // width, height, 1 / half diagonal squared [pixels]
 out vec4 fragment;
@@ -49,8 +50,9 @@ float spot(vec3 at) {
 }
 )";
 
-/// Part of the key light that the shadow map lets through: the mean of comparisons of 2x2 texels at one or two pairs of opposite places;
-/// 1 outside the map. Look-ups are the dearest part of the fragment shaders, so the objects make do with one pair.
+/// Part of the key light that the shadow map lets through: the mean of comparisons of 2x2 texels at one or
+/// two pairs of opposite places; 1 outside the map. Look-ups are the dearest part of the fragment shaders, so
+/// the objects make do with one pair.
 const char* const kShadow = R"(
 uniform sampler2DShadow shadow_map;
 uniform float shadow_texel;  // 1 / size
@@ -75,12 +77,15 @@ std::string shadow_vertex() {
 layout(location = 0) in vec3 position;
 layout(location = 3) in vec3 roughness_lathed_object;
 uniform mat4 clip_from_light_world;
-)" + kObjectMatrices + R"(
+)" + kObjectMatrices +
+           R"(
 void main() { gl_Position = clip_from_light_world * vec4(to_world(position, 6 * int(roughness_lathed_object.z)), 1.0); }
 )";
 }
 
-std::string shadow_fragment() { return std::string(kVersion) + "void main() {}\n"; }
+std::string shadow_fragment() {
+    return std::string(kVersion) + "void main() {}\n";
+}
 
 std::string object_vertex() {
     return std::string(kVersion) + R"(
@@ -96,7 +101,8 @@ out vec3 v_world, v_normal, v_groove, v_shadow;
 out vec3 v_around;  // diffuse light of the surroundings
 flat out vec4 v_color_metallic;
 flat out vec2 v_roughness_lathed;
-)" + kObjectMatrices + R"(
+)" + kObjectMatrices +
+           R"(
 void main() {
     int object = 6 * int(roughness_lathed_object.z);
     v_world = to_world(position, object);
@@ -115,15 +121,17 @@ void main() {
 )";
 }
 
-/// Key light: GGX with roughness across the grooves raised for lathed metal (Burley 2012), visibility and Fresnel by the fit of Karis and
-/// Lagarde for one light. Surroundings: hemisphere for diffuse; for reflections a warm stage floor, a dark room, and two soft boxes.
+/// Key light: GGX with roughness across the grooves raised for lathed metal (Burley 2012), visibility and
+/// Fresnel by the fit of Karis and Lagarde for one light. Surroundings: hemisphere for diffuse; for
+/// reflections a warm stage floor, a dark room, and two soft boxes.
 std::string object_fragment() {
     return std::string(kVersion) + R"(
 in vec3 v_world, v_normal, v_groove, v_shadow, v_around;
 flat in vec4 v_color_metallic;
 flat in vec2 v_roughness_lathed;
 uniform vec3 eye, towards_light, key_light, sky_light, ground_light;
-)" + kPicture + kSpot + kShadow + R"(
+)" + kPicture +
+           kSpot + kShadow + R"(
 vec3 surroundings(vec3 r, float roughness) {
     float blur = 0.08 + 0.8 * roughness;
     vec3 light = mix(ground_light, sky_light, smoothstep(-blur, blur, r.y));
@@ -154,7 +162,8 @@ void main() {
 )";
 }
 
-/// Where a point of the floor lies in the picture and in the shadow map, and how much of the sky the balls above leave open to it.
+/// Where a point of the floor lies in the picture and in the shadow map, and how much of the sky the balls
+/// above leave open to it.
 std::string floor_vertex() {
     return std::string(kVersion) + R"(
 layout(location = 0) in vec3 position;  // world
@@ -179,13 +188,15 @@ void main() {
 )";
 }
 
-/// The floor in the key light (key_part 1) or in its shadow (0), for baking: planks with seams, a gloss, fading into the wall with distance.
+/// The floor in the key light (key_part 1) or in its shadow (0), for baking: planks with seams, a gloss,
+/// fading into the wall with distance.
 std::string floor_bake_fragment() {
     return std::string(kVersion) + R"(
 in vec3 v_world, v_shadow;
 uniform vec3 eye, towards_light, key_light, sky_light, floor_color, center;
 uniform float key_part;
-)" + kPicture + kBackdrop + kSpot + R"(
+)" + kPicture +
+           kBackdrop + kSpot + R"(
 float random(vec2 cell) { return fract(sin(dot(cell, vec2(12.9898, 78.233))) * 43758.547); }
 void main() {
     vec2 plank = vec2(v_world.x / 0.14, v_world.z / 1.7);
@@ -221,14 +232,16 @@ void main() { write_picture(backdrop(), 1.0); }
 )";
 }
 
-/// The objects' picture (colour times coverage, coverage) over the baked floor, which the shadow map and the balls darken.
+/// The objects' picture (colour times coverage, coverage) over the baked floor, which the shadow map and the
+/// balls darken.
 std::string floor_fragment() {
     return std::string(kVersion) + R"(
 in vec3 v_shadow;
 in float v_open;
 uniform sampler2D objects, lit_floor, dark_floor;
 out vec4 fragment;
-)" + kShadow + R"(
+)" + kShadow +
+           R"(
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     vec4 object = texelFetch(objects, at, 0);

@@ -6,8 +6,8 @@ namespace render::shaders {
 /// The number of balls that darken the floor under the objects; larger ones first.
 inline constexpr int kMaxBalls = 32;
 
-// GLSL 3.30. Attribute numbers: SceneGeometry. The objects' and the baking shaders compute in linear light and write display values (sRGB); the
-// floor's and the backdrop's put display values together.
+// GLSL 3.30. Attribute numbers: SceneGeometry. The objects' and the baking shaders compute in linear light
+// and write display values (sRGB); the floor's and the backdrop's put display values together.
 [[nodiscard]] std::string shadow_vertex();
 [[nodiscard]] std::string shadow_fragment();
 [[nodiscard]] std::string object_vertex();

@@ -11,7 +11,8 @@ namespace {
 
 constexpr int kRings = 30, kSpokes = 56;
 
-/// Radii [m] of the floor's circles: 7 cm apart where things stand, then growing to 7 m, where the floor has faded into the wall.
+/// Radii [m] of the floor's circles: 7 cm apart where things stand, then growing to 7 m, where the floor has
+/// faded into the wall.
 float ring_radius(int ring) {
     const float x = static_cast<float>(ring) / kRings;
     return 2.1f * x + 4.9f * std::pow(x, 7.0f);
@@ -22,7 +23,8 @@ std::vector<Eigen::Vector3f> floor_vertices(const Eigen::Vector3f& center) {
     for (int ring = 0; ring <= kRings; ++ring) {
         for (int spoke = 0; spoke < kSpokes; ++spoke) {
             const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(spoke) / kSpokes;
-            vertices.push_back(center + ring_radius(ring) * Eigen::Vector3f(std::cos(angle), 0, -std::sin(angle)));
+            vertices.push_back(center +
+                               ring_radius(ring) * Eigen::Vector3f(std::cos(angle), 0, -std::sin(angle)));
         }
     }
     return vertices;
@@ -33,7 +35,8 @@ std::vector<GLuint> floor_triangles() {
     for (GLuint ring = 0; ring < kRings; ++ring) {
         for (GLuint spoke = 0; spoke < kSpokes; ++spoke) {
             const GLuint next = (spoke + 1) % kSpokes;
-            const GLuint a = ring * kSpokes + spoke, b = ring * kSpokes + next, c = a + kSpokes, d = b + kSpokes;
+            const GLuint a = ring * kSpokes + spoke, b = ring * kSpokes + next, c = a + kSpokes,
+                         d = b + kSpokes;
             if (ring > 0) indices.insert(indices.end(), {a, d, b});
             indices.insert(indices.end(), {a, c, d});
         }
@@ -69,14 +72,18 @@ void Stage::make_floor(const Eigen::Vector3f& center) {
     GLuint buffers[2];
     gl_.GenBuffers(2, buffers);
     gl_.BindBuffer(GL_ARRAY_BUFFER, buffers[0]);
-    gl_.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof vertices[0]), vertices.data(), GL_STATIC_DRAW);
+    gl_.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof vertices[0]),
+                   vertices.data(), GL_STATIC_DRAW);
     gl_.BindBuffer(GL_ELEMENT_ARRAY_BUFFER, buffers[1]);
-    gl_.BufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(indices.size() * sizeof indices[0]), indices.data(), GL_STATIC_DRAW);
+    gl_.BufferData(GL_ELEMENT_ARRAY_BUFFER, static_cast<GLsizeiptr>(indices.size() * sizeof indices[0]),
+                   indices.data(), GL_STATIC_DRAW);
     gl_.EnableVertexAttribArray(0);
     gl_.VertexAttribPointer(0, 3, GL_FLOAT, GL_FALSE, sizeof vertices[0], nullptr);
 }
 
-std::vector<const GlProgram*> Stage::programs() const { return {&floor_bake_, &backdrop_bake_, &floor_, &backdrop_}; }
+std::vector<const GlProgram*> Stage::programs() const {
+    return {&floor_bake_, &backdrop_bake_, &floor_, &backdrop_};
+}
 
 void Stage::bake(GLuint lit_unit, GLuint dark_unit) {
     bake_one(lit_texture_, 1);

@@ -7,9 +7,10 @@
 
 namespace render {
 
-/// The floor (planks that fade into the wall with distance) and the wall behind. The camera and the light stand still, so both are shaded once:
-/// one picture in the key light, one in its shadow. A frame blends them by its shadow map, darkens the floor under the objects, and lays the
-/// objects' picture over it. Ends with its context.
+/// The floor (planks that fade into the wall with distance) and the wall behind. The camera and the light
+/// stand still, so both are shaded once: one picture in the key light, one in its shadow. A frame blends them
+/// by its shadow map, darkens the floor under the objects, and lays the objects' picture over it. Ends with
+/// its context.
 class Stage {
 public:
     Stage(const GlFunctions& gl, const SceneDescription& scene);
@@ -18,7 +19,8 @@ public:
     [[nodiscard]] std::vector<const GlProgram*> programs() const;
     void bake(GLuint lit_unit, GLuint dark_unit);
 
-    /// Every pixel of the bound framebuffer. The objects' picture and the shadow map are bound to the units that the uniforms name.
+    /// Every pixel of the bound framebuffer. The objects' picture and the shadow map are bound to the units
+    /// that the uniforms name.
     void draw(const std::vector<Eigen::Vector4f>& balls) const;
 
 private:

@@ -49,7 +49,8 @@ float shadow_reach(const Camera& camera, float aspect) {
 Eigen::Matrix4f light_from_world(const KeyLight& light, const Eigen::Vector3f& center, float reach) {
     Eigen::Matrix4f projection = Eigen::Matrix4f::Identity();
     projection(0, 0) = projection(1, 1) = 1 / reach;
-    projection(2, 2) = -1 / (4 * reach);  // both sides of the centre; nearer casters are clamped to the near plane
+    projection(2, 2) =
+        -1 / (4 * reach);  // both sides of the centre; nearer casters are clamped to the near plane
     return projection * view_from_world(center, -light.towards_light);
 }
 

@@ -40,9 +40,8 @@ struct TangentProblem {
     Eigen::Matrix2d curvature;  // T^T (I + lambda H) T
 };
 
-TangentProblem tangent_problem(const Gauge& gauge, const Deformation& d, const Eigen::Vector3d& x,
+TangentProblem tangent_problem(const GaugeDerivatives& g, const Deformation& d, const Eigen::Vector3d& x,
                                const Foot& foot) {
-    const GaugeDerivatives g = gauge.derivatives(foot.r);
     const Eigen::Vector3d gradient = d.inverse.transpose() * g.gradient;
     const double length = gradient.norm();
     TangentProblem problem;
@@ -69,22 +68,31 @@ bool solve_step(const TangentProblem& problem, double mu, Eigen::Vector2d& step)
 }
 
 Foot refine(const Gauge& gauge, const Deformation& d, const Eigen::Vector3d& x, Foot foot) {
+    const auto problem_at = [&](const Foot& f) { return tangent_problem(gauge.derivatives(f.r), d, x, f); };
     double mu = 0;
-    TangentProblem problem = tangent_problem(gauge, d, x, foot);
+    bool cautious = false;
+    TangentProblem problem = problem_at(foot);
     for (int i = 0; i < kMaxSteps; ++i) {
         Eigen::Vector2d step;
         if (solve_step(problem, mu, step)) {
             const Foot next = foot_at(gauge, d, x, d.inverse * (foot.y + problem.tangents * step));
+            const bool settled = step.squaredNorm() < kSettled_m * kSettled_m;
             if (next.squared <= foot.squared) {
                 foot = next;
-                if (step.squaredNorm() < kSettled_m * kSettled_m) break;
+                if (settled) break;
                 mu = mu < 0.1 ? 0 : 0.1 * mu;
-                problem = tangent_problem(gauge, d, x, foot);
+                problem = problem_at(foot);
+                cautious = false;
                 continue;
             }
-            if (step.squaredNorm() < kSettled_m * kSettled_m) break;
+            if (settled) break;
         }
-        mu = 4 * mu + 0.5;
+        if (gauge.has_kinks() && !cautious) {
+            problem = tangent_problem(gauge.cautious_derivatives(foot.r), d, x, foot);
+            cautious = true;
+        } else {
+            mu = 4 * mu + 0.5;
+        }
     }
     return foot;
 }

@@ -61,6 +61,14 @@ double Gauge::inside_outside(const Eigen::Vector3d& r) const noexcept {
 }
 
 GaugeDerivatives Gauge::derivatives(const Eigen::Vector3d& r) const noexcept {
+    return derivatives(r, p1_ - 1, p2_ - 1);
+}
+
+GaugeDerivatives Gauge::cautious_derivatives(const Eigen::Vector3d& r) const noexcept {
+    return derivatives(r, std::max(p1_ - 1, 1.0), std::max(p2_ - 1, 1.0));
+}
+
+GaugeDerivatives Gauge::derivatives(const Eigen::Vector3d& r, double curve1, double curve2) const noexcept {
     const Eigen::Vector3d exact = r.cwiseAbs().cwiseQuotient(semi_axes_);
     const double lowest = kPlaneHeight * exact.maxCoeff();
     const Eigen::Vector3d u = exact.cwiseMax(lowest);
@@ -74,8 +82,8 @@ GaugeDerivatives Gauge::derivatives(const Eigen::Vector3d& r) const noexcept {
     gradient.y() = whole.second * n / u.y();
     const Eigen::Vector3d bend_flat(rho / u.x(), 0, -rho / u.z());
     const Eigen::Vector3d bend_whole(rho_gradient.x() * n / rho, -n / u.y(), rho_gradient.z() * n / rho);
-    const double flat_rate = n_rho * (p2_ - 1) * flat.first * flat.second / rho;
-    const double whole_rate = (p1_ - 1) * whole.first * whole.second / n;
+    const double flat_rate = n_rho * curve2 * flat.first * flat.second / rho;
+    const double whole_rate = curve1 * whole.first * whole.second / n;
 
     Eigen::Vector3d scale;  // d|x/a| / dx
     for (int i = 0; i < 3; ++i) {

@@ -26,6 +26,10 @@ public:
 
     [[nodiscard]] double value(const Eigen::Vector3d& r) const noexcept;
     [[nodiscard]] GaugeDerivatives derivatives(const Eigen::Vector3d& r) const noexcept;  ///< r not zero
+    /// As derivatives, but where p < 2 the curvature is divided by p - 1: then grad N(r) + H s does not overshoot the kink at a
+    /// coordinate plane, however near it is (the weights of iteratively reweighted least squares).
+    [[nodiscard]] GaugeDerivatives cautious_derivatives(const Eigen::Vector3d& r) const noexcept;
+    [[nodiscard]] bool has_kinks() const noexcept { return e1_ > 1 || e2_ > 1; }
     /// F itself (thesis 2.6, generalised); overflows to infinity far outside when e1 is small.
     [[nodiscard]] double inside_outside(const Eigen::Vector3d& r) const noexcept;
     /// The surface point on the ray from the centre through r; the upper pole for the centre.
@@ -41,6 +45,8 @@ public:
     [[nodiscard]] double bounding_radius() const noexcept { return bounding_radius_; }
 
 private:
+    [[nodiscard]] GaugeDerivatives derivatives(const Eigen::Vector3d& r, double curve1, double curve2) const noexcept;
+
     Eigen::Vector3d semi_axes_;
     double e1_, e2_, p1_, p2_;
     double bounding_radius_;

@@ -51,9 +51,11 @@ TEST(BundledKits, NoTwoBodiesTouch) {
                     for (double y = -1; y <= 1; y += 0.25)
                         for (double z = -1; z <= 1; z += 0.1) {
                             const Eigen::Vector3d point =
-                                a.body.world_from_body * Eigen::Vector3d(x, y, z).cwiseProduct(a.body.shape.semi_axes);
+                                a.body.world_from_body *
+                                Eigen::Vector3d(x, y, z).cwiseProduct(a.body.shape.semi_axes);
                             if (sim::rest_distance(a.body, point, 0).distance > 0) continue;
-                            ASSERT_GT(sim::rest_distance(b.body, point, 0).distance, 0) << name << ": " << a.name << ", " << b.name;
+                            ASSERT_GT(sim::rest_distance(b.body, point, 0).distance, 0)
+                                << name << ": " << a.name << ", " << b.name;
                         }
             }
     }
@@ -64,7 +66,9 @@ TEST(BundledKits, ADrumsHeadAndRimSoundShellAndUndersideAreSilent) {
         if (instrument.kind != "drum") continue;
         const auto zone_at = [&](double x, double y) {
             const Eigen::Vector3d half = instrument.body.shape.semi_axes;
-            const int zone = sim::rest_zone(instrument.body, instrument.body.world_from_body * Eigen::Vector3d(x * half.x(), y * half.y(), 0));
+            const int zone =
+                sim::rest_zone(instrument.body, instrument.body.world_from_body *
+                                                    Eigen::Vector3d(x * half.x(), y * half.y(), 0));
             return zone < 0 ? "silent" : instrument.zones[static_cast<std::size_t>(zone)].name;
         };
         EXPECT_EQ(zone_at(0, 1), "head") << instrument.name;
@@ -80,9 +84,11 @@ TEST(BundledKits, AllOfABellAStringAndACymbalSounds) {
     for (const char* name : kBundled)
         for (const Instrument& instrument : read_kit(find_kit(name)).instruments) {
             if (instrument.kind == "drum") continue;
-            for (const Eigen::Vector3d& side : {Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(1, 0, 0),
-                                                Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, 0, -1)}) {
-                const Eigen::Vector3d point = instrument.body.world_from_body * side.cwiseProduct(instrument.body.shape.semi_axes);
+            for (const Eigen::Vector3d& side :
+                 {Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(1, 0, 0),
+                  Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, 0, -1)}) {
+                const Eigen::Vector3d point =
+                    instrument.body.world_from_body * side.cwiseProduct(instrument.body.shape.semi_axes);
                 EXPECT_GE(sim::rest_zone(instrument.body, point), 0) << name << ": " << instrument.name;
             }
         }
@@ -98,7 +104,8 @@ TEST(BundledKits, BellsSwingOnHingesAndRiseByTheMajorScale) {
         double frequency = 0;
         for (const auto& [name, value] : kit.instruments[i].voice.parameters)
             if (name == "frequency_hz") frequency = value;
-        EXPECT_NEAR(frequency, 440 * std::exp2((72 + kScale[i] - 69) / 12.0), 0.001);  // written with three decimals
+        EXPECT_NEAR(frequency, 440 * std::exp2((72 + kScale[i] - 69) / 12.0),
+                    0.001);  // written with three decimals
     }
 }
 
@@ -110,7 +117,8 @@ TEST(BundledKits, StringsAreFiveToEightMillimetresThickAndMoreThanThirtyApart) {
         EXPECT_GE(2 * body.shape.semi_axes.y(), 0.005);
         EXPECT_LE(2 * body.shape.semi_axes.y(), 0.008);
         for (std::size_t k = 0; k < i; ++k) {
-            const Eigen::Vector3d apart = body.world_from_body.translation() - kit.instruments[k].body.world_from_body.translation();
+            const Eigen::Vector3d apart =
+                body.world_from_body.translation() - kit.instruments[k].body.world_from_body.translation();
             EXPECT_GT(apart.norm(), 0.040);
         }
     }

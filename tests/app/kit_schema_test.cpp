@@ -20,13 +20,15 @@ json schema() {
 
 /// Follows a $ref into the schema's definitions.
 const json& resolved(const json& root, const json& node) {
-    return node.contains("$ref") ? root.at(json::json_pointer(node["$ref"].get<std::string>().substr(1))) : node;
+    return node.contains("$ref") ? root.at(json::json_pointer(node["$ref"].get<std::string>().substr(1)))
+                                 : node;
 }
 
 std::string toml_of(const json& value) {
     std::string text;
     if (value.is_object()) {
-        for (const auto& [key, inner] : value.items()) text += (text.empty() ? "" : ", ") + ('"' + key + "\" = " + toml_of(inner));
+        for (const auto& [key, inner] : value.items())
+            text += (text.empty() ? "" : ", ") + ('"' + key + "\" = " + toml_of(inner));
         return "{ " + text + " }";
     }
     if (value.is_array()) {
@@ -64,7 +66,8 @@ std::string refusal_of(const json& kit) {
 
 json full_kit(const json& root) {
     json kit = example_of(root, root);
-    // Instruments take what they say before what the defaults say; so that defaults are read too, each kind has one that says little.
+    // Instruments take what they say before what the defaults say; so that defaults are read too, each kind
+    // has one that says little.
     for (const char* kind : {"drum", "cymbal", "bell", "string"})
         kit["instrument"].push_back({{"name", kind}, {"kind", kind}});
     return kit;
@@ -72,12 +75,15 @@ json full_kit(const json& root) {
 
 /// Visits every object of the schema that holds named keys, with the place of such an object in a kit.
 template <class Visit>
-void for_each_table(const json& root, const json& node_or_ref, const json::json_pointer& place, const Visit& visit) {
+void for_each_table(const json& root, const json& node_or_ref, const json::json_pointer& place,
+                    const Visit& visit) {
     const json& node = resolved(root, node_or_ref);
-    if (node["type"] == "array" && node["items"].contains("$ref")) for_each_table(root, node["items"], place / 0, visit);
+    if (node["type"] == "array" && node["items"].contains("$ref"))
+        for_each_table(root, node["items"], place / 0, visit);
     if (!node.contains("properties")) return;
     visit(node, place);
-    for (const auto& [key, inner] : node["properties"].items()) for_each_table(root, inner, place / key, visit);
+    for (const auto& [key, inner] : node["properties"].items())
+        for_each_table(root, inner, place / key, visit);
 }
 
 TEST(KitSchema, EveryKeyThatItNamesIsReadAtItsExample) {
@@ -123,7 +129,8 @@ TEST(KitSchema, TheReaderKnowsNoKeyThatItDoesNotName) {
         std::istringstream known(refusal.substr(at + before.size()));
         for (std::string key; std::getline(known >> std::ws, key, ',');) {
             // Defaults are read by the same reader as the instrument, which alone may have a name and a kind.
-            const bool of_instrument = place.to_string().starts_with("/defaults/") && (key == "name" || key == "kind");
+            const bool of_instrument =
+                place.to_string().starts_with("/defaults/") && (key == "name" || key == "kind");
             EXPECT_TRUE(table["properties"].contains(key) || of_instrument) << place << ": " << key;
         }
     });
@@ -137,7 +144,8 @@ TEST(KitSchema, NumbersOutsideItsRangesAreRefused) {
             const bool array = node.contains("items") && node["items"].contains("minimum");
             const json& range = array ? node["items"] : node;
             if (!range.contains("minimum")) continue;
-            for (const double value : {range["minimum"].get<double>() - 1, range["maximum"].get<double>() + 1}) {
+            for (const double value :
+                 {range["minimum"].get<double>() - 1, range["maximum"].get<double>() + 1}) {
                 json kit = full_kit(root);
                 const json::json_pointer at = array ? place / key / 0 : place / key;
                 kit[at] = range["type"] == "integer" ? json(static_cast<int>(value)) : json(value);

@@ -74,9 +74,11 @@ TEST(Kit, APositiveTiltAboutXTurnsAHeadTowardsThePlayer) {
     const Kit kit = written.read();
     const double angle = 10 * 3.14159265358979323846 / 180;
     // The normal (0, 1, 0) turned about x by the angle.
-    EXPECT_TRUE(kit.instruments[0].body.world_from_body.linear().col(1).isApprox(Eigen::Vector3d(0, std::cos(angle), std::sin(angle)), 1e-12));
+    EXPECT_TRUE(kit.instruments[0].body.world_from_body.linear().col(1).isApprox(
+        Eigen::Vector3d(0, std::cos(angle), std::sin(angle)), 1e-12));
     // 90 degrees about y takes x to -z.
-    EXPECT_TRUE(kit.instruments[1].body.world_from_body.linear().col(0).isApprox(-Eigen::Vector3d::UnitZ(), 1e-6));
+    EXPECT_TRUE(
+        kit.instruments[1].body.world_from_body.linear().col(0).isApprox(-Eigen::Vector3d::UnitZ(), 1e-6));
 }
 
 TEST(Kit, IncludedInstrumentsFollowAndTheirFilesAreListed) {
@@ -118,18 +120,28 @@ TEST(Kit, MalformedKitsEndInBadInputAtThePlace) {
         {"name twice", instrument("") + instrument(""), "6:1", "a second instrument \"a\""},
         {"kind missing", "[[instrument]]\nname = \"a\"\n", "1:1", "no key \"kind\""},
         {"kind unknown", "[[instrument]]\nname = \"a\"\nkind = \"gong\"\n", "3:8", "kind = \"gong\""},
-        {"size missing", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nposition = [0, 0, 0]\n", "1:1", "no key \"size\""},
-        {"position missing", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 1, 1]\n", "1:1", "no key \"position\""},
-        {"size of two", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 1]\n", "4:8", "size with 2 entries"},
-        {"size zero", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 0, 1]\n", "4:12", "size[1] = 0"},
-        {"size text", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = \"big\"\n", "4:8", "size = \"big\""},
-        {"position far", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 1, 1]\nposition = [0, 1e9, 0]\n", "5:16", "1000000000"},
-        {"position nan", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 1, 1]\nposition = [0, nan, 0]\n", "5:16", "nan"},
+        {"size missing", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nposition = [0, 0, 0]\n", "1:1",
+         "no key \"size\""},
+        {"position missing", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 1, 1]\n", "1:1",
+         "no key \"position\""},
+        {"size of two", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 1]\n", "4:8",
+         "size with 2 entries"},
+        {"size zero", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 0, 1]\n", "4:12",
+         "size[1] = 0"},
+        {"size text", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = \"big\"\n", "4:8",
+         "size = \"big\""},
+        {"position far",
+         "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 1, 1]\nposition = [0, 1e9, 0]\n", "5:16",
+         "1000000000"},
+        {"position nan",
+         "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 1, 1]\nposition = [0, nan, 0]\n", "5:16",
+         "nan"},
         {"unknown key of an instrument", instrument("pitch = 3\n"), "6:1", "unknown key \"pitch\""},
         {"shape", instrument("shape = \"cube\"\n"), "6:9", "shape = \"cube\""},
         {"exponents low", instrument("exponents = [0.05, 1]\n"), "6:14", "exponents[0] = 0.05"},
         {"exponents high", instrument("exponents = [1, 2]\n"), "6:17", "exponents[1] = 2"},
-        {"orientation not unit", instrument("orientation = [1, 1, 0, 0]\n"), "6:15", "a quaternion of length"},
+        {"orientation not unit", instrument("orientation = [1, 1, 0, 0]\n"), "6:15",
+         "a quaternion of length"},
         {"orientation zero", instrument("orientation = [0, 0, 0, 0]\n"), "6:15", "a quaternion of length 0"},
         {"tilt", instrument("tilt_deg = [1, 2, inf]\n"), "6:19", "inf"},
         {"material key", instrument("material = { yung_pa = 3 }\n"), "6:14", "unknown key \"yung_pa\""},
@@ -145,15 +157,19 @@ TEST(Kit, MalformedKitsEndInBadInputAtThePlace) {
         {"zones no array", instrument("zones = { name = \"a\" }\n"), "6:9", "zones = a table"},
         {"zone without name", instrument("zones = [{ radius = [0, 1] }]\n"), "6:10", "no key \"name\""},
         {"zone key", instrument("zones = [{ name = \"a\", r = 1 }]\n"), "6:24", "unknown key \"r\""},
-        {"zone turned round", instrument("zones = [{ name = \"a\", radius = [1, 0] }]\n"), "6:33", "a zone without radius"},
-        {"zone flat", instrument("zones = [{ name = \"a\", height = [1, 1] }]\n"), "6:33", "a zone without height"},
+        {"zone turned round", instrument("zones = [{ name = \"a\", radius = [1, 0] }]\n"), "6:33",
+         "a zone without radius"},
+        {"zone flat", instrument("zones = [{ name = \"a\", height = [1, 1] }]\n"), "6:33",
+         "a zone without height"},
         {"midi note", instrument("midi_note = 128\n"), "6:13", "midi_note = 128"},
         {"midi note fraction", instrument("midi_note = 38.5\n"), "6:13", "midi_note = 38.5"},
         {"mesh missing", instrument("mesh = \"no_such.obj\"\n"), "6:8", "no_such.obj"},
-        {"mesh name too long", instrument("mesh = \"" + std::string(5000, 'm') + "\"\n"), "6:8", "which is no file"},
+        {"mesh name too long", instrument("mesh = \"" + std::string(5000, 'm') + "\"\n"), "6:8",
+         "which is no file"},
         {"look part", instrument("look = { skin = { roughness = 1 } }\n"), "6:10", "unknown key \"skin\""},
         {"look colour", instrument("look = { body = { color = [1, 1, 2] } }\n"), "6:34", "color[2] = 2"},
-        {"sound text", instrument("sound = { frequency_hz = \"high\" }\n"), "6:26", "frequency_hz = \"high\""},
+        {"sound text", instrument("sound = { frequency_hz = \"high\" }\n"), "6:26",
+         "frequency_hz = \"high\""},
         {"sound instrument", instrument("sound = { instrument = 3 }\n"), "6:24", "instrument = 3"},
         {"pan", instrument("sound = { pan = 2 }\n"), "6:17", "pan = 2"},
         {"choke group", instrument("choke_group = 1\n"), "6:15", "choke_group = 1"},
@@ -162,17 +178,22 @@ TEST(Kit, MalformedKitsEndInBadInputAtThePlace) {
         {"stick shaft zero", "[stick]\nshaft = [0, 0, 0]\n" + instrument(""), "2:9", "shaft = [0, 0, 0]"},
         {"stick key", "[stick]\nlenght = 1\n" + instrument(""), "2:1", "unknown key \"lenght\""},
         {"stick number", "stick = 3\n" + instrument(""), "1:9", "stick = 3"},
-        {"camera in its target", "[camera]\neye = [1, 1, 1]\ntarget = [1, 1, 1]\n" + instrument(""), "3:10", "target at its eye"},
-        {"camera angle", "[camera]\nvertical_fov_deg = 180\n" + instrument(""), "2:20", "vertical_fov_deg = 180"},
+        {"camera in its target", "[camera]\neye = [1, 1, 1]\ntarget = [1, 1, 1]\n" + instrument(""), "3:10",
+         "target at its eye"},
+        {"camera angle", "[camera]\nvertical_fov_deg = 180\n" + instrument(""), "2:20",
+         "vertical_fov_deg = 180"},
         {"room", "[room]\nfloor_color = [0, 0]\n" + instrument(""), "2:15", "floor_color with 2 entries"},
-        {"defaults of no kind", "[defaults.gong]\nmidi_note = 3\n" + instrument(""), "1:", "unknown key \"gong\""},
+        {"defaults of no kind", "[defaults.gong]\nmidi_note = 3\n" + instrument(""),
+         "1:", "unknown key \"gong\""},
         {"defaults number", "[defaults]\ndrum = 3\n" + instrument(""), "2:8", "drum = 3"},
         {"defaults key", "[defaults.drum]\nhue = 3\n" + instrument(""), "2:1", "unknown key \"hue\""},
         {"include missing", "include = [\"no_such.toml\"]\n" + instrument(""), "1:11", "no_such.toml"},
         {"include a folder", "include = [\".\"]\n" + instrument(""), "1:11", "which is no file"},
         {"include text", "include = \"bells.toml\"\n" + instrument(""), "1:11", "include = \"bells.toml\""},
-        {"include too long", "include = [\"" + std::string(5000, 'i') + "\"]\n" + instrument(""), "1:11", "which is no file"},
-        {"nested too deeply", "a = " + std::string(2000, '[') + std::string(2000, ']') + "\n", "1:", "a syntax error"},
+        {"include too long", "include = [\"" + std::string(5000, 'i') + "\"]\n" + instrument(""), "1:11",
+         "which is no file"},
+        {"nested too deeply", "a = " + std::string(2000, '[') + std::string(2000, ']') + "\n",
+         "1:", "a syntax error"},
     };
     for (const Malformed& bad : cases) {
         const WrittenKit written(bad.text);
@@ -181,7 +202,8 @@ TEST(Kit, MalformedKitsEndInBadInputAtThePlace) {
             ADD_FAILURE() << bad.what << ": was read";
         } catch (const BadInput& wrong) {
             const std::string message = wrong.what();
-            EXPECT_EQ(message.find(written.file().string() + ":" + bad.place), 0u) << bad.what << ": " << message;
+            EXPECT_EQ(message.find(written.file().string() + ":" + bad.place), 0u)
+                << bad.what << ": " << message;
             EXPECT_NE(message.find("error: found "), std::string::npos) << bad.what << ": " << message;
             EXPECT_NE(message.find(", expected "), std::string::npos) << bad.what << ": " << message;
             EXPECT_NE(message.find(bad.found), std::string::npos) << bad.what << ": " << message;
@@ -193,7 +215,8 @@ TEST(Kit, MalformedKitsEndInBadInputAtThePlace) {
 TEST(Kit, SixtyFiveInstrumentsAreTooMany) {
     std::string text;
     for (int i = 0; i < 65; ++i)
-        text += "[[instrument]]\nname = \"" + std::to_string(i) + "\"\nkind = \"bell\"\nsize = [1, 1, 1]\nposition = [0, 0, 0]\n";
+        text += "[[instrument]]\nname = \"" + std::to_string(i) +
+                "\"\nkind = \"bell\"\nsize = [1, 1, 1]\nposition = [0, 0, 0]\n";
     const WrittenKit written(text);
     EXPECT_THROW((void)written.read(), BadInput);
 }
@@ -207,18 +230,43 @@ TEST(Kit, AKitThatIncludesItselfIsReadOnce) {
 
 TEST(Kit, TwoThousandMutatedKitsAreReadOrRefusedInOneLine) {
     std::mt19937 random(20240601);
-    constexpr std::string_view kSnippets[] = {"[", "]", "{", "}", "=", "\"", "\n", "nan", "-1e308", "[[instrument]]", "99999999999999999999",
-                                              "\\u0000", "\x80", "'", "0x", "1979-05-27", ",", ".", "#", "inf"};
+    constexpr std::string_view kSnippets[] = {"[",
+                                              "]",
+                                              "{",
+                                              "}",
+                                              "=",
+                                              "\"",
+                                              "\n",
+                                              "nan",
+                                              "-1e308",
+                                              "[[instrument]]",
+                                              "99999999999999999999",
+                                              "\\u0000",
+                                              "\x80",
+                                              "'",
+                                              "0x",
+                                              "1979-05-27",
+                                              ",",
+                                              ".",
+                                              "#",
+                                              "inf"};
     int refused = 0;
     for (int i = 0; i < 2000; ++i) {
         std::string text = kGood;
         for (unsigned k = 0; k <= random() % 3; ++k) {
             const std::size_t at = random() % text.size();
             switch (random() % 4) {
-                case 0: text[at] = static_cast<char>(random() % 256); break;
-                case 1: text.erase(at, 1 + random() % 12); break;
-                case 2: text.insert(at, kSnippets[random() % std::size(kSnippets)]); break;
-                default: text.insert(at, text.substr(random() % text.size(), random() % 40));
+                case 0:
+                    text[at] = static_cast<char>(random() % 256);
+                    break;
+                case 1:
+                    text.erase(at, 1 + random() % 12);
+                    break;
+                case 2:
+                    text.insert(at, kSnippets[random() % std::size(kSnippets)]);
+                    break;
+                default:
+                    text.insert(at, text.substr(random() % text.size(), random() % 40));
             }
         }
         const WrittenKit written(text);

@@ -9,7 +9,9 @@
 namespace app {
 namespace {
 
-toml::table parsed(std::string_view text) { return toml::parse(text, "test.toml"); }
+toml::table parsed(std::string_view text) {
+    return toml::parse(text, "test.toml");
+}
 
 /// The message of the BadInput that an action ends with.
 std::string message_of(const std::function<void()>& action) {
@@ -23,7 +25,8 @@ std::string message_of(const std::function<void()>& action) {
 }
 
 TEST(TomlReader, TheFirstLayerThatHasAKeyGivesItsValue) {
-    const toml::table first = parsed("a = 1\n[inner]\nx = 10"), second = parsed("a = 2\nb = 3\n[inner]\nx = 20\ny = 30");
+    const toml::table first = parsed("a = 1\n[inner]\nx = 10"),
+                      second = parsed("a = 2\nb = 3\n[inner]\nx = 20\ny = 30");
     TomlReader reader({&first, &second}, "test");
     EXPECT_EQ(reader.number("a", 0, 10), 1);
     EXPECT_EQ(reader.number("b", 0, 10), 3);
@@ -35,12 +38,15 @@ TEST(TomlReader, TheFirstLayerThatHasAKeyGivesItsValue) {
 }
 
 TEST(TomlReader, RangesAreClosedAndNumbersMustBeFinite) {
-    const toml::table table = parsed("low = 1\nhigh = 2.0\nbelow = 0.999\nabove = 2.001\nnan = nan\ninf = inf\ntext = \"1\"\nflag = true");
+    const toml::table table = parsed(
+        "low = 1\nhigh = 2.0\nbelow = 0.999\nabove = 2.001\nnan = nan\ninf = inf\ntext = \"1\"\nflag = true");
     TomlReader reader({&table}, "test");
     EXPECT_EQ(reader.number("low", 1, 2), 1);
     EXPECT_EQ(reader.number("high", 1, 2), 2);
     for (const char* key : {"below", "above", "nan", "inf", "text", "flag"})
-        EXPECT_NE(message_of([&] { (void)reader.number(key, 1, 2); }).find("expected a number from 1 to 2"), std::string::npos) << key;
+        EXPECT_NE(message_of([&] { (void)reader.number(key, 1, 2); }).find("expected a number from 1 to 2"),
+                  std::string::npos)
+            << key;
 }
 
 TEST(TomlReader, AMissingKeyGivesTheFallbackOrFailsAtTheTable) {
@@ -58,14 +64,16 @@ TEST(TomlReader, UnknownKeysAreRefusedAtTheirPlaceWithTheKnownOnes) {
     TomlReader reader({&table}, "test");
     (void)reader.number("a", 0, 1);
     (void)reader.number("b", 0, 1, 0.0);
-    EXPECT_EQ(message_of([&] { reader.done(); }), "test.toml:2:3: error: found unknown key \"colour\" in test, expected only a, b");
+    EXPECT_EQ(message_of([&] { reader.done(); }),
+              "test.toml:2:3: error: found unknown key \"colour\" in test, expected only a, b");
 }
 
 TEST(TomlReader, ArraysFailAtTheEntryThatIsWrong) {
     const toml::table table = parsed("v = [1, 2,\n     \"x\"]\nshort = [1, 2]\nnumber = 3");
     TomlReader reader({&table}, "test");
     EXPECT_EQ(message_of([&] { (void)reader.vector("v", 0, 9); }).substr(0, 14), "test.toml:2:6:");
-    EXPECT_NE(message_of([&] { (void)reader.vector("short", 0, 9); }).find("short with 2 entries"), std::string::npos);
+    EXPECT_NE(message_of([&] { (void)reader.vector("short", 0, 9); }).find("short with 2 entries"),
+              std::string::npos);
     EXPECT_NE(message_of([&] { (void)reader.vector("number", 0, 9); }).find("number = 3"), std::string::npos);
 }
 
@@ -74,12 +82,15 @@ TEST(TomlReader, WrongKindsAreNamed) {
     TomlReader reader({&table}, "test");
     EXPECT_NE(message_of([&] { (void)reader.text("t"); }).find("t = a table"), std::string::npos);
     EXPECT_NE(message_of([&] { (void)reader.flag("array"); }).find("array = an array"), std::string::npos);
-    EXPECT_NE(message_of([&] { (void)reader.integer("whole", 0, 9); }).find("a whole number from 0 to 9"), std::string::npos);
-    EXPECT_NE(message_of([&] { (void)reader.number("day", 0, 9); }).find("a date or time"), std::string::npos);
+    EXPECT_NE(message_of([&] { (void)reader.integer("whole", 0, 9); }).find("a whole number from 0 to 9"),
+              std::string::npos);
+    EXPECT_NE(message_of([&] { (void)reader.number("day", 0, 9); }).find("a date or time"),
+              std::string::npos);
     EXPECT_NE(message_of([&] { (void)reader.table("array"); }).find("expected a table"), std::string::npos);
     EXPECT_NE(message_of([&] { (void)reader.tables("array"); }).find("expected a table"), std::string::npos);
     EXPECT_NE(message_of([&] { (void)reader.texts("array"); }).find("expected a text"), std::string::npos);
-    EXPECT_NE(message_of([&] { (void)reader.choice("t", {"x"}); }).find("expected a text"), std::string::npos);
+    EXPECT_NE(message_of([&] { (void)reader.choice("t", {"x"}); }).find("expected a text"),
+              std::string::npos);
 }
 
 TEST(TomlReader, AWrongTableInALowerLayerIsNotPassedOver) {

@@ -5,16 +5,17 @@
 namespace tracking {
 namespace {
 
-constexpr double kLever = 0.4;       // m, a stick's length: turns rad into metres at the tip
-constexpr double kFastest = 25;      // m/s, of a tracked hand or tip
-constexpr double kStrongest = 3000;  // m/s^2, apart from contacts
+constexpr double kLever = 0.4;        // m, a stick's length: turns rad into metres at the tip
+constexpr double kFastest = 25;       // m/s, of a tracked hand or tip
+constexpr double kStrongest = 3000;   // m/s^2, apart from contacts
+constexpr double kFastestTurn = 120;  // rad/s; expert wrists reach 100 in recordings
 
 }  // namespace
 
 KalmanPredictor::KalmanPredictor(const MotionModel& model, double gate_sigmas)
     : covariance_(model),
       gate_(gate_sigmas, kFastest, kStrongest),
-      rotation_(model.scaled(1 / kLever), OutlierGate(gate_sigmas, kFastest / kLever, kStrongest / kLever)) {}
+      rotation_(model.scaled(1 / kLever), OutlierGate(gate_sigmas, kFastestTurn, kStrongest / kLever)) {}
 
 SampleStatus KalmanPredictor::correct(const PoseSample& sample) noexcept {
     const SampleStatus status = clock_.judge(sample);

@@ -12,9 +12,8 @@ namespace {
 constexpr double kRestShare = 0.6;                                // of the apex: where a stick waits
 constexpr double kRestShares[] = {kRestShare, 0.7, 0.8, 0.9, 1};  // with little time it waits higher
 constexpr double kPreparation = 0.2;                              // s, the rise from there to the apex
-constexpr double kLift = 100;  // m/s^2, the most that a lift without rebound accelerates
-constexpr double kMinimumJerk =
-    5.7735;  // largest second derivative of the minimum-jerk curve, distance / duration^2
+constexpr double kLift = 100;            // m/s^2, the most that a lift without rebound accelerates
+constexpr double kMinimumJerk = 5.7735;  // largest second derivative, in way / duration^2
 constexpr double kStrongestHeight = 0.75 * TipPath::kStrongest;  // shares of the whole
 constexpr double kStrongestTravel = 0.2 * TipPath::kStrongest;
 constexpr double kBefore = 2;  // s before the first stroke at which the path begins, at rest
@@ -26,6 +25,7 @@ double longest_lift(double way, double curvature) {
     return std::sqrt(20 * way / curvature);
 }
 
+/// The hand lifts as briskly as kLift allows, and no slower than it may before an apex of that curvature.
 double lift_duration(double way, double curvature) {
     const double brisk = std::sqrt(kMinimumJerk * way / kLift);
     return curvature > 0 ? std::min(brisk, longest_lift(way, curvature)) : brisk;
@@ -44,7 +44,7 @@ double rise_acceleration(const TipPath::Departure& from, double apex) {
     return way > 0 ? std::max(kLift, 0.75 * from.speed * from.speed / way) : kLift;
 }
 
-/// Highest apex up to `rise` from which the stroke is reached in `time`; below least_apex() if none.
+/// Highest apex up to `rise` from which the stroke is reached in `time`; 0 if there is none.
 double highest_apex(const TipPath::Departure& from, const StrokeShape& to, double time, double rise) {
     const auto needed = [&](double apex) {
         return rise_duration(from, apex, to.descent_acceleration(apex)) + to.descent_duration(apex);

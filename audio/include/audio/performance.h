@@ -19,7 +19,9 @@ struct Voice {
     std::vector<std::pair<std::string, double>> parameters;
     double pan = 0.5;  ///< 0 left, 1 right; constant power
     double gain_db = 0;
-    std::string choke_group;  ///< a new note fades the group's older ones within 20 ms; empty: none
+    /// A new note fades the group's older ones from its own first sample to exact zero within 15 ms; notes of
+    /// equal onset leave each other alone. Empty: none.
+    std::string choke_group;
 };
 
 /// One strike as the audio hears it.
@@ -46,17 +48,21 @@ public:
     Performance(const Performance&) = delete;
     Performance& operator=(const Performance&) = delete;
 
-    /// Adds or replaces (same id) a note. Its onset must not lie before the sample given to advance_to: such
-    /// a call throws std::logic_error.
+    /// Adds or replaces (same id) a note. Its onset must not lie before the sample given to advance_to, nor
+    /// may the note that it replaces; a note without id or voice or with a value out of range is no note:
+    /// such calls throw std::logic_error.
     void schedule(const Note& note);
     /// Removes a note that has not been reached by advance_to; throws std::logic_error for another id.
     void cancel(std::uint64_t id);
-    /// Everything before `sample` is fixed and may be rendered. Returns at once; rendering happens on the
-    /// audio thread (bounded queue).
+    /// Everything before `sample` is fixed and may be rendered; a smaller sample than before changes nothing.
+    /// Returns at once (it waits only while 256 commands are outstanding); rendering happens on the audio
+    /// thread, in whole blocks. An error of that thread is thrown by one of the next calls, at the latest by
+    /// finish.
     void advance_to(std::int64_t sample);
-    /// Renders to `minimum_samples`, then on until the output stays below -80 dBFS, at most `tail_samples`
-    /// more; returns all samples, interleaved stereo in [-1, 1] nominal (not normalised, not clipped). Ends
-    /// the performance.
+    /// Renders to `minimum_samples`, then on until the output stays below -80 dBFS (the last sample is the
+    /// last one that is not), at most `tail_samples` more; returns all samples, interleaved stereo in [-1, 1]
+    /// nominal (not normalised, not clipped). Notes still ahead are played. Ends the performance: later calls
+    /// throw std::logic_error.
     [[nodiscard]] std::vector<float> finish(std::int64_t minimum_samples, std::int64_t tail_samples);
 
     /// "Csound 6.18.1, sample-accurate: ..." for reports.

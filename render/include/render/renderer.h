@@ -5,8 +5,9 @@
 
 namespace render {
 
-/// Draws a scene off screen with OSMesa. Owns the one context of its thread: construct, use and destroy it on one thread.
-/// Throws std::runtime_error ("FILE: error: found ..., expected ...") for a mesh that is missing, malformed or too large, and when no context can be had.
+/// Draws a scene off screen with OSMesa. Owns the one context of its thread: construct, use and destroy it on
+/// one thread. Throws std::runtime_error ("FILE: error: found ..., expected ...") for a mesh that is missing,
+/// malformed or too large, and when no context can be had.
 class Renderer {
 public:
     explicit Renderer(const SceneDescription& scene);

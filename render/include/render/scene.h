@@ -10,12 +10,14 @@ namespace render {
 /// How a surface looks. Colour is linear RGB in [0, 1].
 struct Appearance {
     Eigen::Vector3f color = Eigen::Vector3f(0.7f, 0.7f, 0.7f);
-    float metallic = 0;     ///< 0 dielectric (skin, lacquer, wood), 1 metal (bronze)
+    float metallic = 0;      ///< 0 dielectric (skin, lacquer, wood), 1 metal (bronze)
     float roughness = 0.5f;  ///< 0 mirror, 1 chalk
-    float lathed = 0;        ///< 0 to 1: fine grooves around the object's y axis, as on cymbals: highlights become spokes
+    float lathed =
+        0;  ///< 0 to 1: fine grooves around the object's y axis, as on cymbals: highlights become spokes
 };
 
-/// A part of a mesh file names its material; `parts` gives the look of each name ("shell", "head", "hoop", ...); others use `body`.
+/// A part of a mesh file names its material; `parts` gives the look of each name ("shell", "head", "hoop",
+/// ...); others use `body`.
 struct Look {
     Appearance body;
     std::vector<std::pair<std::string, Appearance>> parts;
@@ -29,7 +31,7 @@ struct SceneObject {
 };
 
 struct Camera {
-    Eigen::Vector3f eye = Eigen::Vector3f(0, 1.6f, 1.6f);     ///< [m], world
+    Eigen::Vector3f eye = Eigen::Vector3f(0, 1.6f, 1.6f);  ///< [m], world
     Eigen::Vector3f target = Eigen::Vector3f(0, 0.8f, -0.3f);
     float vertical_fov_deg = 45;
 };
@@ -37,11 +39,11 @@ struct Camera {
 struct Room {
     Eigen::Vector3f floor_color = Eigen::Vector3f(0.20f, 0.115f, 0.06f);
     Eigen::Vector3f wall_color = Eigen::Vector3f(0.075f, 0.07f, 0.09f);
-    float floor_height = 0;      ///< world y [m]
+    float floor_height = 0;  ///< world y [m]
 };
 
-/// Parallel light with a shadow, its strength falling off softly around the camera's target like a spot's. The shadow covers what the camera
-/// sees at the target's distance.
+/// Parallel light with a shadow, its strength falling off softly around the camera's target like a spot's.
+/// The shadow covers what the camera sees at the target's distance.
 struct KeyLight {
     Eigen::Vector3f towards_light = Eigen::Vector3f(-0.55f, 1.0f, 0.45f);  ///< world, any length but 0
     Eigen::Vector3f color = Eigen::Vector3f(1.0f, 0.86f, 0.68f);
@@ -54,11 +56,12 @@ struct SceneDescription {
     Room room;
     KeyLight key_light;
     int width = 640, height = 480;
-    int samples = 4;          ///< of MSAA, 0 or 1: off
-    int shadow_size = 1024;   ///< texels a side, 0: no shadow
+    int samples = 4;         ///< of MSAA, 0 or 1: off
+    int shadow_size = 1024;  ///< texels a side, 0: no shadow
 };
 
-/// One frame: a matrix an object in the order of the description (w row 0 0 0 1; scale and shear allowed), and whether it is drawn.
+/// One frame: a matrix an object in the order of the description (w row 0 0 0 1; scale and shear allowed),
+/// and whether it is drawn.
 struct FrameState {
     std::vector<Eigen::Matrix4f> world_from_object;
     std::vector<bool> visible;

@@ -25,7 +25,7 @@ class Predictor {
 public:
     virtual ~Predictor() = default;
     /// Takes the next sample. Samples that are not newer than the state, or not finite, are ignored and
-    /// counted by the caller. After a gap longer than `gap_s` (see make_predictor) the state starts anew from
+    /// counted by the caller. After a gap longer than kGapS the state starts anew from
     /// this sample: `reinitialised` (the very first sample answers `reinitialised` too).
     [[nodiscard]] virtual SampleStatus correct(const PoseSample& sample) noexcept = 0;
     /// Pose `lead_s` >= 0 after the newest accepted sample; leaves the state alone.
@@ -37,9 +37,21 @@ public:
 /// Longest pause between samples that an estimator bridges; after a longer one it starts anew.
 inline constexpr double kGapS = 0.1;
 
-/// Makes a predictor from its name and parameters in mm and s: `naive`, `naive:n=4`, `thesis`,
-/// `thesis:q=outer`, `ca:q=1e9`, `cv:q=1e8`, `singer:alpha=3,q=1e10`, `hold`, `difference`, `auto`. Throws
-/// std::invalid_argument with one line (found, expected) for an unknown name, key or value.
+/// Makes a predictor from its name and parameters in mm and s:
+///
+///   hold                    the newest sample
+///   difference              the last two samples, extrapolated at constant velocity
+///   naive, naive:n=4        mean of the last 1/15 s (or n samples) with the velocity of successive means
+///   thesis, thesis:q=outer  Kalman filter, constant acceleration, (3.18) as a diagonal, or as printed
+///   cv:q=1e8                constant velocity, white acceleration of density q [mm^2/s^3]
+///   ca:q=1e9                constant acceleration, white jerk of density q [mm^2/s^5]
+///   singer:alpha=3,q=1e10   acceleration that decays at alpha [1/s], driven by density q [mm^2/s^5]
+///   auto                    ca:q=1e9,gate=5
+///
+/// The numbers shown are the defaults. Orientation is filtered by the same model about its own quaternion.
+/// The four Kalman filters take `gate=G`: samples beyond G standard deviations that a stick cannot have made
+/// (25 m/s, 3000 m/s^2, contacts excepted) are outliers. Throws std::invalid_argument with one line (found,
+/// expected) for an unknown name, key or value.
 [[nodiscard]] std::unique_ptr<Predictor> make_predictor(const std::string& specification);
 
 /// The names make_predictor knows, in the order of the documentation.

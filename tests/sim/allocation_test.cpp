@@ -1,0 +1,44 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "stepped_body.h"
+#include "test_kit.h"
+
+namespace {
+std::atomic<std::size_t> allocations = 0;
+}
+
+void* operator new(std::size_t size) {
+    ++allocations;
+    if (void* p = std::malloc(size ? size : 1)) return p;
+    throw std::bad_alloc();
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+
+namespace {
+
+TEST(SteppedBody, ModalStepSweepAndPicturesOfAWarmBodyAllocateNothing) {
+    sim_test::Scenario scenario(4);
+    const auto simulation = sim::make_local_simulation(scenario.bodies());
+    std::vector<sim::SteppedBody> bodies;
+    for (std::uint32_t i = 0; i < scenario.bodies().size(); ++i) bodies.emplace_back(i, scenario.bodies()[i]);
+    std::vector<sim::BodyOutcome> outcomes(bodies.size());
+    for (sim::BodyOutcome& outcome : outcomes) outcome.contacts.reserve(16), outcome.clearance_m.reserve(4), outcome.pictures.reserve(4);
+    std::size_t contacts = 0;
+    for (int i = 0; i < 200; ++i) {
+        const sim::StepRequest request = scenario.next();
+        const std::size_t before = allocations;
+        for (std::size_t b = 0; b < bodies.size(); ++b) bodies[b].step(request, outcomes[b]);
+        ASSERT_EQ(allocations, before);
+        const sim::StepReply reply = simulation->step(request);
+        contacts += reply.contacts.size();
+        scenario.learn(reply);
+    }
+    EXPECT_GT(contacts, 50u);
+}
+
+}  // namespace
