@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <ranges>
 
 #include "notes.h"
 
@@ -86,7 +87,7 @@ void OfflineRun::feed(const Tick& tick, std::vector<std::uint32_t>& moved, std::
     const Stopwatch watch(times_.tracking);
     for (const auto& [stick, index] : tick.samples) {
         const tracking::SampleStatus status = sticks_[stick].correct(trace_.sticks[stick].samples[index]);
-        if (status == tracking::SampleStatus::not_newer || status == tracking::SampleStatus::not_finite) {
+        if (status != tracking::SampleStatus::accepted && status != tracking::SampleStatus::reinitialised) {
             ++refused_;
             continue;
         }
@@ -170,12 +171,22 @@ void OfflineRun::draw_frames(double s, double next) {
     }
 }
 
+double OfflineRun::until_contact(std::uint32_t stick, double s, double T) const {
+    double until = T;
+    for (const Strike& strike : scheduler_.strikes() | std::views::reverse) {
+        if (strike.scheduled_at_s < s - 1) break;
+        if (strike.stick == stick && strike.outcome != Outcome::cancelled && strike.contact_s > s)
+            until = std::min(until, strike.contact_s);
+    }
+    return until;
+}
+
 void OfflineRun::draw_frame(double s, double T) {
     std::vector<std::optional<tracking::PosePrediction>> poses(sticks_.size());
     std::vector<sim::ModalState> bodies;
     if (std::isfinite(s)) {
         for (std::size_t i = 0; i < sticks_.size(); ++i)
-            if (sticks_[i].started()) poses[i] = sticks_[i].pose_at(T);
+            if (sticks_[i].started()) poses[i] = sticks_[i].pose_at(until_contact(static_cast<std::uint32_t>(i), s, T));
         sim::StepRequest request;
         request.t_s = s;
         settle_impulses(s, request);

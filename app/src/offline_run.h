@@ -50,6 +50,8 @@ private:
     /// Draws the frames that may use samples up to s but not the next one, at `next`.
     void draw_frames(double s, double next);
     void draw_frame(double s, double T);
+    /// The time of the pose drawn at T: a stick that is predicted to strike between s and T is drawn on the surface, not beyond it.
+    [[nodiscard]] double until_contact(std::uint32_t stick, double s, double T) const;
 
     const tracking::Trace& trace_;
     const Kit& kit_;

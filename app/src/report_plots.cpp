@@ -16,7 +16,20 @@ namespace app {
 namespace {
 
 constexpr int kWidth = 1040;
-constexpr double kHistogramHalf_ms = 30;
+
+/// The range of the timing plots, [-half_ms, half_ms], and their bins: as wide as the errors ask for.
+struct ErrorScale {
+    double half_ms = 30, bin_ms = 1;
+    int tic_ms = 5;
+};
+
+ErrorScale error_scale(const std::vector<MatchedNote>& notes) {
+    double largest_ms = 0;
+    for (const MatchedNote& note : notes) largest_ms = std::max(largest_ms, std::abs(note.error_ms));
+    if (largest_ms < 5) return {5, 0.25, 1};
+    if (largest_ms < 10) return {10, 0.5, 2};
+    return {30, 1, 5};
+}
 
 std::string zero_line() {
     return fmt::format("set arrow 1 from 0, graph 0 to 0, graph 1 nohead lt 1 lw 1 dt '-' lc {}\n",
@@ -66,22 +79,24 @@ std::vector<MatchedNote> matched_notes(const PlayResult& result) {
 }
 
 PlotScript timing_plot(const PlayResult& result) {
+    const std::vector<MatchedNote> notes = matched_notes(result);
+    const ErrorScale scale = error_scale(notes);
     std::map<int, int> bins;
-    for (const MatchedNote& note : matched_notes(result)) ++bins[static_cast<int>(std::floor(note.error_ms))];
+    for (const MatchedNote& note : notes) ++bins[static_cast<int>(std::floor(note.error_ms / scale.bin_ms))];
     std::string data;
     int highest = 1;
     for (const auto& [bin, count] : bins) {
-        fmt::format_to(std::back_inserter(data), "{} {}\n", bin + 0.5, count);
+        fmt::format_to(std::back_inserter(data), "{} {}\n", (bin + 0.5) * scale.bin_ms, count);
         highest = std::max(highest, count);
     }
     PlotPanel panel;
     panel.add(data, "with boxes fs solid 0.75 noborder lc " + gnuplot_colour(colours::released));
-    const double step = std::max(1.0, round_step(highest, 5));
     std::string commands = plot_axes() + zero_line();
     commands += fmt::format(
-        "set xrange [{0}:{1}]\nset yrange [0:{2}]\nset ytics {3}\nset xtics 5\nset boxwidth 0.9\n"
-        "set xlabel 'onset - true contact, ms (positive: sound late)'\nset ylabel 'notes'\n",
-        -kHistogramHalf_ms, kHistogramHalf_ms, highest * 1.08, step);
+        "set xrange [{}:{}]\nset yrange [0:{}]\nset ytics {}\nset xtics {}\nset boxwidth {}\n"
+        "set xlabel 'onset - true contact, ms (positive: sound late)'\nset ylabel 'notes in {} ms'\n",
+        -scale.half_ms, scale.half_ms, highest * 1.08, std::max(1.0, round_step(highest, 5)), scale.tic_ms,
+        0.9 * scale.bin_ms, scale.bin_ms);
     return {kWidth / 2, 260, commands + panel.text()};
 }
 
@@ -97,7 +112,8 @@ PlotScript timing_by_instrument_plot(const PlayResult& result) {
                        gnuplot_string(result.instruments.at(line->first)), count++);
     }
     const int rows = std::max(count, 1), height = std::max(260, 70 + 24 * rows);
-    const PlotArea area = {-kHistogramHalf_ms, kHistogramHalf_ms, -0.6, rows - 0.4, kWidth, height * 2};
+    const ErrorScale scale = error_scale(notes);
+    const PlotArea area = {-scale.half_ms, scale.half_ms, -0.6, rows - 0.4, kWidth, height * 2};
     PlotPanel panel;
     const double sticks = std::max<double>(static_cast<double>(result.sticks.size()), 1);
     for (std::uint32_t stick = 0; stick < result.sticks.size(); ++stick) {
@@ -110,9 +126,9 @@ PlotScript timing_by_instrument_plot(const PlayResult& result) {
     }
     std::string commands = plot_axes() + zero_line();
     commands += fmt::format(
-        "set xrange [{}:{}]\nset yrange [-0.6:{}]\nset xtics 5\nset ytics ({})\n"
+        "set xrange [{}:{}]\nset yrange [-0.6:{}]\nset xtics {}\nset ytics ({})\n"
         "set xlabel 'onset - true contact, ms (positive: sound late)'\n",
-        area.x_low, area.x_high, area.y_high, tics);
+        area.x_low, area.x_high, area.y_high, scale.tic_ms, tics);
     return {kWidth / 2, height, commands + panel.text()};
 }
 

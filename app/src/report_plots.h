@@ -42,7 +42,8 @@ struct Timeline {
 [[nodiscard]] PlotScript overview_plot(const PlayResult& result, const Timeline& timeline);
 /// The envelope of the whole sound, tail included, with the onsets. The result must hold audio.
 [[nodiscard]] PlotScript sound_plot(const PlayResult& result);
-/// Histogram of onset - true contact [ms], bins of 1 ms.
+/// Histogram of onset - true contact [ms]: +-30 ms in bins of 1 ms; +-10 or +-5 ms in finer ones where all
+/// errors are smaller.
 [[nodiscard]] PlotScript timing_plot(const PlayResult& result);
 /// The same a point a note and a line an instrument.
 [[nodiscard]] PlotScript timing_by_instrument_plot(const PlayResult& result);

@@ -23,7 +23,7 @@ p.note{color:var(--axis);margin:0 0 10px;max-width:95ch}
 .figures div{background:var(--card);border:1px solid var(--grid);border-top:3px solid var(--tone,var(--axis));border-radius:6px;padding:8px 11px}
 .figures b{display:block;white-space:nowrap;font-size:20px;line-height:1.2;font-weight:650;font-variant-numeric:tabular-nums}
 .figures span{color:var(--axis);font-size:12.5px}
-.frames{display:grid;grid-template-columns:repeat(auto-fill,minmax(240px,1fr));gap:12px}
+.frames{display:grid;grid-template-columns:repeat(auto-fill,minmax(300px,1fr));gap:12px}
 figure{margin:0}
 .frames img{width:100%;height:auto;display:block;border-radius:6px;border:1px solid var(--grid)}
 figcaption{color:var(--axis);font-size:12.5px;padding-top:3px}

@@ -50,12 +50,18 @@ std::vector<InstrumentRow> count_by_instrument(const PlayResult& result) {
     return rows;
 }
 
+/// Rounded to tenths, without a negative zero.
+double tenths(double value) {
+    return std::round(value * 10) / 10 + 0.0;
+}
+
 /// Median of the absolute and of the signed errors, as two cells.
 std::string error_cells(const std::vector<double>& errors_ms) {
     if (errors_ms.empty()) return "<td class=n>&ndash;</td><td class=n>&ndash;</td>";
     std::vector<double> sizes;
     for (const double error : errors_ms) sizes.push_back(std::abs(error));
-    return fmt::format("<td class=n>{:.1f}</td><td class=n>{:+.1f}</td>", median(sizes), median(errors_ms));
+    return fmt::format("<td class=n>{:.1f}</td><td class=n>{:+.1f}</td>", median(sizes),
+                       tenths(median(errors_ms)));
 }
 
 std::string stages_table(const PlayResult& result) {

@@ -105,6 +105,7 @@ void Renderer::Implementation::set_uniforms(const GlProgram& program) const {
     program.set("dark_floor", static_cast<int>(kDarkUnit));
     program.set("floor_color", room.floor_color);
     program.set("wall_color", room.wall_color);
+    program.set("floor_height", room.floor_height);
     program.set("eye", scene.camera.eye);
     program.set("towards_light", Eigen::Vector3f(key.towards_light.normalized()));
     program.set("key_light", key_light);
@@ -128,7 +129,9 @@ void Renderer::Implementation::draw(const FrameState& frame, Image& image) {
     shadow.bind(kShadowUnit);
     picture.begin_objects();
     object_program.use();
+    gl.Enable(GL_CLIP_DISTANCE0);  // the floor, which is laid under the objects afterwards, hides what is below it
     geometry.draw(kMatrixUnit);
+    gl.Disable(GL_CLIP_DISTANCE0);
     gl.Disable(GL_DEPTH_TEST);
     picture.begin_background(kObjectsUnit);
     stage.draw(geometry.volume_balls(shaders::kMaxBalls));

@@ -9,8 +9,12 @@ const char* const kVersion = "#version 330 core\n";
 const char* const kObjectMatrices = R"(
 uniform samplerBuffer matrices;
 vec3 to_world(vec3 position, int object) {
-    vec4 p = vec4(position, 1.0);
-    return vec3(dot(texelFetch(matrices, object), p), dot(texelFetch(matrices, object + 1), p), dot(texelFetch(matrices, object + 2), p));
+    vec4 x = texelFetch(matrices, object), y = texelFetch(matrices, object + 1), z = texelFetch(matrices, object + 2);
+    return vec3(dot(x.xyz, position) + x.w, dot(y.xyz, position) + y.w, dot(z.xyz, position) + z.w);
+}
+vec3 rotate(vec3 direction, int rows) {
+    vec4 x = texelFetch(matrices, rows), y = texelFetch(matrices, rows + 1), z = texelFetch(matrices, rows + 2);
+    return vec3(dot(x.xyz, direction), dot(y.xyz, direction), dot(z.xyz, direction));
 }
 )";
 
@@ -50,23 +54,26 @@ float spot(vec3 at) {
 }
 )";
 
-/// Part of the key light that the shadow map lets through: the mean of comparisons of 2x2 texels at one or
-/// two pairs of opposite places; 1 outside the map. Look-ups are the dearest part of the fragment shaders, so
-/// the objects make do with one pair.
+/// Part of the key light that the shadow map lets through: the mean of comparisons of 2x2 texels at two or
+/// three places around; 1 outside the map. Look-ups are the dearest part of the fragment shaders, so the
+/// objects make do with two.
 const char* const kShadow = R"(
 uniform sampler2DShadow shadow_map;
 uniform float shadow_texel;  // 1 / size
-float shadow_pair(vec3 at, vec2 apart) {
-    return 0.5 * (textureLod(shadow_map, at + vec3(apart, 0.0), 0.0) + textureLod(shadow_map, at - vec3(apart, 0.0), 0.0));
+float shadow_look_up(vec3 at, vec2 texels) {
+    return textureLod(shadow_map, vec3(at.xy + shadow_texel * texels, at.z), 0.0);
 }
-float within_map(vec3 at) {
+float within_map(vec3 at, float lit) {
     vec2 from_center = abs(at.xy - 0.5);
-    return step(max(from_center.x, from_center.y), 0.495);
+    return mix(1.0, lit, step(max(from_center.x, from_center.y), 0.495));
 }
-float shadow_light_sharp(vec3 at) { return mix(1.0, shadow_pair(at, shadow_texel * vec2(0.6, 1.0)), within_map(at)); }
+float shadow_light_sharp(vec3 at) {
+    return within_map(at, 0.5 * (shadow_look_up(at, vec2(0.5, 0.9)) + shadow_look_up(at, vec2(-0.5, -0.9))));
+}
 float shadow_light_soft(vec3 at) {
-    float lit = shadow_pair(at, shadow_texel * vec2(0.75, 1.75)) + shadow_pair(at, shadow_texel * vec2(-1.75, 0.75));
-    return mix(1.0, 0.5 * lit, within_map(at));
+    float lit = shadow_look_up(at, vec2(0.0, 1.6)) + shadow_look_up(at, vec2(1.39, -0.8)) +
+                shadow_look_up(at, vec2(-1.39, -0.8));
+    return within_map(at, lit / 3.0);
 }
 )";
 
@@ -96,6 +103,7 @@ layout(location = 3) in vec3 roughness_lathed_object;
 uniform mat4 clip_from_world;
 uniform mat4 shadow_from_world;  // texture coordinates and depth, all in [0, 1]
 uniform float shadow_offset;     // along the normal [m]
+uniform float floor_height;      // nothing below is seen
 uniform vec3 sky_light, ground_light, fill_light;
 out vec3 v_world, v_normal, v_groove, v_shadow;
 out vec3 v_around;  // diffuse light of the surroundings
@@ -106,17 +114,16 @@ flat out vec2 v_roughness_lathed;
 void main() {
     int object = 6 * int(roughness_lathed_object.z);
     v_world = to_world(position, object);
-    v_normal = normalize(vec3(dot(texelFetch(matrices, object + 3).xyz, normal), dot(texelFetch(matrices, object + 4).xyz, normal),
-                              dot(texelFetch(matrices, object + 5).xyz, normal)));
-    vec3 around = vec3(-position.z, 0.0, position.x);
-    v_groove = vec3(dot(texelFetch(matrices, object).xyz, around), dot(texelFetch(matrices, object + 1).xyz, around),
-                    dot(texelFetch(matrices, object + 2).xyz, around));
+    v_normal = normalize(rotate(normal, object + 3));
+    v_groove = rotate(vec3(-position.z, 0.0, position.x), object);
     v_shadow = (shadow_from_world * vec4(v_world + shadow_offset * v_normal, 1.0)).xyz;
     float towards_fill = 0.5 + 0.5 * dot(v_normal, vec3(0.62, 0.25, 0.74));
-    v_around = mix(ground_light, sky_light, 0.5 + 0.5 * v_normal.y) + fill_light * (towards_fill * towards_fill);
+    v_around = mix(ground_light, sky_light, 0.5 + 0.5 * v_normal.y);
+    v_around += fill_light * (towards_fill * towards_fill);
     v_color_metallic = color_metallic;
     v_roughness_lathed = roughness_lathed_object.xy;
     gl_Position = clip_from_world * vec4(v_world, 1.0);
+    gl_ClipDistance[0] = v_world.y - floor_height;
 }
 )";
 }
@@ -136,27 +143,32 @@ vec3 surroundings(vec3 r, float roughness) {
     float blur = 0.08 + 0.8 * roughness;
     vec3 light = mix(ground_light, sky_light, smoothstep(-blur, blur, r.y));
     float over = dot(r, vec3(-0.42, 0.74, -0.53)), side = dot(r, vec3(0.82, 0.36, 0.45));
-    light += vec3(1.9, 1.75, 1.5) * smoothstep(0.86 - 0.5 * blur, 0.90 + 0.3 * blur, over) * (1.0 - 0.75 * roughness);
-    light += vec3(0.55, 0.7, 1.0) * smoothstep(0.88 - 0.5 * blur, 0.93 + 0.3 * blur, side) * (1.0 - 0.75 * roughness);
-    return light;
+    float warm = smoothstep(0.86 - 0.5 * blur, 0.90 + 0.3 * blur, over);
+    float cool = smoothstep(0.88 - 0.5 * blur, 0.93 + 0.3 * blur, side);
+    return light + (vec3(1.9, 1.75, 1.5) * warm + vec3(0.55, 0.7, 1.0) * cool) * (1.0 - 0.75 * roughness);
 }
 void main() {
-    vec3 color = v_color_metallic.rgb, n = normalize(v_normal), v = normalize(eye - v_world), h = normalize(v + towards_light);
+    vec3 color = v_color_metallic.rgb, n = normalize(v_normal), v = normalize(eye - v_world);
+    vec3 h = normalize(v + towards_light);
     vec3 groove = v_groove * inversesqrt(dot(v_groove, v_groove) + 1e-12);
     float metallic = v_color_metallic.a, roughness = v_roughness_lathed.x, lathed = v_roughness_lathed.y;
-    float nl = max(dot(n, towards_light), 0.0), nv = clamp(dot(n, v), 0.0, 1.0), nh = max(dot(n, h), 0.0), lh = dot(towards_light, h);
+    float nl = max(dot(n, towards_light), 0.0), nv = clamp(dot(n, v), 0.0, 1.0);
+    float nh = max(dot(n, h), 0.0), lh = dot(towards_light, h);
     vec3 f0 = mix(vec3(0.04), color, metallic), diffuse = color * (1.0 - metallic);
 
-    float along = max(roughness * roughness, 0.004), across = mix(along, min(1.0, 2.5 * along + 0.25), lathed);
+    float along = max(roughness * roughness, 0.004);
+    float across = mix(along, min(1.0, 2.5 * along + 0.25), lathed);
     float th = dot(groove, h), bh2 = max(1.0 - nh * nh - th * th, 0.0);
     float d = th * th / (along * along) + bh2 / (across * across) + nh * nh;
-    float highlight = min(1.0 / (along * across * d * d * max(lh * lh, 0.1) * (4.0 * roughness + 2.0)), 30.0);
+    float bound = along * across * d * d * max(lh * lh, 0.1) * (4.0 * roughness + 2.0);
+    float highlight = min(1.0 / bound, 30.0);
     vec3 key = key_light * (shadow_light_sharp(v_shadow) * spot(v_shadow) * nl);
 
     vec3 grooved = normalize(mix(n, v - groove * dot(groove, v), 0.45 * lathed));
     float grazing = 1.0 - nv, grazing2 = grazing * grazing;
     vec3 f = f0 + (max(vec3(1.0 - roughness), f0) - f0) * (grazing2 * grazing2 * grazing);
-    vec3 light = diffuse * (v_around + key) + f0 * key * highlight + f * surroundings(reflect(-v, grooved), roughness);
+    vec3 mirrored = f * surroundings(reflect(-v, grooved), roughness);
+    vec3 light = diffuse * (v_around + key) + f0 * key * highlight + mirrored;
     write_picture(light, 1.0);
 }
 )";
@@ -205,7 +217,8 @@ void main() {
     float tone = random(vec2(row, floor(plank.y)));
     vec2 from_edge = 0.5 - abs(fract(plank) - 0.5);
     float distance_eye = length(eye - v_world);
-    float seam = smoothstep(0.0, 0.012 + 0.012 * distance_eye, from_edge.x) * smoothstep(0.0, 0.004 + 0.002 * distance_eye, from_edge.y);
+    float seam = smoothstep(0.0, 0.012 + 0.012 * distance_eye, from_edge.x) *
+                 smoothstep(0.0, 0.004 + 0.002 * distance_eye, from_edge.y);
     vec3 color = floor_color * (0.82 + 0.3 * tone) * (0.6 + 0.4 * seam);
     vec3 v = (eye - v_world) / distance_eye, h = normalize(v + towards_light);
     vec3 key = key_light * (key_part * spot(v_shadow));
@@ -245,7 +258,8 @@ out vec4 fragment;
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     vec4 object = texelFetch(objects, at, 0);
-    vec3 lit = texelFetch(lit_floor, at, 0).rgb * (0.7 + 0.3 * v_open), dark = texelFetch(dark_floor, at, 0).rgb * v_open;
+    vec3 lit = texelFetch(lit_floor, at, 0).rgb * (0.7 + 0.3 * v_open);
+    vec3 dark = texelFetch(dark_floor, at, 0).rgb * v_open;
     fragment = vec4(object.rgb + (1.0 - object.a) * mix(dark, lit, shadow_light_soft(v_shadow)), 1.0);
 }
 )";

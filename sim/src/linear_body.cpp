@@ -23,8 +23,9 @@ void make_canonical(const Eigen::Vector3d& values, Eigen::Matrix3d& vectors) {
         first = end;
     }
     for (int k = 0; k < 3; ++k) {
-        Eigen::Index largest;
-        vectors.col(k).cwiseAbs().maxCoeff(&largest);
+        const double top = vectors.col(k).cwiseAbs().maxCoeff();
+        int largest = 0;  // the first of equals, whatever their last digits
+        while (std::abs(vectors(largest, k)) < 0.999 * top) ++largest;
         if (vectors(largest, k) < 0) vectors.col(k) = -vectors.col(k);
     }
 }

@@ -110,7 +110,7 @@ TEST(Kit, MalformedKitsEndInBadInputAtThePlace) {
         {"a key twice", "name = \"a\"\nname = \"b\"\n", "2:", "a syntax error"},
         {"not UTF-8", "name = \"\xff\xfe\"\n", "1:", "a syntax error"},
         {"unknown key", "colour = 1\n" + instrument(""), "1:1", "unknown key \"colour\""},
-        {"unknown table", instrument("") + "[drum]\n", "6:1", "unknown key \"drum\""},
+        {"unknown table", instrument("") + "[drum]\n", "6:2", "unknown key \"drum\""},
         {"no instrument", "name = \"a\"\n", "1:1", "no [[instrument]]"},
         {"instrument no array", "instrument = 3\n", "1:14", "instrument = 3"},
         {"instrument of numbers", "instrument = [3]\n", "1:15", "3 in the kit"},

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "bad_input.h"
+#include "tip_track.h"
 #include "true_contacts.h"
 
 namespace app {

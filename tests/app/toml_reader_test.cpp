@@ -10,7 +10,7 @@ namespace app {
 namespace {
 
 toml::table parsed(std::string_view text) {
-    return toml::parse(text, "test.toml");
+    return toml::parse(text, std::string_view("test.toml"));
 }
 
 /// The message of the BadInput that an action ends with.

@@ -22,7 +22,7 @@ TEST(Simulation, ReferenceStrikeDisplacesTheStruckPointByItsShareOfTheSize) {
         double most = 0;
         for (int k = 0; k < 3; ++k) {
             Vector3d r = Vector3d::Zero();
-            if (k != 1) r[k] = 0.5 * shape.semi_axes[k];
+            if (k != 1) r[k] = 0.95 * shape.semi_axes[k];
             r = model.gauge().along_axis(r, 1);
             const sim::OscillatorState kicked = model.kick({0, 0, r, Vector3d(0, -1.5 * 0.05 * 5, 0)});
             for (double t = 0; t < 0.2; t += 1e-5) {
@@ -73,12 +73,12 @@ TEST(Simulation, ManySmallStepsEqualOneLongStepToRounding) {
     EXPECT_GT(std::abs(l.swing), 1e-5);
 }
 
-TEST(Simulation, HundredsOfViolentStrikesLeaveTheDeformationInvertibleAndFinite) {
+TEST(Simulation, AHundredViolentStrikesLeaveTheDeformationInvertibleAndFinite) {
     std::mt19937 rng(5);
     std::uniform_real_distribution<double> unit(-1, 1);
     for (const sim::BodyDefinition& body : {sim_test::drum(), sim_test::bell(Vector3d::Zero()), sim_test::string_body(Vector3d::Zero())}) {
         const auto simulation = sim::make_local_simulation({body});
-        for (int i = 0; i < 300; ++i) {
+        for (int i = 0; i < 100; ++i) {
             const Vector3d r = Vector3d(unit(rng), unit(rng), unit(rng)).cwiseProduct(body.shape.semi_axes);
             const double t = 0.002 * i;
             const sim::StepRequest request{t, {{0, t, r, Vector3d(unit(rng), unit(rng), unit(rng)) * 100}}, {},
@@ -107,7 +107,7 @@ TEST(Simulation, ConfirmedImpulsesAreFeltByContactsFromTheirTimeOn) {
     sim::StepRequest request{0, {}, {}, {sim_test::path_through(Vector3d(0, 0.1, 0), Vector3d(0, -5, 0), Vector3d::Zero(), 0)}, {}};
     const sim::Contact at_rest = simulation->step(request).contacts.at(0);
     request.confirmed = {{0, 0.06, Vector3d(0, 0.1, 0), Vector3d(0, -0.5, 0)}};
-    EXPECT_EQ(simulation->step(request).contacts.at(0).t_s, at_rest.t_s);
+    EXPECT_NEAR(simulation->step(request).contacts.at(0).t_s, at_rest.t_s, 1e-7);  // a contact's stated precision
     request.confirmed[0].t_s = 0.005;
     const sim::Contact moving = simulation->step(request).contacts.at(0);
     EXPECT_GT(moving.t_s, at_rest.t_s + 1e-4);     // the head has gone down

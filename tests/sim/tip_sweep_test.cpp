@@ -21,27 +21,34 @@ struct Swept {
     double clearance;
 };
 
-Swept sweep(const sim::BodyDefinition& body, const sim::TipPath& path, const std::vector<sim::Impulse>& impulses = {}) {
-    const sim::BodyModel model(body);
-    sim::BodyMotion motion(model);
-    motion.start(0, {});
-    for (const sim::Impulse& impulse : impulses) motion.add(impulse);
-    Swept swept;
-    swept.clearance = sim::TipSweep(model, motion).sweep(path, 0, swept.contacts);
-    return swept;
-}
+/// A body at rest to sweep many paths against.
+class Resting {
+public:
+    explicit Resting(const sim::BodyDefinition& body) : model_(body), motion_(model_) { motion_.start(0, {}); }
+
+    [[nodiscard]] Swept sweep(const sim::TipPath& path) const {
+        Swept swept;
+        swept.clearance = sim::TipSweep(model_, motion_).sweep(path, 0, swept.contacts);
+        return swept;
+    }
+
+private:
+    sim::BodyModel model_;
+    sim::BodyMotion motion_;
+};
 
 TEST(TipSweep, TwentyThousandStrokesThroughADrumHeadMatchTheClosedFormNoneMissedNoneDoubled) {
     // Parabolas y(t) = y0 - v t + g t^2 / 2 over the inner head, whose plane is y = b to 2e-6 m: solve the quadratic.
-    sim::BodyDefinition drum = sim_test::drum(Vector3d(0.3, 0.8, -0.2));
+    const Resting drum(sim_test::drum(Vector3d(0.3, 0.8, -0.2)));
     const double height = 0.8 + 0.1 + 0.006;
     std::mt19937 rng(11);
     std::uniform_real_distribution<double> unit(0, 1);
     int crossings = 0, passes = 0;
     for (int i = 0; i < 20000; ++i) {
         const double v = 0.5 + 11.5 * unit(rng), y0 = 0.004 + 0.2 * unit(rng), g = 400 * unit(rng);
-        const double dip = y0 - v * v / (2 * g);
-        if (std::abs(dip) < 0.001) continue;  // a graze of under 1 mm may be missed, by contract
+        const double turn = std::min(v / g, 1 / 15.0), lowest = y0 - v * turn + g * turn * turn / 2;
+        if (std::abs(y0 - v * v / (2 * g)) < 0.001) continue;  // a graze of under 1 mm may be missed, by contract
+        if (lowest < -0.15) continue;                          // would leave by the underside
         const Vector3d start(0.3 + 0.06 * (unit(rng) - 0.5), height, -0.2 + 0.06 * (unit(rng) - 0.5));
         const Vector3d along(0.5 * (unit(rng) - 0.5), 0, 0.5 * (unit(rng) - 0.5));
         sim::TipPath path;
@@ -50,8 +57,8 @@ TEST(TipSweep, TwentyThousandStrokesThroughADrumHeadMatchTheClosedFormNoneMissed
             path.nodes.push_back({1 + t, start + t * along + Vector3d(0, y0 - v * t + g * t * t / 2, 0),
                                   along + Vector3d(0, -v + g * t, 0)});
         }
-        const double root = dip < 0 ? 2 * y0 / (v + std::sqrt(v * v - 2 * g * y0)) : 1;  // stable form of the quadratic's first root
-        const Swept swept = sweep(drum, path);
+        const double root = v * v > 2 * g * y0 ? 2 * y0 / (v + std::sqrt(v * v - 2 * g * y0)) : 1;  // stable form of the quadratic's first root
+        const Swept swept = drum.sweep(path);
         EXPECT_NEAR(swept.clearance, y0, 1e-5);
         if (root < 1 / 15.0) {
             ASSERT_EQ(swept.contacts.size(), 1u) << i;
@@ -73,6 +80,7 @@ TEST(TipSweep, TwentyThousandStrokesThroughADrumHeadMatchTheClosedFormNoneMissed
 TEST(TipSweep, SphereAtRestIsEnteredWithinAHundredNanosecondsOfTheClosedForm) {
     sim::BodyDefinition ball;
     ball.shape = {Vector3d::Constant(0.1), 1, 1};
+    const Resting target(ball);
     std::mt19937 rng(12);
     std::uniform_real_distribution<double> unit(-1, 1);
     for (int i = 0; i < 5000; ++i) {
@@ -81,7 +89,7 @@ TEST(TipSweep, SphereAtRestIsEnteredWithinAHundredNanosecondsOfTheClosedForm) {
         const double r = 0.106, b = from.dot(velocity), a = velocity.squaredNorm(), c = from.squaredNorm() - r * r;
         const double closest = std::sqrt(std::max(0.0, from.squaredNorm() - b * b / a));
         if (std::abs(closest - r) < 0.001) continue;
-        const Swept swept = sweep(ball, line(from, velocity, 0.1));
+        const Swept swept = target.sweep(line(from, velocity, 0.1));
         ASSERT_EQ(swept.contacts.size(), closest < r ? 1u : 0u) << i;
         if (closest < r) {
             EXPECT_NEAR(swept.contacts[0].t_s, (-b - std::sqrt(b * b - a * c)) / a, 1e-7);
@@ -90,35 +98,35 @@ TEST(TipSweep, SphereAtRestIsEnteredWithinAHundredNanosecondsOfTheClosedForm) {
 }
 
 TEST(TipSweep, AFiveMillimetreStringIsNeverTunnelledAtTwentyMetresASecond) {
-    const sim::BodyDefinition string = sim_test::string_body(Vector3d::Zero());
+    const Resting string(sim_test::string_body(Vector3d::Zero()));
     std::mt19937 rng(13);
     std::uniform_real_distribution<double> unit(-1, 1);
     for (int i = 0; i < 5000; ++i) {
         sim::TipPath path = line(Vector3d(0.25 * unit(rng), 0.6 + 0.3 * unit(rng), 0.001 * unit(rng)), Vector3d(0, -20, 0), 1 / 15.0);
         path.tip_radius_m = 0.0005;
         const bool through = path.nodes[1].position.y() < -0.01;
-        ASSERT_EQ(sweep(string, path).contacts.size(), through ? 1u : 0u);
+        ASSERT_EQ(string.sweep(path).contacts.size(), through ? 1u : 0u);
     }
 }
 
 TEST(TipSweep, ASecondCrossingCountsOnlyAfterThreeMillimetresOutside) {
-    const sim::BodyDefinition drum = sim_test::drum();
+    const Resting drum(sim_test::drum());
     const auto bounce = [&](double height) {  // in, out to `height`, in again; turning points at the nodes
         sim::TipPath path;
         const double y[] = {0.05, -0.004, height, -0.004, 0.05};
         for (int k = 0; k < 5; ++k) path.nodes.push_back({0.01 * k, Vector3d(0, 0.106 + y[k], 0), Vector3d::Zero()});
-        return sweep(drum, path).contacts.size();
+        return drum.sweep(path).contacts.size();
     };
     EXPECT_EQ(bounce(0.002), 1u);
     EXPECT_EQ(bounce(0.004), 2u);
 }
 
 TEST(TipSweep, ATipThatStartsInsideIsReportedWithItsDepthAndMayStrikeAfterLeaving) {
-    const sim::BodyDefinition drum = sim_test::drum();
+    const Resting drum(sim_test::drum());
     sim::TipPath path;
     const double y[] = {-0.005, 0.02, -0.005};
     for (int k = 0; k < 3; ++k) path.nodes.push_back({0.02 * k, Vector3d(0, 0.106 + y[k], 0), Vector3d(0, k == 0 ? 1 : 0, 0)});
-    const Swept swept = sweep(drum, path);
+    const Swept swept = drum.sweep(path);
     ASSERT_EQ(swept.contacts.size(), 2u);
     EXPECT_TRUE(swept.contacts[0].starts_inside);
     EXPECT_EQ(swept.contacts[0].t_s, 0);
@@ -138,7 +146,7 @@ TEST(TipSweep, AMovingBodysCrossingIsWhereAFineScanOfTheSameMotionFindsIt) {
         motion.add({0, 0.03, Vector3d(-0.03, 0.09, 0.02), Vector3d(0.1, -0.3, 0)});
         std::mt19937 rng(14);
         std::uniform_real_distribution<double> unit(-1, 1);
-        for (int i = 0; i < 60; ++i) {
+        for (int i = 0; i < 30; ++i) {
             const Vector3d target(0.05 * unit(rng), 0.05 * unit(rng), 0.05 * unit(rng));
             const Vector3d velocity(unit(rng), -3 + unit(rng), unit(rng));
             const sim::TipPath path = sim_test::path_through(target, velocity, Vector3d(0, 60 * unit(rng), 0), 0.01);
@@ -154,8 +162,8 @@ TEST(TipSweep, AMovingBodysCrossingIsWhereAFineScanOfTheSameMotionFindsIt) {
             };
             EXPECT_NEAR(distance(0.01), clearance, 1e-9);
             double first = -1;
-            for (double t = 0.01; t < 0.01 + 1 / 15.0 - 1e-5 && first < 0; t += 1e-5) {
-                if (distance(t) >= 0 && distance(t + 1e-5) < 0) first = t;
+            for (double t = 0.01; t < 0.01 + 1 / 15.0 - 5e-5 && first < 0; t += 5e-5) {
+                if (distance(t) >= 0 && distance(t + 5e-5) < 0) first = t;
             }
             const sim::Contact* entry = nullptr;
             for (const sim::Contact& c : contacts) {
@@ -165,7 +173,7 @@ TEST(TipSweep, AMovingBodysCrossingIsWhereAFineScanOfTheSameMotionFindsIt) {
             ASSERT_EQ(entry != nullptr, first >= 0) << i;
             if (!entry) continue;
             EXPECT_GE(entry->t_s, first - 1e-7);
-            EXPECT_LE(entry->t_s, first + 1e-5 + 1e-7);
+            EXPECT_LE(entry->t_s, first + 5e-5 + 1e-7);
             // Speed: the distance's own slope. Central difference over 2e-6 s of a smooth function.
             const double slope = (distance(entry->t_s + 1e-6) - distance(entry->t_s - 1e-6)) / 2e-6;
             EXPECT_NEAR(entry->speed_mps, -slope, 1e-3 * std::abs(slope) + 1e-4);
@@ -174,17 +182,17 @@ TEST(TipSweep, AMovingBodysCrossingIsWhereAFineScanOfTheSameMotionFindsIt) {
 }
 
 TEST(TipSweep, ImpulsePushesInwardsWithTheEffectiveMass) {
-    sim::BodyDefinition drum = sim_test::drum();
-    const Swept swept = sweep(drum, line(Vector3d(0, 0.2, 0), Vector3d(0, -5, 0), 0.04));
+    const Resting drum(sim_test::drum());
+    const Swept swept = drum.sweep(line(Vector3d(0, 0.2, 0), Vector3d(0, -5, 0), 0.04));
     ASSERT_EQ(swept.contacts.size(), 1u);
     EXPECT_LT((swept.contacts[0].impulse_body - Vector3d(0, -1.5 * 0.05 * 5, 0)).norm(), 1e-6);
     EXPECT_NEAR(swept.contacts[0].point_body.y(), 0.1, 1e-6);
 }
 
 TEST(TipSweep, RimAndShellAreToldApartByTheRestShapesPoint) {
-    sim::BodyDefinition drum = sim_test::drum();
-    EXPECT_EQ(sweep(drum, line(Vector3d(0.17, 0.2, 0), Vector3d(0, -5, 0), 0.04)).contacts.at(0).zone, 1);
-    EXPECT_EQ(sweep(drum, line(Vector3d(0.4, 0, 0), Vector3d(-8, 0, 0), 0.04)).contacts.at(0).zone, -1);
+    const Resting drum(sim_test::drum());
+    EXPECT_EQ(drum.sweep(line(Vector3d(0.17, 0.2, 0), Vector3d(0, -5, 0), 0.04)).contacts.at(0).zone, 1);
+    EXPECT_EQ(drum.sweep(line(Vector3d(0.4, 0, 0), Vector3d(-8, 0, 0), 0.04)).contacts.at(0).zone, -1);
 }
 
 }  // namespace

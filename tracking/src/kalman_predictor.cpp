@@ -8,7 +8,7 @@ namespace {
 constexpr double kLever = 0.4;        // m, a stick's length: turns rad into metres at the tip
 constexpr double kFastest = 25;       // m/s, of a tracked hand or tip
 constexpr double kStrongest = 3000;   // m/s^2, apart from contacts
-constexpr double kFastestTurn = 120;  // rad/s; expert wrists reach 100 in recordings
+constexpr double kFastestTurn = 120;  // rad/s, with room to spare for a wrist
 
 }  // namespace
 
