@@ -26,6 +26,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kTailS = 0.5, kLongestTailS = 10;
+constexpr double kApartS = 0.5;  // between the notes whose frames the report shows
 
 class Timer {
 public:
@@ -112,22 +113,28 @@ void write_midi(const fs::path& file, const PlayResult& result, const Kit& kit) 
     audio::write_midi(file, notes);
 }
 
-/// Frames for the report: around the loudest matched strikes, three before, at and after each.
+/// Frames for the report: before, at and after the two loudest notes that lie apart.
 std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& folder) {
     std::vector<const Strike*> loudest;
     for (const Strike& strike : result.strikes)
         if (strike.outcome == Outcome::released) loudest.push_back(&strike);
     std::stable_sort(loudest.begin(), loudest.end(),
                      [](const Strike* a, const Strike* b) { return a->speed_mps > b->speed_mps; });
+    std::vector<const Strike*> shown;
+    for (const Strike* strike : loudest) {
+        const bool apart = shown.empty() || std::abs(strike->onset_s - shown.front()->onset_s) > kApartS;
+        if (apart && shown.size() < 2) shown.push_back(strike);
+    }
     std::vector<fs::path> files;
-    for (std::size_t i = 0; i < std::min<std::size_t>(2, loudest.size()); ++i) {
-        const auto at = static_cast<long>(std::ceil((loudest[i]->onset_s - result.t0_s) * result.fps));
+    for (const Strike* strike : shown) {
+        const auto at = static_cast<long>(std::ceil((strike->onset_s - result.t0_s) * result.fps));
         for (const long k : {at - 2, at, at + 2})
             if (k >= 0 && k < static_cast<long>(result.frames)) files.push_back(folder / fmt::format("{:06}.png", k));
     }
     return files;
 }
 
+/// Encodes frames and sound beside the video's place, as FILE.partial.
 void make_video(const PlayOptions& options, const fs::path& staging) {
     std::vector<std::string> command = {"ffmpeg", "-nostdin", "-loglevel", "error", "-y", "-framerate",
                                         fmt::format("{}", options.fps), "-i", (staging / "frames" / "%06d.png").string()};
@@ -135,7 +142,6 @@ void make_video(const PlayOptions& options, const fs::path& staging) {
     command.insert(command.end(), {"-c:v", "libx264", "-preset", "veryfast", "-pix_fmt", "yuv420p", "-fflags",
                                    "+bitexact", "-f", "mp4", options.video->string() + ".partial"});
     run_child(command);
-    fs::rename(options.video->string() + ".partial", *options.video);
 }
 
 }  // namespace
@@ -224,6 +230,7 @@ PlayResult play(const PlayOptions& options) {
     result.wall_s = wall.seconds();
     write_file(folder.path("summary.json"), format_summary(result));
     folder.finish();
+    if (options.video) fs::rename(options.video->string() + ".partial", *options.video);
     return result;
 }
 

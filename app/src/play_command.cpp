@@ -50,8 +50,10 @@ PlayOptions options_of(const PlayArguments& a) {
 
 void print_result(const PlayResult& result, const PlayOptions& options) {
     const StrikeScore& s = result.score;
-    fmt::print("{} strikes of {} sounded, {} false, {} cancelled; median timing error {:.1f} ms; {:.1f} times real time\n",
-               s.true_contacts - s.missed, s.true_contacts, s.false_notes, s.cancelled, s.timing_median_ms,
+    const int sounded = s.true_contacts - s.missed;
+    fmt::print("{} strikes of {} sounded, {} false, {} cancelled; median timing error {}; {:.1f} times real time\n", sounded,
+               s.true_contacts, s.false_notes, s.cancelled,
+               sounded > 0 ? fmt::format("{:.1f} ms", s.timing_median_ms) : "unknown (nothing matched)",
                (result.t_end_s - result.t0_s) / result.wall_s);
     fmt::print("Look at {}, listen to {}, see frames in {}\n", (options.out / "report.html").string(),
                options.audio ? (options.out / "audio.wav").string() : "nothing (--no-audio)",

@@ -52,7 +52,8 @@ void ThinnedMarks::add(double x, double y, std::string_view rest) {
 std::string sound_envelope(std::span<const float> stereo, double t0_s, double from_s, double to_s,
                            int columns) {
     constexpr double kRate = 48000;
-    const double count = static_cast<double>(stereo.size() / 2), column_s = (to_s - from_s) / columns;
+    const std::size_t frames = stereo.size() / 2;
+    const double count = static_cast<double>(frames), column_s = (to_s - from_s) / columns;
     const auto sample_at = [&](double t_s) {
         return static_cast<std::size_t>(std::clamp(std::round((t_s - t0_s) * kRate), 0.0, count)) * 2;
     };

@@ -49,7 +49,7 @@ std::string nearest_note(const PlayResult& result, double shown_s) {
 
 /// Frames are named by their number: frame k is shown at t0 + k / fps.
 std::string frame_caption(const PlayResult& result, const fs::path& file) {
-    const std::string number = file.stem().string();
+    std::string number = file.stem().string();
     if (number.empty() || number.size() > 12 || number.find_first_not_of("0123456789") != std::string::npos)
         return number;
     const double shown_s = result.t0_s + static_cast<double>(std::stoll(number)) / result.fps;

@@ -206,7 +206,8 @@ PlotScript overview_plot(const PlayResult& result, const Timeline& timeline) {
 }
 
 PlotScript sound_plot(const PlayResult& result) {
-    const double length_s = static_cast<double>(result.audio.size() / 2) / 48000;
+    const std::size_t frames = result.audio.size() / 2;
+    const double length_s = static_cast<double>(frames) / 48000;
     const PlotArea area = {result.t0_s, result.t0_s + length_s, -1, 1, kWidth, 1};
     const auto [low, high] = std::minmax_element(result.audio.begin(), result.audio.end());
     const double peak = std::max({-static_cast<double>(*low), static_cast<double>(*high), 1e-3});

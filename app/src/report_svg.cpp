@@ -68,12 +68,9 @@ std::string without_ballast(std::string_view svg) {
     }
     std::string out;
     for (const std::string_view line : lines) {
-        if (line.starts_with("\t<g id=\"gnuplot_plot_"))
-            out += "<g>";
-        else if (line.starts_with("<g id=\"gnuplot_canvas\""))
-            out += "<g>";
-        else
-            out += line;
+        const bool named =
+            line.starts_with("\t<g id=\"gnuplot_plot_") || line.starts_with("<g id=\"gnuplot_canvas\"");
+        out += named ? "<g>" : line;
         out += '\n';
     }
     return out;

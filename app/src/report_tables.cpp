@@ -58,8 +58,8 @@ double tenths(double value) {
 /// Median of the absolute and of the signed errors, as two cells.
 std::string error_cells(const std::vector<double>& errors_ms) {
     if (errors_ms.empty()) return "<td class=n>&ndash;</td><td class=n>&ndash;</td>";
-    std::vector<double> sizes;
-    for (const double error : errors_ms) sizes.push_back(std::abs(error));
+    std::vector<double> sizes = errors_ms;
+    for (double& size : sizes) size = std::abs(size);
     return fmt::format("<td class=n>{:.1f}</td><td class=n>{:+.1f}</td>", median(sizes),
                        tenths(median(errors_ms)));
 }

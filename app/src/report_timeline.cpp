@@ -74,19 +74,19 @@ std::string height_line(const TipTrack& track, double from_s, double to_s) {
 }
 
 struct MarkStyle {
-    Mark mark;
     const ReportColour& colour;
+    Mark mark;
     int point_type;
     double size;
 };
 
 /// In the order of drawing; gnuplot's point types: 2 cross, 4 frame, 6 ring, 7 disc, 11 triangle pointing
 /// down.
-constexpr MarkStyle kMarkStyles[] = {{Mark::cancelled, colours::cancelled, 2, 0.85},
-                                     {Mark::contact, colours::contact, 6, 0.95},
-                                     {Mark::released, colours::released, 7, 0.55},
-                                     {Mark::missed, colours::missed, 4, 1.0},
-                                     {Mark::wrong, colours::wrong, 11, 0.8}};
+constexpr MarkStyle kMarkStyles[] = {{colours::cancelled, Mark::cancelled, 2, 0.85},
+                                     {colours::contact, Mark::contact, 6, 0.95},
+                                     {colours::released, Mark::released, 7, 0.55},
+                                     {colours::missed, Mark::missed, 4, 1.0},
+                                     {colours::wrong, Mark::wrong, 11, 0.8}};
 
 std::string mark_points(const PlayResult& result, const std::vector<Mark>& kinds, Mark wanted,
                         const PlotArea& area) {

@@ -74,7 +74,6 @@ Renderer::Implementation::Implementation(const SceneDescription& description)
     light = light_from_world(scene.key_light, scene.camera.target, reach);
     texel = scene.shadow_size > 0 ? 2 * reach / static_cast<float>(scene.shadow_size) : 0;
     gl.Enable(GL_CULL_FACE);
-    gl.Enable(GL_DEPTH_CLAMP);
     gl.DepthFunc(GL_LEQUAL);
     gl.PolygonOffset(1.5f, 2.0f);  // shadow map only
     set_uniforms(object_program);
@@ -122,8 +121,10 @@ void Renderer::Implementation::draw(const FrameState& frame, Image& image) {
     if (scene.shadow_size > 0) {
         shadow.begin();
         gl.Enable(GL_POLYGON_OFFSET_FILL);
+        gl.Enable(GL_DEPTH_CLAMP);  // what is nearer to the light than the map's depth still casts
         shadow_program.use();
         geometry.draw(kMatrixUnit);
+        gl.Disable(GL_DEPTH_CLAMP);
         gl.Disable(GL_POLYGON_OFFSET_FILL);
     }
     shadow.bind(kShadowUnit);

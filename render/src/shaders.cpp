@@ -9,11 +9,13 @@ const char* const kVersion = "#version 330 core\n";
 const char* const kObjectMatrices = R"(
 uniform samplerBuffer matrices;
 vec3 to_world(vec3 position, int object) {
-    vec4 x = texelFetch(matrices, object), y = texelFetch(matrices, object + 1), z = texelFetch(matrices, object + 2);
+    vec4 x = texelFetch(matrices, object), y = texelFetch(matrices, object + 1);
+    vec4 z = texelFetch(matrices, object + 2);
     return vec3(dot(x.xyz, position) + x.w, dot(y.xyz, position) + y.w, dot(z.xyz, position) + z.w);
 }
 vec3 rotate(vec3 direction, int rows) {
-    vec4 x = texelFetch(matrices, rows), y = texelFetch(matrices, rows + 1), z = texelFetch(matrices, rows + 2);
+    vec4 x = texelFetch(matrices, rows), y = texelFetch(matrices, rows + 1);
+    vec4 z = texelFetch(matrices, rows + 2);
     return vec3(dot(x.xyz, direction), dot(y.xyz, direction), dot(z.xyz, direction));
 }
 )";

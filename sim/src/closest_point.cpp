@@ -123,7 +123,7 @@ ClosestPoint closest_point(const Gauge& gauge, const Deformation& d, const Eigen
     } else if (inside) {
         foot = nearest_from_inside(gauge, d, x, r);
     } else {
-        foot = refine(gauge, d, x, foot_at(gauge, d, x, r));
+        foot = refine(gauge, d, x, foot_at(gauge, d, x, gauge.near_outside(r)));
     }
     const double distance = std::sqrt(foot.squared);
     // Outside, the direction to the foot is the normal also where an exponent above 1 makes the surface a

@@ -9,8 +9,23 @@ namespace {
 constexpr double kSmallestExponent = 0.1, kLargestExponent = 1.9;
 constexpr double kPlaneHeight = 1e-7;
 
+// base^exponent; whole exponents (e = 0.1 gives 20) by squaring.
 double power(double base, double exponent) {
-    return exponent == 2 ? base * base : std::pow(base, exponent);
+    int n = static_cast<int>(exponent);
+    if (n != exponent) return std::pow(base, exponent);
+    double result = 1;
+    for (; n > 0; n >>= 1, base *= base) {
+        if (n & 1) result *= base;
+    }
+    return result;
+}
+
+// (1 + t)^(1/p) for t in [0, 1]; the series' first left-out term is below 1e-17.
+double root_of_one_plus(double t, double p) {
+    if (p == 2) return std::sqrt(1 + t);
+    if (t > 1e-4) return std::pow(1 + t, 1 / p);
+    const double k = 1 / p;
+    return 1 + k * t * (1 + (k - 1) / 2 * t * (1 + (k - 2) / 3 * t * (1 + (k - 3) / 4 * t)));
 }
 
 // (u^p + w^p)^(1/p) for u, w >= 0 without overflow, and the share u^p / (u^p + w^p) of the first.
@@ -22,7 +37,7 @@ PairNorm pair_norm(double u, double w, double p) {
     const double large = std::max(u, w), small = std::min(u, w);
     if (large == 0) return {0, 1, 0};
     const double t = power(small / large, p);
-    const double root = p == 2 ? std::sqrt(1 + t) : (t < 1e-17 ? 1 : std::pow(1 + t, 1 / p));
+    const double root = root_of_one_plus(t, p);
     const double major = 1 / (1 + t), minor = t / (1 + t);
     return u >= w ? PairNorm{large * root, major, minor} : PairNorm{large * root, minor, major};
 }
@@ -98,6 +113,13 @@ Eigen::Vector3d Gauge::onto_surface(const Eigen::Vector3d& r) const noexcept {
     const double n = value(r);
     if (n < 1e-12) return Eigen::Vector3d(0, semi_axes_.y(), 0);
     return r / n;
+}
+
+Eigen::Vector3d Gauge::near_outside(const Eigen::Vector3d& r) const noexcept {
+    if (e1_ >= 0.6) return onto_surface(r);
+    const Eigen::Vector3d u = r.cwiseAbs().cwiseQuotient(semi_axes_);
+    const double flat = 1 / std::max(1.0, pair_norm(u.x(), u.z(), p2_).value);
+    return onto_surface(Eigen::Vector3d(flat * r.x(), r.y() / std::max(1.0, u.y()), flat * r.z()));
 }
 
 Eigen::Vector3d Gauge::along_axis(const Eigen::Vector3d& r, int axis) const noexcept {

@@ -38,6 +38,10 @@ public:
     /// one is kept.
     [[nodiscard]] Eigen::Vector3d along_axis(const Eigen::Vector3d& r, int axis) const noexcept;
 
+    /// A surface point near the closest one to r outside: along the ray for a round profile, for a flat one (e1 < 0.6) that of r brought
+    /// into the straight prism, each of height and cross-section by itself.
+    [[nodiscard]] Eigen::Vector3d near_outside(const Eigen::Vector3d& r) const noexcept;
+
     [[nodiscard]] const Eigen::Vector3d& semi_axes() const noexcept { return semi_axes_; }
     [[nodiscard]] double e1() const noexcept { return e1_; }
     [[nodiscard]] double e2() const noexcept { return e2_; }
