@@ -130,7 +130,8 @@ void Renderer::Implementation::draw(const FrameState& frame, Image& image) {
     shadow.bind(kShadowUnit);
     picture.begin_objects();
     object_program.use();
-    gl.Enable(GL_CLIP_DISTANCE0);  // the floor, which is laid under the objects afterwards, hides what is below it
+    gl.Enable(
+        GL_CLIP_DISTANCE0);  // the floor, which is laid under the objects afterwards, hides what is below it
     geometry.draw(kMatrixUnit);
     gl.Disable(GL_CLIP_DISTANCE0);
     gl.Disable(GL_DEPTH_TEST);

@@ -1,25 +1,65 @@
-// Cost of one step of a kit of ten bodies with two sticks. Prints microseconds: median and 99th percentile.
-#include <algorithm>
-#include <chrono>
-#include <cstdio>
-#include <vector>
+// Cost of a simulation step: a kit of ten drums, two sticks of eight nodes each, two pictures. Prints what
+// Google Benchmark prints.
+#include <benchmark/benchmark.h>
 
-#include "../../tests/sim/test_kit.h"
+#include <random>
 
-int main() {
-    sim_test::Scenario scenario(3);
-    const auto simulation = sim::make_local_simulation(scenario.bodies());
-    std::vector<double> us;
-    std::size_t contacts = 0;
-    for (int i = 0; i < 20000; ++i) {
-        const sim::StepRequest request = scenario.next();
-        const auto from = std::chrono::steady_clock::now();
-        const sim::StepReply reply = simulation->step(request);
-        us.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - from).count());
-        contacts += reply.contacts.size();
-        scenario.learn(reply);
+#include "sim/simulation.h"
+
+namespace {
+
+using Eigen::Vector3d;
+
+std::vector<sim::BodyDefinition> ten_drums() {
+    std::vector<sim::BodyDefinition> bodies(10);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        bodies[i].shape = {{0.18, 0.1, 0.18}, 0.1, 1};
+        bodies[i].world_from_body.translation() = Vector3d(0.4 * (i % 5), 0.8, 0.45 * (i / 5));
     }
-    std::sort(us.begin(), us.end());
-    std::printf("10 bodies, 2 paths of 8 nodes, 2 pictures: median %.1f us, p99 %.1f us a step, %.2f contacts a step\n",
-                us[us.size() / 2], us[us.size() * 99 / 100], double(contacts) / us.size());
+    return bodies;
 }
+
+sim::TipPath stroke(const Vector3d& above, double t) {
+    sim::TipPath path;
+    for (int k = 0; k < 8; ++k) {
+        const double h = k / 15.0 / 7;
+        path.nodes.push_back({t + h, above + Vector3d(0.5 * h, 0.15 - 4 * h, 0), Vector3d(0.5, -4, 0)});
+    }
+    return path;
+}
+
+// Argument: 1 with bodies that ring, 0 at rest.
+void step(benchmark::State& state) {
+    const std::vector<sim::BodyDefinition> bodies = ten_drums();
+    const auto simulation = sim::make_local_simulation(bodies);
+    std::mt19937 rng(1);
+    double t = 0;
+    for (auto _ : state) {
+        sim::StepRequest request{t += 1 / 60.0, {}, {}, {}, {{t + 0.01, {}}, {t + 0.03, {}}}};
+        for (int stick = 0; stick < 2; ++stick) {
+            request.paths.push_back(
+                stroke(bodies[rng() % 10].world_from_body.translation() + Vector3d(0.05, 0.1, 0), t));
+        }
+        if (state.range(0) == 1) {
+            request.folded.push_back(
+                {static_cast<std::uint32_t>(rng() % 10), t, Vector3d(0.05, 0.1, 0), Vector3d(0, -0.3, 0)});
+        }
+        benchmark::DoNotOptimize(simulation->step(request));
+    }
+}
+BENCHMARK(step)->Arg(0)->Arg(1)->Unit(benchmark::kMicrosecond);
+
+void distance(benchmark::State& state) {
+    sim::BodyDefinition body;
+    body.shape = {{0.18, 0.1, 0.18}, 0.1 * static_cast<double>(state.range(0)), 1};
+    std::mt19937 rng(2);
+    std::uniform_real_distribution<double> unit(-1, 1);
+    std::vector<Vector3d> points(1024);
+    for (Vector3d& p : points) p = Vector3d(0.2 * unit(rng), 0.12 * unit(rng), 0.2 * unit(rng));
+    std::size_t i = 0;
+    for (auto _ : state)
+        benchmark::DoNotOptimize(sim::rest_distance(body, points[i++ % points.size()], 0.006));
+}
+BENCHMARK(distance)->Arg(1)->Arg(5)->Arg(10);  // e1 in tenths
+
+}  // namespace

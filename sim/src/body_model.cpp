@@ -76,7 +76,8 @@ void BodyModel::set_visual_modes() {
     const Eigen::Vector3d& s = gauge_.semi_axes();
     const int axis = shortest_axis(s);
     double peak = 0;
-    for (int k = 0; k < 3; ++k) {  // the pole, and near the edge along either other axis, where a disc gives way most
+    for (int k = 0; k < 3;
+         ++k) {  // the pole, and near the edge along either other axis, where a disc gives way most
         Eigen::Vector3d r = Eigen::Vector3d::Zero();
         if (k != axis) r[k] = kNearEdge * s[k];
         peak = std::max(peak, reference_peak(gauge_.along_axis(r, axis), axis));

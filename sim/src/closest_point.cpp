@@ -8,7 +8,7 @@ namespace {
 
 using Tangents = Eigen::Matrix<double, 3, 2>;
 
-constexpr int kMaxSteps = 300;  // smooth shapes take 3-8; the sharpest kinks (exponent 1.9) this many
+constexpr int kMaxSteps = 300;         // smooth shapes take 3-8; the sharpest kinks (exponent 1.9) this many
 constexpr double kSettled_m = 1e-8;    // a Newton step this short leaves an error of its square
 constexpr double kAtSurface_m = 1e-5;  // nearer, the direction to the foot is lost in rounding
 

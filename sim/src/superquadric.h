@@ -26,8 +26,9 @@ public:
 
     [[nodiscard]] double value(const Eigen::Vector3d& r) const noexcept;
     [[nodiscard]] GaugeDerivatives derivatives(const Eigen::Vector3d& r) const noexcept;  ///< r not zero
-    /// As derivatives, but where p < 2 the curvature is divided by p - 1: then grad N(r) + H s does not overshoot the kink at a
-    /// coordinate plane, however near it is (the weights of iteratively reweighted least squares).
+    /// As derivatives, but where p < 2 the curvature is divided by p - 1: then grad N(r) + H s does not
+    /// overshoot the kink at a coordinate plane, however near it is (the weights of iteratively reweighted
+    /// least squares).
     [[nodiscard]] GaugeDerivatives cautious_derivatives(const Eigen::Vector3d& r) const noexcept;
     [[nodiscard]] bool has_kinks() const noexcept { return e1_ > 1 || e2_ > 1; }
     /// F itself (thesis 2.6, generalised); overflows to infinity far outside when e1 is small.
@@ -38,8 +39,8 @@ public:
     /// one is kept.
     [[nodiscard]] Eigen::Vector3d along_axis(const Eigen::Vector3d& r, int axis) const noexcept;
 
-    /// A surface point near the closest one to r outside: along the ray for a round profile, for a flat one (e1 < 0.6) that of r brought
-    /// into the straight prism, each of height and cross-section by itself.
+    /// A surface point near the closest one to r outside: along the ray for a round profile, for a flat one
+    /// (e1 < 0.6) that of r brought into the straight prism, each of height and cross-section by itself.
     [[nodiscard]] Eigen::Vector3d near_outside(const Eigen::Vector3d& r) const noexcept;
 
     [[nodiscard]] const Eigen::Vector3d& semi_axes() const noexcept { return semi_axes_; }
@@ -49,7 +50,8 @@ public:
     [[nodiscard]] double bounding_radius() const noexcept { return bounding_radius_; }
 
 private:
-    [[nodiscard]] GaugeDerivatives derivatives(const Eigen::Vector3d& r, double curve1, double curve2) const noexcept;
+    [[nodiscard]] GaugeDerivatives derivatives(const Eigen::Vector3d& r, double curve1,
+                                               double curve2) const noexcept;
 
     Eigen::Vector3d semi_axes_;
     double e1_, e2_, p1_, p2_;

@@ -46,8 +46,10 @@ TEST(BundledKits, NoTwoBodiesTouch) {
         const Kit kit = read_kit(find_kit(name));
         for (const Instrument& a : kit.instruments)
             for (const Instrument& b : kit.instruments) {
-                const Eigen::Vector3d apart = a.body.world_from_body.translation() - b.body.world_from_body.translation();
-                if (&a == &b || apart.norm() > a.body.shape.semi_axes.norm() + b.body.shape.semi_axes.norm()) continue;
+                const Eigen::Vector3d apart =
+                    a.body.world_from_body.translation() - b.body.world_from_body.translation();
+                if (&a == &b || apart.norm() > a.body.shape.semi_axes.norm() + b.body.shape.semi_axes.norm())
+                    continue;
                 for (double x = -1; x <= 1; x += 0.2)
                     for (double y = -1; y <= 1; y += 0.25)
                         for (double z = -1; z <= 1; z += 0.2) {

@@ -11,14 +11,32 @@ namespace {
 std::atomic<std::size_t> allocations = 0;
 }
 
+namespace {
+
+void* counted(std::size_t size) noexcept {
+    ++allocations;
+    return std::malloc(size ? size : 1);
+}
+
+}  // namespace
+
 // Not inlined: the compiler would take malloc and free here for a mistake.
 [[gnu::noinline]] void* operator new(std::size_t size) {
-    ++allocations;
-    if (void* p = std::malloc(size ? size : 1)) return p;
+    if (void* p = counted(size)) return p;
     throw std::bad_alloc();
 }
-[[gnu::noinline]] void operator delete(void* p) noexcept { std::free(p); }
-[[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+    return counted(size);
+}
+[[gnu::noinline]] void operator delete(void* p) noexcept {
+    std::free(p);
+}
+[[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept {
+    std::free(p);
+}
+[[gnu::noinline]] void operator delete(void* p, const std::nothrow_t&) noexcept {
+    std::free(p);
+}
 
 namespace {
 
@@ -28,7 +46,8 @@ TEST(SteppedBody, ModalStepSweepAndPicturesOfAWarmBodyAllocateNothing) {
     std::vector<sim::SteppedBody> bodies;
     for (std::uint32_t i = 0; i < scenario.bodies().size(); ++i) bodies.emplace_back(i, scenario.bodies()[i]);
     std::vector<sim::BodyOutcome> outcomes(bodies.size());
-    for (sim::BodyOutcome& outcome : outcomes) outcome.contacts.reserve(16), outcome.clearance_m.reserve(4), outcome.pictures.reserve(4);
+    for (sim::BodyOutcome& outcome : outcomes)
+        outcome.contacts.reserve(16), outcome.clearance_m.reserve(4), outcome.pictures.reserve(4);
     std::size_t contacts = 0;
     for (int i = 0; i < 200; ++i) {
         const sim::StepRequest request = scenario.next();

@@ -16,7 +16,8 @@ double dual_pair(double u, double w, double p) {
     return large * std::pow(std::pow(u / large, q) + std::pow(w / large, q), 1 / q);
 }
 
-// Support function max n.y over the deformed body, in closed form (dual norm): independent of the solver's gauge and steps.
+// Support function max n.y over the deformed body, in closed form (dual norm): independent of the solver's
+// gauge and steps.
 double support(const sim::Superquadric& s, const Eigen::Matrix3d& d, const Vector3d& n) {
     const Vector3d m = (d.transpose() * n).cwiseAbs().cwiseProduct(s.semi_axes);
     return dual_pair(dual_pair(m.x(), m.z(), 2 / s.e2), m.y(), 2 / s.e1);
@@ -38,7 +39,8 @@ Vector3d random_direction(std::mt19937& rng) {
     return Vector3d(normal(rng), normal(rng), normal(rng)).normalized();
 }
 
-// Signed distance of a convex body: the largest n.x - h(n) over unit n. Dense directions, then a shrinking pattern search.
+// Signed distance of a convex body: the largest n.x - h(n) over unit n. Dense directions, then a shrinking
+// pattern search.
 double brute_distance(const sim::Superquadric& s, const Eigen::Matrix3d& d, const Vector3d& x,
                       const std::vector<Vector3d>& directions) {
     std::vector<std::pair<double, Vector3d>> found;
@@ -61,7 +63,8 @@ double brute_distance(const sim::Superquadric& s, const Eigen::Matrix3d& d, cons
             const Vector3d t = n.unitOrthogonal(), b = n.cross(t);
             for (int i = 0; i < 8; ++i) {
                 const double angle = i * M_PI / 4;
-                const Vector3d candidate = (n + step * (std::cos(angle) * t + std::sin(angle) * b)).normalized();
+                const Vector3d candidate =
+                    (n + step * (std::cos(angle) * t + std::sin(angle) * b)).normalized();
                 if (gap(candidate) > value) value = gap(candidate), n = candidate, moved = true;
             }
             if (!moved) step *= 0.5;
@@ -72,10 +75,10 @@ double brute_distance(const sim::Superquadric& s, const Eigen::Matrix3d& d, cons
 }
 
 const std::vector<sim::Superquadric> kShapes = {
-    {{0.18, 0.10, 0.18}, 0.1, 1.0},   {{0.25, 0.02, 0.25}, 0.1, 1.0}, {{0.1, 0.12, 0.1}, 1.0, 1.0},
-    {{0.2, 0.006, 0.2}, 1.0, 1.0},    {{0.3, 0.0025, 0.0025}, 1, 1},  {{0.3, 0.0025, 0.0025}, 0.1, 0.1},
-    {{0.2, 0.1, 0.15}, 0.1, 0.1},     {{0.15, 0.1, 0.15}, 0.5, 0.7},  {{0.15, 0.1, 0.12}, 1.5, 1.0},
-    {{0.15, 0.1, 0.15}, 1.9, 1.9},    {{0.15, 0.1, 0.15}, 0.1, 1.9},  {{0.15, 0.1, 0.15}, 1.9, 0.1},
+    {{0.18, 0.10, 0.18}, 0.1, 1.0}, {{0.25, 0.02, 0.25}, 0.1, 1.0}, {{0.1, 0.12, 0.1}, 1.0, 1.0},
+    {{0.2, 0.006, 0.2}, 1.0, 1.0},  {{0.3, 0.0025, 0.0025}, 1, 1},  {{0.3, 0.0025, 0.0025}, 0.1, 0.1},
+    {{0.2, 0.1, 0.15}, 0.1, 0.1},   {{0.15, 0.1, 0.15}, 0.5, 0.7},  {{0.15, 0.1, 0.12}, 1.5, 1.0},
+    {{0.15, 0.1, 0.15}, 1.9, 1.9},  {{0.15, 0.1, 0.15}, 0.1, 1.9},  {{0.15, 0.1, 0.15}, 1.9, 0.1},
 };
 
 TEST(ClosestPoint, OutsideDistanceAndItsCertificateAgreeToTenNanometresAndAtKinksToATenthOfAMillimetre) {
@@ -85,10 +88,13 @@ TEST(ClosestPoint, OutsideDistanceAndItsCertificateAgreeToTenNanometresAndAtKink
         double worst = 0;
         for (int i = 0; i < 3000; ++i) {
             const sim::Deformation d = random_deformation(rng, i % 3 ? 0.12 : 0);
-            const Vector3d surface = d.matrix * gauge.onto_surface(random_direction(rng).cwiseProduct(shape.semi_axes));
-            const Vector3d x = surface + std::uniform_real_distribution<double>(0, 0.1)(rng) * surface.normalized();
+            const Vector3d surface =
+                d.matrix * gauge.onto_surface(random_direction(rng).cwiseProduct(shape.semi_axes));
+            const Vector3d x =
+                surface + std::uniform_real_distribution<double>(0, 0.1)(rng) * surface.normalized();
             const sim::ClosestPoint p = sim::closest_point(gauge, d, x);
-            // Weak duality: |x - y| bounds the distance from above, n.x - h(n) from below, whatever y and n are.
+            // Weak duality: |x - y| bounds the distance from above, n.x - h(n) from below, whatever y and n
+            // are.
             worst = std::max(worst, p.distance - (p.normal.dot(x) - support(shape, d.matrix, p.normal)));
         }
         // Kinks (exponents above 1) converge linearly; a tenth of a millimetre is what contacts need.
@@ -105,7 +111,8 @@ TEST(ClosestPoint, UpToTenMillimetresInsideWithinATenthOfAMillimetreOfBruteForce
         double worst = 0;
         for (int i = 0; i < 60; ++i) {
             const sim::Deformation d = random_deformation(rng, i % 3 ? 0.1 : 0);
-            const Vector3d surface = d.matrix * gauge.onto_surface(random_direction(rng).cwiseProduct(shape.semi_axes));
+            const Vector3d surface =
+                d.matrix * gauge.onto_surface(random_direction(rng).cwiseProduct(shape.semi_axes));
             const double depth = std::uniform_real_distribution<double>(0, 0.012)(rng);
             const Vector3d x = surface * std::max(0.0, 1 - depth / surface.norm());
             const double brute = brute_distance(shape, d.matrix, x, directions);
@@ -123,7 +130,8 @@ TEST(ClosestPoint, NeverNanOnAxesPolesPlanesAndTheCentre) {
             const double at[] = {0, 1, -1, 0.5, 2};
             const Vector3d x = Vector3d(at[i % 5], at[i / 5 % 5], at[i / 25]).cwiseProduct(shape.semi_axes);
             const sim::ClosestPoint p = sim::closest_point(gauge, {}, x);
-            ASSERT_TRUE(std::isfinite(p.distance) && p.normal.allFinite() && p.point.allFinite()) << x.transpose();
+            ASSERT_TRUE(std::isfinite(p.distance) && p.normal.allFinite() && p.point.allFinite())
+                << x.transpose();
             ASSERT_NEAR(p.normal.norm(), 1, 1e-12);
         }
     }
@@ -136,7 +144,8 @@ TEST(ClosestPoint, SphereAndDeformedSphereMatchTheirClosedForms) {
         const Vector3d x = random_direction(rng) * std::uniform_real_distribution<double>(0.01, 0.3)(rng);
         const sim::ClosestPoint p = sim::closest_point(gauge, {}, x);
         EXPECT_NEAR(p.distance, x.norm() - 0.1, 1e-12);
-        EXPECT_LT((p.normal - x.normalized()).norm(), 1e-6);  // derivatives are linear within 1e-7 of a coordinate plane
+        EXPECT_LT((p.normal - x.normalized()).norm(),
+                  1e-6);  // derivatives are linear within 1e-7 of a coordinate plane
     }
 }
 

@@ -31,11 +31,14 @@ TEST(VolumeMoments, SphereAndEllipsoidMatchTheirClosedForms) {
 }
 
 TEST(VolumeMoments, SuperquadricsMatchACountOfCellsToAPercent) {
-    for (const auto& [e1, e2] : {std::pair(0.1, 1.0), {1.0, 1.0}, {0.1, 0.1}, {0.5, 1.5}, {1.9, 0.3}, {1.5, 1.5}}) {
+    for (const auto& [e1, e2] :
+         {std::pair(0.1, 1.0), {1.0, 1.0}, {0.1, 0.1}, {0.5, 1.5}, {1.9, 0.3}, {1.5, 1.5}}) {
         const sim::Gauge gauge({{0.2, 0.1, 0.3}, e1, e2});
         const sim::VolumeMoments exact = sim::volume_moments(gauge), count = counted(gauge, 80);
-        EXPECT_NEAR(exact.volume / count.volume, 1, 0.01) << e1 << ' ' << e2;  // cells cut by the surface: 1 in 80
-        for (int i = 0; i < 3; ++i) EXPECT_NEAR(exact.second[i] / count.second[i], 1, 0.015) << e1 << ' ' << e2;
+        EXPECT_NEAR(exact.volume / count.volume, 1, 0.01)
+            << e1 << ' ' << e2;  // cells cut by the surface: 1 in 80
+        for (int i = 0; i < 3; ++i)
+            EXPECT_NEAR(exact.second[i] / count.second[i], 1, 0.015) << e1 << ' ' << e2;
     }
 }
 
@@ -55,12 +58,14 @@ TEST(LinearBody, ShearAndDeviatoricModesOfACubeAreEqualAndTheDilationIsTheBulkMo
     const sim::Gauge gauge({Vector3d::Constant(0.5), 0.1, 0.1});
     const sim::LinearBody b = sim::make_linear_body(gauge, {e, nu, 600});
     const double v = sim::volume_moments(gauge).volume, j = b.moments.y();
-    // For a perfect cube V / J = 12 / (rho L^2), and this is 24 G / (rho L^2); the rounded cube has x and z alike, y by 1 % other.
+    // For a perfect cube V / J = 12 / (rho L^2), and this is 24 G / (rho L^2); the rounded cube has x and z
+    // alike, y by 1 % other.
     EXPECT_NEAR(b.omega[0] * b.omega[0] / (2 * g * v / j), 1, 0.01);
     EXPECT_NEAR(b.omega[1] * b.omega[1] / (2 * g * v / j), 1, 0.01);
     EXPECT_NEAR(b.omega[2] * b.omega[2] / ((3 * lambda + 2 * g) * v / j), 1, 0.01);
     for (int i = 3; i < 6; ++i) EXPECT_NEAR(b.omega[i] * b.omega[i] / (2 * g * v / j), 1, 0.01);
-    EXPECT_NEAR(b.omega[0] * b.omega[0] / (24 * g / 600), 1, 0.06);  // rounding at e = 0.1 lightens it by 2.6 %
+    EXPECT_NEAR(b.omega[0] * b.omega[0] / (24 * g / 600), 1,
+                0.06);  // rounding at e = 0.1 lightens it by 2.6 %
 }
 
 TEST(LinearBody, SphereHasTheClosedFormsFrequencies) {
@@ -83,7 +88,8 @@ TEST(LinearBody, BasisDiagonalisesMassAndStiffnessAndIsItsOwnInverse) {
 }
 
 TEST(LinearBody, DegenerateModesHaveACanonicalBasisThatATinyChangeOfAModulusDoesNotTurn) {
-    const sim::LinearBody a = body(Vector3d::Constant(0.2), 1, 1, 0.3), b = body(Vector3d::Constant(0.2), 1, 1, 0.3000001);
+    const sim::LinearBody a = body(Vector3d::Constant(0.2), 1, 1, 0.3),
+                          b = body(Vector3d::Constant(0.2), 1, 1, 0.3000001);
     EXPECT_LT((a.strain_from_modal - b.strain_from_modal).norm(), 1e-6 * a.strain_from_modal.norm());
 }
 

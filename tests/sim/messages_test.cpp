@@ -21,7 +21,13 @@ std::vector<sim::Message> samples() {
         body.step(request, answer.outcomes.back());
         assign.bodies.push_back({b, scenario.bodies()[b], body.record()});
     }
-    return {sim::Hello{42}, sim::Heartbeat{43}, sim::Welcome{44}, assign, sim::Step{9, 77, {0, 3, 4}, request}, answer, sim::Stop{},
+    return {sim::Hello{42},
+            sim::Heartbeat{43},
+            sim::Welcome{44},
+            assign,
+            sim::Step{9, 77, {0, 3, 4}, request},
+            answer,
+            sim::Stop{},
             sim::Failure{"a failure"}};
 }
 
@@ -42,7 +48,8 @@ TEST(Messages, ABodysStateRecordIs120Bytes) {
 
 TEST(Messages, ChecksumIsTheCommonCrc32) {
     const std::string text = "123456789";
-    EXPECT_EQ(sim::crc32({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}), 0xCBF43926u);  // its published check value
+    EXPECT_EQ(sim::crc32({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}),
+              0xCBF43926u);  // its published check value
 }
 
 void seal(std::vector<std::uint8_t>& bytes) {
@@ -57,11 +64,21 @@ void mutate(std::vector<std::uint8_t>& bytes, std::mt19937& rng) {
     for (unsigned n = 1 + rng() % 3; n > 0 && !bytes.empty(); --n) {
         const std::size_t at = rng() % bytes.size();
         switch (rng() % 5) {
-            case 0: bytes[at] ^= static_cast<std::uint8_t>(1u << rng() % 8); break;
-            case 1: bytes[at] = rng() % 2 ? 0xFF : 0x00; break;
-            case 2: bytes.resize(at); break;
-            case 3: bytes.insert(bytes.begin() + at, rng() % 9, static_cast<std::uint8_t>(rng())); break;
-            default: std::fill_n(bytes.begin() + at, std::min<std::size_t>(8, bytes.size() - at), static_cast<std::uint8_t>(rng()));
+            case 0:
+                bytes[at] ^= static_cast<std::uint8_t>(1u << rng() % 8);
+                break;
+            case 1:
+                bytes[at] = rng() % 2 ? 0xFF : 0x00;
+                break;
+            case 2:
+                bytes.resize(at);
+                break;
+            case 3:
+                bytes.insert(bytes.begin() + at, rng() % 9, static_cast<std::uint8_t>(rng()));
+                break;
+            default:
+                std::fill_n(bytes.begin() + at, std::min<std::size_t>(8, bytes.size() - at),
+                            static_cast<std::uint8_t>(rng()));
         }
     }
 }

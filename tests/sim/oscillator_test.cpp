@@ -23,7 +23,8 @@ State integrated(double omega, double sigma, double t, State s) {
     const auto rate = [&](State x) { return State{x.z_dot, -2 * sigma * x.z_dot - omega * omega * x.z}; };
     const auto plus = [](State x, double k, State y) { return State{x.z + k * y.z, x.z_dot + k * y.z_dot}; };
     for (int i = 0; i < n; ++i) {
-        const State a = rate(s), b = rate(plus(s, h / 2, a)), c = rate(plus(s, h / 2, b)), d = rate(plus(s, h, c));
+        const State a = rate(s), b = rate(plus(s, h / 2, a)), c = rate(plus(s, h / 2, b)),
+                    d = rate(plus(s, h, c));
         s = plus(plus(plus(plus(s, h / 6, a), h / 3, b), h / 3, c), h / 6, d);
     }
     return s;
@@ -40,7 +41,8 @@ TEST(Oscillator, UndampedEnergyHoldsToAPartInTenToTheTwelfthOver600StepsAtAnyOme
 
 TEST(Oscillator, UnderAtAndOverCriticalDampingMatchNumericalIntegration) {
     for (const double sigma : {0.0, 5.0, 19.9, 19.999999, 20.0, 20.000001, 20.1, 60.0}) {
-        const State exact = stepped(20, sigma, 0.25, 1, {0.4, -3}), numeric = integrated(20, sigma, 0.25, {0.4, -3});
+        const State exact = stepped(20, sigma, 0.25, 1, {0.4, -3}),
+                    numeric = integrated(20, sigma, 0.25, {0.4, -3});
         EXPECT_NEAR(exact.z, numeric.z, 1e-11) << sigma;  // RK4's own error is below 1e-12 here
         EXPECT_NEAR(exact.z_dot, numeric.z_dot, 1e-10) << sigma;
     }

@@ -15,7 +15,9 @@ using Eigen::Vector3d;
 const sim::Impulse kStrike{0, 0.0, Vector3d(0.09, 0.1, 0.02), Vector3d(0, -0.3, 0)};
 
 TEST(Simulation, ReferenceStrikeDisplacesTheStruckPointByItsShareOfTheSize) {
-    for (const sim::Superquadric& shape : {sim::Superquadric{{0.18, 0.1, 0.18}, 0.1, 1}, {{0.2, 0.006, 0.2}, 1, 1}, {{0.3, 0.0025, 0.0025}, 0.1, 1}}) {
+    for (const sim::Superquadric& shape : {sim::Superquadric{{0.18, 0.1, 0.18}, 0.1, 1},
+                                           {{0.2, 0.006, 0.2}, 1, 1},
+                                           {{0.3, 0.0025, 0.0025}, 0.1, 1}}) {
         sim::BodyDefinition body = sim_test::drum();
         body.shape = shape;
         const sim::BodyModel model(body);
@@ -38,11 +40,14 @@ TEST(Simulation, LowestModeHasTheVisibleFrequencyAndAllAreSixtyDecibelsDownAfter
     const sim::BodyModel model(sim_test::drum());
     EXPECT_NEAR(model.omega().head<6>().minCoeff() / (2 * M_PI), 6, 1e-12);
     EXPECT_NEAR(std::exp(-model.sigma()[0] * 0.6), 1e-3, 1e-15);
-    EXPECT_LT((model.omega().head<6>() / model.omega()[0] - model.linear().omega / model.linear().omega[0]).norm(), 1e-12);
+    EXPECT_LT(
+        (model.omega().head<6>() / model.omega()[0] - model.linear().omega / model.linear().omega[0]).norm(),
+        1e-12);
 }
 
 TEST(Simulation, PictureStateIsTheFoldedStatesMotionPlusWeightedResponses) {
-    const auto once = sim::make_local_simulation({sim_test::drum()}), apart = sim::make_local_simulation({sim_test::drum()});
+    const auto once = sim::make_local_simulation({sim_test::drum()}),
+               apart = sim::make_local_simulation({sim_test::drum()});
     sim::Impulse second = kStrike;
     second.t_s = 0.013;
     second.point_body.x() = -0.05;
@@ -58,11 +63,13 @@ TEST(Simulation, ImpulsesOfTheFutureDoNotShowInAPicture) {
     const auto simulation = sim::make_local_simulation({sim_test::drum()});
     sim::Impulse later = kStrike;
     later.t_s = 0.06;
-    EXPECT_EQ(simulation->step({0.02, {}, {}, {}, {{0.05, {{later, 1}}}}}).pictures[0][0].q, sim::Vector6d::Zero());
+    EXPECT_EQ(simulation->step({0.02, {}, {}, {}, {{0.05, {{later, 1}}}}}).pictures[0][0].q,
+              sim::Vector6d::Zero());
 }
 
 TEST(Simulation, ManySmallStepsEqualOneLongStepToRounding) {
-    const auto small = sim::make_local_simulation({sim_test::bell(Vector3d::Zero())}), large = sim::make_local_simulation({sim_test::bell(Vector3d::Zero())});
+    const auto small = sim::make_local_simulation({sim_test::bell(Vector3d::Zero())}),
+               large = sim::make_local_simulation({sim_test::bell(Vector3d::Zero())});
     (void)small->step({0, {kStrike}, {}, {}, {}});
     (void)large->step({0, {kStrike}, {}, {}, {}});
     sim::ModalState s;
@@ -76,19 +83,27 @@ TEST(Simulation, ManySmallStepsEqualOneLongStepToRounding) {
 TEST(Simulation, AHundredViolentStrikesLeaveTheDeformationInvertibleAndFinite) {
     std::mt19937 rng(5);
     std::uniform_real_distribution<double> unit(-1, 1);
-    for (const sim::BodyDefinition& body : {sim_test::drum(), sim_test::bell(Vector3d::Zero()), sim_test::string_body(Vector3d::Zero())}) {
+    for (const sim::BodyDefinition& body :
+         {sim_test::drum(), sim_test::bell(Vector3d::Zero()), sim_test::string_body(Vector3d::Zero())}) {
         const auto simulation = sim::make_local_simulation({body});
         for (int i = 0; i < 100; ++i) {
             const Vector3d r = Vector3d(unit(rng), unit(rng), unit(rng)).cwiseProduct(body.shape.semi_axes);
             const double t = 0.002 * i;
-            const sim::StepRequest request{t, {{0, t, r, Vector3d(unit(rng), unit(rng), unit(rng)) * 100}}, {},
-                                           {sim_test::path_through(Vector3d::Zero(), Vector3d(0, -5, 0), Vector3d::Zero(), t)}, {}};
+            const sim::StepRequest request{
+                t,
+                {{0, t, r, Vector3d(unit(rng), unit(rng), unit(rng)) * 100}},
+                {},
+                {sim_test::path_through(Vector3d::Zero(), Vector3d(0, -5, 0), Vector3d::Zero(), t)},
+                {}};
             const sim::StepReply reply = simulation->step(request);
-            const Eigen::Matrix4d m = body.world_from_body.inverse().matrix() * sim::body_matrix(body, reply.states[0]);
+            const Eigen::Matrix4d m =
+                body.world_from_body.inverse().matrix() * sim::body_matrix(body, reply.states[0]);
             ASSERT_TRUE(m.allFinite());
             const Eigen::Matrix3d square = m.topLeftCorner<3, 3>().transpose() * m.topLeftCorner<3, 3>();
-            ASSERT_GE(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(square).eigenvalues()[0], 0.3 * 0.3 - 1e-9);
-            for (const sim::Contact& c : reply.contacts) ASSERT_TRUE(std::isfinite(c.speed_mps) && c.point_world.allFinite());
+            ASSERT_GE(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(square).eigenvalues()[0],
+                      0.3 * 0.3 - 1e-9);
+            for (const sim::Contact& c : reply.contacts)
+                ASSERT_TRUE(std::isfinite(c.speed_mps) && c.point_world.allFinite());
         }
     }
 }
@@ -104,13 +119,19 @@ TEST(Simulation, BodyMatrixAtRestIsTheBodysPlaceAndTheHingeKeepsItsPivot) {
 
 TEST(Simulation, ConfirmedImpulsesAreFeltByContactsFromTheirTimeOn) {
     const auto simulation = sim::make_local_simulation({sim_test::drum()});
-    sim::StepRequest request{0, {}, {}, {sim_test::path_through(Vector3d(0, 0.1, 0), Vector3d(0, -5, 0), Vector3d::Zero(), 0)}, {}};
+    sim::StepRequest request{
+        0,
+        {},
+        {},
+        {sim_test::path_through(Vector3d(0, 0.1, 0), Vector3d(0, -5, 0), Vector3d::Zero(), 0)},
+        {}};
     const sim::Contact at_rest = simulation->step(request).contacts.at(0);
     request.confirmed = {{0, 0.06, Vector3d(0, 0.1, 0), Vector3d(0, -0.5, 0)}};
-    EXPECT_NEAR(simulation->step(request).contacts.at(0).t_s, at_rest.t_s, 1e-7);  // a contact's stated precision
+    EXPECT_NEAR(simulation->step(request).contacts.at(0).t_s, at_rest.t_s,
+                1e-7);  // a contact's stated precision
     request.confirmed[0].t_s = 0.005;
     const sim::Contact moving = simulation->step(request).contacts.at(0);
-    EXPECT_GT(moving.t_s, at_rest.t_s + 1e-4);     // the head has gone down
+    EXPECT_GT(moving.t_s, at_rest.t_s + 1e-4);  // the head has gone down
     EXPECT_NE(moving.speed_mps, at_rest.speed_mps);
     EXPECT_EQ(simulation->step({0.1, {}, {}, {}, {}}).states[0].q, sim::Vector6d::Zero());  // never folded
 }
@@ -131,7 +152,8 @@ TEST(Simulation, BadDefinitionsAndRequestsAreRejectedWithTheValueFound) {
     const auto simulation = sim::make_local_simulation({sim_test::drum()});
     (void)simulation->step({1, {}, {}, {}, {}});
     EXPECT_THROW((void)simulation->step({0.5, {}, {}, {}, {}}), std::invalid_argument);
-    EXPECT_THROW((void)simulation->step({2, {{7, 1, Vector3d::Zero(), Vector3d::Zero()}}, {}, {}, {}}), std::invalid_argument);
+    EXPECT_THROW((void)simulation->step({2, {{7, 1, Vector3d::Zero(), Vector3d::Zero()}}, {}, {}, {}}),
+                 std::invalid_argument);
     EXPECT_THROW((void)simulation->step({2, {}, {}, {{0, 0.006, {}}}, {}}), std::invalid_argument);
     EXPECT_THROW((void)simulation->step({std::nan(""), {}, {}, {}, {}}), std::invalid_argument);
 }

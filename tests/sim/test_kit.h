@@ -22,7 +22,8 @@ inline sim::BodyDefinition bell(const Eigen::Vector3d& at) {
     body.shape = {{0.08, 0.1, 0.08}, 1, 1};
     body.material = {1e9, 0.3, 900};
     body.stand = {true, Eigen::Vector3d(0, 0.15, 0), Eigen::Vector3d::UnitX(), 1.2, 0.1};
-    body.world_from_body = Eigen::Translation3d(at) * Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized());
+    body.world_from_body =
+        Eigen::Translation3d(at) * Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized());
     body.zones = {{"all", 0, 2, -2, 2}};
     return body;
 }
@@ -52,12 +53,14 @@ inline sim::TipPath path_through(const Eigen::Vector3d& target, const Eigen::Vec
     sim::TipPath path;
     for (int k = 0; k < 8; ++k) {
         const double h = k / 15.0 / 7, s = h - 1 / 30.0;
-        path.nodes.push_back({t0 + h, target + s * velocity + 0.5 * s * s * acceleration, velocity + s * acceleration});
+        path.nodes.push_back(
+            {t0 + h, target + s * velocity + 0.5 * s * s * acceleration, velocity + s * acceleration});
     }
     return path;
 }
 
-/// A reproducible run of strokes: each step sweeps two paths; contacts found are felt at once, folded later, drawn meanwhile.
+/// A reproducible run of strokes: each step sweeps two paths; contacts found are felt at once, folded later,
+/// drawn meanwhile.
 class Scenario {
 public:
     explicit Scenario(unsigned seed) : rng_(seed), bodies_(kit()) {}
@@ -73,19 +76,23 @@ public:
         std::erase_if(known_, [this](const sim::Impulse& impulse) { return impulse.t_s <= t_ - 0.02; });
         for (std::uint32_t stick = 0; stick < 2; ++stick) {
             const auto& body = bodies_[rng_() % bodies_.size()];
-            const Eigen::Vector3d target = body.world_from_body.translation() + Eigen::Vector3d(unit() * 0.1, unit() * 0.15, unit() * 0.1);
-            request.paths.push_back(path_through(target, Eigen::Vector3d(2 * unit(), -5 + 3 * unit(), 2 * unit()),
+            const Eigen::Vector3d target = body.world_from_body.translation() +
+                                           Eigen::Vector3d(unit() * 0.1, unit() * 0.15, unit() * 0.1);
+            request.paths.push_back(path_through(target,
+                                                 Eigen::Vector3d(2 * unit(), -5 + 3 * unit(), 2 * unit()),
                                                  Eigen::Vector3d(0, 200 * unit(), 0), t_));
             request.paths.back().stick = stick;
         }
         sim::PictureRequest picture{t_ + 1.0 / 30, {}};
-        for (const sim::Impulse& impulse : request.confirmed) picture.provisional.push_back({impulse, 0.5 + 0.5 * unit()});
+        for (const sim::Impulse& impulse : request.confirmed)
+            picture.provisional.push_back({impulse, 0.5 + 0.5 * unit()});
         request.pictures = {picture, {t_ + 0.01, {}}};
         return request;
     }
     void learn(const sim::StepReply& reply) {
         for (const sim::Contact& c : reply.contacts) {
-            if (!c.starts_inside && c.speed_mps > 0.2) known_.push_back({c.body, c.t_s, c.point_body, c.impulse_body});
+            if (!c.starts_inside && c.speed_mps > 0.2)
+                known_.push_back({c.body, c.t_s, c.point_body, c.impulse_body});
         }
     }
 

@@ -24,7 +24,9 @@ struct Swept {
 /// A body at rest to sweep many paths against.
 class Resting {
 public:
-    explicit Resting(const sim::BodyDefinition& body) : model_(body), motion_(model_) { motion_.start(0, {}); }
+    explicit Resting(const sim::BodyDefinition& body) : model_(body), motion_(model_) {
+        motion_.start(0, {});
+    }
 
     [[nodiscard]] Swept sweep(const sim::TipPath& path) const {
         Swept swept;
@@ -38,7 +40,8 @@ private:
 };
 
 TEST(TipSweep, TwentyThousandStrokesThroughADrumHeadMatchTheClosedFormNoneMissedNoneDoubled) {
-    // Parabolas y(t) = y0 - v t + g t^2 / 2 over the inner head, whose plane is y = b to 2e-6 m: solve the quadratic.
+    // Parabolas y(t) = y0 - v t + g t^2 / 2 over the inner head, whose plane is y = b to 2e-6 m: solve the
+    // quadratic.
     const Resting drum(sim_test::drum(Vector3d(0.3, 0.8, -0.2)));
     const double height = 0.8 + 0.1 + 0.006;
     std::mt19937 rng(11);
@@ -47,8 +50,9 @@ TEST(TipSweep, TwentyThousandStrokesThroughADrumHeadMatchTheClosedFormNoneMissed
     for (int i = 0; i < 20000; ++i) {
         const double v = 0.5 + 11.5 * unit(rng), y0 = 0.004 + 0.2 * unit(rng), g = 400 * unit(rng);
         const double turn = std::min(v / g, 1 / 15.0), lowest = y0 - v * turn + g * turn * turn / 2;
-        if (std::abs(y0 - v * v / (2 * g)) < 0.001) continue;  // a graze of under 1 mm may be missed, by contract
-        if (lowest < -0.15) continue;                          // would leave by the underside
+        if (std::abs(y0 - v * v / (2 * g)) < 0.001)
+            continue;                  // a graze of under 1 mm may be missed, by contract
+        if (lowest < -0.15) continue;  // would leave by the underside
         const Vector3d start(0.3 + 0.06 * (unit(rng) - 0.5), height, -0.2 + 0.06 * (unit(rng) - 0.5));
         const Vector3d along(0.5 * (unit(rng) - 0.5), 0, 0.5 * (unit(rng) - 0.5));
         sim::TipPath path;
@@ -57,7 +61,8 @@ TEST(TipSweep, TwentyThousandStrokesThroughADrumHeadMatchTheClosedFormNoneMissed
             path.nodes.push_back({1 + t, start + t * along + Vector3d(0, y0 - v * t + g * t * t / 2, 0),
                                   along + Vector3d(0, -v + g * t, 0)});
         }
-        const double root = v * v > 2 * g * y0 ? 2 * y0 / (v + std::sqrt(v * v - 2 * g * y0)) : 1;  // stable form of the quadratic's first root
+        const double root = v * v > 2 * g * y0 ? 2 * y0 / (v + std::sqrt(v * v - 2 * g * y0))
+                                               : 1;  // stable form of the quadratic's first root
         const Swept swept = drum.sweep(path);
         EXPECT_NEAR(swept.clearance, y0, 1e-5);
         if (root < 1 / 15.0) {
@@ -86,7 +91,8 @@ TEST(TipSweep, SphereAtRestIsEnteredWithinAHundredNanosecondsOfTheClosedForm) {
     for (int i = 0; i < 5000; ++i) {
         const Vector3d from = Vector3d(unit(rng), unit(rng), unit(rng)).normalized() * 0.4;
         const Vector3d velocity = (0.14 * Vector3d(unit(rng), unit(rng), unit(rng)) - from) / 0.05;
-        const double r = 0.106, b = from.dot(velocity), a = velocity.squaredNorm(), c = from.squaredNorm() - r * r;
+        const double r = 0.106, b = from.dot(velocity), a = velocity.squaredNorm(),
+                     c = from.squaredNorm() - r * r;
         const double closest = std::sqrt(std::max(0.0, from.squaredNorm() - b * b / a));
         if (std::abs(closest - r) < 0.001) continue;
         const Swept swept = target.sweep(line(from, velocity, 0.1));
@@ -102,7 +108,8 @@ TEST(TipSweep, AFiveMillimetreStringIsNeverTunnelledAtTwentyMetresASecond) {
     std::mt19937 rng(13);
     std::uniform_real_distribution<double> unit(-1, 1);
     for (int i = 0; i < 5000; ++i) {
-        sim::TipPath path = line(Vector3d(0.25 * unit(rng), 0.6 + 0.3 * unit(rng), 0.001 * unit(rng)), Vector3d(0, -20, 0), 1 / 15.0);
+        sim::TipPath path = line(Vector3d(0.25 * unit(rng), 0.6 + 0.3 * unit(rng), 0.001 * unit(rng)),
+                                 Vector3d(0, -20, 0), 1 / 15.0);
         path.tip_radius_m = 0.0005;
         const bool through = path.nodes[1].position.y() < -0.01;
         ASSERT_EQ(string.sweep(path).contacts.size(), through ? 1u : 0u);
@@ -114,7 +121,8 @@ TEST(TipSweep, ASecondCrossingCountsOnlyAfterThreeMillimetresOutside) {
     const auto bounce = [&](double height) {  // in, out to `height`, in again; turning points at the nodes
         sim::TipPath path;
         const double y[] = {0.05, -0.004, height, -0.004, 0.05};
-        for (int k = 0; k < 5; ++k) path.nodes.push_back({0.01 * k, Vector3d(0, 0.106 + y[k], 0), Vector3d::Zero()});
+        for (int k = 0; k < 5; ++k)
+            path.nodes.push_back({0.01 * k, Vector3d(0, 0.106 + y[k], 0), Vector3d::Zero()});
         return drum.sweep(path).contacts.size();
     };
     EXPECT_EQ(bounce(0.002), 1u);
@@ -125,7 +133,8 @@ TEST(TipSweep, ATipThatStartsInsideIsReportedWithItsDepthAndMayStrikeAfterLeavin
     const Resting drum(sim_test::drum());
     sim::TipPath path;
     const double y[] = {-0.005, 0.02, -0.005};
-    for (int k = 0; k < 3; ++k) path.nodes.push_back({0.02 * k, Vector3d(0, 0.106 + y[k], 0), Vector3d(0, k == 0 ? 1 : 0, 0)});
+    for (int k = 0; k < 3; ++k)
+        path.nodes.push_back({0.02 * k, Vector3d(0, 0.106 + y[k], 0), Vector3d(0, k == 0 ? 1 : 0, 0)});
     const Swept swept = drum.sweep(path);
     ASSERT_EQ(swept.contacts.size(), 2u);
     EXPECT_TRUE(swept.contacts[0].starts_inside);
@@ -149,17 +158,22 @@ TEST(TipSweep, AMovingBodysCrossingIsWhereAFineScanOfTheSameMotionFindsIt) {
         for (int i = 0; i < 30; ++i) {
             const Vector3d target(0.05 * unit(rng), 0.05 * unit(rng), 0.05 * unit(rng));
             const Vector3d velocity(unit(rng), -3 + unit(rng), unit(rng));
-            const sim::TipPath path = sim_test::path_through(target, velocity, Vector3d(0, 60 * unit(rng), 0), 0.01);
+            const sim::TipPath path =
+                sim_test::path_through(target, velocity, Vector3d(0, 60 * unit(rng), 0), 0.01);
             std::vector<sim::Contact> contacts;
             const double clearance = sim::TipSweep(model, motion).sweep(path, 0, contacts);
-            const auto distance = [&](double t) {  // straight from the definitions: pose, inverse, closest point
-                const sim::BodyPose pose = motion.pose_at(t);
-                const double s = t - 0.01 - 1 / 30.0;
-                const Vector3d x = target + s * velocity + 0.5 * s * s * (path.nodes[1].velocity - path.nodes[0].velocity) * 105;
-                const Vector3d& pivot = body.stand.pivot_body;
-                const Vector3d local = pose.hinge.transpose() * (body.world_from_body.inverse() * x - pivot) + pivot;
-                return sim::closest_point(model.gauge(), pose.deformation, local).distance - path.tip_radius_m;
-            };
+            const auto distance =
+                [&](double t) {  // straight from the definitions: pose, inverse, closest point
+                    const sim::BodyPose pose = motion.pose_at(t);
+                    const double s = t - 0.01 - 1 / 30.0;
+                    const Vector3d x = target + s * velocity +
+                                       0.5 * s * s * (path.nodes[1].velocity - path.nodes[0].velocity) * 105;
+                    const Vector3d& pivot = body.stand.pivot_body;
+                    const Vector3d local =
+                        pose.hinge.transpose() * (body.world_from_body.inverse() * x - pivot) + pivot;
+                    return sim::closest_point(model.gauge(), pose.deformation, local).distance -
+                           path.tip_radius_m;
+                };
             EXPECT_NEAR(distance(0.01), clearance, 1e-9);
             double first = -1;
             for (double t = 0.01; t < 0.01 + 1 / 15.0 - 5e-5 && first < 0; t += 5e-5) {

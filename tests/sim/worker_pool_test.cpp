@@ -1,3 +1,5 @@
+#include "worker_pool.h"
+
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -12,7 +14,6 @@
 
 #include "messages.h"
 #include "test_kit.h"
-#include "worker_pool.h"
 
 namespace {
 
@@ -35,10 +36,14 @@ std::string option(const std::vector<std::string>& words, const std::string& nam
 }
 
 sim::WorkerLaunch run_test(const std::string& test, int count) {
-    return {fs::read_symlink("/proc/self/exe"), {"--gtest_filter=" + test, "--gtest_also_run_disabled_tests"}, count};
+    return {fs::read_symlink("/proc/self/exe"),
+            {"--gtest_filter=" + test, "--gtest_also_run_disabled_tests"},
+            count};
 }
 
-sim::WorkerLaunch workers(int count) { return run_test("WorkerProcess.DISABLED_Serves", count); }
+sim::WorkerLaunch workers(int count) {
+    return run_test("WorkerProcess.DISABLED_Serves", count);
+}
 
 // The program that the tests start as a worker; the disabled test is never run by itself.
 TEST(WorkerProcess, DISABLED_Serves) {
@@ -66,9 +71,11 @@ std::vector<pid_t> children_of(pid_t parent) {
 // The exact bits of a reply: what travels in an answer, in order.
 std::vector<std::uint8_t> bits(const sim::StepReply& reply) {
     sim::ByteWriter out;
-    for (const sim::ModalState& s : reply.states) out.matrix(s.q), out.matrix(s.q_dot), out.number(s.swing), out.number(s.swing_dot);
+    for (const sim::ModalState& s : reply.states)
+        out.matrix(s.q), out.matrix(s.q_dot), out.number(s.swing), out.number(s.swing_dot);
     for (const auto& picture : reply.pictures) {
-        for (const sim::ModalState& s : picture) out.matrix(s.q), out.matrix(s.q_dot), out.number(s.swing), out.number(s.swing_dot);
+        for (const sim::ModalState& s : picture)
+            out.matrix(s.q), out.matrix(s.q_dot), out.number(s.swing), out.number(s.swing_dot);
     }
     for (const double c : reply.clearance_m) out.number(c);
     for (const sim::Contact& c : reply.contacts) {
@@ -79,7 +86,8 @@ std::vector<std::uint8_t> bits(const sim::StepReply& reply) {
     return out.bytes();
 }
 
-// Runs the scenario on `simulation` and on a local one; fails at the first step whose bits differ. `before` runs before each step.
+// Runs the scenario on `simulation` and on a local one; fails at the first step whose bits differ. `before`
+// runs before each step.
 template <typename Before>
 void expect_same_bits(sim::Simulation& simulation, Scenario& scenario, int steps, Before before) {
     const auto local = sim::make_local_simulation(scenario.bodies());
@@ -116,11 +124,13 @@ TEST(WorkerPool, KilledWorkersAreReplacedWithTheSameBitsDownToNone) {
         if (std::find(std::begin(at), std::end(at), i) == std::end(at)) return;
         const std::vector<pid_t> left = children_of(getpid());
         const pid_t victim = left[rng() % left.size()];
-        const auto delay = std::chrono::microseconds(rng() % 400);  // anywhere in the step that follows, whichever it is
+        const auto delay =
+            std::chrono::microseconds(rng() % 400);  // anywhere in the step that follows, whichever it is
         killers.emplace_back([=] { std::this_thread::sleep_for(delay), ::kill(victim, SIGKILL); });
     });
     EXPECT_EQ(pool->report().lost, 3);
-    EXPECT_GE(pool->report().bodies_reowned, 10);  // each of ten bodies at least once, when the last worker goes
+    EXPECT_GE(pool->report().bodies_reowned,
+              10);  // each of ten bodies at least once, when the last worker goes
 }
 
 TEST(WorkerPool, AStoppedWorkerIsReplacedWithTheSameBits) {
@@ -136,7 +146,8 @@ TEST(WorkerPool, AStoppedWorkerIsReplacedWithTheSameBits) {
 TEST(WorkerPool, GarbageAndForgedMessagesToItsSocketDoNoHarm) {
     Scenario scenario(10);
     const auto pool = sim::make_distributed_simulation(scenario.bodies(), workers(2));
-    const std::string endpoint = option(command_line("/proc/" + std::to_string(children_of(getpid()).front())), "--connect");
+    const std::string endpoint =
+        option(command_line("/proc/" + std::to_string(children_of(getpid()).front())), "--connect");
     zmq::context_t context;
     zmq::socket_t stranger(context, zmq::socket_type::dealer);
     stranger.set(zmq::sockopt::linger, 0);
@@ -146,8 +157,9 @@ TEST(WorkerPool, GarbageAndForgedMessagesToItsSocketDoNoHarm) {
         std::vector<std::uint8_t> noise(rng() % 300);
         for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(rng());
         stranger.send(zmq::buffer(noise), i % 3 ? zmq::send_flags::none : zmq::send_flags::sndmore);
-        for (const sim::Message& forged : {sim::Message(sim::Hello{static_cast<std::uint32_t>(getpid())}), sim::Message(sim::Stop{}),
-                                           sim::Message(sim::Answer{1, static_cast<std::uint64_t>(i), {}})}) {
+        for (const sim::Message& forged :
+             {sim::Message(sim::Hello{static_cast<std::uint32_t>(getpid())}), sim::Message(sim::Stop{}),
+              sim::Message(sim::Answer{1, static_cast<std::uint64_t>(i), {}})}) {
             stranger.send(zmq::buffer(sim::encode(forged)), zmq::send_flags::none);
         }
     });
@@ -162,7 +174,8 @@ TEST(WorkerPool, AProgramThatIsMissingOrEndsAtOnceIsAnErrorAndLeavesNoFolder) {
     EXPECT_THROW(launch("/bin/false"), std::runtime_error);
 }
 
-// Waits for what another process is to bring about; the limit is the stated one with room for a loaded machine.
+// Waits for what another process is to bring about; the limit is the stated one with room for a loaded
+// machine.
 template <typename Condition>
 bool comes_true(Condition condition) {
     for (int i = 0; i < 1000; ++i) {
@@ -176,7 +189,9 @@ TEST(WorkerPool, AtItsEndWorkersAndFolderAreGone) {
     auto pool = sim::make_distributed_simulation(sim_test::kit(), workers(2));
     const std::vector<pid_t> ids = children_of(getpid());
     ASSERT_EQ(ids.size(), 2u);
-    const fs::path folder = fs::path(option(command_line("/proc/" + std::to_string(ids[0])), "--connect").substr(6)).parent_path();
+    const fs::path folder =
+        fs::path(option(command_line("/proc/" + std::to_string(ids[0])), "--connect").substr(6))
+            .parent_path();
     EXPECT_EQ(fs::status(folder).permissions(), fs::perms::owner_all);
     pool.reset();
     EXPECT_TRUE(children_of(getpid()).empty());
@@ -195,11 +210,15 @@ TEST(WorkerPool, WorkersEndAndRemoveTheFolderWhenTheirApplicationIsKilled) {
     fs::path folder;
     ASSERT_TRUE(comes_true([&] {
         ids = children_of(static_cast<pid_t>(application.id()));
-        if (ids.size() == 2) folder = fs::path(option(command_line("/proc/" + std::to_string(ids[0])), "--connect").substr(6)).parent_path();
+        if (ids.size() == 2)
+            folder = fs::path(option(command_line("/proc/" + std::to_string(ids[0])), "--connect").substr(6))
+                         .parent_path();
         return ids.size() == 2 && fs::exists(folder / "workers");
     }));
     application.kill();
-    const auto ended = [](pid_t id) { return command_line("/proc/" + std::to_string(id)).empty(); };  // gone, or a zombie of init's
+    const auto ended = [](pid_t id) {
+        return command_line("/proc/" + std::to_string(id)).empty();
+    };  // gone, or a zombie of init's
     EXPECT_TRUE(comes_true([&] { return std::all_of(ids.begin(), ids.end(), ended); }));
     EXPECT_TRUE(comes_true([&] { return !fs::exists(folder); }));
 }

@@ -31,9 +31,9 @@ struct SceneObject {
 };
 
 struct Camera {
-    Eigen::Vector3f eye = Eigen::Vector3f(0, 1.6f, 1.6f);  ///< [m], world
-    Eigen::Vector3f target = Eigen::Vector3f(0, 0.8f, -0.3f);
-    float vertical_fov_deg = 45;
+    Eigen::Vector3f eye = Eigen::Vector3f(0, 1.5f, 1.55f);  ///< [m], world
+    Eigen::Vector3f target = Eigen::Vector3f(0, 0.68f, -0.25f);
+    float vertical_fov_deg = 42;
 };
 
 struct Room {
