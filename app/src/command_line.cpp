@@ -51,7 +51,9 @@ int run(int argc, char** argv) {
     } catch (const CLI::CallForVersion& version) {
         return program.exit(version);
     } catch (const CLI::ParseError& wrong) {
-        return complain(fmt::format("error: found bad usage ({}), expected what `musicworld --help` tells", wrong.what()),
+        const std::string typed = fmt::format("musicworld {}", fmt::join(argv + 1, argv + argc, " "));
+        return complain(fmt::format("error: found bad usage in `{}` ({}), expected what `musicworld --help` tells", typed,
+                                    wrong.what()),
                         kBadInput);
     }
     return status;

@@ -1,5 +1,6 @@
 #include "kit.h"
 
+#include <audio/orchestra.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -22,6 +23,7 @@ constexpr double kRoomM = 100;  // everything of a kit lies within this of the o
 struct Layers {
     std::vector<toml::table> tables;
     std::vector<fs::path> files;
+    std::vector<audio::Instrument> sounds;  ///< of the orchestra
 
     [[nodiscard]] std::vector<const toml::table*> at(const std::string& key, const std::string& inner = {}) const {
         std::vector<const toml::table*> found;
@@ -175,15 +177,26 @@ fs::path read_mesh(TomlReader& reader, const std::string& fallback, const Kit& k
                 fmt::format("a file beside {} or among the bundled meshes", kit.file.filename().string()));
 }
 
-audio::Voice read_voice(TomlReader reader, const Instrument& instrument) {
+audio::Voice read_voice(TomlReader reader, const Instrument& instrument, const std::vector<audio::Instrument>& sounds) {
     audio::Voice voice;
     voice.name = instrument.name;
     voice.instrument = reader.text("instrument", instrument.kind);
     voice.gain_db = reader.number("gain_db", -60, 20, 0);
     const double x = instrument.body.world_from_body.translation().x();
     voice.pan = reader.number("pan", 0, 1, std::clamp(0.5 + 0.5 * x, 0.08, 0.92));
-    voice.parameters = reader.remaining_numbers();
-    return voice;
+    std::string known;
+    for (const audio::Instrument& sound : sounds) {
+        known += (known.empty() ? "" : ", ") + sound.name;
+        if (sound.name != voice.instrument) continue;
+        for (const audio::Parameter& p : sound.parameters) {
+            const bool given = reader.has(p.name);
+            const double value = reader.number(p.name, p.minimum, p.maximum, p.fallback);
+            if (given) voice.parameters.emplace_back(p.name, value);
+        }
+        reader.done();
+        return voice;
+    }
+    reader.fail("instrument", fmt::format("instrument = \"{}\"", voice.instrument), fmt::format("one of {}", known));
 }
 
 Instrument read_instrument(const toml::table& table, const Layers& layers, const Kit& kit) {
@@ -215,7 +228,7 @@ Instrument read_instrument(const toml::table& table, const Layers& layers, const
 
     instrument.mesh = read_mesh(reader, instrument.kind + ".obj", kit);
     read_look(reader.table("look"), instrument.look);
-    instrument.voice = read_voice(reader.table("sound"), instrument);
+    instrument.voice = read_voice(reader.table("sound"), instrument, layers.sounds);
     instrument.voice.choke_group = reader.text("choke_group", "");
     instrument.velocity_gamma = reader.number("velocity_curve", 0.2, 5, 1);
     reader.done();
@@ -282,6 +295,7 @@ Kit read_kit(const fs::path& file) {
     load(layers, file);
     load(layers, assets_folder() / "kits" / "defaults.toml");
     check_top_level(layers);
+    layers.sounds = audio::read_instruments(assets_folder() / "orchestra" / "musicworld.orc");
 
     Kit kit;
     kit.file = file;

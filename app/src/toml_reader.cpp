@@ -189,17 +189,6 @@ std::vector<std::string> TomlReader::texts(std::string_view key) {
     return result;
 }
 
-std::vector<std::pair<std::string, double>> TomlReader::remaining_numbers() {
-    std::vector<std::pair<std::string, double>> result;
-    for (const toml::table* layer : layers_)
-        for (const auto& [key, node] : *layer) {
-            const std::string name(key.str());
-            if (std::find(read_.begin(), read_.end(), name) != read_.end()) continue;
-            result.emplace_back(name, number(name, -1e9, 1e9));
-        }
-    return result;
-}
-
 void TomlReader::done() const {
     for (const toml::table* layer : layers_)
         for (const auto& [key, node] : *layer)

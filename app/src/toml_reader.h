@@ -32,8 +32,6 @@ public:
     [[nodiscard]] TomlReader table(std::string_view key);
     [[nodiscard]] std::vector<TomlReader> tables(std::string_view key);
     [[nodiscard]] std::vector<std::string> texts(std::string_view key);
-    /// All remaining keys that hold numbers, as name and value.
-    [[nodiscard]] std::vector<std::pair<std::string, double>> remaining_numbers();
 
     /// Refuses keys that were not read.
     void done() const;

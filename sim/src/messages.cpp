@@ -31,9 +31,7 @@ void write_body(ByteWriter& out, const Hello& m) {
 void write_body(ByteWriter& out, const Heartbeat& m) {
     out.number(m.process);
 }
-void write_body(ByteWriter& out, const Welcome& m) {
-    out.number(m.process);
-}
+void write_body(ByteWriter&, const Welcome&) {}
 void write_body(ByteWriter&, const Stop&) {}
 void write_body(ByteWriter& out, const Failure& m) {
     out.text(m.text);
@@ -108,7 +106,7 @@ Message read_body(std::uint16_t type, ByteReader& in) {
         case 2:
             return Heartbeat{in.number<std::uint32_t>()};
         case 3:
-            return Welcome{in.number<std::uint32_t>()};
+            return Welcome{};
         case 4:
             return read_assign(in);
         case 5:

@@ -25,7 +25,7 @@ namespace sim {
 //
 //   1 hello      worker   u32 process id
 //   2 heartbeat  worker   u32 process id
-//   3 welcome    app      u32 process id of the application
+//   3 welcome    app      nothing; answers a hello
 //   4 assign     app      u32 epoch, list of {definition, record, u8 stepped, f64 t_s}
 //   5 step       app      u32 epoch, u64 step, list of u32 body, request
 //   6 answer     worker   u32 epoch, u64 step, list of {record, list of v6 picture, list of f64 clearance,
@@ -54,9 +54,7 @@ struct Hello {
 struct Heartbeat {
     std::uint32_t process;
 };
-struct Welcome {
-    std::uint32_t process;
-};
+struct Welcome {};
 struct Assignment {
     std::uint32_t body;
     BodyDefinition definition;

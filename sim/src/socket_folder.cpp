@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
 #include <cstdlib>
 #include <cstring>
 #include <stdexcept>
@@ -18,9 +19,9 @@ constexpr std::size_t kLongestPath = 99;  // a Unix socket's path has 107 charac
 
 SocketFolder::SocketFolder() {
     const char* wanted = std::getenv("TMPDIR");
-    std::string pattern = std::string(wanted && *wanted ? wanted : "/tmp") + kPrefix + "XXXXXX";
-    if (pattern.size() + std::strlen(kSocket) > kLongestPath)
-        pattern = std::string("/tmp") + kPrefix + "XXXXXX";
+    const std::string name = kPrefix + std::to_string(getpid()) + "-XXXXXX";
+    std::string pattern = (wanted && *wanted ? wanted : "/tmp") + name;
+    if (pattern.size() + std::strlen(kSocket) > kLongestPath) pattern = "/tmp" + name;
     if (!mkdtemp(pattern.data())) {
         throw std::runtime_error("cannot make a folder " + pattern +
                                  " for the workers' socket: " + std::strerror(errno));
@@ -31,6 +32,16 @@ SocketFolder::SocketFolder() {
 SocketFolder::~SocketFolder() {
     unlink((path_ + kSocket).c_str());
     rmdir(path_.c_str());
+}
+
+std::uint32_t application_of(const std::string& endpoint) noexcept {
+    const std::size_t at = endpoint.rfind(kPrefix);
+    std::uint32_t process = 0;
+    if (at != std::string::npos) {
+        const char* digits = endpoint.data() + at + std::strlen(kPrefix);
+        std::from_chars(digits, endpoint.data() + endpoint.size(), process);
+    }
+    return process;
 }
 
 void remove_left_socket(const std::string& endpoint) noexcept {

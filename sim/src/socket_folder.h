@@ -1,10 +1,11 @@
 #pragma once
+#include <cstdint>
 #include <string>
 
 namespace sim {
 
-/// A private folder (0700, under TMPDIR or /tmp) for the workers' ipc socket; removed with the socket at the
-/// end.
+/// A private folder (0700, musicworld-PROCESS-XXXXXX under TMPDIR or /tmp) for the workers' ipc socket;
+/// removed with the socket at the end.
 class SocketFolder {
 public:
     SocketFolder();  ///< throws std::runtime_error
@@ -18,6 +19,10 @@ public:
 private:
     std::string path_;
 };
+
+/// Process id of the application that made `endpoint`, from its folder's name; 0 if SocketFolder did not make
+/// it.
+[[nodiscard]] std::uint32_t application_of(const std::string& endpoint) noexcept;
 
 /// Removes what an application that ended abnormally left at `endpoint`: the socket and its folder, if
 /// SocketFolder made them.

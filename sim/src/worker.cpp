@@ -36,17 +36,15 @@ bool send(zmq::socket_t& socket, const Message& message, zmq::send_flags flags =
 }
 
 /// Sends heartbeats from a thread of its own, so that long work is not taken for death, and watches for the
-/// application's end.
+/// application's end: our parent is then no longer the application.
 class Pulse {
 public:
     Pulse(zmq::context_t& context, const std::string& endpoint)
-        : parent_(getppid()), thread_([this, &context, endpoint](const std::stop_token& stop) {
-              beat(context, endpoint, stop);
-          }) {}
+        : parent_(application_of(endpoint) != 0 ? static_cast<pid_t>(application_of(endpoint)) : getppid()),
+          thread_(
+              [this, &context, endpoint](const std::stop_token& stop) { beat(context, endpoint, stop); }) {}
 
     [[nodiscard]] bool application_gone() const noexcept { return gone_; }
-    /// The application's process id, once known; until then it is whoever was our parent at the start.
-    void expect_parent(std::uint32_t id) noexcept { parent_ = static_cast<pid_t>(id); }
 
 private:
     void beat(zmq::context_t& context, const std::string& endpoint, const std::stop_token& stop) {
@@ -62,7 +60,7 @@ private:
         }
     }
 
-    std::atomic<pid_t> parent_;
+    const pid_t parent_;  ///< the application; whoever started us if the endpoint does not tell
     std::atomic<bool> gone_ = false;
     std::jthread thread_;  // last: starts when the rest is there, joins before it goes
 };
@@ -99,10 +97,7 @@ private:
             throw;
         }
     }
-    void handle(const Welcome& welcome) {
-        pulse_.expect_parent(welcome.process);
-        welcomed_ = true;
-    }
+    void handle(const Welcome&) { welcomed_ = true; }
     void handle(const Assign& assign) {
         for (const Assignment& a : assign.bodies)
             bodies_.insert_or_assign(a.body, SteppedBody(a.body, a.definition, a.record));

@@ -1,7 +1,5 @@
 #include "worker_pool.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <stdexcept>
 #include <thread>
@@ -57,11 +55,15 @@ void WorkerPool::bind() {
 
 void WorkerPool::wait_for_hellos() {
     const Clock::time_point deadline = Clock::now() + kHelloWithin;
-    const auto missing = [](const Slot& slot) { return slot.identity.empty(); };
+    const auto missing = [](const Slot& slot) { return slot.alive && slot.identity.empty(); };
     while (std::any_of(slots_.begin(), slots_.end(), missing)) {
         receive(kPoll);
         for (Slot& slot : slots_) {
             if (missing(slot) && slot.process.has_ended()) {
+                if (slot.process.was_killed()) {
+                    lose(slot);  // as later: the others take its share
+                    continue;
+                }
                 throw std::runtime_error("a worker ended before it joined: " + slot.process.ending());
             }
         }
@@ -190,7 +192,7 @@ void WorkerPool::take(const std::string& identity, const zmq::message_t& frame) 
             const auto slot = process(hello->process);
             if (slot == slots_.end() || !slot->identity.empty()) return;
             slot->identity = identity;
-            send(*slot, Welcome{static_cast<std::uint32_t>(getpid())});
+            send(*slot, Welcome{});
         } else if (const auto* heartbeat = std::get_if<Heartbeat>(&message)) {
             const auto slot = process(heartbeat->process);
             if (slot != slots_.end()) slot->heard = Clock::now();

@@ -73,6 +73,10 @@ bool WorkerProcess::has_ended() noexcept {
     return ended_;
 }
 
+bool WorkerProcess::was_killed() const noexcept {
+    return ended_ && WIFSIGNALED(status_);
+}
+
 std::string WorkerProcess::ending() const {
     if (WIFSIGNALED(status_)) return "ended by signal " + std::to_string(WTERMSIG(status_));
     return "exit status " + std::to_string(WEXITSTATUS(status_));

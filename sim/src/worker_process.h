@@ -20,6 +20,8 @@ public:
     [[nodiscard]] std::uint32_t id() const noexcept { return static_cast<std::uint32_t>(id_); }
     /// True once the process has ended; reaps it. Never blocks.
     [[nodiscard]] bool has_ended() noexcept;
+    /// It has ended, by a signal.
+    [[nodiscard]] bool was_killed() const noexcept;
     /// How it ended, in words.
     [[nodiscard]] std::string ending() const;
     /// Kills it (also if it is stopped) and waits for its end.

@@ -55,7 +55,7 @@ TEST(BadInput, TracesOfThirtyKindsAreRefusedWithTheirPlace) {
         {"time repeats", kHeader + kGood + "0.02,r,0,1,0,1,0,0,0\n", ":5:1:"},
         {"zero quaternion", kHeader + "0,r,0,1,0,0,0,0,0\n" + row, ":2:"},
         {"long quaternion", kHeader + "0,r,0,1,0,2,0,0,0\n" + row, ":2:"},
-        {"NaN quaternion", kHeader + "0,r,0,1,0,nan,0,0,0\n" + row, ":2:9:"},
+        {"NaN quaternion", kHeader + "0,r,0,1,0,nan,0,0,0\n" + row, ":2:11:"},
         {"too few fields", kHeader + "0,r,0,1\n" + row, ":2:"},
         {"too many fields", kHeader + "0,r,0,1,0,1,0,0,0,7\n" + row, ":2:"},
         {"a word for a number", kHeader + "0,r,left,1,0,1,0,0,0\n" + row, ":2:5:"},
@@ -99,8 +99,8 @@ TEST(BadInput, KitsOfManyKindsAreRefusedWithTheirPlace) {
         {"missing include", "include = [\"nowhere.toml\"]\n" + good, "kit.toml:1:"},
         {"same name twice", good + good, "kit.toml:"},
         {"zero quaternion", good + "orientation = [0, 0, 0, 0]\n", "kit.toml:6:"},
-        {"unknown sound", good + "sound = { instrument = \"kazoo\" }\n", "kazoo"},
-        {"unknown sound parameter", good + "sound = { frequence_hz = 3 }\n", "frequence_hz"},
+        {"unknown sound", good + "sound = { instrument = \"kazoo\" }\n", "kit.toml:6:"},
+        {"unknown sound parameter", good + "sound = { frequence_hz = 3 }\n", "kit.toml:6:"},
     };
     const Folder folder;
     for (const Case& c : cases) {

@@ -23,7 +23,7 @@ std::vector<sim::Message> samples() {
     }
     return {sim::Hello{42},
             sim::Heartbeat{43},
-            sim::Welcome{44},
+            sim::Welcome{},
             assign,
             sim::Step{9, 77, {0, 3, 4}, request},
             answer,
