@@ -17,7 +17,7 @@ while IFS=: read -r pattern folder; do
     found=$(grep -rlE "^ *# *include *[<\"]($pattern)" app tracking sim render audio --include='*.h' --include='*.cpp' | grep -v "^$folder/")
     [ -n "$found" ] && complain "$pattern belongs to $folder alone: $found"
 done <<'LIST'
-GL/|assimp/|spng:render
+GL/|assimp/|spng|isa-l/:render
 csound|sndfile|smf:audio
 zmq|Spectra/:sim
 CLI/|toml\+\+/|nlohmann/:app

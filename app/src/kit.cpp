@@ -152,6 +152,7 @@ render::Appearance read_appearance(TomlReader reader) {
     look.color = reader.vector("color", 0, 1, Eigen::Vector3d(look.color.cast<double>())).cast<float>();
     look.metallic = static_cast<float>(reader.number("metallic", 0, 1, 0));
     look.roughness = static_cast<float>(reader.number("roughness", 0.02, 1, 0.5));
+    look.lathed = static_cast<float>(reader.number("lathed", 0, 1, 0));
     reader.done();
     return look;
 }

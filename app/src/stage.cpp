@@ -11,11 +11,24 @@ namespace {
 
 constexpr double kMeshStickLengthM = 0.40;  // of stick.obj and mallet.obj, hand to tip
 
-render::Look steel() { return {{Eigen::Vector3f(0.55f, 0.56f, 0.58f), 1.0f, 0.35f}, {}}; }
-render::Look hickory() {
-    return {{Eigen::Vector3f(0.72f, 0.5f, 0.28f), 0.0f, 0.45f}, {{"tip", {Eigen::Vector3f(0.85f, 0.7f, 0.5f), 0.0f, 0.35f}}}};
+render::Look chrome() {
+    render::Look look;
+    look.body = {Eigen::Vector3f(0.72f, 0.73f, 0.75f), 1.0f, 0.20f};
+    look.parts = {{"rubber", {Eigen::Vector3f(0.02f, 0.02f, 0.02f), 0.0f, 0.7f}}};
+    return look;
 }
-render::Look walnut() { return {{Eigen::Vector3f(0.26f, 0.13f, 0.06f), 0.0f, 0.4f}, {}}; }
+
+render::Look hickory() {
+    render::Look look;
+    look.body = {Eigen::Vector3f(0.62f, 0.40f, 0.20f), 0.0f, 0.38f};
+    return look;
+}
+
+render::Look walnut() {
+    render::Look look;
+    look.body = {Eigen::Vector3f(0.26f, 0.13f, 0.06f), 0.0f, 0.4f};
+    return look;
+}
 
 }  // namespace
 
@@ -36,7 +49,7 @@ void Stage::add_stand(const Instrument& instrument) {
     Eigen::Matrix4f matrix = Eigen::Matrix4f::Identity();
     matrix.topLeftCorner<3, 3>() = Eigen::Vector3d(spread, height, spread).cast<float>().asDiagonal();
     matrix.topRightCorner<3, 1>() = top.cast<float>();
-    props_.push_back({instrument.name + " stand", assets_folder() / "meshes" / "stand.obj", steel(), matrix});
+    props_.push_back({instrument.name + " stand", assets_folder() / "meshes" / "stand.obj", chrome(), matrix});
 }
 
 void Stage::add_string_frame() {
@@ -57,7 +70,7 @@ void Stage::add_string_frame() {
     Eigen::Matrix4f stand = Eigen::Matrix4f::Identity();
     stand.topLeftCorner<3, 3>() = Eigen::Vector3d(1.5, std::max(0.05, height), 1.5).cast<float>().asDiagonal();
     stand.topRightCorner<3, 1>() = matrix.topRightCorner<3, 1>();
-    props_.push_back({"soundboard stand", assets_folder() / "meshes" / "stand.obj", steel(), stand});
+    props_.push_back({"soundboard stand", assets_folder() / "meshes" / "stand.obj", chrome(), stand});
 }
 
 render::SceneDescription Stage::scene(int width, int height) const {

@@ -1,9 +1,13 @@
+#include <isa-l/crc.h>
+#include <isa-l/igzip_lib.h>
 #include <spng.h>
 
-#include <cstdlib>
+#include <algorithm>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include "render/renderer.h"
 
@@ -25,33 +29,72 @@ Context make_context(int flags) {
     return context;
 }
 
+void append_number(std::vector<std::uint8_t>& bytes, std::uint32_t value) {
+    for (int shift = 24; shift >= 0; shift -= 8) bytes.push_back(static_cast<std::uint8_t>(value >> shift));
+}
+
+void append_chunk(std::vector<std::uint8_t>& png, std::string_view type, std::span<const std::uint8_t> data) {
+    append_number(png, static_cast<std::uint32_t>(data.size()));
+    const std::size_t start = png.size();
+    png.insert(png.end(), type.begin(), type.end());
+    png.insert(png.end(), data.begin(), data.end());
+    append_number(png, crc32_gzip_refl(0, png.data() + start, png.size() - start));
+}
+
+/// Rows of the image, each after the number of its filter: 1, the difference to the pixel on the left.
+std::vector<std::uint8_t> sub_filtered(const Image& image) {
+    const std::size_t row = std::size_t{3} * static_cast<std::size_t>(image.width);
+    std::vector<std::uint8_t> lines((row + 1) * static_cast<std::size_t>(image.height));
+    for (std::size_t y = 0; y < static_cast<std::size_t>(image.height); ++y) {
+        const std::uint8_t* from = image.rgb.data() + y * row;
+        std::uint8_t* to = lines.data() + y * (row + 1);
+        *to++ = 1;
+        std::copy(from, from + 3, to);
+        for (std::size_t i = 3; i < row; ++i) to[i] = static_cast<std::uint8_t>(from[i] - from[i - 3]);
+    }
+    return lines;
+}
+
+/// zlib stream by ISA-L, level 1: an image takes a tenth of zlib's time.
+std::vector<std::uint8_t> compressed(std::vector<std::uint8_t> lines) {
+    isal_zstream stream;
+    isal_deflate_init(&stream);
+    std::vector<std::uint8_t> work(ISAL_DEF_LVL1_DEFAULT);
+    std::vector<std::uint8_t> out(lines.size() + lines.size() / 8 + 1024);
+    stream.level = 1;
+    stream.level_buf = work.data();
+    stream.level_buf_size = static_cast<std::uint32_t>(work.size());
+    stream.gzip_flag = IGZIP_ZLIB;
+    stream.end_of_stream = 1;
+    stream.flush = NO_FLUSH;
+    stream.next_in = lines.data();
+    stream.avail_in = static_cast<std::uint32_t>(lines.size());
+    stream.next_out = out.data();
+    stream.avail_out = static_cast<std::uint32_t>(out.size());
+    if (isal_deflate(&stream) != COMP_OK || stream.avail_in != 0 || stream.internal_state.state != ZSTATE_END)
+        throw std::runtime_error("PNG: error: found an image that does not compress, expected a PNG stream");
+    out.resize(stream.total_out);
+    return out;
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> encode_png(const Image& image) {
-    if (image.width <= 0 || image.height <= 0 ||
+    if (image.width <= 0 || image.height <= 0 || image.width > static_cast<int>(kMaxSide) ||
+        image.height > static_cast<int>(kMaxSide) ||
         image.rgb.size() !=
             std::size_t{3} * static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height)) {
         throw std::invalid_argument("encode_png: the image has not width x height x 3 bytes");
     }
-    const Context context = make_context(SPNG_CTX_ENCODER);
-    spng_set_option(context.get(), SPNG_ENCODE_TO_BUFFER, 1);
-    spng_set_option(context.get(), SPNG_IMG_COMPRESSION_LEVEL, 1);
-    spng_set_option(context.get(), SPNG_FILTER_CHOICE, SPNG_FILTER_CHOICE_SUB);
-    spng_ihdr header{};
-    header.width = static_cast<std::uint32_t>(image.width);
-    header.height = static_cast<std::uint32_t>(image.height);
-    header.bit_depth = 8;
-    header.color_type = SPNG_COLOR_TYPE_TRUECOLOR;
-    require(spng_set_ihdr(context.get(), &header));
-    require(spng_encode_image(context.get(), image.rgb.data(), image.rgb.size(), SPNG_FMT_PNG,
-                              SPNG_ENCODE_FINALIZE));
-    std::size_t length = 0;
-    int error = 0;
-    const std::unique_ptr<void, void (*)(void*)> bytes(spng_get_png_buffer(context.get(), &length, &error),
-                                                       std::free);
-    require(error);
-    const auto* first = static_cast<const std::uint8_t*>(bytes.get());
-    return {first, first + length};
+    std::vector<std::uint8_t> png = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+    std::vector<std::uint8_t> header;
+    append_number(header, static_cast<std::uint32_t>(image.width));
+    append_number(header, static_cast<std::uint32_t>(image.height));
+    header.insert(header.end(), {8, 2, 0, 0, 0});  // 8 bits, RGB, deflate, adaptive filters, not interlaced
+    append_chunk(png, "IHDR", header);
+    append_chunk(png, "IDAT", compressed(sub_filtered(image)));
+    append_chunk(png, "IEND", {});
+    return png;
 }
 
 Image decode_png(const std::vector<std::uint8_t>& bytes) {

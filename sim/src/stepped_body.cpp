@@ -61,9 +61,11 @@ void SteppedBody::sweep(const StepRequest& request, BodyOutcome& outcome) {
 
 void SteppedBody::step(const StepRequest& request, BodyOutcome& outcome) {
     const auto mine = [this](const Impulse& impulse) { return impulse.body == index_; };
-    const bool changes = !record_.stepped || request.t_s != record_.t_s || std::ranges::any_of(request.folded, mine);
+    const bool changes =
+        !record_.stepped || request.t_s != record_.t_s || std::ranges::any_of(request.folded, mine);
     const OscillatorState now = folded(request);
-    // A step that changes nothing leaves the state as it is to the last bit, so that asking twice is asking once.
+    // A step that changes nothing leaves the state as it is to the last bit, so that asking twice is asking
+    // once.
     if (changes) record_ = {model_->to_modal(now), true, request.t_s};
     outcome.body = index_;
     outcome.state = record_.state;

@@ -107,14 +107,5 @@ TEST(TomlReader, MessagesStayOneLineWhateverTheFileHolds) {
     EXPECT_EQ(message_of([&] { reader.done(); }).find('\n'), std::string::npos);
 }
 
-TEST(TomlReader, RemainingNumbersAreThoseThatNobodyAskedFor) {
-    const toml::table first = parsed("gain = 1\npitch = 2"), second = parsed("pitch = 3\ndecay = 4");
-    TomlReader reader({&first, &second}, "test");
-    (void)reader.number("gain", 0, 9);
-    const std::vector<std::pair<std::string, double>> expected = {{"pitch", 2}, {"decay", 4}};
-    EXPECT_EQ(reader.remaining_numbers(), expected);
-    reader.done();
-}
-
 }  // namespace
 }  // namespace app
