@@ -286,7 +286,7 @@ fs::path assets_folder() {
 }
 
 fs::path find_kit(const std::string& name_or_path) {
-    const fs::path bundled = assets_folder() / "kits" / (name_or_path + ".toml");
+    fs::path bundled = assets_folder() / "kits" / (name_or_path + ".toml");
     if (name_or_path.find('/') == std::string::npos && fs::is_regular_file(bundled)) return bundled;
     return name_or_path;
 }

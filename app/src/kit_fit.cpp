@@ -39,7 +39,7 @@ struct Mode {
 };
 
 /// Climbs from a place to the middle of the densest disc about it.
-Mode climb(Eigen::Vector2d place, const Lows& lows) {
+Mode climb(const Eigen::Vector2d& place, const Lows& lows) {
     constexpr int kMostSteps = 100;
     Mode mode{place, 0};
     for (int step = 0; step < kMostSteps; ++step) {

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <ranges>
 
 #include "notes.h"
 
@@ -173,11 +172,10 @@ void OfflineRun::draw_frames(double s, double next) {
 
 double OfflineRun::until_contact(std::uint32_t stick, double s, double T) const {
     double until = T;
-    for (const Strike& strike : scheduler_.strikes() | std::views::reverse) {
-        if (strike.scheduled_at_s < s - 1) break;
-        if (strike.stick == stick && strike.outcome != Outcome::cancelled && strike.contact_s > s)
-            until = std::min(until, strike.contact_s);
-    }
+    const std::vector<Strike>& all = scheduler_.strikes();
+    for (auto strike = all.rbegin(); strike != all.rend() && strike->scheduled_at_s > s - 1; ++strike)
+        if (strike->stick == stick && strike->outcome != Outcome::cancelled && strike->contact_s > s)
+            until = std::min(until, strike->contact_s);
     return until;
 }
 

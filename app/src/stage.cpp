@@ -9,6 +9,7 @@
 namespace app {
 namespace {
 
+constexpr int kShadowTexels = 512;  // a side: 1024 costs a tenth of a frame more and shows no more
 constexpr double kMeshStickLengthM = 0.40;  // of stick.obj and mallet.obj, hand to tip
 
 render::Look chrome() {
@@ -84,6 +85,7 @@ render::SceneDescription Stage::scene(int width, int height) const {
     scene.room = kit_.room;
     scene.width = width;
     scene.height = height;
+    scene.shadow_size = kShadowTexels;
     return scene;
 }
 

@@ -56,9 +56,8 @@ float spot(vec3 at) {
 }
 )";
 
-/// Part of the key light that the shadow map lets through: the mean of comparisons of 2x2 texels at two or
-/// three places around; 1 outside the map. Look-ups are the dearest part of the fragment shaders, so the
-/// objects make do with two.
+/// Part of the key light that the shadow map lets through: the mean of comparisons of 2x2 texels at two
+/// places around; 1 outside the map. Look-ups are the dearest part of the fragment shaders.
 const char* const kShadow = R"(
 uniform sampler2DShadow shadow_map;
 uniform float shadow_texel;  // 1 / size
@@ -73,9 +72,7 @@ float shadow_light_sharp(vec3 at) {
     return within_map(at, 0.5 * (shadow_look_up(at, vec2(0.5, 0.9)) + shadow_look_up(at, vec2(-0.5, -0.9))));
 }
 float shadow_light_soft(vec3 at) {
-    float lit = shadow_look_up(at, vec2(0.0, 1.6)) + shadow_look_up(at, vec2(1.39, -0.8)) +
-                shadow_look_up(at, vec2(-1.39, -0.8));
-    return within_map(at, lit / 3.0);
+    return within_map(at, 0.5 * (shadow_look_up(at, vec2(0.7, 1.1)) + shadow_look_up(at, vec2(-0.7, -1.1))));
 }
 )";
 
