@@ -34,7 +34,8 @@ void add_worker_command(CLI::App& program, int& status) {
 }
 
 int run(int argc, char** argv) {
-    CLI::App program("MusicWorld: tracked drumsticks play a virtual kit, predicted ahead of the lag", "musicworld");
+    CLI::App program("MusicWorld: tracked drumsticks play a virtual kit, predicted ahead of the lag",
+                     "musicworld");
     program.set_version_flag("--version", MUSICWORLD_VERSION);
     program.require_subcommand(1);
     int status = 0;
@@ -52,9 +53,10 @@ int run(int argc, char** argv) {
         return program.exit(version);
     } catch (const CLI::ParseError& wrong) {
         const std::string typed = fmt::format("musicworld {}", fmt::join(argv + 1, argv + argc, " "));
-        return complain(fmt::format("error: found bad usage in `{}` ({}), expected what `musicworld --help` tells", typed,
-                                    wrong.what()),
-                        kBadInput);
+        return complain(
+            fmt::format("error: found bad usage in `{}` ({}), expected what `musicworld --help` tells", typed,
+                        wrong.what()),
+            kBadInput);
     }
     return status;
 }

@@ -27,7 +27,8 @@ void DrawnStrikes::start(double T, std::span<const Strike> strikes) {
         ++first_open_;
     for (std::size_t i = first_open_; i < strikes.size(); ++i) {
         const Strike& strike = strikes[i];
-        if (strike.outcome == Outcome::cancelled || strike.contact_s > T || seen_.contains(strike.id)) continue;
+        if (strike.outcome == Outcome::cancelled || strike.contact_s > T || seen_.contains(strike.id))
+            continue;
         seen_.insert(strike.id);
         drawn_.push_back({strike.id, impulse_of(strike)});
     }
@@ -39,7 +40,8 @@ std::vector<sim::WeightedImpulse> DrawnStrikes::frame(double T, std::span<const 
     for (Drawn& d : drawn_) {
         const Strike& strike = strikes[d.id - 1];
         const bool replaced = strike.outcome == Outcome::released && !same(d.first, impulse_of(strike));
-        d.first_weight = toward(d.first_weight, replaced || strike.outcome == Outcome::cancelled ? 0 : 1, step);
+        d.first_weight =
+            toward(d.first_weight, replaced || strike.outcome == Outcome::cancelled ? 0 : 1, step);
         if (replaced) d.final_weight = toward(d.final_weight, 1, step);
     }
     start(T, strikes);
@@ -59,8 +61,8 @@ std::vector<sim::WeightedImpulse> DrawnStrikes::frame(double T, std::span<const 
         const bool faded = d.first_weight == 0 && strikes[d.id - 1].outcome == Outcome::cancelled;
         if (faded) seen_.erase(d.id);
         const bool replaced_settled = d.final_weight == 1 && d.first_weight == 0;
-        const bool first_settled = d.first_weight == 1 && d.final_weight == 0 &&
-                                   same(d.first, impulse_of(strikes[d.id - 1]));
+        const bool first_settled =
+            d.first_weight == 1 && d.final_weight == 0 && same(d.first, impulse_of(strikes[d.id - 1]));
         return faded || (folded_.contains(d.id) && (replaced_settled || first_settled));
     });
     return result;

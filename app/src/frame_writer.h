@@ -50,12 +50,13 @@ private:
     bool closed_ = false;
 };
 
-/// Draws frames on a thread of its own (which owns the renderer) and encodes and writes them as FOLDER/000000.png on another.
-/// Failures of either thread are thrown by the next push() or by finish().
+/// Draws frames on a thread of its own (which owns the renderer) and encodes and writes them as
+/// FOLDER/000000.png on another. Failures of either thread are thrown by the next push() or by finish().
 class FrameWriter {
 public:
     /// `rest`: the frame drawn first, to warm up and for the fingerprint; it is not written.
-    FrameWriter(const render::SceneDescription& scene, const render::FrameState& rest, std::filesystem::path folder);
+    FrameWriter(const render::SceneDescription& scene, const render::FrameState& rest,
+                std::filesystem::path folder);
     ~FrameWriter();
     FrameWriter(const FrameWriter&) = delete;
     FrameWriter& operator=(const FrameWriter&) = delete;

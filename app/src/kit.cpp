@@ -25,7 +25,8 @@ struct Layers {
     std::vector<fs::path> files;
     std::vector<audio::Instrument> sounds;  ///< of the orchestra
 
-    [[nodiscard]] std::vector<const toml::table*> at(const std::string& key, const std::string& inner = {}) const {
+    [[nodiscard]] std::vector<const toml::table*> at(const std::string& key,
+                                                     const std::string& inner = {}) const {
         std::vector<const toml::table*> found;
         for (const toml::table& table : tables) {
             const toml::table* here = table[key].as_table();
@@ -44,10 +45,13 @@ bool is_file(const fs::path& path) {
 toml::table parse(const fs::path& file) {
     std::error_code error;
     if (fs::is_directory(file, error))
-        throw BadInput(fmt::format("{}: error: found a directory, expected a kit file (TOML)", file.string()));
+        throw BadInput(
+            fmt::format("{}: error: found a directory, expected a kit file (TOML)", file.string()));
     if (!std::ifstream(file).good())
-        throw BadInput(fmt::format("{}: error: found no readable file, expected a kit (TOML); `musicworld kit list` names the bundled ones",
-                                   file.string()));
+        throw BadInput(
+            fmt::format("{}: error: found no readable file, expected a kit (TOML); `musicworld kit list` "
+                        "names the bundled ones",
+                        file.string()));
     try {
         return toml::parse_file(file.string());
     } catch (const toml::parse_error& wrong) {
@@ -60,7 +64,9 @@ toml::table parse(const fs::path& file) {
 
 void load(Layers& layers, const fs::path& file) {
     if (std::find(layers.files.begin(), layers.files.end(), file) != layers.files.end()) return;
-    if (layers.files.size() > 32) throw BadInput(fmt::format("{}: error: found more than 32 included files, expected fewer", file.string()));
+    if (layers.files.size() > 32)
+        throw BadInput(
+            fmt::format("{}: error: found more than 32 included files, expected fewer", file.string()));
     layers.tables.push_back(parse(file));
     layers.files.push_back(file);
     const std::size_t index = layers.tables.size() - 1;
@@ -85,14 +91,17 @@ Eigen::Vector3d unit(TomlReader& reader, std::string_view key, const Eigen::Vect
 
 Eigen::Quaterniond read_orientation(TomlReader& reader) {
     constexpr double degree = std::numbers::pi / 180;
-    const Eigen::Vector3d euler = reader.vector("tilt_deg", -360, 360, Eigen::Vector3d::Zero().eval()) * degree;
+    const Eigen::Vector3d euler =
+        reader.vector("tilt_deg", -360, 360, Eigen::Vector3d::Zero().eval()) * degree;
     const Eigen::VectorXd q =
         reader.numbers("orientation", 4, -1.01, 1.01, Eigen::VectorXd(Eigen::Vector4d(1, 0, 0, 0)));
     if (std::abs(q.norm() - 1) > 0.01)
-        reader.fail("orientation", fmt::format("a quaternion of length {:.3g}", q.norm()), "a unit quaternion [w, x, y, z]");
+        reader.fail("orientation", fmt::format("a quaternion of length {:.3g}", q.norm()),
+                    "a unit quaternion [w, x, y, z]");
     const Eigen::Quaterniond base = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
     return base * Eigen::AngleAxisd(euler.x(), Eigen::Vector3d::UnitX()) *
-           Eigen::AngleAxisd(euler.y(), Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(euler.z(), Eigen::Vector3d::UnitZ());
+           Eigen::AngleAxisd(euler.y(), Eigen::Vector3d::UnitY()) *
+           Eigen::AngleAxisd(euler.z(), Eigen::Vector3d::UnitZ());
 }
 
 sim::Material read_material(TomlReader reader) {
@@ -130,10 +139,14 @@ void read_zones(TomlReader& reader, Instrument& instrument) {
     for (TomlReader& entry : reader.tables("zones")) {
         sim::Zone zone;
         zone.name = entry.text("name");
-        const Eigen::VectorXd radius = entry.numbers("radius", 2, 0, 100, Eigen::VectorXd(Eigen::Vector2d(0, 1.01)));
-        const Eigen::VectorXd height = entry.numbers("height", 2, -100, 100, Eigen::VectorXd(Eigen::Vector2d(0.5, 2)));
-        if (!(radius[0] < radius[1])) entry.fail("radius", "a zone without radius", "[inner, outer], inner below outer");
-        if (!(height[0] < height[1])) entry.fail("height", "a zone without height", "[low, high], low below high");
+        const Eigen::VectorXd radius =
+            entry.numbers("radius", 2, 0, 100, Eigen::VectorXd(Eigen::Vector2d(0, 1.01)));
+        const Eigen::VectorXd height =
+            entry.numbers("height", 2, -100, 100, Eigen::VectorXd(Eigen::Vector2d(0.5, 2)));
+        if (!(radius[0] < radius[1]))
+            entry.fail("radius", "a zone without radius", "[inner, outer], inner below outer");
+        if (!(height[0] < height[1]))
+            entry.fail("height", "a zone without height", "[low, high], low below high");
         zone.min_radius = radius[0], zone.max_radius = radius[1];
         zone.min_height = height[0], zone.max_height = height[1];
         const int own_note = entry.integer("midi_note", 0, 127, note);
@@ -164,8 +177,10 @@ void read_look(TomlReader reader, render::Look& look) {
             continue;
         }
         const render::Appearance appearance = read_appearance(reader.table(part));
-        if (std::string_view(part) == "body") look.body = appearance;
-        else look.parts.emplace_back(part, appearance);
+        if (std::string_view(part) == "body")
+            look.body = appearance;
+        else
+            look.parts.emplace_back(part, appearance);
     }
     reader.done();
 }
@@ -178,7 +193,8 @@ fs::path read_mesh(TomlReader& reader, const std::string& fallback, const Kit& k
                 fmt::format("a file beside {} or among the bundled meshes", kit.file.filename().string()));
 }
 
-audio::Voice read_voice(TomlReader reader, const Instrument& instrument, const std::vector<audio::Instrument>& sounds) {
+audio::Voice read_voice(TomlReader reader, const Instrument& instrument,
+                        const std::vector<audio::Instrument>& sounds) {
     audio::Voice voice;
     voice.name = instrument.name;
     voice.instrument = reader.text("instrument", instrument.kind);
@@ -197,7 +213,8 @@ audio::Voice read_voice(TomlReader reader, const Instrument& instrument, const s
         reader.done();
         return voice;
     }
-    reader.fail("instrument", fmt::format("instrument = \"{}\"", voice.instrument), fmt::format("one of {}", known));
+    reader.fail("instrument", fmt::format("instrument = \"{}\"", voice.instrument),
+                fmt::format("one of {}", known));
 }
 
 Instrument read_instrument(const toml::table& table, const Layers& layers, const Kit& kit) {
@@ -215,7 +232,8 @@ Instrument read_instrument(const toml::table& table, const Layers& layers, const
     body.name = instrument.name;
     (void)reader.choice("shape", {"superquadric", "mesh"}, "superquadric");
     body.shape.semi_axes = 0.5 * reader.vector("size", 0.001, 10);
-    const Eigen::VectorXd exponents = reader.numbers("exponents", 2, 0.1, 1.9, Eigen::VectorXd(Eigen::Vector2d(1, 1)));
+    const Eigen::VectorXd exponents =
+        reader.numbers("exponents", 2, 0.1, 1.9, Eigen::VectorXd(Eigen::Vector2d(1, 1)));
     body.shape.e1 = exponents[0], body.shape.e2 = exponents[1];
     body.world_from_body.translation() = reader.vector("position", -kRoomM, kRoomM);
     body.world_from_body.linear() = read_orientation(reader).toRotationMatrix();
@@ -251,16 +269,22 @@ void read_stick(TomlReader reader, Kit& kit) {
 }
 
 void read_camera(TomlReader reader, render::Camera& camera) {
-    camera.eye = reader.vector("eye", -kRoomM, kRoomM, Eigen::Vector3d(camera.eye.cast<double>())).cast<float>();
-    camera.target = reader.vector("target", -kRoomM, kRoomM, Eigen::Vector3d(camera.target.cast<double>())).cast<float>();
-    camera.vertical_fov_deg = static_cast<float>(reader.number("vertical_fov_deg", 5, 120, camera.vertical_fov_deg));
-    if ((camera.eye - camera.target).norm() < 1e-3f) reader.fail("target", "the camera's target at its eye", "two different points");
+    camera.eye =
+        reader.vector("eye", -kRoomM, kRoomM, Eigen::Vector3d(camera.eye.cast<double>())).cast<float>();
+    camera.target =
+        reader.vector("target", -kRoomM, kRoomM, Eigen::Vector3d(camera.target.cast<double>())).cast<float>();
+    camera.vertical_fov_deg =
+        static_cast<float>(reader.number("vertical_fov_deg", 5, 120, camera.vertical_fov_deg));
+    if ((camera.eye - camera.target).norm() < 1e-3f)
+        reader.fail("target", "the camera's target at its eye", "two different points");
     reader.done();
 }
 
 void read_room(TomlReader reader, render::Room& room) {
-    room.floor_color = reader.vector("floor_color", 0, 1, Eigen::Vector3d(room.floor_color.cast<double>())).cast<float>();
-    room.wall_color = reader.vector("wall_color", 0, 1, Eigen::Vector3d(room.wall_color.cast<double>())).cast<float>();
+    room.floor_color =
+        reader.vector("floor_color", 0, 1, Eigen::Vector3d(room.floor_color.cast<double>())).cast<float>();
+    room.wall_color =
+        reader.vector("wall_color", 0, 1, Eigen::Vector3d(room.wall_color.cast<double>())).cast<float>();
     room.floor_height = static_cast<float>(reader.number("floor_height", -kRoomM, kRoomM, room.floor_height));
     reader.done();
 }
@@ -315,13 +339,16 @@ Kit read_kit(const fs::path& file) {
         for (const toml::node& node : *instruments) {
             kit.instruments.push_back(read_instrument(*node.as_table(), layers, kit));
             if (!names.insert(kit.instruments.back().name).second)
-                fail_at(node.source(), fmt::format("a second instrument \"{}\"", kit.instruments.back().name), "a name of its own");
+                fail_at(node.source(), fmt::format("a second instrument \"{}\"", kit.instruments.back().name),
+                        "a name of its own");
         }
     }
     if (kit.instruments.empty())
-        throw BadInput(fmt::format("{}:1:1: error: found no [[instrument]], expected at least one", file.string()));
+        throw BadInput(
+            fmt::format("{}:1:1: error: found no [[instrument]], expected at least one", file.string()));
     if (kit.instruments.size() > 64)
-        throw BadInput(fmt::format("{}:1:1: error: found {} instruments, expected at most 64", file.string(), kit.instruments.size()));
+        throw BadInput(fmt::format("{}:1:1: error: found {} instruments, expected at most 64", file.string(),
+                                   kit.instruments.size()));
     return kit;
 }
 

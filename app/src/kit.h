@@ -25,14 +25,14 @@ struct Instrument {
     std::filesystem::path mesh;  ///< unit mesh, scaled to the body's semi-axes
     render::Look look;
     audio::Voice voice;
-    std::vector<ZoneSound> zones;   ///< as body.zones
-    double velocity_gamma = 1;      ///< loudness speed = 5 (speed / 5)^gamma [m/s]
-    bool drawn_stand = true;        ///< a stand is drawn from the body down to the floor
+    std::vector<ZoneSound> zones;  ///< as body.zones
+    double velocity_gamma = 1;     ///< loudness speed = 5 (speed / 5)^gamma [m/s]
+    bool drawn_stand = true;       ///< a stand is drawn from the body down to the floor
 };
 
 /// The stick as the kit wants it; unset values come from the trace.
 struct StickDefinition {
-    double length_m = 0.40;  ///< of the drawn stick, hand to tip
+    double length_m = 0.40;                ///< of the drawn stick, hand to tip
     std::optional<Eigen::Vector3d> tip;    ///< in the tracked body's frame [m]
     std::optional<Eigen::Vector3d> shaft;  ///< unit, hand to tip
     double radius_m = 0.006;
@@ -51,8 +51,9 @@ struct Kit {
     render::Room room;
 };
 
-/// Reads a kit (TOML). `defaults.toml` of the assets stands under every kit; `include` names further files, relative to the kit or to the assets.
-/// Throws BadInput with FILE:LINE:COLUMN for whatever is unknown, missing or out of range.
+/// Reads a kit (TOML). `defaults.toml` of the assets stands under every kit; `include` names further files,
+/// relative to the kit or to the assets. Throws BadInput with FILE:LINE:COLUMN for whatever is unknown,
+/// missing or out of range.
 [[nodiscard]] Kit read_kit(const std::filesystem::path& file);
 
 /// A kit by path, or by the name of a bundled one ("drums" is assets/kits/drums.toml).

@@ -6,7 +6,8 @@
 namespace app {
 namespace {
 
-/// 0 at the centre of the struck zone, 1 at its edge: along a string, else by the radius about the body's axis.
+/// 0 at the centre of the struck zone, 1 at its edge: along a string, else by the radius about the body's
+/// axis.
 double place_of(const Strike& strike, const Instrument& instrument) {
     const Eigen::Vector3d unit = strike.point_body.cwiseQuotient(instrument.body.shape.semi_axes);
     if (instrument.kind == "string") return std::clamp(std::abs(unit.x()), 0.0, 1.0);
@@ -27,7 +28,8 @@ audio::Note note_of(const Strike& strike, const Instrument& instrument) {
     note.place = place_of(strike, instrument);
     note.zone = strike.zone;
     note.midi_note = instrument.zones[static_cast<std::size_t>(strike.zone)].midi_note;
-    note.midi_velocity = static_cast<int>(std::clamp(std::round(127 * std::pow(strike.speed_mps / 8, 0.7)), 1.0, 127.0));
+    note.midi_velocity =
+        static_cast<int>(std::clamp(std::round(127 * std::pow(strike.speed_mps / 8, 0.7)), 1.0, 127.0));
     return note;
 }
 

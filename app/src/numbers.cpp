@@ -33,7 +33,8 @@ double parse_number(const std::string& text, const std::string& option) {
         const std::optional<double> divisor = whole<double>(std::string_view(text).substr(slash + 1));
         value = divisor && *divisor != 0 ? std::optional(*value / *divisor) : std::nullopt;
     }
-    if (!value || !std::isfinite(*value)) refuse(text, option, "a number such as 0.05 or a fraction such as 1/15");
+    if (!value || !std::isfinite(*value))
+        refuse(text, option, "a number such as 0.05 or a fraction such as 1/15");
     return *value;
 }
 

@@ -10,7 +10,8 @@
 namespace app {
 namespace {
 
-constexpr double kSlackS = 1e-9;  // of the causality rules
+constexpr double kSlackS = 1e-9;    // of the causality rules
+constexpr double kReboundS = 0.05;  // a filter has seen a rebound by then
 
 /// Adds the time of its life to a sum.
 class Stopwatch {
@@ -35,8 +36,9 @@ StrikeRules rules_of(const PlayOptions& options, double t0_s) {
 
 }  // namespace
 
-OfflineRun::OfflineRun(const tracking::Trace& trace, const Kit& kit, const PlayOptions& options, const StickGeometry& stick,
-                       sim::Simulation& simulation, const Stage& stage, FrameWriter* frames, audio::Performance* performance)
+OfflineRun::OfflineRun(const tracking::Trace& trace, const Kit& kit, const PlayOptions& options,
+                       const StickGeometry& stick, sim::Simulation& simulation, const Stage& stage,
+                       FrameWriter* frames, audio::Performance* performance)
     : trace_(trace),
       kit_(kit),
       options_(options),
@@ -61,7 +63,8 @@ std::vector<OfflineRun::Tick> OfflineRun::ticks() const {
     for (std::uint32_t stick = 0; stick < trace_.sticks.size(); ++stick)
         for (std::size_t i = 0; i < trace_.sticks[stick].samples.size(); ++i)
             entries.push_back({trace_.sticks[stick].samples[i].t_s, stick, i});
-    std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.t_s < b.t_s; });
+    std::stable_sort(entries.begin(), entries.end(),
+                     [](const Entry& a, const Entry& b) { return a.t_s < b.t_s; });
     std::vector<Tick> result;
     for (const Entry& entry : entries) {
         if (result.empty() || entry.t_s > result.back().t_s) result.push_back({entry.t_s, {}});
@@ -75,7 +78,8 @@ void OfflineRun::run(const std::function<void(double)>& progress) {
     draw_frames(-std::numeric_limits<double>::infinity(), all.front().t_s);
     for (std::size_t i = 0; i < all.size(); ++i) {
         take(all[i]);
-        draw_frames(all[i].t_s, i + 1 < all.size() ? all[i + 1].t_s : std::numeric_limits<double>::infinity());
+        draw_frames(all[i].t_s,
+                    i + 1 < all.size() ? all[i + 1].t_s : std::numeric_limits<double>::infinity());
         if (i % 64 == 0) progress(static_cast<double>(i) / static_cast<double>(all.size()));
     }
     scheduler_.finish();
@@ -94,7 +98,8 @@ void OfflineRun::feed(const Tick& tick, std::vector<std::uint32_t>& moved, std::
         moved.push_back(stick);
         paths.push_back(sticks_[stick].predicted_path(options_.sound_lead_s));
         paths.push_back(sticks_[stick].measured_path());
-        paths.back().stick += static_cast<std::uint32_t>(sticks_.size());  // so that its contacts are told apart
+        paths.back().stick +=
+            static_cast<std::uint32_t>(sticks_.size());  // so that its contacts are told apart
     }
 }
 
@@ -137,11 +142,13 @@ void OfflineRun::take(const Tick& tick) {
     send_notes();
 }
 
-void OfflineRun::take_contacts(double s, const std::vector<std::uint32_t>& moved, const sim::StepReply& reply) {
+void OfflineRun::take_contacts(double s, const std::vector<std::uint32_t>& moved,
+                               const sim::StepReply& reply) {
     const std::size_t bodies = kit_.instruments.size();
     std::vector<sim::Contact> own;
     for (std::size_t i = 0; i < moved.size(); ++i) {
-        // Two paths a stick: the predicted one, and the measured tip, which stands still and makes no contact but by starting inside.
+        // Two paths a stick: the predicted one, and the measured tip, which stands still and makes no contact
+        // but by starting inside.
         const std::span<const double> filtered(reply.clearance_m.data() + 2 * i * bodies, bodies);
         const std::span<const double> measured(reply.clearance_m.data() + (2 * i + 1) * bodies, bodies);
         own.clear();
@@ -155,8 +162,10 @@ void OfflineRun::send_notes() {
     for (const NoteChange& change : scheduler_.take_changes()) {
         if (!performance_ || (options_.solo && *options_.solo != change.id)) continue;
         const Strike& strike = scheduler_.strikes()[change.id - 1];
-        if (change.scheduled) performance_->schedule(note_of(strike, kit_.instruments[strike.instrument]));
-        else performance_->cancel(change.id);
+        if (change.scheduled)
+            performance_->schedule(note_of(strike, kit_.instruments[strike.instrument]));
+        else
+            performance_->cancel(change.id);
     }
 }
 
@@ -172,10 +181,17 @@ void OfflineRun::draw_frames(double s, double next) {
 
 double OfflineRun::until_contact(std::uint32_t stick, double s, double T) const {
     double until = T;
+    const auto behind = [&](const Strike& strike) {
+        return (sticks_[stick].tip_at(T) - strike.point_world).dot(strike.normal_world) < 0;
+    };
     const std::vector<Strike>& all = scheduler_.strikes();
     for (auto strike = all.rbegin(); strike != all.rend() && strike->scheduled_at_s > s - 1; ++strike)
-        if (strike->stick == stick && strike->outcome != Outcome::cancelled && strike->contact_s > s)
-            until = std::min(until, strike->contact_s);
+        if (strike->stick == stick && strike->outcome != Outcome::cancelled) {
+            if (strike->contact_s > s)
+                until = std::min(until, strike->contact_s);
+            else if (strike->contact_s > s - kReboundS && behind(*strike))
+                until = std::min(until, s);
+        }
     return until;
 }
 
@@ -184,7 +200,8 @@ void OfflineRun::draw_frame(double s, double T) {
     std::vector<sim::ModalState> bodies;
     if (std::isfinite(s)) {
         for (std::size_t i = 0; i < sticks_.size(); ++i)
-            if (sticks_[i].started()) poses[i] = sticks_[i].pose_at(until_contact(static_cast<std::uint32_t>(i), s, T));
+            if (sticks_[i].started())
+                poses[i] = sticks_[i].pose_at(until_contact(static_cast<std::uint32_t>(i), s, T));
         sim::StepRequest request;
         request.t_s = s;
         settle_impulses(s, request);

@@ -22,12 +22,14 @@ struct LoopTimes {
     double tracking = 0, simulation = 0, strikes = 0, waiting_for_frames = 0;
 };
 
-/// The loop of an offline run: every sample of the trace in order of time through filters, contacts and strikes to notes; every frame as soon as
-/// the last sample that it may use has been taken. Frames and performance may be absent (nullptr).
+/// The loop of an offline run: every sample of the trace in order of time through filters, contacts and
+/// strikes to notes; every frame as soon as the last sample that it may use has been taken. Frames and
+/// performance may be absent (nullptr).
 class OfflineRun {
 public:
-    OfflineRun(const tracking::Trace& trace, const Kit& kit, const PlayOptions& options, const StickGeometry& stick,
-               sim::Simulation& simulation, const Stage& stage, FrameWriter* frames, audio::Performance* performance);
+    OfflineRun(const tracking::Trace& trace, const Kit& kit, const PlayOptions& options,
+               const StickGeometry& stick, sim::Simulation& simulation, const Stage& stage,
+               FrameWriter* frames, audio::Performance* performance);
 
     /// Runs to the end; `progress` gets the share done, now and then.
     void run(const std::function<void(double)>& progress);
@@ -50,7 +52,9 @@ private:
     /// Draws the frames that may use samples up to s but not the next one, at `next`.
     void draw_frames(double s, double next);
     void draw_frame(double s, double T);
-    /// The time of the pose drawn at T: a stick that is predicted to strike between s and T is drawn on the surface, not beyond it.
+    /// The time of the pose drawn at T: a stick that is predicted to strike between s and T is drawn on the
+    /// surface, not beyond it; one that has just struck and whose filter has not yet seen the rebound is
+    /// drawn as it was at s.
     [[nodiscard]] double until_contact(std::uint32_t stick, double s, double T) const;
 
     const tracking::Trace& trace_;

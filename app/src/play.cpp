@@ -47,7 +47,8 @@ void check(const PlayOptions& o) {
     refuse(o.width < 16 || o.height < 16 || o.width > 4096 || o.height > 4096,
            fmt::format("--size {}x{}", o.width, o.height), "16x16 to 4096x4096");
     refuse(o.workers < 0 || o.workers > 64, fmt::format("--workers {}", o.workers), "0 to 64");
-    for (const auto& [name, lead] : {std::pair{"--render-lead", o.render_lead_s}, {"--sound-lead", o.sound_lead_s}})
+    for (const auto& [name, lead] :
+         {std::pair{"--render-lead", o.render_lead_s}, {"--sound-lead", o.sound_lead_s}})
         refuse(!(lead >= 0 && lead <= 1), fmt::format("{} {}", name, lead), "0 to 1 s");
     refuse(!(o.release_margin_s >= 0 && o.release_margin_s <= o.sound_lead_s),
            fmt::format("--release-margin {}", o.release_margin_s), "0 s to the sound lead");
@@ -62,7 +63,8 @@ std::vector<sim::BodyDefinition> bodies_of(const Kit& kit) {
 
 std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers) {
     if (workers == 0) return sim::make_local_simulation(bodies_of(kit));
-    return sim::make_distributed_simulation(bodies_of(kit), {fs::read_symlink("/proc/self/exe").string(), {"worker"}, workers});
+    return sim::make_distributed_simulation(
+        bodies_of(kit), {fs::read_symlink("/proc/self/exe").string(), {"worker"}, workers});
 }
 
 std::unique_ptr<audio::Performance> make_performance(const Kit& kit) {
@@ -107,9 +109,11 @@ void score(PlayResult& result, const Kit& kit, const StickGeometry& stick) {
 void write_midi(const fs::path& file, const PlayResult& result, const Kit& kit) {
     std::vector<audio::Note> notes;
     for (const Strike& strike : result.strikes)
-        if (strike.outcome == Outcome::released) notes.push_back(note_of(strike, kit.instruments[strike.instrument]));
-    std::stable_sort(notes.begin(), notes.end(),
-                     [](const audio::Note& a, const audio::Note& b) { return a.onset_sample < b.onset_sample; });
+        if (strike.outcome == Outcome::released)
+            notes.push_back(note_of(strike, kit.instruments[strike.instrument]));
+    std::stable_sort(notes.begin(), notes.end(), [](const audio::Note& a, const audio::Note& b) {
+        return a.onset_sample < b.onset_sample;
+    });
     audio::write_midi(file, notes);
 }
 
@@ -129,15 +133,23 @@ std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& f
     for (const Strike* strike : shown) {
         const auto at = static_cast<long>(std::ceil((strike->onset_s - result.t0_s) * result.fps));
         for (const long k : {at - 2, at, at + 2})
-            if (k >= 0 && k < static_cast<long>(result.frames)) files.push_back(folder / fmt::format("{:06}.png", k));
+            if (k >= 0 && k < static_cast<long>(result.frames))
+                files.push_back(folder / fmt::format("{:06}.png", k));
     }
     return files;
 }
 
 /// Encodes frames and sound beside the video's place, as FILE.partial.
 void make_video(const PlayOptions& options, const fs::path& staging) {
-    std::vector<std::string> command = {"ffmpeg", "-nostdin", "-loglevel", "error", "-y", "-framerate",
-                                        fmt::format("{}", options.fps), "-i", (staging / "frames" / "%06d.png").string()};
+    std::vector<std::string> command = {"ffmpeg",
+                                        "-nostdin",
+                                        "-loglevel",
+                                        "error",
+                                        "-y",
+                                        "-framerate",
+                                        fmt::format("{}", options.fps),
+                                        "-i",
+                                        (staging / "frames" / "%06d.png").string()};
     if (options.audio) command.insert(command.end(), {"-i", (staging / "audio.wav").string(), "-c:a", "aac"});
     command.insert(command.end(), {"-c:v", "libx264", "-preset", "veryfast", "-pix_fmt", "yuv420p", "-fflags",
                                    "+bitexact", "-f", "mp4", options.video->string() + ".partial"});
@@ -152,7 +164,8 @@ PlayResult play(const PlayOptions& options) {
     const tracking::Trace trace = tracking::read_trace(options.trace);
     const Kit kit = read_kit(options.kit);
     const StickGeometry stick = stick_geometry(trace, kit.stick, options.tip, options.shaft);
-    for (const std::string& name : {options.picture_predictor, options.sound_predictor}) (void)tracking::make_predictor(name);
+    for (const std::string& name : {options.picture_predictor, options.sound_predictor})
+        (void)tracking::make_predictor(name);
     PlayResult result = describe(options, trace, kit);
     result.tracks = tip_tracks(trace, stick);
     OutputFolder folder(options.out);
@@ -161,8 +174,8 @@ PlayResult play(const PlayOptions& options) {
     std::unique_ptr<FrameWriter> frames;
     if (options.frames) {
         fs::create_directory(folder.path("frames"));
-        frames = std::make_unique<FrameWriter>(stage.scene(options.width, options.height), stage.frame({}, {}),
-                                               folder.path("frames"));
+        frames = std::make_unique<FrameWriter>(stage.scene(options.width, options.height),
+                                               stage.frame({}, {}), folder.path("frames"));
     }
     std::unique_ptr<audio::Performance> performance = options.audio ? make_performance(kit) : nullptr;
     const std::unique_ptr<sim::Simulation> simulation = make_simulation(kit, options.workers);
@@ -175,7 +188,8 @@ PlayResult play(const PlayOptions& options) {
     result.strikes = run.strikes();
     if (options.solo && (*options.solo == 0 || *options.solo > result.strikes.size() ||
                          result.strikes[*options.solo - 1].outcome != Outcome::released))
-        throw BadInput(fmt::format("error: found --solo {}, expected the id of a released note of events.csv", *options.solo));
+        throw BadInput(fmt::format("error: found --solo {}, expected the id of a released note of events.csv",
+                                   *options.solo));
     result.samples_refused = run.refused();
     result.stages_s.emplace_back("tracking", run.times().tracking);
     result.stages_s.emplace_back("simulation", run.times().simulation);

@@ -51,10 +51,11 @@ PlayOptions options_of(const PlayArguments& a) {
 void print_result(const PlayResult& result, const PlayOptions& options) {
     const StrikeScore& s = result.score;
     const int sounded = s.true_contacts - s.missed;
-    fmt::print("{} strikes of {} sounded, {} false, {} cancelled; median timing error {}; {:.1f} times real time\n", sounded,
-               s.true_contacts, s.false_notes, s.cancelled,
-               sounded > 0 ? fmt::format("{:.1f} ms", s.timing_median_ms) : "unknown (nothing matched)",
-               (result.t_end_s - result.t0_s) / result.wall_s);
+    fmt::print(
+        "{} strikes of {} sounded, {} false, {} cancelled; median timing error {}; {:.1f} times real time\n",
+        sounded, s.true_contacts, s.false_notes, s.cancelled,
+        sounded > 0 ? fmt::format("{:.1f} ms", s.timing_median_ms) : "unknown (nothing matched)",
+        (result.t_end_s - result.t0_s) / result.wall_s);
     fmt::print("Look at {}, listen to {}, see frames in {}\n", (options.out / "report.html").string(),
                options.audio ? (options.out / "audio.wav").string() : "nothing (--no-audio)",
                options.frames ? (options.out / "frames").string() : "none (--no-frames)");
@@ -66,21 +67,27 @@ void add_play_command(CLI::App& program) {
     CLI::App* play_command = program.add_subcommand("play", "Play a recorded trace into pictures and sound");
     auto a = std::make_shared<PlayArguments>();
     play_command->add_option("TRACE", a->trace, "Trace (CSV); the bundled flourish if left out");
-    play_command->add_option("--kit", a->kit, "Kit: a file, or the name of a bundled one")->capture_default_str();
+    play_command->add_option("--kit", a->kit, "Kit: a file, or the name of a bundled one")
+        ->capture_default_str();
     play_command->add_option("--out", a->out, "Folder for the products")->capture_default_str();
     play_command->add_option("--fps", a->fps, "Frames a second")->capture_default_str();
     play_command->add_option("--size", a->size, "Size of the frames")->capture_default_str();
-    CLI::Option* both = play_command->add_option("--predictor", a->predictor, "Predictor of pictures and sound (default auto)");
-    play_command->add_option("--picture-predictor", a->picture_predictor, "Predictor of pictures")->excludes(both);
+    CLI::Option* both = play_command->add_option("--predictor", a->predictor,
+                                                 "Predictor of pictures and sound (default auto)");
+    play_command->add_option("--picture-predictor", a->picture_predictor, "Predictor of pictures")
+        ->excludes(both);
     play_command->add_option("--sound-predictor", a->sound_predictor, "Predictor of sound")->excludes(both);
     play_command->add_option("--render-lead", a->render_lead, "Lead of pictures [s]")->capture_default_str();
     play_command->add_option("--sound-lead", a->sound_lead, "Lead of sound [s]")->capture_default_str();
-    play_command->add_option("--release-margin", a->release_margin, "A note is fixed this long before its onset [s]")
+    play_command
+        ->add_option("--release-margin", a->release_margin, "A note is fixed this long before its onset [s]")
         ->capture_default_str();
-    play_command->add_option("--workers", a->workers, "Worker processes of the simulation; 0: none")->capture_default_str();
+    play_command->add_option("--workers", a->workers, "Worker processes of the simulation; 0: none")
+        ->capture_default_str();
     play_command->add_option("--tip", a->tip, "Tip in the tracked body's frame, X,Y,Z [m]");
     play_command->add_option("--shaft", a->shaft, "Body axis from hand to tip, e.g. -z");
-    play_command->add_option("--solo", a->solo, "Render the sound of one note alone, by its id in events.csv");
+    play_command->add_option("--solo", a->solo,
+                             "Render the sound of one note alone, by its id in events.csv");
     play_command->add_option("--video", a->video, "Also make a video (MP4) of frames and sound");
     play_command->add_flag("--no-cancel", a->no_cancel, "Play every scheduled note, also those of feints");
     play_command->add_flag("--no-frames", a->no_frames, "Draw nothing");

@@ -12,8 +12,9 @@ namespace app {
 /// How the notes of a run compare with the true contacts.
 struct StrikeScore {
     int true_contacts = 0, released = 0, cancelled = 0, moved = 0, false_notes = 0, missed = 0;
-    int false_turned_early = 0;  ///< false notes whose true path turned back at least 25 ms before the release point
-    int false_turned_late = 0;   ///< the other false notes
+    int false_turned_early =
+        0;  ///< false notes whose true path turned back at least 25 ms before the release point
+    int false_turned_late = 0;                       ///< the other false notes
     double timing_median_ms = 0, timing_p95_ms = 0;  ///< of |onset - true contact|, matched notes
 };
 
@@ -36,15 +37,15 @@ struct PlayResult {
     double fps = 30, render_lead_s = 0, sound_lead_s = 0, release_margin_s = 0;
     bool cancelling = true;
     int width = 640, height = 480;
-    std::size_t frames = 0;             ///< drawn
+    std::size_t frames = 0;                ///< drawn
     std::vector<std::string> sticks;       ///< names, by index
     std::vector<std::string> instruments;  ///< names, by index
     std::vector<Strike> strikes;           ///< by id
     std::vector<TrueContact> contacts;     ///< by time
     StrikeScore score;
     std::vector<TipTrack> tracks;
-    std::vector<float> audio;           ///< interleaved stereo, 48 kHz; empty with --no-audio
-    std::size_t samples_refused = 0;    ///< reports that the filters ignored
+    std::vector<float> audio;         ///< interleaved stereo, 48 kHz; empty with --no-audio
+    std::size_t samples_refused = 0;  ///< reports that the filters ignored
     std::size_t clipped_samples = 0;
     double wall_s = 0;
     std::vector<std::pair<std::string, double>> stages_s;  ///< name, seconds
@@ -52,7 +53,8 @@ struct PlayResult {
     std::vector<InputFile> inputs;
     std::string fingerprint;
     std::vector<std::pair<std::string, std::string>> versions;
-    std::vector<std::filesystem::path> report_frames;  ///< a few frames (PNG files on disk) that the report shows
+    std::vector<std::filesystem::path>
+        report_frames;  ///< a few frames (PNG files on disk) that the report shows
 };
 
 }  // namespace app

@@ -1,15 +1,14 @@
 #include "stage.h"
 
-#include <sim/simulation.h>
-
 #include <fmt/format.h>
+#include <sim/simulation.h>
 
 #include <cmath>
 
 namespace app {
 namespace {
 
-constexpr int kShadowTexels = 512;  // a side: 1024 costs a tenth of a frame more and shows no more
+constexpr int kShadowTexels = 512;          // a side: 1024 costs a tenth of a frame more and shows no more
 constexpr double kMeshStickLengthM = 0.40;  // of stick.obj and mallet.obj, hand to tip
 
 render::Look chrome() {
@@ -33,7 +32,8 @@ render::Look walnut() {
 
 }  // namespace
 
-Stage::Stage(const Kit& kit, std::size_t sticks, const StickGeometry& stick) : kit_(kit), sticks_(sticks), stick_(stick) {
+Stage::Stage(const Kit& kit, std::size_t sticks, const StickGeometry& stick)
+    : kit_(kit), sticks_(sticks), stick_(stick) {
     for (const Instrument& instrument : kit_.instruments)
         if (instrument.drawn_stand && instrument.kind != "string") add_stand(instrument);
     add_string_frame();
@@ -50,7 +50,8 @@ void Stage::add_stand(const Instrument& instrument) {
     Eigen::Matrix4f matrix = Eigen::Matrix4f::Identity();
     matrix.topLeftCorner<3, 3>() = Eigen::Vector3d(spread, height, spread).cast<float>().asDiagonal();
     matrix.topRightCorner<3, 1>() = top.cast<float>();
-    props_.push_back({instrument.name + " stand", assets_folder() / "meshes" / "stand.obj", chrome(), matrix});
+    props_.push_back(
+        {instrument.name + " stand", assets_folder() / "meshes" / "stand.obj", chrome(), matrix});
 }
 
 void Stage::add_string_frame() {
@@ -58,7 +59,8 @@ void Stage::add_string_frame() {
     for (const Instrument& instrument : kit_.instruments)
         if (instrument.kind == "string" && instrument.drawn_stand)
             for (const double side : {-1.0, 1.0})
-                box.extend(instrument.body.world_from_body * Eigen::Vector3d(side * instrument.body.shape.semi_axes.x(), 0, 0));
+                box.extend(instrument.body.world_from_body *
+                           Eigen::Vector3d(side * instrument.body.shape.semi_axes.x(), 0, 0));
     if (box.isEmpty()) return;
     const double thickness = 0.03, gap = 0.05;
     const Eigen::Vector3d size(box.sizes().x() + 0.12, thickness, box.sizes().z() + 0.12);
@@ -69,7 +71,8 @@ void Stage::add_string_frame() {
     props_.push_back({"soundboard", assets_folder() / "meshes" / "string_frame.obj", walnut(), matrix});
     const double height = box.min().y() - gap - kit_.room.floor_height;
     Eigen::Matrix4f stand = Eigen::Matrix4f::Identity();
-    stand.topLeftCorner<3, 3>() = Eigen::Vector3d(1.5, std::max(0.05, height), 1.5).cast<float>().asDiagonal();
+    stand.topLeftCorner<3, 3>() =
+        Eigen::Vector3d(1.5, std::max(0.05, height), 1.5).cast<float>().asDiagonal();
     stand.topRightCorner<3, 1>() = matrix.topRightCorner<3, 1>();
     props_.push_back({"soundboard stand", assets_folder() / "meshes" / "stand.obj", chrome(), stand});
 }
@@ -91,7 +94,8 @@ render::SceneDescription Stage::scene(int width, int height) const {
 
 Eigen::Matrix4f Stage::stick_matrix(const tracking::PosePrediction& pose) const {
     // The mesh runs along -z and has its bead's centre at (0, 0, -0.40).
-    const Eigen::Quaterniond body_from_mesh = Eigen::Quaterniond::FromTwoVectors(-Eigen::Vector3d::UnitZ(), stick_.shaft);
+    const Eigen::Quaterniond body_from_mesh =
+        Eigen::Quaterniond::FromTwoVectors(-Eigen::Vector3d::UnitZ(), stick_.shaft);
     const double scale = stick_.length_m / kMeshStickLengthM;
     Eigen::Isometry3d world_from_body = Eigen::Isometry3d::Identity();
     world_from_body.linear() = pose.orientation.toRotationMatrix();
@@ -109,7 +113,8 @@ render::FrameState Stage::frame(std::span<const sim::ModalState> bodies,
         const sim::BodyDefinition& body = kit_.instruments[i].body;
         Eigen::Matrix4d size = Eigen::Matrix4d::Identity();
         size.topLeftCorner<3, 3>() = body.shape.semi_axes.asDiagonal();
-        const Eigen::Matrix4d matrix = sim::body_matrix(body, bodies.empty() ? sim::ModalState{} : bodies[i]) * size;
+        const Eigen::Matrix4d matrix =
+            sim::body_matrix(body, bodies.empty() ? sim::ModalState{} : bodies[i]) * size;
         state.world_from_object.push_back(matrix.cast<float>());
         state.visible.push_back(true);
     }
@@ -119,7 +124,8 @@ render::FrameState Stage::frame(std::span<const sim::ModalState> bodies,
     }
     for (std::size_t i = 0; i < sticks_; ++i) {
         const bool visible = i < sticks.size() && sticks[i].has_value();
-        state.world_from_object.push_back(visible ? stick_matrix(*sticks[i]) : Eigen::Matrix4f(Eigen::Matrix4f::Identity()));
+        state.world_from_object.push_back(visible ? stick_matrix(*sticks[i])
+                                                  : Eigen::Matrix4f(Eigen::Matrix4f::Identity()));
         state.visible.push_back(visible);
     }
     return state;

@@ -12,15 +12,17 @@
 
 namespace app {
 
-/// What is on stage: the kit's instruments, their stands, and the sticks; how a state of the bodies and sticks becomes matrices.
+/// What is on stage: the kit's instruments, their stands, and the sticks; how a state of the bodies and
+/// sticks becomes matrices.
 class Stage {
 public:
     Stage(const Kit& kit, std::size_t sticks, const StickGeometry& stick);
 
     [[nodiscard]] render::SceneDescription scene(int width, int height) const;
     /// Bodies in the kit's order (empty: all at rest); a stick without a pose is not drawn.
-    [[nodiscard]] render::FrameState frame(std::span<const sim::ModalState> bodies,
-                                           std::span<const std::optional<tracking::PosePrediction>> sticks) const;
+    [[nodiscard]] render::FrameState frame(
+        std::span<const sim::ModalState> bodies,
+        std::span<const std::optional<tracking::PosePrediction>> sticks) const;
 
 private:
     struct Prop {  // does not move

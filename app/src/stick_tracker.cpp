@@ -5,20 +5,22 @@
 namespace app {
 namespace {
 
-// Cubic Hermite pieces of 8.3 ms: exact for the filters' parabolas; for a stick turning at 20 rad/s within 1 um.
+// Cubic Hermite pieces of 8.3 ms: exact for the filters' parabolas; for a stick turning at 20 rad/s within 1
+// um.
 constexpr int kPathPieces = 8;
 constexpr double kLongestPredictionS = 0.15;
 constexpr double kStandstillS = 1e-6;
 
-// What `auto` stands for. Pictures want the least mean error, strikes a path that bends: constant velocity does the one, constant acceleration the other
-// (an acceleration in the state costs 40 % and more of position error at 1/15 s on recorded strokes, and times contacts best).
+// What `auto` stands for. Pictures want the least mean error, strikes a path that bends: constant velocity
+// does the one, constant acceleration the other (an acceleration in the state costs 40 % and more of position
+// error at 1/15 s on recorded strokes, and times contacts best).
 constexpr const char* kAutoPicture = "cv:q=1e8,gate=5";
 constexpr const char* kAutoSound = "ca:q=1e9,gate=5";
 
 }  // namespace
 
-StickTracker::StickTracker(std::uint32_t stick, const StickGeometry& geometry, const std::string& picture_predictor,
-                           const std::string& sound_predictor)
+StickTracker::StickTracker(std::uint32_t stick, const StickGeometry& geometry,
+                           const std::string& picture_predictor, const std::string& sound_predictor)
     : stick_(stick),
       geometry_(geometry),
       picture_(tracking::make_predictor(picture_predictor == "auto" ? kAutoPicture : picture_predictor)),
@@ -55,7 +57,8 @@ sim::TipPath StickTracker::measured_path() const {
     path.stick = stick_;
     path.tip_radius_m = geometry_.radius_m;
     const double t = sound_->time_s();
-    path.nodes = {{t, measured_tip_, Eigen::Vector3d::Zero()}, {t + kStandstillS, measured_tip_, Eigen::Vector3d::Zero()}};
+    path.nodes = {{t, measured_tip_, Eigen::Vector3d::Zero()},
+                  {t + kStandstillS, measured_tip_, Eigen::Vector3d::Zero()}};
     return path;
 }
 

@@ -18,9 +18,15 @@ public:
     /// What the sound's filter made of the sample; refused samples change nothing.
     [[nodiscard]] tracking::SampleStatus correct(const tracking::PoseSample& sample);
     [[nodiscard]] bool started() const { return started_; }
-    /// Pose for a picture shown at T >= the newest sample's time; a prediction is carried at most 0.15 s beyond that, then held.
+    /// Pose for a picture shown at T >= the newest sample's time; a prediction is carried at most 0.15 s
+    /// beyond that, then held.
     [[nodiscard]] tracking::PosePrediction pose_at(double T) const;
-    /// The path that the sound's filter predicts over [0, lead] from its newest sample, and the measured tip as a path that stands still.
+    /// The tip's centre in that pose.
+    [[nodiscard]] Eigen::Vector3d tip_at(double T) const {
+        return tracking::point_of(pose_at(T), geometry_.tip).position;
+    }
+    /// The path that the sound's filter predicts over [0, lead] from its newest sample, and the measured tip
+    /// as a path that stands still.
     [[nodiscard]] sim::TipPath predicted_path(double lead_s) const;
     [[nodiscard]] sim::TipPath measured_path() const;
 

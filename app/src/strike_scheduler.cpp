@@ -16,6 +16,7 @@ void copy_contact(Strike& strike, const sim::Contact& contact) {
     strike.zone = contact.zone;
     strike.speed_mps = contact.speed_mps;
     strike.point_world = contact.point_world;
+    strike.normal_world = contact.normal_world;
     strike.point_body = contact.point_body;
     strike.impulse_body = contact.impulse_body;
 }
@@ -23,7 +24,10 @@ void copy_contact(Strike& strike, const sim::Contact& contact) {
 }  // namespace
 
 StrikeScheduler::StrikeScheduler(const StrikeRules& rules, std::size_t sticks, std::size_t instruments)
-    : rules_(rules), instruments_(instruments), approaches_(sticks * instruments), samples_since_start_(sticks, 0) {}
+    : rules_(rules),
+      instruments_(instruments),
+      approaches_(sticks * instruments),
+      samples_since_start_(sticks, 0) {}
 
 StrikeScheduler::Approach& StrikeScheduler::approach(std::uint32_t stick, std::uint32_t instrument) {
     return approaches_[stick * instruments_ + instrument];
@@ -68,9 +72,12 @@ void StrikeScheduler::finish() {
     }
 }
 
-void StrikeScheduler::restart(std::uint32_t stick) { samples_since_start_[stick] = 0; }
+void StrikeScheduler::restart(std::uint32_t stick) {
+    samples_since_start_[stick] = 0;
+}
 
-void StrikeScheduler::update_arming(Approach& a, double s, double measured, double filtered, bool first) const {
+void StrikeScheduler::update_arming(Approach& a, double s, double measured, double filtered,
+                                    bool first) const {
     if (first) {
         disarm(a);
         a.armed = measured > 0 && filtered > 0;
@@ -78,12 +85,14 @@ void StrikeScheduler::update_arming(Approach& a, double s, double measured, doub
         a.lowest_measured = std::min(a.lowest_measured, measured);
         a.lowest_filtered = std::min(a.lowest_filtered, filtered);
         const double d = rules_.rearm_m;
-        a.armed = measured >= d && measured >= a.lowest_measured + d && filtered >= d && filtered >= a.lowest_filtered + d;
+        a.armed = measured >= d && measured >= a.lowest_measured + d && filtered >= d &&
+                  filtered >= a.lowest_filtered + d;
     }
     if (a.armed && !a.entered_s && measured <= 0) {
         // Straight between the samples.
         const double fall = a.last_clearance - measured;
-        a.entered_s = fall > 0 && a.last_clearance > 0 ? a.last_s + (s - a.last_s) * a.last_clearance / fall : s;
+        a.entered_s =
+            fall > 0 && a.last_clearance > 0 ? a.last_s + (s - a.last_s) * a.last_clearance / fall : s;
     }
     a.last_clearance = measured;
     a.last_s = s;
@@ -152,7 +161,8 @@ void StrikeScheduler::cancel(Approach& a, double s, std::uint64_t id) {
 
 void StrikeScheduler::keep_or_cancel(Approach& a, double s, std::uint64_t id) {
     if (a.entered_s) {
-        // The measured tip has met the surface: the stroke came, whatever the path now says. It sounds as soon as it may.
+        // The measured tip has met the surface: the stroke came, whatever the path now says. It sounds as
+        // soon as it may.
         Strike& kept = strike(id);
         const std::int64_t onset = kept.onset_sample;
         kept.contact_s = std::min(kept.contact_s, *a.entered_s);
@@ -169,8 +179,8 @@ void StrikeScheduler::keep_or_cancel(Approach& a, double s, std::uint64_t id) {
     }
 }
 
-void StrikeScheduler::follow(Approach& a, double s, std::uint32_t stick, std::span<const sim::Contact> contacts,
-                             bool settled) {
+void StrikeScheduler::follow(Approach& a, double s, std::uint32_t stick,
+                             std::span<const sim::Contact> contacts, bool settled) {
     std::vector<const sim::Contact*> found;
     if (settled) found = candidates(a, s, contacts);
     std::vector<std::uint64_t> waiting = a.pending;
@@ -192,7 +202,8 @@ void StrikeScheduler::follow(Approach& a, double s, std::uint32_t stick, std::sp
 }
 
 void StrikeScheduler::sample(std::uint32_t stick, double s, std::span<const sim::Contact> contacts,
-                             std::span<const double> measured_clearance, std::span<const double> filtered_clearance) {
+                             std::span<const double> measured_clearance,
+                             std::span<const double> filtered_clearance) {
     const int number = samples_since_start_[stick]++;
     std::vector<sim::Contact> own;
     for (std::uint32_t instrument = 0; instrument < instruments_; ++instrument) {
@@ -203,12 +214,17 @@ void StrikeScheduler::sample(std::uint32_t stick, double s, std::span<const sim:
             if (contact.body == instrument) own.push_back(contact);
         follow(a, s, stick, own, number >= rules_.settling_samples);
         // A stroke that was not found in time is missed; the stick lies in the head until it rises again.
-        if (a.entered_s && a.pending.empty() && s + rules_.release_margin_s - *a.entered_s > rules_.late_s) disarm(a);
+        if (a.entered_s && a.pending.empty() && s + rules_.release_margin_s - *a.entered_s > rules_.late_s)
+            disarm(a);
     }
 }
 
-std::vector<NoteChange> StrikeScheduler::take_changes() { return std::exchange(changes_, {}); }
+std::vector<NoteChange> StrikeScheduler::take_changes() {
+    return std::exchange(changes_, {});
+}
 
-std::vector<std::uint64_t> StrikeScheduler::take_released() { return std::exchange(released_, {}); }
+std::vector<std::uint64_t> StrikeScheduler::take_released() {
+    return std::exchange(released_, {});
+}
 
 }  // namespace app

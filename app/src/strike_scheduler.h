@@ -13,26 +13,29 @@ namespace app {
 
 /// The constants of a strike's life (the strike rules of the README).
 struct StrikeRules {
-    double t0_s = 0;                 ///< time of audio sample 0
-    double release_margin_s = 0.010; ///< a note is fixed this long before its onset
-    double late_s = 0.030;           ///< a stroke found later than this after its contact is not played
-    double revive_s = 0.030;         ///< a contact predicted again this near to a cancelled onset keeps its id
-    double rearm_m = 0.003;          ///< the tip must rise this far, and be this far outside, before it can strike again
+    double t0_s = 0;                  ///< time of audio sample 0
+    double release_margin_s = 0.010;  ///< a note is fixed this long before its onset
+    double late_s = 0.030;            ///< a stroke found later than this after its contact is not played
+    double revive_s = 0.030;  ///< a contact predicted again this near to a cancelled onset keeps its id
+    double rearm_m =
+        0.003;  ///< the tip must rise this far, and be this far outside, before it can strike again
     double minimum_speed_mps = 0.2;  ///< slower contacts make no note
     int settling_samples = 3;        ///< samples after a start of the filter that make no strike
     bool cancelling = true;          ///< false: a note once scheduled is played
 };
 
-/// A change that the audio has to follow: the note of a strike stands as `strikes()[id - 1]` says, or is gone.
+/// A change that the audio has to follow: the note of a strike stands as `strikes()[id - 1]` says, or is
+/// gone.
 struct NoteChange {
     std::uint64_t id = 0;
     bool scheduled = true;  ///< added, moved or re-weighted; false: cancelled
 };
 
-/// Turns predicted contacts into strikes: every (stick, instrument) pair holds a list of pending contacts that each new sample confirms,
-/// moves or cancels until their release point. Doubles are prevented by geometry alone: after a release the pair makes no strike until the tip,
-/// as measured and as filtered, has risen `rearm_m` from its lowest point and is `rearm_m` outside the surface.
-/// Causal: the call for a sample at s changes only notes with onset >= s + release margin. Times in seconds of the trace's clock.
+/// Turns predicted contacts into strikes: every (stick, instrument) pair holds a list of pending contacts
+/// that each new sample confirms, moves or cancels until their release point. Doubles are prevented by
+/// geometry alone: after a release the pair makes no strike until the tip, as measured and as filtered, has
+/// risen `rearm_m` from its lowest point and is `rearm_m` outside the surface. Causal: the call for a sample
+/// at s changes only notes with onset >= s + release margin. Times in seconds of the trace's clock.
 class StrikeScheduler {
 public:
     StrikeScheduler(const StrikeRules& rules, std::size_t sticks, std::size_t instruments);
@@ -43,8 +46,8 @@ public:
     void restart(std::uint32_t stick);
     /// The sample of `stick` at time s.
     ///   contacts            of its predicted path, by time
-    ///   measured_clearance  signed distance of the measured tip to each instrument's surface grown by the tip's radius [m]
-    ///   filtered_clearance  the same of the filtered tip at lead 0
+    ///   measured_clearance  signed distance of the measured tip to each instrument's surface grown by the
+    ///   tip's radius [m] filtered_clearance  the same of the filtered tip at lead 0
     void sample(std::uint32_t stick, double s, std::span<const sim::Contact> contacts,
                 std::span<const double> measured_clearance, std::span<const double> filtered_clearance);
     /// After the last sample: what is pending is released, as when a sensor falls silent.
@@ -64,14 +67,15 @@ private:
         double lowest_filtered = std::numeric_limits<double>::infinity();
         std::optional<double> entered_s;  ///< the measured tip entered the surface since it was armed
         double last_clearance = 0, last_s = 0;
-        std::vector<std::uint64_t> pending;  ///< ids by contact time
-        std::vector<std::uint64_t> cancelled; ///< ids, newest last; a few
+        std::vector<std::uint64_t> pending;    ///< ids by contact time
+        std::vector<std::uint64_t> cancelled;  ///< ids, newest last; a few
     };
 
     Approach& approach(std::uint32_t stick, std::uint32_t instrument);
     Strike& strike(std::uint64_t id) { return strikes_[id - 1]; }
     void update_arming(Approach& a, double s, double measured, double filtered, bool first) const;
-    void follow(Approach& a, double s, std::uint32_t stick, std::span<const sim::Contact> contacts, bool settled);
+    void follow(Approach& a, double s, std::uint32_t stick, std::span<const sim::Contact> contacts,
+                bool settled);
     [[nodiscard]] std::vector<const sim::Contact*> candidates(const Approach& a, double s,
                                                               std::span<const sim::Contact> contacts) const;
     void create(Approach& a, double s, std::uint32_t stick, const sim::Contact& contact);

@@ -6,10 +6,11 @@
 
 namespace app {
 
-/// Where the tip and the shaft lie in the tracked body's frame: an option overrides the kit, the kit the trace.
+/// Where the tip and the shaft lie in the tracked body's frame: an option overrides the kit, the kit the
+/// trace.
 struct StickGeometry {
-    Eigen::Vector3d tip = Eigen::Vector3d::Zero();            ///< centre of the tip [m]
-    Eigen::Vector3d shaft = -Eigen::Vector3d::UnitZ();        ///< unit, hand to tip
+    Eigen::Vector3d tip = Eigen::Vector3d::Zero();      ///< centre of the tip [m]
+    Eigen::Vector3d shaft = -Eigen::Vector3d::UnitZ();  ///< unit, hand to tip
     double radius_m = 0.006;
     double length_m = 0.40;
 };

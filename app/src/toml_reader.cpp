@@ -9,7 +9,9 @@
 namespace app {
 namespace {
 
-bool is_control(char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }
+bool is_control(char c) {
+    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+}
 
 /// A file's text for a one-line message: control characters as '?', long ones cut.
 std::string printable(std::string_view text) {
@@ -36,14 +38,16 @@ std::string checked_text(const toml::node& node) {
     return value;
 }
 
-std::string range_text(double low, double high) { return fmt::format("a number from {} to {}", low, high); }
+std::string range_text(double low, double high) {
+    return fmt::format("a number from {} to {}", low, high);
+}
 
 }  // namespace
 
 void fail_at(const toml::source_region& place, const std::string& found, const std::string& expected) {
     const std::string file = place.path ? *place.path : "kit";
-    throw BadInput(fmt::format("{}:{}:{}: error: found {}, expected {}", file, place.begin.line, place.begin.column,
-                               found, expected));
+    throw BadInput(fmt::format("{}:{}:{}: error: found {}, expected {}", file, place.begin.line,
+                               place.begin.column, found, expected));
 }
 
 TomlReader::TomlReader(std::vector<const toml::table*> layers, std::string where)
@@ -63,7 +67,8 @@ const toml::node* TomlReader::find(std::string_view key) {
 void TomlReader::fail(std::string_view key, const std::string& found, const std::string& expected) const {
     const toml::node* node = get(key);
     const toml::source_region none{};
-    const toml::source_region& place = node ? node->source() : (layers_.empty() ? none : layers_.front()->source());
+    const toml::source_region& place =
+        node ? node->source() : (layers_.empty() ? none : layers_.front()->source());
     fail_at(place, fmt::format("{} in {}", found, where_), expected);
 }
 
@@ -108,7 +113,8 @@ int TomlReader::integer(std::string_view key, int low, int high, std::optional<i
         missing(key, fmt::format("a whole number from {} to {}", low, high));
     }
     if (!node->is_integer() || node->as_integer()->get() < low || node->as_integer()->get() > high)
-        fail(key, fmt::format("{} = {}", key, kind_of(*node)), fmt::format("a whole number from {} to {}", low, high));
+        fail(key, fmt::format("{} = {}", key, kind_of(*node)),
+             fmt::format("a whole number from {} to {}", low, high));
     return static_cast<int>(node->as_integer()->get());
 }
 
@@ -132,20 +138,24 @@ Eigen::VectorXd TomlReader::numbers(std::string_view key, int size, double low, 
     }
     const toml::array* array = node->as_array();
     if (!array || array->size() != static_cast<std::size_t>(size))
-        fail(key, array ? fmt::format("{} with {} entries", key, array->size()) : fmt::format("{} = {}", key, kind_of(*node)),
+        fail(key,
+             array ? fmt::format("{} with {} entries", key, array->size())
+                   : fmt::format("{} = {}", key, kind_of(*node)),
              expected);
     Eigen::VectorXd values(size);
     for (int i = 0; i < size; ++i) {
         const toml::node& entry = *array->get(static_cast<std::size_t>(i));
         const std::optional<double> value = entry.is_number() ? entry.value<double>() : std::nullopt;
         if (!value || !(*value >= low && *value <= high))
-            fail_at(entry.source(), fmt::format("{}[{}] = {} in {}", key, i, kind_of(entry), where_), expected);
+            fail_at(entry.source(), fmt::format("{}[{}] = {} in {}", key, i, kind_of(entry), where_),
+                    expected);
         values[i] = *value;
     }
     return values;
 }
 
-Eigen::Vector3d TomlReader::vector(std::string_view key, double low, double high, std::optional<Eigen::Vector3d> fallback) {
+Eigen::Vector3d TomlReader::vector(std::string_view key, double low, double high,
+                                   std::optional<Eigen::Vector3d> fallback) {
     std::optional<Eigen::VectorXd> wide;
     if (fallback) wide = Eigen::VectorXd(*fallback);
     return numbers(key, 3, low, high, wide);
@@ -170,7 +180,8 @@ std::vector<TomlReader> TomlReader::tables(std::string_view key) {
     const toml::array* array = node->as_array();
     if (!array) fail(key, fmt::format("{} = {}", key, kind_of(*node)), "an array of tables");
     for (const toml::node& entry : *array) {
-        if (!entry.is_table()) fail_at(entry.source(), fmt::format("{} in {}", kind_of(entry), where_), "a table");
+        if (!entry.is_table())
+            fail_at(entry.source(), fmt::format("{} in {}", kind_of(entry), where_), "a table");
         result.push_back(TomlReader({entry.as_table()}, fmt::format("{}, {}", where_, key)));
     }
     return result;
@@ -183,7 +194,8 @@ std::vector<std::string> TomlReader::texts(std::string_view key) {
     const toml::array* array = node->as_array();
     if (!array) fail(key, fmt::format("{} = {}", key, kind_of(*node)), "an array of texts");
     for (const toml::node& entry : *array) {
-        if (!entry.is_string()) fail_at(entry.source(), fmt::format("{} in {}", kind_of(entry), where_), "a text in quotes");
+        if (!entry.is_string())
+            fail_at(entry.source(), fmt::format("{} in {}", kind_of(entry), where_), "a text in quotes");
         result.push_back(checked_text(entry));
     }
     return result;

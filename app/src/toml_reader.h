@@ -1,16 +1,18 @@
 #pragma once
+#include <toml++/toml.h>
+
 #include <Eigen/Core>
 #include <initializer_list>
 #include <optional>
 #include <string>
-#include <toml++/toml.h>
 #include <vector>
 
 namespace app {
 
-/// Reads the keys of a stack of TOML tables (the first that has a key gives its value: an instrument, then the defaults of its kind)
-/// and holds them to what is known: every value is checked where it is read, and done() refuses keys that nobody asked for.
-/// All failures are BadInput with FILE:LINE:COLUMN. The tables must outlive the reader.
+/// Reads the keys of a stack of TOML tables (the first that has a key gives its value: an instrument, then
+/// the defaults of its kind) and holds them to what is known: every value is checked where it is read, and
+/// done() refuses keys that nobody asked for. All failures are BadInput with FILE:LINE:COLUMN. The tables
+/// must outlive the reader.
 class TomlReader {
 public:
     /// `where` names the table in messages, e.g. "[[instrument]] snare".
@@ -20,7 +22,8 @@ public:
     [[nodiscard]] std::string text(std::string_view key, std::optional<std::string> fallback = {});
     [[nodiscard]] std::string choice(std::string_view key, std::initializer_list<std::string_view> allowed,
                                      std::optional<std::string> fallback = {});
-    [[nodiscard]] double number(std::string_view key, double low, double high, std::optional<double> fallback = {});
+    [[nodiscard]] double number(std::string_view key, double low, double high,
+                                std::optional<double> fallback = {});
     [[nodiscard]] int integer(std::string_view key, int low, int high, std::optional<int> fallback = {});
     [[nodiscard]] bool flag(std::string_view key, std::optional<bool> fallback = {});
     /// `size` numbers, each in [low, high].
@@ -49,6 +52,7 @@ private:
 };
 
 /// "FILE:LINE:COLUMN: error: found F, expected E" as BadInput.
-[[noreturn]] void fail_at(const toml::source_region& place, const std::string& found, const std::string& expected);
+[[noreturn]] void fail_at(const toml::source_region& place, const std::string& found,
+                          const std::string& expected);
 
 }  // namespace app

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kDepthM = 0.003;
 constexpr double kRearmM = 0.003;
-constexpr double kStepM = 0.0005;       // finest step along a path: a 3 mm dip is at least 6 steps long
+constexpr double kStepM = 0.0005;  // finest step along a path: a 3 mm dip is at least 6 steps long
 constexpr double kTurnEarlyS = 0.025;
 
 /// One tip over one instrument, walked along the straight pieces of its path.
@@ -51,10 +51,12 @@ public:
     }
 
 private:
-    [[nodiscard]] double clearance(const Eigen::Vector3d& p) const { return sim::rest_distance(body_, p, radius_).distance; }
+    [[nodiscard]] double clearance(const Eigen::Vector3d& p) const {
+        return sim::rest_distance(body_, p, radius_).distance;
+    }
 
-    void enter(const Eigen::Vector3d& a, double ta, const Eigen::Vector3d& b, double tb, double low, double high,
-               double length) {
+    void enter(const Eigen::Vector3d& a, double ta, const Eigen::Vector3d& b, double tb, double low,
+               double high, double length) {
         for (int i = 0; i < 40 && high - low > 1e-9; ++i) {
             const double middle = 0.5 * (low + high);
             (clearance(a + (b - a) * (middle / length)) > 0 ? low : high) = middle;
@@ -62,7 +64,8 @@ private:
         const double share = high / length;
         entry_.t_s = ta + (tb - ta) * share;
         entry_.point_world = a + (b - a) * share;
-        entry_.speed_mps = -(b - a).dot(sim::rest_distance(body_, entry_.point_world, radius_).normal) / (tb - ta);
+        entry_.speed_mps =
+            -(b - a).dot(sim::rest_distance(body_, entry_.point_world, radius_).normal) / (tb - ta);
         entered_ = true;
     }
 
@@ -72,7 +75,8 @@ private:
     TrueContact entry_;
 };
 
-double nearest_approach_s(const TipTrack& track, const sim::BodyDefinition& body, double radius, double from, double to) {
+double nearest_approach_s(const TipTrack& track, const sim::BodyDefinition& body, double radius, double from,
+                          double to) {
     double best = std::numeric_limits<double>::infinity(), at = from;
     for (std::size_t i = 0; i < track.t_s.size(); ++i) {
         if (track.t_s[i] < from || track.t_s[i] > to) continue;
@@ -84,7 +88,8 @@ double nearest_approach_s(const TipTrack& track, const sim::BodyDefinition& body
 
 }  // namespace
 
-std::vector<TrueContact> find_true_contacts(std::span<const TipTrack> tracks, std::span<const sim::BodyDefinition> bodies,
+std::vector<TrueContact> find_true_contacts(std::span<const TipTrack> tracks,
+                                            std::span<const sim::BodyDefinition> bodies,
                                             double tip_radius_m) {
     std::vector<TrueContact> contacts;
     for (std::uint32_t stick = 0; stick < tracks.size(); ++stick) {
@@ -97,21 +102,23 @@ std::vector<TrueContact> find_true_contacts(std::span<const TipTrack> tracks, st
                     crossing.start(track.tip[i]);
                     continue;
                 }
-                crossing.walk(track.tip[i - 1], track.t_s[i - 1], track.tip[i], track.t_s[i], [&](TrueContact contact) {
-                    contact.stick = stick;
-                    contact.instrument = instrument;
-                    contacts.push_back(contact);
-                });
+                crossing.walk(track.tip[i - 1], track.t_s[i - 1], track.tip[i], track.t_s[i],
+                              [&](TrueContact contact) {
+                                  contact.stick = stick;
+                                  contact.instrument = instrument;
+                                  contacts.push_back(contact);
+                              });
             }
         }
     }
-    std::stable_sort(contacts.begin(), contacts.end(), [](const TrueContact& a, const TrueContact& b) { return a.t_s < b.t_s; });
+    std::stable_sort(contacts.begin(), contacts.end(),
+                     [](const TrueContact& a, const TrueContact& b) { return a.t_s < b.t_s; });
     return contacts;
 }
 
 void count_turns(StrikeScore& score, std::span<const Strike> strikes, std::span<const TrueContact> contacts,
-                 std::span<const TipTrack> tracks, std::span<const sim::BodyDefinition> bodies, double tip_radius_m,
-                 double release_margin_s) {
+                 std::span<const TipTrack> tracks, std::span<const sim::BodyDefinition> bodies,
+                 double tip_radius_m, double release_margin_s) {
     std::set<std::uint64_t> matched;
     for (const TrueContact& contact : contacts) matched.insert(contact.matched_id);
     for (const Strike& strike : strikes) {

@@ -8,17 +8,19 @@
 
 namespace app {
 
-/// Contacts of the measured tip paths, straight between samples, with the instruments at rest, for scoring only: the tip's centre enters the rest surface
-/// grown by the tip's radius in a zone that sounds and goes at least 3 mm deep; armed again 3 mm outside. Not armed inside at the first sample
-/// or after a gap of more than tracking::kGapS. By time.
+/// Contacts of the measured tip paths, straight between samples, with the instruments at rest, for scoring
+/// only: the tip's centre enters the rest surface grown by the tip's radius in a zone that sounds and goes at
+/// least 3 mm deep; armed again 3 mm outside. Not armed inside at the first sample or after a gap of more
+/// than tracking::kGapS. By time.
 [[nodiscard]] std::vector<TrueContact> find_true_contacts(std::span<const TipTrack> tracks,
                                                           std::span<const sim::BodyDefinition> bodies,
                                                           double tip_radius_m);
 
-/// Counts the false notes whose stick had turned back 25 ms or more before the release point, and the others (StrikeScore::false_turned_*).
-/// The turn is the measured tip's nearest approach to the instrument between the note's scheduling less 0.1 s and its onset plus 0.1 s.
+/// Counts the false notes whose stick had turned back 25 ms or more before the release point, and the others
+/// (StrikeScore::false_turned_*). The turn is the measured tip's nearest approach to the instrument between
+/// the note's scheduling less 0.1 s and its onset plus 0.1 s.
 void count_turns(StrikeScore& score, std::span<const Strike> strikes, std::span<const TrueContact> contacts,
-                 std::span<const TipTrack> tracks, std::span<const sim::BodyDefinition> bodies, double tip_radius_m,
-                 double release_margin_s);
+                 std::span<const TipTrack> tracks, std::span<const sim::BodyDefinition> bodies,
+                 double tip_radius_m, double release_margin_s);
 
 }  // namespace app

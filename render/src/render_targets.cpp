@@ -87,7 +87,8 @@ void PictureTarget::read(Image& image) {
     for (std::size_t y = 0; y < height; ++y) {
         const std::uint8_t* from = rgba_.data() + 4 * width * (height - 1 - y);
         std::uint8_t* to = image.rgb.data() + 3 * width * y;
-        // Four bytes at a time, the fourth overwritten by the next pixel; the last pixel of a row has room for three.
+        // Four bytes at a time, the fourth overwritten by the next pixel; the last pixel of a row has room
+        // for three.
         for (std::size_t x = 0; x + 1 < width; ++x, from += 4, to += 3) std::copy_n(from, 4, to);
         std::copy_n(from, 3, to);
     }

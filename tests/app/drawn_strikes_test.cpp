@@ -16,7 +16,8 @@ Strike strike_at(double contact_s, double push = 1) {
     return strike;
 }
 
-/// Sum of weight times push over the impulses: what the body shows, in units of the push, plus what is folded into its state.
+/// Sum of weight times push over the impulses: what the body shows, in units of the push, plus what is folded
+/// into its state.
 double shown(const std::vector<sim::WeightedImpulse>& list, double folded = 0) {
     double sum = folded;
     for (const sim::WeightedImpulse& entry : list) sum -= entry.weight * entry.impulse.impulse_body.y();

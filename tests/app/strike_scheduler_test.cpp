@@ -1,4 +1,5 @@
-// Strikes of a tip that moves over one plane y = 0: contacts are computed here from a local parabola, as a filter without noise would predict them.
+// Strikes of a tip that moves over one plane y = 0: contacts are computed here from a local parabola, as a
+// filter without noise would predict them.
 #include "strike_scheduler.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +28,8 @@ Motion motion_at(const Height& height, double t) {
     return {y0, (3 * y0 - 4 * y1 + y2) / (2 * h), (y0 - 2 * y1 + y2) / (h * h)};
 }
 
-/// Inward crossings of y = 0 on the parabola over [t, t + lead], the second only after 3 mm outside; as the simulation reports them.
+/// Inward crossings of y = 0 on the parabola over [t, t + lead], the second only after 3 mm outside; as the
+/// simulation reports them.
 std::vector<sim::Contact> contacts_of(const Motion& m, double t) {
     std::vector<sim::Contact> found;
     const auto y = [&](double h) { return m.y + m.v * h + 0.5 * m.a * h * h; };
@@ -97,7 +99,8 @@ TEST(StrikeScheduler, OneStrokeThatBouncesMakesOneReleasedNoteAtItsContact) {
     const Height height = [](double t) { return 2.0 * std::abs(t - 0.5) - 0.004; };  // 2 m/s, 4 mm deep
     const Notes run = play(height, 1);
     ASSERT_EQ(run.with(Outcome::released).size(), 1U);
-    // Motion is uniform until contact, so the prediction is exact to one audio sample and one step of the search above.
+    // Motion is uniform until contact, so the prediction is exact to one audio sample and one step of the
+    // search above.
     EXPECT_NEAR(run.strikes[0].onset_s, 0.498, 1.0 / 48000 + kLeadS / 2000);
     EXPECT_NEAR(run.strikes[0].speed_mps, 2.0, 1e-6);
     EXPECT_TRUE(run.causal);
@@ -124,7 +127,8 @@ TEST(StrikeScheduler, RollsOf7And15HzMakeOneNoteAStroke) {
         const Notes run = play(strokes(rate, 0.04, 0.004), 2.02);
         // Strokes at k / rate; the first at t = 0 begins inside and makes none.
         const std::vector<Strike> released = run.with(Outcome::released);
-        const auto sounded = std::count_if(released.begin(), released.end(), [](const Strike& s) { return s.onset_s < 2.02; });
+        const auto sounded =
+            std::count_if(released.begin(), released.end(), [](const Strike& s) { return s.onset_s < 2.02; });
         EXPECT_EQ(sounded, static_cast<long>(2.0 * rate)) << rate << " Hz";
         EXPECT_TRUE(run.causal);
     }
@@ -154,7 +158,8 @@ TEST(StrikeScheduler, ATipThatIsInsideAtTheFirstSampleDoesNotStrikeUntilItHasRis
 }
 
 TEST(StrikeScheduler, TheFirstThreeSamplesMakeNoStrike) {
-    // Contact at 20 ms: predicted by the samples at 0, 8.3 and 16.7 ms, which may not strike; the next is 5 ms late.
+    // Contact at 20 ms: predicted by the samples at 0, 8.3 and 16.7 ms, which may not strike; the next is 5
+    // ms late.
     const Height height = [](double t) { return 2.0 * (0.020 - t); };
     const Notes run = play(height, 0.3);
     for (const Strike& strike : run.strikes) EXPECT_GE(strike.scheduled_at_s, 3.0 / 120 - 1e-12);

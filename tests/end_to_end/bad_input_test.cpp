@@ -1,4 +1,5 @@
-// Whatever is wrong with the input: one line that says where and what, status 2 (1 while running), and no file that looks finished.
+// Whatever is wrong with the input: one line that says where and what, status 2 (1 while running), and no
+// file that looks finished.
 #include <gtest/gtest.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
@@ -38,7 +39,11 @@ TEST(BadInput, TracesOfThirtyKindsAreRefusedWithTheirPlace) {
     const std::string row = "0.03,r,0,1,0,1,0,0,0\n";
     const std::vector<Case> cases = {
         {"empty", "", ":1"},
-        {"binary", std::string("\x7f""ELF\0\1\2\3\0\0", 10), ":1"},
+        {"binary",
+         std::string("\x7f"
+                     "ELF\0\1\2\3\0\0",
+                     10),
+         ":1"},
         {"only comments", "# units: m\n", "trace.csv"},
         {"no rows", kHeader, "trace.csv"},
         {"missing column", "t,stick,px,py\n0,r,0,0\n1,r,0,0\n", ":1:"},
@@ -75,14 +80,16 @@ TEST(BadInput, TracesOfThirtyKindsAreRefusedWithTheirPlace) {
     const Folder folder;
     for (const Case& c : cases) {
         write(folder / "trace.csv", c.text);
-        const Ended ended = run({"play", (folder / "trace.csv").string(), "--out", (folder / "out").string(), "--no-frames"});
+        const Ended ended =
+            run({"play", (folder / "trace.csv").string(), "--out", (folder / "out").string(), "--no-frames"});
         expect_refused(ended, c.what, c.place);
         expect_nothing_finished(folder / "out");
     }
 }
 
 TEST(BadInput, KitsOfManyKindsAreRefusedWithTheirPlace) {
-    const std::string good = "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [0.3, 0.1, 0.3]\nposition = [0, 0.7, 0]\n";
+    const std::string good =
+        "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [0.3, 0.1, 0.3]\nposition = [0, 0.7, 0]\n";
     const std::vector<Case> cases = {
         {"empty", "", "kit.toml:1:1"},
         {"binary", std::string("\x89PNG\0\0", 6), "kit.toml:1:"},
@@ -91,8 +98,12 @@ TEST(BadInput, KitsOfManyKindsAreRefusedWithTheirPlace) {
         {"unknown table", good + "[lights]\nx = 1\n", "kit.toml:6:"},
         {"unknown kind", "[[instrument]]\nname = \"a\"\nkind = \"kazoo\"\n", "kit.toml:3:"},
         {"no name", "[[instrument]]\nkind = \"drum\"\n", "kit.toml:1:"},
-        {"negative size", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [-1, 0.1, 0.3]\nposition = [0, 1, 0]\n", "kit.toml:4:"},
-        {"two numbers", "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 1]\nposition = [0, 1, 0]\n", "kit.toml:4:"},
+        {"negative size",
+         "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [-1, 0.1, 0.3]\nposition = [0, 1, 0]\n",
+         "kit.toml:4:"},
+        {"two numbers",
+         "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [1, 1]\nposition = [0, 1, 0]\n",
+         "kit.toml:4:"},
         {"text for a number", good + "restitution = \"much\"\n", "kit.toml:6:"},
         {"nan", good + "restitution = nan\n", "kit.toml:6:"},
         {"missing mesh", good + "mesh = \"nowhere.obj\"\n", "kit.toml:6:"},
@@ -105,8 +116,9 @@ TEST(BadInput, KitsOfManyKindsAreRefusedWithTheirPlace) {
     const Folder folder;
     for (const Case& c : cases) {
         write(folder / "kit.toml", c.text);
-        const Ended ended = run({"play", bundled("traces/flourish.csv").string(), "--kit", (folder / "kit.toml").string(), "--out",
-                                 (folder / "out").string(), "--no-frames"});
+        const Ended ended =
+            run({"play", bundled("traces/flourish.csv").string(), "--kit", (folder / "kit.toml").string(),
+                 "--out", (folder / "out").string(), "--no-frames"});
         expect_refused(ended, c.what, c.place);
         expect_nothing_finished(folder / "out");
     }
@@ -114,12 +126,14 @@ TEST(BadInput, KitsOfManyKindsAreRefusedWithTheirPlace) {
 
 TEST(BadInput, AMalformedMeshIsRefused) {
     const Folder folder;
-    for (const std::string& text : {std::string(), std::string("not a mesh"), std::string("v nan 0 0\nv 0 1 0\nv 1 0 0\nf 1 2 3\n")}) {
+    for (const std::string& text :
+         {std::string(), std::string("not a mesh"), std::string("v nan 0 0\nv 0 1 0\nv 1 0 0\nf 1 2 3\n")}) {
         write(folder / "broken.obj", text);
         write(folder / "kit.toml",
-              "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [0.3, 0.1, 0.3]\nposition = [0, 0.7, 0]\nmesh = \"broken.obj\"\n");
-        const Ended ended = run({"play", bundled("traces/flourish.csv").string(), "--kit", (folder / "kit.toml").string(), "--out",
-                                 (folder / "out").string()});
+              "[[instrument]]\nname = \"a\"\nkind = \"drum\"\nsize = [0.3, 0.1, 0.3]\nposition = [0, 0.7, "
+              "0]\nmesh = \"broken.obj\"\n");
+        const Ended ended = run({"play", bundled("traces/flourish.csv").string(), "--kit",
+                                 (folder / "kit.toml").string(), "--out", (folder / "out").string()});
         EXPECT_TRUE(ended.status == 1 || ended.status == 2) << ended.status;
         expect_refused(ended, "mesh", "broken.obj", ended.status);
         expect_nothing_finished(folder / "out");
@@ -165,8 +179,10 @@ TEST(BadInput, ArgumentsAndPlacesThatCannotBeAreRefused) {
 TEST(BadInput, AFullDiskFailsWithOneLineAndLeavesNothingThatLooksFinished) {
     const Folder folder;
     fs::create_directory(folder / "small");
-    if (mount("none", (folder / "small").c_str(), "tmpfs", 0, "size=300k") != 0) GTEST_SKIP() << "needs the right to mount";
-    const Ended ended = run({"play", bundled("traces/flourish.csv").string(), "--out", (folder / "small/out").string(), "--size", "160x120"});
+    if (mount("none", (folder / "small").c_str(), "tmpfs", 0, "size=300k") != 0)
+        GTEST_SKIP() << "needs the right to mount";
+    const Ended ended = run({"play", bundled("traces/flourish.csv").string(), "--out",
+                             (folder / "small/out").string(), "--size", "160x120"});
     expect_refused(ended, "disk full", "small/out", 1);
     expect_nothing_finished(folder / "small/out");
     umount((folder / "small").c_str());

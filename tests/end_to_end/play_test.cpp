@@ -24,20 +24,24 @@ std::vector<std::string> play(const std::filesystem::path& trace, const std::fil
 }
 
 /// A shorter trace, so that the sanitizers finish in time too.
-std::filesystem::path short_trace(const Folder& folder, const std::string& name, double until, double from = -1e9) {
+std::filesystem::path short_trace(const Folder& folder, const std::string& name, double until,
+                                  double from = -1e9) {
     const std::filesystem::path file = folder / ("cut_" + name + ".csv");
     write(file, cut_trace(read(bundled("traces/" + name + ".csv")), until, from));
     return file;
 }
 
-Json summary(const std::filesystem::path& out) { return Json::parse(read(out / "summary.json")); }
+Json summary(const std::filesystem::path& out) {
+    return Json::parse(read(out / "summary.json"));
+}
 
 void expect_same_products(const std::filesystem::path& a, const std::filesystem::path& b) {
     const auto left = read_tree(a, {"summary.json", "report.html"});
     const auto right = read_tree(b, {"summary.json", "report.html"});
     ASSERT_GT(left.size(), 4U);
     ASSERT_EQ(left.size(), right.size());
-    for (const auto& [name, bytes] : left) EXPECT_TRUE(right.contains(name) && right.at(name) == bytes) << name;
+    for (const auto& [name, bytes] : left)
+        EXPECT_TRUE(right.contains(name) && right.at(name) == bytes) << name;
 }
 
 TEST(Play, TwoRunsAndZeroOneAndThreeWorkersGiveTheSameBytes) {
@@ -58,7 +62,8 @@ TEST(Play, EventsAndSoundDoNotDependOnWhetherFramesAreDrawn) {
     ASSERT_EQ(run(play(trace, folder / "a", {"--workers", "0"})).status, 0);
     ASSERT_EQ(run(play(trace, folder / "b", {"--workers", "0", "--no-frames"})).status, 0);
     for (const char* name : {"events.csv", "audio.wav", "hits.mid", "contacts.csv"})
-        EXPECT_EQ(read(folder / (std::string("a/") + name)), read(folder / (std::string("b/") + name))) << name;
+        EXPECT_EQ(read(folder / (std::string("a/") + name)), read(folder / (std::string("b/") + name)))
+            << name;
 }
 
 TEST(Play, CuttingTheTraceLeavesEveryEarlierFrameAndSampleAsItWas) {
@@ -76,7 +81,8 @@ TEST(Play, CuttingTheTraceLeavesEveryEarlierFrameAndSampleAsItWas) {
     for (int k = 0; k / 30.0 < t_end - t0; ++k, ++frames) {
         char name[32];
         std::snprintf(name, sizeof name, "/frames/%06d.png", k);
-        ASSERT_EQ(read(folder / ("part" + std::string(name))), read(folder / ("whole" + std::string(name)))) << k;
+        ASSERT_EQ(read(folder / ("part" + std::string(name))), read(folder / ("whole" + std::string(name))))
+            << k;
     }
     EXPECT_GE(frames, 30);
 
@@ -86,7 +92,8 @@ TEST(Play, CuttingTheTraceLeavesEveryEarlierFrameAndSampleAsItWas) {
     const auto samples = static_cast<std::size_t>((t_end + 0.010 - t0) * 48000);
     ASSERT_GT(a.size(), samples * 2);
     bool same = true, sounding = false;
-    for (std::size_t i = 0; i < samples * 2; ++i) same = same && a[i] == b[i], sounding = sounding || a[i] != 0;
+    for (std::size_t i = 0; i < samples * 2; ++i)
+        same = same && a[i] == b[i], sounding = sounding || a[i] != 0;
     EXPECT_TRUE(same);
     EXPECT_TRUE(sounding) << "silence would prove nothing";
 }
@@ -98,7 +105,10 @@ TEST(Play, EachInstrumentsFirstNoteSoundsAtItsPlannedSample) {
     for (const auto& row : read_csv(folder / "all/events.csv")) {
         if (row.at("outcome") != "released" || !done.insert(row.at("instrument")).second) continue;
         const std::string solo = "solo" + row.at("id");
-        ASSERT_EQ(run(play(bundled("traces/flourish.csv"), folder / solo, {"--no-frames", "--solo", row.at("id")})).status, 0);
+        ASSERT_EQ(
+            run(play(bundled("traces/flourish.csv"), folder / solo, {"--no-frames", "--solo", row.at("id")}))
+                .status,
+            0);
         int channels = 0;
         const std::vector<int> samples = read_wav(folder / (solo + "/audio.wav"), channels);
         ASSERT_EQ(channels, 2);
@@ -123,8 +133,11 @@ TEST(Play, OnTheFlourishAtLeast95PercentOfTheTrueContactsSoundWithin30Ms) {
 TEST(Play, NoFeintThatTurns25MsBeforeTheReleasePointSoundsAndWithoutCancellingSomeDo) {
     const Folder folder;
     ASSERT_EQ(run(play(bundled("traces/feints.csv"), folder / "with", {"--no-frames"})).status, 0);
-    ASSERT_EQ(run(play(bundled("traces/feints.csv"), folder / "without", {"--no-frames", "--no-cancel"})).status, 0);
-    const Json with = summary(folder / "with").at("strikes"), without = summary(folder / "without").at("strikes");
+    ASSERT_EQ(
+        run(play(bundled("traces/feints.csv"), folder / "without", {"--no-frames", "--no-cancel"})).status,
+        0);
+    const Json with = summary(folder / "with").at("strikes"),
+               without = summary(folder / "without").at("strikes");
     EXPECT_EQ(with.at("false_turned_early").get<int>(), 0);
     EXPECT_GT(with.at("cancelled").get<int>(), 0);
     EXPECT_EQ(without.at("cancelled").get<int>(), 0);
@@ -140,7 +153,8 @@ TEST(Play, AWorkerThatIsKilledChangesNothingButTheSummary) {
         Started started(play(trace, folder / "killed", {"--workers", "2", "--no-frames"}), folder / "");
         const std::string find = "pgrep -P " + std::to_string(started.pid()) + " -f 'worker --connect' > " +
                                  (folder / "pids").string();
-        // Kill as soon as one is there, later at every attempt, so that one falls into the run whatever the machine's speed.
+        // Kill as soon as one is there, later at every attempt, so that one falls into the run whatever the
+        // machine's speed.
         for (int i = 0; i < 400 && read(folder / "pids").empty(); ++i) {
             if (std::system(find.c_str()) != 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
         }

@@ -19,8 +19,8 @@ namespace end_to_end {
 namespace fs = std::filesystem;
 namespace {
 
-int spawn(const std::vector<std::string>& arguments, const std::vector<std::string>& environment, const fs::path& out,
-          const fs::path& err) {
+int spawn(const std::vector<std::string>& arguments, const std::vector<std::string>& environment,
+          const fs::path& out, const fs::path& err) {
     std::vector<std::string> words = {MUSICWORLD_PROGRAM};
     words.insert(words.end(), arguments.begin(), arguments.end());
     std::vector<char*> argv, envp;
@@ -52,7 +52,8 @@ Ended collect(int pid, const fs::path& out, const fs::path& err) {
 
 Ended run(const std::vector<std::string>& arguments, const std::vector<std::string>& environment) {
     const Folder folder;
-    return collect(spawn(arguments, environment, folder / "out", folder / "err"), folder / "out", folder / "err");
+    return collect(spawn(arguments, environment, folder / "out", folder / "err"), folder / "out",
+                   folder / "err");
 }
 
 Started::Started(const std::vector<std::string>& arguments, const fs::path& folder)
@@ -60,7 +61,9 @@ Started::Started(const std::vector<std::string>& arguments, const fs::path& fold
     pid_ = spawn(arguments, {}, out_, err_);
 }
 
-Ended Started::wait() { return collect(pid_, out_, err_); }
+Ended Started::wait() {
+    return collect(pid_, out_, err_);
+}
 
 Folder::Folder() {
     std::string name = (fs::temp_directory_path() / "musicworld-test-XXXXXX").string();
@@ -80,7 +83,9 @@ std::string read(const fs::path& file) {
     return text.str();
 }
 
-void write(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
+void write(const fs::path& file, const std::string& text) {
+    std::ofstream(file, std::ios::binary) << text;
+}
 
 std::map<std::string, std::string> read_tree(const fs::path& folder, const std::vector<std::string>& except) {
     std::map<std::string, std::string> files;
@@ -129,9 +134,12 @@ template <class Row, class Other>
 void each_line(const std::string& text, const Row& row, const Other& other) {
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) {
-        const bool data = !line.empty() && (std::isdigit(static_cast<unsigned char>(line[0])) || line[0] == '-');
-        if (data) row(line, std::strtod(line.c_str(), nullptr));
-        else other(line);
+        const bool data =
+            !line.empty() && (std::isdigit(static_cast<unsigned char>(line[0])) || line[0] == '-');
+        if (data)
+            row(line, std::strtod(line.c_str(), nullptr));
+        else
+            other(line);
     }
 }
 
@@ -140,7 +148,10 @@ void each_line(const std::string& text, const Row& row, const Other& other) {
 std::string cut_trace(const std::string& text, double until, double from) {
     std::string result;
     each_line(
-        text, [&](const std::string& line, double t) { if (t < until && t >= from) result += line + "\n"; },
+        text,
+        [&](const std::string& line, double t) {
+            if (t < until && t >= from) result += line + "\n";
+        },
         [&](const std::string& line) { result += line + "\n"; });
     return result;
 }
@@ -148,11 +159,16 @@ std::string cut_trace(const std::string& text, double until, double from) {
 std::pair<double, double> time_span(const std::string& text) {
     std::pair<double, double> span(1e300, -1e300);
     each_line(
-        text, [&](const std::string&, double t) { span = {std::min(span.first, t), std::max(span.second, t)}; },
+        text,
+        [&](const std::string&, double t) {
+            span = {std::min(span.first, t), std::max(span.second, t)};
+        },
         [](const std::string&) {});
     return span;
 }
 
-fs::path bundled(const std::string& name) { return fs::path(MUSICWORLD_SOURCE_DIR) / "assets" / name; }
+fs::path bundled(const std::string& name) {
+    return fs::path(MUSICWORLD_SOURCE_DIR) / "assets" / name;
+}
 
 }  // namespace end_to_end

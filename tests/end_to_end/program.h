@@ -9,7 +9,7 @@
 namespace end_to_end {
 
 struct Ended {
-    int status = -1;     ///< exit status; 128 + signal when killed
+    int status = -1;  ///< exit status; 128 + signal when killed
     std::string out, err;
 };
 
@@ -44,7 +44,8 @@ private:
 std::string read(const std::filesystem::path& file);
 void write(const std::filesystem::path& file, const std::string& text);
 /// All files below a folder, by relative path, but those in `except`.
-std::map<std::string, std::string> read_tree(const std::filesystem::path& folder, const std::vector<std::string>& except);
+std::map<std::string, std::string> read_tree(const std::filesystem::path& folder,
+                                             const std::vector<std::string>& except);
 
 /// Rows of a CSV file by column name (no quoting).
 std::vector<std::map<std::string, std::string>> read_csv(const std::filesystem::path& file);

@@ -27,7 +27,8 @@ private:
     std::unique_ptr<Implementation> implementation_;
 };
 
-/// PNG file bytes of an image: SUB filter, deflate by ISA-L at level 1 (fast; the bytes, not the pixels, depend on the processor's kind).
+/// PNG file bytes of an image: SUB filter, deflate by ISA-L at level 1 (fast; the bytes, not the pixels,
+/// depend on the processor's kind).
 [[nodiscard]] std::vector<std::uint8_t> encode_png(const Image& image);
 /// The inverse, for tests and reports; throws std::runtime_error.
 [[nodiscard]] Image decode_png(const std::vector<std::uint8_t>& bytes);

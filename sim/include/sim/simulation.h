@@ -9,8 +9,8 @@
 
 namespace sim {
 
-/// Where one state of a stick's filter predicts its tip to go: nodes of a cubic Hermite curve, times strictly increasing,
-/// at least two. Swept as a whole against every body; nothing is swept between paths.
+/// Where one state of a stick's filter predicts its tip to go: nodes of a cubic Hermite curve, times strictly
+/// increasing, at least two. Swept as a whole against every body; nothing is swept between paths.
 struct PathNode {
     double t_s;
     Eigen::Vector3d position;  ///< [m], world
@@ -26,23 +26,25 @@ struct TipPath {
 struct Impulse {
     std::uint32_t body = 0;
     double t_s = 0;
-    Eigen::Vector3d point_body = Eigen::Vector3d::Zero();  ///< in the rest shape [m]
-    Eigen::Vector3d impulse_body = Eigen::Vector3d::Zero();///< [N s], body frame
+    Eigen::Vector3d point_body = Eigen::Vector3d::Zero();    ///< in the rest shape [m]
+    Eigen::Vector3d impulse_body = Eigen::Vector3d::Zero();  ///< [N s], body frame
 };
 
 /// The tip's surface (grown by its radius) crossed inwards on a path.
 struct Contact {
     std::uint32_t stick = 0;
     std::uint32_t body = 0;
-    double t_s = 0;             ///< crossing, found to 1e-7 s; the path's first time if the tip starts inside
-    bool starts_inside = false; ///< the tip was inside at the path's first time
-    double depth_m = 0;         ///< at the path's first time when it starts inside, else 0
-    double speed_mps = 0;       ///< inward normal speed of the tip relative to the moving, deformed surface (negative: leaving)
-    std::int32_t zone = -1;     ///< index into the body's zones, -1 silent
+    double t_s = 0;  ///< crossing, found to 1e-7 s; the path's first time if the tip starts inside
+    bool starts_inside = false;  ///< the tip was inside at the path's first time
+    double depth_m = 0;          ///< at the path's first time when it starts inside, else 0
+    double speed_mps =
+        0;  ///< inward normal speed of the tip relative to the moving, deformed surface (negative: leaving)
+    std::int32_t zone = -1;                                 ///< index into the body's zones, -1 silent
     Eigen::Vector3d point_world = Eigen::Vector3d::Zero();  ///< on the deformed surface
     Eigen::Vector3d normal_world = Eigen::Vector3d::UnitY();
-    Eigen::Vector3d point_body = Eigen::Vector3d::Zero();   ///< the same material point in the rest shape
-    Eigen::Vector3d impulse_body = Eigen::Vector3d::Zero(); ///< that the stick's effective mass gives the body [N s], (1 + e) m_eff v
+    Eigen::Vector3d point_body = Eigen::Vector3d::Zero();  ///< the same material point in the rest shape
+    Eigen::Vector3d impulse_body =
+        Eigen::Vector3d::Zero();  ///< that the stick's effective mass gives the body [N s], (1 + e) m_eff v
 };
 
 /// One impulse as a picture shows it: its response times `weight` is added to the body's state.
@@ -59,18 +61,21 @@ struct PictureRequest {
 
 /// One step of the simulation: from the last step's time to t_s.
 struct StepRequest {
-    double t_s = 0;                    ///< not earlier than the last step's
-    std::vector<Impulse> folded;       ///< impulses that become part of the bodies' exact states; t_s <= this step's time
-    std::vector<Impulse> confirmed;    ///< fixed but not yet folded: contacts feel them from their time on
+    double t_s = 0;  ///< not earlier than the last step's
+    std::vector<Impulse>
+        folded;  ///< impulses that become part of the bodies' exact states; t_s <= this step's time
+    std::vector<Impulse> confirmed;  ///< fixed but not yet folded: contacts feel them from their time on
     std::vector<TipPath> paths;
     std::vector<PictureRequest> pictures;
 };
 
 struct StepReply {
-    std::vector<Contact> contacts;     ///< ordered by stick's place in paths, then time, then body
-    std::vector<ModalState> states;    ///< every body's exact state at t_s, in order of definition
-    std::vector<std::vector<ModalState>> pictures;  ///< for each request, every body's state in order of definition
-    std::vector<double> clearance_m;   ///< paths x bodies, row-major: signed distance of the tip (grown surface, as deformed) at each path's first node
+    std::vector<Contact> contacts;   ///< ordered by stick's place in paths, then time, then body
+    std::vector<ModalState> states;  ///< every body's exact state at t_s, in order of definition
+    std::vector<std::vector<ModalState>>
+        pictures;                     ///< for each request, every body's state in order of definition
+    std::vector<double> clearance_m;  ///< paths x bodies, row-major: signed distance of the tip (grown
+                                      ///< surface, as deformed) at each path's first node
 };
 
 /// What happened to the workers of a run.
@@ -80,7 +85,8 @@ struct WorkerReport {
     int bodies_reowned = 0;  ///< bodies that went on elsewhere
 };
 
-/// Steps a fixed set of bodies. The reply is a pure function of the bodies and the requests so far, whoever computes it.
+/// Steps a fixed set of bodies. The reply is a pure function of the bodies and the requests so far, whoever
+/// computes it.
 class Simulation {
 public:
     virtual ~Simulation() = default;
@@ -93,22 +99,26 @@ public:
 
 /// How to start a worker process: `program arguments... --connect ENDPOINT`.
 struct WorkerLaunch {
-    std::string program;                  ///< absolute path
-    std::vector<std::string> arguments;   ///< e.g. {"worker"}
+    std::string program;                 ///< absolute path
+    std::vector<std::string> arguments;  ///< e.g. {"worker"}
     int count = 1;
 };
 
-/// Bodies shared out to worker processes over ZeroMQ (ipc in a private 0700 folder, removed at the end; also after SIGINT/SIGTERM of this
-/// process workers end within 2 s). A worker that dies or is silent for 1 s is replaced by the others (by this process when none is left):
-/// its bodies go on from their last exact state and the step is repeated. Throws std::runtime_error when a worker cannot be started.
+/// Bodies shared out to worker processes over ZeroMQ (ipc in a private 0700 folder, removed at the end; also
+/// after SIGINT/SIGTERM of this process workers end within 2 s). A worker that dies or is silent for 1 s is
+/// replaced by the others (by this process when none is left): its bodies go on from their last exact state
+/// and the step is repeated. Throws std::runtime_error when a worker cannot be started.
 [[nodiscard]] std::unique_ptr<Simulation> make_distributed_simulation(std::vector<BodyDefinition> bodies,
                                                                       const WorkerLaunch& launch);
 
-/// The worker process: joins at `endpoint` and serves until told to stop or until its application is gone. Returns an exit status.
+/// The worker process: joins at `endpoint` and serves until told to stop or until its application is gone.
+/// Returns an exit status.
 [[nodiscard]] int run_worker(const std::string& endpoint);
 
-/// Rest-shape queries for scoring and layout: signed distance of a world point to the body's rest surface grown by `radius_m`.
-[[nodiscard]] SurfacePoint rest_distance(const BodyDefinition& body, const Eigen::Vector3d& point_world, double radius_m);
+/// Rest-shape queries for scoring and layout: signed distance of a world point to the body's rest surface
+/// grown by `radius_m`.
+[[nodiscard]] SurfacePoint rest_distance(const BodyDefinition& body, const Eigen::Vector3d& point_world,
+                                         double radius_m);
 /// Zone of a world point near the rest surface, -1 if none.
 [[nodiscard]] int rest_zone(const BodyDefinition& body, const Eigen::Vector3d& point_world);
 
