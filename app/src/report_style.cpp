@@ -37,8 +37,6 @@ table{border-collapse:collapse;font-variant-numeric:tabular-nums}
 th,td{padding:4px 14px 4px 0;text-align:left;border-bottom:1px solid var(--grid);vertical-align:top;overflow-wrap:anywhere}
 th{color:var(--axis);font-weight:500;font-size:13px}
 td.n,th.n{text-align:right}
-td.bar{min-width:180px;vertical-align:middle}
-td.bar i{display:block;height:9px;border-radius:3px;background:var(--wave)}
 code{font:12.5px/1.5 ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;overflow-wrap:anywhere}
 @media(max-width:520px){.pair{grid-template-columns:1fr}main{padding:20px 14px}}
 @media print{body{font-size:12px}.plot,figure,tr{break-inside:avoid}}

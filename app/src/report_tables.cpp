@@ -64,19 +64,6 @@ std::string error_cells(const std::vector<double>& errors_ms) {
                        tenths(median(errors_ms)));
 }
 
-std::string stages_table(const PlayResult& result) {
-    double longest = 1e-9;
-    for (const auto& [name, seconds] : result.stages_s) longest = std::max(longest, seconds);
-    std::string text = "<table><tr><th>stage<th class=n>seconds<th></tr>\n";
-    for (const auto& [name, seconds] : result.stages_s)
-        fmt::format_to(std::back_inserter(text),
-                       "<tr><td>{}<td class=n>{:.3f}<td class=bar><i style=\"width:{:.1f}%\"></i></tr>\n",
-                       html(name), seconds, 100 * std::clamp(seconds / longest, 0.0, 1.0));
-    fmt::format_to(std::back_inserter(text), "<tr><td>whole run<td class=n>{:.3f}<td></tr></table>\n",
-                   result.wall_s);
-    return text;
-}
-
 }  // namespace
 
 std::string report_heading(const PlayResult& r) {
@@ -113,9 +100,6 @@ std::string report_figures(const PlayResult& r) {
     text += figure(fmt::format("{}", s.missed), "missed", "missed");
     text += figure(ms(s.timing_median_ms), "median error", "axis");
     text += figure(ms(s.timing_p95_ms), "95 % error", "axis");
-    const std::string factor =
-        r.wall_s > 0 ? fmt::format("{:.3g} x", (r.t_end_s - r.t0_s) / r.wall_s) : "none";
-    text += figure(factor, "real time", "axis");
     text += "</section>\n";
     text += fmt::format(
         "<p class=note>Heard: {} of the true contacts. False: {} of the notes, {} after a stroke that turned "
@@ -152,10 +136,8 @@ std::string report_instruments(const PlayResult& result) {
 }
 
 std::string report_provenance(const PlayResult& r) {
-    std::string text = "<h2>Where the time went</h2>\n" + stages_table(r);
-    text +=
-        fmt::format("<p class=note>Stages may overlap. Workers: {} ({} lost, {} bodies taken over).</p>\n",
-                    r.workers, r.workers_lost, r.bodies_reowned);
+    std::string text =
+        "<p class=note>Times and workers, which differ between runs, are in summary.json.</p>\n";
     text += "<h2>Inputs</h2>\n<table><tr><th>file<th>SHA-256</tr>\n";
     for (const InputFile& input : r.inputs)
         fmt::format_to(std::back_inserter(text), "<tr><td>{}<td><code>{}</code></tr>\n", html(input.file),

@@ -36,9 +36,9 @@ Json summary(const std::filesystem::path& out) {
 }
 
 void expect_same_products(const std::filesystem::path& a, const std::filesystem::path& b) {
-    const auto left = read_tree(a, {"summary.json", "report.html"});
-    const auto right = read_tree(b, {"summary.json", "report.html"});
-    ASSERT_GT(left.size(), 4U);
+    const auto left = read_tree(a, {"summary.json"});
+    const auto right = read_tree(b, {"summary.json"});
+    ASSERT_GE(left.size(), 4U);
     ASSERT_EQ(left.size(), right.size());
     for (const auto& [name, bytes] : left)
         EXPECT_TRUE(right.contains(name) && right.at(name) == bytes) << name;
