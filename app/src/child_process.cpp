@@ -1,5 +1,6 @@
 #include "child_process.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -12,13 +13,19 @@ extern char** environ;
 
 namespace app {
 
-void run_child(const std::vector<std::string>& command) {
+void run_child(const std::vector<std::string>& command, const std::filesystem::path& log) {
     std::vector<char*> arguments;
     arguments.reserve(command.size() + 1);
     for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
     arguments.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, 1, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    posix_spawn_file_actions_adddup2(&actions, 1, 2);
     pid_t child = 0;
-    if (const int error = posix_spawnp(&child, arguments[0], nullptr, nullptr, arguments.data(), environ))
+    const int error = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    if (error != 0)
         throw std::runtime_error(fmt::format("error: found no way to start {} ({}), expected it installed",
                                              command[0], std::strerror(error)));
     int status = 0;

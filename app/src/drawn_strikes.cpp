@@ -6,6 +6,7 @@ namespace app {
 namespace {
 
 constexpr double kFadeS = 0.1;
+constexpr double kLongAgoS = 2;  // no cancelled strike comes back after that
 
 bool same(const sim::Impulse& a, const sim::Impulse& b) {
     return a.t_s == b.t_s && a.point_body == b.point_body && a.impulse_body == b.impulse_body;
@@ -22,9 +23,11 @@ sim::Impulse impulse_of(const Strike& strike) {
 }
 
 void DrawnStrikes::start(double T, std::span<const Strike> strikes) {
-    while (first_open_ < strikes.size() && seen_.contains(strikes[first_open_].id) &&
-           folded_.contains(strikes[first_open_].id))
-        ++first_open_;
+    const auto settled = [&](const Strike& strike) {
+        if (strike.outcome == Outcome::cancelled) return strike.decided_at_s < T - kLongAgoS;
+        return seen_.contains(strike.id) && folded_.contains(strike.id);
+    };
+    while (first_open_ < strikes.size() && settled(strikes[first_open_])) ++first_open_;
     for (std::size_t i = first_open_; i < strikes.size(); ++i) {
         const Strike& strike = strikes[i];
         if (strike.outcome == Outcome::cancelled || strike.contact_s > T || seen_.contains(strike.id))

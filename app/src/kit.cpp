@@ -230,7 +230,7 @@ Instrument read_instrument(const toml::table& table, const Layers& layers, const
 
     sim::BodyDefinition& body = instrument.body;
     body.name = instrument.name;
-    (void)reader.choice("shape", {"superquadric", "mesh"}, "superquadric");
+    (void)reader.choice("shape", {"superquadric"}, "superquadric");
     body.shape.semi_axes = 0.5 * reader.vector("size", 0.001, 10);
     const Eigen::VectorXd exponents =
         reader.numbers("exponents", 2, 0.1, 1.9, Eigen::VectorXd(Eigen::Vector2d(1, 1)));

@@ -46,6 +46,7 @@ OfflineRun::OfflineRun(const tracking::Trace& trace, const Kit& kit, const PlayO
       stage_(stage),
       frames_(frames),
       performance_(performance),
+      tip_radius_m_(stick.radius_m),
       t0_s_(trace.t0_s()),
       t_end_s_(trace.t_end_s()),
       scheduler_(rules_of(options, trace.t0_s()), trace.sticks.size(), kit.instruments.size()) {
@@ -150,7 +151,15 @@ void OfflineRun::take_contacts(double s, const std::vector<std::uint32_t>& moved
         // Two paths a stick: the predicted one, and the measured tip, which stands still and makes no contact
         // but by starting inside.
         const std::span<const double> filtered(reply.clearance_m.data() + 2 * i * bodies, bodies);
-        const std::span<const double> measured(reply.clearance_m.data() + (2 * i + 1) * bodies, bodies);
+        std::vector<double> measured(bodies);
+        for (std::size_t b = 0; b < bodies; ++b) {
+            // The nearer of the surface as it vibrates and at rest: a vibrating head does not arm a stick
+            // that lies on it.
+            const double rest =
+                sim::rest_distance(kit_.instruments[b].body, sticks_[moved[i]].measured_tip(), tip_radius_m_)
+                    .distance;
+            measured[b] = std::min(rest, reply.clearance_m[(2 * i + 1) * bodies + b]);
+        }
         own.clear();
         for (const sim::Contact& contact : reply.contacts)
             if (contact.stick == moved[i]) own.push_back(contact);
@@ -205,7 +214,7 @@ void OfflineRun::draw_frame(double s, double T) {
         sim::StepRequest request;
         request.t_s = s;
         settle_impulses(s, request);
-        request.pictures.push_back({T, drawn_.frame(T, scheduler_.strikes())});
+        request.pictures.push_back({std::max(T, s), drawn_.frame(T, scheduler_.strikes())});
         const Stopwatch watch(times_.simulation);
         bodies = std::move(simulation_.step(request).pictures.front());
     }

@@ -64,6 +64,7 @@ private:
     const Stage& stage_;
     FrameWriter* frames_;
     audio::Performance* performance_;
+    double tip_radius_m_;
     double t0_s_, t_end_s_;
     StrikeScheduler scheduler_;
     DrawnStrikes drawn_;

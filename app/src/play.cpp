@@ -25,6 +25,7 @@ namespace app {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr double kLongestHours = 3;  // a WAV file holds four
 constexpr double kTailS = 0.5, kLongestTailS = 10;
 constexpr double kApartS = 0.5;  // between the notes whose frames the report shows
 
@@ -49,10 +50,20 @@ void check(const PlayOptions& o) {
     refuse(o.workers < 0 || o.workers > 64, fmt::format("--workers {}", o.workers), "0 to 64");
     for (const auto& [name, lead] :
          {std::pair{"--render-lead", o.render_lead_s}, {"--sound-lead", o.sound_lead_s}})
-        refuse(!(lead >= 0 && lead <= 1), fmt::format("{} {}", name, lead), "0 to 1 s");
+        refuse(!(lead >= (name == std::string_view("--sound-lead") ? 0.001 : 0) && lead <= 1),
+               fmt::format("{} {}", name, lead), "0 to 1 s (of sound at least 0.001 s)");
     refuse(!(o.release_margin_s >= 0 && o.release_margin_s <= o.sound_lead_s),
            fmt::format("--release-margin {}", o.release_margin_s), "0 s to the sound lead");
-    refuse(o.video && !o.frames, "--video with --no-frames", "one of them");
+    if (!o.video) return;
+    const std::string video = fmt::format("--video {}", o.video->string());
+    refuse(!o.frames, "--video with --no-frames", "one of them");
+    refuse(o.width % 2 != 0 || o.height % 2 != 0, fmt::format("--video with --size {}x{}", o.width, o.height),
+           "even sides");
+    std::error_code error;
+    refuse(fs::is_directory(*o.video, error), video + ", which is a directory", "a file");
+    const fs::path parent = o.video->parent_path();
+    refuse(!parent.empty() && !fs::is_directory(parent, error), video + " in a folder that is not there",
+           "an existing folder");
 }
 
 std::vector<sim::BodyDefinition> bodies_of(const Kit& kit) {
@@ -79,8 +90,8 @@ PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, co
     result.kit = options.kit.string();
     result.kit_name = kit.name;
     result.trace_source = trace.source;
-    result.picture_predictor = options.picture_predictor;
-    result.sound_predictor = options.sound_predictor;
+    result.picture_predictor = picture_specification(options.picture_predictor);
+    result.sound_predictor = sound_specification(options.sound_predictor);
     result.t0_s = trace.t0_s();
     result.t_end_s = trace.t_end_s();
     result.fps = options.fps;
@@ -153,7 +164,13 @@ void make_video(const PlayOptions& options, const fs::path& staging) {
     if (options.audio) command.insert(command.end(), {"-i", (staging / "audio.wav").string(), "-c:a", "aac"});
     command.insert(command.end(), {"-c:v", "libx264", "-preset", "veryfast", "-pix_fmt", "yuv420p", "-fflags",
                                    "+bitexact", "-f", "mp4", options.video->string() + ".partial"});
-    run_child(command);
+    try {
+        run_child(command, staging / "scratch" / "ffmpeg.log");
+    } catch (...) {
+        std::error_code ignored;
+        fs::remove(options.video->string() + ".partial", ignored);
+        throw;
+    }
 }
 
 }  // namespace
@@ -162,6 +179,11 @@ PlayResult play(const PlayOptions& options) {
     const Timer wall;
     check(options);
     const tracking::Trace trace = tracking::read_trace(options.trace);
+    if (const double hours = (trace.t_end_s() - trace.t0_s()) / 3600; hours > kLongestHours)
+        throw BadInput(fmt::format(
+            "{}: error: found {:.3g} hours between the first sample and the last, expected at most {}; "
+            "are there two clocks in it?",
+            options.trace.string(), hours, kLongestHours));
     const Kit kit = read_kit(options.kit);
     const StickGeometry stick = stick_geometry(trace, kit.stick, options.tip, options.shaft);
     for (const std::string& name : {options.picture_predictor, options.sound_predictor})

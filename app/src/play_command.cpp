@@ -18,7 +18,7 @@ struct PlayArguments {
     std::string render_lead = "1/30", sound_lead = "1/15", release_margin = "0.010";
     std::string tip, shaft, video;
     int workers = 1;
-    std::uint64_t solo = 0;
+    std::int64_t solo = -1;  // none
     bool no_cancel = false, no_frames = false, no_audio = false;
 };
 
@@ -40,7 +40,7 @@ PlayOptions options_of(const PlayArguments& a) {
     o.cancelling = !a.no_cancel;
     o.frames = !a.no_frames;
     o.audio = !a.no_audio;
-    if (a.solo != 0) o.solo = a.solo;
+    if (a.solo >= 0) o.solo = static_cast<std::uint64_t>(a.solo);
     if (!a.tip.empty()) o.tip = parse_vector(a.tip, "--tip");
     if (!a.shaft.empty()) o.shaft = parse_axis(a.shaft, "--shaft");
     if (!a.video.empty()) o.video = a.video;

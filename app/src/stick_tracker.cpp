@@ -10,6 +10,7 @@ namespace {
 constexpr int kPathPieces = 8;
 constexpr double kLongestPredictionS = 0.15;
 constexpr double kStandstillS = 1e-6;
+constexpr double kImpossibleSpeed_mps = 1e4, kImpossibleDistanceM = 1e4;
 
 // What `auto` stands for. Pictures want the least mean error, strikes a path that bends: constant velocity
 // does the one, constant acceleration the other (an acceleration in the state costs 40 % and more of position
@@ -19,12 +20,20 @@ constexpr const char* kAutoSound = "ca:q=1e9,gate=5";
 
 }  // namespace
 
+std::string picture_specification(const std::string& specification) {
+    return specification == "auto" ? kAutoPicture : specification;
+}
+
+std::string sound_specification(const std::string& specification) {
+    return specification == "auto" ? kAutoSound : specification;
+}
+
 StickTracker::StickTracker(std::uint32_t stick, const StickGeometry& geometry,
                            const std::string& picture_predictor, const std::string& sound_predictor)
     : stick_(stick),
       geometry_(geometry),
-      picture_(tracking::make_predictor(picture_predictor == "auto" ? kAutoPicture : picture_predictor)),
-      sound_(tracking::make_predictor(sound_predictor == "auto" ? kAutoSound : sound_predictor)) {}
+      picture_(tracking::make_predictor(picture_specification(picture_predictor))),
+      sound_(tracking::make_predictor(sound_specification(sound_predictor))) {}
 
 tracking::SampleStatus StickTracker::correct(const tracking::PoseSample& sample) {
     (void)picture_->correct(sample);
@@ -48,6 +57,9 @@ sim::TipPath StickTracker::predicted_path(double lead_s) const {
         const double h = lead_s * i / kPathPieces;
         const tracking::PointMotion tip = tracking::point_of(sound_->predict(h), geometry_.tip);
         path.nodes.push_back({sound_->time_s() + h, tip.position, tip.velocity});
+        // What no stick can do (samples that jump within microseconds) makes no contact.
+        if (!(tip.velocity.norm() < kImpossibleSpeed_mps) || !(tip.position.norm() < kImpossibleDistanceM))
+            return measured_path();
     }
     return path;
 }

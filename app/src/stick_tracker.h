@@ -9,6 +9,10 @@
 
 namespace app {
 
+/// A predictor's specification with `auto` resolved: what measurements chose for pictures and for sound.
+[[nodiscard]] std::string picture_specification(const std::string& specification);
+[[nodiscard]] std::string sound_specification(const std::string& specification);
+
 /// One stick's filters: one predictor for pictures, one for sound, fed the same samples.
 class StickTracker {
 public:
@@ -18,6 +22,8 @@ public:
     /// What the sound's filter made of the sample; refused samples change nothing.
     [[nodiscard]] tracking::SampleStatus correct(const tracking::PoseSample& sample);
     [[nodiscard]] bool started() const { return started_; }
+    /// Centre of the tip in the newest sample that the filter took [m].
+    [[nodiscard]] const Eigen::Vector3d& measured_tip() const { return measured_tip_; }
     /// Pose for a picture shown at T >= the newest sample's time; a prediction is carried at most 0.15 s
     /// beyond that, then held.
     [[nodiscard]] tracking::PosePrediction pose_at(double T) const;

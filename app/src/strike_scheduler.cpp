@@ -159,8 +159,8 @@ void StrikeScheduler::cancel(Approach& a, double s, std::uint64_t id) {
     if (a.cancelled.size() > kRememberedCancellations) a.cancelled.erase(a.cancelled.begin());
 }
 
-void StrikeScheduler::keep_or_cancel(Approach& a, double s, std::uint64_t id) {
-    if (a.entered_s) {
+void StrikeScheduler::keep_or_cancel(Approach& a, double s, std::uint64_t id, bool may_keep) {
+    if (a.entered_s && may_keep) {
         // The measured tip has met the surface: the stroke came, whatever the path now says. It sounds as
         // soon as it may.
         Strike& kept = strike(id);
@@ -196,7 +196,11 @@ void StrikeScheduler::follow(Approach& a, double s, std::uint32_t stick,
         waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(best_p));
         found.erase(found.begin() + static_cast<std::ptrdiff_t>(best_c));
     }
-    for (const std::uint64_t id : waiting) keep_or_cancel(a, s, id);
+    // One stroke has come when the tip is in: the earliest note is its own, unless the path has confirmed
+    // another.
+    bool may_keep = waiting.size() == a.pending.size();
+    std::ranges::sort(waiting, {}, [this](std::uint64_t id) { return strike(id).contact_s; });
+    for (const std::uint64_t id : waiting) keep_or_cancel(a, s, id, std::exchange(may_keep, false));
     std::erase_if(a.pending, [&](std::uint64_t id) { return strike(id).outcome == Outcome::cancelled; });
     for (const sim::Contact* contact : found) create(a, s, stick, *contact);
 }

@@ -81,7 +81,7 @@ private:
     void create(Approach& a, double s, std::uint32_t stick, const sim::Contact& contact);
     void update(Strike& strike, double s, const sim::Contact& contact);
     void place_onset(Strike& strike, double s) const;
-    void keep_or_cancel(Approach& a, double s, std::uint64_t id);
+    void keep_or_cancel(Approach& a, double s, std::uint64_t id, bool may_keep);
     void cancel(Approach& a, double s, std::uint64_t id);
     void release(std::uint64_t id);
     static void disarm(Approach& a);

@@ -123,8 +123,9 @@ void count_turns(StrikeScore& score, std::span<const Strike> strikes, std::span<
     for (const TrueContact& contact : contacts) matched.insert(contact.matched_id);
     for (const Strike& strike : strikes) {
         if (strike.outcome != Outcome::released || matched.contains(strike.id)) continue;
-        const double turn = nearest_approach_s(tracks[strike.stick], bodies[strike.instrument], tip_radius_m,
-                                               strike.scheduled_at_s - 0.1, strike.onset_s + 0.1);
+        const double turn =
+            nearest_approach_s(tracks[strike.stick], bodies[strike.instrument], tip_radius_m,
+                               strike.scheduled_at_s - 0.1, strike.onset_s + release_margin_s);
         const bool early = turn <= strike.onset_s - release_margin_s - kTurnEarlyS;
         ++(early ? score.false_turned_early : score.false_turned_late);
     }

@@ -18,7 +18,7 @@ namespace app {
 
 /// Counts the false notes whose stick had turned back 25 ms or more before the release point, and the others
 /// (StrikeScore::false_turned_*). The turn is the measured tip's nearest approach to the instrument between
-/// the note's scheduling less 0.1 s and its onset plus 0.1 s.
+/// 0.1 s before the note's scheduling and a release margin after its onset.
 void count_turns(StrikeScore& score, std::span<const Strike> strikes, std::span<const TrueContact> contacts,
                  std::span<const TipTrack> tracks, std::span<const sim::BodyDefinition> bodies,
                  double tip_radius_m, double release_margin_s);

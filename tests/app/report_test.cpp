@@ -73,11 +73,10 @@ TEST(Report, EveryPlotIsAWholeSvgWithALabelAndFollowsThePagesColours) {
 
 TEST(Report, ShowsTheFiguresAndTheProvenance) {
     const std::string page = report_of(sample_play_result());
-    for (const char* text :
-         {"<b>3</b><span>true contacts", "<b>1</b><span>cancelled", "<b>2</b><span>moved",
-          "<b>1</b><span>false", "<b>1</b><span>missed", "<b>3.0 ms</b><span>median error",
-          "<b>4.0 ms</b><span>95 % error", "drums &amp; bells", "33.3 ms ahead",
-          "up to 66.7 ms ahead", "0123456789abcdef", "Heard: 66.7 %", "False: 33.3 %"})
+    for (const char* text : {"<b>3</b><span>true contacts", "<b>1</b><span>cancelled", "<b>2</b><span>moved",
+                             "<b>1</b><span>false", "<b>1</b><span>missed", "<b>3.0 ms</b><span>median error",
+                             "<b>4.0 ms</b><span>95 % error", "drums &amp; bells", "33.3 ms ahead",
+                             "up to 66.7 ms ahead", "0123456789abcdef", "Heard: 66.7 %", "False: 33.3 %"})
         EXPECT_TRUE(holds(page, text)) << text;
     EXPECT_TRUE(holds(page, std::string(64, 'a')));
 }

@@ -253,5 +253,24 @@ TEST(KalmanPredictor, VelocityIsTheDerivativeOfThePredictedPath) {
     }
 }
 
+TEST(KalmanPredictor, OrientationsThatJumpAtRandomDoNotMakeTheTurningRunAway) {
+    std::mt19937 random(3);
+    const auto component = [&] { return static_cast<double>(random() % 2001) / 1000 - 1; };
+    constexpr double kDt = 1.0 / 90, kLead = 1.0 / 15;
+    for (const char* name : {"thesis", "cv", "ca", "singer", "auto"}) {
+        const auto predictor = make_predictor(name);
+        for (int i = 0; i < 5000; ++i) {
+            PoseSample sample = sample_at(i * kDt, Vector3d::Zero());
+            sample.has_orientation = true;
+            sample.orientation =
+                Eigen::Quaterniond(component(), component(), component(), component() + 1e-3).normalized();
+            (void)predictor->correct(sample);
+            // Half a turn a sample, and a change of the rate by as much in every sample of the lead.
+            ASSERT_LE(predictor->predict(kLead).angular_velocity.norm(), M_PI / kDt * (1 + kLead / kDt))
+                << name;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace tracking

@@ -1,10 +1,16 @@
 #include "rotation_filter.h"
 
 #include <cmath>
+#include <numbers>
 
 #include "rotation.h"
 
 namespace tracking {
+namespace {
+
+constexpr double kHalfTurn = std::numbers::pi;
+
+}  // namespace
 
 void RotationFilter::restart() noexcept {
     started_ = false;
@@ -45,6 +51,11 @@ void RotationFilter::correct(const Eigen::Quaterniond& measured) noexcept {
             break;
     }
     rates_ += covariance_.correct() * innovation.transpose();
+    // Beyond half a turn a sample the rates are aliases of slower ones, which the measurements cannot tell
+    // apart.
+    const double dt = since_measured_;
+    if (rates_.row(1).norm() * dt > kHalfTurn || rates_.row(2).norm() * dt * dt > kHalfTurn)
+        return start(measured);
     q_ = (exponential(rates_.row(0).transpose()) * q_).normalized();
     rates_.row(0).setZero();
     last_measured_ = z;

@@ -14,8 +14,9 @@ namespace tracking {
 ///   innovate   log(z q^-1), the shorter way round, so the sign of z does not matter
 ///   correct    [rho, w, a] += K innovation, then q <- exp(rho) q and rho = 0
 ///
-/// Valid while the turn between two samples is small against pi. The covariance is the axes' own (the noise
-/// is alike in all directions, so turning rho's frame leaves it alone). No allocation.
+/// Valid while the turn between two samples is small against pi; a state that turns, or changes its rate, by
+/// more starts anew from the measurement. The covariance is the axes' own (the noise is alike in all
+/// directions, so turning rho's frame leaves it alone). No allocation.
 class RotationFilter {
 public:
     RotationFilter(const MotionModel& model, const OutlierGate& gate) : covariance_(model), gate_(gate) {}

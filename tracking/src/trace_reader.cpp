@@ -173,7 +173,12 @@ private:
     }
 
     void read_orientation(const Line& line, Reading& stick, PoseSample& sample) const {
-        if (orientation_ == Orientation::absent || orientation_left_out(line)) return;
+        if (orientation_ == Orientation::absent) return;
+        if (orientation_left_out(
+                line)) {  // the newest known one, so that the tip stays where the stick last pointed
+            if (!stick.trace.samples.empty()) sample.orientation = stick.trace.samples.back().orientation;
+            return;
+        }
         Eigen::Quaterniond q;
         if (orientation_ == Orientation::quaternion) {
             q = read_quaternion(line);

@@ -14,7 +14,8 @@ struct PoseSample {
     double t_s = 0;
     Eigen::Vector3d position = Eigen::Vector3d::Zero();
     Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-    bool has_orientation = false;  ///< false: position only; orientation is then the identity
+    bool has_orientation =
+        false;  ///< false: position only; orientation is then the newest known one (the identity before any)
 };
 
 /// Samples of one stick, t_s strictly increasing, at least two.
