@@ -56,9 +56,10 @@ void print_result(const PlayResult& result, const PlayOptions& options) {
         sounded, s.true_contacts, s.false_notes, s.cancelled,
         sounded > 0 ? fmt::format("{:.1f} ms", s.timing_median_ms) : "unknown (nothing matched)",
         (result.t_end_s - result.t0_s) / result.wall_s);
-    fmt::print("Look at {}, listen to {}, see frames in {}\n", (options.out / "report.html").string(),
-               options.audio ? (options.out / "audio.wav").string() : "nothing (--no-audio)",
-               options.frames ? (options.out / "frames").string() : "none (--no-frames)");
+    fmt::print("Look at {}", (options.out / "report.html").string());
+    if (options.audio) fmt::print(", listen to {}", (options.out / "audio.wav").string());
+    if (options.frames) fmt::print(", see {}", (options.out / "frames").string());
+    fmt::print("\n");
 }
 
 }  // namespace
