@@ -89,7 +89,7 @@ StickGeometry common_geometry(const std::vector<tracking::Trace>& traces, const 
     if (tip && tip->cwiseAbs().maxCoeff() > 2)
         throw BadInput(fmt::format("error: found --tip {}, expected coordinates within 2 m", a.tip));
     if (!a.shaft.empty()) shaft = parse_axis(a.shaft, "--shaft");
-    const StickGeometry first = stick_geometry(traces.front(), stick, tip, shaft);
+    StickGeometry first = stick_geometry(traces.front(), stick, tip, shaft);
     for (const tracking::Trace& trace : traces) {
         const StickGeometry other = stick_geometry(trace, stick, tip, shaft);
         if (other.tip != first.tip || other.shaft != first.shaft)
