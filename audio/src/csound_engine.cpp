@@ -5,13 +5,14 @@
 #include <algorithm>
 #include <stdexcept>
 #include <string_view>
+#include <type_traits>
 
 #include "audio/performance.h"
 
 namespace audio {
 namespace {
 
-static_assert(sizeof(MYFLT) == sizeof(double), "the 64-bit Csound library is expected");
+static_assert(std::is_same_v<MYFLT, double>, "the 64-bit Csound library is expected");
 
 constexpr std::size_t kMessageLimit = 600;
 

@@ -32,7 +32,7 @@ bool sounds_at(CsoundEngine& engine, double instrument, OnsetRule rule, int offs
         const std::span<const double> frames = engine.render_block();
         for (int frame = 0; frame < engine.block_size(); ++frame) {
             const double expected = block == 0 && frame == offset ? 1 : 0;
-            exact = exact && frames[static_cast<std::size_t>(2 * frame)] == expected;
+            exact = exact && frames[2 * static_cast<std::size_t>(frame)] == expected;
         }
     }
     return exact;

@@ -133,9 +133,11 @@ std::vector<double> resolve_parameters(const Instrument& instrument,
                                      ", expected each at most once of: " + known_names(instrument));
         }
         if (!(value >= parameter->minimum && value <= parameter->maximum)) {
-            throw std::runtime_error(owner + ": found " + name + " = " + std::to_string(value) +
-                                     ", expected " + std::to_string(parameter->minimum) + " to " +
-                                     std::to_string(parameter->maximum));
+            std::string what = owner;
+            what.append(": found ").append(name).append(" = ").append(std::to_string(value));
+            what.append(", expected ").append(std::to_string(parameter->minimum));
+            what.append(" to ").append(std::to_string(parameter->maximum));
+            throw std::runtime_error(what);
         }
         values[place] = value;
         seen[place] = true;

@@ -37,6 +37,8 @@ private:
 
 }  // namespace
 
+// By value as its public contract says: a caller hands its bodies over.
+// NOLINTNEXTLINE(performance-unnecessary-value-param)
 std::unique_ptr<Simulation> make_local_simulation(std::vector<BodyDefinition> bodies) {
     return std::make_unique<LocalSimulation>(bodies);
 }

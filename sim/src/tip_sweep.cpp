@@ -86,7 +86,7 @@ TipSweep::Evaluation TipSweep::close_in(const Segment& segment, const Walk& walk
     Evaluation b = inside;
     for (int i = 1, last_side = 0; i < 100 && b.t - ta > kTimeTolerance_s; ++i) {
         const double share = i % 8 == 0 ? 0.5 : std::clamp(fa / (fa - fb), 1e-3, 1 - 1e-3);
-        const Evaluation m = at(ta + share * (b.t - ta));
+        Evaluation m = at(ta + share * (b.t - ta));
         if (std::abs(m.s) < kDistanceTolerance_m) return m;
         const int side = m.s > 0 ? 1 : -1;
         if (side > 0) {
