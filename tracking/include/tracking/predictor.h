@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Geometry>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,14 @@ struct PosePrediction {
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< d position / d lead [m/s]
     Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
     Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< world frame [rad/s]
+};
+
+/// Covariance of the errors of a prediction as the estimator itself states it. World frame.
+struct PoseCovariance {
+    Eigen::Matrix3d position = Eigen::Matrix3d::Zero();  ///< [m^2]
+    Eigen::Matrix3d velocity = Eigen::Matrix3d::Zero();  ///< [m^2/s^2]
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();  ///< of the small rotation from the predicted
+                                                         ///< orientation to the true one [rad^2]
 };
 
 /// What became of a sample. `outlier`: only with a gate (`auto`, `gate=`); the sample was ignored, but the
@@ -32,6 +41,18 @@ public:
     [[nodiscard]] virtual PosePrediction predict(double lead_s) const noexcept = 0;
     /// Time of the newest accepted sample [s].
     [[nodiscard]] virtual double time_s() const noexcept = 0;
+    /// Covariance of predict(lead_s); none for estimators that state none.
+    [[nodiscard]] virtual std::optional<PoseCovariance> covariance(double /*lead_s*/) const noexcept {
+        return std::nullopt;
+    }
+
+    /// Several models in parallel (3.25-3.28): how many, which one predict() speaks for, and what model
+    /// `index` alone predicts. An estimator of one model has only itself.
+    [[nodiscard]] virtual std::size_t models() const noexcept { return 1; }
+    [[nodiscard]] virtual std::size_t selected() const noexcept { return 0; }
+    [[nodiscard]] virtual PosePrediction predict_model(std::size_t /*index*/, double lead_s) const noexcept {
+        return predict(lead_s);
+    }
 };
 
 /// Longest pause between samples that an estimator bridges; after a longer one it starts anew.
