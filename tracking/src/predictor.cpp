@@ -23,12 +23,6 @@ double density(Specification& specification, double otherwise) {
     return kSquareMetres * specification.number("q", otherwise, kLeastDensity, kMostDensity);
 }
 
-std::unique_ptr<Predictor> make_auto(Specification&) {
-    constexpr double kGateSigmas = 5;
-    return std::make_unique<KalmanPredictor>(
-        MotionModel{MotionModel::ConstantAcceleration{1e9 * kSquareMetres}}, kGateSigmas);
-}
-
 std::unique_ptr<Predictor> make_hold(Specification&) {
     return std::make_unique<Hold>();
 }
@@ -72,8 +66,7 @@ struct Entry {
     std::unique_ptr<Predictor> (*make)(Specification&);
 };
 
-constexpr std::array<Entry, 8> kPredictors = {{{"auto", make_auto},
-                                               {"hold", make_hold},
+constexpr std::array<Entry, 7> kPredictors = {{{"hold", make_hold},
                                                {"naive", make_naive},
                                                {"difference", make_difference},
                                                {"thesis", make_thesis},

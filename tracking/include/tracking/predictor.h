@@ -25,7 +25,7 @@ struct PoseCovariance {
                                                          ///< orientation to the true one [rad^2]
 };
 
-/// What became of a sample. `outlier`: only with a gate (`auto`, `gate=`); the sample was ignored, but the
+/// What became of a sample. `outlier`: only with a gate (`gate=`); the sample was ignored, but the
 /// third in a row is taken as real and answers `reinitialised`.
 enum class SampleStatus { accepted, not_newer, not_finite, reinitialised, outlier };
 
@@ -67,7 +67,6 @@ inline constexpr double kGapS = 0.1;
 ///   cv:q=1e8                constant velocity, white acceleration of density q [mm^2/s^3]
 ///   ca:q=1e9                constant acceleration, white jerk of density q [mm^2/s^5]
 ///   singer:alpha=3,q=1e10   acceleration that decays at alpha [1/s], driven by density q [mm^2/s^5]
-///   auto                    ca:q=1e9,gate=5
 ///
 /// The numbers shown are the defaults. Orientation is filtered by the same model about its own quaternion.
 /// The four Kalman filters take `gate=G`: samples beyond G standard deviations that a stick cannot have made
