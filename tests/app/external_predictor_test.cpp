@@ -15,8 +15,8 @@
 #include <random>
 #include <sstream>
 
-#include "../render/temporary_folder.h"
 #include "predictors.h"
+#include "temporary_folder.h"
 
 namespace {
 

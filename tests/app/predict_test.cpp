@@ -7,10 +7,10 @@
 #include <map>
 #include <stdexcept>
 
-#include "../render/temporary_folder.h"
 #include "bad_input.h"
 #include "prediction_file.h"
 #include "stick_tracker.h"
+#include "temporary_folder.h"
 
 namespace {
 
