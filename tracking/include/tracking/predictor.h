@@ -73,7 +73,6 @@ inline constexpr double kGapS = 0.1;
 ///   bank:cv=1e7,ca=3e8,alpha=30,singer=1e11,lead=0.0667   the model that was right a lead ago (3.28);
 ///                           score=likelihood: most likely (3.27) instead of nearest
 ///   imm:alpha=3,q1=1e9,q2=3e10,q3=1e12,rate=10             interacting Singer models, switching at `rate`
-///   auto                    ca:q=1e9,gate=5
 ///
 /// The numbers shown are the defaults. Orientation is filtered by the same model about its own quaternion.
 /// thesis, cv, ca, singer, bank and imm also take: `r=0.25`, the sensor's noise; `p0=10`, `v0=1000`,
