@@ -13,6 +13,7 @@
 #include "trace_convert.h"
 #include "trace_files.h"
 #include "trace_info.h"
+#include "trace_warnings.h"
 
 namespace app {
 namespace {
@@ -58,6 +59,7 @@ void add_info(CLI::App& trace) {
     command->callback([file, json] {
         const tracking::Trace trace_read = tracking::read_trace(find_trace(*file));
         const std::vector<StickInfo> sticks = trace_info(trace_read);
+        if (!*json) warn_of_implausible(trace_read);
         fmt::print("{}", *json ? format_info_json(trace_read, sticks) : format_info(trace_read, sticks));
     });
 }
@@ -72,6 +74,7 @@ void add_check(CLI::App& trace) {
             const tracking::Trace checked = tracking::read_trace(find_trace(file));
             std::size_t samples = 0;
             for (const tracking::StickTrace& stick : checked.sticks) samples += stick.samples.size();
+            warn_of_implausible(checked);
             fmt::print("{}: in order, {} sticks, {} samples\n", file, checked.sticks.size(), samples);
         }
     });

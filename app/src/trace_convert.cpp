@@ -12,6 +12,7 @@
 #include "numbers.h"
 #include "sensor_options.h"
 #include "trace_files.h"
+#include "trace_warnings.h"
 
 namespace app {
 namespace {
@@ -109,6 +110,7 @@ void convert(const ConvertArguments& a, const SensorArguments& sensor) {
     if (!a.tip.empty()) trace.tip = parse_vector(a.tip, "--tip");
     if (!a.shaft.empty()) trace.shaft = parse_axis(a.shaft, "--shaft");
     if (!a.source.empty()) trace.source = a.source;
+    warn_of_implausible(trace);
     const tracking::Trace seen = seen_by(trace, model);
     write_finished_file(a.out, tracking::format_trace(seen));
     for (const std::string& remark : trace.remarks) fmt::print("{}: {}\n", trace.file, remark);
