@@ -11,6 +11,7 @@
 #include <new>
 
 #include "bad_input.h"
+#include "compare_command.h"
 #include "kit_commands.h"
 #include "play_command.h"
 #include "trace_commands.h"
@@ -41,6 +42,7 @@ int run(int argc, char** argv) {
     int status = 0;
     add_play_command(program);
     add_kit_command(program);
+    add_compare_command(program);
     add_trace_command(program);
     add_worker_command(program, status);
     try {

@@ -108,7 +108,7 @@ struct Comparison {
     ComparisonOptions options;
     std::vector<std::string> persons;                             ///< by first appearance
     std::vector<std::pair<std::string, std::string>> predictors;  ///< shown name, what it is
-    std::vector<ComparisonRow> rows;  ///< by recording, stick, predictor, lead
+    std::vector<ComparisonRow> rows;                              ///< by recording, stick, predictor, lead
     std::vector<ComparisonSummary> summaries;
     std::vector<PairedResult> paired;
     std::vector<LeadCurve> curves;

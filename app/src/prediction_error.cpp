@@ -39,8 +39,7 @@ void ErrorGatherer::add(const tracking::PosePrediction& predicted, const Truth& 
     if (truth.unflagged) score_.unflagged_sum_mm2 += square_mm2, ++score_.unflagged_count;
     if (truth.rotation_trusted) {
         const double angle = kDegrees * predicted.orientation.angularDistance(truth.pose.orientation);
-        const Eigen::Vector3d tip_error =
-            error + predicted.orientation * tip - truth.pose.orientation * tip;
+        const Eigen::Vector3d tip_error = error + predicted.orientation * tip - truth.pose.orientation * tip;
         score_.rotation_sum_deg2 += angle * angle;
         score_.tip_sum_mm2 += kMm2 * tip_error.squaredNorm();
         ++score_.rotation_count;

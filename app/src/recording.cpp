@@ -41,8 +41,9 @@ std::vector<MarkedTime> read_marks(const fs::path& file, const std::string& head
     for (int number = 1; std::getline(in, line); ++number) {
         if (!line.empty() && line.back() == '\r') line.pop_back();
         if (number == 1 && !line.starts_with(header))
-            throw BadInput(fmt::format("{}:1:1: error: found \"{}\", expected the columns {}; mend it or move it away",
-                                       file.string(), line.substr(0, 60), header));
+            throw BadInput(
+                fmt::format("{}:1:1: error: found \"{}\", expected the columns {}; mend it or move it away",
+                            file.string(), line.substr(0, 60), header));
         if (number == 1 || line.empty()) continue;
         const std::vector<std::string> fields = fields_of(line);
         double t_s = 0;
@@ -71,8 +72,7 @@ bool is_of(const MarkedTime& mark, const std::string& stick) {
 void add_hits(Recording& recording, const fs::path& file) {
     for (const MarkedTime& mark : read_marks(file, "t,stick"))
         for (std::size_t i = 0; i < recording.marks.size(); ++i)
-            if (is_of(mark, recording.trace.sticks[i].name))
-                recording.marks[i].impacts_s.push_back(mark.t_s);
+            if (is_of(mark, recording.trace.sticks[i].name)) recording.marks[i].impacts_s.push_back(mark.t_s);
 }
 
 void add_flags(Recording& recording, const fs::path& file) {

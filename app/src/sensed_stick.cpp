@@ -20,8 +20,7 @@ std::optional<Truth> truth_at(const Recording& recording, std::size_t stick, dou
     const MarkedTimes& marks = recording.marks[stick];
     Truth truth;
     truth.pose = *pose;
-    truth.unflagged =
-        !near_any(marks.flagged_s, sample_s) && !near_any(marks.flagged_s, sample_s + lead_s);
+    truth.unflagged = !near_any(marks.flagged_s, sample_s) && !near_any(marks.flagged_s, sample_s + lead_s);
     truth.free = truth.unflagged && !near_any(marks.impacts_s, sample_s + lead_s);
     truth.rotation_trusted = pose->has_orientation && !near_any(marks.flagged_rotations_s, sample_s) &&
                              !near_any(marks.flagged_rotations_s, sample_s + lead_s);

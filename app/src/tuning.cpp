@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "predictors.h"
 #include "parallel.h"
+#include "predictors.h"
 
 namespace app {
 namespace {
@@ -42,7 +42,8 @@ std::vector<std::string> crossed(const std::string& first, const std::vector<std
 std::vector<std::string> grid_of(const std::string& family) {
     if (family == "naive") return filled("naive:n=", {"1", "2", "3", "4", "5", "6", "8", "11", "16"});
     if (family == "least-squares") {
-        std::vector<std::string> grid = filled("least-squares:degree=1,n=", {"2", "3", "4", "5", "6", "8", "12", "16"});
+        std::vector<std::string> grid =
+            filled("least-squares:degree=1,n=", {"2", "3", "4", "5", "6", "8", "12", "16"});
         for (const std::string& more :
              filled("least-squares:degree=2,n=", {"3", "4", "5", "6", "8", "10", "12", "16", "24"}))
             grid.push_back(more);
@@ -53,7 +54,8 @@ std::vector<std::string> grid_of(const std::string& family) {
     if (family == "singer")
         return crossed("singer:alpha=", {"1", "3", "10", "20", "40", "100"}, ",q=", densities(6, 14));
     if (family == "double-exponential")
-        return filled("double-exponential:a=", {"0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "0.95", "0.98"});
+        return filled("double-exponential:a=",
+                      {"0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "0.95", "0.98"});
     return {};
 }
 
@@ -81,9 +83,8 @@ std::vector<std::string> candidates_of(const std::vector<std::string>& families)
     return all;
 }
 
-TuningTable::TuningTable(const std::vector<std::string>& specifications,
-                         std::span<const SensedStick> sticks, std::size_t recordings, unsigned threads,
-                         const std::function<void(double)>& done)
+TuningTable::TuningTable(const std::vector<std::string>& specifications, std::span<const SensedStick> sticks,
+                         std::size_t recordings, unsigned threads, const std::function<void(double)>& done)
     : specifications_(specifications),
       recordings_(recordings),
       leads_(sticks.empty() ? 0 : sticks.front().leads_s.size()),
