@@ -219,6 +219,7 @@ Comparison compare(const ComparisonOptions& options) {
     if (options.cost) measure_costs(comparison.rows, field, entrants.size());
     comparison.summaries = summarise(comparison, entrants);
     comparison.paired = pair_all(comparison, entrants);
+    if (options.map) comparison.map = map_sensors(field.recordings, options);
     return comparison;
 }
 

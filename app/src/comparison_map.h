@@ -1,15 +1,36 @@
 #pragma once
+#include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "comparison.h"
+#include "recording.h"
 
 namespace app {
 
-/// One estimator at one lead under one sensor: RMS, and against the best tuned baseline there.
+/// One estimator at one lead under one sensor, against the best baseline there. Both are tuned on other
+/// recordings for that very sensor.
 struct MapCell {
-    double rate_hz = 0, noise_mm = 0, jitter_ms = 0, drop_out = 0, lead_s = 0;
+    double rate_hz = 0, noise_mm = 0, jitter_ms = 0, drop_out = 0;
     PairedResult result;
 };
+
+/// The sensors of a map: every combination.
+struct MapAxes {
+    std::vector<double> rates_hz = {30, 60, 120, 240};
+    std::vector<double> noises_mm = {0.1, 0.25, 1, 4};
+    std::vector<double> jitters_ms = {0, 3};
+    std::vector<double> drop_outs = {0, 0.1};
+};
+
+/// Position errors of the families of `predictors` (tuned where they have parameters; as named otherwise)
+/// over all sensors of `axes`, by sensor, lead, predictor. Samples carry their true times. With fewer than
+/// two recordings there is nothing to tune on: the predictors as named. Results do not depend on `threads`.
+[[nodiscard]] std::vector<MapCell> map_sensors(std::span<const Recording> recordings,
+                                               const ComparisonOptions& options, const MapAxes& axes = {});
+
+/// Of the cells of one sensor and lead, the one of least RMS among estimators.
+[[nodiscard]] std::vector<const MapCell*> best_cells(const std::vector<MapCell>& map);
 
 }  // namespace app

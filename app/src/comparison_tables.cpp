@@ -82,6 +82,21 @@ void add_paired(std::string& text, const Comparison& comparison, double lead_s, 
     }
 }
 
+void add_map(std::string& text, const Comparison& comparison) {
+    text += fmt::format(
+        "\nWhere filters pay, each sensor and lead: the best estimator against the best baseline, tuned "
+        "alike\n"
+        "{:>5} {:>8} {:>9} {:>6} {:>7}  {:<22} {:>8}  {:<22} {:>8}  ratio\n",
+        "Hz", "noise mm", "jitter ms", "lost", "lead ms", "estimator", "rms mm", "baseline", "rms mm");
+    for (const MapCell* cell : best_cells(comparison.map)) {
+        const PairedResult& r = cell->result;
+        fmt::format_to(std::back_inserter(text),
+                       "{:>5} {:>8} {:>9} {:>5.0f}% {:>7.1f}  {:<22} {:>8.2f}  {:<22} {:>8.2f}  {}\n",
+                       cell->rate_hz, cell->noise_mm, cell->jitter_ms, 100 * cell->drop_out, 1e3 * r.lead_s,
+                       r.predictor, r.rms_mm, r.baseline, r.baseline_rms_mm, verdict(r.by_recording));
+    }
+}
+
 }  // namespace
 
 std::string format_comparison_csv(const Comparison& comparison) {
@@ -119,6 +134,7 @@ std::string format_comparison_text(const Comparison& comparison) {
             if (summary.lead_s == lead_s) add_summary(text, summary, width);
         add_paired(text, comparison, lead_s, width);
     }
+    if (!comparison.map.empty()) add_map(text, comparison);
     text += '\n';
     for (const std::string& sentence : winners(comparison)) text += sentence + "\n";
     return text;

@@ -43,18 +43,6 @@ Entrant named(const std::string& specification, std::size_t recordings, std::siz
     return entrant;
 }
 
-/// The predictors named, without repetitions, and the baselines.
-std::vector<std::string> specifications_of(const ComparisonOptions& options) {
-    std::vector<std::string> all;
-    const auto add = [&](const std::string& specification) {
-        if (std::find(all.begin(), all.end(), specification) == all.end()) all.push_back(specification);
-    };
-    for (const std::string& specification : options.predictors) add(specification);
-    for (const char* baseline : {"naive", "difference", kParabola})
-        if (is_known(baseline)) add(baseline);
-    return all;
-}
-
 void check(const std::string& specification, std::span<const double> leads_s) {
     try {
         if (!is_external(specification)) (void)make_any_predictor(specification, leads_s);
@@ -151,6 +139,17 @@ void enter_tuned(EntrantList& list, const std::vector<std::string>& families,
 }
 
 }  // namespace
+
+std::vector<std::string> specifications_of(const ComparisonOptions& options) {
+    std::vector<std::string> all;
+    const auto add = [&](const std::string& specification) {
+        if (std::find(all.begin(), all.end(), specification) == all.end()) all.push_back(specification);
+    };
+    for (const std::string& specification : options.predictors) add(specification);
+    for (const char* baseline : {"naive", "difference", kParabola})
+        if (is_known(baseline)) add(baseline);
+    return all;
+}
 
 EntrantList enter(const ComparisonOptions& options, std::span<const Recording> recordings,
                   std::span<const SensedStick> sticks) {

@@ -30,6 +30,9 @@ struct EntrantList {
     std::string tuned_on;  ///< what the tuned ones were tuned on, one sentence
 };
 
+/// The predictors named, without repetitions, and the baselines (naive, difference, the parabola).
+[[nodiscard]] std::vector<std::string> specifications_of(const ComparisonOptions& options);
+
 /// Those named, then the baselines that were not (naive, difference, the parabola), then the tuned ones of
 /// each family among them: on the `--tune` recordings without the one scored, or on all others compared (two
 /// recordings or more), and on those of other persons (two persons or more). Throws BadInput for a predictor
