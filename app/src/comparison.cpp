@@ -1,13 +1,9 @@
 #include "comparison.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <array>
-#include <cmath>
 
-#include "bad_input.h"
 #include "comparison_map.h"
+#include "comparison_pairs.h"
 #include "entrants.h"
 #include "parallel.h"
 #include "prediction_cost.h"
@@ -32,63 +28,89 @@ Field read_field(const ComparisonOptions& options) {
     return field;
 }
 
-HitScore hits_of(const Field& field, const SensedStick& stick, const std::string& specification,
-                 const ComparisonOptions& options, double lead_s) {
-    const Recording& recording = field.recordings[stick.recording];
-    const std::array<double, 1> leads_s = {lead_s};
-    const auto predictor = make_any_predictor(specification, leads_s);
-    return evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples, *predictor,
-                            recording.geometry, options.surface, lead_s, options.release_margin_s);
-}
-
-/// The leads at which an entrant runs one specification, so that one pass serves them all.
-std::vector<std::pair<std::string, std::vector<std::size_t>>> passes_of(
-    const std::vector<std::string>& by_lead) {
-    std::vector<std::pair<std::string, std::vector<std::size_t>>> passes;
-    for (std::size_t lead = 0; lead < by_lead.size(); ++lead) {
+/// The leads that one predictor serves in one pass: those for which the same specification runs.
+std::vector<std::vector<std::size_t>> passes_of(const Entrant& entrant, std::size_t recording) {
+    const std::vector<std::string>& used = entrant.used[recording];
+    std::vector<std::vector<std::size_t>> passes;
+    for (std::size_t lead = 0; lead < used.size(); ++lead) {
+        if (used[lead].empty()) continue;
         const auto same = std::find_if(passes.begin(), passes.end(),
-                                       [&](const auto& pass) { return pass.first == by_lead[lead]; });
-        if (same == passes.end())
-            passes.push_back({by_lead[lead], {lead}});
+                                       [&](const auto& pass) { return used[pass.front()] == used[lead]; });
+        if (same == passes.end() || !entrant.replays.empty())
+            passes.push_back({lead});
         else
-            same->second.push_back(lead);
+            same->push_back(lead);
     }
     return passes;
 }
 
-/// The rows of one entrant on one stick, a lead each.
-std::vector<ComparisonRow> rows_of(const Field& field, const SensedStick& stick, const Entrant& entrant,
-                                   const ComparisonOptions& options) {
-    const Recording& recording = field.recordings[stick.recording];
-    std::vector<ComparisonRow> rows(stick.leads_s.size());
-    for (const auto& [specification, leads] : passes_of(entrant.used[stick.recording])) {
-        const auto predictor = make_any_predictor(specification, stick.leads_s);
-        const std::vector<LeadScore> scores = score_predictor(stick, *predictor);
-        for (const std::size_t lead : leads) {
-            ComparisonRow& row = rows[lead];
-            row.trace = recording.file;
-            row.person = recording.person;
-            row.stick = recording.trace.sticks[stick.stick].name;
-            row.predictor = entrant.name;
-            row.used = specification;
-            row.lead_s = stick.leads_s[lead];
-            row.rate_hz = stick.rate_hz;
-            row.noise_mm = 1e3 * options.sensor.noise_m;
-            row.error = scores[lead].error;
-            row.calibration = scores[lead].calibration;
-            row.external = entrant.external;
-            if (options.surface.kind != StrikeSurface::Kind::none)
-                row.hits = hits_of(field, stick, specification, options, row.lead_s);
+/// Runs entrants over the sticks of a field.
+class Runs {
+public:
+    Runs(const Field& field, const std::vector<Entrant>& entrants, const ComparisonOptions& options)
+        : field_(field), entrants_(entrants), options_(options) {}
+
+    [[nodiscard]] std::size_t count() const { return field_.sticks.size() * entrants_.size(); }
+
+    /// The rows of run `index`, a lead each; those without predictions have no `used`.
+    [[nodiscard]] std::vector<ComparisonRow> rows(std::size_t index) const {
+        const std::size_t place = index / entrants_.size();
+        const SensedStick& stick = field_.sticks[place];
+        const Entrant& entrant = entrants_[index % entrants_.size()];
+        std::vector<ComparisonRow> rows(stick.leads_s.size());
+        for (const std::vector<std::size_t>& pass : passes_of(entrant, stick.recording)) {
+            const auto predictor = make_entrant(entrant, stick, place, pass.front());
+            const std::vector<LeadScore> scores = score_predictor(stick, *predictor);
+            require_working(*predictor);
+            for (const std::size_t lead : pass) {
+                rows[lead] = labelled(stick, entrant, lead);
+                rows[lead].error = scores[lead].error;
+                rows[lead].calibration = scores[lead].calibration;
+                if (options_.surface.kind != StrikeSurface::Kind::none)
+                    rows[lead].hits = hits(stick, entrant, place, lead);
+            }
         }
+        return rows;
     }
-    return rows;
-}
+
+private:
+    [[nodiscard]] ComparisonRow labelled(const SensedStick& stick, const Entrant& entrant,
+                                         std::size_t lead) const {
+        const Recording& recording = field_.recordings[stick.recording];
+        ComparisonRow row;
+        row.trace = recording.file;
+        row.person = recording.person;
+        row.stick = stick.name;
+        row.predictor = entrant.name;
+        row.used = entrant.used[stick.recording][lead];
+        row.lead_s = stick.leads_s[lead];
+        row.rate_hz = stick.rate_hz;
+        row.noise_mm = 1e3 * options_.sensor.noise_m;
+        row.external = entrant.external;
+        return row;
+    }
+
+    [[nodiscard]] HitScore hits(const SensedStick& stick, const Entrant& entrant, std::size_t place,
+                                std::size_t lead) const {
+        const Recording& recording = field_.recordings[stick.recording];
+        const auto predictor = make_entrant(entrant, stick, place, lead);
+        HitScore score = evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples, *predictor,
+                                          recording.geometry, options_.surface, stick.leads_s[lead],
+                                          options_.release_margin_s);
+        require_working(*predictor);
+        return score;
+    }
+
+    const Field& field_;
+    const std::vector<Entrant>& entrants_;
+    const ComparisonOptions& options_;
+};
 
 void measure_costs(std::vector<ComparisonRow>& rows, const Field& field, std::size_t entrants) {
     const std::size_t leads = field.sticks.front().leads_s.size();
     for (std::size_t i = 0; i < rows.size(); ++i) {
         ComparisonRow& row = rows[i];
-        if (row.external) continue;
+        if (row.external || row.used.empty()) continue;
         const std::size_t lead = i % leads;
         for (std::size_t before = i - lead; before < i && row.ns_per_sample == 0; ++before)
             if (rows[before].used == row.used) row.ns_per_sample = rows[before].ns_per_sample;
@@ -117,73 +139,9 @@ std::vector<ComparisonSummary> summarise(const Comparison& comparison, const std
                 if (row.ns_per_sample > 0) costs.push_back(row.ns_per_sample);
             }
             if (!costs.empty()) summary.ns_per_sample = quantile(std::move(costs), 0.5);
-            summaries.push_back(std::move(summary));
+            if (summary.error.count > 0) summaries.push_back(std::move(summary));
         }
     return summaries;
-}
-
-const ComparisonSummary& summary_of(const Comparison& comparison, const std::string& predictor,
-                                    double lead_s) {
-    return *std::find_if(comparison.summaries.begin(), comparison.summaries.end(),
-                         [&](const ComparisonSummary& summary) {
-                             return summary.predictor == predictor && summary.lead_s == lead_s;
-                         });
-}
-
-/// The squared errors of two predictors at a lead, grouped by recording or by person.
-std::vector<PairedSums> paired_sums(const Comparison& comparison, const std::string& a, const std::string& b,
-                                    double lead_s, std::string ComparisonRow::*group) {
-    std::vector<std::string> names;
-    std::vector<PairedSums> sums;
-    for (const ComparisonRow& row : comparison.rows) {
-        if (row.lead_s != lead_s || (row.predictor != a && row.predictor != b)) continue;
-        const auto found = std::find(names.begin(), names.end(), row.*group);
-        const std::size_t place = static_cast<std::size_t>(found - names.begin());
-        if (found == names.end()) names.push_back(row.*group), sums.emplace_back();
-        if (row.predictor == a) sums[place].sum_a += row.error.sum_square_mm2;
-        if (row.predictor == a) sums[place].count += row.error.count;
-        if (row.predictor == b) sums[place].sum_b += row.error.sum_square_mm2;
-    }
-    return sums;
-}
-
-/// Of the baselines that know as much as `entrant` does, the one of least RMS at a lead; nullptr: none.
-const Entrant* best_baseline(const Comparison& comparison, const std::vector<Entrant>& entrants,
-                             const Entrant& entrant, double lead_s) {
-    const Entrant* best = nullptr;
-    for (const Entrant& other : entrants) {
-        const bool persons = entrant.tuning == Tuning::other_persons;
-        if (!other.baseline || other.tuning == (persons ? Tuning::other_recordings : Tuning::other_persons))
-            continue;
-        if (best == nullptr || summary_of(comparison, other.name, lead_s).error.rms_mm <
-                                   summary_of(comparison, best->name, lead_s).error.rms_mm)
-            best = &other;
-    }
-    return best;
-}
-
-std::vector<PairedResult> pair_all(const Comparison& comparison, const std::vector<Entrant>& entrants) {
-    std::vector<PairedResult> results;
-    for (const Entrant& entrant : entrants)
-        for (const double lead_s : comparison.options.leads_s) {
-            const Entrant* baseline = best_baseline(comparison, entrants, entrant, lead_s);
-            if (entrant.baseline || baseline == nullptr) continue;
-            PairedResult result;
-            result.predictor = entrant.name;
-            result.baseline = baseline->name;
-            result.lead_s = lead_s;
-            result.rms_mm = summary_of(comparison, entrant.name, lead_s).error.rms_mm;
-            result.baseline_rms_mm = summary_of(comparison, baseline->name, lead_s).error.rms_mm;
-            const std::uint64_t seed = comparison.options.sensor.seed;
-            result.by_recording = paired_difference(
-                paired_sums(comparison, entrant.name, baseline->name, lead_s, &ComparisonRow::trace), seed);
-            if (comparison.persons.size() >= 2)
-                result.by_person = paired_difference(
-                    paired_sums(comparison, entrant.name, baseline->name, lead_s, &ComparisonRow::person),
-                    seed);
-            results.push_back(std::move(result));
-        }
-    return results;
 }
 
 std::vector<std::string> persons_of(const std::vector<Recording>& recordings) {
@@ -206,42 +164,18 @@ Comparison compare(const ComparisonOptions& options) {
     const std::vector<Entrant>& entrants = list.entrants;
     for (const Entrant& entrant : entrants)
         comparison.predictors.emplace_back(entrant.name, entrant.description);
-    std::vector<std::vector<ComparisonRow>> parts(field.sticks.size() * entrants.size());
+    const Runs runs(field, entrants, options);
+    std::vector<std::vector<ComparisonRow>> parts(runs.count());
     parallel_for(
-        parts.size(), options.threads,
-        [&](std::size_t i) {
-            parts[i] =
-                rows_of(field, field.sticks[i / entrants.size()], entrants[i % entrants.size()], options);
-        },
-        options.progress);
+        parts.size(), options.threads, [&](std::size_t i) { parts[i] = runs.rows(i); }, options.progress);
     for (std::vector<ComparisonRow>& part : parts)
         for (ComparisonRow& row : part) comparison.rows.push_back(std::move(row));
     if (options.cost) measure_costs(comparison.rows, field, entrants.size());
+    std::erase_if(comparison.rows, [](const ComparisonRow& row) { return row.used.empty(); });
     comparison.summaries = summarise(comparison, entrants);
-    comparison.paired = pair_all(comparison, entrants);
+    comparison.paired = pair_with_baselines(comparison, entrants);
     if (options.map) comparison.map = map_sensors(field.recordings, options);
     return comparison;
-}
-
-std::vector<std::string> winners(const Comparison& comparison) {
-    std::vector<std::string> sentences;
-    for (const double lead_s : comparison.options.leads_s) {
-        const ComparisonSummary* best = nullptr;
-        for (const ComparisonSummary& summary : comparison.summaries)
-            if (summary.lead_s == lead_s && summary.error.count > 0 &&
-                (best == nullptr || summary.error.rms_mm < best->error.rms_mm))
-                best = &summary;
-        if (best == nullptr) continue;
-        std::string text = fmt::format("{:.1f} ms ahead {} errs least, {:.1f} mm RMS", 1e3 * lead_s,
-                                       best->predictor, best->error.rms_mm);
-        for (const PairedResult& paired : comparison.paired)
-            if (paired.predictor == best->predictor && paired.lead_s == lead_s)
-                text += fmt::format("; against the best baseline {} ({:.1f} mm): {}", paired.baseline,
-                                    paired.baseline_rms_mm, verdict(paired.by_recording));
-        if (best->baseline) text += ": a baseline, no filter does better";
-        sentences.push_back(text + ".");
-    }
-    return sentences;
 }
 
 }  // namespace app

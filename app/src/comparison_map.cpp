@@ -5,6 +5,7 @@
 #include "entrants.h"
 #include "parallel.h"
 #include "prediction_error.h"
+#include "predictors.h"
 #include "tuning.h"
 
 namespace app {
@@ -61,7 +62,7 @@ struct MapField {
 MapField field_of(const ComparisonOptions& options, bool tunable) {
     MapField field;
     for (const std::string& specification : specifications_of(options)) {
-        if (specification.starts_with("exec:")) continue;
+        if (is_external(specification)) continue;
         const std::string family = family_of(specification);
         if (!tunable || tuning_grid(family).empty())
             field.specifications.push_back(specification);

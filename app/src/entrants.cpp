@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <set>
-#include <stdexcept>
 
 #include "bad_input.h"
 #include "predictors.h"
@@ -15,11 +15,8 @@ namespace app {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr const char* kFromFiles = "predictions made elsewhere; their cost is not known";
 constexpr const char* kParabola = "least-squares:degree=2,n=4";
-
-bool is_external(const std::string& specification) {
-    return specification.starts_with("exec:");
-}
 
 bool is_known(const std::string& specification) {
     const std::vector<std::string>& known = tracking::predictor_names();
@@ -41,14 +38,6 @@ Entrant named(const std::string& specification, std::size_t recordings, std::siz
     entrant.external = is_external(specification);
     entrant.used.assign(recordings, std::vector<std::string>(leads, specification));
     return entrant;
-}
-
-void check(const std::string& specification, std::span<const double> leads_s) {
-    try {
-        if (!is_external(specification)) (void)make_any_predictor(specification, leads_s);
-    } catch (const std::invalid_argument& wrong) {
-        throw BadInput(fmt::format("error: {}", wrong.what()));
-    }
 }
 
 std::string whole_path(const std::string& file) {
@@ -138,7 +127,89 @@ void enter_tuned(EntrantList& list, const std::vector<std::string>& families,
                     splits.size() > 1 ? "; ** on recordings of other persons only" : "");
 }
 
+/// Leads and the file's own: t is written in digits.
+constexpr double kSameLeadS = 1e-6;
+
+std::size_t lead_of(const StickPredictions& predictions, const std::string& file,
+                    std::span<const double> leads_s) {
+    for (std::size_t lead = 0; lead < leads_s.size(); ++lead)
+        if (std::abs(leads_s[lead] - predictions.lead_s) < kSameLeadS) return lead;
+    throw BadInput(fmt::format(
+        "{}: error: found predictions {} s ahead, expected one of the leads {}; name it in --leads", file,
+        predictions.lead_s, fmt::join(leads_s, ", ")));
+}
+
+/// The sticks of one recording as a file answers them; nothing where it does not fit.
+using Answers = std::vector<std::pair<std::size_t, StickPredictions>>;  // place among all sticks
+Answers answers_of(const PredictionFile& file, std::span<const SensedStick> sticks, std::size_t recording) {
+    Answers answers;
+    for (std::size_t place = 0; place < sticks.size(); ++place)
+        if (sticks[place].recording == recording)
+            answers.emplace_back(place, match_predictions(file, sticks[place].name, sticks[place].samples));
+    return answers;
+}
+
+/// The recording that a file answers, with its answers. With one recording its misfit is told in full.
+std::pair<std::size_t, Answers> find_recording(const PredictionFile& file,
+                                               std::span<const SensedStick> sticks, std::size_t recordings) {
+    if (recordings == 1) return {0, answers_of(file, sticks, 0)};
+    for (std::size_t recording = 0; recording < recordings; ++recording) {
+        try {
+            return {recording, answers_of(file, sticks, recording)};
+        } catch (const BadInput&) {  // the samples of another recording
+        }
+    }
+    throw BadInput(fmt::format(
+        "{}: error: found predictions that fit none of the {} traces, expected a row for every sample from "
+        "the second on of each stick; compare it with its trace alone to see why",
+        file.rows.file, recordings));
+}
+
+void add_file(Entrant& entrant, const std::string& file, std::span<const SensedStick> sticks,
+              std::size_t recordings, std::span<const double> leads_s) {
+    const PredictionFile predictions = read_prediction_file(file);
+    const auto [recording, answers] = find_recording(predictions, sticks, recordings);
+    for (const auto& [place, answer] : answers) {
+        const std::size_t lead = lead_of(answer, file, leads_s);
+        entrant.used[recording][lead] = file;
+        StickPredictions exact = answer;
+        exact.lead_s = leads_s[lead];
+        if (!entrant.replays.emplace(std::pair{place, lead}, std::move(exact)).second)
+            throw BadInput(fmt::format(
+                "{}: error: found predictions of {} {} s ahead a second time, expected one file a trace "
+                "and lead",
+                file, entrant.name, leads_s[lead]));
+    }
+}
+
+void enter_files(EntrantList& list, const ComparisonOptions& options, std::span<const SensedStick> sticks,
+                 std::size_t recordings) {
+    for (const auto& [name, file] : options.predictions) {
+        const auto same = std::find_if(list.entrants.begin(), list.entrants.end(),
+                                       [&](const Entrant& entrant) { return entrant.name == name; });
+        if (same != list.entrants.end() && same->description != kFromFiles)
+            throw BadInput(fmt::format(
+                "error: found --predictions {}={}, expected a name that no predictor has", name, file));
+        if (same == list.entrants.end()) {
+            Entrant entrant = named("", recordings, options.leads_s.size());
+            entrant.name = name;
+            entrant.description = kFromFiles;
+            entrant.external = true;
+            list.entrants.push_back(std::move(entrant));
+        }
+        Entrant& entrant = same == list.entrants.end() ? list.entrants.back() : *same;
+        add_file(entrant, file, sticks, recordings, options.leads_s);
+    }
+}
+
 }  // namespace
+
+std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const SensedStick& stick,
+                                                  std::size_t place, std::size_t lead) {
+    if (const auto replay = entrant.replays.find({place, lead}); replay != entrant.replays.end())
+        return make_replay(replay->second);
+    return make_any_predictor(entrant.used[stick.recording][lead], stick.leads_s, stick.name);
+}
 
 std::vector<std::string> specifications_of(const ComparisonOptions& options) {
     std::vector<std::string> all;
@@ -156,13 +227,14 @@ EntrantList enter(const ComparisonOptions& options, std::span<const Recording> r
     EntrantList list;
     const std::vector<std::string> specifications = specifications_of(options);
     for (const std::string& specification : specifications) {
-        check(specification, options.leads_s);
+        check_specification(specification);
         list.entrants.push_back(named(specification, recordings.size(), options.leads_s.size()));
     }
     if (options.tuning)
         enter_tuned(list, tunable_families(specifications), options, recordings, sticks);
     else
         list.tuned_on = "nothing is tuned, as asked";
+    enter_files(list, options, sticks, recordings.size());
     return list;
 }
 

@@ -34,6 +34,7 @@ SensedStick sense_stick(const Recording& recording, std::size_t stick, const tra
     SensedStick sensed;
     const tracking::StickTrace& recorded = recording.trace.sticks[stick];
     sensed.stick = stick;
+    sensed.name = recorded.name;
     sensed.tip = recording.geometry.tip;
     sensed.samples = tracking::sense(recorded, sensor, place);
     sensed.rate_hz = sensor.rate_hz > 0 ? sensor.rate_hz : median_rate(recorded.samples);

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "recording.h"
@@ -26,6 +27,7 @@ struct Truth {
 struct SensedStick {
     std::size_t recording = 0;  ///< index of the recording
     std::size_t stick = 0;      ///< index within it
+    std::string name;
     Eigen::Vector3d tip = Eigen::Vector3d::Zero();
     double rate_hz = 0;  ///< the sensor's; the recording's own median if the sensor keeps its times
     std::vector<tracking::PoseSample> samples;  ///< in order of arrival
