@@ -87,7 +87,12 @@ struct LeadCurve {
     std::vector<std::pair<double, double>> rms_mm;  ///< lead [s], RMS
 };
 
-struct MapCell;  // comparison_map.h
+/// One estimator at one lead under one sensor, against the best baseline there. Both are tuned on other
+/// recordings for that very sensor.
+struct MapCell {
+    double rate_hz = 0, noise_mm = 0, jitter_ms = 0, drop_out = 0;
+    PairedResult result;
+};
 
 /// What to compare, and how it is sensed.
 struct ComparisonOptions {

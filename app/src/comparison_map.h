@@ -9,13 +9,6 @@
 
 namespace app {
 
-/// One estimator at one lead under one sensor, against the best baseline there. Both are tuned on other
-/// recordings for that very sensor.
-struct MapCell {
-    double rate_hz = 0, noise_mm = 0, jitter_ms = 0, drop_out = 0;
-    PairedResult result;
-};
-
 /// The sensors of a map: every combination.
 struct MapAxes {
     std::vector<double> rates_hz = {30, 60, 120, 240};
