@@ -1,58 +1,96 @@
 #include "motion_model.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace tracking {
 namespace {
 
 Transition polynomial_transition(double dt) {
-    Transition f;
-    f << 1, dt, dt * dt / 2, 0, 1, dt, 0, 0, 1;
-    return f;
+    return {dt, dt * dt / 2, dt, 1};
 }
 
-/// u - 1 + exp(-u) without cancellation.
-double decayed_displacement(double u) {
-    if (u > 0.1) return u + std::expm1(-u);
+AxisMatrix<double> scaled_matrix(const AxisMatrix<double>& m, double factor) {
+    return {factor * m.pp, factor * m.pv, factor * m.pa, factor * m.vv, factor * m.va, factor * m.aa};
+}
+
+/// u - 1 + exp(-u) without cancellation; `decay` = expm1(-u).
+double decayed_displacement(double u, double decay) {
+    if (u > 0.1) return u + decay;
     // u^2 (1/2 - u/6 + u^2/24 - ...), the terms left out are below 1e-17 of the first for u <= 0.1.
-    double term = u * u / 2;
-    double sum = term;
-    for (int k = 3; k <= 11; ++k) sum += term *= -u / k;
-    return sum;
+    double sum = 0;
+    constexpr std::array<double, 9> kTerms = {1.0 / 2,     -1.0 / 6,      1.0 / 24,
+                                              -1.0 / 120,  1.0 / 720,     -1.0 / 5040,
+                                              1.0 / 40320, -1.0 / 362880, 1.0 / 3628800};
+    for (std::size_t k = kTerms.size(); k-- > 0;) sum = sum * u + kTerms[k];
+    return u * u * sum;
 }
 
-/// Response of [p, v, a] a time s after a unit step of acceleration that decays at rate alpha.
-Eigen::Vector3d singer_response(double alpha, double s) {
-    const double u = alpha * s;
-    return {decayed_displacement(u) / (alpha * alpha), -std::expm1(-u) / alpha, std::exp(-u)};
+Transition singer_transition(double alpha, double dt) {
+    const double u = alpha * dt;
+    const double decay = std::expm1(-u);
+    return {dt, decayed_displacement(u, decay) / (alpha * alpha), -decay / alpha, 1 + decay};
 }
 
-/// Integral of response * response^T over [0, dt]: exact discretisation, by Gauss-Legendre quadrature with 8
-/// nodes on pieces of alpha * length <= 1, where its error is below the rounding (the integrand is analytic).
-Eigen::Matrix3d singer_noise(const MotionModel::Singer& model, double dt) {
-    constexpr double kNode[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267,
-                                 0.9602898564975363};
-    constexpr double kWeight[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
-                                   0.1012285362903763};
-    const int pieces = 1 + static_cast<int>(model.alpha * dt);
-    const double half = dt / (2 * pieces);
-    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-    for (int piece = 0; piece < pieces; ++piece)
-        for (int node = 0; node < 4; ++node)
-            for (const double side : {-1.0, 1.0}) {
-                const Eigen::Vector3d r =
-                    singer_response(model.alpha, (2 * piece + 1 + side * kNode[node]) * half);
-                sum += kWeight[node] * half * (r * r.transpose());
+/// The six integrals over [0, 1] of products r_i(s) r_j(s), where r_p, r_v, r_a are the displacement, the
+/// velocity and the acceleration a time s after a unit step of acceleration that decays at rate u:
+/// power series in u, r_i = sum_k (-u)^k s^(k+m) / (k+m)! with m = 2, 1, 0, multiplied and integrated term by
+/// term. The first term left out is below 1e-17 of the first one for u <= kSeriesLimit.
+constexpr int kTerms = 16;
+constexpr double kSeriesLimit = 0.25;
+
+struct SingerSeries {
+    std::array<std::array<double, kTerms>, 6> coefficient{};
+
+    constexpr SingerSeries() {
+        constexpr int kOrder[6][2] = {{2, 2}, {2, 1}, {2, 0}, {1, 1}, {1, 0}, {0, 0}};
+        std::array<double, kTerms + 3> inverse_factorial{};
+        inverse_factorial[0] = 1;
+        for (int k = 1; k < kTerms + 3; ++k)
+            inverse_factorial[static_cast<std::size_t>(k)] =
+                inverse_factorial[static_cast<std::size_t>(k - 1)] / k;
+        for (std::size_t entry = 0; entry < 6; ++entry)
+            for (int n = 0; n < kTerms; ++n) {
+                const int i = kOrder[entry][0], j = kOrder[entry][1];
+                double sum = 0;
+                for (int k = 0; k <= n; ++k)
+                    sum += inverse_factorial[static_cast<std::size_t>(k + i)] *
+                           inverse_factorial[static_cast<std::size_t>(n - k + j)];
+                coefficient[entry][static_cast<std::size_t>(n)] = sum / (n + i + j + 1);
             }
-    return model.q * sum;
+    }
+};
+constexpr SingerSeries kSeries;
+
+AxisMatrix<double> series_noise(double u, double dt) {
+    std::array<double, 6> g{};
+    for (std::size_t n = kTerms; n-- > 0;)
+        for (std::size_t entry = 0; entry < 6; ++entry)
+            g[entry] = kSeries.coefficient[entry][n] - u * g[entry];
+    const double dt2 = dt * dt, dt3 = dt2 * dt;
+    return {g[0] * dt3 * dt2, g[1] * dt2 * dt2, g[2] * dt3, g[3] * dt3, g[4] * dt2, g[5] * dt};
+}
+
+/// The same in closed form (Singer 1970, with sigma_m^2 2 alpha = 1); above kSeriesLimit cancellation costs
+/// at most three digits.
+AxisMatrix<double> closed_noise(double alpha, double u) {
+    const double decay = std::expm1(-u);
+    const double e = 1 + decay;
+    const double twice = decay * (1 + e);  // exp(-2u) - 1
+    const double a2 = alpha * alpha, a3 = a2 * alpha;
+    return {(2 * u - 2 * u * u + 2 * u * u * u / 3 - 4 * u * e - twice) / (2 * a3 * a2),
+            (decay + u) * (decay + u) / (2 * a2 * a2),
+            (-twice - 2 * u * e) / (2 * a3),
+            (4 * decay - twice + 2 * u) / (2 * a3),
+            decay * decay / (2 * a2),
+            -twice / (2 * alpha)};
 }
 
 struct TransitionOver {
     double dt;
     Transition operator()(const MotionModel::Singer& model) const {
-        Transition f = polynomial_transition(dt);
-        f.col(2) = singer_response(model.alpha, dt);
-        return f;
+        return singer_transition(model.alpha, dt);
     }
     template <typename Polynomial>
     Transition operator()(const Polynomial&) const {
@@ -62,31 +100,35 @@ struct TransitionOver {
 
 struct NoiseOver {
     double dt;
-    Eigen::Matrix3d operator()(const MotionModel::ConstantVelocity& model) const {
-        Eigen::Matrix3d q;
-        q << dt * dt * dt / 3, dt * dt / 2, 0, dt * dt / 2, dt, 0, 0, 0, 0;
-        return model.q * q;
+    AxisMatrix<double> operator()(const MotionModel::ConstantVelocity& model) const {
+        const double q = model.q * dt;
+        return {q * dt * dt / 3, q * dt / 2, 0, q, 0, 0};
     }
-    Eigen::Matrix3d operator()(const MotionModel::ConstantAcceleration& model) const {
-        const double dt2 = dt * dt;
-        Eigen::Matrix3d q;
-        q << dt2 * dt2 * dt / 20, dt2 * dt2 / 8, dt2 * dt / 6,  //
-            dt2 * dt2 / 8, dt2 * dt / 3, dt2 / 2,               //
-            dt2 * dt / 6, dt2 / 2, dt;
-        return model.q * q;
+    AxisMatrix<double> operator()(const MotionModel::ConstantAcceleration& model) const {
+        const double q = model.q * dt, q1 = q * dt, q2 = q1 * dt;
+        return {q2 * dt * dt / 20, q2 * dt / 8, q2 / 6, q2 / 3, q1 / 2, q};
     }
-    Eigen::Matrix3d operator()(const MotionModel::Singer& model) const { return singer_noise(model, dt); }
-    Eigen::Matrix3d operator()(const MotionModel::FixedStep& model) const { return model.q; }
+    AxisMatrix<double> operator()(const MotionModel::Singer& model) const {
+        const double u = model.alpha * dt;
+        return scaled_matrix(u <= kSeriesLimit ? series_noise(u, dt) : closed_noise(model.alpha, u), model.q);
+    }
+    AxisMatrix<double> operator()(const MotionModel::FixedStep& model) const { return model.q; }
 };
 
 struct ScaledBy {
     double square;
-    void operator()(MotionModel::FixedStep& model) const { model.q *= square; }
+    void operator()(MotionModel::FixedStep& model) const { model.q = scaled_matrix(model.q, square); }
     template <typename Driven>
     void operator()(Driven& model) const {
         model.q *= square;
     }
 };
+
+double largest_change(const AxisMatrix<double>& a, const AxisMatrix<double>& b) {
+    const auto change = [](double x, double y) { return x == y ? 0 : std::abs(x - y) / std::abs(y); };
+    return std::max({change(a.pp, b.pp), change(a.pv, b.pv), change(a.pa, b.pa), change(a.vv, b.vv),
+                     change(a.va, b.va), change(a.aa, b.aa)});
+}
 
 }  // namespace
 
@@ -94,7 +136,7 @@ Transition MotionModel::transition(double dt) const noexcept {
     return std::visit(TransitionOver{dt}, kind);
 }
 
-Eigen::Matrix3d MotionModel::process_noise(double dt) const noexcept {
+AxisMatrix<double> MotionModel::process_noise(double dt) const noexcept {
     return std::visit(NoiseOver{dt}, kind);
 }
 
@@ -104,6 +146,21 @@ MotionModel MotionModel::scaled(double factor) const {
     other.measurement_variance *= factor * factor;
     other.initial_variance *= factor * factor;
     return other;
+}
+
+SteadyState steady_state(const MotionModel& model, double dt) {
+    constexpr int kMostSteps = 1'000'000;
+    constexpr double kSettled = 1e-15;
+    const Transition f = model.transition(dt);
+    const AxisMatrix<double> q = model.process_noise(dt);
+    SteadyState steady{model.initial_covariance(), {}};
+    for (int step = 0; step < kMostSteps; ++step) {
+        const AxisMatrix<double> before = steady.covariance;
+        steady.covariance = propagated(before, f, q);
+        steady.gain = correct(steady.covariance, model.measurement_variance);
+        if (largest_change(before, steady.covariance) <= kSettled) break;
+    }
+    return steady;
 }
 
 }  // namespace tracking

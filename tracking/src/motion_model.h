@@ -2,14 +2,13 @@
 #include <Eigen/Core>
 #include <variant>
 
-namespace tracking {
+#include "axis_state.h"
 
-/// F(dt) of the state [position, velocity, acceleration] of one axis.
-using Transition = Eigen::Matrix3d;
+namespace tracking {
 
 /// A model of one axis' motion in SI units (m, or rad for rotations): state [p, v, a], F(dt) and Q(dt) for
 /// any dt, the sensor's variance and the covariance at the start. The axes are alike and independent, so one
-/// 3x3 covariance serves all.
+/// covariance serves all.
 struct MotionModel {
     /// Constant velocity driven by white acceleration noise of density q [m^2/s^3]; the state's acceleration
     /// stays 0.
@@ -27,7 +26,7 @@ struct MotionModel {
     };
     /// Constant acceleration and the same Q at every step, whatever its dt (Friedmann 1992, 3.12 and 3.18).
     struct FixedStep {
-        Eigen::Matrix3d q;
+        AxisMatrix<double> q;
     };
 
     std::variant<ConstantVelocity, ConstantAcceleration, Singer, FixedStep> kind;
@@ -35,9 +34,22 @@ struct MotionModel {
     Eigen::Vector3d initial_variance = Eigen::Vector3d(1e2, 1e6, 1e8) * 1e-6;  ///< of p, v, a
 
     [[nodiscard]] Transition transition(double dt) const noexcept;
-    [[nodiscard]] Eigen::Matrix3d process_noise(double dt) const noexcept;
+    /// Q(dt), exact: the integral of F(s) g g^T F(s)^T q over [0, dt], g the place where the noise enters.
+    [[nodiscard]] AxisMatrix<double> process_noise(double dt) const noexcept;
+    [[nodiscard]] AxisMatrix<double> initial_covariance() const noexcept {
+        return {initial_variance.x(), 0, 0, initial_variance.y(), 0, initial_variance.z()};
+    }
     /// The same model with every length multiplied by `factor`: the same gains in another unit.
     [[nodiscard]] MotionModel scaled(double factor) const;
 };
+
+/// The covariance after a correction that (3.10) and (3.9) settle to at a constant rate, the solution of the
+/// discrete Riccati equation (3.7), and its gain. Iterates until no entry changes by more than 1e-15 of
+/// itself, at most 1e6 times.
+struct SteadyState {
+    AxisMatrix<double> covariance;
+    AxisGain<double> gain;
+};
+[[nodiscard]] SteadyState steady_state(const MotionModel& model, double dt);
 
 }  // namespace tracking
