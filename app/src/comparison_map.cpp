@@ -54,9 +54,15 @@ struct Runner {
     }
 };
 
-/// The specifications of a map: the grids of the tunable families, the others once as named.
+/// What a map compares: families that are tuned, and the other specifications as named.
 struct MapField {
-    std::vector<std::string> families, specifications;  ///< families: tuned ones
+    std::vector<std::string> families, as_named;
+
+    [[nodiscard]] std::vector<std::string> specifications(double noise_mm) const {
+        std::vector<std::string> all = as_named;
+        for (const std::string& candidate : candidates_of(families, noise_mm)) all.push_back(candidate);
+        return all;
+    }
 };
 
 MapField field_of(const ComparisonOptions& options, bool tunable) {
@@ -65,12 +71,10 @@ MapField field_of(const ComparisonOptions& options, bool tunable) {
         if (is_external(specification)) continue;
         const std::string family = family_of(specification);
         if (!tunable || tuning_grid(family).empty())
-            field.specifications.push_back(specification);
+            field.as_named.push_back(specification);
         else if (std::find(field.families.begin(), field.families.end(), family) == field.families.end())
             field.families.push_back(family);
     }
-    for (const std::string& candidate : candidates_of(field.families))
-        field.specifications.push_back(candidate);
     return field;
 }
 
@@ -87,11 +91,8 @@ Runner tuned_runner(const TuningTable& table, const std::string& family, std::si
 
 std::vector<Runner> runners_of(const TuningTable& table, const MapField& field, std::size_t lead) {
     std::vector<Runner> runners;
-    for (std::size_t i = 0; i < field.specifications.size(); ++i) {
+    for (std::size_t i = 0; i < field.as_named.size(); ++i) {  // first in the table
         const std::string& specification = table.specification(i);
-        if (std::find(field.families.begin(), field.families.end(), family_of(specification)) !=
-            field.families.end())
-            continue;
         Runner runner{specification, is_baseline(specification), {}};
         for (std::size_t r = 0; r < table.recordings(); ++r)
             runner.by_recording.push_back(table.sum(i, r, lead));
@@ -139,7 +140,7 @@ std::vector<MapCell> map_sensors(std::span<const Recording> recordings, const Co
     std::vector<std::vector<MapCell>> parts(sensors.size());
     const auto work = [&](std::size_t i) {
         const std::vector<SensedStick> sticks = sense_all(positions, sensors[i], options.leads_s);
-        const TuningTable table(field.specifications, sticks, positions.size(), 1);
+        const TuningTable table(field.specifications(sensors[i].noise_m / kMm), sticks, positions.size(), 1);
         for (std::size_t lead = 0; lead < options.leads_s.size(); ++lead)
             add_cells(parts[i], runners_of(table, field, lead), sensors[i], options.leads_s[lead]);
     };

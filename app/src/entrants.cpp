@@ -112,7 +112,8 @@ void enter_tuned(EntrantList& list, const std::vector<std::string>& families,
         list.tuned_on = "nothing is tuned: one recording, and no others by --tune";
         return;
     }
-    const TuningTable table(candidates_of(families), seen, field.size(), options.threads);
+    const TuningTable table(candidates_of(families, 1e3 * options.sensor.noise_m), seen, field.size(),
+                            options.threads);
     std::vector<Tuning> splits = {Tuning::other_recordings};
     if (count_persons(scored, field) >= 2) splits.push_back(Tuning::other_persons);
     for (const Tuning split : splits)

@@ -14,9 +14,10 @@ namespace app {
 /// The name before the colon.
 [[nodiscard]] std::string family_of(const std::string& specification);
 
-/// The specifications among which tuning chooses for a family: a small grid, its densities logarithmic. Empty
-/// for a family without parameters, and for one that tracking does not know.
-[[nodiscard]] std::vector<std::string> tuning_grid(const std::string& family);
+/// The specifications among which tuning chooses for a family: a small grid, its densities logarithmic. The
+/// filters are told the sensor's noise (0: not known, their own 0.25 mm). Empty for a family without
+/// parameters.
+[[nodiscard]] std::vector<std::string> tuning_grid(const std::string& family, double noise_mm = 0);
 
 /// The position errors of every candidate on every recording at every lead.
 class TuningTable {
@@ -45,7 +46,8 @@ private:
     std::vector<SquareSum> sums_;  // candidates x recordings x leads
 };
 
-/// The grids of several families in one list, and those of them without a grid as they are.
-[[nodiscard]] std::vector<std::string> candidates_of(const std::vector<std::string>& families);
+/// The grids of several families in one list.
+[[nodiscard]] std::vector<std::string> candidates_of(const std::vector<std::string>& families,
+                                                     double noise_mm);
 
 }  // namespace app
