@@ -48,17 +48,18 @@ void parse_numbers(std::string_view line, std::size_t count, std::vector<double>
 }  // namespace
 
 ExternalPredictor::ExternalPredictor(const std::string& command, std::span<const double> leads_s,
-                                     const std::string& stick)
+                                     const std::string& stick, ExternalPatience patience)
     : place_(fmt::format("exec:{}, stick {}", command, stick)),
       leads_s_(ascending(leads_s)),
       held_(tracking::make_predictor("hold")),
-      child_(command) {
+      patience_(patience) {
     try {
+        child_.emplace(command);
         fmt::format_to(std::back_inserter(line_), "musicworld {} {}", kProtocol, stick);
         for (const double lead : leads_s_) fmt::format_to(std::back_inserter(line_), " {}", lead);
         line_ += '\n';
-        child_.send(line_, kStartS);
-        path_ = AnswerPath(leads_s_, form_ = parse_answer_form(child_.receive(kStartS)));
+        child_->send(line_, patience_.start_s);
+        path_ = AnswerPath(leads_s_, form_ = parse_answer_form(child_->receive(patience_.start_s)));
     } catch (const std::runtime_error& wrong) {
         throw std::runtime_error(fmt::format("{}, first line: error: {}", place_, wrong.what()));
     }
@@ -88,8 +89,8 @@ void ExternalPredictor::exchange(const tracking::PoseSample& sample, bool anew) 
     line_ += '\n';
     ++answers_;
     try {
-        child_.send(line_, kAnswerS);
-        parse_numbers(child_.receive(kAnswerS), leads_s_.size() * form_.numbers(), numbers_);
+        child_->send(line_, patience_.answer_s);
+        parse_numbers(child_->receive(patience_.answer_s), leads_s_.size() * form_.numbers(), numbers_);
         path_.take(held_->predict(0), numbers_);
     } catch (const std::runtime_error& wrong) {
         throw std::runtime_error(fmt::format("{}, answer {}: error: {}", place_, answers_, wrong.what()));

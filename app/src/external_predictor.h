@@ -3,6 +3,7 @@
 
 #include <exception>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +13,11 @@
 
 namespace app {
 
+/// How long an external predictor is waited for.
+struct ExternalPatience {
+    double start_s = 10, answer_s = 2;
+};
+
 /// A predictor of one's own: a child process that gets one sample a line and answers where the stick will be
 /// at the leads that it was told at the start. The line protocol is in assets/predictors/README.md.
 ///
@@ -19,15 +25,14 @@ namespace app {
 /// not sent; before the sample after a gap of more than kGapS the child is told to start anew. A sample is
 /// sent when correct() gets it, so the child is causal by construction.
 ///
-/// correct() waits for the answer, at most kAnswerS (the child's first line: kStartS). When the child ends,
-/// hangs or answers anything but what it announced, the predictor keeps what went wrong, answers
-/// `not_finite` from then on, and predicts its last good path; see require_working().
+/// correct() waits for the answer, at most ExternalPatience::answer_s (the child's first line: start_s). When
+/// the child ends, hangs or answers anything but what it announced, the predictor keeps what went wrong,
+/// answers `not_finite` from then on, and predicts its last good path; see require_working().
 class ExternalPredictor : public tracking::Predictor {
 public:
-    static constexpr double kStartS = 10, kAnswerS = 2;
-
     /// Starts `sh -c COMMAND` and waits for its first line. Throws std::runtime_error, one line.
-    ExternalPredictor(const std::string& command, std::span<const double> leads_s, const std::string& stick);
+    ExternalPredictor(const std::string& command, std::span<const double> leads_s, const std::string& stick,
+                      ExternalPatience patience = {});
 
     [[nodiscard]] tracking::SampleStatus correct(const tracking::PoseSample& sample) noexcept override;
     [[nodiscard]] tracking::PosePrediction predict(double lead_s) const noexcept override {
@@ -48,7 +53,8 @@ private:
     std::string place_;                          // for messages
     std::vector<double> leads_s_;                // ascending, each once
     std::unique_ptr<tracking::Predictor> held_;  // `hold`: judges samples, keeps the newest pose
-    LineChild child_;
+    ExternalPatience patience_;
+    std::optional<LineChild> child_;
     AnswerForm form_;
     AnswerPath path_;
     std::vector<double> numbers_;  // of one answer

@@ -142,10 +142,11 @@ std::string_view LineChild::receive(double timeout_s) {
         end = received_.find('\n', before);
     }
     taken_ = end + 1;
-    if (taken_ < received_.size())
-        throw std::runtime_error(
-            fmt::format("found a second line, \"{}\", expected one line for each line sent",
-                        one_line(std::string_view(received_).substr(taken_), 60)));
+    if (taken_ < received_.size()) {
+        const std::string second = received_.substr(taken_, received_.find('\n', taken_) - taken_);
+        throw std::runtime_error(fmt::format(
+            "found a second line, \"{}\", expected one line for each line sent", one_line(second, 60)));
+    }
     return std::string_view(received_).substr(0, end);
 }
 

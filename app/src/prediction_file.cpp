@@ -101,6 +101,12 @@ PredictionFile read_prediction_file(const fs::path& file) {
     std::ifstream in(file, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
     result.lines = lines_of(result.rows, text);
+    for (std::size_t s = 0; s < result.lines.size(); ++s)
+        if (result.lines[s].size() != result.rows.sticks[s].samples.size())
+            throw BadInput(
+                fmt::format("{}: error: found a recording in another format, expected rows as `musicworld "
+                            "predict` writes",
+                            file.string()));
     return result;
 }
 

@@ -17,7 +17,7 @@ struct PredictionFile {
     std::vector<std::vector<std::size_t>> lines;  ///< of each stick's rows: the line in the file
 };
 
-/// Throws tracking::TraceError: FILE:LINE:COLUMN: error: found ..., expected ...; what to do.
+/// Throws tracking::TraceError or BadInput: FILE:LINE:COLUMN: error: found ..., expected ...; what to do.
 [[nodiscard]] PredictionFile read_prediction_file(const std::filesystem::path& file);
 
 /// One stick's predictions: rows[i] is what was predicted from samples 0 to i + 1, counting the samples that

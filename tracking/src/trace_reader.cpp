@@ -2,6 +2,7 @@
 #include <numbers>
 #include <unordered_map>
 
+#include "bsor_reader.h"
 #include "rotation.h"
 #include "text_cursor.h"
 #include "trace_keys.h"
@@ -253,6 +254,7 @@ private:
 }  // namespace
 
 Trace parse_trace(std::string_view text, const std::string& name) {
+    if (is_bsor(text)) return parse_bsor(text, name);
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
     return Reader(text, name).read();
 }
