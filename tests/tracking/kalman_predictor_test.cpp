@@ -130,7 +130,7 @@ TEST(KalmanPredictor, ThesisIsTheBatchEstimateOfItsModelAtAnyStep) {
 
 TEST(KalmanPredictor, NoiseFreeMotionOfItsOwnKindIsPredictedExactlyOnceConverged) {
     const Vector3d p(1, 2, 3), v(0.5, -1, 2), a(0.4, -3, 0.8);
-    for (const char* name : {"ca:q=1e9", "thesis", "auto", "cv:q=1e8", "singer:alpha=0.001"}) {
+    for (const char* name : {"ca:q=1e9", "thesis", "ca:gate=5", "cv:q=1e8", "singer:alpha=0.001"}) {
         const bool curved = std::string(name) != "cv:q=1e8";
         const auto at = [&](double t) { return Vector3d(p + v * t + (curved ? 0.5 : 0.0) * a * t * t); };
         const auto predictor = make_predictor(name);
@@ -144,7 +144,7 @@ TEST(KalmanPredictor, NoiseFreeMotionOfItsOwnKindIsPredictedExactlyOnceConverged
 }
 
 TEST(KalmanPredictor, VelocityIsTheDerivativeOfThePredictedPath) {
-    for (const char* name : {"thesis", "cv", "ca", "singer", "bank", "imm", "auto"}) {
+    for (const char* name : {"thesis", "cv", "ca", "singer", "bank", "imm", "ca:gate=5"}) {
         const auto predictor = make_predictor(name);
         for (int i = 0; i < 20; ++i)
             (void)predictor->correct(sample_at(i * 0.01, {std::sin(i * 0.2), 0.1 * i, 0}));
@@ -161,7 +161,7 @@ TEST(KalmanPredictor, OrientationsThatJumpAtRandomDoNotMakeTheTurningRunAway) {
     std::mt19937 random(3);
     const auto component = [&] { return static_cast<double>(random() % 2001) / 1000 - 1; };
     constexpr double kDt = 1.0 / 90, kLead = 1.0 / 15;
-    for (const char* name : {"thesis", "cv", "ca", "singer", "bank", "imm", "auto"}) {
+    for (const char* name : {"thesis", "cv", "ca", "singer", "bank", "imm", "ca:gate=5"}) {
         const auto predictor = make_predictor(name);
         for (int i = 0; i < 5000; ++i) {
             PoseSample sample = sample_at(i * kDt, Vector3d::Zero());

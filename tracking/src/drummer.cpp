@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
-#include <random>
 #include <stdexcept>
 
+#include "random_stream.h"
 #include "rotation.h"
 #include "text_cursor.h"
 #include "tip_path.h"
@@ -16,28 +15,6 @@ namespace {
 
 constexpr double kClosest = 0.030;  // s between two strokes of a stick
 const Eigen::Vector3d kTipAxis(0, 0, -1);
-
-/// Normal deviates by Box and Muller's transform: the standard library's own differ between implementations.
-class Gaussian {
-public:
-    explicit Gaussian(std::uint64_t seed) : engine_(seed) {}
-
-    Eigen::Vector3d vector(double sigma) {
-        Eigen::Vector3d v;
-        for (int axis = 0; axis < 3; ++axis) v[axis] = sigma * next();
-        return v;
-    }
-
-private:
-    /// Uniform in (0, 1].
-    double uniform() { return (static_cast<double>(engine_() >> 11) + 1) * 0x1p-53; }
-    double next() {
-        const double radius = std::sqrt(-2 * std::log(uniform()));
-        return radius * std::cos(2 * std::numbers::pi * uniform());
-    }
-
-    std::mt19937_64 engine_;
-};
 
 void require(bool holds, const std::string& found, const std::string& expected) {
     if (!holds) throw std::invalid_argument("drummer: found " + found + ", expected " + expected);
@@ -107,7 +84,7 @@ PoseSample pose_at(const TipPath& path, double t, double length) {
 }
 
 StickTrace play(const std::string& name, const TipPath& path, double duration_s,
-                const DrummerParameters& parameters, Gaussian& noise) {
+                const DrummerParameters& parameters, RandomStream& noise) {
     StickTrace trace{name, {}};
     const auto count =
         static_cast<std::size_t>(std::floor(duration_s * parameters.rate_hz * (1 + 1e-12))) + 1;
@@ -115,8 +92,8 @@ StickTrace play(const std::string& name, const TipPath& path, double duration_s,
     for (std::size_t k = 0; k < count; ++k) {
         PoseSample sample =
             pose_at(path, static_cast<double>(k) / parameters.rate_hz, parameters.stick_length_m);
-        sample.position += noise.vector(parameters.noise_m);
-        const Eigen::Vector3d turn = noise.vector(parameters.noise_rad);
+        sample.position += noise.normal_vector(parameters.noise_m);
+        const Eigen::Vector3d turn = noise.normal_vector(parameters.noise_rad);
         sample.orientation = (exponential(turn) * sample.orientation).normalized();
         trace.samples.push_back(sample);
     }
@@ -133,7 +110,7 @@ Trace synthesise(const std::vector<Stroke>& score, double duration_s, const Drum
     trace.rate_hz = parameters.rate_hz;
     trace.tip = parameters.stick_length_m * kTipAxis;
     trace.shaft = kTipAxis;
-    Gaussian noise(parameters.seed);
+    RandomStream noise(parameters.seed);
     int lowered = 0;
     for (const auto& [name, strokes] : by_stick(score)) {
         const TipPath path(strokes, parameters);

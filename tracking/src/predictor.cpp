@@ -57,12 +57,6 @@ MotionModel constant_velocity(double q) {
     return model;
 }
 
-std::unique_ptr<Predictor> make_auto(Specification&) {
-    constexpr double kGateSigmas = 5;
-    return std::make_unique<KalmanPredictor>(
-        MotionModel{MotionModel::ConstantAcceleration{1e9 * kSquareMetres}}, KalmanOptions{kGateSigmas});
-}
-
 std::unique_ptr<Predictor> make_hold(Specification&) {
     return std::make_unique<Hold>();
 }
@@ -153,8 +147,7 @@ struct Entry {
     std::unique_ptr<Predictor> (*make)(Specification&);
 };
 
-constexpr std::array<Entry, 13> kPredictors = {{{"auto", make_auto},
-                                                {"hold", make_hold},
+constexpr std::array<Entry, 12> kPredictors = {{{"hold", make_hold},
                                                 {"naive", make_naive},
                                                 {"difference", make_difference},
                                                 {"least-squares", make_least_squares},

@@ -17,14 +17,6 @@ bool is_blank(char c) {
     return c == ' ' || c == '\t';
 }
 
-std::string printable(std::string_view text) {
-    std::string out(text);
-    for (std::size_t bad = first_unprintable(out); bad != std::string::npos; bad = first_unprintable(out))
-        out[bad] = '?';
-    std::replace(out.begin(), out.end(), '\t', ' ');
-    return out;
-}
-
 std::string byte_name(char c) {
     constexpr char kHex[] = "0123456789abcdef";
     const auto byte = static_cast<unsigned char>(c);
@@ -63,6 +55,14 @@ std::size_t first_unprintable(std::string_view text) {
         i += length;
     }
     return std::string_view::npos;
+}
+
+std::string printable(std::string_view text) {
+    std::string out(text);
+    for (std::size_t bad = first_unprintable(out); bad != std::string::npos; bad = first_unprintable(out))
+        out[bad] = '?';
+    std::replace(out.begin(), out.end(), '\t', ' ');
+    return out;
 }
 
 std::string in_quotes(std::string_view text) {

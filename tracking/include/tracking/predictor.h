@@ -25,7 +25,7 @@ struct PoseCovariance {
                                                          ///< orientation to the true one [rad^2]
 };
 
-/// What became of a sample. `outlier`: only with a gate (`auto`, `gate=`); the sample was ignored, but the
+/// What became of a sample. `outlier`: only with a gate (`gate=`); the sample was ignored, but the
 /// third in a row is taken as real and answers `reinitialised`.
 enum class SampleStatus { accepted, not_newer, not_finite, reinitialised, outlier };
 

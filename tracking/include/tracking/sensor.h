@@ -16,7 +16,7 @@ struct SensorModel {
                               ///< that neighbours keep their order (within 0.45 periods)
     bool true_stamps = true;  ///< samples carry the time at which they were taken; false: the nominal one
     double drop_out = 0;      ///< share of samples lost, in [0, 0.9], in bursts (two-state Markov chain) ...
-    double burst = 3;         ///< ... of this mean length [samples], >= 1
+    double burst = 3;         ///< ... of this mean length [samples], at least 1 and drop_out / (1 - drop_out)
     double noise_m = 0;       ///< standard deviation of white position noise on each axis
     double noise_rad = 0;     ///< of a small rotation's vector, each axis, world frame
     double quantum_m = 0;     ///< positions are rounded to multiples of this; 0: not rounded
@@ -25,7 +25,7 @@ struct SensorModel {
     double outlier_m = 0.5;   ///< radius of the ball that outliers fall into, about the true position
     double latency_s = 0;     ///< every stamp is later than the pose it carries by this
     double duplicate = 0;     ///< share of samples that arrive twice
-    double late = 0;          ///< share of samples that arrive after their successor (reordered)
+    double late = 0;          ///< share of samples that arrive after their successor, at most 0.5
     std::uint64_t seed = 1;
 
     /// Throws std::invalid_argument (found, expected) for values out of range.

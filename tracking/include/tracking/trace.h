@@ -32,12 +32,14 @@ struct Trace {
     std::optional<Eigen::Vector3d> tip;    ///< tip in the tracked body's frame [m]; key `tip_m`
     std::optional<Eigen::Vector3d> shaft;  ///< unit body axis from hand to tip; key `shaft`
     std::vector<StickTrace> sticks;        ///< in order of first appearance
+    std::vector<std::string> remarks;      ///< what an importer left out, a line each; not written to files
 
     [[nodiscard]] double t0_s() const;     ///< earliest sample time of all sticks
     [[nodiscard]] double t_end_s() const;  ///< latest
 };
 
-/// Bad input. what() is one line: FILE:LINE:COLUMN: error: found ..., expected ...; what to do.
+/// Bad input. what() is one line: FILE:LINE:COLUMN (FILE:byte N in binary files): error: found ..., expected
+/// ...; what to do.
 class TraceError : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
@@ -59,6 +61,10 @@ public:
 ///   (x, y, z) becomes (x, z, -y) and q becomes (sqrt 1/2, -sqrt 1/2, 0, 0) q limits       |coordinate| <=
 ///   1000 m, |t| <= 1e7 s, t strictly increasing within a stick, at least two samples a stick,
 ///                UTF-8 without control characters, at most 1 GiB; LF or CRLF; a byte order mark is skipped
+///
+/// A file that begins as a Beat Saber Open Replay (`*.bsor`) is read as one: the sabers `left` and `right`,
+/// mirrored to right-handed axes, tip (0, 0, -0.35). Frames that do not advance and the start-up are left
+/// out and counted in `remarks`; places of faults are FILE:byte N.
 [[nodiscard]] Trace read_trace(const std::filesystem::path& file);
 
 /// The same from memory; `name` stands for the file in messages. (Fuzzed.)
