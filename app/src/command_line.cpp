@@ -11,6 +11,7 @@
 #include <new>
 
 #include "bad_input.h"
+#include "compare_command.h"
 #include "kit_commands.h"
 #include "play_command.h"
 #include "predict_command.h"
@@ -43,6 +44,7 @@ int run(int argc, char** argv) {
     add_play_command(program);
     add_predict_command(program);
     add_kit_command(program);
+    add_compare_command(program);
     add_trace_command(program);
     add_worker_command(program, status);
     try {
