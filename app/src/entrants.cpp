@@ -186,20 +186,19 @@ void add_file(Entrant& entrant, const std::string& file, std::span<const SensedS
 void enter_files(EntrantList& list, const ComparisonOptions& options, std::span<const SensedStick> sticks,
                  std::size_t recordings) {
     for (const auto& [name, file] : options.predictions) {
-        const auto same = std::find_if(list.entrants.begin(), list.entrants.end(),
-                                       [&](const Entrant& entrant) { return entrant.name == name; });
-        if (same != list.entrants.end() && same->description != kFromFiles)
+        auto entrant = std::find_if(list.entrants.begin(), list.entrants.end(),
+                                    [&](const Entrant& e) { return e.name == name; });
+        if (entrant != list.entrants.end() && entrant->description != kFromFiles)
             throw BadInput(fmt::format(
                 "error: found --predictions {}={}, expected a name that no predictor has", name, file));
-        if (same == list.entrants.end()) {
-            Entrant entrant = named("", recordings, options.leads_s.size());
-            entrant.name = name;
-            entrant.description = kFromFiles;
-            entrant.external = true;
-            list.entrants.push_back(std::move(entrant));
+        if (entrant == list.entrants.end()) {
+            Entrant fresh = named("", recordings, options.leads_s.size());
+            fresh.name = name;
+            fresh.description = kFromFiles;
+            fresh.external = true;
+            entrant = list.entrants.insert(entrant, std::move(fresh));
         }
-        Entrant& entrant = same == list.entrants.end() ? list.entrants.back() : *same;
-        add_file(entrant, file, sticks, recordings, options.leads_s);
+        add_file(*entrant, file, sticks, recordings, options.leads_s);
     }
 }
 
