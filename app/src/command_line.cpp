@@ -11,8 +11,10 @@
 #include <new>
 
 #include "bad_input.h"
+#include "compare_command.h"
 #include "kit_commands.h"
 #include "play_command.h"
+#include "predict_command.h"
 #include "trace_commands.h"
 
 namespace app {
@@ -56,7 +58,9 @@ int run(int argc, char** argv) {
     program.require_subcommand(1);
     int status = 0;
     add_play_command(program);
+    add_predict_command(program);
     add_kit_command(program);
+    add_compare_command(program);
     add_trace_command(program);
     add_worker_command(program, status);
     try {

@@ -51,7 +51,8 @@ OfflineRun::OfflineRun(const tracking::Trace& trace, const Kit& kit, const PlayO
       t_end_s_(trace.t_end_s()),
       scheduler_(rules_of(options, trace.t0_s()), trace.sticks.size(), kit.instruments.size()) {
     for (std::uint32_t i = 0; i < trace.sticks.size(); ++i)
-        sticks_.emplace_back(i, stick, options.picture_predictor, options.sound_predictor);
+        sticks_.emplace_back(i, trace.sticks[i].name, stick, options.picture_predictor,
+                             options.sound_predictor, options.sound_lead_s);
 }
 
 std::vector<OfflineRun::Tick> OfflineRun::ticks() const {
@@ -97,7 +98,7 @@ void OfflineRun::feed(const Tick& tick, std::vector<std::uint32_t>& moved, std::
         }
         if (status == tracking::SampleStatus::reinitialised) scheduler_.restart(stick);
         moved.push_back(stick);
-        paths.push_back(sticks_[stick].predicted_path(options_.sound_lead_s));
+        paths.push_back(sticks_[stick].predicted_path());
         paths.push_back(sticks_[stick].measured_path());
         paths.back().stick +=
             static_cast<std::uint32_t>(sticks_.size());  // so that its contacts are told apart

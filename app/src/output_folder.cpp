@@ -20,11 +20,11 @@ namespace app {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::string_view kSummary = "summary.json";
-/// The summary leads: it goes first, so that a folder whose products are being exchanged does not look
+/// The first leads: it goes first, so that a folder whose products are being exchanged does not look
 /// finished.
-constexpr std::array<std::string_view, 7> kProducts = {kSummary,       "frames",   "audio.wav",  "events.csv",
-                                                       "contacts.csv", "hits.mid", "report.html"};
+constexpr std::array<std::string_view, 7> kPlayProducts = {
+    "summary.json", "frames", "audio.wav", "events.csv", "contacts.csv", "hits.mid", "report.html"};
+constexpr std::array<std::string_view, 3> kCompareProducts = {"compare.json", "compare.csv", "report.html"};
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& found) {
     throw BadInput(fmt::format("{}: error: found {}, expected a folder to write into; choose another --out",
@@ -83,7 +83,16 @@ void write_all(const fs::path& file, const void* data, std::size_t size) {
 
 }  // namespace
 
-OutputFolder::OutputFolder(const fs::path& folder) : folder_(folder), staging_(folder / ".unfinished") {
+std::span<const std::string_view> play_products() {
+    return kPlayProducts;
+}
+
+std::span<const std::string_view> compare_products() {
+    return kCompareProducts;
+}
+
+OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_view> products)
+    : folder_(folder), staging_(folder / ".unfinished"), products_(products.begin(), products.end()) {
     std::error_code error;
     made_folder_ = fs::create_directories(folder_, error);
     std::error_code none;  // a path that cannot even be looked at has failed above
@@ -91,7 +100,8 @@ OutputFolder::OutputFolder(const fs::path& folder) : folder_(folder), staging_(f
     if (error) refuse(folder_, error.message());
     lock();
     try {
-        check_frames(folder_ / "frames");
+        if (std::find(products_.begin(), products_.end(), "frames") != products_.end())
+            check_frames(folder_ / "frames");
         make_staging();
     } catch (...) {
         ::close(lock_);
@@ -132,7 +142,7 @@ void OutputFolder::finish() {
     std::error_code error;
     fs::remove_all(scratch(), error);
     check_moved(error, scratch());
-    for (const std::string_view name : kProducts) {
+    for (const std::string_view name : products_) {
         fs::remove_all(folder_ / name, error);
         check_moved(error, folder_ / name);
     }
@@ -140,7 +150,7 @@ void OutputFolder::finish() {
     for (const fs::directory_entry& entry : fs::directory_iterator(staging_)) staged.push_back(entry.path());
     std::sort(staged.begin(), staged.end());
     std::stable_partition(staged.begin(), staged.end(),
-                          [](const fs::path& path) { return path.filename() != kSummary; });
+                          [&](const fs::path& path) { return path.filename() != products_.front(); });
     for (const fs::path& product : staged) {
         const fs::path target = folder_ / product.filename();
         fs::rename(product, target, error);

@@ -3,19 +3,27 @@
 #include <filesystem>
 #include <span>
 #include <string_view>
+#include <vector>
 
 namespace app {
 
+/// What `play` writes: summary.json, frames, audio.wav, events.csv, contacts.csv, hits.mid, report.html. The
+/// first of a list leads: a folder that has it is a finished run.
+[[nodiscard]] std::span<const std::string_view> play_products();
+/// What `compare` writes: compare.json, compare.csv, report.html.
+[[nodiscard]] std::span<const std::string_view> compare_products();
+
 /// The folder that a run writes its products into, all of them or none. They are staged in its hidden
-/// subfolder `.unfinished`; finish() moves them into place by rename, summary.json last, so that a folder
-/// with a summary.json is a finished run. A folder serves one run at a time (advisory lock). One thread at a
+/// subfolder `.unfinished`; finish() moves them into place by rename, the leading product last, so that
+/// a folder with it is a finished run. A folder serves one run at a time (advisory lock). One thread at a
 /// time.
 class OutputFolder {
 public:
     /// Makes the folder (parents too) and an empty staging folder, removing one that an interrupted run left.
     /// Throws BadInput when that cannot be: a file is in the way, no permission, another run is writing
     /// there, or `frames` holds files that no run wrote and finish() would delete.
-    explicit OutputFolder(const std::filesystem::path& folder);
+    explicit OutputFolder(const std::filesystem::path& folder,
+                          std::span<const std::string_view> products = play_products());
     /// Without finish(): removes what was staged, and the folder if this run made it and nothing else is in
     /// it.
     ~OutputFolder();
@@ -28,9 +36,9 @@ public:
     /// An existing folder for temporary files; never moved into place.
     [[nodiscard]] std::filesystem::path scratch() const { return staging_ / "scratch"; }
 
-    /// Removes the products of earlier runs (known names only: frames, audio.wav, events.csv, contacts.csv,
-    /// hits.mid, summary.json, report.html), moves everything staged into place and removes the staging
-    /// folder. Throws std::runtime_error; summary.json is then not there.
+    /// Removes the products of earlier runs (known names only), moves everything staged into place, the
+    /// leading product last, and removes the staging folder. Throws std::runtime_error; the leading product
+    /// is then not there.
     void finish();
 
 private:
@@ -38,6 +46,7 @@ private:
     void make_staging();
 
     std::filesystem::path folder_, staging_;
+    std::vector<std::string_view> products_;
     bool made_folder_ = false, finished_ = false;
     int lock_ = -1;
 };

@@ -14,6 +14,7 @@
 #include "notes.h"
 #include "offline_run.h"
 #include "output_folder.h"
+#include "predictors.h"
 #include "progress_bar.h"
 #include "report.h"
 #include "score_strikes.h"
@@ -187,7 +188,7 @@ PlayResult play(const PlayOptions& options) {
     const Kit kit = read_kit(options.kit);
     const StickGeometry stick = stick_geometry(trace, kit.stick, options.tip, options.shaft);
     for (const std::string& name : {options.picture_predictor, options.sound_predictor})
-        (void)tracking::make_predictor(name);
+        check_specification(name);
     PlayResult result = describe(options, trace, kit);
     result.tracks = tip_tracks(trace, stick);
     OutputFolder folder(options.out);

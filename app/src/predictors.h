@@ -10,13 +10,26 @@ namespace app {
 
 /// Makes any predictor that the command line may name: those of tracking::make_predictor and `exec:CMD`, a
 /// child process (ExternalPredictor). `auto` must have been resolved before. `leads_s` are the leads that
-/// will be asked for: an external predictor computes these, in between its answers are interpolated. Throws
-/// BadInput with one line.
+/// will be asked for: an external predictor computes these, in between its answers are interpolated. `stick`
+/// is the name an external predictor is told. Throws BadInput with one line; std::runtime_error when the
+/// child fails.
 [[nodiscard]] std::unique_ptr<tracking::Predictor> make_any_predictor(const std::string& specification,
-                                                                      std::span<const double> leads_s);
+                                                                      std::span<const double> leads_s,
+                                                                      const std::string& stick = "-");
+
+/// Throws BadInput if make_any_predictor would; starts no child.
+void check_specification(const std::string& specification);
+
+/// True for `exec:CMD`: its time includes a process and two messages, and is marked as external.
+[[nodiscard]] bool is_external(const std::string& specification);
+
+/// Throws what made an external predictor give up (its correct() and predict() cannot throw); does nothing
+/// for all others. To be called before a run's results are used.
+void require_working(const tracking::Predictor& predictor);
 
 /// Splits a comma-separated list of specifications: a part with `=` but no `:` belongs to the one before, and
-/// `exec:` takes the rest of its part up to the next comma that is not escaped as `\,`.
+/// `exec:` takes the rest of its part up to the next comma that is not escaped as `\,`. Throws BadInput for
+/// empty parts.
 [[nodiscard]] std::vector<std::string> split_specifications(const std::string& list);
 
 }  // namespace app

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "tip_track.h"
 
@@ -16,10 +17,13 @@ namespace app {
 /// One stick's filters: one predictor for pictures, one for sound, fed the same samples.
 class StickTracker {
 public:
-    StickTracker(std::uint32_t stick, const StickGeometry& geometry, const std::string& picture_predictor,
-                 const std::string& sound_predictor);
+    /// `name` is what external predictors are told; `sound_lead_s` the lead of every predicted_path().
+    StickTracker(std::uint32_t stick, const std::string& name, const StickGeometry& geometry,
+                 const std::string& picture_predictor, const std::string& sound_predictor,
+                 double sound_lead_s);
 
-    /// What the sound's filter made of the sample; refused samples change nothing.
+    /// What the sound's filter made of the sample; refused samples change nothing. Throws
+    /// std::runtime_error when an external predictor has failed.
     [[nodiscard]] tracking::SampleStatus correct(const tracking::PoseSample& sample);
     [[nodiscard]] bool started() const { return started_; }
     /// Centre of the tip in the newest sample that the filter took [m].
@@ -31,14 +35,15 @@ public:
     [[nodiscard]] Eigen::Vector3d tip_at(double T) const {
         return tracking::point_of(pose_at(T), geometry_.tip).position;
     }
-    /// The path that the sound's filter predicts over [0, lead] from its newest sample, and the measured tip
-    /// as a path that stands still.
-    [[nodiscard]] sim::TipPath predicted_path(double lead_s) const;
+    /// The path that the sound's filter predicts over [0, sound lead] from its newest sample, and the
+    /// measured tip as a path that stands still.
+    [[nodiscard]] sim::TipPath predicted_path() const;
     [[nodiscard]] sim::TipPath measured_path() const;
 
 private:
     std::uint32_t stick_;
     StickGeometry geometry_;
+    std::vector<double> sound_leads_s_;  // of the nodes of predicted_path()
     std::unique_ptr<tracking::Predictor> picture_, sound_;
     Eigen::Vector3d measured_tip_ = Eigen::Vector3d::Zero();
     bool started_ = false;

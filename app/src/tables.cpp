@@ -9,16 +9,6 @@
 namespace app {
 namespace {
 
-std::string csv_field(std::string_view text) {
-    if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
-    std::string quoted = "\"";
-    for (const char c : text) {
-        if (c == '"') quoted += '"';
-        quoted += c;
-    }
-    return quoted + '"';
-}
-
 std::string_view outcome_word(const Strike& strike) {
     switch (strike.outcome) {
         case Outcome::released:
@@ -33,6 +23,16 @@ std::string_view outcome_word(const Strike& strike) {
 }
 
 }  // namespace
+
+std::string csv_field(std::string_view text) {
+    if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
+    std::string quoted = "\"";
+    for (const char c : text) {
+        if (c == '"') quoted += '"';
+        quoted += c;
+    }
+    return quoted + '"';
+}
 
 std::string format_events(const PlayResult& result) {
     std::string text =

@@ -1,5 +1,6 @@
 #pragma once
 #include <string>
+#include <string_view>
 
 #include "play_result.h"
 
@@ -17,7 +18,10 @@ namespace app {
 /// px,py,pz the centre of the tip [m]; matched_id the note that sounded it, 0 for a missed one.
 [[nodiscard]] std::string format_contacts(const PlayResult& result);
 
-// Both: numbers read back to the same double; a name that holds a comma, a quote or a line break is quoted
-// (RFC 4180); lines end in "\n".
+/// A name as a field of a CSV row: quoted where it must be (RFC 4180).
+[[nodiscard]] std::string csv_field(std::string_view text);
+
+// Both tables: numbers read back to the same double; a name that holds a comma, a quote or a line break is
+// quoted (RFC 4180); lines end in "\n".
 
 }  // namespace app

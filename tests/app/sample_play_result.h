@@ -1,11 +1,9 @@
 #pragma once
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <stdexcept>
 #include <string>
 
 #include "play_result.h"
+#include "temporary_folder.h"
 
 /// A small finished run for the tests of its outputs: two sticks, three instruments, four strikes (one false,
 /// one cancelled), three contacts (one missed), a second and a half of sound. Names hold everything that a
@@ -74,23 +72,3 @@ inline app::PlayResult sample_play_result() {
     r.versions = {{"csound", "6.18"}};
     return r;
 }
-
-/// A new empty folder, removed at the end.
-class TemporaryFolder {
-public:
-    TemporaryFolder() {
-        std::string name = (std::filesystem::temp_directory_path() / "musicworld_test_XXXXXX").string();
-        if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-        path_ = name;
-    }
-    ~TemporaryFolder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
-private:
-    std::filesystem::path path_;
-};

@@ -2,12 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <Eigen/QR>
 #include <cmath>
 #include <random>
-
-#include "motion_model.h"
 
 namespace tracking {
 namespace {
@@ -131,102 +128,9 @@ TEST(KalmanPredictor, ThesisIsTheBatchEstimateOfItsModelAtAnyStep) {
     EXPECT_LT(worst_difference("thesis:q=outer", times, free_covariances_fixed(times, outer)), 1e-9);
 }
 
-/// Steady covariance before a measurement, from the discrete Riccati equation solved by structure-preserving
-/// doubling.
-Matrix3d riccati_by_doubling(const Matrix3d& f, const Matrix3d& q, double r) {
-    Matrix3d a = f.transpose();
-    Matrix3d g = Vector3d::UnitX() * Vector3d::UnitX().transpose() / r;
-    Matrix3d h = q;
-    for (int i = 0; i < 40; ++i) {
-        const Matrix3d w = (Matrix3d::Identity() + g * h).inverse();
-        const Matrix3d next_g = g + a * w * g * a.transpose();
-        const Matrix3d next_h = h + a.transpose() * h * w * a;
-        a = (a * w * a).eval();
-        g = next_g;
-        h = next_h;
-    }
-    return h;
-}
-
-TEST(AxisCovariance, AfterThousandStepsTheGainSolvesTheRiccatiEquation) {
-    const Vector3d xi(1e-3, 20e-3, 63e-3);
-    const Matrix3d diagonal = Vector3d(xi.cwiseAbs2()).asDiagonal();
-    for (const MotionModel& model :
-         {MotionModel{MotionModel::FixedStep{diagonal}}, MotionModel{MotionModel::ConstantAcceleration{1e3}},
-          MotionModel{MotionModel::Singer{3, 1e4}}}) {
-        constexpr double kStep = 1.0 / 120;
-        AxisCovariance covariance(model);
-        Vector3d gain;
-        for (int i = 0; i < 1000; ++i) {
-            covariance.propagate(kStep);
-            gain = covariance.correct();
-        }
-        const Matrix3d p = riccati_by_doubling(model.transition(kStep), model.process_noise(kStep),
-                                               model.measurement_variance);
-        const Vector3d expected = p.col(0) / (p(0, 0) + model.measurement_variance);
-        // Gains range over 1 to 1e4 (position to acceleration), so compare each with itself; both ways round
-        // to about 1e-12.
-        for (int i = 0; i < 3; ++i) EXPECT_NEAR(gain[i] / expected[i], 1, 1e-9);
-    }
-}
-
-TEST(AxisCovariance, StaysSymmetricAndPositiveOverAMillionUnevenSteps) {
-    AxisCovariance covariance(MotionModel{MotionModel::ConstantAcceleration{1e3}});
-    std::mt19937 random(5);
-    for (int i = 0; i < 1000000; ++i) {
-        covariance.propagate(1e-5 + 1e-4 * static_cast<double>(random() % 1000));
-        (void)covariance.correct();
-    }
-    const Matrix3d& p = covariance.covariance();
-    EXPECT_EQ(p, p.transpose());
-    for (int n = 1; n <= 3; ++n) EXPECT_GT(p.topLeftCorner(n, n).determinant(), 0);  // Sylvester's criterion
-}
-
-TEST(MotionModel, SingerMatchesItsClosedFormAtAlphaDtOfTwoAndTwenty) {
-    for (const double u : {2.0, 20.0}) {
-        const double alpha = 40;
-        const double dt = u / alpha;
-        const double e = std::exp(-u);
-        const MotionModel model{MotionModel::Singer{alpha, 1}};
-        Matrix3d q;  // Singer 1970, (18), for white noise of density 1
-        q(0, 0) = (1 - e * e + 2 * u + 2 * u * u * u / 3 - 2 * u * u - 4 * u * e) / (2 * std::pow(alpha, 5));
-        q(0, 1) = q(1, 0) = (e * e + 1 - 2 * e + 2 * u * e - 2 * u + u * u) / (2 * std::pow(alpha, 4));
-        q(0, 2) = q(2, 0) = (1 - e * e - 2 * u * e) / (2 * std::pow(alpha, 3));
-        q(1, 1) = (4 * e - 3 - e * e + 2 * u) / (2 * std::pow(alpha, 3));
-        q(1, 2) = q(2, 1) = (e * e + 1 - 2 * e) / (2 * alpha * alpha);
-        q(2, 2) = (1 - e * e) / (2 * alpha);
-        // The closed form cancels about three digits at u = 2; quadrature does not.
-        EXPECT_LT((model.process_noise(dt) - q).cwiseQuotient(q).cwiseAbs().maxCoeff(), 1e-12);
-        EXPECT_NEAR(model.transition(dt)(0, 2), (u - 1 + e) / (alpha * alpha), 1e-18);
-    }
-}
-
-TEST(MotionModel, SlowSingerTendsToConstantAcceleration) {
-    const MotionModel singer{MotionModel::Singer{1e-3, 2}};
-    const MotionModel ca{MotionModel::ConstantAcceleration{2}};
-    // The difference is of first order in alpha dt = 1e-5.
-    EXPECT_LT((singer.process_noise(0.01) - ca.process_noise(0.01))
-                  .cwiseQuotient(ca.process_noise(0.01))
-                  .cwiseAbs()
-                  .maxCoeff(),
-              2e-5);
-    EXPECT_LT((singer.transition(0.01) - ca.transition(0.01)).cwiseAbs().maxCoeff(), 2e-5);
-}
-
-TEST(MotionModel, NoiseOfTwoStepsIsTheNoiseOfOneLongStep) {
-    for (const MotionModel& model :
-         {MotionModel{MotionModel::ConstantVelocity{3}}, MotionModel{MotionModel::ConstantAcceleration{3}},
-          MotionModel{MotionModel::Singer{7, 3}}, MotionModel{MotionModel::Singer{500, 3}}}) {
-        const Matrix3d f = model.transition(0.03);
-        const Matrix3d two = f * model.process_noise(0.02) * f.transpose() + model.process_noise(0.03);
-        const Matrix3d one = model.process_noise(0.05);
-        EXPECT_LT((two - one).norm(), 1e-14 * one.norm());
-    }
-}
-
 TEST(KalmanPredictor, NoiseFreeMotionOfItsOwnKindIsPredictedExactlyOnceConverged) {
     const Vector3d p(1, 2, 3), v(0.5, -1, 2), a(0.4, -3, 0.8);
-    for (const char* name : {"ca:q=1e9", "thesis", "auto", "cv:q=1e8", "singer:alpha=0.001"}) {
+    for (const char* name : {"ca:q=1e9", "thesis", "ca:gate=5", "cv:q=1e8", "singer:alpha=0.001"}) {
         const bool curved = std::string(name) != "cv:q=1e8";
         const auto at = [&](double t) { return Vector3d(p + v * t + (curved ? 0.5 : 0.0) * a * t * t); };
         const auto predictor = make_predictor(name);
@@ -240,7 +144,7 @@ TEST(KalmanPredictor, NoiseFreeMotionOfItsOwnKindIsPredictedExactlyOnceConverged
 }
 
 TEST(KalmanPredictor, VelocityIsTheDerivativeOfThePredictedPath) {
-    for (const char* name : {"thesis", "cv", "ca", "singer", "auto"}) {
+    for (const char* name : {"thesis", "cv", "ca", "singer", "bank", "imm", "ca:gate=5"}) {
         const auto predictor = make_predictor(name);
         for (int i = 0; i < 20; ++i)
             (void)predictor->correct(sample_at(i * 0.01, {std::sin(i * 0.2), 0.1 * i, 0}));
@@ -257,7 +161,7 @@ TEST(KalmanPredictor, OrientationsThatJumpAtRandomDoNotMakeTheTurningRunAway) {
     std::mt19937 random(3);
     const auto component = [&] { return static_cast<double>(random() % 2001) / 1000 - 1; };
     constexpr double kDt = 1.0 / 90, kLead = 1.0 / 15;
-    for (const char* name : {"thesis", "cv", "ca", "singer", "auto"}) {
+    for (const char* name : {"thesis", "cv", "ca", "singer", "bank", "imm", "ca:gate=5"}) {
         const auto predictor = make_predictor(name);
         for (int i = 0; i < 5000; ++i) {
             PoseSample sample = sample_at(i * kDt, Vector3d::Zero());

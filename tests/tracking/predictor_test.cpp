@@ -112,6 +112,12 @@ TEST_P(EveryPredictor, IsUnchangedByTurningTheWorld) {
     }
     const PosePrediction a = plain->predict(1.0 / 15);
     const PosePrediction b = turned->predict(1.0 / 15);
+    if (GetParam() == "imm") {
+        // Each axis has a covariance of its own (the modes' spread differs), so turning the axes changes the
+        // prediction, by far less than its error (centimetres here).
+        EXPECT_LT((world * a.position - b.position).norm(), 1e-3);
+        return;
+    }
     // Noise is alike in all directions, so only rounding differs (accelerations of 100 m/s^2 amplify it).
     EXPECT_LT((world * a.position - b.position).norm(), 1e-12);
     EXPECT_LT((world * a.velocity - b.velocity).norm(), 1e-10);
@@ -131,8 +137,10 @@ TEST_P(EveryPredictor, FindsAConstantAngularVelocityOf10RadPerSecond) {
         return;
     }
     EXPECT_LT((ahead.angular_velocity - w).norm(), 1e-6);
-    // The moving average of 8 samples lags 3.5 of them; the others are on the turn.
-    const double lag = GetParam() == "naive" ? 3.5 / 120 : 0;
+    // The moving average of 8 samples lags 3.5 of them, the 1 euro filter (1 - share) / share of one at its
+    // cut-off of 10 Hz + 0.1 Hz s/mm * 10 rad/s * 400 mm; the others are on the turn.
+    const double unseen = 1 / (2 * M_PI * (10 + 0.1 * 10 * 400) / 120);
+    const double lag = GetParam() == "naive" ? 3.5 / 120 : GetParam() == "one-euro" ? unseen / 120 : 0;
     EXPECT_LT(angle_between(ahead.orientation, at(kLast / 120.0 + 1.0 / 15 - lag)), 1e-6);
 }
 
@@ -164,8 +172,8 @@ TEST(Naive, WindowOf67MillisecondsHolds4SamplesAt60HertzAnd8At120) {
     }
 }
 
-TEST(Auto, RefusesASingleImpossibleSampleAndStaysOnTheMotion) {
-    const auto gated = make_predictor("auto");
+TEST(Gate, RefusesASingleImpossibleSampleAndStaysOnTheMotion) {
+    const auto gated = make_predictor("ca:gate=5");
     const auto named = make_predictor("ca:q=1e9");
     for (int i = 0; i <= 40; ++i) {
         const double t = i / 120.0;
@@ -182,8 +190,8 @@ TEST(Auto, RefusesASingleImpossibleSampleAndStaysOnTheMotion) {
     EXPECT_GT((named->predict(1.0 / 15).position - expected).norm(), 1e-2);  // named filters do not gate
 }
 
-TEST(Auto, AcceptsANewPlaceThatPersistsForThreeSamples) {
-    const auto predictor = make_predictor("auto");
+TEST(Gate, AcceptsANewPlaceThatPersistsForThreeSamples) {
+    const auto predictor = make_predictor("ca:gate=5");
     for (int i = 0; i <= 20; ++i) (void)predictor->correct(sample_at(i / 240.0, {0, 1, 0}));
     EXPECT_EQ(predictor->correct(sample_at(21 / 240.0, {2, 1, 0})), SampleStatus::outlier);
     EXPECT_EQ(predictor->correct(sample_at(22 / 240.0, {2, 1, 0})), SampleStatus::outlier);
@@ -191,9 +199,9 @@ TEST(Auto, AcceptsANewPlaceThatPersistsForThreeSamples) {
     EXPECT_EQ(predictor->predict(0).position, Vector3d(2, 1, 0));
 }
 
-TEST(Auto, AcceptsAContactThatTurns8MetresPerSecondRoundBetweenTwoSamples) {
+TEST(Gate, AcceptsAContactThatTurns8MetresPerSecondRoundBetweenTwoSamples) {
     for (const double rate : {60.0, 120.0, 250.0, 500.0}) {
-        const auto predictor = make_predictor("auto");
+        const auto predictor = make_predictor("ca:gate=5");
         for (int i = -30; i <= 30; ++i) {
             const double t = i / rate;
             const SampleStatus status = predictor->correct(sample_at(t, {0, t < 0 ? -8 * t : 5 * t, 0}));
@@ -241,7 +249,7 @@ TEST(MakePredictor, RefusesWhatItDoesNotKnowInOneLine) {
                              "naive:n=100000",
                              "thesis:q=inner",
                              "singer:alpha=0",
-                             "auto:gate=5",
+                             "auto",
                              "ca:gate=0",
                              "ca:q=1e9\nx",
                              "a\nb"}) {
@@ -259,7 +267,7 @@ TEST(MakePredictor, RefusesWhatItDoesNotKnowInOneLine) {
 
 TEST(MakePredictor, KnowsTheDocumentedSpecifications) {
     for (const char* text : {"naive", "naive:n=4", "thesis", "thesis:q=outer", "ca:q=1e9", "cv:q=1e8",
-                             "singer:alpha=3,q=1e10", "hold", "difference", "auto"})
+                             "singer:alpha=3,q=1e10", "hold", "difference", "ca:gate=5"})
         EXPECT_NO_THROW((void)make_predictor(text)) << text;
 }
 

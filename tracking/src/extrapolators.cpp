@@ -1,7 +1,5 @@
 #include "extrapolators.h"
 
-#include <algorithm>
-
 #include "rotation.h"
 
 namespace tracking {
@@ -63,63 +61,27 @@ SampleStatus Difference::correct(const PoseSample& sample) noexcept {
     return status;
 }
 
-MovingAverage::MovingAverage(std::size_t count, double window_s)
-    : count_(count), window_s_(window_s), ring_(kCapacity) {}
-
-std::unique_ptr<MovingAverage> MovingAverage::of_count(std::size_t count) {
-    return std::unique_ptr<MovingAverage>(new MovingAverage(count, 0));
-}
-
-std::unique_ptr<MovingAverage> MovingAverage::of_window(double window_s) {
-    return std::unique_ptr<MovingAverage>(new MovingAverage(0, window_s));
-}
-
-const PoseSample& MovingAverage::back(std::size_t age) const noexcept {
-    return ring_[(newest_ + kCapacity - age) % kCapacity];
-}
-
-void MovingAverage::push(const PoseSample& sample) noexcept {
-    const Eigen::Quaterniond known = held_ > 0 ? back(0).orientation : Eigen::Quaterniond::Identity();
-    newest_ = (newest_ + 1) % kCapacity;
-    ring_[newest_] = sample;
-    ring_[newest_].orientation = orientation_of(sample, known);
-    held_ = std::min(held_ + 1, kCapacity);
-}
-
-void MovingAverage::restart(const PoseSample& sample) noexcept {
-    held_ = 0;
-    for (std::size_t i = 0; i < std::max<std::size_t>(count_, 1); ++i) push(sample);
-    rates_.now = at_rest(sample);
-}
-
-std::size_t MovingAverage::in_window() const noexcept {
-    if (count_ > 0) return count_;
-    constexpr double kSlack = 1e-6;
-    std::size_t n = 1;
-    while (n < held_ && back(0).t_s - back(n).t_s < window_s_ - kSlack) ++n;
-    return n;
-}
-
 SampleStatus MovingAverage::correct(const PoseSample& sample) noexcept {
     const SampleStatus status = clock_.judge(sample);
     if (status != SampleStatus::accepted && status != SampleStatus::reinitialised) return status;
     const double dt = sample.t_s - clock_.time_s();
     clock_.advance(sample.t_s);
     if (status == SampleStatus::reinitialised) {
-        restart(sample);
+        window_.fill(sample);
+        rates_.now = at_rest(sample);
         return status;
     }
-    push(sample);
-    const std::size_t n = in_window();
+    window_.push(sample);
+    const std::size_t n = window_.size();
     Eigen::Vector3d position = Eigen::Vector3d::Zero();
     Eigen::Vector3d turn = Eigen::Vector3d::Zero();
-    const Eigen::Quaterniond to_newest = back(0).orientation.conjugate();
+    const Eigen::Quaterniond newest = window_.back(0).orientation;
     for (std::size_t age = 0; age < n; ++age) {
-        position += back(age).position;
-        turn += logarithm(back(age).orientation * to_newest);
+        position += window_.back(age).position;
+        turn += logarithm(window_.back(age).orientation * newest.conjugate());
     }
     const double share = 1 / static_cast<double>(n);
-    rates_.step_to(share * position, exponential(share * turn) * back(0).orientation, dt);
+    rates_.step_to(share * position, exponential(share * turn) * newest, dt);
     return status;
 }
 

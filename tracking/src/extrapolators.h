@@ -1,7 +1,6 @@
 #pragma once
-#include <vector>
-
 #include "sample_clock.h"
+#include "sample_window.h"
 #include "tracking/predictor.h"
 
 namespace tracking {
@@ -43,16 +42,11 @@ private:
 
 /// The method that the thesis compares with (its introduction to chapter 3 and figure 3-3): a moving average
 /// as the position, the difference of successive averages over the newest dt as the velocity. The average
-/// lags by half the window. Rotations are averaged as rotation vectors about the newest one. At most
-/// kCapacity samples are averaged.
+/// lags by half the window. Rotations are averaged as rotation vectors about the newest one.
 class MovingAverage : public Predictor {
 public:
-    static constexpr std::size_t kCapacity = 256;
-
-    /// The last `count` samples, the buffer filled with the first at the start; 1 <= count <= kCapacity.
-    static std::unique_ptr<MovingAverage> of_count(std::size_t count);
-    /// The samples of the last `window_s`: younger than that by more than 1 us.
-    static std::unique_ptr<MovingAverage> of_window(double window_s);
+    /// A window by count starts filled with the first sample.
+    explicit MovingAverage(const SampleWindow& window) : window_(window) {}
 
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override {
@@ -61,19 +55,8 @@ public:
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
 
 private:
-    MovingAverage(std::size_t count, double window_s);
-    void restart(const PoseSample& sample) noexcept;
-    void push(const PoseSample& sample) noexcept;
-    [[nodiscard]] std::size_t in_window() const noexcept;
-    /// The sample `age` samples before the newest.
-    [[nodiscard]] const PoseSample& back(std::size_t age) const noexcept;
-
     SampleClock clock_;
-    std::size_t count_;  // 0: by time
-    double window_s_;
-    std::vector<PoseSample> ring_;  // kCapacity long from the start
-    std::size_t newest_ = 0;
-    std::size_t held_ = 0;
+    SampleWindow window_;
     ConstantRates rates_;
 };
 

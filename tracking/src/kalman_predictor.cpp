@@ -2,20 +2,29 @@
 
 #include <cmath>
 
+#include "rotation.h"
+
 namespace tracking {
 namespace {
 
-constexpr double kLever = 0.4;        // m, a stick's length: turns rad into metres at the tip
 constexpr double kFastest = 25;       // m/s, of a tracked hand or tip
 constexpr double kStrongest = 3000;   // m/s^2, apart from contacts
 constexpr double kFastestTurn = 120;  // rad/s, with room to spare for a wrist
 
 }  // namespace
 
-KalmanPredictor::KalmanPredictor(const MotionModel& model, double gate_sigmas)
-    : covariance_(model),
-      gate_(gate_sigmas, kFastest, kStrongest),
-      rotation_(model.scaled(1 / kLever), OutlierGate(gate_sigmas, kFastestTurn, kStrongest / kLever)) {}
+OutlierGate position_gate(double sigmas) noexcept {
+    return {sigmas, kFastest, kStrongest};
+}
+
+OutlierGate rotation_gate(double sigmas) noexcept {
+    return {sigmas, kFastestTurn, kStrongest / kLever};
+}
+
+KalmanPredictor::KalmanPredictor(const MotionModel& model, const KalmanOptions& options)
+    : position_(model, options.steady_rate_hz),
+      gate_(position_gate(options.gate_sigmas)),
+      rotation_(model.scaled(1 / kLever), rotation_gate(options.gate_sigmas)) {}
 
 SampleStatus KalmanPredictor::correct(const PoseSample& sample) noexcept {
     const SampleStatus status = clock_.judge(sample);
@@ -25,50 +34,50 @@ SampleStatus KalmanPredictor::correct(const PoseSample& sample) noexcept {
 
 SampleStatus KalmanPredictor::start(const PoseSample& sample) noexcept {
     clock_.advance(sample.t_s);
-    covariance_.restart();
-    gate_.restart();
+    position_.start(sample.position);
+    gate_.restart(sample.position);
     rotation_.restart();
-    x_.setZero();
-    x_.row(0) = sample.position.transpose();
-    last_measured_ = sample.position;
     if (sample.has_orientation) rotation_.correct(sample.orientation);
     return SampleStatus::reinitialised;
 }
 
-OutlierGate::Verdict KalmanPredictor::judge(const PoseSample& sample, double dt,
-                                            const AxisStates& x) noexcept {
-    const double innovation = (sample.position.transpose() - x.row(0)).norm();
-    return gate_.judge(sample.position - last_measured_, dt, innovation,
-                       std::sqrt(covariance_.innovation_variance()));
-}
-
 SampleStatus KalmanPredictor::update(const PoseSample& sample) noexcept {
     const double dt = sample.t_s - clock_.time_s();
-    const AxisCovariance before = covariance_;
-    const AxisStates predicted = covariance_.propagate(dt) * x_;
-    switch (judge(sample, dt, predicted)) {
-        case OutlierGate::Verdict::refuse:
-            covariance_ = before;
-            return SampleStatus::outlier;
-        case OutlierGate::Verdict::persists:
-            return start(sample);
-        case OutlierGate::Verdict::pass:
-            break;
+    PositionFilter::Estimate ahead = position_.propagate(dt);
+    const Lanes innovation = ahead.innovation(sample.position);
+    if (gate_.is_on()) {
+        switch (gate_.judge(sample.position, dt, innovation.matrix().squaredNorm(),
+                            position_.innovation_variance(ahead))) {
+            case OutlierGate::Verdict::refuse:
+                return SampleStatus::outlier;
+            case OutlierGate::Verdict::persists:
+                return start(sample);
+            case OutlierGate::Verdict::pass:
+                break;
+        }
     }
-    const Eigen::RowVector3d innovation = sample.position.transpose() - predicted.row(0);
-    x_ = predicted + covariance_.correct() * innovation;
+    position_.correct(ahead, innovation);
     rotation_.propagate(dt);
     if (sample.has_orientation) rotation_.correct(sample.orientation);
-    if (!x_.allFinite() || !rotation_.is_finite()) return start(sample);
+    if (!ahead.x.is_finite() || !rotation_.is_finite()) return start(sample);
+    position_.accept(ahead);
     clock_.advance(sample.t_s);
-    last_measured_ = sample.position;
     return SampleStatus::accepted;
 }
 
 PosePrediction KalmanPredictor::predict(double lead_s) const noexcept {
-    const AxisStates ahead = covariance_.model().transition(lead_s) * x_;
-    return {ahead.row(0).transpose(), ahead.row(1).transpose(), rotation_.orientation_after(lead_s),
-            rotation_.velocity_after(lead_s)};
+    const AxisStates ahead = position_.after(lead_s);
+    PosePrediction pose;
+    pose.position = ahead.p.head<3>();
+    pose.velocity = ahead.v.head<3>();
+    rotation_.predict(lead_s, pose);
+    return pose;
+}
+
+std::optional<PoseCovariance> KalmanPredictor::covariance(double lead_s) const noexcept {
+    const AxisMatrix<double> ahead = position_.covariance_after(lead_s);
+    return PoseCovariance{ahead.pp * Eigen::Matrix3d::Identity(), ahead.vv * Eigen::Matrix3d::Identity(),
+                          rotation_.variance_after(lead_s) * Eigen::Matrix3d::Identity()};
 }
 
 }  // namespace tracking

@@ -1,43 +1,48 @@
 #pragma once
-#include "axis_covariance.h"
 #include "outlier_gate.h"
+#include "position_filter.h"
 #include "rotation_filter.h"
 #include "sample_clock.h"
 #include "tracking/predictor.h"
 
 namespace tracking {
 
-/// Kalman filter of a pose with a given model of motion (Friedmann 1992, 3.1-3.19 and section 3.2).
+/// What a Kalman predictor is told beyond its model of motion.
+struct KalmanOptions {
+    double gate_sigmas = 0;  ///< <= 0: no gate. Otherwise impossible samples (OutlierGate) answer `outlier`
+    double steady_rate_hz = 0;  ///< > 0: the steady gain of this rate (PositionFilter)
+};
+
+/// Kalman filter of a pose with a given model of motion (Friedmann 1992, 3.1-3.19 and section 3.2): a
+/// PositionFilter and a RotationFilter.
 ///
-///   x  3x3  rows position [m], velocity, acceleration; a column an axis, world frame; P shared by the axes
-///   a sample at dt after the state: x <- F(dt) x, P <- F P F^T + Q(dt), then x <- x + K (z - H x)
-///   a prediction at lead L:         F(L) x, its velocity the second row
-///
-/// The rotation runs the same model (RotationFilter), scaled as if it moved the tip of a stick of kLever: its
-/// gains are those of the position. predict() extrapolates it with F(L) too. A state that is not finite after
-/// a sample starts anew from it. No allocation.
-class KalmanPredictor : public Predictor {
+/// The rotation runs the same model, scaled as if it moved the tip of a stick of kLever: its gains are those
+/// of the position. A state that is not finite after a sample starts anew from it. No allocation. Cost with
+/// position only: benchmark `kalman_*`.
+class KalmanPredictor final : public Predictor {
 public:
-    /// gate_sigmas <= 0: no gate. Otherwise impossible samples (OutlierGate: 25 m/s, 3000 m/s^2) answer
-    /// `outlier`.
-    KalmanPredictor(const MotionModel& model, double gate_sigmas);
+    KalmanPredictor(const MotionModel& model, const KalmanOptions& options);
 
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override;
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
+    [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
+
+    [[nodiscard]] const PositionFilter& position() const noexcept { return position_; }
 
 private:
     SampleStatus start(const PoseSample& sample) noexcept;
     SampleStatus update(const PoseSample& sample) noexcept;
-    [[nodiscard]] OutlierGate::Verdict judge(const PoseSample& sample, double dt,
-                                             const AxisStates& x) noexcept;
 
     SampleClock clock_;
-    AxisCovariance covariance_;
+    PositionFilter position_;
     OutlierGate gate_;
     RotationFilter rotation_;
-    AxisStates x_ = AxisStates::Zero();
-    Eigen::Vector3d last_measured_ = Eigen::Vector3d::Zero();
 };
+
+/// The gates of a tracked hand or tip: 25 m/s and 3000 m/s^2; 120 rad/s and what moves the tip of a stick of
+/// kLever by the same acceleration.
+[[nodiscard]] OutlierGate position_gate(double sigmas) noexcept;
+[[nodiscard]] OutlierGate rotation_gate(double sigmas) noexcept;
 
 }  // namespace tracking

@@ -1,101 +1,129 @@
 #include "motion_model.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace tracking {
 namespace {
 
-Transition polynomial_transition(double dt) {
-    Transition f;
-    f << 1, dt, dt * dt / 2, 0, 1, dt, 0, 0, 1;
-    return f;
+AxisMatrix<double> scaled_matrix(const AxisMatrix<double>& m, double factor) {
+    return {factor * m.pp, factor * m.pv, factor * m.pa, factor * m.vv, factor * m.va, factor * m.aa};
 }
 
-/// u - 1 + exp(-u) without cancellation.
-double decayed_displacement(double u) {
-    if (u > 0.1) return u + std::expm1(-u);
-    // u^2 (1/2 - u/6 + u^2/24 - ...), the terms left out are below 1e-17 of the first for u <= 0.1.
-    double term = u * u / 2;
-    double sum = term;
-    for (int k = 3; k <= 11; ++k) sum += term *= -u / k;
-    return sum;
+/// exp(-u) - 1 and u - 1 + exp(-u), neither with cancellation.
+struct Decay {
+    double change, displacement;
+};
+
+Decay decay(double u) {
+    if (u > 0.25) {
+        const double change = std::exp(-u) - 1;
+        return {change, u + change};
+    }
+    // u^2 (1/2 - u/6 + u^2/24 - ...), the terms left out are below 1e-17 of the first for u <= 0.25. Even and
+    // odd powers run side by side.
+    constexpr double kTerms[12] = {1.0 / 2,       -1.0 / 6,        1.0 / 24,        -1.0 / 120,
+                                   1.0 / 720,     -1.0 / 5040,     1.0 / 40320,     -1.0 / 362880,
+                                   1.0 / 3628800, -1.0 / 39916800, 1.0 / 479001600, -1.0 / 6227020800};
+    const double square = u * u;
+    double even = kTerms[10], odd = kTerms[11];
+    for (int k = 8; k >= 0; k -= 2) {
+        even = even * square + kTerms[k];
+        odd = odd * square + kTerms[k + 1];
+    }
+    const double displacement = square * (even + u * odd);
+    return {displacement - u, displacement};
 }
 
-/// Response of [p, v, a] a time s after a unit step of acceleration that decays at rate alpha.
-Eigen::Vector3d singer_response(double alpha, double s) {
-    const double u = alpha * s;
-    return {decayed_displacement(u) / (alpha * alpha), -std::expm1(-u) / alpha, std::exp(-u)};
+Transition singer_transition(double alpha, double dt, const Decay& d) {
+    const double time = 1 / alpha;
+    return {dt, d.displacement * (time * time), -d.change * time, 1 + d.change};
 }
 
-/// Integral of response * response^T over [0, dt]: exact discretisation, by Gauss-Legendre quadrature with 8
-/// nodes on pieces of alpha * length <= 1, where its error is below the rounding (the integrand is analytic).
-Eigen::Matrix3d singer_noise(const MotionModel::Singer& model, double dt) {
-    constexpr double kNode[4] = {0.1834346424956498, 0.5255324099163290, 0.7966664774136267,
-                                 0.9602898564975363};
-    constexpr double kWeight[4] = {0.3626837833783620, 0.3137066458778873, 0.2223810344533745,
-                                   0.1012285362903763};
-    const int pieces = 1 + static_cast<int>(model.alpha * dt);
-    const double half = dt / (2 * pieces);
-    Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-    for (int piece = 0; piece < pieces; ++piece)
-        for (int node = 0; node < 4; ++node)
-            for (const double side : {-1.0, 1.0}) {
-                const Eigen::Vector3d r =
-                    singer_response(model.alpha, (2 * piece + 1 + side * kNode[node]) * half);
-                sum += kWeight[node] * half * (r * r.transpose());
+/// The six integrals over [0, 1] of products r_i(s) r_j(s), where r_p, r_v, r_a are the displacement, the
+/// velocity and the acceleration a time s after a unit step of acceleration that decays at rate u:
+/// power series in u, r_i = sum_k (-u)^k s^(k+m) / (k+m)! with m = 2, 1, 0, multiplied and integrated term by
+/// term. The first term left out is below 1e-17 of the first one for u <= kSeriesLimit.
+constexpr int kTerms = 16;
+constexpr double kSeriesLimit = 0.25;
+
+struct SingerSeries {
+    std::array<std::array<double, 6>, kTerms> coefficient{};  // [power][entry]
+
+    constexpr SingerSeries() {
+        constexpr int kOrder[6][2] = {{2, 2}, {2, 1}, {2, 0}, {1, 1}, {1, 0}, {0, 0}};
+        std::array<double, kTerms + 3> inverse_factorial{};
+        inverse_factorial[0] = 1;
+        for (int k = 1; k < kTerms + 3; ++k)
+            inverse_factorial[static_cast<std::size_t>(k)] =
+                inverse_factorial[static_cast<std::size_t>(k - 1)] / k;
+        for (std::size_t entry = 0; entry < 6; ++entry)
+            for (int n = 0; n < kTerms; ++n) {
+                const int i = kOrder[entry][0], j = kOrder[entry][1];
+                double sum = 0;
+                for (int k = 0; k <= n; ++k)
+                    sum += inverse_factorial[static_cast<std::size_t>(k + i)] *
+                           inverse_factorial[static_cast<std::size_t>(n - k + j)];
+                coefficient[static_cast<std::size_t>(n)][entry] = sum / (n + i + j + 1);
             }
-    return model.q * sum;
+    }
+};
+constexpr SingerSeries kSeries;
+
+AxisMatrix<double> series_noise(double u, double dt) {
+    const double square = u * u;
+    std::array<double, 6> even{}, odd{};
+    for (std::size_t n = kTerms; n > 0; n -= 2)
+        for (std::size_t entry = 0; entry < 6; ++entry) {
+            odd[entry] = odd[entry] * square + kSeries.coefficient[n - 1][entry];
+            even[entry] = even[entry] * square + kSeries.coefficient[n - 2][entry];
+        }
+    const auto g = [&](std::size_t entry) { return even[entry] - u * odd[entry]; };
+    const double dt2 = dt * dt, dt3 = dt2 * dt;
+    return {g(0) * (dt3 * dt2), g(1) * (dt2 * dt2), g(2) * dt3, g(3) * dt3, g(4) * dt2, g(5) * dt};
 }
 
-struct TransitionOver {
-    double dt;
-    Transition operator()(const MotionModel::Singer& model) const {
-        Transition f = polynomial_transition(dt);
-        f.col(2) = singer_response(model.alpha, dt);
-        return f;
-    }
-    template <typename Polynomial>
-    Transition operator()(const Polynomial&) const {
-        return polynomial_transition(dt);
-    }
-};
-
-struct NoiseOver {
-    double dt;
-    Eigen::Matrix3d operator()(const MotionModel::ConstantVelocity& model) const {
-        Eigen::Matrix3d q;
-        q << dt * dt * dt / 3, dt * dt / 2, 0, dt * dt / 2, dt, 0, 0, 0, 0;
-        return model.q * q;
-    }
-    Eigen::Matrix3d operator()(const MotionModel::ConstantAcceleration& model) const {
-        const double dt2 = dt * dt;
-        Eigen::Matrix3d q;
-        q << dt2 * dt2 * dt / 20, dt2 * dt2 / 8, dt2 * dt / 6,  //
-            dt2 * dt2 / 8, dt2 * dt / 3, dt2 / 2,               //
-            dt2 * dt / 6, dt2 / 2, dt;
-        return model.q * q;
-    }
-    Eigen::Matrix3d operator()(const MotionModel::Singer& model) const { return singer_noise(model, dt); }
-    Eigen::Matrix3d operator()(const MotionModel::FixedStep& model) const { return model.q; }
-};
+/// The same in closed form (Singer 1970, with sigma_m^2 2 alpha = 1); above kSeriesLimit cancellation costs
+/// at most four digits.
+AxisMatrix<double> closed_noise(double alpha, double u, const Decay& d) {
+    const double e = 1 + d.change;
+    const double twice = d.change * (1 + e);  // exp(-2u) - 1
+    const double time = 1 / alpha, t2 = time * time, t3 = t2 * time;
+    return {(2 * u - 2 * u * u + u * u * u * (2.0 / 3) - 4 * u * e - twice) * (t3 * t2 / 2),
+            d.displacement * d.displacement * (t2 * t2 / 2),
+            (-twice - 2 * u * e) * (t3 / 2),
+            (4 * d.change - twice + 2 * u) * (t3 / 2),
+            d.change * d.change * (t2 / 2),
+            -twice * (time / 2)};
+}
 
 struct ScaledBy {
     double square;
-    void operator()(MotionModel::FixedStep& model) const { model.q *= square; }
+    void operator()(MotionModel::FixedStep& model) const { model.q = scaled_matrix(model.q, square); }
     template <typename Driven>
     void operator()(Driven& model) const {
         model.q *= square;
     }
 };
 
-}  // namespace
-
-Transition MotionModel::transition(double dt) const noexcept {
-    return std::visit(TransitionOver{dt}, kind);
+double largest_change(const AxisMatrix<double>& a, const AxisMatrix<double>& b) {
+    const auto change = [](double x, double y) { return x == y ? 0 : std::abs(x - y) / std::abs(y); };
+    return std::max({change(a.pp, b.pp), change(a.pv, b.pv), change(a.pa, b.pa), change(a.vv, b.vv),
+                     change(a.va, b.va), change(a.aa, b.aa)});
 }
 
-Eigen::Matrix3d MotionModel::process_noise(double dt) const noexcept {
-    return std::visit(NoiseOver{dt}, kind);
+}  // namespace
+
+Transition MotionModel::Singer::transition(double dt) const noexcept {
+    return singer_transition(alpha, dt, decay(alpha * dt));
+}
+
+MotionStep MotionModel::Singer::step(double dt) const noexcept {
+    const double u = alpha * dt;
+    const Decay d = decay(u);
+    return {singer_transition(alpha, dt, d),
+            scaled_matrix(u <= kSeriesLimit ? series_noise(u, dt) : closed_noise(alpha, u, d), q)};
 }
 
 MotionModel MotionModel::scaled(double factor) const {
@@ -104,6 +132,20 @@ MotionModel MotionModel::scaled(double factor) const {
     other.measurement_variance *= factor * factor;
     other.initial_variance *= factor * factor;
     return other;
+}
+
+SteadyState steady_state(const MotionModel& model, double dt) {
+    constexpr int kMostSteps = 1'000'000;
+    constexpr double kSettled = 1e-15;
+    const MotionStep step = model.step(dt);
+    SteadyState steady{{}, model.initial_covariance(), {}};
+    for (int i = 0; i < kMostSteps; ++i) {
+        const AxisMatrix<double> last = steady.covariance;
+        steady.before = steady.covariance = propagated(last, step);
+        steady.gain = correct(steady.covariance, model.measurement_variance);
+        if (largest_change(last, steady.covariance) <= kSettled) break;
+    }
+    return steady;
 }
 
 }  // namespace tracking

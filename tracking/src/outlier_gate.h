@@ -18,24 +18,30 @@ public:
     OutlierGate(double sigmas, double fastest, double strongest)
         : sigmas_(sigmas), fastest_(fastest), strongest_(strongest) {}
 
-    /// `step`: from the last measurement taken, `dt` ago. `innovation`: distance from the filter's
-    /// prediction, of standard deviation `sigma` on each axis.
-    [[nodiscard]] Verdict judge(const Eigen::Vector3d& step, double dt, double innovation,
-                                double sigma) noexcept;
-    /// The state starts anew.
-    void restart() noexcept;
+    [[nodiscard]] bool is_on() const noexcept { return sigmas_ > 0; }
+
+    /// `measured`, `dt` after the last measurement taken, lies `innovation_square` from the filter's
+    /// prediction, whose variance on an axis is `variance`.
+    [[nodiscard]] Verdict judge(const Eigen::Vector3d& measured, double dt, double innovation_square,
+                                double variance) noexcept;
+    /// The same for a quantity of which only steps are known (a rotation): `step` from the last one taken.
+    [[nodiscard]] Verdict judge_step(const Eigen::Vector3d& step, double dt, double innovation_square,
+                                     double variance) noexcept;
+    /// The state starts anew, at `measured`.
+    void restart(const Eigen::Vector3d& measured = Eigen::Vector3d::Zero()) noexcept;
 
 private:
-    [[nodiscard]] bool possible(const Eigen::Vector3d& step, double dt, double innovation,
-                                double sigma) const noexcept;
+    [[nodiscard]] bool possible(const Eigen::Vector3d& step, double dt, double innovation_square,
+                                double variance) const noexcept;
 
     double sigmas_;
     double fastest_;
     double strongest_;
     int refused_ = 0;
-    int steps_ = 0;                                       // measured so far, counted to 2
+    int steps_ = 0;  // measured so far, counted to 2
+    Eigen::Vector3d taken_ = Eigen::Vector3d::Zero();
     Eigen::Vector3d velocity_ = Eigen::Vector3d::Zero();  // of the last step
-    double speed_before_ = 0;                             // of the step before it
+    double speed_ = 0, speed_before_ = 0;                 // of the last step and the one before
 };
 
 }  // namespace tracking

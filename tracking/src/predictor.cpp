@@ -4,29 +4,57 @@
 #include <cmath>
 
 #include "extrapolators.h"
+#include "interacting_models.h"
 #include "kalman_predictor.h"
+#include "least_squares.h"
+#include "model_bank.h"
+#include "smoothers.h"
 #include "specification.h"
 #include "text_cursor.h"
 
 namespace tracking {
 namespace {
 
-constexpr double kSquareMetres = 1e-6;  // a mm^2; the parameters are in mm
+constexpr double kMetres = 1e-3;        // a mm; the parameters are in mm
+constexpr double kSquareMetres = 1e-6;  // a mm^2
 constexpr double kLeastDensity = 1e-6;
 constexpr double kMostDensity = 1e18;
 
-std::unique_ptr<Predictor> make_kalman(Specification& specification, const MotionModel& model) {
-    return std::make_unique<KalmanPredictor>(model, specification.number("gate", 0, 1, 1000));
+double square(double x) {
+    return x * x;
 }
 
-double density(Specification& specification, double otherwise) {
-    return kSquareMetres * specification.number("q", otherwise, kLeastDensity, kMostDensity);
+double gate(Specification& specification) {
+    return specification.number("gate", 0, 1, 1000);
 }
 
-std::unique_ptr<Predictor> make_auto(Specification&) {
-    constexpr double kGateSigmas = 5;
+/// `r`: the sensor's noise; `p0`, `v0`, `a0`: what is not known at the start; standard deviations in mm and
+/// s.
+void set_noise(Specification& specification, MotionModel& model) {
+    const auto variance = [&](const char* key, double otherwise) {
+        return kSquareMetres * square(specification.number(key, otherwise, 1e-9, 1e9));
+    };
+    model.measurement_variance = variance("r", 0.25);
+    model.initial_variance.x() = variance("p0", 10);
+    model.initial_variance.y() = variance("v0", 1000);
+    // Zero where the model has no acceleration.
+    if (model.initial_variance.z() > 0) model.initial_variance.z() = variance("a0", 1e4);
+}
+
+std::unique_ptr<Predictor> make_kalman(Specification& specification, MotionModel model) {
+    set_noise(specification, model);
     return std::make_unique<KalmanPredictor>(
-        MotionModel{MotionModel::ConstantAcceleration{1e9 * kSquareMetres}}, kGateSigmas);
+        model, KalmanOptions{gate(specification), specification.number("steady", 0, 1, 1e4)});
+}
+
+double density(Specification& specification, const char* key, double otherwise) {
+    return kSquareMetres * specification.number(key, otherwise, kLeastDensity, kMostDensity);
+}
+
+MotionModel constant_velocity(double q) {
+    MotionModel model{MotionModel::ConstantVelocity{q}};
+    model.initial_variance.z() = 0;
+    return model;
 }
 
 std::unique_ptr<Predictor> make_hold(Specification&) {
@@ -35,36 +63,83 @@ std::unique_ptr<Predictor> make_hold(Specification&) {
 
 std::unique_ptr<Predictor> make_naive(Specification& specification) {
     constexpr double kWindow = 1.0 / 15;
-    const double n = specification.number("n", 0, 1, MovingAverage::kCapacity);
-    if (n != std::floor(n)) specification.fail("n that is not whole", "a whole number of samples");
-    return n > 0 ? MovingAverage::of_count(static_cast<std::size_t>(n)) : MovingAverage::of_window(kWindow);
+    const std::size_t n = specification.whole("n", 0, 1, SampleWindow::kCapacity);
+    return std::make_unique<MovingAverage>(n > 0 ? SampleWindow::of_count(n)
+                                                 : SampleWindow::of_time(kWindow));
 }
 
 std::unique_ptr<Predictor> make_difference(Specification&) {
     return std::make_unique<Difference>();
 }
 
+std::unique_ptr<Predictor> make_least_squares(Specification& specification) {
+    const std::size_t degree = specification.whole("degree", 2, 0, LeastSquares::kMostDegree);
+    const std::size_t n = specification.whole("n", degree + 2, degree + 1, LeastSquares::kMostSamples);
+    return std::make_unique<LeastSquares>(static_cast<int>(degree), n);
+}
+
+std::unique_ptr<Predictor> make_double_exponential(Specification& specification) {
+    return std::make_unique<DoubleExponential>(specification.number("a", 0.9, 0.001, 0.999));
+}
+
+std::unique_ptr<Predictor> make_one_euro(Specification& specification) {
+    OneEuro::Options options{};
+    options.least_cutoff_hz = specification.number("min", 10, 1e-3, 1e5);
+    options.beta_hz_s_per_m = specification.number("beta", 0.1, 0, 1e3) / kMetres;
+    options.derivative_cutoff_hz = specification.number("d", 30, 1e-3, 1e5);
+    return std::make_unique<OneEuro>(options);
+}
+
 std::unique_ptr<Predictor> make_thesis(Specification& specification) {
-    const Eigen::Vector3d xi = Eigen::Vector3d(1, 20, 63) * 1e-3;  // (3.18)
-    const bool outer = specification.word("q", "outer");
-    const Eigen::Matrix3d full = xi * xi.transpose();
-    const Eigen::Matrix3d diagonal = full.diagonal().asDiagonal();
-    return make_kalman(specification, {MotionModel::FixedStep{outer ? full : diagonal}});
+    const Eigen::Vector3d xi = Eigen::Vector3d(1, 20, 63) * kMetres;  // (3.18)
+    const double coupled = specification.word("q", "outer") ? 1 : 0;
+    const AxisMatrix<double> q{square(xi.x()), coupled * xi.x() * xi.y(), coupled * xi.x() * xi.z(),
+                               square(xi.y()), coupled * xi.y() * xi.z(), square(xi.z())};
+    return make_kalman(specification, {MotionModel::FixedStep{q}});
 }
 
 std::unique_ptr<Predictor> make_cv(Specification& specification) {
-    MotionModel model{MotionModel::ConstantVelocity{density(specification, 1e8)}};
-    model.initial_variance.z() = 0;
-    return make_kalman(specification, model);
+    return make_kalman(specification, constant_velocity(density(specification, "q", 1e8)));
 }
 
 std::unique_ptr<Predictor> make_ca(Specification& specification) {
-    return make_kalman(specification, {MotionModel::ConstantAcceleration{density(specification, 1e9)}});
+    return make_kalman(specification, {MotionModel::ConstantAcceleration{density(specification, "q", 1e9)}});
+}
+
+double decay_rate(Specification& specification, double otherwise) {
+    return specification.number("alpha", otherwise, 1e-3, 1000);
 }
 
 std::unique_ptr<Predictor> make_singer(Specification& specification) {
-    const double alpha = specification.number("alpha", 3, 1e-3, 1000);
-    return make_kalman(specification, {MotionModel::Singer{alpha, density(specification, 1e10)}});
+    return make_kalman(specification, {MotionModel::Singer{decay_rate(specification, 3),
+                                                           density(specification, "q", 1e10)}});
+}
+
+std::unique_ptr<Predictor> make_bank(Specification& specification) {
+    ModelBank::Options options;
+    options.models = {constant_velocity(density(specification, "cv", 1e7)),
+                      MotionModel{MotionModel::ConstantAcceleration{density(specification, "ca", 3e8)}},
+                      MotionModel{MotionModel::Singer{decay_rate(specification, 30),
+                                                      density(specification, "singer", 1e11)}}};
+    for (MotionModel& model : options.models) set_noise(specification, model);
+    options.lead_s = specification.number("lead", 1.0 / 15, 1e-3, 0.25);
+    options.score = specification.word("score", "likelihood") ? BankScore::likelihood : BankScore::distance;
+    options.gate_sigmas = gate(specification);
+    return std::make_unique<ModelBank>(options);
+}
+
+std::unique_ptr<Predictor> make_imm(Specification& specification) {
+    MotionModel noise{MotionModel::Singer{1, 1}};
+    set_noise(specification, noise);
+    InteractingModels::Options options{};
+    options.alpha = decay_rate(specification, 3);
+    options.density = {density(specification, "q1", 1e9), density(specification, "q2", 3e10),
+                       density(specification, "q3", 1e12)};
+    options.switching_rate = specification.number("rate", 10, 1e-3, 1e4);
+    options.measurement_variance = noise.measurement_variance;
+    options.initial_variance = noise.initial_variance;
+    options.gate_sigmas = gate(specification);
+    return std::make_unique<InteractingModels>(options);
 }
 
 struct Entry {
@@ -72,14 +147,18 @@ struct Entry {
     std::unique_ptr<Predictor> (*make)(Specification&);
 };
 
-constexpr std::array<Entry, 8> kPredictors = {{{"auto", make_auto},
-                                               {"hold", make_hold},
-                                               {"naive", make_naive},
-                                               {"difference", make_difference},
-                                               {"thesis", make_thesis},
-                                               {"cv", make_cv},
-                                               {"ca", make_ca},
-                                               {"singer", make_singer}}};
+constexpr std::array<Entry, 12> kPredictors = {{{"hold", make_hold},
+                                                {"naive", make_naive},
+                                                {"difference", make_difference},
+                                                {"least-squares", make_least_squares},
+                                                {"double-exponential", make_double_exponential},
+                                                {"one-euro", make_one_euro},
+                                                {"thesis", make_thesis},
+                                                {"cv", make_cv},
+                                                {"ca", make_ca},
+                                                {"singer", make_singer},
+                                                {"bank", make_bank},
+                                                {"imm", make_imm}}};
 
 }  // namespace
 

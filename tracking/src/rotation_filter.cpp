@@ -10,66 +10,78 @@ namespace {
 
 constexpr double kHalfTurn = std::numbers::pi;
 
+/// Whether the lanes' length exceeds `limit`.
+bool exceeds(const Lanes& lanes, double limit) {
+    return !(lanes.matrix().squaredNorm() <= limit * limit);
+}
+
 }  // namespace
 
 void RotationFilter::restart() noexcept {
     started_ = false;
     q_ = Eigen::Quaterniond::Identity();
-    rates_.setZero();
+    rates_ = {};
 }
 
 void RotationFilter::start(const Eigen::Quaterniond& measured) noexcept {
-    covariance_.restart();
+    p_ = model_.initial_covariance();
     gate_.restart();
     started_ = true;
     q_ = measured.normalized();
     last_measured_ = q_;
     since_measured_ = 0;
-    rates_.setZero();
+    rates_ = {};
 }
 
-void RotationFilter::propagate(double dt) noexcept {
-    if (!started_) return;
+void RotationFilter::absorb() noexcept {
+    q_ = exponential(rates_.p.head<3>()) * q_;
+    rates_.p.setZero();
+}
+
+void RotationFilter::turn(double dt) noexcept {
     since_measured_ += dt;
-    rates_ = (covariance_.propagate(dt) * rates_).eval();
-    q_ = exponential(rates_.row(0).transpose()) * q_;
-    rates_.row(0).setZero();
+    const MotionStep step = model_.step(dt);
+    rates_ = step.f * rates_;
+    p_ = propagated(p_, step);
+    absorb();
 }
 
 void RotationFilter::correct(const Eigen::Quaterniond& measured) noexcept {
     if (!started_) return start(measured);
     const Eigen::Quaterniond z = measured.normalized();
     const Eigen::Vector3d innovation = logarithm(z * q_.conjugate());
-    const Eigen::Vector3d step = logarithm(z * last_measured_.conjugate());
-    const double sigma = std::sqrt(covariance_.innovation_variance());
-    switch (gate_.judge(step, since_measured_, innovation.norm(), sigma)) {
-        case OutlierGate::Verdict::refuse:
-            return;
-        case OutlierGate::Verdict::persists:
-            return start(measured);
-        case OutlierGate::Verdict::pass:
-            break;
+    if (gate_.is_on()) {
+        const Eigen::Vector3d step = logarithm(z * last_measured_.conjugate());
+        switch (gate_.judge_step(step, since_measured_, innovation.squaredNorm(),
+                                 p_.pp + model_.measurement_variance)) {
+            case OutlierGate::Verdict::refuse:
+                return;
+            case OutlierGate::Verdict::persists:
+                return start(measured);
+            case OutlierGate::Verdict::pass:
+                break;
+        }
     }
-    rates_ += covariance_.correct() * innovation.transpose();
+    add(rates_, tracking::correct(p_, model_.measurement_variance), to_lanes(innovation));
     // Beyond half a turn a sample the rates are aliases of slower ones, which the measurements cannot tell
     // apart.
     const double dt = since_measured_;
-    if (rates_.row(1).norm() * dt > kHalfTurn || rates_.row(2).norm() * dt * dt > kHalfTurn)
-        return start(measured);
-    q_ = (exponential(rates_.row(0).transpose()) * q_).normalized();
-    rates_.row(0).setZero();
+    if (exceeds(rates_.v * dt, kHalfTurn) || exceeds(rates_.a * (dt * dt), kHalfTurn)) return start(measured);
+    absorb();
+    q_.normalize();
     last_measured_ = z;
     since_measured_ = 0;
 }
 
-Eigen::Quaterniond RotationFilter::orientation_after(double lead_s) const noexcept {
-    const Eigen::RowVector3d rho = covariance_.model().transition(lead_s).row(0) * rates_;
-    return (exponential(rho.transpose()) * q_).normalized();
+void RotationFilter::turned(double lead_s, PosePrediction& pose) const noexcept {
+    const AxisStates ahead = model_.transition(lead_s) * rates_;
+    pose.orientation = (exponential(ahead.p.head<3>()) * q_).normalized();
+    pose.angular_velocity = ahead.v.head<3>();
 }
 
-Eigen::Vector3d RotationFilter::velocity_after(double lead_s) const noexcept {
-    const Eigen::RowVector3d w = covariance_.model().transition(lead_s).row(1) * rates_;
-    return w.transpose();
+double RotationFilter::variance_after(double lead_s) const noexcept {
+    if (!started_) return kHalfTurn * kHalfTurn / 3;
+    return propagated(p_, model_.step(lead_s)).pp;
 }
 
 }  // namespace tracking

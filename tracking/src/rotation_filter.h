@@ -1,8 +1,9 @@
 #pragma once
 #include <Eigen/Geometry>
 
-#include "axis_covariance.h"
+#include "motion_model.h"
 #include "outlier_gate.h"
+#include "tracking/predictor.h"
 
 namespace tracking {
 
@@ -19,28 +20,42 @@ namespace tracking {
 /// directions, so turning rho's frame leaves it alone). No allocation.
 class RotationFilter {
 public:
-    RotationFilter(const MotionModel& model, const OutlierGate& gate) : covariance_(model), gate_(gate) {}
+    RotationFilter(const MotionModel& model, const OutlierGate& gate)
+        : model_(model), p_(model.initial_covariance()), gate_(gate) {}
 
     void restart() noexcept;
     /// Moves the state on by dt.
-    void propagate(double dt) noexcept;
+    void propagate(double dt) noexcept {
+        if (started_) turn(dt);
+    }
     /// Takes a measured orientation; the first one after restart() is taken as it is.
     void correct(const Eigen::Quaterniond& measured) noexcept;
 
-    [[nodiscard]] Eigen::Quaterniond orientation_after(double lead_s) const noexcept;
-    [[nodiscard]] Eigen::Vector3d velocity_after(double lead_s) const noexcept;
-    [[nodiscard]] bool is_finite() const noexcept { return q_.coeffs().allFinite() && rates_.allFinite(); }
+    /// Fills in orientation and angular velocity a lead ahead; leaves them alone before the first
+    /// measurement.
+    void predict(double lead_s, PosePrediction& pose) const noexcept {
+        if (started_) turned(lead_s, pose);
+    }
+    /// Variance of the predicted orientation about each axis [rad^2]; pi^2/3 (any angle) before the first
+    /// measurement.
+    [[nodiscard]] double variance_after(double lead_s) const noexcept;
+    [[nodiscard]] bool is_finite() const noexcept { return !started_ || rates_.is_finite(); }
 
 private:
     void start(const Eigen::Quaterniond& measured) noexcept;
+    void turn(double dt) noexcept;
+    void turned(double lead_s, PosePrediction& pose) const noexcept;
+    /// q <- exp(rho) q, rho <- 0.
+    void absorb() noexcept;
 
-    AxisCovariance covariance_;
+    MotionModel model_;
+    AxisMatrix<double> p_;
     OutlierGate gate_;
     bool started_ = false;
     Eigen::Quaterniond q_ = Eigen::Quaterniond::Identity();
     Eigen::Quaterniond last_measured_ = Eigen::Quaterniond::Identity();
     double since_measured_ = 0;
-    AxisStates rates_ = AxisStates::Zero();  // rows: rho (always 0 here), w [rad/s], a [rad/s^2]
+    AxisStates rates_;  // rho (0 between samples), w [rad/s], a [rad/s^2]
 };
 
 }  // namespace tracking

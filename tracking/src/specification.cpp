@@ -1,6 +1,7 @@
 #include "specification.h"
 
 #include <charconv>
+#include <cmath>
 #include <stdexcept>
 
 #include "text_cursor.h"
@@ -44,6 +45,14 @@ double Specification::number(const std::string& key, double otherwise, double le
     if (end != digits.data() + digits.size() || problem != std::errc() || !(value >= least && value <= most))
         fail(key + "=" + in_quotes(digits), "a number from " + shown(least) + " to " + shown(most));
     return value;
+}
+
+std::size_t Specification::whole(const std::string& key, std::size_t otherwise, std::size_t least,
+                                 std::size_t most) {
+    const double value =
+        number(key, static_cast<double>(otherwise), static_cast<double>(least), static_cast<double>(most));
+    if (value != std::floor(value)) fail(key + " that is not whole", "a whole number");
+    return static_cast<std::size_t>(value);
 }
 
 bool Specification::word(const std::string& key, const std::string& only) {

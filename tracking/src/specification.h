@@ -15,6 +15,9 @@ public:
     /// The number given for `key`, or `otherwise`; throws unless least <= number <= most. The key counts as
     /// known from here on.
     [[nodiscard]] double number(const std::string& key, double otherwise, double least, double most);
+    /// The same for a whole number.
+    [[nodiscard]] std::size_t whole(const std::string& key, std::size_t otherwise, std::size_t least,
+                                    std::size_t most);
     /// The word given for `key`, or empty; throws unless it is `only`.
     [[nodiscard]] bool word(const std::string& key, const std::string& only);
     [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }

@@ -25,7 +25,7 @@ struct PoseCovariance {
                                                          ///< orientation to the true one [rad^2]
 };
 
-/// What became of a sample. `outlier`: only with a gate (`auto`, `gate=`); the sample was ignored, but the
+/// What became of a sample. `outlier`: only with a gate (`gate=`); the sample was ignored, but the
 /// third in a row is taken as real and answers `reinitialised`.
 enum class SampleStatus { accepted, not_newer, not_finite, reinitialised, outlier };
 
@@ -63,16 +63,24 @@ inline constexpr double kGapS = 0.1;
 ///   hold                    the newest sample
 ///   difference              the last two samples, extrapolated at constant velocity
 ///   naive, naive:n=4        mean of the last 1/15 s (or n samples) with the velocity of successive means
+///   least-squares:degree=2,n=4            polynomial through the last n samples (n: degree + 2)
+///   double-exponential:a=0.9              LaViola 2003
+///   one-euro:min=10,beta=0.1,d=30         Casiez 2012 with its velocity; beta in Hz s/mm
 ///   thesis, thesis:q=outer  Kalman filter, constant acceleration, (3.18) as a diagonal, or as printed
 ///   cv:q=1e8                constant velocity, white acceleration of density q [mm^2/s^3]
 ///   ca:q=1e9                constant acceleration, white jerk of density q [mm^2/s^5]
 ///   singer:alpha=3,q=1e10   acceleration that decays at alpha [1/s], driven by density q [mm^2/s^5]
+///   bank:cv=1e7,ca=3e8,alpha=30,singer=1e11,lead=0.0667   the model that was right a lead ago (3.28);
+///                           score=likelihood: most likely (3.27) instead of nearest
+///   imm:alpha=3,q1=1e9,q2=3e10,q3=1e12,rate=10             interacting Singer models, switching at `rate`
 ///   auto                    ca:q=1e9,gate=5
 ///
 /// The numbers shown are the defaults. Orientation is filtered by the same model about its own quaternion.
-/// The four Kalman filters take `gate=G`: samples beyond G standard deviations that a stick cannot have made
-/// (25 m/s, 3000 m/s^2, contacts excepted) are outliers. Throws std::invalid_argument with one line (found,
-/// expected) for an unknown name, key or value.
+/// thesis, cv, ca, singer, bank and imm also take: `r=0.25`, the sensor's noise; `p0=10`, `v0=1000`,
+/// `a0=1e4`, standard deviations of the start; `gate=G`: samples beyond G standard deviations that a stick
+/// cannot have made (25 m/s, 3000 m/s^2, contacts excepted) are outliers. thesis, cv, ca and singer take
+/// `steady=HZ`: the steady gain of that rate. Throws std::invalid_argument with one line (found, expected)
+/// for an unknown name, key or value.
 [[nodiscard]] std::unique_ptr<Predictor> make_predictor(const std::string& specification);
 
 /// The names make_predictor knows, in the order of the documentation.

@@ -1,0 +1,176 @@
+#include "compare_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "bad_input.h"
+#include "comparison.h"
+#include "comparison_map.h"
+#include "comparison_tables.h"
+#include "kit.h"
+#include "numbers.h"
+#include "output_folder.h"
+#include "parallel.h"
+#include "predictors.h"
+#include "progress_bar.h"
+
+namespace app {
+namespace {
+
+constexpr double kLongestLeadS = 1;
+
+/// The options as typed.
+struct CompareArguments {
+    std::vector<std::string> traces, tune, predictions, persons;
+    std::string predictors, leads = "1/30,1/15,1/10", kit, plane, out;
+    std::string rate, noise = "0", jitter = "0", drop_out = "0";
+    std::uint64_t seed = 1;
+    bool no_tuning = false, no_cost = false, map = false;
+};
+
+std::vector<std::string> split_at_commas(const std::string& text) {
+    std::vector<std::string> parts;
+    for (std::size_t begin = 0; begin <= text.size();) {
+        const std::size_t comma = std::min(text.find(',', begin), text.size());
+        parts.push_back(text.substr(begin, comma - begin));
+        begin = comma + 1;
+    }
+    return parts;
+}
+
+double in_range(const std::string& text, const std::string& option, double least, double most) {
+    const double value = parse_number(text, option);
+    if (!(value >= least && value <= most))
+        throw BadInput(fmt::format("error: found {} {}, expected {} to {}", option, text, least, most));
+    return value;
+}
+
+std::vector<double> leads_of(const std::string& text) {
+    std::vector<double> leads;
+    for (const std::string& part : split_at_commas(text)) {
+        const double lead = in_range(part, "--leads", 0, kLongestLeadS);
+        if (std::find(leads.begin(), leads.end(), lead) != leads.end())
+            throw BadInput(
+                fmt::format("error: found --leads {} with {} twice, expected each lead once", text, part));
+        leads.push_back(lead);
+    }
+    return leads;
+}
+
+std::vector<std::string> predictors_of(const std::string& list) {
+    if (!list.empty()) return split_specifications(list);
+    return tracking::predictor_names();
+}
+
+/// NAME=VALUE pairs; the last `=` parts them if `at_last`, else the first.
+std::vector<std::pair<std::string, std::string>> pairs_of(const std::vector<std::string>& texts,
+                                                          const std::string& option, bool at_last) {
+    std::vector<std::pair<std::string, std::string>> pairs;
+    for (const std::string& text : texts) {
+        const std::size_t equals = at_last ? text.rfind('=') : text.find('=');
+        if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+            throw BadInput(fmt::format("error: found {} \"{}\", expected {}", option, text,
+                                       at_last ? "TEXT=NAME" : "NAME=FILE"));
+        pairs.emplace_back(text.substr(0, equals), text.substr(equals + 1));
+    }
+    return pairs;
+}
+
+StrikeSurface surface_of(const CompareArguments& a) {
+    StrikeSurface surface;
+    constexpr std::string_view kContact = "contact";
+    if (!a.kit.empty()) {
+        surface.kind = StrikeSurface::Kind::kit;
+        surface.kit = read_kit(find_kit(a.kit));
+    } else if (a.plane.starts_with(kContact)) {
+        surface.kind = StrikeSurface::Kind::above_contact;
+        const std::string above = a.plane.substr(kContact.size());
+        if (!above.empty() && above[0] != '+' && above[0] != '-')
+            throw BadInput(fmt::format("error: found --plane {}, expected a height or contact+D", a.plane));
+        if (!above.empty())
+            surface.height_m = (above[0] == '-' ? -1 : 1) * in_range(above.substr(1), "--plane", 0, 10);
+    } else if (!a.plane.empty()) {
+        surface.kind = StrikeSurface::Kind::plane;
+        surface.height_m = in_range(a.plane, "--plane", -1000, 1000);
+    }
+    return surface;
+}
+
+tracking::SensorModel sensor_of(const CompareArguments& a) {
+    constexpr double kMm = 1e-3, kMs = 1e-3;
+    tracking::SensorModel sensor;
+    if (!a.rate.empty()) sensor.rate_hz = in_range(a.rate, "--rate", 10, 10000);
+    sensor.noise_m = kMm * in_range(a.noise, "--noise", 0, 1000);
+    sensor.jitter_s = kMs * in_range(a.jitter, "--jitter", 0, 1000);
+    sensor.drop_out = in_range(a.drop_out, "--drop-out", 0, 0.9);
+    sensor.seed = a.seed;
+    return sensor;
+}
+
+ComparisonOptions options_of(const CompareArguments& a) {
+    ComparisonOptions o;
+    o.traces = a.traces;
+    o.tune_traces = a.tune;
+    o.predictors = predictors_of(a.predictors);
+    o.predictions = pairs_of(a.predictions, "--predictions", false);
+    o.persons = pairs_of(a.persons, "--person", true);
+    o.leads_s = leads_of(a.leads);
+    o.sensor = sensor_of(a);
+    o.surface = surface_of(a);
+    o.surface_text = !a.kit.empty() ? "kit " + a.kit : a.plane.empty() ? "none" : "plane " + a.plane;
+    o.tuning = !a.no_tuning;
+    o.cost = !a.no_cost;
+    o.map = a.map;
+    o.threads = worthwhile_threads();
+    return o;
+}
+
+void run(const CompareArguments& a) {
+    ComparisonOptions options = options_of(a);
+    OutputFolder out(a.out, compare_products());
+    ProgressBar bar(true);
+    options.progress = [&bar](double share) { bar.show(share); };
+    const Comparison comparison = compare(options);
+    write_file(out.path("compare.json"), format_comparison_json(comparison));
+    write_file(out.path("compare.csv"), format_comparison_csv(comparison));
+    out.finish();
+    bar.clear();
+    fmt::print("{}", format_comparison_text(comparison));
+}
+
+}  // namespace
+
+void add_compare_command(CLI::App& program) {
+    CLI::App* command = program.add_subcommand(
+        "compare", "Compare predictors on recordings: errors, strikes, cost, every predictor at every lead");
+    auto a = std::make_shared<CompareArguments>();
+    command->add_option("TRACE", a->traces, "Traces (CSV)")->required();
+    command->add_option("--predictors", a->predictors, "Predictors, separated by commas (default: all)");
+    command->add_option("--leads", a->leads, "Leads [s], separated by commas")->capture_default_str();
+    CLI::Option* kit = command->add_option("--kit", a->kit, "Score strikes on a kit");
+    command
+        ->add_option("--plane", a->plane,
+                     "Score strikes on a plane: its height [m], or contact+D: D above the contact height")
+        ->excludes(kit);
+    command->add_option("--rate", a->rate, "The sensor's rate [Hz] (default: the recording's own times)");
+    command->add_option("--noise", a->noise, "Standard deviation of position noise [mm]")
+        ->capture_default_str();
+    command->add_option("--jitter", a->jitter, "Standard deviation of the sample times [ms]")
+        ->capture_default_str();
+    command->add_option("--drop-out", a->drop_out, "Share of samples lost, in bursts")->capture_default_str();
+    command->add_option("--seed", a->seed, "Seed of the sensor and of the intervals")->capture_default_str();
+    command->add_option("--tune", a->tune, "Tune on these traces instead of on the others compared");
+    command->add_option("--predictions", a->predictions,
+                        "NAME=FILE: predictions made elsewhere, in predict's format");
+    command->add_option("--person", a->persons, "TEXT=NAME: traces whose path contains TEXT are of NAME");
+    command->add_flag("--no-tuning", a->no_tuning, "Run the predictors as named only");
+    command->add_flag("--no-cost", a->no_cost, "Measure no cost: the results are then the same on every run");
+    command->add_flag("--map", a->map, "Also map rate x noise x jitter x drop-outs (minutes)");
+    command->add_option("--out", a->out, "Folder for compare.json, compare.csv, report.html")->required();
+    command->callback([a] { run(*a); });
+}
+
+}  // namespace app

@@ -1,0 +1,181 @@
+#include "comparison.h"
+
+#include <algorithm>
+
+#include "comparison_map.h"
+#include "comparison_pairs.h"
+#include "entrants.h"
+#include "parallel.h"
+#include "prediction_cost.h"
+#include "prediction_error.h"
+#include "predictors.h"
+#include "stroke_lows.h"
+
+namespace app {
+namespace {
+
+/// The recordings compared and what the sensor saw of them.
+struct Field {
+    std::vector<Recording> recordings;
+    std::vector<SensedStick> sticks;
+};
+
+Field read_field(const ComparisonOptions& options) {
+    Field field;
+    for (const std::string& file : options.traces)
+        field.recordings.push_back(read_recording(file, options.persons));
+    field.sticks = sense_all(field.recordings, options.sensor, options.leads_s);
+    return field;
+}
+
+/// The leads that one predictor serves in one pass: those for which the same specification runs.
+std::vector<std::vector<std::size_t>> passes_of(const Entrant& entrant, std::size_t recording) {
+    const std::vector<std::string>& used = entrant.used[recording];
+    std::vector<std::vector<std::size_t>> passes;
+    for (std::size_t lead = 0; lead < used.size(); ++lead) {
+        if (used[lead].empty()) continue;
+        const auto same = std::find_if(passes.begin(), passes.end(),
+                                       [&](const auto& pass) { return used[pass.front()] == used[lead]; });
+        if (same == passes.end() || !entrant.replays.empty())
+            passes.push_back({lead});
+        else
+            same->push_back(lead);
+    }
+    return passes;
+}
+
+/// Runs entrants over the sticks of a field.
+class Runs {
+public:
+    Runs(const Field& field, const std::vector<Entrant>& entrants, const ComparisonOptions& options)
+        : field_(field), entrants_(entrants), options_(options) {}
+
+    [[nodiscard]] std::size_t count() const { return field_.sticks.size() * entrants_.size(); }
+
+    /// The rows of run `index`, a lead each; those without predictions have no `used`.
+    [[nodiscard]] std::vector<ComparisonRow> rows(std::size_t index) const {
+        const std::size_t place = index / entrants_.size();
+        const SensedStick& stick = field_.sticks[place];
+        const Entrant& entrant = entrants_[index % entrants_.size()];
+        std::vector<ComparisonRow> rows(stick.leads_s.size());
+        for (const std::vector<std::size_t>& pass : passes_of(entrant, stick.recording)) {
+            const auto predictor = make_entrant(entrant, stick, place, pass.front());
+            const std::vector<LeadScore> scores = score_predictor(stick, *predictor);
+            require_working(*predictor);
+            for (const std::size_t lead : pass) {
+                rows[lead] = labelled(stick, entrant, lead);
+                rows[lead].error = scores[lead].error;
+                rows[lead].calibration = scores[lead].calibration;
+                if (options_.surface.kind != StrikeSurface::Kind::none)
+                    rows[lead].hits = hits(stick, entrant, place, lead);
+            }
+        }
+        return rows;
+    }
+
+private:
+    [[nodiscard]] ComparisonRow labelled(const SensedStick& stick, const Entrant& entrant,
+                                         std::size_t lead) const {
+        const Recording& recording = field_.recordings[stick.recording];
+        ComparisonRow row;
+        row.trace = recording.file;
+        row.person = recording.person;
+        row.stick = stick.name;
+        row.predictor = entrant.name;
+        row.used = entrant.used[stick.recording][lead];
+        row.lead_s = stick.leads_s[lead];
+        row.rate_hz = stick.rate_hz;
+        row.noise_mm = 1e3 * options_.sensor.noise_m;
+        row.external = entrant.external;
+        return row;
+    }
+
+    [[nodiscard]] HitScore hits(const SensedStick& stick, const Entrant& entrant, std::size_t place,
+                                std::size_t lead) const {
+        const Recording& recording = field_.recordings[stick.recording];
+        const auto predictor = make_entrant(entrant, stick, place, lead);
+        HitScore score = evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples, *predictor,
+                                          recording.geometry, options_.surface, stick.leads_s[lead],
+                                          options_.release_margin_s);
+        require_working(*predictor);
+        return score;
+    }
+
+    const Field& field_;
+    const std::vector<Entrant>& entrants_;
+    const ComparisonOptions& options_;
+};
+
+void measure_costs(std::vector<ComparisonRow>& rows, const Field& field, std::size_t entrants) {
+    const std::size_t leads = field.sticks.front().leads_s.size();
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        ComparisonRow& row = rows[i];
+        if (row.external || row.used.empty()) continue;
+        const std::size_t lead = i % leads;
+        for (std::size_t before = i - lead; before < i && row.ns_per_sample == 0; ++before)
+            if (rows[before].used == row.used) row.ns_per_sample = rows[before].ns_per_sample;
+        const SensedStick& stick = field.sticks[i / (entrants * leads)];
+        if (row.ns_per_sample == 0)
+            row.ns_per_sample = nanoseconds_per_sample(row.used, stick.samples, stick.leads_s);
+    }
+}
+
+std::vector<ComparisonSummary> summarise(const Comparison& comparison, const std::vector<Entrant>& entrants) {
+    std::vector<ComparisonSummary> summaries;
+    for (const Entrant& entrant : entrants)
+        for (const double lead_s : comparison.options.leads_s) {
+            ComparisonSummary summary;
+            summary.predictor = entrant.name;
+            summary.lead_s = lead_s;
+            summary.baseline = entrant.baseline;
+            summary.external = entrant.external;
+            std::vector<double> costs;
+            for (const ComparisonRow& row : comparison.rows) {
+                if (row.predictor != entrant.name || row.lead_s != lead_s) continue;
+                add(summary.error, row.error);
+                add(summary.calibration, row.calibration);
+                if (row.hits && !summary.hits) summary.hits = HitScore{};
+                if (row.hits) summary.hits->add(*row.hits);
+                if (row.ns_per_sample > 0) costs.push_back(row.ns_per_sample);
+            }
+            if (!costs.empty()) summary.ns_per_sample = quantile(std::move(costs), 0.5);
+            if (summary.error.count > 0) summaries.push_back(std::move(summary));
+        }
+    return summaries;
+}
+
+std::vector<std::string> persons_of(const std::vector<Recording>& recordings) {
+    std::vector<std::string> persons;
+    for (const Recording& recording : recordings)
+        if (std::find(persons.begin(), persons.end(), recording.person) == persons.end())
+            persons.push_back(recording.person);
+    return persons;
+}
+
+}  // namespace
+
+Comparison compare(const ComparisonOptions& options) {
+    Comparison comparison;
+    comparison.options = options;
+    const Field field = read_field(options);
+    comparison.persons = persons_of(field.recordings);
+    const EntrantList list = enter(options, field.recordings, field.sticks);
+    comparison.tuned_on = list.tuned_on;
+    const std::vector<Entrant>& entrants = list.entrants;
+    for (const Entrant& entrant : entrants)
+        comparison.predictors.emplace_back(entrant.name, entrant.description);
+    const Runs runs(field, entrants, options);
+    std::vector<std::vector<ComparisonRow>> parts(runs.count());
+    parallel_for(
+        parts.size(), options.threads, [&](std::size_t i) { parts[i] = runs.rows(i); }, options.progress);
+    for (std::vector<ComparisonRow>& part : parts)
+        for (ComparisonRow& row : part) comparison.rows.push_back(std::move(row));
+    if (options.cost) measure_costs(comparison.rows, field, entrants.size());
+    std::erase_if(comparison.rows, [](const ComparisonRow& row) { return row.used.empty(); });
+    comparison.summaries = summarise(comparison, entrants);
+    comparison.paired = pair_with_baselines(comparison, entrants);
+    if (options.map) comparison.map = map_sensors(field.recordings, options);
+    return comparison;
+}
+
+}  // namespace app

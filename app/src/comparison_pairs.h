@@ -1,0 +1,14 @@
+#pragma once
+#include <vector>
+
+#include "comparison.h"
+#include "entrants.h"
+
+namespace app {
+
+/// Every estimator at every lead against the best baseline (PairedResult), on the recordings that the
+/// estimator answers. Rows and summaries are those of the comparison.
+[[nodiscard]] std::vector<PairedResult> pair_with_baselines(const Comparison& comparison,
+                                                            const std::vector<Entrant>& entrants);
+
+}  // namespace app

@@ -1,0 +1,242 @@
+#include "entrants.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "bad_input.h"
+#include "predictors.h"
+#include "tuning.h"
+
+namespace app {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kFromFiles = "predictions made elsewhere; their cost is not known";
+constexpr const char* kParabola = "least-squares:degree=2,n=4";
+
+bool is_known(const std::string& specification) {
+    const std::vector<std::string>& known = tracking::predictor_names();
+    return std::find(known.begin(), known.end(), family_of(specification)) != known.end();
+}
+
+std::string description_of(const std::string& specification) {
+    if (is_external(specification)) return "a child process; its cost is not measured";
+    if (specification == "naive") return "baseline: the moving average of 1992, 67 ms";
+    if (specification == kParabola) return "baseline: the parabola through four samples";
+    return is_baseline(specification) ? "baseline, as named" : "as named";
+}
+
+Entrant named(const std::string& specification, std::size_t recordings, std::size_t leads) {
+    Entrant entrant;
+    entrant.name = specification;
+    entrant.description = description_of(specification);
+    entrant.baseline = is_baseline(specification);
+    entrant.external = is_external(specification);
+    entrant.used.assign(recordings, std::vector<std::string>(leads, specification));
+    return entrant;
+}
+
+std::string whole_path(const std::string& file) {
+    std::error_code error;
+    return fs::weakly_canonical(file, error).string();
+}
+
+/// Which of `field` may tune for `scored`: others only.
+std::vector<bool> allowed_for(const Recording& scored, std::span<const Recording> field, Tuning tuning) {
+    std::vector<bool> allowed;
+    const std::string path = whole_path(scored.file);
+    for (const Recording& recording : field)
+        allowed.push_back(whole_path(recording.file) != path &&
+                          (tuning != Tuning::other_persons || recording.person != scored.person));
+    return allowed;
+}
+
+/// The tuned entrant of a family; without specifications where some recording has nothing to be tuned on.
+Entrant tuned(const std::string& family, Tuning tuning, const TuningTable& table,
+              std::span<const Recording> scored, std::span<const Recording> field, std::size_t leads) {
+    Entrant entrant;
+    const bool persons = tuning == Tuning::other_persons;
+    entrant.name = family + (persons ? "**" : "*");
+    entrant.baseline = is_baseline(family);
+    entrant.tuning = tuning;
+    entrant.description = fmt::format("{}tuned on {}", entrant.baseline ? "baseline, " : "",
+                                      persons ? "recordings of other persons" : "other recordings");
+    for (const Recording& recording : scored) {
+        const std::vector<bool> allowed = allowed_for(recording, field, tuning);
+        std::vector<std::string> by_lead;
+        for (std::size_t lead = 0; lead < leads; ++lead) {
+            const std::size_t best = table.best(family, lead, allowed);
+            if (best == TuningTable::npos) return Entrant{};
+            by_lead.push_back(table.specification(best));
+        }
+        entrant.used.push_back(std::move(by_lead));
+    }
+    return entrant;
+}
+
+std::vector<std::string> tunable_families(const std::vector<std::string>& specifications) {
+    std::vector<std::string> families;
+    for (const std::string& specification : specifications) {
+        const std::string family = family_of(specification);
+        if (!tuning_grid(family).empty() &&
+            std::find(families.begin(), families.end(), family) == families.end())
+            families.push_back(family);
+    }
+    return families;
+}
+
+std::size_t count_persons(std::span<const Recording> a, std::span<const Recording> b) {
+    std::set<std::string> persons;
+    for (const std::span<const Recording> recordings : {a, b})
+        for (const Recording& recording : recordings) persons.insert(recording.person);
+    return persons.size();
+}
+
+void enter_tuned(EntrantList& list, const std::vector<std::string>& families,
+                 const ComparisonOptions& options, std::span<const Recording> scored,
+                 std::span<const SensedStick> sticks) {
+    std::vector<Recording> own_field;
+    std::vector<SensedStick> own_sticks;
+    for (const std::string& file : options.tune_traces)
+        own_field.push_back(read_recording(file, options.persons));
+    if (!own_field.empty()) own_sticks = sense_all(own_field, options.sensor, options.leads_s);
+    const std::span<const Recording> field =
+        own_field.empty() ? scored : std::span<const Recording>(own_field);
+    const std::span<const SensedStick> seen =
+        own_field.empty() ? sticks : std::span<const SensedStick>(own_sticks);
+    if (own_field.empty() && scored.size() < 2) {
+        list.tuned_on = "nothing is tuned: one recording, and no others by --tune";
+        return;
+    }
+    const TuningTable table(candidates_of(families, 1e3 * options.sensor.noise_m), seen, field.size(),
+                            options.threads);
+    std::vector<Tuning> splits = {Tuning::other_recordings};
+    if (count_persons(scored, field) >= 2) splits.push_back(Tuning::other_persons);
+    for (const Tuning split : splits)
+        for (const std::string& family : families) {
+            Entrant entrant = tuned(family, split, table, scored, field, options.leads_s.size());
+            if (!entrant.used.empty()) list.entrants.push_back(std::move(entrant));
+        }
+    list.tuned_on =
+        fmt::format("tuned by RMS at each lead on {}, never on the recording that is scored{}",
+                    own_field.empty() ? fmt::format("the other {} recordings", scored.size() - 1)
+                                      : fmt::format("{} recordings named by --tune", field.size()),
+                    splits.size() > 1 ? "; ** on recordings of other persons only" : "");
+}
+
+/// Leads and the file's own: t is written in digits.
+constexpr double kSameLeadS = 1e-6;
+
+std::size_t lead_of(const StickPredictions& predictions, const std::string& file,
+                    std::span<const double> leads_s) {
+    for (std::size_t lead = 0; lead < leads_s.size(); ++lead)
+        if (std::abs(leads_s[lead] - predictions.lead_s) < kSameLeadS) return lead;
+    throw BadInput(fmt::format(
+        "{}: error: found predictions {} s ahead, expected one of the leads {}; name it in --leads", file,
+        predictions.lead_s, fmt::join(leads_s, ", ")));
+}
+
+/// The sticks of one recording as a file answers them; nothing where it does not fit.
+using Answers = std::vector<std::pair<std::size_t, StickPredictions>>;  // place among all sticks
+Answers answers_of(const PredictionFile& file, std::span<const SensedStick> sticks, std::size_t recording) {
+    Answers answers;
+    for (std::size_t place = 0; place < sticks.size(); ++place)
+        if (sticks[place].recording == recording)
+            answers.emplace_back(place, match_predictions(file, sticks[place].name, sticks[place].samples));
+    return answers;
+}
+
+/// The recording that a file answers, with its answers. With one recording its misfit is told in full.
+std::pair<std::size_t, Answers> find_recording(const PredictionFile& file,
+                                               std::span<const SensedStick> sticks, std::size_t recordings) {
+    if (recordings == 1) return {0, answers_of(file, sticks, 0)};
+    for (std::size_t recording = 0; recording < recordings; ++recording) {
+        try {
+            return {recording, answers_of(file, sticks, recording)};
+        } catch (const BadInput&) {  // the samples of another recording
+        }
+    }
+    throw BadInput(fmt::format(
+        "{}: error: found predictions that fit none of the {} traces, expected a row for every sample from "
+        "the second on of each stick; compare it with its trace alone to see why",
+        file.rows.file, recordings));
+}
+
+void add_file(Entrant& entrant, const std::string& file, std::span<const SensedStick> sticks,
+              std::size_t recordings, std::span<const double> leads_s) {
+    const PredictionFile predictions = read_prediction_file(file);
+    const auto [recording, answers] = find_recording(predictions, sticks, recordings);
+    for (const auto& [place, answer] : answers) {
+        const std::size_t lead = lead_of(answer, file, leads_s);
+        entrant.used[recording][lead] = file;
+        StickPredictions exact = answer;
+        exact.lead_s = leads_s[lead];
+        if (!entrant.replays.emplace(std::pair{place, lead}, std::move(exact)).second)
+            throw BadInput(fmt::format(
+                "{}: error: found predictions of {} {} s ahead a second time, expected one file a trace "
+                "and lead",
+                file, entrant.name, leads_s[lead]));
+    }
+}
+
+void enter_files(EntrantList& list, const ComparisonOptions& options, std::span<const SensedStick> sticks,
+                 std::size_t recordings) {
+    for (const auto& [name, file] : options.predictions) {
+        const auto same = std::find_if(list.entrants.begin(), list.entrants.end(),
+                                       [&](const Entrant& entrant) { return entrant.name == name; });
+        if (same != list.entrants.end() && same->description != kFromFiles)
+            throw BadInput(fmt::format(
+                "error: found --predictions {}={}, expected a name that no predictor has", name, file));
+        if (same == list.entrants.end()) {
+            Entrant entrant = named("", recordings, options.leads_s.size());
+            entrant.name = name;
+            entrant.description = kFromFiles;
+            entrant.external = true;
+            list.entrants.push_back(std::move(entrant));
+        }
+        Entrant& entrant = same == list.entrants.end() ? list.entrants.back() : *same;
+        add_file(entrant, file, sticks, recordings, options.leads_s);
+    }
+}
+
+}  // namespace
+
+std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const SensedStick& stick,
+                                                  std::size_t place, std::size_t lead) {
+    if (const auto replay = entrant.replays.find({place, lead}); replay != entrant.replays.end())
+        return make_replay(replay->second);
+    return make_any_predictor(entrant.used[stick.recording][lead], stick.leads_s, stick.name);
+}
+
+std::vector<std::string> specifications_of(const ComparisonOptions& options) {
+    std::vector<std::string> all;
+    const auto add = [&](const std::string& specification) {
+        if (std::find(all.begin(), all.end(), specification) == all.end()) all.push_back(specification);
+    };
+    for (const std::string& specification : options.predictors) add(specification);
+    for (const char* baseline : {"naive", "difference", kParabola})
+        if (is_known(baseline)) add(baseline);
+    return all;
+}
+
+EntrantList enter(const ComparisonOptions& options, std::span<const Recording> recordings,
+                  std::span<const SensedStick> sticks) {
+    EntrantList list;
+    const std::vector<std::string> specifications = specifications_of(options);
+    for (const std::string& specification : specifications) {
+        check_specification(specification);
+        list.entrants.push_back(named(specification, recordings.size(), options.leads_s.size()));
+    }
+    if (options.tuning)
+        enter_tuned(list, tunable_families(specifications), options, recordings, sticks);
+    else
+        list.tuned_on = "nothing is tuned, as asked";
+    enter_files(list, options, sticks, recordings.size());
+    return list;
+}
+
+}  // namespace app

@@ -1,0 +1,176 @@
+#include "interacting_models.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rotation.h"
+
+namespace tracking {
+namespace {
+
+AxisMatrix<double> times(const AxisMatrix<double>& q, double density) {
+    return {density * q.pp, density * q.pv, density * q.pa, density * q.vv, density * q.va, density * q.aa};
+}
+
+/// sum += weight (p + d d^T).
+void add_spread(AxisMatrix<Lanes>& sum, double weight, const AxisMatrix<Lanes>& p, const AxisStates& d) {
+    sum.pp += weight * (p.pp + d.p * d.p);
+    sum.pv += weight * (p.pv + d.p * d.v);
+    sum.pa += weight * (p.pa + d.p * d.a);
+    sum.vv += weight * (p.vv + d.v * d.v);
+    sum.va += weight * (p.va + d.v * d.a);
+    sum.aa += weight * (p.aa + d.a * d.a);
+}
+
+void add_weighted(AxisStates& sum, double weight, const AxisStates& x) {
+    sum.p += weight * x.p;
+    sum.v += weight * x.v;
+    sum.a += weight * x.a;
+}
+
+AxisStates minus(const AxisStates& a, const AxisStates& b) {
+    return {a.p - b.p, a.v - b.v, a.a - b.a};
+}
+
+AxisMatrix<Lanes> zero_lanes() {
+    const Lanes zero = Lanes::Zero();
+    return {zero, zero, zero, zero, zero, zero};
+}
+
+AxisMatrix<Lanes> in_lanes(const AxisMatrix<double>& p) {
+    return {Lanes::Constant(p.pp), Lanes::Constant(p.pv), Lanes::Constant(p.pa),
+            Lanes::Constant(p.vv), Lanes::Constant(p.va), Lanes::Constant(p.aa)};
+}
+
+}  // namespace
+
+InteractingModels::InteractingModels(const Options& options)
+    : gate_(position_gate(options.gate_sigmas)),
+      rotation_(
+          [&] {
+              MotionModel middle{MotionModel::Singer{options.alpha, options.density[1]},
+                                 options.measurement_variance, options.initial_variance};
+              return middle.scaled(1 / kLever);
+          }(),
+          rotation_gate(options.gate_sigmas)),
+      options_(options),
+      unit_{MotionModel::Singer{options.alpha, 1}, options.measurement_variance, options.initial_variance} {}
+
+SampleStatus InteractingModels::correct(const PoseSample& sample) noexcept {
+    const SampleStatus status = clock_.judge(sample);
+    if (status == SampleStatus::accepted) return update(sample);
+    return status == SampleStatus::reinitialised ? start(sample) : status;
+}
+
+SampleStatus InteractingModels::start(const PoseSample& sample) noexcept {
+    clock_.advance(sample.t_s);
+    gate_.restart(sample.position);
+    rotation_.restart();
+    if (sample.has_orientation) rotation_.correct(sample.orientation);
+    mean_ = {to_lanes(sample.position), Lanes::Zero(), Lanes::Zero()};
+    for (std::size_t j = 0; j < kModes; ++j) {
+        modes_.mode[j] = {mean_, in_lanes(unit_.initial_covariance())};
+        modes_.mu[j] = 1.0 / kModes;
+    }
+    return SampleStatus::reinitialised;
+}
+
+InteractingModels::Modes InteractingModels::mixed(double dt) const noexcept {
+    const double stay = std::exp(-options_.switching_rate * dt);
+    const double leave = (1 - stay) / (kModes - 1);
+    Modes out;
+    for (std::size_t j = 0; j < kModes; ++j) {
+        Probabilities w{};
+        for (std::size_t i = 0; i < kModes; ++i) {
+            w[i] = (i == j ? stay : leave) * modes_.mu[i];
+            out.mu[j] += w[i];
+        }
+        Mode& mode = out.mode[j];
+        mode.p = zero_lanes();
+        for (std::size_t i = 0; i < kModes; ++i) add_weighted(mode.x, w[i] /= out.mu[j], modes_.mode[i].x);
+        for (std::size_t i = 0; i < kModes; ++i)
+            add_spread(mode.p, w[i], modes_.mode[i].p, minus(modes_.mode[i].x, mode.x));
+    }
+    return out;
+}
+
+void InteractingModels::correct_modes(Modes& modes, const Eigen::Vector3d& measured) const noexcept {
+    Probabilities log_likelihood{};
+    for (std::size_t j = 0; j < kModes; ++j) {
+        Mode& mode = modes.mode[j];
+        const Lanes innovation = to_lanes(measured) - mode.x.p;
+        const Lanes variance = mode.p.pp + options_.measurement_variance;
+        log_likelihood[j] = -0.5 * ((innovation * innovation / variance).head<3>().sum() +
+                                    std::log(variance[0] * variance[1] * variance[2]));
+        add(mode.x, tracking::correct(mode.p, options_.measurement_variance), innovation);
+    }
+    const double best = *std::max_element(log_likelihood.begin(), log_likelihood.end());
+    double sum = 0;
+    for (std::size_t j = 0; j < kModes; ++j) sum += modes.mu[j] *= std::exp(log_likelihood[j] - best);
+    double floored = 0;
+    for (double& mu : modes.mu) floored += mu = std::max(mu / sum, kLeastProbability);
+    for (double& mu : modes.mu) mu /= floored;
+}
+
+AxisStates InteractingModels::mean_of(const Modes& modes) noexcept {
+    AxisStates mean;
+    for (std::size_t j = 0; j < kModes; ++j) add_weighted(mean, modes.mu[j], modes.mode[j].x);
+    return mean;
+}
+
+SampleStatus InteractingModels::update(const PoseSample& sample) noexcept {
+    const double dt = sample.t_s - clock_.time_s();
+    Modes ahead = mixed(dt);
+    const MotionStep unit = unit_.step(dt);
+    for (std::size_t j = 0; j < kModes; ++j) {
+        Mode& mode = ahead.mode[j];
+        mode.x = unit.f * mode.x;
+        mode.p = propagated(mode.p, unit.f, times(unit.q, options_.density[j]));
+    }
+    if (gate_.is_on()) {
+        const Lanes innovation = to_lanes(sample.position) - mean_of(ahead).p;
+        const double variance = ahead.mode.back().p.pp.head<3>().maxCoeff() + options_.measurement_variance;
+        switch (gate_.judge(sample.position, dt, innovation.matrix().squaredNorm(), variance)) {
+            case OutlierGate::Verdict::refuse:
+                return SampleStatus::outlier;
+            case OutlierGate::Verdict::persists:
+                return start(sample);
+            case OutlierGate::Verdict::pass:
+                break;
+        }
+    }
+    correct_modes(ahead, sample.position);
+    const AxisStates mean = mean_of(ahead);
+    rotation_.propagate(dt);
+    if (sample.has_orientation) rotation_.correct(sample.orientation);
+    if (!mean.is_finite() || !rotation_.is_finite()) return start(sample);
+    modes_ = ahead;
+    mean_ = mean;
+    clock_.advance(sample.t_s);
+    return SampleStatus::accepted;
+}
+
+PosePrediction InteractingModels::predict(double lead_s) const noexcept {
+    const AxisStates ahead = unit_.transition(lead_s) * mean_;
+    PosePrediction pose;
+    pose.position = ahead.p.head<3>();
+    pose.velocity = ahead.v.head<3>();
+    rotation_.predict(lead_s, pose);
+    return pose;
+}
+
+std::optional<PoseCovariance> InteractingModels::covariance(double lead_s) const noexcept {
+    const MotionStep unit = unit_.step(lead_s);
+    AxisMatrix<Lanes> spread = zero_lanes();
+    for (std::size_t j = 0; j < kModes; ++j)
+        add_spread(spread, modes_.mu[j],
+                   propagated(modes_.mode[j].p, unit.f, times(unit.q, options_.density[j])),
+                   unit.f * minus(modes_.mode[j].x, mean_));
+    PoseCovariance covariance;
+    covariance.position.diagonal() = spread.pp.head<3>();
+    covariance.velocity.diagonal() = spread.vv.head<3>();
+    covariance.rotation = rotation_.variance_after(lead_s) * Eigen::Matrix3d::Identity();
+    return covariance;
+}
+
+}  // namespace tracking
