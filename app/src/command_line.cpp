@@ -35,6 +35,22 @@ void add_worker_command(CLI::App& program, int& status) {
     worker->callback([endpoint, &status] { status = sim::run_worker(*endpoint); });
 }
 
+std::string full_name(const CLI::App& command) {
+    return command.get_parent() ? full_name(*command.get_parent()) + " " + command.get_name()
+                                : command.get_name();
+}
+
+/// The commands that could have followed the last one that was understood.
+std::string what_to_say(const CLI::App& program) {
+    const CLI::App* at = &program;
+    while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
+    std::vector<std::string> names;
+    for (const CLI::App* command : at->get_subcommands(nullptr))
+        if (command->get_name() != "worker") names.push_back(command->get_name());
+    if (names.empty()) return fmt::format("what `{} --help` tells", full_name(*at));
+    return fmt::format("`{}` and one of {}", full_name(*at), fmt::join(names, ", "));
+}
+
 int run(int argc, char** argv) {
     CLI::App program("MusicWorld: tracked drumsticks play a virtual kit, predicted ahead of the lag",
                      "musicworld");
@@ -57,10 +73,9 @@ int run(int argc, char** argv) {
         return program.exit(version);
     } catch (const CLI::ParseError& wrong) {
         const std::string typed = fmt::format("musicworld {}", fmt::join(argv + 1, argv + argc, " "));
-        return complain(
-            fmt::format("error: found bad usage in `{}` ({}), expected what `musicworld --help` tells", typed,
-                        wrong.what()),
-            kBadInput);
+        return complain(fmt::format("error: found bad usage in `{}` ({}), expected {}", typed, wrong.what(),
+                                    what_to_say(program)),
+                        kBadInput);
     }
     return status;
 }

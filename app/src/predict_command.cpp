@@ -16,6 +16,7 @@
 #include "predict.h"
 #include "predictors.h"
 #include "sensor_options.h"
+#include "trace_files.h"
 
 namespace app {
 namespace {
@@ -38,7 +39,7 @@ void predict(const PredictArguments& a, const SensorArguments& sensor) {
     check_specification(a.predictor);
     const tracking::SensorModel model = sensor_model(sensor);
     const std::string table =
-        predict_table(seen_by(tracking::read_trace(a.trace), model), a.predictor, lead_s);
+        predict_table(seen_by(tracking::read_trace(find_trace(a.trace)), model), a.predictor, lead_s);
     if (a.out.empty())
         print(table);
     else

@@ -36,4 +36,7 @@ enum class Arrivals { any_order, in_order };
 /// of which fewer than two samples are left, or too many asked.
 [[nodiscard]] tracking::Trace seen_by(const tracking::Trace& trace, const tracking::SensorModel& sensor);
 
+/// What a sensor does to a trace, in words, for a trace's source; empty for one that does nothing.
+[[nodiscard]] std::string describe(const tracking::SensorModel& sensor);
+
 }  // namespace app

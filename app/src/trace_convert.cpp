@@ -111,7 +111,9 @@ void convert(const ConvertArguments& a, const SensorArguments& sensor) {
     if (!a.shaft.empty()) trace.shaft = parse_axis(a.shaft, "--shaft");
     if (!a.source.empty()) trace.source = a.source;
     warn_of_implausible(trace);
-    const tracking::Trace seen = seen_by(trace, model);
+    tracking::Trace seen = seen_by(trace, model);
+    const std::string described = describe(model);
+    if (!described.empty()) seen.source += (seen.source.empty() ? "" : "; ") + described;
     write_finished_file(a.out, tracking::format_trace(seen));
     for (const std::string& remark : trace.remarks) fmt::print("{}: {}\n", trace.file, remark);
     for (const tracking::StickTrace& stick : seen.sticks)
