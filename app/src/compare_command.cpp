@@ -8,7 +8,7 @@
 
 #include "bad_input.h"
 #include "comparison.h"
-#include "comparison_map.h"
+#include "comparison_report.h"
 #include "comparison_tables.h"
 #include "kit.h"
 #include "numbers.h"
@@ -136,6 +136,7 @@ void run(const CompareArguments& a) {
     const Comparison comparison = compare(options);
     write_file(out.path("compare.json"), format_comparison_json(comparison));
     write_file(out.path("compare.csv"), format_comparison_csv(comparison));
+    write_file(out.path("report.html"), format_comparison_report(comparison, out.scratch()));
     out.finish();
     bar.clear();
     fmt::print("{}", format_comparison_text(comparison));

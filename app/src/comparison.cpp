@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "comparison_figures.h"
 #include "comparison_map.h"
 #include "comparison_pairs.h"
 #include "entrants.h"
@@ -174,6 +175,8 @@ Comparison compare(const ComparisonOptions& options) {
     std::erase_if(comparison.rows, [](const ComparisonRow& row) { return row.used.empty(); });
     comparison.summaries = summarise(comparison, entrants);
     comparison.paired = pair_with_baselines(comparison, entrants);
+    comparison.curves = lead_curves(field.recordings, entrants, options);
+    comparison.figure = stick_figure(field.recordings, field.sticks, entrants, comparison);
     if (options.map) comparison.map = map_sensors(field.recordings, options);
     return comparison;
 }
