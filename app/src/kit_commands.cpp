@@ -13,6 +13,7 @@
 #include "kit_fit.h"
 #include "numbers.h"
 #include "stage.h"
+#include "trace_files.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -103,7 +104,7 @@ StickGeometry common_geometry(const std::vector<tracking::Trace>& traces, const 
 
 void fit(const FitArguments& a) {
     std::vector<tracking::Trace> traces;
-    for (const std::string& file : a.traces) traces.push_back(tracking::read_trace(file));
+    for (const std::string& file : a.traces) traces.push_back(tracking::read_trace(find_trace(file)));
     const StickGeometry geometry = common_geometry(traces, a);
     const KitFit fitted = fit_kit(traces, geometry);
     const std::string name = fs::path(a.traces.front()).filename().string();

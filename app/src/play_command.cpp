@@ -7,6 +7,7 @@
 #include "kit.h"
 #include "numbers.h"
 #include "play.h"
+#include "trace_files.h"
 
 namespace app {
 namespace {
@@ -24,7 +25,7 @@ struct PlayArguments {
 
 PlayOptions options_of(const PlayArguments& a) {
     PlayOptions o;
-    o.trace = a.trace.empty() ? assets_folder() / "traces" / "flourish.csv" : std::filesystem::path(a.trace);
+    o.trace = find_trace(a.trace.empty() ? "flourish" : a.trace);
     o.kit = find_kit(a.kit);
     o.out = a.out;
     o.fps = parse_number(a.fps, "--fps");
@@ -67,7 +68,9 @@ void print_result(const PlayResult& result, const PlayOptions& options) {
 void add_play_command(CLI::App& program) {
     CLI::App* play_command = program.add_subcommand("play", "Play a recorded trace into pictures and sound");
     auto a = std::make_shared<PlayArguments>();
-    play_command->add_option("TRACE", a->trace, "Trace (CSV); the bundled flourish if left out");
+    play_command->add_option(
+        "TRACE", a->trace,
+        "Trace (CSV, Beat Saber replay, or the name of a bundled one); the bundled flourish if left out");
     play_command->add_option("--kit", a->kit, "Kit: a file, or the name of a bundled one")
         ->capture_default_str();
     play_command->add_option("--out", a->out, "Folder for the products")->capture_default_str();

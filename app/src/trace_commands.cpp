@@ -10,7 +10,10 @@
 #include "kit.h"
 #include "numbers.h"
 #include "score.h"
+#include "trace_convert.h"
+#include "trace_files.h"
 #include "trace_info.h"
+#include "trace_warnings.h"
 
 namespace app {
 namespace {
@@ -42,7 +45,7 @@ void add_synth(CLI::App& trace) {
     command->add_option("--rate", a->rate, "Samples a second")->capture_default_str();
     command->add_option("--noise", a->noise, "Standard deviation of position noise [mm]")
         ->capture_default_str();
-    command->add_option("--out", a->out, "Trace to write (CSV)")->required();
+    command->add_option("--out", a->out, "Trace to write (CSV); replaced if there is one")->required();
     command->callback([a] { synthesise_file(*a); });
 }
 
@@ -50,11 +53,13 @@ void add_info(CLI::App& trace) {
     CLI::App* command = trace.add_subcommand("info", "Tell what a trace holds");
     auto file = std::make_shared<std::string>();
     auto json = std::make_shared<bool>(false);
-    command->add_option("TRACE", *file, "Trace (CSV)")->required();
+    command->add_option("TRACE", *file, "Trace (CSV, Beat Saber replay, or the name of a bundled one)")
+        ->required();
     command->add_flag("--json", *json, "As one JSON document");
     command->callback([file, json] {
-        const tracking::Trace trace_read = tracking::read_trace(*file);
+        const tracking::Trace trace_read = tracking::read_trace(find_trace(*file));
         const std::vector<StickInfo> sticks = trace_info(trace_read);
+        if (!*json) warn_of_implausible(trace_read);
         fmt::print("{}", *json ? format_info_json(trace_read, sticks) : format_info(trace_read, sticks));
     });
 }
@@ -62,12 +67,14 @@ void add_info(CLI::App& trace) {
 void add_check(CLI::App& trace) {
     CLI::App* command = trace.add_subcommand("check", "Check traces; the first fault ends it");
     auto files = std::make_shared<std::vector<std::string>>();
-    command->add_option("TRACE", *files, "Traces (CSV)")->required();
+    command->add_option("TRACE", *files, "Traces (CSV, Beat Saber replays, or names of bundled ones)")
+        ->required();
     command->callback([files] {
         for (const std::string& file : *files) {
-            const tracking::Trace checked = tracking::read_trace(file);
+            const tracking::Trace checked = tracking::read_trace(find_trace(file));
             std::size_t samples = 0;
             for (const tracking::StickTrace& stick : checked.sticks) samples += stick.samples.size();
+            warn_of_implausible(checked);
             fmt::print("{}: in order, {} sticks, {} samples\n", file, checked.sticks.size(), samples);
         }
     });
@@ -76,11 +83,12 @@ void add_check(CLI::App& trace) {
 }  // namespace
 
 void add_trace_command(CLI::App& program) {
-    CLI::App* trace = program.add_subcommand("trace", "Look at, check or make traces");
+    CLI::App* trace = program.add_subcommand("trace", "Look at, check, convert or make traces");
     trace->require_subcommand(1);
     add_info(*trace);
     add_check(*trace);
     add_synth(*trace);
+    add_convert_command(*trace);
 }
 
 }  // namespace app

@@ -3,7 +3,7 @@
 
 namespace app {
 
-/// `musicworld trace info|check|synth`.
+/// `musicworld trace info|check|convert|synth`.
 void add_trace_command(CLI::App& program);
 
 }  // namespace app

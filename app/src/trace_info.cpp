@@ -1,6 +1,7 @@
 #include "trace_info.h"
 
 #include <fmt/format.h>
+#include <tracking/plausibility.h>
 #include <tracking/predictor.h>
 
 #include <algorithm>
@@ -11,6 +12,8 @@
 
 namespace app {
 namespace {
+
+constexpr double kFlip = 1.5707963267948966;  // rad between two samples
 
 StickInfo info_of(const tracking::StickTrace& stick, const TipTrack& track) {
     StickInfo info;
@@ -36,6 +39,10 @@ StickInfo info_of(const tracking::StickTrace& stick, const TipTrack& track) {
     info.speed_max_mps = quantile(speed, 1);
     info.orientation = std::all_of(stick.samples.begin(), stick.samples.end(),
                                    [](const tracking::PoseSample& sample) { return sample.has_orientation; });
+    for (std::size_t i = 1; i < stick.samples.size(); ++i) {
+        if (stick.samples[i].orientation.angularDistance(stick.samples[i - 1].orientation) <= kFlip) continue;
+        if (info.flips++ == 0) info.first_flip_s = stick.samples[i].t_s;
+    }
     info.strokes = static_cast<int>(find_lows(track).size());
     return info;
 }
@@ -62,6 +69,7 @@ nlohmann::ordered_json json_of(const StickInfo& s) {
         {"tip_max_m", numbers(s.high)},
         {"speed_mps", {{"median", s.speed_median_mps}, {"p95", s.speed_p95_mps}, {"max", s.speed_max_mps}}},
         {"has_orientation", s.orientation},
+        {"flips", s.flips},
         {"strokes", s.strokes}};
 }
 
@@ -82,6 +90,7 @@ std::string format_info(const tracking::Trace& trace, const std::vector<StickInf
                         trace.rate_hz > 0 ? fmt::format("{} Hz", trace.rate_hz) : "(not said)");
     text += fmt::format("  tip          {}\n",
                         trace.tip ? point(*trace.tip) + " m" : "(not said; the tracked point)");
+    for (const std::string& remark : trace.remarks) text += fmt::format("  remark       {}\n", remark);
     for (const StickInfo& s : sticks) {
         text +=
             fmt::format("\n{}: {} samples from {:.6f} to {:.6f} s\n", s.name, s.samples, s.t0_s, s.t_end_s);
@@ -94,6 +103,10 @@ std::string format_info(const tracking::Trace& trace, const std::vector<StickInf
                             s.speed_median_mps, s.speed_p95_mps, s.speed_max_mps);
         text += fmt::format("  strokes      {} (falls and rises of 25 mm and more)\n", s.strokes);
         text += fmt::format("  orientation  {}\n", s.orientation ? "yes" : "no, or not throughout");
+        if (s.flips > 0)
+            text +=
+                fmt::format("  flips        {} steps turn by more than 90 degrees, the first at {:.6f} s\n",
+                            s.flips, s.first_flip_s);
     }
     return text;
 }
@@ -103,6 +116,8 @@ std::string format_info_json(const tracking::Trace& trace, const std::vector<Sti
         {"trace", trace.file},  {"source", trace.source},     {"rate_hz", trace.rate_hz},
         {"t0_s", trace.t0_s()}, {"t_end_s", trace.t_end_s()}, {"duration_s", trace.t_end_s() - trace.t0_s()},
         {"tip_m", nullptr},     {"shaft", nullptr},           {"sticks", nlohmann::ordered_json::array()}};
+    json["remarks"] = trace.remarks;
+    json["warnings"] = tracking::implausible(trace);
     if (trace.tip) json["tip_m"] = numbers(*trace.tip);
     if (trace.shaft) json["shaft"] = numbers(*trace.shaft);
     for (const StickInfo& stick : sticks) json["sticks"].push_back(json_of(stick));

@@ -20,7 +20,9 @@ struct StickInfo {
                     high = Eigen::Vector3d::Zero();  ///< extents of the tip's path
     double speed_median_mps = 0, speed_p95_mps = 0, speed_max_mps = 0;
     bool orientation = false;  ///< every sample has one
-    int strokes = 0;           ///< height minima of the tip, prominence 25 mm
+    int flips = 0;             ///< turns by more than 90 degrees between samples: faults of a tracker, mostly
+    double first_flip_s = 0;
+    int strokes = 0;  ///< height minima of the tip, prominence 25 mm
 };
 
 [[nodiscard]] std::vector<StickInfo> trace_info(const tracking::Trace& trace);

@@ -40,13 +40,12 @@ TEST(MotionModel, AfterThousandStepsTheGainSolvesTheRiccatiEquation) {
         AxisMatrix<double> covariance = model.initial_covariance();
         AxisGain<double> last{};
         for (int i = 0; i < 1000; ++i) {
-            covariance = propagated(covariance, model.transition(kStep), model.process_noise(kStep));
+            covariance = propagated(covariance, model.transition(kStep), model.step(kStep).q);
             last = correct(covariance, model.measurement_variance);
         }
         const SteadyState steady = steady_state(model, kStep);
-        const Matrix3d p =
-            riccati_by_doubling(model.transition(kStep).matrix(), model.process_noise(kStep).matrix(),
-                                model.measurement_variance);
+        const Matrix3d p = riccati_by_doubling(model.transition(kStep).matrix(), model.step(kStep).q.matrix(),
+                                               model.measurement_variance);
         const Vector3d expected = p.col(0) / (p(0, 0) + model.measurement_variance);
         // Gains range over 1 to 1e4 (position to acceleration), so compare each with itself; both ways round
         // to about 1e-12.
@@ -69,8 +68,8 @@ TEST(MotionModel, SingerMatchesItsClosedFormAtAlphaDtOfTwoAndTwenty) {
         q(1, 2) = q(2, 1) = (e * e + 1 - 2 * e) / (2 * alpha * alpha);
         q(2, 2) = (1 - e * e) / (2 * alpha);
         // This form cancels about three digits at u = 2.
-        EXPECT_LT((model.process_noise(dt).matrix() - q).cwiseQuotient(q).cwiseAbs().maxCoeff(), 1e-12);
-        EXPECT_NEAR(model.transition(dt).pa, (u - 1 + e) / (alpha * alpha), 1e-18);
+        EXPECT_LT((model.step(dt).q.matrix() - q).cwiseQuotient(q).cwiseAbs().maxCoeff(), 1e-12);
+        EXPECT_NEAR(model.transition(dt).pa * alpha * alpha / (u - 1 + e), 1, 1e-15);  // four roundings
     }
 }
 
@@ -78,8 +77,8 @@ TEST(MotionModel, SlowSingerTendsToConstantAcceleration) {
     const MotionModel singer{MotionModel::Singer{1e-3, 2}};
     const MotionModel ca{MotionModel::ConstantAcceleration{2}};
     // The difference is of first order in alpha dt = 1e-5.
-    EXPECT_LT((singer.process_noise(0.01).matrix() - ca.process_noise(0.01).matrix())
-                  .cwiseQuotient(ca.process_noise(0.01).matrix())
+    EXPECT_LT((singer.step(0.01).q.matrix() - ca.step(0.01).q.matrix())
+                  .cwiseQuotient(ca.step(0.01).q.matrix())
                   .cwiseAbs()
                   .maxCoeff(),
               2e-5);
@@ -91,9 +90,8 @@ TEST(MotionModel, NoiseOfTwoStepsIsTheNoiseOfOneLongStep) {
          {MotionModel{MotionModel::ConstantVelocity{3}}, MotionModel{MotionModel::ConstantAcceleration{3}},
           MotionModel{MotionModel::Singer{7, 3}}, MotionModel{MotionModel::Singer{500, 3}}}) {
         const Matrix3d f = model.transition(0.03).matrix();
-        const Matrix3d two =
-            f * model.process_noise(0.02).matrix() * f.transpose() + model.process_noise(0.03).matrix();
-        const Matrix3d one = model.process_noise(0.05).matrix();
+        const Matrix3d two = f * model.step(0.02).q.matrix() * f.transpose() + model.step(0.03).q.matrix();
+        const Matrix3d one = model.step(0.05).q.matrix();
         EXPECT_LT((two - one).norm(), 1e-14 * one.norm());
     }
 }
@@ -123,7 +121,7 @@ TEST(MotionModel, SingerNoiseIsItsIntegralFromAlphaDtOf1e5thTo50) {
     for (double u = 1e-5; u < 50; u *= 1.7) {
         constexpr double kAlpha = 30;
         const Matrix3d exact = singer_noise_by_quadrature(kAlpha, u / kAlpha);
-        const Matrix3d noise = MotionModel{MotionModel::Singer{kAlpha, 1}}.process_noise(u / kAlpha).matrix();
+        const Matrix3d noise = MotionModel{MotionModel::Singer{kAlpha, 1}}.step(u / kAlpha).q.matrix();
         // Just above the series' limit of 0.25 the closed form cancels four digits.
         EXPECT_LT((noise - exact).cwiseQuotient(exact).cwiseAbs().maxCoeff(), 1e-11) << "alpha dt = " << u;
     }
@@ -133,8 +131,8 @@ TEST(MotionModel, SingerNoiseAndTransitionDoNotJumpWhereTheirFormulasChange) {
     for (const double u : {0.1, 0.25}) {
         const MotionModel model{MotionModel::Singer{1, 1}};
         const double above = std::nextafter(u, 1.0);
-        const Matrix3d step = model.process_noise(above).matrix() - model.process_noise(u).matrix();
-        EXPECT_LT(step.cwiseQuotient(model.process_noise(u).matrix()).cwiseAbs().maxCoeff(), 1e-11);
+        const Matrix3d step = model.step(above).q.matrix() - model.step(u).q.matrix();
+        EXPECT_LT(step.cwiseQuotient(model.step(u).q.matrix()).cwiseAbs().maxCoeff(), 1e-11);
         EXPECT_NEAR(model.transition(above).pa / model.transition(u).pa, 1, 1e-13);
     }
 }
@@ -159,7 +157,7 @@ bool is_positive(const AxisMatrix<double>& p, int size) {
         if (i % 1000 == 0)
             model.measurement_variance = 1e-6 * std::pow(10, -12 + 18.0 * (random() % 1001) / 1000);
         const double dt = std::pow(10, -5 + 5.0 * (random() % 1001) / 1000);
-        p = propagated(p, model.transition(dt), model.process_noise(dt));
+        p = propagated(p, model.transition(dt), model.step(dt).q);
         if (random() % 10 != 0) (void)correct(p, model.measurement_variance);
         if ((i % 97 == 0 || i < 10000) && !is_positive(p, size))
             return ::testing::AssertionFailure() << "after update " << i << ":\n" << p.matrix();

@@ -121,12 +121,11 @@ AxisStates InteractingModels::mean_of(const Modes& modes) noexcept {
 SampleStatus InteractingModels::update(const PoseSample& sample) noexcept {
     const double dt = sample.t_s - clock_.time_s();
     Modes ahead = mixed(dt);
-    const Transition f = unit_.transition(dt);
-    const AxisMatrix<double> q = unit_.process_noise(dt);
+    const MotionStep unit = unit_.step(dt);
     for (std::size_t j = 0; j < kModes; ++j) {
         Mode& mode = ahead.mode[j];
-        mode.x = f * mode.x;
-        mode.p = propagated(mode.p, f, times(q, options_.density[j]));
+        mode.x = unit.f * mode.x;
+        mode.p = propagated(mode.p, unit.f, times(unit.q, options_.density[j]));
     }
     if (gate_.is_on()) {
         const Lanes innovation = to_lanes(sample.position) - mean_of(ahead).p;
@@ -161,12 +160,12 @@ PosePrediction InteractingModels::predict(double lead_s) const noexcept {
 }
 
 std::optional<PoseCovariance> InteractingModels::covariance(double lead_s) const noexcept {
-    const Transition f = unit_.transition(lead_s);
-    const AxisMatrix<double> q = unit_.process_noise(lead_s);
+    const MotionStep unit = unit_.step(lead_s);
     AxisMatrix<Lanes> spread = zero_lanes();
     for (std::size_t j = 0; j < kModes; ++j)
-        add_spread(spread, modes_.mu[j], propagated(modes_.mode[j].p, f, times(q, options_.density[j])),
-                   f * minus(modes_.mode[j].x, mean_));
+        add_spread(spread, modes_.mu[j],
+                   propagated(modes_.mode[j].p, unit.f, times(unit.q, options_.density[j])),
+                   unit.f * minus(modes_.mode[j].x, mean_));
     PoseCovariance covariance;
     covariance.position.diagonal() = spread.pp.head<3>();
     covariance.velocity.diagonal() = spread.vv.head<3>();

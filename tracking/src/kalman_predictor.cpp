@@ -43,12 +43,11 @@ SampleStatus KalmanPredictor::start(const PoseSample& sample) noexcept {
 
 SampleStatus KalmanPredictor::update(const PoseSample& sample) noexcept {
     const double dt = sample.t_s - clock_.time_s();
-    PositionFilter ahead = position_;
-    ahead.propagate(dt);
+    PositionFilter::Estimate ahead = position_.propagate(dt);
     const Lanes innovation = ahead.innovation(sample.position);
     if (gate_.is_on()) {
         switch (gate_.judge(sample.position, dt, innovation.matrix().squaredNorm(),
-                            ahead.innovation_variance())) {
+                            position_.innovation_variance(ahead))) {
             case OutlierGate::Verdict::refuse:
                 return SampleStatus::outlier;
             case OutlierGate::Verdict::persists:
@@ -57,11 +56,11 @@ SampleStatus KalmanPredictor::update(const PoseSample& sample) noexcept {
                 break;
         }
     }
-    ahead.correct(innovation);
+    position_.correct(ahead, innovation);
     rotation_.propagate(dt);
     if (sample.has_orientation) rotation_.correct(sample.orientation);
-    if (!ahead.state().is_finite() || !rotation_.is_finite()) return start(sample);
-    position_ = ahead;
+    if (!ahead.x.is_finite() || !rotation_.is_finite()) return start(sample);
+    position_.accept(ahead);
     clock_.advance(sample.t_s);
     return SampleStatus::accepted;
 }

@@ -46,12 +46,12 @@ SampleStatus ModelBank::start(const PoseSample& sample) noexcept {
 
 SampleStatus ModelBank::update(const PoseSample& sample) noexcept {
     const double dt = sample.t_s - clock_.time_s();
-    std::array<PositionFilter, kModels> ahead = position_;
-    for (PositionFilter& filter : ahead) filter.propagate(dt);
+    std::array<PositionFilter::Estimate, kModels> ahead;
+    for (std::size_t i = 0; i < kModels; ++i) ahead[i] = position_[i].propagate(dt);
     if (gate_.is_on()) {
-        const PositionFilter& judged = ahead[selected_];
-        switch (gate_.judge(sample.position, dt, judged.innovation(sample.position).matrix().squaredNorm(),
-                            judged.innovation_variance())) {
+        const double square = ahead[selected_].innovation(sample.position).matrix().squaredNorm();
+        switch (gate_.judge(sample.position, dt, square,
+                            position_[selected_].innovation_variance(ahead[selected_]))) {
             case OutlierGate::Verdict::refuse:
                 return SampleStatus::outlier;
             case OutlierGate::Verdict::persists:
@@ -62,13 +62,13 @@ SampleStatus ModelBank::update(const PoseSample& sample) noexcept {
     }
     bool finite = true;
     for (std::size_t i = 0; i < kModels; ++i) {
-        ahead[i].correct(ahead[i].innovation(sample.position));
+        position_[i].correct(ahead[i], ahead[i].innovation(sample.position));
         rotation_[i].propagate(dt);
         if (sample.has_orientation) rotation_[i].correct(sample.orientation);
-        finite = finite && ahead[i].state().is_finite() && rotation_[i].is_finite();
+        finite = finite && ahead[i].x.is_finite() && rotation_[i].is_finite();
     }
     if (!finite) return start(sample);
-    position_ = ahead;
+    for (std::size_t i = 0; i < kModels; ++i) position_[i].accept(ahead[i]);
     clock_.advance(sample.t_s);
     select(sample);
     remember();
@@ -80,8 +80,8 @@ void ModelBank::remember() noexcept {
     Past& now = history_[newest_];
     now.t_s = clock_.time_s();
     for (std::size_t i = 0; i < kModels; ++i) {
-        now.x[i] = position_[i].state();
-        if (score_ == BankScore::likelihood) now.p[i] = position_[i].covariance();
+        now.x[i] = position_[i].now().x;
+        if (score_ == BankScore::likelihood) now.p[i] = position_[i].now().p;
     }
     if (held_ < kHistory) ++held_;
 }
@@ -89,13 +89,14 @@ void ModelBank::remember() noexcept {
 double ModelBank::penalty(std::size_t model, const Past& past, double elapsed,
                           const Lanes& measured) const noexcept {
     const MotionModel& motion = position_[model].model();
-    const Transition f = motion.transition(elapsed);
-    const AxisStates& x = past.x[model];
-    const double square = (measured - (x.p + f.pv * x.v + f.pa * x.a)).matrix().squaredNorm();
-    if (score_ == BankScore::distance) return square;
-    const double variance =
-        propagated(past.p[model], f, motion.process_noise(elapsed)).pp + motion.measurement_variance;
-    return square / variance + 3 * std::log(variance);  // -2 log (3.27), its constant left out
+    const auto square = [&](const Transition& f) {
+        const AxisStates& x = past.x[model];
+        return (measured - (x.p + f.pv * x.v + f.pa * x.a)).matrix().squaredNorm();
+    };
+    if (score_ == BankScore::distance) return square(motion.transition(elapsed));
+    const MotionStep step = motion.step(elapsed);
+    const double variance = propagated(past.p[model], step).pp + motion.measurement_variance;
+    return square(step.f) / variance + 3 * std::log(variance);  // -2 log (3.27), its constant left out
 }
 
 void ModelBank::select(const PoseSample& sample) noexcept {

@@ -7,30 +7,38 @@
 namespace tracking {
 namespace {
 
-Transition polynomial_transition(double dt) {
-    return {dt, dt * dt / 2, dt, 1};
-}
-
 AxisMatrix<double> scaled_matrix(const AxisMatrix<double>& m, double factor) {
     return {factor * m.pp, factor * m.pv, factor * m.pa, factor * m.vv, factor * m.va, factor * m.aa};
 }
 
-/// u - 1 + exp(-u) without cancellation; `decay` = expm1(-u).
-double decayed_displacement(double u, double decay) {
-    if (u > 0.1) return u + decay;
-    // u^2 (1/2 - u/6 + u^2/24 - ...), the terms left out are below 1e-17 of the first for u <= 0.1.
-    double sum = 0;
-    constexpr std::array<double, 9> kTerms = {1.0 / 2,     -1.0 / 6,      1.0 / 24,
-                                              -1.0 / 120,  1.0 / 720,     -1.0 / 5040,
-                                              1.0 / 40320, -1.0 / 362880, 1.0 / 3628800};
-    for (std::size_t k = kTerms.size(); k-- > 0;) sum = sum * u + kTerms[k];
-    return u * u * sum;
+/// exp(-u) - 1 and u - 1 + exp(-u), neither with cancellation.
+struct Decay {
+    double change, displacement;
+};
+
+Decay decay(double u) {
+    if (u > 0.25) {
+        const double change = std::exp(-u) - 1;
+        return {change, u + change};
+    }
+    // u^2 (1/2 - u/6 + u^2/24 - ...), the terms left out are below 1e-17 of the first for u <= 0.25. Even and
+    // odd powers run side by side.
+    constexpr double kTerms[12] = {1.0 / 2,       -1.0 / 6,        1.0 / 24,        -1.0 / 120,
+                                   1.0 / 720,     -1.0 / 5040,     1.0 / 40320,     -1.0 / 362880,
+                                   1.0 / 3628800, -1.0 / 39916800, 1.0 / 479001600, -1.0 / 6227020800};
+    const double square = u * u;
+    double even = kTerms[10], odd = kTerms[11];
+    for (int k = 8; k >= 0; k -= 2) {
+        even = even * square + kTerms[k];
+        odd = odd * square + kTerms[k + 1];
+    }
+    const double displacement = square * (even + u * odd);
+    return {displacement - u, displacement};
 }
 
-Transition singer_transition(double alpha, double dt) {
-    const double u = alpha * dt;
-    const double decay = std::expm1(-u);
-    return {dt, decayed_displacement(u, decay) / (alpha * alpha), -decay / alpha, 1 + decay};
+Transition singer_transition(double alpha, double dt, const Decay& d) {
+    const double time = 1 / alpha;
+    return {dt, d.displacement * (time * time), -d.change * time, 1 + d.change};
 }
 
 /// The six integrals over [0, 1] of products r_i(s) r_j(s), where r_p, r_v, r_a are the displacement, the
@@ -41,7 +49,7 @@ constexpr int kTerms = 16;
 constexpr double kSeriesLimit = 0.25;
 
 struct SingerSeries {
-    std::array<std::array<double, kTerms>, 6> coefficient{};
+    std::array<std::array<double, 6>, kTerms> coefficient{};  // [power][entry]
 
     constexpr SingerSeries() {
         constexpr int kOrder[6][2] = {{2, 2}, {2, 1}, {2, 0}, {1, 1}, {1, 0}, {0, 0}};
@@ -57,63 +65,38 @@ struct SingerSeries {
                 for (int k = 0; k <= n; ++k)
                     sum += inverse_factorial[static_cast<std::size_t>(k + i)] *
                            inverse_factorial[static_cast<std::size_t>(n - k + j)];
-                coefficient[entry][static_cast<std::size_t>(n)] = sum / (n + i + j + 1);
+                coefficient[static_cast<std::size_t>(n)][entry] = sum / (n + i + j + 1);
             }
     }
 };
 constexpr SingerSeries kSeries;
 
 AxisMatrix<double> series_noise(double u, double dt) {
-    std::array<double, 6> g{};
-    for (std::size_t n = kTerms; n-- > 0;)
-        for (std::size_t entry = 0; entry < 6; ++entry)
-            g[entry] = kSeries.coefficient[entry][n] - u * g[entry];
+    const double square = u * u;
+    std::array<double, 6> even{}, odd{};
+    for (std::size_t n = kTerms; n > 0; n -= 2)
+        for (std::size_t entry = 0; entry < 6; ++entry) {
+            odd[entry] = odd[entry] * square + kSeries.coefficient[n - 1][entry];
+            even[entry] = even[entry] * square + kSeries.coefficient[n - 2][entry];
+        }
+    const auto g = [&](std::size_t entry) { return even[entry] - u * odd[entry]; };
     const double dt2 = dt * dt, dt3 = dt2 * dt;
-    return {g[0] * dt3 * dt2, g[1] * dt2 * dt2, g[2] * dt3, g[3] * dt3, g[4] * dt2, g[5] * dt};
+    return {g(0) * (dt3 * dt2), g(1) * (dt2 * dt2), g(2) * dt3, g(3) * dt3, g(4) * dt2, g(5) * dt};
 }
 
 /// The same in closed form (Singer 1970, with sigma_m^2 2 alpha = 1); above kSeriesLimit cancellation costs
-/// at most three digits.
-AxisMatrix<double> closed_noise(double alpha, double u) {
-    const double decay = std::expm1(-u);
-    const double e = 1 + decay;
-    const double twice = decay * (1 + e);  // exp(-2u) - 1
-    const double a2 = alpha * alpha, a3 = a2 * alpha;
-    return {(2 * u - 2 * u * u + 2 * u * u * u / 3 - 4 * u * e - twice) / (2 * a3 * a2),
-            (decay + u) * (decay + u) / (2 * a2 * a2),
-            (-twice - 2 * u * e) / (2 * a3),
-            (4 * decay - twice + 2 * u) / (2 * a3),
-            decay * decay / (2 * a2),
-            -twice / (2 * alpha)};
+/// at most four digits.
+AxisMatrix<double> closed_noise(double alpha, double u, const Decay& d) {
+    const double e = 1 + d.change;
+    const double twice = d.change * (1 + e);  // exp(-2u) - 1
+    const double time = 1 / alpha, t2 = time * time, t3 = t2 * time;
+    return {(2 * u - 2 * u * u + u * u * u * (2.0 / 3) - 4 * u * e - twice) * (t3 * t2 / 2),
+            d.displacement * d.displacement * (t2 * t2 / 2),
+            (-twice - 2 * u * e) * (t3 / 2),
+            (4 * d.change - twice + 2 * u) * (t3 / 2),
+            d.change * d.change * (t2 / 2),
+            -twice * (time / 2)};
 }
-
-struct TransitionOver {
-    double dt;
-    Transition operator()(const MotionModel::Singer& model) const {
-        return singer_transition(model.alpha, dt);
-    }
-    template <typename Polynomial>
-    Transition operator()(const Polynomial&) const {
-        return polynomial_transition(dt);
-    }
-};
-
-struct NoiseOver {
-    double dt;
-    AxisMatrix<double> operator()(const MotionModel::ConstantVelocity& model) const {
-        const double q = model.q * dt;
-        return {q * dt * dt / 3, q * dt / 2, 0, q, 0, 0};
-    }
-    AxisMatrix<double> operator()(const MotionModel::ConstantAcceleration& model) const {
-        const double q = model.q * dt, q1 = q * dt, q2 = q1 * dt;
-        return {q2 * dt * dt / 20, q2 * dt / 8, q2 / 6, q2 / 3, q1 / 2, q};
-    }
-    AxisMatrix<double> operator()(const MotionModel::Singer& model) const {
-        const double u = model.alpha * dt;
-        return scaled_matrix(u <= kSeriesLimit ? series_noise(u, dt) : closed_noise(model.alpha, u), model.q);
-    }
-    AxisMatrix<double> operator()(const MotionModel::FixedStep& model) const { return model.q; }
-};
 
 struct ScaledBy {
     double square;
@@ -132,12 +115,15 @@ double largest_change(const AxisMatrix<double>& a, const AxisMatrix<double>& b) 
 
 }  // namespace
 
-Transition MotionModel::transition(double dt) const noexcept {
-    return std::visit(TransitionOver{dt}, kind);
+Transition MotionModel::Singer::transition(double dt) const noexcept {
+    return singer_transition(alpha, dt, decay(alpha * dt));
 }
 
-AxisMatrix<double> MotionModel::process_noise(double dt) const noexcept {
-    return std::visit(NoiseOver{dt}, kind);
+MotionStep MotionModel::Singer::step(double dt) const noexcept {
+    const double u = alpha * dt;
+    const Decay d = decay(u);
+    return {singer_transition(alpha, dt, d),
+            scaled_matrix(u <= kSeriesLimit ? series_noise(u, dt) : closed_noise(alpha, u, d), q)};
 }
 
 MotionModel MotionModel::scaled(double factor) const {
@@ -151,14 +137,13 @@ MotionModel MotionModel::scaled(double factor) const {
 SteadyState steady_state(const MotionModel& model, double dt) {
     constexpr int kMostSteps = 1'000'000;
     constexpr double kSettled = 1e-15;
-    const Transition f = model.transition(dt);
-    const AxisMatrix<double> q = model.process_noise(dt);
-    SteadyState steady{model.initial_covariance(), {}};
-    for (int step = 0; step < kMostSteps; ++step) {
-        const AxisMatrix<double> before = steady.covariance;
-        steady.covariance = propagated(before, f, q);
+    const MotionStep step = model.step(dt);
+    SteadyState steady{{}, model.initial_covariance(), {}};
+    for (int i = 0; i < kMostSteps; ++i) {
+        const AxisMatrix<double> last = steady.covariance;
+        steady.before = steady.covariance = propagated(last, step);
         steady.gain = correct(steady.covariance, model.measurement_variance);
-        if (largest_change(before, steady.covariance) <= kSettled) break;
+        if (largest_change(last, steady.covariance) <= kSettled) break;
     }
     return steady;
 }

@@ -18,32 +18,54 @@ namespace tracking {
 /// and P stays what it is there; F(dt) keeps the true dt. No allocation.
 class PositionFilter {
 public:
+    struct Estimate {
+        AxisStates x;
+        AxisMatrix<double> p;
+
+        /// From the estimated position to a measured one [m].
+        [[nodiscard]] Lanes innovation(const Eigen::Vector3d& measured) const noexcept {
+            return to_lanes(measured) - x.p;
+        }
+    };
+
     /// steady_rate_hz 0: the gain follows P.
     explicit PositionFilter(const MotionModel& model, double steady_rate_hz = 0);
 
     void start(const Eigen::Vector3d& position) noexcept;
-    void propagate(double dt) noexcept;
-    /// From the position that propagate() predicted to a measured one [m].
-    [[nodiscard]] Lanes innovation(const Eigen::Vector3d& measured) const noexcept {
-        return to_lanes(measured) - x_.p;
+    /// The estimate moved on by dt; leaves the filter alone.
+    [[nodiscard]] Estimate propagate(double dt) const noexcept {
+        if (steady_) return {model_.transition(dt) * now_.x, steady_->before};
+        const MotionStep step = model_.step(dt);
+        return {step.f * now_.x, propagated(now_.p, step)};
     }
+    /// Takes a measurement into account that lies `innovation` from a propagated estimate.
+    void correct(Estimate& estimate, const Lanes& innovation) const noexcept {
+        if (steady_) {
+            add(estimate.x, steady_->gain, innovation);
+            estimate.p = steady_->covariance;
+        } else {
+            add(estimate.x, tracking::correct(estimate.p, model_.measurement_variance), innovation);
+        }
+    }
+    void accept(const Estimate& estimate) noexcept { now_ = estimate; }
     /// Variance of the innovation on an axis, H P H^T + R [m^2].
-    [[nodiscard]] double innovation_variance() const noexcept { return p_.pp + model_.measurement_variance; }
-    void correct(const Lanes& innovation) noexcept;
-
-    [[nodiscard]] AxisStates after(double lead_s) const noexcept { return model_.transition(lead_s) * x_; }
-    [[nodiscard]] AxisMatrix<double> covariance_after(double lead_s) const noexcept {
-        return propagated(p_, model_.transition(lead_s), model_.process_noise(lead_s));
+    [[nodiscard]] double innovation_variance(const Estimate& estimate) const noexcept {
+        return estimate.p.pp + model_.measurement_variance;
     }
-    [[nodiscard]] const AxisStates& state() const noexcept { return x_; }
-    [[nodiscard]] const AxisMatrix<double>& covariance() const noexcept { return p_; }
+
+    [[nodiscard]] AxisStates after(double lead_s) const noexcept {
+        return model_.transition(lead_s) * now_.x;
+    }
+    [[nodiscard]] AxisMatrix<double> covariance_after(double lead_s) const noexcept {
+        return propagated(now_.p, model_.step(lead_s));
+    }
+    [[nodiscard]] const Estimate& now() const noexcept { return now_; }
     [[nodiscard]] const MotionModel& model() const noexcept { return model_; }
 
 private:
     MotionModel model_;
+    Estimate now_;
     std::optional<SteadyState> steady_;
-    AxisStates x_;
-    AxisMatrix<double> p_;
 };
 
 }  // namespace tracking

@@ -40,9 +40,9 @@ void RotationFilter::absorb() noexcept {
 
 void RotationFilter::turn(double dt) noexcept {
     since_measured_ += dt;
-    const Transition f = model_.transition(dt);
-    rates_ = f * rates_;
-    p_ = propagated(p_, f, model_.process_noise(dt));
+    const MotionStep step = model_.step(dt);
+    rates_ = step.f * rates_;
+    p_ = propagated(p_, step);
     absorb();
 }
 
@@ -81,7 +81,7 @@ void RotationFilter::turned(double lead_s, PosePrediction& pose) const noexcept 
 
 double RotationFilter::variance_after(double lead_s) const noexcept {
     if (!started_) return kHalfTurn * kHalfTurn / 3;
-    return propagated(p_, model_.transition(lead_s), model_.process_noise(lead_s)).pp;
+    return propagated(p_, model_.step(lead_s)).pp;
 }
 
 }  // namespace tracking

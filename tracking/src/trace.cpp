@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "text_cursor.h"
+#include "tracking/import.h"
 
 namespace tracking {
 namespace {
@@ -22,7 +23,21 @@ struct FileCloser {
     Line(name, 1, "").fail(0, found, "a trace file that can be read", remedy);
 }
 
-std::string read_all(const std::string& name) {
+}  // namespace
+
+double Trace::t0_s() const {
+    double t = std::numeric_limits<double>::infinity();
+    for (const StickTrace& stick : sticks) t = std::min(t, stick.samples.front().t_s);
+    return t;
+}
+
+double Trace::t_end_s() const {
+    double t = -std::numeric_limits<double>::infinity();
+    for (const StickTrace& stick : sticks) t = std::max(t, stick.samples.back().t_s);
+    return t;
+}
+
+std::string read_bytes(const std::string& name) {
     std::error_code ignored;
     if (std::filesystem::is_directory(name, ignored)) fail(name, "a directory", "name the file in it");
     const std::unique_ptr<std::FILE, FileCloser> file(std::fopen(name.c_str(), "rb"));
@@ -41,23 +56,9 @@ std::string read_all(const std::string& name) {
     return text;
 }
 
-}  // namespace
-
-double Trace::t0_s() const {
-    double t = std::numeric_limits<double>::infinity();
-    for (const StickTrace& stick : sticks) t = std::min(t, stick.samples.front().t_s);
-    return t;
-}
-
-double Trace::t_end_s() const {
-    double t = -std::numeric_limits<double>::infinity();
-    for (const StickTrace& stick : sticks) t = std::max(t, stick.samples.back().t_s);
-    return t;
-}
-
 Trace read_trace(const std::filesystem::path& file) {
     const std::string name = file.string();
-    return parse_trace(read_all(name), name);
+    return parse_trace(read_bytes(name), name);
 }
 
 }  // namespace tracking

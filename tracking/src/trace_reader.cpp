@@ -3,6 +3,7 @@
 #include <unordered_map>
 
 #include "bsor_reader.h"
+#include "orientation_forms.h"
 #include "rotation.h"
 #include "text_cursor.h"
 #include "trace_keys.h"
@@ -155,7 +156,7 @@ private:
             p[axis] = line.number_in(fields_[static_cast<std::size_t>(axis) + 2], "a coordinate",
                                      kFarthest / scale, limit);
         if (scale != 1) p /= 1000;  // 0.001 is no double: dividing keeps whole mm exact
-        return keys_.z_up() ? Eigen::Vector3d(p.x(), p.z(), -p.y()) : p;
+        return keys_.z_up() ? from_z_up(p) : p;
     }
 
     /// True if the orientation fields are all empty; throws if only some are.
@@ -185,13 +186,13 @@ private:
             q = read_quaternion(line);
         } else {
             const Eigen::Vector3d v = read_angles(line);
-            q = orientation_ == Orientation::euler ? from_euler(v) : stick.file_orientation * exponential(v);
+            q = orientation_ == Orientation::euler ? from_euler(v * (std::numbers::pi / 180), "XYZ")
+                                                   : stick.file_orientation * exponential(v);
         }
         if (std::abs(q.squaredNorm() - 1) > kUnitTolerance) q.normalize();
         if (q.dot(stick.file_orientation) < 0 && !stick.trace.samples.empty()) q.coeffs() = -q.coeffs();
         stick.file_orientation = q;
-        constexpr double kHalf = std::numbers::sqrt2 / 2;
-        sample.orientation = keys_.z_up() ? (Eigen::Quaterniond(kHalf, -kHalf, 0, 0) * q).normalized() : q;
+        sample.orientation = keys_.z_up() ? from_z_up(q) : q;
         sample.has_orientation = true;
     }
 
@@ -216,13 +217,6 @@ private:
                                euler ? "an Euler angle in degrees" : "an incremental rotation in rad",
                                euler ? kLargestAngle : kLargestIncrement, euler ? "1e6 degrees" : "100 rad");
         return v;
-    }
-
-    static Eigen::Quaterniond from_euler(const Eigen::Vector3d& degrees) {
-        const Eigen::Vector3d rad = degrees * (std::numbers::pi / 180);
-        return exponential(rad.x() * Eigen::Vector3d::UnitX()) *
-               exponential(rad.y() * Eigen::Vector3d::UnitY()) *
-               exponential(rad.z() * Eigen::Vector3d::UnitZ());
     }
 
     Trace finish() {

@@ -1,0 +1,31 @@
+#pragma once
+#include <tracking/import.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace app {
+
+/// A map by path, or by the name of a bundled one ("optitrack" is assets/maps/optitrack.toml), or spelt out:
+/// "t=Time,px=X,py=Y,pz=Z". Throws BadInput with its place.
+[[nodiscard]] tracking::ColumnMap find_map(const std::string& map);
+
+/// A map file (TOML). Throws BadInput with FILE:LINE:COLUMN for whatever is unknown or wrong.
+[[nodiscard]] tracking::ColumnMap read_map(const std::filesystem::path& file);
+/// Its text; reads back to the same map.
+[[nodiscard]] std::string format_map(const tracking::ColumnMap& map);
+
+/// The bundled map for a file that begins so; none if it has none of their signatures.
+[[nodiscard]] std::optional<tracking::ColumnMap> map_for(std::string_view text);
+/// Names of the bundled maps.
+[[nodiscard]] std::vector<std::string> map_names();
+
+/// Metres per unit of "m", "cm" or "mm"; the separator called "comma", "semicolon", "tab" or "space"; seconds
+/// per "s", "ms", "us" or "ns". Throw BadInput naming the option.
+[[nodiscard]] double metres_per(const std::string& unit, const std::string& option);
+[[nodiscard]] char separator_called(const std::string& name, const std::string& option);
+[[nodiscard]] double seconds_per(const std::string& unit, const std::string& option);
+
+}  // namespace app

@@ -1,0 +1,63 @@
+#pragma once
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tracking/trace.h"
+
+namespace tracking {
+
+/// Where a table of another program keeps what a trace needs, and in which units and axes.
+///
+/// `columns` maps roles to columns. Roles: `t` or `frame` (neither: rows are frames), `stick` (a row a
+/// stick), px py pz, and one of qw qx qy qz | ex ey ez (with `euler`) | m00 m01 .. m22 (rotation matrix, row
+/// and column) | nothing. All turn body to world. A role may name its stick: `left.px`. Columns are
+///
+///   NAME    the header's cell; a header of several lines: its cells from top to bottom, joined by '/',
+///           empty ones left out. '*' stands for anything; {stick} for a name without '/': a stick each
+///   #N      the N-th column, from 1
+///   +N      N columns right of the same stick's px
+struct ColumnMap {
+    char separator = ',';  ///< ',' ';' or '\t'; ' ': any run of blanks and tabs
+    char comment = 0;      ///< lines that begin with it are left out
+    bool decimal_comma = false;
+    std::string header;       ///< first cell of the header's last line; empty: the first line that is no
+                              ///< comment, or none where all columns are numbers
+    std::string header_from;  ///< a cell of the header's first line, among its first two; empty: `header`
+    std::map<std::string, std::string> columns;
+    double metres_per_unit = 1;
+    std::string units_from;  ///< above the header, a cell of this text stands before the unit's name
+    bool z_up = false;       ///< (x, y, z) becomes (x, z, -y), as in native files
+    std::string euler;       ///< order of the intrinsic turns, a permutation of XYZ
+    bool radians = false;    ///< of Euler angles; else degrees
+    double seconds_per_unit = 1;
+    bool from_zero = false;  ///< times count from the first row's
+    double rate_hz = 0;      ///< of frames
+    std::string rate_from;   ///< above the header, a cell of this text stands before the rate, unless given
+    bool zero_is_lost = false;  ///< a position of three zeros means: not seen
+    std::string signature;      ///< text within a file's first 2000 bytes that tells this kind of file
+    std::optional<Eigen::Vector3d> tip, shaft;
+
+    /// Throws std::invalid_argument (found, expected) for what cannot be a map.
+    void check() const;
+};
+
+/// A table's text; `stick` names the stick where the table itself does not.
+struct Table {
+    std::string text;
+    std::string name;  ///< of the file, for messages
+    std::string stick = "stick";
+};
+
+/// Reads tables of one kind into one trace. Rows in which a stick is not seen (all its cells empty, or `NaN`)
+/// are left out and counted in the trace's remarks; a row without orientation is position only. Quaternions
+/// take the sign that continues the sample before, so that Euler angles that jump by 360 degrees, or pass
+/// through 90, read to continuous ones. Limits as for native traces. Frames and `from_zero` count from the
+/// first row of the first table. Throws TraceError with its place; nothing is guessed.
+[[nodiscard]] Trace read_tables(const std::vector<Table>& tables, const ColumnMap& map);
+
+/// A file's bytes, at most 1 GiB. Throws TraceError.
+[[nodiscard]] std::string read_bytes(const std::string& file);
+
+}  // namespace tracking

@@ -1,0 +1,29 @@
+#pragma once
+#include <string>
+#include <vector>
+
+#include "tracking/trace.h"
+
+namespace tracking {
+
+/// What a trace holds that recordings of drummers do not, a line each with its evidence; empty for nothing.
+/// Wrong units, axes and conventions look like this:
+///
+///   units        no stick ranges over 0.1 m nor moves at 0.5 m/s (both as the 98 % in the middle, and the
+///                fastest per cent); or one ranges over more than 3 m, or moves at more than 30 m/s
+///   gravity      what stops the tips (the strongest 0.2 % of accelerations, of 1000 at least) comes from one
+///                side (the mean of their unit vectors is longer than 0.45) that is more than 60 degrees off
+///                from up
+///   orientation  wrists turn sticks: motion over 1/30 s is compared with that of a body that turns about a
+///                point r fixed in it, dp = -(dR) r, r by least squares. Another reading of the orientation
+///                (inverse; mirrored in x, y or z; components in another order; y for z) explains half of the
+///                motion and more, and a quarter of the motion more than the one given
+///   sides        a stick `left` more than 5 cm to the right of one `right`, seen along their shafts: a
+///                mirrored axis, or swapped names
+///
+/// Thresholds: 31 recordings (sabers, mallets, a drumstick) stay clear of them: ranges 0.23 to 1.2 m, fastest
+/// per cent 1.9 to 16 m/s, accelerations of sabers, which nothing stops, up to 0.39. Sides are judged only
+/// where the shafts point one way (mean of their horizontal parts above 0.7).
+[[nodiscard]] std::vector<std::string> implausible(const Trace& trace);
+
+}  // namespace tracking
