@@ -62,7 +62,10 @@ std::vector<double> leads_of(const std::string& text) {
 
 std::vector<std::string> predictors_of(const std::string& list) {
     if (!list.empty()) return split_specifications(list);
-    return tracking::predictor_names();
+    std::vector<std::string> all = {"auto"};
+    for (const std::string& name : tracking::predictor_names())
+        if (name != "auto") all.push_back(name);
+    return all;
 }
 
 /// NAME=VALUE pairs; the last `=` parts them if `at_last`, else the first.

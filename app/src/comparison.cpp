@@ -94,7 +94,7 @@ private:
     [[nodiscard]] HitScore hits(const SensedStick& stick, const Entrant& entrant, std::size_t place,
                                 std::size_t lead) const {
         const Recording& recording = field_.recordings[stick.recording];
-        const auto predictor = make_entrant(entrant, stick, place, lead);
+        const auto predictor = make_striker(entrant, stick, place, lead);
         HitScore score = evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples, *predictor,
                                           recording.geometry, options_.surface, stick.leads_s[lead],
                                           options_.release_margin_s);

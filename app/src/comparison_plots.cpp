@@ -65,6 +65,16 @@ bool superseded(const std::string& name, const std::set<std::string>& tuned) {
     return !name.ends_with('*') && name != "naive" && tuned.contains(family_of(name));
 }
 
+/// The place of a family among those that take part: its colour in every plot of costs.
+std::size_t family_number(const Comparison& comparison, const std::string& family) {
+    std::vector<std::string> families;
+    for (const auto& [name, description] : comparison.predictors) {
+        const std::string own = family_of(name.substr(0, name.find('*')));
+        if (std::find(families.begin(), families.end(), own) == families.end()) families.push_back(own);
+    }
+    return static_cast<std::size_t>(std::find(families.begin(), families.end(), family) - families.begin());
+}
+
 }  // namespace
 
 ComparisonPlot height_plot(const StickFigure& figure) {
@@ -125,35 +135,29 @@ ComparisonPlot curves_plot(const Comparison& comparison) {
 }
 
 ComparisonPlot cost_plot(const Comparison& comparison, double lead_s) {
-    std::string points, tuned_points;
+    ComparisonPlot plot;
+    PlotPanel panel;
     double fastest = 1e9, slowest = 1, least = 1e9, most = 0;
     for (const ComparisonSummary& s : comparison.summaries) {
         if (s.lead_s != lead_s || !(s.ns_per_sample > 0) || s.predictor.ends_with("**")) continue;
-        fmt::format_to(std::back_inserter(s.predictor.ends_with('*') ? tuned_points : points),
-                       "{:.3f} {:.4f} \"{}\"\n", s.ns_per_sample, s.error.rms_mm, s.predictor);
+        const bool tuned = s.predictor.ends_with('*');
+        const std::size_t n =
+            family_number(comparison, family_of(s.predictor.substr(0, s.predictor.find('*'))));
+        const PlotLine look = line_of(n, s.predictor);
+        panel.add(fmt::format("{:.3f} {:.4f}\n", s.ns_per_sample, s.error.rms_mm),
+                  fmt::format("with points pt {} ps 0.8 lw 1.5 lc {}",
+                              (look.dashed ? 4 : 6) + (tuned ? 1 : 0), gnuplot_colour(look.colour)));
+        if (!tuned) plot.legend.push_back(look);
         fastest = std::min(fastest, s.ns_per_sample), slowest = std::max(slowest, s.ns_per_sample);
         least = std::min(least, s.error.rms_mm), most = std::max(most, s.error.rms_mm);
     }
-    const auto marks = [](const ReportColour& colour) {
-        return fmt::format(
-            "using 1:2:3 with labels point pt 7 ps 0.5 lc {} offset 0,0.6 font ',9' textcolor {}",
-            gnuplot_colour(colour), gnuplot_colour(colours::axis));
-    };
-    PlotPanel panel;
-    panel.add(points, marks(colours::sticks[0]));
-    panel.add(tuned_points, marks(colours::sticks[1]));
-    ComparisonPlot plot;
-    plot.legend = {{"as named", colours::sticks[0], false},
-                   {"tuned on other recordings", colours::sticks[1], false}};
     const double room = 0.12 * (most - least) + 0.5;
-    plot.script = {
-        kHalf, 320,
-        plot_axes() + round_tics("y", most - least + 2 * room, 6) +
-            fmt::format(
-                "set logscale x\nset xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel 'ns a sample, all "
-                "leads'\nset ylabel 'RMS error, mm'\n",
-                fastest / 2, slowest * 2, std::max(0.0, least - room), most + room) +
-            panel.text()};
+    plot.script = {kHalf, 320,
+                   plot_axes() + round_tics("y", most - least + 2 * room, 6) +
+                       fmt::format("set logscale x\nset xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel 'ns a "
+                                   "sample, all leads'\nset ylabel 'RMS error, mm'\n",
+                                   fastest / 1.5, slowest * 1.5, std::max(0.0, least - room), most + room) +
+                       panel.text()};
     return plot;
 }
 

@@ -28,7 +28,8 @@ struct ComparisonPlot {
 [[nodiscard]] ComparisonPlot zoomed_plot(const StickFigure& figure, const std::string& predictor);
 /// RMS over lead, 0 to 150 ms. Of a family the tuned curve alone, where there is one; naive of 1992 stays.
 [[nodiscard]] ComparisonPlot curves_plot(const Comparison& comparison);
-/// Cost of a sample against RMS at a lead, a labelled point a predictor.
+/// Cost of a sample against RMS at a lead: an open point a predictor as named, a filled one as tuned; a
+/// colour a family, and a square where its legend is dashed.
 [[nodiscard]] ComparisonPlot cost_plot(const Comparison& comparison, double lead_s);
 /// Committed minus true time of the matched strikes of one predictor at a lead.
 [[nodiscard]] ComparisonPlot timing_plot(const ComparisonSummary& summary);

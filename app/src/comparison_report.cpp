@@ -133,9 +133,12 @@ Placed declare(Plots& plots, const Comparison& comparison) {
         placed.zoomed.push_back(plots.add(
             zoomed_plot(figure, name), fmt::format("Figure {}: {}", name == "naive" ? "3-3" : "3-2", name)));
     placed.curves = plots.add(curves_plot(comparison), "RMS error against lead");
-    for (const double lead_s : comparison.options.leads_s)
+    const bool timed = std::any_of(comparison.summaries.begin(), comparison.summaries.end(),
+                                   [](const ComparisonSummary& s) { return s.ns_per_sample > 0; });
+    for (std::size_t i = 0; timed && i < comparison.options.leads_s.size(); ++i)
         placed.costs.push_back(
-            plots.add(cost_plot(comparison, lead_s), fmt::format("{:.1f} ms ahead", 1e3 * lead_s)));
+            plots.add(cost_plot(comparison, comparison.options.leads_s[i]),
+                      fmt::format("{:.1f} ms ahead", 1e3 * comparison.options.leads_s[i])));
     for (const ComparisonSummary* s : shown_strikes(comparison))
         placed.timings.push_back(plots.add(
             timing_plot(*s), fmt::format("{}, {:.1f} ms ahead: {} of {} true strikes matched", s->predictor,
@@ -169,11 +172,12 @@ std::string sections(const Comparison& c, const Plots& plots, const Placed& plac
                     "Ratio of the RMS errors, below 1 is better; where the interval includes 1 there is no "
                     "measurable gain.",
                     paired_table(c));
-    if (c.options.cost)
-        text +=
-            section("Speed against error",
-                    "Update and predictions at all leads, one core; the figure that differs between runs.",
-                    plots.pair(placed.costs));
+    if (!placed.costs.empty())
+        text += section("Speed against error",
+                        "Update and predictions at all leads, one core; the figure that differs between "
+                        "runs. Open points: "
+                        "as named; filled: tuned. Families whose legend is dashed are squares.",
+                        plots.pair(placed.costs));
     text += section("Strikes",
                     "Committed at the lead, matched one to one within 30 ms; cancelling goes on until the "
                     "release margin.",

@@ -9,6 +9,7 @@
 
 #include "bad_input.h"
 #include "predictors.h"
+#include "stick_tracker.h"
 #include "tuning.h"
 
 namespace app {
@@ -16,6 +17,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kFromFiles = "predictions made elsewhere; their cost is not known";
+constexpr const char* kAuto = "auto";
 constexpr const char* kParabola = "least-squares:degree=2,n=4";
 
 bool is_known(const std::string& specification) {
@@ -24,6 +26,9 @@ bool is_known(const std::string& specification) {
 }
 
 std::string description_of(const std::string& specification) {
+    if (specification == kAuto)
+        return fmt::format("the program's default: {} draws (errors), {} strikes",
+                           picture_specification(specification), sound_specification(specification));
     if (is_external(specification)) return "a child process; its cost is not measured";
     if (specification == "naive") return "baseline: the moving average of 1992, 67 ms";
     if (specification == kParabola) return "baseline: the parabola through four samples";
@@ -36,7 +41,8 @@ Entrant named(const std::string& specification, std::size_t recordings, std::siz
     entrant.description = description_of(specification);
     entrant.baseline = is_baseline(specification);
     entrant.external = is_external(specification);
-    entrant.used.assign(recordings, std::vector<std::string>(leads, specification));
+    entrant.used.assign(recordings, std::vector<std::string>(leads, picture_specification(specification)));
+    if (specification == kAuto) entrant.strikes_by = sound_specification(specification);
     return entrant;
 }
 
@@ -210,6 +216,12 @@ std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const 
     if (const auto replay = entrant.replays.find({place, lead}); replay != entrant.replays.end())
         return make_replay(replay->second);
     return make_any_predictor(entrant.used[stick.recording][lead], stick.leads_s, stick.name);
+}
+
+std::unique_ptr<tracking::Predictor> make_striker(const Entrant& entrant, const SensedStick& stick,
+                                                  std::size_t place, std::size_t lead) {
+    if (entrant.strikes_by.empty()) return make_entrant(entrant, stick, place, lead);
+    return make_any_predictor(entrant.strikes_by, stick.leads_s, stick.name);
 }
 
 std::vector<std::string> specifications_of(const ComparisonOptions& options) {
