@@ -189,24 +189,27 @@ void add_file(Entrant& entrant, const std::string& file, std::span<const SensedS
     }
 }
 
+/// The entrant of a name that stands for files: the one there, or a new one.
+Entrant& file_entrant(EntrantList& list, const std::string& name, std::size_t recordings, std::size_t leads) {
+    for (Entrant& entrant : list.entrants) {
+        if (entrant.name != name) continue;
+        if (entrant.description == kFromFiles) return entrant;
+        throw BadInput(
+            fmt::format("error: found --predictions {}=..., expected a name that no predictor has", name));
+    }
+    Entrant entrant = named("", recordings, leads);
+    entrant.name = name;
+    entrant.description = kFromFiles;
+    entrant.external = true;
+    list.entrants.push_back(std::move(entrant));
+    return list.entrants.back();
+}
+
 void enter_files(EntrantList& list, const ComparisonOptions& options, std::span<const SensedStick> sticks,
                  std::size_t recordings) {
-    for (const auto& [name, file] : options.predictions) {
-        const auto same = std::find_if(list.entrants.begin(), list.entrants.end(),
-                                       [&](const Entrant& entrant) { return entrant.name == name; });
-        if (same != list.entrants.end() && same->description != kFromFiles)
-            throw BadInput(fmt::format(
-                "error: found --predictions {}={}, expected a name that no predictor has", name, file));
-        if (same == list.entrants.end()) {
-            Entrant entrant = named("", recordings, options.leads_s.size());
-            entrant.name = name;
-            entrant.description = kFromFiles;
-            entrant.external = true;
-            list.entrants.push_back(std::move(entrant));
-        }
-        Entrant& entrant = same == list.entrants.end() ? list.entrants.back() : *same;
-        add_file(entrant, file, sticks, recordings, options.leads_s);
-    }
+    for (const auto& [name, file] : options.predictions)
+        add_file(file_entrant(list, name, recordings, options.leads_s.size()), file, sticks, recordings,
+                 options.leads_s);
 }
 
 }  // namespace

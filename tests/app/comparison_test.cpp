@@ -127,7 +127,7 @@ TEST_F(Comparisons, PredictionsFromAFileOfHoldErrAsHoldDoes) {
     // `hold` predicts the sample itself: the file is the sensed samples, a lead later.
     const app::Recording recording = app::read_recording(options_.traces[1]);
     tracking::Trace answers;
-    answers.sticks.push_back({"right", tracking::sense(recording.trace.sticks[0], options_.sensor, 1)});
+    answers.sticks.push_back({"right", tracking::sense(recording.trace.sticks[0], options_.sensor, 0)});
     auto& rows = answers.sticks[0].samples;
     rows.erase(rows.begin());
     for (tracking::PoseSample& row : rows) row.t_s += 0.1;
