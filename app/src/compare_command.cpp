@@ -168,7 +168,7 @@ void add_compare_command(CLI::App& program) {
     command->add_option("--seed", a->seed, "Seed of the sensor and of the intervals")->capture_default_str();
     command->add_option("--tune", a->tune, "Tune on these traces instead of on the others compared");
     command->add_option("--predictions", a->predictions,
-                        "NAME=FILE: predictions made elsewhere, in predict's format");
+                        "NAME=FILE[@TRACE]: predictions made elsewhere, in predict's format");
     command->add_option("--person", a->persons, "TEXT=NAME: traces whose path contains TEXT are of NAME");
     command->add_flag("--no-tuning", a->no_tuning, "Run the predictors as named only");
     command->add_flag("--no-cost", a->no_cost, "Measure no cost: the results are then the same on every run");

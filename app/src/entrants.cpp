@@ -156,27 +156,46 @@ Answers answers_of(const PredictionFile& file, std::span<const SensedStick> stic
     return answers;
 }
 
-/// The recording that a file answers, with its answers. With one recording its misfit is told in full.
-std::pair<std::size_t, Answers> find_recording(const PredictionFile& file,
-                                               std::span<const SensedStick> sticks, std::size_t recordings) {
-    if (recordings == 1) return {0, answers_of(file, sticks, 0)};
-    for (std::size_t recording = 0; recording < recordings; ++recording) {
+/// FILE or FILE@TRACE: the file, and the recording that is named (all: none).
+std::pair<std::string, std::size_t> split_file(const std::string& text,
+                                               std::span<const Recording> recordings) {
+    const std::size_t at = text.rfind('@');
+    for (std::size_t r = 0; at != std::string::npos && r < recordings.size(); ++r)
+        if (recordings[r].file == text.substr(at + 1)) return {text.substr(0, at), r};
+    return {text, recordings.size()};
+}
+
+/// The recordings whose samples a file answers; recordings sampled at the same times cannot be told apart.
+std::size_t find_recording(const PredictionFile& file, std::span<const SensedStick> sticks,
+                           std::span<const Recording> recordings) {
+    std::vector<std::size_t> fitting;
+    for (std::size_t recording = 0; recording < recordings.size(); ++recording) {
         try {
-            return {recording, answers_of(file, sticks, recording)};
+            (void)answers_of(file, sticks, recording);
+            fitting.push_back(recording);
         } catch (const BadInput&) {  // the samples of another recording
         }
     }
+    if (fitting.size() == 1) return fitting.front();
+    if (fitting.empty())
+        throw BadInput(fmt::format(
+            "{}: error: found predictions that fit none of the {} traces, expected a row for every "
+            "sample from the second on of each stick; say NAME=FILE@TRACE to see why",
+            file.rows.file, recordings.size()));
     throw BadInput(fmt::format(
-        "{}: error: found predictions that fit none of the {} traces, expected a row for every sample from "
-        "the second on of each stick; compare it with its trace alone to see why",
-        file.rows.file, recordings));
+        "{}: error: found predictions that fit {} and {}, expected to know which; say NAME=FILE@TRACE",
+        file.rows.file, recordings[fitting[0]].file, recordings[fitting[1]].file));
 }
 
-void add_file(Entrant& entrant, const std::string& file, std::span<const SensedStick> sticks,
-              std::size_t recordings, std::span<const double> leads_s) {
+void add_file(Entrant& entrant, const std::string& text, std::span<const SensedStick> sticks,
+              std::span<const Recording> recordings, std::span<const double> leads_s) {
+    const auto [file, named_recording] = split_file(text, recordings);
     const PredictionFile predictions = read_prediction_file(file);
-    const auto [recording, answers] = find_recording(predictions, sticks, recordings);
-    for (const auto& [place, answer] : answers) {
+    // With one recording its misfit is told in full.
+    const std::size_t recording = named_recording < recordings.size() ? named_recording
+                                  : recordings.size() == 1            ? 0
+                                                           : find_recording(predictions, sticks, recordings);
+    for (const auto& [place, answer] : answers_of(predictions, sticks, recording)) {
         const std::size_t lead = lead_of(answer, file, leads_s);
         entrant.used[recording][lead] = file;
         StickPredictions exact = answer;
@@ -206,10 +225,10 @@ Entrant& file_entrant(EntrantList& list, const std::string& name, std::size_t re
 }
 
 void enter_files(EntrantList& list, const ComparisonOptions& options, std::span<const SensedStick> sticks,
-                 std::size_t recordings) {
+                 std::span<const Recording> recordings) {
     for (const auto& [name, file] : options.predictions)
-        add_file(file_entrant(list, name, recordings, options.leads_s.size()), file, sticks, recordings,
-                 options.leads_s);
+        add_file(file_entrant(list, name, recordings.size(), options.leads_s.size()), file, sticks,
+                 recordings, options.leads_s);
 }
 
 }  // namespace
@@ -250,7 +269,7 @@ EntrantList enter(const ComparisonOptions& options, std::span<const Recording> r
         enter_tuned(list, tunable_families(specifications), options, recordings, sticks);
     else
         list.tuned_on = "nothing is tuned, as asked";
-    enter_files(list, options, sticks, recordings.size());
+    enter_files(list, options, sticks, recordings);
     return list;
 }
 

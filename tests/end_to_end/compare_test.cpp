@@ -54,9 +54,14 @@ TEST(Compare, WhatPredictWroteScoresAsThePredictorItself) {
     const Ended predicted =
         with_sensor({"predict", roll, "--predictor", "thesis", "--lead", "1/15", "--out", mine});
     ASSERT_EQ(predicted.status, 0) << predicted.err;
-    const Ended compared = with_sensor({"compare", flourish, roll, "--predictors", "thesis", "--leads",
-                                        "1/30,1/15", "--no-tuning", "--no-cost", "--predictions",
-                                        "mine=" + mine, "--out", (folder / "out").string()});
+    const auto compare = [&](const std::string& predictions) {
+        return with_sensor({"compare", flourish, roll, "--predictors", "thesis", "--leads", "1/30,1/15",
+                            "--no-tuning", "--no-cost", "--predictions", predictions, "--out",
+                            (folder / "out").string()});
+    };
+    // Both traces are sampled at the same times, so which one was predicted must be said.
+    expect_refused(compare("mine=" + mine), "flourish.csv and ");
+    const Ended compared = compare("mine=" + mine + "@" + roll);
     ASSERT_EQ(compared.status, 0) << compared.err;
     std::map<std::string, double> rms, tip;
     int rows = 0;
