@@ -8,7 +8,7 @@
 
 #include "bad_input.h"
 #include "comparison.h"
-#include "comparison_map.h"
+#include "comparison_report.h"
 #include "comparison_tables.h"
 #include "kit.h"
 #include "numbers.h"
@@ -62,7 +62,10 @@ std::vector<double> leads_of(const std::string& text) {
 
 std::vector<std::string> predictors_of(const std::string& list) {
     if (!list.empty()) return split_specifications(list);
-    return tracking::predictor_names();
+    std::vector<std::string> all = {"auto"};
+    for (const std::string& name : tracking::predictor_names())
+        if (name != "auto") all.push_back(name);
+    return all;
 }
 
 /// NAME=VALUE pairs; the last `=` parts them if `at_last`, else the first.
@@ -136,6 +139,7 @@ void run(const CompareArguments& a) {
     const Comparison comparison = compare(options);
     write_file(out.path("compare.json"), format_comparison_json(comparison));
     write_file(out.path("compare.csv"), format_comparison_csv(comparison));
+    write_file(out.path("report.html"), format_comparison_report(comparison, out.scratch()));
     out.finish();
     bar.clear();
     fmt::print("{}", format_comparison_text(comparison));
@@ -164,7 +168,7 @@ void add_compare_command(CLI::App& program) {
     command->add_option("--seed", a->seed, "Seed of the sensor and of the intervals")->capture_default_str();
     command->add_option("--tune", a->tune, "Tune on these traces instead of on the others compared");
     command->add_option("--predictions", a->predictions,
-                        "NAME=FILE: predictions made elsewhere, in predict's format");
+                        "NAME=FILE[@TRACE]: predictions made elsewhere, in predict's format");
     command->add_option("--person", a->persons, "TEXT=NAME: traces whose path contains TEXT are of NAME");
     command->add_flag("--no-tuning", a->no_tuning, "Run the predictors as named only");
     command->add_flag("--no-cost", a->no_cost, "Measure no cost: the results are then the same on every run");

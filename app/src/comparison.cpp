@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "comparison_figures.h"
 #include "comparison_map.h"
 #include "comparison_pairs.h"
 #include "entrants.h"
@@ -93,7 +94,7 @@ private:
     [[nodiscard]] HitScore hits(const SensedStick& stick, const Entrant& entrant, std::size_t place,
                                 std::size_t lead) const {
         const Recording& recording = field_.recordings[stick.recording];
-        const auto predictor = make_entrant(entrant, stick, place, lead);
+        const auto predictor = make_striker(entrant, stick, place, lead);
         HitScore score = evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples, *predictor,
                                           recording.geometry, options_.surface, stick.leads_s[lead],
                                           options_.release_margin_s);
@@ -174,6 +175,8 @@ Comparison compare(const ComparisonOptions& options) {
     std::erase_if(comparison.rows, [](const ComparisonRow& row) { return row.used.empty(); });
     comparison.summaries = summarise(comparison, entrants);
     comparison.paired = pair_with_baselines(comparison, entrants);
+    comparison.curves = lead_curves(field.recordings, entrants, options);
+    comparison.figure = stick_figure(field.recordings, field.sticks, entrants, comparison);
     if (options.map) comparison.map = map_sensors(field.recordings, options);
     return comparison;
 }

@@ -87,6 +87,21 @@ struct LeadCurve {
     std::vector<std::pair<double, double>> rms_mm;  ///< lead [s], RMS
 };
 
+/// What a predictor said of a stick's height at one lead: (time predicted for [s], height [m]).
+struct FigurePath {
+    std::string predictor, used;
+    double lead_s = 0;
+    std::vector<std::pair<double, double>> height_m;
+};
+
+/// One stick's height as recorded and as predicted (figures 3-1 to 3-3 of the thesis).
+struct StickFigure {
+    std::string trace, stick;
+    double from_s = 0, to_s = 0, zoom_from_s = 0, zoom_to_s = 0;
+    std::vector<std::pair<double, double>> recorded_m;
+    std::vector<FigurePath> paths;
+};
+
 /// One estimator at one lead under one sensor, against the best baseline there. Both are tuned on other
 /// recordings for that very sensor.
 struct MapCell {
@@ -117,6 +132,7 @@ struct Comparison {
     std::vector<ComparisonSummary> summaries;
     std::vector<PairedResult> paired;
     std::vector<LeadCurve> curves;
+    StickFigure figure;
     std::vector<MapCell> map;
     std::string tuned_on;  ///< one sentence
 };

@@ -6,6 +6,7 @@
 #include "parallel.h"
 #include "prediction_error.h"
 #include "predictors.h"
+#include "stick_tracker.h"
 #include "tuning.h"
 
 namespace app {
@@ -71,7 +72,7 @@ MapField field_of(const ComparisonOptions& options, bool tunable) {
         if (is_external(specification)) continue;
         const std::string family = family_of(specification);
         if (!tunable || tuning_grid(family).empty())
-            field.as_named.push_back(specification);
+            field.as_named.push_back(picture_specification(specification));
         else if (std::find(field.families.begin(), field.families.end(), family) == field.families.end())
             field.families.push_back(family);
     }

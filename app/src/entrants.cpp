@@ -9,6 +9,7 @@
 
 #include "bad_input.h"
 #include "predictors.h"
+#include "stick_tracker.h"
 #include "tuning.h"
 
 namespace app {
@@ -16,6 +17,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kFromFiles = "predictions made elsewhere; their cost is not known";
+constexpr const char* kAuto = "auto";
 constexpr const char* kParabola = "least-squares:degree=2,n=4";
 
 bool is_known(const std::string& specification) {
@@ -24,6 +26,9 @@ bool is_known(const std::string& specification) {
 }
 
 std::string description_of(const std::string& specification) {
+    if (specification == kAuto)
+        return fmt::format("the program's default: {} draws (errors), {} strikes",
+                           picture_specification(specification), sound_specification(specification));
     if (is_external(specification)) return "a child process; its cost is not measured";
     if (specification == "naive") return "baseline: the moving average of 1992, 67 ms";
     if (specification == kParabola) return "baseline: the parabola through four samples";
@@ -36,7 +41,8 @@ Entrant named(const std::string& specification, std::size_t recordings, std::siz
     entrant.description = description_of(specification);
     entrant.baseline = is_baseline(specification);
     entrant.external = is_external(specification);
-    entrant.used.assign(recordings, std::vector<std::string>(leads, specification));
+    entrant.used.assign(recordings, std::vector<std::string>(leads, picture_specification(specification)));
+    if (specification == kAuto) entrant.strikes_by = sound_specification(specification);
     return entrant;
 }
 
@@ -150,27 +156,46 @@ Answers answers_of(const PredictionFile& file, std::span<const SensedStick> stic
     return answers;
 }
 
-/// The recording that a file answers, with its answers. With one recording its misfit is told in full.
-std::pair<std::size_t, Answers> find_recording(const PredictionFile& file,
-                                               std::span<const SensedStick> sticks, std::size_t recordings) {
-    if (recordings == 1) return {0, answers_of(file, sticks, 0)};
-    for (std::size_t recording = 0; recording < recordings; ++recording) {
+/// FILE or FILE@TRACE: the file, and the recording that is named (all: none).
+std::pair<std::string, std::size_t> split_file(const std::string& text,
+                                               std::span<const Recording> recordings) {
+    const std::size_t at = text.rfind('@');
+    for (std::size_t r = 0; at != std::string::npos && r < recordings.size(); ++r)
+        if (recordings[r].file == text.substr(at + 1)) return {text.substr(0, at), r};
+    return {text, recordings.size()};
+}
+
+/// The recordings whose samples a file answers; recordings sampled at the same times cannot be told apart.
+std::size_t find_recording(const PredictionFile& file, std::span<const SensedStick> sticks,
+                           std::span<const Recording> recordings) {
+    std::vector<std::size_t> fitting;
+    for (std::size_t recording = 0; recording < recordings.size(); ++recording) {
         try {
-            return {recording, answers_of(file, sticks, recording)};
+            (void)answers_of(file, sticks, recording);
+            fitting.push_back(recording);
         } catch (const BadInput&) {  // the samples of another recording
         }
     }
+    if (fitting.size() == 1) return fitting.front();
+    if (fitting.empty())
+        throw BadInput(fmt::format(
+            "{}: error: found predictions that fit none of the {} traces, expected a row for every "
+            "sample from the second on of each stick; say NAME=FILE@TRACE to see why",
+            file.rows.file, recordings.size()));
     throw BadInput(fmt::format(
-        "{}: error: found predictions that fit none of the {} traces, expected a row for every sample from "
-        "the second on of each stick; compare it with its trace alone to see why",
-        file.rows.file, recordings));
+        "{}: error: found predictions that fit {} and {}, expected to know which; say NAME=FILE@TRACE",
+        file.rows.file, recordings[fitting[0]].file, recordings[fitting[1]].file));
 }
 
-void add_file(Entrant& entrant, const std::string& file, std::span<const SensedStick> sticks,
-              std::size_t recordings, std::span<const double> leads_s) {
+void add_file(Entrant& entrant, const std::string& text, std::span<const SensedStick> sticks,
+              std::span<const Recording> recordings, std::span<const double> leads_s) {
+    const auto [file, named_recording] = split_file(text, recordings);
     const PredictionFile predictions = read_prediction_file(file);
-    const auto [recording, answers] = find_recording(predictions, sticks, recordings);
-    for (const auto& [place, answer] : answers) {
+    // With one recording its misfit is told in full.
+    const std::size_t recording = named_recording < recordings.size() ? named_recording
+                                  : recordings.size() == 1            ? 0
+                                                           : find_recording(predictions, sticks, recordings);
+    for (const auto& [place, answer] : answers_of(predictions, sticks, recording)) {
         const std::size_t lead = lead_of(answer, file, leads_s);
         entrant.used[recording][lead] = file;
         StickPredictions exact = answer;
@@ -183,23 +208,27 @@ void add_file(Entrant& entrant, const std::string& file, std::span<const SensedS
     }
 }
 
-void enter_files(EntrantList& list, const ComparisonOptions& options, std::span<const SensedStick> sticks,
-                 std::size_t recordings) {
-    for (const auto& [name, file] : options.predictions) {
-        auto entrant = std::find_if(list.entrants.begin(), list.entrants.end(),
-                                    [&](const Entrant& e) { return e.name == name; });
-        if (entrant != list.entrants.end() && entrant->description != kFromFiles)
-            throw BadInput(fmt::format(
-                "error: found --predictions {}={}, expected a name that no predictor has", name, file));
-        if (entrant == list.entrants.end()) {
-            Entrant fresh = named("", recordings, options.leads_s.size());
-            fresh.name = name;
-            fresh.description = kFromFiles;
-            fresh.external = true;
-            entrant = list.entrants.insert(entrant, std::move(fresh));
-        }
-        add_file(*entrant, file, sticks, recordings, options.leads_s);
+/// The entrant of a name that stands for files: the one there, or a new one.
+Entrant& file_entrant(EntrantList& list, const std::string& name, std::size_t recordings, std::size_t leads) {
+    for (Entrant& entrant : list.entrants) {
+        if (entrant.name != name) continue;
+        if (entrant.description == kFromFiles) return entrant;
+        throw BadInput(
+            fmt::format("error: found --predictions {}=..., expected a name that no predictor has", name));
     }
+    Entrant entrant = named("", recordings, leads);
+    entrant.name = name;
+    entrant.description = kFromFiles;
+    entrant.external = true;
+    list.entrants.push_back(std::move(entrant));
+    return list.entrants.back();
+}
+
+void enter_files(EntrantList& list, const ComparisonOptions& options, std::span<const SensedStick> sticks,
+                 std::span<const Recording> recordings) {
+    for (const auto& [name, file] : options.predictions)
+        add_file(file_entrant(list, name, recordings.size(), options.leads_s.size()), file, sticks,
+                 recordings, options.leads_s);
 }
 
 }  // namespace
@@ -209,6 +238,12 @@ std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const 
     if (const auto replay = entrant.replays.find({place, lead}); replay != entrant.replays.end())
         return make_replay(replay->second);
     return make_any_predictor(entrant.used[stick.recording][lead], stick.leads_s, stick.name);
+}
+
+std::unique_ptr<tracking::Predictor> make_striker(const Entrant& entrant, const SensedStick& stick,
+                                                  std::size_t place, std::size_t lead) {
+    if (entrant.strikes_by.empty()) return make_entrant(entrant, stick, place, lead);
+    return make_any_predictor(entrant.strikes_by, stick.leads_s, stick.name);
 }
 
 std::vector<std::string> specifications_of(const ComparisonOptions& options) {
@@ -234,7 +269,7 @@ EntrantList enter(const ComparisonOptions& options, std::span<const Recording> r
         enter_tuned(list, tunable_families(specifications), options, recordings, sticks);
     else
         list.tuned_on = "nothing is tuned, as asked";
-    enter_files(list, options, sticks, recordings.size());
+    enter_files(list, options, sticks, recordings);
     return list;
 }
 

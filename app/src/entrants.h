@@ -26,14 +26,19 @@ struct Entrant {
     std::string description;  ///< one line
     Tuning tuning = Tuning::none;
     bool baseline = false, external = false;
+    std::string strikes_by;  ///< the specification that is scored on strikes, where it differs (`auto`)
     /// Recording x lead: the specification that runs, or the file that answers; empty: does not take part.
     std::vector<std::vector<std::string>> used;
     std::map<std::pair<std::size_t, std::size_t>, StickPredictions>
         replays;  ///< (stick among all, lead): the file's answers
 };
 
-/// A fresh predictor for the stick numbered `place` among all, at a lead. `used` of that place is not empty.
+/// A fresh predictor for the stick numbered `place` among all, at a lead; `used` of that place is not empty.
 [[nodiscard]] std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant,
+                                                                const SensedStick& stick, std::size_t place,
+                                                                std::size_t lead);
+/// The same for strikes.
+[[nodiscard]] std::unique_ptr<tracking::Predictor> make_striker(const Entrant& entrant,
                                                                 const SensedStick& stick, std::size_t place,
                                                                 std::size_t lead);
 

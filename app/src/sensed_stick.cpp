@@ -30,13 +30,13 @@ std::optional<Truth> truth_at(const Recording& recording, std::size_t stick, dou
 }  // namespace
 
 SensedStick sense_stick(const Recording& recording, std::size_t stick, const tracking::SensorModel& sensor,
-                        std::span<const double> leads_s, std::size_t place) {
+                        std::span<const double> leads_s) {
     SensedStick sensed;
     const tracking::StickTrace& recorded = recording.trace.sticks[stick];
     sensed.stick = stick;
     sensed.name = recorded.name;
     sensed.tip = recording.geometry.tip;
-    sensed.samples = tracking::sense(recorded, sensor, place);
+    sensed.samples = tracking::sense(recorded, sensor, stick);
     sensed.rate_hz = sensor.rate_hz > 0 ? sensor.rate_hz : median_rate(recorded.samples);
     sensed.leads_s.assign(leads_s.begin(), leads_s.end());
     sensed.truths.reserve(sensed.samples.size() * leads_s.size());
@@ -56,7 +56,7 @@ std::vector<SensedStick> sense_all(std::span<const Recording> recordings, const 
     std::vector<SensedStick> sticks;
     for (std::size_t r = 0; r < recordings.size(); ++r)
         for (std::size_t s = 0; s < recordings[r].trace.sticks.size(); ++s) {
-            sticks.push_back(sense_stick(recordings[r], s, sensor, leads_s, sticks.size()));
+            sticks.push_back(sense_stick(recordings[r], s, sensor, leads_s));
             sticks.back().recording = r;
         }
     return sticks;

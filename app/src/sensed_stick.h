@@ -42,10 +42,9 @@ struct SensedStick {
 /// Seconds at the start of a recording that are not scored.
 inline constexpr double kSettlingS = 0.5;
 
-/// `place`: index of the stick among all, for noise of its own.
+/// The samples are those that `musicworld predict` sees of the same file with the same sensor.
 [[nodiscard]] SensedStick sense_stick(const Recording& recording, std::size_t stick,
-                                      const tracking::SensorModel& sensor, std::span<const double> leads_s,
-                                      std::size_t place);
+                                      const tracking::SensorModel& sensor, std::span<const double> leads_s);
 
 /// Every stick of every recording, in order.
 [[nodiscard]] std::vector<SensedStick> sense_all(std::span<const Recording> recordings,

@@ -52,7 +52,7 @@ std::vector<std::string> least_squares_grid() {
 
 /// Singer's densities: a decade each, from a slow hand to contacts.
 std::vector<std::string> singer_grid() {
-    return crossed(filled("singer:alpha=", {"3", "10", "30", "100"}),
+    return crossed(filled("singer:alpha=", {"3", "10", "30", "100", "300"}),
                    filled(",q=", {"1e7", "1e8", "1e9", "1e10", "1e11", "1e12", "1e13", "1e14"}));
 }
 
@@ -67,9 +67,9 @@ std::vector<std::string> imm_grid() {
 }
 
 std::vector<std::string> one_euro_grid() {
-    return crossed(
-        crossed(filled("one-euro:min=", {"1", "3", "10", "30"}), filled(",beta=", {"0", "0.01", "0.1", "1"})),
-        filled(",d=", {"10", "30", "100"}));
+    return crossed(crossed(filled("one-euro:min=", {"1", "2", "3", "5", "10", "20", "40"}),
+                           filled(",beta=", {"0", "0.01", "0.1"})),
+                   filled(",d=", {"10", "30", "100", "1000"}));
 }
 
 const std::map<std::string, std::function<std::vector<std::string>()>>& grids() {

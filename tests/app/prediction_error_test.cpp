@@ -14,7 +14,7 @@ constexpr double kPi = std::numbers::pi;
 std::vector<app::LeadScore> scores_of(const app::Recording& recording, const std::string& predictor,
                                       const std::vector<double>& leads_s,
                                       const tracking::SensorModel& sensor = {}) {
-    const app::SensedStick stick = app::sense_stick(recording, 0, sensor, leads_s, 0);
+    const app::SensedStick stick = app::sense_stick(recording, 0, sensor, leads_s);
     return app::score_predictor(stick, *tracking::make_predictor(predictor));
 }
 
@@ -169,7 +169,7 @@ TEST(PredictionError, PositionsAloneScoreAsTheWholeDoes) {
     sensor.noise_m = 0.00025;
     const std::vector<double> leads_s = {1.0 / 30, 0.1};
     const app::SensedStick stick =
-        app::sense_stick(sample::recording_of(sample::steady, 5, 250), 0, sensor, leads_s, 0);
+        app::sense_stick(sample::recording_of(sample::steady, 5, 250), 0, sensor, leads_s);
     for (const char* name : {"naive", "cv", "singer"}) {
         const auto whole = app::score_predictor(stick, *tracking::make_predictor(name));
         const auto positions = app::score_positions(stick, *tracking::make_predictor(name));

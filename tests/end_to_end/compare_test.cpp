@@ -42,6 +42,41 @@ TEST(Compare, TwoBundledTracesGiveTheSameFilesTwiceAndSayWhichPredictorWins) {
     EXPECT_EQ(read_csv(folder / "a" / "compare.csv").size(), json["results"].size());
 }
 
+TEST(Compare, WhatPredictWroteScoresAsThePredictorItself) {
+    const Folder folder;
+    const std::vector<std::string> sensor = {"--rate", "60", "--noise", "0.25", "--seed", "5"};
+    const auto with_sensor = [&](std::vector<std::string> arguments) {
+        arguments.insert(arguments.end(), sensor.begin(), sensor.end());
+        return run(arguments);
+    };
+    const std::string flourish = bundled("traces/flourish.csv").string(),
+                      roll = bundled("traces/roll.csv").string(), mine = (folder / "mine.csv").string();
+    const Ended predicted =
+        with_sensor({"predict", roll, "--predictor", "thesis", "--lead", "1/15", "--out", mine});
+    ASSERT_EQ(predicted.status, 0) << predicted.err;
+    const auto compare = [&](const std::string& predictions) {
+        return with_sensor({"compare", flourish, roll, "--predictors", "thesis", "--leads", "1/30,1/15",
+                            "--no-tuning", "--no-cost", "--predictions", predictions, "--out",
+                            (folder / "out").string()});
+    };
+    // Both traces are sampled at the same times, so which one was predicted must be said.
+    expect_refused(compare("mine=" + mine), "flourish.csv and ");
+    const Ended compared = compare("mine=" + mine + "@" + roll);
+    ASSERT_EQ(compared.status, 0) << compared.err;
+    std::map<std::string, double> rms, tip;
+    int rows = 0;
+    const auto json = nlohmann::json::parse(read(folder / "out" / "compare.json"));
+    for (const auto& row : json["results"]) {
+        rows += row["predictor"] == "mine";
+        if (row["trace"] != roll || row["lead_s"].get<double>() < 0.05 || row["stick"] != "right") continue;
+        rms[row["predictor"]] = row["rms_mm"];
+        tip[row["predictor"]] = row["tip_rms_mm"];
+    }
+    EXPECT_EQ(rows, 2);                             // two sticks of one trace at one lead
+    EXPECT_NEAR(rms["mine"], rms["thesis"], 1e-6);  // t + lead is rounded where it is written
+    EXPECT_NEAR(tip["mine"], tip["thesis"], 1e-6);
+}
+
 TEST(Compare, BadUsageIsOneLineAndLeavesNothing) {
     const Folder folder;
     const std::string trace = bundled("traces/roll.csv").string();

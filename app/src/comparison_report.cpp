@@ -1,0 +1,211 @@
+#include "comparison_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <vector>
+
+#include "comparison_plots.h"
+#include "comparison_report_tables.h"
+#include "report_style.h"
+#include "report_svg.h"
+
+namespace app {
+namespace {
+
+std::string fact(std::string_view name, std::string_view value) {
+    return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", html(name), html(value));
+}
+
+std::string leads_text(const std::vector<double>& leads_s) {
+    std::string text;
+    for (const double lead_s : leads_s)
+        text += fmt::format("{}{:.1f}", text.empty() ? "" : ", ", 1e3 * lead_s);
+    return text + " ms";
+}
+
+std::string sensor_text(const tracking::SensorModel& sensor) {
+    std::string text =
+        sensor.rate_hz > 0 ? fmt::format("{:g} Hz", sensor.rate_hz) : "the recordings' own times";
+    text += fmt::format(", noise {:g} mm", 1e3 * sensor.noise_m);
+    if (sensor.jitter_s > 0) text += fmt::format(", jitter {:g} ms (true stamps)", 1e3 * sensor.jitter_s);
+    if (sensor.drop_out > 0) text += fmt::format(", {:g} % lost in bursts", 100 * sensor.drop_out);
+    return text + fmt::format(", seed {}", sensor.seed);
+}
+
+std::string heading(const Comparison& c) {
+    std::string persons;
+    for (const std::string& person : c.persons) persons += (persons.empty() ? "" : ", ") + person;
+    std::string text = "<header><h1>Predictors compared</h1>\n<p>by MusicWorld</p>\n<dl class=facts>\n";
+    text += fact("recordings", fmt::format("{}", c.options.traces.size()));
+    text += fact("persons", fmt::format("{}: {}", c.persons.size(), persons));
+    text += fact("sensor", sensor_text(c.options.sensor));
+    text += fact("leads", leads_text(c.options.leads_s));
+    text += fact("tuning", c.tuned_on);
+    text += fact("strikes on", c.options.surface_text);
+    text += "</dl></header>\n<h2>Which predictor wins</h2>\n";
+    for (const std::string& sentence : winners(c)) text += fmt::format("<p>{}</p>\n", html(sentence));
+    return text +
+           "<p class=note>Samples are taken at uniform times by linear interpolation, with noise; truth "
+           "likewise "
+           "at t + lead from the noiseless recording. The first 0.5 s and gaps are left out. Intervals are "
+           "95 %, by "
+           "bootstrap over recordings or persons; n is their number. NAME* runs the parameters that erred "
+           "least "
+           "on other recordings, NAME** on recordings of other persons. The best baseline is chosen on the "
+           "scored "
+           "recordings themselves, which favours it.</p>\n";
+}
+
+std::string legend_of(const std::vector<PlotLine>& lines) {
+    std::string text = "<ul class=legend>\n";
+    for (const PlotLine& line : lines)
+        text += fmt::format(
+            "<li><svg viewBox=\"0 0 22 12\" aria-hidden=\"true\"><path d=\"M1,6h20\" stroke=\"var(--{})\" "
+            "stroke-width=\"2.5\"{}/></svg>{}</li>\n",
+            line.colour.name, line.dashed ? " stroke-dasharray=\"5 3\"" : "", html(line.name));
+    return text + "</ul>\n";
+}
+
+/// The page's plots: declared in the order of the page, drawn at once, placed by number.
+class Plots {
+public:
+    std::size_t add(ComparisonPlot plot, std::string label) {
+        plots_.push_back(std::move(plot));
+        labels_.push_back(std::move(label));
+        return plots_.size() - 1;
+    }
+    void draw(const std::filesystem::path& scratch) {
+        std::vector<PlotScript> scripts;
+        for (const ComparisonPlot& plot : plots_) scripts.push_back(plot.script);
+        drawn_ = draw_svg(scripts, scratch);
+    }
+    [[nodiscard]] std::string symbols() const { return svg_symbols(drawn_.front()); }
+    [[nodiscard]] std::string element(std::size_t number) const {
+        const std::vector<PlotLine>& lines = plots_[number].legend;
+        return fmt::format("<div><h3>{}</h3>\n{}<div class=plot>\n{}</div></div>\n", html(labels_[number]),
+                           lines.empty() ? "" : legend_of(lines),
+                           inline_svg(drawn_[number], labels_[number]));
+    }
+    [[nodiscard]] std::string pair(const std::vector<std::size_t>& numbers) const {
+        std::string text = "<div class=pair>";
+        for (const std::size_t number : numbers) text += element(number);
+        return text + "</div>\n";
+    }
+
+private:
+    std::vector<ComparisonPlot> plots_;
+    std::vector<std::string> labels_, drawn_;
+};
+
+/// The predictors whose strikes are shown as histograms: of each lead the best F1, then thesis and naive.
+std::vector<const ComparisonSummary*> shown_strikes(const Comparison& comparison) {
+    std::vector<const ComparisonSummary*> shown;
+    for (const double lead_s : comparison.options.leads_s) {
+        const ComparisonSummary* best = nullptr;
+        for (const ComparisonSummary& s : comparison.summaries)
+            if (s.lead_s == lead_s && s.hits && (best == nullptr || s.hits->f1() > best->hits->f1()))
+                best = &s;
+        if (best != nullptr) shown.push_back(best);
+        for (const ComparisonSummary& s : comparison.summaries)
+            if (s.lead_s == lead_s && s.hits && &s != best &&
+                (s.predictor == "thesis" || s.predictor == "naive"))
+                shown.push_back(&s);
+    }
+    return shown;
+}
+
+struct Placed {
+    std::size_t height = 0, curves = 0;
+    std::vector<std::size_t> zoomed, costs, timings;
+};
+
+Placed declare(Plots& plots, const Comparison& comparison) {
+    Placed placed;
+    const StickFigure& figure = comparison.figure;
+    placed.height = plots.add(height_plot(figure), "Figure 3-1: height as recorded and as predicted");
+    std::vector<std::string> names;
+    for (const FigurePath& path : figure.paths)
+        if (std::find(names.begin(), names.end(), path.predictor) == names.end())
+            names.push_back(path.predictor);
+    for (const std::string& name : names)
+        placed.zoomed.push_back(plots.add(
+            zoomed_plot(figure, name), fmt::format("Figure {}: {}", name == "naive" ? "3-3" : "3-2", name)));
+    placed.curves = plots.add(curves_plot(comparison), "RMS error against lead");
+    const bool timed = std::any_of(comparison.summaries.begin(), comparison.summaries.end(),
+                                   [](const ComparisonSummary& s) { return s.ns_per_sample > 0; });
+    for (std::size_t i = 0; timed && i < comparison.options.leads_s.size(); ++i)
+        placed.costs.push_back(
+            plots.add(cost_plot(comparison, comparison.options.leads_s[i]),
+                      fmt::format("{:.1f} ms ahead", 1e3 * comparison.options.leads_s[i])));
+    for (const ComparisonSummary* s : shown_strikes(comparison))
+        placed.timings.push_back(plots.add(
+            timing_plot(*s), fmt::format("{}, {:.1f} ms ahead: {} of {} true strikes matched", s->predictor,
+                                         1e3 * s->lead_s, s->hits->matched, s->hits->true_contacts)));
+    return placed;
+}
+
+std::string section(std::string_view title, std::string_view note, const std::string& content) {
+    if (content.empty()) return {};
+    return fmt::format("<h2>{}</h2>\n<p class=note>{}</p>\n{}", title, note, content);
+}
+
+std::string sections(const Comparison& c, const Plots& plots, const Placed& placed) {
+    std::string text =
+        section("A stick and its predictions",
+                fmt::format("{}, stick {}. Each predicted point stands at the time that it was "
+                            "predicted for.",
+                            html(c.figure.trace), html(c.figure.stick)),
+                plots.element(placed.height) + plots.pair(placed.zoomed));
+    text += section("Error against lead",
+                    "All recordings together. Tuned parameters are those of the nearest lead asked for.",
+                    plots.element(placed.curves));
+    std::string tables;
+    for (const double lead_s : c.options.leads_s)
+        tables += fmt::format("<h3>{:.1f} ms ahead</h3>\n{}", 1e3 * lead_s, error_table(c, lead_s));
+    text += section("Errors",
+                    "Of the tracked point but where tip is said; free of impacts: truth not within 50 ms of "
+                    "impacts or flagged times.",
+                    tables);
+    text += section("Against the best baseline",
+                    "Ratio of the RMS errors, below 1 is better; where the interval includes 1 there is no "
+                    "measurable gain.",
+                    paired_table(c));
+    if (!placed.costs.empty())
+        text += section("Speed against error",
+                        "Update and predictions at all leads, one core; the figure that differs between "
+                        "runs. Open points: "
+                        "as named; filled: tuned. Families whose legend is dashed are squares.",
+                        plots.pair(placed.costs));
+    text += section("Strikes",
+                    "Committed at the lead, matched one to one within 30 ms; cancelling goes on until the "
+                    "release margin.",
+                    strike_table(c) + (placed.timings.empty() ? "" : plots.pair(placed.timings)));
+    text += section("Calibration",
+                    "Share of position errors inside the regions that a predictor states, and the mean "
+                    "negative log likelihood (nats, metres).",
+                    calibration_table(c));
+    text += section("Where filters pay",
+                    "Estimators and baselines tuned alike for each sensor, on other recordings; position "
+                    "only, true time stamps.",
+                    map_table(c));
+    return text + section("Predictors", "Parameters in mm and s.", predictor_table(c));
+}
+
+}  // namespace
+
+std::string format_comparison_report(const Comparison& comparison, const std::filesystem::path& scratch) {
+    Plots plots;
+    const Placed placed = declare(plots, comparison);
+    plots.draw(scratch);
+    std::string page = fmt::format(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+        "<title>Predictors compared: MusicWorld</title>\n<style>{}</style></head>\n<body><main>\n",
+        report_style());
+    page += heading(comparison) + plots.symbols() + sections(comparison, plots, placed);
+    return page + "</main></body></html>\n";
+}
+
+}  // namespace app
