@@ -1,5 +1,7 @@
 #include "strike_evaluation.h"
 
+#include <stdexcept>
+
 namespace app {
 
 double HitScore::precision() const {
@@ -28,9 +30,10 @@ void HitScore::add(const HitScore& other) {
     true_contacts += other.true_contacts;
 }
 
+// Stand-in: refuses rather than answer figures that nothing measured.
 HitScore evaluate_strikes(const tracking::StickTrace&, std::span<const tracking::PoseSample>,
                           tracking::Predictor&, const StickGeometry&, const StrikeSurface&, double, double) {
-    return {};
+    throw std::logic_error("error: found a surface for strikes, expected none: strikes are not scored yet");
 }
 
 }  // namespace app
