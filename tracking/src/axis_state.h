@@ -37,7 +37,9 @@ struct Transition {
 struct AxisStates {
     Lanes p = Lanes::Zero(), v = Lanes::Zero(), a = Lanes::Zero();
 
-    [[nodiscard]] bool is_finite() const noexcept { return std::isfinite((p + v + a).sum()); }
+    /// Sums of all entries, lane by lane: not finite if an entry is not.
+    [[nodiscard]] Lanes sum() const noexcept { return p + v + a; }
+    [[nodiscard]] bool is_finite() const noexcept { return std::isfinite(sum().sum()); }
 };
 
 [[nodiscard]] inline AxisStates operator*(const Transition& f, const AxisStates& x) noexcept {

@@ -22,7 +22,9 @@ ModelBank::ModelBank(const Options& options)
                 rotation_of(options.models[2], options.gate_sigmas)},
       lead_s_(options.lead_s),
       score_(options.score),
-      history_(kHistory) {}
+      times_s_(kHistory),
+      states_(kHistory),
+      covariances_(score_ == BankScore::likelihood ? kHistory : 0) {}
 
 SampleStatus ModelBank::correct(const PoseSample& sample) noexcept {
     const SampleStatus status = clock_.judge(sample);
@@ -60,14 +62,12 @@ SampleStatus ModelBank::update(const PoseSample& sample) noexcept {
                 break;
         }
     }
-    bool finite = true;
+    Lanes sum = Lanes::Zero();
     for (std::size_t i = 0; i < kModels; ++i) {
         position_[i].correct(ahead[i], ahead[i].innovation(sample.position));
-        rotation_[i].propagate(dt);
-        if (sample.has_orientation) rotation_[i].correct(sample.orientation);
-        finite = finite && ahead[i].x.is_finite() && rotation_[i].is_finite();
+        sum += ahead[i].x.sum();
     }
-    if (!finite) return start(sample);
+    if (!update_rotations(sample, dt) || !std::isfinite(sum.sum())) return start(sample);
     for (std::size_t i = 0; i < kModels; ++i) position_[i].accept(ahead[i]);
     clock_.advance(sample.t_s);
     select(sample);
@@ -75,45 +75,55 @@ SampleStatus ModelBank::update(const PoseSample& sample) noexcept {
     return SampleStatus::accepted;
 }
 
+bool ModelBank::update_rotations(const PoseSample& sample, double dt) noexcept {
+    if (!sample.has_orientation && !rotation_[0].has_started()) return true;
+    bool finite = true;
+    for (RotationFilter& rotation : rotation_) {
+        rotation.propagate(dt);
+        if (sample.has_orientation) rotation.correct(sample.orientation);
+        finite = finite && rotation.is_finite();
+    }
+    return finite;
+}
+
 void ModelBank::remember() noexcept {
     newest_ = (newest_ + 1) % kHistory;
-    Past& now = history_[newest_];
-    now.t_s = clock_.time_s();
-    for (std::size_t i = 0; i < kModels; ++i) {
-        now.x[i] = position_[i].now().x;
-        if (score_ == BankScore::likelihood) now.p[i] = position_[i].now().p;
-    }
+    times_s_[newest_] = clock_.time_s();
+    for (std::size_t i = 0; i < kModels; ++i) states_[newest_][i] = position_[i].now().x;
+    if (score_ == BankScore::likelihood)
+        for (std::size_t i = 0; i < kModels; ++i) covariances_[newest_][i] = position_[i].now().p;
     if (held_ < kHistory) ++held_;
 }
 
-double ModelBank::penalty(std::size_t model, const Past& past, double elapsed,
+double ModelBank::penalty(std::size_t model, std::size_t past, double elapsed,
                           const Lanes& measured) const noexcept {
     const MotionModel& motion = position_[model].model();
     const auto square = [&](const Transition& f) {
-        const AxisStates& x = past.x[model];
+        const AxisStates& x = states_[past][model];
         return (measured - (x.p + f.pv * x.v + f.pa * x.a)).matrix().squaredNorm();
     };
     if (score_ == BankScore::distance) return square(motion.transition(elapsed));
     const MotionStep step = motion.step(elapsed);
-    const double variance = propagated(past.p[model], step).pp + motion.measurement_variance;
+    const double variance = propagated(covariances_[past][model], step).pp + motion.measurement_variance;
     return square(step.f) / variance + 3 * std::log(variance);  // -2 log (3.27), its constant left out
 }
 
 void ModelBank::select(const PoseSample& sample) noexcept {
     // The entry nearest to one lead ago; from one sample to the next its age changes little.
-    const auto miss = [&](std::size_t age) { return std::abs(sample.t_s - past(age).t_s - lead_s_); };
+    const auto miss = [&](std::size_t age) { return std::abs(sample.t_s - times_s_[place(age)] - lead_s_); };
     std::size_t age = std::min(age_ + 1, held_ - 1);
     while (age > 0 && miss(age - 1) < miss(age)) --age;
     while (age + 1 < held_ && miss(age + 1) < miss(age)) ++age;
     age_ = age;
-    const double elapsed = sample.t_s - past(age).t_s;
-    const double period = clock_.time_s() - past(0).t_s;
+    const std::size_t past = place(age);
+    const double elapsed = sample.t_s - times_s_[past];
+    const double period = sample.t_s - times_s_[place(0)];
     if (elapsed < lead_s_ - period / 2) return;
     const Lanes measured = to_lanes(sample.position);
-    double least = penalty(0, past(age), elapsed, measured);
+    double least = penalty(0, past, elapsed, measured);
     selected_ = 0;
     for (std::size_t i = 1; i < kModels; ++i) {
-        const double other = penalty(i, past(age), elapsed, measured);
+        const double other = penalty(i, past, elapsed, measured);
         if (other < least) least = other, selected_ = i;
     }
 }

@@ -42,20 +42,20 @@ public:
     [[nodiscard]] PosePrediction predict_model(std::size_t index, double lead_s) const noexcept override;
 
 private:
-    struct Past {
-        double t_s = 0;
-        std::array<AxisStates, kModels> x;
-        std::array<AxisMatrix<double>, kModels> p{};
-    };
+    using States = std::array<AxisStates, kModels>;
+    using Covariances = std::array<AxisMatrix<double>, kModels>;
 
     SampleStatus start(const PoseSample& sample) noexcept;
     SampleStatus update(const PoseSample& sample) noexcept;
     void remember() noexcept;
+    /// Turns the orientations on and takes the measured one; false if a state is no longer finite.
+    [[nodiscard]] bool update_rotations(const PoseSample& sample, double dt) noexcept;
     void select(const PoseSample& sample) noexcept;
-    [[nodiscard]] double penalty(std::size_t model, const Past& past, double elapsed,
+    [[nodiscard]] double penalty(std::size_t model, std::size_t past, double elapsed,
                                  const Lanes& measured) const noexcept;
-    [[nodiscard]] const Past& past(std::size_t age) const noexcept {
-        return history_[(newest_ + kHistory - age) % kHistory];
+    /// Where the history holds the sample `age` samples before the newest.
+    [[nodiscard]] std::size_t place(std::size_t age) const noexcept {
+        return (newest_ + kHistory - age) % kHistory;
     }
 
     SampleClock clock_;
@@ -65,7 +65,10 @@ private:
     double lead_s_;
     BankScore score_;
     std::size_t selected_ = 0;
-    std::vector<Past> history_;  // kHistory long from the start
+    // Of past samples; kHistory long from the start.
+    std::vector<double> times_s_;
+    std::vector<States> states_;
+    std::vector<Covariances> covariances_;  // where the score needs them
     std::size_t newest_ = 0, held_ = 0;
     std::size_t age_ = 0;  // of the entry that the last sample was scored with
 };

@@ -40,6 +40,7 @@ public:
     /// measurement.
     [[nodiscard]] double variance_after(double lead_s) const noexcept;
     [[nodiscard]] bool is_finite() const noexcept { return !started_ || rates_.is_finite(); }
+    [[nodiscard]] bool has_started() const noexcept { return started_; }
 
 private:
     void start(const Eigen::Quaterniond& measured) noexcept;
