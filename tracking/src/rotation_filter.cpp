@@ -81,7 +81,7 @@ void RotationFilter::turned(double lead_s, PosePrediction& pose) const noexcept 
 
 double RotationFilter::variance_after(double lead_s) const noexcept {
     if (!started_) return kHalfTurn * kHalfTurn / 3;
-    return propagated(p_, model_.step(lead_s)).pp;
+    return lead_s == 0 ? p_.pp : propagated(p_, model_.step(lead_s)).pp;
 }
 
 }  // namespace tracking
