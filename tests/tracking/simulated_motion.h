@@ -16,7 +16,8 @@ struct LinearMotion {
     int order;         ///< of the state: 2 (constant velocity) or 3
     double alpha = 0;  ///< decay of the acceleration [1/s]
     double q = 0;      ///< [m^2/s^3] for order 2, [m^2/s^5] for order 3
-    Eigen::Vector3d jump = Eigen::Vector3d::Zero();  ///< standard deviations added at each step, whatever its dt
+    Eigen::Vector3d jump =
+        Eigen::Vector3d::Zero();  ///< standard deviations added at each step, whatever its dt
 
     /// F(dt) and a lower triangular L with L L^T = Q(dt).
     struct Step {
@@ -52,7 +53,8 @@ inline LinearMotion::Step LinearMotion::step(double dt) const {
     Eigen::Matrix<double, 6, 6> term = sum;
     for (int k = 1; k <= 60; ++k) sum += term = (term * block / k).eval();
     const Eigen::Matrix3d f = sum.bottomRightCorner<3, 3>().transpose();
-    const Eigen::Vector3d scale = order == 3 ? Eigen::Vector3d(dt * dt, dt, 1) : Eigen::Vector3d(dt, 1, 1 / dt);
+    const Eigen::Vector3d scale =
+        order == 3 ? Eigen::Vector3d(dt * dt, dt, 1) : Eigen::Vector3d(dt, 1, 1 / dt);
     return {scale.asDiagonal() * f * scale.cwiseInverse().asDiagonal(),
             std::sqrt(q * dt) * (scale.asDiagonal() * lower_root(f * sum.topRightCorner<3, 3>())) +
                 Eigen::Matrix3d(jump.asDiagonal())};
@@ -72,7 +74,7 @@ inline AxisColumns moved(const LinearMotion::Step& step, const AxisColumns& x, R
 }
 
 /// Motion that switches between models as a Markov process: out of each at `rate` over a step (stays with
-/// probability exp(-rate dt)), to the others alike. One model: no switching.
+/// probability exp(-rate dt)), to the others alike. Rate 0: no switching.
 struct World {
     std::vector<LinearMotion> models;
     double rate = 0;
@@ -80,7 +82,7 @@ struct World {
     AxisColumns x = AxisColumns::Zero();
 
     void advance(double dt, RandomStream& random) {
-        if (models.size() > 1 && dt > 0 && random.uniform() > std::exp(-rate * dt)) {
+        if (rate > 0 && random.uniform() > std::exp(-rate * dt)) {
             const double other = random.uniform() * static_cast<double>(models.size() - 1);
             mode = (mode + 1 + std::min(static_cast<std::size_t>(other), models.size() - 2)) % models.size();
         }
@@ -89,7 +91,7 @@ struct World {
     /// The world `lead` later, in steps as near to `dt` as divide the lead.
     [[nodiscard]] World after(double lead, double dt, RandomStream& random) const {
         World later = *this;
-        const int pieces = models.size() > 1 ? std::max(1, static_cast<int>(std::lround(lead / dt))) : 1;
+        const int pieces = rate > 0 ? std::max(1, static_cast<int>(std::lround(lead / dt))) : 1;
         for (int i = 0; i < pieces; ++i) later.advance(lead / pieces, random);
         return later;
     }
