@@ -229,8 +229,8 @@ std::vector<double> rotation_squares(const Case& c, double lead, std::size_t ste
 }
 
 // Densities of a hundredth, so that predicted errors are small against 1 rad, as the filter takes them to be.
-// It also leaves out that errors of a rate lag a turn by theta: the part sin(theta/2) / (theta/2) of them is
-// seen across the axis, a square of 0.95 at the 12 rad/s and 1/15 s reached here.
+// It also leaves out that the effect of a rate's error shrinks while q turns by theta, to sin(theta/2) /
+// (theta/2) across the axis: squares of 0.9 to 0.95 at the 12 rad/s and 1/15 s reached here.
 TEST(Consistency, ErrorsOfOrientationsAreAsLargeAsStatedWhileTheyAreSmall) {
     const Case cases[] = {{"cv:q=1e6", {{2, 0, 1}}},
                           {"ca:q=1e7", {{3, 0, 1e1}}},
@@ -244,7 +244,7 @@ TEST(Consistency, ErrorsOfOrientationsAreAsLargeAsStatedWhileTheyAreSmall) {
             for (int run = 0; run < 500; ++run)
                 squares.quantities.back().squares.add_run(rotation_squares(c, lead, 30, random));
         }
-        squares.expect_near(c.specification + " rotation", 0.05);
+        squares.expect_near(c.specification + " rotation", 0.08);
     }
 }
 
