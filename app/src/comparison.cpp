@@ -1,6 +1,8 @@
 #include "comparison.h"
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 
 #include "comparison_figures.h"
 #include "comparison_map.h"
@@ -10,6 +12,7 @@
 #include "prediction_cost.h"
 #include "prediction_error.h"
 #include "predictors.h"
+#include "stick_tracker.h"
 #include "stroke_lows.h"
 
 namespace app {
@@ -68,10 +71,26 @@ public:
                 rows[lead].error = scores[lead].error;
                 rows[lead].calibration = scores[lead].calibration;
                 if (options_.surface.kind != StrikeSurface::Kind::none)
-                    rows[lead].hits = hits(stick, entrant, place, lead);
+                    rows[lead].hits = hits(place, index % entrants_.size(), lead, 0);
             }
         }
         return rows;
+    }
+
+    [[nodiscard]] HitScore hits(std::size_t place, std::size_t entrant_index, std::size_t lead,
+                                double advance_s) const {
+        const SensedStick& stick = field_.sticks[place];
+        const Entrant& entrant = entrants_[entrant_index];
+        const Recording& recording = field_.recordings[stick.recording];
+        const auto timing = make_striker(entrant, stick, place, lead);
+        std::unique_ptr<tracking::Predictor> confirming;
+        if (!entrant.confirmed_by.empty())
+            confirming = make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), stick.name);
+        HitScore score = evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples,
+                                          {*timing, confirming.get()}, recording.geometry, options_.surface,
+                                          {stick.leads_s[lead], options_.release_margin_s, advance_s});
+        require_working(*timing);
+        return score;
     }
 
 private:
@@ -91,21 +110,44 @@ private:
         return row;
     }
 
-    [[nodiscard]] HitScore hits(const SensedStick& stick, const Entrant& entrant, std::size_t place,
-                                std::size_t lead) const {
-        const Recording& recording = field_.recordings[stick.recording];
-        const auto predictor = make_striker(entrant, stick, place, lead);
-        HitScore score = evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples, *predictor,
-                                          recording.geometry, options_.surface, stick.leads_s[lead],
-                                          options_.release_margin_s);
-        require_working(*predictor);
-        return score;
-    }
-
     const Field& field_;
     const std::vector<Entrant>& entrants_;
     const ComparisonOptions& options_;
 };
+
+/// Advances that learning chooses from [s].
+constexpr double kAdvances_s[] = {-2e-3, -1e-3, 0, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 7e-3, 8e-3};
+
+/// Scores the strikes of the entrants that learn an advance again: contacts are taken to come earlier by what
+/// costs least (HitScore::loss) on the other recordings at that lead.
+void advance_strikes(std::vector<std::vector<ComparisonRow>>& parts, const Runs& runs, const Field& field,
+                     const std::vector<Entrant>& entrants, const ComparisonOptions& options) {
+    if (options.surface.kind == StrikeSurface::Kind::none || !options.tuning || field.recordings.size() < 2)
+        return;
+    const std::size_t leads = options.leads_s.size(), sticks = field.sticks.size();
+    for (std::size_t entrant = 0; entrant < entrants.size(); ++entrant) {
+        if (!entrants[entrant].learns_advance) continue;
+        // By stick and lead, each advance's score.
+        std::vector<std::array<HitScore, std::size(kAdvances_s)>> scores(sticks * leads);
+        parallel_for(scores.size(), options.threads, [&](std::size_t i) {
+            for (std::size_t k = 0; k < std::size(kAdvances_s); ++k)
+                scores[i][k] = runs.hits(i / leads, entrant, i % leads, kAdvances_s[k]);
+        });
+        for (std::size_t place = 0; place < sticks; ++place)
+            for (std::size_t lead = 0; lead < leads; ++lead) {
+                std::array<double, std::size(kAdvances_s)> loss{};
+                for (std::size_t other = 0; other < sticks; ++other)
+                    for (std::size_t k = 0; k < loss.size(); ++k)
+                        if (field.sticks[other].recording != field.sticks[place].recording)
+                            loss[k] += scores[other * leads + lead][k].loss();
+                const auto best =
+                    static_cast<std::size_t>(std::min_element(loss.begin(), loss.end()) - loss.begin());
+                ComparisonRow& row = parts[place * entrants.size() + entrant][lead];
+                row.advance_s = kAdvances_s[best];
+                row.hits = scores[place * leads + lead][best];
+            }
+    }
+}
 
 void measure_costs(std::vector<ComparisonRow>& rows, const Field& field, std::size_t entrants) {
     const std::size_t leads = field.sticks.front().leads_s.size();
@@ -169,6 +211,7 @@ Comparison compare(const ComparisonOptions& options) {
     std::vector<std::vector<ComparisonRow>> parts(runs.count());
     parallel_for(
         parts.size(), options.threads, [&](std::size_t i) { parts[i] = runs.rows(i); }, options.progress);
+    advance_strikes(parts, runs, field, entrants, options);
     for (std::vector<ComparisonRow>& part : parts)
         for (ComparisonRow& row : part) comparison.rows.push_back(std::move(row));
     if (options.cost) measure_costs(comparison.rows, field, entrants.size());

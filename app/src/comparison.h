@@ -51,6 +51,7 @@ struct ComparisonRow {
     ErrorScore error;
     std::optional<Calibration> calibration;
     std::optional<HitScore> hits;
+    double advance_s = 0;  ///< that the strikes were scored with, learned on other recordings
     double ns_per_sample =
         0;  ///< update and the prediction at every lead; median of several runs; 0 where not measured
     bool external = false;  ///< exec:, or predictions from a file: no cost is measured

@@ -65,6 +65,7 @@ Json json_of(const ComparisonRow& row) {
     json["external"] = row.external;
     json["calibration"] = json_of(row.calibration);
     json["hits"] = json_of(row.hits);
+    if (row.hits) json["hits"]["advance_ms"] = 1e3 * row.advance_s;
     return json;
 }
 

@@ -27,8 +27,9 @@ bool is_known(const std::string& specification) {
 
 std::string description_of(const std::string& specification) {
     if (specification == kAuto)
-        return fmt::format("the program's default: {} draws (errors), {} strikes",
-                           picture_specification(specification), sound_specification(specification));
+        return fmt::format("the program's default: {} draws (errors), {} strikes, {} confirms",
+                           picture_specification(specification), sound_specification(specification),
+                           confirming_specification(specification));
     if (is_external(specification)) return "a child process; its cost is not measured";
     if (specification == "naive") return "baseline: the moving average of 1992, 67 ms";
     if (specification == kParabola) return "baseline: the parabola through four samples";
@@ -42,7 +43,11 @@ Entrant named(const std::string& specification, std::size_t recordings, std::siz
     entrant.baseline = is_baseline(specification);
     entrant.external = is_external(specification);
     entrant.used.assign(recordings, std::vector<std::string>(leads, picture_specification(specification)));
-    if (specification == kAuto) entrant.strikes_by = sound_specification(specification);
+    if (specification == kAuto) {
+        entrant.strikes_by = sound_specification(specification);
+        entrant.confirmed_by = confirming_specification(specification);
+        entrant.learns_advance = true;
+    }
     return entrant;
 }
 

@@ -26,7 +26,9 @@ struct Entrant {
     std::string description;  ///< one line
     Tuning tuning = Tuning::none;
     bool baseline = false, external = false;
-    std::string strikes_by;  ///< the specification that is scored on strikes, where it differs (`auto`)
+    std::string strikes_by;       ///< the specification that is scored on strikes, where it differs (`auto`)
+    std::string confirmed_by;     ///< the one that confirms them (`auto`), else empty
+    bool learns_advance = false;  ///< of the strikes' times, from other recordings (`auto`)
     /// Recording x lead: the specification that runs, or the file that answers; empty: does not take part.
     std::vector<std::vector<std::string>> used;
     std::map<std::pair<std::size_t, std::size_t>, StickPredictions>

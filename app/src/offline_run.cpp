@@ -29,7 +29,7 @@ private:
 StrikeRules rules_of(const PlayOptions& options, double t0_s) {
     StrikeRules rules;
     rules.t0_s = t0_s;
-    rules.release_margin_s = options.release_margin_s;
+    rules.release_margin_s = rules.commit_lead_s = options.release_margin_s;
     rules.cancelling = options.cancelling;
     return rules;
 }
@@ -100,8 +100,12 @@ void OfflineRun::feed(const Tick& tick, std::vector<std::uint32_t>& moved, std::
         moved.push_back(stick);
         paths.push_back(sticks_[stick].predicted_path());
         paths.push_back(sticks_[stick].measured_path());
-        paths.back().stick +=
-            static_cast<std::uint32_t>(sticks_.size());  // so that its contacts are told apart
+        // Numbered beyond the sticks, so that its contacts are told apart.
+        paths.back().stick += static_cast<std::uint32_t>(sticks_.size());
+        if (std::optional<sim::TipPath> confirming = sticks_[stick].confirming_path()) {
+            paths.push_back(std::move(*confirming));
+            paths.back().stick += 2 * static_cast<std::uint32_t>(sticks_.size());
+        }
     }
 }
 
@@ -147,24 +151,34 @@ void OfflineRun::take(const Tick& tick) {
 void OfflineRun::take_contacts(double s, const std::vector<std::uint32_t>& moved,
                                const sim::StepReply& reply) {
     const std::size_t bodies = kit_.instruments.size();
-    std::vector<sim::Contact> own;
-    for (std::size_t i = 0; i < moved.size(); ++i) {
+    const auto sticks = static_cast<std::uint32_t>(sticks_.size());
+    const auto contacts_of = [&](std::uint32_t number) {
+        std::vector<sim::Contact> own;
+        for (const sim::Contact& contact : reply.contacts)
+            if (contact.stick == number) own.push_back(contact);
+        return own;
+    };
+    std::size_t path = 0;
+    for (const std::uint32_t stick : moved) {
         // Two paths a stick: the predicted one, and the measured tip, which stands still and makes no contact
-        // but by starting inside.
-        const std::span<const double> filtered(reply.clearance_m.data() + 2 * i * bodies, bodies);
+        // but by starting inside; a third where another filter confirms.
+        const std::span<const double> filtered(reply.clearance_m.data() + path * bodies, bodies);
         std::vector<double> measured(bodies);
         for (std::size_t b = 0; b < bodies; ++b) {
             // The nearer of the surface as it vibrates and at rest: a vibrating head does not arm a stick
             // that lies on it.
             const double rest =
-                sim::rest_distance(kit_.instruments[b].body, sticks_[moved[i]].measured_tip(), tip_radius_m_)
+                sim::rest_distance(kit_.instruments[b].body, sticks_[stick].measured_tip(), tip_radius_m_)
                     .distance;
-            measured[b] = std::min(rest, reply.clearance_m[(2 * i + 1) * bodies + b]);
+            measured[b] = std::min(rest, reply.clearance_m[(path + 1) * bodies + b]);
         }
-        own.clear();
-        for (const sim::Contact& contact : reply.contacts)
-            if (contact.stick == moved[i]) own.push_back(contact);
-        scheduler_.sample(moved[i], s, own, measured, filtered);
+        std::vector<sim::Contact> contacts = contacts_of(stick);
+        if (sticks_[stick].confirms()) {
+            if (options_.cancelling) keep_confirmed(contacts, contacts_of(stick + 2 * sticks), s);
+            ++path;
+        }
+        path += 2;
+        scheduler_.sample(stick, s, contacts, measured, filtered, sticks_[stick].selected_model());
     }
 }
 

@@ -34,20 +34,38 @@ struct HitScore {
     [[nodiscard]] double p95_ms() const;
     [[nodiscard]] double false_per_min() const;
     [[nodiscard]] double false_per_min_without_cancel() const;
+    /// What the strikes cost: 1 for each missed contact and each false note, |error| / 60 ms for the others
+    /// (a note at the edge of the 30 ms window is half a miss).
+    [[nodiscard]] double loss() const;
     /// Both together, as if one recording followed the other.
     void add(const HitScore& other);
 };
 
+/// Who says when a stick strikes.
+struct StrikePredictors {
+    tracking::Predictor& timing;                ///< whose path is swept
+    tracking::Predictor* confirming = nullptr;  ///< whose path must bear it out (keep_confirmed); may be none
+};
+
+struct StrikeTiming {
+    double lead_s = 1.0 / 15;         ///< a strike's time is fixed this long before
+    double release_margin_s = 0.010;  ///< and cancelled until this long before
+    double advance_s = 0;             ///< predicted contacts are taken to come earlier by this
+};
+
 /// Strikes of one stick (the strike rules of the README): at each sample the path that the predictor states
-/// for [0, lead_s + what has to be known] is swept against the surface; a contact's time is re-timed at each
-/// sample until `lead_s` before it, then frozen; it may be cancelled until `release_margin_s` before it. The
-/// true contacts are those of the recorded path, straight between samples, 3 mm deep. A pure function.
+/// until a little beyond the lead is swept against the surface; a contact's time is re-timed at each sample
+/// until the lead before it, then fixed; it may be cancelled, and taken up again, until the release margin
+/// before it. Each model of a predictor of several keeps its own pending contacts; those of the model that is
+/// selected when they must be released count. Without cancelling every contact whose time was fixed is
+/// played. The true contacts are those of the recorded path, straight between samples, 3 mm deep. A pure
+/// function.
 ///
-///   recorded  the stick as recorded, for the truth     samples  what the sensor reports, in order of arrival
-///   predictor made by the caller for this run; fed from its start
+///   recorded    the stick as recorded, for the truth    samples  what the sensor reports, in order of
+///   arrival predictors  made by the caller for this run; fed from their start
 [[nodiscard]] HitScore evaluate_strikes(const tracking::StickTrace& recorded,
                                         std::span<const tracking::PoseSample> samples,
-                                        tracking::Predictor& predictor, const StickGeometry& geometry,
-                                        const StrikeSurface& surface, double lead_s, double release_margin_s);
+                                        const StrikePredictors& predictors, const StickGeometry& geometry,
+                                        const StrikeSurface& surface, const StrikeTiming& timing);
 
 }  // namespace app

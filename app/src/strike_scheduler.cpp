@@ -40,10 +40,14 @@ void StrikeScheduler::disarm(Approach& a) {
 }
 
 void StrikeScheduler::place_onset(Strike& strike, double s) const {
-    // Rounded up, so that the onset never lies nearer to the sample than the release margin.
-    const double earliest = std::max(strike.contact_s, s + rules_.release_margin_s);
+    // Rounded up, so that the onset never lies nearer to the sample than it may.
+    const double earliest = std::max(strike.contact_s, s + rules_.commit_lead_s);
     strike.onset_sample = static_cast<std::int64_t>(std::ceil((earliest - rules_.t0_s) * audio::kSampleRate));
     strike.onset_s = rules_.t0_s + static_cast<double>(strike.onset_sample) / audio::kSampleRate;
+}
+
+bool StrikeScheduler::is_committed(const Strike& strike, double s) const {
+    return strike.onset_s < s + rules_.commit_lead_s;
 }
 
 void StrikeScheduler::release(std::uint64_t id) {
@@ -98,28 +102,29 @@ void StrikeScheduler::update_arming(Approach& a, double s, double measured, doub
     a.last_s = s;
 }
 
-std::vector<const sim::Contact*> StrikeScheduler::candidates(const Approach& a, double s,
-                                                             std::span<const sim::Contact> contacts) const {
-    std::vector<const sim::Contact*> result;
+std::vector<StrikeScheduler::Candidate> StrikeScheduler::candidates(
+    const Approach& a, double s, std::span<const sim::Contact> contacts) const {
+    std::vector<Candidate> result;
     for (std::size_t i = 0; i < contacts.size(); ++i) {
         const sim::Contact& contact = contacts[i];
         if (i == 0 && !a.armed) continue;  // still the stroke that was released
         // A path that goes right through a thin body and turns back into it from behind is no second stroke.
         if (i > 0 && contact.normal_world.dot(contacts[0].normal_world) <= 0) continue;
         if (contact.zone < 0 || contact.speed_mps < rules_.minimum_speed_mps) continue;
-        const double onset = std::max(contact.t_s, s + rules_.release_margin_s);
+        const double onset = std::max(contact.t_s, s + rules_.commit_lead_s);
         const double happened = i == 0 && a.entered_s ? std::min(*a.entered_s, contact.t_s) : contact.t_s;
-        if (onset - happened > rules_.late_s) continue;
-        result.push_back(&contact);
+        result.push_back({&contact, happened, onset - happened > rules_.late_s});
     }
     return result;
 }
 
 void StrikeScheduler::update(Strike& moved, double s, const sim::Contact& contact) {
+    if (is_committed(moved, s)) return;
     const std::int64_t onset = moved.onset_sample;
     const double speed = moved.speed_mps;
     const std::int32_t zone = moved.zone;
     copy_contact(moved, contact);
+    moved.model = model_;
     place_onset(moved, s);
     if (onset == moved.onset_sample && speed == moved.speed_mps && zone == moved.zone) return;
     ++moved.moves;
@@ -131,6 +136,7 @@ void StrikeScheduler::create(Approach& a, double s, std::uint32_t stick, const s
     fresh.stick = stick;
     fresh.instrument = contact.body;
     copy_contact(fresh, contact);
+    fresh.model = model_;
     place_onset(fresh, s);
     fresh.scheduled_at_s = s;
     const auto again = std::find_if(a.cancelled.rbegin(), a.cancelled.rend(), [&](std::uint64_t id) {
@@ -138,6 +144,12 @@ void StrikeScheduler::create(Approach& a, double s, std::uint32_t stick, const s
     });
     if (again != a.cancelled.rend()) {
         const Strike old = strike(*again);
+        // A time that stood when it was cancelled stands again, as long as it can be met.
+        if (is_committed(old, s) && old.onset_s >= s + rules_.release_margin_s) {
+            fresh.contact_s = old.contact_s;
+            fresh.onset_sample = old.onset_sample;
+            fresh.onset_s = old.onset_s;
+        }
         a.cancelled.erase(std::next(again).base());
         fresh.id = old.id;
         fresh.scheduled_at_s = old.scheduled_at_s;
@@ -164,6 +176,11 @@ void StrikeScheduler::keep_or_cancel(Approach& a, double s, std::uint64_t id, bo
         // The measured tip has met the surface: the stroke came, whatever the path now says. It sounds as
         // soon as it may.
         Strike& kept = strike(id);
+        if (is_committed(kept, s)) {
+            // Its time cannot be mended: a note far from its stroke is not played.
+            if (rules_.cancelling && kept.onset_s - *a.entered_s > rules_.late_s) cancel(a, s, id);
+            return;
+        }
         const std::int64_t onset = kept.onset_sample;
         kept.contact_s = std::min(kept.contact_s, *a.entered_s);
         place_onset(kept, s);
@@ -174,14 +191,19 @@ void StrikeScheduler::keep_or_cancel(Approach& a, double s, std::uint64_t id, bo
             kept.onset_sample = onset;
             kept.onset_s = rules_.t0_s + static_cast<double>(onset) / audio::kSampleRate;
         }
-    } else if (rules_.cancelling) {
+    } else if (rules_.cancelling || strike(id).onset_s >= s + rules_.sent_lead_s) {
         cancel(a, s, id);
     }
 }
 
+bool StrikeScheduler::may_be(const Strike& strike, const Candidate& candidate, double s) const {
+    if (!is_committed(strike, s)) return !candidate.late;
+    return candidate.happens_s - strike.onset_s <= rules_.late_s;
+}
+
 void StrikeScheduler::follow(Approach& a, double s, std::uint32_t stick,
                              std::span<const sim::Contact> contacts, bool settled) {
-    std::vector<const sim::Contact*> found;
+    std::vector<Candidate> found;
     if (settled) found = candidates(a, s, contacts);
     std::vector<std::uint64_t> waiting = a.pending;
     // Nearest pairs first: the lists hold one or two entries.
@@ -189,10 +211,13 @@ void StrikeScheduler::follow(Approach& a, double s, std::uint32_t stick,
         std::size_t best_p = 0, best_c = 0;
         double best = std::numeric_limits<double>::infinity();
         for (std::size_t p = 0; p < waiting.size(); ++p)
-            for (std::size_t c = 0; c < found.size(); ++c)
-                if (const double apart = std::abs(strike(waiting[p]).contact_s - found[c]->t_s); apart < best)
-                    best = apart, best_p = p, best_c = c;
-        update(strike(waiting[best_p]), s, *found[best_c]);
+            for (std::size_t c = 0; c < found.size(); ++c) {
+                if (!may_be(strike(waiting[p]), found[c], s)) continue;
+                const double apart = std::abs(strike(waiting[p]).contact_s - found[c].contact->t_s);
+                if (apart < best) best = apart, best_p = p, best_c = c;
+            }
+        if (!std::isfinite(best)) break;
+        update(strike(waiting[best_p]), s, *found[best_c].contact);
         waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(best_p));
         found.erase(found.begin() + static_cast<std::ptrdiff_t>(best_c));
     }
@@ -202,12 +227,14 @@ void StrikeScheduler::follow(Approach& a, double s, std::uint32_t stick,
     std::ranges::sort(waiting, {}, [this](std::uint64_t id) { return strike(id).contact_s; });
     for (const std::uint64_t id : waiting) keep_or_cancel(a, s, id, std::exchange(may_keep, false));
     std::erase_if(a.pending, [&](std::uint64_t id) { return strike(id).outcome == Outcome::cancelled; });
-    for (const sim::Contact* contact : found) create(a, s, stick, *contact);
+    for (const Candidate& candidate : found)
+        if (!candidate.late) create(a, s, stick, *candidate.contact);
 }
 
 void StrikeScheduler::sample(std::uint32_t stick, double s, std::span<const sim::Contact> contacts,
                              std::span<const double> measured_clearance,
-                             std::span<const double> filtered_clearance) {
+                             std::span<const double> filtered_clearance, std::size_t model) {
+    model_ = static_cast<std::uint32_t>(model);
     const int number = samples_since_start_[stick]++;
     std::vector<sim::Contact> own;
     for (std::uint32_t instrument = 0; instrument < instruments_; ++instrument) {
@@ -218,7 +245,7 @@ void StrikeScheduler::sample(std::uint32_t stick, double s, std::span<const sim:
             if (contact.body == instrument) own.push_back(contact);
         follow(a, s, stick, own, number >= rules_.settling_samples);
         // A stroke that was not found in time is missed; the stick lies in the head until it rises again.
-        if (a.entered_s && a.pending.empty() && s + rules_.release_margin_s - *a.entered_s > rules_.late_s)
+        if (a.entered_s && a.pending.empty() && s + rules_.commit_lead_s - *a.entered_s > rules_.late_s)
             disarm(a);
     }
 }

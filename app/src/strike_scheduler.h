@@ -15,13 +15,15 @@ namespace app {
 struct StrikeRules {
     double t0_s = 0;                  ///< time of audio sample 0
     double release_margin_s = 0.010;  ///< a note is fixed this long before its onset
+    double commit_lead_s = 0.010;     ///< its time is fixed this long before, >= release_margin_s
     double late_s = 0.030;            ///< a stroke found later than this after its contact is not played
     double revive_s = 0.030;  ///< a contact predicted again this near to a cancelled onset keeps its id
     double rearm_m =
         0.003;  ///< the tip must rise this far, and be this far outside, before it can strike again
     double minimum_speed_mps = 0.2;  ///< slower contacts make no note
     int settling_samples = 3;        ///< samples after a start of the filter that make no strike
-    bool cancelling = true;          ///< false: a note once scheduled is played
+    bool cancelling = true;          ///< false: a note whose onset lies within sent_lead_s is played
+    double sent_lead_s = std::numeric_limits<double>::infinity();
 };
 
 /// A change that the audio has to follow: the note of a strike stands as `strikes()[id - 1]` says, or is
@@ -34,7 +36,9 @@ struct NoteChange {
 /// Turns predicted contacts into strikes: every (stick, instrument) pair holds a list of pending contacts
 /// that each new sample confirms, moves or cancels until their release point. Doubles are prevented by
 /// geometry alone: after a release the pair makes no strike until the tip, as measured and as filtered, has
-/// risen `rearm_m` from its lowest point and is `rearm_m` outside the surface. Causal: the call for a sample
+/// risen `rearm_m` from its lowest point and is `rearm_m` outside the surface. With a commit lead beyond the
+/// release margin a note's time stands from that lead on, while it may still be cancelled, and taken up
+/// again. Causal: the call for a sample
 /// at s changes only notes with onset >= s + release margin. Times in seconds of the trace's clock.
 class StrikeScheduler {
 public:
@@ -48,8 +52,10 @@ public:
     ///   contacts            of its predicted path, by time
     ///   measured_clearance  signed distance of the measured tip to each instrument's surface grown by the
     ///   tip's radius [m] filtered_clearance  the same of the filtered tip at lead 0
+    ///   model               that predicts the contacts, of a predictor of several
     void sample(std::uint32_t stick, double s, std::span<const sim::Contact> contacts,
-                std::span<const double> measured_clearance, std::span<const double> filtered_clearance);
+                std::span<const double> measured_clearance, std::span<const double> filtered_clearance,
+                std::size_t model = 0);
     /// After the last sample: what is pending is released, as when a sensor falls silent.
     void finish();
 
@@ -76,11 +82,21 @@ private:
     void update_arming(Approach& a, double s, double measured, double filtered, bool first) const;
     void follow(Approach& a, double s, std::uint32_t stick, std::span<const sim::Contact> contacts,
                 bool settled);
-    [[nodiscard]] std::vector<const sim::Contact*> candidates(const Approach& a, double s,
-                                                              std::span<const sim::Contact> contacts) const;
+    /// A contact of the predicted path that may be a strike.
+    struct Candidate {
+        const sim::Contact* contact;
+        double happens_s;  ///< its time, or that at which the measured tip entered
+        bool late;         ///< too late for a new note; it may confirm one whose time stands
+    };
+    [[nodiscard]] std::vector<Candidate> candidates(const Approach& a, double s,
+                                                    std::span<const sim::Contact> contacts) const;
     void create(Approach& a, double s, std::uint32_t stick, const sim::Contact& contact);
     void update(Strike& strike, double s, const sim::Contact& contact);
     void place_onset(Strike& strike, double s) const;
+    [[nodiscard]] bool is_committed(const Strike& strike, double s) const;
+    /// Whether a candidate may be the strike's own contact. A note whose time stands is not borne out by a
+    /// contact that would come more than late_s after it; one that would come sooner will sound late.
+    [[nodiscard]] bool may_be(const Strike& strike, const Candidate& candidate, double s) const;
     void keep_or_cancel(Approach& a, double s, std::uint64_t id, bool may_keep);
     void cancel(Approach& a, double s, std::uint64_t id);
     void release(std::uint64_t id);
@@ -88,6 +104,7 @@ private:
 
     StrikeRules rules_;
     std::size_t instruments_;
+    std::uint32_t model_ = 0;           // of the sample at hand
     std::vector<Approach> approaches_;  // stick-major
     std::vector<int> samples_since_start_;
     std::vector<Strike> strikes_;

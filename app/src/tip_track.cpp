@@ -21,18 +21,20 @@ StickGeometry stick_geometry(const tracking::Trace& trace, const StickDefinition
     return geometry;
 }
 
+TipTrack tip_track(const tracking::StickTrace& stick, const StickGeometry& geometry) {
+    TipTrack track{stick.name, {}, {}};
+    track.t_s.reserve(stick.samples.size());
+    track.tip.reserve(stick.samples.size());
+    for (const tracking::PoseSample& sample : stick.samples) {
+        track.t_s.push_back(sample.t_s);
+        track.tip.push_back(sample.position + sample.orientation * geometry.tip);
+    }
+    return track;
+}
+
 std::vector<TipTrack> tip_tracks(const tracking::Trace& trace, const StickGeometry& geometry) {
     std::vector<TipTrack> tracks;
-    for (const tracking::StickTrace& stick : trace.sticks) {
-        TipTrack track{stick.name, {}, {}};
-        track.t_s.reserve(stick.samples.size());
-        track.tip.reserve(stick.samples.size());
-        for (const tracking::PoseSample& sample : stick.samples) {
-            track.t_s.push_back(sample.t_s);
-            track.tip.push_back(sample.position + sample.orientation * geometry.tip);
-        }
-        tracks.push_back(std::move(track));
-    }
+    for (const tracking::StickTrace& stick : trace.sticks) tracks.push_back(tip_track(stick, geometry));
     return tracks;
 }
 

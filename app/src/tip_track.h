@@ -19,6 +19,9 @@ struct StickGeometry {
                                            const std::optional<Eigen::Vector3d>& tip_option,
                                            const std::optional<Eigen::Vector3d>& shaft_option);
 
+/// The measured path of a stick's tip.
+[[nodiscard]] TipTrack tip_track(const tracking::StickTrace& stick, const StickGeometry& geometry);
+
 /// The measured paths of the sticks' tips, a track a stick.
 [[nodiscard]] std::vector<TipTrack> tip_tracks(const tracking::Trace& trace, const StickGeometry& geometry);
 

@@ -75,6 +75,44 @@ private:
     TrueContact entry_;
 };
 
+/// Height over the plane along a cubic Hermite piece between two nodes, u in [0, 1].
+struct Piece {
+    const sim::PathNode& a;
+    const sim::PathNode& b;
+    double height_m;
+
+    [[nodiscard]] double at(double u) const {
+        const double dt = b.t_s - a.t_s, v = 1 - u;
+        return v * v * (1 + 2 * u) * a.position.y() + u * u * (1 + 2 * v) * b.position.y() +
+               u * v * dt * (v * a.velocity.y() - u * b.velocity.y()) - height_m;
+    }
+    [[nodiscard]] Eigen::Vector3d velocity(double u) const {
+        const double dt = b.t_s - a.t_s;
+        return 6 * u * (1 - u) / dt * (b.position - a.position) + (1 - u) * (1 - 3 * u) * a.velocity +
+               u * (3 * u - 2) * b.velocity;
+    }
+};
+
+sim::Contact plane_contact(const Piece& piece, double u, bool starts_inside) {
+    sim::Contact contact;
+    contact.t_s = piece.a.t_s + u * (piece.b.t_s - piece.a.t_s);
+    contact.starts_inside = starts_inside;
+    contact.depth_m = starts_inside ? -piece.at(0) : 0;
+    contact.speed_mps = -piece.velocity(u).y();
+    contact.zone = 0;
+    contact.point_world = piece.a.position + u * (piece.b.position - piece.a.position);
+    return contact;
+}
+
+/// Where a piece falls through the plane between u and w, at(u) > 0 >= at(w).
+double crossing(const Piece& piece, double u, double w) {
+    for (int i = 0; i < 40; ++i) {
+        const double middle = 0.5 * (u + w);
+        (piece.at(middle) > 0 ? u : w) = middle;
+    }
+    return w;
+}
+
 double nearest_approach_s(const TipTrack& track, const sim::BodyDefinition& body, double radius, double from,
                           double to) {
     double best = std::numeric_limits<double>::infinity(), at = from;
@@ -113,6 +151,63 @@ std::vector<TrueContact> find_true_contacts(std::span<const TipTrack> tracks,
     }
     std::stable_sort(contacts.begin(), contacts.end(),
                      [](const TrueContact& a, const TrueContact& b) { return a.t_s < b.t_s; });
+    return contacts;
+}
+
+std::vector<TrueContact> find_plane_contacts(const TipTrack& track, double height_m) {
+    std::vector<TrueContact> contacts;
+    bool armed = track.tip.front().y() > height_m, entered = false;
+    TrueContact entry;
+    for (std::size_t i = 1; i < track.t_s.size(); ++i) {
+        const double before = track.tip[i - 1].y() - height_m, now = track.tip[i].y() - height_m;
+        const double dt = track.t_s[i] - track.t_s[i - 1];
+        if (dt > tracking::kGapS) {
+            armed = now > 0;
+            entered = false;
+            continue;
+        }
+        if (armed && before > 0 && now <= 0) {
+            const double share = before / (before - now);
+            entry.t_s = track.t_s[i - 1] + share * dt;
+            entry.point_world = track.tip[i - 1] + share * (track.tip[i] - track.tip[i - 1]);
+            entry.speed_mps = (before - now) / dt;
+            entered = true;
+        }
+        if (now > 0) entered = false;
+        if (armed && entered && now <= -kDepthM) {
+            contacts.push_back(entry);
+            armed = entered = false;
+        }
+        if (!armed && now >= kRearmM) armed = true;
+    }
+    return contacts;
+}
+
+std::vector<sim::Contact> plane_contacts(const sim::TipPath& path, double height_m) {
+    constexpr int kSteps = 8;  // a millisecond or so each
+    std::vector<sim::Contact> contacts;
+    double depth = 0;  // since the last contact
+    const auto leave = [&] {
+        if (!contacts.empty() && !contacts.back().starts_inside && depth < kDepthM) contacts.pop_back();
+        depth = 0;
+    };
+    bool inside = false;
+    for (std::size_t i = 0; i + 1 < path.nodes.size(); ++i) {
+        const Piece piece{path.nodes[i], path.nodes[i + 1], height_m};
+        if (i == 0 && piece.at(0) <= 0) {
+            contacts.push_back(plane_contact(piece, 0, true));
+            inside = true;
+        }
+        for (int step = 0; step < kSteps; ++step) {
+            const double u = static_cast<double>(step) / kSteps, w = static_cast<double>(step + 1) / kSteps;
+            const double height = piece.at(w);
+            if (height <= 0 && !inside)
+                contacts.push_back(plane_contact(piece, crossing(piece, u, w), false));
+            if (height > 0 && inside) leave();
+            inside = height <= 0;
+            if (inside) depth = std::max(depth, -height);
+        }
+    }
     return contacts;
 }
 
