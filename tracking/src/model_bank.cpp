@@ -1,5 +1,6 @@
 #include "model_bank.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "rotation.h"
@@ -9,6 +10,11 @@ namespace {
 
 RotationFilter rotation_of(const MotionModel& model, double gate_sigmas) {
     return {model.scaled(1 / kLever), rotation_gate(gate_sigmas)};
+}
+
+/// variance on every axis, and d d^T.
+Eigen::Matrix3d spread(double variance, const Eigen::Vector3d& d) {
+    return variance * Eigen::Matrix3d::Identity() + d * d.transpose();
 }
 
 }  // namespace
@@ -22,9 +28,7 @@ ModelBank::ModelBank(const Options& options)
                 rotation_of(options.models[2], options.gate_sigmas)},
       lead_s_(options.lead_s),
       score_(options.score),
-      times_s_(kHistory),
-      states_(kHistory),
-      covariances_(score_ == BankScore::likelihood ? kHistory : 0) {}
+      history_(kHistory) {}
 
 SampleStatus ModelBank::correct(const PoseSample& sample) noexcept {
     const SampleStatus status = clock_.judge(sample);
@@ -42,7 +46,7 @@ SampleStatus ModelBank::start(const PoseSample& sample) noexcept {
     }
     selected_ = 0;
     held_ = age_ = 0;
-    remember();
+    remember({0, 0, 0}, {1, 1, 1});
     return SampleStatus::reinitialised;
 }
 
@@ -62,68 +66,66 @@ SampleStatus ModelBank::update(const PoseSample& sample) noexcept {
                 break;
         }
     }
-    Lanes sum = Lanes::Zero();
+    bool finite = true;
+    PerModel square{}, variance{};
     for (std::size_t i = 0; i < kModels; ++i) {
-        position_[i].correct(ahead[i], ahead[i].innovation(sample.position));
-        sum += ahead[i].x.sum();
+        const Lanes innovation = ahead[i].innovation(sample.position);
+        square[i] = innovation.matrix().squaredNorm();
+        variance[i] = position_[i].innovation_variance(ahead[i]);
+        position_[i].correct(ahead[i], innovation);
+        rotation_[i].propagate(dt);
+        if (sample.has_orientation) rotation_[i].correct(sample.orientation);
+        finite = finite && ahead[i].x.is_finite() && rotation_[i].is_finite();
     }
-    if (!update_rotations(sample, dt) || !std::isfinite(sum.sum())) return start(sample);
+    if (!finite) return start(sample);
     for (std::size_t i = 0; i < kModels; ++i) position_[i].accept(ahead[i]);
     clock_.advance(sample.t_s);
     select(sample);
-    remember();
+    remember(square, variance);
     return SampleStatus::accepted;
 }
 
-bool ModelBank::update_rotations(const PoseSample& sample, double dt) noexcept {
-    if (!sample.has_orientation && !rotation_[0].has_started()) return true;
-    bool finite = true;
-    for (RotationFilter& rotation : rotation_) {
-        rotation.propagate(dt);
-        if (sample.has_orientation) rotation.correct(sample.orientation);
-        finite = finite && rotation.is_finite();
-    }
-    return finite;
-}
-
-void ModelBank::remember() noexcept {
+void ModelBank::remember(const PerModel& innovation_square, const PerModel& innovation_variance) noexcept {
     newest_ = (newest_ + 1) % kHistory;
-    times_s_[newest_] = clock_.time_s();
-    for (std::size_t i = 0; i < kModels; ++i) states_[newest_][i] = position_[i].now().x;
-    if (score_ == BankScore::likelihood)
-        for (std::size_t i = 0; i < kModels; ++i) covariances_[newest_][i] = position_[i].now().p;
+    Past& now = history_[newest_];
+    now.t_s = clock_.time_s();
+    now.innovation_square = innovation_square;
+    now.innovation_variance = innovation_variance;
+    for (std::size_t i = 0; i < kModels; ++i) {
+        now.x[i] = position_[i].now().x;
+        if (score_ == BankScore::likelihood) now.p[i] = position_[i].now().p;
+    }
     if (held_ < kHistory) ++held_;
 }
 
-double ModelBank::penalty(std::size_t model, std::size_t past, double elapsed,
+double ModelBank::penalty(std::size_t model, const Past& past, double elapsed,
                           const Lanes& measured) const noexcept {
     const MotionModel& motion = position_[model].model();
     const auto square = [&](const Transition& f) {
-        const AxisStates& x = states_[past][model];
+        const AxisStates& x = past.x[model];
         return (measured - (x.p + f.pv * x.v + f.pa * x.a)).matrix().squaredNorm();
     };
     if (score_ == BankScore::distance) return square(motion.transition(elapsed));
     const MotionStep step = motion.step(elapsed);
-    const double variance = propagated(covariances_[past][model], step).pp + motion.measurement_variance;
+    const double variance = propagated(past.p[model], step).pp + motion.measurement_variance;
     return square(step.f) / variance + 3 * std::log(variance);  // -2 log (3.27), its constant left out
 }
 
 void ModelBank::select(const PoseSample& sample) noexcept {
     // The entry nearest to one lead ago; from one sample to the next its age changes little.
-    const auto miss = [&](std::size_t age) { return std::abs(sample.t_s - times_s_[place(age)] - lead_s_); };
+    const auto miss = [&](std::size_t age) { return std::abs(sample.t_s - past(age).t_s - lead_s_); };
     std::size_t age = std::min(age_ + 1, held_ - 1);
     while (age > 0 && miss(age - 1) < miss(age)) --age;
     while (age + 1 < held_ && miss(age + 1) < miss(age)) ++age;
     age_ = age;
-    const std::size_t past = place(age);
-    const double elapsed = sample.t_s - times_s_[past];
-    const double period = sample.t_s - times_s_[place(0)];
+    const double elapsed = sample.t_s - past(age).t_s;
+    const double period = clock_.time_s() - past(0).t_s;
     if (elapsed < lead_s_ - period / 2) return;
     const Lanes measured = to_lanes(sample.position);
-    double least = penalty(0, past, elapsed, measured);
+    double least = penalty(0, past(age), elapsed, measured);
     selected_ = 0;
     for (std::size_t i = 1; i < kModels; ++i) {
-        const double other = penalty(i, past, elapsed, measured);
+        const double other = penalty(i, past(age), elapsed, measured);
         if (other < least) least = other, selected_ = i;
     }
 }
@@ -137,10 +139,34 @@ PosePrediction ModelBank::predict_model(std::size_t index, double lead_s) const 
     return pose;
 }
 
+ModelBank::PerModel ModelBank::probabilities() const noexcept {
+    PerModel log_likelihood{};
+    for (std::size_t age = 0; age < std::min(held_, kEvidence); ++age)
+        for (std::size_t i = 0; i < kModels; ++i) {
+            const double variance = past(age).innovation_variance[i];
+            log_likelihood[i] -= 0.5 * (past(age).innovation_square[i] / variance + 3 * std::log(variance));
+        }
+    const double best = *std::max_element(log_likelihood.begin(), log_likelihood.end());
+    PerModel weight{};
+    double sum = 0;
+    for (std::size_t i = 0; i < kModels; ++i) sum += weight[i] = std::exp(log_likelihood[i] - best);
+    for (double& w : weight) w /= sum;
+    return weight;
+}
+
 std::optional<PoseCovariance> ModelBank::covariance(double lead_s) const noexcept {
-    const AxisMatrix<double> ahead = position_[selected_].covariance_after(lead_s);
-    return PoseCovariance{ahead.pp * Eigen::Matrix3d::Identity(), ahead.vv * Eigen::Matrix3d::Identity(),
-                          rotation_[selected_].variance_after(lead_s) * Eigen::Matrix3d::Identity()};
+    const PerModel weight = probabilities();
+    const PosePrediction chosen = predict(lead_s);
+    PoseCovariance sum;
+    for (std::size_t i = 0; i < kModels; ++i) {
+        const PosePrediction other = predict_model(i, lead_s);
+        const AxisMatrix<double> p = position_[i].covariance_after(lead_s);
+        sum.position += weight[i] * spread(p.pp, other.position - chosen.position);
+        sum.velocity += weight[i] * spread(p.vv, other.velocity - chosen.velocity);
+        sum.rotation += weight[i] * spread(rotation_[i].variance_after(lead_s),
+                                           logarithm(other.orientation * chosen.orientation.conjugate()));
+    }
+    return sum;
 }
 
 }  // namespace tracking

@@ -36,26 +36,39 @@ public:
         return predict_model(selected_, lead_s);
     }
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
+    /// Of the selected model's prediction if one of the models is true, each as likely as its innovations of
+    /// the last kEvidence samples say: sum_i w_i (P_i + d_i d_i^T), d_i from the selected prediction to the
+    /// model's.
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
     [[nodiscard]] std::size_t models() const noexcept override { return kModels; }
     [[nodiscard]] std::size_t selected() const noexcept override { return selected_; }
     [[nodiscard]] PosePrediction predict_model(std::size_t index, double lead_s) const noexcept override;
+    [[nodiscard]] const PositionFilter& position(std::size_t index) const noexcept {
+        return position_[index];
+    }
 
 private:
-    using States = std::array<AxisStates, kModels>;
-    using Covariances = std::array<AxisMatrix<double>, kModels>;
+    using PerModel = std::array<double, kModels>;
+    static constexpr std::size_t kEvidence = 32;
+
+    struct Past {
+        double t_s = 0;
+        std::array<AxisStates, kModels> x;
+        std::array<AxisMatrix<double>, kModels> p{};
+        PerModel innovation_square{},
+            innovation_variance{1, 1, 1};  ///< 0 and 1 at a start, which tells nothing
+    };
 
     SampleStatus start(const PoseSample& sample) noexcept;
     SampleStatus update(const PoseSample& sample) noexcept;
-    void remember() noexcept;
-    /// Turns the orientations on and takes the measured one; false if a state is no longer finite.
-    [[nodiscard]] bool update_rotations(const PoseSample& sample, double dt) noexcept;
+    void remember(const PerModel& innovation_square, const PerModel& innovation_variance) noexcept;
+    /// Probabilities of the models from their innovations of the last kEvidence samples.
+    [[nodiscard]] PerModel probabilities() const noexcept;
     void select(const PoseSample& sample) noexcept;
-    [[nodiscard]] double penalty(std::size_t model, std::size_t past, double elapsed,
+    [[nodiscard]] double penalty(std::size_t model, const Past& past, double elapsed,
                                  const Lanes& measured) const noexcept;
-    /// Where the history holds the sample `age` samples before the newest.
-    [[nodiscard]] std::size_t place(std::size_t age) const noexcept {
-        return (newest_ + kHistory - age) % kHistory;
+    [[nodiscard]] const Past& past(std::size_t age) const noexcept {
+        return history_[(newest_ + kHistory - age) % kHistory];
     }
 
     SampleClock clock_;
@@ -65,10 +78,7 @@ private:
     double lead_s_;
     BankScore score_;
     std::size_t selected_ = 0;
-    // Of past samples; kHistory long from the start.
-    std::vector<double> times_s_;
-    std::vector<States> states_;
-    std::vector<Covariances> covariances_;  // where the score needs them
+    std::vector<Past> history_;  // kHistory long from the start
     std::size_t newest_ = 0, held_ = 0;
     std::size_t age_ = 0;  // of the entry that the last sample was scored with
 };
