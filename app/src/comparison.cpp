@@ -82,13 +82,14 @@ public:
         const SensedStick& stick = field_.sticks[place];
         const Entrant& entrant = entrants_[entrant_index];
         const Recording& recording = field_.recordings[stick.recording];
-        const auto timing = make_striker(entrant, stick, place, lead);
+        const StrikeTiming when{stick.leads_s[lead], options_.release_margin_s, advance_s};
+        const auto timing = make_striker(entrant, stick, place, lead, strike_leads(when));
         std::unique_ptr<tracking::Predictor> confirming;
         if (!entrant.confirmed_by.empty())
             confirming = make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), stick.name);
-        HitScore score = evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples,
-                                          {*timing, confirming.get()}, recording.geometry, options_.surface,
-                                          {stick.leads_s[lead], options_.release_margin_s, advance_s});
+        HitScore score =
+            evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples, {*timing, confirming.get()},
+                             recording.geometry, options_.surface, when);
         require_working(*timing);
         return score;
     }
