@@ -178,7 +178,7 @@ void OfflineRun::take_contacts(double s, const std::vector<std::uint32_t>& moved
             ++path;
         }
         path += 2;
-        scheduler_.sample(stick, s, contacts, measured, filtered);
+        scheduler_.sample(stick, s, contacts, measured, filtered, sticks_[stick].selected_model());
     }
 }
 

@@ -93,6 +93,8 @@ PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, co
     result.trace_source = trace.source;
     result.picture_predictor = picture_specification(options.picture_predictor);
     result.sound_predictor = sound_specification(options.sound_predictor);
+    if (!is_external(result.sound_predictor))
+        result.sound_models = tracking::make_predictor(result.sound_predictor)->models();
     result.t0_s = trace.t0_s();
     result.t_end_s = trace.t_end_s();
     result.fps = options.fps;

@@ -33,6 +33,7 @@ struct InputFile {
 struct PlayResult {
     std::string trace, kit, kit_name, trace_source;
     std::string picture_predictor, sound_predictor;
+    std::size_t sound_models = 1;  ///< that the sound's predictor runs in parallel
     double t0_s = 0, t_end_s = 0;
     double fps = 30, render_lead_s = 0, sound_lead_s = 0, release_margin_s = 0;
     bool cancelling = true;

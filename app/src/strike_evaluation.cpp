@@ -226,7 +226,7 @@ double HitScore::false_per_min_without_cancel() const {
 
 double HitScore::loss() const {
     double sum = true_contacts + predicted - 2 * matched;
-    for (const double error : errors_ms) sum += std::abs(error) / (1e3 * kMatchWindow_s);
+    for (const double error : errors_ms) sum += 0.5 * std::abs(error) / (1e3 * kMatchWindow_s);
     return sum;
 }
 

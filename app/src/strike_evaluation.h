@@ -34,7 +34,8 @@ struct HitScore {
     [[nodiscard]] double p95_ms() const;
     [[nodiscard]] double false_per_min() const;
     [[nodiscard]] double false_per_min_without_cancel() const;
-    /// What the strikes cost: 1 for each missed contact and each false note, |error| / 30 ms for the others.
+    /// What the strikes cost: 1 for each missed contact and each false note, |error| / 60 ms for the others
+    /// (a note at the edge of the 30 ms window is half a miss).
     [[nodiscard]] double loss() const;
     /// Both together, as if one recording followed the other.
     void add(const HitScore& other);

@@ -124,6 +124,7 @@ void StrikeScheduler::update(Strike& moved, double s, const sim::Contact& contac
     const double speed = moved.speed_mps;
     const std::int32_t zone = moved.zone;
     copy_contact(moved, contact);
+    moved.model = model_;
     place_onset(moved, s);
     if (onset == moved.onset_sample && speed == moved.speed_mps && zone == moved.zone) return;
     ++moved.moves;
@@ -135,6 +136,7 @@ void StrikeScheduler::create(Approach& a, double s, std::uint32_t stick, const s
     fresh.stick = stick;
     fresh.instrument = contact.body;
     copy_contact(fresh, contact);
+    fresh.model = model_;
     place_onset(fresh, s);
     fresh.scheduled_at_s = s;
     const auto again = std::find_if(a.cancelled.rbegin(), a.cancelled.rend(), [&](std::uint64_t id) {
@@ -231,7 +233,8 @@ void StrikeScheduler::follow(Approach& a, double s, std::uint32_t stick,
 
 void StrikeScheduler::sample(std::uint32_t stick, double s, std::span<const sim::Contact> contacts,
                              std::span<const double> measured_clearance,
-                             std::span<const double> filtered_clearance) {
+                             std::span<const double> filtered_clearance, std::size_t model) {
+    model_ = static_cast<std::uint32_t>(model);
     const int number = samples_since_start_[stick]++;
     std::vector<sim::Contact> own;
     for (std::uint32_t instrument = 0; instrument < instruments_; ++instrument) {

@@ -52,8 +52,10 @@ public:
     ///   contacts            of its predicted path, by time
     ///   measured_clearance  signed distance of the measured tip to each instrument's surface grown by the
     ///   tip's radius [m] filtered_clearance  the same of the filtered tip at lead 0
+    ///   model               that predicts the contacts, of a predictor of several
     void sample(std::uint32_t stick, double s, std::span<const sim::Contact> contacts,
-                std::span<const double> measured_clearance, std::span<const double> filtered_clearance);
+                std::span<const double> measured_clearance, std::span<const double> filtered_clearance,
+                std::size_t model = 0);
     /// After the last sample: what is pending is released, as when a sensor falls silent.
     void finish();
 
@@ -102,6 +104,7 @@ private:
 
     StrikeRules rules_;
     std::size_t instruments_;
+    std::uint32_t model_ = 0;           // of the sample at hand
     std::vector<Approach> approaches_;  // stick-major
     std::vector<int> samples_since_start_;
     std::vector<Strike> strikes_;

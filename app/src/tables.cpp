@@ -37,12 +37,16 @@ std::string csv_field(std::string_view text) {
 std::string format_events(const PlayResult& result) {
     std::string text =
         "id,stick,instrument,onset_s,speed_mps,px,py,pz,scheduled_at_s,outcome,moves,decided_at_s,model\n";
-    const std::string model = csv_field(result.sound_predictor);
+    // Of several models in parallel, the number of the one that the note's time comes from.
+    const auto model = [&](const Strike& s) {
+        return csv_field(result.sound_models > 1 ? fmt::format("{}#{}", result.sound_predictor, s.model)
+                                                 : result.sound_predictor);
+    };
     for (const Strike& s : result.strikes)
         fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", s.id,
                        csv_field(result.sticks.at(s.stick)), csv_field(result.instruments.at(s.instrument)),
                        s.onset_s, s.speed_mps, s.point_world.x(), s.point_world.y(), s.point_world.z(),
-                       s.scheduled_at_s, outcome_word(s), s.moves, s.decided_at_s, model);
+                       s.scheduled_at_s, outcome_word(s), s.moves, s.decided_at_s, model(s));
     return text;
 }
 

@@ -85,7 +85,11 @@ const std::map<std::string, std::function<std::vector<std::string>()>>& grids() 
                            {"0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "0.95", "0.98"});
          }},
         {"one-euro", one_euro_grid},
-        {"cv", [] { return filled("cv:q=", densities(4, 12)); }},
+        {"cv",
+         [] {
+             return crossed(filled("cv:q=", densities(4, 12)),
+                            {"", ",decay=2", ",decay=4", ",decay=8", ",decay=16", ",decay=32"});
+         }},
         {"ca", [] { return filled("ca:q=", densities(5, 14)); }},
         {"singer", singer_grid},
         {"bank", bank_grid},

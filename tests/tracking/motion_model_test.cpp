@@ -85,10 +85,33 @@ TEST(MotionModel, SlowSingerTendsToConstantAcceleration) {
     EXPECT_LT((singer.transition(0.01).matrix() - ca.transition(0.01).matrix()).cwiseAbs().maxCoeff(), 2e-5);
 }
 
+TEST(MotionModel, SlowlyDecayingVelocityTendsToConstantVelocity) {
+    const MotionStep decaying = MotionModel{MotionModel::DecayingVelocity{1e-3, 2}}.step(0.01);
+    const MotionStep lasting = MotionModel{MotionModel::ConstantVelocity{2}}.step(0.01);
+    // The difference is of first order in decay dt = 1e-5.
+    EXPECT_NEAR(decaying.f.pv / lasting.f.pv, 1, 1e-5);
+    EXPECT_NEAR(decaying.f.vv, 1, 2e-5);
+    EXPECT_NEAR(decaying.q.pp / lasting.q.pp, 1, 2e-5);
+    EXPECT_NEAR(decaying.q.pv / lasting.q.pv, 1, 2e-5);
+    EXPECT_NEAR(decaying.q.vv / lasting.q.vv, 1, 2e-5);
+}
+
+TEST(MotionModel, DecayingVelocityHasTheVarianceOfTheOrnsteinUhlenbeckProcess) {
+    constexpr double kDecay = 8, kDensity = 3, kTime = 0.2;
+    const MotionStep step = MotionModel{MotionModel::DecayingVelocity{kDecay, kDensity}}.step(kTime);
+    const double e = std::exp(-kDecay * kTime);
+    // Uhlenbeck and Ornstein 1930, for white noise of density q: variances of velocity and displacement.
+    EXPECT_NEAR(step.q.vv, kDensity * (1 - e * e) / (2 * kDecay), 1e-15);
+    EXPECT_NEAR(step.q.pp, kDensity / (kDecay * kDecay * kDecay) * (kDecay * kTime - 1.5 + 2 * e - e * e / 2),
+                1e-15);
+    EXPECT_NEAR(step.f.pv, (1 - e) / kDecay, 1e-16);
+}
+
 TEST(MotionModel, NoiseOfTwoStepsIsTheNoiseOfOneLongStep) {
     for (const MotionModel& model :
          {MotionModel{MotionModel::ConstantVelocity{3}}, MotionModel{MotionModel::ConstantAcceleration{3}},
-          MotionModel{MotionModel::Singer{7, 3}}, MotionModel{MotionModel::Singer{500, 3}}}) {
+          MotionModel{MotionModel::DecayingVelocity{7, 3}}, MotionModel{MotionModel::Singer{7, 3}},
+          MotionModel{MotionModel::Singer{500, 3}}}) {
         const Matrix3d f = model.transition(0.03).matrix();
         const Matrix3d two = f * model.step(0.02).q.matrix() * f.transpose() + model.step(0.03).q.matrix();
         const Matrix3d one = model.step(0.05).q.matrix();

@@ -21,14 +21,14 @@ using Lanes = Eigen::Array4d;
 /// F(dt) of one axis' state [position, velocity, acceleration], upper triangular:
 ///
 ///   [1 pv pa]
-///   [0  1 va]
+///   [0 vv va]
 ///   [0  0 aa]
 struct Transition {
-    double pv, pa, va, aa;
+    double pv, pa, vv, va, aa;
 
     [[nodiscard]] Eigen::Matrix3d matrix() const {
         Eigen::Matrix3d f;
-        f << 1, pv, pa, 0, 1, va, 0, 0, aa;
+        f << 1, pv, pa, 0, vv, va, 0, 0, aa;
         return f;
     }
 };
@@ -41,7 +41,7 @@ struct AxisStates {
 };
 
 [[nodiscard]] inline AxisStates operator*(const Transition& f, const AxisStates& x) noexcept {
-    return {x.p + f.pv * x.v + f.pa * x.a, x.v + f.va * x.a, f.aa * x.a};
+    return {x.p + f.pv * x.v + f.pa * x.a, f.vv * x.v + f.va * x.a, f.aa * x.a};
 }
 
 /// Symmetric 3x3 matrix over [p, v, a] by its six entries, so that it stays symmetric. T is double where the
@@ -63,11 +63,11 @@ template <typename T>
                                               const AxisMatrix<double>& q) noexcept {
     const T row_pv = p.pv + (f.pv * p.vv + f.pa * p.va);
     const T row_pa = p.pa + (f.pv * p.va + f.pa * p.aa);
-    const T row_va = p.va + f.va * p.aa;
+    const T row_va = f.vv * p.va + f.va * p.aa;
     return {(p.pp + q.pp + (f.pv * p.pv + f.pa * p.pa)) + (f.pv * row_pv + f.pa * row_pa),
-            (row_pv + q.pv) + f.va * row_pa,
+            f.vv * row_pv + (f.va * row_pa + q.pv),
             f.aa * row_pa + q.pa,
-            (p.vv + f.va * p.va + q.vv) + f.va * row_va,
+            f.vv * (f.vv * p.vv + f.va * p.va) + (f.va * row_va + q.vv),
             f.aa * row_va + q.va,
             f.aa * f.aa * p.aa + q.aa};
 }

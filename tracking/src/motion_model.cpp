@@ -38,7 +38,7 @@ Decay decay(double u) {
 
 Transition singer_transition(double alpha, double dt, const Decay& d) {
     const double time = 1 / alpha;
-    return {dt, d.displacement * (time * time), -d.change * time, 1 + d.change};
+    return {dt, d.displacement * (time * time), 1, -d.change * time, 1 + d.change};
 }
 
 /// The six integrals over [0, 1] of products r_i(s) r_j(s), where r_p, r_v, r_a are the displacement, the
@@ -124,6 +124,17 @@ MotionStep MotionModel::Singer::step(double dt) const noexcept {
     const Decay d = decay(u);
     return {singer_transition(alpha, dt, d),
             scaled_matrix(u <= kSeriesLimit ? series_noise(u, dt) : closed_noise(alpha, u, d), q)};
+}
+
+// One integration less than Singer's: its velocity and acceleration stand for position and velocity.
+Transition MotionModel::DecayingVelocity::transition(double dt) const noexcept {
+    const Transition f = Singer{decay, q}.transition(dt);
+    return {f.va, 0, f.aa, 0, 1};
+}
+
+MotionStep MotionModel::DecayingVelocity::step(double dt) const noexcept {
+    const MotionStep step = Singer{decay, q}.step(dt);
+    return {{step.f.va, 0, step.f.aa, 0, 1}, {step.q.vv, step.q.va, 0, step.q.aa, 0, 0}};
 }
 
 MotionModel MotionModel::scaled(double factor) const {

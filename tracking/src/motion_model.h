@@ -30,6 +30,13 @@ struct MotionModel {
             return {q1 * dt * dt / 3, q1 * dt / 2, 0, q1, 0, 0};
         }
     };
+    /// Velocity that decays at rate `decay` [1/s], driven by white acceleration noise of density q
+    /// (integrated Ornstein-Uhlenbeck process): what is known of a velocity fades with the lead.
+    struct DecayingVelocity {
+        double decay, q;
+        [[nodiscard]] Transition transition(double dt) const noexcept;
+        [[nodiscard]] MotionStep step(double dt) const noexcept;
+    };
     /// Constant acceleration driven by white jerk of density q [m^2/s^5].
     struct ConstantAcceleration {
         double q;
@@ -50,13 +57,14 @@ struct MotionModel {
         AxisMatrix<double> q;
     };
 
-    std::variant<ConstantVelocity, ConstantAcceleration, Singer, FixedStep> kind;
+    std::variant<ConstantVelocity, DecayingVelocity, ConstantAcceleration, Singer, FixedStep> kind;
     double measurement_variance = 0.25e-3 * 0.25e-3;                           ///< R (3.19)
     Eigen::Vector3d initial_variance = Eigen::Vector3d(1e2, 1e6, 1e8) * 1e-6;  ///< of p, v, a
 
     [[nodiscard]] Transition transition(double dt) const noexcept {
         if (const auto* singer = std::get_if<Singer>(&kind)) return singer->transition(dt);
-        return {dt, dt * dt / 2, dt, 1};
+        if (const auto* decaying = std::get_if<DecayingVelocity>(&kind)) return decaying->transition(dt);
+        return {dt, dt * dt / 2, 1, dt, 1};
     }
     /// Both, exact: Q is the integral of F(s) g g^T F(s)^T q over [0, dt], g the place where the noise
     /// enters.
@@ -71,7 +79,8 @@ struct MotionModel {
 // Here, not in the source file: the filters' inner loop keeps the entries in registers.
 inline MotionStep MotionModel::step(double dt) const noexcept {
     if (const auto* singer = std::get_if<Singer>(&kind)) return singer->step(dt);
-    const Transition f{dt, dt * dt / 2, dt, 1};
+    if (const auto* decaying = std::get_if<DecayingVelocity>(&kind)) return decaying->step(dt);
+    const Transition f{dt, dt * dt / 2, 1, dt, 1};
     if (const auto* acceleration = std::get_if<ConstantAcceleration>(&kind))
         return {f, acceleration->noise(dt)};
     if (const auto* velocity = std::get_if<ConstantVelocity>(&kind)) return {f, velocity->noise(dt)};

@@ -51,8 +51,9 @@ double density(Specification& specification, const char* key, double otherwise) 
     return kSquareMetres * specification.number(key, otherwise, kLeastDensity, kMostDensity);
 }
 
-MotionModel constant_velocity(double q) {
+MotionModel constant_velocity(double q, double decay = 0) {
     MotionModel model{MotionModel::ConstantVelocity{q}};
+    if (decay > 0) model.kind = MotionModel::DecayingVelocity{decay, q};
     model.initial_variance.z() = 0;
     return model;
 }
@@ -99,7 +100,8 @@ std::unique_ptr<Predictor> make_thesis(Specification& specification) {
 }
 
 std::unique_ptr<Predictor> make_cv(Specification& specification) {
-    return make_kalman(specification, constant_velocity(density(specification, "q", 1e8)));
+    return make_kalman(specification, constant_velocity(density(specification, "q", 1e8),
+                                                        specification.number("decay", 0, 1e-3, 1000)));
 }
 
 std::unique_ptr<Predictor> make_ca(Specification& specification) {

@@ -88,7 +88,8 @@ private:
         else if (names == "t,stick,px,py,pz,ex,ey,ez,")
             orientation_ = Orientation::euler;
         else
-            line.fail(0, in_quotes(line.text()), kHeaderHelp, "name the columns so, in this order, or bring the table in with `trace convert --map`");
+            line.fail(0, in_quotes(line.text()), kHeaderHelp,
+                      "name the columns so, in this order, or bring the table in with `trace convert --map`");
         columns_ = orientation_ == Orientation::absent ? 5 : orientation_ == Orientation::quaternion ? 9 : 8;
     }
 

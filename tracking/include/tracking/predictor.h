@@ -68,6 +68,7 @@ inline constexpr double kGapS = 0.1;
 ///   one-euro:min=10,beta=0.1,d=30         Casiez 2012 with its velocity; beta in Hz s/mm
 ///   thesis, thesis:q=outer  Kalman filter, constant acceleration, (3.18) as a diagonal, or as printed
 ///   cv:q=1e8                constant velocity, white acceleration of density q [mm^2/s^3]
+///   cv:q=1e8,decay=10       velocity that decays at 10 /s (default 0: does not)
 ///   ca:q=1e9                constant acceleration, white jerk of density q [mm^2/s^5]
 ///   singer:alpha=3,q=1e10   acceleration that decays at alpha [1/s], driven by density q [mm^2/s^5]
 ///   bank:cv=1e7,ca=3e8,alpha=30,singer=1e11,lead=0.0667   the model that was right a lead ago (3.28);
