@@ -164,6 +164,11 @@ void measure_costs(std::vector<ComparisonRow>& rows, const Field& field, std::si
     }
 }
 
+void widen(std::optional<std::pair<double, double>>& range, double value) {
+    if (!range) range = {value, value};
+    range = {std::min(range->first, value), std::max(range->second, value)};
+}
+
 std::vector<ComparisonSummary> summarise(const Comparison& comparison, const std::vector<Entrant>& entrants) {
     std::vector<ComparisonSummary> summaries;
     for (const Entrant& entrant : entrants)
@@ -180,6 +185,7 @@ std::vector<ComparisonSummary> summarise(const Comparison& comparison, const std
                 add(summary.calibration, row.calibration);
                 if (row.hits && !summary.hits) summary.hits = HitScore{};
                 if (row.hits) summary.hits->add(*row.hits);
+                if (row.advance_s) widen(summary.advance_s, *row.advance_s);
                 if (row.ns_per_sample > 0) costs.push_back(row.ns_per_sample);
             }
             if (!costs.empty()) summary.ns_per_sample = quantile(std::move(costs), 0.5);

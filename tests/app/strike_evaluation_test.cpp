@@ -279,7 +279,7 @@ TEST(HitScore, FiguresAreThoseOfTheirDefinitions) {
     EXPECT_EQ(hits.p95_ms(), 9);
     EXPECT_EQ(hits.false_per_min(), 2);
     EXPECT_EQ(hits.false_per_min_without_cancel(), 12);
-    EXPECT_DOUBLE_EQ(hits.loss(), 2 + 1 + 18.0 / 30);  // missed, false, and the times
+    EXPECT_DOUBLE_EQ(hits.loss(), 2 + 1 + 0.5 * 18.0 / 30);  // missed, false, and the times
 }
 
 TEST(HitScore, SumsAreOfCountsAndTimes) {
