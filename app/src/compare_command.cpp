@@ -16,6 +16,8 @@
 #include "parallel.h"
 #include "predictors.h"
 #include "progress_bar.h"
+#include "sensor_options.h"
+#include "trace_files.h"
 
 namespace app {
 namespace {
@@ -26,8 +28,6 @@ constexpr double kLongestLeadS = 1;
 struct CompareArguments {
     std::vector<std::string> traces, tune, predictions, persons;
     std::string predictors, leads = "1/30,1/15,1/10", kit, plane, out;
-    std::string rate, noise = "0", jitter = "0", drop_out = "0";
-    std::uint64_t seed = 1;
     bool no_tuning = false, no_cost = false, map = false;
 };
 
@@ -102,26 +102,22 @@ StrikeSurface surface_of(const CompareArguments& a) {
     return surface;
 }
 
-tracking::SensorModel sensor_of(const CompareArguments& a) {
-    constexpr double kMm = 1e-3, kMs = 1e-3;
-    tracking::SensorModel sensor;
-    if (!a.rate.empty()) sensor.rate_hz = in_range(a.rate, "--rate", 10, 10000);
-    sensor.noise_m = kMm * in_range(a.noise, "--noise", 0, 1000);
-    sensor.jitter_s = kMs * in_range(a.jitter, "--jitter", 0, 1000);
-    sensor.drop_out = in_range(a.drop_out, "--drop-out", 0, 0.9);
-    sensor.seed = a.seed;
-    return sensor;
+/// Paths of traces, or of bundled ones by name.
+std::vector<std::string> found_traces(const std::vector<std::string>& names) {
+    std::vector<std::string> files;
+    for (const std::string& name : names) files.push_back(find_trace(name).string());
+    return files;
 }
 
-ComparisonOptions options_of(const CompareArguments& a) {
+ComparisonOptions options_of(const CompareArguments& a, const SensorArguments& sensor) {
     ComparisonOptions o;
-    o.traces = a.traces;
-    o.tune_traces = a.tune;
+    o.traces = found_traces(a.traces);
+    o.tune_traces = found_traces(a.tune);
     o.predictors = predictors_of(a.predictors);
     o.predictions = pairs_of(a.predictions, "--predictions", false);
     o.persons = pairs_of(a.persons, "--person", true);
     o.leads_s = leads_of(a.leads);
-    o.sensor = sensor_of(a);
+    o.sensor = sensor_model(sensor);
     o.surface = surface_of(a);
     o.surface_text = !a.kit.empty() ? "kit " + a.kit : a.plane.empty() ? "none" : "plane " + a.plane;
     o.tuning = !a.no_tuning;
@@ -131,8 +127,8 @@ ComparisonOptions options_of(const CompareArguments& a) {
     return o;
 }
 
-void run(const CompareArguments& a) {
-    ComparisonOptions options = options_of(a);
+void run(const CompareArguments& a, const SensorArguments& sensor) {
+    ComparisonOptions options = options_of(a, sensor);
     OutputFolder out(a.out, compare_products());
     ProgressBar bar(true);
     options.progress = [&bar](double share) { bar.show(share); };
@@ -151,30 +147,27 @@ void add_compare_command(CLI::App& program) {
     CLI::App* command = program.add_subcommand(
         "compare", "Compare predictors on recordings: errors, strikes, cost, every predictor at every lead");
     auto a = std::make_shared<CompareArguments>();
-    command->add_option("TRACE", a->traces, "Traces (CSV)")->required();
+    command->add_option("TRACE", a->traces, "Traces (CSV), or names of bundled ones")->required();
     command->add_option("--predictors", a->predictors, "Predictors, separated by commas (default: all)");
     command->add_option("--leads", a->leads, "Leads [s], separated by commas")->capture_default_str();
-    CLI::Option* kit = command->add_option("--kit", a->kit, "Score strikes on a kit");
+    CLI::Option* kit =
+        command->add_option("--kit", a->kit, "Score strikes on the instruments of a kit: its name or file");
     command
-        ->add_option("--plane", a->plane,
-                     "Score strikes on a plane: its height [m], or contact+D: D above the contact height")
+        ->add_option(
+            "--plane", a->plane,
+            "Score strikes on a level plane: its height [m], or contact+D or contact-D: D [m] from each "
+            "stick's contact height, the median low of its tip")
         ->excludes(kit);
-    command->add_option("--rate", a->rate, "The sensor's rate [Hz] (default: the recording's own times)");
-    command->add_option("--noise", a->noise, "Standard deviation of position noise [mm]")
-        ->capture_default_str();
-    command->add_option("--jitter", a->jitter, "Standard deviation of the sample times [ms]")
-        ->capture_default_str();
-    command->add_option("--drop-out", a->drop_out, "Share of samples lost, in bursts")->capture_default_str();
-    command->add_option("--seed", a->seed, "Seed of the sensor and of the intervals")->capture_default_str();
     command->add_option("--tune", a->tune, "Tune on these traces instead of on the others compared");
     command->add_option("--predictions", a->predictions,
                         "NAME=FILE[@TRACE]: predictions made elsewhere, in predict's format");
     command->add_option("--person", a->persons, "TEXT=NAME: traces whose path contains TEXT are of NAME");
     command->add_flag("--no-tuning", a->no_tuning, "Run the predictors as named only");
     command->add_flag("--no-cost", a->no_cost, "Measure no cost: the results are then the same on every run");
-    command->add_flag("--map", a->map, "Also map rate x noise x jitter x drop-outs (minutes)");
+    command->add_flag("--map", a->map, "Also map 30 to 240 Hz x noise x jitter x drop-outs (minutes)");
     command->add_option("--out", a->out, "Folder for compare.json, compare.csv, report.html")->required();
-    command->callback([a] { run(*a); });
+    const std::shared_ptr<SensorArguments> sensor = add_sensor_options(*command);
+    command->callback([a, sensor] { run(*a, *sensor); });
 }
 
 }  // namespace app

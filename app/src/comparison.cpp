@@ -82,13 +82,14 @@ public:
         const SensedStick& stick = field_.sticks[place];
         const Entrant& entrant = entrants_[entrant_index];
         const Recording& recording = field_.recordings[stick.recording];
-        const auto timing = make_striker(entrant, stick, place, lead);
+        const StrikeTiming when{stick.leads_s[lead], options_.release_margin_s, advance_s};
+        const auto timing = make_striker(entrant, stick, place, lead, strike_leads(when));
         std::unique_ptr<tracking::Predictor> confirming;
         if (!entrant.confirmed_by.empty())
             confirming = make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), stick.name);
-        HitScore score = evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples,
-                                          {*timing, confirming.get()}, recording.geometry, options_.surface,
-                                          {stick.leads_s[lead], options_.release_margin_s, advance_s});
+        HitScore score =
+            evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples, {*timing, confirming.get()},
+                             recording.geometry, options_.surface, when);
         require_working(*timing);
         return score;
     }
@@ -163,6 +164,11 @@ void measure_costs(std::vector<ComparisonRow>& rows, const Field& field, std::si
     }
 }
 
+void widen(std::optional<std::pair<double, double>>& range, double value) {
+    if (!range) range = {value, value};
+    range = {std::min(range->first, value), std::max(range->second, value)};
+}
+
 std::vector<ComparisonSummary> summarise(const Comparison& comparison, const std::vector<Entrant>& entrants) {
     std::vector<ComparisonSummary> summaries;
     for (const Entrant& entrant : entrants)
@@ -179,6 +185,7 @@ std::vector<ComparisonSummary> summarise(const Comparison& comparison, const std
                 add(summary.calibration, row.calibration);
                 if (row.hits && !summary.hits) summary.hits = HitScore{};
                 if (row.hits) summary.hits->add(*row.hits);
+                if (row.advance_s) widen(summary.advance_s, *row.advance_s);
                 if (row.ns_per_sample > 0) costs.push_back(row.ns_per_sample);
             }
             if (!costs.empty()) summary.ns_per_sample = quantile(std::move(costs), 0.5);

@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "comparison_map.h"
+#include "comparison_pairs.h"
 #include "comparison_tables.h"
 
 namespace app {
@@ -65,7 +66,7 @@ Json json_of(const ComparisonRow& row) {
     json["external"] = row.external;
     json["calibration"] = json_of(row.calibration);
     json["hits"] = json_of(row.hits);
-    if (row.hits) json["hits"]["advance_ms"] = 1e3 * row.advance_s;
+    if (row.hits) json["hits"]["advance_ms"] = 1e3 * row.advance_s.value_or(0);
     return json;
 }
 
@@ -77,6 +78,10 @@ Json json_of(const ComparisonSummary& summary) {
     json["external"] = summary.external;
     json["calibration"] = json_of(summary.calibration);
     json["hits"] = json_of(summary.hits);
+    if (summary.advance_s) {
+        json["hits"]["advance_low_ms"] = 1e3 * summary.advance_s->first;
+        json["hits"]["advance_high_ms"] = 1e3 * summary.advance_s->second;
+    }
     return json;
 }
 
@@ -117,8 +122,18 @@ Json settings_of(const Comparison& comparison) {
         {"leads_s", o.leads_s},
         {"rate_hz", if_any(o.sensor.rate_hz, o.sensor.rate_hz > 0)},
         {"noise_mm", 1e3 * o.sensor.noise_m},
+        {"noise_rad", o.sensor.noise_rad},
         {"jitter_ms", 1e3 * o.sensor.jitter_s},
+        {"true_stamps", o.sensor.true_stamps},
         {"drop_out", o.sensor.drop_out},
+        {"burst", o.sensor.burst},
+        {"latency_ms", 1e3 * o.sensor.latency_s},
+        {"quantum_mm", 1e3 * o.sensor.quantum_m},
+        {"quantum_rad", o.sensor.quantum_rad},
+        {"outlier", o.sensor.outlier},
+        {"outlier_radius_mm", 1e3 * o.sensor.outlier_m},
+        {"duplicate", o.sensor.duplicate},
+        {"late", o.sensor.late},
         {"seed", o.sensor.seed},
         {"tune", o.tune_traces},
         {"tuned", comparison.tuned_on},
@@ -137,7 +152,8 @@ std::string format_comparison_json(const Comparison& comparison) {
                  {"results", array_of(comparison.rows)},
                  {"summary", array_of(comparison.summaries)},
                  {"paired", array_of(comparison.paired)},
-                 {"winners", winners(comparison)}};
+                 {"winners", winners(comparison)},
+                 {"winners_caution", selection_caution(comparison)}};
     if (comparison.options.map) json["map"] = array_of(comparison.map);
     return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

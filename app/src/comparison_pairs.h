@@ -11,4 +11,7 @@ namespace app {
 [[nodiscard]] std::vector<PairedResult> pair_with_baselines(const Comparison& comparison,
                                                             const std::vector<Entrant>& entrants);
 
+/// What the winners' intervals do not say: among how many they were picked.
+[[nodiscard]] std::string selection_caution(const Comparison& comparison);
+
 }  // namespace app

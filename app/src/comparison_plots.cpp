@@ -75,6 +75,15 @@ std::size_t family_number(const Comparison& comparison, const std::string& famil
     return static_cast<std::size_t>(std::find(families.begin(), families.end(), family) - families.begin());
 }
 
+/// 1, 2 and 5 times the powers of ten within a range.
+std::string logarithmic_tics(double low, double high) {
+    std::string tics;
+    for (double decade = std::pow(10, std::floor(std::log10(low))); decade <= high; decade *= 10)
+        for (const double tic : {1 * decade, 2 * decade, 5 * decade})
+            if (tic >= low && tic <= high) tics += fmt::format("{}{}", tics.empty() ? "" : ",", tic);
+    return "set xtics (" + tics + ")\nset mxtics 1\n";
+}
+
 }  // namespace
 
 ComparisonPlot height_plot(const StickFigure& figure) {
@@ -152,12 +161,14 @@ ComparisonPlot cost_plot(const Comparison& comparison, double lead_s) {
         least = std::min(least, s.error.rms_mm), most = std::max(most, s.error.rms_mm);
     }
     const double room = 0.12 * (most - least) + 0.5;
-    plot.script = {kHalf, 320,
-                   plot_axes() + round_tics("y", most - least + 2 * room, 6) +
-                       fmt::format("set logscale x\nset xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel 'ns a "
-                                   "sample, all leads'\nset ylabel 'RMS error, mm'\n",
-                                   fastest / 1.5, slowest * 1.5, std::max(0.0, least - room), most + room) +
-                       panel.text()};
+    plot.script = {
+        kHalf, 320,
+        plot_axes() + round_tics("y", most - least + 2 * room, 6) +
+            logarithmic_tics(fastest / 1.5, slowest * 1.5) +
+            fmt::format("set logscale x\nset xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel 'cost, ns a "
+                        "sample'\nset ylabel 'RMS error, mm'\n",
+                        fastest / 1.5, slowest * 1.5, std::max(0.0, least - room), most + room) +
+            panel.text()};
     return plot;
 }
 

@@ -6,10 +6,13 @@
 #include <iterator>
 #include <vector>
 
+#include "comparison_map_grid.h"
+#include "comparison_pairs.h"
 #include "comparison_plots.h"
 #include "comparison_report_tables.h"
 #include "report_style.h"
 #include "report_svg.h"
+#include "sensor_options.h"
 
 namespace app {
 namespace {
@@ -25,27 +28,20 @@ std::string leads_text(const std::vector<double>& leads_s) {
     return text + " ms";
 }
 
-std::string sensor_text(const tracking::SensorModel& sensor) {
-    std::string text =
-        sensor.rate_hz > 0 ? fmt::format("{:g} Hz", sensor.rate_hz) : "the recordings' own times";
-    text += fmt::format(", noise {:g} mm", 1e3 * sensor.noise_m);
-    if (sensor.jitter_s > 0) text += fmt::format(", jitter {:g} ms (true stamps)", 1e3 * sensor.jitter_s);
-    if (sensor.drop_out > 0) text += fmt::format(", {:g} % lost in bursts", 100 * sensor.drop_out);
-    return text + fmt::format(", seed {}", sensor.seed);
-}
-
 std::string heading(const Comparison& c) {
     std::string persons;
     for (const std::string& person : c.persons) persons += (persons.empty() ? "" : ", ") + person;
     std::string text = "<header><h1>Predictors compared</h1>\n<p>by MusicWorld</p>\n<dl class=facts>\n";
     text += fact("recordings", fmt::format("{}", c.options.traces.size()));
     text += fact("persons", fmt::format("{}: {}", c.persons.size(), persons));
-    text += fact("sensor", sensor_text(c.options.sensor));
+    const std::string sensor = describe(c.options.sensor);
+    text += fact("sensor", sensor.empty() ? "the recordings as they are" : sensor);
     text += fact("leads", leads_text(c.options.leads_s));
     text += fact("tuning", c.tuned_on);
     text += fact("strikes on", c.options.surface_text);
     text += "</dl></header>\n<h2>Which predictor wins</h2>\n";
     for (const std::string& sentence : winners(c)) text += fmt::format("<p>{}</p>\n", html(sentence));
+    text += fmt::format("<p class=note>{}</p>\n", html(selection_caution(c)));
     return text +
            "<p class=note>Samples are taken at uniform times by linear interpolation, with noise; truth "
            "likewise "
@@ -99,7 +95,8 @@ private:
     std::vector<std::string> labels_, drawn_;
 };
 
-/// The predictors whose strikes are shown as histograms: of each lead the best F1, then thesis and naive.
+/// The predictors whose strikes are shown as histograms: of each lead the best F1, then auto, thesis and
+/// naive.
 std::vector<const ComparisonSummary*> shown_strikes(const Comparison& comparison) {
     std::vector<const ComparisonSummary*> shown;
     for (const double lead_s : comparison.options.leads_s) {
@@ -110,7 +107,7 @@ std::vector<const ComparisonSummary*> shown_strikes(const Comparison& comparison
         if (best != nullptr) shown.push_back(best);
         for (const ComparisonSummary& s : comparison.summaries)
             if (s.lead_s == lead_s && s.hits && &s != best &&
-                (s.predictor == "thesis" || s.predictor == "naive"))
+                (s.predictor == "auto" || s.predictor == "thesis" || s.predictor == "naive"))
                 shown.push_back(&s);
     }
     return shown;
@@ -151,6 +148,34 @@ std::string section(std::string_view title, std::string_view note, const std::st
     return fmt::format("<h2>{}</h2>\n<p class=note>{}</p>\n{}", title, note, content);
 }
 
+/// A table a lead.
+std::string by_lead(const Comparison& c, std::string (*table)(const Comparison&, double)) {
+    std::string text;
+    for (const double lead_s : c.options.leads_s)
+        if (const std::string rows = table(c, lead_s); !rows.empty())
+            text += fmt::format("<h3>{:.1f} ms ahead</h3>\n{}", 1e3 * lead_s, rows);
+    return text;
+}
+
+std::string strike_note(const Comparison& c) {
+    return fmt::format(
+        "On {}. A strike's time is fixed at the lead; it may be cancelled until {:g} ms before its onset. "
+        "Notes "
+        "and true contacts are matched one to one within 30 ms; errors are those of the matched ones. Not "
+        "cancelling: false strikes a minute if all that was fixed is played. Advance: what contacts are "
+        "taken to "
+        "come earlier than predicted, learned on the other recordings (least to most over the recordings). "
+        "Tuned parameters are those of the least position error, not of the best strikes.",
+        html(c.options.surface_text), 1e3 * c.options.release_margin_s);
+}
+
+std::string map_section(const Comparison& c) {
+    const std::string grids = map_grids(c);
+    if (grids.empty()) return {};
+    return grids + "<details><summary>All sensors with errors in mm</summary>\n" + map_table(c) +
+           "</details>\n";
+}
+
 std::string sections(const Comparison& c, const Plots& plots, const Placed& placed) {
     std::string text =
         section("A stick and its predictions",
@@ -161,35 +186,33 @@ std::string sections(const Comparison& c, const Plots& plots, const Placed& plac
     text += section("Error against lead",
                     "All recordings together. Tuned parameters are those of the nearest lead asked for.",
                     plots.element(placed.curves));
-    std::string tables;
-    for (const double lead_s : c.options.leads_s)
-        tables += fmt::format("<h3>{:.1f} ms ahead</h3>\n{}", 1e3 * lead_s, error_table(c, lead_s));
     text += section("Errors",
                     "Of the tracked point but where tip is said; free of impacts: truth not within 50 ms of "
                     "impacts or flagged times.",
-                    tables);
+                    by_lead(c, error_table));
     text += section("Against the best baseline",
                     "Ratio of the RMS errors, below 1 is better; where the interval includes 1 there is no "
                     "measurable gain.",
-                    paired_table(c));
+                    by_lead(c, paired_table));
     if (!placed.costs.empty())
         text += section("Speed against error",
                         "Update and predictions at all leads, one core; the figure that differs between "
                         "runs. Open points: "
                         "as named; filled: tuned. Families whose legend is dashed are squares.",
                         plots.pair(placed.costs));
-    text += section("Strikes",
-                    "Committed at the lead, matched one to one within 30 ms; cancelling goes on until the "
-                    "release margin.",
-                    strike_table(c) + (placed.timings.empty() ? "" : plots.pair(placed.timings)));
+    text += section("Strikes", strike_note(c),
+                    by_lead(c, strike_table) + (placed.timings.empty() ? "" : plots.pair(placed.timings)));
     text += section("Calibration",
                     "Share of position errors inside the regions that a predictor states, and the mean "
                     "negative log likelihood (nats, metres).",
-                    calibration_table(c));
-    text += section("Where filters pay",
-                    "Estimators and baselines tuned alike for each sensor, on other recordings; position "
-                    "only, true time stamps.",
-                    map_table(c));
+                    by_lead(c, calibration_table));
+    text +=
+        section("Where filters pay",
+                "Estimators and baselines tuned alike for each sensor, on other recordings; position only, "
+                "true time stamps. A cell: the estimator that errs least there and by how much less than the "
+                "best baseline, with the 95 % interval by recording (of the gain in RMS error). The best is "
+                "picked on the scored recordings; the intervals do not correct for that.",
+                map_section(c));
     return text + section("Predictors", "Parameters in mm and s.", predictor_table(c));
 }
 

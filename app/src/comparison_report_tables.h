@@ -9,11 +9,12 @@ namespace app {
 
 /// Errors and cost of every predictor at a lead.
 [[nodiscard]] std::string error_table(const Comparison& comparison, double lead_s);
-/// Strikes at every lead; empty where none were scored.
-[[nodiscard]] std::string strike_table(const Comparison& comparison);
+/// Strikes at a lead; empty where none were scored.
+[[nodiscard]] std::string strike_table(const Comparison& comparison, double lead_s);
 /// Coverage and likelihood of the covariances stated; empty where none are.
-[[nodiscard]] std::string calibration_table(const Comparison& comparison);
-[[nodiscard]] std::string paired_table(const Comparison& comparison);
+[[nodiscard]] std::string calibration_table(const Comparison& comparison, double lead_s);
+/// Every estimator against the best baseline at a lead.
+[[nodiscard]] std::string paired_table(const Comparison& comparison, double lead_s);
 /// Each sensor and lead: the best estimator against the best baseline. Empty without a map.
 [[nodiscard]] std::string map_table(const Comparison& comparison);
 /// Each predictor: what it is and which parameters ran.

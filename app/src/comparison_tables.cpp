@@ -6,6 +6,8 @@
 #include <iterator>
 
 #include "comparison_map.h"
+#include "comparison_map_grid.h"
+#include "comparison_pairs.h"
 #include "tables.h"
 
 namespace app {
@@ -15,13 +17,13 @@ std::string number(double value, bool any) {
     return any ? fmt::format("{}", value) : "";
 }
 
-std::string hit_columns(const std::optional<HitScore>& hits) {
-    if (!hits) return ",,,,,,,,,";
-    return fmt::format("{},{},{},{},{},{},{},{},{},{}", hits->true_contacts, hits->predicted, hits->matched,
-                       hits->precision(), hits->recall(), hits->f1(),
+std::string hit_columns(const std::optional<HitScore>& hits, double advance_s) {
+    if (!hits) return ",,,,,,,,,,";
+    return fmt::format("{},{},{},{},{},{},{},{},{},{},{}", hits->true_contacts, hits->predicted,
+                       hits->matched, hits->precision(), hits->recall(), hits->f1(),
                        number(hits->median_ms(), hits->matched > 0),
                        number(hits->p95_ms(), hits->matched > 0), hits->false_per_min(),
-                       hits->false_per_min_without_cancel());
+                       hits->false_per_min_without_cancel(), 1e3 * advance_s);
 }
 
 std::string calibration_columns(const std::optional<Calibration>& calibration) {
@@ -82,6 +84,16 @@ void add_paired(std::string& text, const Comparison& comparison, double lead_s, 
     }
 }
 
+void add_advances(std::string& text, const Comparison& comparison, double lead_s) {
+    for (const ComparisonSummary& s : comparison.summaries)
+        if (s.lead_s == lead_s && s.advance_s)
+            fmt::format_to(
+                std::back_inserter(text),
+                "  {}: contacts are taken to come {:g} to {:g} ms earlier than predicted, learned on "
+                "the other recordings\n",
+                s.predictor, 1e3 * s.advance_s->first, 1e3 * s.advance_s->second);
+}
+
 void add_map(std::string& text, const Comparison& comparison) {
     text += fmt::format(
         "\nWhere filters pay, each sensor and lead: the best estimator against the best baseline, tuned "
@@ -95,6 +107,7 @@ void add_map(std::string& text, const Comparison& comparison) {
                        cell->rate_hz, cell->noise_mm, cell->jitter_ms, 100 * cell->drop_out, 1e3 * r.lead_s,
                        r.predictor, r.rms_mm, r.baseline, r.baseline_rms_mm, verdict(r.by_recording));
     }
+    for (const double lead_s : comparison.options.leads_s) text += map_sentence(comparison, lead_s) + "\n";
 }
 
 }  // namespace
@@ -104,7 +117,7 @@ std::string format_comparison_csv(const Comparison& comparison) {
         "trace,person,stick,predictor,used,lead_s,rate_hz,noise_mm,rms_mm,p95_mm,free_rms_mm,"
         "unflagged_rms_mm,rotation_rms_deg,tip_rms_mm,predictions,ns_per_sample,inside_50,inside_95,"
         "negative_log_likelihood,true,predicted,matched,precision,recall,f1,median_ms,p95_ms,false_per_min,"
-        "false_per_min_without_cancel\n";
+        "false_per_min_without_cancel,advance_ms\n";
     for (const ComparisonRow& row : comparison.rows) {
         const ErrorScore& e = row.error;
         fmt::format_to(
@@ -115,7 +128,7 @@ std::string format_comparison_csv(const Comparison& comparison) {
             number(e.unflagged_rms_mm, e.unflagged_count > 0),
             number(e.rotation_rms_deg, e.rotation_count > 0), number(e.tip_rms_mm, e.rotation_count > 0),
             e.count, number(row.ns_per_sample, row.ns_per_sample > 0), calibration_columns(row.calibration),
-            hit_columns(row.hits));
+            hit_columns(row.hits, row.advance_s.value_or(0)));
     }
     return text;
 }
@@ -133,11 +146,12 @@ std::string format_comparison_text(const Comparison& comparison) {
         for (const ComparisonSummary& summary : comparison.summaries)
             if (summary.lead_s == lead_s) add_summary(text, summary, width);
         add_paired(text, comparison, lead_s, width);
+        add_advances(text, comparison, lead_s);
     }
     if (!comparison.map.empty()) add_map(text, comparison);
     text += '\n';
     for (const std::string& sentence : winners(comparison)) text += sentence + "\n";
-    return text;
+    return text + selection_caution(comparison) + "\n";
 }
 
 }  // namespace app

@@ -10,6 +10,7 @@
 #include "bad_input.h"
 #include "predictors.h"
 #include "stick_tracker.h"
+#include "trace_files.h"
 #include "tuning.h"
 
 namespace app {
@@ -166,7 +167,7 @@ std::pair<std::string, std::size_t> split_file(const std::string& text,
                                                std::span<const Recording> recordings) {
     const std::size_t at = text.rfind('@');
     for (std::size_t r = 0; at != std::string::npos && r < recordings.size(); ++r)
-        if (recordings[r].file == text.substr(at + 1)) return {text.substr(0, at), r};
+        if (recordings[r].file == find_trace(text.substr(at + 1))) return {text.substr(0, at), r};
     return {text, recordings.size()};
 }
 
@@ -246,9 +247,11 @@ std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const 
 }
 
 std::unique_ptr<tracking::Predictor> make_striker(const Entrant& entrant, const SensedStick& stick,
-                                                  std::size_t place, std::size_t lead) {
-    if (entrant.strikes_by.empty()) return make_entrant(entrant, stick, place, lead);
-    return make_any_predictor(entrant.strikes_by, stick.leads_s, stick.name);
+                                                  std::size_t place, std::size_t lead,
+                                                  std::span<const double> leads_s) {
+    if (entrant.replays.contains({place, lead})) return make_entrant(entrant, stick, place, lead);
+    const std::string& named = entrant.used[stick.recording][lead];
+    return make_any_predictor(entrant.strikes_by.empty() ? named : entrant.strikes_by, leads_s, stick.name);
 }
 
 std::vector<std::string> specifications_of(const ComparisonOptions& options) {

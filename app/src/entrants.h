@@ -39,10 +39,11 @@ struct Entrant {
 [[nodiscard]] std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant,
                                                                 const SensedStick& stick, std::size_t place,
                                                                 std::size_t lead);
-/// The same for strikes.
+/// The same for strikes, whose path is asked at `leads_s`.
 [[nodiscard]] std::unique_ptr<tracking::Predictor> make_striker(const Entrant& entrant,
                                                                 const SensedStick& stick, std::size_t place,
-                                                                std::size_t lead);
+                                                                std::size_t lead,
+                                                                std::span<const double> leads_s);
 
 struct EntrantList {
     std::vector<Entrant> entrants;

@@ -37,6 +37,16 @@ table{border-collapse:collapse;font-variant-numeric:tabular-nums}
 th,td{padding:4px 14px 4px 0;text-align:left;border-bottom:1px solid var(--grid);vertical-align:top;overflow-wrap:anywhere}
 th{color:var(--axis);font-weight:500;font-size:13px}
 td.n,th.n{text-align:right}
+.wide td,.wide th,.grid td{overflow-wrap:normal}
+.scroll+h3{margin-top:20px}
+.wide td,.grid td{white-space:nowrap}
+.wide td.text{white-space:normal}
+.grid{font-size:12.5px}
+.grid td{padding:2px 16px 2px 0}
+.grid td.gain b{color:var(--released)}
+.grid td.none{color:var(--axis)}
+details summary{cursor:pointer;margin:12px 0 6px}
+.pair,.plot+.pair{margin-top:12px}
 code{font:12.5px/1.5 ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;overflow-wrap:anywhere}
 @media(max-width:520px){.pair{grid-template-columns:1fr}main{padding:20px 14px}}
 @media print{body{font-size:12px}.plot,figure,tr{break-inside:avoid}}

@@ -1,7 +1,11 @@
 #include "sensed_stick.h"
 
-#include <limits>
+#include <fmt/format.h>
 
+#include <limits>
+#include <stdexcept>
+
+#include "bad_input.h"
 #include "stroke_lows.h"
 
 namespace app {
@@ -36,7 +40,11 @@ SensedStick sense_stick(const Recording& recording, std::size_t stick, const tra
     sensed.stick = stick;
     sensed.name = recorded.name;
     sensed.tip = recording.geometry.tip;
-    sensed.samples = tracking::sense(recorded, sensor, stick);
+    try {
+        sensed.samples = tracking::sense(recorded, sensor, stick);
+    } catch (const std::invalid_argument& error) {
+        throw BadInput(fmt::format("{}: error: {}", recording.file, error.what()));
+    }
     sensed.rate_hz = sensor.rate_hz > 0 ? sensor.rate_hz : median_rate(recorded.samples);
     sensed.leads_s.assign(leads_s.begin(), leads_s.end());
     sensed.truths.reserve(sensed.samples.size() * leads_s.size());

@@ -43,6 +43,7 @@ struct SensedStick {
 inline constexpr double kSettlingS = 0.5;
 
 /// The samples are those that `musicworld predict` sees of the same file with the same sensor.
+/// Throws BadInput for more samples than can be.
 [[nodiscard]] SensedStick sense_stick(const Recording& recording, std::size_t stick,
                                       const tracking::SensorModel& sensor, std::span<const double> leads_s);
 

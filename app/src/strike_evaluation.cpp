@@ -61,7 +61,8 @@ public:
     [[nodiscard]] std::size_t parts() const override { return bodies_.size(); }
     [[nodiscard]] std::vector<sim::Contact> sweep(const sim::TipPath& path) override {
         sim::StepRequest request;
-        request.t_s = path.nodes.front().t_s;
+        // A confirming filter may lag behind: it refused the newest sample.
+        request.t_s = last_s_ = std::max(last_s_, path.nodes.front().t_s);
         request.paths = {path};
         return simulation_->step(request).contacts;
     }
@@ -77,6 +78,7 @@ public:
 
 private:
     double radius_;
+    double last_s_ = -std::numeric_limits<double>::infinity();
     std::vector<sim::BodyDefinition> bodies_;
     std::unique_ptr<sim::Simulation> simulation_;
 };
@@ -144,11 +146,7 @@ public:
     [[nodiscard]] std::vector<Strike> finish() {
         for (std::size_t model = 0; model < schedulers_.size(); ++model) {
             schedulers_[model].finish();
-            if (model != selected_) continue;
-            for (const Strike& strike : schedulers_[model].strikes())
-                if (strike.outcome == Outcome::released &&
-                    (played_.empty() || strike.onset_s > played_.back().onset_s))
-                    play(strike);
+            take_released(model);
         }
         return std::move(played_);
     }
@@ -252,7 +250,7 @@ public:
           geometry_(geometry),
           surface_(surface),
           advance_s_(timing.advance_s),
-          leads_(path_leads(std::max(timing.lead_s, timing.release_margin_s) + kBeyondLeadS)),
+          leads_(strike_leads(timing)),
           confirming_leads_(path_leads(kConfirmingLeadS)) {}
 
     /// Contacts that a model predicts from its newest sample.
@@ -286,6 +284,10 @@ private:
 };
 
 }  // namespace
+
+std::vector<double> strike_leads(const StrikeTiming& timing) {
+    return path_leads(std::max(timing.lead_s, timing.release_margin_s) + kBeyondLeadS);
+}
 
 HitScore evaluate_strikes(const tracking::StickTrace& recorded, std::span<const tracking::PoseSample> samples,
                           const StrikePredictors& predictors, const StickGeometry& geometry,

@@ -53,6 +53,10 @@ struct StrikeTiming {
     double advance_s = 0;             ///< predicted contacts are taken to come earlier by this
 };
 
+/// The leads at which evaluate_strikes asks the timing predictor: 0 to a little beyond the strike's lead.
+/// External predictors are told these.
+[[nodiscard]] std::vector<double> strike_leads(const StrikeTiming& timing);
+
 /// Strikes of one stick (the strike rules of the README): at each sample the path that the predictor states
 /// until a little beyond the lead is swept against the surface; a contact's time is re-timed at each sample
 /// until the lead before it, then fixed; it may be cancelled, and taken up again, until the release margin

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
+#include <span>
 
 namespace app {
 namespace {
@@ -211,6 +213,122 @@ TEST(StrikeScheduler, SilentZonesMakeNoNote) {
     contact.t_s = 0.08;
     for (int i = 0; i < 6; ++i) scheduler.sample(0, 0.01 * i, std::span(&contact, 1), clearance, clearance);
     EXPECT_TRUE(scheduler.strikes().empty());
+}
+
+/// A scheduler whose notes' times are fixed 50 ms ahead, told one predicted contact at each sample while the
+/// tip hangs 50 mm above. It is settled at 0.035 s.
+class Committed {
+public:
+    explicit Committed(bool cancelling = true) : scheduler_(rules(cancelling), 1, 1) {
+        for (int i = 0; i < 4; ++i) sample(0.01 * i, std::nullopt);
+    }
+    void sample(double s, std::optional<double> contact_s, double clearance = 0.05) {
+        sim::Contact contact;
+        contact.zone = 0;
+        contact.speed_mps = 2;
+        contact.t_s = contact_s.value_or(0);
+        scheduler_.advance_to(s);
+        scheduler_.sample(0, s, std::span(&contact, contact_s ? 1 : 0), std::span(&clearance, 1),
+                          std::span(&clearance, 1));
+    }
+    [[nodiscard]] const std::vector<Strike>& strikes() const { return scheduler_.strikes(); }
+    [[nodiscard]] const Strike& first() const { return scheduler_.strikes().at(0); }
+
+    static constexpr double kSample_s = 1.0 / 48000 + 1e-9;  // onsets are rounded up to audio samples
+
+private:
+    static StrikeRules rules(bool cancelling) {
+        StrikeRules rules;
+        rules.release_margin_s = 0.010;
+        rules.commit_lead_s = rules.sent_lead_s = 0.050;
+        rules.cancelling = cancelling;
+        return rules;
+    }
+    StrikeScheduler scheduler_;
+};
+
+TEST(CommitLead, ANoteIsTimedUntilThenAndItsTimeStandsFromThenOn) {
+    Committed run;
+    run.sample(0.040, 0.100);
+    EXPECT_NEAR(run.first().onset_s, 0.100, Committed::kSample_s);
+    run.sample(0.049, 0.103);
+    EXPECT_NEAR(run.first().onset_s, 0.103, Committed::kSample_s);
+    for (const double s : {0.056, 0.070, 0.090}) run.sample(s, 0.115);
+    EXPECT_NEAR(run.first().onset_s, 0.103, Committed::kSample_s);
+    run.sample(0.094, 0.115);
+    EXPECT_EQ(run.first().outcome, Outcome::released);
+    EXPECT_NEAR(run.first().decided_at_s, 0.093, Committed::kSample_s) << "a release margin ahead";
+    EXPECT_EQ(run.strikes().size(), 1U);
+}
+
+TEST(CommitLead, AContactFoundLaterThanThatIsDelayedToIt) {
+    Committed run;
+    run.sample(0.040, 0.070);
+    EXPECT_NEAR(run.first().onset_s, 0.090, Committed::kSample_s);
+    Committed late;
+    late.sample(0.040, 0.059);  // would sound 31 ms late
+    EXPECT_TRUE(late.strikes().empty());
+}
+
+TEST(CommitLead, ACommittedNoteMayBeCancelledAndIsTakenUpAgainAtTheTimeThatStood) {
+    Committed run;
+    run.sample(0.040, 0.100);
+    run.sample(0.060, std::nullopt);
+    EXPECT_EQ(run.first().outcome, Outcome::cancelled);
+    run.sample(0.080, 0.110);
+    EXPECT_EQ(run.first().outcome, Outcome::pending);
+    EXPECT_NEAR(run.first().onset_s, 0.100, Committed::kSample_s);
+    EXPECT_EQ(run.strikes().size(), 1U);
+}
+
+TEST(CommitLead, ATimeThatCanNoLongerBeMetIsNotTakenUp) {
+    Committed run;
+    run.sample(0.040, 0.100);
+    run.sample(0.060, std::nullopt);
+    run.sample(0.092, 0.118);  // 0.100 is nearer than the release margin; 0.142 is 24 ms late
+    EXPECT_EQ(run.strikes().size(), 1U) << "the contact keeps its id";
+    EXPECT_EQ(run.first().outcome, Outcome::pending);
+    EXPECT_NEAR(run.first().onset_s, 0.142, Committed::kSample_s);
+}
+
+TEST(CommitLead, ACommittedNoteIsNotBorneOutByAContactMoreThan30MsLater) {
+    Committed near;
+    near.sample(0.040, 0.100);
+    near.sample(0.060, 0.129);
+    EXPECT_EQ(near.first().outcome, Outcome::pending);
+    Committed far;
+    far.sample(0.040, 0.100);
+    far.sample(0.060, 0.131);
+    EXPECT_EQ(far.first().outcome, Outcome::cancelled);
+    ASSERT_EQ(far.strikes().size(), 2U) << "the later contact is one of its own";
+    EXPECT_NEAR(far.strikes()[1].onset_s, 0.131, Committed::kSample_s);
+}
+
+TEST(CommitLead, ACommittedNoteMoreThan30MsBehindTheTipThatHasEnteredIsCancelled) {
+    const auto entering = [](double entered_s, bool cancelling) {
+        Committed run(cancelling);
+        run.sample(0.080, 0.160);
+        run.sample(0.112, 0.160);
+        run.sample(entered_s, std::nullopt, -0.001);  // from 50 mm above: straight, so 0.98 of the way
+        return run.first().outcome;
+    };
+    EXPECT_EQ(entering(0.120, true), Outcome::cancelled);
+    EXPECT_EQ(entering(0.140, true), Outcome::pending);
+    EXPECT_EQ(entering(0.120, false), Outcome::pending);
+}
+
+TEST(CommitLead, WithoutCancellingOnlyNotesNotYetSentAreDropped) {
+    Committed sent(false);
+    sent.sample(0.040, 0.100);
+    sent.sample(0.049, 0.098);
+    sent.sample(0.060, std::nullopt);
+    sent.sample(0.095, std::nullopt);
+    EXPECT_EQ(sent.first().outcome, Outcome::released);
+    Committed unsent(false);
+    unsent.sample(0.040, 0.100);
+    unsent.sample(0.045, std::nullopt);
+    unsent.sample(0.095, std::nullopt);
+    EXPECT_EQ(unsent.first().outcome, Outcome::cancelled);
 }
 
 }  // namespace

@@ -95,7 +95,7 @@ TEST(Compare, BadUsageIsOneLineAndLeavesNothing) {
     refused({trace, "--leads", "1/30,1/30"}, "twice");
     refused({trace, "--plane", "contact*2"}, "contact*2");
     refused({trace, "--plane", "1", "--kit", "drums"}, "--kit");
-    refused({trace, "--rate", "0"}, "--rate");
+    refused({trace, "--rate", "-60"}, "--rate");
     refused({trace, "--noise", "-1"}, "--noise");
     refused({trace, "--predictions", "mine"}, "mine");
     refused({trace, "--predictions", "mine=" + trace}, "roll.csv");

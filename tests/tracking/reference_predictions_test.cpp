@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <ostream>
 #include <sstream>
 
 #include "tracking/predictor.h"
@@ -17,6 +18,10 @@ struct Case {
     const char* specification;
     double tolerance_mm = 1e-6;
 };
+
+std::ostream& operator<<(std::ostream& out, const Case& tested) {
+    return out << tested.file << " by " << tested.specification;
+}
 
 class ReferencePredictions : public testing::TestWithParam<Case> {};
 
