@@ -20,7 +20,7 @@ constexpr double kImpossibleSpeed_mps = 1e4, kImpossibleDistanceM = 1e4;
 // recording. Strikes want a path that bends: constant acceleration times them best, and the constant
 // velocity, which does not overshoot after a rebound, confirms them.
 constexpr const char* kAutoPicture = "cv:q=1e8,decay=8,gate=5";
-constexpr const char* kAutoSound = "ca:q=5e8,gate=5";
+constexpr const char* kAutoSound = "ca:q=7e8,gate=5";
 constexpr const char* kAutoConfirming = "cv:q=1e8,gate=5";
 
 constexpr double kNearS = 0.05;   // a contact that near must be borne out

@@ -37,7 +37,9 @@ struct Transition {
 struct AxisStates {
     Lanes p = Lanes::Zero(), v = Lanes::Zero(), a = Lanes::Zero();
 
-    [[nodiscard]] bool is_finite() const noexcept { return std::isfinite((p + v + a).sum()); }
+    /// Sums of all entries, lane by lane: not finite if an entry is not.
+    [[nodiscard]] Lanes sum() const noexcept { return p + v + a; }
+    [[nodiscard]] bool is_finite() const noexcept { return std::isfinite(sum().sum()); }
 };
 
 [[nodiscard]] inline AxisStates operator*(const Transition& f, const AxisStates& x) noexcept {
@@ -78,11 +80,15 @@ struct AxisGain {
     T p, v, a;
 };
 
+/// Some roundings of a product of doubles.
+inline constexpr double kRounding = 0x1p-48;
+
 /// Takes a position of variance r into account: K = P H^T / s with s = P_pp + r (3.5), then (3.9), entry by
 /// entry as (s P - P H^T H P) / s:
 ///
 ///   first row   r P_p. / s, where s P_p. - P_pp P_p. is r P_p. without cancellation
-///   the rest    (s P_ij - P_pi P_pj) / s
+///   the rest    (s P_ij - P_pi P_pj) / s, where s P_ii is taken kRounding larger: more than the products'
+///               rounding, so that what this leaves of a nearly singular P is no less than positive
 ///
 /// The conditional covariance of v and a given p, which a measured p must leave alone, keeps its relative
 /// accuracy of a few roundings of P, as in Joseph's form; and everything but a product waits for the division
@@ -90,15 +96,16 @@ struct AxisGain {
 template <typename T>
 inline AxisGain<T> correct(AxisMatrix<T>& p, double r) noexcept {
     const T s = p.pp + r;
+    const T more = s * (1 + kRounding);
     const T share = 1 / s;
     const T keep = r * share;
     const AxisGain<T> k{p.pp * share, p.pv * share, p.pa * share};
     p = {p.pp * keep,
          p.pv * keep,
          p.pa * keep,
-         (p.vv * s - p.pv * p.pv) * share,
+         (p.vv * more - p.pv * p.pv) * share,
          (p.va * s - p.pv * p.pa) * share,
-         (p.aa * s - p.pa * p.pa) * share};
+         (p.aa * more - p.pa * p.pa) * share};
     return k;
 }
 

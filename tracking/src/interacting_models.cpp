@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "rotation.h"
 
 namespace tracking {
 namespace {
+
+constexpr double kMostSteps = 64;  // within a lead
 
 AxisMatrix<double> times(const AxisMatrix<double>& q, double density) {
     return {density * q.pp, density * q.pv, density * q.pa, density * q.vv, density * q.va, density * q.aa};
@@ -68,6 +71,7 @@ SampleStatus InteractingModels::start(const PoseSample& sample) noexcept {
     rotation_.restart();
     if (sample.has_orientation) rotation_.correct(sample.orientation);
     mean_ = {to_lanes(sample.position), Lanes::Zero(), Lanes::Zero()};
+    period_ = 0;
     for (std::size_t j = 0; j < kModes; ++j) {
         modes_.mode[j] = {mean_, in_lanes(unit_.initial_covariance())};
         modes_.mu[j] = 1.0 / kModes;
@@ -146,6 +150,7 @@ SampleStatus InteractingModels::update(const PoseSample& sample) noexcept {
     if (!mean.is_finite() || !rotation_.is_finite()) return start(sample);
     modes_ = ahead;
     mean_ = mean;
+    period_ = dt;
     clock_.advance(sample.t_s);
     return SampleStatus::accepted;
 }
@@ -159,13 +164,36 @@ PosePrediction InteractingModels::predict(double lead_s) const noexcept {
     return pose;
 }
 
-std::optional<PoseCovariance> InteractingModels::covariance(double lead_s) const noexcept {
-    const MotionStep unit = unit_.step(lead_s);
+InteractingModels::Probabilities InteractingModels::switched(const Probabilities& mu,
+                                                             double dt) const noexcept {
+    const double stay = std::exp(-options_.switching_rate * dt);
+    const double leave = (1 - stay) / (kModes - 1);
+    const double sum = std::accumulate(mu.begin(), mu.end(), 0.0);
+    Probabilities next{};
+    for (std::size_t j = 0; j < kModes; ++j) next[j] = stay * mu[j] + leave * (sum - mu[j]);
+    return next;
+}
+
+AxisMatrix<Lanes> InteractingModels::mixture() const noexcept {
     AxisMatrix<Lanes> spread = zero_lanes();
     for (std::size_t j = 0; j < kModes; ++j)
-        add_spread(spread, modes_.mu[j],
-                   propagated(modes_.mode[j].p, unit.f, times(unit.q, options_.density[j])),
-                   unit.f * minus(modes_.mode[j].x, mean_));
+        add_spread(spread, modes_.mu[j], modes_.mode[j].p, minus(modes_.mode[j].x, mean_));
+    return spread;
+}
+
+std::optional<PoseCovariance> InteractingModels::covariance(double lead_s) const noexcept {
+    // Mixing changes neither mean nor covariance of the whole, and the modes differ in their noise only: what
+    // matters is the density expected in each step.
+    const double steps = period_ > 0 ? std::clamp(std::round(lead_s / period_), 1.0, kMostSteps) : 1;
+    const double dt = lead_s / steps;
+    const MotionStep unit = unit_.step(dt);
+    AxisMatrix<Lanes> spread = mixture();
+    Probabilities mu = modes_.mu;
+    for (int i = 0; i < static_cast<int>(steps); ++i) {
+        mu = switched(mu, dt);
+        const double density = std::inner_product(mu.begin(), mu.end(), options_.density.begin(), 0.0);
+        spread = propagated(spread, unit.f, times(unit.q, density));
+    }
     PoseCovariance covariance;
     covariance.position.diagonal() = spread.pp.head<3>();
     covariance.velocity.diagonal() = spread.vv.head<3>();

@@ -37,16 +37,19 @@ public:
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override;
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
+    /// That of the mixture, moved on while the modes go on switching in steps like the newest.
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
 
     using Probabilities = std::array<double, kModes>;
     [[nodiscard]] const Probabilities& probabilities() const noexcept { return modes_.mu; }
 
-private:
     struct Mode {
         AxisStates x;
         AxisMatrix<Lanes> p;
     };
+    [[nodiscard]] const Mode& mode(std::size_t j) const noexcept { return modes_.mode[j]; }
+
+private:
     struct Modes {
         std::array<Mode, kModes> mode;
         Probabilities mu{};
@@ -55,6 +58,10 @@ private:
     SampleStatus start(const PoseSample& sample) noexcept;
     SampleStatus update(const PoseSample& sample) noexcept;
     [[nodiscard]] Modes mixed(double dt) const noexcept;
+    /// What the modes' probabilities become over dt: the chain's steps.
+    [[nodiscard]] Probabilities switched(const Probabilities& mu, double dt) const noexcept;
+    /// Covariance of the mixture now.
+    [[nodiscard]] AxisMatrix<Lanes> mixture() const noexcept;
     void correct_modes(Modes& modes, const Eigen::Vector3d& measured) const noexcept;
     [[nodiscard]] static AxisStates mean_of(const Modes& modes) noexcept;
 
@@ -65,6 +72,7 @@ private:
     MotionModel unit_;  ///< the Singer model of density 1
     Modes modes_;
     AxisStates mean_;
+    double period_ = 0;  ///< the newest step, 0 until there was one [s]
 };
 
 }  // namespace tracking

@@ -1,5 +1,6 @@
 #include "model_bank.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "rotation.h"
@@ -9,6 +10,11 @@ namespace {
 
 RotationFilter rotation_of(const MotionModel& model, double gate_sigmas) {
     return {model.scaled(1 / kLever), rotation_gate(gate_sigmas)};
+}
+
+/// variance on every axis, and d d^T.
+Eigen::Matrix3d spread(double variance, const Eigen::Vector3d& d) {
+    return variance * Eigen::Matrix3d::Identity() + d * d.transpose();
 }
 
 }  // namespace
@@ -40,7 +46,7 @@ SampleStatus ModelBank::start(const PoseSample& sample) noexcept {
     }
     selected_ = 0;
     held_ = age_ = 0;
-    remember();
+    remember({0, 0, 0}, {1, 1, 1});
     return SampleStatus::reinitialised;
 }
 
@@ -61,8 +67,12 @@ SampleStatus ModelBank::update(const PoseSample& sample) noexcept {
         }
     }
     bool finite = true;
+    PerModel square{}, variance{};
     for (std::size_t i = 0; i < kModels; ++i) {
-        position_[i].correct(ahead[i], ahead[i].innovation(sample.position));
+        const Lanes innovation = ahead[i].innovation(sample.position);
+        square[i] = innovation.matrix().squaredNorm();
+        variance[i] = position_[i].innovation_variance(ahead[i]);
+        position_[i].correct(ahead[i], innovation);
         rotation_[i].propagate(dt);
         if (sample.has_orientation) rotation_[i].correct(sample.orientation);
         finite = finite && ahead[i].x.is_finite() && rotation_[i].is_finite();
@@ -71,14 +81,16 @@ SampleStatus ModelBank::update(const PoseSample& sample) noexcept {
     for (std::size_t i = 0; i < kModels; ++i) position_[i].accept(ahead[i]);
     clock_.advance(sample.t_s);
     select(sample);
-    remember();
+    remember(square, variance);
     return SampleStatus::accepted;
 }
 
-void ModelBank::remember() noexcept {
+void ModelBank::remember(const PerModel& innovation_square, const PerModel& innovation_variance) noexcept {
     newest_ = (newest_ + 1) % kHistory;
     Past& now = history_[newest_];
     now.t_s = clock_.time_s();
+    now.innovation_square = innovation_square;
+    now.innovation_variance = innovation_variance;
     for (std::size_t i = 0; i < kModels; ++i) {
         now.x[i] = position_[i].now().x;
         if (score_ == BankScore::likelihood) now.p[i] = position_[i].now().p;
@@ -127,10 +139,34 @@ PosePrediction ModelBank::predict_model(std::size_t index, double lead_s) const 
     return pose;
 }
 
+ModelBank::PerModel ModelBank::probabilities() const noexcept {
+    PerModel log_likelihood{};
+    for (std::size_t age = 0; age < std::min(held_, kEvidence); ++age)
+        for (std::size_t i = 0; i < kModels; ++i) {
+            const double variance = past(age).innovation_variance[i];
+            log_likelihood[i] -= 0.5 * (past(age).innovation_square[i] / variance + 3 * std::log(variance));
+        }
+    const double best = *std::max_element(log_likelihood.begin(), log_likelihood.end());
+    PerModel weight{};
+    double sum = 0;
+    for (std::size_t i = 0; i < kModels; ++i) sum += weight[i] = std::exp(log_likelihood[i] - best);
+    for (double& w : weight) w /= sum;
+    return weight;
+}
+
 std::optional<PoseCovariance> ModelBank::covariance(double lead_s) const noexcept {
-    const AxisMatrix<double> ahead = position_[selected_].covariance_after(lead_s);
-    return PoseCovariance{ahead.pp * Eigen::Matrix3d::Identity(), ahead.vv * Eigen::Matrix3d::Identity(),
-                          rotation_[selected_].variance_after(lead_s) * Eigen::Matrix3d::Identity()};
+    const PerModel weight = probabilities();
+    const PosePrediction chosen = predict(lead_s);
+    PoseCovariance sum;
+    for (std::size_t i = 0; i < kModels; ++i) {
+        const PosePrediction other = predict_model(i, lead_s);
+        const AxisMatrix<double> p = position_[i].covariance_after(lead_s);
+        sum.position += weight[i] * spread(p.pp, other.position - chosen.position);
+        sum.velocity += weight[i] * spread(p.vv, other.velocity - chosen.velocity);
+        sum.rotation += weight[i] * spread(rotation_[i].variance_after(lead_s),
+                                           logarithm(other.orientation * chosen.orientation.conjugate()));
+    }
+    return sum;
 }
 
 }  // namespace tracking

@@ -36,21 +36,34 @@ public:
         return predict_model(selected_, lead_s);
     }
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
+    /// Of the selected model's prediction if one of the models is true, each as likely as its innovations of
+    /// the last kEvidence samples say: sum_i w_i (P_i + d_i d_i^T), d_i from the selected prediction to the
+    /// model's.
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
     [[nodiscard]] std::size_t models() const noexcept override { return kModels; }
     [[nodiscard]] std::size_t selected() const noexcept override { return selected_; }
     [[nodiscard]] PosePrediction predict_model(std::size_t index, double lead_s) const noexcept override;
+    [[nodiscard]] const PositionFilter& position(std::size_t index) const noexcept {
+        return position_[index];
+    }
 
 private:
+    using PerModel = std::array<double, kModels>;
+    static constexpr std::size_t kEvidence = 32;
+
     struct Past {
         double t_s = 0;
         std::array<AxisStates, kModels> x;
         std::array<AxisMatrix<double>, kModels> p{};
+        PerModel innovation_square{},
+            innovation_variance{1, 1, 1};  ///< 0 and 1 at a start, which tells nothing
     };
 
     SampleStatus start(const PoseSample& sample) noexcept;
     SampleStatus update(const PoseSample& sample) noexcept;
-    void remember() noexcept;
+    void remember(const PerModel& innovation_square, const PerModel& innovation_variance) noexcept;
+    /// Probabilities of the models from their innovations of the last kEvidence samples.
+    [[nodiscard]] PerModel probabilities() const noexcept;
     void select(const PoseSample& sample) noexcept;
     [[nodiscard]] double penalty(std::size_t model, const Past& past, double elapsed,
                                  const Lanes& measured) const noexcept;

@@ -57,6 +57,7 @@ public:
         return model_.transition(lead_s) * now_.x;
     }
     [[nodiscard]] AxisMatrix<double> covariance_after(double lead_s) const noexcept {
+        if (lead_s == 0) return now_.p;  // a noise that is the same at any step has none at no step
         return propagated(now_.p, model_.step(lead_s));
     }
     [[nodiscard]] const Estimate& now() const noexcept { return now_; }

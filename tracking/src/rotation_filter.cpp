@@ -1,5 +1,6 @@
 #include "rotation_filter.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -13,6 +14,18 @@ constexpr double kHalfTurn = std::numbers::pi;
 /// Whether the lanes' length exceeds `limit`.
 bool exceeds(const Lanes& lanes, double limit) {
     return !(lanes.matrix().squaredNorm() <= limit * limit);
+}
+
+double median(double a, double b, double c) {
+    return std::max(std::min(a, b), std::min(std::max(a, b), c));
+}
+
+/// `v` turned back by half of the turn q, the shorter way: v - n x v + n x (n x v) / (1 + q_w), n q's vector.
+Eigen::Vector3d half_way_back(const Eigen::Quaterniond& q, const Eigen::Vector3d& v) {
+    const double sign = q.w() < 0 ? -1 : 1;
+    const Eigen::Vector3d n = sign * q.vec();
+    const Eigen::Vector3d side = n.cross(v);
+    return v - side + n.cross(side) / (1 + sign * q.w());
 }
 
 }  // namespace
@@ -29,21 +42,20 @@ void RotationFilter::start(const Eigen::Quaterniond& measured) noexcept {
     started_ = true;
     q_ = measured.normalized();
     last_measured_ = q_;
-    since_measured_ = 0;
+    since_measured_ = interval_ = interval_before_ = 0;
+    turned_ = Eigen::Quaterniond::Identity();
     rates_ = {};
 }
 
-void RotationFilter::absorb() noexcept {
-    q_ = exponential(rates_.p.head<3>()) * q_;
-    rates_.p.setZero();
-}
-
 void RotationFilter::turn(double dt) noexcept {
-    since_measured_ += dt;
     const MotionStep step = model_.step(dt);
     rates_ = step.f * rates_;
     p_ = propagated(p_, step);
-    absorb();
+    const Eigen::Quaterniond by = exponential(rates_.p.head<3>());
+    rates_.p.setZero();
+    q_ = by * q_;
+    turned_ = since_measured_ > 0 ? by * turned_ : by;
+    since_measured_ += dt;
 }
 
 void RotationFilter::correct(const Eigen::Quaterniond& measured) noexcept {
@@ -62,18 +74,27 @@ void RotationFilter::correct(const Eigen::Quaterniond& measured) noexcept {
                 break;
         }
     }
-    add(rates_, tracking::correct(p_, model_.measurement_variance), to_lanes(innovation));
-    // Beyond half a turn a sample the rates are aliases of slower ones, which the measurements cannot tell
-    // apart.
-    const double dt = since_measured_;
-    if (exceeds(rates_.v * dt, kHalfTurn) || exceeds(rates_.a * (dt * dt), kHalfTurn)) return start(measured);
-    absorb();
-    q_.normalize();
+    const AxisGain<double> k = tracking::correct(p_, model_.measurement_variance);
+    const Lanes back = to_lanes(half_way_back(turned_, innovation));
+    rates_.v += k.v * back;
+    rates_.a += k.a * back;
+    if (is_beyond_half_a_turn()) return start(measured);
+    q_ = (exponential(k.p * innovation) * q_).normalized();
     last_measured_ = z;
+    interval_before_ = interval_;
+    interval_ = since_measured_;
     since_measured_ = 0;
 }
 
-void RotationFilter::turned(double lead_s, PosePrediction& pose) const noexcept {
+bool RotationFilter::is_beyond_half_a_turn() const noexcept {
+    // Of three intervals the middle one: a drop-out does not count.
+    const double first = interval_before_ > 0 ? interval_before_ : since_measured_;
+    const double second = interval_ > 0 ? interval_ : since_measured_;
+    const double dt = median(since_measured_, first, second);
+    return exceeds(rates_.v * dt, kHalfTurn) || exceeds(rates_.a * (dt * dt), kHalfTurn);
+}
+
+void RotationFilter::look_ahead(double lead_s, PosePrediction& pose) const noexcept {
     const AxisStates ahead = model_.transition(lead_s) * rates_;
     pose.orientation = (exponential(ahead.p.head<3>()) * q_).normalized();
     pose.angular_velocity = ahead.v.head<3>();
@@ -81,7 +102,7 @@ void RotationFilter::turned(double lead_s, PosePrediction& pose) const noexcept 
 
 double RotationFilter::variance_after(double lead_s) const noexcept {
     if (!started_) return kHalfTurn * kHalfTurn / 3;
-    return propagated(p_, model_.step(lead_s)).pp;
+    return lead_s == 0 ? p_.pp : propagated(p_, model_.step(lead_s)).pp;
 }
 
 }  // namespace tracking

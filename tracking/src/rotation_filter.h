@@ -12,12 +12,18 @@ namespace tracking {
 /// rho is 0 between samples.
 ///
 ///   propagate  q <- exp(rho) q with [rho, w, a] <- F(dt) [0, w, a]
-///   innovate   log(z q^-1), the shorter way round, so the sign of z does not matter
-///   correct    [rho, w, a] += K innovation, then q <- exp(rho) q and rho = 0
+///   innovate   nu = log(z q^-1), the shorter way round, so the sign of z does not matter
+///   correct    q <- exp(K_p nu) q, and w, a += K_v, K_a times nu turned back by half of what q turned
+///              since the last measurement
 ///
-/// Valid while the turn between two samples is small against pi; a state that turns, or changes its rate, by
-/// more starts anew from the measurement. The covariance is the axes' own (the noise is alike in all
-/// directions, so turning rho's frame leaves it alone). No allocation.
+/// An error of w in world axes has turned q about axes that turned with it, by half the turn on average: w
+/// and a corrected with nu as it is make the filter unstable from 0.55 rad a sample on (33 rad/s at 60 Hz),
+/// with half the turn taken back it is stable up to half a turn a sample (eigenvalues of the error's
+/// recursion).
+///
+/// Valid while the turn between two samples is below pi; a state that turns, or changes its rate, by more
+/// starts anew from the measurement. The covariance is the axes' own (the noise is alike in all directions,
+/// so turning rho's frame leaves it alone). No allocation.
 class RotationFilter {
 public:
     RotationFilter(const MotionModel& model, const OutlierGate& gate)
@@ -34,19 +40,21 @@ public:
     /// Fills in orientation and angular velocity a lead ahead; leaves them alone before the first
     /// measurement.
     void predict(double lead_s, PosePrediction& pose) const noexcept {
-        if (started_) turned(lead_s, pose);
+        if (started_) look_ahead(lead_s, pose);
     }
     /// Variance of the predicted orientation about each axis [rad^2]; pi^2/3 (any angle) before the first
     /// measurement.
     [[nodiscard]] double variance_after(double lead_s) const noexcept;
     [[nodiscard]] bool is_finite() const noexcept { return !started_ || rates_.is_finite(); }
+    [[nodiscard]] bool has_started() const noexcept { return started_; }
 
 private:
     void start(const Eigen::Quaterniond& measured) noexcept;
     void turn(double dt) noexcept;
-    void turned(double lead_s, PosePrediction& pose) const noexcept;
-    /// q <- exp(rho) q, rho <- 0.
-    void absorb() noexcept;
+    void look_ahead(double lead_s, PosePrediction& pose) const noexcept;
+    /// Beyond half a turn a sample the rates are aliases of slower ones, which the measurements cannot tell
+    /// apart.
+    [[nodiscard]] bool is_beyond_half_a_turn() const noexcept;
 
     MotionModel model_;
     AxisMatrix<double> p_;
@@ -54,8 +62,10 @@ private:
     bool started_ = false;
     Eigen::Quaterniond q_ = Eigen::Quaterniond::Identity();
     Eigen::Quaterniond last_measured_ = Eigen::Quaterniond::Identity();
+    Eigen::Quaterniond turned_ = Eigen::Quaterniond::Identity();  // since then, by prediction
     double since_measured_ = 0;
-    AxisStates rates_;  // rho (0 between samples), w [rad/s], a [rad/s^2]
+    double interval_ = 0, interval_before_ = 0;  // between the last measurements, 0: not yet
+    AxisStates rates_;                           // rho (0 between samples), w [rad/s], a [rad/s^2]
 };
 
 }  // namespace tracking
