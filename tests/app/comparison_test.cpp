@@ -152,14 +152,14 @@ TEST_F(Comparisons, PredictionsFromAFileOfHoldErrAsHoldDoes) {
     EXPECT_THROW((void)app::compare(options_), app::BadInput);  // the file's lead is not asked for
 }
 
-/// Strokes of `top` m/s that slow down before they land, two a second: whoever predicts constant velocity or
-/// acceleration is late by what depends on how much they slow.
-tracking::StickTrace slowing_strokes(double last_s, double share) {
+/// Strokes, two a second, whose fall of 0.3 m gathers speed as time^power: beyond 2 the acceleration itself
+/// grows, and a contact comes earlier than who believes it constant predicts.
+tracking::StickTrace gathering_strokes(double last_s, double power) {
     return sample::stick_of(
         [=](double t) {
-            const double phase = std::abs(std::remainder(t, 0.5)) / 0.25;  // 0 at a low, 1 on top
+            const double low_to_top = std::abs(std::remainder(t, 0.5)) / 0.25;
             tracking::PoseSample pose;
-            pose.position = {0, 0.97 + 0.3 * (share * phase * phase + (1 - share) * phase), 0};
+            pose.position = {0, 0.97 + 0.3 * (1 - std::pow(1 - low_to_top, power)), 0};
             return pose;
         },
         last_s, 250);
@@ -168,18 +168,18 @@ tracking::StickTrace slowing_strokes(double last_s, double share) {
 class Advances : public Comparisons {
 protected:
     Advances() {
-        for (const int i : {1, 2, 3}) write(i, 0.2);
-        options_.traces = {file("p1_slowing.csv"), file("p2_slowing.csv"), file("p3_slowing.csv")};
+        for (const int i : {1, 2, 3}) write(i, 2.5);
+        options_.traces = {file("p1_gathering.csv"), file("p2_gathering.csv"), file("p3_gathering.csv")};
         options_.predictors = {"auto"};
         options_.leads_s = {1.0 / 15};
         options_.surface.kind = app::StrikeSurface::Kind::plane;
         options_.surface.height_m = 0.98;
         options_.surface_text = "plane 0.98";
     }
-    void write(int i, double share) const {
+    void write(int i, double power) const {
         tracking::Trace trace;
-        trace.sticks.push_back(slowing_strokes(4 + i, share));
-        std::ofstream(file("p" + std::to_string(i) + "_slowing.csv")) << tracking::format_trace(trace);
+        trace.sticks.push_back(gathering_strokes(4 + i, power));
+        std::ofstream(file("p" + std::to_string(i) + "_gathering.csv")) << tracking::format_trace(trace);
     }
     /// What `auto` learned, by trace.
     [[nodiscard]] std::vector<double> learned() const {
@@ -193,7 +193,7 @@ protected:
 TEST_F(Advances, AreLearnedOnOtherRecordingsOnly) {
     const std::vector<double> before = learned();
     ASSERT_EQ(before.size(), 3U);
-    write(1, 0.9);
+    write(1, 4);
     const std::vector<double> after = learned();
     EXPECT_EQ(after[0], before[0]) << "the recording itself has no say";
     EXPECT_NE(after[1], before[1]) << "it has on the others";
