@@ -117,7 +117,8 @@ private:
 };
 
 /// Advances that learning chooses from [s].
-constexpr double kAdvances_s[] = {-2e-3, -1e-3, 0, 1e-3, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 7e-3, 8e-3};
+constexpr double kAdvances_s[] = {-2e-3, -1e-3, 0,    1e-3, 2e-3,  3e-3,  4e-3, 5e-3,
+                                  6e-3,  7e-3,  8e-3, 9e-3, 10e-3, 11e-3, 12e-3};
 
 /// Scores the strikes of the entrants that learn an advance again: contacts are taken to come earlier by what
 /// costs least (HitScore::loss) on the other recordings at that lead.

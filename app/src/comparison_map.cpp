@@ -60,7 +60,8 @@ struct MapField {
     std::vector<std::string> families, as_named;
 
     [[nodiscard]] std::vector<std::string> specifications(double noise_mm) const {
-        std::vector<std::string> all = as_named;
+        std::vector<std::string> all;
+        for (const std::string& name : as_named) all.push_back(picture_specification(name));
         for (const std::string& candidate : candidates_of(families, noise_mm)) all.push_back(candidate);
         return all;
     }
@@ -72,7 +73,7 @@ MapField field_of(const ComparisonOptions& options, bool tunable) {
         if (is_external(specification)) continue;
         const std::string family = family_of(specification);
         if (!tunable || tuning_grid(family).empty())
-            field.as_named.push_back(picture_specification(specification));
+            field.as_named.push_back(specification);
         else if (std::find(field.families.begin(), field.families.end(), family) == field.families.end())
             field.families.push_back(family);
     }
@@ -93,8 +94,7 @@ Runner tuned_runner(const TuningTable& table, const std::string& family, std::si
 std::vector<Runner> runners_of(const TuningTable& table, const MapField& field, std::size_t lead) {
     std::vector<Runner> runners;
     for (std::size_t i = 0; i < field.as_named.size(); ++i) {  // first in the table
-        const std::string& specification = table.specification(i);
-        Runner runner{specification, is_baseline(specification), {}};
+        Runner runner{field.as_named[i], is_baseline(field.as_named[i]), {}};
         for (std::size_t r = 0; r < table.recordings(); ++r)
             runner.by_recording.push_back(table.sum(i, r, lead));
         runners.push_back(std::move(runner));

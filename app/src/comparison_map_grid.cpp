@@ -30,23 +30,21 @@ double gain_percent(double ratio) {
     return 100 * (1 - ratio);
 }
 
+/// The gain in % of the RMS error and its interval.
 std::string cell_of(const PairedResult& result) {
     const PairedDifference& d = result.by_recording;
-    if (!d.has_interval())
-        return fmt::format("<td>{} {:+.1f} %", html(result.predictor), gain_percent(d.ratio));
-    const std::string range = fmt::format("({:+.1f} to {:+.1f})", gain_percent(d.high), gain_percent(d.low));
-    if (d.gain())
-        return fmt::format("<td class=gain>{} <b>{:+.1f} %</b> {}", html(result.predictor),
-                           gain_percent(d.ratio), range);
+    const std::string name = html(result.predictor), gain = fmt::format("{:.1f} %", gain_percent(d.ratio));
+    if (!d.has_interval()) return fmt::format("<td>{} {}", name, gain);
+    const std::string range = fmt::format("({:.1f} to {:.1f})", gain_percent(d.high), gain_percent(d.low));
+    if (d.gain()) return fmt::format("<td class=gain>{} <b>{}</b> {}", name, gain, range);
     return fmt::format("<td class=none>{} {}", d.loss() ? "loss" : "no measurable gain", range);
 }
 
 std::string grid(const Comparison& comparison, double lead_s) {
     const auto rows = rows_of(comparison, lead_s);
     if (rows.empty()) return {};
-    std::string text =
-        fmt::format("<h3>{:.1f} ms ahead</h3>\n<p>{}</p>\n<div class=scroll><table class=grid><tr><th>sensor",
-                    1e3 * lead_s, html(map_sentence(comparison, lead_s)));
+    std::string text = fmt::format("<p>{}</p>\n<div class=scroll><table class=grid><tr><th>sensor",
+                                   html(map_sentence(comparison, lead_s)));
     for (const auto& [noise_mm, cell] : rows.begin()->second)
         text += fmt::format("<th>noise {:g} mm", noise_mm);
     text += "</tr>\n";

@@ -106,7 +106,7 @@ std::vector<const ComparisonSummary*> shown_strikes(const Comparison& comparison
                 best = &s;
         if (best != nullptr) shown.push_back(best);
         for (const ComparisonSummary& s : comparison.summaries)
-            if (s.lead_s == lead_s && s.hits && &s != best &&
+            if (s.lead_s == lead_s && s.hits && s.hits->matched > 0 && &s != best &&
                 (s.predictor == "auto" || s.predictor == "thesis" || s.predictor == "naive"))
                 shown.push_back(&s);
     }

@@ -85,13 +85,15 @@ void add_paired(std::string& text, const Comparison& comparison, double lead_s, 
 }
 
 void add_advances(std::string& text, const Comparison& comparison, double lead_s) {
-    for (const ComparisonSummary& s : comparison.summaries)
-        if (s.lead_s == lead_s && s.advance_s)
-            fmt::format_to(
-                std::back_inserter(text),
-                "  {}: contacts are taken to come {:g} to {:g} ms earlier than predicted, learned on "
-                "the other recordings\n",
-                s.predictor, 1e3 * s.advance_s->first, 1e3 * s.advance_s->second);
+    for (const ComparisonSummary& s : comparison.summaries) {
+        if (s.lead_s != lead_s || !s.advance_s) continue;
+        const auto [low_s, high_s] = *s.advance_s;
+        const std::string range = low_s == high_s ? fmt::format("{:g}", 1e3 * low_s)
+                                                  : fmt::format("{:g} to {:g}", 1e3 * low_s, 1e3 * high_s);
+        fmt::format_to(std::back_inserter(text),
+                       "  {}: its contacts are brought forward by {} ms, learned on the other recordings\n",
+                       s.predictor, range);
+    }
 }
 
 void add_map(std::string& text, const Comparison& comparison) {

@@ -41,8 +41,9 @@ td.n,th.n{text-align:right}
 .scroll+h3{margin-top:20px}
 .wide td,.grid td{white-space:nowrap}
 .wide td.text{white-space:normal}
-.grid{font-size:12.5px}
-.grid td{padding:2px 16px 2px 0}
+.grid{font-size:12px}
+.grid td,.grid th{padding:2px 10px 2px 0}
+.scroll+p{margin-top:20px}
 .grid td.gain b{color:var(--released)}
 .grid td.none{color:var(--axis)}
 details summary{cursor:pointer;margin:12px 0 6px}

@@ -111,11 +111,16 @@ StrikeRules rules_at(const StrikeTiming& timing, bool cancelling, double t0_s) {
 
 /// One stick's released strikes, of a predictor with one model or several. Each model has a scheduler of its
 /// own; what a scheduler releases is played if its model is selected, unless another model's note has been
-/// played for the same stroke: the tip must first rise out of the surface, as the scheduler asks too.
+/// played for the same stroke: the tip must first rise out of the surface, as the scheduler asks too. A model
+/// that is selected after it has released a stroke itself, not being selected then, stands by that stroke:
+/// the note of another model for it is played.
 class PlayedStrikes {
 public:
     PlayedStrikes(const StrikeRules& rules, std::size_t parts, std::size_t models)
-        : rules_(rules), shut_(parts), schedulers_(models, StrikeScheduler(rules, 1, parts)) {}
+        : rules_(rules),
+          shut_(parts),
+          schedulers_(models, StrikeScheduler(rules, 1, parts)),
+          unplayed_s_(models, std::vector<double>(parts, -std::numeric_limits<double>::infinity())) {}
 
     /// Before the sample at s: what falls due is released by the model selected until now.
     void advance_to(double s) {
@@ -158,8 +163,14 @@ private:
     };
 
     void take_released(std::size_t model) {
-        for (const std::uint64_t id : schedulers_[model].take_released())
-            if (model == selected_) play(schedulers_[model].strikes()[id - 1]);
+        for (const std::uint64_t id : schedulers_[model].take_released()) {
+            const Strike& strike = schedulers_[model].strikes()[id - 1];
+            const double stood_by_s = unplayed_s_[selected_][strike.instrument];
+            if (model == selected_ || std::abs(strike.onset_s - stood_by_s) <= rules_.late_s)
+                play(strike);
+            else
+                unplayed_s_[model][strike.instrument] = strike.onset_s;
+        }
     }
     void play(const Strike& strike) {
         Shut& shut = shut_[strike.instrument];
@@ -172,6 +183,7 @@ private:
     StrikeRules rules_;
     std::vector<Shut> shut_;
     std::vector<StrikeScheduler> schedulers_;
+    std::vector<std::vector<double>> unplayed_s_;  // model x part: onset last released while not selected
     std::size_t selected_ = 0;
     std::vector<Strike> played_;
 };

@@ -4,11 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "bad_input.h"
+#include "comparison_map_grid.h"
 #include "comparison_tables.h"
 #include "sample_recordings.h"
 
@@ -147,6 +150,123 @@ TEST_F(Comparisons, PredictionsFromAFileOfHoldErrAsHoldDoes) {
               1);
     options_.leads_s = {1.0 / 30};
     EXPECT_THROW((void)app::compare(options_), app::BadInput);  // the file's lead is not asked for
+}
+
+/// Strokes, two a second, whose fall of 0.3 m gathers speed as time^power: beyond 2 the acceleration itself
+/// grows, and a contact comes earlier than who believes it constant predicts.
+tracking::StickTrace gathering_strokes(double last_s, double power) {
+    return sample::stick_of(
+        [=](double t) {
+            const double low_to_top = std::abs(std::remainder(t, 0.5)) / 0.25;
+            tracking::PoseSample pose;
+            pose.position = {0, 0.97 + 0.3 * (1 - std::pow(1 - low_to_top, power)), 0};
+            return pose;
+        },
+        last_s, 250);
+}
+
+class Advances : public Comparisons {
+protected:
+    Advances() {
+        for (const int i : {1, 2, 3}) write(i, 2.5);
+        options_.traces = {file("p1_gathering.csv"), file("p2_gathering.csv"), file("p3_gathering.csv")};
+        options_.predictors = {"auto"};
+        options_.leads_s = {1.0 / 15};
+        options_.surface.kind = app::StrikeSurface::Kind::plane;
+        options_.surface.height_m = 0.98;
+        options_.surface_text = "plane 0.98";
+    }
+    void write(int i, double power) const {
+        tracking::Trace trace;
+        trace.sticks.push_back(gathering_strokes(4 + i, power));
+        std::ofstream(file("p" + std::to_string(i) + "_gathering.csv")) << tracking::format_trace(trace);
+    }
+    /// What `auto` learned, by trace.
+    [[nodiscard]] std::vector<double> learned() const {
+        std::vector<double> advances;
+        for (const app::ComparisonRow& row : app::compare(options_).rows)
+            if (row.predictor == "auto") advances.push_back(row.advance_s.value_or(1));
+        return advances;
+    }
+};
+
+TEST_F(Advances, AreLearnedOnOtherRecordingsOnly) {
+    const std::vector<double> before = learned();
+    ASSERT_EQ(before.size(), 3U);
+    write(1, 4);
+    const std::vector<double> after = learned();
+    EXPECT_EQ(after[0], before[0]) << "the recording itself has no say";
+    EXPECT_NE(after[1], before[1]) << "it has on the others";
+    EXPECT_NE(after[2], before[2]);
+}
+
+TEST_F(Advances, AreStatedInEveryProduct) {
+    const app::Comparison comparison = app::compare(options_);
+    const auto json = nlohmann::json::parse(app::format_comparison_json(comparison));
+    for (std::size_t i = 0; i < comparison.rows.size(); ++i) {
+        const auto& hits = json["results"][i]["hits"];
+        EXPECT_EQ(hits["advance_ms"], 1e3 * comparison.rows[i].advance_s.value_or(0));
+        EXPECT_EQ(comparison.rows[i].advance_s.has_value(), comparison.rows[i].predictor == "auto");
+        for (const char* key : {"true", "predicted", "matched", "precision", "recall", "f1", "median_ms",
+                                "p95_ms", "false_per_min", "false_per_min_without_cancel"})
+            EXPECT_TRUE(hits.contains(key)) << key;
+        EXPECT_EQ(hits["true"], 2 * (5 + static_cast<int>(i * 3 / comparison.rows.size())));
+    }
+    std::istringstream csv(app::format_comparison_csv(comparison));
+    std::string line, header;
+    std::getline(csv, header);
+    EXPECT_TRUE(header.ends_with(",advance_ms"));
+    while (std::getline(csv, line)) EXPECT_EQ(columns_after_first(line), columns_after_first(header)) << line;
+    EXPECT_NE(app::format_comparison_text(comparison).find("auto: its contacts are brought forward by"),
+              std::string::npos);
+    EXPECT_NE(app::winners(comparison)[0].find("true strikes"), std::string::npos);
+}
+
+TEST_F(Advances, NothingIsLearnedFromOneRecording) {
+    options_.traces.resize(1);
+    EXPECT_EQ(learned(), std::vector<double>{1});
+}
+
+TEST_F(Advances, TheExampleOfAnExternalPredictorStrikesAsDifferenceDoes) {
+    if (std::system("python3 -c '' 2>/dev/null") != 0) GTEST_SKIP() << "needs python3";
+    options_.predictors = {"difference",
+                           "exec:python3 '" MUSICWORLD_SOURCE_DIR "/assets/predictors/difference.py'"};
+    options_.traces.resize(1);
+    options_.leads_s = {1.0 / 30, 1.0 / 15};
+    std::vector<std::vector<double>> errors_ms;
+    for (const app::ComparisonRow& row : app::compare(options_).rows)
+        if (row.predictor == options_.predictors[0] || row.predictor == options_.predictors[1]) {
+            ASSERT_GT(row.hits->matched, 5) << row.predictor;
+            errors_ms.push_back(row.hits->errors_ms);
+        }
+    ASSERT_EQ(errors_ms.size(), 4U);  // by predictor, then lead
+    EXPECT_EQ(errors_ms[0], errors_ms[2]);
+    EXPECT_EQ(errors_ms[1], errors_ms[3]);
+}
+
+TEST_F(Comparisons, TheGridsOfAMapNameTheBestEstimatorOfEverySensor) {
+    app::Comparison comparison;
+    comparison.options.leads_s = {0.1};
+    const auto cell = [](double rate_hz, double noise_mm, const char* name, double rms_mm, double low,
+                         double high) {
+        app::MapCell made{rate_hz, noise_mm, 3, 0.1, {}};
+        made.result.predictor = name;
+        made.result.lead_s = 0.1;
+        made.result.rms_mm = rms_mm;
+        made.result.by_recording = {5, 0.5 * (low + high), low, high, 0, 0, 0};
+        return made;
+    };
+    comparison.map = {cell(60, 1, "cv*", 8, 0.85, 0.95), cell(60, 1, "ca*", 9, 0.98, 1.01),
+                      cell(60, 4, "ca*", 12, 0.96, 1.02)};
+    const std::string grids = app::map_grids(comparison);
+    EXPECT_NE(grids.find("60 Hz, jitter 3 ms, 10 % lost"), std::string::npos);
+    EXPECT_NE(grids.find("<td class=gain>cv* <b>10.0 %</b> (5.0 to 15.0)"), std::string::npos) << grids;
+    EXPECT_NE(grids.find("<td class=none>no measurable gain (-2.0 to 4.0)"), std::string::npos) << grids;
+    EXPECT_EQ(
+        app::map_sentence(comparison, 0.1),
+        "100.0 ms ahead the best estimator gains measurably over the best baseline in 1 of 2 sensors, 10.0 % "
+        "in the median of these (cv* 1).");
+    EXPECT_EQ(app::map_grids({}), "");
 }
 
 }  // namespace

@@ -216,6 +216,11 @@ TEST(StrikeEvaluation, AStrokeThatOneModelHasPlayedIsNotPlayedByAnother) {
     expect_on_time(score_models(0.496), 0, "one note");
 }
 
+TEST(StrikeEvaluation, AStrokeIsNotLostBetweenModels) {
+    // The second is selected when the first releases, the first when the second does: both mean the stroke.
+    expect_on_time(score_models(0.496, 1), 12, "one note");
+}
+
 constexpr const char* kFlatDrum = R"(
 name = "Flat"
 [[instrument]]

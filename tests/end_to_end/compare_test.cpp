@@ -22,9 +22,9 @@ void expect_refused(const Ended& ended, const std::string& found) {
 TEST(Compare, TwoBundledTracesGiveTheSameFilesTwiceAndSayWhichPredictorWins) {
     const Folder folder;
     const auto compare = [&](const std::string& out) {
-        return run({"compare", bundled("traces/flourish.csv").string(), bundled("traces/roll.csv").string(),
-                    "--predictors", "difference,thesis,cv,singer:alpha=3,q=1e10", "--rate", "60", "--noise",
-                    "0.25", "--leads", "1/30,1/15", "--no-cost", "--out", (folder / out).string()});
+        return run({"compare", "flourish", bundled("traces/roll.csv").string(), "--predictors",
+                    "difference,thesis,cv,singer:alpha=3,q=1e10", "--rate", "60", "--noise", "0.25",
+                    "--leads", "1/30,1/15", "--no-cost", "--out", (folder / out).string()});
     };
     const Ended first = compare("a"), second = compare("b");
     ASSERT_EQ(first.status, 0) << first.err;
