@@ -4,6 +4,7 @@
 #include <array>
 #include <iterator>
 
+#include "bad_input.h"
 #include "comparison_figures.h"
 #include "comparison_map.h"
 #include "comparison_pairs.h"
@@ -29,6 +30,15 @@ Field read_field(const ComparisonOptions& options) {
     for (const std::string& file : options.traces)
         field.recordings.push_back(read_recording(file, options.persons));
     field.sticks = sense_all(field.recordings, options.sensor, options.leads_s);
+    const auto scored = [](const SensedStick& stick) {
+        return std::any_of(stick.truths.begin(), stick.truths.end(),
+                           [](const std::optional<Truth>& truth) { return truth.has_value(); });
+    };
+    if (std::none_of(field.sticks.begin(), field.sticks.end(), scored))
+        throw BadInput(
+            "error: found no sample whose prediction could be held against the recording (the first 0.5 s, "
+            "gaps, and leads beyond the end do not count), expected some; give longer recordings, shorter "
+            "leads or a faster sensor");
     return field;
 }
 
@@ -117,8 +127,8 @@ private:
 };
 
 /// Advances that learning chooses from [s].
-constexpr double kAdvances_s[] = {-2e-3, -1e-3, 0,    1e-3, 2e-3,  3e-3,  4e-3, 5e-3,
-                                  6e-3,  7e-3,  8e-3, 9e-3, 10e-3, 11e-3, 12e-3};
+constexpr double kAdvances_s[] = {-6e-3, -5e-3, -4e-3, -3e-3, -2e-3, -1e-3, 0,     1e-3,  2e-3, 3e-3,
+                                  4e-3,  5e-3,  6e-3,  7e-3,  8e-3,  9e-3,  10e-3, 11e-3, 12e-3};
 
 /// Scores the strikes of the entrants that learn an advance again: contacts are taken to come earlier by what
 /// costs least (HitScore::loss) on the other recordings at that lead.
