@@ -5,6 +5,7 @@
 #include <limits>
 #include <span>
 
+#include "bad_input.h"
 #include "comparison_figures.h"
 #include "comparison_map.h"
 #include "comparison_pairs.h"
@@ -30,6 +31,15 @@ Field read_field(const ComparisonOptions& options) {
     for (const std::string& file : options.traces)
         field.recordings.push_back(read_recording(file, options.persons));
     field.sticks = sense_all(field.recordings, options.sensor, options.leads_s);
+    const auto scored = [](const SensedStick& stick) {
+        return std::any_of(stick.truths.begin(), stick.truths.end(),
+                           [](const std::optional<Truth>& truth) { return truth.has_value(); });
+    };
+    if (std::none_of(field.sticks.begin(), field.sticks.end(), scored))
+        throw BadInput(
+            "error: found no sample whose prediction could be held against the recording (the first 0.5 s, "
+            "gaps, and leads beyond the end do not count), expected some; give longer recordings, shorter "
+            "leads or a faster sensor");
     return field;
 }
 
@@ -117,10 +127,10 @@ private:
     const ComparisonOptions& options_;
 };
 
-/// Advances that learning tries: -4 to 12 ms.
-constexpr std::size_t kAdvances = 17;
+/// Advances that learning tries: -8 to 14 ms.
+constexpr std::size_t kAdvances = 23;
 constexpr double advance_s(std::size_t k) {
-    return 1e-3 * (static_cast<double>(k) - 4);
+    return 1e-3 * (static_cast<double>(k) - 8);
 }
 
 /// The advance whose loss, averaged with those up to 2 ms off, is least: single notes that match or just miss

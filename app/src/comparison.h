@@ -142,7 +142,8 @@ struct Comparison {
 /// Compares. A pure function of the files and options but for ns_per_sample. Predictors named bare or with
 /// parameters run as they are; of each family that has parameters to tune, `NAME*` runs those that erred
 /// least (RMS, at that lead) on other recordings (the `--tune` ones, or all others that are compared), and
-/// `NAME**` those from the recordings of other persons. Throws BadInput, tracking::TraceError.
+/// `NAME**` those from the recordings of other persons. Throws BadInput (also where nothing can be scored),
+/// tracking::TraceError.
 [[nodiscard]] Comparison compare(const ComparisonOptions& options);
 
 /// "33.3 ms ahead singer* errs least, ...; of 292 true strikes ca predicts most, ...", a sentence a lead.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "bad_input.h"
 #include "numbers.h"
@@ -15,6 +16,12 @@ double number_within(const std::string& text, const std::string& option, double 
     if (value >= least && value <= most) return value;
     throw BadInput(
         fmt::format("error: found {} {}, expected a number from {} to {}", option, text, least, most));
+}
+
+/// Shorter bursts cannot lose that share [samples].
+double shortest_burst(double drop_out) {
+    constexpr double kDigits = 1e9;  // so that 0.9 allows 9
+    return std::max(1.0, std::round(kDigits * drop_out / (1 - drop_out)) / kDigits);
 }
 
 double rate_of(const SensorArguments& a) {
@@ -63,8 +70,7 @@ tracking::SensorModel sensor_model(const SensorArguments& a) {
     sensor.jitter_s = number_within(a.jitter, "--jitter", 0, 1000) / 1000;
     sensor.true_stamps = !a.nominal_stamps;
     sensor.drop_out = number_within(a.drop_out, "--drop-out", 0, 0.9);
-    sensor.burst =
-        number_within(a.burst, "--burst", std::max(1.0, sensor.drop_out / (1 - sensor.drop_out)), 1e6);
+    sensor.burst = number_within(a.burst, "--burst", shortest_burst(sensor.drop_out), 1e6);
     sensor.noise_m = number_within(a.noise, "--noise", 0, 1000) / 1000;
     sensor.noise_rad = number_within(a.noise_rad, "--noise-rad", 0, 1);
     sensor.quantum_m = number_within(a.quantum, "--quantum", 0, 1000) / 1000;

@@ -190,6 +190,11 @@ protected:
     }
 };
 
+TEST_F(Comparisons, ASensorTooSlowToScoreIsRefused) {
+    options_.sensor.rate_hz = 0.1;
+    EXPECT_THROW((void)app::compare(options_), app::BadInput);
+}
+
 TEST_F(Advances, AreLearnedOnOtherRecordingsOnly) {
     const std::vector<double> before = learned();
     ASSERT_EQ(before.size(), 3U);
