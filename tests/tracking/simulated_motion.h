@@ -52,7 +52,7 @@ inline LinearMotion::Step LinearMotion::step(double dt) const {
     block.bottomRightCorner<3, 3>() = a.transpose();
     Eigen::Matrix<double, 6, 6> sum = Eigen::Matrix<double, 6, 6>::Identity();
     Eigen::Matrix<double, 6, 6> term = sum;
-    for (int k = 1; k <= 60; ++k) sum += term = (term * block / k).eval();
+    for (int k = 1; k <= 30; ++k) sum += term = (term * block / k).eval();
     const Eigen::Matrix3d f = sum.bottomRightCorner<3, 3>().transpose();
     const Eigen::Vector3d scale =
         order == 3 ? Eigen::Vector3d(dt * dt, dt, 1) : Eigen::Vector3d(dt, 1, 1 / dt);
