@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <iterator>
+#include <limits>
+#include <span>
 
 #include "bad_input.h"
 #include "comparison_figures.h"
@@ -126,9 +127,25 @@ private:
     const ComparisonOptions& options_;
 };
 
-/// Advances that learning chooses from [s].
-constexpr double kAdvances_s[] = {-6e-3, -5e-3, -4e-3, -3e-3, -2e-3, -1e-3, 0,     1e-3,  2e-3, 3e-3,
-                                  4e-3,  5e-3,  6e-3,  7e-3,  8e-3,  9e-3,  10e-3, 11e-3, 12e-3};
+/// Advances that learning tries: -4 to 12 ms.
+constexpr std::size_t kAdvances = 17;
+constexpr double advance_s(std::size_t k) {
+    return 1e-3 * (static_cast<double>(k) - 4);
+}
+
+/// The advance whose loss, averaged with those up to 2 ms off, is least: single notes that match or just miss
+/// decide nothing. Of equals the first.
+std::size_t least_smoothed(std::span<const double, kAdvances> loss) {
+    constexpr std::size_t kReach = 2;
+    std::size_t best = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = kReach; k + kReach < kAdvances; ++k) {
+        double sum = 0;
+        for (std::size_t near = k - kReach; near <= k + kReach; ++near) sum += loss[near];
+        if (sum < least) least = sum, best = k;
+    }
+    return best;
+}
 
 /// Scores the strikes of the entrants that learn an advance again: contacts are taken to come earlier by what
 /// costs least (HitScore::loss) on the other recordings at that lead.
@@ -140,22 +157,21 @@ void advance_strikes(std::vector<std::vector<ComparisonRow>>& parts, const Runs&
     for (std::size_t entrant = 0; entrant < entrants.size(); ++entrant) {
         if (!entrants[entrant].learns_advance) continue;
         // By stick and lead, each advance's score.
-        std::vector<std::array<HitScore, std::size(kAdvances_s)>> scores(sticks * leads);
+        std::vector<std::array<HitScore, kAdvances>> scores(sticks * leads);
         parallel_for(scores.size(), options.threads, [&](std::size_t i) {
-            for (std::size_t k = 0; k < std::size(kAdvances_s); ++k)
-                scores[i][k] = runs.hits(i / leads, entrant, i % leads, kAdvances_s[k]);
+            for (std::size_t k = 0; k < kAdvances; ++k)
+                scores[i][k] = runs.hits(i / leads, entrant, i % leads, advance_s(k));
         });
         for (std::size_t place = 0; place < sticks; ++place)
             for (std::size_t lead = 0; lead < leads; ++lead) {
-                std::array<double, std::size(kAdvances_s)> loss{};
+                std::array<double, kAdvances> loss{};
                 for (std::size_t other = 0; other < sticks; ++other)
                     for (std::size_t k = 0; k < loss.size(); ++k)
                         if (field.sticks[other].recording != field.sticks[place].recording)
                             loss[k] += scores[other * leads + lead][k].loss();
-                const auto best =
-                    static_cast<std::size_t>(std::min_element(loss.begin(), loss.end()) - loss.begin());
+                const std::size_t best = least_smoothed(loss);
                 ComparisonRow& row = parts[place * entrants.size() + entrant][lead];
-                row.advance_s = kAdvances_s[best];
+                row.advance_s = advance_s(best);
                 row.hits = scores[place * leads + lead][best];
             }
     }

@@ -14,7 +14,7 @@ namespace tracking {
 /// apart from the library: F by the series of exp(A dt), Q by Van Loan's block exponential.
 struct LinearMotion {
     int order;         ///< of the state: 2 (constant velocity) or 3
-    double alpha = 0;  ///< decay of the acceleration [1/s]
+    double alpha = 0;  ///< decay of the last component [1/s]
     double q = 0;      ///< [m^2/s^3] for order 2, [m^2/s^5] for order 3
     Eigen::Vector3d jump =
         Eigen::Vector3d::Zero();  ///< standard deviations added at each step, whatever its dt
@@ -45,7 +45,8 @@ inline LinearMotion::Step LinearMotion::step(double dt) const {
     Eigen::Matrix<double, 6, 6> block = Eigen::Matrix<double, 6, 6>::Zero();
     Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
     a(0, 1) = 1;
-    if (order == 3) a(1, 2) = 1, a(2, 2) = -alpha * dt;
+    a(order - 1, order - 1) = -alpha * dt;
+    if (order == 3) a(1, 2) = 1;
     block.topLeftCorner<3, 3>() = -a;
     block(order - 1, order + 2) = 1;
     block.bottomRightCorner<3, 3>() = a.transpose();
