@@ -19,7 +19,7 @@ constexpr double kImpossibleSpeed_mps = 1e4, kImpossibleDistanceM = 1e4;
 // least mean error: a velocity that fades with the lead errs 5 to 25 % less than one that lasts, on every
 // recording. Strikes want a path that bends: constant acceleration times them best, and the constant
 // velocity, which does not overshoot after a rebound, confirms them.
-constexpr const char* kAutoPicture = "cv:q=1e8,decay=8,gate=5";
+constexpr const char* kAutoPicture = "cv:q=1e7,decay=8,r=0.5,gate=5";
 constexpr const char* kAutoSound = "ca:q=7e8,gate=5";
 constexpr const char* kAutoConfirming = "cv:q=1e8,gate=5";
 
