@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -28,16 +29,26 @@ double now_s() {
         fmt::format("found that {} failed ({}), expected it to work", what, std::strerror(errno)));
 }
 
+/// A file without a name, which no other child inherits.
+std::FILE* memory_file() {
+    const int descriptor = memfd_create("errors", MFD_CLOEXEC);
+    if (descriptor < 0) fail_system("making a temporary file");
+    std::FILE* file = fdopen(descriptor, "w+");
+    if (!file) fail_system("opening a temporary file");
+    return file;
+}
+
 }  // namespace
 
-LineChild::LineChild(const std::string& command) : errors_(std::tmpfile()) {
-    if (!errors_) fail_system("making a temporary file");
+LineChild::LineChild(const std::string& command) : errors_(memory_file()) {
     int ends[2];
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) fail_system("making a socket");
     socket_ = ends[0];
     try {
         pid_ = start_child({{"sh", "-c", command}, {}, ends[1], ends[1], fileno(errors_.get()), true});
+        keeper_.emplace(pid_);
     } catch (...) {
+        if (pid_ > 0) (void)collect();
         close(ends[0]);
         close(ends[1]);
         throw;
@@ -71,6 +82,7 @@ std::optional<int> LineChild::collect() {
         usleep(kPauseUs);
     }
     kill(-pid_, SIGKILL);  // the group outlives its leader until that is collected
+    keeper_.reset();
     const int status = wait_for_child(pid_);
     pid_ = -1;
     return by_itself ? std::optional(status) : std::nullopt;

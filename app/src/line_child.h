@@ -6,11 +6,14 @@
 #include <string>
 #include <string_view>
 
+#include "group_keeper.h"
+
 namespace app {
 
 /// A program run by `sh -c COMMAND` with which lines are exchanged: its standard input and output are one
 /// socket, its standard error is kept for messages. It runs in a process group of its own; the destructor
-/// ends its input, gives it kFarewellS to leave, and kills and collects what is left of it.
+/// ends its input, gives it kFarewellS to leave, and kills and collects what is left of it. If the program is
+/// killed, the group is, too (GroupKeeper).
 ///
 /// All faults are thrown as std::runtime_error "found ..., expected ...; ...", one line.
 class LineChild {
@@ -43,6 +46,7 @@ private:
     std::unique_ptr<std::FILE, CloseFile> errors_;
     int socket_ = -1;
     int pid_ = -1;
+    std::optional<GroupKeeper> keeper_;  // of its group; ends before the group's leader is collected
     std::array<char, std::size_t{1} << 16> chunk_{};
     std::string received_;
     std::size_t taken_ = 0;  // bytes of it that were handed out

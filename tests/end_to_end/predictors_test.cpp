@@ -1,13 +1,17 @@
 // Predictors of one's own and `predict`, as a user runs them.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
+#include <sstream>
 
 #include "program.h"
 
 namespace end_to_end {
+namespace fs = std::filesystem;
 namespace {
 
 const std::string kExample = "exec:python3 '" + bundled("predictors/difference.py").string() + "'";
@@ -105,6 +109,51 @@ TEST(Predictors, AFaultyChildEndsTheProgramWithOneLineAndStatus1) {
         EXPECT_NE(predicted.err.find(message), std::string::npos) << predicted.err;
         EXPECT_FALSE(std::filesystem::exists(folder / "rows.csv"));
         EXPECT_FALSE(std::filesystem::exists(folder / "out/summary.json"));
+    }
+}
+
+/// Whether a process is there and not merely uncollected.
+bool is_running(int pid) {
+    const std::string state = read("/proc/" + std::to_string(pid) + "/stat");
+    return !state.empty() && state.find(") Z") == std::string::npos;
+}
+
+int count_children(int pid) {
+    std::istringstream list(
+        read("/proc/" + std::to_string(pid) + "/task/" + std::to_string(pid) + "/children"));
+    int children = 0;
+    for (int child = 0; list >> child;) ++children;
+    return children;
+}
+
+/// Polls for a minute, far beyond what a loaded machine takes.
+template <class Condition>
+bool comes_true(const Condition& condition) {
+    constexpr int kTries = 6000;
+    for (int i = 0; i < kTries && !condition(); ++i) usleep(10000);
+    return condition();
+}
+
+TEST(Predictors, ChildrenEndWithTheProgramHoweverItEnds) {
+    for (const int signal : {SIGTERM, SIGINT, SIGKILL}) {
+        const Folder folder;
+        // The shell and a process that it has started; neither reads its input's end.
+        const std::string child = "exec:sleep 1000 & echo $! $$ > '" + (folder / "new").string() + "'; mv '" +
+                                  (folder / "new").string() + "' '" + (folder / "pids").string() +
+                                  "'; sleep 1000";
+        Started program(
+            {"predict", bundled("traces/roll.csv").string(), "--predictor", child, "--lead", "1/30"},
+            folder / "");
+        ASSERT_TRUE(comes_true([&] { return fs::exists(folder / "pids"); }));
+        int background = 0, shell = 0;
+        std::istringstream(read(folder / "pids")) >> background >> shell;
+        ASSERT_TRUE(is_running(background) && is_running(shell));
+        // The watcher may be starting yet: it is there before the first answer is waited for.
+        ASSERT_TRUE(comes_true([&] { return count_children(program.pid()) == 2; }));
+        kill(program.pid(), signal);
+        EXPECT_EQ(program.wait().status, 128 + signal);
+        EXPECT_TRUE(comes_true([&] { return !is_running(background) && !is_running(shell); }))
+            << "after signal " << signal;
     }
 }
 
