@@ -158,7 +158,10 @@ void add_compare_command(CLI::App& program) {
             "Score strikes on a level plane: its height [m], or contact+D or contact-D: D [m] from each "
             "stick's contact height, the median low of its tip")
         ->excludes(kit);
-    command->add_option("--tune", a->tune, "Tune on these traces instead of on the others compared");
+    command->add_option(
+        "--tune", a->tune,
+        "Tune, and learn the advance of auto's strikes, on these traces (without the one scored) "
+        "instead of on the others compared; --map does not use them");
     command->add_option("--predictions", a->predictions,
                         "NAME=FILE[@TRACE]: predictions made elsewhere, in predict's format");
     command->add_option("--person", a->persons, "TEXT=NAME: traces whose path contains TEXT are of NAME");

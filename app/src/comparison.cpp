@@ -20,17 +20,8 @@
 namespace app {
 namespace {
 
-/// The recordings compared and what the sensor saw of them.
-struct Field {
-    std::vector<Recording> recordings;
-    std::vector<SensedStick> sticks;
-};
-
-Field read_field(const ComparisonOptions& options) {
-    Field field;
-    for (const std::string& file : options.traces)
-        field.recordings.push_back(read_recording(file, options.persons));
-    field.sticks = sense_all(field.recordings, options.sensor, options.leads_s);
+Field read_scored(const ComparisonOptions& options) {
+    Field field = read_field(options.traces, options);
     const auto scored = [](const SensedStick& stick) {
         return std::any_of(stick.truths.begin(), stick.truths.end(),
                            [](const std::optional<Truth>& truth) { return truth.has_value(); });
@@ -147,33 +138,61 @@ std::size_t least_smoothed(std::span<const double, kAdvances> loss) {
     return best;
 }
 
+/// What the strikes of one entrant cost on recordings, by advance.
+class AdvanceLosses {
+public:
+    AdvanceLosses(const Field& field, const Entrant& entrant, const ComparisonOptions& options)
+        : field_(field), leads_(options.leads_s.size()), losses_(field.sticks.size() * leads_) {
+        // The same specification runs on every recording.
+        std::vector<Entrant> alone = {entrant};
+        alone[0].used.assign(field.recordings.size(), entrant.used.front());
+        const Runs runs(field, alone, options);
+        parallel_for(losses_.size(), options.threads, [&](std::size_t i) {
+            for (std::size_t k = 0; k < kAdvances; ++k)
+                losses_[i][k] = runs.hits(i / leads_, 0, i % leads_, advance_s(k)).loss();
+        });
+    }
+
+    /// The advance of least cost at a lead, on the recordings but `scored`; none where there are no others.
+    [[nodiscard]] std::optional<double> best_s(const Recording& scored, std::size_t lead) const {
+        std::array<double, kAdvances> loss{};
+        bool any = false;
+        for (std::size_t place = 0; place < field_.sticks.size(); ++place) {
+            if (same_samples(field_.recordings[field_.sticks[place].recording], scored)) continue;
+            any = true;
+            for (std::size_t k = 0; k < kAdvances; ++k) loss[k] += losses_[place * leads_ + lead][k];
+        }
+        return any ? std::optional(advance_s(least_smoothed(loss))) : std::nullopt;
+    }
+
+private:
+    const Field& field_;
+    std::size_t leads_;
+    std::vector<std::array<double, kAdvances>> losses_;  // by stick and lead
+};
+
 /// Scores the strikes of the entrants that learn an advance again: contacts are taken to come earlier by what
-/// costs least (HitScore::loss) on the other recordings at that lead.
+/// costs least (HitScore::loss) at that lead on the `--tune` recordings, or on all others compared, never on
+/// the one that is scored.
 void advance_strikes(std::vector<std::vector<ComparisonRow>>& parts, const Runs& runs, const Field& field,
                      const std::vector<Entrant>& entrants, const ComparisonOptions& options) {
-    if (options.surface.kind == StrikeSurface::Kind::none || !options.tuning || field.recordings.size() < 2)
+    const auto learns = [](const Entrant& entrant) { return entrant.learns_advance; };
+    if (options.surface.kind == StrikeSurface::Kind::none || !options.tuning ||
+        std::none_of(entrants.begin(), entrants.end(), learns))
         return;
-    const std::size_t leads = options.leads_s.size(), sticks = field.sticks.size();
+    const Field own = read_field(options.tune_traces, options);
+    const Field& others = options.tune_traces.empty() ? field : own;
+    if (&others == &field && field.recordings.size() < 2) return;
+    const std::size_t leads = options.leads_s.size();
     for (std::size_t entrant = 0; entrant < entrants.size(); ++entrant) {
         if (!entrants[entrant].learns_advance) continue;
-        // By stick and lead, each advance's score.
-        std::vector<std::array<HitScore, kAdvances>> scores(sticks * leads);
-        parallel_for(scores.size(), options.threads, [&](std::size_t i) {
-            for (std::size_t k = 0; k < kAdvances; ++k)
-                scores[i][k] = runs.hits(i / leads, entrant, i % leads, advance_s(k));
+        const AdvanceLosses losses(others, entrants[entrant], options);
+        parallel_for(field.sticks.size() * leads, options.threads, [&](std::size_t i) {
+            const std::size_t place = i / leads, lead = i % leads;
+            ComparisonRow& row = parts[place * entrants.size() + entrant][lead];
+            row.advance_s = losses.best_s(field.recordings[field.sticks[place].recording], lead);
+            if (row.advance_s) row.hits = runs.hits(place, entrant, lead, *row.advance_s);
         });
-        for (std::size_t place = 0; place < sticks; ++place)
-            for (std::size_t lead = 0; lead < leads; ++lead) {
-                std::array<double, kAdvances> loss{};
-                for (std::size_t other = 0; other < sticks; ++other)
-                    for (std::size_t k = 0; k < loss.size(); ++k)
-                        if (field.sticks[other].recording != field.sticks[place].recording)
-                            loss[k] += scores[other * leads + lead][k].loss();
-                const std::size_t best = least_smoothed(loss);
-                ComparisonRow& row = parts[place * entrants.size() + entrant][lead];
-                row.advance_s = advance_s(best);
-                row.hits = scores[place * leads + lead][best];
-            }
     }
 }
 
@@ -234,7 +253,7 @@ std::vector<std::string> persons_of(const std::vector<Recording>& recordings) {
 Comparison compare(const ComparisonOptions& options) {
     Comparison comparison;
     comparison.options = options;
-    const Field field = read_field(options);
+    const Field field = read_scored(options);
     comparison.persons = persons_of(field.recordings);
     const EntrantList list = enter(options, field.recordings, field.sticks);
     comparison.tuned_on = list.tuned_on;

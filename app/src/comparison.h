@@ -51,7 +51,7 @@ struct ComparisonRow {
     ErrorScore error;
     std::optional<Calibration> calibration;
     std::optional<HitScore> hits;
-    std::optional<double> advance_s;  ///< of the strikes, if it was learned on other recordings
+    std::optional<double> advance_s;  ///< of the strikes, if it was learned (on the recordings that tune)
     double ns_per_sample =
         0;  ///< update and the prediction at every lead; median of several runs; 0 where not measured
     bool external = false;  ///< exec:, or predictions from a file: no cost is measured
@@ -139,11 +139,13 @@ struct Comparison {
     std::string tuned_on;  ///< one sentence
 };
 
-/// Compares. A pure function of the files and options but for ns_per_sample. Predictors named bare or with
+/// Compares. A pure function of the files and options but for ns_per_sample and `exec:` predictors with a
+/// state of their own. Predictors named bare or with
 /// parameters run as they are; of each family that has parameters to tune, `NAME*` runs those that erred
 /// least (RMS, at that lead) on other recordings (the `--tune` ones, or all others that are compared), and
-/// `NAME**` those from the recordings of other persons. Throws BadInput (also where nothing can be scored),
-/// tracking::TraceError.
+/// `NAME**` those from the recordings of other persons; the advance of `auto`'s strikes is learned on the
+/// same recordings as `NAME*`. A map tunes on all others that are compared, `--tune` or not. Throws BadInput
+/// (also where nothing can be scored, or two files hold the same samples), tracking::TraceError.
 [[nodiscard]] Comparison compare(const ComparisonOptions& options);
 
 /// "33.3 ms ahead singer* errs least, ...; of 292 true strikes ca predicts most, ...", a sentence a lead.

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <set>
 
 #include "bad_input.h"
@@ -14,7 +13,6 @@
 #include "tuning.h"
 
 namespace app {
-namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kFromFiles = "predictions made elsewhere; their cost is not known";
@@ -52,17 +50,11 @@ Entrant named(const std::string& specification, std::size_t recordings, std::siz
     return entrant;
 }
 
-std::string whole_path(const std::string& file) {
-    std::error_code error;
-    return fs::weakly_canonical(file, error).string();
-}
-
 /// Which of `field` may tune for `scored`: others only.
 std::vector<bool> allowed_for(const Recording& scored, std::span<const Recording> field, Tuning tuning) {
     std::vector<bool> allowed;
-    const std::string path = whole_path(scored.file);
     for (const Recording& recording : field)
-        allowed.push_back(whole_path(recording.file) != path &&
+        allowed.push_back(!same_samples(recording, scored) &&
                           (tuning != Tuning::other_persons || recording.person != scored.person));
     return allowed;
 }
@@ -108,19 +100,22 @@ std::size_t count_persons(std::span<const Recording> a, std::span<const Recordin
     return persons.size();
 }
 
+/// `named`: recordings of --tune, none where the `others` that are compared serve.
+std::string tuned_sentence(std::size_t named, std::size_t others, bool by_person) {
+    const std::size_t count = named > 0 ? named : others;
+    return fmt::format(
+        "tuned by RMS at each lead on {}{} recording{}{}, never on the recording that is scored{}",
+        named > 0 ? "" : "the other ", count, count == 1 ? "" : "s", named > 0 ? " named by --tune" : "",
+        by_person ? "; ** on recordings of other persons only" : "");
+}
+
 void enter_tuned(EntrantList& list, const std::vector<std::string>& families,
                  const ComparisonOptions& options, std::span<const Recording> scored,
                  std::span<const SensedStick> sticks) {
-    std::vector<Recording> own_field;
-    std::vector<SensedStick> own_sticks;
-    for (const std::string& file : options.tune_traces)
-        own_field.push_back(read_recording(file, options.persons));
-    if (!own_field.empty()) own_sticks = sense_all(own_field, options.sensor, options.leads_s);
-    const std::span<const Recording> field =
-        own_field.empty() ? scored : std::span<const Recording>(own_field);
-    const std::span<const SensedStick> seen =
-        own_field.empty() ? sticks : std::span<const SensedStick>(own_sticks);
-    if (own_field.empty() && scored.size() < 2) {
+    const Field own = read_field(options.tune_traces, options);
+    const std::span<const Recording> field = own.recordings.empty() ? scored : own.recordings;
+    const std::span<const SensedStick> seen = own.recordings.empty() ? sticks : own.sticks;
+    if (own.recordings.empty() && scored.size() < 2) {
         list.tuned_on = "nothing is tuned: one recording, and no others by --tune";
         return;
     }
@@ -128,16 +123,17 @@ void enter_tuned(EntrantList& list, const std::vector<std::string>& families,
                             options.threads);
     std::vector<Tuning> splits = {Tuning::other_recordings};
     if (count_persons(scored, field) >= 2) splits.push_back(Tuning::other_persons);
+    bool any = false, by_person = false;
     for (const Tuning split : splits)
         for (const std::string& family : families) {
             Entrant entrant = tuned(family, split, table, scored, field, options.leads_s.size());
-            if (!entrant.used.empty()) list.entrants.push_back(std::move(entrant));
+            if (entrant.used.empty()) continue;
+            any = true;
+            by_person = by_person || split == Tuning::other_persons;
+            list.entrants.push_back(std::move(entrant));
         }
-    list.tuned_on =
-        fmt::format("tuned by RMS at each lead on {}, never on the recording that is scored{}",
-                    own_field.empty() ? fmt::format("the other {} recordings", scored.size() - 1)
-                                      : fmt::format("{} recordings named by --tune", field.size()),
-                    splits.size() > 1 ? "; ** on recordings of other persons only" : "");
+    list.tuned_on = any ? tuned_sentence(own.recordings.size(), scored.size() - 1, by_person)
+                        : "nothing is tuned: a recording has no others to be tuned on";
 }
 
 /// Leads and the file's own: t is written in digits.
@@ -252,6 +248,14 @@ std::unique_ptr<tracking::Predictor> make_striker(const Entrant& entrant, const 
     if (entrant.replays.contains({place, lead})) return make_entrant(entrant, stick, place, lead);
     const std::string& named = entrant.used[stick.recording][lead];
     return make_any_predictor(entrant.strikes_by.empty() ? named : entrant.strikes_by, leads_s, stick.name);
+}
+
+Field read_field(const std::vector<std::string>& files, const ComparisonOptions& options) {
+    Field field;
+    for (const std::string& file : files) field.recordings.push_back(read_recording(file, options.persons));
+    require_distinct(field.recordings);
+    if (!files.empty()) field.sticks = sense_all(field.recordings, options.sensor, options.leads_s);
+    return field;
 }
 
 std::vector<std::string> specifications_of(const ComparisonOptions& options) {

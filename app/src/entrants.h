@@ -13,6 +13,15 @@
 
 namespace app {
 
+/// Recordings and what the sensor sees of them.
+struct Field {
+    std::vector<Recording> recordings;
+    std::vector<SensedStick> sticks;
+};
+
+/// Throws tracking::TraceError, and BadInput, also where two files hold the same samples.
+[[nodiscard]] Field read_field(const std::vector<std::string>& files, const ComparisonOptions& options);
+
 /// Where a predictor's parameters come from.
 enum class Tuning {
     none,              ///< as named
@@ -54,8 +63,9 @@ struct EntrantList {
 [[nodiscard]] std::vector<std::string> specifications_of(const ComparisonOptions& options);
 
 /// Those named, then the baselines that were not (naive, difference, the parabola), then the tuned ones of
-/// each family among them: on the `--tune` recordings without the one scored, or on all others compared (two
-/// recordings or more), and on those of other persons (two persons or more); last the files of
+/// each family among them: on the `--tune` recordings without the one scored (known by its samples), or on
+/// all others compared (two recordings or more), and on those of other persons (two persons or more); last
+/// the files of
 /// `--predictions`, each at its lead on the recording whose samples it answers. Throws BadInput for a
 /// predictor that is not known and a file that fits no recording or lead.
 [[nodiscard]] EntrantList enter(const ComparisonOptions& options, std::span<const Recording> recordings,

@@ -70,9 +70,11 @@ PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint
 }
 
 std::string verdict(const PairedDifference& d) {
+    if (std::isinf(d.ratio)) return "the baseline errs nothing, so there is no ratio";
     if (!d.has_interval())
         return fmt::format("ratio {:.3f}; no interval from one recording or person", d.ratio);
-    const std::string range = fmt::format("({:.3f} to {:.3f}, n = {})", d.low, d.high, d.n);
+    const std::string high = std::isinf(d.high) ? "no bound" : fmt::format("{:.3f}", d.high);
+    const std::string range = fmt::format("({:.3f} to {}, n = {})", d.low, high, d.n);
     if (d.gain()) return fmt::format("{:.1f} % better {}", 100 * (1 - d.ratio), range);
     if (d.loss()) return fmt::format("{:.1f} % worse {}", 100 * (d.ratio - 1), range);
     return fmt::format("no measurable gain {}", range);

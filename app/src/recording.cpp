@@ -151,6 +151,29 @@ Recording recording_of(tracking::Trace trace, std::string person) {
     return recording;
 }
 
+bool same_samples(const Recording& a, const Recording& b) {
+    const auto same_pose = [](const tracking::PoseSample& x, const tracking::PoseSample& y) {
+        return x.t_s == y.t_s && x.position == y.position && x.has_orientation == y.has_orientation &&
+               (!x.has_orientation || x.orientation.coeffs() == y.orientation.coeffs());
+    };
+    return std::equal(a.trace.sticks.begin(), a.trace.sticks.end(), b.trace.sticks.begin(),
+                      b.trace.sticks.end(),
+                      [&](const tracking::StickTrace& x, const tracking::StickTrace& y) {
+                          return std::equal(x.samples.begin(), x.samples.end(), y.samples.begin(),
+                                            y.samples.end(), same_pose);
+                      });
+}
+
+void require_distinct(std::span<const Recording> recordings) {
+    for (std::size_t i = 0; i < recordings.size(); ++i)
+        for (std::size_t before = 0; before < i; ++before)
+            if (same_samples(recordings[i], recordings[before]))
+                throw BadInput(
+                    fmt::format("{}: error: found the samples of {} again, expected every recording once; "
+                                "leave one of them out",
+                                recordings[i].file, recordings[before].file));
+}
+
 bool near_any(const std::vector<double>& times, double t_s) {
     const auto next = std::lower_bound(times.begin(), times.end(), t_s - kNearS);
     return next != times.end() && *next <= t_s + kNearS;

@@ -1,6 +1,7 @@
 #pragma once
 #include <tracking/trace.h>
 
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,6 +39,12 @@ struct Recording {
 
 /// The same from memory, without files beside it.
 [[nodiscard]] Recording recording_of(tracking::Trace trace, std::string person);
+
+/// Whether both hold the same samples, whatever their files and sticks are called.
+[[nodiscard]] bool same_samples(const Recording& a, const Recording& b);
+
+/// Throws BadInput if two of them hold the same samples.
+void require_distinct(std::span<const Recording> recordings);
 
 /// Whether `t_s` lies within +-50 ms of one of `times` (ascending).
 [[nodiscard]] bool near_any(const std::vector<double>& times, double t_s);

@@ -82,9 +82,9 @@ TEST(Tuning, ParametersComeFromTheOtherRecordingsNotFromTheOneScored) {
 TEST(Tuning, WithTwoPersonsASecondOneIsTunedOnOtherPersonsOnly) {
     const std::vector<app::Recording> recordings = {
         sample::recording_of(still, 6, 250, "/none/a1.csv", "Ann"),
-        sample::recording_of(still, 6, 250, "/none/a2.csv", "Ann"),
+        sample::recording_of(still, 5, 250, "/none/a2.csv", "Ann"),
         sample::recording_of(fast, 6, 250, "/none/b1.csv", "Ben"),
-        sample::recording_of(fast, 6, 250, "/none/b2.csv", "Ben")};
+        sample::recording_of(fast, 5, 250, "/none/b2.csv", "Ben")};
     const app::EntrantList list = entrants_of(recordings, options_of({"naive"}));
     EXPECT_EQ(named(list, "naive**").used[0][0], "naive:n=1");
     EXPECT_EQ(named(list, "naive**").used[2][0], "naive:n=16");
