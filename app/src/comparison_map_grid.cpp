@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -34,6 +35,7 @@ double gain_percent(double ratio) {
 std::string cell_of(const PairedResult& result) {
     const PairedDifference& d = result.by_recording;
     const std::string name = html(result.predictor), gain = fmt::format("{:.1f} %", gain_percent(d.ratio));
+    if (std::isinf(d.ratio)) return "<td class=none>the baseline errs nothing";
     if (!d.has_interval()) return fmt::format("<td>{} {}", name, gain);
     const std::string range = fmt::format("({:.1f} to {:.1f})", gain_percent(d.high), gain_percent(d.low));
     if (d.gain()) return fmt::format("<td class=gain>{} <b>{}</b> {}", name, gain, range);

@@ -73,8 +73,7 @@ std::string strike_winner(const Comparison& comparison, double lead_s) {
     const HitScore& best = *ranked[0]->hits;
     std::string text = fmt::format(
         ". Of {} true strikes {} commits best that far ahead: F1 {:.3f}, median error {:.1f} ms, {:.2f} "
-        "false a "
-        "minute; then {} ({:.3f})",
+        "false a minute; then {} ({:.3f})",
         best.true_contacts, ranked[0]->predictor, best.f1(), best.median_ms(), best.false_per_min(),
         ranked[1]->predictor, ranked[1]->hits->f1());
     const auto baseline =

@@ -63,10 +63,13 @@ struct StrikeTiming {
 /// before it. Each model of a predictor of several keeps its own pending contacts; those of the model that is
 /// selected when they must be released count. Without cancelling every contact whose time was fixed is
 /// played. The true contacts are those of the recorded path, straight between samples, 3 mm deep. A pure
-/// function.
+/// function, but for `exec:` predictors with a state of their own.
 ///
-///   recorded    the stick as recorded, for the truth    samples  what the sensor reports, in order of
-///   arrival predictors  made by the caller for this run; fed from their start
+///   recorded    the stick as recorded, for the truth
+///
+///   samples     what the sensor reports, in order of arrival
+///
+///   predictors  made by the caller for this run; fed from their start
 [[nodiscard]] HitScore evaluate_strikes(const tracking::StickTrace& recorded,
                                         std::span<const tracking::PoseSample> samples,
                                         const StrikePredictors& predictors, const StickGeometry& geometry,

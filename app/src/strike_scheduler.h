@@ -38,8 +38,8 @@ struct NoteChange {
 /// geometry alone: after a release the pair makes no strike until the tip, as measured and as filtered, has
 /// risen `rearm_m` from its lowest point and is `rearm_m` outside the surface. With a commit lead beyond the
 /// release margin a note's time stands from that lead on, while it may still be cancelled, and taken up
-/// again. Causal: the call for a sample
-/// at s changes only notes with onset >= s + release margin. Times in seconds of the trace's clock.
+/// again. Causal: the call for a sample at s changes only notes with onset >= s + release margin. Times in
+/// seconds of the trace's clock.
 class StrikeScheduler {
 public:
     StrikeScheduler(const StrikeRules& rules, std::size_t sticks, std::size_t instruments);
@@ -49,9 +49,14 @@ public:
     /// The filter of `stick` starts anew: its next sample is a first sample.
     void restart(std::uint32_t stick);
     /// The sample of `stick` at time s.
+    ///
     ///   contacts            of its predicted path, by time
-    ///   measured_clearance  signed distance of the measured tip to each instrument's surface grown by the
-    ///   tip's radius [m] filtered_clearance  the same of the filtered tip at lead 0
+    ///
+    ///   measured_clearance  [m] signed, of the measured tip from each instrument's surface grown by the
+    ///   tip's radius
+    ///
+    ///   filtered_clearance  the same of the filtered tip at lead 0
+    ///
     ///   model               that predicts the contacts, of a predictor of several
     void sample(std::uint32_t stick, double s, std::span<const sim::Contact> contacts,
                 std::span<const double> measured_clearance, std::span<const double> filtered_clearance,

@@ -205,6 +205,57 @@ TEST_F(Advances, AreLearnedOnOtherRecordingsOnly) {
     EXPECT_NE(after[2], before[2]);
 }
 
+TEST_F(Advances, AreLearnedOnTheTuningRecordingsWhereThereAreAny) {
+    options_.traces = {file("p1_gathering.csv"), file("p2_gathering.csv")};
+    options_.tune_traces = {file("p3_gathering.csv")};
+    const std::vector<double> before = learned();
+    write(2, 4);
+    EXPECT_EQ(learned(), before) << "the others compared have no say";
+    write(3, 4);
+    const std::vector<double> after = learned();
+    ASSERT_EQ(after.size(), 2U);
+    EXPECT_NE(after[0], before[0]) << "those that tune have";
+    EXPECT_EQ(after[0], after[1]) << "the same for all";
+    options_.traces.resize(1);
+    EXPECT_EQ(learned(), std::vector<double>{after[0]}) << "one recording is enough to be scored";
+}
+
+TEST_F(Advances, ACopyOfTheRecordingScoredTeachesNothing) {
+    options_.traces.resize(1);
+    fs::copy_file(file("p1_gathering.csv"), file("copy.csv"));
+    options_.tune_traces = {file("copy.csv")};
+    EXPECT_EQ(learned(), std::vector<double>{1}) << "none learned";
+    options_.predictors = {"cv"};
+    const app::Comparison alone = app::compare(options_);
+    EXPECT_TRUE(std::all_of(alone.rows.begin(), alone.rows.end(),
+                            [](const app::ComparisonRow& row) { return !row.predictor.ends_with("*"); }));
+    EXPECT_TRUE(alone.tuned_on.starts_with("nothing is tuned")) << alone.tuned_on;
+    options_.tune_traces.push_back(file("p2_gathering.csv"));
+    const app::Comparison with_copy = app::compare(options_);
+    options_.tune_traces = {file("p2_gathering.csv")};
+    const app::Comparison without = app::compare(options_);
+    ASSERT_EQ(with_copy.rows.size(), without.rows.size());
+    for (std::size_t i = 0; i < without.rows.size(); ++i)
+        EXPECT_EQ(with_copy.rows[i].used, without.rows[i].used);
+    EXPECT_NE(without.tuned_on.find("1 recording named by --tune"), std::string::npos) << without.tuned_on;
+}
+
+TEST_F(Comparisons, ARecordingIsComparedOnceByWhateverName) {
+    EXPECT_NE(app::compare(options_).tuned_on.find("the other 1 recording,"), std::string::npos);
+    const std::string first = options_.traces[0], copy = file("copy.csv");
+    fs::copy_file(first, copy);
+    for (const std::string& again : {first, copy}) {
+        options_.traces.push_back(again);
+        try {
+            (void)app::compare(options_);
+            ADD_FAILURE() << again;
+        } catch (const app::BadInput& refused) {
+            EXPECT_TRUE(std::string(refused.what()).starts_with(again + ": error: found")) << refused.what();
+        }
+        options_.traces.pop_back();
+    }
+}
+
 TEST_F(Advances, AreStatedInEveryProduct) {
     const app::Comparison comparison = app::compare(options_);
     const auto json = nlohmann::json::parse(app::format_comparison_json(comparison));

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <random>
+#include <span>
 #include <vector>
 
 namespace {
@@ -30,6 +31,15 @@ TEST(PairedDifference, TenPercentInEveryRecordingIsAGainHoweverTheRecordingsDiff
     EXPECT_NEAR(d.high, 0.9, 1e-12);
     EXPECT_TRUE(d.gain());
     EXPECT_EQ(app::verdict(d), "10.0 % better (0.900 to 0.900, n = 4)");
+}
+
+TEST(PairedDifference, ABaselineWithoutErrorIsWordedNotDividedBy) {
+    const std::vector<PairedSums> groups = {{10, 0, 5}, {40, 0, 8}};
+    for (const std::size_t count : {1, 2}) {
+        const PairedDifference d = app::paired_difference(std::span(groups).first(count), 1);
+        EXPECT_EQ(app::verdict(d), "the baseline errs nothing, so there is no ratio");
+        EXPECT_GT(d.difference_mm, 0);
+    }
 }
 
 TEST(PairedDifference, BetterOnHalfAndWorseOnHalfIsNoMeasurableGain) {
