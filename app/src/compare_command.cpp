@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "bad_input.h"
+#include "comma_list.h"
 #include "comparison.h"
 #include "comparison_report.h"
 #include "comparison_tables.h"
@@ -30,16 +31,6 @@ struct CompareArguments {
     std::string predictors, leads = "1/30,1/15,1/10", kit, plane, out;
     bool no_tuning = false, no_cost = false, map = false;
 };
-
-std::vector<std::string> split_at_commas(const std::string& text) {
-    std::vector<std::string> parts;
-    for (std::size_t begin = 0; begin <= text.size();) {
-        const std::size_t comma = std::min(text.find(',', begin), text.size());
-        parts.push_back(text.substr(begin, comma - begin));
-        begin = comma + 1;
-    }
-    return parts;
-}
 
 double in_range(const std::string& text, const std::string& option, double least, double most) {
     const double value = parse_number(text, option);

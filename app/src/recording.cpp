@@ -10,6 +10,7 @@
 #include <iterator>
 
 #include "bad_input.h"
+#include "comma_list.h"
 #include "stroke_lows.h"
 
 namespace app {
@@ -23,16 +24,6 @@ struct MarkedTime {
     std::string stick, kind;
 };
 
-std::vector<std::string> fields_of(const std::string& line) {
-    std::vector<std::string> fields;
-    for (std::size_t begin = 0; begin <= line.size();) {
-        const std::size_t comma = std::min(line.find(',', begin), line.size());
-        fields.push_back(line.substr(begin, comma - begin));
-        begin = comma + 1;
-    }
-    return fields;
-}
-
 /// Rows t,stick,WORD,... of a table whose header begins with `header`.
 std::vector<MarkedTime> read_marks(const fs::path& file, const std::string& header) {
     std::ifstream in(file);
@@ -45,7 +36,7 @@ std::vector<MarkedTime> read_marks(const fs::path& file, const std::string& head
                 fmt::format("{}:1:1: error: found \"{}\", expected the columns {}; mend it or move it away",
                             file.string(), line.substr(0, 60), header));
         if (number == 1 || line.empty()) continue;
-        const std::vector<std::string> fields = fields_of(line);
+        const std::vector<std::string> fields = split_at_commas(line);
         double t_s = 0;
         const char* end = fields[0].data() + fields[0].size();
         const auto [stop, error] = std::from_chars(fields[0].data(), end, t_s);

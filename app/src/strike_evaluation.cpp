@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "played_strikes.h"
 #include "score_strikes.h"
 #include "stick_tracker.h"
 #include "strike_scheduler.h"
@@ -108,85 +109,6 @@ StrikeRules rules_at(const StrikeTiming& timing, bool cancelling, double t0_s) {
     rules.cancelling = cancelling;
     return rules;
 }
-
-/// One stick's released strikes, of a predictor with one model or several. Each model has a scheduler of its
-/// own; what a scheduler releases is played if its model is selected, unless another model's note has been
-/// played for the same stroke: the tip must first rise out of the surface, as the scheduler asks too. A model
-/// that is selected after it has released a stroke itself, not being selected then, stands by that stroke:
-/// the note of another model for it is played.
-class PlayedStrikes {
-public:
-    PlayedStrikes(const StrikeRules& rules, std::size_t parts, std::size_t models)
-        : rules_(rules),
-          shut_(parts),
-          schedulers_(models, StrikeScheduler(rules, 1, parts)),
-          unplayed_s_(models, std::vector<double>(parts, -std::numeric_limits<double>::infinity())) {}
-
-    /// Before the sample at s: what falls due is released by the model selected until now.
-    void advance_to(double s) {
-        for (std::size_t model = 0; model < schedulers_.size(); ++model) {
-            schedulers_[model].advance_to(s);
-            take_released(model);
-        }
-    }
-    void restart() {
-        for (StrikeScheduler& scheduler : schedulers_) scheduler.restart(0);
-    }
-    /// The contacts of one model's path at the sample at s.
-    void sample(std::size_t model, double s, std::span<const sim::Contact> contacts,
-                std::span<const double> measured, std::span<const double> filtered) {
-        schedulers_[model].sample(0, s, contacts, measured, filtered);
-        (void)schedulers_[model].take_changes();
-    }
-    /// After the models' contacts: the model selected from here on, and the measured tip's clearances.
-    void select(std::size_t model, double s, std::span<const double> measured) {
-        selected_ = model;
-        for (std::size_t part = 0; part < shut_.size(); ++part) {
-            Shut& shut = shut_[part];
-            if (!shut.since_s || s < *shut.since_s) continue;
-            shut.lowest = std::min(shut.lowest, measured[part]);
-            if (measured[part] >= rules_.rearm_m && measured[part] >= shut.lowest + rules_.rearm_m) shut = {};
-        }
-    }
-    [[nodiscard]] std::vector<Strike> finish() {
-        for (std::size_t model = 0; model < schedulers_.size(); ++model) {
-            schedulers_[model].finish();
-            take_released(model);
-        }
-        return std::move(played_);
-    }
-
-private:
-    struct Shut {
-        std::optional<double> since_s;  ///< onset of the note played
-        double lowest = std::numeric_limits<double>::infinity();
-    };
-
-    void take_released(std::size_t model) {
-        for (const std::uint64_t id : schedulers_[model].take_released()) {
-            const Strike& strike = schedulers_[model].strikes()[id - 1];
-            const double stood_by_s = unplayed_s_[selected_][strike.instrument];
-            if (model == selected_ || std::abs(strike.onset_s - stood_by_s) <= rules_.late_s)
-                play(strike);
-            else
-                unplayed_s_[model][strike.instrument] = strike.onset_s;
-        }
-    }
-    void play(const Strike& strike) {
-        Shut& shut = shut_[strike.instrument];
-        if (schedulers_.size() > 1 && shut.since_s) return;
-        shut = {strike.onset_s};
-        played_.push_back(strike);
-        played_.back().id = played_.size();
-    }
-
-    StrikeRules rules_;
-    std::vector<Shut> shut_;
-    std::vector<StrikeScheduler> schedulers_;
-    std::vector<std::vector<double>> unplayed_s_;  // model x part: onset last released while not selected
-    std::size_t selected_ = 0;
-    std::vector<Strike> played_;
-};
 
 HitScore score_of(const std::vector<Strike>& strikes, std::vector<TrueContact>& contacts) {
     const StrikeScore score = score_strikes(strikes, contacts);
