@@ -164,7 +164,8 @@ std::string strike_note(const Comparison& c) {
         "and true contacts are matched one to one within 30 ms; errors are those of the matched ones. Not "
         "cancelling: false strikes a minute if all that was fixed is played. Advance: what contacts are "
         "taken to "
-        "come earlier than predicted, learned on the other recordings (least to most over the recordings). "
+        "come earlier than predicted, learned on the recordings that tune (least to most over the "
+        "recordings). "
         "Tuned parameters are those of the least position error, not of the best strikes.",
         html(c.options.surface_text), 1e3 * c.options.release_margin_s);
 }
