@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <span>
 
 #include "bad_input.h"
@@ -125,17 +124,20 @@ constexpr double advance_s(std::size_t k) {
 }
 
 /// The advance whose loss, averaged with those up to 2 ms off, is least: single notes that match or just miss
-/// decide nothing. Of equals the first.
+/// decide nothing. None if that saves less than 5 % against none.
 std::size_t least_smoothed(std::span<const double, kAdvances> loss) {
-    constexpr std::size_t kReach = 2;
-    std::size_t best = 0;
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t k = kReach; k + kReach < kAdvances; ++k) {
+    constexpr std::size_t kReach = 2, kNone = 8;
+    constexpr double kWorthwhile = 0.95;
+    static_assert(advance_s(kNone) == 0);
+    const auto smoothed = [&](std::size_t k) {
         double sum = 0;
         for (std::size_t near = k - kReach; near <= k + kReach; ++near) sum += loss[near];
-        if (sum < least) least = sum, best = k;
-    }
-    return best;
+        return sum;
+    };
+    std::size_t best = kNone;
+    for (std::size_t k = kReach; k + kReach < kAdvances; ++k)
+        if (smoothed(k) < smoothed(best)) best = k;
+    return smoothed(best) < kWorthwhile * smoothed(kNone) ? best : kNone;
 }
 
 /// What the strikes of one entrant cost on recordings, by advance.
