@@ -93,10 +93,18 @@ StrikeSurface surface_of(const CompareArguments& a) {
     return surface;
 }
 
-/// Paths of traces, or of bundled ones by name.
+/// Paths of traces, or of bundled ones by name. What lies beside traces (TRACE.hits.csv, TRACE.flags.csv) is
+/// passed over, so that `takes/*.csv` means the takes.
 std::vector<std::string> found_traces(const std::vector<std::string>& names) {
     std::vector<std::string> files;
-    for (const std::string& name : names) files.push_back(find_trace(name).string());
+    for (const std::string& name : names)
+        if (!name.ends_with(".hits.csv") && !name.ends_with(".flags.csv"))
+            files.push_back(find_trace(name).string());
+    if (files.empty() && !names.empty())
+        throw BadInput(
+            fmt::format("{}: error: found marks that belong to a trace, expected a trace; name "
+                        "the trace itself",
+                        names.front()));
     return files;
 }
 

@@ -91,7 +91,8 @@ void add_advances(std::string& text, const Comparison& comparison, double lead_s
         const std::string range = low_s == high_s ? fmt::format("{:g}", 1e3 * low_s)
                                                   : fmt::format("{:g} to {:g}", 1e3 * low_s, 1e3 * high_s);
         fmt::format_to(std::back_inserter(text),
-                       "  {}: its contacts are brought forward by {} ms, learned on tuning recordings\n",
+                       "  {}: its contacts are brought forward (negative: put back) by {} ms, learned on "
+                       "tuning recordings\n",
                        s.predictor, range);
     }
 }

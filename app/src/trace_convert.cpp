@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 #include <tracking/import.h>
 
+#include <fstream>
 #include <memory>
+#include <set>
 #include <sstream>
+#include <string_view>
 
 #include "bad_input.h"
 #include "finished_file.h"
@@ -58,10 +61,28 @@ std::optional<tracking::ColumnMap> map_of(const ConvertArguments& a, const std::
     return map;
 }
 
+/// The word after `Stick-` in a Vicon export's first line; empty without one.
+std::string named_by_export(const std::string& file) {
+    std::ifstream in(find_trace(file), std::ios::binary);
+    std::string line;
+    std::getline(in, line);
+    while (!line.empty() && (line.back() == '\r' || line.back() == ',')) line.pop_back();
+    constexpr std::string_view kMark = "Stick-";
+    const bool marked = line.starts_with(kMark) && line.find(',') == std::string::npos;
+    return marked ? line.substr(kMark.size()) : "";
+}
+
+/// --sticks; else what the exports call them, if all differ; else left and right, or stick.
 std::vector<std::string> stick_names(const ConvertArguments& a) {
     std::vector<std::string> names;
     std::stringstream rest(a.sticks);
     for (std::string name; std::getline(rest, name, ',');) names.push_back(name);
+    if (names.empty()) {
+        for (const std::string& file : a.in)
+            if (const std::string name = named_by_export(file); !name.empty()) names.push_back(name);
+        const bool differ = std::set<std::string>(names.begin(), names.end()).size() == a.in.size();
+        if (!differ) names.clear();
+    }
     if (names.empty() && a.in.size() == 2) names = {"left", "right"};
     if (names.empty() && a.in.size() == 1) names = {"stick"};
     if (names.size() == a.in.size()) return names;
