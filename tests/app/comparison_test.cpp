@@ -273,7 +273,8 @@ TEST_F(Advances, AreStatedInEveryProduct) {
     std::getline(csv, header);
     EXPECT_TRUE(header.ends_with(",advance_ms"));
     while (std::getline(csv, line)) EXPECT_EQ(columns_after_first(line), columns_after_first(header)) << line;
-    EXPECT_NE(app::format_comparison_text(comparison).find("auto: its contacts are brought forward by"),
+    EXPECT_NE(app::format_comparison_text(comparison)
+                  .find("auto: its contacts are brought forward (negative: put back) by"),
               std::string::npos);
     EXPECT_NE(app::winners(comparison)[0].find("true strikes"), std::string::npos);
 }
