@@ -1,6 +1,7 @@
 #include "answer_path.h"
 
 #include <fmt/format.h>
+#include <tracking/rotation.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -17,18 +18,12 @@ constexpr double kFarthestM = 1e6;
 constexpr double kNormSlack = 0.01;
 
 Eigen::Quaterniond turned(const Eigen::Quaterniond& from, const Eigen::Vector3d& by) {
-    const double angle = by.norm();
-    if (angle == 0) return from;
-    return (Eigen::Quaterniond(Eigen::AngleAxisd(angle, by / angle)) * from).normalized();
+    return (tracking::exponential(by) * from).normalized();
 }
 
 /// Rotation vector of the shorter way from one orientation to another, world frame.
 Eigen::Vector3d turn_between(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to) {
-    Eigen::Quaterniond q = to * from.conjugate();
-    if (q.w() < 0) q.coeffs() = -q.coeffs();
-    const double sine = q.vec().norm();
-    if (sine == 0) return Eigen::Vector3d::Zero();
-    return 2 * std::atan2(sine, q.w()) / sine * q.vec();
+    return tracking::logarithm(to * from.conjugate());
 }
 
 /// Rates at the nodes from the slopes between them: of the parabola through three neighbours.

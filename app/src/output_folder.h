@@ -30,7 +30,6 @@ public:
     OutputFolder(const OutputFolder&) = delete;
     OutputFolder& operator=(const OutputFolder&) = delete;
 
-    [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
     /// Where to write the product `name` (a file, or a folder to be made by the caller).
     [[nodiscard]] std::filesystem::path path(std::string_view name) const { return staging_ / name; }
     /// An existing folder for temporary files; never moved into place.

@@ -1,6 +1,7 @@
 #include "prediction_file.h"
 
 #include <fmt/format.h>
+#include <tracking/rotation.h>
 
 #include <algorithm>
 #include <cmath>
@@ -78,14 +79,9 @@ public:
 private:
     /// Turns the pose by `share` of the shorter way to another orientation.
     void turn(tracking::PosePrediction& pose, const Eigen::Quaterniond& to, double share) const {
-        Eigen::Quaterniond q = to * pose.orientation.conjugate();
-        if (q.w() < 0) q.coeffs() = -q.coeffs();
-        const double sine = q.vec().norm(), angle = 2 * std::atan2(sine, q.w());
-        if (sine == 0) return;
-        const Eigen::Vector3d axis = q.vec() / sine;
-        pose.orientation =
-            share == 1 ? to : Eigen::Quaterniond(Eigen::AngleAxisd(share * angle, axis)) * pose.orientation;
-        if (predictions_.lead_s > 0) pose.angular_velocity = angle / predictions_.lead_s * axis;
+        const Eigen::Vector3d whole = tracking::logarithm(to * pose.orientation.conjugate());
+        pose.orientation = share == 1 ? to : tracking::exponential(share * whole) * pose.orientation;
+        if (predictions_.lead_s > 0) pose.angular_velocity = whole / predictions_.lead_s;
     }
 
     StickPredictions predictions_;

@@ -18,7 +18,6 @@ public:
     /// its response by then.
     void add(const Impulse& impulse);
 
-    [[nodiscard]] bool at_rest() const noexcept { return at_rest_; }
     [[nodiscard]] BodyPose pose_at(double t_s) const noexcept;
     /// Bounds over the whole motion.
     [[nodiscard]] const MotionBounds& bounds() const noexcept { return bounds_; }

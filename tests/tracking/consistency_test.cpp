@@ -4,9 +4,10 @@
 
 #include <cstdio>
 
-#include "rotation.h"
+#include "outlier_gate.h"
 #include "simulated_motion.h"
 #include "tracking/predictor.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 namespace {

@@ -9,8 +9,9 @@
 
 namespace tracking {
 
-/// What every trace promises, wherever it came from.
-inline void expect_valid(const Trace& trace) {
+/// What every trace promises, wherever it came from; no coordinate beyond `farthest_m`: 1000 m, and a
+/// rounding where units or axes were converted.
+inline void expect_valid(const Trace& trace, double farthest_m = 1000 * (1 + 1e-12)) {
     ASSERT_FALSE(trace.sticks.empty());
     for (const StickTrace& stick : trace.sticks) {
         ASSERT_GE(stick.samples.size(), 2u);
@@ -18,7 +19,7 @@ inline void expect_valid(const Trace& trace) {
         for (std::size_t i = 0; i < stick.samples.size(); ++i) {
             const PoseSample& sample = stick.samples[i];
             ASSERT_TRUE(sample.position.allFinite());
-            ASSERT_LE(sample.position.cwiseAbs().maxCoeff(), 1000 * (1 + 1e-12));
+            ASSERT_LE(sample.position.cwiseAbs().maxCoeff(), farthest_m);
             ASSERT_LE(std::abs(sample.t_s), 1e7);
             ASSERT_NEAR(sample.orientation.norm(), 1, 1e-12);
             ASSERT_TRUE(i == 0 || sample.t_s > stick.samples[i - 1].t_s);

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "rotation.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 namespace {

@@ -6,8 +6,8 @@
 #include <sstream>
 
 #include "random_stream.h"
-#include "rotation.h"
 #include "tracking/predictor.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 namespace {

@@ -7,8 +7,8 @@
 #include <numeric>
 #include <random>
 
-#include "rotation.h"
 #include "tracking/predictor.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 namespace {

@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "mutation.h"
-#include "rotation.h"
 #include "tracking/import.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 namespace {

@@ -6,9 +6,9 @@
 #include <stdexcept>
 
 #include "random_stream.h"
-#include "rotation.h"
 #include "text_cursor.h"
 #include "tip_path.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 namespace {

@@ -1,6 +1,6 @@
 #include "extrapolators.h"
 
-#include "rotation.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 namespace {

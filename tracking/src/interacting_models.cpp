@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "rotation.h"
-
 namespace tracking {
 namespace {
 
@@ -48,28 +46,23 @@ AxisMatrix<Lanes> in_lanes(const AxisMatrix<double>& p) {
 }  // namespace
 
 InteractingModels::InteractingModels(const Options& options)
-    : gate_(position_gate(options.gate_sigmas)),
-      rotation_(
-          [&] {
-              MotionModel middle{MotionModel::Singer{options.alpha, options.density[1]},
-                                 options.measurement_variance, options.initial_variance};
-              return middle.scaled(1 / kLever);
-          }(),
-          rotation_gate(options.gate_sigmas)),
+    : gate_(OutlierGate::of_positions(options.gate_sigmas)),
+      rotation_({MotionModel::Singer{options.alpha, options.density[1]}, options.measurement_variance,
+                 options.initial_variance},
+                options.gate_sigmas),
       options_(options),
       unit_{MotionModel::Singer{options.alpha, 1}, options.measurement_variance, options.initial_variance} {}
 
 SampleStatus InteractingModels::correct(const PoseSample& sample) noexcept {
-    const SampleStatus status = clock_.judge(sample);
-    if (status == SampleStatus::accepted) return update(sample);
-    return status == SampleStatus::reinitialised ? start(sample) : status;
+    return clock_.take(
+        sample, [this](const PoseSample& first) { return start(first); },
+        [this](const PoseSample& next) { return update(next); });
 }
 
 SampleStatus InteractingModels::start(const PoseSample& sample) noexcept {
     clock_.advance(sample.t_s);
     gate_.restart(sample.position);
-    rotation_.restart();
-    if (sample.has_orientation) rotation_.correct(sample.orientation);
+    rotation_.start(sample);
     mean_ = {to_lanes(sample.position), Lanes::Zero(), Lanes::Zero()};
     period_ = 0;
     for (std::size_t j = 0; j < kModes; ++j) {
@@ -134,19 +127,14 @@ SampleStatus InteractingModels::update(const PoseSample& sample) noexcept {
     if (gate_.is_on()) {
         const Lanes innovation = to_lanes(sample.position) - mean_of(ahead).p;
         const double variance = ahead.mode.back().p.pp.head<3>().maxCoeff() + options_.measurement_variance;
-        switch (gate_.judge(sample.position, dt, innovation.matrix().squaredNorm(), variance)) {
-            case OutlierGate::Verdict::refuse:
-                return SampleStatus::outlier;
-            case OutlierGate::Verdict::persists:
-                return start(sample);
-            case OutlierGate::Verdict::pass:
-                break;
-        }
+        const OutlierGate::Verdict verdict =
+            gate_.judge(sample.position, dt, innovation.matrix().squaredNorm(), variance);
+        if (verdict == OutlierGate::Verdict::refuse) return SampleStatus::outlier;
+        if (verdict == OutlierGate::Verdict::persists) return start(sample);
     }
     correct_modes(ahead, sample.position);
     const AxisStates mean = mean_of(ahead);
-    rotation_.propagate(dt);
-    if (sample.has_orientation) rotation_.correct(sample.orientation);
+    rotation_.update(sample, dt);
     if (!mean.is_finite() || !rotation_.is_finite()) return start(sample);
     modes_ = ahead;
     mean_ = mean;
@@ -157,11 +145,7 @@ SampleStatus InteractingModels::update(const PoseSample& sample) noexcept {
 
 PosePrediction InteractingModels::predict(double lead_s) const noexcept {
     const AxisStates ahead = unit_.transition(lead_s) * mean_;
-    PosePrediction pose;
-    pose.position = ahead.p.head<3>();
-    pose.velocity = ahead.v.head<3>();
-    rotation_.predict(lead_s, pose);
-    return pose;
+    return rotation_.pose(ahead, lead_s);
 }
 
 InteractingModels::Probabilities InteractingModels::switched(const Probabilities& mu,

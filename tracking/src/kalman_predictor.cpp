@@ -1,43 +1,22 @@
 #include "kalman_predictor.h"
 
-#include <cmath>
-
-#include "rotation.h"
-
 namespace tracking {
-namespace {
-
-constexpr double kFastest = 25;       // m/s, of a tracked hand or tip
-constexpr double kStrongest = 3000;   // m/s^2, apart from contacts
-constexpr double kFastestTurn = 120;  // rad/s, with room to spare for a wrist
-
-}  // namespace
-
-OutlierGate position_gate(double sigmas) noexcept {
-    return {sigmas, kFastest, kStrongest};
-}
-
-OutlierGate rotation_gate(double sigmas) noexcept {
-    return {sigmas, kFastestTurn, kStrongest / kLever};
-}
-
 KalmanPredictor::KalmanPredictor(const MotionModel& model, const KalmanOptions& options)
     : position_(model, options.steady_rate_hz),
-      gate_(position_gate(options.gate_sigmas)),
-      rotation_(model.scaled(1 / kLever), rotation_gate(options.gate_sigmas)) {}
+      gate_(OutlierGate::of_positions(options.gate_sigmas)),
+      rotation_(model, options.gate_sigmas) {}
 
 SampleStatus KalmanPredictor::correct(const PoseSample& sample) noexcept {
-    const SampleStatus status = clock_.judge(sample);
-    if (status == SampleStatus::accepted) return update(sample);
-    return status == SampleStatus::reinitialised ? start(sample) : status;
+    return clock_.take(
+        sample, [this](const PoseSample& first) { return start(first); },
+        [this](const PoseSample& next) { return update(next); });
 }
 
 SampleStatus KalmanPredictor::start(const PoseSample& sample) noexcept {
     clock_.advance(sample.t_s);
     position_.start(sample.position);
     gate_.restart(sample.position);
-    rotation_.restart();
-    if (sample.has_orientation) rotation_.correct(sample.orientation);
+    rotation_.start(sample);
     return SampleStatus::reinitialised;
 }
 
@@ -46,19 +25,13 @@ SampleStatus KalmanPredictor::update(const PoseSample& sample) noexcept {
     PositionFilter::Estimate ahead = position_.propagate(dt);
     const Lanes innovation = ahead.innovation(sample.position);
     if (gate_.is_on()) {
-        switch (gate_.judge(sample.position, dt, innovation.matrix().squaredNorm(),
-                            position_.innovation_variance(ahead))) {
-            case OutlierGate::Verdict::refuse:
-                return SampleStatus::outlier;
-            case OutlierGate::Verdict::persists:
-                return start(sample);
-            case OutlierGate::Verdict::pass:
-                break;
-        }
+        const OutlierGate::Verdict verdict = gate_.judge(
+            sample.position, dt, innovation.matrix().squaredNorm(), position_.innovation_variance(ahead));
+        if (verdict == OutlierGate::Verdict::refuse) return SampleStatus::outlier;
+        if (verdict == OutlierGate::Verdict::persists) return start(sample);
     }
     position_.correct(ahead, innovation);
-    rotation_.propagate(dt);
-    if (sample.has_orientation) rotation_.correct(sample.orientation);
+    rotation_.update(sample, dt);
     if (!ahead.x.is_finite() || !rotation_.is_finite()) return start(sample);
     position_.accept(ahead);
     clock_.advance(sample.t_s);
@@ -66,12 +39,7 @@ SampleStatus KalmanPredictor::update(const PoseSample& sample) noexcept {
 }
 
 PosePrediction KalmanPredictor::predict(double lead_s) const noexcept {
-    const AxisStates ahead = position_.after(lead_s);
-    PosePrediction pose;
-    pose.position = ahead.p.head<3>();
-    pose.velocity = ahead.v.head<3>();
-    rotation_.predict(lead_s, pose);
-    return pose;
+    return rotation_.pose(position_.after(lead_s), lead_s);
 }
 
 std::optional<PoseCovariance> KalmanPredictor::covariance(double lead_s) const noexcept {

@@ -40,9 +40,4 @@ private:
     RotationFilter rotation_;
 };
 
-/// The gates of a tracked hand or tip: 25 m/s and 3000 m/s^2; 120 rad/s and what moves the tip of a stick of
-/// kLever by the same acceleration.
-[[nodiscard]] OutlierGate position_gate(double sigmas) noexcept;
-[[nodiscard]] OutlierGate rotation_gate(double sigmas) noexcept;
-
 }  // namespace tracking

@@ -2,7 +2,7 @@
 
 #include <Eigen/QR>
 
-#include "rotation.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 

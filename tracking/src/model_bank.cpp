@@ -3,14 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rotation.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 namespace {
-
-RotationFilter rotation_of(const MotionModel& model, double gate_sigmas) {
-    return {model.scaled(1 / kLever), rotation_gate(gate_sigmas)};
-}
 
 /// variance on every axis, and d d^T.
 Eigen::Matrix3d spread(double variance, const Eigen::Vector3d& d) {
@@ -20,20 +16,20 @@ Eigen::Matrix3d spread(double variance, const Eigen::Vector3d& d) {
 }  // namespace
 
 ModelBank::ModelBank(const Options& options)
-    : gate_(position_gate(options.gate_sigmas)),
+    : gate_(OutlierGate::of_positions(options.gate_sigmas)),
       position_{PositionFilter(options.models[0]), PositionFilter(options.models[1]),
                 PositionFilter(options.models[2])},
-      rotation_{rotation_of(options.models[0], options.gate_sigmas),
-                rotation_of(options.models[1], options.gate_sigmas),
-                rotation_of(options.models[2], options.gate_sigmas)},
+      rotation_{RotationFilter(options.models[0], options.gate_sigmas),
+                RotationFilter(options.models[1], options.gate_sigmas),
+                RotationFilter(options.models[2], options.gate_sigmas)},
       lead_s_(options.lead_s),
       score_(options.score),
       history_(kHistory) {}
 
 SampleStatus ModelBank::correct(const PoseSample& sample) noexcept {
-    const SampleStatus status = clock_.judge(sample);
-    if (status == SampleStatus::accepted) return update(sample);
-    return status == SampleStatus::reinitialised ? start(sample) : status;
+    return clock_.take(
+        sample, [this](const PoseSample& first) { return start(first); },
+        [this](const PoseSample& next) { return update(next); });
 }
 
 SampleStatus ModelBank::start(const PoseSample& sample) noexcept {
@@ -41,8 +37,7 @@ SampleStatus ModelBank::start(const PoseSample& sample) noexcept {
     gate_.restart(sample.position);
     for (std::size_t i = 0; i < kModels; ++i) {
         position_[i].start(sample.position);
-        rotation_[i].restart();
-        if (sample.has_orientation) rotation_[i].correct(sample.orientation);
+        rotation_[i].start(sample);
     }
     selected_ = 0;
     held_ = age_ = 0;
@@ -56,15 +51,10 @@ SampleStatus ModelBank::update(const PoseSample& sample) noexcept {
     for (std::size_t i = 0; i < kModels; ++i) ahead[i] = position_[i].propagate(dt);
     if (gate_.is_on()) {
         const double square = ahead[selected_].innovation(sample.position).matrix().squaredNorm();
-        switch (gate_.judge(sample.position, dt, square,
-                            position_[selected_].innovation_variance(ahead[selected_]))) {
-            case OutlierGate::Verdict::refuse:
-                return SampleStatus::outlier;
-            case OutlierGate::Verdict::persists:
-                return start(sample);
-            case OutlierGate::Verdict::pass:
-                break;
-        }
+        const OutlierGate::Verdict verdict = gate_.judge(
+            sample.position, dt, square, position_[selected_].innovation_variance(ahead[selected_]));
+        if (verdict == OutlierGate::Verdict::refuse) return SampleStatus::outlier;
+        if (verdict == OutlierGate::Verdict::persists) return start(sample);
     }
     bool finite = true;
     PerModel square{}, variance{};
@@ -73,8 +63,7 @@ SampleStatus ModelBank::update(const PoseSample& sample) noexcept {
         square[i] = innovation.matrix().squaredNorm();
         variance[i] = position_[i].innovation_variance(ahead[i]);
         position_[i].correct(ahead[i], innovation);
-        rotation_[i].propagate(dt);
-        if (sample.has_orientation) rotation_[i].correct(sample.orientation);
+        rotation_[i].update(sample, dt);
         finite = finite && ahead[i].x.is_finite() && rotation_[i].is_finite();
     }
     if (!finite) return start(sample);
@@ -131,12 +120,7 @@ void ModelBank::select(const PoseSample& sample) noexcept {
 }
 
 PosePrediction ModelBank::predict_model(std::size_t index, double lead_s) const noexcept {
-    const AxisStates ahead = position_[index].after(lead_s);
-    PosePrediction pose;
-    pose.position = ahead.p.head<3>();
-    pose.velocity = ahead.v.head<3>();
-    rotation_[index].predict(lead_s, pose);
-    return pose;
+    return rotation_[index].pose(position_[index].after(lead_s), lead_s);
 }
 
 ModelBank::PerModel ModelBank::probabilities() const noexcept {

@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "rotation.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 

@@ -3,6 +3,8 @@
 
 namespace tracking {
 
+inline constexpr double kLever = 0.4;  ///< a stick's length [m]: turns rad into metres at the tip
+
 /// Refuses measurements that a stick cannot have made: a step faster than `fastest` from the last one taken,
 /// or one that surprises both the filter, by more than `sigmas` standard deviations, and mechanics: it lies
 /// further from straight on than a reversal of the recent speed and the acceleration `strongest` explain, 2
@@ -17,6 +19,11 @@ public:
     /// In the unit of the quantity, m or rad. sigmas <= 0 passes everything.
     OutlierGate(double sigmas, double fastest, double strongest)
         : sigmas_(sigmas), fastest_(fastest), strongest_(strongest) {}
+
+    /// The gates of a tracked hand or tip: 25 m/s and 3000 m/s^2; 120 rad/s and what moves the tip of a stick
+    /// of kLever by the same acceleration.
+    [[nodiscard]] static OutlierGate of_positions(double sigmas) noexcept;
+    [[nodiscard]] static OutlierGate of_rotations(double sigmas) noexcept;
 
     [[nodiscard]] bool is_on() const noexcept { return sigmas_ > 0; }
 

@@ -1,4 +1,4 @@
-#include "rotation.h"
+#include "tracking/rotation.h"
 
 #include <cmath>
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "rotation.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 namespace {
@@ -30,13 +30,14 @@ Eigen::Vector3d half_way_back(const Eigen::Quaterniond& q, const Eigen::Vector3d
 
 }  // namespace
 
-void RotationFilter::restart() noexcept {
+void RotationFilter::start(const PoseSample& sample) noexcept {
     started_ = false;
     q_ = Eigen::Quaterniond::Identity();
     rates_ = {};
+    if (sample.has_orientation) start_at(sample.orientation);
 }
 
-void RotationFilter::start(const Eigen::Quaterniond& measured) noexcept {
+void RotationFilter::start_at(const Eigen::Quaterniond& measured) noexcept {
     p_ = model_.initial_covariance();
     gate_.restart();
     started_ = true;
@@ -59,26 +60,21 @@ void RotationFilter::turn(double dt) noexcept {
 }
 
 void RotationFilter::correct(const Eigen::Quaterniond& measured) noexcept {
-    if (!started_) return start(measured);
+    if (!started_) return start_at(measured);
     const Eigen::Quaterniond z = measured.normalized();
     const Eigen::Vector3d innovation = logarithm(z * q_.conjugate());
     if (gate_.is_on()) {
         const Eigen::Vector3d step = logarithm(z * last_measured_.conjugate());
-        switch (gate_.judge_step(step, since_measured_, innovation.squaredNorm(),
-                                 p_.pp + model_.measurement_variance)) {
-            case OutlierGate::Verdict::refuse:
-                return;
-            case OutlierGate::Verdict::persists:
-                return start(measured);
-            case OutlierGate::Verdict::pass:
-                break;
-        }
+        const OutlierGate::Verdict verdict = gate_.judge_step(step, since_measured_, innovation.squaredNorm(),
+                                                              p_.pp + model_.measurement_variance);
+        if (verdict == OutlierGate::Verdict::refuse) return;
+        if (verdict == OutlierGate::Verdict::persists) return start_at(measured);
     }
     const AxisGain<double> k = tracking::correct(p_, model_.measurement_variance);
     const Lanes back = to_lanes(half_way_back(turned_, innovation));
     rates_.v += k.v * back;
     rates_.a += k.a * back;
-    if (is_beyond_half_a_turn()) return start(measured);
+    if (is_beyond_half_a_turn()) return start_at(measured);
     q_ = (exponential(k.p * innovation) * q_).normalized();
     last_measured_ = z;
     interval_before_ = interval_;

@@ -26,30 +26,38 @@ namespace tracking {
 /// so turning rho's frame leaves it alone). No allocation.
 class RotationFilter {
 public:
-    RotationFilter(const MotionModel& model, const OutlierGate& gate)
-        : model_(model), p_(model.initial_covariance()), gate_(gate) {}
+    /// The model of a point's motion, scaled as if the rotation moved the tip of a stick of kLever: the gains
+    /// are those of the position. gate_sigmas <= 0: no gate.
+    RotationFilter(const MotionModel& position_model, double gate_sigmas)
+        : model_(position_model.scaled(1 / kLever)),
+          p_(model_.initial_covariance()),
+          gate_(OutlierGate::of_rotations(gate_sigmas)) {}
 
-    void restart() noexcept;
-    /// Moves the state on by dt.
-    void propagate(double dt) noexcept {
+    /// Starts anew from a sample; its orientation, or the first one that follows, is taken as it is.
+    void start(const PoseSample& sample) noexcept;
+    /// Moves the state on by dt and takes the sample's orientation, if it has one, into account.
+    void update(const PoseSample& sample, double dt) noexcept {
         if (started_) turn(dt);
+        if (sample.has_orientation) correct(sample.orientation);
     }
-    /// Takes a measured orientation; the first one after restart() is taken as it is.
-    void correct(const Eigen::Quaterniond& measured) noexcept;
 
-    /// Fills in orientation and angular velocity a lead ahead; leaves them alone before the first
-    /// measurement.
-    void predict(double lead_s, PosePrediction& pose) const noexcept {
+    /// The pose a lead ahead of a point whose state is then `ahead`. Without any orientation so far it has
+    /// the identity and no turning.
+    [[nodiscard]] PosePrediction pose(const AxisStates& ahead, double lead_s) const noexcept {
+        PosePrediction pose;
+        pose.position = ahead.p.head<3>();
+        pose.velocity = ahead.v.head<3>();
         if (started_) look_ahead(lead_s, pose);
+        return pose;
     }
     /// Variance of the predicted orientation about each axis [rad^2]; pi^2/3 (any angle) before the first
     /// measurement.
     [[nodiscard]] double variance_after(double lead_s) const noexcept;
     [[nodiscard]] bool is_finite() const noexcept { return !started_ || rates_.is_finite(); }
-    [[nodiscard]] bool has_started() const noexcept { return started_; }
 
 private:
-    void start(const Eigen::Quaterniond& measured) noexcept;
+    void correct(const Eigen::Quaterniond& measured) noexcept;
+    void start_at(const Eigen::Quaterniond& measured) noexcept;
     void turn(double dt) noexcept;
     void look_ahead(double lead_s, PosePrediction& pose) const noexcept;
     /// Beyond half a turn a sample the rates are aliases of slower ones, which the measurements cannot tell

@@ -16,6 +16,15 @@ public:
         if (!(sample.t_s > t_s_)) return SampleStatus::not_newer;
         return sample.t_s - t_s_ > kGapS ? SampleStatus::reinitialised : SampleStatus::accepted;
     }
+    /// What most estimators do with a judgement: `update(sample)` takes an accepted one, `start(sample)`
+    /// starts anew from it, and each says what became of it; others are refused.
+    template <class Start, class Update>
+    [[nodiscard]] SampleStatus take(const PoseSample& sample, const Start& start,
+                                    const Update& update) const noexcept {
+        const SampleStatus status = judge(sample);
+        if (status == SampleStatus::accepted) return update(sample);
+        return status == SampleStatus::reinitialised ? start(sample) : status;
+    }
     /// The sample has been taken.
     void advance(double t_s) noexcept {
         started_ = true;

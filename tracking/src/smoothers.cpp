@@ -2,7 +2,8 @@
 
 #include <numbers>
 
-#include "rotation.h"
+#include "outlier_gate.h"
+#include "tracking/rotation.h"
 
 namespace tracking {
 namespace {

@@ -4,9 +4,9 @@
 
 #include "bsor_reader.h"
 #include "orientation_forms.h"
-#include "rotation.h"
 #include "text_cursor.h"
 #include "trace_keys.h"
+#include "tracking/rotation.h"
 #include "tracking/trace.h"
 
 namespace tracking {

@@ -3,9 +3,6 @@
 
 namespace tracking {
 
-/// A stick's length [m]: turns rad into metres at the tip.
-inline constexpr double kLever = 0.4;
-
 /// Unit quaternion of the rotation by |v| about v [rad]: (cos(|v|/2), sin(|v|/2) v/|v|) (Friedmann
 /// 1992, 3.21-3.22 with the sine and cosine in their places).
 [[nodiscard]] Eigen::Quaterniond exponential(const Eigen::Vector3d& v) noexcept;
