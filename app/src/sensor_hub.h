@@ -1,0 +1,71 @@
+#pragma once
+#include <tracking/stick_state.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace app {
+
+/// What the sensor processes of a run are told.
+struct SensorOptions {
+    std::string source;               ///< trace:FILE | stdin | zmq:ENDPOINT | osc:PORT
+    std::vector<std::string> sticks;  ///< names, by index
+    std::string picture_predictor, sound_predictor,
+        confirming_predictor;   ///< resolved; the last may be empty
+    std::int64_t epoch_ns = 0;  ///< CLOCK_MONOTONIC at which a trace's t0 is due; live times count from it
+    double period_s = 0;        ///< a trace begins again this long after it began, > its duration; 0: never
+    double stall_at_s = -1, stall_s = 0;  ///< --disturb: a pause of the reader, for tests; < 0: none
+};
+
+/// What happened to a sensor that the user should know.
+struct SensorEvent {
+    enum class Kind { silent, back, restarted, ended, clock_jumped, failed };
+    Kind kind = Kind::silent;
+    double at_s = 0;  ///< since the epoch
+    std::vector<std::string> sticks;
+    std::string message;  ///< one line, complete
+};
+
+/// How the clock of a source's sample times relates to ours.
+struct ClockReport {
+    std::string clock;        ///< "the trace's own, replayed" | "the source's" | "arrival"
+    double offset_s = 0;      ///< ours (since the epoch) minus the source's
+    double drift_ppm = 0;     ///< of the source's clock against ours
+    double delay_p95_ms = 0;  ///< of arrival beyond the least delay seen
+    int jumps = 0;
+};
+
+/// Starts and watches the sensor processes (one a stick for traces; one for all sticks where a source
+/// delivers them together), each with a reader thread and a filter thread, and keeps the shared memory that
+/// they publish into. The memory has no name left once it is mapped, so nothing stays in /dev/shm however a
+/// process ends. A process that dies is started again. Throws BadInput for a source that cannot be,
+/// std::runtime_error when nothing can be started. One thread.
+class SensorHub {
+public:
+    explicit SensorHub(const SensorOptions& options);
+    ~SensorHub();
+    SensorHub(const SensorHub&) = delete;
+    SensorHub& operator=(const SensorHub&) = delete;
+
+    /// Readable (poll) when a state was published since the last clear_wake().
+    [[nodiscard]] int wake_fd() const;
+    void clear_wake();
+    /// The stick's newest state; bounded time, never blocks, no system call.
+    [[nodiscard]] std::optional<tracking::StickState> newest(std::size_t stick) const noexcept;
+    /// Looks after the processes (call it some times a second): restarts dead ones; what happened since the
+    /// last call.
+    [[nodiscard]] std::vector<SensorEvent> watch();
+    /// Every source has ended, and all that it gave has been published.
+    [[nodiscard]] bool ended() const;
+    [[nodiscard]] std::vector<ClockReport> clocks() const;  ///< one a process
+    [[nodiscard]] int restarts() const;
+
+private:
+    struct Implementation;
+    std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace app

@@ -1,0 +1,26 @@
+#pragma once
+#include <cstdint>
+
+#include "tracking/motion.h"
+
+namespace tracking {
+
+/// What a sensor process knows of one stick after its newest sample. Copied bit by bit through shared memory
+/// (NewestValue). Times: `_s` on the clock of the sample (a trace's own; seconds since the epoch for live
+/// sources), `_ns` on CLOCK_MONOTONIC, which all processes of a machine share.
+struct StickState {
+    std::uint64_t samples =
+        0;  ///< accepted since the run began: a larger number is a newer state; 0: none yet
+    std::uint64_t starts = 0;   ///< how often the sound's filter started anew (the first sample counts)
+    std::uint64_t refused = 0;  ///< samples that the filters ignored
+    std::uint64_t lap = 0;      ///< how often a looped trace has begun again
+    double t_s = 0;             ///< of the newest accepted sample, within its lap
+    std::int64_t due_ns = 0;    ///< when that sample was taken (live: its own time plus the clocks' offset)
+    std::int64_t read_ns = 0;   ///< when the reader got it
+    std::int64_t filtered_ns = 0;  ///< when the filters were done, just before publication
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< measured, of the tracked body [m]
+    Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+    Motion picture, sound, confirming;  ///< of the three filters (confirming: only where there is one)
+};
+
+}  // namespace tracking
