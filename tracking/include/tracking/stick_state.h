@@ -2,6 +2,7 @@
 #include <cstdint>
 
 #include "tracking/motion.h"
+#include "tracking/newest_value.h"
 
 namespace tracking {
 
@@ -22,5 +23,9 @@ struct StickState {
     Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
     Motion picture, sound, confirming;  ///< of the three filters (confirming: only where there is one)
 };
+
+/// Numbers and arrays of numbers.
+template <>
+inline constexpr bool kCopiesAsBytes<StickState> = true;
 
 }  // namespace tracking
