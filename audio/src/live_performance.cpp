@@ -12,6 +12,7 @@
 
 #include "clocks.h"
 #include "command_queue.h"
+#include "jack_output.h"
 #include "live_notes.h"
 #include "playable.h"
 #include "renderer.h"
@@ -71,7 +72,19 @@ private:
     std::size_t read_ = 0;  // reading thread
 };
 
+/// A JACK client, where one is asked for.
+std::unique_ptr<JackOutput> open_jack(const LiveOptions& options) {
+    if (!options.jack_audio && options.midi_port.empty()) return nullptr;
+    return std::make_unique<JackOutput>(JackOutput::Options{.sound = options.jack_audio,
+                                                            .midi_port = options.midi_port,
+                                                            .midi_connect = options.midi_connect,
+                                                            .output_lead_s = options.output_lead_s});
+}
+
 void check_options(const LiveOptions& options) {
+    if (options.midi_port.empty() && !options.midi_connect.empty()) {
+        throw std::logic_error("live performance: found a MIDI peer without a MIDI port, expected both");
+    }
     if (options.output_lead_s >= 0 && options.output_lead_s <= 1 && options.longest_s > 0 &&
         options.longest_s <= 86400) {
         return;
@@ -98,13 +111,15 @@ struct LivePerformance::Implementation {
     void run(const std::filesystem::path& orchestra, const std::vector<Voice>& voices) noexcept;
     void prepare(const std::filesystem::path& orchestra, const std::vector<Voice>& voices);
     void perform();
+    void play_on_device(bool on) noexcept;
     void perform_in_time();
     [[nodiscard]] bool wait_until(std::int64_t planned_ns);
     void play_block(std::int64_t planned_ns);
     void read_commands() noexcept;
     void obey(const Command& command) noexcept;
     void start_notes_before(std::int64_t end);
-    void answer(const TakenNote& taken, std::int64_t taken_ns) noexcept;
+    [[nodiscard]] std::int64_t send_stroke(const Note& note) noexcept;
+    void answer(const TakenNote& taken, std::int64_t taken_ns, std::int64_t midi_sent_ns) noexcept;
     [[nodiscard]] State state_now() const { return state.load(std::memory_order_acquire); }
     [[nodiscard]] std::int64_t longest_samples() const {
         return static_cast<std::int64_t>(std::ceil(options.longest_s * kSampleRate));
@@ -133,6 +148,8 @@ struct LivePerformance::Implementation {
     std::vector<TakenNote> taken = reserved<TakenNote>(kNotesAhead);
     std::vector<float> output;
     std::vector<BlockTiming> timings;
+    std::unique_ptr<JackOutput> jack;  // after `output`, which it reads
+    bool on_device = false;            // from start to stop
     double busy_begin = 0;
 
     std::thread thread;
@@ -143,7 +160,8 @@ LivePerformance::Implementation::Implementation(const std::filesystem::path& orc
                                                 const LiveOptions& live_options)
     : options(live_options),
       voice_count(voices.size()),
-      played(2 * kNotesAhead + static_cast<std::size_t>(kNotesPerSecond * live_options.longest_s)) {
+      played(2 * kNotesAhead + static_cast<std::size_t>(kNotesPerSecond * live_options.longest_s)),
+      jack(open_jack(live_options)) {
     std::future<StartUp> ready = prepared.get_future();
     thread = std::thread([this, orchestra, voices] { run(orchestra, voices); });
     try {
@@ -182,6 +200,7 @@ void LivePerformance::Implementation::run(const std::filesystem::path& orchestra
         recording.set_value(std::move(output));
     } catch (...) {
         failed.store(true, std::memory_order_release);
+        play_on_device(false);
         recording.set_exception(std::current_exception());
     }
     renderer.reset();  // Csound dies on its own thread
@@ -202,7 +221,10 @@ void LivePerformance::Implementation::prepare(const std::filesystem::path& orche
 
 void LivePerformance::Implementation::perform() {
     state.wait(State::waiting, std::memory_order_acquire);
+    play_on_device(true);
     perform_in_time();
+    play_on_device(false);
+    state.wait(State::running, std::memory_order_acquire);
     if (state_now() == State::stopping) return;
     const std::int64_t end = minimum_samples + tail_samples;
     fixed_sample.store(std::max(end, renderer->position()), std::memory_order_seq_cst);
@@ -212,13 +234,19 @@ void LivePerformance::Implementation::perform() {
     busy.store(thread_seconds() - busy_begin, std::memory_order_relaxed);
 }
 
+void LivePerformance::Implementation::play_on_device(bool on) noexcept {
+    if (!jack || on == on_device) return;
+    on_device = on;
+    if (on) {
+        jack->start(output.data(), epoch_ns);
+    } else {
+        jack->stop();
+    }
+}
+
 void LivePerformance::Implementation::perform_in_time() {
     const std::int64_t lead_ns = std::llround(options.output_lead_s * 1e9);
-    while (state_now() == State::running) {
-        if (renderer->position() >= longest_samples()) {
-            state.wait(State::running, std::memory_order_acquire);
-            return;
-        }
+    while (state_now() == State::running && renderer->position() < longest_samples()) {
         const std::int64_t planned_ns = epoch_ns + samples_ns(renderer->position()) - lead_ns;
         if (wait_until(planned_ns)) play_block(planned_ns);
     }
@@ -241,6 +269,7 @@ void LivePerformance::Implementation::play_block(std::int64_t planned_ns) {
     read_commands();
     start_notes_before(end);
     renderer->render_block(output);
+    if (on_device) jack->publish(renderer->position());
     timing.done_ns = monotonic_ns();
     timings.push_back(timing);
     busy.store(thread_seconds() - busy_begin, std::memory_order_relaxed);
@@ -263,15 +292,26 @@ void LivePerformance::Implementation::start_notes_before(std::int64_t end) {
     const std::int64_t now = taken.empty() ? 0 : monotonic_ns();
     for (const TakenNote& each : taken) {
         renderer->add(each.note);
-        answer(each, now);
+        answer(each, now, send_stroke(each.note));
     }
 }
 
-void LivePerformance::Implementation::answer(const TakenNote& each, std::int64_t taken_ns) noexcept {
+/// When it was handed over; 0: it was not.
+std::int64_t LivePerformance::Implementation::send_stroke(const Note& note) noexcept {
+    if (!on_device || !jack->has_midi()) return 0;
+    const MidiStroke stroke{.due_ns = epoch_ns + samples_ns(note.onset_sample),
+                            .key = static_cast<std::uint8_t>(std::clamp(note.midi_note, 0, 127)),
+                            .velocity = static_cast<std::uint8_t>(std::clamp(note.midi_velocity, 1, 127))};
+    return jack->send(stroke) ? monotonic_ns() : 0;
+}
+
+void LivePerformance::Implementation::answer(const TakenNote& each, std::int64_t taken_ns,
+                                             std::int64_t midi_sent_ns) noexcept {
     const PlayedNote note{.id = each.note.id,
                           .planned_sample = each.planned_sample,
                           .onset_sample = each.note.onset_sample,
-                          .taken_ns = taken_ns};
+                          .taken_ns = taken_ns,
+                          .midi_sent_ns = midi_sent_ns};
     if (!played.try_add(note)) overflows.fetch_add(1, std::memory_order_relaxed);
 }
 
@@ -344,7 +384,15 @@ std::uint64_t LivePerformance::queue_overflows() const {
 }
 
 std::uint64_t LivePerformance::device_underruns() const {
-    return 0;
+    return implementation_->jack ? implementation_->jack->counts().underruns : 0;
+}
+
+std::uint64_t LivePerformance::device_corrections() const {
+    return implementation_->jack ? implementation_->jack->counts().corrections : 0;
+}
+
+std::uint64_t LivePerformance::late_strokes() const {
+    return implementation_->jack ? implementation_->jack->counts().late_strokes : 0;
 }
 
 std::string LivePerformance::version() const {
@@ -352,7 +400,7 @@ std::string LivePerformance::version() const {
 }
 
 std::string LivePerformance::device() const {
-    return "file only";
+    return implementation_->jack ? implementation_->jack->description() : "file only";
 }
 
 double LivePerformance::busy_s() const {

@@ -51,7 +51,8 @@ struct PlayedNote {
 class LivePerformance {
 public:
     /// Compiles the orchestra, warms it up, connects to JACK where asked for. Throws std::runtime_error
-    /// (also: no JACK server, with what to do).
+    /// (also: no JACK server, or one whose period the
+    /// output lead does not cover, with what to do).
     LivePerformance(const std::filesystem::path& orchestra, const std::vector<Voice>& voices,
                     const LiveOptions& options);
     ~LivePerformance();
@@ -85,7 +86,9 @@ public:
     [[nodiscard]] std::uint64_t refused_changes() const;  ///< cancels and moves that came too late
     [[nodiscard]] std::uint64_t queue_overflows()
         const;  ///< commands and answers for which there was no room
-    [[nodiscard]] std::uint64_t device_underruns() const;  ///< JACK asked for samples that were not there
+    [[nodiscard]] std::uint64_t device_underruns() const;    ///< JACK asked for samples that were not there
+    [[nodiscard]] std::uint64_t device_corrections() const;  ///< samples dropped or repeated for JACK's clock
+    [[nodiscard]] std::uint64_t late_strokes() const;        ///< MIDI notes that left later than due
     [[nodiscard]] std::string version() const;
     [[nodiscard]] std::string device() const;  ///< "file only" or what JACK says
     [[nodiscard]] double busy_s() const;
