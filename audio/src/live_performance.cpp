@@ -137,7 +137,7 @@ struct LivePerformance::Implementation {
     std::int64_t minimum_samples = 0, tail_samples = 0;  // written before `finishing`
     std::atomic<std::int64_t> fixed_sample{0};
     std::atomic<bool> failed{false};
-    std::atomic<std::uint64_t> overflows{0}, refused{0};
+    std::atomic<std::uint64_t> overflows{0}, refused{0}, blocks_done{0}, blocks_late{0};
     std::atomic<double> busy{0};
     std::promise<StartUp> prepared;
     std::promise<std::vector<float>> recording;
@@ -272,6 +272,9 @@ void LivePerformance::Implementation::play_block(std::int64_t planned_ns) {
     if (on_device) jack->publish(renderer->position());
     timing.done_ns = monotonic_ns();
     timings.push_back(timing);
+    const std::int64_t due_ns = epoch_ns + samples_ns(end - renderer->block_size());
+    if (timing.done_ns > due_ns) blocks_late.fetch_add(1, std::memory_order_relaxed);
+    blocks_done.fetch_add(1, std::memory_order_relaxed);
     busy.store(thread_seconds() - busy_begin, std::memory_order_relaxed);
 }
 
@@ -389,6 +392,11 @@ std::uint64_t LivePerformance::device_underruns() const {
 
 std::uint64_t LivePerformance::device_corrections() const {
     return implementation_->jack ? implementation_->jack->counts().corrections : 0;
+}
+
+BlockCount LivePerformance::block_count() const noexcept {
+    return {implementation_->blocks_done.load(std::memory_order_relaxed),
+            implementation_->blocks_late.load(std::memory_order_relaxed)};
 }
 
 std::uint64_t LivePerformance::late_strokes() const {
