@@ -75,9 +75,10 @@ std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers) {
         bodies_of(kit), {fs::read_symlink("/proc/self/exe").string(), {"worker"}, workers});
 }
 
-PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit) {
+PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
+                    bool trace_is_file) {
     PlayResult result;
-    result.trace = options.trace.string();
+    result.trace = trace.file;
     result.kit = options.kit.string();
     result.kit_name = kit.name;
     result.trace_source = trace.source;
@@ -97,7 +98,7 @@ PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, co
     result.workers = options.workers;
     for (const tracking::StickTrace& stick : trace.sticks) result.sticks.push_back(stick.name);
     for (const Instrument& instrument : kit.instruments) result.instruments.push_back(instrument.name);
-    result.inputs.push_back({options.trace.string(), sha256_of_file(options.trace)});
+    if (trace_is_file) result.inputs.push_back({options.trace.string(), sha256_of_file(options.trace)});
     for (const fs::path& file : kit.files) result.inputs.push_back({file.string(), sha256_of_file(file)});
     return result;
 }

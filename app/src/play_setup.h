@@ -32,7 +32,8 @@ void check_options(const PlayOptions& options);
 /// Reads a trace that is to be played: at most three hours (a WAV file holds four). Throws BadInput.
 [[nodiscard]] tracking::Trace read_played_trace(const std::filesystem::path& file);
 /// What is known of a run before it begins.
-[[nodiscard]] PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit);
+[[nodiscard]] PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
+                                  bool trace_is_file = true);
 
 [[nodiscard]] std::vector<sim::BodyDefinition> bodies_of(const Kit& kit);
 [[nodiscard]] std::vector<audio::Voice> voices_of(const Kit& kit);

@@ -23,7 +23,8 @@ namespace app {
 /// What a run in real time was asked for, beyond PlayOptions.
 struct RealtimeOptions {
     PlayOptions play;
-    std::string source;            ///< of the sensors; empty: the trace, replayed
+    std::vector<std::string> sticks = {"left", "right"};  ///< names, of live sources
+    std::string source;                                   ///< of the sensors; empty: the trace, replayed
     double seconds = 0;            ///< how long; 0: the trace once; live sources: until they end
     bool lead_auto = false;        ///< both leads follow the measured delays, never below those asked for
     double output_lead_s = 0.004;  ///< a block of sound is computed this long before it is due

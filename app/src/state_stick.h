@@ -24,13 +24,13 @@ public:
     [[nodiscard]] bool started() const override { return state_.samples > 0; }
     [[nodiscard]] const Eigen::Vector3d& measured_tip() const override { return measured_tip_; }
     [[nodiscard]] bool confirms() const override { return confirms_; }
-    [[nodiscard]] std::size_t selected_model() const override { return 0; }
+    [[nodiscard]] std::size_t selected_model() const override { return state_.model; }
     [[nodiscard]] double sound_lead_s() const override { return sound_lead_s_; }
 
 private:
-    [[nodiscard]] double picture_time_s() const override { return state_.t_s; }
+    [[nodiscard]] double picture_time_s() const override { return state_.picture_t_s; }
     [[nodiscard]] double sound_time_s() const override { return state_.t_s; }
-    [[nodiscard]] double confirming_time_s() const override { return state_.t_s; }
+    [[nodiscard]] double confirming_time_s() const override { return state_.confirming_t_s; }
     [[nodiscard]] tracking::PosePrediction picture_pose(double lead_s) const override {
         return state_.picture.after(lead_s);
     }
