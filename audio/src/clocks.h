@@ -32,4 +32,9 @@ inline void sleep_until_ns(std::int64_t at_ns) noexcept {
     return samples * 62500 / 3;
 }
 
+/// Whole samples at 48 kHz in so long, rounded down.
+[[nodiscard]] constexpr std::int64_t ns_samples(std::int64_t ns) noexcept {
+    return ns >= 0 ? ns * 3 / 62500 : -((-ns * 3 + 62499) / 62500);
+}
+
 }  // namespace audio

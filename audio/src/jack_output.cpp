@@ -164,10 +164,24 @@ int JackOutput::process(jack_nframes_t frames, void* self) {
 }
 
 void JackOutput::run_cycle(jack_nframes_t frames) noexcept {
-    const jack_nframes_t cycle = jack_last_frame_time(client_.get());
     measure_clock();
-    if (left_ != nullptr) play(cycle, frames);
-    if (midi_ != nullptr) send_strokes(cycle, frames);
+    const Cycle cycle = this_cycle(frames);
+    if (left_ != nullptr) play(cycle);
+    if (midi_ != nullptr) send_strokes(cycle);
+    expected_frame_ = cycle.first_frame + frames;
+}
+
+/// JACK smooths its cycles' times over a second or so; after a hold-up they lag far behind. A cycle runs
+/// within a period of its begin, so what it says is kept within that.
+JackOutput::Cycle JackOutput::this_cycle(jack_nframes_t frames) const noexcept {
+    const jack_nframes_t first = jack_last_frame_time(client_.get());
+    const std::int64_t now = monotonic_ns();
+    const std::int64_t begin =
+        1000 * static_cast<std::int64_t>(jack_frames_to_time(client_.get(), first)) + jack_zero_ns_;
+    return {.first_frame = first,
+            .frames = static_cast<std::int32_t>(frames),
+            .begin_ns = std::clamp(begin, now - samples_ns(frames), now),
+            .continuous = first == expected_frame_};
 }
 
 /// A reading that something came between is left out.
@@ -178,16 +192,15 @@ void JackOutput::measure_clock() noexcept {
     if (jack_zero_ns_ == 0 || after - before < 5000) jack_zero_ns_ = before + (after - before) / 2 - jack_ns;
 }
 
-void JackOutput::play(jack_nframes_t cycle, jack_nframes_t frames) noexcept {
+void JackOutput::play(const Cycle& cycle) noexcept {
+    const auto frames = static_cast<jack_nframes_t>(cycle.frames);
     auto* left = static_cast<float*>(jack_port_get_buffer(left_, frames));
     auto* right = static_cast<float*>(jack_port_get_buffer(right_, frames));
     in_cycle_.store(true, std::memory_order_seq_cst);
     if (sounding_.load(std::memory_order_seq_cst)) {
-        const std::int64_t begin_ns =
-            1000 * static_cast<std::int64_t>(jack_frames_to_time(client_.get(), cycle)) + jack_zero_ns_;
-        const double due = static_cast<double>(begin_ns - epoch_ns_) * kSampleRate * 1e-9;
-        const bool continuous = playing_ && cycle == expected_cycle_;
-        copy_sound(position_.begin_cycle(due, static_cast<int>(frames), continuous), frames, left, right);
+        const double due = static_cast<double>(cycle.begin_ns - epoch_ns_) * kSampleRate * 1e-9;
+        const std::int64_t first = position_.begin_cycle(due, cycle.frames, playing_ && cycle.continuous);
+        copy_sound(first, cycle.frames, left, right);
         corrections_.store(position_.corrections(), std::memory_order_relaxed);
         playing_ = true;
     } else {
@@ -195,24 +208,22 @@ void JackOutput::play(jack_nframes_t cycle, jack_nframes_t frames) noexcept {
         std::fill_n(right, frames, 0.0F);
     }
     in_cycle_.store(false, std::memory_order_seq_cst);
-    expected_cycle_ = cycle + frames;
 }
 
-void JackOutput::copy_sound(std::int64_t first, jack_nframes_t frames, float* left, float* right) noexcept {
+void JackOutput::copy_sound(std::int64_t first, std::int32_t frames, float* left, float* right) noexcept {
     const std::int64_t there = published_.load(std::memory_order_acquire);
-    for (std::int64_t i = 0; i < static_cast<std::int64_t>(frames); ++i) {
+    for (std::int32_t i = 0; i < frames; ++i) {
         const std::int64_t sample = first + i;
         const bool silent = sample < 0 || sample >= there;
         left[i] = silent ? 0.0F : recording_[2 * sample];
         right[i] = silent ? 0.0F : recording_[2 * sample + 1];
     }
-    if (first + static_cast<std::int64_t>(frames) > std::max<std::int64_t>(there, 0) && first >= 0) {
-        underruns_.fetch_add(1, std::memory_order_relaxed);
-    }
+    const std::int64_t end = first + frames;
+    if (end > 0 && end > there) underruns_.fetch_add(1, std::memory_order_relaxed);
 }
 
-void JackOutput::send_strokes(jack_nframes_t cycle, jack_nframes_t frames) noexcept {
-    void* buffer = jack_port_get_buffer(midi_, frames);
+void JackOutput::send_strokes(const Cycle& cycle) noexcept {
+    void* buffer = jack_port_get_buffer(midi_, static_cast<jack_nframes_t>(cycle.frames));
     jack_midi_clear_buffer(buffer);
     MidiStroke stroke;
     while (strokes_.try_pop(stroke)) {
@@ -220,14 +231,11 @@ void JackOutput::send_strokes(jack_nframes_t cycle, jack_nframes_t frames) noexc
     }
     for (; !events_.empty(); events_.pop_front()) {
         const MidiEvent& event = events_.front();
-        const std::int64_t jack_us = (event.due_ns - jack_zero_ns_) / 1000;
-        const jack_nframes_t frame = jack_time_to_frames(client_.get(), static_cast<jack_time_t>(jack_us));
-        const auto offset = static_cast<std::int32_t>(frame - cycle);  // frame counts wrap
-        if (offset >= static_cast<std::int32_t>(frames)) return;
-        const auto at = static_cast<jack_nframes_t>(std::max(offset, 0));
-        if (jack_midi_event_write(buffer, at, event.bytes.data(), event.bytes.size()) != 0)
-            return;  // full: next cycle
-        if (offset < 0 && event.is_note_on()) late_strokes_.fetch_add(1, std::memory_order_relaxed);
+        const std::int64_t frame = ns_samples(event.due_ns - cycle.begin_ns);
+        if (frame >= cycle.frames) return;
+        const auto at = static_cast<jack_nframes_t>(std::max<std::int64_t>(frame, 0));
+        if (jack_midi_event_write(buffer, at, event.bytes.data(), event.bytes.size()) != 0) return;  // full
+        if (frame < 0 && event.is_note_on()) late_strokes_.fetch_add(1, std::memory_order_relaxed);
     }
 }
 

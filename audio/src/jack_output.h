@@ -54,6 +54,13 @@ public:
     [[nodiscard]] JackCounts counts() const noexcept;
 
 private:
+    struct Cycle {
+        jack_nframes_t first_frame = 0;
+        std::int32_t frames = 0;
+        std::int64_t begin_ns = 0;  ///< when its first frame is due
+        bool continuous = true;     ///< it follows the last one without a gap
+    };
+
     static int process(jack_nframes_t frames, void* self);
     static void server_ended(void* self);
     void open_ports(const Options& options);
@@ -63,9 +70,10 @@ private:
     void connect_midi(const std::string& peer);
     void run_cycle(jack_nframes_t frames) noexcept;
     void measure_clock() noexcept;
-    void play(jack_nframes_t cycle, jack_nframes_t frames) noexcept;
-    void copy_sound(std::int64_t first, jack_nframes_t frames, float* left, float* right) noexcept;
-    void send_strokes(jack_nframes_t cycle, jack_nframes_t frames) noexcept;
+    [[nodiscard]] Cycle this_cycle(jack_nframes_t frames) const noexcept;
+    void play(const Cycle& cycle) noexcept;
+    void copy_sound(std::int64_t first, std::int32_t frames, float* left, float* right) noexcept;
+    void send_strokes(const Cycle& cycle) noexcept;
 
     struct Close {
         void operator()(jack_client_t* client) const noexcept { jack_client_close(client); }
@@ -89,7 +97,7 @@ private:
     // JACK's thread's.
     std::int64_t jack_zero_ns_ = 0;  // CLOCK_MONOTONIC when JACK's microseconds were 0
     DevicePosition position_;
-    jack_nframes_t expected_cycle_ = 0;
+    jack_nframes_t expected_frame_ = 0;
     bool playing_ = false;
     MidiEvents events_;
 

@@ -4,9 +4,11 @@
 #include <jack/midiport.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <sstream>
@@ -19,8 +21,17 @@ namespace {
 
 constexpr std::size_t kRoom = 30 * 48000;
 
+// Always the same: JACK keeps one of its eight places for a server that was killed until its name comes
+// again.
 std::string own_name() {
-    return "musicworld-test-" + std::to_string(getpid());
+    return "musicworld-test-" + std::to_string(getuid());
+}
+
+/// Waits until no other process of ours has a server.
+int lock_name() {
+    const int lock = open(("/tmp/" + own_name() + ".lock").c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0600);
+    if (lock >= 0) flock(lock, LOCK_EX);
+    return lock;
 }
 
 void pause_ms(int ms) {
@@ -60,6 +71,10 @@ Program::~Program() {
     end(SIGTERM);
 }
 
+void Program::terminate() {
+    end(SIGTERM);
+}
+
 void Program::kill() {
     end(SIGKILL);
 }
@@ -72,7 +87,8 @@ void Program::end(int signal) {
 }
 
 Server::Server(int period, int rate)
-    : jackd_({"jackd", "-r", "-m", "-n", own_name(), "-d", "dummy", "-r", std::to_string(rate), "-p",
+    : lock_(lock_name()),
+      jackd_({"jackd", "-r", "-m", "-n", own_name(), "-d", "dummy", "-r", std::to_string(rate), "-p",
               std::to_string(period)}) {
     setenv("JACK_DEFAULT_SERVER", own_name().c_str(), 1);
     for (int attempt = 0; attempt < 100 && !up_; ++attempt) {
@@ -85,6 +101,8 @@ Server::Server(int period, int rate)
 
 Server::~Server() {
     unsetenv("JACK_DEFAULT_SERVER");
+    jackd_.terminate();
+    if (lock_ >= 0) close(lock_);
 }
 
 Listener::Listener() : client_(open_client("listener")) {
@@ -128,18 +146,18 @@ void Listener::listen(jack_nframes_t frames) {
     const std::int64_t now = audio::monotonic_ns();
     const std::int64_t zero = now - 1000 * static_cast<std::int64_t>(jack_get_time());
     const jack_nframes_t begin = jack_last_frame_time(client_);
-    const auto at_ns = [&](jack_nframes_t frame) {
-        return zero + 1000 * static_cast<std::int64_t>(jack_frames_to_time(client_, frame));
-    };
+    // After a hold-up JACK's own times lag for a second; a cycle runs within a period of its begin.
+    const std::int64_t said = zero + 1000 * static_cast<std::int64_t>(jack_frames_to_time(client_, begin));
+    const std::int64_t begin_ns = std::clamp(said, now - audio::samples_ns(frames), now);
+    const auto at_ns = [&](jack_nframes_t offset) { return begin_ns + audio::samples_ns(offset); };
     void* midi = jack_port_get_buffer(midi_, frames);
     for (std::uint32_t i = 0; i < jack_midi_get_event_count(midi); ++i) {
         jack_midi_event_t event;
         if (jack_midi_event_get(&event, midi, i) != 0 || event.size != 3) continue;
-        received_.push_back(
-            {at_ns(begin + event.time), now, {event.buffer[0], event.buffer[1], event.buffer[2]}});
+        received_.push_back({at_ns(event.time), now, {event.buffer[0], event.buffer[1], event.buffer[2]}});
     }
     if (left_.size() + frames > kRoom) return;
-    cycles_.push_back({at_ns(begin), left_.size(), begin});
+    cycles_.push_back({at_ns(0), left_.size(), begin});
     const auto* l = static_cast<const float*>(jack_port_get_buffer(in_l_, frames));
     const auto* r = static_cast<const float*>(jack_port_get_buffer(in_r_, frames));
     left_.insert(left_.end(), l, l + frames);

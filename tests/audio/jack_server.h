@@ -18,22 +18,27 @@ public:
     ~Program();
     Program(const Program&) = delete;
     Program& operator=(const Program&) = delete;
-    void kill();  ///< at once
+    void terminate();  ///< and waits
+    void kill();
 
 private:
     void end(int signal);
     pid_t pid_ = -1;
 };
 
-/// jackd with its dummy driver, under a name of this process's own, which is the default one meanwhile.
+/// jackd with its dummy driver, under a name of the tests' own, which is the default one meanwhile; one at
+/// a time, whatever runs the tests.
 class Server {
 public:
     explicit Server(int period = 128, int rate = 48000);
     ~Server();
+    Server(const Server&) = delete;
+    Server& operator=(const Server&) = delete;
     [[nodiscard]] bool is_up() const { return up_; }
-    void kill() { jackd_.kill(); }
+    void end() { jackd_.terminate(); }
 
 private:
+    int lock_ = -1;  // one server at a time
     Program jackd_;
     bool up_ = false;
 };
