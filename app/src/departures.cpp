@@ -11,7 +11,7 @@ namespace app {
 namespace {
 
 constexpr double kNextToS = 0.03;  // as notes are matched with contacts
-constexpr double kEarlierS = 0.5;  // a delay acts on what follows: arming, bodies that still move
+constexpr double kEarlierS = 2;    // a delay acts on what follows: arming, bodies that still move
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<Strike> offline_strikes(const tracking::Trace& trace, const Kit& kit, PlayOptions options,

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "monotonic.h"
 #include "notes.h"
@@ -129,9 +130,8 @@ void RealtimeRun::take_states() {
         query_ns = std::max(query_ns, monotonic_ns() - start);
         if (state && state->samples != samples_seen_[i]) fresh.push_back({i, *state});
     }
-    std::ranges::stable_sort(fresh, [](const New& a, const New& b) {
-        return a.state.lap != b.state.lap ? a.state.lap < b.state.lap : a.state.t_s < b.state.t_s;
-    });
+    // Not stable_sort, whose buffer is not aligned for what holds Eigen's types.
+    std::ranges::sort(fresh, {}, [](const New& n) { return std::tuple(n.state.lap, n.state.t_s, n.stick); });
     for (std::size_t i = 0; i < fresh.size();) {
         // A stick that is still in the lap before has nothing to say any more.
         if (fresh[i].state.lap < lap_) {
