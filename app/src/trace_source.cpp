@@ -42,8 +42,9 @@ TraceSource::TraceSource(const std::string& file, const SourceOptions& options) 
             rows_.push_back({i, sample});
             head_.oriented = head_.oriented || sample.has_orientation;
         }
-    std::stable_sort(rows_.begin(), rows_.end(),
-                     [](const Row& a, const Row& b) { return a.sample.t_s < b.sample.t_s; });
+    std::sort(rows_.begin(), rows_.end(), [](const Row& a, const Row& b) {
+        return a.sample.t_s != b.sample.t_s ? a.sample.t_s < b.sample.t_s : a.stick < b.stick;
+    });
     if (options_.period_s > 0 && !(options_.period_s > trace.t_end_s() - t0_s_))
         throw BadInput(fmt::format("{}: error: found a period of {} s, expected more than its {} s",
                                    trace.file, options_.period_s, trace.t_end_s() - t0_s_));
