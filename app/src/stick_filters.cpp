@@ -54,8 +54,13 @@ tracking::SampleStatus StickFilters::correct(const tracking::PoseSample& sample,
     state.position = sample.position;
     state.orientation = sample.orientation;
     state.picture = picture_->motion().value_or(state.picture);
+    state.picture_t_s = picture_->time_s();
     state.sound = sound_->motion().value_or(state.sound);
-    if (confirming_) state.confirming = confirming_->motion().value_or(state.confirming);
+    state.model = sound_->selected();
+    if (confirming_) {
+        state.confirming = confirming_->motion().value_or(state.confirming);
+        state.confirming_t_s = confirming_->time_s();
+    }
     return status;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "bad_input.h"
 #include "monotonic.h"
@@ -42,9 +43,8 @@ TraceSource::TraceSource(const std::string& file, const SourceOptions& options) 
             rows_.push_back({i, sample});
             head_.oriented = head_.oriented || sample.has_orientation;
         }
-    std::sort(rows_.begin(), rows_.end(), [](const Row& a, const Row& b) {
-        return a.sample.t_s != b.sample.t_s ? a.sample.t_s < b.sample.t_s : a.stick < b.stick;
-    });
+    // A stick's times differ. (stable_sort's buffer is not aligned for what holds Eigen's types.)
+    std::ranges::sort(rows_, {}, [](const Row& row) { return std::tuple(row.sample.t_s, row.stick); });
     if (options_.period_s > 0 && !(options_.period_s > trace.t_end_s() - t0_s_))
         throw BadInput(fmt::format("{}: error: found a period of {} s, expected more than its {} s",
                                    trace.file, options_.period_s, trace.t_end_s() - t0_s_));

@@ -215,7 +215,7 @@ TEST(NewestValue, SurvivesWritersKilledAtRandomMoments) {
     EXPECT_EQ(reads.torn, 0);
     EXPECT_EQ(reads.backwards, 0);
     EXPECT_LT(reads.none, reads.count / 20);  // as above
-    EXPECT_GT(reads.values, writers);
+    EXPECT_GE(reads.values, writers);
 }
 
 }  // namespace
