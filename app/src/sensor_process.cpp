@@ -82,7 +82,8 @@ private:
     void put_on_our_clock(SourceSample& sample);
     void note(const SourceSample& sample);
     void note_source();
-    void stall_if_due(const std::stop_token& stop);
+    /// True if the reader was held up just now.
+    bool stall_if_due(const std::stop_token& stop);
     void report();
     void keep_head();
     [[nodiscard]] SourceOptions source_options() const;
@@ -190,7 +191,7 @@ void Sensor::read(const std::stop_token& stop) {
         SourceSample sample;
         while (!stop.stop_requested()) {
             const SourceStatus status = source_->next(sample, monotonic_ns() + kSourcePatienceNs);
-            stall_if_due(stop);
+            if (stall_if_due(stop)) sample.read_ns = monotonic_ns();
             if (status == SourceStatus::sample) pass(sample, stop);
             if (status != SourceStatus::sample || monotonic_ns() - noted_ns_ > kSourcePatienceNs)
                 note_source();
@@ -203,7 +204,6 @@ void Sensor::read(const std::stop_token& stop) {
 }
 
 void Sensor::pass(SourceSample sample, const std::stop_token& stop) {
-    if (stalled_) sample.read_ns = std::max(sample.read_ns, monotonic_ns());
     note(sample);
     put_on_our_clock(sample);
     if (source_->quiet_until_ns() != 0) note_source();
@@ -250,12 +250,13 @@ void Sensor::note_source() {
     if (reading_.quiet_until_ns != quiet_before_ns) add_one(changed_.get());
 }
 
-void Sensor::stall_if_due(const std::stop_token& stop) {
-    if (stalled_ || task_.stall_at_s < 0 || since_epoch_s(monotonic_ns()) < task_.stall_at_s) return;
+bool Sensor::stall_if_due(const std::stop_token& stop) {
+    if (stalled_ || task_.stall_at_s < 0 || since_epoch_s(monotonic_ns()) < task_.stall_at_s) return false;
     const std::int64_t until = monotonic_ns() + std::llround(task_.stall_s * 1e9);
     while (monotonic_ns() < until && !stop.stop_requested())
         sleep_until_ns(std::min(until, monotonic_ns() + kSourcePatienceNs));
     stalled_ = true;
+    return true;
 }
 
 // The filters.
