@@ -15,6 +15,7 @@
 #include "kit_commands.h"
 #include "play_command.h"
 #include "predict_command.h"
+#include "record_command.h"
 #include "sensor_command.h"
 #include "trace_commands.h"
 
@@ -64,6 +65,7 @@ int run(int argc, char** argv) {
     add_kit_command(program);
     add_compare_command(program);
     add_trace_command(program);
+    add_record_command(program);
     add_worker_command(program, status);
     add_sensor_command(program, status);
     try {
