@@ -1,10 +1,8 @@
 #include "audio/performance.h"
 
-#include <time.h>
 #include <xmmintrin.h>
 
 #include <atomic>
-#include <cmath>
 #include <exception>
 #include <future>
 #include <map>
@@ -14,7 +12,9 @@
 #include <unordered_set>
 #include <variant>
 
+#include "clocks.h"
 #include "command_queue.h"
+#include "playable.h"
 #include "renderer.h"
 
 namespace audio {
@@ -32,15 +32,8 @@ using Command = std::variant<Stop, Note, RenderTo, Finish>;
 
 constexpr std::size_t kQueueLength = 256;
 
-double thread_seconds() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 void check_note(const Note& note, std::size_t voices) {
-    if (note.id == 0 || note.voice >= voices || note.onset_sample < 0 || !std::isfinite(note.speed_mps) ||
-        note.speed_mps < 0 || !(note.place >= 0 && note.place <= 1) || note.zone < 0) {
+    if (!is_playable(note, voices)) {
         throw std::logic_error("note " + std::to_string(note.id) + ": found voice " +
                                std::to_string(note.voice) + ", onset " + std::to_string(note.onset_sample) +
                                ", speed " + std::to_string(note.speed_mps) + ", place " +
@@ -152,9 +145,10 @@ struct Performance::Implementation {
 
     void obey(Renderer& renderer, const Command& command) {
         if (const auto* note = std::get_if<Note>(&command)) renderer.add(*note);
-        if (const auto* render = std::get_if<RenderTo>(&command)) renderer.render_to(render->sample);
+        if (const auto* render = std::get_if<RenderTo>(&command))
+            renderer.render_to(render->sample, rendered);
         if (const auto* finish = std::get_if<Finish>(&command)) {
-            rendered = renderer.finish(finish->minimum_samples, finish->tail_samples);
+            renderer.finish(rendered, finish->minimum_samples, finish->tail_samples);
         }
     }
 

@@ -1,7 +1,6 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
-#include <deque>
 #include <span>
 #include <string>
 #include <vector>
@@ -39,20 +38,29 @@ public:
 
     [[nodiscard]] int block_size() const { return engine_.block_size(); }
     [[nodiscard]] std::string version() const;
+    [[nodiscard]] std::int64_t position() const { return position_; }  ///< first sample of the coming block
 
-    /// Notes come in order of onset, each before render_to passes its block.
+    /// Runs notes of every voice, choked at once, before the first block, so that their code and their memory
+    /// in Csound are in place. They leave no trace in what is rendered. False where that cannot be had (an
+    /// instrument that does not obey p11): then a new renderer is needed.
+    [[nodiscard]] bool warm_up();
+
+    /// Notes come in order of onset, each before its block is rendered.
     void add(const Note& note) { due_.push_back(note); }
+    /// Renders the next block and appends it to `output`, interleaved stereo, which grows only beyond its
+    /// capacity. Itself it allocates nothing while notes are added a block at a time (Csound may).
+    void render_block(std::vector<float>& output);
     /// Renders whole blocks up to `sample`, a multiple of the block size.
-    void render_to(std::int64_t sample);
-    /// Performance::finish.
-    [[nodiscard]] std::vector<float> finish(std::int64_t minimum_samples, std::int64_t tail_samples);
+    void render_to(std::int64_t sample, std::vector<float>& output);
+    /// Performance::finish, of all that `output` holds.
+    void finish(std::vector<float>& output, std::int64_t minimum_samples, std::int64_t tail_samples);
 
 private:
     Renderer(const std::string& text, const std::string& source, const std::vector<Voice>& voices);
-    void render_block();
     void start_due_notes();
     void mark_chokes(std::span<const Note> notes);
     void start(const Note& note, std::span<const Note> block_notes);
+    void start_choked(const Note& note, std::int64_t choke_sample);  ///< p11; -1: none
     [[nodiscard]] bool sounding() const;
 
     CsoundEngine engine_;
@@ -60,11 +68,10 @@ private:
     std::vector<RenderedVoice> voices_;
     std::span<double> chokes_;  ///< table 901
     std::span<double> ends_;    ///< table 902
-    std::deque<Note> due_;
-    std::vector<Note> block_notes_;
+    std::vector<Note> due_;     ///< from next_due_ on still to be started
+    std::size_t next_due_ = 0;
     std::vector<double> p_fields_;
-    std::int64_t position_ = 0;  ///< first sample of the coming block
-    std::vector<float> output_;
+    std::int64_t position_ = 0;
 };
 
 }  // namespace audio

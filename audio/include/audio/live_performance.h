@@ -15,11 +15,11 @@ struct LiveOptions {
     /// A block is planned to be computed this long before its first sample is due [s]: room for lateness and
     /// for the device's buffer. Notes of that block cannot change any more then.
     double output_lead_s = 0.004;
-    double longest_s = 60;     ///< of sound, for which memory is reserved; rendering ends there
-    bool jack_audio = false;   ///< play through a running JACK server (its default outputs)
-    std::string midi_port;     ///< name of a MIDI output port of ours in JACK; empty: none
-    std::string midi_connect;  ///< connect that port to this one, when it is there; empty: leave it open
-    std::function<void()> on_thread_start;  ///< run first on the audio thread (its priority)
+    double longest_s = 60;       ///< of sound, for which memory is reserved; real time ends there
+    bool jack_audio = false;     ///< play through a running JACK server (its default outputs)
+    std::string midi_port{};     ///< name of a MIDI output port of ours in JACK; empty: none
+    std::string midi_connect{};  ///< connect that port to this one, when it is there; empty: leave it open
+    std::function<void()> on_thread_start{};  ///< run first on the audio thread (its priority)
 };
 
 /// One block of sound in real time; nanoseconds of CLOCK_MONOTONIC.
@@ -27,10 +27,16 @@ struct BlockTiming {
     std::int64_t planned_ns = 0, started_ns = 0, done_ns = 0;
 };
 
+/// How many blocks of real time there were so far, and how many were done only after their first sample was
+/// due.
+struct BlockCount {
+    std::uint64_t all = 0, late = 0;
+};
+
 /// A note that was sounded.
 struct PlayedNote {
     std::uint64_t id = 0;
-    std::int64_t planned_sample = 0;  ///< its onset as asked for last
+    std::int64_t planned_sample = 0;  ///< its onset as asked for last before it was taken
     std::int64_t onset_sample =
         0;  ///< in the recorded output; later than planned only for a note that came too late
     std::int64_t taken_ns = 0;      ///< when its block was begun: from then on it could not change
@@ -41,37 +47,55 @@ struct PlayedNote {
 /// each block output_lead_s before it is due (the sooner when it has fallen behind: nothing is skipped in the
 /// recording), and never waits for anything but the clock. The caller's thread sends notes through a
 /// wait-free queue. Notes are never late silently: one that arrives after its block has begun sounds with the
-/// next block, and its PlayedNote says so; a cancel or a move that comes too late is counted and answered
-/// there too. The recorded samples equal those of the offline Performance for the same notes.
+/// next block, and its PlayedNote says so; a move or a cancel of a note that was taken already is counted and
+/// leaves it alone. The recorded samples equal those of the offline Performance for the same notes, with the
+/// onsets that were played.
+///
+/// Bounds: 1024 commands between two blocks, 4096 notes ahead, 1000 notes a second on average. Once running,
+/// the audio thread allocates nothing, takes no lock and makes no system call but the clock's (Csound's own
+/// code excepted).
 class LivePerformance {
 public:
     /// Compiles the orchestra, warms it up, connects to JACK where asked for. Throws std::runtime_error
-    /// (also: no JACK server, with what to do).
+    /// (also: no JACK server, or one whose period the
+    /// output lead does not cover, with what to do).
     LivePerformance(const std::filesystem::path& orchestra, const std::vector<Voice>& voices,
                     const LiveOptions& options);
     ~LivePerformance();
     LivePerformance(const LivePerformance&) = delete;
     LivePerformance& operator=(const LivePerformance&) = delete;
 
-    /// Sample 0 is due at epoch_ns of CLOCK_MONOTONIC, which lies ahead.
+    /// Sample 0 is due at epoch_ns of CLOCK_MONOTONIC, which lies ahead. Once; throws std::logic_error.
     void start(std::int64_t epoch_ns);
-    /// Adds or replaces (same id) a note. Wait-free, allocates nothing. False: the queue is full (counted).
+    /// Adds or replaces (same id) a note. Wait-free, allocates nothing; one thread at a time. False: the
+    /// queue is full (counted), the note is none (as Performance::schedule tells), or the audio thread has
+    /// failed.
     bool schedule(const Note& note) noexcept;
     bool cancel(std::uint64_t id) noexcept;
-    /// Notes before this sample cannot change any more. Any thread.
+    /// Notes before this sample cannot change any more: the end of the block that was begun last. Any thread.
+    /// It is published before that block's commands are read. So a command is in time for certain if, *after*
+    /// schedule or cancel has returned true, fixed_sample() is at most the note's onset (both of its onsets,
+    /// for a move). Read before, it is only a hint: the next block may begin in between.
     [[nodiscard]] std::int64_t fixed_sample() const noexcept;
-    /// Notes sounded since the last call, in order of onset.
+    /// Whether something went wrong on the audio thread; finish() throws it.
+    [[nodiscard]] bool failed() const noexcept;
+    /// Notes sounded since the last call, in order of onset. One thread at a time.
     [[nodiscard]] std::vector<PlayedNote> take_played();
     /// Ends at `minimum_samples` and the sound's tail as Performance::finish, rendered as fast as can be from
-    /// here on; returns all samples. Throws what went wrong on the audio thread.
+    /// here on (a device falls silent); returns all samples. Throws what went wrong on the audio thread.
+    /// Once.
     [[nodiscard]] std::vector<float> finish(std::int64_t minimum_samples, std::int64_t tail_samples);
 
-    /// After finish().
+    /// After finish(); the counts at any time.
     [[nodiscard]] std::span<const BlockTiming> blocks() const;  ///< those of real time
     [[nodiscard]] int block_size() const;
-    [[nodiscard]] std::uint64_t refused_changes() const;  ///< cancels and moves that came too late
-    [[nodiscard]] std::uint64_t queue_overflows() const;
-    [[nodiscard]] std::uint64_t device_underruns() const;  ///< JACK asked for samples that were not there
+    [[nodiscard]] BlockCount block_count() const noexcept;  ///< any thread
+    [[nodiscard]] std::uint64_t refused_changes() const;    ///< cancels and moves that came too late
+    [[nodiscard]] std::uint64_t queue_overflows()
+        const;  ///< commands and answers for which there was no room
+    [[nodiscard]] std::uint64_t device_underruns() const;    ///< JACK asked for samples that were not there
+    [[nodiscard]] std::uint64_t device_corrections() const;  ///< samples dropped or repeated for JACK's clock
+    [[nodiscard]] std::uint64_t late_strokes() const;        ///< MIDI notes that left later than due
     [[nodiscard]] std::string version() const;
     [[nodiscard]] std::string device() const;  ///< "file only" or what JACK says
     [[nodiscard]] double busy_s() const;

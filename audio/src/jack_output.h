@@ -1,0 +1,107 @@
+#pragma once
+#include <jack/jack.h>
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "command_queue.h"
+#include "device_position.h"
+#include "midi_events.h"
+
+namespace audio {
+
+/// What the server's own thread counted.
+struct JackCounts {
+    std::uint64_t underruns = 0;     ///< cycles that asked for samples which were not there; silence instead
+    std::uint64_t corrections = 0;   ///< samples dropped or repeated to follow the device's clock
+    std::uint64_t late_strokes = 0;  ///< MIDI notes whose frame had passed; sent at once
+};
+
+/// One client of a running JACK server: sound on two ports, strokes on a MIDI port. Sample n and a stroke of
+/// the same due time leave in the same frame: the one that JACK's own clock gives for that moment.
+///
+/// Threads: the constructor's (opens, connects, closes); the audio thread (start, publish, send, stop);
+/// JACK's, which reads the recording where it lies and never waits. JACK's clock is CLOCK_MONOTONIC_RAW,
+/// which drifts against CLOCK_MONOTONIC; their difference is taken anew each cycle.
+class JackOutput {
+public:
+    struct Options {
+        bool sound = false;        ///< ports out_l and out_r, connected to the first two physical outputs
+        std::string midi_port;     ///< name of the MIDI port; empty: none
+        std::string midi_connect;  ///< its peer, where that exists
+        double output_lead_s = 0;
+    };
+
+    /// Throws std::runtime_error: no server, another rate than 48 kHz, a period too long for the output lead.
+    explicit JackOutput(const Options& options);
+    ~JackOutput();
+    JackOutput(const JackOutput&) = delete;
+    JackOutput& operator=(const JackOutput&) = delete;
+
+    /// From here on sound is played: interleaved stereo that stays where it is and of which `publish` tells
+    /// how much is there; sample 0 is due at epoch_ns.
+    void start(const float* recording, std::int64_t epoch_ns) noexcept;
+    void publish(std::int64_t frames) noexcept { published_.store(frames, std::memory_order_release); }
+    /// Hands a stroke over; false where that cannot be. Wait-free.
+    [[nodiscard]] bool send(const MidiStroke& stroke) noexcept;
+    /// Silence; the recording is not read any more. Waits (0.1 s at most) until every note-off is sent.
+    void stop() noexcept;
+
+    [[nodiscard]] bool has_midi() const noexcept { return midi_ != nullptr; }
+    [[nodiscard]] std::string description() const;
+    [[nodiscard]] JackCounts counts() const noexcept;
+
+private:
+    struct Cycle {
+        jack_nframes_t first_frame = 0;
+        std::int32_t frames = 0;
+        std::int64_t begin_ns = 0;  ///< when its first frame is due
+        bool continuous = true;     ///< it follows the last one without a gap
+    };
+
+    static int process(jack_nframes_t frames, void* self);
+    static void server_ended(void* self);
+    void open_ports(const Options& options);
+    void check_timing(const Options& options) const;
+    void connect(const Options& options);
+    void connect_sound();
+    void connect_midi(const std::string& peer);
+    void run_cycle(jack_nframes_t frames) noexcept;
+    void measure_clock() noexcept;
+    [[nodiscard]] Cycle this_cycle(jack_nframes_t frames) const noexcept;
+    void play(const Cycle& cycle) noexcept;
+    void copy_sound(std::int64_t first, std::int32_t frames, float* left, float* right) noexcept;
+    void send_strokes(const Cycle& cycle) noexcept;
+
+    struct Close {
+        void operator()(jack_client_t* client) const noexcept { jack_client_close(client); }
+    };
+
+    // The opening thread's.
+    jack_port_t *left_ = nullptr, *right_ = nullptr, *midi_ = nullptr;
+    std::string description_;
+
+    // Shared.
+    CommandQueue<MidiStroke> strokes_{MidiEvents::kCapacity};
+    const float* recording_ = nullptr;  // with epoch_ns_, written before sounding_
+    std::int64_t epoch_ns_ = 0;
+    std::atomic<bool> sounding_{false}, in_cycle_{false}, ended_{false};
+    std::atomic<std::int64_t> published_{0};
+    std::atomic<std::uint64_t> underruns_{0}, corrections_{0}, late_strokes_{0};
+
+    // The audio thread's.
+    std::int64_t last_due_ns_ = 0;
+
+    // JACK's thread's.
+    std::int64_t jack_zero_ns_ = 0;  // CLOCK_MONOTONIC when JACK's microseconds were 0
+    DevicePosition position_;
+    jack_nframes_t expected_frame_ = 0;
+    bool playing_ = false;
+    MidiEvents events_;
+
+    std::unique_ptr<jack_client_t, Close> client_;  // last: it is closed first
+};
+
+}  // namespace audio
