@@ -82,10 +82,9 @@ int run_program(std::vector<std::string> arguments, LatencyArguments* asked = nu
         run.kit = sample::one_drum();
         run.play.sticks = {"left"};
         run.play.instruments = {"snare"};
-        run.play.strikes = {sample::strike_at(0.5)};
         run.realtime.seconds = a.seconds;
         sample::draw(run.realtime, sample::falling(0.493, sample::touch_height(run.kit), 2), 0.4, 0.6);
-        sample::sound(run.realtime, 1);
+        sample::sound(run.play, run.realtime, {0.5});
         run.realtime.samples.resize(3);
         return run;
     });

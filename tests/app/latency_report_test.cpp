@@ -25,14 +25,12 @@ struct SampleRun {
     RealtimeResult realtime;
     Kit kit = sample::one_drum();
     StickGeometry geometry;
-    tracking::Trace trace;
 
     SampleRun() {
         play.trace = "take.csv";
         play.kit_name = "one drum";
         play.sticks = {"left, \"hand\""};
         play.instruments = {"snare"};
-        play.strikes = {sample::strike_at(0.5), sample::strike_at(0.9)};
         realtime.seconds = 1;
         realtime.output_lead_s = 0.004;
         realtime.audio_device = "file only";
@@ -40,11 +38,10 @@ struct SampleRun {
         add_frames();
         for (std::int64_t i = 1; i <= 100; ++i) realtime.blocks.push_back({i, i, i + i * kMs / 20});
         sample::draw(realtime, sample::falling(0.493, sample::touch_height(kit), 2), 0.4, 0.6);
-        sample::sound(realtime, 2);
+        sample::sound(play, realtime, {0.5, 0.9});
         realtime.notes[1].late_s = 0.002;
         realtime.leads.push_back({0.25, 0.03, 0.06, 0.02, 0.01, 0, 30, ""});
         realtime.leads.push_back({0.5, 0.04, 0.06, 0.03, 0.01, 1, 30, "frames are late: no shadows"});
-        add_trace();
     }
     void add_samples() {
         for (std::int64_t i = 1; i <= 100; ++i) {
@@ -82,19 +79,7 @@ struct SampleRun {
         realtime.frames[99].fate = FrameFate::late;
         realtime.frames[99].read_ns += 5 * kMs;
     }
-    void add_trace() {
-        tracking::StickTrace stick;
-        stick.name = "left";
-        for (int i = 0; i <= 100; ++i) {
-            tracking::PoseSample pose;
-            pose.t_s = 0.01 * i;
-            stick.samples.push_back(pose);
-        }
-        trace.sticks.push_back(stick);
-    }
-    [[nodiscard]] LatencyReport report() const {
-        return latency_report(play, realtime, kit, geometry, trace);
-    }
+    [[nodiscard]] LatencyReport report() const { return latency_report(play, realtime, kit, geometry); }
 };
 
 double p(const LatencyReport& report, const char* stage, double percent) {
