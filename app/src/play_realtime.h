@@ -2,6 +2,7 @@
 #include <functional>
 #include <string>
 
+#include "latency_report.h"
 #include "play_result.h"
 #include "realtime_run.h"
 
@@ -26,7 +27,8 @@ struct RealtimeOutcome {
     Kit kit;
     StickGeometry stick;
     std::vector<Departure> departures;  ///< traces only
-    std::size_t offline_strikes = 0;    ///< released ones of the offline run over the same laps
+    LatencyReport latency;
+    std::size_t offline_strikes = 0;  ///< released ones of the offline run over the same laps
 };
 
 /// Plays in real time: sensor processes, contacts, strikes, sound and frames against the wall clock, into the

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "latency_tables.h"
 #include "report.h"
 #include "summary.h"
 #include "tables.h"
@@ -122,8 +123,17 @@ std::string format_departures(const RealtimeOutcome& outcome) {
     return text;
 }
 
-void write_realtime_products(const RealtimeOutcome& outcome, const tracking::Trace&,
-                             const OutputFolder& folder) {
+void write_latency_products(const RealtimeOutcome& o, const OutputFolder& folder) {
+    write_file(folder.path("samples.csv"), format_samples_csv(o.play, o.realtime));
+    write_file(folder.path("frames.csv"), format_frames_csv(o.realtime));
+    write_file(folder.path("notes.csv"), format_notes_csv(o.latency, o.play, o.realtime));
+    write_file(folder.path("blocks.csv"), format_blocks_csv(o.realtime));
+    write_file(folder.path("leads.csv"), format_leads_csv(o.realtime));
+    write_file(folder.path("errors.csv"), format_errors_csv(o.latency, o.play));
+    write_file(folder.path("latency.json"), format_latency_json(o.latency, o.play, o.realtime));
+}
+
+void write_realtime_products(const RealtimeOutcome& outcome, const OutputFolder& folder) {
     write_file(folder.path("events.csv"), format_events(outcome.play));
     write_file(folder.path("contacts.csv"), format_contacts(outcome.play));
     write_file(folder.path("departures.csv"), format_departures(outcome));

@@ -11,8 +11,9 @@ namespace app {
 [[nodiscard]] std::string format_realtime_section(const RealtimeOutcome& outcome);
 /// Rows of departures.csv.
 [[nodiscard]] std::string format_departures(const RealtimeOutcome& outcome);
-/// Writes all files of a run in real time but frames, audio.wav and hits.mid.
-void write_realtime_products(const RealtimeOutcome& outcome, const tracking::Trace& trace,
-                             const OutputFolder& folder);
+/// Writes all files of a run in real time but frames, audio.wav, hits.mid and those of latency.
+void write_realtime_products(const RealtimeOutcome& outcome, const OutputFolder& folder);
+/// latency.json and its tables; `outcome.play.strikes` are on their laps' clocks here.
+void write_latency_products(const RealtimeOutcome& outcome, const OutputFolder& folder);
 
 }  // namespace app
