@@ -9,15 +9,8 @@
 namespace app {
 namespace {
 
-/// A time since the epoch as lap and time on the lap's clock.
-struct LapTime {
-    std::uint64_t lap = 0;
-    double t_s = 0;
-};
-
-LapTime lap_time(double at_s, double period_s, double t0_s) {
-    const double lap = period_s > 0 ? std::floor(at_s / period_s) : 0;
-    return {static_cast<std::uint64_t>(std::max(0.0, lap)), t0_s + at_s - lap * period_s};
+std::uint64_t lap_at(double at_s, double period_s) {
+    return period_s > 0 ? static_cast<std::uint64_t>(std::max(0.0, std::floor(at_s / period_s))) : 0;
 }
 
 std::optional<Eigen::Vector3d> truth_at(const TipTrack& track, double t_s) {
@@ -41,10 +34,10 @@ std::vector<DrawnError> drawn_errors(const RealtimeResult& realtime, std::span<c
             if (tip->shown && tip->stick < screen.size()) screen[tip->stick] = &*tip;
         if (!frame.asked_for) continue;
         const double at_s = 1e-9 * static_cast<double>(frame.shown_ns);
-        const LapTime now = lap_time(at_s, realtime.period_s, t0_s);
+        const std::uint64_t lap = lap_at(at_s, realtime.period_s);
         for (std::uint32_t stick = 0; stick < screen.size(); ++stick) {
-            if (screen[stick] == nullptr || screen[stick]->lap != now.lap) continue;
-            if (const auto truth = truth_at(tracks[stick], now.t_s))
+            if (screen[stick] == nullptr || screen[stick]->lap != lap) continue;
+            if (const auto truth = truth_at(tracks[stick], t0_s + at_s))
                 errors.push_back({at_s, stick, (screen[stick]->tip - *truth).norm()});
         }
     }

@@ -16,10 +16,9 @@ struct DrawnError {
 };
 
 /// For each frame that was asked for and each stick: what is on the screen when the frame is due is the last
-/// frame that was in time; a missed one leaves the picture before it standing. The truth is the recorded path
-/// (`tracks`, by stick), straight between samples. Left out: before a stick's first picture in a lap, and
-/// where the recording has no samples within tracking::kGapS. `t0_s`: the trace's first time, due at the
-/// epoch.
+/// frame that was in time; a missed one leaves the picture before it standing. The truth is the measured path
+/// (`tracks`, by stick, on the run's clock: `t0_s` at the epoch), straight between samples. Left out: before
+/// a stick's first picture in a lap, and between samples more than tracking::kGapS apart.
 [[nodiscard]] std::vector<DrawnError> drawn_errors(const RealtimeResult& realtime,
                                                    std::span<const TipTrack> tracks, double t0_s);
 

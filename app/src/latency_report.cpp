@@ -91,7 +91,7 @@ void add_deadlines(LatencyReport& report, const RealtimeResult& realtime) {
 
 void add_sound_and_picture(LatencyReport& report, const PlayResult& play, const RealtimeResult& realtime,
                            const Kit& kit, double tip_radius_m) {
-    report.pictures = sound_and_picture(play.strikes, realtime, kit, tip_radius_m);
+    report.pictures = sound_and_picture(play, realtime, kit, tip_radius_m);
     report.notes_without_picture = realtime.notes.size() - report.pictures.size();
     std::vector<double> touches, frames;
     for (const SoundPicture& picture : report.pictures) {
@@ -132,7 +132,7 @@ double Spread::share_within(double low, double high) const {
 }
 
 LatencyReport latency_report(const PlayResult& play, const RealtimeResult& realtime, const Kit& kit,
-                             const StickGeometry& geometry, const tracking::Trace& trace) {
+                             const StickGeometry& geometry) {
     LatencyReport report;
     add_sample_stages(report, realtime.samples);
     add(report, Kind::sound, "block computed", "planned to done", realtime.blocks,
@@ -141,7 +141,7 @@ LatencyReport latency_report(const PlayResult& play, const RealtimeResult& realt
     add_ages(report, realtime);
     add_deadlines(report, realtime);
     add_sound_and_picture(report, play, realtime, kit, geometry.radius_m);
-    report.errors = drawn_errors(realtime, tip_tracks(trace, geometry), play.t0_s);
+    report.errors = drawn_errors(realtime, play.tracks, play.t0_s);
     add_needed_leads(report, realtime.output_lead_s);
     return report;
 }

@@ -89,9 +89,10 @@ struct LatencyReport {
     std::optional<double> sound_lead_needed_ms;
 };
 
+/// `play.tracks` are on the run's clock, t0 + time since the epoch; of `play.strikes` stick and instrument
+/// count.
 [[nodiscard]] LatencyReport latency_report(const PlayResult& play, const RealtimeResult& realtime,
-                                           const Kit& kit, const StickGeometry& geometry,
-                                           const tracking::Trace& trace);
+                                           const Kit& kit, const StickGeometry& geometry);
 
 /// By name; null if nothing took it.
 [[nodiscard]] const LatencyStage* find_stage(const LatencyReport& report, std::string_view name);

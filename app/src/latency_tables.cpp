@@ -118,11 +118,11 @@ std::string format_notes_csv(const LatencyReport& report, const PlayResult& play
         "midi_sent_ns,touch_s,sound_minus_picture_ms,sound_minus_frame_ms",
         realtime.notes, [&](Out out, const NoteTiming& n) {
             const Strike& strike = play.strikes.at(n.strike);
-            fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{},{},", strike.id,
-                           csv_field(play.sticks.at(strike.stick)),
-                           csv_field(play.instruments.at(strike.instrument)), n.lap,
-                           strike.onset_s + n.late_s, n.late_s, n.pose_age_s, n.played.planned_sample,
-                           n.played.onset_sample, n.played.taken_ns, n.played.midi_sent_ns);
+            fmt::format_to(
+                out, "{},{},{},{},{},{},{},{},{},{},{},", strike.id, csv_field(play.sticks.at(strike.stick)),
+                csv_field(play.instruments.at(strike.instrument)), n.lap,
+                onset_in_lap_s(n, play.t0_s, realtime.period_s), n.late_s, n.pose_age_s,
+                n.played.planned_sample, n.played.onset_sample, n.played.taken_ns, n.played.midi_sent_ns);
             const std::size_t number = next++;
             if (picture == report.pictures.end() || picture->note != number) {
                 fmt::format_to(out, ",,\n");

@@ -1,12 +1,11 @@
 #pragma once
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "kit.h"
+#include "play_result.h"
 #include "realtime_result.h"
-#include "strike.h"
 
 namespace app {
 
@@ -16,7 +15,7 @@ inline constexpr double kPictureWindowS = 0.150;
 /// A note and the stroke that the screen shows for it. Times on the lap's clock.
 struct SoundPicture {
     std::size_t note = 0;  ///< index into RealtimeResult::notes
-    double onset_s = 0;    ///< in the output: the strike's onset plus what it was late
+    double onset_s = 0;    ///< of the note in the output
     double touch_s =
         0;  ///< the drawn path comes into the instrument's rest surface grown by the tip's radius
     std::optional<double> frame_s;  ///< of the first frame that shows the stick at or behind the surface
@@ -31,8 +30,11 @@ struct SoundPicture {
 
 /// For each note the nearest way in of the drawn path of its stick, in its lap, through its instrument's
 /// surface, within kPictureWindowS; notes without one are left out. In order of the notes.
-[[nodiscard]] std::vector<SoundPicture> sound_and_picture(std::span<const Strike> strikes,
+[[nodiscard]] std::vector<SoundPicture> sound_and_picture(const PlayResult& play,
                                                           const RealtimeResult& realtime, const Kit& kit,
                                                           double tip_radius_m);
+
+/// When the note began in the output, on its lap's clock.
+[[nodiscard]] double onset_in_lap_s(const NoteTiming& note, double t0_s, double period_s);
 
 }  // namespace app

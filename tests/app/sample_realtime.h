@@ -63,23 +63,22 @@ inline Height falling(double t_s, double height_m, double speed) {
     return {[=](double t) { return height_m - speed * (t - t_s); }, [=](double) { return -speed; }};
 }
 
-inline app::Strike strike_at(double onset_s, std::uint32_t stick = 0) {
-    app::Strike strike;
-    strike.id = 1;
-    strike.stick = stick;
-    strike.outcome = app::Outcome::released;
-    strike.onset_s = onset_s;
-    return strike;
-}
-
-/// Notes of the strikes, in order, all in one lap.
-inline void sound(app::RealtimeResult& run, std::size_t strikes, std::uint64_t lap = 0, double late_s = 0) {
-    for (std::size_t i = 0; i < strikes; ++i) {
+/// Strikes of the drum, released; notes of them in the output at these times of the lap's clock, which began
+/// with the run. Times are whole samples.
+inline void sound(app::PlayResult& play, app::RealtimeResult& run, const std::vector<double>& onsets_s,
+                  std::uint32_t stick = 0, std::uint64_t lap = 0) {
+    for (const double onset_s : onsets_s) {
+        app::Strike strike;
+        strike.id = play.strikes.size() + 1;
+        strike.stick = stick;
+        strike.outcome = app::Outcome::released;
+        play.strikes.push_back(strike);
         app::NoteTiming note;
-        note.strike = i;
+        note.strike = play.strikes.size() - 1;
         note.lap = lap;
-        note.late_s = late_s;
         note.pose_age_s = 0.05;
+        note.played.onset_sample = std::llround(
+            (onset_s - play.t0_s + static_cast<double>(lap) * run.period_s) * audio::kSampleRate);
         run.notes.push_back(note);
     }
 }
