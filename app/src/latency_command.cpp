@@ -49,7 +49,7 @@ void measure(Typed typed, const MeasureRun& run) {
     std::optional<OutputFolder> out;
     if (!typed.out.empty()) out.emplace(typed.out, latency_products());
     const MeasuredRun r = run(typed.run);
-    const LatencyReport report = latency_report(r.play, r.realtime, r.kit, r.geometry, r.trace);
+    const LatencyReport report = latency_report(r.play, r.realtime, r.kit, r.geometry);
     if (out) {
         write_latency_products(*out, report, r.play, r.realtime);
         out->finish();
