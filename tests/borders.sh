@@ -14,12 +14,13 @@ for folder in tracking sim render audio; do
 done
 # Libraries that belong to one folder.
 while IFS=: read -r pattern folder; do
-    found=$(grep -rlE "^ *# *include *[<\"]($pattern)" app tracking sim render audio --include='*.h' --include='*.cpp' | grep -v "^$folder/")
+    found=$(grep -rlE "^ *# *include *[<\"]($pattern)" app tracking sim render audio --include='*.h' --include='*.cpp' | grep -vE "^($folder)/")
     [ -n "$found" ] && complain "$pattern belongs to $folder alone: $found"
 done <<'LIST'
 GL/|assimp/|spng|isa-l/:render
 csound|sndfile|smf:audio
-zmq|Spectra/:sim
-CLI/|toml\+\+/|nlohmann/:app
+Spectra/:sim
+zmq:sim|app
+CLI/|toml\+\+/|nlohmann/|lo/:app
 LIST
 exit $status

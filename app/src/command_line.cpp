@@ -16,6 +16,7 @@
 #include "latency_command.h"
 #include "play_command.h"
 #include "predict_command.h"
+#include "record_command.h"
 #include "sensor_command.h"
 #include "trace_commands.h"
 
@@ -66,6 +67,7 @@ int run(int argc, char** argv) {
     add_compare_command(program);
     add_latency_command(program);
     add_trace_command(program);
+    add_record_command(program);
     add_worker_command(program, status);
     add_sensor_command(program, status);
     try {

@@ -1,14 +1,18 @@
 #include "sample_source.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "bad_input.h"
+#include "osc_source.h"
+#include "stream_source.h"
 #include "trace_source.h"
+#include "zmq_source.h"
 
 namespace app {
 namespace {
 
-constexpr std::string_view kTrace = "trace:";
+constexpr std::string_view kTrace = "trace:", kStream = "stdin", kZmq = "zmq:", kOsc = "osc:";
 
 [[noreturn]] void refuse(const std::string& source) {
     throw BadInput(fmt::format(
@@ -22,16 +26,23 @@ bool serves_all_sticks(const std::string& source) {
 }
 
 void check_source(const SourceOptions& options) {
-    if (options.source.starts_with(kTrace))
+    if (options.source.starts_with(kOsc))
+        check_osc_port(options.source.substr(kOsc.size()));
+    else if (options.source != kStream)
         (void)open_source(options);
-    else
-        refuse(options.source);
+    if (options.sticks.size() > StickNames::kMostSticks)
+        throw BadInput(fmt::format("error: found {} sticks, expected at most {}", options.sticks.size(),
+                                   StickNames::kMostSticks));
 }
 
 std::unique_ptr<SampleSource> open_source(const SourceOptions& options) {
-    if (options.source.starts_with(kTrace))
-        return std::make_unique<TraceSource>(options.source.substr(kTrace.size()), options);
-    refuse(options.source);
+    const std::string& source = options.source;
+    if (source.starts_with(kTrace))
+        return std::make_unique<TraceSource>(source.substr(kTrace.size()), options);
+    if (source == kStream) return std::make_unique<StreamSource>(STDIN_FILENO, options);
+    if (source.starts_with(kZmq)) return std::make_unique<ZmqSource>(source.substr(kZmq.size()), options);
+    if (source.starts_with(kOsc)) return std::make_unique<OscSource>(source.substr(kOsc.size()), options);
+    refuse(source);
 }
 
 }  // namespace app

@@ -53,6 +53,8 @@ public:
     [[nodiscard]] virtual SourceFaults faults() const { return {}; }
     /// Samples come from a recording and say when they are due.
     [[nodiscard]] virtual bool replayed() const { return false; }
+    /// The first lines of a stream, without which the rest cannot be read; empty for other sources.
+    [[nodiscard]] virtual std::string stream_head() const { return {}; }
     /// There will be no sample before that time, and this is as it should be; 0: not known.
     [[nodiscard]] virtual std::int64_t quiet_until_ns() const { return 0; }
 };
@@ -65,6 +67,7 @@ struct SourceOptions {
     double period_s = 0;              ///< a trace begins again this long after it began; 0: never
     double speed = 1;                 ///< of a replay
     bool resume = false;  ///< begin at the current time: samples of a trace that are due have been seen
+    std::string stream_head = {};  ///< with `resume`: the first lines of the stream
 };
 
 /// Throws BadInput for a source that does not exist, is not one, or lacks a stick that was asked for.

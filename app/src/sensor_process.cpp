@@ -82,8 +82,11 @@ private:
     void put_on_our_clock(SourceSample& sample);
     void note(const SourceSample& sample);
     void note_source();
-    void stall_if_due(const std::stop_token& stop);
+    /// True if the reader was held up just now.
+    bool stall_if_due(const std::stop_token& stop);
     void report();
+    void keep_head();
+    [[nodiscard]] SourceOptions source_options() const;
     void fail(const char* what);
     [[nodiscard]] double since_epoch_s(std::int64_t ns) const {
         return static_cast<double>(ns - task_.source.epoch_ns) * 1e-9;
@@ -96,7 +99,8 @@ private:
     SourceClock clock_;           // the reader's
     DelayPercentile delays_;      // of replayed samples; the reader's
     std::vector<double> last_s_;  // times of the sticks' newest samples; the reader's
-    double replay_offset_s_ = 0;  // the reader's, as the next three
+    double replay_offset_s_ = 0;  // the reader's, as the next four
+    std::string head_;
     std::int64_t noted_ns_ = 0;
     std::uint64_t dropped_ = 0;
     bool stalled_ = false;
@@ -127,7 +131,7 @@ int Sensor::run() {
     const Descriptor signals(make_signal_fd());
     report();
     try {
-        source_ = open_source(task_.source);
+        source_ = open_source(source_options());
         if (source_->sticks().names().size() != sticks_.size())
             throw std::runtime_error("error: found sticks without shared memory, expected one a stick");
         note_source();
@@ -152,6 +156,24 @@ int Sensor::run() {
     return phase_ == SensorPhase::failed ? 1 : 0;
 }
 
+SourceOptions Sensor::source_options() const {
+    SourceOptions options = task_.source;
+    if (options.resume)
+        if (const std::optional<StreamHead> head = sticks_.front().memory->head.read())
+            options.stream_head = head->text.data();
+    return options;
+}
+
+/// The stream's first lines stay in the shared memory for the process that follows this one.
+void Sensor::keep_head() {
+    const std::string text = source_->stream_head();
+    if (text == head_ || text.size() >= StreamHead{}.text.size()) return;
+    head_ = text;
+    StreamHead head;
+    std::copy(text.begin(), text.end(), head.text.begin());
+    sticks_.front().memory->head.publish(head);
+}
+
 void Sensor::fail(const char* what) {
     {
         const std::lock_guard lock(mutex_);
@@ -169,7 +191,7 @@ void Sensor::read(const std::stop_token& stop) {
         SourceSample sample;
         while (!stop.stop_requested()) {
             const SourceStatus status = source_->next(sample, monotonic_ns() + kSourcePatienceNs);
-            stall_if_due(stop);
+            if (stall_if_due(stop)) sample.read_ns = monotonic_ns();
             if (status == SourceStatus::sample) pass(sample, stop);
             if (status != SourceStatus::sample || monotonic_ns() - noted_ns_ > kSourcePatienceNs)
                 note_source();
@@ -182,7 +204,6 @@ void Sensor::read(const std::stop_token& stop) {
 }
 
 void Sensor::pass(SourceSample sample, const std::stop_token& stop) {
-    if (stalled_) sample.read_ns = std::max(sample.read_ns, monotonic_ns());
     note(sample);
     put_on_our_clock(sample);
     if (source_->quiet_until_ns() != 0) note_source();
@@ -219,6 +240,7 @@ void Sensor::note_source() {
     ClockEstimate estimate = clock_.estimate();
     if (source_->replayed()) estimate = {replay_offset_s_, 0, delays_.p95(), 0, 0};
     noted_ns_ = monotonic_ns();
+    keep_head();
     const std::lock_guard lock(mutex_);
     const std::int64_t quiet_before_ns = reading_.quiet_until_ns;
     reading_.faults = source_->faults();
@@ -228,12 +250,13 @@ void Sensor::note_source() {
     if (reading_.quiet_until_ns != quiet_before_ns) add_one(changed_.get());
 }
 
-void Sensor::stall_if_due(const std::stop_token& stop) {
-    if (stalled_ || task_.stall_at_s < 0 || since_epoch_s(monotonic_ns()) < task_.stall_at_s) return;
+bool Sensor::stall_if_due(const std::stop_token& stop) {
+    if (stalled_ || task_.stall_at_s < 0 || since_epoch_s(monotonic_ns()) < task_.stall_at_s) return false;
     const std::int64_t until = monotonic_ns() + std::llround(task_.stall_s * 1e9);
     while (monotonic_ns() < until && !stop.stop_requested())
         sleep_until_ns(std::min(until, monotonic_ns() + kSourcePatienceNs));
     stalled_ = true;
+    return true;
 }
 
 // The filters.

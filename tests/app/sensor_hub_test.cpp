@@ -3,18 +3,22 @@
 #include "sensor_hub.h"
 
 #include <gtest/gtest.h>
+#include <lo/lo.h>
 #include <poll.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "bad_input.h"
+#include "free_port.h"
 #include "monotonic.h"
 #include "predictors.h"
 #include "stick_tracker.h"
@@ -301,6 +305,98 @@ TEST(SensorHub, RefusesWhatCannotBe) {
     options = options_for("trace:flourish");
     options.period_s = 2;
     expect_refused(options, "found a period of 2 s, expected more than its");
+}
+
+// A live source that serves two sticks from one process.
+
+/// Sends poses of both sticks over OSC with a clock of its own, from a thread.
+class OscSender {
+public:
+    explicit OscSender(int port) : to_(lo_address_new("127.0.0.1", std::to_string(port).c_str())) {
+        thread_ = std::jthread([this](const std::stop_token& stop) {
+            while (!stop.stop_requested()) {
+                send();
+                app::sleep_until_ns(app::monotonic_ns() + 5'000'000);
+            }
+        });
+    }
+    ~OscSender() {
+        thread_ = {};
+        lo_address_free(to_);
+    }
+    OscSender(const OscSender&) = delete;
+    OscSender& operator=(const OscSender&) = delete;
+    void turn_clock_by(double seconds) { ahead_s_ = ahead_s_ + seconds; }
+    void pause(bool paused) { paused_ = paused; }
+    void send_rubbish() { lo_send(to_, "/left", "s", "rubbish"); }
+
+private:
+    void send() {
+        if (paused_) return;
+        const double t = static_cast<double>(app::monotonic_ns()) * 1e-9;
+        for (const char* stick : {"/left", "/right"})
+            lo_send(to_, stick, "dfff", t + ahead_s_, 0.1F, 1 + 0.1F * static_cast<float>(std::sin(9 * t)),
+                    0.0F);
+    }
+
+    lo_address to_;
+    std::atomic<double> ahead_s_ = 1e9;
+    std::atomic<bool> paused_ = false;
+    std::jthread thread_;
+};
+
+TEST(SensorHub, LiveSticksShareAProcessAndSurviveWhatHappensToIt) {
+    const int port = app::free_udp_port();
+    const app::SensorOptions options = options_for("osc:" + std::to_string(port));
+    SensorHub hub(options);
+    EXPECT_EQ(children().size(), 1u);
+    OscSender sender(port);
+    Watched seen;
+    const auto grown_by = [&](std::uint64_t more) {
+        return [&seen, more, left = seen.states[0].empty() ? 0 : seen.states[0].back().samples,
+                right = seen.states[1].empty() ? 0 : seen.states[1].back().samples] {
+            return !seen.states[0].empty() && !seen.states[1].empty() &&
+                   seen.states[0].back().samples > left + more &&
+                   seen.states[1].back().samples > right + more;
+        };
+    };
+    seen.states.resize(2);
+    watch_until(hub, 2, seen, grown_by(100));
+    EXPECT_EQ(seen.all_messages(), "");
+    EXPECT_EQ(hub.clocks().at(0).clock, "the source's");
+
+    sender.turn_clock_by(-7);
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::clock_jumped) == 1; });
+    sender.send_rubbish();
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::malformed) == 1; });
+    sender.pause(true);
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::silent) >= 2; });
+    sender.pause(false);
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::back) >= 2; });
+    kill(children().front(), SIGKILL);
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::restarted) == 1; });
+    watch_until(hub, 2, seen, grown_by(100));
+
+    const std::string messages = seen.all_messages();
+    EXPECT_NE(messages.find("sensor left, right: the source's clock jumped by -7.0"), std::string::npos)
+        << messages;
+    EXPECT_NE(messages.find("sensor left, right: left out what it could not read: osc /left: error: found 1 "
+                            "arguments, expected 3"),
+              std::string::npos)
+        << messages;
+    EXPECT_EQ(hub.restarts(), 1);
+    for (std::size_t stick = 0; stick < 2; ++stick) {
+        const tracking::StickState* before = nullptr;
+        for (const tracking::StickState& state : seen.states[stick]) {
+            // The times are ours, counted from the epoch.
+            EXPECT_NEAR(static_cast<double>(state.due_ns - options.epoch_ns) * 1e-9, state.t_s, 1e-9);
+            EXPECT_NEAR(static_cast<double>(state.read_ns - options.epoch_ns) * 1e-9, state.t_s, 5);
+            if (before && before->starts == state.starts) {
+                EXPECT_GT(state.t_s, before->t_s);
+            }
+            before = &state;
+        }
+    }
 }
 
 }  // namespace

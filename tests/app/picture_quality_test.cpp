@@ -1,0 +1,80 @@
+#include "picture_quality.h"
+
+#include <gtest/gtest.h>
+
+namespace {
+
+constexpr double kFrameS = 1.0 / 30;
+
+app::QualityRule rule(double best_s) {
+    return app::QualityRule(kFrameS, {best_s, 0.6 * best_s, 0.5 * best_s, 0.2 * best_s, 0.2 * best_s, 0.2 * best_s});
+}
+
+/// Frames from second `from` on, all alike; the reasons for changes.
+std::vector<std::string> frames(app::QualityRule& rule, double from_s, int count, bool in_time, double draw_s) {
+    std::vector<std::string> reasons;
+    for (int i = 0; i < count; ++i)
+        if (const auto why = rule.frame(from_s + i * kFrameS, in_time, draw_s)) reasons.push_back(*why);
+    return reasons;
+}
+
+TEST(PictureQuality, BeginsAtTheBestLevelThatNeedsLessThanSixTenthsOfAFrame) {
+    EXPECT_EQ(rule(0.59 * kFrameS).level(), 0u);
+    EXPECT_EQ(rule(0.61 * kFrameS).level(), 1u);
+    EXPECT_EQ(rule(2 * kFrameS).level(), 3u);
+    EXPECT_EQ(rule(100 * kFrameS).level(), app::quality_levels().size() - 1);
+}
+
+TEST(PictureQuality, ThreeLateFramesOfEightLowerItByOneLevelAndSayWhy) {
+    app::QualityRule quality = rule(0.01);
+    for (int i = 0; i < 30; ++i)  // two of eight are borne
+        EXPECT_FALSE(quality.frame(i * kFrameS, i % 4 != 0, 0.01)) << i;
+    EXPECT_EQ(quality.level(), 0u);
+    const std::vector<std::string> why = frames(quality, 1, 3, false, 0.04);
+    ASSERT_EQ(why.size(), 1u);
+    EXPECT_EQ(quality.level(), 1u);
+    EXPECT_NE(why[0].find(app::quality_levels()[1].name), std::string::npos) << why[0];
+}
+
+TEST(PictureQuality, LateSoundLowersItBeforeMoreOfItIsLate) {
+    app::QualityRule quality = rule(0.01);
+    EXPECT_FALSE(quality.blocks(0, 150, 3));
+    EXPECT_FALSE(quality.blocks(0.2, 150, 4));  // 7 of 300 are below 5 %
+    EXPECT_TRUE(quality.blocks(0.4, 150, 20));
+    EXPECT_EQ(quality.level(), 1u);
+}
+
+TEST(PictureQuality, RisesAfterFourQuietSecondsIfTheBetterLevelWouldFit) {
+    app::QualityRule quality = rule(0.01);
+    (void)frames(quality, 0, 3, false, 0.04);
+    ASSERT_EQ(quality.level(), 1u);
+    // What made it late was seen at level 0: its drawing time has grown from 10 ms to 24.6 (a fifth of the way a
+    // frame), more than 20 of 33 ms, so it is believed less with time before it is tried again.
+    EXPECT_TRUE(frames(quality, 1, 3 * 30, true, 0.006).empty());
+    EXPECT_FALSE(frames(quality, 4, 90 * 30, true, 0.006).empty());
+    EXPECT_EQ(quality.level(), 0u);
+}
+
+TEST(PictureQuality, ARiseThatHadToBeTakenBackIsTriedLaterAndLater) {
+    app::QualityRule quality = rule(0.015);
+    double now_s = 0;
+    std::vector<double> waits;
+    for (int round = 0; round < 5; ++round) {
+        while (quality.level() == 0) (void)quality.frame(now_s += kFrameS, false, 0.015);
+        const double lowered_s = now_s;
+        while (quality.level() == 1) (void)quality.frame(now_s += kFrameS, true, 0.009);
+        waits.push_back(now_s - lowered_s);
+    }
+    for (std::size_t i = 1; i < waits.size(); ++i) EXPECT_GT(waits[i], 1.8 * waits[i - 1]) << i;
+    EXPECT_LT(waits.back(), 66);
+}
+
+TEST(PictureQuality, AtHalfTheRateEverySecondFrameIsWanted) {
+    const app::QualityRule slow = rule(100);
+    const auto every = static_cast<std::uint64_t>(app::quality_levels().back().rate_divisor);
+    for (std::uint64_t i = 0; i < 12; ++i) EXPECT_EQ(slow.wants(i), i % every == 0);
+    const app::QualityRule fast = rule(0.001);
+    EXPECT_TRUE(fast.wants(1));
+}
+
+}  // namespace
