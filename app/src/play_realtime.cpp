@@ -368,7 +368,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
     result.versions.emplace_back("musicworld", MUSICWORLD_VERSION);
     if (options.play.video) make_video(options.play, folder.path("."));
     result.wall_s = wall.seconds();
-    outcome.latency = latency_report(result, outcome.realtime, session.kit, session.stick);
+    outcome.latency = latency_report(result, outcome.realtime, session.kit, session.stick.radius_m);
     write_latency_products(outcome, folder);
     write_realtime_products(outcome, folder);
     folder.finish();
