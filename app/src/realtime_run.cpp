@@ -249,10 +249,12 @@ void RealtimeRun::ask_for_frame(std::uint64_t index) {
 }
 
 void RealtimeRun::record_tips(const Scene& scene, std::uint64_t index, double T) {
-    for (std::uint32_t i = 0; i < sticks_.size(); ++i)
-        if (scene.sticks[i])
-            result_.tips.push_back({index, i, lap_, T, false, scene.sticks[i]->held,
-                                    scene.sticks[i]->tip.position, scene.sticks[i]->tip.velocity});
+    for (std::uint32_t i = 0; i < sticks_.size(); ++i) {
+        if (!scene.sticks[i]) continue;
+        const DrawnStick& stick = *scene.sticks[i];
+        result_.tips.push_back({index, i, lap_, T, false, stick.held, stick.tip.position, stick.tip.velocity,
+                                tracking::point_of(stick.pose, geometry_.tip).position});
+    }
 }
 
 void RealtimeRun::take_frames() {
