@@ -13,6 +13,7 @@
 #include "bad_input.h"
 #include "compare_command.h"
 #include "kit_commands.h"
+#include "latency_command.h"
 #include "play_command.h"
 #include "predict_command.h"
 #include "record_command.h"
@@ -64,6 +65,7 @@ int run(int argc, char** argv) {
     add_predict_command(program);
     add_kit_command(program);
     add_compare_command(program);
+    add_latency_command(program);
     add_trace_command(program);
     add_record_command(program);
     add_worker_command(program, status);

@@ -2,33 +2,56 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <filesystem>
 #include <memory>
-#include <optional>
 
-#include "bad_input.h"
 #include "latency_comparison.h"
-#include "latency_products.h"
 #include "latency_tables.h"
-#include "numbers.h"
+#include "output_folder.h"
+#include "play_arguments.h"
+#include "realtime_arguments.h"
 
 namespace app {
+namespace fs = std::filesystem;
 namespace {
-
-constexpr double kShortestS = 1, kLongestS = 86400;
 
 /// The options as typed.
 struct Typed {
-    LatencyArguments run;
-    std::string seconds = "60", out;
+    PlayArguments play;
+    RealtimeArguments in_time;
     std::vector<std::string> compare;
     bool json = false;
 };
 
+/// A folder for the products of a run that nobody asked for; gone at the end.
+class PassingFolder {
+public:
+    PassingFolder() {
+        std::string name = (fs::temp_directory_path() / "musicworld_latency_XXXXXX").string();
+        if (::mkdtemp(name.data()) == nullptr)
+            throw std::runtime_error(fmt::format(
+                "{}: error: found no way to make a folder there, expected one for the run; use --out DIR",
+                fs::temp_directory_path().string()));
+        path_ = name;
+    }
+    ~PassingFolder() {
+        std::error_code ignored;
+        fs::remove_all(path_, ignored);
+    }
+    PassingFolder(const PassingFolder&) = delete;
+    PassingFolder& operator=(const PassingFolder&) = delete;
+    [[nodiscard]] const fs::path& path() const { return path_; }
+
+private:
+    fs::path path_;
+};
+
 void compare(const Typed& typed) {
     const LatencyComparison comparison = compare_latency(typed.compare[0], typed.compare[1]);
-    if (!typed.out.empty()) {
+    if (!typed.play.out.empty()) {
         static constexpr std::array<std::string_view, 2> kProducts = {"comparison.json", "report.html"};
-        OutputFolder out(typed.out, kProducts);
+        OutputFolder out(typed.play.out, kProducts);
         write_file(out.path("comparison.json"), format_json(comparison));
         write_file(out.path("report.html"), format_page(comparison));
         out.finish();
@@ -36,48 +59,45 @@ void compare(const Typed& typed) {
     fmt::print("{}", typed.json ? format_json(comparison) : format_text(comparison));
 }
 
-double seconds_of(const Typed& typed) {
-    const double seconds = parse_number(typed.seconds, "--seconds");
-    if (!(seconds >= kShortestS && seconds <= kLongestS))
-        throw BadInput(fmt::format("error: found --seconds {}, expected {} to {}", typed.seconds, kShortestS,
-                                   kLongestS));
-    return seconds;
+void measure(const Typed& typed, const RunInTime& run) {
+    std::unique_ptr<PassingFolder> passing;
+    RealtimeOptions options = realtime_options(play_options(typed.play), typed.in_time);
+    if (typed.play.out.empty()) {
+        passing = std::make_unique<PassingFolder>();
+        options.play.out = passing->path();
+    }
+    const RealtimeOutcome outcome = run(options);
+    fmt::print("{}", typed.json ? format_latency_json(outcome.latency, outcome.play, outcome.realtime)
+                                : format_latency_text(outcome.latency, outcome.realtime));
+    if (!typed.play.out.empty() && !typed.json)
+        fmt::print("Look at {}\n", (options.play.out / "latency.html").string());
 }
 
-void measure(Typed typed, const MeasureRun& run) {
-    typed.run.seconds = seconds_of(typed);
-    std::optional<OutputFolder> out;
-    if (!typed.out.empty()) out.emplace(typed.out, latency_products());
-    const MeasuredRun r = run(typed.run);
-    const LatencyReport report = latency_report(r.play, r.realtime, r.kit, r.geometry, r.trace);
-    if (out) {
-        write_latency_products(*out, report, r.play, r.realtime);
-        out->finish();
-    }
-    fmt::print("{}", typed.json ? format_latency_json(report, r.play, r.realtime)
-                                : format_latency_text(report, r.realtime));
+RealtimeOutcome run_and_warn(const RealtimeOptions& options) {
+    return play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
 }
 
 }  // namespace
 
-void add_latency_command(CLI::App& program, const MeasureRun& run) {
+void add_latency_command(CLI::App& program, const RunInTime& run) {
     CLI::App* command = program.add_subcommand(
         "latency",
-        "Play a trace in real time and measure: each stage's latency, deadlines missed, leads needed");
+        "Play in real time and measure: each stage's latency, deadlines missed, sound against picture, leads "
+        "needed");
     auto typed = std::make_shared<Typed>();
-    command->add_option("TRACE", typed->run.trace, "Trace (CSV), or the name of a bundled one")
-        ->capture_default_str();
-    command->add_option("--kit", typed->run.kit, "Kit: its name or file")->capture_default_str();
-    command->add_option("--seconds", typed->seconds, "How long; a shorter trace loops")
-        ->capture_default_str();
+    add_play_options(*command, typed->play);
+    add_realtime_options(*command, typed->in_time);
     command->add_flag("--json", typed->json, "Print one JSON document");
-    command->add_option("--out", typed->out, "Folder for latency.json, the rows as CSV, report.html");
+    command->add_option("--out", typed->play.out,
+                        "Folder for what play writes, latency.json, latency.html and the rows as CSV");
     command
-        ->add_option("--compare", typed->compare, "Two folders of earlier runs: their figures side by side")
+        ->add_option("--compare", typed->compare,
+                     "Two such folders of earlier runs: their figures side by side (--out: comparison.json, "
+                     "report.html)")
         ->expected(2);
     command->callback([typed, run] {
         if (typed->compare.empty())
-            measure(*typed, run);
+            measure(*typed, run ? run : run_and_warn);
         else
             compare(*typed);
     });

@@ -1,33 +1,15 @@
 #pragma once
 #include <CLI/CLI.hpp>
 #include <functional>
-#include <string>
 
-#include "kit.h"
-#include "play_result.h"
-#include "realtime_result.h"
-#include "tip_track.h"
+#include "play_realtime.h"
 
 namespace app {
 
-/// What is measured: a run in real time without products of its own.
-struct LatencyArguments {
-    std::string trace = "flourish";  ///< file or name of a bundled one
-    std::string kit = "drums";
-    double seconds = 60;
-};
+/// Plays in real time into the folder of the options.
+using RunInTime = std::function<RealtimeOutcome(const RealtimeOptions&)>;
 
-/// What a run in real time leaves for its reports.
-struct MeasuredRun {
-    PlayResult play;
-    RealtimeResult realtime;
-    Kit kit;
-    StickGeometry geometry;
-    tracking::Trace trace;
-};
-using MeasureRun = std::function<MeasuredRun(const LatencyArguments&)>;
-
-/// Adds `latency` to the program. `measure` makes the run; --compare does without.
-void add_latency_command(CLI::App& program, const MeasureRun& measure);
+/// Adds `latency` to the program: play_realtime(), or `run` in its place, and what it measured.
+void add_latency_command(CLI::App& program, const RunInTime& run = {});
 
 }  // namespace app

@@ -47,7 +47,10 @@ Histogram histogram(const Spread& ms, double bin_ms, double low_ms, double high_
     for (const double value : ms.sorted())
         if (value >= low_ms && value <= high_ms) ++bins[static_cast<int>(std::floor(value / bin_ms))];
     Histogram made;
-    for (const auto& [bin, count] : bins) {
+    if (bins.empty()) return made;
+    for (int bin = bins.begin()->first - 1; bin <= bins.rbegin()->first + 1; ++bin) {
+        const auto found = bins.find(bin);
+        const int count = found == bins.end() ? 0 : found->second;
         fmt::format_to(std::back_inserter(made.data), "{} {}\n", (bin + 0.5) * bin_ms, count);
         made.highest = std::max(made.highest, count);
     }
@@ -121,15 +124,18 @@ PlotWithLegend leads_plot(const RealtimeResult& realtime) {
     PlotPanel panel;
     double highest = 10;
     for (const Series& series : kSeries) {
+        const auto ms = [&](const LeadStep& step) { return 1e3 * step.*series.value; };
+        // Delays are measured where leads follow them.
+        if (std::all_of(realtime.leads.begin(), realtime.leads.end(),
+                        [&](const LeadStep& step) { return ms(step) == 0; }))
+            continue;
         std::string data;
         for (const LeadStep& step : realtime.leads) {
-            fmt::format_to(std::back_inserter(data), "{:.3f} {:.4f}\n", step.at_s, 1e3 * step.*series.value);
-            highest = std::max(highest, 1e3 * step.*series.value);
+            fmt::format_to(std::back_inserter(data), "{:.3f} {:.4f}\n", step.at_s, ms(step));
+            highest = std::max(highest, ms(step));
         }
-        if (!realtime.leads.empty())
-            fmt::format_to(std::back_inserter(data), "{:.3f} {:.4f}\n",
-                           std::max(realtime.seconds, realtime.leads.back().at_s),
-                           1e3 * realtime.leads.back().*series.value);
+        fmt::format_to(std::back_inserter(data), "{:.3f} {:.4f}\n",
+                       std::max(realtime.seconds, realtime.leads.back().at_s), ms(realtime.leads.back()));
         plot.legend.push_back({series.name, series.colour, series.dashed});
         panel.add(data, fmt::format("with steps lt 1 lw 1.6{} lc {}", series.dashed ? " dt '-'" : "",
                                     gnuplot_colour(series.colour)));

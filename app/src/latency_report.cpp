@@ -132,7 +132,7 @@ double Spread::share_within(double low, double high) const {
 }
 
 LatencyReport latency_report(const PlayResult& play, const RealtimeResult& realtime, const Kit& kit,
-                             const StickGeometry& geometry) {
+                             double tip_radius_m) {
     LatencyReport report;
     add_sample_stages(report, realtime.samples);
     add(report, Kind::sound, "block computed", "planned to done", realtime.blocks,
@@ -140,7 +140,7 @@ LatencyReport latency_report(const PlayResult& play, const RealtimeResult& realt
     add_frame_stages(report, realtime.frames);
     add_ages(report, realtime);
     add_deadlines(report, realtime);
-    add_sound_and_picture(report, play, realtime, kit, geometry.radius_m);
+    add_sound_and_picture(report, play, realtime, kit, tip_radius_m);
     report.errors = drawn_errors(realtime, play.tracks, play.t0_s);
     add_needed_leads(report, realtime.output_lead_s);
     return report;

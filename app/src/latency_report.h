@@ -9,7 +9,6 @@
 #include "play_result.h"
 #include "realtime_result.h"
 #include "sound_picture.h"
-#include "tip_track.h"
 
 namespace app {
 
@@ -92,7 +91,7 @@ struct LatencyReport {
 /// `play.tracks` are on the run's clock, t0 + time since the epoch; of `play.strikes` stick and instrument
 /// count.
 [[nodiscard]] LatencyReport latency_report(const PlayResult& play, const RealtimeResult& realtime,
-                                           const Kit& kit, const StickGeometry& geometry);
+                                           const Kit& kit, double tip_radius_m);
 
 /// By name; null if nothing took it.
 [[nodiscard]] const LatencyStage* find_stage(const LatencyReport& report, std::string_view name);

@@ -127,6 +127,7 @@ SensorOptions sensor_options(const Session& session, std::int64_t epoch_ns) {
     sensors.stall_at_s = o.disturbance.stall_at_s;
     sensors.stall_s = o.disturbance.stall_s;
     sensors.realtime = o.realtime_priority;
+    sensors.program = o.program;
     return sensors;
 }
 
@@ -367,13 +368,8 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
     result.versions.emplace_back("musicworld", MUSICWORLD_VERSION);
     if (options.play.video) make_video(options.play, folder.path("."));
     result.wall_s = wall.seconds();
-    {
-        // Latency is judged lap by lap.
-        std::swap(result.strikes, outcome.lap_strikes);
-        outcome.latency = latency_report(result, outcome.realtime, session.kit, session.stick, session.trace);
-        write_latency_products(outcome, folder);
-        std::swap(result.strikes, outcome.lap_strikes);
-    }
+    outcome.latency = latency_report(result, outcome.realtime, session.kit, session.stick.radius_m);
+    write_latency_products(outcome, folder);
     write_realtime_products(outcome, folder);
     folder.finish();
     if (options.play.video) fs::rename(options.play.video->string() + ".partial", *options.play.video);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "latency_page.h"
 #include "latency_tables.h"
 #include "report.h"
 #include "summary.h"
@@ -131,6 +132,8 @@ void write_latency_products(const RealtimeOutcome& o, const OutputFolder& folder
     write_file(folder.path("leads.csv"), format_leads_csv(o.realtime));
     write_file(folder.path("errors.csv"), format_errors_csv(o.latency, o.play));
     write_file(folder.path("latency.json"), format_latency_json(o.latency, o.play, o.realtime));
+    write_file(folder.path("latency.html"),
+               format_latency_page(o.latency, o.play, o.realtime, folder.scratch()));
 }
 
 void write_realtime_products(const RealtimeOutcome& outcome, const OutputFolder& folder) {

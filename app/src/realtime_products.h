@@ -13,7 +13,7 @@ namespace app {
 [[nodiscard]] std::string format_departures(const RealtimeOutcome& outcome);
 /// Writes all files of a run in real time but frames, audio.wav, hits.mid and those of latency.
 void write_realtime_products(const RealtimeOutcome& outcome, const OutputFolder& folder);
-/// latency.json and its tables; `outcome.play.strikes` are on their laps' clocks here.
+/// latency.json, latency.html, samples.csv, frames.csv, notes.csv, blocks.csv, leads.csv, errors.csv.
 void write_latency_products(const RealtimeOutcome& outcome, const OutputFolder& folder);
 
 }  // namespace app

@@ -29,6 +29,7 @@ struct RealtimeOptions {
     bool lead_auto = false;        ///< both leads follow the measured delays, never below those asked for
     double output_lead_s = 0.004;  ///< a block of sound is computed this long before it is due
     bool realtime_priority = true;
+    std::string program;  ///< that has the command `sensor`; empty: this one
     bool jack_audio = false;
     std::string midi_port, midi_connect;
     Disturbance disturbance;

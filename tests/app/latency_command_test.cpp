@@ -73,19 +73,19 @@ TEST(LatencyComparison, RefusesWhatLatencyDidNotWrite) {
     EXPECT_THROW((void)compare_latency(good, folder.path() / "none"), BadInput);
 }
 
-/// The program with `latency` alone, over a made-up run.
-int run_program(std::vector<std::string> arguments, LatencyArguments* asked = nullptr) {
+/// The program with `latency` alone, over a made-up run; what was asked of it.
+int run_program(std::vector<std::string> arguments, RealtimeOptions* asked = nullptr) {
     CLI::App program("test");
-    add_latency_command(program, [asked](const LatencyArguments& a) {
-        if (asked != nullptr) *asked = a;
-        MeasuredRun run;
+    add_latency_command(program, [asked](const RealtimeOptions& options) {
+        if (asked != nullptr) *asked = options;
+        EXPECT_FALSE(options.play.out.empty());
+        RealtimeOutcome run;
         run.kit = sample::one_drum();
         run.play.sticks = {"left"};
         run.play.instruments = {"snare"};
-        run.realtime.seconds = a.seconds;
         sample::draw(run.realtime, sample::falling(0.493, sample::touch_height(run.kit), 2), 0.4, 0.6);
         sample::sound(run.play, run.realtime, {0.5});
-        run.realtime.samples.resize(3);
+        run.latency = latency_report(run.play, run.realtime, run.kit, sample::kTipRadius);
         return run;
     });
     std::reverse(arguments.begin(), arguments.end());
@@ -97,44 +97,38 @@ int run_program(std::vector<std::string> arguments, LatencyArguments* asked = nu
     return 0;
 }
 
-TEST(LatencyCommand, MeasuresAndWritesItsProducts) {
-    const TemporaryFolder folder;
-    LatencyArguments asked;
+std::string printed_by(const std::vector<std::string>& arguments, RealtimeOptions* asked = nullptr) {
     testing::internal::CaptureStdout();
-    EXPECT_EQ(run_program({"latency", "roll", "--seconds", "5/2", "--json", "--out", folder.path() / "out"},
-                          &asked),
-              0);
-    const Json printed = Json::parse(testing::internal::GetCapturedStdout());
-    EXPECT_NEAR(printed["sound_minus_picture_ms"]["median"].get<double>(), 7, 1e-5);
-    EXPECT_EQ(asked.trace, "roll");
-    EXPECT_EQ(asked.seconds, 2.5);
-    for (const char* name : {"latency.json", "samples.csv", "frames.csv", "notes.csv", "blocks.csv",
-                             "leads.csv", "errors.csv", "report.html"})
-        EXPECT_TRUE(std::filesystem::exists(folder.path() / "out" / name)) << name;
+    EXPECT_EQ(run_program(arguments, asked), 0);
+    return testing::internal::GetCapturedStdout();
 }
 
-TEST(LatencyCommand, ComparesWhatItWrote) {
+TEST(LatencyCommand, RunsInATemporaryFolderUnlessOneIsNamed) {
+    RealtimeOptions asked;
+    const Json json = Json::parse(printed_by({"latency", "roll", "--seconds", "5/2", "--json"}, &asked));
+    EXPECT_NEAR(json["sound_minus_picture_ms"]["median"].get<double>(), 7, 1e-5);
+    EXPECT_EQ(asked.play.trace.filename(), "roll.csv");
+    EXPECT_EQ(asked.seconds, 2.5);
+    EXPECT_FALSE(std::filesystem::exists(asked.play.out)) << asked.play.out;
+    EXPECT_NE(printed_by({"latency", "roll", "--out", "some/where"}, &asked).find("latency.html"),
+              std::string::npos);
+    EXPECT_EQ(asked.play.out, "some/where");
+}
+
+TEST(LatencyCommand, ComparesTwoFolders) {
     const TemporaryFolder folder;
-    testing::internal::CaptureStdout();
-    for (const char* name : {"a", "b"})
-        ASSERT_EQ(run_program({"latency", "--seconds", "3", "--out", folder.path() / name}), 0);
-    (void)testing::internal::GetCapturedStdout();
-    testing::internal::CaptureStdout();
-    EXPECT_EQ(run_program({"latency", "--compare", folder.path() / "a", folder.path() / "b", "--json",
-                           "--out", folder.path() / "c"}),
-              0);
-    const Json json = Json::parse(testing::internal::GetCapturedStdout());
-    for (const Json& figure : json["figures"]) {
-        if (figure["name"] != "sound minus picture, median ms") continue;
-        EXPECT_NEAR(figure["ratio"].get<double>(), 1, 1e-12);
-    }
+    const auto a = run_folder(folder, "a", document(2, 1)), b = run_folder(folder, "b", document(3, 4));
+    const Json json =
+        Json::parse(printed_by({"latency", "--compare", a, b, "--json", "--out", folder.path() / "c"}));
+    EXPECT_EQ(json["figures"][1]["ratio"], 4);
     EXPECT_TRUE(std::filesystem::exists(folder.path() / "c" / "comparison.json"));
     EXPECT_TRUE(std::filesystem::exists(folder.path() / "c" / "report.html"));
 }
 
-TEST(LatencyCommand, RefusesLengthsThatCannotBe) {
-    for (const char* seconds : {"0", "-3", "1e9", "long"})
-        EXPECT_THROW((void)run_program({"latency", "--seconds", seconds}), BadInput) << seconds;
+TEST(LatencyCommand, RefusesValuesThatCannotBe) {
+    EXPECT_THROW((void)run_program({"latency", "--seconds", "long"}), BadInput);
+    EXPECT_THROW((void)run_program({"latency", "--lead", "some"}), BadInput);
+    EXPECT_NE(run_program({"latency", "--compare", "one"}), 0);
 }
 
 }  // namespace

@@ -24,7 +24,6 @@ struct SampleRun {
     PlayResult play;
     RealtimeResult realtime;
     Kit kit = sample::one_drum();
-    StickGeometry geometry;
 
     SampleRun() {
         play.trace = "take.csv";
@@ -79,7 +78,9 @@ struct SampleRun {
         realtime.frames[99].fate = FrameFate::late;
         realtime.frames[99].read_ns += 5 * kMs;
     }
-    [[nodiscard]] LatencyReport report() const { return latency_report(play, realtime, kit, geometry); }
+    [[nodiscard]] LatencyReport report() const {
+        return latency_report(play, realtime, kit, sample::kTipRadius);
+    }
 };
 
 double p(const LatencyReport& report, const char* stage, double percent) {
