@@ -99,6 +99,8 @@ int start_child(const ChildStart& start) {
     files.become(start.in, STDIN_FILENO);
     files.become(start.out, STDOUT_FILENO);
     files.become(start.err, STDERR_FILENO);
+    for (const int descriptor : start.inherited)
+        files.become(descriptor, descriptor);  // onto itself: open across exec in the child alone
     const Attributes attributes(start.own_group);
     const std::vector<char*> arguments = pointers(start.command);
     const std::vector<std::string> variables = environment_with(start.variables);

@@ -11,6 +11,7 @@ struct ChildStart {
     std::vector<std::string> variables;  ///< NAME=VALUE, in place of this process's own
     int in = -1, out = -1, err = -1;     ///< descriptors that become the child's 0, 1, 2
     bool own_group = false;              ///< so that kill(-pid) reaches what the child starts, too
+    std::vector<int> inherited = {};     ///< descriptors that the child keeps, by the same numbers
 };
 
 /// Starts it and returns its process id. Throws std::runtime_error (what is missing) when that fails.

@@ -15,6 +15,7 @@
 #include "kit_commands.h"
 #include "play_command.h"
 #include "predict_command.h"
+#include "sensor_command.h"
 #include "trace_commands.h"
 
 namespace app {
@@ -46,7 +47,8 @@ std::string what_to_say(const CLI::App& program) {
     while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
     std::vector<std::string> names;
     for (const CLI::App* command : at->get_subcommands(nullptr))
-        if (command->get_name() != "worker") names.push_back(command->get_name());
+        if (command->get_name() != "worker" && command->get_name() != "sensor")
+            names.push_back(command->get_name());
     if (names.empty()) return fmt::format("what `{} --help` tells", full_name(*at));
     return fmt::format("`{}` and one of {}", full_name(*at), fmt::join(names, ", "));
 }
@@ -63,6 +65,7 @@ int run(int argc, char** argv) {
     add_compare_command(program);
     add_trace_command(program);
     add_worker_command(program, status);
+    add_sensor_command(program, status);
     try {
         program.parse(argc, argv);
     } catch (const CLI::CallForHelp& help) {

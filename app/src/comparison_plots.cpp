@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <map>
@@ -16,20 +15,6 @@ namespace app {
 namespace {
 
 constexpr int kWide = 1040, kHalf = 520;
-
-constexpr std::array<ReportColour, 9> kLineColours = {
-    colours::sticks[0], colours::sticks[1], colours::sticks[2], colours::sticks[3], colours::released,
-    colours::wrong,     colours::missed,    colours::wave,      colours::cancelled};
-
-/// The n-th line's look: colours first, then the same ones dashed.
-PlotLine line_of(std::size_t n, const std::string& name) {
-    return {name, kLineColours[n % kLineColours.size()], n / kLineColours.size() % 2 == 1};
-}
-
-std::string style_of(const PlotLine& line, double width) {
-    return fmt::format("with lines lt 1 lw {}{} lc {}", width, line.dashed ? " dt '-'" : "",
-                       gnuplot_colour(line.colour));
-}
 
 using Points = std::vector<std::pair<double, double>>;
 
@@ -86,8 +71,8 @@ std::string logarithmic_tics(double low, double high) {
 
 }  // namespace
 
-ComparisonPlot height_plot(const StickFigure& figure) {
-    ComparisonPlot plot;
+PlotWithLegend height_plot(const StickFigure& figure) {
+    PlotWithLegend plot;
     plot.legend.push_back({"recorded", colours::contact, false});
     std::vector<std::pair<PlotLine, const FigurePath*>> paths;
     std::set<std::string> seen;
@@ -102,8 +87,8 @@ ComparisonPlot height_plot(const StickFigure& figure) {
     return plot;
 }
 
-ComparisonPlot zoomed_plot(const StickFigure& figure, const std::string& predictor) {
-    ComparisonPlot plot;
+PlotWithLegend zoomed_plot(const StickFigure& figure, const std::string& predictor) {
+    PlotWithLegend plot;
     plot.legend.push_back({"recorded", colours::contact, false});
     std::vector<std::pair<PlotLine, const FigurePath*>> paths;
     for (const FigurePath& path : figure.paths) {
@@ -115,12 +100,12 @@ ComparisonPlot zoomed_plot(const StickFigure& figure, const std::string& predict
     return plot;
 }
 
-ComparisonPlot curves_plot(const Comparison& comparison) {
+PlotWithLegend curves_plot(const Comparison& comparison) {
     std::set<std::string> tuned;
     for (const LeadCurve& curve : comparison.curves)
         if (curve.predictor.ends_with('*'))
             tuned.insert(curve.predictor.substr(0, curve.predictor.find('*')));
-    ComparisonPlot plot;
+    PlotWithLegend plot;
     PlotPanel panel;
     double highest = 1;
     for (const LeadCurve& curve : comparison.curves) {
@@ -143,8 +128,8 @@ ComparisonPlot curves_plot(const Comparison& comparison) {
     return plot;
 }
 
-ComparisonPlot cost_plot(const Comparison& comparison, double lead_s) {
-    ComparisonPlot plot;
+PlotWithLegend cost_plot(const Comparison& comparison, double lead_s) {
+    PlotWithLegend plot;
     PlotPanel panel;
     double fastest = 1e9, slowest = 1, least = 1e9, most = 0;
     for (const ComparisonSummary& s : comparison.summaries) {
@@ -172,7 +157,7 @@ ComparisonPlot cost_plot(const Comparison& comparison, double lead_s) {
     return plot;
 }
 
-ComparisonPlot timing_plot(const ComparisonSummary& summary) {
+PlotWithLegend timing_plot(const ComparisonSummary& summary) {
     constexpr int kHalfMs = 30;
     std::map<int, int> bins;
     if (summary.hits)
@@ -185,7 +170,7 @@ ComparisonPlot timing_plot(const ComparisonSummary& summary) {
     }
     PlotPanel panel;
     panel.add(data, "with boxes fs solid 0.75 noborder lc " + gnuplot_colour(colours::released));
-    ComparisonPlot plot;
+    PlotWithLegend plot;
     plot.script = {
         kHalf, 220,
         plot_axes() +

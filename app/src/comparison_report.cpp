@@ -17,10 +17,6 @@
 namespace app {
 namespace {
 
-std::string fact(std::string_view name, std::string_view value) {
-    return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", html(name), html(value));
-}
-
 std::string leads_text(const std::vector<double>& leads_s) {
     std::string text;
     for (const double lead_s : leads_s)
@@ -32,13 +28,13 @@ std::string heading(const Comparison& c) {
     std::string persons;
     for (const std::string& person : c.persons) persons += (persons.empty() ? "" : ", ") + person;
     std::string text = "<header><h1>Predictors compared</h1>\n<p>by MusicWorld</p>\n<dl class=facts>\n";
-    text += fact("recordings", fmt::format("{}", c.options.traces.size()));
-    text += fact("persons", fmt::format("{}: {}", c.persons.size(), persons));
+    text += report_fact("recordings", fmt::format("{}", c.options.traces.size()));
+    text += report_fact("persons", fmt::format("{}: {}", c.persons.size(), persons));
     const std::string sensor = describe(c.options.sensor);
-    text += fact("sensor", sensor.empty() ? "the recordings as they are" : sensor);
-    text += fact("leads", leads_text(c.options.leads_s));
-    text += fact("tuning", c.tuned_on);
-    text += fact("strikes on", c.options.surface_text);
+    text += report_fact("sensor", sensor.empty() ? "the recordings as they are" : sensor);
+    text += report_fact("leads", leads_text(c.options.leads_s));
+    text += report_fact("tuning", c.tuned_on);
+    text += report_fact("strikes on", c.options.surface_text);
     text += "</dl></header>\n<h2>Which predictor wins</h2>\n";
     for (const std::string& sentence : winners(c)) text += fmt::format("<p>{}</p>\n", html(sentence));
     text += fmt::format("<p class=note>{}</p>\n", html(selection_caution(c)));
@@ -53,47 +49,6 @@ std::string heading(const Comparison& c) {
            "scored "
            "recordings themselves, which favours it.</p>\n";
 }
-
-std::string legend_of(const std::vector<PlotLine>& lines) {
-    std::string text = "<ul class=legend>\n";
-    for (const PlotLine& line : lines)
-        text += fmt::format(
-            "<li><svg viewBox=\"0 0 22 12\" aria-hidden=\"true\"><path d=\"M1,6h20\" stroke=\"var(--{})\" "
-            "stroke-width=\"2.5\"{}/></svg>{}</li>\n",
-            line.colour.name, line.dashed ? " stroke-dasharray=\"5 3\"" : "", html(line.name));
-    return text + "</ul>\n";
-}
-
-/// The page's plots: declared in the order of the page, drawn at once, placed by number.
-class Plots {
-public:
-    std::size_t add(ComparisonPlot plot, std::string label) {
-        plots_.push_back(std::move(plot));
-        labels_.push_back(std::move(label));
-        return plots_.size() - 1;
-    }
-    void draw(const std::filesystem::path& scratch) {
-        std::vector<PlotScript> scripts;
-        for (const ComparisonPlot& plot : plots_) scripts.push_back(plot.script);
-        drawn_ = draw_svg(scripts, scratch);
-    }
-    [[nodiscard]] std::string symbols() const { return svg_symbols(drawn_.front()); }
-    [[nodiscard]] std::string element(std::size_t number) const {
-        const std::vector<PlotLine>& lines = plots_[number].legend;
-        return fmt::format("<div><h3>{}</h3>\n{}<div class=plot>\n{}</div></div>\n", html(labels_[number]),
-                           lines.empty() ? "" : legend_of(lines),
-                           inline_svg(drawn_[number], labels_[number]));
-    }
-    [[nodiscard]] std::string pair(const std::vector<std::size_t>& numbers) const {
-        std::string text = "<div class=pair>";
-        for (const std::size_t number : numbers) text += element(number);
-        return text + "</div>\n";
-    }
-
-private:
-    std::vector<ComparisonPlot> plots_;
-    std::vector<std::string> labels_, drawn_;
-};
 
 /// The predictors whose strikes are shown as histograms: of each lead the best F1, then auto, thesis and
 /// naive.
@@ -118,7 +73,7 @@ struct Placed {
     std::vector<std::size_t> zoomed, costs, timings;
 };
 
-Placed declare(Plots& plots, const Comparison& comparison) {
+Placed declare(PlotGallery& plots, const Comparison& comparison) {
     Placed placed;
     const StickFigure& figure = comparison.figure;
     placed.height = plots.add(height_plot(figure), "Figure 3-1: height as recorded and as predicted");
@@ -177,7 +132,7 @@ std::string map_section(const Comparison& c) {
            "</details>\n";
 }
 
-std::string sections(const Comparison& c, const Plots& plots, const Placed& placed) {
+std::string sections(const Comparison& c, const PlotGallery& plots, const Placed& placed) {
     std::string text =
         section("A stick and its predictions",
                 fmt::format("{}, stick {}. Each predicted point stands at the time that it was "
@@ -220,16 +175,11 @@ std::string sections(const Comparison& c, const Plots& plots, const Placed& plac
 }  // namespace
 
 std::string format_comparison_report(const Comparison& comparison, const std::filesystem::path& scratch) {
-    Plots plots;
+    PlotGallery plots;
     const Placed placed = declare(plots, comparison);
     plots.draw(scratch);
-    std::string page = fmt::format(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
-        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-        "<title>Predictors compared: MusicWorld</title>\n<style>{}</style></head>\n<body><main>\n",
-        report_style());
-    page += heading(comparison) + plots.symbols() + sections(comparison, plots, placed);
-    return page + "</main></body></html>\n";
+    return report_page("Predictors compared",
+                       heading(comparison) + plots.symbols() + sections(comparison, plots, placed));
 }
 
 }  // namespace app

@@ -22,8 +22,10 @@ namespace {
 
 /// The first leads: it goes first, so that a folder whose products are being exchanged does not look
 /// finished.
-constexpr std::array<std::string_view, 7> kPlayProducts = {
-    "summary.json", "frames", "audio.wav", "events.csv", "contacts.csv", "hits.mid", "report.html"};
+constexpr std::array<std::string_view, 16> kPlayProducts = {
+    "summary.json", "frames",       "audio.wav",    "events.csv",     "contacts.csv", "hits.mid",
+    "report.html",  "latency.json", "latency.html", "departures.csv", "samples.csv",  "frames.csv",
+    "notes.csv",    "blocks.csv",   "leads.csv",    "errors.csv"};
 constexpr std::array<std::string_view, 3> kCompareProducts = {"compare.json", "compare.csv", "report.html"};
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& found) {

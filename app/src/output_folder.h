@@ -7,8 +7,9 @@
 
 namespace app {
 
-/// What `play` writes: summary.json, frames, audio.wav, events.csv, contacts.csv, hits.mid, report.html. The
-/// first of a list leads: a folder that has it is a finished run.
+/// What `play` writes: summary.json, frames, audio.wav, events.csv, contacts.csv, hits.mid, report.html, and,
+/// in real time, the measurements (latency.json, latency.html, departures.csv and tables). The first of a
+/// list leads: a folder that has it is a finished run.
 [[nodiscard]] std::span<const std::string_view> play_products();
 /// What `compare` writes: compare.json, compare.csv, report.html.
 [[nodiscard]] std::span<const std::string_view> compare_products();

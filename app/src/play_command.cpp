@@ -7,6 +7,8 @@
 #include "kit.h"
 #include "numbers.h"
 #include "play.h"
+#include "play_realtime.h"
+#include "realtime_arguments.h"
 #include "trace_files.h"
 
 namespace app {
@@ -21,6 +23,8 @@ struct PlayArguments {
     int workers = 1;
     std::int64_t solo = -1;  // none
     bool no_cancel = false, no_frames = false, no_audio = false;
+    bool realtime = false;
+    RealtimeArguments in_time;
 };
 
 PlayOptions options_of(const PlayArguments& a) {
@@ -49,6 +53,13 @@ PlayOptions options_of(const PlayArguments& a) {
     return o;
 }
 
+void print_places(const PlayOptions& options) {
+    fmt::print("Look at {}", (options.out / "report.html").string());
+    if (options.audio) fmt::print(", listen to {}", (options.out / "audio.wav").string());
+    if (options.frames) fmt::print(", see {}", (options.out / "frames").string());
+    fmt::print("\n");
+}
+
 void print_result(const PlayResult& result, const PlayOptions& options) {
     const StrikeScore& s = result.score;
     const int sounded = s.true_contacts - s.missed;
@@ -57,10 +68,30 @@ void print_result(const PlayResult& result, const PlayOptions& options) {
         sounded, s.true_contacts, s.false_notes, s.cancelled,
         sounded > 0 ? fmt::format("{:.1f} ms", s.timing_median_ms) : "unknown (nothing matched)",
         (result.t_end_s - result.t0_s) / result.wall_s);
-    fmt::print("Look at {}", (options.out / "report.html").string());
-    if (options.audio) fmt::print(", listen to {}", (options.out / "audio.wav").string());
-    if (options.frames) fmt::print(", see {}", (options.out / "frames").string());
-    fmt::print("\n");
+    print_places(options);
+}
+
+void play_in_time(const RealtimeOptions& options) {
+    const RealtimeOutcome outcome =
+        play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
+    const StrikeScore& s = outcome.play.score;
+    const RealtimeResult& r = outcome.realtime;
+    const auto missed = std::ranges::count_if(r.frames, [](const FrameTiming& frame) {
+        return frame.asked_for && frame.fate != FrameFate::in_time;
+    });
+    const auto late = std::ranges::count_if(r.notes, [](const NoteTiming& note) { return note.late_s > 0; });
+    const auto unexplained = std::ranges::count_if(
+        outcome.departures, [](const Departure& d) { return d.cause == "unexplained"; });
+    fmt::print(
+        "{:.1f} s in real time: {} strikes of {} sounded, {} false, {} cancelled; {} of {} frames missed, {} "
+        "of {} notes late\n",
+        r.seconds, s.true_contacts - s.missed, s.true_contacts, s.false_notes, s.cancelled, missed,
+        r.frames.size(), late, r.notes.size());
+    if (outcome.offline_strikes > 0)
+        fmt::print("{} strikes offline: {} depart from them here, {} unexplained ({})\n",
+                   outcome.offline_strikes, outcome.departures.size(), unexplained,
+                   (options.play.out / "departures.csv").string());
+    print_places(options.play);
 }
 
 }  // namespace
@@ -96,8 +127,15 @@ void add_play_command(CLI::App& program) {
     play_command->add_flag("--no-cancel", a->no_cancel, "Play every scheduled note, also those of feints");
     play_command->add_flag("--no-frames", a->no_frames, "Draw nothing");
     play_command->add_flag("--no-audio", a->no_audio, "Sound nothing");
+    CLI::Option* realtime = play_command->add_flag(
+        "--realtime", a->realtime, "Play against the wall clock, sensors in processes of their own");
+    for (CLI::Option* option : add_realtime_options(*play_command, a->in_time)) option->needs(realtime);
     play_command->callback([a] {
         const PlayOptions options = options_of(*a);
+        if (a->realtime) {
+            play_in_time(realtime_options(options, a->in_time));
+            return;
+        }
         print_result(play(options), options);
     });
 }

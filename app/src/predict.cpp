@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <iterator>
 #include <memory>
+#include <tuple>
 #include <vector>
 
 #include "predictors.h"
@@ -65,8 +66,8 @@ std::string predict_table(const tracking::Trace& seen, const std::string& specif
             make_any_predictor(picture_specification(specification), leads, seen.sticks[i].name);
         predict_stick(seen.sticks[i], i, *predictor, lead_s, rows);
     }
-    std::stable_sort(rows.begin(), rows.end(),
-                     [](const Row& a, const Row& b) { return a.sample_t_s < b.sample_t_s; });
+    // A stick's times differ. (stable_sort's buffer is not aligned for what holds Eigen's types.)
+    std::ranges::sort(rows, {}, [](const Row& row) { return std::tuple(row.sample_t_s, row.stick); });
     return format_rows(seen, rows);
 }
 

@@ -179,15 +179,10 @@ std::string plot_sections(const PlayResult& result, const fs::path& scratch) {
 }  // namespace
 
 std::string format_report(const PlayResult& result, const fs::path& scratch) {
-    const std::string name = html(fs::path(result.trace).filename().string());
-    std::string page = fmt::format(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
-        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-        "<title>{} on {}: MusicWorld</title>\n<style>{}</style></head>\n<body><main>\n",
-        name, html(result.kit_name), report_style());
-    page += report_heading(result) + report_figures(result) + frames_section(result);
-    page += plot_sections(result, scratch) + report_provenance(result);
-    return page + "</main></body></html>\n";
+    const std::string name = fs::path(result.trace).filename().string();
+    return report_page(fmt::format("{} on {}", name, result.kit_name),
+                       report_heading(result) + report_figures(result) + frames_section(result) +
+                           plot_sections(result, scratch) + report_provenance(result));
 }
 
 }  // namespace app

@@ -1,5 +1,7 @@
 #include "report_style.h"
 
+#include <fmt/format.h>
+
 #include "report_svg.h"
 
 namespace app {
@@ -60,6 +62,23 @@ std::string report_style() {
            "}\n@media screen and "
            "(prefers-color-scheme:dark){:root{--page:#12161b;--card:#1a2027;--ink:#e3e8ee;" +
            css_colours(true) + "}}" + kRules;
+}
+
+std::string report_page(std::string_view title, std::string_view body) {
+    return fmt::format(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+        "<title>{}: MusicWorld</title>\n<style>{}</style></head>\n<body><main>\n{}</main></body></html>\n",
+        html(title), report_style(), body);
+}
+
+std::string report_fact(std::string_view name, std::string_view value) {
+    return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", html(name), html(value));
+}
+
+std::string report_figure(std::string_view value, std::string_view name, std::string_view tone) {
+    return fmt::format("<div style=\"--tone:var(--{})\"><b>{}</b><span>{}</span></div>\n", tone, html(value),
+                       html(name));
 }
 
 }  // namespace app

@@ -7,20 +7,12 @@
 #include <iterator>
 
 #include "report_plots.h"
+#include "report_style.h"
 #include "report_svg.h"
 #include "score_strikes.h"
 
 namespace app {
 namespace {
-
-std::string fact(std::string_view name, std::string_view value) {
-    return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", html(name), html(value));
-}
-
-std::string figure(std::string_view value, std::string_view name, std::string_view tone) {
-    return fmt::format("<div style=\"--tone:var(--{})\"><b>{}</b><span>{}</span></div>\n", tone, html(value),
-                       html(name));
-}
 
 std::string percent(int part, int whole) {
     return whole > 0 ? fmt::format("{:.1f} %", 100.0 * part / whole) : "none";
@@ -70,18 +62,20 @@ std::string report_heading(const PlayResult& r) {
     std::string text =
         fmt::format("<header><h1>{}</h1>\n<p>played on {} by MusicWorld</p>\n<dl class=facts>\n",
                     html(std::filesystem::path(r.trace).filename().string()), html(r.kit_name));
-    text += fact("trace", r.trace);
-    if (!r.trace_source.empty()) text += fact("recorded from", r.trace_source);
-    text += fact("kit", r.kit);
-    text += fact("duration",
-                 fmt::format("{:.3f} s ({:.3f} s to {:.3f} s)", r.t_end_s - r.t0_s, r.t0_s, r.t_end_s));
-    text += fact("pictures predicted by",
-                 fmt::format("{}, {:.1f} ms ahead", r.picture_predictor, r.render_lead_s * 1e3));
-    text += fact("sounds predicted by",
-                 fmt::format("{}, up to {:.1f} ms ahead", r.sound_predictor, r.sound_lead_s * 1e3));
-    text += fact("sounds are fixed", fmt::format("{:.1f} ms before their onset; cancelling is {}",
-                                                 r.release_margin_s * 1e3, r.cancelling ? "on" : "off"));
-    text += fact("frames", fmt::format("{} of {} x {}, {:g} a second", r.frames, r.width, r.height, r.fps));
+    text += report_fact("trace", r.trace);
+    if (!r.trace_source.empty()) text += report_fact("recorded from", r.trace_source);
+    text += report_fact("kit", r.kit);
+    text += report_fact(
+        "duration", fmt::format("{:.3f} s ({:.3f} s to {:.3f} s)", r.t_end_s - r.t0_s, r.t0_s, r.t_end_s));
+    text += report_fact("pictures predicted by",
+                        fmt::format("{}, {:.1f} ms ahead", r.picture_predictor, r.render_lead_s * 1e3));
+    text += report_fact("sounds predicted by",
+                        fmt::format("{}, up to {:.1f} ms ahead", r.sound_predictor, r.sound_lead_s * 1e3));
+    text +=
+        report_fact("sounds are fixed", fmt::format("{:.1f} ms before their onset; cancelling is {}",
+                                                    r.release_margin_s * 1e3, r.cancelling ? "on" : "off"));
+    text += report_fact("frames",
+                        fmt::format("{} of {} x {}, {:g} a second", r.frames, r.width, r.height, r.fps));
     return text + "</dl></header>\n";
 }
 
@@ -92,14 +86,14 @@ std::string report_figures(const PlayResult& r) {
         return matched ? fmt::format("{:.1f} ms", value) : std::string("none");
     };
     std::string text = "<section class=figures>\n";
-    text += figure(fmt::format("{}", s.true_contacts), "true contacts", "contact");
-    text += figure(fmt::format("{}", s.released), "released", "released");
-    text += figure(fmt::format("{}", s.cancelled), "cancelled", "cancelled");
-    text += figure(fmt::format("{}", s.moved), "moved", "axis");
-    text += figure(fmt::format("{}", s.false_notes), "false", "wrong");
-    text += figure(fmt::format("{}", s.missed), "missed", "missed");
-    text += figure(ms(s.timing_median_ms), "median error", "axis");
-    text += figure(ms(s.timing_p95_ms), "95 % error", "axis");
+    text += report_figure(fmt::format("{}", s.true_contacts), "true contacts", "contact");
+    text += report_figure(fmt::format("{}", s.released), "released", "released");
+    text += report_figure(fmt::format("{}", s.cancelled), "cancelled", "cancelled");
+    text += report_figure(fmt::format("{}", s.moved), "moved", "axis");
+    text += report_figure(fmt::format("{}", s.false_notes), "false", "wrong");
+    text += report_figure(fmt::format("{}", s.missed), "missed", "missed");
+    text += report_figure(ms(s.timing_median_ms), "median error", "axis");
+    text += report_figure(ms(s.timing_p95_ms), "95 % error", "axis");
     text += "</section>\n";
     text += fmt::format(
         "<p class=note>Heard: {} of the true contacts. False: {} of the notes, {} after a stroke that turned "

@@ -192,7 +192,7 @@ Score make_score(const std::string& name, const Kit& kit) {
         fmt::format("error: found score \"{}\", expected one of {}", name, fmt::join(score_names(), ", ")));
 }
 
-tracking::Trace synthesise_score(const std::string& name, const Kit& kit, const SensorOptions& sensor) {
+tracking::Trace synthesise_score(const std::string& name, const Kit& kit, const SyntheticSensor& sensor) {
     const Score score = make_score(name, kit);
     tracking::DrummerParameters drummer;
     drummer.rate_hz = sensor.rate_hz;

@@ -28,7 +28,7 @@ struct Score {
 [[nodiscard]] Score make_score(const std::string& name, const Kit& kit);
 
 /// The sensor that a synthetic trace is seen with.
-struct SensorOptions {
+struct SyntheticSensor {
     double rate_hz = 120;
     double noise_mm = 0.25;  ///< standard deviation of position noise, each axis; orientation noise goes with
                              ///< it (4 mrad/mm)
@@ -40,6 +40,6 @@ struct SensorOptions {
 /// source says that it is synthetic. Throws BadInput, and std::invalid_argument where the strokes cannot be
 /// played on this kit.
 [[nodiscard]] tracking::Trace synthesise_score(const std::string& name, const Kit& kit,
-                                               const SensorOptions& sensor);
+                                               const SyntheticSensor& sensor);
 
 }  // namespace app

@@ -18,11 +18,13 @@ struct SensorOptions {
     std::int64_t epoch_ns = 0;  ///< CLOCK_MONOTONIC at which a trace's t0 is due; live times count from it
     double period_s = 0;        ///< a trace begins again this long after it began, > its duration; 0: never
     double stall_at_s = -1, stall_s = 0;  ///< --disturb: a pause of the reader, for tests; < 0: none
+    bool realtime = true;                 ///< real-time scheduling where that is permitted
+    std::string program;                  ///< that has the command `sensor`; empty: this one
 };
 
 /// What happened to a sensor that the user should know.
 struct SensorEvent {
-    enum class Kind { silent, back, restarted, ended, clock_jumped, failed };
+    enum class Kind { silent, back, restarted, ended, clock_jumped, malformed, failed };
     Kind kind = Kind::silent;
     double at_s = 0;  ///< since the epoch
     std::vector<std::string> sticks;
@@ -41,10 +43,12 @@ struct ClockReport {
 /// Starts and watches the sensor processes (one a stick for traces; one for all sticks where a source
 /// delivers them together), each with a reader thread and a filter thread, and keeps the shared memory that
 /// they publish into. The memory has no name left once it is mapped, so nothing stays in /dev/shm however a
-/// process ends. A process that dies is started again. Throws BadInput for a source that cannot be,
-/// std::runtime_error when nothing can be started. One thread.
+/// process ends. A process that dies is started again, at most 5 times in 10 s. One thread.
 class SensorHub {
 public:
+    /// Returns when the sensors are ready (tens of ms), so the epoch should lie that far ahead. Throws
+    /// BadInput for a source, sticks or predictors that cannot be, before anything starts;
+    /// std::runtime_error when a source cannot be opened.
     explicit SensorHub(const SensorOptions& options);
     ~SensorHub();
     SensorHub(const SensorHub&) = delete;

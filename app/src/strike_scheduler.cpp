@@ -41,7 +41,7 @@ void StrikeScheduler::disarm(Approach& a) {
 
 void StrikeScheduler::place_onset(Strike& strike, double s) const {
     // Rounded up, so that the onset never lies nearer to the sample than it may.
-    const double earliest = std::max(strike.contact_s, s + rules_.commit_lead_s);
+    const double earliest = std::max(strike.contact_s, earliest_onset(s));
     strike.onset_sample = static_cast<std::int64_t>(std::ceil((earliest - rules_.t0_s) * audio::kSampleRate));
     strike.onset_s = rules_.t0_s + static_cast<double>(strike.onset_sample) / audio::kSampleRate;
 }
@@ -57,9 +57,11 @@ void StrikeScheduler::release(std::uint64_t id) {
     released_.push_back(id);
 }
 
-void StrikeScheduler::advance_to(double s) {
+void StrikeScheduler::advance_to(double s, double fixed_s) {
+    fixed_s_ = fixed_s;
+    const double until = std::max(s + rules_.release_margin_s, fixed_s);
     for (Approach& a : approaches_) {
-        const auto fixed = [&](std::uint64_t id) { return strike(id).onset_s < s + rules_.release_margin_s; };
+        const auto fixed = [&](std::uint64_t id) { return strike(id).onset_s < until; };
         bool any = false;
         for (const std::uint64_t id : a.pending)
             if (fixed(id)) release(id), any = true;
@@ -111,7 +113,7 @@ std::vector<StrikeScheduler::Candidate> StrikeScheduler::candidates(
         // A path that goes right through a thin body and turns back into it from behind is no second stroke.
         if (i > 0 && contact.normal_world.dot(contacts[0].normal_world) <= 0) continue;
         if (contact.zone < 0 || contact.speed_mps < rules_.minimum_speed_mps) continue;
-        const double onset = std::max(contact.t_s, s + rules_.commit_lead_s);
+        const double onset = std::max(contact.t_s, earliest_onset(s));
         const double happened = i == 0 && a.entered_s ? std::min(*a.entered_s, contact.t_s) : contact.t_s;
         result.push_back({&contact, happened, onset - happened > rules_.late_s});
     }

@@ -1,6 +1,7 @@
 #pragma once
 #include <sim/simulation.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -44,8 +45,10 @@ class StrikeScheduler {
 public:
     StrikeScheduler(const StrikeRules& rules, std::size_t sticks, std::size_t instruments);
 
-    /// Before the samples at s: releases the notes whose release point lies before s.
-    void advance_to(double s);
+    /// Before the samples at s: releases the notes whose release point lies before s. Notes before `fixed_s`
+    /// are sounding already (in real time, when a sample comes late): they are released, too, and none is
+    /// placed there.
+    void advance_to(double s, double fixed_s = -std::numeric_limits<double>::infinity());
     /// The filter of `stick` starts anew: its next sample is a first sample.
     void restart(std::uint32_t stick);
     /// The sample of `stick` at time s.
@@ -97,6 +100,10 @@ private:
                                                     std::span<const sim::Contact> contacts) const;
     void create(Approach& a, double s, std::uint32_t stick, const sim::Contact& contact);
     void update(Strike& strike, double s, const sim::Contact& contact);
+    /// Earliest onset that the sample at s may ask for.
+    [[nodiscard]] double earliest_onset(double s) const {
+        return std::max(s + rules_.commit_lead_s, fixed_s_);
+    }
     void place_onset(Strike& strike, double s) const;
     [[nodiscard]] bool is_committed(const Strike& strike, double s) const;
     /// Whether a candidate may be the strike's own contact. A note whose time stands is not borne out by a
@@ -109,6 +116,7 @@ private:
 
     StrikeRules rules_;
     std::size_t instruments_;
+    double fixed_s_ = -std::numeric_limits<double>::infinity();
     std::uint32_t model_ = 0;           // of the sample at hand
     std::vector<Approach> approaches_;  // stick-major
     std::vector<int> samples_since_start_;

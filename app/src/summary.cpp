@@ -39,9 +39,9 @@ Json inputs(const std::vector<InputFile>& files) {
 
 }  // namespace
 
-std::string format_summary(const PlayResult& r) {
+std::string format_summary(const PlayResult& r, const std::string& realtime_json) {
     const double duration_s = r.t_end_s - r.t0_s;
-    const Json summary = {
+    Json summary = {
         {"trace", r.trace},
         {"kit", r.kit},
         {"duration_s", duration_s},
@@ -71,6 +71,7 @@ std::string format_summary(const PlayResult& r) {
         {"clipped_samples", r.clipped_samples},
         {"wall_s", r.wall_s},
     };
+    if (!realtime_json.empty()) summary["realtime"] = Json::parse(realtime_json);
     // File names are bytes: what is not UTF-8 in them becomes U+FFFD.
     return summary.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

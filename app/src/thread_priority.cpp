@@ -50,4 +50,10 @@ std::string set_thread_priority(ThreadRole role, bool realtime) {
     return "nice 0";
 }
 
+void leave_thread_priority() {
+    const sched_param parameter{};
+    (void)sched_setscheduler(0, SCHED_OTHER, &parameter);
+    (void)setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), 0);
+}
+
 }  // namespace app

@@ -12,4 +12,7 @@ enum class ThreadRole { sound, sensing, control, simulation, drawing, writing };
 /// never SCHED_FIFO. Says what was obtained ("SCHED_FIFO 70", "nice 10").
 std::string set_thread_priority(ThreadRole role, bool realtime);
 
+/// Back to ordinary scheduling, nice 0.
+void leave_thread_priority();
+
 }  // namespace app

@@ -24,7 +24,7 @@ struct SynthArguments {
 };
 
 void synthesise_file(const SynthArguments& a) {
-    SensorOptions sensor;
+    SyntheticSensor sensor;
     sensor.rate_hz = parse_number(a.rate, "--rate");
     sensor.noise_mm = parse_number(a.noise, "--noise");
     sensor.seed = a.seed;

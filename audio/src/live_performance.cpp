@@ -57,6 +57,10 @@ int LivePerformance::block_size() const {
     return implementation_->thread.start_up().block_size;
 }
 
+BlockCount LivePerformance::block_count() const noexcept {
+    return implementation_->thread.counts().blocks;
+}
+
 std::uint64_t LivePerformance::refused_changes() const {
     return implementation_->thread.counts().refused;
 }

@@ -99,7 +99,9 @@ std::vector<float> LiveThread::finish(std::int64_t minimum_samples, std::int64_t
 }
 
 LiveThread::Counts LiveThread::counts() const noexcept {
-    return {refused_.load(std::memory_order_relaxed), overflows_.load(std::memory_order_relaxed)};
+    return {refused_.load(std::memory_order_relaxed),
+            overflows_.load(std::memory_order_relaxed),
+            {blocks_done_.load(std::memory_order_relaxed), blocks_late_.load(std::memory_order_relaxed)}};
 }
 
 bool LiveThread::send(const LiveCommand& command) noexcept {
@@ -186,14 +188,21 @@ bool LiveThread::wait_until(std::int64_t planned_ns) {
 
 void LiveThread::play_block(std::int64_t planned_ns) {
     BlockTiming timing{.planned_ns = planned_ns, .started_ns = monotonic_ns()};
-    const std::int64_t end = renderer_->position() + renderer_->block_size();
+    const std::int64_t begin = renderer_->position();
+    const std::int64_t end = begin + renderer_->block_size();
     fixed_sample_.store(end, std::memory_order_seq_cst);  // before the queue is read: see the header
     read_commands();
     start_notes_before(end);
     renderer_->render_block(output_);
-    if (on_device_) jack_->publish(renderer_->position());
+    if (on_device_) jack_->publish(end);
     timing.done_ns = monotonic_ns();
+    note_timing(timing, epoch_ns_ + samples_ns(begin));
+}
+
+void LiveThread::note_timing(const BlockTiming& timing, std::int64_t due_ns) noexcept {
     timings_.push_back(timing);
+    if (timing.done_ns > due_ns) blocks_late_.fetch_add(1, std::memory_order_relaxed);
+    blocks_done_.fetch_add(1, std::memory_order_relaxed);
     measure_busy();
 }
 

@@ -39,6 +39,7 @@ public:
 
     struct Counts {
         std::uint64_t refused = 0, overflows = 0;
+        BlockCount blocks;
     };
 
     /// Returns when all is prepared; throws what went wrong meanwhile.
@@ -79,6 +80,7 @@ private:
     void start_notes_before(std::int64_t end);
     [[nodiscard]] std::int64_t send_stroke(const Note& note) noexcept;
     void answer(const PlayedNote& note) noexcept;
+    void note_timing(const BlockTiming& timing, std::int64_t due_ns) noexcept;
     void measure_busy() noexcept;
     void set_state(State state) noexcept;
 
@@ -94,7 +96,7 @@ private:
     std::int64_t minimum_samples_ = 0, tail_samples_ = 0;  // written before `finishing`
     std::atomic<std::int64_t> fixed_sample_{0};
     std::atomic<bool> failed_{false};
-    std::atomic<std::uint64_t> overflows_{0}, refused_{0};
+    std::atomic<std::uint64_t> overflows_{0}, refused_{0}, blocks_done_{0}, blocks_late_{0};
     std::atomic<double> busy_s_{0};
     std::promise<StartUp> prepared_;
     std::promise<std::vector<float>> recording_;

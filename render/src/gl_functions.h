@@ -31,6 +31,7 @@ namespace render {
     X(PFNGLDRAWELEMENTSPROC, DrawElements)                                     \
     X(PFNGLENABLEPROC, Enable)                                                 \
     X(PFNGLENABLEVERTEXATTRIBARRAYPROC, EnableVertexAttribArray)               \
+    X(PFNGLFINISHPROC, Finish)                                                 \
     X(PFNGLFRAMEBUFFERRENDERBUFFERPROC, FramebufferRenderbuffer)               \
     X(PFNGLFRAMEBUFFERTEXTURE2DPROC, FramebufferTexture2D)                     \
     X(PFNGLFRONTFACEPROC, FrontFace)                                           \

@@ -45,7 +45,7 @@ SceneDescription checked(const SceneDescription& scene) {
 struct Renderer::Implementation {
     explicit Implementation(const SceneDescription& description);
 
-    void draw(const FrameState& frame, Image& image);
+    DrawTimes draw(const FrameState& frame, Image& image);
     void set_uniforms(const GlProgram& program) const;
 
     SceneDescription scene;
@@ -114,7 +114,7 @@ void Renderer::Implementation::set_uniforms(const GlProgram& program) const {
     program.set("fill_light", Eigen::Vector3f(0.07f, 0.085f, 0.13f));
 }
 
-void Renderer::Implementation::draw(const FrameState& frame, Image& image) {
+DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) {
     context.make_current();
     geometry.update(frame, scene.camera.eye);
     gl.Enable(GL_DEPTH_TEST);
@@ -137,7 +137,12 @@ void Renderer::Implementation::draw(const FrameState& frame, Image& image) {
     gl.Disable(GL_DEPTH_TEST);
     picture.begin_background(kObjectsUnit);
     stage.draw(geometry.volume_balls(shaders::kMaxBalls));
+    DrawTimes times;
+    gl.Finish();
+    times.drawn = std::chrono::steady_clock::now();
     picture.read(image);
+    times.read = std::chrono::steady_clock::now();
+    return times;
 }
 
 Renderer::Renderer(const SceneDescription& scene)
@@ -145,8 +150,8 @@ Renderer::Renderer(const SceneDescription& scene)
 
 Renderer::~Renderer() = default;
 
-void Renderer::draw(const FrameState& frame, Image& image) {
-    implementation_->draw(frame, image);
+DrawTimes Renderer::draw(const FrameState& frame, Image& image) {
+    return implementation_->draw(frame, image);
 }
 
 std::string Renderer::version() const {

@@ -18,7 +18,7 @@ public:
 
     StepReply step(const StepRequest& request) override {
         check_request(request, bodies_.size());
-        if (stepped_ && request.t_s < last_t_s_)
+        if (stepped_ && !request.anew && request.t_s < last_t_s_)
             throw std::invalid_argument("request.t_s is before the last step's");
         for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].step(request, outcomes_[i]);
         stepped_ = true;

@@ -10,7 +10,7 @@ namespace sim {
 namespace {
 
 constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'M'};
-constexpr std::uint16_t kVersion = 1;
+constexpr std::uint16_t kVersion = 2;
 constexpr std::size_t kHeaderBytes = 12, kChecksumBytes = 4;
 constexpr std::size_t kSmallestAssignment = 400, kRecordBytes = 120;
 constexpr std::uint32_t kMostBodies = 1u << 20;

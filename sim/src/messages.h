@@ -14,7 +14,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSM"
-//   4       2      version, 1
+//   4       2      version, 2
 //   6       2      type
 //   8       4      length of the whole message
 //   12      ...    body, by type
@@ -38,11 +38,11 @@ namespace sim {
 //               flag hinged, v3 pivot, v3 axis, f64 frequency damping, f64 rotation[9] by columns, v3
 //               translation, f64 stick mass, f64 restitution, list of zone {text name, f64 min radius, max
 //               radius, min height, max height}
-//   request     f64 t_s, list of impulse (folded), list of impulse (confirmed), list of path, list of picture
-//   request impulse     60 bytes: u32 body, f64 t_s, v3 point, v3 impulse path        u32 stick, f64 tip
-//   radius, list of node {f64 t_s, v3 position, v3 velocity} picture request  f64 t_s, list of {impulse, f64
-//   weight} contact     u32 path, u32 stick, f64 t_s, flag starts inside, f64 depth, f64 speed, i32 zone, v3
-//   point_world, v3 normal_world,
+//   request     f64 t_s, flag anew, list of impulse (folded), list of impulse (confirmed), list of path, list
+//   of picture request impulse     60 bytes: u32 body, f64 t_s, v3 point, v3 impulse path        u32 stick,
+//   f64 tip radius, list of node {f64 t_s, v3 position, v3 velocity} picture request  f64 t_s, list of
+//   {impulse, f64 weight} contact     u32 path, u32 stick, f64 t_s, flag starts inside, f64 depth, f64 speed,
+//   i32 zone, v3 point_world, v3 normal_world,
 //               v3 point_body, v3 impulse_body
 //
 // Decoders check length, checksum, counts, flags, text lengths, that every number is finite and in the range

@@ -174,6 +174,7 @@ BodyDefinition read_definition(ByteReader& in) {
 
 void write(ByteWriter& out, const StepRequest& request) {
     out.number(request.t_s);
+    out.number(static_cast<std::uint8_t>(request.anew));
     write(out, request.folded);
     write(out, request.confirmed);
     out.count(request.paths.size());
@@ -201,6 +202,7 @@ void write(ByteWriter& out, const StepRequest& request) {
 StepRequest read_request(ByteReader& in) {
     StepRequest request;
     request.t_s = in.number<double>();
+    request.anew = in.flag();
     request.folded = read_impulses(in);
     request.confirmed = read_impulses(in);
     request.paths.resize(in.count(16));

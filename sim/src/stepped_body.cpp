@@ -60,6 +60,7 @@ void SteppedBody::sweep(const StepRequest& request, BodyOutcome& outcome) {
 }
 
 void SteppedBody::step(const StepRequest& request, BodyOutcome& outcome) {
+    if (request.anew) record_ = {};
     const auto mine = [this](const Impulse& impulse) { return impulse.body == index_; };
     const bool changes =
         !record_.stepped || request.t_s != record_.t_s || std::ranges::any_of(request.folded, mine);

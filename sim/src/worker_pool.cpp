@@ -91,7 +91,7 @@ WorkerPool::~WorkerPool() {
 
 StepReply WorkerPool::step(const StepRequest& request) {
     check_request(request, definitions_.size());
-    if (step_ > 0 && request.t_s < last_t_s_)
+    if (step_ > 0 && !request.anew && request.t_s < last_t_s_)
         throw std::invalid_argument("request.t_s is before the last step's");
     receive(0ms);
     request_ = nullptr;

@@ -221,7 +221,7 @@ TEST(KitFit, TheWrittenKitIsValidAndItsHeadLiesTheTipsRadiusBelowTheMetSurface) 
 
 TEST(KitFit, OnTheTraceOfABundledScoreEveryStrokeOnAFittedHeadIsATrueContact) {
     const Kit drums = read_kit(find_kit("drums"));
-    SensorOptions sensor;
+    SyntheticSensor sensor;
     sensor.rate_hz = 240;
     const tracking::Trace trace = synthesise_score("roll", drums, sensor);
     const StickGeometry geometry = stick_geometry(trace, {}, {}, {});

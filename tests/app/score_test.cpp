@@ -131,7 +131,7 @@ double turned_before_contact_s(const TipTrack& track, const tracking::Stroke& fe
 TEST(Score, HalfOfFeintsAreFeintsAndHalfOfThoseTurn25MillisecondsOrMoreBeforeTheRelease) {
     const Kit kit = drums();
     const Score score = make_score("feints", kit);
-    SensorOptions fine;
+    SyntheticSensor fine;
     fine.rate_hz = 1000;
     fine.noise_mm = 0;
     const tracking::Trace trace = synthesise_score("feints", kit, fine);
@@ -178,7 +178,7 @@ TEST(Score, RollHasSinglesAt6To8HertzAHandAndPassagesAt15) {
 
 TEST(Score, AnotherSeedChangesTheNoiseOnlyAndNoNoiseLeavesNone) {
     const Kit kit = drums();
-    SensorOptions first, second, clean;
+    SyntheticSensor first, second, clean;
     second.seed = 2;
     clean.noise_mm = 0;
     const tracking::Trace a = synthesise_score("roll", kit, first), b = synthesise_score("roll", kit, second),

@@ -20,6 +20,7 @@ public:
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override;
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
+    [[nodiscard]] std::optional<Motion> motion() const noexcept override { return steady_motion(pose_); }
 
 private:
     SampleClock clock_;
@@ -34,6 +35,7 @@ public:
         return rates_.after(lead_s);
     }
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
+    [[nodiscard]] std::optional<Motion> motion() const noexcept override { return steady_motion(rates_.now); }
 
 private:
     SampleClock clock_;
@@ -53,6 +55,7 @@ public:
         return rates_.after(lead_s);
     }
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
+    [[nodiscard]] std::optional<Motion> motion() const noexcept override { return steady_motion(rates_.now); }
 
 private:
     SampleClock clock_;

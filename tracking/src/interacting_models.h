@@ -39,6 +39,7 @@ public:
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
     /// That of the mixture, moved on while the modes go on switching in steps like the newest.
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
+    [[nodiscard]] std::optional<Motion> motion() const noexcept override { return rotation_.motion(mean_); }
 
     using Probabilities = std::array<double, kModes>;
     [[nodiscard]] const Probabilities& probabilities() const noexcept { return modes_.mu; }

@@ -27,6 +27,9 @@ public:
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override;
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
+    [[nodiscard]] std::optional<Motion> motion() const noexcept override {
+        return rotation_.motion(position_.now().x);
+    }
 
     [[nodiscard]] const PositionFilter& position() const noexcept { return position_; }
 

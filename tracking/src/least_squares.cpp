@@ -58,6 +58,22 @@ void LeastSquares::fit() noexcept {
     coefficients_.topRows(terms) = Eigen::HouseholderQR<Design>(design).solve(values);
 }
 
+std::optional<Motion> LeastSquares::motion() const noexcept {
+    if (degree_ > 2) return std::nullopt;
+    const Eigen::Matrix<double, 1, 6> slope = coefficients_.row(1) / span_s_;
+    const Eigen::Matrix<double, 1, 6> bend = 2 * coefficients_.row(2) / (span_s_ * span_s_);
+    const PoseSample& newest = window_.back(0);
+    Motion motion;
+    motion.position = newest.position + coefficients_.row(0).head<3>().transpose();
+    motion.velocity = slope.head<3>();
+    motion.acceleration = bend.head<3>();
+    motion.orientation = newest.orientation;
+    motion.turn = coefficients_.row(0).tail<3>();
+    motion.angular_velocity = slope.tail<3>();
+    motion.angular_acceleration = bend.tail<3>();
+    return motion;
+}
+
 PosePrediction LeastSquares::predict(double lead_s) const noexcept {
     const double t = lead_s / span_s_;
     Eigen::Matrix<double, 1, 6> value = coefficients_.row(kMostDegree);

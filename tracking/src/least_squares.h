@@ -21,6 +21,8 @@ public:
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override;
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
+    /// None for degree 3.
+    [[nodiscard]] std::optional<Motion> motion() const noexcept override;
 
 private:
     /// The stick stood still before its first sample: copies of it at earlier times, `dt` apart.

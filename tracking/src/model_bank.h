@@ -40,6 +40,10 @@ public:
     /// the last kEvidence samples say: sum_i w_i (P_i + d_i d_i^T), d_i from the selected prediction to the
     /// model's.
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
+    /// That of the selected model.
+    [[nodiscard]] std::optional<Motion> motion() const noexcept override {
+        return rotation_[selected_].motion(position_[selected_].now().x);
+    }
     [[nodiscard]] std::size_t models() const noexcept override { return kModels; }
     [[nodiscard]] std::size_t selected() const noexcept override { return selected_; }
     [[nodiscard]] PosePrediction predict_model(std::size_t index, double lead_s) const noexcept override;

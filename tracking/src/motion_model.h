@@ -1,8 +1,10 @@
 #pragma once
 #include <Eigen/Core>
+#include <utility>
 #include <variant>
 
 #include "axis_state.h"
+#include "tracking/motion.h"
 
 namespace tracking {
 
@@ -71,6 +73,14 @@ struct MotionModel {
     /// Both, exact: Q is the integral of F(s) g g^T F(s)^T q over [0, dt], g the place where the noise
     /// enters.
     [[nodiscard]] MotionStep step(double dt) const noexcept;
+    /// How the transition goes on, and the rate of its decay [1/s].
+    [[nodiscard]] std::pair<MotionLaw, double> law() const noexcept {
+        if (const auto* singer = std::get_if<Singer>(&kind))
+            return {MotionLaw::decaying_acceleration, singer->alpha};
+        if (const auto* decaying = std::get_if<DecayingVelocity>(&kind))
+            return {MotionLaw::decaying_velocity, decaying->decay};
+        return {MotionLaw::constant, 0};
+    }
     [[nodiscard]] AxisMatrix<double> initial_covariance() const noexcept {
         return {initial_variance.x(), 0, 0, initial_variance.y(), 0, initial_variance.z()};
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "tracking/rotation.h"
 
@@ -91,9 +92,20 @@ bool RotationFilter::is_beyond_half_a_turn() const noexcept {
 }
 
 void RotationFilter::look_ahead(double lead_s, PosePrediction& pose) const noexcept {
-    const AxisStates ahead = model_.transition(lead_s) * rates_;
-    pose.orientation = (exponential(ahead.p.head<3>()) * q_).normalized();
-    pose.angular_velocity = ahead.v.head<3>();
+    set_rotation(pose, model_.transition(lead_s) * rates_, q_);
+}
+
+Motion RotationFilter::motion(const AxisStates& point) const noexcept {
+    Motion motion;
+    motion.position = point.p.head<3>();
+    motion.velocity = point.v.head<3>();
+    motion.acceleration = point.a.head<3>();
+    motion.orientation = q_;
+    motion.turn = rates_.p.head<3>();
+    motion.angular_velocity = rates_.v.head<3>();
+    motion.angular_acceleration = rates_.a.head<3>();
+    std::tie(motion.law, motion.rate) = model_.law();
+    return motion;
 }
 
 double RotationFilter::variance_after(double lead_s) const noexcept {

@@ -3,6 +3,7 @@
 
 #include "motion_model.h"
 #include "outlier_gate.h"
+#include "pose_of_states.h"
 #include "tracking/predictor.h"
 
 namespace tracking {
@@ -44,12 +45,12 @@ public:
     /// The pose a lead ahead of a point whose state is then `ahead`. Without any orientation so far it has
     /// the identity and no turning.
     [[nodiscard]] PosePrediction pose(const AxisStates& ahead, double lead_s) const noexcept {
-        PosePrediction pose;
-        pose.position = ahead.p.head<3>();
-        pose.velocity = ahead.v.head<3>();
+        PosePrediction pose = pose_of_point(ahead);
         if (started_) look_ahead(lead_s, pose);
         return pose;
     }
+    /// What pose() depends on where the point's state is now `point`, under the same model.
+    [[nodiscard]] Motion motion(const AxisStates& point) const noexcept;
     /// Variance of the predicted orientation about each axis [rad^2]; pi^2/3 (any angle) before the first
     /// measurement.
     [[nodiscard]] double variance_after(double lead_s) const noexcept;

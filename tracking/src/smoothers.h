@@ -20,6 +20,7 @@ public:
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override;
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
+    [[nodiscard]] std::optional<Motion> motion() const noexcept override { return steady_motion(predict(0)); }
 
 private:
     SampleClock clock_;
@@ -50,6 +51,7 @@ public:
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override;
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
+    [[nodiscard]] std::optional<Motion> motion() const noexcept override { return steady_motion(smoothed_); }
 
 private:
     [[nodiscard]] double share_at_speed(double speed_mps, double dt) const noexcept;

@@ -4,6 +4,7 @@
 
 #include "text_cursor.h"
 #include "tracking/trace.h"
+#include "tracking/trace_rows.h"
 
 namespace tracking {
 namespace {
@@ -29,7 +30,7 @@ std::string axis_name(const Eigen::Vector3d& shaft) {
         "found a shaft that is not an axis of the body, expected one of +x, -x, +y, -y, +z, -z");
 }
 
-std::string keys_of(const Trace& trace) {
+std::string format_keys(const Trace& trace) {
     if (first_unprintable(trace.source) != std::string::npos)
         throw std::invalid_argument(
             "found control characters in a trace's source, expected one line of text");
@@ -73,8 +74,16 @@ void require_word(const std::string& name) {
 
 }  // namespace
 
+std::string format_trace_head(const Trace& keys, bool oriented) {
+    return format_keys(keys) + (oriented ? "t,stick,px,py,pz,qw,qx,qy,qz\n" : "t,stick,px,py,pz\n");
+}
+
+void append_trace_row(std::string& text, const std::string& stick, const PoseSample& sample, bool oriented) {
+    require_word(stick);
+    append_row(text, stick, sample, oriented);
+}
+
 std::string format_trace(const Trace& trace) {
-    std::string out = keys_of(trace);
     bool oriented = false;
     std::size_t rows = 0;
     for (const StickTrace& stick : trace.sticks) {
@@ -83,7 +92,7 @@ std::string format_trace(const Trace& trace) {
         oriented = oriented || std::any_of(stick.samples.begin(), stick.samples.end(),
                                            [](const PoseSample& sample) { return sample.has_orientation; });
     }
-    out += oriented ? "t,stick,px,py,pz,qw,qx,qy,qz\n" : "t,stick,px,py,pz\n";
+    std::string out = format_trace_head(trace, oriented);
     out.reserve(out.size() + rows * 160);
     std::vector<std::size_t> next(trace.sticks.size(), 0);
     for (; rows > 0; --rows) {

@@ -27,6 +27,12 @@ struct BlockTiming {
     std::int64_t planned_ns = 0, started_ns = 0, done_ns = 0;
 };
 
+/// How many blocks of real time there were so far, and how many were done only after their first sample was
+/// due.
+struct BlockCount {
+    std::uint64_t all = 0, late = 0;
+};
+
 /// A note that was sounded.
 struct PlayedNote {
     std::uint64_t id = 0;
@@ -83,7 +89,8 @@ public:
     /// After finish(); the counts at any time.
     [[nodiscard]] std::span<const BlockTiming> blocks() const;  ///< those of real time
     [[nodiscard]] int block_size() const;
-    [[nodiscard]] std::uint64_t refused_changes() const;  ///< cancels and moves that came too late
+    [[nodiscard]] BlockCount block_count() const noexcept;  ///< any thread
+    [[nodiscard]] std::uint64_t refused_changes() const;    ///< cancels and moves that came too late
     [[nodiscard]] std::uint64_t queue_overflows()
         const;  ///< commands and answers for which there was no room
     [[nodiscard]] std::uint64_t device_underruns() const;    ///< JACK asked for samples that were not there

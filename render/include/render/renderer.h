@@ -1,9 +1,15 @@
 #pragma once
+#include <chrono>
 #include <memory>
 
 #include "render/scene.h"
 
 namespace render {
+
+/// When a frame was drawn (all commands done), and when its pixels were in memory.
+struct DrawTimes {
+    std::chrono::steady_clock::time_point drawn, read;
+};
 
 /// Draws a scene off screen with OSMesa. Owns the one context of its thread: construct, use and destroy it on
 /// one thread. Throws std::runtime_error ("FILE: error: found ..., expected ...") for a mesh that is missing,
@@ -16,7 +22,7 @@ public:
     Renderer& operator=(const Renderer&) = delete;
 
     /// Draws one frame. The same state gives the same bytes.
-    void draw(const FrameState& frame, Image& image);
+    DrawTimes draw(const FrameState& frame, Image& image);
 
     /// "OSMesa 22.3.6, llvmpipe ..." for reports.
     [[nodiscard]] std::string version() const;

@@ -66,7 +66,8 @@ struct StepRequest {
         folded;  ///< impulses that become part of the bodies' exact states; t_s <= this step's time
     std::vector<Impulse> confirmed;  ///< fixed but not yet folded: contacts feel them from their time on
     std::vector<TipPath> paths;
-    std::vector<PictureRequest> pictures;
+    std::vector<PictureRequest> pictures = {};
+    bool anew = false;  ///< the bodies are at rest before this step, which may have any time
 };
 
 struct StepReply {

@@ -5,17 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "tracking/motion.h"
 #include "tracking/trace.h"
 
 namespace tracking {
-
-/// The pose expected a lead after the newest sample. World frame, SI.
-struct PosePrediction {
-    Eigen::Vector3d position = Eigen::Vector3d::Zero();
-    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< d position / d lead [m/s]
-    Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-    Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< world frame [rad/s]
-};
 
 /// Covariance of the errors of a prediction as the estimator itself states it. World frame.
 struct PoseCovariance {
@@ -45,6 +38,9 @@ public:
     [[nodiscard]] virtual std::optional<PoseCovariance> covariance(double /*lead_s*/) const noexcept {
         return std::nullopt;
     }
+    /// What predict() depends on, as a value: motion()->after(lead_s) is predict(lead_s). None where a Motion
+    /// cannot say it: polynomials of degree 3, programs of one's own.
+    [[nodiscard]] virtual std::optional<Motion> motion() const noexcept { return std::nullopt; }
 
     /// Several models in parallel (3.25-3.28): how many, which one predict() speaks for, and what model
     /// `index` alone predicts. An estimator of one model has only itself.

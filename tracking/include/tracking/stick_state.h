@@ -2,6 +2,7 @@
 #include <cstdint>
 
 #include "tracking/motion.h"
+#include "tracking/newest_value.h"
 
 namespace tracking {
 
@@ -21,6 +22,14 @@ struct StickState {
     Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< measured, of the tracked body [m]
     Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
     Motion picture, sound, confirming;  ///< of the three filters (confirming: only where there is one)
+    /// Time of the newest sample that the filters for pictures and for confirmation took; t_s, unless their
+    /// gates refused that one.
+    double picture_t_s = 0, confirming_t_s = 0;
+    std::uint64_t model = 0;  ///< which of its models the sound's filter has selected
 };
+
+/// Numbers and arrays of numbers.
+template <>
+inline constexpr bool kCopiesAsBytes<StickState> = true;
 
 }  // namespace tracking

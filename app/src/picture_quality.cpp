@@ -1,0 +1,93 @@
+#include "picture_quality.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+
+namespace app {
+namespace {
+
+constexpr std::size_t kRecentFrames = 8, kLateFrames = 3;
+constexpr std::size_t kRecentBlocks = 200;
+constexpr double kLateBlocks = 0.05;
+constexpr double kShareOfFrame = 0.6;
+constexpr double kLeastWaitS = 4, kLongestWaitS = 64;
+constexpr double kNewest = 0.2;  // weight of the newest drawing time
+
+}  // namespace
+
+const std::vector<QualityLevel>& quality_levels() {
+    static const std::vector<QualityLevel> levels = {
+        {"4 samples a pixel, shadows", 4, 512, 1, 1}, {"1 sample a pixel, shadows", 1, 512, 1, 1},
+        {"1 sample a pixel, no shadows", 1, 0, 1, 1}, {"half the size, no shadows", 1, 0, 2, 1},
+        {"half the size, half the rate", 1, 0, 2, 2}, {"half the size, a quarter of the rate", 1, 0, 2, 4},
+    };
+    return levels;
+}
+
+QualityRule::QualityRule(double frame_s, std::vector<double> draw_s)
+    : frame_s_(frame_s), draw_s_(std::move(draw_s)) {
+    const auto fits = [&](std::size_t level) {
+        return draw_s_[level] < kShareOfFrame * frame_s_ * quality_levels()[level].rate_divisor;
+    };
+    while (level_ + 1 < draw_s_.size() && !fits(level_)) ++level_;
+}
+
+bool QualityRule::wants(std::uint64_t index) const {
+    return index % static_cast<std::uint64_t>(quality_levels()[level_].rate_divisor) == 0;
+}
+
+std::optional<std::string> QualityRule::lower(double at_s, const std::string& why) {
+    quiet_since_s_ = at_s;
+    late_.clear();
+    blocks_.clear();
+    if (level_ + 1 == draw_s_.size()) return std::nullopt;
+    // A rise that did not last is not tried again so soon.
+    wait_s_ = at_s - raised_at_s_ < kLongestWaitS ? std::min(2 * wait_s_, kLongestWaitS) : kLeastWaitS;
+    ++level_;
+    return fmt::format("{}: pictures go down to {}", why, quality_levels()[level_].name);
+}
+
+std::optional<std::string> QualityRule::frame(double at_s, bool in_time, double draw_s) {
+    if (draw_s >= 0) draw_s_[level_] += kNewest * (draw_s - draw_s_[level_]);
+    late_.push_back(!in_time);
+    if (late_.size() > kRecentFrames) late_.pop_front();
+    if (!in_time) {
+        quiet_since_s_ = at_s;
+        const auto late = std::count(late_.begin(), late_.end(), true);
+        if (late >= static_cast<std::ptrdiff_t>(kLateFrames))
+            return lower(at_s, fmt::format("{} of the last {} frames were late", late, late_.size()));
+    }
+    if (level_ == 0 || at_s - quiet_since_s_ < wait_s_) return std::nullopt;
+    const QualityLevel& better = quality_levels()[level_ - 1];
+    // What it would take, as far as drawing has become slower since its trial.
+    if (draw_s_[level_ - 1] >= kShareOfFrame * frame_s_ * better.rate_divisor) {
+        // The trial may have met a busy moment: believe it less with time.
+        draw_s_[level_ - 1] *= 0.98;
+        quiet_since_s_ = at_s - wait_s_ + 1;
+        return std::nullopt;
+    }
+    --level_;
+    raised_at_s_ = quiet_since_s_ = at_s;
+    late_.clear();
+    return fmt::format("nothing was late for {:.0f} s: pictures go up to {}", wait_s_,
+                       quality_levels()[level_].name);
+}
+
+std::optional<std::string> QualityRule::blocks(double at_s, std::size_t count, std::size_t late) {
+    if (count == 0) return std::nullopt;
+    blocks_.emplace_back(count, late);
+    std::size_t total = 0, bad = 0;
+    for (const auto& [n, l] : blocks_) total += n, bad += l;
+    while (total - blocks_.front().first >= kRecentBlocks) {
+        total -= blocks_.front().first, bad -= blocks_.front().second;
+        blocks_.pop_front();
+    }
+    if (total < kRecentBlocks || static_cast<double>(bad) < kLateBlocks * static_cast<double>(total))
+        return std::nullopt;
+    return lower(at_s, fmt::format("{} of {} blocks of sound were late", bad, total));
+}
+
+}  // namespace app

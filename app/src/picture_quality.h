@@ -1,0 +1,56 @@
+#pragma once
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace app {
+
+/// One level of picture quality, the dearest first.
+struct QualityLevel {
+    std::string name;
+    int samples = 4;          ///< of multisampling, 1: none
+    int shadow_texels = 512;  ///< 0: no shadows
+    int size_divisor = 1;     ///< drawn smaller by this, and enlarged
+    int rate_divisor = 1;     ///< every so-many-th frame only
+};
+
+[[nodiscard]] const std::vector<QualityLevel>& quality_levels();
+
+/// Lowers the quality of pictures, then their rate, before the sound suffers, and raises it again. The rule:
+///
+///   lower   when 3 of the last 8 frames that were asked for were late or skipped, or when 5 % of the last
+///   200
+///           blocks of sound were late beyond what their lead allows
+///   raise   when for 4 s nothing was late and the next better level, by the times that it took when it was
+///           drawn last, would need less than 0.6 of the time between two frames; after a rise that
+///           had to be taken back, the wait doubles (up to 64 s)
+///
+/// Pure: times come from outside.
+class QualityRule {
+public:
+    /// `frame_s`: time between two frames; `draw_s`: what drawing a frame took at each level in a trial.
+    /// Begins at the best level that needs less than 0.6 of the time between two frames.
+    QualityRule(double frame_s, std::vector<double> draw_s);
+
+    [[nodiscard]] std::size_t level() const { return level_; }
+    /// Whether frame `index` is drawn at the level's rate.
+    [[nodiscard]] bool wants(std::uint64_t index) const;
+    /// A frame that was asked for at `at_s`; draw_s < 0: it was skipped. Answers why the level changed, if it
+    /// did.
+    std::optional<std::string> frame(double at_s, bool in_time, double draw_s);
+    /// Blocks of sound since the last call, and how many were late.
+    std::optional<std::string> blocks(double at_s, std::size_t count, std::size_t late);
+
+private:
+    std::optional<std::string> lower(double at_s, const std::string& why);
+
+    double frame_s_;
+    std::vector<double> draw_s_;  // by level, a running mean
+    std::size_t level_ = 0;
+    std::deque<bool> late_;  // of the last frames
+    std::deque<std::pair<std::size_t, std::size_t>> blocks_;
+    double quiet_since_s_ = 0, wait_s_ = 4, raised_at_s_ = -1e9;
+};
+
+}  // namespace app

@@ -1,0 +1,383 @@
+#include "play_realtime.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <map>
+
+#include "bad_input.h"
+#include "checksum.h"
+#include "departures.h"
+#include "monotonic.h"
+#include "output_folder.h"
+#include "play_products.h"
+#include "play_setup.h"
+#include "progress_bar.h"
+#include "realtime_products.h"
+#include "report.h"
+#include "summary.h"
+#include "tables.h"
+#include "thread_priority.h"
+
+namespace app {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kBetweenLapsS = 0.25;  // more than tracking::kGapS and any note's way beyond the last sample
+constexpr double kStartS = 0.2;         // from the sensors being ready to the epoch
+constexpr double kLongestLiveS = 3600;
+constexpr double kSpareSoundS = 1;
+
+/// SIGINT and SIGTERM end the run in order while this lives.
+class StopSignals {
+public:
+    StopSignals() {
+        asked = 0;
+        struct sigaction action {};
+        action.sa_handler = [](int) { asked = 1; };
+        sigaction(SIGINT, &action, &interrupt_);
+        sigaction(SIGTERM, &action, &terminate_);
+    }
+    ~StopSignals() {
+        sigaction(SIGINT, &interrupt_, nullptr);
+        sigaction(SIGTERM, &terminate_, nullptr);
+    }
+    StopSignals(const StopSignals&) = delete;
+    StopSignals& operator=(const StopSignals&) = delete;
+    static bool stopped() { return asked != 0; }
+
+private:
+    static inline volatile std::sig_atomic_t asked = 0;
+    struct sigaction interrupt_ {
+    }, terminate_{};
+};
+
+bool is_live(const RealtimeOptions& options) {
+    return !options.source.empty() && !options.source.starts_with("trace:");
+}
+
+void refuse(bool wrong, const std::string& found, const std::string& expected) {
+    if (wrong) throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
+}
+
+void check(const RealtimeOptions& o) {
+    check_options(o.play);
+    refuse(!(o.seconds >= 0 && o.seconds <= 3 * 3600), fmt::format("--seconds {}", o.seconds),
+           "0 to 10800 s");
+    refuse(
+        !(o.output_lead_s >= 0.001 && o.output_lead_s < o.play.release_margin_s),
+        fmt::format("--output-lead {} with a release margin of {}", o.output_lead_s, o.play.release_margin_s),
+        "0.001 s to less than the release margin");
+    refuse(o.play.solo.has_value(), "--solo with --realtime",
+           "one of them: play the trace offline to hear one note");
+    refuse(!o.play.audio && !o.midi_port.empty(), "--midi-out with --no-audio",
+           "sound, whose clock times MIDI");
+}
+
+/// A trace that stands for the sticks of a live source, which has no samples yet.
+tracking::Trace live_trace(const RealtimeOptions& options, const std::vector<std::string>& names) {
+    tracking::Trace trace;
+    trace.file = trace.source = options.source;
+    for (const std::string& name : names) trace.sticks.push_back({name, {{}, {}}});
+    return trace;
+}
+
+/// Everything of a run but its loop.
+struct Session {
+    RealtimeOptions options;
+    tracking::Trace trace;
+    Kit kit;
+    StickGeometry stick;
+    bool live = false;
+    double seconds = 0;
+    std::int64_t period_samples = 0;
+};
+
+Session open_session(const RealtimeOptions& options) {
+    Session session{options, {}, {}, {}, is_live(options), options.seconds, 0};
+    session.trace =
+        session.live ? live_trace(options, options.sticks) : read_played_trace(options.play.trace);
+    session.kit = read_kit(options.play.kit);
+    session.stick = stick_geometry(session.trace, session.kit.stick, options.play.tip, options.play.shaft);
+    const double once_s = session.trace.t_end_s() - session.trace.t0_s();
+    if (session.live) {
+        if (session.seconds == 0) session.seconds = kLongestLiveS;
+        session.period_samples =
+            static_cast<std::int64_t>(std::ceil((session.seconds + 60) * audio::kSampleRate));
+        return session;
+    }
+    if (session.seconds == 0) session.seconds = once_s;
+    session.period_samples =
+        static_cast<std::int64_t>(std::ceil((once_s + kBetweenLapsS) * audio::kSampleRate));
+    return session;
+}
+
+SensorOptions sensor_options(const Session& session, std::int64_t epoch_ns) {
+    SensorOptions sensors;
+    const RealtimeOptions& o = session.options;
+    sensors.source = session.live ? o.source : "trace:" + o.play.trace.string();
+    for (const tracking::StickTrace& stick : session.trace.sticks) sensors.sticks.push_back(stick.name);
+    sensors.picture_predictor = picture_specification(o.play.picture_predictor);
+    sensors.sound_predictor = sound_specification(o.play.sound_predictor);
+    sensors.confirming_predictor = confirming_specification(o.play.sound_predictor);
+    sensors.epoch_ns = epoch_ns;
+    sensors.period_s = static_cast<double>(session.period_samples) / audio::kSampleRate;
+    sensors.stall_at_s = o.disturbance.stall_at_s;
+    sensors.stall_s = o.disturbance.stall_s;
+    sensors.realtime = o.realtime_priority;
+    return sensors;
+}
+
+std::vector<render::SceneDescription> scenes_of(const Stage& stage, int width, int height) {
+    std::vector<render::SceneDescription> scenes;
+    for (const QualityLevel& level : quality_levels()) {
+        if (level.rate_divisor > 1) continue;
+        const auto smaller = [&](int side) {
+            return std::max(1, (side + level.size_divisor - 1) / level.size_divisor);
+        };
+        scenes.push_back(stage.scene(smaller(width), smaller(height)));
+        scenes.back().samples = level.samples;
+        scenes.back().shadow_size = level.shadow_texels;
+    }
+    return scenes;
+}
+
+std::unique_ptr<audio::LivePerformance> make_sound(const Session& session, std::string& priority) {
+    const RealtimeOptions& o = session.options;
+    audio::LiveOptions live;
+    live.output_lead_s = o.output_lead_s;
+    live.longest_s = session.seconds + kSpareSoundS;
+    live.jack_audio = o.jack_audio;
+    live.midi_port = o.midi_port;
+    live.midi_connect = o.midi_connect;
+    live.on_thread_start = [&priority, realtime = o.realtime_priority] {
+        priority = set_thread_priority(ThreadRole::sound, realtime);
+    };
+    return std::make_unique<audio::LivePerformance>(orchestra_file(), voices_of(session.kit), live);
+}
+
+/// The strikes of all laps: as on their laps' clocks, and on the run's. What the sound says was played was
+/// played.
+void collect_strikes(RealtimeOutcome& outcome, const RealtimeRun& run, std::vector<LapStrikes>& laps,
+                     std::int64_t period_samples, bool sound) {
+    std::map<std::uint64_t, const audio::PlayedNote*> played;
+    for (const NoteTiming& note : outcome.realtime.notes) played[note.played.id] = &note.played;
+    const double period_s = outcome.realtime.period_s;
+    for (LapStrikes& lap : laps)
+        for (Strike& strike : lap.strikes) {
+            strike.id += lap.first_id;
+            const auto note = played.find(strike.id);
+            if (sound) strike.outcome = note == played.end() ? Outcome::cancelled : Outcome::released;
+            if (note != played.end()) {
+                strike.onset_sample =
+                    note->second->onset_sample - static_cast<std::int64_t>(lap.lap) * period_samples;
+                strike.onset_s =
+                    outcome.play.t0_s + static_cast<double>(strike.onset_sample) / audio::kSampleRate;
+            }
+            outcome.lap_strikes.push_back(strike);
+            const double shift_s = static_cast<double>(lap.lap) * period_s;
+            strike.onset_sample += static_cast<std::int64_t>(lap.lap) * period_samples;
+            strike.onset_s =
+                outcome.play.t0_s + static_cast<double>(strike.onset_sample) / audio::kSampleRate;
+            for (double* t : {&strike.contact_s, &strike.scheduled_at_s, &strike.decided_at_s}) *t += shift_s;
+            outcome.play.strikes.push_back(strike);
+        }
+    for (NoteTiming& note : outcome.realtime.notes) {
+        note.strike = static_cast<std::size_t>(note.played.id - 1);
+        const auto lap = std::ranges::find_if(laps, [&](const LapStrikes& l) {
+            return note.played.id > l.first_id && note.played.id <= l.first_id + l.strikes.size();
+        });
+        note.lap = lap == laps.end() ? 0 : lap->lap;
+    }
+    (void)run;
+}
+
+/// Age of the newest sample that a note could use: its onset less the sample's time.
+void age_notes(RealtimeOutcome& outcome) {
+    for (NoteTiming& note : outcome.realtime.notes) {
+        const Strike& strike = outcome.lap_strikes[note.strike];
+        double newest_s = strike.scheduled_at_s;
+        for (const SampleTiming& sample : outcome.realtime.samples)
+            if (sample.lap == note.lap && sample.stick == strike.stick &&
+                sample.handed_ns <= note.played.taken_ns)
+                newest_s = std::max(newest_s, sample.t_s);
+        note.pose_age_s = strike.onset_s - newest_s;
+    }
+}
+
+/// The recorded paths on the run's clock: the trace lap by lap, or what a live source gave.
+std::vector<TipTrack> tracks_of(const Session& session, const RealtimeRun& run) {
+    tracking::Trace trace = session.trace;
+    const double t0_s = trace.t0_s(), end_s = t0_s + run.end_s();
+    const double period_s = static_cast<double>(session.period_samples) / audio::kSampleRate;
+    for (std::size_t i = 0; i < trace.sticks.size(); ++i) {
+        std::vector<tracking::PoseSample> samples;
+        if (session.live) {
+            samples = run.seen()[i];
+        } else {
+            for (std::uint64_t lap = 0; static_cast<double>(lap) * period_s < run.end_s(); ++lap)
+                for (tracking::PoseSample sample : session.trace.sticks[i].samples) {
+                    sample.t_s += static_cast<double>(lap) * period_s;
+                    if (sample.t_s <= end_s) samples.push_back(sample);
+                }
+        }
+        trace.sticks[i].samples = std::move(samples);
+    }
+    return tip_tracks(trace, session.stick);
+}
+
+/// What stayed on the screen instead of a frame that is not there.
+void fill_gaps(const fs::path& folder, std::size_t frames) {
+    fs::path last;
+    for (std::size_t k = 0; k < frames; ++k) {
+        const fs::path file = folder / fmt::format("{:06}.png", k);
+        std::error_code error;
+        if (fs::exists(file, error))
+            last = file;
+        else if (!last.empty())
+            fs::create_hard_link(last, file, error);
+    }
+}
+
+void finish_frames(RealtimeFrames& frames, RealtimeResult& result) {
+    frames.finish();
+    for (const FrameTiming& done : frames.take_done()) {
+        const auto at = std::ranges::lower_bound(result.frames, done.index, {}, &FrameTiming::index);
+        if (at != result.frames.end() && at->index == done.index) *at = done;
+    }
+    for (const auto& [index, written_ns] : frames.written()) {
+        const auto at = std::ranges::lower_bound(result.frames, index, {}, &FrameTiming::index);
+        if (at != result.frames.end() && at->index == index) at->written_ns = written_ns;
+    }
+    result.frames_not_written = frames.not_written();
+    std::map<std::uint64_t, bool> in_time;
+    for (const FrameTiming& frame : result.frames) in_time[frame.index] = frame.fate == FrameFate::in_time;
+    for (DrawnTip& tip : result.tips) tip.shown = in_time[tip.frame];
+}
+
+void finish_sound(audio::LivePerformance& sound, RealtimeOutcome& outcome, const OutputFolder& folder,
+                  std::int64_t epoch_ns) {
+    const double length = (outcome.realtime.seconds + kSoundTailS) * audio::kSampleRate;
+    outcome.play.audio = sound.finish(static_cast<std::int64_t>(std::ceil(length)),
+                                      static_cast<std::int64_t>(kLongestSoundTailS * audio::kSampleRate));
+    for (const audio::PlayedNote& played : sound.take_played()) {
+        NoteTiming note;
+        note.played = played;
+        note.late_s = static_cast<double>(played.onset_sample - played.planned_sample) / audio::kSampleRate;
+        outcome.realtime.notes.push_back(note);
+    }
+    for (NoteTiming& note : outcome.realtime.notes) {
+        note.played.taken_ns -= epoch_ns;
+        if (note.played.midi_sent_ns != 0) note.played.midi_sent_ns -= epoch_ns;
+    }
+    for (audio::BlockTiming block : sound.blocks()) {
+        block.planned_ns -= epoch_ns, block.started_ns -= epoch_ns, block.done_ns -= epoch_ns;
+        outcome.realtime.blocks.push_back(block);
+    }
+    RealtimeResult& result = outcome.realtime;
+    result.audio_device = sound.device();
+    result.refused_changes = sound.refused_changes();
+    result.queue_overflows = sound.queue_overflows();
+    result.device_underruns = sound.device_underruns();
+    outcome.play.clipped_samples = audio::write_wav(folder.path("audio.wav"), outcome.play.audio);
+    outcome.play.stages_s.emplace_back("sound (own thread)", sound.busy_s());
+    outcome.play.versions.emplace_back("csound", sound.version());
+}
+
+}  // namespace
+
+RealtimeOutcome play_realtime(const RealtimeOptions& options,
+                              const std::function<void(const std::string&)>& warn) {
+    const WallTimer wall;
+    check(options);
+    Session session = open_session(options);
+    RealtimeOutcome outcome;
+    outcome.play = describe(session.options.play, session.trace, session.kit, !session.live);
+    outcome.kit = session.kit;
+    outcome.stick = session.stick;
+    PlayResult& result = outcome.play;
+    OutputFolder folder(options.play.out);
+
+    std::string sound_priority, control_priority;
+    const Stage stage(session.kit, session.trace.sticks.size(), session.stick);
+    const std::unique_ptr<sim::Simulation> simulation = make_simulation(session.kit, options.play.workers);
+    std::unique_ptr<audio::LivePerformance> sound =
+        options.play.audio ? make_sound(session, sound_priority) : nullptr;
+    std::unique_ptr<RealtimeFrames> frames;
+    if (options.play.frames) {
+        fs::create_directory(folder.path("frames"));
+        frames = std::make_unique<RealtimeFrames>(
+            scenes_of(stage, options.play.width, options.play.height), stage.frame({}, {}),
+            options.play.width, options.play.height, folder.path("frames"), options.realtime_priority);
+    }
+    SensorOptions sensing = sensor_options(session, monotonic_ns() + to_ns(kStartS + 0.5));
+    SensorHub sensors(sensing);
+    const std::int64_t epoch_ns = sensing.epoch_ns;
+    result.stages_s.emplace_back("start", wall.seconds());
+    {
+        RealtimeRun run(session.kit, options, session.stick, session.trace.t0_s(), session.period_samples,
+                        {*simulation, stage, sensors, sound.get(), frames.get()}, session.trace.sticks.size(),
+                        !sensing.confirming_predictor.empty(), epoch_ns);
+        if (sound) sound->start(epoch_ns);
+        if (frames) frames->start(epoch_ns, options.disturbance);
+        const BusyThreads load(options.disturbance, epoch_ns);
+        control_priority = set_thread_priority(ThreadRole::control, options.realtime_priority);
+        ProgressBar bar(options.play.progress);
+        const StopSignals signals;
+        run.run(
+            session.seconds, [] { return StopSignals::stopped(); }, warn,
+            [&](double done) { bar.show(done); });
+        bar.clear();
+        leave_thread_priority();
+        outcome.realtime = std::move(run.result());
+        RealtimeResult& realtime = outcome.realtime;
+        realtime.clocks = sensors.clocks();
+        result.samples_refused = run.refused();
+        if (frames) finish_frames(*frames, realtime);
+        if (sound) finish_sound(*sound, outcome, folder, epoch_ns);
+        result.t_end_s = result.t0_s + run.end_s();
+        result.tracks = tracks_of(session, run);
+        collect_strikes(outcome, run, run.laps(), session.period_samples, sound != nullptr);
+    }
+    age_notes(outcome);
+    outcome.realtime.priorities = {{"control", control_priority}};
+    if (sound) outcome.realtime.priorities.emplace_back("sound", sound_priority);
+    if (frames) outcome.realtime.priorities.emplace_back("drawing", frames->priority());
+    const sim::WorkerReport workers = simulation->report();
+    result.workers_lost = workers.lost;
+    result.bodies_reowned = workers.bodies_reowned;
+    if (!session.live) find_departures(outcome, session.trace, session.options.play);
+
+    score(result, session.kit, session.stick);
+    write_hits(folder.path("hits.mid"), result, session.kit);
+    std::vector<std::uint8_t> test_frame;
+    if (frames) {
+        result.frames = outcome.realtime.frames.size();
+        fill_gaps(folder.path("frames"), result.frames);
+        result.versions.emplace_back("renderer", frames->version());
+        result.stages_s.emplace_back("drawing (own thread)", frames->draw_s());
+        result.stages_s.emplace_back("writing frames (own thread)", frames->write_s());
+        test_frame = frames->rest_image().rgb;
+        result.report_frames = frames_to_show(result, folder.path("frames"));
+        std::erase_if(result.report_frames, [](const fs::path& file) { return !fs::exists(file); });
+    }
+    result.fingerprint = fingerprint(test_frame);
+    result.versions.emplace_back("musicworld", MUSICWORLD_VERSION);
+    if (options.play.video) make_video(options.play, folder.path("."));
+    result.wall_s = wall.seconds();
+    {
+        // Latency is judged lap by lap.
+        std::swap(result.strikes, outcome.lap_strikes);
+        outcome.latency = latency_report(result, outcome.realtime, session.kit, session.stick, session.trace);
+        write_latency_products(outcome, folder);
+        std::swap(result.strikes, outcome.lap_strikes);
+    }
+    write_realtime_products(outcome, folder);
+    folder.finish();
+    if (options.play.video) fs::rename(options.play.video->string() + ".partial", *options.play.video);
+    return outcome;
+}
+
+}  // namespace app

@@ -1,0 +1,43 @@
+#pragma once
+#include <audio/performance.h>
+#include <sim/simulation.h>
+#include <tracking/trace.h>
+
+#include <chrono>
+#include <memory>
+#include <vector>
+
+#include "kit.h"
+#include "play.h"
+#include "tip_track.h"
+
+namespace app {
+
+/// Seconds of wall time since it was made.
+class WallTimer {
+public:
+    [[nodiscard]] double seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    }
+
+private:
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// Sound goes on this long after the last sample, then until it is silent, at most so long.
+inline constexpr double kSoundTailS = 0.5, kLongestSoundTailS = 10;
+
+/// Throws BadInput for options out of range.
+void check_options(const PlayOptions& options);
+/// Reads a trace that is to be played: at most three hours (a WAV file holds four). Throws BadInput.
+[[nodiscard]] tracking::Trace read_played_trace(const std::filesystem::path& file);
+/// What is known of a run before it begins.
+[[nodiscard]] PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
+                                  bool trace_is_file = true);
+
+[[nodiscard]] std::vector<sim::BodyDefinition> bodies_of(const Kit& kit);
+[[nodiscard]] std::vector<audio::Voice> voices_of(const Kit& kit);
+[[nodiscard]] std::filesystem::path orchestra_file();
+[[nodiscard]] std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers);
+
+}  // namespace app
