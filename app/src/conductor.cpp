@@ -145,8 +145,7 @@ DrawnStick Conductor::drawn(std::uint32_t stick, double s, double T) {
     if (const Strike* strike = struck_by(stick, s, T)) {
         touching_.insert(strike->id);
         const Eigen::Vector3d touch = strike->point_world + tip_radius_m_ * strike->normal_world;
-        result.tip = strike->contact_s > s ? outlook.sounding_tip_at(T)
-                                           : tracking::PointMotion{touch, Eigen::Vector3d::Zero()};
+        if (strike->contact_s > s) result.tip = outlook.sounding_tip_at(T);
         result.pose = outlook.pose_at(std::max(s, strike->contact_s));
         result.pose.position += touch - tracking::point_of(result.pose, outlook.geometry().tip).position;
         result.held = true;

@@ -9,12 +9,12 @@
 namespace app {
 namespace {
 
-constexpr std::size_t kRecentFrames = 8, kLateFrames = 3;
+constexpr std::size_t kRecentFrames = 90, kLateFrames = 3;
 constexpr std::size_t kRecentBlocks = 200;
 constexpr double kLateBlocks = 0.05;
 constexpr double kShareOfFrame = 0.6;
-constexpr double kLeastWaitS = 4, kLongestWaitS = 64;
-constexpr double kNewest = 0.2;  // weight of the newest drawing time
+constexpr double kLeastWaitS = 8, kLongestWaitS = 64;
+constexpr double kNewest = 0.1;  // weight of the newest drawing time
 
 }  // namespace
 
@@ -27,12 +27,13 @@ const std::vector<QualityLevel>& quality_levels() {
     return levels;
 }
 
-QualityRule::QualityRule(double frame_s, std::vector<double> draw_s)
-    : frame_s_(frame_s), draw_s_(std::move(draw_s)) {
-    const auto fits = [&](std::size_t level) {
-        return draw_s_[level] < kShareOfFrame * frame_s_ * quality_levels()[level].rate_divisor;
-    };
-    while (level_ + 1 < draw_s_.size() && !fits(level_)) ++level_;
+QualityRule::QualityRule(double frame_s, std::vector<double> trial_s)
+    : frame_s_(frame_s), trial_s_(std::move(trial_s)) {
+    while (level_ + 1 < trial_s_.size() && !fits(level_)) ++level_;
+}
+
+bool QualityRule::fits(std::size_t level) const {
+    return slowdown_ * trial_s_[level] < kShareOfFrame * frame_s_ * quality_levels()[level].rate_divisor;
 }
 
 bool QualityRule::wants(std::uint64_t index) const {
@@ -43,7 +44,7 @@ std::optional<std::string> QualityRule::lower(double at_s, const std::string& wh
     quiet_since_s_ = at_s;
     late_.clear();
     blocks_.clear();
-    if (level_ + 1 == draw_s_.size()) return std::nullopt;
+    if (level_ + 1 == trial_s_.size()) return std::nullopt;
     // A rise that did not last is not tried again so soon.
     wait_s_ = at_s - raised_at_s_ < kLongestWaitS ? std::min(2 * wait_s_, kLongestWaitS) : kLeastWaitS;
     ++level_;
@@ -51,7 +52,7 @@ std::optional<std::string> QualityRule::lower(double at_s, const std::string& wh
 }
 
 std::optional<std::string> QualityRule::frame(double at_s, bool in_time, double draw_s) {
-    if (draw_s >= 0) draw_s_[level_] += kNewest * (draw_s - draw_s_[level_]);
+    if (draw_s >= 0 && trial_s_[level_] > 0) slowdown_ += kNewest * (draw_s / trial_s_[level_] - slowdown_);
     late_.push_back(!in_time);
     if (late_.size() > kRecentFrames) late_.pop_front();
     if (!in_time) {
@@ -60,15 +61,7 @@ std::optional<std::string> QualityRule::frame(double at_s, bool in_time, double 
         if (late >= static_cast<std::ptrdiff_t>(kLateFrames))
             return lower(at_s, fmt::format("{} of the last {} frames were late", late, late_.size()));
     }
-    if (level_ == 0 || at_s - quiet_since_s_ < wait_s_) return std::nullopt;
-    const QualityLevel& better = quality_levels()[level_ - 1];
-    // What it would take, as far as drawing has become slower since its trial.
-    if (draw_s_[level_ - 1] >= kShareOfFrame * frame_s_ * better.rate_divisor) {
-        // The trial may have met a busy moment: believe it less with time.
-        draw_s_[level_ - 1] *= 0.98;
-        quiet_since_s_ = at_s - wait_s_ + 1;
-        return std::nullopt;
-    }
+    if (level_ == 0 || at_s - quiet_since_s_ < wait_s_ || !fits(level_ - 1)) return std::nullopt;
     --level_;
     raised_at_s_ = quiet_since_s_ = at_s;
     late_.clear();

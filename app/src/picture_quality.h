@@ -19,19 +19,22 @@ struct QualityLevel {
 
 /// Lowers the quality of pictures, then their rate, before the sound suffers, and raises it again. The rule:
 ///
-///   lower   when 3 of the last 8 frames that were asked for were late or skipped, or when 5 % of the last
+///   lower   when 3 of the last 90 frames that were asked for were late or skipped, or when 5 % of the last
 ///   200
 ///           blocks of sound were late beyond what their lead allows
-///   raise   when for 4 s nothing was late and the next better level, by the times that it took when it was
-///           drawn last, would need less than 0.6 of the time between two frames; after a rise that
-///           had to be taken back, the wait doubles (up to 64 s)
+///   raise   when for 8 s nothing was late and the next better level would fit; after a rise that had to be
+///   taken
+///           back, the wait doubles (up to 64 s)
+///   fits    what the level took in its trial, times how much slower drawing is now than in the trial of the
+///   level
+///           at hand (1.4 before anything was drawn: the trial runs alone), is less than 0.6 of the time
+///           between two frames
 ///
-/// Pure: times come from outside.
+/// Begins at the best level that fits. Pure: times come from outside.
 class QualityRule {
 public:
-    /// `frame_s`: time between two frames; `draw_s`: what drawing a frame took at each level in a trial.
-    /// Begins at the best level that needs less than 0.6 of the time between two frames.
-    QualityRule(double frame_s, std::vector<double> draw_s);
+    /// `frame_s`: time between two frames; `trial_s`: what drawing a frame took at each level in a trial.
+    QualityRule(double frame_s, std::vector<double> trial_s);
 
     [[nodiscard]] std::size_t level() const { return level_; }
     /// Whether frame `index` is drawn at the level's rate.
@@ -45,12 +48,15 @@ public:
 private:
     std::optional<std::string> lower(double at_s, const std::string& why);
 
+    [[nodiscard]] bool fits(std::size_t level) const;
+
     double frame_s_;
-    std::vector<double> draw_s_;  // by level, a running mean
+    std::vector<double> trial_s_;  // by level
+    double slowdown_ = 1.4;        // a running mean
     std::size_t level_ = 0;
     std::deque<bool> late_;  // of the last frames
     std::deque<std::pair<std::size_t, std::size_t>> blocks_;
-    double quiet_since_s_ = 0, wait_s_ = 4, raised_at_s_ = -1e9;
+    double quiet_since_s_ = 0, wait_s_ = 8, raised_at_s_ = -1e9;
 };
 
 }  // namespace app
