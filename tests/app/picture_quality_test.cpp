@@ -68,7 +68,7 @@ TEST(PictureQuality, ARiseThatHadToBeTakenBackIsTriedLaterAndLater) {
     app::QualityRule quality = rule(0.012);
     double now_s = 0;
     std::vector<double> waits;
-    for (int round = 0; round < 5; ++round) {
+    for (int round = 0; round < 4; ++round) {
         while (quality.level() == 0) (void)quality.frame(now_s += kFrameS, false, 0.012);
         const double lowered_s = now_s;
         while (quality.level() == 1) (void)quality.frame(now_s += kFrameS, true, 0.0072);
