@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "offline_run.h"
 #include "play_setup.h"
@@ -75,8 +76,14 @@ private:
     void add(const Strike& strike, const std::string& what, double offline_s, double here_s) {
         Departure departure{lap_, strike.stick, strike.instrument, what, offline_s, here_s, 0, "unexplained"};
         const double from_s = strike.scheduled_at_s - kEarlierS, to_s = strike.onset_s;
+        std::map<std::uint32_t, double> before_s;  // the sample before, by stick
         for (const SampleTiming& sample : outcome_.realtime.samples) {
-            if (sample.lap != lap_ || sample.t_s < from_s || sample.t_s > to_s) continue;
+            if (sample.lap != lap_) continue;
+            // What was skipped lies before the sample that came instead.
+            const auto [before, first] = before_s.try_emplace(sample.stick, sample.t_s);
+            const double begin_s = sample.skipped > 0 ? before->second : sample.t_s;
+            before->second = sample.t_s;
+            if (sample.t_s < from_s || begin_s > to_s) continue;
             const double late_s = std::max(sample.late_s, 0.0);
             if (late_s == 0 && sample.skipped == 0) continue;
             // How late the sample was with the sound, whatever else held it up.

@@ -38,7 +38,7 @@ std::vector<DrawnError> drawn_errors(const RealtimeResult& realtime, std::span<c
         for (std::uint32_t stick = 0; stick < screen.size(); ++stick) {
             if (screen[stick] == nullptr || screen[stick]->lap != lap) continue;
             if (const auto truth = truth_at(tracks[stick], t0_s + at_s))
-                errors.push_back({at_s, stick, (screen[stick]->tip - *truth).norm()});
+                errors.push_back({at_s, stick, (screen[stick]->drawn - *truth).norm()});
         }
     }
     return errors;

@@ -12,7 +12,7 @@ namespace app {
 struct DrawnError {
     double at_s = 0;  ///< since the run's epoch
     std::uint32_t stick = 0;
-    double error_m = 0;  ///< from the tip shown (of the predicted pose) to the recorded tip
+    double error_m = 0;  ///< from the tip as drawn to the recorded tip
 };
 
 /// For each frame that was asked for and each stick: what is on the screen when the frame is due is the last

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 #include <vector>
 
@@ -31,6 +32,14 @@ struct OscPose {
     tracking::PoseSample sample;
     bool has_time = false;
 };
+
+/// An argument's value. OSC aligns to 4 bytes, less than the union lo_arg wants.
+template <class T>
+T value_of(const lo_arg* argument) {
+    T value;
+    std::memcpy(&value, static_cast<const void*>(argument), sizeof value);
+    return value;
+}
 
 double seconds_of(const lo_timetag& tag) {
     return tag.sec + tag.frac / kFractionsPerS;
@@ -56,7 +65,8 @@ std::string_view stick_of(std::string_view path) {
 double number_of(std::string_view path, char type, const lo_arg* argument, double limit) {
     if (type != 'f' && type != 'd')
         refuse(path, fmt::format("an argument of type {}", one_line({&type, 1})), "floats or doubles");
-    const double number = type == 'f' ? static_cast<double>(argument->f) : argument->d;
+    const double number =
+        type == 'f' ? static_cast<double>(value_of<float>(argument)) : value_of<double>(argument);
     if (!(std::abs(number) <= limit))
         refuse(path, fmt::format("{}", number), fmt::format("a number within {}", limit));
     return number;
@@ -74,7 +84,7 @@ Eigen::Quaterniond orientation_of(std::string_view path, std::string_view types,
 /// The time argument, if there is one.
 std::optional<double> time_of(std::string_view path, std::string_view types, lo_arg** arguments) {
     if (types.size() != 4 && types.size() != 8) return std::nullopt;
-    if (types[0] == 't') return seconds_of(arguments[0]->t);
+    if (types[0] == 't') return seconds_of(value_of<lo_timetag>(arguments[0]));
     if (types[0] == 'd') return number_of(path, 'd', arguments[0], kLatest);
     refuse(path,
            fmt::format("{} arguments, the first of type {}", types.size(), one_line(types.substr(0, 1))),

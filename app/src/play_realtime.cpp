@@ -54,10 +54,6 @@ private:
     }, terminate_{};
 };
 
-bool is_live(const RealtimeOptions& options) {
-    return !options.source.empty() && !options.source.starts_with("trace:");
-}
-
 void refuse(bool wrong, const std::string& found, const std::string& expected) {
     if (wrong) throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
 }
@@ -127,6 +123,7 @@ SensorOptions sensor_options(const Session& session, std::int64_t epoch_ns) {
     sensors.stall_at_s = o.disturbance.stall_at_s;
     sensors.stall_s = o.disturbance.stall_s;
     sensors.realtime = o.realtime_priority;
+    sensors.program = o.program;
     return sensors;
 }
 
@@ -301,7 +298,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
     OutputFolder folder(options.play.out);
 
     std::string sound_priority, control_priority;
-    const Stage stage(session.kit, session.trace.sticks.size(), session.stick);
+    Stage stage(session.kit, session.trace.sticks.size(), session.stick);
     const std::unique_ptr<sim::Simulation> simulation = make_simulation(session.kit, options.play.workers);
     std::unique_ptr<audio::LivePerformance> sound =
         options.play.audio ? make_sound(session, sound_priority) : nullptr;
@@ -337,6 +334,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
         result.samples_refused = run.refused();
         if (frames) finish_frames(*frames, realtime);
         if (sound) finish_sound(*sound, outcome, folder, epoch_ns);
+        outcome.stick = session.stick = run.geometry();
         result.t_end_s = result.t0_s + run.end_s();
         result.tracks = tracks_of(session, run);
         collect_strikes(outcome, run, run.laps(), session.period_samples, sound != nullptr);

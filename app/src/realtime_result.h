@@ -54,6 +54,7 @@ struct DrawnTip {
     bool shown = true;  ///< of a frame in time
     bool held = false;  ///< drawn on the surface instead
     Eigen::Vector3d tip = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();  ///< [m], [m/s]
+    Eigen::Vector3d drawn = Eigen::Vector3d::Zero();  ///< the tip as it is drawn, held or not [m]
 };
 
 /// A note in real time.

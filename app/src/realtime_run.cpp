@@ -9,6 +9,7 @@
 
 #include "monotonic.h"
 #include "notes.h"
+#include "row_decoder.h"
 
 namespace app {
 namespace {
@@ -45,6 +46,7 @@ RealtimeRun::RealtimeRun(const Kit& kit, const RealtimeOptions& options, const S
       period_samples_(period_samples),
       parts_(parts),
       epoch_ns_(epoch_ns),
+      geometry_known_(!is_live(options)),
       samples_seen_(sticks, 0),
       starts_seen_(sticks, 0),
       fps_(options.play.fps),
@@ -116,7 +118,21 @@ void RealtimeRun::wait(std::int64_t until_ns) {
     if (ppoll(&wake, 1, &timeout, nullptr) > 0) parts_.sensors.clear_wake();
 }
 
+/// A live stream may say where the tip is (`# tip_m:`), in the lines before its first row.
+void RealtimeRun::learn_geometry() {
+    const std::string head = parts_.sensors.stream_head();
+    if (head.empty()) return;
+    geometry_known_ = true;
+    RowDecoder decoder(
+        "stream", [](const tracking::TraceRow&) {}, [](const std::string&) {});
+    decoder.message(head);
+    geometry_ = stick_geometry(decoder.keys(), kit_.stick, options_.play.tip, options_.play.shaft);
+    for (const auto& stick : sticks_) stick->set_geometry(geometry_);
+    parts_.stage.set_stick(geometry_);
+}
+
 void RealtimeRun::take_states() {
+    if (!geometry_known_) learn_geometry();
     struct New {
         std::uint32_t stick;
         tracking::StickState state;
@@ -249,10 +265,12 @@ void RealtimeRun::ask_for_frame(std::uint64_t index) {
 }
 
 void RealtimeRun::record_tips(const Scene& scene, std::uint64_t index, double T) {
-    for (std::uint32_t i = 0; i < sticks_.size(); ++i)
-        if (scene.sticks[i])
-            result_.tips.push_back({index, i, lap_, T, false, scene.sticks[i]->held,
-                                    scene.sticks[i]->tip.position, scene.sticks[i]->tip.velocity});
+    for (std::uint32_t i = 0; i < sticks_.size(); ++i) {
+        if (!scene.sticks[i]) continue;
+        const DrawnStick& stick = *scene.sticks[i];
+        result_.tips.push_back({index, i, lap_, T, false, stick.held, stick.tip.position, stick.tip.velocity,
+                                tracking::point_of(stick.pose, geometry_.tip).position});
+    }
 }
 
 void RealtimeRun::take_frames() {

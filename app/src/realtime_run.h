@@ -29,15 +29,21 @@ struct RealtimeOptions {
     bool lead_auto = false;        ///< both leads follow the measured delays, never below those asked for
     double output_lead_s = 0.004;  ///< a block of sound is computed this long before it is due
     bool realtime_priority = true;
+    std::string program;  ///< that has the command `sensor`; empty: this one
     bool jack_audio = false;
     std::string midi_port, midi_connect;
     Disturbance disturbance;
 };
 
+/// True if the sticks are live: there is no trace.
+[[nodiscard]] inline bool is_live(const RealtimeOptions& options) {
+    return !options.source.empty() && !options.source.starts_with("trace:");
+}
+
 /// The parts of a run that others make.
 struct RealtimeParts {
     sim::Simulation& simulation;
-    const Stage& stage;
+    Stage& stage;
     SensorHub& sensors;
     audio::LivePerformance* sound = nullptr;  ///< may be absent
     RealtimeFrames* frames = nullptr;         ///< may be absent
@@ -78,6 +84,8 @@ public:
     [[nodiscard]] const std::vector<std::vector<tracking::PoseSample>>& seen() const { return seen_; }
     [[nodiscard]] double end_s() const { return end_s_; }
     [[nodiscard]] std::uint64_t refused() const;
+    /// Of the sticks, also as a live source gave it.
+    [[nodiscard]] const StickGeometry& geometry() const { return geometry_; }
 
 private:
     [[nodiscard]] std::int64_t now_ns() const;
@@ -85,6 +93,7 @@ private:
     [[nodiscard]] double fixed_s(std::uint64_t lap) const;
     void wait(std::int64_t until_ns);
     void take_states();
+    void learn_geometry();
     void take(const std::vector<std::uint32_t>& moved, std::int64_t taken_ns, std::int64_t query_ns);
     void begin_lap(std::uint64_t lap);
     void send(const Strike& strike, bool scheduled);
@@ -108,6 +117,7 @@ private:
     std::vector<std::unique_ptr<StateStick>> sticks_;
     std::unique_ptr<Conductor> conductor_;
     std::uint64_t lap_ = 0, first_id_ = 0;
+    bool geometry_known_;
     double newest_s_ = 0;  // of the samples taken, on the lap's clock
     bool any_sample_ = false;
     std::vector<std::uint64_t> samples_seen_, starts_seen_;

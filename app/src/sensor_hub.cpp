@@ -267,6 +267,11 @@ std::vector<ClockReport> SensorHub::clocks() const {
     return clocks;
 }
 
+std::string SensorHub::stream_head() const {
+    const StreamHead head = implementation_->memory.front()->head.read().value_or(StreamHead{});
+    return head.text.data();
+}
+
 int SensorHub::restarts() const {
     return implementation_->restarts;
 }

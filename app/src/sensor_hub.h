@@ -65,6 +65,8 @@ public:
     /// Every source has ended, and all that it gave has been published.
     [[nodiscard]] bool ended() const;
     [[nodiscard]] std::vector<ClockReport> clocks() const;  ///< one a process
+    /// The key lines and the header that a live stream began with (units, tip_m, ...); empty: none so far.
+    [[nodiscard]] std::string stream_head() const;
     [[nodiscard]] int restarts() const;
 
 private:

@@ -18,6 +18,8 @@ class Stage {
 public:
     Stage(const Kit& kit, std::size_t sticks, const StickGeometry& stick);
 
+    /// Where tip and shaft are in the tracked body, once that is known of live sticks.
+    void set_stick(const StickGeometry& stick) { stick_ = stick; }
     [[nodiscard]] render::SceneDescription scene(int width, int height) const;
     /// Bodies in the kit's order (empty: all at rest); a stick without a pose is not drawn.
     [[nodiscard]] render::FrameState frame(

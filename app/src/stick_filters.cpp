@@ -44,6 +44,7 @@ tracking::SampleStatus StickFilters::correct(const tracking::PoseSample& sample,
     (void)picture_->correct(sample);
     if (confirming_) (void)confirming_->correct(sample);
     const tracking::SampleStatus status = sound_->correct(sample);
+    say_motions(state);  // a sample that one filter refuses may count for another
     if (!taken(status)) {
         ++state.refused;
         return status;
@@ -53,15 +54,17 @@ tracking::SampleStatus StickFilters::correct(const tracking::PoseSample& sample,
     state.t_s = sample.t_s;
     state.position = sample.position;
     state.orientation = sample.orientation;
+    return status;
+}
+
+void StickFilters::say_motions(tracking::StickState& state) const {
     state.picture = picture_->motion().value_or(state.picture);
     state.picture_t_s = picture_->time_s();
     state.sound = sound_->motion().value_or(state.sound);
     state.model = sound_->selected();
-    if (confirming_) {
-        state.confirming = confirming_->motion().value_or(state.confirming);
-        state.confirming_t_s = confirming_->time_s();
-    }
-    return status;
+    if (!confirming_) return;
+    state.confirming = confirming_->motion().value_or(state.confirming);
+    state.confirming_t_s = confirming_->time_s();
 }
 
 }  // namespace app

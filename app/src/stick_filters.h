@@ -26,6 +26,8 @@ public:
                                                  tracking::StickState& state);
 
 private:
+    void say_motions(tracking::StickState& state) const;
+
     std::unique_ptr<tracking::Predictor> picture_, sound_, confirming_;  // confirming_ may be none
 };
 

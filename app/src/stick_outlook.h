@@ -36,6 +36,7 @@ public:
 
     [[nodiscard]] std::uint32_t stick() const { return stick_; }
     [[nodiscard]] const StickGeometry& geometry() const { return geometry_; }
+    void set_geometry(const StickGeometry& geometry) { geometry_ = geometry; }
     /// False before the first sample.
     [[nodiscard]] virtual bool started() const = 0;
     /// Centre of the tip in the newest sample that the filter took [m].

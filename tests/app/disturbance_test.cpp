@@ -20,8 +20,8 @@ TEST(Disturbance, PartsAreReadInAnyOrder) {
 }
 
 TEST(Disturbance, WhatIsNoneIsRefused) {
-    for (const char* text : {"load", "load:2", "load@3", "load:0@1", "load:x@1", "rain:2@3", "load:2@5-4", "load:1e9@1",
-                             "renderer:-1@2", "stall:nan@1", ":@", "load:2@-1"})
+    for (const char* text : {"load", "load:2", "load@3", "load:0@1", "load:x@1", "rain:2@3", "load:2@5-4",
+                             "load:1e9@1", "renderer:-1@2", "stall:nan@1", ":@", "load:2@-1"})
         EXPECT_THROW((void)app::parse_disturbance(text), app::BadInput) << text;
 }
 

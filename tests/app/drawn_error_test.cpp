@@ -25,7 +25,7 @@ protected:
             DrawnTip tip;
             tip.frame = k;
             tip.t_s = 5 + 1e-9 * static_cast<double>(frame.shown_ns);
-            tip.tip = Eigen::Vector3d(tip.t_s - 5, 0.002, 0);
+            tip.drawn = Eigen::Vector3d(tip.t_s - 5, 0.002, 0);
             run.tips.push_back(tip);
         }
     }

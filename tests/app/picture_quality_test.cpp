@@ -7,11 +7,13 @@ namespace {
 constexpr double kFrameS = 1.0 / 30;
 
 app::QualityRule rule(double best_s) {
-    return app::QualityRule(kFrameS, {best_s, 0.6 * best_s, 0.5 * best_s, 0.2 * best_s, 0.2 * best_s, 0.2 * best_s});
+    return app::QualityRule(kFrameS,
+                            {best_s, 0.6 * best_s, 0.5 * best_s, 0.2 * best_s, 0.2 * best_s, 0.2 * best_s});
 }
 
 /// Frames from second `from` on, all alike; the reasons for changes.
-std::vector<std::string> frames(app::QualityRule& rule, double from_s, int count, bool in_time, double draw_s) {
+std::vector<std::string> frames(app::QualityRule& rule, double from_s, int count, bool in_time,
+                                double draw_s) {
     std::vector<std::string> reasons;
     for (int i = 0; i < count; ++i)
         if (const auto why = rule.frame(from_s + i * kFrameS, in_time, draw_s)) reasons.push_back(*why);
@@ -48,8 +50,8 @@ TEST(PictureQuality, RisesAfterFourQuietSecondsIfTheBetterLevelWouldFit) {
     app::QualityRule quality = rule(0.01);
     (void)frames(quality, 0, 3, false, 0.04);
     ASSERT_EQ(quality.level(), 1u);
-    // What made it late was seen at level 0: its drawing time has grown from 10 ms to 24.6 (a fifth of the way a
-    // frame), more than 20 of 33 ms, so it is believed less with time before it is tried again.
+    // What made it late was seen at level 0: its drawing time has grown from 10 ms to 24.6 (a fifth of the
+    // way a frame), more than 20 of 33 ms, so it is believed less with time before it is tried again.
     EXPECT_TRUE(frames(quality, 1, 3 * 30, true, 0.006).empty());
     EXPECT_FALSE(frames(quality, 4, 90 * 30, true, 0.006).empty());
     EXPECT_EQ(quality.level(), 0u);

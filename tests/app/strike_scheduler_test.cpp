@@ -331,5 +331,60 @@ TEST(CommitLead, WithoutCancellingOnlyNotesNotYetSentAreDropped) {
     EXPECT_EQ(unsent.first().outcome, Outcome::cancelled);
 }
 
+/// One stick over one instrument; contacts are given at will.
+struct Late {
+    StrikeRules rules;
+    StrikeScheduler scheduler{rules, 1, 1};
+
+    Late() {
+        for (int i = 0; i < 4; ++i) sample(0.01 * i, std::nullopt);
+    }
+    void sample(double s, std::optional<double> contact_s,
+                double fixed_s = -std::numeric_limits<double>::infinity()) {
+        scheduler.advance_to(s, fixed_s);
+        const double clearance[] = {0.1};
+        std::vector<sim::Contact> contacts;
+        if (contact_s) {
+            contacts.emplace_back();
+            contacts[0].t_s = *contact_s;
+            contacts[0].zone = 0;
+            contacts[0].speed_mps = 3;
+        }
+        scheduler.sample(0, s, contacts, clearance, clearance);
+    }
+    [[nodiscard]] const Strike& first() const { return scheduler.strikes().at(0); }
+};
+
+TEST(LateSample, WhatSoundsAlreadyIsReleasedAndCannotBeCancelled) {
+    Late in_time, late;
+    for (Late* run : {&in_time, &late}) run->sample(0.040, 0.080);
+    in_time.sample(0.060, std::nullopt, 0.075);
+    late.sample(0.060, std::nullopt, 0.0801);  // by the time it is here the sound is beyond the onset
+    EXPECT_EQ(in_time.first().outcome, Outcome::cancelled);
+    EXPECT_EQ(late.first().outcome, Outcome::released);
+    EXPECT_NEAR(late.first().onset_s, 0.080, 1.0 / 48000);
+}
+
+TEST(LateSample, ANewNoteIsPlacedWhereTheSoundIsNotFixedYet) {
+    Late run;
+    run.sample(0.040, 0.052, 0.061);
+    ASSERT_EQ(run.scheduler.strikes().size(), 1U);
+    EXPECT_GE(run.first().onset_s, 0.061);
+    EXPECT_LT(run.first().onset_s, 0.061 + 1.0 / 48000);
+    Late too_late;  // 30 ms behind its contact a note is not played
+    too_late.sample(0.040, 0.052, 0.0825);
+    EXPECT_TRUE(too_late.scheduler.strikes().empty());
+}
+
+TEST(LateSample, AFixedTimeBehindTheMarginChangesNothing) {
+    Late plain, fixed;
+    for (int i = 4; i < 9; ++i) {
+        plain.sample(0.01 * i, 0.12);
+        fixed.sample(0.01 * i, 0.12, 0.01 * i + 0.0099);
+    }
+    EXPECT_EQ(plain.first().onset_sample, fixed.first().onset_sample);
+    EXPECT_EQ(plain.first().moves, fixed.first().moves);
+}
+
 }  // namespace
 }  // namespace app

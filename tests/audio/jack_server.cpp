@@ -55,6 +55,8 @@ bool Program::is_installed(const std::string& name) {
 }
 
 Program::Program(std::vector<std::string> arguments) {
+    // Ends with this process too, however that ends.
+    arguments.insert(arguments.begin(), {"setpriv", "--pdeathsig", "KILL"});
     std::vector<char*> pointers;
     for (std::string& argument : arguments) pointers.push_back(argument.data());
     pointers.push_back(nullptr);

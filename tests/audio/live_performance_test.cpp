@@ -101,6 +101,10 @@ TEST(LivePerformance, EveryBlockIsPlannedTheLeadAheadAndNoneIsSkipped) {
         EXPECT_GE(blocks[i].done_ns, blocks[i].started_ns);
     }
     EXPECT_GE(blocks.size(), 9600U / kBlock);
+    EXPECT_EQ(live.block_count().all, blocks.size());
+    const auto late = std::ranges::count_if(
+        blocks, [](const audio::BlockTiming& each) { return each.done_ns > each.planned_ns + 10'000'000; });
+    EXPECT_EQ(live.block_count().late, static_cast<std::uint64_t>(late));
 }
 
 TEST(LivePerformance, NoteThatComesTooLateSoundsWithTheNextBlockAndSaysSo) {

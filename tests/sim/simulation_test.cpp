@@ -136,6 +136,19 @@ TEST(Simulation, ConfirmedImpulsesAreFeltByContactsFromTheirTimeOn) {
     EXPECT_EQ(simulation->step({0.1, {}, {}, {}, {}}).states[0].q, sim::Vector6d::Zero());  // never folded
 }
 
+TEST(Simulation, BeginningAnewIsAFreshSimulationToTheBitAtAnyTime) {
+    const auto used = sim::make_local_simulation({sim_test::drum()}),
+               fresh = sim::make_local_simulation({sim_test::drum()});
+    (void)used->step({5, {kStrike}, {}, {}, {}});
+    EXPECT_NE(used->step({5.01, {}, {}, {}, {}}).states[0].q, sim::Vector6d::Zero());
+    sim::StepRequest first{0, {}, {}, {}, {}};
+    first.anew = true;
+    EXPECT_EQ(used->step(first).states[0].q, sim::Vector6d::Zero());
+    (void)fresh->step(first);
+    const sim::StepRequest struck{0.02, {kStrike}, {}, {}, {}};
+    EXPECT_EQ(used->step(struck).states[0].q, fresh->step(struck).states[0].q);
+}
+
 TEST(Simulation, RestDistanceAndZoneAreThoseOfAContact) {
     const sim::BodyDefinition drum = sim_test::drum(Vector3d(0.1, 0.7, 0));
     const sim::SurfacePoint p = sim::rest_distance(drum, Vector3d(0.12, 0.83, 0), 0.006);

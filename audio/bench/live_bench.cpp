@@ -1,0 +1,102 @@
+// Lateness of live sound: some seconds of notes on the wall clock; how much later than planned blocks began
+// and were done. `live_bench [SECONDS] [--realtime]`; with --realtime the audio thread asks for
+// SCHED_FIFO 70.
+#include <pthread.h>
+#include <sched.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "audio/live_performance.h"
+#include "clocks.h"
+
+namespace {
+
+using audio::BlockTiming;
+
+void ask_for_realtime() {
+    sched_param priority{};
+    priority.sched_priority = 70;
+    if (pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority) != 0) {
+        throw std::runtime_error(
+            "found no permission for SCHED_FIFO, expected CAP_SYS_NICE or an rtprio limit; leave out "
+            "--realtime");
+    }
+}
+
+double ms_at(std::vector<std::int64_t>& values, double fraction) {
+    const auto at =
+        values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
+    std::ranges::nth_element(values, at);
+    return 1e-6 * static_cast<double>(*at);
+}
+
+void print(const char* what, std::vector<std::int64_t> values) {
+    std::printf("%-18s p50 %7.3f  p95 %7.3f  p99 %7.3f  max %7.3f ms\n", what, ms_at(values, 0.5),
+                ms_at(values, 0.95), ms_at(values, 0.99), ms_at(values, 1));
+}
+
+/// A kit's worth of voices, sixteen strokes a second.
+std::vector<audio::Voice> voices() {
+    const auto voice = [](const char* instrument) {
+        return audio::Voice{instrument, instrument, {}, 0.5, 0, ""};
+    };
+    return {voice("drum"), voice("drum"), voice("cymbal"), voice("bell"), voice("string"), voice("cymbal")};
+}
+
+void play(audio::LivePerformance& live, double seconds) {
+    const std::int64_t epoch = audio::monotonic_ns() + 100'000'000;
+    live.start(epoch);
+    for (std::uint64_t id = 1; static_cast<double>(id) / 16 < seconds; ++id) {
+        const auto onset = static_cast<std::int64_t>(id) * audio::kSampleRate / 16;
+        audio::sleep_until_ns(epoch + audio::samples_ns(onset) - 66'000'000);
+        audio::Note note{
+            .id = id, .voice = static_cast<std::uint32_t>(id % 6), .onset_sample = onset, .speed_mps = 4};
+        live.schedule(note);
+    }
+    audio::sleep_until_ns(epoch + static_cast<std::int64_t>(1e9 * seconds));
+}
+
+void report(const audio::LivePerformance& live) {
+    std::vector<std::int64_t> started, computed, done;
+    for (const BlockTiming& block : live.blocks()) {
+        started.push_back(block.started_ns - block.planned_ns);
+        computed.push_back(block.done_ns - block.started_ns);
+        done.push_back(block.done_ns - block.planned_ns);
+    }
+    std::printf("%s, %zu blocks of %d samples (%.3f ms)\n", live.version().c_str(), done.size(),
+                live.block_size(), 1e3 * live.block_size() / audio::kSampleRate);
+    print("started - planned", started);
+    print("done - started", computed);
+    print("done - planned", done);
+    std::printf("processor time %.3f s\n", live.busy_s());
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+    double seconds = 10;
+    audio::LiveOptions options;
+    for (int i = 1; i < count; ++i) {
+        if (std::strcmp(arguments[i], "--realtime") == 0) {
+            options.on_thread_start = ask_for_realtime;
+        } else {
+            seconds = std::stod(arguments[i]);
+        }
+    }
+    options.longest_s = seconds + 1;
+    try {
+        audio::LivePerformance live(MUSICWORLD_SOURCE_DIR "/assets/orchestra/musicworld.orc", voices(),
+                                    options);
+        play(live, seconds);
+        (void)live.finish(0, 0);
+        report(live);
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "error: %s\n", error.what());
+        return 1;
+    }
+}
