@@ -45,10 +45,12 @@ std::vector<DrawnError> drawn_errors(const RealtimeResult& realtime, std::span<c
 }
 
 double rms_mm(std::span<const DrawnError> errors, double from_s, double to_s) {
-    double sum = 0, count = 0;
-    for (const DrawnError& error : errors)
-        if (error.at_s >= from_s && error.at_s < to_s) sum += error.error_m * error.error_m, ++count;
-    return count > 0 ? 1e3 * std::sqrt(sum / count) : 0;
+    const auto before = [](const DrawnError& error, double t_s) { return error.at_s < t_s; };
+    const auto begin = std::lower_bound(errors.begin(), errors.end(), from_s, before),
+               end = std::lower_bound(begin, errors.end(), to_s, before);
+    double sum = 0;
+    for (auto error = begin; error != end; ++error) sum += error->error_m * error->error_m;
+    return begin == end ? 0 : 1e3 * std::sqrt(sum / static_cast<double>(end - begin));
 }
 
 }  // namespace app

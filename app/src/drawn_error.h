@@ -22,7 +22,7 @@ struct DrawnError {
 [[nodiscard]] std::vector<DrawnError> drawn_errors(const RealtimeResult& realtime,
                                                    std::span<const TipTrack> tracks, double t0_s);
 
-/// Root mean square of the errors from `from_s` up to `to_s` [mm]; 0 for none.
+/// Root mean square of the errors from `from_s` up to `to_s` [mm]; 0 for none. By time, as above.
 [[nodiscard]] double rms_mm(std::span<const DrawnError> errors, double from_s, double to_s);
 
 }  // namespace app

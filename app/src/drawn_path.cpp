@@ -63,6 +63,11 @@ double walk(double now, double fastest, const Distance& distance, const Found& f
     return now;
 }
 
+std::vector<DrawnTip>::const_iterator first_from(const std::vector<DrawnTip>& nodes, double from_s) {
+    return std::lower_bound(nodes.begin(), nodes.end(), from_s,
+                            [](const DrawnTip& node, double t_s) { return node.t_s < t_s; });
+}
+
 }  // namespace
 
 void DrawnPath::add(const DrawnTip& tip) {
@@ -72,8 +77,7 @@ void DrawnPath::add(const DrawnTip& tip) {
 std::vector<double> DrawnPath::touches(const sim::BodyDefinition& body, double radius_m, double from_s,
                                        double to_s) const {
     std::vector<double> times;
-    auto b = std::lower_bound(nodes_.begin(), nodes_.end(), from_s,
-                              [](const DrawnTip& node, double t_s) { return node.t_s < t_s; });
+    auto b = first_from(nodes_, from_s);
     if (b == nodes_.begin() && b != nodes_.end()) ++b;
     double now = 0;
     bool joined = false;  // `now` is the distance at the piece's start
@@ -97,11 +101,8 @@ std::vector<double> DrawnPath::touches(const sim::BodyDefinition& body, double r
 
 const DrawnTip* DrawnPath::first_behind(const sim::BodyDefinition& body, double radius_m, double from_s,
                                         double to_s) const {
-    for (const DrawnTip& node : nodes_) {
-        if (node.t_s < from_s) continue;
-        if (node.t_s > to_s) break;
-        if (node.held || sim::rest_distance(body, node.tip, radius_m).distance <= 0) return &node;
-    }
+    for (auto node = first_from(nodes_, from_s); node != nodes_.end() && node->t_s <= to_s; ++node)
+        if (node->held || sim::rest_distance(body, node->tip, radius_m).distance <= 0) return &*node;
     return nullptr;
 }
 

@@ -91,9 +91,9 @@ Json frames_of(const LatencyReport& report, const RealtimeResult& realtime) {
 /// RMS errors of the drawn sticks in all and second by second.
 Json errors_of(const LatencyReport& report) {
     Json windows = Json::array();
-    const double end_s = report.errors.empty() ? 0 : report.errors.back().at_s;
-    for (double from_s = 0; from_s <= end_s && !report.errors.empty(); from_s += 1)
-        windows.push_back({{"from_s", from_s}, {"rms", rms_mm(report.errors, from_s, from_s + 1)}});
+    const double end_s = report.errors.empty() ? -1 : report.errors.back().at_s;
+    for (int second = 0; second <= end_s; ++second)
+        windows.push_back({{"from_s", second}, {"rms", rms_mm(report.errors, second, second + 1)}});
     return {{"count", report.errors.size()},
             {"rms", report.errors.empty() ? Json() : Json(rms_mm(report.errors, 0, 1e300))},
             {"seconds", windows}};

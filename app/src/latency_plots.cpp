@@ -215,7 +215,8 @@ PlotWithLegend error_plot(const LatencyReport& report) {
     std::string data;
     double highest = 1;
     const double end_s = report.errors.empty() ? 1 : report.errors.back().at_s;
-    for (double from_s = 0; from_s < end_s; from_s += kWindowS) {
+    for (int window = 0; window * kWindowS < end_s; ++window) {
+        const double from_s = window * kWindowS;
         const double rms = rms_mm(report.errors, from_s, from_s + kWindowS);
         fmt::format_to(std::back_inserter(data), "{:.3f} {:.4f}\n", from_s + kWindowS / 2, rms);
         highest = std::max(highest, rms);
