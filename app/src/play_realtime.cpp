@@ -299,7 +299,11 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
 
     std::string sound_priority, control_priority;
     Stage stage(session.kit, session.trace.sticks.size(), session.stick);
+    // Worker processes and ZeroMQ's threads inherit it.
+    const std::string simulation_priority =
+        set_thread_priority(ThreadRole::simulation, options.realtime_priority);
     const std::unique_ptr<sim::Simulation> simulation = make_simulation(session.kit, options.play.workers);
+    leave_thread_priority();
     std::unique_ptr<audio::LivePerformance> sound =
         options.play.audio ? make_sound(session, sound_priority) : nullptr;
     std::unique_ptr<RealtimeFrames> frames;
@@ -340,7 +344,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
         collect_strikes(outcome, run, run.laps(), session.period_samples, sound != nullptr);
     }
     age_notes(outcome);
-    outcome.realtime.priorities = {{"control", control_priority}};
+    outcome.realtime.priorities = {{"control", control_priority}, {"simulation", simulation_priority}};
     if (sound) outcome.realtime.priorities.emplace_back("sound", sound_priority);
     if (frames) outcome.realtime.priorities.emplace_back("drawing", frames->priority());
     const sim::WorkerReport workers = simulation->report();

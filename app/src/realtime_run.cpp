@@ -19,6 +19,7 @@ constexpr double kSamplesExpectedHz = 100;
 constexpr double kStepS = 0.1;  // between two recorded steps of the leads
 constexpr std::int64_t kLongestWaitNs = 20'000'000;
 constexpr double kWatchS = 0.05;
+constexpr double kGraceS = 0.001, kJitterS = 1e-5;
 
 StrikeRules rules_of(const PlayOptions& options, double t0_s) {
     StrikeRules rules;
@@ -216,11 +217,21 @@ void RealtimeRun::record_sample(std::uint32_t stick, std::uint64_t skipped, std:
     result_.samples.push_back(timing);
 }
 
+double RealtimeRun::next_frame_at_s() const {
+    const double begin_s = static_cast<double>(next_frame_) / fps_ - render_lead_.lead_s();
+    const double begin_lap_s = lap_time_s(to_ns(begin_s), lap_);
+    const bool expected = std::ranges::any_of(sticks_, [&](const auto& stick) {
+        const double due_s = stick->state().t_s + stick->interval_s();
+        return stick->started() && due_s <= begin_lap_s + kJitterS &&
+               due_s > begin_lap_s - stick->interval_s();
+    });
+    return expected ? begin_s + kGraceS : begin_s;
+}
+
 void RealtimeRun::ask_for_frames() {
     for (;; ++next_frame_) {
         const double shown_s = static_cast<double>(next_frame_) / fps_;
-        const std::int64_t now = now_ns();
-        if (shown_s >= end_s_ || now < to_ns(shown_s - render_lead_.lead_s())) return;
+        if (shown_s >= end_s_ || now_ns() < to_ns(next_frame_at_s())) return;
         ask_for_frame(next_frame_);
     }
 }
@@ -357,8 +368,7 @@ void RealtimeRun::run(double seconds, const std::function<bool()>& stop,
         const double now_s = static_cast<double>(now_ns()) / 1e9;
         if (now_s >= end_s_ || stop() || (parts_.sensors.ended() && now_s > 0)) break;
         double next_s = end_s_;
-        if (parts_.frames)
-            next_s = std::min(next_s, static_cast<double>(next_frame_) / fps_ - render_lead_.lead_s());
+        if (parts_.frames) next_s = std::min(next_s, next_frame_at_s());
         wait(to_ns(next_s));
         take_states();
         if (parts_.frames) ask_for_frames();

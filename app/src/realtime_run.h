@@ -99,6 +99,9 @@ private:
     void send(const Strike& strike, bool scheduled);
     void record_sample(std::uint32_t stick, std::uint64_t skipped, std::int64_t taken_ns,
                        std::int64_t query_ns);
+    /// When the next frame is to be begun: a render lead before it is shown, or up to 1 ms later while a
+    /// sample of before then is on its way.
+    [[nodiscard]] double next_frame_at_s() const;
     void ask_for_frames();
     void ask_for_frame(std::uint64_t index);
     void record_tips(const Scene& scene, std::uint64_t index, double T);

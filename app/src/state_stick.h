@@ -13,6 +13,7 @@ public:
         : StickOutlook(stick, geometry), confirms_(confirms), sound_lead_s_(sound_lead_s) {}
 
     void take(const tracking::StickState& state) {
+        interval_s_ = started() && state.t_s > state_.t_s ? state.t_s - state_.t_s : 0;
         state_ = state;
         measured_tip_ = state.position + state.orientation * geometry().tip;
     }
@@ -20,6 +21,8 @@ public:
     void forget() { state_ = {}; }
     void set_sound_lead(double lead_s) { sound_lead_s_ = lead_s; }
     [[nodiscard]] const tracking::StickState& state() const { return state_; }
+    /// Between the last two samples seen [s]; 0: not known.
+    [[nodiscard]] double interval_s() const { return interval_s_; }
 
     [[nodiscard]] bool started() const override { return state_.samples > 0; }
     [[nodiscard]] const Eigen::Vector3d& measured_tip() const override { return measured_tip_; }
@@ -42,7 +45,7 @@ private:
     }
 
     bool confirms_;
-    double sound_lead_s_;
+    double sound_lead_s_, interval_s_ = 0;
     tracking::StickState state_;
     Eigen::Vector3d measured_tip_ = Eigen::Vector3d::Zero();
 };

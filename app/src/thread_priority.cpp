@@ -9,51 +9,50 @@
 namespace app {
 namespace {
 
-struct Place {
-    int fifo;  // SCHED_FIFO priority, 0: not of real time
-    int nice;
-};
+constexpr int kSimulationNice = -8;
 
-Place place_of(ThreadRole role) {
+/// SCHED_FIFO priority; 0: not of real time.
+int fifo_of(ThreadRole role) {
     switch (role) {
         case ThreadRole::sound:
-            return {70, -11};
+            return 70;
         case ThreadRole::sensing:
-            return {60, -8};
+            return 60;
         case ThreadRole::control:
-            return {50, -6};
-        case ThreadRole::simulation:
-            return {0, -4};
-        case ThreadRole::drawing:
-            return {0, 10};
-        case ThreadRole::writing:
-            return {0, 15};
+            return 50;
+        default:
+            return 0;
     }
-    return {0, 0};
+}
+
+bool schedule(int policy, int priority) {
+    sched_param parameter{};
+    parameter.sched_priority = priority;
+    return sched_setscheduler(0, policy, &parameter) == 0;
+}
+
+bool set_nice(int value) {
+    // On Linux the nice value is the thread's own.
+    return setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), value) == 0;
 }
 
 }  // namespace
 
 std::string set_thread_priority(ThreadRole role, bool realtime) {
-    const Place place = place_of(role);
-    if (place.fifo > 0 && realtime) {
-        sched_param parameter{};
-        parameter.sched_priority = place.fifo;
-        // Without SCHED_RESET_ON_FORK Csound's or a driver's own threads would inherit it.
-        if (sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &parameter) == 0)
-            return fmt::format("SCHED_FIFO {}", place.fifo);
-    }
-    if (place.nice < 0 && !realtime) return "nice 0";
-    // On Linux the nice value is the thread's own.
-    const auto thread = static_cast<id_t>(syscall(SYS_gettid));
-    if (setpriority(PRIO_PROCESS, thread, place.nice) == 0) return fmt::format("nice {}", place.nice);
+    if (role == ThreadRole::drawing || role == ThreadRole::writing)
+        return schedule(SCHED_IDLE, 0) ? "SCHED_IDLE" : "nice 0";
+    // Without SCHED_RESET_ON_FORK Csound's or a driver's own threads would inherit it.
+    const int fifo = realtime ? fifo_of(role) : 0;
+    if (fifo > 0 && schedule(SCHED_FIFO | SCHED_RESET_ON_FORK, fifo))
+        return fmt::format("SCHED_FIFO {}", fifo);
+    if (realtime && role == ThreadRole::simulation && set_nice(kSimulationNice))
+        return fmt::format("nice {}", kSimulationNice);
     return "nice 0";
 }
 
 void leave_thread_priority() {
-    const sched_param parameter{};
-    (void)sched_setscheduler(0, SCHED_OTHER, &parameter);
-    (void)setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), 0);
+    (void)schedule(SCHED_OTHER, 0);
+    (void)set_nice(0);
 }
 
 }  // namespace app
