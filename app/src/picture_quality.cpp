@@ -14,15 +14,20 @@ constexpr std::size_t kRecentBlocks = 200;
 constexpr double kLateBlocks = 0.05;
 constexpr double kShareOfFrame = 0.6;
 constexpr double kLeastWaitS = 8, kLongestWaitS = 64;
+constexpr double kSettleS = 0.25;
 constexpr double kNewest = 0.1;  // weight of the newest drawing time
 
 }  // namespace
 
 const std::vector<QualityLevel>& quality_levels() {
     static const std::vector<QualityLevel> levels = {
-        {"4 samples a pixel, shadows", 4, 512, 1, 1}, {"1 sample a pixel, shadows", 1, 512, 1, 1},
-        {"1 sample a pixel, no shadows", 1, 0, 1, 1}, {"half the size, no shadows", 1, 0, 2, 1},
-        {"half the size, half the rate", 1, 0, 2, 2}, {"half the size, a quarter of the rate", 1, 0, 2, 4},
+        {"4 samples a pixel, shadows", 4, 512, 1, 1},
+        {"1 sample a pixel, shadows", 1, 512, 1, 1},
+        {"1 sample a pixel, no shadows", 1, 0, 1, 1},
+        {"half the size, no shadows", 1, 0, 2, 1},
+        {"a quarter of the size, no shadows", 1, 0, 4, 1},
+        {"a quarter of the size, half the rate", 1, 0, 4, 2},
+        {"a quarter of the size, a quarter of the rate", 1, 0, 4, 4},
     };
     return levels;
 }
@@ -41,7 +46,7 @@ bool QualityRule::wants(std::uint64_t index) const {
 }
 
 std::optional<std::string> QualityRule::lower(double at_s, const std::string& why) {
-    quiet_since_s_ = at_s;
+    quiet_since_s_ = lowered_at_s_ = at_s;
     late_.clear();
     blocks_.clear();
     if (level_ + 1 == trial_s_.size()) return std::nullopt;
@@ -67,6 +72,13 @@ std::optional<std::string> QualityRule::frame(double at_s, bool in_time, double 
     late_.clear();
     return fmt::format("nothing was late for {:.0f} s: pictures go up to {}", wait_s_,
                        quality_levels()[level_].name);
+}
+
+std::optional<std::string> QualityRule::outgrown(double at_s) {
+    if (at_s - lowered_at_s_ < kSettleS || level_ + 1 == trial_s_.size() ||
+        quality_levels()[level_ + 1].rate_divisor > quality_levels()[level_].rate_divisor)
+        return std::nullopt;
+    return lower(at_s, "the delay of pictures outgrew their lead");
 }
 
 std::optional<std::string> QualityRule::blocks(double at_s, std::size_t count, std::size_t late) {

@@ -22,6 +22,7 @@ struct QualityLevel {
 ///   lower   when 3 of the last 90 frames that were asked for were late or skipped, or when 5 % of the last
 ///   200
 ///           blocks of sound were late beyond what their lead allows
+///           (and, with leads that adapt, when the delay outgrows the lead asked for)
 ///   raise   when for 8 s nothing was late and the next better level would fit; after a rise that had to be
 ///   taken
 ///           back, the wait doubles (up to 64 s)
@@ -42,6 +43,10 @@ public:
     /// A frame that was asked for at `at_s`; draw_s < 0: it was skipped. Answers why the level changed, if it
     /// did.
     std::optional<std::string> frame(double at_s, bool in_time, double draw_s);
+    /// The delay of pictures has outgrown the lead asked for (`--lead auto`): simpler pictures come before a
+    /// longer lead, which costs accuracy; a lower rate does not help. At most every 0.25 s, so that a level
+    /// can show its delay.
+    std::optional<std::string> outgrown(double at_s);
     /// Blocks of sound since the last call, and how many were late.
     std::optional<std::string> blocks(double at_s, std::size_t count, std::size_t late);
 
@@ -56,7 +61,7 @@ private:
     std::size_t level_ = 0;
     std::deque<bool> late_;  // of the last frames
     std::deque<std::pair<std::size_t, std::size_t>> blocks_;
-    double quiet_since_s_ = 0, wait_s_ = 8, raised_at_s_ = -1e9;
+    double quiet_since_s_ = 0, wait_s_ = 8, raised_at_s_ = -1e9, lowered_at_s_ = -1e9;
 };
 
 }  // namespace app

@@ -47,7 +47,7 @@ public:
 
     [[nodiscard]] const std::vector<double>& trial_s() const {
         return trial_s_;
-    }  ///< median time of drawing, by level
+    }  ///< lower quartile of drawing times, by level
     [[nodiscard]] const std::string& version() const { return version_; }
     [[nodiscard]] const render::Image& rest_image() const { return rest_image_; }
     [[nodiscard]] const std::string& priority() const { return priority_; }

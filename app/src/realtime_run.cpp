@@ -14,7 +14,7 @@
 namespace app {
 namespace {
 
-constexpr double kRenderReserveS = 0.002, kSoundReserveS = 0.005;
+constexpr double kRenderReserveS = 0.003, kSoundReserveS = 0.005;
 constexpr double kSamplesExpectedHz = 100;
 constexpr double kStepS = 0.1;  // between two recorded steps of the leads
 constexpr std::int64_t kLongestWaitNs = 20'000'000;
@@ -297,8 +297,9 @@ void RealtimeRun::take_frames() {
         const double query_start_s = static_cast<double>(done.started_ns - done.query_ns) / 1e9;
         const double delay_s = static_cast<double>(done.read_ns) / 1e9 - query_start_s;
         const double shown_s = static_cast<double>(done.shown_ns) / 1e9;
-        if (options_.lead_auto && static_cast<std::size_t>(done.quality) == quality_.level())
-            (void)render_lead_.measured(delay_s);
+        if (static_cast<std::size_t>(done.quality) != quality_.level()) continue;
+        if (options_.lead_auto && render_lead_.measured(delay_s) > options_.play.render_lead_s)
+            if (const auto why = quality_.outgrown(shown_s)) note_step(*why);
         if (static_cast<std::size_t>(done.quality) != quality_.level()) continue;
         if (const auto why =
                 quality_.frame(shown_s, in_time, static_cast<double>(done.read_ns - done.started_ns) / 1e9))

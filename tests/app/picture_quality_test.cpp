@@ -7,8 +7,8 @@ namespace {
 constexpr double kFrameS = 1.0 / 30;
 
 app::QualityRule rule(double best_s) {
-    return app::QualityRule(kFrameS,
-                            {best_s, 0.6 * best_s, 0.5 * best_s, 0.2 * best_s, 0.2 * best_s, 0.2 * best_s});
+    return app::QualityRule(kFrameS, {best_s, 0.6 * best_s, 0.5 * best_s, 0.2 * best_s, 0.1 * best_s,
+                                      0.1 * best_s, 0.1 * best_s});
 }
 
 /// Frames from second `from` on, all alike; the reasons for changes.
@@ -76,6 +76,20 @@ TEST(PictureQuality, ARiseThatHadToBeTakenBackIsTriedLaterAndLater) {
     }
     for (std::size_t i = 1; i < waits.size(); ++i) EXPECT_GT(waits[i], 1.8 * waits[i - 1]) << i;
     EXPECT_LT(waits.back(), 66);
+}
+
+TEST(PictureQuality, ADelayThatOutgrowsItsLeadLowersPicturesButNotTheirRate) {
+    app::QualityRule quality = rule(0.01);
+    std::size_t changes = 0;
+    for (int i = 0; i < 100; ++i)
+        if (quality.outgrown(i * kFrameS)) ++changes;
+    EXPECT_EQ(app::quality_levels()[quality.level()].rate_divisor, 1);
+    EXPECT_GT(app::quality_levels()[quality.level() + 1].rate_divisor, 1);
+    EXPECT_EQ(changes, quality.level());
+    app::QualityRule once = rule(0.01);
+    EXPECT_TRUE(once.outgrown(1));
+    EXPECT_FALSE(once.outgrown(1.2));
+    EXPECT_TRUE(once.outgrown(1.26));
 }
 
 TEST(PictureQuality, AtHalfTheRateEverySecondFrameIsWanted) {
