@@ -71,7 +71,7 @@ std::int64_t RealtimeRun::now_ns() const {
 
 double RealtimeRun::lap_time_s(std::int64_t run_ns, std::uint64_t lap) const {
     const double lap_start_s = static_cast<double>(lap) * result_.period_s;
-    return t0_s_ + (static_cast<double>(run_ns) / 1e9 - lap_start_s);
+    return t0_s_ + (to_s(run_ns) - lap_start_s);
 }
 
 /// The earliest onset on the lap's clock that the sound can still place: a block beyond the one it is at.
@@ -182,7 +182,7 @@ void RealtimeRun::take(const std::vector<std::uint32_t>& moved, std::int64_t tak
         samples_seen_[stick] = state.samples;
         if (state.starts != starts_seen_[stick]) conductor_->restart(stick);
         starts_seen_[stick] = state.starts;
-        sticks_[stick]->set_sound_lead(sound_lead_.lead_s());
+        sticks_[stick]->set_sound_lead(sound_lead_s());
         seen_[stick].push_back(
             {s + static_cast<double>(lap_) * result_.period_s, state.position, state.orientation, true});
     }
@@ -196,8 +196,7 @@ void RealtimeRun::take(const std::vector<std::uint32_t>& moved, std::int64_t tak
         timing.contact_ns = contact_ns;
         timing.handed_ns = handed_ns;
         timing.late_s = fixed - (s + options_.play.release_margin_s);
-        if (options_.lead_auto)
-            (void)sound_lead_.measured(static_cast<double>(handed_ns - timing.due_ns) / 1e9);
+        (void)sound_lead_.measured(to_s(handed_ns - timing.due_ns));
     }
 }
 
@@ -218,7 +217,7 @@ void RealtimeRun::record_sample(std::uint32_t stick, std::uint64_t skipped, std:
 }
 
 double RealtimeRun::next_frame_at_s() const {
-    const double begin_s = static_cast<double>(next_frame_) / fps_ - render_lead_.lead_s();
+    const double begin_s = static_cast<double>(next_frame_) / fps_ - render_lead_s();
     const double begin_lap_s = lap_time_s(to_ns(begin_s), lap_);
     const bool expected = std::ranges::any_of(sticks_, [&](const auto& stick) {
         const double due_s = stick->state().t_s + stick->interval_s();
@@ -242,7 +241,7 @@ void RealtimeRun::ask_for_frame(std::uint64_t index) {
     timing.index = index;
     const double shown_s = static_cast<double>(index) / fps_;
     timing.shown_ns = to_ns(shown_s);
-    timing.lead_s = render_lead_.lead_s();
+    timing.lead_s = render_lead_s();
     timing.quality = static_cast<int>(quality_.level());
     timing.fate = FrameFate::skipped;
     const std::int64_t start = now_ns();
@@ -294,35 +293,38 @@ void RealtimeRun::take_frames() {
             DrawnTip& tip = result_.tips[first_tip_++];
             tip.shown = tip.frame == done.index && in_time;
         }
-        const double query_start_s = static_cast<double>(done.started_ns - done.query_ns) / 1e9;
-        const double delay_s = static_cast<double>(done.read_ns) / 1e9 - query_start_s;
-        const double shown_s = static_cast<double>(done.shown_ns) / 1e9;
+        const double query_start_s = to_s(done.started_ns - done.query_ns);
+        const double delay_s = to_s(done.read_ns) - query_start_s;
+        const double shown_s = to_s(done.shown_ns);
         if (static_cast<std::size_t>(done.quality) != quality_.level()) continue;
-        if (options_.lead_auto && render_lead_.measured(delay_s) > options_.play.render_lead_s)
+        if (render_lead_.measured(delay_s) > options_.play.render_lead_s && options_.lead_auto)
             if (const auto why = quality_.outgrown(shown_s)) note_step(*why);
         if (static_cast<std::size_t>(done.quality) != quality_.level()) continue;
-        if (const auto why =
-                quality_.frame(shown_s, in_time, static_cast<double>(done.read_ns - done.started_ns) / 1e9))
+        if (const auto why = quality_.frame(shown_s, in_time, to_s(done.read_ns - done.started_ns)))
             note_step(*why);
     }
 }
 
-void RealtimeRun::note_step(const std::string& why) {
-    render_lead_.forget();
+LeadStep RealtimeRun::step_now() const {
     LeadStep step;
-    step.at_s = static_cast<double>(now_ns()) / 1e9;
-    step.render_lead_s = render_lead_.lead_s();
-    step.sound_lead_s = sound_lead_.lead_s();
+    step.at_s = to_s(now_ns());
+    step.render_lead_s = render_lead_s();
+    step.sound_lead_s = sound_lead_s();
     step.render_delay_s = render_lead_.delay_s();
     step.sound_delay_s = sound_lead_.delay_s();
     step.quality = static_cast<int>(quality_.level());
     step.fps = fps_ / quality_levels()[quality_.level()].rate_divisor;
-    step.why = why;
-    result_.leads.push_back(step);
+    return step;
+}
+
+void RealtimeRun::note_step(const std::string& why) {
+    render_lead_.forget();
+    result_.leads.push_back(step_now());
+    result_.leads.back().why = why;
 }
 
 void RealtimeRun::follow_delays() {
-    const double at_s = static_cast<double>(now_ns()) / 1e9;
+    const double at_s = to_s(now_ns());
     if (at_s - last_step_s_ < kStepS) return;
     last_step_s_ = at_s;
     if (parts_.sound) {
@@ -332,15 +334,7 @@ void RealtimeRun::follow_delays() {
         if (parts_.frames)
             if (const auto why = quality_.blocks(at_s, all, late)) note_step(*why);
     }
-    LeadStep step;
-    step.at_s = at_s;
-    step.render_lead_s = render_lead_.lead_s();
-    step.sound_lead_s = sound_lead_.lead_s();
-    step.render_delay_s = render_lead_.delay_s();
-    step.sound_delay_s = sound_lead_.delay_s();
-    step.quality = static_cast<int>(quality_.level());
-    step.fps = fps_ / quality_levels()[quality_.level()].rate_divisor;
-    result_.leads.push_back(step);
+    result_.leads.push_back(step_now());
 }
 
 void RealtimeRun::take_notes() {
@@ -366,7 +360,7 @@ void RealtimeRun::run(double seconds, const std::function<bool()>& stop,
     end_s_ = seconds;
     double watched_s = 0;
     for (;;) {
-        const double now_s = static_cast<double>(now_ns()) / 1e9;
+        const double now_s = to_s(now_ns());
         if (now_s >= end_s_ || stop() || (parts_.sensors.ended() && now_s > 0)) break;
         double next_s = end_s_;
         if (parts_.frames) next_s = std::min(next_s, next_frame_at_s());
@@ -384,7 +378,7 @@ void RealtimeRun::run(double seconds, const std::function<bool()>& stop,
         }
         progress(now_s / end_s_);
     }
-    end_s_ = std::min(end_s_, static_cast<double>(now_ns()) / 1e9);
+    end_s_ = std::min(end_s_, to_s(now_ns()));
     begin_lap(lap_ + 1);  // what is pending is played
     result_.seconds = end_s_;
     result_.laps = laps_.size();

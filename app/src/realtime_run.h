@@ -108,6 +108,13 @@ private:
     void take_frames();
     void take_notes();
     void follow_delays();
+    [[nodiscard]] double render_lead_s() const {
+        return options_.lead_auto ? render_lead_.lead_s() : options_.play.render_lead_s;
+    }
+    [[nodiscard]] double sound_lead_s() const {
+        return options_.lead_auto ? sound_lead_.lead_s() : options_.play.sound_lead_s;
+    }
+    [[nodiscard]] LeadStep step_now() const;
     void note_step(const std::string& why);
 
     const Kit& kit_;
@@ -128,6 +135,7 @@ private:
     double fps_;
     std::uint64_t next_frame_ = 0, first_tip_ = 0;
     QualityRule quality_;
+    // Measured always; followed with --lead auto.
     LeadControl render_lead_, sound_lead_;
     double last_step_s_ = -1;
     std::size_t blocks_seen_ = 0, late_blocks_seen_ = 0;
