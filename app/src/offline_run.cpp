@@ -6,19 +6,12 @@
 #include <limits>
 
 #include "notes.h"
+#include "play_setup.h"
 
 namespace app {
 namespace {
 
 constexpr double kSlackS = 1e-9;  // of the causality rules
-
-StrikeRules rules_of(const PlayOptions& options, double t0_s) {
-    StrikeRules rules;
-    rules.t0_s = t0_s;
-    rules.release_margin_s = rules.commit_lead_s = options.release_margin_s;
-    rules.cancelling = options.cancelling;
-    return rules;
-}
 
 std::vector<std::unique_ptr<StickTracker>> trackers(const tracking::Trace& trace, const PlayOptions& options,
                                                     const StickGeometry& stick) {
@@ -50,7 +43,7 @@ OfflineRun::OfflineRun(const tracking::Trace& trace, const Kit& kit, const PlayO
       t0_s_(trace.t0_s()),
       t_end_s_(trace.t_end_s()),
       sticks_(trackers(trace, options, stick)),
-      conductor_(kit, rules_of(options, trace.t0_s()), stick.radius_m, outlooks(sticks_), simulation,
+      conductor_(kit, strike_rules(options, trace.t0_s()), stick.radius_m, outlooks(sticks_), simulation,
                  [this](const Strike& strike, bool scheduled) { send(strike, scheduled); }) {}
 
 LoopTimes OfflineRun::times() const {

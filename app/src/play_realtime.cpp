@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <map>
 
 #include "bad_input.h"
@@ -16,144 +15,15 @@
 #include "play_setup.h"
 #include "progress_bar.h"
 #include "realtime_products.h"
-#include "report.h"
-#include "summary.h"
-#include "tables.h"
+#include "realtime_session.h"
+#include "stop_signals.h"
 #include "thread_priority.h"
 
 namespace app {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kBetweenLapsS = 0.25;  // more than tracking::kGapS and any note's way beyond the last sample
-constexpr double kStartS = 0.2;         // from the sensors being ready to the epoch
-constexpr double kLongestLiveS = 3600;
-constexpr double kSpareSoundS = 1;
-
-/// SIGINT and SIGTERM end the run in order while this lives.
-class StopSignals {
-public:
-    StopSignals() {
-        asked = 0;
-        struct sigaction action {};
-        action.sa_handler = [](int) { asked = 1; };
-        sigaction(SIGINT, &action, &interrupt_);
-        sigaction(SIGTERM, &action, &terminate_);
-    }
-    ~StopSignals() {
-        sigaction(SIGINT, &interrupt_, nullptr);
-        sigaction(SIGTERM, &terminate_, nullptr);
-    }
-    StopSignals(const StopSignals&) = delete;
-    StopSignals& operator=(const StopSignals&) = delete;
-    static bool stopped() { return asked != 0; }
-
-private:
-    static inline volatile std::sig_atomic_t asked = 0;
-    struct sigaction interrupt_ {
-    }, terminate_{};
-};
-
-void refuse(bool wrong, const std::string& found, const std::string& expected) {
-    if (wrong) throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
-}
-
-void check(const RealtimeOptions& o) {
-    check_options(o.play);
-    refuse(!(o.seconds >= 0 && o.seconds <= 3 * 3600), fmt::format("--seconds {}", o.seconds),
-           "0 to 10800 s");
-    refuse(
-        !(o.output_lead_s >= 0.001 && o.output_lead_s < o.play.release_margin_s),
-        fmt::format("--output-lead {} with a release margin of {}", o.output_lead_s, o.play.release_margin_s),
-        "0.001 s to less than the release margin");
-    refuse(o.play.solo.has_value(), "--solo with --realtime",
-           "one of them: play the trace offline to hear one note");
-    refuse(!o.play.audio && !o.midi_port.empty(), "--midi-out with --no-audio",
-           "sound, whose clock times MIDI");
-}
-
-/// A trace that stands for the sticks of a live source, which has no samples yet.
-tracking::Trace live_trace(const RealtimeOptions& options, const std::vector<std::string>& names) {
-    tracking::Trace trace;
-    trace.file = trace.source = options.source;
-    for (const std::string& name : names) trace.sticks.push_back({name, {{}, {}}});
-    return trace;
-}
-
-/// Everything of a run but its loop.
-struct Session {
-    RealtimeOptions options;
-    tracking::Trace trace;
-    Kit kit;
-    StickGeometry stick;
-    bool live = false;
-    double seconds = 0;
-    std::int64_t period_samples = 0;
-};
-
-Session open_session(const RealtimeOptions& options) {
-    Session session{options, {}, {}, {}, is_live(options), options.seconds, 0};
-    session.trace =
-        session.live ? live_trace(options, options.sticks) : read_played_trace(options.play.trace);
-    session.kit = read_kit(options.play.kit);
-    session.stick = stick_geometry(session.trace, session.kit.stick, options.play.tip, options.play.shaft);
-    const double once_s = session.trace.t_end_s() - session.trace.t0_s();
-    if (session.live) {
-        if (session.seconds == 0) session.seconds = kLongestLiveS;
-        session.period_samples =
-            static_cast<std::int64_t>(std::ceil((session.seconds + 60) * audio::kSampleRate));
-        return session;
-    }
-    if (session.seconds == 0) session.seconds = once_s;
-    session.period_samples =
-        static_cast<std::int64_t>(std::ceil((once_s + kBetweenLapsS) * audio::kSampleRate));
-    return session;
-}
-
-SensorOptions sensor_options(const Session& session, std::int64_t epoch_ns) {
-    SensorOptions sensors;
-    const RealtimeOptions& o = session.options;
-    sensors.source = session.live ? o.source : "trace:" + o.play.trace.string();
-    for (const tracking::StickTrace& stick : session.trace.sticks) sensors.sticks.push_back(stick.name);
-    sensors.picture_predictor = picture_specification(o.play.picture_predictor);
-    sensors.sound_predictor = sound_specification(o.play.sound_predictor);
-    sensors.confirming_predictor = confirming_specification(o.play.sound_predictor);
-    sensors.epoch_ns = epoch_ns;
-    sensors.period_s = static_cast<double>(session.period_samples) / audio::kSampleRate;
-    sensors.stall_at_s = o.disturbance.stall_at_s;
-    sensors.stall_s = o.disturbance.stall_s;
-    sensors.realtime = o.realtime_priority;
-    sensors.program = o.program;
-    return sensors;
-}
-
-std::vector<render::SceneDescription> scenes_of(const Stage& stage, int width, int height) {
-    std::vector<render::SceneDescription> scenes;
-    for (const QualityLevel& level : quality_levels()) {
-        if (level.rate_divisor > 1) continue;
-        const auto smaller = [&](int side) {
-            return std::max(1, (side + level.size_divisor - 1) / level.size_divisor);
-        };
-        scenes.push_back(stage.scene(smaller(width), smaller(height)));
-        scenes.back().samples = level.samples;
-        scenes.back().shadow_size = level.shadow_texels;
-    }
-    return scenes;
-}
-
-std::unique_ptr<audio::LivePerformance> make_sound(const Session& session, std::string& priority) {
-    const RealtimeOptions& o = session.options;
-    audio::LiveOptions live;
-    live.output_lead_s = o.output_lead_s;
-    live.longest_s = session.seconds + kSpareSoundS;
-    live.jack_audio = o.jack_audio;
-    live.midi_port = o.midi_port;
-    live.midi_connect = o.midi_connect;
-    live.on_thread_start = [&priority, realtime = o.realtime_priority] {
-        priority = set_thread_priority(ThreadRole::sound, realtime);
-    };
-    return std::make_unique<audio::LivePerformance>(orchestra_file(), voices_of(session.kit), live);
-}
+constexpr double kStartS = 0.2;  // from the sensors being ready to the epoch
 
 /// The strikes of all laps: as on their laps' clocks, and on the run's. What the sound says was played was
 /// played.
@@ -205,7 +75,7 @@ void age_notes(RealtimeOutcome& outcome) {
 }
 
 /// The recorded paths on the run's clock: the trace lap by lap, or what a live source gave.
-std::vector<TipTrack> tracks_of(const Session& session, const RealtimeRun& run) {
+std::vector<TipTrack> tracks_of(const RealtimeSession& session, const RealtimeRun& run) {
     tracking::Trace trace = session.trace;
     const double t0_s = trace.t0_s(), end_s = t0_s + run.end_s();
     const double period_s = static_cast<double>(session.period_samples) / audio::kSampleRate;
@@ -288,8 +158,7 @@ void finish_sound(audio::LivePerformance& sound, RealtimeOutcome& outcome, const
 RealtimeOutcome play_realtime(const RealtimeOptions& options,
                               const std::function<void(const std::string&)>& warn) {
     const WallTimer wall;
-    check(options);
-    Session session = open_session(options);
+    RealtimeSession session = open_session(options);
     RealtimeOutcome outcome;
     outcome.play = describe(session.options.play, session.trace, session.kit, !session.live);
     outcome.kit = session.kit;
@@ -305,7 +174,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
     const std::unique_ptr<sim::Simulation> simulation = make_simulation(session.kit, options.play.workers);
     leave_thread_priority();
     std::unique_ptr<audio::LivePerformance> sound =
-        options.play.audio ? make_sound(session, sound_priority) : nullptr;
+        options.play.audio ? make_live_sound(session, sound_priority) : nullptr;
     std::unique_ptr<RealtimeFrames> frames;
     if (options.play.frames) {
         fs::create_directory(folder.path("frames"));
@@ -313,7 +182,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
             scenes_of(stage, options.play.width, options.play.height), stage.frame({}, {}),
             options.play.width, options.play.height, folder.path("frames"), options.realtime_priority);
     }
-    SensorOptions sensing = sensor_options(session, monotonic_ns() + to_ns(kStartS + 0.5));
+    SensorOptions sensing = sensors_of(session, monotonic_ns() + to_ns(kStartS + 0.5));
     SensorHub sensors(sensing);
     const std::int64_t epoch_ns = sensing.epoch_ns;
     result.stages_s.emplace_back("start", wall.seconds());

@@ -53,6 +53,14 @@ tracking::Trace read_played_trace(const fs::path& file) {
     return trace;
 }
 
+StrikeRules strike_rules(const PlayOptions& options, double t0_s) {
+    StrikeRules rules;
+    rules.t0_s = t0_s;
+    rules.release_margin_s = rules.commit_lead_s = options.release_margin_s;
+    rules.cancelling = options.cancelling;
+    return rules;
+}
+
 std::vector<sim::BodyDefinition> bodies_of(const Kit& kit) {
     std::vector<sim::BodyDefinition> bodies;
     for (const Instrument& instrument : kit.instruments) bodies.push_back(instrument.body);

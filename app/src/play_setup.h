@@ -9,6 +9,7 @@
 
 #include "kit.h"
 #include "play.h"
+#include "strike_scheduler.h"
 #include "tip_track.h"
 
 namespace app {
@@ -34,6 +35,9 @@ void check_options(const PlayOptions& options);
 /// What is known of a run before it begins.
 [[nodiscard]] PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
                                   bool trace_is_file = true);
+
+/// The rules of a strike's life that the options ask for.
+[[nodiscard]] StrikeRules strike_rules(const PlayOptions& options, double t0_s);
 
 [[nodiscard]] std::vector<sim::BodyDefinition> bodies_of(const Kit& kit);
 [[nodiscard]] std::vector<audio::Voice> voices_of(const Kit& kit);

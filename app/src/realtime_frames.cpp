@@ -53,6 +53,10 @@ RealtimeFrames::RealtimeFrames(std::vector<render::SceneDescription> scenes, con
 }
 
 RealtimeFrames::~RealtimeFrames() {
+    join();
+}
+
+void RealtimeFrames::join() {
     {
         const std::scoped_lock lock(mutex_);
         end_ = true;
@@ -176,14 +180,7 @@ std::vector<FrameTiming> RealtimeFrames::take_done() {
 }
 
 void RealtimeFrames::finish() {
-    {
-        const std::scoped_lock lock(mutex_);
-        end_ = true;
-        changed_.notify_all();
-    }
-    if (drawing_.joinable()) drawing_.join();
-    images_.close();
-    if (writing_.joinable()) writing_.join();
+    join();
     rethrow();
 }
 

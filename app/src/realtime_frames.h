@@ -70,6 +70,7 @@ private:
     void draw_all(const std::vector<render::SceneDescription>& scenes, const render::FrameState& rest);
     void draw_one(Renderers& renderers, FrameJob& job);
     void write_all();
+    void join();
     void guard(const std::function<void()>& work);
     void rethrow();
 

@@ -9,6 +9,7 @@
 
 #include "monotonic.h"
 #include "notes.h"
+#include "play_setup.h"
 #include "row_decoder.h"
 
 namespace app {
@@ -20,14 +21,6 @@ constexpr double kStepS = 0.1;  // between two recorded steps of the leads
 constexpr std::int64_t kLongestWaitNs = 20'000'000;
 constexpr double kWatchS = 0.05;
 constexpr double kGraceS = 0.001, kJitterS = 1e-5;
-
-StrikeRules rules_of(const PlayOptions& options, double t0_s) {
-    StrikeRules rules;
-    rules.t0_s = t0_s;
-    rules.release_margin_s = rules.commit_lead_s = options.release_margin_s;
-    rules.cancelling = options.cancelling;
-    return rules;
-}
 
 std::vector<double> trial_of(const RealtimeFrames* frames) {
     std::vector<double> trial = frames ? frames->trial_s() : std::vector<double>{0.0};
@@ -96,7 +89,7 @@ void RealtimeRun::begin_lap(std::uint64_t lap) {
         outlooks.push_back(stick.get());
     }
     conductor_ = std::make_unique<Conductor>(
-        kit_, rules_of(options_.play, t0_s_), geometry_.radius_m, std::move(outlooks), parts_.simulation,
+        kit_, strike_rules(options_.play, t0_s_), geometry_.radius_m, std::move(outlooks), parts_.simulation,
         [this](const Strike& strike, bool scheduled) { send(strike, scheduled); });
 }
 

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <stdexcept>
 
 #include "monotonic.h"
 #include "recording_file.h"
+#include "stop_signals.h"
 
 namespace app {
 namespace {
@@ -16,30 +16,6 @@ namespace {
 constexpr std::int64_t kFlushEveryNs = 200'000'000;
 constexpr double kGapIntervals = 2.5, kLeastGapS = 0.02;
 constexpr double kSmoothing = 0.1;
-
-volatile std::sig_atomic_t stop_asked = 0;
-
-/// SIGINT and SIGTERM end the recording, not the program, while this object lives.
-class StopSignals {
-public:
-    StopSignals() {
-        stop_asked = 0;
-        struct sigaction action {};
-        action.sa_handler = [](int) { stop_asked = 1; };
-        sigaction(SIGINT, &action, &old_int_);
-        sigaction(SIGTERM, &action, &old_term_);
-    }
-    ~StopSignals() {
-        sigaction(SIGINT, &old_int_, nullptr);
-        sigaction(SIGTERM, &old_term_, nullptr);
-    }
-    StopSignals(const StopSignals&) = delete;
-    StopSignals& operator=(const StopSignals&) = delete;
-
-private:
-    struct sigaction old_int_ {
-    }, old_term_{};
-};
 
 class Recorder {
 public:
@@ -50,7 +26,7 @@ public:
         const StopSignals signals;
         flushed_ns_ = monotonic_ns();
         SourceSample sample;
-        while (stop_asked == 0 && !over(monotonic_ns())) {
+        while (!StopSignals::stopped() && !over(monotonic_ns())) {
             const SourceStatus status = source_->next(sample, monotonic_ns() + kSourcePatienceNs);
             if (status == SourceStatus::ended) break;
             if (status == SourceStatus::sample && !over(sample.read_ns)) take(sample);
