@@ -1,0 +1,167 @@
+// `play --realtime` and `latency` as a user runs them, also when processes are killed on the way.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "program.h"
+
+namespace end_to_end {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+std::vector<std::string> in_time(const std::string& command, const fs::path& out,
+                                 std::vector<std::string> more) {
+    std::vector<std::string> all = {command, bundled("traces/roll.csv"), "--out", out, "--size", "64x48"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+}
+
+/// The processes of `musicworld sensor` that a process has started.
+std::vector<int> sensors_of(int parent) {
+    std::vector<int> found;
+    std::error_code error;
+    for (const fs::directory_entry& entry : fs::directory_iterator("/proc", error)) {
+        const std::string name = entry.path().filename();
+        if (!std::isdigit(static_cast<unsigned char>(name[0]))) continue;
+        std::ifstream stat(entry.path() / "stat"), line(entry.path() / "cmdline");
+        std::string text, arguments{std::istreambuf_iterator<char>(line), {}};
+        std::getline(stat, text);
+        std::istringstream fields(text.substr(std::min(text.size(), text.rfind(')') + 2)));
+        char state = 0;
+        int of = 0;
+        fields >> state >> of;
+        if (of == parent && state != 'Z' && arguments.find(std::string("\0sensor\0", 8)) != std::string::npos)
+            found.push_back(std::stoi(name));
+    }
+    return found;
+}
+
+/// Waits up to 20 s.
+template <class Condition>
+bool happens(Condition condition) {
+    for (int i = 0; i < 2000 && !condition(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return condition();
+}
+
+bool alive(int pid) {
+    return kill(pid, 0) == 0;
+}
+
+std::vector<std::string> left_memory() {
+    std::vector<std::string> left;
+    for (const fs::directory_entry& entry : fs::directory_iterator("/dev/shm"))
+        if (const std::string name = entry.path().filename(); name.starts_with("musicworld."))
+            left.push_back(name);
+    return left;
+}
+
+TEST(Latency, SaysWhatScriptsRelyOn) {
+    const Folder folder;
+    const Ended ended = run(in_time("latency", folder / "out", {"--seconds", "2", "--json"}));
+    ASSERT_EQ(ended.status, 0) << ended.err;
+    const Json said = Json::parse(ended.out);
+    EXPECT_EQ(said, Json::parse(read(folder / "out/latency.json")));
+    for (const Json& stage : said.at("stages")) {
+        EXPECT_FALSE(stage.at("name").get<std::string>().empty());
+        EXPECT_LE(stage.at("p50_ms"), stage.at("p95_ms"));
+        EXPECT_LE(stage.at("p95_ms"), stage.at("p99_ms"));
+        EXPECT_LE(stage.at("p99_ms"), stage.at("max_ms"));
+    }
+    EXPECT_GE(said.at("stages").size(), 12U);
+    EXPECT_LE(said.at("frames").at("missed"), said.at("frames").at("total"));
+    EXPECT_GE(said.at("notes").at("total"), 5);
+    for (const char* key : {"p5", "median", "p95", "min", "max"})
+        EXPECT_TRUE(said.at("sound_minus_picture_ms").contains(key)) << key;
+    EXPECT_GT(said.at("lead_needed_ms").at("sound"), 4.0);  // the output lead is part of it
+    for (const char* file :
+         {"latency.html", "samples.csv", "frames.csv", "notes.csv", "blocks.csv", "leads.csv"})
+        EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
+    const Ended compared = run({"latency", "--compare", folder / "out", folder / "out"});
+    EXPECT_EQ(compared.status, 0) << compared.err;
+    EXPECT_NE(compared.out.find("sample to notes"), std::string::npos) << compared.out;
+}
+
+TEST(Realtime, AKilledSensorIsStartedAgainAndThePlayGoesOn) {
+    const Folder folder;
+    Started started(in_time("play", folder / "out", {"--realtime", "--seconds", "6", "--no-frames"}),
+                    folder / "");
+    ASSERT_TRUE(happens([&] { return sensors_of(started.pid()).size() == 2; }));
+    std::this_thread::sleep_for(std::chrono::milliseconds(2500));
+    const std::vector<int> sensors = sensors_of(started.pid());
+    ASSERT_EQ(sensors.size(), 2U);
+    kill(sensors[0], SIGKILL);
+    const Ended ended = started.wait();
+    ASSERT_EQ(ended.status, 0) << ended.err;
+    EXPECT_NE(ended.err.find("killed by signal 9; started again"), std::string::npos) << ended.err;
+    const Json summary = Json::parse(read(folder / "out/summary.json"));
+    EXPECT_GT(summary.at("strikes").at("released"), 20);
+    EXPECT_EQ(summary.at("realtime").at("against_offline").at("unexplained"), 0)
+        << read(folder / "out/departures.csv");
+    EXPECT_EQ(left_memory(), std::vector<std::string>());
+}
+
+TEST(Realtime, InterruptedItFinishesWhatItHas) {
+    const Folder folder;
+    Started started(in_time("play", folder / "out", {"--realtime", "--seconds", "60", "--no-frames"}),
+                    folder / "");
+    ASSERT_TRUE(happens([&] { return sensors_of(started.pid()).size() == 2; }));
+    std::this_thread::sleep_for(std::chrono::milliseconds(2500));
+    kill(started.pid(), SIGINT);
+    const Ended ended = started.wait();
+    ASSERT_EQ(ended.status, 0) << ended.err;
+    const Json summary = Json::parse(read(folder / "out/summary.json"));
+    EXPECT_LT(summary.at("duration_s"), 50);
+    int channels = 0;
+    EXPECT_GT(read_wav(folder / "out/audio.wav", channels).size(), 48000U);
+}
+
+TEST(Realtime, AProgramThatIsKilledLeavesNoProcessAndNoMemoryBehind) {
+    const Folder folder;
+    Started started(in_time("play", folder / "out", {"--realtime", "--seconds", "60", "--no-frames"}),
+                    folder / "");
+    ASSERT_TRUE(happens([&] { return sensors_of(started.pid()).size() == 2; }));
+    const std::vector<int> sensors = sensors_of(started.pid());
+    kill(started.pid(), SIGKILL);
+    (void)started.wait();
+    for (const int sensor : sensors) EXPECT_TRUE(happens([&] { return !alive(sensor); })) << sensor;
+    EXPECT_EQ(left_memory(), std::vector<std::string>());
+    EXPECT_FALSE(fs::exists(folder / "out/summary.json"));
+}
+
+TEST(Realtime, WhatCannotBeIsRefusedInOneLine) {
+    const Folder folder;
+    const std::vector<std::vector<std::string>> cases = {
+        {"--seconds", "5"},  // without --realtime
+        {"--realtime", "--lead", "long"},
+        {"--realtime", "--seconds", "-1"},
+        {"--realtime", "--priority", "high"},
+        {"--realtime", "--disturb", "rain:1@2"},
+        {"--realtime", "--output-lead", "0.010"},
+        {"--realtime", "--source", "osc:70000"},
+        {"--realtime", "--source", "pigeon"},
+        {"--realtime", "--sound-predictor", "exec:cat"},
+        {"--realtime", "--solo", "1"},
+    };
+    for (const auto& more : cases) {
+        const Ended ended = run(in_time("play", folder / "out", more));
+        EXPECT_EQ(ended.status, 2) << more.back() << ended.err;
+        EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 1) << ended.err;
+        EXPECT_NE(ended.err.find("expected"), std::string::npos) << ended.err;
+        EXPECT_FALSE(fs::exists(folder / "out/summary.json"));
+    }
+    // No JACK server runs under this name.
+    const Ended jack = run(in_time("play", folder / "out", {"--realtime", "--jack", "--no-frames"}),
+                           {"JACK_DEFAULT_SERVER=musicworld-none"});
+    EXPECT_EQ(jack.status, 1);
+    EXPECT_EQ(std::count(jack.err.begin(), jack.err.end(), '\n'), 1) << jack.err;
+}
+
+}  // namespace
+}  // namespace end_to_end
