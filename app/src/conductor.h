@@ -39,7 +39,9 @@ private:
 /// How a stick is drawn in a frame.
 struct DrawnStick {
     tracking::PosePrediction pose;  ///< as drawn: held on a surface that it meets
-    tracking::PointMotion tip;      ///< of the pose predicted for the frame's time, before it is held
+    /// The tip that was predicted for the frame's time, before it is held: by the pictures' filter, or, where
+    /// the frame holds the stick at a coming contact, by the sound's, which has predicted that contact.
+    tracking::PointMotion tip;
     bool held = false;
 };
 

@@ -49,9 +49,13 @@ public:
             const std::ptrdiff_t match = nearest(strike, taken);
             if (match >= 0) taken[static_cast<std::size_t>(match)] = true;
             const Strike* other = match < 0 ? nullptr : own_[static_cast<std::size_t>(match)];
-            if (other && other->onset_sample == strike.onset_sample) continue;
-            add(strike, other ? "another onset" : "not sounded", strike.onset_s,
-                other ? other->onset_s : kNone);
+            if (other && other->onset_sample == strike.onset_sample && other->speed_mps == strike.speed_mps)
+                continue;
+            add(strike,
+                !other                                       ? "not sounded"
+                : other->onset_sample != strike.onset_sample ? "another onset"
+                                                             : "another speed",
+                strike.onset_s, other ? other->onset_s : kNone);
         }
         for (std::size_t i = 0; i < own_.size(); ++i)
             if (!taken[i] && own_[i]->outcome == Outcome::released)

@@ -12,9 +12,9 @@
 namespace app {
 
 /// The path of one stick's tip as the screen shows it during one lap: a cubic Hermite curve through the tips
-/// and their velocities of the frames that were shown in time, on the lap's clock. The tips are those of the
-/// predicted poses, before a stick that meets a surface is held there. No curve joins frames more than
-/// kLongestPieceS apart.
+/// and their velocities of the frames that were shown in time, on the lap's clock. The tips are those
+/// that were predicted for the frames (DrawnTip), before a stick that meets a surface is held there. No curve
+/// joins frames more than kLongestPieceS apart.
 class DrawnPath {
 public:
     static constexpr double kLongestPieceS = 0.25;

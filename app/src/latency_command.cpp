@@ -71,6 +71,7 @@ void measure(const Typed& typed, const RunInTime& run) {
                                 : format_latency_text(outcome.latency, outcome.realtime));
     if (!typed.play.out.empty() && !typed.json)
         fmt::print("Look at {}\n", (options.play.out / "latency.html").string());
+    if (!outcome.failure.empty()) throw std::runtime_error(outcome.failure);
 }
 
 RealtimeOutcome run_and_warn(const RealtimeOptions& options) {

@@ -67,10 +67,8 @@ Json sound_minus_picture(const LatencyReport& report) {
     const Spread& ms = report.sound_minus_picture_ms;
     Json json = json_of(ms);
     json["unmatched"] = report.notes_without_picture;
-    json["share_within_atsc"] =
-        ms.empty() ? Json() : Json(ms.share_within(kAtscLimits.early_ms, kAtscLimits.late_ms));
-    json["share_within_itu"] =
-        ms.empty() ? Json() : Json(ms.share_within(kItuLimits.early_ms, kItuLimits.late_ms));
+    json["share_within_atsc"] = ms.empty() ? Json() : Json(report.share_within_atsc());
+    json["share_within_itu"] = ms.empty() ? Json() : Json(report.share_within_itu());
     return json;
 }
 

@@ -73,22 +73,23 @@ std::string stage_table(const LatencyReport& report) {
 }
 
 std::string sound_picture_note(const LatencyReport& report) {
-    const Spread& ms = report.sound_minus_picture_ms;
     return fmt::format(
         "<p class=note>A note's onset in the output minus the time at which the drawn path of its stick, a "
         "cubic "
-        "Hermite curve through the predicted poses of the frames shown, comes into the instrument's surface. "
-        "The "
-        "screen shows no time between frames: the first frame that shows the stick at or behind the surface "
-        "is up "
-        "to a frame later (p5 {}, median {}, p95 {} against that). {:.1f} % of the notes lie within ATSC's "
-        "limit, "
-        "{:.1f} % within ITU's; of {} notes the drawn stick did not strike within {:g} ms.</p>\n",
+        "Hermite curve through the tips predicted for the frames shown, comes into the instrument's surface. "
+        "Frames "
+        "that hold a stick at a coming contact count with the prediction of that contact, which the sound's "
+        "filter "
+        "made a render lead before. The screen shows no time between frames: the first frame that shows the "
+        "stick at "
+        "or behind the surface is up to a frame later (p5 {}, median {}, p95 {} against that). {:.1f} % of "
+        "all notes "
+        "lie within ATSC's limit, {:.1f} % of those with a picture within ITU's; of {} notes the drawn stick "
+        "did not "
+        "strike within {:g} ms.</p>\n",
         signed_ms(report.sound_minus_frame_ms, 5), signed_ms(report.sound_minus_frame_ms, 50),
-        signed_ms(report.sound_minus_frame_ms, 95),
-        100 * ms.share_within(kAtscLimits.early_ms, kAtscLimits.late_ms),
-        100 * ms.share_within(kItuLimits.early_ms, kItuLimits.late_ms), report.notes_without_picture,
-        1e3 * kPictureWindowS);
+        signed_ms(report.sound_minus_frame_ms, 95), 100 * report.share_within_atsc(),
+        100 * report.share_within_itu(), report.notes_without_picture, 1e3 * kPictureWindowS);
 }
 
 std::string remarks(const RealtimeResult& realtime) {

@@ -61,8 +61,8 @@ void add_ages(LatencyReport& report, const RealtimeResult& realtime) {
         [](const FrameTiming& f) {
             return f.fate == FrameFate::in_time ? MaybeMs(1e3 * f.oldest_sample_age_s) : MaybeMs();
         });
-    add(report, Kind::age, "pose age in notes", "onset minus the newest sample that moved it", realtime.notes,
-        [](const NoteTiming& n) { return MaybeMs(1e3 * n.pose_age_s); });
+    add(report, Kind::age, "pose age in notes", "onset minus the newest sample that could change it",
+        realtime.notes, [](const NoteTiming& n) { return MaybeMs(1e3 * n.pose_age_s); });
 }
 
 template <class Items, class Missed>
@@ -122,6 +122,18 @@ double Spread::percentile(double percent) const {
     if (sorted_.empty()) return 0;
     const double rank = std::ceil(percent / 100 * static_cast<double>(sorted_.size()) - 1e-9);
     return sorted_[std::min(sorted_.size() - 1, static_cast<std::size_t>(std::max(rank - 1, 0.0)))];
+}
+
+double LatencyReport::share_within_atsc() const {
+    const auto matched = static_cast<double>(sound_minus_picture_ms.count());
+    const double all = matched + static_cast<double>(notes_without_picture);
+    return all == 0 ? 0
+                    : sound_minus_picture_ms.share_within(kAtscLimits.early_ms, kAtscLimits.late_ms) *
+                          matched / all;
+}
+
+double LatencyReport::share_within_itu() const {
+    return sound_minus_picture_ms.share_within(kItuLimits.early_ms, kItuLimits.late_ms);
 }
 
 double Spread::share_within(double low, double high) const {

@@ -58,19 +58,24 @@ inline constexpr double kDrummersLatencyMs = 10, kDrummersJitterMs = 3;
 
 /// What `latency` says of a run in real time.
 struct LatencyReport {
+    // clang-format off
     /// In order of the way; those that nothing took are left out:
     ///
-    ///   sensor to filter   sample due to both filters done        frame query         poses and simulation
-    ///   asked filter to app      that to the application having it      frame drawn         drawing begun to
-    ///   ended query              of the shared memory                   frame read back     that to pixels
-    ///   being there contact            the application having it to the       frame written       that to
-    ///   the file written
-    ///                      simulation's answer                    frame in all        query begun to pixels
-    ///                      there
-    ///   note hand-over     that to its notes being with the       pose age in frames  shown minus sample
-    ///                      audio
-    ///   sample to notes    due to notes being with the audio      pose age in notes   onset minus sample
-    ///   block computed     planned to done
+    ///   sensor to filter     sample due to all its filters done
+    ///   filter to app        that to the application having it
+    ///   query                of the shared memory
+    ///   contact              the application having it to the simulation's answer
+    ///   note hand-over       that to its notes being with the audio
+    ///   sample to notes      due to notes being with the audio
+    ///   block computed       planned to done
+    ///   frame query          poses and simulation asked
+    ///   frame drawn          drawing begun to ended
+    ///   frame read back      that to pixels being there
+    ///   frame in all         query begun to pixels there
+    ///   frame written        pixels there to the file written
+    ///   pose age in frames   shown minus the oldest stick's sample
+    ///   pose age in notes    onset minus the newest sample that could change it
+    // clang-format on
     std::vector<LatencyStage> stages;
     Deadline frames;  ///< asked for; missed: late or not drawn
     Deadline notes;   ///< sounded; missed: later than planned
@@ -79,6 +84,10 @@ struct LatencyReport {
     std::vector<SoundPicture> pictures;  ///< of the notes that the drawn sticks play, too
     std::size_t notes_without_picture = 0;
     Spread sound_minus_picture_ms, sound_minus_frame_ms;
+    /// Share of the notes within ATSC's limit; one without a picture is not.
+    [[nodiscard]] double share_within_atsc() const;
+    /// Share of those with a picture within ITU-R BT.1359's limits.
+    [[nodiscard]] double share_within_itu() const;
     std::vector<DrawnError> errors;
     /// p99 of "frame in all": what the render lead must cover so that 99 of 100 frames are in time.
     std::optional<double> render_lead_needed_ms;

@@ -33,12 +33,10 @@ void add_sound_and_picture(Out out, const LatencyReport& report) {
                    "p5", "median", "p95", "max");
     add_spread(out, "picture", report.sound_minus_picture_ms);
     add_spread(out, "first frame", report.sound_minus_frame_ms);
-    const Spread& ms = report.sound_minus_picture_ms;
     fmt::format_to(out,
                    "within ATSC's {:g} to {:+g} ms: {:.1f} %; ITU-R BT.1359's {:g} to {:+g} ms: {:.1f} %; ",
-                   kAtscLimits.early_ms, kAtscLimits.late_ms,
-                   100 * ms.share_within(kAtscLimits.early_ms, kAtscLimits.late_ms), kItuLimits.early_ms,
-                   kItuLimits.late_ms, 100 * ms.share_within(kItuLimits.early_ms, kItuLimits.late_ms));
+                   kAtscLimits.early_ms, kAtscLimits.late_ms, 100 * report.share_within_atsc(),
+                   kItuLimits.early_ms, kItuLimits.late_ms, 100 * report.share_within_itu());
     fmt::format_to(out, "notes whose drawn stick does not strike: {}\n", report.notes_without_picture);
 }
 

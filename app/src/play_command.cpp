@@ -51,22 +51,20 @@ void play_in_time(const RealtimeOptions& options) {
         play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
     const StrikeScore& s = outcome.play.score;
     const RealtimeResult& r = outcome.realtime;
-    const auto missed = std::ranges::count_if(r.frames, [](const FrameTiming& frame) {
-        return frame.asked_for && frame.fate != FrameFate::in_time;
-    });
-    const auto late = std::ranges::count_if(r.notes, [](const NoteTiming& note) { return note.late_s > 0; });
     const auto unexplained = std::ranges::count_if(
         outcome.departures, [](const Departure& d) { return d.cause == "unexplained"; });
     fmt::print(
         "{:.1f} s in real time: {} strikes of {} sounded, {} false, {} cancelled; {} of {} frames missed, {} "
         "of {} notes late\n",
-        r.seconds, s.true_contacts - s.missed, s.true_contacts, s.false_notes, s.cancelled, missed,
-        r.frames.size(), late, r.notes.size());
+        r.seconds, s.true_contacts - s.missed, s.true_contacts, s.false_notes, s.cancelled,
+        outcome.latency.frames.missed, outcome.latency.frames.total, outcome.latency.notes.missed,
+        outcome.latency.notes.total);
     if (outcome.offline_strikes > 0)
         fmt::print("{} strikes offline: {} depart from them here, {} unexplained ({})\n",
                    outcome.offline_strikes, outcome.departures.size(), unexplained,
                    (options.play.out / "departures.csv").string());
     print_places(options.play);
+    if (!outcome.failure.empty()) throw std::runtime_error(outcome.failure);
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "progress_bar.h"
 #include "realtime_products.h"
 #include "realtime_session.h"
+#include "stick_tracker.h"
 #include "stop_signals.h"
 #include "thread_priority.h"
 
@@ -23,12 +24,30 @@ namespace app {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kStartS = 0.2;  // from the sensors being ready to the epoch
+constexpr double kStartS = 0.7;  // from starting the sensors to the epoch, at first
+constexpr double kAheadS = 0.1;  // the epoch lies at least that far ahead when all is ready
+constexpr int kStarts = 3;
+
+/// Sensors have to know the epoch when they are started; where starting takes until then, they are started
+/// once more with more time (of a live source, whose first samples then count from before the epoch, that
+/// does no harm).
+std::unique_ptr<SensorHub> start_sensors(const RealtimeSession& session, std::int64_t& epoch_ns) {
+    double ahead_s = session.live ? 2 * kStartS : kStartS;
+    for (int i = 1;; ++i, ahead_s *= 4) {
+        epoch_ns = monotonic_ns() + to_ns(ahead_s);
+        auto hub = std::make_unique<SensorHub>(sensors_of(session, epoch_ns));
+        if (session.live || monotonic_ns() < epoch_ns - to_ns(kAheadS)) return hub;
+        if (i == kStarts)
+            throw std::runtime_error(fmt::format(
+                "error: found sensors that took more than {:.1f} s to start, expected a machine less busy",
+                ahead_s));
+    }
+}
 
 /// The strikes of all laps: as on their laps' clocks, and on the run's. What the sound says was played was
 /// played.
-void collect_strikes(RealtimeOutcome& outcome, const RealtimeRun& run, std::vector<LapStrikes>& laps,
-                     std::int64_t period_samples, bool sound) {
+void collect_strikes(RealtimeOutcome& outcome, std::vector<LapStrikes>& laps, std::int64_t period_samples,
+                     bool sound) {
     std::map<std::uint64_t, const audio::PlayedNote*> played;
     for (const NoteTiming& note : outcome.realtime.notes) played[note.played.id] = &note.played;
     const double period_s = outcome.realtime.period_s;
@@ -58,18 +77,20 @@ void collect_strikes(RealtimeOutcome& outcome, const RealtimeRun& run, std::vect
         });
         note.lap = lap == laps.end() ? 0 : lap->lap;
     }
-    (void)run;
 }
 
 /// Age of the newest sample that a note could use: its onset less the sample's time.
 void age_notes(RealtimeOutcome& outcome) {
+    const std::vector<SampleTiming>& samples = outcome.realtime.samples;  // by time of their hand-over
     for (NoteTiming& note : outcome.realtime.notes) {
         const Strike& strike = outcome.lap_strikes[note.strike];
         double newest_s = strike.scheduled_at_s;
-        for (const SampleTiming& sample : outcome.realtime.samples)
-            if (sample.lap == note.lap && sample.stick == strike.stick &&
-                sample.handed_ns <= note.played.taken_ns)
-                newest_s = std::max(newest_s, sample.t_s);
+        auto sample = std::ranges::upper_bound(samples, note.played.taken_ns, {}, &SampleTiming::handed_ns);
+        while (sample != samples.begin() && (--sample)->lap == note.lap)
+            if (sample->stick == strike.stick) {
+                newest_s = std::max(newest_s, sample->t_s);
+                break;
+            }
         note.pose_age_s = strike.onset_s - newest_s;
     }
 }
@@ -95,16 +116,20 @@ std::vector<TipTrack> tracks_of(const RealtimeSession& session, const RealtimeRu
     return tip_tracks(trace, session.stick);
 }
 
-/// What stayed on the screen instead of a frame that is not there.
-void fill_gaps(const fs::path& folder, std::size_t frames) {
+/// What stayed on the screen instead of a frame that is not there: the frame before; before the first, the
+/// stage at rest.
+void fill_gaps(const fs::path& folder, std::size_t frames, const render::Image& rest) {
     fs::path last;
     for (std::size_t k = 0; k < frames; ++k) {
         const fs::path file = folder / fmt::format("{:06}.png", k);
         std::error_code error;
-        if (fs::exists(file, error))
-            last = file;
-        else if (!last.empty())
-            fs::create_hard_link(last, file, error);
+        if (!fs::exists(file, error)) {
+            if (last.empty())
+                write_file(file, render::encode_png(rest));
+            else
+                fs::create_hard_link(last, file, error);
+        }
+        last = file;
     }
 }
 
@@ -182,14 +207,14 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
             scenes_of(stage, options.play.width, options.play.height), stage.frame({}, {}),
             options.play.width, options.play.height, folder.path("frames"), options.realtime_priority);
     }
-    SensorOptions sensing = sensors_of(session, monotonic_ns() + to_ns(kStartS + 0.5));
-    SensorHub sensors(sensing);
-    const std::int64_t epoch_ns = sensing.epoch_ns;
+    std::int64_t epoch_ns = 0;
+    const std::unique_ptr<SensorHub> hub = start_sensors(session, epoch_ns);
+    SensorHub& sensors = *hub;
     result.stages_s.emplace_back("start", wall.seconds());
     {
         RealtimeRun run(session.kit, options, session.stick, session.trace.t0_s(), session.period_samples,
                         {*simulation, stage, sensors, sound.get(), frames.get()}, session.trace.sticks.size(),
-                        !sensing.confirming_predictor.empty(), epoch_ns);
+                        !confirming_specification(options.play.sound_predictor).empty(), epoch_ns);
         if (sound) sound->start(epoch_ns);
         if (frames) frames->start(epoch_ns, options.disturbance);
         const BusyThreads load(options.disturbance, epoch_ns);
@@ -210,10 +235,12 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
         outcome.stick = session.stick = run.geometry();
         result.t_end_s = result.t0_s + run.end_s();
         result.tracks = tracks_of(session, run);
-        collect_strikes(outcome, run, run.laps(), session.period_samples, sound != nullptr);
+        collect_strikes(outcome, run.laps(), session.period_samples, sound != nullptr);
     }
     age_notes(outcome);
-    outcome.realtime.priorities = {{"control", control_priority}, {"simulation", simulation_priority}};
+    outcome.realtime.priorities = {
+        {"control", control_priority},
+        {"simulation", options.play.workers > 0 ? simulation_priority : control_priority}};
     if (sound) outcome.realtime.priorities.emplace_back("sound", sound_priority);
     if (frames) outcome.realtime.priorities.emplace_back("drawing", frames->priority());
     const sim::WorkerReport workers = simulation->report();
@@ -226,7 +253,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
     std::vector<std::uint8_t> test_frame;
     if (frames) {
         result.frames = outcome.realtime.frames.size();
-        fill_gaps(folder.path("frames"), result.frames);
+        fill_gaps(folder.path("frames"), result.frames, frames->rest_image());
         result.versions.emplace_back("renderer", frames->version());
         result.stages_s.emplace_back("drawing (own thread)", frames->draw_s());
         result.stages_s.emplace_back("writing frames (own thread)", frames->write_s());
@@ -243,6 +270,8 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
     write_realtime_products(outcome, folder);
     folder.finish();
     if (options.play.video) fs::rename(options.play.video->string() + ".partial", *options.play.video);
+    for (const SensorEvent& event : outcome.realtime.events)
+        if (event.kind == SensorEvent::Kind::failed) outcome.failure = event.message;
     return outcome;
 }
 

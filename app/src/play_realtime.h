@@ -28,6 +28,8 @@ struct RealtimeOutcome {
     StickGeometry stick;
     std::vector<Departure> departures;  ///< traces only
     LatencyReport latency;
+    std::string failure;  ///< a sensor that could not go on: the products hold what was played until then;
+                          ///< empty: none
     std::size_t offline_strikes = 0;  ///< released ones of the offline run over the same laps
 };
 

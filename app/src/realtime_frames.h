@@ -38,7 +38,7 @@ public:
     RealtimeFrames& operator=(const RealtimeFrames&) = delete;
 
     void start(std::int64_t epoch_ns, const Disturbance& disturbance);
-    /// False: the thread is still busy with the one before.
+    /// False: the thread is still busy with the one before. Waits 0.1 ms at the longest.
     [[nodiscard]] bool offer(FrameJob job);
     /// Frames that were drawn (in time or late) since the last call. Throws what went wrong on a thread.
     [[nodiscard]] std::vector<FrameTiming> take_done();
@@ -71,6 +71,7 @@ private:
     void draw_one(Renderers& renderers, FrameJob& job);
     void write_all();
     void join();
+    [[nodiscard]] std::unique_lock<std::mutex> try_to_lock();
     void guard(const std::function<void()>& work);
     void rethrow();
 

@@ -44,8 +44,9 @@ struct FrameTiming {
     std::int64_t written_ns = 0;                             ///< file written; 0: not
 };
 
-/// A stick in a frame that was drawn: the tip of the predicted pose, before it is held on a surface that it
-/// meets.
+/// A stick in a frame that was drawn: the tip that was predicted for it, before it is held on a surface that
+/// it meets: by the pictures' filter, or, where it is held at a coming contact, by the sound's, which has
+/// predicted that contact.
 struct DrawnTip {
     std::uint64_t frame = 0;
     std::uint32_t stick = 0;
@@ -61,7 +62,7 @@ struct DrawnTip {
 struct NoteTiming {
     std::size_t strike = 0;  ///< index into PlayResult::strikes
     std::uint64_t lap = 0;
-    double pose_age_s = 0;  ///< onset minus the time of the newest sample that moved it
+    double pose_age_s = 0;  ///< onset minus the time of the newest sample that could change it
     audio::PlayedNote played;
     double late_s = 0;  ///< onset in the output minus the planned one
 };

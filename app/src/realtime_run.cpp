@@ -40,7 +40,6 @@ RealtimeRun::RealtimeRun(const Kit& kit, const RealtimeOptions& options, const S
       period_samples_(period_samples),
       parts_(parts),
       epoch_ns_(epoch_ns),
-      geometry_known_(!is_live(options)),
       samples_seen_(sticks, 0),
       starts_seen_(sticks, 0),
       fps_(options.play.fps),
@@ -115,8 +114,8 @@ void RealtimeRun::wait(std::int64_t until_ns) {
 /// A live stream may say where the tip is (`# tip_m:`), in the lines before its first row.
 void RealtimeRun::learn_geometry() {
     const std::string head = parts_.sensors.stream_head();
-    if (head.empty()) return;
-    geometry_known_ = true;
+    if (head == stream_head_) return;
+    stream_head_ = head;
     RowDecoder decoder(
         "stream", [](const tracking::TraceRow&) {}, [](const std::string&) {});
     decoder.message(head);
@@ -126,7 +125,7 @@ void RealtimeRun::learn_geometry() {
 }
 
 void RealtimeRun::take_states() {
-    if (!geometry_known_) learn_geometry();
+    if (is_live(options_)) learn_geometry();
     struct New {
         std::uint32_t stick;
         tracking::StickState state;
@@ -242,8 +241,7 @@ void RealtimeRun::ask_for_frame(std::uint64_t index) {
     timing.asked_for = quality_.wants(index);
     if (!timing.asked_for || start >= timing.shown_ns) {
         result_.frames.push_back(timing);
-        if (timing.asked_for)
-            if (const auto why = quality_.frame(shown_s, false, -1)) note_step(*why);
+        if (timing.asked_for) skipped(shown_s);
         return;
     }
     const double T = lap_time_s(timing.shown_ns, lap_);
@@ -263,8 +261,16 @@ void RealtimeRun::ask_for_frame(std::uint64_t index) {
     job.state = parts_.stage.frame(bodies, poses);
     timing.query_ns = now_ns() - start;
     result_.frames.push_back(timing);
-    if (!parts_.frames->offer(std::move(job)))
-        if (const auto why = quality_.frame(shown_s, false, -1)) note_step(*why);
+    if (parts_.frames->offer(std::move(job)))
+        drawing_quality_ = timing.quality;
+    else
+        skipped(shown_s);
+}
+
+void RealtimeRun::skipped(double shown_s) {
+    // One that waits for a frame of another level says nothing of this one.
+    if (static_cast<std::size_t>(drawing_quality_) != quality_.level()) return;
+    if (const auto why = quality_.frame(shown_s, false, -1)) note_step(*why);
 }
 
 void RealtimeRun::record_tips(const Scene& scene, std::uint64_t index, double T) {
@@ -371,10 +377,11 @@ void RealtimeRun::run(double seconds, const std::function<bool()>& stop,
         }
         progress(now_s / end_s_);
     }
+    take_states();
     end_s_ = std::min(end_s_, to_s(now_ns()));
     begin_lap(lap_ + 1);  // what is pending is played
     result_.seconds = end_s_;
-    result_.laps = laps_.size();
+    result_.laps = lap_;  // also those that no sample came from
 }
 
 }  // namespace app

@@ -104,6 +104,8 @@ private:
     [[nodiscard]] double next_frame_at_s() const;
     void ask_for_frames();
     void ask_for_frame(std::uint64_t index);
+    /// A frame that was asked for was not drawn.
+    void skipped(double shown_s);
     void record_tips(const Scene& scene, std::uint64_t index, double T);
     void take_frames();
     void take_notes();
@@ -127,13 +129,14 @@ private:
     std::vector<std::unique_ptr<StateStick>> sticks_;
     std::unique_ptr<Conductor> conductor_;
     std::uint64_t lap_ = 0, first_id_ = 0;
-    bool geometry_known_;
-    double newest_s_ = 0;  // of the samples taken, on the lap's clock
+    std::string stream_head_;  // of a live source, as far as it was learnt
+    double newest_s_ = 0;      // of the samples taken, on the lap's clock
     bool any_sample_ = false;
     std::vector<std::uint64_t> samples_seen_, starts_seen_;
 
     double fps_;
     std::uint64_t next_frame_ = 0, first_tip_ = 0;
+    int drawing_quality_ = 0;  // of the frame at hand
     QualityRule quality_;
     // Measured always; followed with --lead auto.
     LeadControl render_lead_, sound_lead_;

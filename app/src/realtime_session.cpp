@@ -9,10 +9,12 @@
 #include "play_setup.h"
 #include "stick_tracker.h"
 #include "thread_priority.h"
+#include "trace_files.h"
 
 namespace app {
 namespace {
 
+constexpr std::string_view kTracePrefix = "trace:";
 constexpr double kBetweenLapsS = 0.25;  // more than tracking::kGapS and any note's way beyond the last sample
 constexpr double kLongestLiveS = 600;   // 23 MB of sound a minute are kept
 constexpr double kSpareSoundS = 1;
@@ -48,7 +50,7 @@ tracking::Trace live_trace(const RealtimeOptions& options) {
 RealtimeSession open_session(const RealtimeOptions& options) {
     check(options);
     RealtimeSession session{options, {}, {}, {}, is_live(options), options.seconds, 0};
-    session.trace = session.live ? live_trace(options) : read_played_trace(options.play.trace);
+    session.trace = session.live ? live_trace(options) : read_played_trace(session.options.play.trace);
     session.kit = read_kit(options.play.kit);
     session.stick = stick_geometry(session.trace, session.kit.stick, options.play.tip, options.play.shaft);
     const double once_s = session.trace.t_end_s() - session.trace.t0_s();

@@ -6,13 +6,14 @@ namespace app {
 /// What a thread does, from the most to the least urgent.
 enum class ThreadRole { sound, sensing, control, simulation, drawing, writing };
 
-/// Gives the calling thread, and threads and processes that it starts from now on, its place. Drawing and
-/// writing step back to SCHED_IDLE, which needs no privilege and gives way to every other thread at once.
-/// Where it is permitted (and `realtime`), sound, sensing and control have SCHED_FIFO and the simulation a
-/// better nice value; else they stay as they are. Says what was obtained ("SCHED_FIFO 70", "nice 0").
+/// Gives the calling thread, and threads and processes that it starts from now on, its place. Where real-time
+/// scheduling is permitted (and `realtime`): SCHED_FIFO for sound, sensing and control, nice -8 for the
+/// simulation, 10 and 15 for drawing and writing. Else drawing and writing step back to SCHED_IDLE, which
+/// needs no privilege and gives way to every other thread at once, and the others stay as they are. Says what
+/// was obtained ("SCHED_FIFO 70", "as it was").
 std::string set_thread_priority(ThreadRole role, bool realtime);
 
-/// Back to ordinary scheduling, nice 0.
+/// Back to ordinary scheduling and the nice value before the thread's last set_thread_priority().
 void leave_thread_priority();
 
 }  // namespace app

@@ -132,6 +132,7 @@ std::vector<TrueContact> find_true_contacts(std::span<const TipTrack> tracks,
     std::vector<TrueContact> contacts;
     for (std::uint32_t stick = 0; stick < tracks.size(); ++stick) {
         const TipTrack& track = tracks[stick];
+        if (track.tip.empty()) continue;  // a live stick that sent nothing
         for (std::uint32_t instrument = 0; instrument < bodies.size(); ++instrument) {
             Crossing crossing(bodies[instrument], tip_radius_m);
             crossing.start(track.tip.front());
