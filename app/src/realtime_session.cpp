@@ -50,6 +50,8 @@ tracking::Trace live_trace(const RealtimeOptions& options) {
 RealtimeSession open_session(const RealtimeOptions& options) {
     check(options);
     RealtimeSession session{options, {}, {}, {}, is_live(options), options.seconds, 0};
+    if (options.source.starts_with(kTracePrefix))
+        session.options.play.trace = find_trace(options.source.substr(kTracePrefix.size()));
     session.trace = session.live ? live_trace(options) : read_played_trace(session.options.play.trace);
     session.kit = read_kit(options.play.kit);
     session.stick = stick_geometry(session.trace, session.kit.stick, options.play.tip, options.play.shaft);

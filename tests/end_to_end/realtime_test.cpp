@@ -64,10 +64,10 @@ std::vector<std::string> left_memory() {
 
 TEST(Latency, SaysWhatScriptsRelyOn) {
     const Folder folder;
-    const Ended ended = run(in_time("latency", folder / "out", {"--seconds", "2", "--json"}));
+    const Ended ended = run(in_time("latency", folder / "played", {"--seconds", "2", "--json"}));
     ASSERT_EQ(ended.status, 0) << ended.err;
     const Json said = Json::parse(ended.out);
-    EXPECT_EQ(said, Json::parse(read(folder / "out/latency.json")));
+    EXPECT_EQ(said, Json::parse(read(folder / "played/latency.json")));
     for (const Json& stage : said.at("stages")) {
         EXPECT_FALSE(stage.at("name").get<std::string>().empty());
         EXPECT_LE(stage.at("p50_ms"), stage.at("p95_ms"));
@@ -82,15 +82,15 @@ TEST(Latency, SaysWhatScriptsRelyOn) {
     EXPECT_GT(said.at("lead_needed_ms").at("sound"), 4.0);  // the output lead is part of it
     for (const char* file :
          {"latency.html", "samples.csv", "frames.csv", "notes.csv", "blocks.csv", "leads.csv"})
-        EXPECT_TRUE(fs::exists(folder / "out" / file)) << file;
-    const Ended compared = run({"latency", "--compare", folder / "out", folder / "out"});
+        EXPECT_TRUE(fs::exists(folder / "played" / file)) << file;
+    const Ended compared = run({"latency", "--compare", folder / "played", folder / "played"});
     EXPECT_EQ(compared.status, 0) << compared.err;
     EXPECT_NE(compared.out.find("sample to notes"), std::string::npos) << compared.out;
 }
 
 TEST(Realtime, AKilledSensorIsStartedAgainAndThePlayGoesOn) {
     const Folder folder;
-    Started started(in_time("play", folder / "out", {"--realtime", "--seconds", "6", "--no-frames"}),
+    Started started(in_time("play", folder / "played", {"--realtime", "--seconds", "6", "--no-frames"}),
                     folder / "");
     ASSERT_TRUE(happens([&] { return sensors_of(started.pid()).size() == 2; }));
     std::this_thread::sleep_for(std::chrono::milliseconds(2500));
@@ -100,31 +100,31 @@ TEST(Realtime, AKilledSensorIsStartedAgainAndThePlayGoesOn) {
     const Ended ended = started.wait();
     ASSERT_EQ(ended.status, 0) << ended.err;
     EXPECT_NE(ended.err.find("killed by signal 9; started again"), std::string::npos) << ended.err;
-    const Json summary = Json::parse(read(folder / "out/summary.json"));
+    const Json summary = Json::parse(read(folder / "played/summary.json"));
     EXPECT_GT(summary.at("strikes").at("released"), 20);
     EXPECT_EQ(summary.at("realtime").at("against_offline").at("unexplained"), 0)
-        << read(folder / "out/departures.csv");
+        << read(folder / "played/departures.csv");
     EXPECT_EQ(left_memory(), std::vector<std::string>());
 }
 
 TEST(Realtime, InterruptedItFinishesWhatItHas) {
     const Folder folder;
-    Started started(in_time("play", folder / "out", {"--realtime", "--seconds", "60", "--no-frames"}),
+    Started started(in_time("play", folder / "played", {"--realtime", "--seconds", "60", "--no-frames"}),
                     folder / "");
     ASSERT_TRUE(happens([&] { return sensors_of(started.pid()).size() == 2; }));
     std::this_thread::sleep_for(std::chrono::milliseconds(2500));
     kill(started.pid(), SIGINT);
     const Ended ended = started.wait();
     ASSERT_EQ(ended.status, 0) << ended.err;
-    const Json summary = Json::parse(read(folder / "out/summary.json"));
+    const Json summary = Json::parse(read(folder / "played/summary.json"));
     EXPECT_LT(summary.at("duration_s"), 50);
     int channels = 0;
-    EXPECT_GT(read_wav(folder / "out/audio.wav", channels).size(), 48000U);
+    EXPECT_GT(read_wav(folder / "played/audio.wav", channels).size(), 48000U);
 }
 
 TEST(Realtime, AProgramThatIsKilledLeavesNoProcessAndNoMemoryBehind) {
     const Folder folder;
-    Started started(in_time("play", folder / "out", {"--realtime", "--seconds", "60", "--no-frames"}),
+    Started started(in_time("play", folder / "played", {"--realtime", "--seconds", "60", "--no-frames"}),
                     folder / "");
     ASSERT_TRUE(happens([&] { return sensors_of(started.pid()).size() == 2; }));
     const std::vector<int> sensors = sensors_of(started.pid());
@@ -132,7 +132,7 @@ TEST(Realtime, AProgramThatIsKilledLeavesNoProcessAndNoMemoryBehind) {
     (void)started.wait();
     for (const int sensor : sensors) EXPECT_TRUE(happens([&] { return !alive(sensor); })) << sensor;
     EXPECT_EQ(left_memory(), std::vector<std::string>());
-    EXPECT_FALSE(fs::exists(folder / "out/summary.json"));
+    EXPECT_FALSE(fs::exists(folder / "played/summary.json"));
 }
 
 TEST(Realtime, WhatCannotBeIsRefusedInOneLine) {
@@ -150,14 +150,14 @@ TEST(Realtime, WhatCannotBeIsRefusedInOneLine) {
         {"--realtime", "--solo", "1"},
     };
     for (const auto& more : cases) {
-        const Ended ended = run(in_time("play", folder / "out", more));
+        const Ended ended = run(in_time("play", folder / "played", more));
         EXPECT_EQ(ended.status, 2) << more.back() << ended.err;
         EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 1) << ended.err;
         EXPECT_NE(ended.err.find("expected"), std::string::npos) << ended.err;
-        EXPECT_FALSE(fs::exists(folder / "out/summary.json"));
+        EXPECT_FALSE(fs::exists(folder / "played/summary.json"));
     }
     // No JACK server runs under this name.
-    const Ended jack = run(in_time("play", folder / "out", {"--realtime", "--jack", "--no-frames"}),
+    const Ended jack = run(in_time("play", folder / "played", {"--realtime", "--jack", "--no-frames"}),
                            {"JACK_DEFAULT_SERVER=musicworld-none"});
     EXPECT_EQ(jack.status, 1);
     EXPECT_EQ(std::count(jack.err.begin(), jack.err.end(), '\n'), 1) << jack.err;
