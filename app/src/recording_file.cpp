@@ -40,7 +40,6 @@ RecordingFile::~RecordingFile() {
 }
 
 void RecordingFile::begin(const tracking::Trace& keys, bool oriented) {
-    begun_ = true;
     oriented_ = oriented;
     head_ = tracking::format_trace_head(keys, oriented);
 }

@@ -20,7 +20,6 @@ public:
 
     /// Before the first row.
     void begin(const tracking::Trace& keys, bool oriented);
-    [[nodiscard]] bool begun() const { return begun_; }
     void add(std::size_t stick, const std::string& name, const tracking::PoseSample& sample);
     /// Writes the rows so far. Throws std::runtime_error, one line.
     void flush();
@@ -39,7 +38,7 @@ private:
     std::string head_;
     std::vector<Row> rows_;               // not yet written
     std::vector<std::uint64_t> samples_;  // of each stick
-    bool begun_ = false, oriented_ = true, wrote_ = false, finished_ = false;
+    bool oriented_ = true, wrote_ = false, finished_ = false;
 };
 
 }  // namespace app

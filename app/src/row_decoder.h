@@ -34,8 +34,9 @@ public:
     /// Of the key lines; nothing before the header.
     [[nodiscard]] const tracking::Trace& keys() const { return rows_.keys(); }
     [[nodiscard]] bool oriented() const { return !rows_.headed() || rows_.oriented(); }
-    /// The key lines and header in force, at most 2000 bytes; empty if none were sent.
-    [[nodiscard]] const std::string& head() const { return head_; }
+    /// The key lines and header in force, at most 2000 bytes; empty if none were sent, or the header line has
+    /// not come yet.
+    [[nodiscard]] std::string head() const { return rows_.headed() ? head_ : std::string(); }
 
 private:
     void grow(std::string_view bytes);

@@ -35,11 +35,6 @@ std::optional<SourceSample> SampleQueue::pop(const std::stop_token& stop) {
     return sample;
 }
 
-bool SampleQueue::empty() const {
-    const std::lock_guard lock(mutex_);
-    return samples_.empty();
-}
-
 void SampleQueue::close() {
     {
         const std::lock_guard lock(mutex_);

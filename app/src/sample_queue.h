@@ -20,12 +20,11 @@ public:
     [[nodiscard]] bool try_push(const SourceSample& sample);
     /// The next sample, waiting for it; none after close(), or when told to stop.
     [[nodiscard]] std::optional<SourceSample> pop(const std::stop_token& stop);
-    [[nodiscard]] bool empty() const;
     /// There will be no more.
     void close();
 
 private:
-    mutable std::mutex mutex_;
+    std::mutex mutex_;
     std::condition_variable_any changed_;
     std::deque<SourceSample> samples_;
     bool closed_ = false;

@@ -53,8 +53,15 @@ public:
     [[nodiscard]] virtual SourceFaults faults() const { return {}; }
     /// Samples come from a recording and say when they are due.
     [[nodiscard]] virtual bool replayed() const { return false; }
-    /// The first lines of a stream, without which the rest cannot be read; empty for other sources.
+    /// The lines of a stream without which the rest cannot be read, once they are complete, no later than the
+    /// first sample that they hold for; empty for other sources.
     [[nodiscard]] virtual std::string stream_head() const { return {}; }
+    /// How many samples of the stick lie after the one of time t_s in that lap and before the next one that
+    /// this will give: those that a replay with `resume` has passed over. t_s: none where there was none.
+    [[nodiscard]] virtual std::uint64_t passed_over(std::size_t /*stick*/, std::uint64_t /*lap*/,
+                                                    std::optional<double> /*t_s*/) const {
+        return 0;
+    }
     /// There will be no sample before that time, and this is as it should be; 0: not known.
     [[nodiscard]] virtual std::int64_t quiet_until_ns() const { return 0; }
 };
@@ -67,7 +74,7 @@ struct SourceOptions {
     double period_s = 0;              ///< a trace begins again this long after it began; 0: never
     double speed = 1;                 ///< of a replay
     bool resume = false;  ///< begin at the current time: samples of a trace that are due have been seen
-    std::string stream_head = {};  ///< with `resume`: the first lines of the stream
+    std::string stream_head = {};  ///< with `resume`: what stream_head() was
 };
 
 /// Throws BadInput for a source that does not exist, is not one, or lacks a stick that was asked for.

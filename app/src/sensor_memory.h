@@ -17,7 +17,6 @@ enum class SampleClock : std::uint64_t { replayed, source, arrival };
 /// How a sensor process is, for its hub. One a stick; what concerns the process is the same in all.
 struct SensorReport {
     std::uint64_t pid = 0;
-    std::int64_t heartbeat_ns = 0;
     SensorPhase phase = SensorPhase::starting;
     std::int64_t quiet_until_ns = 0;  ///< no sample is expected before
     double interval_s = 0;            ///< between the stick's samples, smoothed; 0: not known

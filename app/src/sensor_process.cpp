@@ -12,6 +12,7 @@
 #include <csignal>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "child_process.h"
 #include "monotonic.h"
@@ -64,6 +65,7 @@ private:
         StickFilters filters, fresh;  // `fresh`: for the next lap
         tracking::StickState state;
         std::uint64_t lap = 0;
+        std::uint64_t missed = 0;  // samples while no process ran, which are still to be counted
     };
     /// What the reader knows, for reports.
     struct Reading {
@@ -86,6 +88,7 @@ private:
     bool stall_if_due(const std::stop_token& stop);
     void report();
     void keep_head();
+    void count_missed();
     [[nodiscard]] SourceOptions source_options() const;
     void fail(const char* what);
     [[nodiscard]] double since_epoch_s(std::int64_t ns) const {
@@ -119,6 +122,7 @@ Sensor::Sensor(const SensorTask& task) : task_(task), changed_(eventfd(0, EFD_CL
                            StickFilters(task.predictors),
                            StickFilters(task.predictors),
                            {},
+                           0,
                            0});
         sticks_.back().state = sticks_.back().memory->state.read().value_or(tracking::StickState{});
     }
@@ -134,6 +138,7 @@ int Sensor::run() {
         source_ = open_source(source_options());
         if (source_->sticks().names().size() != sticks_.size())
             throw std::runtime_error("error: found sticks without shared memory, expected one a stick");
+        count_missed();
         note_source();
         phase_ = SensorPhase::running;
         reader_ = std::jthread([this](const std::stop_token& stop) { read(stop); });
@@ -164,10 +169,21 @@ SourceOptions Sensor::source_options() const {
     return options;
 }
 
-/// The stream's first lines stay in the shared memory for the process that follows this one.
+/// What a replay passed over after the newest state of the process before this one.
+void Sensor::count_missed() {
+    if (!task_.source.resume) return;
+    for (std::size_t i = 0; i < sticks_.size(); ++i) {
+        const tracking::StickState& state = sticks_[i].state;
+        const bool any = state.samples > 0;
+        sticks_[i].missed = source_->passed_over(i, state.lap, any ? std::optional(state.t_s) : std::nullopt);
+    }
+}
+
+/// The stream's key lines and header, for the hub and for the process that follows this one: in the shared
+/// memory before the first sample that they hold for.
 void Sensor::keep_head() {
     const std::string text = source_->stream_head();
-    if (text == head_ || text.size() >= StreamHead{}.text.size()) return;
+    if (text.empty() || text == head_ || text.size() >= StreamHead{}.text.size()) return;
     head_ = text;
     StreamHead head;
     std::copy(text.begin(), text.end(), head.text.begin());
@@ -206,6 +222,7 @@ void Sensor::read(const std::stop_token& stop) {
 void Sensor::pass(SourceSample sample, const std::stop_token& stop) {
     note(sample);
     put_on_our_clock(sample);
+    keep_head();
     if (source_->quiet_until_ns() != 0) note_source();
     if (source_->replayed())
         (void)queue_.push(sample, stop);
@@ -280,6 +297,7 @@ void Sensor::take(const SourceSample& sample) {
     const std::uint64_t before = stick.state.samples;
     (void)stick.filters.correct(sample.sample, stick.state);
     if (stick.state.samples != before) {
+        stick.state.samples += std::exchange(stick.missed, 0);
         stick.state.lap = sample.lap;
         stick.state.due_ns = sample.due_ns;
         stick.state.read_ns = sample.read_ns;
@@ -297,7 +315,6 @@ void Sensor::report() {
     for (std::size_t i = 0; i < sticks_.size(); ++i) {
         SensorReport report;
         report.pid = static_cast<std::uint64_t>(getpid());
-        report.heartbeat_ns = monotonic_ns();
         report.phase = phase_;
         report.quiet_until_ns = reading_.quiet_until_ns;
         report.interval_s = reading_.interval_s[i];

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 #include "bad_input.h"
@@ -86,6 +87,21 @@ SourceStatus TraceSource::next(SourceSample& sample, std::int64_t deadline_ns) {
 
 std::int64_t TraceSource::quiet_until_ns() const {
     return next_ == 0 && !rows_.empty() ? due_ns(rows_[0]) : 0;  // before it begins, and between laps
+}
+
+std::uint64_t TraceSource::passed_over(std::size_t stick, std::uint64_t lap,
+                                       std::optional<double> t_s) const {
+    const auto end = rows_.begin() + static_cast<std::ptrdiff_t>(next_);
+    const auto count = [&](auto last, double until_s) {
+        return static_cast<std::uint64_t>(std::count_if(rows_.begin(), last, [&](const Row& row) {
+            return row.stick == stick && row.sample.t_s <= until_s;
+        }));
+    };
+    constexpr double kAll = std::numeric_limits<double>::infinity();
+    const std::uint64_t a_lap = count(rows_.end(), kAll);
+    const std::uint64_t given = t_s ? lap * a_lap + count(rows_.end(), *t_s) : 0;
+    const std::uint64_t gone = lap_ * a_lap + count(end, kAll);
+    return gone > given ? gone - given : 0;
 }
 
 }  // namespace app

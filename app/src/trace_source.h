@@ -20,6 +20,8 @@ public:
     [[nodiscard]] SourceHead head() const override { return head_; }
     [[nodiscard]] bool replayed() const override { return true; }
     [[nodiscard]] std::int64_t quiet_until_ns() const override;
+    [[nodiscard]] std::uint64_t passed_over(std::size_t stick, std::uint64_t lap,
+                                            std::optional<double> t_s) const override;
 
 private:
     struct Row {

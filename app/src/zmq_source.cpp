@@ -59,6 +59,7 @@ struct ZmqSource::Connection {
 
 ZmqSource::ZmqSource(const std::string& endpoint, const SourceOptions& options)
     : connection_(std::make_unique<Connection>(options.sticks)) {
+    connection_->rows.piece(options.stream_head);
     try {
         if (!endpoint.starts_with("tcp://") && !endpoint.starts_with("ipc://")) throw zmq::error_t(EINVAL);
         connection_->socket.connect(endpoint);
@@ -97,6 +98,10 @@ SourceHead ZmqSource::head() const {
 
 SourceFaults ZmqSource::faults() const {
     return connection_->intake.faults();
+}
+
+std::string ZmqSource::stream_head() const {
+    return connection_->rows.head();
 }
 
 }  // namespace app

@@ -18,6 +18,7 @@ public:
     [[nodiscard]] const StickNames& sticks() const override;
     [[nodiscard]] SourceHead head() const override;
     [[nodiscard]] SourceFaults faults() const override;
+    [[nodiscard]] std::string stream_head() const override;
 
 private:
     struct Connection;

@@ -15,6 +15,7 @@ namespace audio {
 namespace {
 
 constexpr double kRoomToCompute_s = 0.001;
+constexpr std::int64_t kPatienceNs = 100'000'000;
 
 std::string in_ms(double seconds) {
     std::string text = std::to_string(1e3 * seconds);
@@ -121,7 +122,12 @@ void JackOutput::connect_midi(const std::string& peer) {
     description_ += std::string("; MIDI ") + jack_port_name(midi_);
     if (peer.empty()) return;
     const bool connected = jack_connect(client_.get(), jack_port_name(midi_), peer.c_str()) == 0;
-    description_ += connected ? " -> " + peer : " (not connected: found no MIDI input `" + peer + "`)";
+    description_ += connected ? " -> " + peer : " (not connected)";
+    if (connected) return;
+    midi_problem_ = "JACK: found no port `" + peer +
+                    "` to connect to, expected a MIDI input that is there before this starts (jack_lsp -t "
+                    "lists them); `" +
+                    jack_port_name(midi_) + "` stays open";
 }
 
 void JackOutput::start(const float* recording, std::int64_t epoch_ns) noexcept {
@@ -131,18 +137,32 @@ void JackOutput::start(const float* recording, std::int64_t epoch_ns) noexcept {
 }
 
 bool JackOutput::send(const MidiStroke& stroke) noexcept {
-    if (midi_ == nullptr || ended_.load(std::memory_order_relaxed) || !strokes_.try_push(stroke))
+    if (midi_ == nullptr || ended_.load(std::memory_order_relaxed)) return false;
+    if (!strokes_.try_push(stroke)) {
+        lost_strokes_.fetch_add(1, std::memory_order_relaxed);
         return false;
+    }
     last_due_ns_ = std::max(last_due_ns_, stroke.due_ns);
     return true;
 }
 
-void JackOutput::stop() noexcept {
-    sounding_.store(false, std::memory_order_seq_cst);
-    while (in_cycle_.load(std::memory_order_seq_cst)) sleep_until_ns(monotonic_ns() + 100'000);
-    if (last_due_ns_ == 0 || ended_.load(std::memory_order_relaxed)) return;
+bool JackOutput::stop() noexcept {
+    const bool left = leave_recording();
+    if (last_due_ns_ == 0 || ended_.load(std::memory_order_relaxed)) return left;
     const std::int64_t period_ns = samples_ns(jack_get_buffer_size(client_.get()));
     sleep_until_ns(last_due_ns_ + MidiEvents::kLengthNs + 2 * period_ns);
+    return left;
+}
+
+/// A cycle may never end: a server that goes away can take JACK's thread with it.
+bool JackOutput::leave_recording() noexcept {
+    sounding_.store(false, std::memory_order_seq_cst);
+    const std::int64_t until = monotonic_ns() + kPatienceNs;
+    while (in_cycle_.load(std::memory_order_seq_cst)) {
+        if (ended_.load(std::memory_order_relaxed) || monotonic_ns() > until) return false;
+        sleep_until_ns(monotonic_ns() + 100'000);
+    }
+    return true;
 }
 
 std::string JackOutput::description() const {
@@ -151,7 +171,7 @@ std::string JackOutput::description() const {
 
 JackCounts JackOutput::counts() const noexcept {
     return {underruns_.load(std::memory_order_relaxed), corrections_.load(std::memory_order_relaxed),
-            late_strokes_.load(std::memory_order_relaxed)};
+            late_strokes_.load(std::memory_order_relaxed), lost_strokes_.load(std::memory_order_relaxed)};
 }
 
 void JackOutput::server_ended(void* self) {
@@ -227,7 +247,7 @@ void JackOutput::send_strokes(const Cycle& cycle) noexcept {
     jack_midi_clear_buffer(buffer);
     MidiStroke stroke;
     while (strokes_.try_pop(stroke)) {
-        if (!events_.add(stroke)) late_strokes_.fetch_add(1, std::memory_order_relaxed);
+        if (!events_.add(stroke)) lost_strokes_.fetch_add(1, std::memory_order_relaxed);
     }
     for (; !events_.empty(); events_.pop_front()) {
         const MidiEvent& event = events_.front();

@@ -17,6 +17,7 @@ struct JackCounts {
     std::uint64_t underruns = 0;     ///< cycles that asked for samples which were not there; silence instead
     std::uint64_t corrections = 0;   ///< samples dropped or repeated to follow the device's clock
     std::uint64_t late_strokes = 0;  ///< MIDI notes whose frame had passed; sent at once
+    std::uint64_t lost_strokes = 0;  ///< MIDI notes for which there was no room; never sent
 };
 
 /// One client of a running JACK server: sound on two ports, strokes on a MIDI port. Sample n and a stroke of
@@ -46,11 +47,15 @@ public:
     void publish(std::int64_t frames) noexcept { published_.store(frames, std::memory_order_release); }
     /// Hands a stroke over; false where that cannot be. Wait-free.
     [[nodiscard]] bool send(const MidiStroke& stroke) noexcept;
-    /// Silence; the recording is not read any more. Waits (0.1 s at most) until every note-off is sent.
-    void stop() noexcept;
+    /// Silence. Waits until every note-off is sent (0.1 s after the last stroke). False: JACK's thread was
+    /// still in a cycle when the server had ended or 0.1 s were over, and may read the recording until this
+    /// is destroyed.
+    [[nodiscard]] bool stop() noexcept;
 
     [[nodiscard]] bool has_midi() const noexcept { return midi_ != nullptr; }
     [[nodiscard]] std::string description() const;
+    /// Why the MIDI port is not connected to the peer that was asked for, one line; empty: it is.
+    [[nodiscard]] const std::string& midi_problem() const noexcept { return midi_problem_; }
     [[nodiscard]] JackCounts counts() const noexcept;
 
 private:
@@ -72,6 +77,7 @@ private:
     void measure_clock() noexcept;
     [[nodiscard]] Cycle this_cycle(jack_nframes_t frames) const noexcept;
     void play(const Cycle& cycle) noexcept;
+    [[nodiscard]] bool leave_recording() noexcept;
     void copy_sound(std::int64_t first, std::int32_t frames, float* left, float* right) noexcept;
     void send_strokes(const Cycle& cycle) noexcept;
 
@@ -81,7 +87,7 @@ private:
 
     // The opening thread's.
     jack_port_t *left_ = nullptr, *right_ = nullptr, *midi_ = nullptr;
-    std::string description_;
+    std::string description_, midi_problem_;
 
     // Shared.
     CommandQueue<MidiStroke> strokes_{MidiEvents::kCapacity};
@@ -89,7 +95,7 @@ private:
     std::int64_t epoch_ns_ = 0;
     std::atomic<bool> sounding_{false}, in_cycle_{false}, ended_{false};
     std::atomic<std::int64_t> published_{0};
-    std::atomic<std::uint64_t> underruns_{0}, corrections_{0}, late_strokes_{0};
+    std::atomic<std::uint64_t> underruns_{0}, corrections_{0}, late_strokes_{0}, lost_strokes_{0};
 
     // The audio thread's.
     std::int64_t last_due_ns_ = 0;

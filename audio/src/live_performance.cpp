@@ -81,6 +81,15 @@ std::uint64_t LivePerformance::late_strokes() const {
     return implementation_->device_counts().late_strokes;
 }
 
+std::uint64_t LivePerformance::lost_strokes() const {
+    return implementation_->device_counts().lost_strokes;
+}
+
+std::string LivePerformance::midi_problem() const {
+    const JackOutput* device = implementation_->thread.device();
+    return device != nullptr ? device->midi_problem() : "";
+}
+
 std::string LivePerformance::version() const {
     return implementation_->thread.start_up().version;
 }

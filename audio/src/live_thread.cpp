@@ -163,8 +163,8 @@ void LiveThread::play_on_device(bool on) noexcept {
     on_device_ = on;
     if (on) {
         jack_->start(output_.data(), epoch_ns_);
-    } else {
-        jack_->stop();
+    } else if (!jack_->stop()) {
+        abandoned_ = std::exchange(output_, std::vector<float>(output_));
     }
 }
 

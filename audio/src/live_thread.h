@@ -105,10 +105,10 @@ private:
     std::optional<Renderer> renderer_;
     LiveNotes notes_;
     std::vector<TakenNote> taken_;
-    std::vector<float> output_;
-    std::vector<BlockTiming> timings_;  // the caller's after finish()
-    std::unique_ptr<JackOutput> jack_;  // after output_, which it reads
-    bool on_device_ = false;            // from its start to its stop
+    std::vector<float> output_, abandoned_;  // the latter JACK's thread may still read
+    std::vector<BlockTiming> timings_;       // the caller's after finish()
+    std::unique_ptr<JackOutput> jack_;       // after output_ and abandoned_, which it reads
+    bool on_device_ = false;                 // from its start to its stop
     double busy_begin_s_ = 0;
 
     std::thread thread_;

@@ -79,6 +79,16 @@ TEST(RowDecoder, HeadsHoldUntilTheNextHoweverTheStreamIsCut) {
     }
 }
 
+TEST(RowDecoder, HeadIsNoneUntilItIsComplete) {
+    Decoded d;
+    d.decoder.piece("# units: mm\n# up: z\n");
+    EXPECT_EQ(d.decoder.head(), "");
+    d.decoder.piece("t,stick,px,py,pz\n");
+    EXPECT_EQ(d.decoder.head(), "# units: mm\n# up: z\nt,stick,px,py,pz\n");
+    d.decoder.piece("# units: m\n");  // of the next head
+    EXPECT_EQ(d.decoder.head(), "");
+}
+
 TEST(RowDecoder, FaultyLinesAreSaidAndLeftOut) {
     Decoded d;
     d.decoder.message("1,left,0,nan,0\n2,left,0,1,0\n3,left\n" + std::string(5000, 'x') + "\n4,left,0,1,0\n");
@@ -201,6 +211,37 @@ TEST(ZmqSource, TakesTheLastPartOfEachMessage) {
     EXPECT_GE(source.faults().malformed, 1u);
     EXPECT_THROW(app::ZmqSource("http://x", {}), app::BadInput);
     EXPECT_THROW(app::ZmqSource("tcp://", {}), app::BadInput);
+}
+
+TEST(ZmqSource, IsTakenUpWithTheHeadThatWasSentOnce) {
+    zmq::context_t context;
+    zmq::socket_t publisher(context, zmq::socket_type::xpub);  // says when it is subscribed to
+    publisher.set(zmq::sockopt::linger, 0);
+    publisher.set(zmq::sockopt::rcvtimeo, 10'000);
+    publisher.bind("tcp://127.0.0.1:*");
+    const std::string endpoint = publisher.get(zmq::sockopt::last_endpoint);
+    zmq::message_t subscription;
+    const std::string head = "# units: mm\nt,stick,px,py,pz\n";
+    app::SourceOptions resumed;
+    resumed.resume = true;
+    {
+        app::ZmqSource first(endpoint, {});
+        ASSERT_TRUE(publisher.recv(subscription));
+        EXPECT_EQ(first.stream_head(), "");
+        publisher.send(zmq::buffer(head + "1,left,1000,0,0\n"));
+        ASSERT_EQ(take(first, 1).size(), 1u);
+        EXPECT_EQ(first.stream_head(), head);
+        resumed.stream_head = first.stream_head();
+    }
+    ASSERT_TRUE(publisher.recv(subscription));  // that it is gone
+    app::ZmqSource second(endpoint, resumed);
+    ASSERT_TRUE(publisher.recv(subscription));
+    publisher.send(zmq::str_buffer("2,left,2000,0,0\n"));
+    const std::vector<SourceSample> samples = take(second, 1);
+    ASSERT_EQ(samples.size(), 1u);
+    EXPECT_EQ(samples[0].sample.position, Vector3d(2, 0, 0));
+    EXPECT_EQ(second.stream_head(), head);
+    EXPECT_EQ(second.faults().malformed, 0u);
 }
 
 // OSC.

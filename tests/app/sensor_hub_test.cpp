@@ -11,11 +11,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <thread>
+#include <zmq.hpp>
 
 #include "bad_input.h"
 #include "free_port.h"
@@ -82,6 +84,13 @@ struct Watched {
     [[nodiscard]] std::string all_messages() const {
         std::string text;
         for (const SensorEvent& e : events) text += e.message + "\n";
+        return text;
+    }
+    /// A machine that is held up for 100 ms makes silences that no test here is about.
+    [[nodiscard]] std::string messages_but_of_silence() const {
+        std::string text;
+        for (const SensorEvent& e : events)
+            if (e.kind != Kind::silent && e.kind != Kind::back) text += e.message + "\n";
         return text;
     }
 };
@@ -152,7 +161,13 @@ TEST(SensorHub, StatesEqualAnOfflineRunToTheBit) {
         }
         EXPECT_GT(compared, 100u);
     }
-    EXPECT_EQ(seen.all_messages(), "");  // the pause between the laps is no silence
+    EXPECT_EQ(seen.messages_but_of_silence(), "");
+    // The pauses between the laps are no silences: there were two for each stick, from 1 to 1.5 s in each
+    // lap. One may be told of where the machine is held up just then.
+    const auto in_pauses = std::count_if(seen.events.begin(), seen.events.end(), [](const SensorEvent& e) {
+        return e.kind == Kind::silent && std::fmod(e.at_s, 1.5) > 1;
+    });
+    EXPECT_LE(in_pauses, 1) << seen.all_messages();
     for (const app::ClockReport& clock : hub.clocks()) EXPECT_EQ(clock.clock, "the trace's own, replayed");
 }
 
@@ -165,10 +180,10 @@ TEST(SensorHub, EndsWithItsSourceAndLeavesNothing) {
         EXPECT_EQ(children().size(), 2u);
         Watched seen;
         watch_until(hub, 2, seen, [&] { return hub.ended() && seen.count(Kind::ended) == 2; });
-        EXPECT_EQ(seen.events.size(), 2u) << seen.all_messages();
-        const std::string messages = seen.all_messages();  // in either order
-        EXPECT_NE(messages.find("sensor left: the source has ended after 60 samples\n"), std::string::npos);
-        EXPECT_NE(messages.find("sensor right: the source has ended after 60 samples\n"), std::string::npos);
+        const std::string left = "sensor left: the source has ended after 60 samples\n",
+                          right = "sensor right: the source has ended after 60 samples\n",
+                          messages = seen.messages_but_of_silence();
+        EXPECT_TRUE(messages == left + right || messages == right + left) << messages;
         EXPECT_EQ(hub.newest(0)->samples, 60u);
         EXPECT_EQ(hub.newest(1)->samples, 60u);
         EXPECT_EQ(hub.restarts(), 0);
@@ -193,10 +208,18 @@ TEST(SensorHub, KilledSensorIsStartedAgainAndGoesOnAtTheCurrentTime) {
         "sensor left: its process was killed by signal 9; started again (1 of at most 5 times in 10 s)");
     EXPECT_EQ(event->sticks, std::vector<std::string>{"left"});
     EXPECT_EQ(hub.restarts(), 1);
+    const tracking::Trace trace = tracking::read_trace(app::find_trace("flourish"));
+    const auto due_until = [&](double t_s) {
+        const auto& rows = trace.sticks[0].samples;
+        return static_cast<std::uint64_t>(
+            std::count_if(rows.begin(), rows.end(), [&](const auto& row) { return row.t_s <= t_s; }));
+    };
     std::uint64_t samples = 0, starts = 0;
     for (const tracking::StickState& state : seen.states[0]) {
         EXPECT_GT(state.samples, samples);
         samples = state.samples;
+        // Those that were due in the gap are counted, too.
+        EXPECT_EQ(state.samples + state.refused, due_until(state.t_s));
         if (state.starts != starts && starts != 0) {
             EXPECT_GE(state.due_ns, killed_ns - 100'000'000);
         }
@@ -362,7 +385,7 @@ TEST(SensorHub, LiveSticksShareAProcessAndSurviveWhatHappensToIt) {
     };
     seen.states.resize(2);
     watch_until(hub, 2, seen, grown_by(100));
-    EXPECT_EQ(seen.all_messages(), "");
+    EXPECT_EQ(seen.messages_but_of_silence(), "");
     EXPECT_EQ(hub.clocks().at(0).clock, "the source's");
 
     sender.turn_clock_by(-7);
@@ -397,6 +420,33 @@ TEST(SensorHub, LiveSticksShareAProcessAndSurviveWhatHappensToIt) {
             before = &state;
         }
     }
+}
+
+TEST(SensorHub, HeadOfAStreamIsThereBeforeItsFirstStateAndOutlivesTheSensor) {
+    zmq::context_t context;
+    zmq::socket_t publisher(context, zmq::socket_type::pub);
+    publisher.set(zmq::sockopt::linger, 0);
+    publisher.bind("tcp://127.0.0.1:*");
+    SensorHub hub(options_for("zmq:" + publisher.get(zmq::sockopt::last_endpoint), {"left"}));
+    const std::string head = "# units: mm\n# tip_m: 0,0,-0.4\nt,stick,px,py,pz\n";
+    Watched seen;
+    seen.states.resize(1);
+    // The head only until the first state is seen: a message before the subscription is lost.
+    const auto send = [&] {
+        const std::string row =
+            std::to_string(1e-9 * static_cast<double>(app::monotonic_ns())) + ",left,1000,1500,0\n";
+        publisher.send(zmq::buffer(seen.states[0].empty() ? head + row : row));
+    };
+    watch_until(hub, 1, seen, [&] { return send(), !seen.states[0].empty(); });
+    EXPECT_EQ(hub.stream_head(), head);
+    kill(children().front(), SIGKILL);
+    watch_until(hub, 1, seen, [&] { return send(), seen.count(Kind::restarted) == 1; });
+    const std::size_t before = seen.states[0].size();
+    watch_until(hub, 1, seen, [&] { return send(), seen.states[0].size() > before + 10; });
+    EXPECT_EQ(hub.stream_head(), head);
+    EXPECT_EQ(seen.states[0].back().starts, 2u);
+    for (const tracking::StickState& state : seen.states[0])
+        EXPECT_EQ(state.position, Eigen::Vector3d(1, 1.5, 0));
 }
 
 }  // namespace

@@ -1,3 +1,5 @@
+#include "jack_output.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -160,6 +162,7 @@ TEST_F(JackOutput, StrokesArriveInTheFrameOfTheirOnsetAndCancelledOnesSendNothin
                          {.longest_s = 5, .midi_port = "strokes", .midi_connect = "listener:midi"});
     EXPECT_NE(live.device().find("MIDI musicworld:strokes -> listener:midi"), std::string::npos)
         << live.device();
+    EXPECT_EQ(live.midi_problem(), "");
     const std::int64_t epoch = audio::monotonic_ns() + 200 * kMs;
     live.start(epoch);
     std::map<int, std::int64_t> planned;  // by key
@@ -227,6 +230,36 @@ TEST_F(JackOutput, ServerThatEndsLeavesTheRecordingWhole) {
     wait_until(epoch + 700 * kMs);
     EXPECT_EQ(live.finish(kSecond, kSecond), rendering::render({voice("drum")}, notes, kSecond, kSecond));
     EXPECT_NE(live.device().find("the server ended"), std::string::npos) << live.device();
+}
+
+TEST_F(JackOutput, MidiPeerThatIsNotThereIsToldAndThePortStaysOpen) {
+    const Server server(128);
+    ASSERT_TRUE(server.is_up());
+    {
+        const LivePerformance live(kOrchestra, {voice("drum")},
+                                   {.midi_port = "strokes", .midi_connect = "nobody:midi"});
+        EXPECT_EQ(live.midi_problem(),
+                  "JACK: found no port `nobody:midi` to connect to, expected a MIDI input that is there "
+                  "before this starts (jack_lsp -t lists them); `musicworld:strokes` stays open");
+        Listener listener;
+        EXPECT_TRUE(listener.connect("musicworld:strokes", "listener:midi"));
+    }
+    const LivePerformance alone(kOrchestra, {voice("drum")}, {.midi_port = "strokes"});
+    EXPECT_EQ(alone.midi_problem(), "") << "none was asked for";
+}
+
+TEST_F(JackOutput, StrokesForWhichThereIsNoRoomAreCounted) {
+    const Server server(128);
+    ASSERT_TRUE(server.is_up());
+    audio::JackOutput output({.midi_port = "strokes", .midi_connect = "", .output_lead_s = 0.004});
+    const std::int64_t due = audio::monotonic_ns() + 3600 * 1000 * kMs;  // none leaves meanwhile
+    for (int i = 0; i < 1500; ++i) (void)output.send({.due_ns = due + i, .key = 38, .velocity = 64});
+    constexpr std::uint64_t kRoom = audio::MidiEvents::kCapacity / 2;  // a note-on and a note-off each
+    const std::int64_t until = audio::monotonic_ns() + 20'000 * kMs;
+    while (output.counts().lost_strokes < 1500 - kRoom && audio::monotonic_ns() < until)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    EXPECT_EQ(output.counts().lost_strokes, 1500 - kRoom);
+    EXPECT_EQ(output.counts().late_strokes, 0U);
 }
 
 }  // namespace

@@ -6,9 +6,6 @@
 namespace tracking {
 namespace {
 
-constexpr const char* kHeaderHelp =
-    "the header t,stick,px,py,pz with nothing or qw,qx,qy,qz or rx,ry,rz or ex,ey,ez after it";
-
 Trace read_rows(std::string_view text, const std::string& name) {
     LineReader lines(text, name);
     TraceRows rows(name, RowOrder::strict);
@@ -24,10 +21,6 @@ Trace read_rows(std::string_view text, const std::string& name) {
         if (row->stick == sticks.size()) sticks.push_back({std::string(row->name), {}});
         sticks[row->stick].samples.push_back(row->sample);
     }
-    if (!rows.headed())
-        Line(name, lines.lines_read() + 1, "")
-            .fail(0, "the end of the file", kHeaderHelp,
-                  "check that this is a trace and that it is complete");
     rows.require_complete();
     Trace trace = rows.keys();
     trace.file = name;

@@ -222,6 +222,10 @@ struct TraceRows::Reading {
     }
 
     void require_complete() const {
+        if (!headed)
+            Line(name, lines + 1, "")
+                .fail(0, "the end of the file", kHeaderHelp,
+                      "check that this is a trace and that it is complete");
         if (sticks.empty())
             Line(name, lines + 1, "")
                 .fail(0, "the end of the file", "at least two samples", "check that the trace is complete");

@@ -96,7 +96,12 @@ public:
     [[nodiscard]] std::uint64_t device_underruns() const;    ///< JACK asked for samples that were not there
     [[nodiscard]] std::uint64_t device_corrections() const;  ///< samples dropped or repeated for JACK's clock
     [[nodiscard]] std::uint64_t late_strokes() const;        ///< MIDI notes that left later than due
+    /// Why the MIDI port is not connected to midi_connect, one line (it stays open); empty: nothing is wrong.
+    /// From construction on.
+    [[nodiscard]] std::string midi_problem() const;
     [[nodiscard]] std::string version() const;
+    [[nodiscard]] std::uint64_t lost_strokes()
+        const;  ///< MIDI notes that were not sent: 1024 waited for JACK, or 512 for their time, already
     [[nodiscard]] std::string device() const;  ///< "file only" or what JACK says
     [[nodiscard]] double busy_s() const;
 

@@ -11,7 +11,8 @@ namespace tracking {
 /// sources), `_ns` on CLOCK_MONOTONIC, which all processes of a machine share.
 struct StickState {
     std::uint64_t samples =
-        0;  ///< accepted since the run began: a larger number is a newer state; 0: none yet
+        0;  ///< accepted since the run began, and those of a trace that were due while its sensor process
+            ///< was started again: a larger number is a newer state; 0: none yet
     std::uint64_t starts = 0;   ///< how often the sound's filter started anew (the first sample counts)
     std::uint64_t refused = 0;  ///< samples that the filters ignored
     std::uint64_t lap = 0;      ///< how often a looped trace has begun again

@@ -40,7 +40,7 @@ public:
     [[nodiscard]] bool oriented() const noexcept;
     /// Rate, source, tip and shaft, once headed.
     [[nodiscard]] const Trace& keys() const noexcept;
-    /// Throws TraceError unless there were at least two samples of each stick.
+    /// Throws TraceError unless there were a header and at least two samples of each stick.
     void require_complete() const;
 
 private:
