@@ -11,9 +11,15 @@
 namespace app {
 namespace {
 
-constexpr double kNextToS = 0.03;  // as notes are matched with contacts
-constexpr double kEarlierS = 2;    // a delay acts on what follows: arming, bodies that still move
+constexpr double kSameSpeed = 1e-6;  // relative: far below a step of MIDI or 24 bits
+constexpr double kNextToS = 0.03;    // as notes are matched with contacts
+constexpr double kEarlierS = 2;      // a delay acts on what follows: arming, bodies that still move
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+/// A filter that was started again comes near to one that was not, but never to the last bit.
+bool same_speed(const Strike& a, const Strike& b) {
+    return std::abs(a.speed_mps - b.speed_mps) <= kSameSpeed * b.speed_mps;
+}
 
 std::vector<Strike> offline_strikes(const tracking::Trace& trace, const Kit& kit, PlayOptions options,
                                     const StickGeometry& stick) {
@@ -49,8 +55,7 @@ public:
             const std::ptrdiff_t match = nearest(strike, taken);
             if (match >= 0) taken[static_cast<std::size_t>(match)] = true;
             const Strike* other = match < 0 ? nullptr : own_[static_cast<std::size_t>(match)];
-            if (other && other->onset_sample == strike.onset_sample && other->speed_mps == strike.speed_mps)
-                continue;
+            if (other && other->onset_sample == strike.onset_sample && same_speed(*other, strike)) continue;
             add(strike,
                 !other                                       ? "not sounded"
                 : other->onset_sample != strike.onset_sample ? "another onset"

@@ -173,6 +173,9 @@ void finish_sound(audio::LivePerformance& sound, RealtimeOutcome& outcome, const
     result.refused_changes = sound.refused_changes();
     result.queue_overflows = sound.queue_overflows();
     result.device_underruns = sound.device_underruns();
+    result.device_corrections = sound.device_corrections();
+    result.midi_late = sound.late_strokes();
+    result.midi_lost = sound.lost_strokes();
     outcome.play.clipped_samples = audio::write_wav(folder.path("audio.wav"), outcome.play.audio);
     outcome.play.stages_s.emplace_back("sound (own thread)", sound.busy_s());
     outcome.play.versions.emplace_back("csound", sound.version());
@@ -200,6 +203,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
     leave_thread_priority();
     std::unique_ptr<audio::LivePerformance> sound =
         options.play.audio ? make_live_sound(session, sound_priority) : nullptr;
+    if (sound && !sound->midi_problem().empty()) warn(sound->midi_problem());
     std::unique_ptr<RealtimeFrames> frames;
     if (options.play.frames) {
         fs::create_directory(folder.path("frames"));

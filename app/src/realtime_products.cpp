@@ -105,7 +105,10 @@ Json section(const RealtimeOutcome& o) {
             {"sensors", sensors(r)},
             {"priorities", priorities},
             {"audio_device", r.audio_device},
-            {"device_underruns", r.device_underruns}};
+            {"device_underruns", r.device_underruns},
+            {"device_corrections", r.device_corrections},
+            {"midi_late", r.midi_late},
+            {"midi_lost", r.midi_lost}};
 }
 
 }  // namespace

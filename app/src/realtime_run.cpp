@@ -125,7 +125,6 @@ void RealtimeRun::learn_geometry() {
 }
 
 void RealtimeRun::take_states() {
-    if (is_live(options_)) learn_geometry();
     struct New {
         std::uint32_t stick;
         tracking::StickState state;
@@ -139,6 +138,7 @@ void RealtimeRun::take_states() {
         query_ns = std::max(query_ns, monotonic_ns() - start);
         if (state && state->samples != samples_seen_[i]) fresh.push_back({i, *state});
     }
+    if (is_live(options_) && !fresh.empty()) learn_geometry();  // the head comes before the first state
     // Not stable_sort, whose buffer is not aligned for what holds Eigen's types.
     std::ranges::sort(fresh, {}, [](const New& n) { return std::tuple(n.state.lap, n.state.t_s, n.stick); });
     for (std::size_t i = 0; i < fresh.size();) {
