@@ -110,6 +110,7 @@ Json run_of(const PlayResult& play, const RealtimeResult& realtime) {
             {"fps", play.fps},
             {"output_lead_s", realtime.output_lead_s},
             {"release_margin_s", realtime.release_margin_s},
+            {"disturbed_by", realtime.disturbed_by},
             {"audio_device", realtime.audio_device},
             {"priorities", priorities},
             {"quality_levels", realtime.quality_levels},

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "bad_input.h"
 #include "play.h"
 #include "play_arguments.h"
 #include "play_realtime.h"
@@ -84,6 +85,9 @@ void add_play_command(CLI::App& program) {
     play_command->callback([a] {
         const PlayOptions options = options_of(*a);
         if (a->realtime) {
+            if (!a->in_time.source.empty() && !a->play.trace.empty())
+                throw BadInput(fmt::format("error: found TRACE {} and --source {}, expected one of them",
+                                           a->play.trace, a->in_time.source));
             play_in_time(realtime_options(options, a->in_time));
             return;
         }

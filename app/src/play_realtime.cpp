@@ -230,10 +230,18 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
             [&](double done) { bar.show(done); });
         bar.clear();
         leave_thread_priority();
+        if (run.end_s() <= 0)
+            throw std::runtime_error(
+                "error: found an interruption before anything was played, expected a run");
         outcome.realtime = std::move(run.result());
         RealtimeResult& realtime = outcome.realtime;
+        realtime.disturbed_by = options.disturbed_by;
         realtime.clocks = sensors.clocks();
         result.samples_refused = run.refused();
+        for (std::size_t i = 0; i < session.trace.sticks.size(); ++i)
+            if (run.seen()[i].empty())
+                warn(fmt::format("stick {}: found no sample in {:.1f} s, expected some of that name",
+                                 session.trace.sticks[i].name, run.end_s()));
         if (frames) finish_frames(*frames, realtime);
         if (sound) finish_sound(*sound, outcome, folder, epoch_ns);
         outcome.stick = session.stick = run.geometry();

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <set>
+
 #include "bad_input.h"
 #include "comma_list.h"
 #include "numbers.h"
@@ -20,9 +22,9 @@ void one_of(const std::string& option, const std::string& value, const std::stri
 std::vector<CLI::Option*> add_realtime_options(CLI::App& command, RealtimeArguments& a) {
     return {
         command.add_option("--seconds", a.seconds,
-                           "How long; a shorter trace is played again and again (default: once)"),
+                           "How long; a shorter trace is played again and again (default, and 0: once)"),
         command.add_option("--source", a.source,
-                           "Sensors instead of the trace: stdin, zmq:ENDPOINT, osc:PORT"),
+                           "Sensors instead of TRACE: stdin, zmq:ENDPOINT, osc:PORT, trace:FILE"),
         command.add_option("--sticks", a.sticks, "Names of the sticks of --source")->capture_default_str(),
         command
             .add_option("--lead", a.lead,
@@ -48,6 +50,10 @@ RealtimeOptions realtime_options(const PlayOptions& play, const RealtimeArgument
     o.play = play;
     o.source = a.source;
     o.sticks = split_at_commas(a.sticks);
+    const std::set<std::string> names(o.sticks.begin(), o.sticks.end());
+    if (names.size() != o.sticks.size() || names.contains(""))
+        throw BadInput(
+            fmt::format("error: found --sticks {}, expected different names such as left,right", a.sticks));
     if (!a.seconds.empty()) o.seconds = parse_number(a.seconds, "--seconds");
     one_of("--lead", a.lead, "fixed", "auto");
     one_of("--priority", a.priority, "auto", "normal");
@@ -61,6 +67,7 @@ RealtimeOptions realtime_options(const PlayOptions& play, const RealtimeArgument
         if (elsewhere) o.midi_connect = a.midi_out;
     }
     if (!a.disturb.empty()) o.disturbance = parse_disturbance(a.disturb);
+    o.disturbed_by = a.disturb;
     return o;
 }
 

@@ -78,6 +78,7 @@ Json quality(const RealtimeResult& r) {
         if (!step.why.empty())
             changes.push_back({{"at_s", step.at_s}, {"level", step.quality}, {"why", step.why}});
     return {{"levels", r.quality_levels},
+            {"first", r.leads.empty() ? Json() : Json(r.leads.front().quality)},
             {"last", r.leads.empty() ? Json() : Json(r.leads.back().quality)},
             {"changes", changes}};
 }
@@ -104,6 +105,7 @@ Json section(const RealtimeOutcome& o) {
             {"quality", quality(r)},
             {"sensors", sensors(r)},
             {"priorities", priorities},
+            {"disturbed_by", r.disturbed_by},
             {"audio_device", r.audio_device},
             {"device_underruns", r.device_underruns},
             {"device_corrections", r.device_corrections},

@@ -136,7 +136,11 @@ void RealtimeRun::take_states() {
         const std::int64_t start = monotonic_ns();
         const std::optional<tracking::StickState> state = parts_.sensors.newest(i);
         query_ns = std::max(query_ns, monotonic_ns() - start);
-        if (state && state->samples != samples_seen_[i]) fresh.push_back({i, *state});
+        if (!state || state->samples == samples_seen_[i]) continue;
+        if (state->t_s < t0_s_)
+            samples_seen_[i] = state->samples;  // live, before the epoch: not part of the run
+        else
+            fresh.push_back({i, *state});
     }
     if (is_live(options_) && !fresh.empty()) learn_geometry();  // the head comes before the first state
     // Not stable_sort, whose buffer is not aligned for what holds Eigen's types.

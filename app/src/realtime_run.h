@@ -33,6 +33,7 @@ struct RealtimeOptions {
     bool jack_audio = false;
     std::string midi_port, midi_connect;
     Disturbance disturbance;
+    std::string disturbed_by;  ///< the same as typed, for the products
 };
 
 /// True if the sticks are live: there is no trace.

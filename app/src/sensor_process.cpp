@@ -24,6 +24,8 @@
 namespace app {
 namespace {
 
+constexpr std::int64_t kSettlingNs = 250'000'000;
+
 constexpr int kReportEveryMs = 50;
 constexpr double kSmoothing = 0.1;       // of the interval between samples
 constexpr double kLongestIntervalS = 1;  // longer ones are pauses
@@ -81,6 +83,8 @@ private:
     void filter(const std::stop_token& stop);
     void take(const SourceSample& sample);
     void pass(SourceSample sample, const std::stop_token& stop);
+    /// True for what a live source with a clock of its own sends in the first moments.
+    bool settling(const SourceSample& sample);
     void put_on_our_clock(SourceSample& sample);
     void note(const SourceSample& sample);
     void note_source();
@@ -99,10 +103,11 @@ private:
     std::vector<Stick> sticks_;
     std::unique_ptr<SampleSource> source_;
     SampleQueue queue_;
-    SourceClock clock_;           // the reader's
-    DelayPercentile delays_;      // of replayed samples; the reader's
-    std::vector<double> last_s_;  // times of the sticks' newest samples; the reader's
-    double replay_offset_s_ = 0;  // the reader's, as the next four
+    std::int64_t first_read_ns_ = 0;  // of a live source; the reader's
+    SourceClock clock_;               // the reader's
+    DelayPercentile delays_;          // of replayed samples; the reader's
+    std::vector<double> last_s_;      // times of the sticks' newest samples; the reader's
+    double replay_offset_s_ = 0;      // the reader's, as the next four
     std::string head_;
     std::int64_t noted_ns_ = 0;
     std::uint64_t dropped_ = 0;
@@ -221,13 +226,22 @@ void Sensor::read(const std::stop_token& stop) {
 
 void Sensor::pass(SourceSample sample, const std::stop_token& stop) {
     note(sample);
-    put_on_our_clock(sample);
     keep_head();
+    if (settling(sample)) return;
+    put_on_our_clock(sample);
     if (source_->quiet_until_ns() != 0) note_source();
     if (source_->replayed())
         (void)queue_.push(sample, stop);
     else if (!queue_.try_push(sample))
         ++dropped_;
+}
+
+/// What had piled up before this process was ready arrives all at once and says nothing of the clocks'
+/// offset; it would be played late, too. So the first moments are let go.
+bool Sensor::settling(const SourceSample& sample) {
+    if (source_->replayed() || !sample.has_time) return false;
+    if (first_read_ns_ == 0) first_read_ns_ = sample.read_ns;
+    return sample.read_ns - first_read_ns_ < kSettlingNs;
 }
 
 void Sensor::put_on_our_clock(SourceSample& sample) {

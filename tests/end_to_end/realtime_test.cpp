@@ -66,7 +66,12 @@ TEST(Latency, SaysWhatScriptsRelyOn) {
     const Folder folder;
     const Ended ended = run(in_time("latency", folder / "played", {"--seconds", "2", "--json"}));
     ASSERT_EQ(ended.status, 0) << ended.err;
+#ifdef __SANITIZE_ADDRESS__
+    // Csound writes a row of dashes to standard output when it runs under the sanitizer.
+    const Json said = Json::parse(ended.out.substr(ended.out.find('{')));
+#else
     const Json said = Json::parse(ended.out);
+#endif
     EXPECT_EQ(said, Json::parse(read(folder / "played/latency.json")));
     for (const Json& stage : said.at("stages")) {
         EXPECT_FALSE(stage.at("name").get<std::string>().empty());
