@@ -51,10 +51,6 @@ public:
     /// Pose for a picture shown at T >= the newest sample's time; a prediction is carried at most 0.15 s
     /// beyond that, then held.
     [[nodiscard]] tracking::PosePrediction pose_at(double T) const;
-    /// The tip's centre in that pose.
-    [[nodiscard]] Eigen::Vector3d tip_at(double T) const {
-        return tracking::point_of(pose_at(T), geometry_.tip).position;
-    }
     /// The tip by the sound's filter at T, carried likewise.
     [[nodiscard]] tracking::PointMotion sounding_tip_at(double T) const;
     /// The path that the sound's filter predicts over [0, sound lead] from its newest sample, and the

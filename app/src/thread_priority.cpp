@@ -28,9 +28,9 @@ int nice_of(ThreadRole role) {
         case ThreadRole::simulation:
             return -8;
         case ThreadRole::drawing:
-            return 10;
+            return 0;
         case ThreadRole::writing:
-            return 15;
+            return 10;
         default:
             return 0;
     }
