@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <vector>
 
 namespace sim {
 
@@ -11,6 +12,21 @@ namespace sim {
 struct Superquadric {
     Eigen::Vector3d semi_axes = Eigen::Vector3d::Ones();
     double e1 = 1, e2 = 1;
+};
+
+/// A smooth spike (or dent) on a surface: the surface is displaced along its normal by
+///   height exp(-(angle / width)^2),   angle between r / semi_axes and `direction` / semi_axes.
+struct Bump {
+    Eigen::Vector3d direction = Eigen::Vector3d::UnitY();  ///< from the centre towards the spike, body frame
+    double height_m = 0;                                   ///< negative: a dent
+    double width_rad = 0.2;
+};
+
+/// A superquadric displaced along its normal (the spiked bodies of figure 2-10). Mass and inertia are those
+/// of the superquadric alone.
+struct GeneralizedSuperquadric {
+    Superquadric base;
+    std::vector<Bump> bumps;
 };
 
 /// Value and gradient of the signed distance to the surface [m], negative inside. See signed_distance.

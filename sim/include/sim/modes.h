@@ -1,0 +1,90 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "sim/geometry.h"
+#include "sim/modal_body.h"
+
+namespace sim {
+
+/// Which matter the mass and stiffness integrals run over. The displacement is always that of
+/// elements x elements x elements 27-node bricks (triquadratic Lagrange) that fill the body's bounding box.
+enum class ModeDomain {
+    box,          ///< the whole brick, 3x3x3 Gauss points an element: exact
+    superquadric  ///< the superquadric's volume, by quadrature of stated accuracy
+};
+
+struct ModesRequest {
+    Superquadric shape;  ///< box: only the semi-axes count
+    ModeDomain domain = ModeDomain::superquadric;
+    Material material;
+    int elements = 1;  ///< a side
+    int count = 12;    ///< lowest non-rigid modes wanted; -1: all that one element has (75)
+};
+
+/// Free vibration modes of (2.5): K phi = omega^2 M phi, phi^T M phi = 1, rigid modes left out.
+///
+/// Canonical: ascending; each mode is even or odd in each of x, y, z (eight independent problems), a group of
+/// equal eigenvalues (to 1e-9 relative) is ordered by parity class and, within one class, spanned by the
+/// projections of the nodal axes in order; the largest entry (first of equals) is positive.
+struct ModalBasis {
+    Eigen::Vector3d half_extents = Eigen::Vector3d::Ones();  ///< of the bricks' box [m]
+    int elements = 1;                                        ///< a side
+    Eigen::VectorXd omega;                                   ///< [rad/s], ascending
+    /// Nodal shapes, 3 (2 elements + 1)^3 x n [kg^-1/2]; row 3 k + axis, node k = ix + m (iy + m iz), m = 2
+    /// elements + 1, at x = half_extents.x (2 ix / (m - 1) - 1) and so on.
+    Eigen::MatrixXd nodal;
+    [[nodiscard]] int count() const noexcept { return static_cast<int>(omega.size()); }
+};
+
+/// What `count` cut: the borders of the degenerate groups around it. below == count: nothing was cut.
+struct GroupCut {
+    int count, below, above;
+};
+
+struct FreeVibrationModes {
+    ModalBasis basis;
+    Eigen::VectorXd eigenvalues;  ///< [rad^2/s^2], ascending, all that were computed, the six rigid first
+    GroupCut cut;
+};
+
+/// Throws std::invalid_argument for a request out of range, std::runtime_error if no solution is found.
+/// Dense (Eigen) for small problems, shift-invert Lanczos (Spectra) for large ones.
+[[nodiscard]] FreeVibrationModes free_vibration_modes(const ModesRequest& request);
+
+/// The six uniform-strain modes (2.12) of LinearBody as a basis of one element.
+[[nodiscard]] ModalBasis uniform_strain_basis(const Superquadric& shape, const Material& material);
+
+/// Mass [kg], and moments of inertia about the principal axes x, y, z [kg m^2], of the rest superquadric.
+struct RigidMass {
+    double mass;
+    Eigen::Vector3d inertia;
+};
+[[nodiscard]] RigidMass rigid_mass(const Superquadric& shape, const Material& material);
+
+/// phi(r), 3 x n [kg^-1/2]: the displacement at r by each mode; r outside the box is taken at its border.
+[[nodiscard]] Eigen::Matrix3Xd mode_shapes_at(const ModalBasis& basis, const Eigen::Vector3d& r);
+
+/// u(r) [m] with du/dr of a displacement given at the nodes.
+struct Displacement {
+    Eigen::Vector3d value;
+    Eigen::Matrix3d gradient;  ///< (i, j) = du_i / dr_j [-]
+};
+/// nodal_displacement is basis.nodal * q. No allocation.
+[[nodiscard]] Displacement displacement_at(const ModalBasis& basis,
+                                           const Eigen::Ref<const Eigen::VectorXd>& nodal_displacement,
+                                           const Eigen::Vector3d& r) noexcept;
+
+/// r with r + u(r) = x by safeguarded Newton (2.11).
+struct InversePoint {
+    Eigen::Vector3d r;
+    Eigen::Matrix3d gradient;  ///< du/dr there
+    int iterations;
+    bool fallback;  ///< Newton did not reach 1e-12 of the size in 20 iterations: damped fixed point was used
+};
+[[nodiscard]] InversePoint inverse_displacement(const ModalBasis& basis,
+                                                const Eigen::Ref<const Eigen::VectorXd>& nodal_displacement,
+                                                const Eigen::Vector3d& x) noexcept;
+
+}  // namespace sim

@@ -1,0 +1,179 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sim/geometry.h"
+#include "sim/modal_body.h"
+#include "sim/modes.h"
+
+namespace sim {
+
+/// How much of a body is computed.
+enum class Fidelity {
+    rigid,
+    linear,    ///< six uniform strains (2.12), inverse mapping in closed form
+    modal,     ///< `modes` free vibration modes, polynomial mapping
+    automatic  ///< the cheapest of these that meets `error` (choose_fidelity)
+};
+
+struct FidelityRequest {
+    Fidelity fidelity = Fidelity::automatic;
+    int modes = 12;
+    int elements = 1;
+    ModeDomain domain = ModeDomain::superquadric;
+    double error = 0.01;    ///< automatic: displacement error allowed, share of the largest extent
+    double impact_mps = 5;  ///< automatic: the fastest impact expected [m/s]
+};
+
+struct FidelityChoice {
+    Fidelity fidelity;
+    int modes;
+    double expected_error;  ///< share of the largest extent, see choose_fidelity
+};
+
+/// One body of a world.
+struct WorldBody {
+    std::string name;
+    GeneralizedSuperquadric shape;
+    Material material;
+    /// C = damping_alpha M + damping_beta K (2.1): sigma = (alpha + beta omega^2) / 2 a mode. Added to it:
+    /// damping_ratio omega.
+    double damping_alpha = 0, damping_beta = 0, damping_ratio = 0.05;
+    FidelityRequest fidelity;
+    int triangles = 360;     ///< of the sampled surface
+    double friction = 0.5;   ///< Coulomb; of a pair: sqrt(a b)
+    double restitution = 0;  ///< of a pair: the larger
+    bool fixed = false;      ///< never moves, does not deform
+    double gravity_scale = 1;
+    Eigen::Isometry3d world_from_body = Eigen::Isometry3d::Identity();
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< of the centre of mass [m/s]
+    Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< world axes [rad/s]
+};
+
+/// Half-space normal . x <= offset is solid. Static.
+struct WorldPlane {
+    Eigen::Vector3d normal = Eigen::Vector3d::UnitY();  ///< unit
+    double offset = 0;                                  ///< [m]
+    double friction = 0.5, restitution = 0;
+};
+
+/// A damped spring of rest length 0 between a point of a body and a place, or a point of another body: the
+/// thesis's energy constraint. Implicit in the step, so no stiffness is too large.
+struct PointConstraint {
+    std::string name;
+    int body_a = 0;
+    Eigen::Vector3d point_a = Eigen::Vector3d::Zero();  ///< rest body frame of a
+    int body_b = -1;                                    ///< -1: point_b is a place in the world
+    Eigen::Vector3d point_b = Eigen::Vector3d::Zero();
+    double stiffness = 1e4;                                           ///< [N/m]
+    double damping_ratio = 1;                                         ///< against the effective mass
+    double breaking_force = std::numeric_limits<double>::infinity();  ///< [N]; beyond it the constraint goes
+};
+
+struct WorldSettings {
+    double dt = 1.0 / 60;  ///< [s]
+    int substeps = 4;      ///< of each step
+    Eigen::Vector3d gravity = Eigen::Vector3d(0, -9.81, 0);
+    bool sleeping = true;
+    double sleep_speed = 0.02;  ///< [m/s], of any point of a body; half a second below it: asleep
+};
+
+struct WorldDefinition {
+    WorldSettings settings;
+    std::vector<WorldBody> bodies;
+    std::vector<WorldPlane> planes;
+    std::vector<PointConstraint> constraints;
+};
+
+/// Exact state of one body.
+struct WorldBodyState {
+    Eigen::Vector3d position;          ///< of the centre of mass, world [m]
+    Eigen::Quaterniond orientation;    ///< body to world
+    Eigen::Vector3d velocity;          ///< [m/s]
+    Eigen::Vector3d angular_momentum;  ///< about the centre of mass, world axes [kg m^2/s]
+    Eigen::VectorXd q, q_dot;          ///< modal coordinates of mass-normalised modes [m kg^1/2], rates
+};
+
+struct QuarantinedBody {
+    int body;
+    std::uint64_t step;
+    std::string what;  ///< which value was not finite
+};
+
+/// Totals since the start, but where said otherwise.
+struct WorldCounts {
+    std::uint64_t steps = 0;
+    int contacts = 0;                     ///< points in the last step
+    int pairs = 0;                        ///< of bodies and planes whose samples were tested in the last step
+    int islands = 0;                      ///< awake, in the last step
+    int asleep = 0;                       ///< bodies, now
+    std::uint64_t inverse_fallbacks = 0;  ///< inverse mappings without convergence
+    std::uint64_t deformations_limited = 0;
+    std::uint64_t constraints_broken = 0;
+};
+
+/// Many modal bodies that fall, touch, deform and hang together (thesis 2.2, 2.3.1, 2.6). See world.cpp and
+/// the folder's README for the method. One thread at a time. A step's result is a pure function of the
+/// definition and the calls before it.
+class World {
+public:
+    /// Throws std::invalid_argument naming the body or constraint, the value and what was expected.
+    explicit World(const WorldDefinition& definition);
+    ~World();
+    World(World&&) noexcept;
+    World& operator=(World&&) noexcept;
+
+    void step();
+
+    /// Ids are indices, never used again.
+    int add_body(const WorldBody& body);
+    int add_constraint(const PointConstraint& constraint);
+    void remove_constraint(int id);
+    [[nodiscard]] bool constraint_holds(int id) const;  ///< neither removed nor broken
+
+    [[nodiscard]] int bodies() const noexcept;
+    [[nodiscard]] const WorldBody& definition(int body) const;
+    [[nodiscard]] FidelityChoice fidelity(int body) const;  ///< as used; rigid, linear or modal
+    [[nodiscard]] RigidMass rigid_mass(int body) const;
+    [[nodiscard]] const ModalBasis& basis(int body) const;  ///< no modes for a rigid body
+    [[nodiscard]] WorldBodyState state(int body) const;
+    void set_state(int body, const WorldBodyState& state);  ///< wakes it; sizes of q must match
+    void apply_force(int body, const Eigen::Vector3d& force,
+                     const Eigen::Vector3d& point_body);  ///< [N],
+                                                          ///< world axes, at a rest point, for the next step
+    void wake(int body);
+    [[nodiscard]] bool asleep(int body) const;
+    [[nodiscard]] bool all_asleep() const;  ///< fixed and quarantined bodies count as asleep
+    [[nodiscard]] double time_s() const noexcept;
+
+    struct Energy {
+        double kinetic, potential, elastic, springs;  ///< [J]; potential of gravity against the origin
+        [[nodiscard]] double total() const { return kinetic + potential + elastic + springs; }
+    };
+    [[nodiscard]] Energy energy() const;
+    [[nodiscard]] Eigen::Vector3d momentum() const;          ///< of bodies that are not fixed [kg m/s]
+    [[nodiscard]] Eigen::Vector3d angular_momentum() const;  ///< about the origin [kg m^2/s]
+    [[nodiscard]] const WorldCounts& counts() const noexcept;
+    [[nodiscard]] const std::vector<QuarantinedBody>& quarantined() const noexcept;
+    /// FNV-1a 64 over the exact states in order of bodies, little-endian doubles.
+    [[nodiscard]] std::uint64_t state_hash() const;
+
+private:
+    struct Implementation;
+    std::unique_ptr<Implementation> implementation_;
+};
+
+/// The cheapest of rigid, linear and modal (cut at group borders) whose expected error is at most
+/// request.error. Expected error of a basis: an impact at v displaces the struck point by v sqrt(m c), c =
+/// sum (n . phi_k)^2 / omega_k^2 its modal compliance, largest over the surface's six poles; the error is the
+/// difference of that with all 75 modes of an element (of `elements` a side if more) and with the basis's, as
+/// share of the largest extent.
+[[nodiscard]] FidelityChoice choose_fidelity(const Superquadric& shape, const Material& material,
+                                             const FidelityRequest& request);
+
+}  // namespace sim
