@@ -43,12 +43,12 @@ void set_polynomials(BodyKind& kind) {
         for (int mode = 0; mode < kind.modes; ++mode) {
             Eigen::Matrix<double, 27, 3> nodes;
             for (int n = 0; n < 27; ++n) {
-                const int node =
-                    2 * bx + n % 3 + m * (2 * by + n / 3 % 3 + m * (2 * bz + n / 9));
+                const int node = 2 * bx + n % 3 + m * (2 * by + n / 3 % 3 + m * (2 * bz + n / 9));
                 nodes.row(n) = kind.basis.nodal.block<3, 1>(3 * node, mode).transpose();
             }
             const Eigen::Matrix<double, 27, 3> c = polynomial_from_nodes(nodes);
-            float* out = kind.polynomials.data() + static_cast<std::size_t>(brick) * 81 * kind.mode_width + mode;
+            float* out =
+                kind.polynomials.data() + static_cast<std::size_t>(brick) * 81 * kind.mode_width + mode;
             for (int n = 0; n < 27; ++n)
                 for (int axis = 0; axis < 3; ++axis)
                     out[(3 * n + axis) * kind.mode_width] = static_cast<float>(c(n, axis));
@@ -129,8 +129,9 @@ BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
     kind.width = 8 + kind.mode_width;
     kind.root_compliance.resize(kind.mode_width);
     kind.ellipsoid = body.shape.base.e1 == 1 && body.shape.base.e2 == 1 && body.shape.bumps.empty();
-    kind.sigma = body.damping_alpha / 2 +
-                 kind.basis.omega.array() * (body.damping_ratio + body.damping_beta / 2 * kind.basis.omega.array());
+    kind.sigma =
+        body.damping_alpha / 2 +
+        kind.basis.omega.array() * (body.damping_ratio + body.damping_beta / 2 * kind.basis.omega.array());
     for (int k = 0; k < kind.modes; ++k) {
         kind.substep.push_back(
             held_step(kind.basis.omega[k], kind.sigma[k], settings.dt / settings.substeps));

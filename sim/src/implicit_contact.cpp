@@ -1,6 +1,9 @@
 #include "implicit_contact.h"
 
+#include <immintrin.h>
+
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "shape_polynomial.h"
@@ -11,21 +14,29 @@ namespace {
 constexpr int kNewtonSteps = 6;
 constexpr float kResidual = 1e-4f;  // share of the size
 
-Lanes minimum(Lanes a, Lanes b) {
-    return a < b ? a : b;
-}
 Lanes absolute(Lanes a) {
     return a < 0 ? -a : a;
 }
 Lanes square_root(Lanes a) {
-    Lanes r;
-    for (int i = 0; i < kLanes; ++i) r[i] = std::sqrt(a[i]);
-    return r;
+#ifdef __AVX__
+    return _mm256_sqrt_ps(a);
+#else
+    for (int i = 0; i < kLanes; ++i) a[i] = std::sqrt(a[i]);
+    return a;
+#endif
+}
+// A bit a lane.
+int bits(LaneMask mask) {
+#ifdef __AVX__
+    return _mm256_movemask_ps(reinterpret_cast<__m256>(mask));
+#else
+    int result = 0;
+    for (int i = 0; i < kLanes; ++i) result |= mask[i] ? 1 << i : 0;
+    return result;
+#endif
 }
 bool any(LaneMask mask) {
-    std::int32_t all = 0;
-    for (int i = 0; i < kLanes; ++i) all |= mask[i];
-    return all != 0;
+    return bits(mask) != 0;
 }
 
 // Inverse of F = I + G, by cofactors.
@@ -48,9 +59,9 @@ Inverse<T> inverse_of(const T (&g)[3][3]) {
 
 /// Eight points on their way from the deformed frame to the rest shape.
 struct SampleFinder::Batch {
-    Lanes x[3];          // deformed
-    Lanes r[3];          // at rest
-    Lanes inverse[3][3]; // F^-1 there
+    Lanes x[3];           // deformed
+    Lanes r[3];           // at rest
+    Lanes inverse[3][3];  // F^-1 there
     int count;
 };
 
@@ -74,27 +85,29 @@ void SampleFinder::find(const PosedBody& sampled, const PosedBody& implicit, flo
             for (int i = 0; i < 3; ++i) g[i] = u[i] / (safe * axes[i]);
         } else {
             for (int lane = 0; lane < kLanes; ++lane) {
-                const SurfaceDistance s = kind.surface.distance(
+                const SurfacePoint s = kind.surface.distance(
                     Eigen::Vector3d(batch.r[0][lane], batch.r[1][lane], batch.r[2][lane]));
                 value[lane] = static_cast<float>(s.distance);
-                for (int i = 0; i < 3; ++i) g[i][lane] = static_cast<float>(s.gradient[i]);
+                for (int i = 0; i < 3; ++i) g[i][lane] = static_cast<float>(s.normal[i]);
                 if (lane + 1 >= batch.count) break;
             }
         }
         Lanes normal[3];
         for (int i = 0; i < 3; ++i)
-            normal[i] =
-                batch.inverse[0][i] * g[0] + batch.inverse[1][i] * g[1] + batch.inverse[2][i] * g[2];
-        const Lanes steep = square_root(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+            normal[i] = batch.inverse[0][i] * g[0] + batch.inverse[1][i] * g[1] + batch.inverse[2][i] * g[2];
+        const Lanes steep =
+            square_root(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
         for (int lane = 0; lane < batch.count; ++lane) {
             SampleContact contact;
             contact.sample = near_[first + static_cast<std::size_t>(lane)];
             contact.rest = {batch.r[0][lane], batch.r[1][lane], batch.r[2][lane]};
             if (steep[lane] > 1e-6f) {
                 contact.separation = value[lane] / steep[lane];
-                contact.normal = Eigen::Vector3f(normal[0][lane], normal[1][lane], normal[2][lane]) / steep[lane];
+                contact.normal =
+                    Eigen::Vector3f(normal[0][lane], normal[1][lane], normal[2][lane]) / steep[lane];
             } else {  // at the centre every direction is as good: out by the way the sampled body is
-                const Eigen::Vector3d out = implicit.rotation.transpose() * (sampled.position - implicit.position);
+                const Eigen::Vector3d out =
+                    implicit.rotation.transpose() * (sampled.position - implicit.position);
                 contact.separation = -axes.minCoeff();
                 contact.normal = out.norm() > 1e-9 ? Eigen::Vector3f(out.normalized().cast<float>())
                                                    : Eigen::Vector3f::UnitY();
@@ -125,9 +138,9 @@ void SampleFinder::gather(const PosedBody& sampled, const PosedBody& implicit, f
         for (int i = 0; i < 3; ++i) x[i] = turn(i, 0) * a + turn(i, 1) * b + turn(i, 2) * c + shift[i];
         const LaneMask inside = (absolute(x[0]) < box[0]) & (absolute(x[1]) < box[1]) &
                                 (absolute(x[2]) < box[2]) & (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] < ball);
-        if (!any(inside)) continue;
-        for (int lane = 0; lane < kLanes && first + lane < samples; ++lane) {
-            if (!inside[lane]) continue;
+        for (unsigned left = static_cast<unsigned>(bits(inside)); left != 0; left &= left - 1) {
+            const int lane = std::countr_zero(left);
+            if (first + lane >= samples) break;
             for (int i = 0; i < 3; ++i) near_place_.data()[i * capacity_ + near_.size()] = x[i][lane];
             near_.push_back(first + lane);
         }
@@ -164,7 +177,8 @@ void SampleFinder::invert_polynomial(const PosedBody& implicit, Batch& batch) {
             const Lanes bare = batch.r[i] / half[i];
             xi[i] = bare > 1.05f ? lanes_of(1.05f) : bare < -1.05f ? lanes_of(-1.05f) : bare;
         }
-        PolynomialValue<Lanes> p = evaluate_polynomial<Lanes>(implicit.polynomial.data(), xi[0], xi[1], xi[2]);
+        PolynomialValue<Lanes> p =
+            evaluate_polynomial<Lanes>(implicit.polynomial.data(), xi[0], xi[1], xi[2]);
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j) p.gradient[i][j] /= half[j];
         const Inverse<Lanes> inverse = inverse_of(p.gradient);
@@ -176,10 +190,12 @@ void SampleFinder::invert_polynomial(const PosedBody& implicit, Batch& batch) {
         }
         for (int i = 0; i < 3; ++i) {
             for (int j = 0; j < 3; ++j) batch.inverse[i][j] = inverse.m[i][j];
-            const Lanes move = inverse.m[i][0] * residual[0] + inverse.m[i][1] * residual[1] +
-                               inverse.m[i][2] * residual[2];
+            const Lanes move =
+                inverse.m[i][0] * residual[0] + inverse.m[i][1] * residual[1] + inverse.m[i][2] * residual[2];
             const float longest = 0.5f * half[i];
-            const Lanes cut = move > longest ? lanes_of(longest) : move < -longest ? lanes_of(-longest) : move;
+            const Lanes cut = move > longest    ? lanes_of(longest)
+                              : move < -longest ? lanes_of(-longest)
+                                                : move;
             batch.r[i] -= cut;
         }
         if (!any(!(worst < enough))) return;

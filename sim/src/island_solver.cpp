@@ -8,7 +8,7 @@ namespace sim {
 namespace {
 
 constexpr double kPushHz = 30, kPushDamping = 10;
-constexpr float kPushSpeed = 3;          // [m/s]
+constexpr float kPushSpeed = 3;           // [m/s]
 constexpr float kBounceThreshold = 0.1f;  // [m/s]
 
 float dot(const float* a, const float* b, int width) {
@@ -33,8 +33,8 @@ void dot_rows(const float* rows, const float* y, int width, float (&v)[3]) {
 /// y += rows^T p.
 void add_rows_to(const float* rows, const float (&p)[3], int width, float* y) {
     for (int i = 0; i < width; i += kLanes)
-        store_lanes(y + i, load_lanes(y + i) + p[0] * load_lanes(rows + i) + p[1] * load_lanes(rows + width + i) +
-                               p[2] * load_lanes(rows + 2 * width + i));
+        store_lanes(y + i, load_lanes(y + i) + p[0] * load_lanes(rows + i) +
+                               p[1] * load_lanes(rows + width + i) + p[2] * load_lanes(rows + 2 * width + i));
 }
 
 /// Two unit vectors square to n and to each other.
@@ -82,7 +82,8 @@ void IslandSolver::begin(const Island& island) {
     for (const int m : island.manifolds) {
         const Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
         triples += static_cast<std::size_t>(manifold.count);
-        floats += static_cast<std::size_t>(manifold.count) * 3 * (width_of(manifold.a) + width_of(manifold.b));
+        floats +=
+            static_cast<std::size_t>(manifold.count) * 3 * (width_of(manifold.a) + width_of(manifold.b));
     }
     for (const int c : island.constraints) {
         const PointConstraint& held = (*constraints_)[static_cast<std::size_t>(c)].definition;
@@ -94,7 +95,8 @@ void IslandSolver::begin(const Island& island) {
     contacts_.reserve(triples);
     for (const int m : island.manifolds) {
         Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
-        for (int i = 0; i < manifold.count; ++i) add_contact(manifold, manifold.points[static_cast<std::size_t>(i)]);
+        for (int i = 0; i < manifold.count; ++i)
+            add_contact(manifold, manifold.points[static_cast<std::size_t>(i)]);
     }
     for (const int c : island.constraints) add_spring((*constraints_)[static_cast<std::size_t>(c)]);
     for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
@@ -310,7 +312,8 @@ void IslandSolver::solve_spring(SpringRows& s) {
         const int body = side ? s.b : s.a;
         if (body < 0) continue;
         const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
-        dot_rows(jacobians_.data() + (side ? s.offset_b : s.offset_a), y_.data() + rows.offset, rows.width, v);
+        dot_rows(jacobians_.data() + (side ? s.offset_b : s.offset_a), y_.data() + rows.offset, rows.width,
+                 v);
     }
     for (int i = 0; i < 3; ++i) v[i] += s.pull * s.now[i] + s.gamma * s.impulse[i];
     float p[3];
@@ -346,8 +349,8 @@ void IslandSolver::solve_contact(ContactRows& c, bool push) {
         bias = std::max(push_rate_ * c.now, -kPushSpeed);
         mass_share = mass_share_, impulse_share = impulse_share_;
     }
-    const float normal =
-        std::max(c.impulse[0] - mass_share * c.inverse_normal * (v[0] + bias) - impulse_share * c.impulse[0], 0.f);
+    const float normal = std::max(
+        c.impulse[0] - mass_share * c.inverse_normal * (v[0] + bias) - impulse_share * c.impulse[0], 0.f);
     float p[3] = {normal - c.impulse[0], 0, 0};
     c.impulse[0] = normal;
     c.largest = std::max(c.largest, normal);
@@ -377,7 +380,8 @@ void IslandSolver::restitute() {
             const int body = side ? c.b : c.a;
             if (body < 0) continue;
             const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
-            v[0] += dot(jacobians_.data() + (side ? c.offset_b : c.offset_a), y_.data() + rows.offset, rows.width);
+            v[0] += dot(jacobians_.data() + (side ? c.offset_b : c.offset_a), y_.data() + rows.offset,
+                        rows.width);
         }
         const float normal =
             std::max(c.impulse[0] - c.inverse_normal * (v[0] + c.restitution * c.approach), 0.f);
@@ -435,8 +439,7 @@ void IslandSolver::finish() {
             const HeldStep& step = kind.substep[static_cast<std::size_t>(k)];
             double held = (static_cast<double>(y[8 + k]) - start[8 + k]) / step.root_compliance;
             if (body.pushed) held += h_ * body.modal_force[k];
-            const double mean =
-                step.mean_z * s.q[k] + step.mean_rate * s.q_dot[k] + step.compliance * held;
+            const double mean = step.mean_z * s.q[k] + step.mean_rate * s.q_dot[k] + step.compliance * held;
             s.q_dot[k] = step.c * s.q[k] + step.d * s.q_dot[k] + step.rate * held;
             s.q[k] += h_ * mean;
         }

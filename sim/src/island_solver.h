@@ -10,16 +10,17 @@ namespace sim {
 
 /// What touches or hangs together in one step, in order of ids.
 struct Island {
-    std::vector<int> bodies;          ///< that move, ascending
-    std::vector<int> manifolds;       ///< indices, ascending by (a, b)
-    std::vector<int> constraints;     ///< indices, ascending
+    std::vector<int> bodies;       ///< that move, ascending
+    std::vector<int> manifolds;    ///< indices, ascending by (a, b)
+    std::vector<int> constraints;  ///< indices, ascending
 };
 
 /// Moves one island over one step by substeps with soft contacts (Catto 2024, "Solver2D: soft step"; Macklin
 /// et al. 2019, "Small steps in physics simulation"), for bodies with modes.
 ///
 /// A substep of h, for every body with coordinates y = (sqrt(m) v, sqrt(I) w, G):
-///   1. v <- v + h g; modes: free mean rate G0 = (z_free(h) - z) / h; last impulses applied again (warm start)
+///   1. v <- v + h g; modes: free mean rate G0 = (z_free(h) - z) / h; last impulses applied again (warm
+///   start)
 ///   2. one sweep over springs and contacts, overlaps pushed out softly (30 Hz, damping 10, at most 3 m/s)
 ///   3. positions and orientations move with these velocities
 ///   4. one sweep without the push, so that it leaves no speed behind
@@ -30,10 +31,10 @@ struct Island {
 /// positive, for any omega h.
 ///
 /// Rows. One Jacobian row a direction (normal, two tangents) and body, scaled by the square root of the
-/// inverse mass: D = J M^-1/2, floats in whole lanes, (n, R^T(r x n) / sqrt(I), sqrt(w) phi(r)^T R^T n). So the
-/// same row takes velocities out and puts impulses in. The three rows of a point are read together, with K =
-/// D D^T between them; friction is a 2 x 2 block limited to the cone. Separations move along with the rows:
-/// s = s0 + D . integral of y. Everything is frozen over the step but velocities and separations.
+/// inverse mass: D = J M^-1/2, floats in whole lanes, (n, R^T(r x n) / sqrt(I), sqrt(w) phi(r)^T R^T n). So
+/// the same row takes velocities out and puts impulses in. The three rows of a point are read together, with
+/// K = D D^T between them; friction is a 2 x 2 block limited to the cone. Separations move along with the
+/// rows: s = s0 + D . integral of y. Everything is frozen over the step but velocities and separations.
 ///
 /// Deterministic: sweeps go over springs, then contacts in order. No allocation once the buffers have grown.
 class IslandSolver {
@@ -78,9 +79,9 @@ private:
     };
     /// A place on a body that rows act on.
     struct Place {
-        int body;                // island-local, -1
-        Eigen::Vector3f arm;     // world axes, from the centre
-        const float* shapes;     // phi there, [axis][mode_width]; nullptr without modes
+        int body;             // island-local, -1
+        Eigen::Vector3f arm;  // world axes, from the centre
+        const float* shapes;  // phi there, [axis][mode_width]; nullptr without modes
     };
 
     void begin(const Island& island);

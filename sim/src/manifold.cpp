@@ -34,8 +34,8 @@ void choose_points(std::vector<ManifoldPoint>& candidates, float tolerance, Mani
     };
     manifold.points[0] = first;
     manifold.count = 1;
-    const int second =
-        best(candidates, apart * apart, [&](const ManifoldPoint& p) { return across(first, p).squaredNorm(); });
+    const int second = best(candidates, apart * apart,
+                            [&](const ManifoldPoint& p) { return across(first, p).squaredNorm(); });
     if (second < 0) return;
     keep(second);
     const Eigen::Vector3f edge = across(first, manifold.points[1]);

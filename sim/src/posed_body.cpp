@@ -46,9 +46,9 @@ float PosedBody::deform_linear(const Eigen::VectorXd& q) {
         const Lanes dx = lanes_of(deformation(i, 0)), dy = lanes_of(deformation(i, 1)),
                     dz = lanes_of(deformation(i, 2));
         for (int s = 0; s < padded; s += kLanes)
-            store_lanes(samples.data() + i * padded + s,
-                        dx * load_lanes(rest + s) + dy * load_lanes(rest + padded + s) +
-                            dz * load_lanes(rest + 2 * padded + s));
+            store_lanes(samples.data() + i * padded + s, dx * load_lanes(rest + s) +
+                                                             dy * load_lanes(rest + padded + s) +
+                                                             dz * load_lanes(rest + 2 * padded + s));
     }
     return static_cast<float>((d - Eigen::Matrix3d::Identity()).norm() * kind->bounding_radius);
 }

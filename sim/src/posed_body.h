@@ -13,8 +13,8 @@ struct PosedBody {
     LaneArray polynomial;  ///< displacement: [brick][27][3]; modal bodies only
     Eigen::Matrix3f deformation = Eigen::Matrix3f::Identity();  ///< D of (2.12), linear bodies
     Eigen::Matrix3f deformation_inverse = Eigen::Matrix3f::Identity();
-    Eigen::Vector3f half_box;  ///< of the deformed body, its own axes [m]
-    float radius = 0;          ///< [m]
+    Eigen::Vector3f half_box;                             ///< of the deformed body, its own axes [m]
+    float radius = 0;                                     ///< [m]
     Eigen::Vector3d half_aabb = Eigen::Vector3d::Zero();  ///< world axes [m]
 
     [[nodiscard]] const float* sample_data() const noexcept {

@@ -29,7 +29,8 @@ template <typename T>
 /// By Horner's rule along each axis in turn: 26 multiply-adds for the value of a component, 45 for its
 /// gradient. T is float (one point) or Lanes (eight).
 template <typename T>
-[[nodiscard]] inline PolynomialValue<T> evaluate_polynomial(const float* coefficients, T x, T y, T z) noexcept {
+[[nodiscard]] inline PolynomialValue<T> evaluate_polynomial(const float* coefficients, T x, T y,
+                                                            T z) noexcept {
     using detail::broadcast;
     PolynomialValue<T> result;
     for (int i = 0; i < 3; ++i) {

@@ -168,7 +168,8 @@ void World::Implementation::find_islands() {
         return islands[static_cast<std::size_t>(at)];
     };
     for (std::size_t i = 0; i < bodies.size(); ++i)
-        if (bodies[i].moves() && !bodies[i].asleep) island_of(static_cast<int>(i)).bodies.push_back(static_cast<int>(i));
+        if (bodies[i].moves() && !bodies[i].asleep)
+            island_of(static_cast<int>(i)).bodies.push_back(static_cast<int>(i));
     auto& manifolds = contacts.manifolds();
     for (std::size_t m = 0; m < manifolds.size(); ++m) {
         const int id = moves(manifolds[m].a) ? manifolds[m].a : manifolds[m].b;
@@ -229,8 +230,8 @@ void World::Implementation::step() {
     quarantine_broken();
     for (std::size_t i = 0; i < bodies.size(); ++i)
         if (bodies[i].pushed && bodies[i].asleep) wake_group(bodies, static_cast<int>(i));
-    const bool any_awake = std::any_of(bodies.begin(), bodies.end(),
-                                       [](const MovingBody& b) { return b.moves() && !b.asleep; });
+    const bool any_awake =
+        std::any_of(bodies.begin(), bodies.end(), [](const MovingBody& b) { return b.moves() && !b.asleep; });
     counts.contacts = counts.pairs = counts.islands = 0;
     if (!any_awake) return;
     for (MovingBody& body : bodies)
@@ -238,9 +239,6 @@ void World::Implementation::step() {
     contacts.find(settings, planes, joined, bodies);
     find_islands();
     solve_islands();
-    const std::uint64_t held = static_cast<std::uint64_t>(
-        std::count_if(constraints.begin(), constraints.end(), [](const HeldConstraint& c) { return c.holds; }));
-    static_cast<void>(held);
     put_to_sleep();
     for (MovingBody& body : bodies) {
         if (body.asleep || !body.moves()) continue;

@@ -54,7 +54,7 @@ void check_world_body(const WorldBody& body) {
     check_range(who, "damping alpha [1/s]", body.damping_alpha, 0, 1e6);
     check_range(who, "damping beta [s]", body.damping_beta, 0, 1e3);
     check_range(who, "damping ratio", body.damping_ratio, 0, 100);
-    check_range(who, "modes", body.fidelity.modes, 1, 120);
+    if (body.fidelity.fidelity == Fidelity::modal) check_range(who, "modes", body.fidelity.modes, 1, 120);
     check_range(who, "elements a side", body.fidelity.elements, 1, 4);
     check_range(who, "error", body.fidelity.error, 1e-9, 1);
     check_range(who, "triangles", body.triangles, 48, 20000);
@@ -107,8 +107,8 @@ std::string what_is_broken(const MovingBody& body) {
     if (!s.q.allFinite() || (body.kind->modes > 0 && s.q.cwiseAbs().dot(body.kind->gradient_bound) > 1e6))
         return "modal coordinates";
     if (!s.q_dot.allFinite()) return "modal rates";
-    if (body.pushed && !(finite_and_below(body.force / body.kind->mass.mass, 1e12) && body.torque.allFinite() &&
-                         body.modal_force.allFinite()))
+    if (body.pushed && !(finite_and_below(body.force / body.kind->mass.mass, 1e12) &&
+                         body.torque.allFinite() && body.modal_force.allFinite()))
         return "user force";
     return {};
 }

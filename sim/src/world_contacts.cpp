@@ -6,8 +6,8 @@
 namespace sim {
 namespace {
 
-constexpr double kSlop = 0.005;            // of the smaller half extent: contacts exist from here on
-constexpr double kLargestMargin = 0.2;     // of it
+constexpr double kSlop = 0.005;         // of the smaller half extent: contacts exist from here on
+constexpr double kLargestMargin = 0.2;  // of it
 constexpr float kManifoldTolerance = 0.02f;
 
 double smallest_half(const MovingBody& body) {
@@ -17,7 +17,8 @@ double smallest_half(const MovingBody& body) {
 // How far any point may come in a step, against things at rest.
 double reach_of(const MovingBody& body, const WorldSettings& settings) {
     if (!body.moves() || body.asleep) return 0;
-    return settings.dt * (point_speed(body) + settings.dt * std::abs(body.gravity_scale) * settings.gravity.norm());
+    return settings.dt *
+           (point_speed(body) + settings.dt * std::abs(body.gravity_scale) * settings.gravity.norm());
 }
 
 double margin_of(double approach, double size, const WorldSettings& settings) {
@@ -29,7 +30,8 @@ double margin_of(double approach, double size, const WorldSettings& settings) {
 void wake_group(std::vector<MovingBody>& bodies, int body) {
     const int group = bodies[static_cast<std::size_t>(body)].sleep_group;
     for (MovingBody& other : bodies) {
-        if (!other.asleep || (other.sleep_group != group && &other != &bodies[static_cast<std::size_t>(body)]))
+        if (!other.asleep ||
+            (other.sleep_group != group && &other != &bodies[static_cast<std::size_t>(body)]))
             continue;
         other.asleep = false;
         other.still_s = 0;
@@ -56,8 +58,9 @@ bool WorldContacts::find_once(const WorldSettings& settings, const std::vector<W
         if (body.quarantined) continue;
         const double grown = kSlop * smallest_half(body) + reach_of(body, settings);
         const Eigen::Vector3d half = body.posed.half_aabb.array() + grown;
-        boxes.push_back({(body.posed.position - half).cast<float>(), (body.posed.position + half).cast<float>(),
-                         static_cast<int>(i), body.moves() && !body.asleep});
+        boxes.push_back({(body.posed.position - half).cast<float>(),
+                         (body.posed.position + half).cast<float>(), static_cast<int>(i),
+                         body.moves() && !body.asleep});
     }
     auto look_up = [this](Manifold& manifold, float reach) {
         const auto old = std::lower_bound(before_.begin(), before_.end(), manifold.key(),
@@ -124,7 +127,8 @@ void WorldContacts::meet(const WorldSettings& settings, const MovingBody& a, con
         const PosedBody &sampled = b_sampled ? pb : pa, &implicit = b_sampled ? pa : pb;
         found_.clear();
         finder_.find(sampled, implicit, margin, found_);
-        const Eigen::Matrix3f turn = implicit.rotation.cast<float>(), turn_sampled = sampled.rotation.cast<float>();
+        const Eigen::Matrix3f turn = implicit.rotation.cast<float>(),
+                              turn_sampled = sampled.rotation.cast<float>();
         for (const SampleContact& contact : found_) {
             ManifoldPoint point;
             const Eigen::Vector3f out = turn * contact.normal;

@@ -4,8 +4,8 @@
 
 namespace sim {
 
-/// Finds the contacts of a step: broad phase, samples against implicit surfaces both ways, manifolds, impulses
-/// of the step before; wakes sleepers that are touched.
+/// Finds the contacts of a step: broad phase, samples against implicit surfaces both ways, manifolds,
+/// impulses of the step before; wakes sleepers that are touched.
 class WorldContacts {
 public:
     /// `joined`: pairs (a < b, ascending) that a constraint joins; they do not collide.
