@@ -91,7 +91,7 @@ void SceneReader::read_settings(TomlReader reader, std::optional<double> dt_s) {
     settings.gravity = reader.vector("gravity", -kFarM, kFarM, settings.gravity);
     settings.sleeping = reader.flag("sleeping", settings.sleeping);
     settings.sleep_speed = reader.number("sleep_speed", 0, 100, settings.sleep_speed);
-    scene_.seconds = reader.number("seconds", 1e-3, kLongestS, scene_.seconds);
+    scene_.seconds = reader.fraction("seconds", 1e-3, kLongestS, scene_.seconds);
     reader.done();
 }
 
@@ -122,6 +122,7 @@ void SceneReader::read_box(TomlReader reader) {
     const double floor = reader.number("floor", -kFarM, kFarM, 0.0);
     plane.friction = reader.number("friction", 0, 10, plane.friction);
     plane.restitution = reader.number("restitution", 0, 1, plane.restitution);
+    scene_.box = SceneBox{size, center, floor};
     reader.done();
     const auto add = [&](const Eigen::Vector3d& normal, double offset) {
         plane.normal = normal, plane.offset = offset;

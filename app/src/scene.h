@@ -21,6 +21,12 @@ struct Slowing {
     double factor = 1;
 };
 
+/// A floor with four walls: x and z of its inner size and its centre [m].
+struct SceneBox {
+    Eigen::Vector2d size, center;
+    double floor;
+};
+
 /// What happens before a step: constraints go, bodies come, a worker slows down.
 struct SceneEvent {
     std::uint64_t step = 0;          ///< before this one, counted from 0
@@ -38,6 +44,7 @@ struct Scene {
     std::vector<sim::WorldBody> later;
     std::vector<BodyLook> looks;     ///< of all bodies
     std::vector<SceneEvent> events;  ///< in order of steps, then of the file
+    std::optional<SceneBox> box;     ///< its planes are among the world's
     double seconds = 10;             ///< how long it is worth looking at
     render::Camera camera;           ///< [m] of the scene, as is the room
     render::Room room;

@@ -16,14 +16,14 @@ constexpr double kFarM = 1000;  // everything of a scene lies within this of the
 constexpr double kDegree = std::numbers::pi / 180;
 
 /// Colours of bodies that name none: one a kind, or one a copy of a grid.
-const std::array<Eigen::Vector3f, 8> kPalette = {Eigen::Vector3f(0.80f, 0.16f, 0.10f),
-                                                 {0.95f, 0.55f, 0.08f},
-                                                 {0.10f, 0.42f, 0.62f},
-                                                 {0.16f, 0.50f, 0.22f},
-                                                 Eigen::Vector3f(0.85f, 0.75f, 0.25f),
-                                                 {0.45f, 0.20f, 0.50f},
-                                                 {0.75f, 0.72f, 0.66f},
-                                                 {0.12f, 0.55f, 0.52f}};
+const std::array<Eigen::Vector3f, 8> kPalette = {Eigen::Vector3f(0.55f, 0.05f, 0.03f),
+                                                 {0.62f, 0.25f, 0.02f},
+                                                 {0.03f, 0.15f, 0.32f},
+                                                 {0.05f, 0.22f, 0.08f},
+                                                 Eigen::Vector3f(0.55f, 0.40f, 0.06f),
+                                                 {0.20f, 0.06f, 0.22f},
+                                                 {0.42f, 0.40f, 0.36f},
+                                                 {0.03f, 0.24f, 0.24f}};
 
 SceneMaterial read_material(TomlReader reader) {
     SceneMaterial m;
@@ -201,8 +201,9 @@ ReadBodies read_bodies(const toml::table& table, const toml::table* defaults, co
     const sim::WorldBody body = read_body(reader, materials);
     const bool copied = reader.has("grid");
     TomlReader grid = reader.table("grid");
-    const bool coloured = reader.has("look");
-    const render::Appearance look = read_appearance(reader.table("look"));
+    TomlReader looks = reader.table("look");
+    const bool coloured = looks.has("color");
+    const render::Appearance look = read_appearance(std::move(looks));
     reader.done();
 
     ReadBodies result;

@@ -8,6 +8,11 @@ namespace app {
 namespace {
 
 constexpr int kShadowTexels = 1024;
+constexpr double kKerb = 0.03;  // half height and half thickness, as share of the box's longer side
+
+render::Look walnut() {
+    return {{Eigen::Vector3f(0.10f, 0.045f, 0.02f), 0.0f, 0.5f}, {}};
+}
 
 render::Mesh mesh_of(const sim::SurfaceMesh& surface) {
     render::MeshPart part;
@@ -57,6 +62,7 @@ SceneStage::SceneStage(const Scene& scene, const sim::World& world) : scene_(sce
         else
             add_solid(coming, static_cast<int>(body - now));
     }
+    if (scene.box) add_kerbs();
 }
 
 void SceneStage::add_solid(const sim::World& world, int body) {
@@ -67,11 +73,30 @@ void SceneStage::add_solid(const sim::World& world, int body) {
         {mesh_of(surface), bends ? shapes_of(surface, world.basis(body)) : render::ModeShapes{}});
 }
 
+void SceneStage::add_kerbs() {
+    kerb_solid_ = static_cast<int>(solids_.size());
+    const sim::SurfaceMesh bar = sim::surface_mesh({{Eigen::Vector3d::Ones(), 0.1, 0.1}, {}}, 1000);
+    solids_.push_back({mesh_of(bar), {}});
+    const SceneBox& box = *scene_.box;
+    const double thick = kKerb * box.size.maxCoeff();
+    for (const int side : {0, 1}) {
+        for (const double sign : {-1.0, 1.0}) {
+            Eigen::Vector3d half(0.5 * box.size[0] + 2 * thick, thick, 0.5 * box.size[1] + 2 * thick);
+            Eigen::Vector3d at(box.center[0], box.floor, box.center[1]);
+            at[2 * side] += sign * (0.5 * box.size[side] + thick);
+            half[2 * side] = thick;
+            kerbs_.push_back(matrix(Eigen::Isometry3d(Eigen::Translation3d(at)), half.asDiagonal()));
+        }
+    }
+}
+
 render::SceneDescription SceneStage::description(int width, int height) const {
     render::SceneDescription description;
     const auto scale = static_cast<float>(scene_.drawn_scale);
     for (const BodyLook& look : scene_.looks)
         description.objects.push_back({"body", {}, {look.appearance, {}}, solid_of_kind_[look.kind]});
+    for (std::size_t k = 0; k < kerbs_.size(); ++k)
+        description.objects.push_back({"kerb", {}, walnut(), kerb_solid_});
     description.solids = solids_;
     description.camera = scene_.camera;
     description.camera.eye *= scale, description.camera.target *= scale;
@@ -107,6 +132,11 @@ render::FrameState SceneStage::frame(const sim::World& world) const {
         else if (state.q.size() > 0)
             strain = uniform_strain(world.basis(body), state.q);
         frame.world_from_object.back() = matrix(pose, strain);
+    }
+    for (const Eigen::Matrix4f& kerb : kerbs_) {
+        frame.world_from_object.push_back(kerb);
+        frame.visible.push_back(true);
+        frame.modal.emplace_back();
     }
     return frame;
 }
