@@ -18,6 +18,7 @@
 #include "predict_command.h"
 #include "record_command.h"
 #include "sensor_command.h"
+#include "simulate_command.h"
 #include "trace_commands.h"
 
 namespace app {
@@ -68,6 +69,7 @@ int run(int argc, char** argv) {
     add_latency_command(program);
     add_trace_command(program);
     add_record_command(program);
+    add_simulate_command(program, status);
     add_worker_command(program, status);
     add_sensor_command(program, status);
     try {
