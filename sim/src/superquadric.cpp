@@ -71,6 +71,19 @@ double Gauge::value(const Eigen::Vector3d& r) const noexcept {
     return pair_norm(pair_norm(u.x(), u.z(), p2_).value, u.y(), p1_).value;
 }
 
+GaugeSlope Gauge::slope(const Eigen::Vector3d& r) const noexcept {
+    const Eigen::Vector3d u = r.cwiseAbs().cwiseQuotient(semi_axes_);
+    const PairNorm flat = pair_norm(u.x(), u.z(), p2_);
+    const PairNorm whole = pair_norm(flat.value, u.y(), p1_);
+    if (whole.value == 0) return {0, Eigen::Vector3d::Zero()};
+    // d n / d|u_i| = share n / u_i; a coordinate of no size has no share. Shares of x and z are of rho's.
+    const double n = whole.value;
+    const Eigen::Vector3d share(whole.first * flat.first, whole.second, whole.first * flat.second);
+    Eigen::Vector3d gradient;
+    for (int i = 0; i < 3; ++i) gradient[i] = u[i] == 0 ? 0 : share[i] * n / r[i];
+    return {n, gradient};
+}
+
 double Gauge::inside_outside(const Eigen::Vector3d& r) const noexcept {
     return power(value(r), p1_);
 }

@@ -11,6 +11,12 @@ struct GaugeDerivatives {
     Eigen::Matrix3d hessian;   ///< [1/m^2]
 };
 
+/// Value and gradient of the gauge: the plane gradient . y = 1 bears the body at its point in that direction.
+struct GaugeSlope {
+    double value;
+    Eigen::Vector3d gradient;  ///< [1/m]
+};
+
 /// The superquadric's inside-outside function in the form that the distance needs: the gauge N = F^(e1/2).
 ///
 ///   rho = (|x/a|^p2 + |z/c|^p2)^(1/p2),  N = (rho^p1 + |y/b|^p1)^(1/p1),  p1 = 2/e1, p2 = 2/e2,  F = N^p1
@@ -26,6 +32,9 @@ public:
 
     [[nodiscard]] double value(const Eigen::Vector3d& r) const noexcept;
     [[nodiscard]] GaugeDerivatives derivatives(const Eigen::Vector3d& r) const noexcept;  ///< r not zero
+    /// Without the curvature, and not made linear near the coordinate planes: at a kink a subgradient. Zero
+    /// at the centre.
+    [[nodiscard]] GaugeSlope slope(const Eigen::Vector3d& r) const noexcept;
     /// As derivatives, but where p < 2 the curvature is divided by p - 1: then grad N(r) + H s does not
     /// overshoot the kink at a coordinate plane, however near it is (the weights of iteratively reweighted
     /// least squares).
