@@ -19,7 +19,7 @@ struct ModesRequest {
     Superquadric shape;  ///< box: only the semi-axes count
     ModeDomain domain = ModeDomain::superquadric;
     Material material;
-    int elements = 1;  ///< a side
+    int elements = 1;  ///< a side, 1 to 12
     int count = 12;    ///< lowest non-rigid modes wanted; -1: all that one element has (75)
 };
 
@@ -46,6 +46,10 @@ struct GroupCut {
 struct FreeVibrationModes {
     ModalBasis basis;
     Eigen::VectorXd eigenvalues;  ///< [rad^2/s^2], ascending, all that were computed, the six rigid first
+    /// Parity class of each eigenvalue: bit j is set if u_j is even along its own axis j and the other
+    /// components are odd in it. 0: stretching; 1, 2, 4: bending towards x, y, z (rigid: translation); 3, 5,
+    /// 6: shear xy, xz, yz (rigid: rotation); 7: twisting.
+    std::vector<int> parity;
     GroupCut cut;
 };
 

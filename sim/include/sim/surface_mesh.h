@@ -18,11 +18,13 @@ struct SurfaceMesh {
     std::vector<Eigen::Vector3d> normals;   ///< outward unit normal of each vertex
     std::vector<std::array<std::uint32_t, 3>> triangles;
     std::size_t features = 0;  ///< points without triangles, for contact only: corners, edge and face centres
-                               ///< of box-like bodies (either exponent below 0.5), tips of spikes
+                               ///< of box-like bodies (either exponent below 0.5), rims of drum-like ones (e1
+                               ///< alone), tips of spikes; none where a vertex is already
 };
 
-/// The mesh of at least `triangles` triangles whose meridians and parallels are nearest to 18 : 10.
-/// triangles from 48 to 20000; throws std::invalid_argument.
+/// The mesh of at least `triangles` triangles whose meridians (an even number) and parallels are near to
+/// 18 : 10. Bumps displace along the unit normal of the superquadric; normals are those of the bumped
+/// surface. triangles from 48 to 20000; throws std::invalid_argument.
 [[nodiscard]] SurfaceMesh surface_mesh(const GeneralizedSuperquadric& shape, int triangles);
 
 }  // namespace sim

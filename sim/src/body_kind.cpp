@@ -1,0 +1,184 @@
+#include "body_kind.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "shape_polynomial.h"
+
+namespace sim {
+namespace {
+
+void set_samples(BodyKind& kind) {
+    const SurfaceMesh mesh = surface_mesh(kind.definition.shape, kind.definition.triangles);
+    kind.samples = static_cast<int>(mesh.vertices.size());
+    kind.batches = whole_lanes(kind.samples) / kLanes;
+    const int padded = kind.batches * kLanes;
+    kind.rest.resize(3 * padded);
+    kind.shapes.resize(static_cast<std::size_t>(kind.modes) * 3 * padded);
+    kind.sample_shapes.resize(static_cast<std::size_t>(padded) * 3 * kind.mode_width);
+    kind.half_box = kind.definition.shape.base.semi_axes;
+    kind.bounding_radius = 0;
+    for (int s = 0; s < padded; ++s) {
+        const Eigen::Vector3d& r = mesh.vertices[std::min(s, kind.samples - 1)];
+        kind.half_box = kind.half_box.cwiseMax(r.cwiseAbs());
+        const Eigen::Matrix3Xd phi = mode_shapes_at(kind.basis, r);
+        for (int axis = 0; axis < 3; ++axis) {
+            kind.rest.data()[axis * padded + s] = static_cast<float>(r[axis]);
+            for (int k = 0; k < kind.modes; ++k) {
+                const float value = static_cast<float>(phi(axis, k));
+                kind.shapes.data()[(k * 3 + axis) * padded + s] = value;
+                kind.sample_shapes.data()[(s * 3 + axis) * kind.mode_width + k] = value;
+            }
+        }
+    }
+    kind.bounding_radius = kind.surface.bounding_radius();
+}
+
+void set_polynomials(BodyKind& kind) {
+    const int k = kind.basis.elements, m = 2 * k + 1;
+    kind.bricks = k;
+    kind.polynomials.resize(static_cast<std::size_t>(k * k * k) * 81 * kind.mode_width);
+    for (int brick = 0; brick < k * k * k; ++brick) {
+        const int bx = brick % k, by = brick / k % k, bz = brick / (k * k);
+        for (int mode = 0; mode < kind.modes; ++mode) {
+            Eigen::Matrix<double, 27, 3> nodes;
+            for (int n = 0; n < 27; ++n) {
+                const int node = 2 * bx + n % 3 + m * (2 * by + n / 3 % 3 + m * (2 * bz + n / 9));
+                nodes.row(n) = kind.basis.nodal.block<3, 1>(3 * node, mode).transpose();
+            }
+            const Eigen::Matrix<double, 27, 3> c = polynomial_from_nodes(nodes);
+            float* out =
+                kind.polynomials.data() + static_cast<std::size_t>(brick) * 81 * kind.mode_width + mode;
+            for (int n = 0; n < 27; ++n)
+                for (int axis = 0; axis < 3; ++axis)
+                    out[(3 * n + axis) * kind.mode_width] = static_cast<float>(c(n, axis));
+        }
+    }
+}
+
+// Largest |d phi_k / dr| (Frobenius) over a 5 x 5 x 5 grid of the box.
+void set_gradient_bounds(BodyKind& kind) {
+    kind.gradient_bound = Eigen::VectorXd::Zero(kind.modes);
+    for (int mode = 0; mode < kind.modes; ++mode) {
+        const Eigen::VectorXd nodal = kind.basis.nodal.col(mode);
+        for (int n = 0; n < 125; ++n) {
+            const Eigen::Vector3d xi(n % 5 / 2.0 - 1, n / 5 % 5 / 2.0 - 1, n / 25 / 2.0 - 1);
+            const Displacement u =
+                displacement_at(kind.basis, nodal, kind.basis.half_extents.cwiseProduct(xi));
+            kind.gradient_bound[mode] = std::max(kind.gradient_bound[mode], u.gradient.norm());
+        }
+    }
+}
+
+ModalBasis basis_of(const WorldBody& body, const FidelityChoice& choice) {
+    if (choice.fidelity == Fidelity::linear) return uniform_strain_basis(body.shape.base, body.material);
+    ModalBasis none;
+    none.half_extents = body.shape.base.semi_axes;
+    if (choice.fidelity == Fidelity::rigid) return none;
+    ModesRequest request;
+    request.shape = body.shape.base;
+    request.domain = body.fidelity.domain;
+    request.material = body.material;
+    request.elements = body.fidelity.elements;
+    request.count = choice.modes;
+    return free_vibration_modes(request).basis;
+}
+
+FidelityChoice choice_of(const WorldBody& body) {
+    if (body.fixed) return {Fidelity::rigid, 0, 0};
+    if (body.fidelity.fidelity == Fidelity::automatic)
+        return choose_fidelity(body.shape.base, body.material, body.fidelity);
+    const int modes = body.fidelity.fidelity == Fidelity::rigid    ? 0
+                      : body.fidelity.fidelity == Fidelity::linear ? 6
+                                                                   : body.fidelity.modes;
+    return {body.fidelity.fidelity, modes, 0};
+}
+
+bool same_shape(const GeneralizedSuperquadric& a, const GeneralizedSuperquadric& b) {
+    return a.base.semi_axes == b.base.semi_axes && a.base.e1 == b.base.e1 && a.base.e2 == b.base.e2 &&
+           a.bumps.size() == b.bumps.size() &&
+           std::equal(a.bumps.begin(), a.bumps.end(), b.bumps.begin(), [](const Bump& p, const Bump& q) {
+               return p.direction == q.direction && p.height_m == q.height_m && p.width_rad == q.width_rad;
+           });
+}
+
+}  // namespace
+
+HeldStep held_step(double omega, double sigma, double tau) noexcept {
+    const OscillatorStep s = oscillator_step(omega, sigma, tau);
+    const double turn = omega * tau;
+    const double compliance = std::max((1 - s.a) / (turn * turn), 1e-20);
+    return {(s.a - 1) / tau, s.b / tau, compliance, s.c, s.d, s.b / tau, std::sqrt(compliance)};
+}
+
+BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
+    const FidelityChoice choice = choice_of(body);
+    BodyKind kind{body,
+                  choice,
+                  GeneralizedSurface(body.shape),
+                  rigid_mass(body.shape.base, body.material),
+                  basis_of(body, choice),
+                  {},
+                  {},
+                  {},
+                  {},
+                  Eigen::Vector3d::Zero()};
+    kind.modes = kind.basis.count();
+    kind.choice.modes = kind.modes;
+    kind.mode_width = whole_lanes(kind.modes);
+    kind.width = 8 + kind.mode_width;
+    kind.root_compliance.resize(kind.mode_width);
+    kind.ellipsoid = body.shape.base.e1 == 1 && body.shape.base.e2 == 1 && body.shape.bumps.empty();
+    kind.sigma =
+        body.damping_alpha / 2 +
+        kind.basis.omega.array() * (body.damping_ratio + body.damping_beta / 2 * kind.basis.omega.array());
+    for (int k = 0; k < kind.modes; ++k) {
+        kind.substep.push_back(
+            held_step(kind.basis.omega[k], kind.sigma[k], settings.dt / settings.substeps));
+        kind.root_compliance.data()[k] = static_cast<float>(kind.substep.back().root_compliance);
+        kind.whole.push_back(held_step(kind.basis.omega[k], kind.sigma[k], settings.dt));
+    }
+    set_samples(kind);
+    if (kind.modes > 0) {
+        set_polynomials(kind);
+        set_gradient_bounds(kind);
+    }
+    return kind;
+}
+
+bool same_kind(const WorldBody& a, const WorldBody& b) noexcept {
+    const Material &m = a.material, &n = b.material;
+    const FidelityRequest &f = a.fidelity, &g = b.fidelity;
+    return a.fixed == b.fixed && same_shape(a.shape, b.shape) && m.young_pa == n.young_pa &&
+           m.poisson == n.poisson && m.density_kg_m3 == n.density_kg_m3 &&
+           a.damping_alpha == b.damping_alpha && a.damping_beta == b.damping_beta &&
+           a.damping_ratio == b.damping_ratio && f.fidelity == g.fidelity && f.modes == g.modes &&
+           f.elements == g.elements && f.domain == g.domain && f.error == g.error &&
+           f.impact_mps == g.impact_mps && a.triangles == b.triangles;
+}
+
+BodyKind::Local BodyKind::locate(const Eigen::Vector3f& r) const noexcept {
+    Eigen::Vector3f xi = r.cwiseQuotient(basis.half_extents.cast<float>()).cwiseMax(-1.f).cwiseMin(1.f);
+    if (bricks == 1) return {0, xi};
+    int index[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        const float place = 0.5f * (xi[axis] + 1) * static_cast<float>(bricks);
+        index[axis] = std::clamp(static_cast<int>(place), 0, bricks - 1);
+        xi[axis] = 2 * (place - static_cast<float>(index[axis])) - 1;
+    }
+    return {index[0] + bricks * (index[1] + bricks * index[2]), xi};
+}
+
+void BodyKind::shapes_at(const Eigen::Vector3f& r, float* out) const noexcept {
+    const Local local = locate(r);
+    float m[27];
+    monomials(local.xi.x(), local.xi.y(), local.xi.z(), m);
+    const float* row = polynomials.data() + static_cast<std::size_t>(local.brick) * 81 * mode_width;
+    for (int at = 0; at < 3 * mode_width; at += kLanes) {
+        Lanes sum = lanes_of(0);
+        for (int n = 0; n < 27; ++n) sum += lanes_of(m[n]) * load_lanes(row + n * 3 * mode_width + at);
+        store_lanes(out + at, sum);
+    }
+}
+
+}  // namespace sim

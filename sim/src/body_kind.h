@@ -1,0 +1,62 @@
+#pragma once
+#include <vector>
+
+#include "generalized_surface.h"
+#include "lanes.h"
+#include "oscillator.h"
+#include "sim/surface_mesh.h"
+#include "sim/world.h"
+
+namespace sim {
+
+/// Exact step of one mode under a modal force held over tau, in terms of the held impulse P = f tau:
+///   mean rate  (z1 - z0) / tau = mean_z z0 + mean_rate z0' + compliance P
+///   end rate   z1'             = c z0 + d z0' + rate P
+/// compliance = (1 - a) / (omega tau)^2 is at least 0 for every omega tau and damping, 1/2 for soft modes,
+/// and 1 / (omega tau)^2 for stiff ones, which then yield statically.
+struct HeldStep {
+    double mean_z, mean_rate, compliance, c, d, rate;
+    double root_compliance;
+};
+[[nodiscard]] HeldStep held_step(double omega, double sigma, double tau) noexcept;
+
+/// What bodies of one shape, material, fidelity and sampling share; computed once.
+struct BodyKind {
+    WorldBody definition;  ///< of the first such body; pose and velocities are not used
+    FidelityChoice choice;
+    GeneralizedSurface surface;
+    RigidMass mass;
+    ModalBasis basis;
+    Eigen::VectorXd sigma;                 ///< decay rates [1/s]
+    Eigen::VectorXd gradient_bound;        ///< largest |d phi_k / dr| over a grid of the box
+    std::vector<HeldStep> substep, whole;  ///< for a substep, for a step
+    Eigen::Vector3d half_box;              ///< of the rest surface, bumps included [m]
+    double bounding_radius = 0;            ///< [m]
+    int modes = 0, width = 8;              ///< width: floats of a Jacobian's row, 8 + mode_width
+    int mode_width = 0;                    ///< modes, whole lanes
+    bool ellipsoid = false;                ///< e1 = e2 = 1 without bumps: gauge in closed form
+    int samples = 0, batches = 0;          ///< batches of eight samples
+    LaneArray rest = {};                   ///< samples: [axis][8 batches]
+    LaneArray shapes = {};                 ///< phi at samples: [mode][axis][8 batches]
+    LaneArray sample_shapes = {};          ///< phi at samples: [sample][axis][mode_width]
+    LaneArray root_compliance = {};        ///< of a substep: [mode_width]
+    LaneArray polynomials = {};            ///< phi's coefficients: [brick][27][axis][mode_width]
+    int bricks = 1;                        ///< a side
+
+    [[nodiscard]] bool linear() const noexcept { return choice.fidelity == Fidelity::linear; }
+    /// phi at a rest point, [axis][mode_width] floats.
+    void shapes_at(const Eigen::Vector3f& r, float* out) const noexcept;
+    /// Brick that holds r, with r in its coordinates.
+    struct Local {
+        int brick;
+        Eigen::Vector3f xi;
+    };
+    [[nodiscard]] Local locate(const Eigen::Vector3f& r) const noexcept;
+};
+
+/// Throws std::invalid_argument naming the body, what was found and expected.
+[[nodiscard]] BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings);
+/// Whether two bodies can share a kind.
+[[nodiscard]] bool same_kind(const WorldBody& a, const WorldBody& b) noexcept;
+
+}  // namespace sim

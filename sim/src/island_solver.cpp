@@ -1,0 +1,462 @@
+#include "island_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace sim {
+namespace {
+
+constexpr double kPushHz = 30, kPushDamping = 10;
+constexpr float kPushSpeed = 3;           // [m/s]
+constexpr float kBounceThreshold = 0.1f;  // [m/s]
+
+float dot(const float* a, const float* b, int width) {
+    Lanes sum = load_lanes(a) * load_lanes(b);
+    for (int i = kLanes; i < width; i += kLanes) sum += load_lanes(a + i) * load_lanes(b + i);
+    return sum_of(sum);
+}
+
+/// Three rows against one vector, added to v.
+void dot_rows(const float* rows, const float* y, int width, float (&v)[3]) {
+    Lanes s0 = load_lanes(rows) * load_lanes(y), s1 = load_lanes(rows + width) * load_lanes(y),
+          s2 = load_lanes(rows + 2 * width) * load_lanes(y);
+    for (int i = kLanes; i < width; i += kLanes) {
+        const Lanes x = load_lanes(y + i);
+        s0 += load_lanes(rows + i) * x;
+        s1 += load_lanes(rows + width + i) * x;
+        s2 += load_lanes(rows + 2 * width + i) * x;
+    }
+    v[0] += sum_of(s0), v[1] += sum_of(s1), v[2] += sum_of(s2);
+}
+
+/// y += rows^T p.
+void add_rows_to(const float* rows, const float (&p)[3], int width, float* y) {
+    for (int i = 0; i < width; i += kLanes)
+        store_lanes(y + i, load_lanes(y + i) + p[0] * load_lanes(rows + i) +
+                               p[1] * load_lanes(rows + width + i) + p[2] * load_lanes(rows + 2 * width + i));
+}
+
+/// Two unit vectors square to n and to each other.
+void set_tangents(const Eigen::Vector3f& n, Eigen::Vector3f (&t)[2]) {
+    const Eigen::Vector3f axis =
+        std::abs(n.x()) < 0.6f ? Eigen::Vector3f::UnitX() : Eigen::Vector3f(Eigen::Vector3f::UnitZ());
+    t[0] = (axis - axis.dot(n) * n).normalized();
+    t[1] = n.cross(t[0]);
+}
+
+}  // namespace
+
+void IslandSolver::solve(const Island& island) {
+    begin(island);
+    for (int i = 0; i < settings_->substeps; ++i) substep(i + 1 == settings_->substeps);
+    keep_impulses();
+}
+
+void IslandSolver::begin(const Island& island) {
+    h_ = settings_->dt / settings_->substeps;
+    const double omega = 2 * std::numbers::pi * std::min(kPushHz, 0.25 / h_);
+    const double a1 = 2 * kPushDamping + h_ * omega, a2 = h_ * omega * a1;
+    push_rate_ = static_cast<float>(omega / a1);
+    mass_share_ = static_cast<float>(a2 / (1 + a2));
+    impulse_share_ = static_cast<float>(1 / (1 + a2));
+
+    local_.resize(bodies_->size(), -1);
+    rows_of_.clear();
+    std::uint32_t offset = 0;
+    for (const int id : island.bodies) {
+        MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        local_[static_cast<std::size_t>(id)] = static_cast<int>(rows_of_.size());
+        rows_of_.push_back({&body, offset, body.kind->width});
+        offset += static_cast<std::uint32_t>(body.kind->width);
+    }
+    y_.resize(offset), start_.resize(offset), moved_.resize(offset);
+    std::fill_n(moved_.data(), offset, 0.f);
+
+    std::size_t triples = 0, floats = 0;
+    auto width_of = [this](int id) {
+        return id >= 0 && id < kFirstPlane && local(id) >= 0
+                   ? static_cast<std::size_t>((*bodies_)[static_cast<std::size_t>(id)].kind->width)
+                   : 0;
+    };
+    for (const int m : island.manifolds) {
+        const Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        triples += static_cast<std::size_t>(manifold.count);
+        floats +=
+            static_cast<std::size_t>(manifold.count) * 3 * (width_of(manifold.a) + width_of(manifold.b));
+    }
+    for (const int c : island.constraints) {
+        const PointConstraint& held = (*constraints_)[static_cast<std::size_t>(c)].definition;
+        floats += 3 * (width_of(held.body_a) + width_of(held.body_b));
+    }
+    jacobians_.resize(floats);
+    jacobians_used_ = 0;
+    contacts_.clear(), springs_.clear();
+    contacts_.reserve(triples);
+    for (const int m : island.manifolds) {
+        Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        for (int i = 0; i < manifold.count; ++i)
+            add_contact(manifold, manifold.points[static_cast<std::size_t>(i)]);
+    }
+    for (const int c : island.constraints) add_spring((*constraints_)[static_cast<std::size_t>(c)]);
+    for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
+}
+
+IslandSolver::Place IslandSolver::place(int body, const Eigen::Vector3f& arm, int sample,
+                                        const Eigen::Vector3f& rest, float* scratch) {
+    const bool moves = body >= 0 && body < kFirstPlane && local(body) >= 0;
+    if (!moves) return {-1, arm, nullptr};
+    const BodyKind& kind = *(*bodies_)[static_cast<std::size_t>(body)].kind;
+    if (kind.modes == 0) return {local(body), arm, nullptr};
+    if (sample >= 0)
+        return {local(body), arm,
+                kind.sample_shapes.data() + static_cast<std::size_t>(sample) * 3 * kind.mode_width};
+    kind.shapes_at(rest, scratch);
+    return {local(body), arm, scratch};
+}
+
+std::uint32_t IslandSolver::add_rows(const Place& place, const Eigen::Matrix3f& directions, float sign) {
+    const std::uint32_t offset = static_cast<std::uint32_t>(jacobians_used_);
+    if (place.body < 0) return offset;
+    const BodyRows& rows = rows_of_[static_cast<std::size_t>(place.body)];
+    const BodyKind& kind = *rows.body->kind;
+    const Eigen::Matrix3f body_from_world = rows.body->posed.rotation.transpose().cast<float>();
+    const Eigen::Vector3f root_inertia = kind.mass.inertia.cwiseSqrt().cwiseInverse().cast<float>();
+    const float root_mass = static_cast<float>(1 / std::sqrt(kind.mass.mass));
+    for (int r = 0; r < 3; ++r) {
+        float* out = jacobians_.data() + jacobians_used_;
+        jacobians_used_ += static_cast<std::size_t>(rows.width);
+        const Eigen::Vector3f world = sign * directions.row(r).transpose();
+        const Eigen::Vector3f turn = (body_from_world * place.arm.cross(world)).cwiseProduct(root_inertia);
+        for (int i = 0; i < 3; ++i) out[i] = root_mass * world[i], out[3 + i] = turn[i];
+        out[6] = out[7] = 0;
+        if (!place.shapes) continue;
+        const Eigen::Vector3f own = body_from_world * world;
+        const int width = kind.mode_width;
+        for (int k = 0; k < width; k += kLanes)
+            store_lanes(out + 8 + k, load_lanes(kind.root_compliance.data() + k) *
+                                         (own.x() * load_lanes(place.shapes + k) +
+                                          own.y() * load_lanes(place.shapes + width + k) +
+                                          own.z() * load_lanes(place.shapes + 2 * width + k)));
+    }
+    return offset;
+}
+
+void IslandSolver::finish_rows(Rows& rows) {
+    for (int i = 0; i < 3; ++i)
+        for (int j = i; j < 3; ++j) {
+            float sum = 0;
+            for (const bool side : {false, true}) {
+                const int body = side ? rows.b : rows.a;
+                if (body < 0) continue;
+                const int width = rows_of_[static_cast<std::size_t>(body)].width;
+                const float* d = jacobians_.data() + (side ? rows.offset_b : rows.offset_a);
+                sum += dot(d + i * width, d + j * width, width);
+            }
+            rows.k[i][j] = rows.k[j][i] = sum;
+        }
+}
+
+void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
+    alignas(32) float scratch[2][3 * 128];
+    ContactRows c;
+    const Place a = place(manifold.a, point.arm_a, point.sample_a, point.rest, scratch[0]);
+    const Place b = place(manifold.b, point.arm_b, point.sample_b, point.rest, scratch[1]);
+    set_tangents(point.normal, c.tangent);
+    Eigen::Matrix3f directions;
+    directions << point.normal.transpose(), c.tangent[0].transpose(), c.tangent[1].transpose();
+    c.a = a.body, c.b = b.body;
+    c.offset_a = add_rows(a, directions, 1);
+    c.offset_b = add_rows(b, directions, -1);
+    finish_rows(c);
+    c.point = &point;
+    c.separation = c.now = point.separation;
+    c.friction = manifold.friction, c.restitution = manifold.restitution;
+    c.approach = 0, c.largest = 0;
+    c.inverse_normal = 1 / c.k[0][0];
+    const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
+    c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
+    c.inverse_tangent[2] = c.k[1][1] / det;
+    c.impulse[0] = point.normal_impulse;
+    c.impulse[1] = point.friction_impulse.dot(c.tangent[0]);
+    c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
+    contacts_.push_back(c);
+}
+
+void IslandSolver::add_spring(HeldConstraint& constraint) {
+    const PointConstraint& held = constraint.definition;
+    alignas(32) float scratch[2][3 * 128];
+    auto arm_of = [this](int body, const Eigen::Vector3d& rest) -> Eigen::Vector3d {
+        const PosedBody& posed = (*bodies_)[static_cast<std::size_t>(body)].posed;
+        return posed.rotation * posed.deformed(rest);
+    };
+    const Eigen::Vector3d arm_a = arm_of(held.body_a, held.point_a);
+    const Eigen::Vector3d place_a = (*bodies_)[static_cast<std::size_t>(held.body_a)].posed.position + arm_a;
+    Eigen::Vector3d arm_b = Eigen::Vector3d::Zero(), place_b = held.point_b;
+    if (held.body_b >= 0) {
+        arm_b = arm_of(held.body_b, held.point_b);
+        place_b = (*bodies_)[static_cast<std::size_t>(held.body_b)].posed.position + arm_b;
+    }
+    SpringRows s;
+    const Place a = place(held.body_a, arm_a.cast<float>(), -1, held.point_a.cast<float>(), scratch[0]);
+    const Place b = place(held.body_b, arm_b.cast<float>(), -1, held.point_b.cast<float>(), scratch[1]);
+    const Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();
+    s.a = a.body, s.b = b.body;
+    s.offset_a = add_rows(a, axes, 1);
+    s.offset_b = add_rows(b, axes, -1);
+    finish_rows(s);
+    s.constraint = &constraint;
+    const double mass = 3.0 / (s.k[0][0] + s.k[1][1] + s.k[2][2]), k = held.stiffness;
+    const double damping = 2 * held.damping_ratio * std::sqrt(k * mass), firm = damping + h_ * k;
+    s.gamma = static_cast<float>(1 / (h_ * firm));
+    s.pull = static_cast<float>(k / firm);
+    Eigen::Matrix3d soft;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) soft(i, j) = s.k[i][j] + (i == j ? s.gamma : 0);
+    const Eigen::Matrix3d inverse = soft.inverse();
+    const Eigen::Vector3d error = place_a - place_b;
+    for (int i = 0; i < 3; ++i) {
+        s.error[i] = s.now[i] = static_cast<float>(error[i]);
+        s.impulse[i] = constraint.impulse[i];
+        for (int j = 0; j < 3; ++j) s.inverse[i][j] = static_cast<float>(inverse(i, j));
+    }
+    springs_.push_back(s);
+}
+
+void IslandSolver::substep(bool last) {
+    load_velocities();
+    warm_start();
+    sweep(true);
+    move();
+    sweep(false);
+    if (last) restitute();
+    finish();
+}
+
+void IslandSolver::load_velocities() {
+    for (const BodyRows& rows : rows_of_) {
+        const MovingBody& body = *rows.body;
+        const BodyKind& kind = *body.kind;
+        const WorldBodyState& s = body.state;
+        const Eigen::Matrix3d& frame = body.posed.rotation;
+        Eigen::Vector3d velocity = s.velocity + h_ * body.gravity_scale * settings_->gravity;
+        Eigen::Vector3d momentum = s.angular_momentum;
+        if (body.pushed) {
+            velocity += h_ / kind.mass.mass * body.force;
+            momentum += h_ * body.torque;
+        }
+        const Eigen::Matrix3d turned = s.orientation.toRotationMatrix();
+        const Eigen::Vector3d spin =
+            frame.transpose() * (turned * (turned.transpose() * momentum).cwiseQuotient(kind.mass.inertia));
+        const double root_mass = std::sqrt(kind.mass.mass);
+        float* y = start_.data() + rows.offset;
+        for (int i = 0; i < 3; ++i) {
+            y[i] = static_cast<float>(root_mass * velocity[i]);
+            y[3 + i] = static_cast<float>(std::sqrt(kind.mass.inertia[i]) * spin[i]);
+        }
+        y[6] = y[7] = 0;
+        for (int k = 0; k < kind.modes; ++k) {
+            const HeldStep& step = kind.substep[static_cast<std::size_t>(k)];
+            double mean = step.mean_z * s.q[k] + step.mean_rate * s.q_dot[k];
+            if (body.pushed) mean += step.compliance * h_ * body.modal_force[k];
+            y[8 + k] = static_cast<float>(mean / step.root_compliance);
+        }
+        for (int k = kind.modes; k < kind.mode_width; ++k) y[8 + k] = 0;
+        std::copy_n(y, rows.width, y_.data() + rows.offset);
+    }
+}
+
+void IslandSolver::warm_start() {
+    // Approach speeds first, before any impulse: gravity's share of this substep included, as it is real.
+    for (ContactRows& c : contacts_) {
+        float speed = 0, moved = 0;
+        for (const bool side : {false, true}) {
+            const int body = side ? c.b : c.a;
+            if (body < 0) continue;
+            const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+            const float* d = jacobians_.data() + (side ? c.offset_b : c.offset_a);
+            if (c.restitution > 0 && c.largest == 0) speed += dot(d, start_.data() + rows.offset, rows.width);
+            moved += dot(d, moved_.data() + rows.offset, rows.width);
+        }
+        if (c.largest == 0) c.approach = speed;
+        c.now = c.separation + moved;
+        for (const bool side : {false, true}) {
+            const int body = side ? c.b : c.a;
+            if (body < 0) continue;
+            const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+            add_rows_to(jacobians_.data() + (side ? c.offset_b : c.offset_a), c.impulse, rows.width,
+                        y_.data() + rows.offset);
+        }
+    }
+    for (SpringRows& s : springs_) {
+        for (int i = 0; i < 3; ++i) s.now[i] = s.error[i];
+        for (const bool side : {false, true}) {
+            const int body = side ? s.b : s.a;
+            if (body < 0) continue;
+            const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+            const float* d = jacobians_.data() + (side ? s.offset_b : s.offset_a);
+            dot_rows(d, moved_.data() + rows.offset, rows.width, s.now);
+            add_rows_to(d, s.impulse, rows.width, y_.data() + rows.offset);
+        }
+    }
+}
+
+void IslandSolver::sweep(bool push) {
+    for (SpringRows& spring : springs_) solve_spring(spring);
+    for (ContactRows& contact : contacts_) solve_contact(contact, push);
+}
+
+void IslandSolver::solve_spring(SpringRows& s) {
+    float v[3] = {0, 0, 0};
+    for (const bool side : {false, true}) {
+        const int body = side ? s.b : s.a;
+        if (body < 0) continue;
+        const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+        dot_rows(jacobians_.data() + (side ? s.offset_b : s.offset_a), y_.data() + rows.offset, rows.width,
+                 v);
+    }
+    for (int i = 0; i < 3; ++i) v[i] += s.pull * s.now[i] + s.gamma * s.impulse[i];
+    float p[3];
+    for (int i = 0; i < 3; ++i) {
+        p[i] = -(s.inverse[i][0] * v[0] + s.inverse[i][1] * v[1] + s.inverse[i][2] * v[2]);
+        s.impulse[i] += p[i];
+    }
+    for (const bool side : {false, true}) {
+        const int body = side ? s.b : s.a;
+        if (body < 0) continue;
+        const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+        add_rows_to(jacobians_.data() + (side ? s.offset_b : s.offset_a), p, rows.width,
+                    y_.data() + rows.offset);
+    }
+}
+
+void IslandSolver::solve_contact(ContactRows& c, bool push) {
+    const float* da = jacobians_.data() + c.offset_a;
+    const float* db = jacobians_.data() + c.offset_b;
+    float v[3] = {0, 0, 0};
+    if (c.a >= 0) {
+        const BodyRows& rows = rows_of_[static_cast<std::size_t>(c.a)];
+        dot_rows(da, y_.data() + rows.offset, rows.width, v);
+    }
+    if (c.b >= 0) {
+        const BodyRows& rows = rows_of_[static_cast<std::size_t>(c.b)];
+        dot_rows(db, y_.data() + rows.offset, rows.width, v);
+    }
+    float bias = 0, mass_share = 1, impulse_share = 0;
+    if (c.now > 0) {
+        bias = c.now / static_cast<float>(h_);
+    } else if (push) {
+        bias = std::max(push_rate_ * c.now, -kPushSpeed);
+        mass_share = mass_share_, impulse_share = impulse_share_;
+    }
+    const float normal = std::max(
+        c.impulse[0] - mass_share * c.inverse_normal * (v[0] + bias) - impulse_share * c.impulse[0], 0.f);
+    float p[3] = {normal - c.impulse[0], 0, 0};
+    c.impulse[0] = normal;
+    c.largest = std::max(c.largest, normal);
+    v[1] += c.k[0][1] * p[0];
+    v[2] += c.k[0][2] * p[0];
+    float t0 = c.impulse[1] - (c.inverse_tangent[0] * v[1] + c.inverse_tangent[1] * v[2]);
+    float t1 = c.impulse[2] - (c.inverse_tangent[1] * v[1] + c.inverse_tangent[2] * v[2]);
+    const float most = c.friction * normal, size = std::sqrt(t0 * t0 + t1 * t1);
+    if (size > most) t0 *= most / size, t1 *= most / size;
+    p[1] = t0 - c.impulse[1], p[2] = t1 - c.impulse[2];
+    c.impulse[1] = t0, c.impulse[2] = t1;
+    if (c.a >= 0) {
+        const BodyRows& rows = rows_of_[static_cast<std::size_t>(c.a)];
+        add_rows_to(da, p, rows.width, y_.data() + rows.offset);
+    }
+    if (c.b >= 0) {
+        const BodyRows& rows = rows_of_[static_cast<std::size_t>(c.b)];
+        add_rows_to(db, p, rows.width, y_.data() + rows.offset);
+    }
+}
+
+void IslandSolver::restitute() {
+    for (ContactRows& c : contacts_) {
+        if (c.restitution == 0 || c.largest == 0 || c.approach > -kBounceThreshold) continue;
+        float v[3] = {0, 0, 0};
+        for (const bool side : {false, true}) {
+            const int body = side ? c.b : c.a;
+            if (body < 0) continue;
+            const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+            v[0] += dot(jacobians_.data() + (side ? c.offset_b : c.offset_a), y_.data() + rows.offset,
+                        rows.width);
+        }
+        const float normal =
+            std::max(c.impulse[0] - c.inverse_normal * (v[0] + c.restitution * c.approach), 0.f);
+        const float p[3] = {normal - c.impulse[0], 0, 0};
+        c.impulse[0] = normal;
+        for (const bool side : {false, true}) {
+            const int body = side ? c.b : c.a;
+            if (body < 0) continue;
+            const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+            add_rows_to(jacobians_.data() + (side ? c.offset_b : c.offset_a), p, rows.width,
+                        y_.data() + rows.offset);
+        }
+    }
+}
+
+void IslandSolver::move() {
+    for (const BodyRows& rows : rows_of_) {
+        MovingBody& body = *rows.body;
+        const BodyKind& kind = *body.kind;
+        const float* y = y_.data() + rows.offset;
+        const float* start = start_.data() + rows.offset;
+        float* moved = moved_.data() + rows.offset;
+        const float h = static_cast<float>(h_);
+        for (int i = 0; i < rows.width; ++i) moved[i] += h * y[i];
+        WorldBodyState& s = body.state;
+        const double root_mass = std::sqrt(kind.mass.mass);
+        s.position += h_ / root_mass * Eigen::Vector3d(y[0], y[1], y[2]);
+        Eigen::Vector3d change;
+        for (int i = 0; i < 3; ++i) change[i] = std::sqrt(kind.mass.inertia[i]) * (y[3 + i] - start[3 + i]);
+        Eigen::Vector3d momentum = s.angular_momentum + body.posed.rotation * change;
+        if (body.pushed) momentum += h_ * body.torque;
+        s.orientation = body.substep_rotation.advance(s.orientation, momentum);
+    }
+}
+
+void IslandSolver::finish() {
+    for (const BodyRows& rows : rows_of_) {
+        MovingBody& body = *rows.body;
+        const BodyKind& kind = *body.kind;
+        const float* y = y_.data() + rows.offset;
+        const float* start = start_.data() + rows.offset;
+        WorldBodyState& s = body.state;
+        Eigen::Vector3d kick, turn;
+        for (int i = 0; i < 3; ++i) {
+            kick[i] = y[i] - start[i];
+            turn[i] = std::sqrt(kind.mass.inertia[i]) * (y[3 + i] - start[3 + i]);
+        }
+        s.velocity += h_ * body.gravity_scale * settings_->gravity + kick / std::sqrt(kind.mass.mass);
+        s.angular_momentum += body.posed.rotation * turn;
+        if (body.pushed) {
+            s.velocity += h_ / kind.mass.mass * body.force;
+            s.angular_momentum += h_ * body.torque;
+        }
+        for (int k = 0; k < kind.modes; ++k) {
+            const HeldStep& step = kind.substep[static_cast<std::size_t>(k)];
+            double held = (static_cast<double>(y[8 + k]) - start[8 + k]) / step.root_compliance;
+            if (body.pushed) held += h_ * body.modal_force[k];
+            const double mean = step.mean_z * s.q[k] + step.mean_rate * s.q_dot[k] + step.compliance * held;
+            s.q_dot[k] = step.c * s.q[k] + step.d * s.q_dot[k] + step.rate * held;
+            s.q[k] += h_ * mean;
+        }
+        if (limit_deformation(body)) ++limited_;
+    }
+}
+
+void IslandSolver::keep_impulses() {
+    for (const ContactRows& c : contacts_) {
+        c.point->normal_impulse = c.impulse[0];
+        c.point->friction_impulse = c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1];
+    }
+    for (const SpringRows& s : springs_) {
+        for (int i = 0; i < 3; ++i) s.constraint->impulse[i] = s.impulse[i];
+        const double force = s.constraint->impulse.norm() / h_;
+        if (force > s.constraint->definition.breaking_force) s.constraint->holds = false;
+    }
+}
+
+}  // namespace sim

@@ -1,0 +1,124 @@
+#pragma once
+#include <span>
+#include <vector>
+
+#include "lanes.h"
+#include "manifold.h"
+#include "moving_body.h"
+
+namespace sim {
+
+/// What touches or hangs together in one step, in order of ids.
+struct Island {
+    std::vector<int> bodies;       ///< that move, ascending
+    std::vector<int> manifolds;    ///< indices, ascending by (a, b)
+    std::vector<int> constraints;  ///< indices, ascending
+};
+
+/// Moves one island over one step by substeps with soft contacts (Catto 2024, "Solver2D: soft step"; Macklin
+/// et al. 2019, "Small steps in physics simulation"), for bodies with modes.
+///
+/// A substep of h, for every body with coordinates y = (sqrt(m) v, sqrt(I) w, G):
+///   1. v <- v + h g; modes: free mean rate G0 = (z_free(h) - z) / h; last impulses applied again (warm
+///   start)
+///   2. one sweep over springs and contacts, overlaps pushed out softly (30 Hz, damping 10, at most 3 m/s)
+///   3. positions and orientations move with these velocities
+///   4. one sweep without the push, so that it leaves no speed behind
+///   5. modes step exactly under the force P / h held over h: z1 = z + h G, z1' = c z + d z' + (b / h) P
+/// and at the end of the last substep restitution. Contact forces act on a mode with its compliance over the
+/// substep, w = (1 - a) / (omega h)^2 >= 0 (body_kind.h), so rigid, stiff and soft bodies go through one
+/// solver, and the force's work on a pair without push is -1/2 P J M^-1 J^T P of the rigid part: never
+/// positive, for any omega h.
+///
+/// Rows. One Jacobian row a direction (normal, two tangents) and body, scaled by the square root of the
+/// inverse mass: D = J M^-1/2, floats in whole lanes, (n, R^T(r x n) / sqrt(I), sqrt(w) phi(r)^T R^T n). So
+/// the same row takes velocities out and puts impulses in. The three rows of a point are read together, with
+/// K = D D^T between them; friction is a 2 x 2 block limited to the cone. Separations move along with the
+/// rows: s = s0 + D . integral of y. Everything is frozen over the step but velocities and separations.
+///
+/// Deterministic: sweeps go over springs, then contacts in order. No allocation once the buffers have grown.
+class IslandSolver {
+public:
+    IslandSolver(const WorldSettings& settings, std::vector<MovingBody>& bodies,
+                 std::vector<WorldPlane>& planes, std::vector<Manifold>& manifolds,
+                 std::vector<HeldConstraint>& constraints)
+        : settings_(&settings),
+          bodies_(&bodies),
+          planes_(&planes),
+          manifolds_(&manifolds),
+          constraints_(&constraints) {}
+
+    void solve(const Island& island);
+    [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
+
+private:
+    struct BodyRows {
+        MovingBody* body;
+        std::uint32_t offset;  // of y, start, moved
+        int width;
+    };
+    /// Where a row triple lies and whom it joins.
+    struct Rows {
+        int a = -1, b = -1;  // island-local, -1: does not move
+        std::uint32_t offset_a = 0, offset_b = 0;
+        float k[3][3];
+    };
+    struct ContactRows : Rows {
+        ManifoldPoint* point;
+        Eigen::Vector3f tangent[2];
+        float separation, now, friction, restitution, approach;
+        float inverse_normal, inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
+        float impulse[3], largest;
+    };
+    struct SpringRows : Rows {
+        HeldConstraint* constraint;
+        float error[3], now[3];
+        float inverse[3][3];  // of K + gamma
+        float gamma, pull;    // pull: bias speed per error [1/s]
+        float impulse[3];
+    };
+    /// A place on a body that rows act on.
+    struct Place {
+        int body;             // island-local, -1
+        Eigen::Vector3f arm;  // world axes, from the centre
+        const float* shapes;  // phi there, [axis][mode_width]; nullptr without modes
+    };
+
+    void begin(const Island& island);
+    void add_contact(Manifold& manifold, ManifoldPoint& point);
+    void add_spring(HeldConstraint& constraint);
+    [[nodiscard]] Place place(int body, const Eigen::Vector3f& arm, int sample, const Eigen::Vector3f& rest,
+                              float* scratch);
+    std::uint32_t add_rows(const Place& place, const Eigen::Matrix3f& directions, float sign);
+    void finish_rows(Rows& rows);
+    [[nodiscard]] int local(int body) const noexcept { return local_[static_cast<std::size_t>(body)]; }
+
+    void substep(bool last);
+    void load_velocities();
+    void warm_start();
+    void sweep(bool push);
+    void solve_spring(SpringRows& spring);
+    void solve_contact(ContactRows& contact, bool push);
+    void restitute();
+    void move();
+    void finish();
+    void keep_impulses();
+
+    const WorldSettings* settings_;
+    std::vector<MovingBody>* bodies_;
+    std::vector<WorldPlane>* planes_;
+    std::vector<Manifold>* manifolds_;
+    std::vector<HeldConstraint>* constraints_;
+
+    std::vector<BodyRows> rows_of_;  // per island body
+    std::vector<int> local_;         // world body -> island body or -1
+    std::vector<ContactRows> contacts_;
+    std::vector<SpringRows> springs_;
+    LaneArray y_, start_, moved_, jacobians_;
+    std::size_t jacobians_used_ = 0;
+    double h_ = 0;
+    float push_rate_ = 0, mass_share_ = 1, impulse_share_ = 0;
+    std::uint64_t limited_ = 0;
+};
+
+}  // namespace sim

@@ -1,0 +1,45 @@
+#pragma once
+#include <array>
+
+#include "implicit_contact.h"
+
+namespace sim {
+
+/// One point where bodies a and b touch or are about to. World axes; normal from b towards a.
+struct ManifoldPoint {
+    std::uint32_t feature =
+        0;                 ///< sample of a, or sample of b with the top bit set: the same from step to step
+    float separation = 0;  ///< negative: overlap [m]
+    Eigen::Vector3f normal;
+    Eigen::Vector3f arm_a, arm_b;      ///< from the centres to the contact, half-way through the overlap [m]
+    int sample_a = -1, sample_b = -1;  ///< which of the samples, or -1: see rest
+    Eigen::Vector3f rest;              ///< place in the implicit body's rest shape
+    float normal_impulse = 0;          ///< of the last substep, to start the next from [N s]
+    Eigen::Vector3f friction_impulse = Eigen::Vector3f::Zero();
+};
+
+constexpr int kManifoldPoints = 4;
+
+/// Contact of a pair: at most four points, the deepest and those that span the largest area with it.
+struct Manifold {
+    int a = 0, b = 0;  ///< bodies, a < b; b >= kFirstPlane: plane b - kFirstPlane
+    int count = 0;
+    std::array<ManifoldPoint, kManifoldPoints> points;
+    float friction = 0, restitution = 0;
+    [[nodiscard]] std::uint64_t key() const noexcept {
+        return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);
+    }
+};
+constexpr int kFirstPlane = 1 << 30;
+
+/// Keeps up to four of the points: the deepest (first of equals by feature), the one furthest from it, the
+/// one that makes the largest triangle with both, the one that adds most on the other side of an edge. Points
+/// more than `tolerance` further out than the deepest, and points nearer than `tolerance` / 2 to a chosen
+/// one, do not count.
+void choose_points(std::vector<ManifoldPoint>& candidates, float tolerance, Manifold& manifold);
+
+/// Takes the impulses of last step's manifold of the same pair: by feature, else from the nearest point left
+/// within `reach`.
+void take_impulses(const Manifold& before, float reach, Manifold& manifold);
+
+}  // namespace sim

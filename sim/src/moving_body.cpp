@@ -1,0 +1,67 @@
+#include "moving_body.h"
+
+#include <cmath>
+
+namespace sim {
+namespace {
+
+// Largest |du/dr| over the grid, from the nodal displacement.
+double largest_gradient(const MovingBody& body) {
+    const ModalBasis& basis = body.kind->basis;
+    const Eigen::VectorXd nodal = basis.nodal * body.state.q;
+    double largest = 0;
+    for (int n = 0; n < 125; ++n) {
+        const Eigen::Vector3d xi(n % 5 / 2.0 - 1, n / 5 % 5 / 2.0 - 1, n / 25 / 2.0 - 1);
+        largest = std::max(
+            largest, displacement_at(basis, nodal, basis.half_extents.cwiseProduct(xi)).gradient.norm());
+    }
+    return largest;
+}
+
+}  // namespace
+
+void move_freely(MovingBody& body, const WorldSettings& settings) {
+    WorldBodyState& s = body.state;
+    const double dt = settings.dt;
+    Eigen::Vector3d acceleration = body.gravity_scale * settings.gravity;
+    if (body.pushed) acceleration += body.force / body.kind->mass.mass;
+    s.position += dt * s.velocity + dt * dt / 2 * acceleration;
+    s.velocity += dt * acceleration;
+    // Half the torque's impulse before the turn, half after it.
+    if (body.pushed) s.angular_momentum += dt / 2 * body.torque;
+    s.orientation = body.step_rotation.advance(s.orientation, s.angular_momentum);
+    if (body.pushed) s.angular_momentum += dt / 2 * body.torque;
+    for (int k = 0; k < body.kind->modes; ++k) {
+        const HeldStep& h = body.kind->whole[static_cast<std::size_t>(k)];
+        const double held = body.pushed ? dt * body.modal_force[k] : 0;
+        const double mean = h.mean_z * s.q[k] + h.mean_rate * s.q_dot[k] + h.compliance * held;
+        s.q_dot[k] = h.c * s.q[k] + h.d * s.q_dot[k] + h.rate * held;
+        s.q[k] += dt * mean;
+    }
+}
+
+bool limit_deformation(MovingBody& body) {
+    if (body.kind->modes == 0) return false;
+    const double bound = body.state.q.cwiseAbs().dot(body.kind->gradient_bound);
+    if (!(bound > kGradientLimit) || !std::isfinite(bound)) return false;
+    const double largest = largest_gradient(body);
+    if (largest <= kGradientLimit) return false;
+    Eigen::VectorXd& q = body.state.q;
+    Eigen::VectorXd& rate = body.state.q_dot;
+    const double outwards = q.dot(rate);
+    if (outwards > 0) rate -= outwards / q.squaredNorm() * q;
+    q *= kGradientLimit / largest;
+    return true;
+}
+
+double point_speed(const MovingBody& body) noexcept {
+    double speed = body.state.velocity.norm() + body.state.angular_momentum.norm() /
+                                                    body.kind->mass.inertia.minCoeff() *
+                                                    body.kind->bounding_radius;
+    // |phi| at the surface is at most its gradient times the reach, roughly; good enough for rest.
+    for (int k = 0; k < body.kind->modes; ++k)
+        speed += std::abs(body.state.q_dot[k]) * body.kind->gradient_bound[k] * body.kind->bounding_radius;
+    return speed;
+}
+
+}  // namespace sim

@@ -1,0 +1,52 @@
+#pragma once
+#include <optional>
+
+#include "free_rotation.h"
+#include "posed_body.h"
+
+namespace sim {
+
+/// A body of a World as it goes from step to step.
+struct MovingBody {
+    const BodyKind* kind = nullptr;
+    std::size_t definition = 0;
+    bool fixed = false, quarantined = false, asleep = false;
+    double gravity_scale = 1;
+    float friction = 0, restitution = 0;
+    WorldBodyState state;
+    PosedBody posed;
+    FreeRotation substep_rotation{Eigen::Vector3d::Ones(), 0}, step_rotation{Eigen::Vector3d::Ones(), 0};
+    double still_s = 0;    ///< how long it has been slower than the sleep speed
+    int sleep_group = -1;  ///< bodies that fell asleep together
+    bool pushed = false;   ///< user forces for the next step
+    Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();  ///< world axes
+    Eigen::VectorXd modal_force;                                                        ///< [N kg^-1/2]
+
+    [[nodiscard]] bool moves() const noexcept { return !fixed && !quarantined; }
+    [[nodiscard]] Eigen::Vector3d angular_velocity() const noexcept {
+        const Eigen::Matrix3d r = state.orientation.toRotationMatrix();
+        return r * (r.transpose() * state.angular_momentum).cwiseQuotient(kind->mass.inertia);
+    }
+};
+
+/// A point constraint as it is being held.
+struct HeldConstraint {
+    PointConstraint definition;
+    bool holds = true;
+    Eigen::Vector3f impulse = Eigen::Vector3f::Zero();  ///< of the last substep on a, world [N s]
+};
+
+/// Free motion over a whole step: parabola, free rotation, exact modes. For bodies that touch nothing.
+void move_freely(MovingBody& body, const WorldSettings& settings);
+
+/// Brings a deformation that goes beyond the limit back to it: all coordinates are scaled, and the rates lose
+/// what pointed outwards, so neither elastic nor kinetic energy rises. The limit: |du/dr| (Frobenius) at most
+/// 0.5 at the points of a 5 x 5 x 5 grid, so D's singular values lie within 0.5 to 1.5 there and it has an
+/// inverse. Returns whether it acted.
+bool limit_deformation(MovingBody& body);
+constexpr double kGradientLimit = 0.5;
+
+/// An upper bound of the speed of any point of the body [m/s].
+[[nodiscard]] double point_speed(const MovingBody& body) noexcept;
+
+}  // namespace sim
