@@ -19,6 +19,7 @@
 #include "predict_command.h"
 #include "record_command.h"
 #include "sensor_command.h"
+#include "simulate_command.h"
 #include "trace_commands.h"
 
 namespace app {
@@ -70,6 +71,7 @@ int run(int argc, char** argv) {
     add_trace_command(program);
     add_record_command(program);
     add_bench_command(program);
+    add_simulate_command(program, status);
     add_worker_command(program, status);
     add_sensor_command(program, status);
     try {

@@ -8,6 +8,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace sim {
@@ -103,16 +104,20 @@ public:
         : problem_(problem), shift_(shift), factor_(problem.stiffness + shift * problem.mass) {
         if (factor_.info() != Eigen::Success)
             throw std::runtime_error("vibration modes: found a stiffness that is not positive");
-        found_.resize(problem.mass.rows(), problem.rigid.size() > 0 ? 1 : 0);
+        found_.resize(problem.mass.rows(), rigid_motions());
         if (problem.rigid.size() > 0)
             found_.col(0) = problem.rigid / std::sqrt(problem.rigid.dot(problem.mass * problem.rigid));
     }
 
     ParitySolution run(int wanted) {
+        constexpr int kSearches = 8;
         search(wanted);
-        const double highest = *std::max_element(eigenvalues_.begin(), eigenvalues_.end());
-        const int below = count_below(highest * (1 + 1e-7));
-        while (found_.cols() < below) search(below - static_cast<int>(found_.cols()));
+        const double sigma = (1 + 1e-7) * *std::max_element(eigenvalues_.begin(), eigenvalues_.end());
+        const int there = count_below(sigma);
+        for (int i = 0; i < kSearches && found_below(sigma) < there; ++i) search(there - found_below(sigma));
+        if (found_below(sigma) != there)
+            throw std::runtime_error("vibration modes: found " + std::to_string(found_below(sigma)) +
+                                     " solutions where " + std::to_string(there) + " are");
         return sorted();
     }
 
@@ -145,14 +150,21 @@ private:
         }
     }
 
-    // Sylvester: as many eigenvalues lie below sigma as pivots of K - sigma M are negative.
+    // Sylvester: as many eigenvalues lie below sigma as pivots of K - sigma M are negative. The rigid
+    // motion is one of them.
     [[nodiscard]] int count_below(double sigma) const {
         const Factor inertia(problem_.stiffness - sigma * problem_.mass);
-        return static_cast<int>((inertia.vectorD().array() < 0).count());
+        if (inertia.info() != Eigen::Success)
+            throw std::runtime_error("vibration modes: found no inertia of the stiffness");
+        return static_cast<int>((inertia.vectorD().array() < 0).count() - rigid_motions());
     }
+    [[nodiscard]] int found_below(double sigma) const {
+        return static_cast<int>(std::count_if(eigenvalues_.begin(), eigenvalues_.end(),
+                                              [sigma](double value) { return value < sigma; }));
+    }
+    [[nodiscard]] Eigen::Index rigid_motions() const { return problem_.rigid.size() > 0 ? 1 : 0; }
 
     [[nodiscard]] ParitySolution sorted() const {
-        const Eigen::Index rigid = problem_.rigid.size() > 0 ? 1 : 0;
         std::vector<int> order(eigenvalues_.size());
         for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>(i);
         std::sort(order.begin(), order.end(), [this](int a, int b) {
@@ -163,7 +175,7 @@ private:
         solution.vectors.resize(found_.rows(), static_cast<Eigen::Index>(order.size()));
         for (Eigen::Index i = 0; i < solution.eigenvalues.size(); ++i) {
             solution.eigenvalues[i] = eigenvalues_[order[i]];
-            solution.vectors.col(i) = found_.col(rigid + order[i]);
+            solution.vectors.col(i) = found_.col(rigid_motions() + order[i]);
         }
         solution.complete = false;
         return solution;

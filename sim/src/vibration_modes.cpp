@@ -11,7 +11,7 @@
 namespace sim {
 namespace {
 
-constexpr int kMostElements = 12, kElementModes = 75;
+constexpr int kMostElements = 12, kMostModes = 300, kElementModes = 75;
 constexpr double kEqual = 1e-9;  // relative: eigenvalues of one degenerate group
 
 void expect(bool right, const std::string& what, double found, const std::string& expected) {
@@ -31,8 +31,8 @@ void check(const ModesRequest& request) {
            "more than 0 kg/m^3");
     expect(request.elements >= 1 && request.elements <= kMostElements, "elements a side", request.elements,
            "1 to 12");
-    expect(request.count == -1 || (request.count >= 0 && request.count <= 1000), "count of modes",
-           request.count, "0 to 1000, or -1");
+    expect(request.count == -1 || (request.count >= 0 && request.count <= kMostModes), "count of modes",
+           request.count, "0 to 300, or -1");
 }
 
 /// One solution with its place.
@@ -40,6 +40,23 @@ struct Candidate {
     double eigenvalue;
     int parity, index;  ///< class, and solution within it
 };
+
+int group_end(const std::vector<Candidate>& sorted, int first) {
+    int end = first + 1;
+    while (end < static_cast<int>(sorted.size()) &&
+           sorted[end].eigenvalue - sorted[first].eigenvalue <= kEqual * sorted[first].eigenvalue)
+        ++end;
+    return end;
+}
+
+GroupCut group_cut(const std::vector<Candidate>& sorted, int count) {
+    int first = 0, end = 0;
+    while (end < count) {
+        first = end;
+        end = group_end(sorted, first);
+    }
+    return {count, end == count ? count : first, end};
+}
 
 /// Solves the classes until all modes up to a count, and the next group's border, are known.
 class ModeSearch {
@@ -96,7 +113,8 @@ private:
 
     // The group around `count` must end before what is known ends.
     [[nodiscard]] bool is_enough() const {
-        return count_ == 0 || static_cast<int>(candidates_.size()) > count_ + 1;
+        const int known = static_cast<int>(candidates_.size());
+        return count_ < known && group_cut(candidates_, count_).above < known;
     }
 
     FiniteElementModel model_;
@@ -105,23 +123,6 @@ private:
     std::vector<Candidate> candidates_;
     int count_ = 0, first_incomplete_ = -1;
 };
-
-int group_end(const std::vector<Candidate>& sorted, int first) {
-    int end = first + 1;
-    while (end < static_cast<int>(sorted.size()) &&
-           sorted[end].eigenvalue - sorted[first].eigenvalue <= kEqual * sorted[first].eigenvalue)
-        ++end;
-    return end;
-}
-
-GroupCut group_cut(const std::vector<Candidate>& sorted, int count) {
-    int first = 0, end = 0;
-    while (end < count) {
-        first = end;
-        end = group_end(sorted, first);
-    }
-    return {count, end == count ? count : first, end};
-}
 
 class BasisWriter {
 public:

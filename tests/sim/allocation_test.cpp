@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "sim/modes.h"
 #include "stepped_body.h"
 #include "test_kit.h"
 
@@ -59,6 +60,19 @@ TEST(SteppedBody, ModalStepSweepAndPicturesOfAWarmBodyAllocateNothing) {
         scenario.learn(reply);
     }
     EXPECT_GT(contacts, 50u);
+}
+
+TEST(ModalBasis, DisplacementAndItsInverseAllocateNothing) {
+    const sim::ModalBasis basis =
+        sim::free_vibration_modes({{{0.3, 0.2, 0.5}, 1, 1}, sim::ModeDomain::superquadric, {}, 2, 12}).basis;
+    const Eigen::VectorXd q = Eigen::VectorXd::Constant(12, 0.01), nodal = basis.nodal * q;
+    const std::size_t before = allocations;
+    for (int i = 0; i < 100; ++i) {
+        const Eigen::Vector3d r(0.003 * i, 0.1, -0.005 * i);
+        const Eigen::Vector3d x = r + sim::displacement_at(basis, nodal, r).value;
+        EXPECT_LT((sim::inverse_displacement(basis, nodal, x).r - r).norm(), 1e-9);
+    }
+    EXPECT_EQ(allocations, before);
 }
 
 }  // namespace

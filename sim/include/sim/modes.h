@@ -20,7 +20,7 @@ struct ModesRequest {
     ModeDomain domain = ModeDomain::superquadric;
     Material material;
     int elements = 1;  ///< a side, 1 to 12
-    int count = 12;    ///< lowest non-rigid modes wanted; -1: all that one element has (75)
+    int count = 12;    ///< lowest non-rigid modes wanted, to 300; -1: as many as one element has (75)
 };
 
 /// Free vibration modes of (2.5): K phi = omega^2 M phi, phi^T M phi = 1, rigid modes left out.
@@ -54,7 +54,9 @@ struct FreeVibrationModes {
 };
 
 /// Throws std::invalid_argument for a request out of range, std::runtime_error if no solution is found.
-/// Dense (Eigen) for small problems, shift-invert Lanczos (Spectra) for large ones.
+/// Dense (Eigen) up to three elements a side, shift-invert Lanczos (Spectra) beyond. One element costs about
+/// 0.6 ms, 2: 2, 3: 20, 4: 60, 6: 300 ms, 8: 1.3 s, 12: 11 s. For the superquadric with several elements a
+/// side, brick space outside it is massless and has 1e-8 of the stiffness.
 [[nodiscard]] FreeVibrationModes free_vibration_modes(const ModesRequest& request);
 
 /// The six uniform-strain modes (2.12) of LinearBody as a basis of one element.
@@ -67,20 +69,23 @@ struct RigidMass {
 };
 [[nodiscard]] RigidMass rigid_mass(const Superquadric& shape, const Material& material);
 
-/// phi(r), 3 x n [kg^-1/2]: the displacement at r by each mode; r outside the box is taken at its border.
+/// phi(r), 3 x n [kg^-1/2]: the displacement at r by each mode; r outside the box is taken at its border (a
+/// coordinate that is no number at the lower one).
 [[nodiscard]] Eigen::Matrix3Xd mode_shapes_at(const ModalBasis& basis, const Eigen::Vector3d& r);
 
 /// u(r) [m] with du/dr of a displacement given at the nodes.
 struct Displacement {
     Eigen::Vector3d value;
-    Eigen::Matrix3d gradient;  ///< (i, j) = du_i / dr_j [-]
+    Eigen::Matrix3d gradient;  ///< (i, j) = du_i / dr_j [-]; column j is zero where r_j is outside the box
 };
 /// nodal_displacement is basis.nodal * q. No allocation.
 [[nodiscard]] Displacement displacement_at(const ModalBasis& basis,
                                            const Eigen::Ref<const Eigen::VectorXd>& nodal_displacement,
                                            const Eigen::Vector3d& r) noexcept;
 
-/// r with r + u(r) = x by safeguarded Newton (2.11).
+/// r with r + u(r) = x by Newton (2.11) from r = x, each step halved until it brings r + u(r) nearer to x: up
+/// to 6 iterations for displacement gradients under 0.3 (spectral norm). The fallback is r <- r - (r + u(r) -
+/// x) / 2, at most 200 times; its best r is returned, converged or not.
 struct InversePoint {
     Eigen::Vector3d r;
     Eigen::Matrix3d gradient;  ///< du/dr there

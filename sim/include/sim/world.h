@@ -172,7 +172,8 @@ private:
 /// request.error. Expected error of a basis: an impact at v displaces the struck point by v sqrt(m c), c =
 /// sum (n . phi_k)^2 / omega_k^2 its modal compliance, largest over the surface's six poles; the error is the
 /// difference of that with all 75 modes of an element (of `elements` a side if more) and with the basis's, as
-/// share of the largest extent.
+/// share of the largest extent. A named fidelity is kept and only its error told. Solves for the 75 modes
+/// each time: 0.7 ms with one element a side.
 [[nodiscard]] FidelityChoice choose_fidelity(const Superquadric& shape, const Material& material,
                                              const FidelityRequest& request);
 
