@@ -11,6 +11,7 @@
 #include <new>
 
 #include "bad_input.h"
+#include "bench_command.h"
 #include "compare_command.h"
 #include "kit_commands.h"
 #include "latency_command.h"
@@ -19,6 +20,7 @@
 #include "predict_command.h"
 #include "record_command.h"
 #include "sensor_command.h"
+#include "simulate_command.h"
 #include "trace_commands.h"
 
 namespace app {
@@ -70,6 +72,8 @@ int run(int argc, char** argv) {
     add_trace_command(program);
     add_record_command(program);
     add_modes_command(program);
+    add_bench_command(program);
+    add_simulate_command(program, status);
     add_worker_command(program, status);
     add_sensor_command(program, status);
     try {

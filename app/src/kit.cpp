@@ -12,12 +12,11 @@
 
 #include "bad_input.h"
 #include "toml_reader.h"
+#include "toml_tables.h"
 
 namespace app {
 namespace fs = std::filesystem;
 namespace {
-
-constexpr double kRoomM = 100;  // everything of a kit lies within this of the origin
 
 /// The parsed files of a kit, the kit itself first, then its includes in order, the assets' defaults last.
 struct Layers {
@@ -42,32 +41,12 @@ bool is_file(const fs::path& path) {
     return fs::is_regular_file(path, error);
 }
 
-toml::table parse(const fs::path& file) {
-    std::error_code error;
-    if (fs::is_directory(file, error))
-        throw BadInput(
-            fmt::format("{}: error: found a directory, expected a kit file (TOML)", file.string()));
-    if (!std::ifstream(file).good())
-        throw BadInput(
-            fmt::format("{}: error: found no readable file, expected a kit (TOML); `musicworld kit list` "
-                        "names the bundled ones",
-                        file.string()));
-    try {
-        return toml::parse_file(file.string());
-    } catch (const toml::parse_error& wrong) {
-        std::string what(wrong.description());
-        std::replace(what.begin(), what.end(), '\n', ' ');
-        throw BadInput(fmt::format("{}:{}:{}: error: found a syntax error ({}), expected TOML", file.string(),
-                                   wrong.source().begin.line, wrong.source().begin.column, what));
-    }
-}
-
 void load(Layers& layers, const fs::path& file) {
     if (std::find(layers.files.begin(), layers.files.end(), file) != layers.files.end()) return;
     if (layers.files.size() > 32)
         throw BadInput(
             fmt::format("{}: error: found more than 32 included files, expected fewer", file.string()));
-    layers.tables.push_back(parse(file));
+    layers.tables.push_back(parse_toml(file, {"a kit", "`musicworld kit list` names the bundled ones"}));
     layers.files.push_back(file);
     const std::size_t index = layers.tables.size() - 1;
     TomlReader reader({&layers.tables[index]}, "the kit");
@@ -87,21 +66,6 @@ Eigen::Vector3d unit(TomlReader& reader, std::string_view key, const Eigen::Vect
     const Eigen::Vector3d value = reader.vector(key, -1e3, 1e3, fallback);
     if (value.norm() < 1e-6) reader.fail(key, fmt::format("{} = [0, 0, 0]", key), "a direction");
     return value.normalized();
-}
-
-Eigen::Quaterniond read_orientation(TomlReader& reader) {
-    constexpr double degree = std::numbers::pi / 180;
-    const Eigen::Vector3d euler =
-        reader.vector("tilt_deg", -360, 360, Eigen::Vector3d::Zero().eval()) * degree;
-    const Eigen::VectorXd q =
-        reader.numbers("orientation", 4, -1.01, 1.01, Eigen::VectorXd(Eigen::Vector4d(1, 0, 0, 0)));
-    if (std::abs(q.norm() - 1) > 0.01)
-        reader.fail("orientation", fmt::format("a quaternion of length {:.3g}", q.norm()),
-                    "a unit quaternion [w, x, y, z]");
-    const Eigen::Quaterniond base = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
-    return base * Eigen::AngleAxisd(euler.x(), Eigen::Vector3d::UnitX()) *
-           Eigen::AngleAxisd(euler.y(), Eigen::Vector3d::UnitY()) *
-           Eigen::AngleAxisd(euler.z(), Eigen::Vector3d::UnitZ());
 }
 
 sim::Material read_material(TomlReader reader) {
@@ -158,16 +122,6 @@ void read_zones(TomlReader& reader, Instrument& instrument) {
         instrument.body.zones.push_back({"body", 0, 100, -100, 100});
         instrument.zones.push_back({"body", note});
     }
-}
-
-render::Appearance read_appearance(TomlReader reader) {
-    render::Appearance look;
-    look.color = reader.vector("color", 0, 1, Eigen::Vector3d(look.color.cast<double>())).cast<float>();
-    look.metallic = static_cast<float>(reader.number("metallic", 0, 1, 0));
-    look.roughness = static_cast<float>(reader.number("roughness", 0.02, 1, 0.5));
-    look.lathed = static_cast<float>(reader.number("lathed", 0, 1, 0));
-    reader.done();
-    return look;
 }
 
 void read_look(TomlReader reader, render::Look& look) {
@@ -268,27 +222,6 @@ void read_stick(TomlReader reader, Kit& kit) {
     reader.done();
 }
 
-void read_camera(TomlReader reader, render::Camera& camera) {
-    camera.eye =
-        reader.vector("eye", -kRoomM, kRoomM, Eigen::Vector3d(camera.eye.cast<double>())).cast<float>();
-    camera.target =
-        reader.vector("target", -kRoomM, kRoomM, Eigen::Vector3d(camera.target.cast<double>())).cast<float>();
-    camera.vertical_fov_deg =
-        static_cast<float>(reader.number("vertical_fov_deg", 5, 120, camera.vertical_fov_deg));
-    if ((camera.eye - camera.target).norm() < 1e-3f)
-        reader.fail("target", "the camera's target at its eye", "two different points");
-    reader.done();
-}
-
-void read_room(TomlReader reader, render::Room& room) {
-    room.floor_color =
-        reader.vector("floor_color", 0, 1, Eigen::Vector3d(room.floor_color.cast<double>())).cast<float>();
-    room.wall_color =
-        reader.vector("wall_color", 0, 1, Eigen::Vector3d(room.wall_color.cast<double>())).cast<float>();
-    room.floor_height = static_cast<float>(reader.number("floor_height", -kRoomM, kRoomM, room.floor_height));
-    reader.done();
-}
-
 void check_top_level(const Layers& layers) {
     for (const toml::table& table : layers.tables) {
         TomlReader reader({&table}, "the kit");
@@ -330,7 +263,9 @@ Kit read_kit(const fs::path& file) {
     kit.description = top.text("description", "");
     read_stick(TomlReader(layers.at("stick"), "[stick]"), kit);
     read_camera(TomlReader(layers.at("camera"), "[camera]"), kit.camera);
-    read_room(TomlReader(layers.at("room"), "[room]"), kit.room);
+    TomlReader room(layers.at("room"), "[room]");
+    read_room(room, kit.room);
+    room.done();
 
     std::set<std::string> names;
     for (const toml::table& table : layers.tables) {

@@ -26,6 +26,8 @@ constexpr std::array<std::string_view, 16> kPlayProducts = {
     "summary.json", "frames",       "audio.wav",    "events.csv",     "contacts.csv", "hits.mid",
     "report.html",  "latency.json", "latency.html", "departures.csv", "samples.csv",  "frames.csv",
     "notes.csv",    "blocks.csv",   "leads.csv",    "errors.csv"};
+constexpr std::array<std::string_view, 5> kSimulateProducts = {"summary.json", "frames", "states.csv",
+                                                               "energy.csv", "times.csv"};
 constexpr std::array<std::string_view, 3> kCompareProducts = {"compare.json", "compare.csv", "report.html"};
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& found) {
@@ -91,6 +93,10 @@ std::span<const std::string_view> play_products() {
 
 std::span<const std::string_view> compare_products() {
     return kCompareProducts;
+}
+
+std::span<const std::string_view> simulate_products() {
+    return kSimulateProducts;
 }
 
 OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_view> products)

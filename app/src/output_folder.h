@@ -13,6 +13,8 @@ namespace app {
 [[nodiscard]] std::span<const std::string_view> play_products();
 /// What `compare` writes: compare.json, compare.csv, report.html.
 [[nodiscard]] std::span<const std::string_view> compare_products();
+/// What `simulate` writes: summary.json, frames, states.csv, energy.csv, times.csv.
+[[nodiscard]] std::span<const std::string_view> simulate_products();
 
 /// The folder that a run writes its products into, all of them or none. They are staged in its hidden
 /// subfolder `.unfinished`; finish() moves them into place by rename, the leading product last, so that

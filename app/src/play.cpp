@@ -93,7 +93,7 @@ PlayResult play(const PlayOptions& options) {
 
     if (options.video) {
         const WallTimer video;
-        make_video(options, folder.path("."));
+        make_video(*options.video, options.fps, options.audio, folder.path("."));
         result.stages_s.emplace_back("video", video.seconds());
     }
     write_file(folder.path("events.csv"), format_events(result));

@@ -59,24 +59,24 @@ std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& f
     return files;
 }
 
-void make_video(const PlayOptions& options, const fs::path& staging) {
+void make_video(const fs::path& video, double fps, bool sound, const fs::path& staging) {
     std::vector<std::string> command = {"ffmpeg",
                                         "-nostdin",
                                         "-loglevel",
                                         "error",
                                         "-y",
                                         "-framerate",
-                                        fmt::format("{}", options.fps),
+                                        fmt::format("{}", fps),
                                         "-i",
                                         (staging / "frames" / "%06d.png").string()};
-    if (options.audio) command.insert(command.end(), {"-i", (staging / "audio.wav").string(), "-c:a", "aac"});
+    if (sound) command.insert(command.end(), {"-i", (staging / "audio.wav").string(), "-c:a", "aac"});
     command.insert(command.end(), {"-c:v", "libx264", "-preset", "veryfast", "-pix_fmt", "yuv420p", "-fflags",
-                                   "+bitexact", "-f", "mp4", options.video->string() + ".partial"});
+                                   "+bitexact", "-f", "mp4", video.string() + ".partial"});
     try {
         run_child(command, staging / "scratch" / "ffmpeg.log");
     } catch (...) {
         std::error_code ignored;
-        fs::remove(options.video->string() + ".partial", ignored);
+        fs::remove(video.string() + ".partial", ignored);
         throw;
     }
 }

@@ -15,7 +15,9 @@ void write_hits(const std::filesystem::path& file, const PlayResult& result, con
 /// Frames for the report: before, at and after the two loudest notes that lie apart.
 [[nodiscard]] std::vector<std::filesystem::path> frames_to_show(const PlayResult& result,
                                                                 const std::filesystem::path& folder);
-/// Encodes frames and sound beside the video's place, as FILE.partial.
-void make_video(const PlayOptions& options, const std::filesystem::path& staging);
+/// Encodes the frames, and audio.wav if `sound`, of a staging folder beside the video's place, as
+/// FILE.partial.
+void make_video(const std::filesystem::path& video, double fps, bool sound,
+                const std::filesystem::path& staging);
 
 }  // namespace app

@@ -275,7 +275,8 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
     }
     result.fingerprint = fingerprint(test_frame);
     result.versions.emplace_back("musicworld", MUSICWORLD_VERSION);
-    if (options.play.video) make_video(options.play, folder.path("."));
+    if (options.play.video)
+        make_video(*options.play.video, options.play.fps, options.play.audio, folder.path("."));
     result.wall_s = wall.seconds();
     outcome.latency = latency_report(result, outcome.realtime, session.kit, session.stick.radius_m);
     write_latency_products(outcome, folder);

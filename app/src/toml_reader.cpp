@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "bad_input.h"
+#include "numbers.h"
 
 namespace app {
 namespace {
@@ -103,6 +104,21 @@ double TomlReader::number(std::string_view key, double low, double high, std::op
     const std::optional<double> value = node->is_number() ? node->value<double>() : std::nullopt;
     if (!value || !(*value >= low && *value <= high))
         fail(key, fmt::format("{} = {}", key, kind_of(*node)), range_text(low, high));
+    return *value;
+}
+
+double TomlReader::fraction(std::string_view key, double low, double high, std::optional<double> fallback) {
+    const toml::node* node = get(key);
+    if (!node || !node->is_string()) return number(key, low, high, fallback);
+    read_.emplace_back(key);
+    std::optional<double> value;
+    try {
+        value = parse_number(checked_text(*node), std::string(key));
+    } catch (const BadInput&) {  // said below, with its place
+    }
+    if (!value || !(*value >= low && *value <= high))
+        fail(key, fmt::format("{} = {}", key, kind_of(*node)),
+             range_text(low, high) + " or a fraction such as \"1/60\"");
     return *value;
 }
 

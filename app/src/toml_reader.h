@@ -19,11 +19,15 @@ public:
     TomlReader(std::vector<const toml::table*> layers, std::string where);
 
     [[nodiscard]] bool has(std::string_view key) const { return get(key) != nullptr; }
+    [[nodiscard]] bool is_array(std::string_view key) const { return has(key) && get(key)->is_array(); }
     [[nodiscard]] std::string text(std::string_view key, std::optional<std::string> fallback = {});
     [[nodiscard]] std::string choice(std::string_view key, std::initializer_list<std::string_view> allowed,
                                      std::optional<std::string> fallback = {});
     [[nodiscard]] double number(std::string_view key, double low, double high,
                                 std::optional<double> fallback = {});
+    /// A number, or a text with a fraction: "1/60".
+    [[nodiscard]] double fraction(std::string_view key, double low, double high,
+                                  std::optional<double> fallback = {});
     [[nodiscard]] int integer(std::string_view key, int low, int high, std::optional<int> fallback = {});
     [[nodiscard]] bool flag(std::string_view key, std::optional<bool> fallback = {});
     /// `size` numbers, each in [low, high].

@@ -64,6 +64,7 @@ namespace render {
     X(PFNGLUNIFORM4FVPROC, Uniform4fv)                                         \
     X(PFNGLUNIFORMMATRIX4FVPROC, UniformMatrix4fv)                             \
     X(PFNGLUSEPROGRAMPROC, UseProgram)                                         \
+    X(PFNGLVERTEXATTRIBIPOINTERPROC, VertexAttribIPointer)                     \
     X(PFNGLVERTEXATTRIBPOINTERPROC, VertexAttribPointer)                       \
     X(PFNGLVIEWPORTPROC, Viewport)
 

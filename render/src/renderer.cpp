@@ -14,7 +14,8 @@
 namespace render {
 namespace {
 
-constexpr GLuint kMatrixUnit = 0, kShadowUnit = 1, kObjectsUnit = 2, kLitUnit = 3, kDarkUnit = 4;
+constexpr GLuint kMatrixUnit = 0, kShadowUnit = 1, kObjectsUnit = 2, kLitUnit = 3, kDarkUnit = 4,
+                 kModesUnit = 5;
 constexpr int kMaxSide = 8192;  // pixels
 
 SceneDescription checked(const SceneDescription& scene) {
@@ -55,19 +56,20 @@ struct Renderer::Implementation {
     float texel;                  ///< of the shadow map [m]
     PictureTarget picture;
     ShadowTarget shadow;
+    SceneGeometry geometry;
     GlProgram shadow_program, object_program;
     Stage stage;
-    SceneGeometry geometry;
 };
 
 Renderer::Implementation::Implementation(const SceneDescription& description)
     : scene(checked(description)),
       picture(gl, scene.width, scene.height, scene.samples),
       shadow(gl, scene.shadow_size),
-      shadow_program(gl, shaders::shadow_vertex(), shaders::shadow_fragment()),
-      object_program(gl, shaders::object_vertex(), shaders::object_fragment()),
-      stage(gl, scene),
-      geometry(gl, scene.objects) {
+      geometry(gl, scene),
+      shadow_program(gl, shaders::shadow_vertex(geometry.bends()), shaders::shadow_fragment()),
+      object_program(gl, shaders::object_vertex(geometry.bends()),
+                     shaders::object_fragment(!scene.solids.empty())),
+      stage(gl, scene) {
     const float aspect = static_cast<float>(scene.width) / static_cast<float>(scene.height);
     const float reach = shadow_reach(scene.camera, aspect);
     clip = clip_from_world(scene.camera, aspect);
@@ -82,6 +84,7 @@ Renderer::Implementation::Implementation(const SceneDescription& description)
     stage.bake(kLitUnit, kDarkUnit);
     shadow_program.use();
     shadow_program.set("matrices", static_cast<int>(kMatrixUnit));
+    shadow_program.set("modes", static_cast<int>(kModesUnit));
     shadow_program.set("clip_from_light_world", light);
 }
 
@@ -99,6 +102,7 @@ void Renderer::Implementation::set_uniforms(const GlProgram& program) const {
     program.set("shadow_texel", scene.shadow_size > 0 ? 1 / static_cast<float>(scene.shadow_size) : 0.0f);
     program.set("shadow_offset", 1.5f * texel);
     program.set("matrices", static_cast<int>(kMatrixUnit));
+    program.set("modes", static_cast<int>(kModesUnit));
     program.set("objects", static_cast<int>(kObjectsUnit));
     program.set("lit_floor", static_cast<int>(kLitUnit));
     program.set("dark_floor", static_cast<int>(kDarkUnit));
@@ -123,7 +127,7 @@ DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) 
         gl.Enable(GL_POLYGON_OFFSET_FILL);
         gl.Enable(GL_DEPTH_CLAMP);  // what is nearer to the light than the map's depth still casts
         shadow_program.use();
-        geometry.draw(kMatrixUnit);
+        geometry.draw(kMatrixUnit, kModesUnit);
         gl.Disable(GL_DEPTH_CLAMP);
         gl.Disable(GL_POLYGON_OFFSET_FILL);
     }
@@ -132,7 +136,7 @@ DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) 
     object_program.use();
     gl.Enable(
         GL_CLIP_DISTANCE0);  // the floor, which is laid under the objects afterwards, hides what is below it
-    geometry.draw(kMatrixUnit);
+    geometry.draw(kMatrixUnit, kModesUnit);
     gl.Disable(GL_CLIP_DISTANCE0);
     gl.Disable(GL_DEPTH_TEST);
     picture.begin_background(kObjectsUnit);

@@ -12,6 +12,7 @@ namespace {
 
 struct Vertex {
     float position[3], normal[3], color_metallic[4], roughness_lathed_object[3];
+    GLint first_mode_texel;
 };
 
 const Appearance& appearance_of(const Look& look, const std::string& material) {
@@ -35,8 +36,10 @@ float volume_of(const Mesh& mesh, const Eigen::Vector3f& center) {
     return static_cast<float>(std::abs(six_volumes) / 6);
 }
 
-void append_object(const Mesh& mesh, const Look& look, std::size_t object, std::vector<Vertex>& vertices,
-                   std::vector<GLuint>& indices) {
+/// `first_texel`: of the mesh's first vertex in the texture of modes, `texels` a vertex.
+void append_object(const Mesh& mesh, const Look& look, std::size_t object, GLint first_texel, GLint texels,
+                   std::vector<Vertex>& vertices, std::vector<GLuint>& indices) {
+    GLint texel = first_texel;
     for (const MeshPart& part : mesh.parts) {
         const Appearance& a = appearance_of(look, part.material);
         const auto base = static_cast<GLuint>(vertices.size());
@@ -45,7 +48,9 @@ void append_object(const Mesh& mesh, const Look& look, std::size_t object, std::
             vertices.push_back({{p.x(), p.y(), p.z()},
                                 {n.x(), n.y(), n.z()},
                                 {a.color.x(), a.color.y(), a.color.z(), a.metallic},
-                                {a.roughness, a.lathed, static_cast<float>(object)}});
+                                {a.roughness, a.lathed, static_cast<float>(object)},
+                                texel});
+            texel += texels;
         }
         for (const std::uint32_t index : part.indices) indices.push_back(base + index);
     }
@@ -66,28 +71,45 @@ const void* offset(std::size_t bytes) {
 
 }  // namespace
 
-SceneGeometry::SceneGeometry(const GlFunctions& gl, const std::vector<SceneObject>& objects) : gl_(gl) {
+SceneGeometry::SceneGeometry(const GlFunctions& gl, const SceneDescription& scene)
+    : gl_(gl), modes_(gl, scene.solids) {
     std::vector<std::filesystem::path> files;
     std::map<std::filesystem::path, std::size_t> number_of_file;
     std::vector<std::size_t> mesh_of_object;
-    for (const SceneObject& object : objects) {
+    for (const SceneObject& object : scene.objects) {
+        if (object.solid >= static_cast<int>(scene.solids.size()))
+            throw std::runtime_error("object " + object.name + ": error: found solid " +
+                                     std::to_string(object.solid) + ", expected fewer than " +
+                                     std::to_string(scene.solids.size()));
+        if (object.solid >= 0) {
+            mesh_of_object.push_back(0);
+            continue;
+        }
         const auto [place, is_new] = number_of_file.try_emplace(object.mesh, files.size());
         if (is_new) files.push_back(object.mesh);
         mesh_of_object.push_back(place->second);
     }
-    make_buffers(objects, load_meshes(files), mesh_of_object);
+    const std::vector<Mesh> loaded = load_meshes(files);
+    std::vector<const Mesh*> meshes;
+    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+        const int solid = scene.objects[i].solid;
+        meshes.push_back(solid >= 0 ? &scene.solids[static_cast<std::size_t>(solid)].mesh
+                                    : &loaded[mesh_of_object[i]]);
+    }
+    make_buffers(scene.objects, meshes);
 }
 
-void SceneGeometry::make_buffers(const std::vector<SceneObject>& objects, const std::vector<Mesh>& meshes,
-                                 const std::vector<std::size_t>& mesh_of_object) {
+void SceneGeometry::make_buffers(const std::vector<SceneObject>& objects,
+                                 const std::vector<const Mesh*>& meshes) {
     std::vector<Vertex> vertices;
     std::vector<GLuint> indices;
     for (std::size_t i = 0; i < objects.size(); ++i) {
-        const Mesh& mesh = meshes[mesh_of_object[i]];
+        const Mesh& mesh = *meshes[i];
         const Eigen::Vector3f center = mesh.bounds().center();
         objects_.push_back({static_cast<GLsizei>(indices.size()), static_cast<GLsizei>(3 * mesh.triangles()),
-                            center, volume_of(mesh, center)});
-        append_object(mesh, objects[i].look, i, vertices, indices);
+                            center, volume_of(mesh, center), modes_.count(objects[i].solid)});
+        append_object(mesh, objects[i].look, i, modes_.first_texel(objects[i].solid),
+                      modes_.texels_a_vertex(objects[i].solid), vertices, indices);
     }
     gl_.GenVertexArrays(1, &vertex_array_);
     gl_.BindVertexArray(vertex_array_);
@@ -107,6 +129,9 @@ void SceneGeometry::make_buffers(const std::vector<SceneObject>& objects, const 
     attribute(kNormal, 3, offsetof(Vertex, normal));
     attribute(kColorMetallic, 4, offsetof(Vertex, color_metallic));
     attribute(kRoughnessLathedObject, 3, offsetof(Vertex, roughness_lathed_object));
+    gl_.EnableVertexAttribArray(kFirstModeTexel);
+    gl_.VertexAttribIPointer(kFirstModeTexel, 1, GL_INT, sizeof(Vertex),
+                             offset(offsetof(Vertex, first_mode_texel)));
     matrix_buffer_ = buffers[2];
     gl_.GenTextures(1, &matrix_texture_);
 }
@@ -134,6 +159,7 @@ void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye) 
             matrix_rows_[6 * i + static_cast<std::size_t>(row)] = world_from_object.row(row).transpose();
             matrix_rows_[6 * i + 3 + static_cast<std::size_t>(row)].head<3>() = normals.row(row).transpose();
         }
+        add_modal(frame, i);
         Drawn drawn{i, 0, determinant < 0, Eigen::Vector4f::Zero()};
         drawn.ball.head<3>() = linear * objects_[i].center + world_from_object.topRightCorner<3, 1>();
         drawn.ball.w() =
@@ -148,7 +174,26 @@ void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye) 
                    matrix_rows_.data(), GL_STREAM_DRAW);
 }
 
-void SceneGeometry::draw(GLuint matrix_unit) const {
+/// Appends the object's coordinates to the rows, four a texel.
+void SceneGeometry::add_modal(const FrameState& frame, std::size_t object) {
+    const int count = objects_[object].modes;
+    if (count == 0) return;
+    if (object >= frame.modal.size() || frame.modal[object].size() != count ||
+        !frame.modal[object].allFinite()) {
+        throw std::invalid_argument("Renderer::draw: found modal coordinates that do not fit object " +
+                                    std::to_string(object) + ", expected " + std::to_string(count) +
+                                    " finite ones");
+    }
+    matrix_rows_[6 * object + 3].w() = static_cast<float>(matrix_rows_.size());
+    matrix_rows_[6 * object + 4].w() = static_cast<float>(count);
+    for (int k = 0; k < count; ++k) {
+        if (k % 4 == 0) matrix_rows_.push_back(Eigen::Vector4f::Zero());
+        matrix_rows_.back()[k % 4] = frame.modal[object][k];
+    }
+}
+
+void SceneGeometry::draw(GLuint matrix_unit, GLuint mode_unit) const {
+    modes_.bind(mode_unit);
     gl_.ActiveTexture(GL_TEXTURE0 + matrix_unit);
     gl_.BindTexture(GL_TEXTURE_BUFFER, matrix_texture_);
     gl_.TexBuffer(GL_TEXTURE_BUFFER, GL_RGBA32F, matrix_buffer_);

@@ -20,6 +20,30 @@ vec3 rotate(vec3 direction, int rows) {
 }
 )";
 
+/// Bends position, normal and groove (along the lathe) in the object's frame. The places of the normals' rows
+/// that rotate() leaves out tell where the object's modal coordinates begin and how many there are; a vertex
+/// has two tangents t1 x t2 = normal in the texture of modes, then, a mode, the displacement and the two
+/// tangents' changes.
+const char* const kBend = R"(
+layout(location = 4) in int first_mode_texel;
+uniform samplerBuffer modes;
+void bend(inout vec3 position, inout vec3 normal, inout vec3 groove, int object) {
+    int first = int(texelFetch(matrices, object + 3).w), count = int(texelFetch(matrices, object + 4).w);
+    if (count == 0) return;
+    vec3 t1 = texelFetch(modes, first_mode_texel).xyz, t2 = texelFetch(modes, first_mode_texel + 1).xyz;
+    vec2 along = vec2(dot(groove, t1), dot(groove, t2));
+    for (int k = 0; k < count; ++k) {
+        float q = texelFetch(matrices, first + k / 4)[k % 4];
+        int at = first_mode_texel + 2 + 3 * k;
+        position += q * texelFetch(modes, at).xyz;
+        t1 += q * texelFetch(modes, at + 1).xyz;
+        t2 += q * texelFetch(modes, at + 2).xyz;
+    }
+    normal = cross(t1, t2);
+    groove = along.x * t1 + along.y * t2;
+}
+)";
+
 /// From linear light to the 8-bit picture: vignette, filmic curve (Narkowicz's fit of ACES), sRGB transfer
 /// (roots fit, error below 0.002).
 const char* const kPicture = R"(
@@ -78,25 +102,48 @@ float shadow_light_soft(vec3 at) {
 
 }  // namespace
 
-std::string shadow_vertex() {
+std::string shadow_vertex(bool bending) {
     return std::string(kVersion) + R"(
 layout(location = 0) in vec3 position;
 layout(location = 3) in vec3 roughness_lathed_object;
 uniform mat4 clip_from_light_world;
 )" + kObjectMatrices +
-           R"(
+           (bending ? std::string(kBend) + R"(
+void main() {
+    int object = 6 * int(roughness_lathed_object.z);
+    vec3 bent = position, normal = vec3(0.0), groove = vec3(0.0);
+    bend(bent, normal, groove, object);
+    gl_Position = clip_from_light_world * vec4(to_world(bent, object), 1.0);
+}
+)"
+                    : R"(
 void main() { gl_Position = clip_from_light_world * vec4(to_world(position, 6 * int(roughness_lathed_object.z)), 1.0); }
-)";
+)");
 }
 
 std::string shadow_fragment() {
     return std::string(kVersion) + "void main() {}\n";
 }
 
-std::string object_vertex() {
+std::string object_vertex(bool bending) {
+    const std::string bend_it = std::string(kBend) + R"(
+void deform(out vec3 position, out vec3 normal, out vec3 groove, int object) {
+    position = rest_position;
+    normal = rest_normal;
+    groove = vec3(-position.z, 0.0, position.x);
+    bend(position, normal, groove, object);
+}
+)";
+    const std::string keep_it = R"(
+void deform(out vec3 position, out vec3 normal, out vec3 groove, int object) {
+    position = rest_position;
+    normal = rest_normal;
+    groove = vec3(-position.z, 0.0, position.x);
+}
+)";
     return std::string(kVersion) + R"(
-layout(location = 0) in vec3 position;
-layout(location = 1) in vec3 normal;
+layout(location = 0) in vec3 rest_position;
+layout(location = 1) in vec3 rest_normal;
 layout(location = 2) in vec4 color_metallic;
 layout(location = 3) in vec3 roughness_lathed_object;
 uniform mat4 clip_from_world;
@@ -109,12 +156,14 @@ out vec3 v_around;  // diffuse light of the surroundings
 flat out vec4 v_color_metallic;
 flat out vec2 v_roughness_lathed;
 )" + kObjectMatrices +
-           R"(
+           (bending ? bend_it : keep_it) + R"(
 void main() {
     int object = 6 * int(roughness_lathed_object.z);
+    vec3 position, normal, groove;
+    deform(position, normal, groove, object);
     v_world = to_world(position, object);
     v_normal = normalize(rotate(normal, object + 3));
-    v_groove = rotate(vec3(-position.z, 0.0, position.x), object);
+    v_groove = rotate(groove, object);
     v_shadow = (shadow_from_world * vec4(v_world + shadow_offset * v_normal, 1.0)).xyz;
     float towards_fill = 0.5 + 0.5 * dot(v_normal, vec3(0.62, 0.25, 0.74));
     v_around = mix(ground_light, sky_light, 0.5 + 0.5 * v_normal.y);
@@ -130,7 +179,10 @@ void main() {
 /// Key light: GGX with roughness across the grooves raised for lathed metal (Burley 2012), visibility and
 /// Fresnel by the fit of Karis and Lagarde for one light. Surroundings: hemisphere for diffuse; for
 /// reflections a warm stage floor, a dark room, and two soft boxes.
-std::string object_fragment() {
+std::string object_fragment(bool coarse) {
+    // A coarse mesh's normals may point away from the eye at its outline: there they are turned until they do
+    // not, as the room's lights would else be mirrored in what is seen from behind.
+    const std::string turn = coarse ? "    n = normalize(n - v * min(dot(n, v), 0.0));\n" : "";
     return std::string(kVersion) + R"(
 in vec3 v_world, v_normal, v_groove, v_shadow, v_around;
 flat in vec4 v_color_metallic;
@@ -148,6 +200,7 @@ vec3 surroundings(vec3 r, float roughness) {
 }
 void main() {
     vec3 color = v_color_metallic.rgb, n = normalize(v_normal), v = normalize(eye - v_world);
+)" + turn + R"(
     vec3 h = normalize(v + towards_light);
     vec3 groove = v_groove * inversesqrt(dot(v_groove, v_groove) + 1e-12);
     float metallic = v_color_metallic.a, roughness = v_roughness_lathed.x, lathed = v_roughness_lathed.y;

@@ -6,13 +6,8 @@
 namespace sim {
 namespace {
 
+constexpr double kCentre = 1e-100;     // smaller, squares vanish
 constexpr double kNegligible = 1e-16;  // exp(-37), share of a bump's height
-
-// The distance of r from the plane that bears the body in the slope's direction.
-SurfacePoint plane_distance(const GaugeSlope& slope, const Eigen::Vector3d& r) {
-    const double inverse = 1 / slope.gradient.norm();
-    return {(slope.gradient.dot(r) - 1) * inverse, slope.gradient * inverse};
-}
 
 // Bodies are convex: of two bearing planes the one that leaves r farther out is nearer the truth.
 void keep_farther_out(SurfacePoint& best, const SurfacePoint& other) {
@@ -38,7 +33,9 @@ SquaredAngle squared_angle(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 
 GeneralizedSurface::GeneralizedSurface(const GeneralizedSuperquadric& shape) : base_(shape.base) {
     const Eigen::Vector3d& axes = base_.semi_axes();
-    sphere_ = base_.e1() == 1 && base_.e2() == 1 && axes.maxCoeff() == axes.minCoeff();
+    inverse_squares_ = axes.cwiseAbs2().cwiseInverse();
+    ellipsoid_ = base_.e1() == 1 && base_.e2() == 1;
+    sphere_ = ellipsoid_ && axes.maxCoeff() == axes.minCoeff();
     axes.minCoeff(&thinnest_);
     for (const Bump& bump : shape.bumps) {
         if (bump.height_m == 0) continue;
@@ -55,31 +52,40 @@ GeneralizedSurface::GeneralizedSurface(const GeneralizedSuperquadric& shape) : b
     }
 }
 
+GeneralizedSurface::Bearing GeneralizedSurface::bearing(const Eigen::Vector3d& y,
+                                                        const Eigen::Vector3d& r) const noexcept {
+    Eigen::Vector3d gradient;  // times what is at hand
+    double n, offset;
+    if (ellipsoid_) {
+        gradient = y.cwiseProduct(inverse_squares_);
+        n = offset = std::sqrt(gradient.dot(y));
+    } else {
+        const GaugeSlope slope = base_.slope(y);
+        gradient = slope.gradient;
+        n = slope.value;
+        offset = 1;
+    }
+    if (!(n > kCentre)) return {0, {-base_.semi_axes()[thinnest_], Eigen::Vector3d::Unit(thinnest_)}};
+    const double inverse = 1 / gradient.norm();
+    return {n, {(gradient.dot(r) - offset) * inverse, gradient * inverse}};
+}
+
 SurfacePoint GeneralizedSurface::towards_foot(const Eigen::Vector3d& r, SurfacePoint best) const noexcept {
-    const GaugeSlope foot = base_.slope(r - best.distance * best.normal);
-    if (foot.value > 0) keep_farther_out(best, plane_distance(foot, r));
+    const Bearing foot = bearing(r - best.distance * best.normal, r);
+    if (foot.n > 0) keep_farther_out(best, foot.plane);
     return best;
 }
 
-SurfacePoint GeneralizedSurface::inside(const Eigen::Vector3d& r, const GaugeSlope& at) const noexcept {
-    SurfacePoint best;
-    if (at.value > 1e-100) {
-        best = plane_distance(at, r);
-    } else {
-        best = {-base_.semi_axes()[thinnest_], Eigen::Vector3d::Unit(thinnest_)};
-    }
-    if (sphere_) return best;
+SurfacePoint GeneralizedSurface::base_distance(const Eigen::Vector3d& r) const noexcept {
+    const Bearing at = bearing(r, r);
+    if (at.n >= 1 || sphere_) return at.plane;
+    SurfacePoint best = at.plane;
     if (base_.has_kinks()) {
         const Eigen::Vector3d beside = signs(r).cwiseProduct(Eigen::Vector3d(1, 0.8, 0.6));
-        const GaugeSlope slope = base_.slope(r - best.distance * beside);
-        if (slope.value > 0) keep_farther_out(best, plane_distance(slope, r));
+        const Bearing raised = bearing(r - best.distance * beside, r);
+        if (raised.n > 0) keep_farther_out(best, raised.plane);
     }
     return towards_foot(r, best);
-}
-
-SurfacePoint GeneralizedSurface::base_distance(const Eigen::Vector3d& r) const noexcept {
-    const GaugeSlope at = base_.slope(r);
-    return at.value < 1 ? inside(r, at) : plane_distance(at, r);
 }
 
 SurfacePoint GeneralizedSurface::distance(const Eigen::Vector3d& r) const noexcept {

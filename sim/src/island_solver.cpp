@@ -358,8 +358,14 @@ void IslandSolver::solve_contact(ContactRows& c, bool push) {
     v[2] += c.k[0][2] * p[0];
     float t0 = c.impulse[1] - (c.inverse_tangent[0] * v[1] + c.inverse_tangent[1] * v[2]);
     float t1 = c.impulse[2] - (c.inverse_tangent[1] * v[1] + c.inverse_tangent[2] * v[2]);
-    const float most = c.friction * normal, size = std::sqrt(t0 * t0 + t1 * t1);
-    if (size > most) t0 *= most / size, t1 *= most / size;
+    const float most = c.friction * normal;
+    if (t0 * t0 + t1 * t1 > most * most) {
+        // It slides: against the speed, whatever the masses in either direction, so by one mass for both.
+        const float mass = 2 / (c.k[1][1] + c.k[2][2]);
+        t0 = c.impulse[1] - mass * v[1], t1 = c.impulse[2] - mass * v[2];
+        const float scale = most / std::max(std::sqrt(t0 * t0 + t1 * t1), 1e-30f);
+        t0 *= scale, t1 *= scale;
+    }
     p[1] = t0 - c.impulse[1], p[2] = t1 - c.impulse[2];
     c.impulse[1] = t0, c.impulse[2] = t1;
     if (c.a >= 0) {

@@ -1,5 +1,8 @@
 #include "manifold.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace sim {
 namespace {
 
@@ -19,43 +22,65 @@ Eigen::Vector3f across(const ManifoldPoint& from, const ManifoldPoint& to) {
     return d - d.dot(from.normal) * from.normal;
 }
 
+float favour(const ManifoldPoint& p) {
+    return p.held ? 1.2f : 1.f;
+}
+
+void mark_held(const Manifold& before, std::vector<ManifoldPoint>& candidates) {
+    for (ManifoldPoint& point : candidates)
+        for (int i = 0; i < before.count; ++i)
+            point.held |= before.points[static_cast<std::size_t>(i)].feature == point.feature;
+}
+
+// The point that adds most length or area to those chosen, of those with separations to `out`; -1 if none
+// adds more than `apart` of width.
+int next_point(const std::vector<ManifoldPoint>& candidates, float out, float apart, const Manifold& chosen) {
+    const ManifoldPoint& first = chosen.points[0];
+    const Eigen::Vector3f& n = first.normal;
+    auto among = [&](const ManifoldPoint& p, float gain) {
+        return p.separation > out ? 0 : favour(p) * gain;
+    };
+    if (chosen.count == 1)
+        return best(candidates, apart,
+                    [&](const ManifoldPoint& p) { return among(p, across(first, p).norm()); });
+    const Eigen::Vector3f second = across(first, chosen.points[1]);
+    const float thin = apart * second.norm();
+    if (chosen.count == 2)
+        return best(candidates, thin, [&](const ManifoldPoint& p) {
+            return among(p, std::abs(n.dot(second.cross(across(first, p)))));
+        });
+    // Area beyond each edge of the triangle (0, second, third).
+    const Eigen::Vector3f third = across(first, chosen.points[2]);
+    const float side = n.dot(second.cross(third)) > 0 ? -1.f : 1.f;
+    return best(candidates, thin, [&](const ManifoldPoint& p) {
+        const Eigen::Vector3f x = across(first, p);
+        const float beyond =
+            std::max({n.dot(second.cross(x)) * side, n.dot((third - second).cross(x - second)) * side,
+                      n.dot((-third).cross(x - third)) * side});
+        return among(p, beyond);
+    });
+}
+
 }  // namespace
 
-void choose_points(std::vector<ManifoldPoint>& candidates, float tolerance, Manifold& manifold) {
+void choose_points(std::vector<ManifoldPoint>& candidates, float tolerance, const Manifold* before,
+                   Manifold& manifold) {
     manifold.count = 0;
-    const int deepest = best(candidates, -1e30f, [](const ManifoldPoint& p) { return -p.separation; });
-    if (deepest < 0) return;
-    const ManifoldPoint first = candidates[static_cast<std::size_t>(deepest)];
-    const float furthest_out = std::max(first.separation, 0.f) + tolerance;
-    std::erase_if(candidates, [&](const ManifoldPoint& p) { return p.separation > furthest_out; });
-    const float apart = tolerance / 2;
-    auto keep = [&](int i) {
-        manifold.points[static_cast<std::size_t>(manifold.count++)] = candidates[static_cast<std::size_t>(i)];
-    };
-    manifold.points[0] = first;
-    manifold.count = 1;
-    const int second = best(candidates, apart * apart,
-                            [&](const ManifoldPoint& p) { return across(first, p).squaredNorm(); });
-    if (second < 0) return;
-    keep(second);
-    const Eigen::Vector3f edge = across(first, manifold.points[1]);
-    const float thin = apart * edge.norm();
-    auto area = [&](const ManifoldPoint& p) { return first.normal.dot(edge.cross(across(first, p))); };
-    const int third = best(candidates, thin, [&](const ManifoldPoint& p) { return std::abs(area(p)); });
-    if (third < 0) return;
-    keep(third);
-    const float side = area(manifold.points[2]) > 0 ? 1.f : -1.f;
-    const Eigen::Vector3f n = first.normal, p2 = across(first, manifold.points[1]),
-                          p3 = across(first, manifold.points[2]);
-    // Gain of area beyond each edge of the triangle (0, p2, p3), whose turn is `side`.
-    const int fourth = best(candidates, thin, [&](const ManifoldPoint& p) {
-        const Eigen::Vector3f x = across(first, p);
-        const float gain1 = -side * n.dot(p2.cross(x));
-        const float gain2 = -side * n.dot((p3 - p2).cross(x - p2));
-        const float gain3 = -side * n.dot((-p3).cross(x - p3));
-        return std::max(gain1, std::max(gain2, gain3));
+    if (before) mark_held(*before, candidates);
+    const int deepest = best(candidates, -1e30f, [&](const ManifoldPoint& p) {
+        return -p.separation + (p.held ? tolerance / 8 : 0);
     });
-    if (fourth >= 0) keep(fourth);
+    if (deepest < 0) return;
+    manifold.points[0] = candidates[static_cast<std::size_t>(deepest)];
+    manifold.count = 1;
+    const float level = std::max(manifold.points[0].separation, 0.f);
+    for (const float out : {level + tolerance / 16, level + tolerance})
+        while (manifold.count < kManifoldPoints) {
+            const int next = next_point(candidates, out, tolerance / 2, manifold);
+            if (next < 0) break;
+            manifold.points[static_cast<std::size_t>(manifold.count++)] =
+                candidates[static_cast<std::size_t>(next)];
+        }
 }
 
 void take_impulses(const Manifold& before, float reach, Manifold& manifold) {

@@ -57,7 +57,6 @@ double growth(double p) {
 
 Gauge::Gauge(const Superquadric& shape)
     : semi_axes_(shape.semi_axes),
-      inverse_semi_axes_(shape.semi_axes.cwiseInverse()),
       e1_(std::clamp(shape.e1, kSmallestExponent, kLargestExponent)),
       e2_(std::clamp(shape.e2, kSmallestExponent, kLargestExponent)),
       p1_(2 / e1_),
@@ -73,12 +72,7 @@ double Gauge::value(const Eigen::Vector3d& r) const noexcept {
 }
 
 GaugeSlope Gauge::slope(const Eigen::Vector3d& r) const noexcept {
-    const Eigen::Vector3d scaled = r.cwiseProduct(inverse_semi_axes_);
-    if (e1_ == 1 && e2_ == 1) {
-        const double n = scaled.norm();
-        return {n, scaled.cwiseProduct(inverse_semi_axes_) * (n > 0 ? 1 / n : 0)};
-    }
-    const Eigen::Vector3d u = scaled.cwiseAbs();
+    const Eigen::Vector3d u = r.cwiseAbs().cwiseQuotient(semi_axes_);
     const PairNorm flat = pair_norm(u.x(), u.z(), p2_);
     const PairNorm whole = pair_norm(flat.value, u.y(), p1_);
     if (whole.value == 0) return {0, Eigen::Vector3d::Zero()};
@@ -86,7 +80,7 @@ GaugeSlope Gauge::slope(const Eigen::Vector3d& r) const noexcept {
     const double n = whole.value;
     const Eigen::Vector3d share(whole.first * flat.first, whole.second, whole.first * flat.second);
     Eigen::Vector3d gradient;
-    for (int i = 0; i < 3; ++i) gradient[i] = scaled[i] == 0 ? 0 : share[i] * n / r[i];
+    for (int i = 0; i < 3; ++i) gradient[i] = u[i] == 0 ? 0 : share[i] * n / r[i];
     return {n, gradient};
 }
 

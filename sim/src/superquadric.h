@@ -33,7 +33,7 @@ public:
     [[nodiscard]] double value(const Eigen::Vector3d& r) const noexcept;
     [[nodiscard]] GaugeDerivatives derivatives(const Eigen::Vector3d& r) const noexcept;  ///< r not zero
     /// Without the curvature, and not made linear near the coordinate planes: at a kink a subgradient. Zero
-    /// at the centre. An ellipsoid's needs no powers.
+    /// at the centre.
     [[nodiscard]] GaugeSlope slope(const Eigen::Vector3d& r) const noexcept;
     /// As derivatives, but where p < 2 the curvature is divided by p - 1: then grad N(r) + H s does not
     /// overshoot the kink at a coordinate plane, however near it is (the weights of iteratively reweighted
@@ -62,7 +62,7 @@ private:
     [[nodiscard]] GaugeDerivatives derivatives(const Eigen::Vector3d& r, double curve1,
                                                double curve2) const noexcept;
 
-    Eigen::Vector3d semi_axes_, inverse_semi_axes_;
+    Eigen::Vector3d semi_axes_;
     double e1_, e2_, p1_, p2_;
     double bounding_radius_;
 };

@@ -62,17 +62,18 @@ bool WorldContacts::find_once(const WorldSettings& settings, const std::vector<W
                          (body.posed.position + half).cast<float>(), static_cast<int>(i),
                          body.moves() && !body.asleep});
     }
-    auto look_up = [this](Manifold& manifold, float reach) {
+    auto last = [this](const Manifold& manifold) -> const Manifold* {
         const auto old = std::lower_bound(before_.begin(), before_.end(), manifold.key(),
                                           [](const Manifold& m, std::uint64_t key) { return m.key() < key; });
-        if (old != before_.end() && old->key() == manifold.key()) take_impulses(*old, reach, manifold);
+        return old != before_.end() && old->key() == manifold.key() ? &*old : nullptr;
     };
     for (const auto& [i, j] : broad_.find()) {
         if (std::binary_search(joined.begin(), joined.end(), std::pair(i, j))) continue;
         const MovingBody &a = bodies[static_cast<std::size_t>(i)], &b = bodies[static_cast<std::size_t>(j)];
         Manifold manifold;
         manifold.a = i, manifold.b = j;
-        meet(settings, a, b, manifold);
+        const Manifold* old = last(manifold);
+        meet(settings, a, b, old, manifold);
         ++pairs_;
         if (manifold.count == 0) continue;
         if (a.asleep || b.asleep) {
@@ -81,7 +82,7 @@ bool WorldContacts::find_once(const WorldSettings& settings, const std::vector<W
         }
         manifold.friction = std::sqrt(a.friction * b.friction);
         manifold.restitution = std::max(a.restitution, b.restitution);
-        look_up(manifold, 0.1f * static_cast<float>(smallest_half(a)));
+        if (old) take_impulses(*old, 0.1f * static_cast<float>(smallest_half(a)), manifold);
         manifolds_.push_back(manifold);
     }
     if (woke) return true;
@@ -95,12 +96,13 @@ bool WorldContacts::find_once(const WorldSettings& settings, const std::vector<W
             if (height > plane.normal.cwiseAbs().dot(body.posed.half_aabb) + grown) continue;
             Manifold manifold;
             manifold.a = static_cast<int>(i), manifold.b = kFirstPlane + static_cast<int>(p);
-            meet_plane(settings, body, plane, manifold);
+            const Manifold* old = last(manifold);
+            meet_plane(settings, body, plane, old, manifold);
             ++pairs_;
             if (manifold.count == 0) continue;
             manifold.friction = std::sqrt(body.friction * static_cast<float>(plane.friction));
             manifold.restitution = std::max(body.restitution, static_cast<float>(plane.restitution));
-            look_up(manifold, 0.1f * static_cast<float>(smallest_half(body)));
+            if (old) take_impulses(*old, 0.1f * static_cast<float>(smallest_half(body)), manifold);
             manifolds_.push_back(manifold);
         }
     }
@@ -110,7 +112,7 @@ bool WorldContacts::find_once(const WorldSettings& settings, const std::vector<W
 }
 
 void WorldContacts::meet(const WorldSettings& settings, const MovingBody& a, const MovingBody& b,
-                         Manifold& manifold) {
+                         const Manifold* before, Manifold& manifold) {
     const PosedBody &pa = a.posed, &pb = b.posed;
     const Eigen::Vector3d apart = pa.position - pb.position;
     const double distance = apart.norm();
@@ -149,11 +151,11 @@ void WorldContacts::meet(const WorldSettings& settings, const MovingBody& a, con
             candidates_.push_back(point);
         }
     }
-    choose_points(candidates_, kManifoldTolerance * static_cast<float>(size), manifold);
+    choose_points(candidates_, kManifoldTolerance * static_cast<float>(size), before, manifold);
 }
 
 void WorldContacts::meet_plane(const WorldSettings& settings, const MovingBody& a, const WorldPlane& plane,
-                               Manifold& manifold) {
+                               const Manifold* before, Manifold& manifold) {
     const PosedBody& posed = a.posed;
     const double size = smallest_half(a);
     const double approach = -plane.normal.dot(a.state.velocity) + point_speed(a) - a.state.velocity.norm();
@@ -181,7 +183,7 @@ void WorldContacts::meet_plane(const WorldSettings& settings, const MovingBody& 
             candidates_.push_back(point);
         }
     }
-    choose_points(candidates_, kManifoldTolerance * static_cast<float>(size), manifold);
+    choose_points(candidates_, kManifoldTolerance * static_cast<float>(size), before, manifold);
 }
 
 }  // namespace sim

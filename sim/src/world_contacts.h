@@ -19,10 +19,10 @@ public:
 private:
     bool find_once(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
                    const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies);
-    void meet(const WorldSettings& settings, const MovingBody& a, const MovingBody& b, Manifold& manifold);
+    void meet(const WorldSettings& settings, const MovingBody& a, const MovingBody& b, const Manifold* before,
+              Manifold& manifold);
     void meet_plane(const WorldSettings& settings, const MovingBody& a, const WorldPlane& plane,
-                    Manifold& manifold);
-    void keep(Manifold& manifold, float size);
+                    const Manifold* before, Manifold& manifold);
 
     BroadPhase broad_;
     SampleFinder finder_;

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "render/mesh.h"
+
 namespace render {
 
 /// How a surface looks. Colour is linear RGB in [0, 1].
@@ -23,11 +25,26 @@ struct Look {
     std::vector<std::pair<std::string, Appearance>> parts;
 };
 
+/// How a mesh bends: with coordinates q a vertex at r moves to r + sum q_k u_k(r), its normal n to the
+/// normalised cof(I + sum q_k du_k/dr) n. Vertices are counted through the mesh's parts.
+struct ModeShapes {
+    int count = 0;
+    std::vector<Eigen::Vector3f> displacement;  ///< u_k at a vertex: [vertex * count + k], object frame
+    std::vector<Eigen::Matrix3f> gradient;      ///< (i, j) = du_i / dr_j there
+};
+
+/// A mesh given by values, rigid (count 0) or bending; many objects may use one.
+struct Solid {
+    Mesh mesh;
+    ModeShapes modes;
+};
+
 /// One drawn object: a mesh, drawn with one 4x4 matrix a frame.
 struct SceneObject {
     std::string name;
     std::filesystem::path mesh;  ///< OBJ, GLB or glTF, STL
     Look look;
+    int solid = -1;  ///< of the scene's solids, instead of a file
 };
 
 struct Camera {
@@ -52,6 +69,7 @@ struct KeyLight {
 
 struct SceneDescription {
     std::vector<SceneObject> objects;
+    std::vector<Solid> solids = {};
     Camera camera;
     Room room;
     KeyLight key_light;
@@ -65,6 +83,9 @@ struct SceneDescription {
 struct FrameState {
     std::vector<Eigen::Matrix4f> world_from_object;
     std::vector<bool> visible;
+    /// Coordinates of each object's modes (as many as its solid has); may be empty when no object bends. The
+    /// matrix comes after them.
+    std::vector<Eigen::VectorXf> modal = {};
 };
 
 /// Top row first, RGB, 8 bits, sRGB.

@@ -1,0 +1,89 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "simulate.h"
+
+namespace app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const Eigen::Vector3d& v) {
+    return {v.x(), v.y(), v.z()};
+}
+
+Json json_of(const sim::World::Energy& e) {
+    return {
+        {"kinetic", e.kinetic}, {"potential", e.potential}, {"elastic", e.elastic}, {"springs", e.springs}};
+}
+
+Json json_of(const sim::WorldCounts& n) {
+    return {{"contacts", n.contacts},
+            {"pairs", n.pairs},
+            {"islands", n.islands},
+            {"asleep", n.asleep},
+            {"inverse_fallbacks", n.inverse_fallbacks},
+            {"deformations_limited", n.deformations_limited},
+            {"constraints_broken", n.constraints_broken}};
+}
+
+/// Share of the momenta that went around.
+Json relative_drift(const SimulateResult& r) {
+    if (!r.drift) return {};
+    return r.drift->scale > 0 ? r.drift->linear / r.drift->scale : r.drift->linear;
+}
+
+Json quarantine(const SimulateResult& r) {
+    Json all = Json::array();
+    for (const auto& [name, q] : r.quarantined)
+        all.push_back({{"body", name}, {"step", q.step}, {"what", q.what}});
+    return all;
+}
+
+void add_details(const SimulateResult& r, Json& json) {
+    json["name"] = r.name;
+    json["time_s"] = r.time_s;
+    json["fidelity"] = {{"rigid", r.rigid}, {"linear", r.linear}, {"modal", r.modal}};
+    json["energy_start_j"] = r.energy_start.total();
+    json["energy_parts_j"] = json_of(r.energy);
+    json["momentum_kg_m_s"] = json_of(r.momentum);
+    json["angular_momentum_kg_m2_s"] = json_of(r.angular_momentum);
+    json["momentum_drift_kg_m_s"] = r.drift ? Json(r.drift->linear) : Json();
+    json["angular_momentum_drift_kg_m2_s"] = r.drift ? Json(r.drift->angular) : Json();
+    json["counts"] = json_of(r.counts);
+    json["quarantined"] = quarantine(r);
+    json["at_rest"] = r.rest_reached;
+    json["frames"] = r.frames;
+    json["notes"] = r.notes;
+    json["wall_s"] = r.wall_s;
+    json["versions"] = {{"musicworld", MUSICWORLD_VERSION}};
+}
+
+}  // namespace
+
+std::string format_simulate(const SimulateResult& r) {
+    Json json;
+    json["scene"] = r.scene.string();
+    json["bodies"] = r.bodies;
+    json["steps"] = r.steps;
+    json["dt_s"] = r.dt_s;
+    json["workers"] = 0;
+    json["mode"] = "sync";
+    json["bound"] = 0;
+    json["elapsed_s"] = r.elapsed_s;
+    json["cpu_s"] = r.cpu_s;
+    json["ns_per_body_step"] = r.body_steps > 0 ? Json(1e9 * r.elapsed_s / double(r.body_steps)) : Json();
+    json["bytes_per_body_update"] = 0;
+    json["cross_worker_contacts"] = 0;
+    json["migrations"] = 0;
+    json["bodies_lost"] = r.quarantined.size();
+    json["state_hash"] = fmt::format("{:016x}", r.state_hash);
+    json["momentum_drift"] = relative_drift(r);
+    json["energy_j"] = r.energy.total();
+    add_details(r, json);
+    return json.dump(2) + "\n";
+}
+
+}  // namespace app
