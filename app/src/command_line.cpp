@@ -11,6 +11,7 @@
 #include <new>
 
 #include "bad_input.h"
+#include "bench_command.h"
 #include "compare_command.h"
 #include "kit_commands.h"
 #include "latency_command.h"
@@ -69,6 +70,7 @@ int run(int argc, char** argv) {
     add_latency_command(program);
     add_trace_command(program);
     add_record_command(program);
+    add_bench_command(program);
     add_simulate_command(program, status);
     add_worker_command(program, status);
     add_sensor_command(program, status);

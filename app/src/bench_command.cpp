@@ -1,0 +1,95 @@
+#include "bench_command.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bad_input.h"
+#include "bench_report.h"
+#include "bench_sim.h"
+#include "comma_list.h"
+#include "output_folder.h"
+
+namespace app {
+namespace {
+
+struct BenchArguments {
+    std::string name, bodies = "25,100,400,1600", out;
+    int rounds = 0;
+    bool json = false;
+};
+
+/// Benchmarks that lie beside what they measure, as programs of their own.
+struct Separate {
+    const char *name, *target;
+};
+constexpr std::array<Separate, 3> kSeparate = {{{"tracking", "musicworld_tracking_bench"},
+                                                {"render", "musicworld_render_bench"},
+                                                {"audio", "musicworld_live_bench"}}};
+
+std::vector<int> parse_bodies(const std::string& list) {
+    std::vector<int> counts;
+    for (const std::string& part : split_at_commas(list)) {
+        int count = 0;
+        const auto [end, wrong] = std::from_chars(part.data(), part.data() + part.size(), count);
+        if (wrong != std::errc() || end != part.data() + part.size() || count < 1 || count > 100000)
+            throw BadInput(
+                fmt::format("error: found --bodies {}, expected whole numbers from 1 to 100000 with "
+                            "commas between them, e.g. 25,100",
+                            list));
+        counts.push_back(count);
+    }
+    return counts;
+}
+
+void report(const BenchReport& measured, const BenchArguments& a) {
+    if (!a.out.empty()) {
+        static constexpr std::array<std::string_view, 1> kProducts = {"bench.json"};
+        OutputFolder out(a.out, kProducts);
+        write_file(out.path("bench.json"), format_json(measured));
+        out.finish();
+    }
+    fmt::print("{}", a.json ? format_json(measured) : format_text(measured));
+}
+
+void bench(const BenchArguments& a) {
+    for (const Separate& other : kSeparate)
+        if (a.name == other.name) {
+            fmt::print(
+                "bench {} is a program of its own: cmake --build build/release --target {}, then run it\n",
+                other.name, other.target);
+            return;
+        }
+    if (a.name == "workers") {
+        fmt::print("bench workers: not there yet\n");
+        return;
+    }
+    SimBenchOptions options;
+    options.bodies = parse_bodies(a.bodies);
+    options.rounds = a.rounds;
+    report(bench_sim(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); }), a);
+}
+
+}  // namespace
+
+void add_bench_command(CLI::App& program) {
+    CLI::App* command =
+        program.add_subcommand("bench", "Measure speed beside peers, and speed against error");
+    auto a = std::make_shared<BenchArguments>();
+    command->add_option("NAME", a->name, "sim, tradeoff; tracking, render, audio, workers are named only")
+        ->required()
+        ->check(CLI::IsMember({"sim", "tracking", "render", "audio", "workers", "all"}));
+    command->add_option("--bodies", a->bodies, "sim: how many, in turn");
+    command->add_option("--rounds", a->rounds, "sim: how often each; 0: five, three for 100, one for more")
+        ->check(CLI::Range(0, 1000));
+    command->add_flag("--json", a->json, "Print one JSON document");
+    command->add_option("--out", a->out, "Folder for bench.json");
+    command->callback([a] { bench(*a); });
+}
+
+}  // namespace app

@@ -1,0 +1,34 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "machine_speed.h"
+
+namespace app {
+
+/// One measured figure; beside a peer's, where there is one.
+struct BenchResult {
+    std::string name;
+    double value = 0;  ///< ours
+    std::string unit;
+    std::string peer = {}, peer_version = {};
+    std::optional<double> peer_value = {};
+    std::optional<double> ratio = {};  ///< ours / peer's, median over the rounds: below 1 is faster
+};
+
+struct BenchReport {
+    MachineName machine;
+    std::vector<BenchResult> results;
+    std::vector<std::string> notes;  ///< what was measured and how, lines
+};
+
+/// One JSON document: machine, results, notes.
+[[nodiscard]] std::string format_json(const BenchReport& report);
+/// The same as lines of a table.
+[[nodiscard]] std::string format_text(const BenchReport& report);
+
+/// 0 for none; of an even number the mean of the two in the middle.
+[[nodiscard]] double median_of(std::vector<double> values);
+
+}  // namespace app
