@@ -143,8 +143,8 @@ TEST(Simulate, ABodyThatComesLaterIsThereFromItsStepOnAndNotDrawnBefore) {
     EXPECT_EQ(r.body_steps, 30u);
     ASSERT_EQ(r.notes.size(), 1u);
     EXPECT_NE(r.notes[0].find("worker 1"), std::string::npos);
-    EXPECT_EQ(rows_of(*options.out / "states.csv").size(),
-              1u + 11 + 2 * 10);  // step 10's row is before it comes
+    // A header; alone at steps 0 to 9; both from 10, before which it comes, to 20.
+    EXPECT_EQ(rows_of(*options.out / "states.csv").size(), 1u + 10 + 2 * 11);
 
     const Scene read = scene.read();
     sim::World world(read.world);
