@@ -22,12 +22,16 @@ Json result_json(const BenchResult& result) {
 
 }  // namespace
 
+nlohmann::ordered_json machine_json(const MachineName& machine) {
+    return {{"processor", machine.processor},
+            {"cores", machine.cores},
+            {"compiler", machine.compiler},
+            {"avx2", machine.avx2}};
+}
+
 std::string format_json(const BenchReport& report) {
     Json json;
-    json["machine"] = {{"processor", report.machine.processor},
-                       {"cores", report.machine.cores},
-                       {"compiler", report.machine.compiler},
-                       {"avx2", report.machine.avx2}};
+    json["machine"] = machine_json(report.machine);
     json["results"] = Json::array();
     for (const BenchResult& result : report.results) json["results"].push_back(result_json(result));
     json["notes"] = report.notes;

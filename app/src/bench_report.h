@@ -1,4 +1,5 @@
 #pragma once
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,9 @@ struct BenchReport {
     std::vector<BenchResult> results;
     std::vector<std::string> notes;  ///< what was measured and how, lines
 };
+
+/// What every benchmark's JSON says of the machine.
+[[nodiscard]] nlohmann::ordered_json machine_json(const MachineName& machine);
 
 /// One JSON document: machine, results, notes.
 [[nodiscard]] std::string format_json(const BenchReport& report);
