@@ -32,7 +32,4 @@ struct BenchReport {
 /// The same as lines of a table.
 [[nodiscard]] std::string format_text(const BenchReport& report);
 
-/// 0 for none; of an even number the mean of the two in the middle.
-[[nodiscard]] double median_of(std::vector<double> values);
-
 }  // namespace app

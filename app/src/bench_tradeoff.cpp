@@ -13,7 +13,7 @@
 namespace app {
 namespace {
 
-constexpr int kMoments = 15, kMomentsPerSecond = 30;
+constexpr int kMoments = 6, kMomentsPerSecond = 30;
 constexpr double kSeconds = static_cast<double>(kMoments) / kMomentsPerSecond;
 constexpr double kLeastMeasured_s = 0.01;  // of processor time; shorter runs are repeated
 
@@ -24,7 +24,8 @@ sim::WorldBody soft_body(const TradeoffSetting& setting) {
     body.fidelity.fidelity = setting.fidelity;
     body.fidelity.modes = setting.modes;
     body.fidelity.elements = setting.elements;
-    body.fidelity.impact_mps = 2;
+    body.fidelity.impact_mps = 1.5;
+    body.damping_ratio = 0.2;
     body.triangles = setting.triangles;
     return body;
 }
@@ -34,13 +35,13 @@ sim::WorldDefinition scene(const TradeoffSetting& setting) {
     world.settings.dt = 1.0 / setting.steps_per_s;
     world.settings.sleeping = false;
     world.planes.push_back({});
-    for (const double height : {0.35, 1.05}) {
+    for (const double height : {0.35, 0.95}) {
         sim::WorldBody body = soft_body(setting);
-        body.name = height < 1 ? "lower" : "upper";
+        body.name = height < 0.5 ? "lower" : "upper";
         body.world_from_body.translation() = Eigen::Vector3d(0.12 * (height - 0.35), height, 0);
         body.world_from_body.linear() =
             Eigen::AngleAxisd(0.3 * height, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
-        body.velocity = Eigen::Vector3d(0, height < 1 ? 0 : -2, 0);
+        body.velocity = Eigen::Vector3d(0, height < 0.5 ? 0 : -1, 0);
         world.bodies.push_back(body);
     }
     return world;
@@ -133,7 +134,7 @@ TradeoffSetting converged_setting() {
 }
 
 TradeoffSetting finer_setting() {
-    return {sim::Fidelity::modal, 75, 7680, 4, 4000};
+    return {sim::Fidelity::modal, 120, 7680, 3, 4000};
 }
 
 void mark_pareto(std::vector<TradeoffPoint>& points) {

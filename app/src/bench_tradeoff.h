@@ -32,8 +32,8 @@ struct Tradeoff {
     double converged_error = 0;  ///< of the converged run against the finer one
 };
 
-/// Two soft ellipsoids for 0.5 s, before chance sets in: one falls at 2 m/s on the other, which falls on a
-/// floor. The error is the rms over 182 surface points of each body and 15 moments.
+/// Two soft ellipsoids for 0.2 s, before small differences grow: one falls at 1 m/s on the other, which falls
+/// on a floor. The error is the rms over 182 surface points of each body and 6 moments.
 [[nodiscard]] Tradeoff measure_tradeoff(const std::vector<TradeoffSetting>& settings,
                                         const TradeoffSetting& converged, const TradeoffSetting& finer,
                                         const std::function<void(const std::string&)>& progress);
