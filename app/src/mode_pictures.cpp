@@ -15,16 +15,20 @@ namespace {
 
 constexpr int kSize = 320, kColumns = 6;  // pixels of a picture's sides; pictures in a row of the sheet
 constexpr int kChecks = 8, kQuads = 16;   // a side of a box's face
-constexpr int kTriangles = 6000;          // of a superquadric
-constexpr double kShare = 0.2;
+// Of a superquadric: meridians and parallels (surface_mesh makes 64 x 36 of 4608 triangles), those in a
+// check.
+constexpr int kMeridians = 64, kParallels = 36, kTriangles = 2 * kMeridians * kParallels, kCheck = 4;
+constexpr double kShare = 0.2, kRadius = 0.92;  // of what is drawn [m]
 
 using Corner = std::pair<Eigen::Vector3d, Eigen::Vector3d>;  // place and normal
 
-bool is_dark(const Eigen::Vector3d& r, const Eigen::Vector3d& half_extents, int but) {
-    int sum = 0;
-    for (int i = 0; i < 3; ++i)
-        if (i != but) sum += static_cast<int>(std::floor((r[i] / half_extents[i] + 1) * 0.5 * kChecks));
-    return sum % 2 != 0;
+// Chequered by meridians and parallels, which the triangles follow.
+bool is_dark(const Eigen::Vector3d& r, const Eigen::Vector3d& half_extents) {
+    const Eigen::Vector3d direction = r.cwiseQuotient(half_extents).normalized();
+    const double around = std::atan2(direction.z(), direction.x()) / (2 * M_PI) + 1;
+    const double down = std::acos(std::clamp(direction.y(), -1.0, 1.0)) / M_PI;
+    const int meridian = static_cast<int>(around * kMeridians) / kCheck;
+    return (meridian + static_cast<int>(down * (kParallels + 1)) / kCheck) % 2 != 0;
 }
 
 void add_triangle(render::Mesh& mesh, const std::array<Corner, 3>& corners, bool dark) {
@@ -71,7 +75,7 @@ render::Mesh superquadric_mesh(const sim::Superquadric& shape) {
             mesh,
             {Corner(surface.vertices[a], surface.normals[a]), Corner(surface.vertices[b], surface.normals[b]),
              Corner(surface.vertices[c], surface.normals[c])},
-            is_dark(centre, shape.semi_axes, -1));
+            is_dark(centre, shape.semi_axes));
     }
     return mesh;
 }
@@ -113,7 +117,7 @@ ModePictures::ModePictures(const sim::ModesRequest& request, const sim::ModalBas
     const double deformation = kShare * 2 * std::cbrt(half.prod());
     solid_.mesh = request.domain == sim::ModeDomain::box ? box_mesh(half) : superquadric_mesh(request.shape);
     solid_.modes = shapes_at(solid_.mesh, basis, std::min(most, basis.count()));
-    scale_ = 0.5 / half.maxCoeff();
+    scale_ = kRadius / (half.norm() + deformation);
     rise_ = scale_ * (half.y() + deformation);
     amplitude_.resize(solid_.modes.count);
     for (int k = 0; k < solid_.modes.count; ++k)

@@ -21,7 +21,7 @@ private:
     [[nodiscard]] render::FrameState frame(int mode) const;
 
     render::Solid solid_;
-    double scale_;               ///< drawn over real lengths: the longest extent is 1 m
+    double scale_;               ///< drawn over real lengths: what is drawn fits the picture
     double rise_;                ///< half the drawn height, with room for the deformation
     Eigen::VectorXf amplitude_;  ///< of each mode [m kg^1/2]
 };
