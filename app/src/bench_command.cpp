@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,7 +13,9 @@
 #include "bad_input.h"
 #include "bench_report.h"
 #include "bench_sim.h"
+#include "bench_tradeoff.h"
 #include "comma_list.h"
+#include "gnuplot.h"
 #include "output_folder.h"
 
 namespace app {
@@ -57,22 +60,57 @@ void report(const BenchReport& measured, const BenchArguments& a) {
     fmt::print("{}", a.json ? format_json(measured) : format_text(measured));
 }
 
-void bench(const BenchArguments& a) {
-    for (const Separate& other : kSeparate)
-        if (a.name == other.name) {
-            fmt::print(
-                "bench {} is a program of its own: cmake --build build/release --target {}, then run it\n",
-                other.name, other.target);
-            return;
-        }
-    if (a.name == "workers") {
-        fmt::print("bench workers: not there yet\n");
-        return;
-    }
+void say(const std::string& line) {
+    fmt::print(stderr, "{}\n", line);
+}
+
+void bench_the_simulation(const BenchArguments& a) {
     SimBenchOptions options;
     options.bodies = parse_bodies(a.bodies);
     options.rounds = a.rounds;
-    report(bench_sim(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); }), a);
+    report(bench_sim(options, say), a);
+}
+
+void bench_the_tradeoff(const BenchArguments& a) {
+    const Tradeoff measured =
+        measure_tradeoff(all_tradeoff_settings(), converged_setting(), finer_setting(), say);
+    if (!a.out.empty()) {
+        static constexpr std::array<std::string_view, 3> kProducts = {"tradeoff.json", "tradeoff.csv",
+                                                                      "tradeoff.svg"};
+        OutputFolder out(a.out, kProducts);
+        std::filesystem::create_directories(out.scratch());
+        write_file(out.path("tradeoff.json"), format_json(measured));
+        write_file(out.path("tradeoff.csv"), format_csv(measured));
+        write_file(out.path("tradeoff.svg"),
+                   draw_svg({{900, 560, plot_commands(measured)}}, out.scratch()).front());
+        out.finish();
+    }
+    fmt::print("{}", a.json ? format_json(measured) : format_text(measured));
+}
+
+/// True if NAME is a benchmark that is not part of this program; says so.
+bool is_elsewhere(const std::string& name) {
+    for (const Separate& other : kSeparate)
+        if (name == other.name) {
+            fmt::print(
+                "bench {} is a program of its own: cmake --build build/release --target {}, then run it\n",
+                other.name, other.target);
+            return true;
+        }
+    if (name == "workers") fmt::print("bench workers: not there yet\n");
+    return name == "workers";
+}
+
+void bench(const BenchArguments& a) {
+    if (a.name == "all") {
+        if (a.json || !a.out.empty())
+            throw BadInput(
+                "error: found bench all with --json or --out, expected one benchmark there: sim or tradeoff");
+        for (const char* name : {"tracking", "render", "audio", "workers"}) (void)is_elsewhere(name);
+    }
+    if (is_elsewhere(a.name)) return;
+    if (a.name != "tradeoff") bench_the_simulation(a);
+    if (a.name != "sim") bench_the_tradeoff(a);
 }
 
 }  // namespace
@@ -81,14 +119,16 @@ void add_bench_command(CLI::App& program) {
     CLI::App* command =
         program.add_subcommand("bench", "Measure speed beside peers, and speed against error");
     auto a = std::make_shared<BenchArguments>();
-    command->add_option("NAME", a->name, "sim, tradeoff; tracking, render, audio, workers are named only")
+    command
+        ->add_option("NAME", a->name, "sim, tradeoff, all; tracking, render, audio are programs of their own")
         ->required()
-        ->check(CLI::IsMember({"sim", "tracking", "render", "audio", "workers", "all"}));
+        ->check(CLI::IsMember({"sim", "tradeoff", "tracking", "render", "audio", "workers", "all"}));
     command->add_option("--bodies", a->bodies, "sim: how many, in turn");
     command->add_option("--rounds", a->rounds, "sim: how often each; 0: five, three for 100, one for more")
         ->check(CLI::Range(0, 1000));
     command->add_flag("--json", a->json, "Print one JSON document");
-    command->add_option("--out", a->out, "Folder for bench.json");
+    command->add_option("--out", a->out,
+                        "Folder for bench.json; of tradeoff for tradeoff.svg, .csv and .json");
     command->callback([a] { bench(*a); });
 }
 

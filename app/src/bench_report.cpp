@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
@@ -22,12 +21,16 @@ Json result_json(const BenchResult& result) {
 
 }  // namespace
 
+nlohmann::ordered_json machine_json(const MachineName& machine) {
+    return {{"processor", machine.processor},
+            {"cores", machine.cores},
+            {"compiler", machine.compiler},
+            {"avx2", machine.avx2}};
+}
+
 std::string format_json(const BenchReport& report) {
     Json json;
-    json["machine"] = {{"processor", report.machine.processor},
-                       {"cores", report.machine.cores},
-                       {"compiler", report.machine.compiler},
-                       {"avx2", report.machine.avx2}};
+    json["machine"] = machine_json(report.machine);
     json["results"] = Json::array();
     for (const BenchResult& result : report.results) json["results"].push_back(result_json(result));
     json["notes"] = report.notes;
@@ -48,13 +51,6 @@ std::string format_text(const BenchReport& report) {
     text += '\n';
     for (const std::string& note : report.notes) text += note + '\n';
     return text;
-}
-
-double median_of(std::vector<double> values) {
-    if (values.empty()) return 0;
-    std::sort(values.begin(), values.end());
-    const std::size_t n = values.size();
-    return 0.5 * (values[(n - 1) / 2] + values[n / 2]);
 }
 
 }  // namespace app

@@ -1,4 +1,5 @@
 #pragma once
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,12 +24,12 @@ struct BenchReport {
     std::vector<std::string> notes;  ///< what was measured and how, lines
 };
 
+/// What every benchmark's JSON says of the machine.
+[[nodiscard]] nlohmann::ordered_json machine_json(const MachineName& machine);
+
 /// One JSON document: machine, results, notes.
 [[nodiscard]] std::string format_json(const BenchReport& report);
 /// The same as lines of a table.
 [[nodiscard]] std::string format_text(const BenchReport& report);
-
-/// 0 for none; of an even number the mean of the two in the middle.
-[[nodiscard]] double median_of(std::vector<double> values);
 
 }  // namespace app

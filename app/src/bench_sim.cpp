@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <memory>
 
+#include "score_strikes.h"
+
 namespace app {
 namespace {
 
@@ -50,7 +52,7 @@ Round run_round(int bodies, const SimBenchOptions& options) {
 double median_over(const std::vector<Round>& rounds, const std::function<double(const Round&)>& value) {
     std::vector<double> values;
     for (const Round& round : rounds) values.push_back(value(round));
-    return median_of(std::move(values));
+    return median(std::move(values));
 }
 
 int rounds_for(int bodies, const SimBenchOptions& options) {

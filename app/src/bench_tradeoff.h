@@ -1,0 +1,58 @@
+#pragma once
+#include <sim/world.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace app {
+
+/// One way to compute the scene.
+struct TradeoffSetting {
+    sim::Fidelity fidelity = sim::Fidelity::modal;
+    int modes = 12;
+    int steps_per_s = 60;
+    int elements = 1;  ///< a side
+    int triangles = 360;
+};
+[[nodiscard]] std::string name_of(const TradeoffSetting& setting);
+
+struct TradeoffPoint {
+    TradeoffSetting setting;
+    double ms_per_s = 0;  ///< processor time for a simulated second of the scene [ms]
+    double error = 0;     ///< rms distance to the converged run, share of the largest extent
+    bool pareto = false;  ///< nothing is both faster and nearer
+};
+
+struct Tradeoff {
+    std::vector<TradeoffPoint> points;
+    TradeoffPoint automatic;     ///< what Fidelity::automatic takes, at 1/60 s, one element, 360 triangles
+    double requested_error = 0;  ///< that automatic was asked for, share of the largest extent
+    TradeoffSetting converged, finer;
+    double converged_error = 0;  ///< of the converged run against the finer one
+};
+
+/// Two soft ellipsoids for 0.2 s, before small differences grow: one falls at 1 m/s on the other, which falls
+/// on a floor. The error is the rms over 182 surface points of each body and 6 moments.
+[[nodiscard]] Tradeoff measure_tradeoff(const std::vector<TradeoffSetting>& settings,
+                                        const TradeoffSetting& converged, const TradeoffSetting& finer,
+                                        const std::function<void(const std::string&)>& progress);
+
+/// Modes (rigid, linear, 5 ... 75) by step (1/30 ... 1/1920 s) by elements (1 to 3) by triangles (48 to
+/// 2000).
+[[nodiscard]] std::vector<TradeoffSetting> all_tradeoff_settings();
+[[nodiscard]] TradeoffSetting converged_setting();
+[[nodiscard]] TradeoffSetting finer_setting();
+
+/// Marks the points that nothing dominates.
+void mark_pareto(std::vector<TradeoffPoint>& points);
+
+/// Rows of all points: name,modes,step_s,elements,triangles,ms_per_s,error,pareto.
+[[nodiscard]] std::string format_csv(const Tradeoff& tradeoff);
+[[nodiscard]] std::string format_json(const Tradeoff& tradeoff);
+/// The front, the automatic point and how converged the reference is.
+[[nodiscard]] std::string format_text(const Tradeoff& tradeoff);
+/// Commands of a plot of error against time.
+[[nodiscard]] std::string plot_commands(const Tradeoff& tradeoff);
+
+}  // namespace app

@@ -1,0 +1,62 @@
+#include "falling_bodies.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "bullet_peer.h"
+
+namespace {
+
+using Eigen::Vector3d;
+using sim_bench::BulletKind, sim_bench::BulletWorld;
+
+TEST(FallingBalls, StartApartFromEachOtherAndWithinTheBoxForAnyNumber) {
+    for (const int count : {1, 4, 25, 100, 400}) {
+        const sim::WorldDefinition world = sim_bench::falling_balls(count);
+        ASSERT_EQ(world.bodies.size(), static_cast<std::size_t>(count));
+        for (std::size_t i = 0; i < world.bodies.size(); ++i) {
+            const Vector3d p = world.bodies[i].world_from_body.translation();
+            EXPECT_GT(p.y(), 0.5);
+            if (count >= 4)
+                EXPECT_LT(std::max(std::abs(p.x()), std::abs(p.z())), sim_bench::box_side(count) / 2 - 0.4);
+            for (std::size_t j = 0; j < i; ++j)
+                ASSERT_GT((p - world.bodies[j].world_from_body.translation()).norm(), 1.0);
+        }
+    }
+}
+
+TEST(FallingBalls, AfterFourSecondsOursAndBulletsRigidOnesLieInTheBoxAtTheSameHeightToATenth) {
+    if (!sim_bench::bullet_is_there()) GTEST_SKIP() << "built without Bullet";
+    const int count = 9, steps = 240;
+    const sim::WorldDefinition definition = sim_bench::falling_balls(count);
+    sim::World ours(definition);
+    BulletWorld rigid(definition, BulletKind::rigid);
+    for (int i = 0; i < steps; ++i) ours.step(), rigid.step();
+    double height = 0, rigid_height = 0;
+    const double half = sim_bench::box_side(count) / 2;
+    for (int i = 0; i < count; ++i) {
+        const Vector3d p = ours.state(i).position, q = rigid.position(i);
+        height += p.y() / count;
+        rigid_height += q.y() / count;
+        for (const Vector3d& at : {p, q}) {
+            EXPECT_GT(at.y(), 0.3);  // a ball of 0.5 m, squashed at most so far
+            EXPECT_LT(std::max(std::abs(at.x()), std::abs(at.z())), half);
+        }
+    }
+    // The same pile but for softness and chance.
+    EXPECT_NEAR(height, rigid_height, 0.15 * rigid_height);
+}
+
+TEST(FallingBalls, BulletsReducedBallsRestOnTheFloorAndDeform) {
+    if (!sim_bench::bullet_is_there()) GTEST_SKIP() << "built without Bullet";
+    BulletWorld reduced(sim_bench::falling_balls(4), BulletKind::reduced);
+    for (int i = 0; i < 240; ++i) reduced.step();
+    for (int i = 0; i < 4; ++i) {
+        EXPECT_GT(reduced.position(i).y(), 0.4);
+        EXPECT_LT(reduced.position(i).y(), 0.5);  // lower than a stiff one's
+    }
+}
+
+}  // namespace
