@@ -145,7 +145,7 @@ std::vector<sim::WorldBody> copies(const sim::WorldBody& body, const Grid& grid)
     const auto [nx, ny, nz] = grid.count;
     const Eigen::Vector3d middle = 0.5 * Eigen::Vector3d(nx - 1, 0, nz - 1);
     for (int k = 0; k < nx * ny * nz; ++k) {
-        const Eigen::Vector3d at(k % nx, k / nx % ny, k / nx / ny);
+        const Eigen::Vector3d at = Eigen::Vector3i(k % nx, k / nx % ny, k / nx / ny).cast<double>();
         sim::WorldBody copy = body;
         copy.name = fmt::format("{}/{}", body.name, k);
         Eigen::Vector3d away;
