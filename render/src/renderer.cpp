@@ -67,7 +67,8 @@ Renderer::Implementation::Implementation(const SceneDescription& description)
       shadow(gl, scene.shadow_size),
       geometry(gl, scene),
       shadow_program(gl, shaders::shadow_vertex(geometry.bends()), shaders::shadow_fragment()),
-      object_program(gl, shaders::object_vertex(geometry.bends()), shaders::object_fragment()),
+      object_program(gl, shaders::object_vertex(geometry.bends()),
+                     shaders::object_fragment(!scene.solids.empty())),
       stage(gl, scene) {
     const float aspect = static_cast<float>(scene.width) / static_cast<float>(scene.height);
     const float reach = shadow_reach(scene.camera, aspect);

@@ -179,7 +179,10 @@ void main() {
 /// Key light: GGX with roughness across the grooves raised for lathed metal (Burley 2012), visibility and
 /// Fresnel by the fit of Karis and Lagarde for one light. Surroundings: hemisphere for diffuse; for
 /// reflections a warm stage floor, a dark room, and two soft boxes.
-std::string object_fragment() {
+std::string object_fragment(bool coarse) {
+    // A coarse mesh's normals may point away from the eye at its outline: there they are turned until they do
+    // not, as the room's lights would else be mirrored in what is seen from behind.
+    const std::string turn = coarse ? "    n = normalize(n - v * min(dot(n, v), 0.0));\n" : "";
     return std::string(kVersion) + R"(
 in vec3 v_world, v_normal, v_groove, v_shadow, v_around;
 flat in vec4 v_color_metallic;
@@ -197,6 +200,7 @@ vec3 surroundings(vec3 r, float roughness) {
 }
 void main() {
     vec3 color = v_color_metallic.rgb, n = normalize(v_normal), v = normalize(eye - v_world);
+)" + turn + R"(
     vec3 h = normalize(v + towards_light);
     vec3 groove = v_groove * inversesqrt(dot(v_groove, v_groove) + 1e-12);
     float metallic = v_color_metallic.a, roughness = v_roughness_lathed.x, lathed = v_roughness_lathed.y;

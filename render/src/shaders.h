@@ -11,7 +11,7 @@ inline constexpr int kMaxBalls = 32;
 [[nodiscard]] std::string shadow_vertex(bool bending);
 [[nodiscard]] std::string shadow_fragment();
 [[nodiscard]] std::string object_vertex(bool bending);
-[[nodiscard]] std::string object_fragment();
+[[nodiscard]] std::string object_fragment(bool coarse);
 [[nodiscard]] std::string floor_vertex();
 [[nodiscard]] std::string floor_fragment();
 [[nodiscard]] std::string floor_bake_fragment();

@@ -7,7 +7,7 @@ namespace sim {
 const std::vector<std::pair<int, int>>& BroadPhase::find() {
     pairs_.clear();
     if (boxes_.empty()) return pairs_;
-    Eigen::Vector3f low = boxes_.front().low, high = low;
+    Eigen::Vector3d low = boxes_.front().low, high = low;
     for (const Box& box : boxes_) low = low.cwiseMin(box.low), high = high.cwiseMax(box.low);
     int axis = 0;
     (high - low).maxCoeff(&axis);

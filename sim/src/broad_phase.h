@@ -10,7 +10,7 @@ namespace sim {
 class BroadPhase {
 public:
     struct Box {
-        Eigen::Vector3f low, high;
+        Eigen::Vector3d low, high;
         int body;
         bool moves;  ///< pairs of two boxes that do not move are left out
     };

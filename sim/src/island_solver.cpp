@@ -461,7 +461,9 @@ void IslandSolver::keep_impulses() {
     for (const SpringRows& s : springs_) {
         for (int i = 0; i < 3; ++i) s.constraint->impulse[i] = s.impulse[i];
         const double force = s.constraint->impulse.norm() / h_;
-        if (force > s.constraint->definition.breaking_force) s.constraint->holds = false;
+        if (!(force > s.constraint->definition.breaking_force)) continue;
+        s.constraint->holds = false;
+        ++broken_;
     }
 }
 

@@ -50,6 +50,7 @@ public:
 
     void solve(const Island& island);
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
+    [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }
 
 private:
     struct BodyRows {
@@ -118,7 +119,7 @@ private:
     std::size_t jacobians_used_ = 0;
     double h_ = 0;
     float push_rate_ = 0, mass_share_ = 1, impulse_share_ = 0;
-    std::uint64_t limited_ = 0;
+    std::uint64_t limited_ = 0, broken_ = 0;
 };
 
 }  // namespace sim

@@ -48,7 +48,7 @@ struct World::Implementation {
     WorldContacts contacts;
     std::unique_ptr<IslandSolver> solver;
     std::vector<Island> islands;
-    std::vector<int> parent;  // union-find
+    std::vector<int> parent, place;  // union-find; a root's island
     std::size_t islands_used = 0;
     WorldCounts counts;
     std::vector<QuarantinedBody> quarantined;
@@ -155,7 +155,7 @@ void World::Implementation::find_islands() {
         if (c.holds && moves(c.definition.body_a) && moves(c.definition.body_b))
             join(c.definition.body_a, c.definition.body_b);
     // An island's place is that of its first body.
-    std::vector<int> place(bodies.size(), -1);
+    place.assign(bodies.size(), -1);
     islands_used = 0;
     auto island_of = [&](int id) -> Island& {
         int& at = place[static_cast<std::size_t>(root(id))];
@@ -199,6 +199,8 @@ void World::Implementation::solve_islands() {
     }
     counts.islands = awake;
     counts.deformations_limited = free_limited + solver->deformations_limited();
+    if (counts.constraints_broken != solver->constraints_broken()) set_joined();
+    counts.constraints_broken = solver->constraints_broken();
 }
 
 void World::Implementation::put_to_sleep() {

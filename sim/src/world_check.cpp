@@ -60,6 +60,14 @@ void check_world_body(const WorldBody& body) {
     check_range(who, "triangles", body.triangles, 48, 20000);
     check_range(who, "friction", body.friction, 0, 100);
     check_range(who, "restitution", body.restitution, 0, 1);
+    check_range(who, "gravity scale", body.gravity_scale, -1e3, 1e3);
+    check_vector(who, "position [m]", body.world_from_body.translation(), kFurthest);
+    check_vector(who, "velocity [m/s]", body.velocity, kFastest);
+    check_vector(who, "angular velocity [rad/s]", body.angular_velocity, kFastest);
+    const Eigen::Matrix3d r = body.world_from_body.linear();
+    const double skew = (r * r.transpose() - Eigen::Matrix3d::Identity()).norm();
+    if (!(skew < 1e-6) || r.determinant() < 0)
+        refuse(who, "orientation: departure from a rotation", skew, "0");
 }
 
 void check_constraint(const PointConstraint& constraint, int bodies) {

@@ -58,8 +58,7 @@ bool WorldContacts::find_once(const WorldSettings& settings, const std::vector<W
         if (body.quarantined) continue;
         const double grown = kSlop * smallest_half(body) + reach_of(body, settings);
         const Eigen::Vector3d half = body.posed.half_aabb.array() + grown;
-        boxes.push_back({(body.posed.position - half).cast<float>(),
-                         (body.posed.position + half).cast<float>(), static_cast<int>(i),
+        boxes.push_back({body.posed.position - half, body.posed.position + half, static_cast<int>(i),
                          body.moves() && !body.asleep});
     }
     auto last = [this](const Manifold& manifold) -> const Manifold* {

@@ -5,6 +5,7 @@
 #include <new>
 
 #include "sim/modes.h"
+#include "sim/world.h"
 #include "stepped_body.h"
 #include "test_kit.h"
 
@@ -73,6 +74,32 @@ TEST(ModalBasis, DisplacementAndItsInverseAllocateNothing) {
         EXPECT_LT((sim::inverse_displacement(basis, nodal, x).r - r).norm(), 1e-9);
     }
     EXPECT_EQ(allocations, before);
+}
+
+TEST(World, AWarmStepOfAPileAllocatesNothing) {
+    sim::WorldDefinition definition;
+    definition.planes.push_back({});
+    definition.settings.sleeping = false;
+    for (int i = 0; i < 6; ++i) {
+        sim::WorldBody body;
+        body.name = "ball";
+        body.shape.base.semi_axes.setConstant(0.5);
+        body.fidelity.fidelity = i % 3 == 0   ? sim::Fidelity::rigid
+                                 : i % 3 == 1 ? sim::Fidelity::linear
+                                              : sim::Fidelity::modal;
+        body.world_from_body.translation() = Eigen::Vector3d(0.1 * i, 0.6 + 1.1 * i, 0);
+        definition.bodies.push_back(body);
+    }
+    sim::World world(definition);
+    for (int i = 0; i < 300; ++i) world.step();
+    const std::size_t before = allocations;
+    int contacts = 0;
+    for (int i = 0; i < 300; ++i) {
+        world.step();
+        contacts += world.counts().contacts;
+    }
+    EXPECT_EQ(allocations, before);
+    EXPECT_GT(contacts, 600) << "there was something to do";
 }
 
 }  // namespace

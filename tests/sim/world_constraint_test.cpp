@@ -1,0 +1,136 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "world_bodies.h"
+
+using namespace world_test;
+using sim::Fidelity;
+
+namespace {
+
+constexpr double kG = 9.81;
+
+sim::PointConstraint to_place(int body, const Eigen::Vector3d& point, const Eigen::Vector3d& place,
+                              double k) {
+    sim::PointConstraint c;
+    c.name = "c";
+    c.body_a = body;
+    c.point_a = point;
+    c.point_b = place;
+    c.stiffness = k;
+    return c;
+}
+
+}  // namespace
+
+TEST(WorldConstraint, AHangingBodyStretchesItsSpringByItsWeight) {
+    for (const Fidelity fidelity : {Fidelity::rigid, Fidelity::linear, Fidelity::modal}) {
+        for (const double k : {1e3, 1e5, 1e9}) {
+            sim::WorldDefinition definition;
+            definition.settings.sleeping = false;
+            definition.bodies.push_back(ball({0, 0, 0}, fidelity));
+            definition.constraints.push_back(to_place(0, {0, 0.5, 0}, {0, 0.5, 0}, k));
+            sim::World world(definition);
+            run(world, 3000);
+            const double mass = world.rigid_mass(0).mass;
+            const sim::WorldBodyState s = world.state(0);
+            const Eigen::VectorXd nodal = world.basis(0).nodal * s.q;
+            const Eigen::Vector3d u = fidelity == Fidelity::rigid
+                                          ? Eigen::Vector3d::Zero()
+                                          : sim::displacement_at(world.basis(0), nodal, {0, 0.5, 0}).value;
+            const double hung = 0.5 - (s.position + s.orientation * (Eigen::Vector3d(0, 0.5, 0) + u)).y();
+            EXPECT_NEAR(hung, mass * kG / k, 1e-3 * mass * kG / k + 1e-6) << "k " << k;
+            if (fidelity == Fidelity::modal) {
+                EXPECT_GT(u.y(), 1e-5) << "it is drawn out by its own weight";
+                double compliance = 0;  // of the modes at the point, along y
+                const Eigen::Matrix3Xd phi = sim::mode_shapes_at(world.basis(0), {0, 0.5, 0});
+                for (int m = 0; m < world.basis(0).count(); ++m)
+                    compliance += std::pow(phi(1, m) / world.basis(0).omega[m], 2);
+                EXPECT_NEAR(u.y() / (compliance * mass * kG), 1, 0.02);
+            }
+        }
+    }
+}
+
+TEST(WorldConstraint, ConflictingConstraintsMeetInTheMiddleByTheirStiffness) {
+    sim::WorldDefinition definition = weightless();
+    definition.settings.sleeping = false;
+    definition.bodies.push_back(ball({0.3, 0, 0}));
+    definition.constraints.push_back(to_place(0, {0, 0, 0}, {-1, 0, 0}, 1e6));
+    definition.constraints.push_back(to_place(0, {0, 0, 0}, {2, 0, 0}, 3e6));
+    sim::World world(definition);
+    for (int k = 0; k < 2000; ++k) {
+        world.step();
+        ASSERT_LT(world.state(0).position.norm(), 2.1) << "bounded";
+    }
+    EXPECT_NEAR(world.state(0).position.x(), (-1.0 * 1e6 + 2.0 * 3e6) / 4e6, 1e-6);
+    EXPECT_LT(world.state(0).velocity.norm(), 1e-6);
+}
+
+TEST(WorldConstraint, BreaksAboveItsForceAndHoldsBelow) {
+    for (const double share : {0.9, 1.1}) {
+        sim::WorldDefinition definition;
+        definition.bodies.push_back(ball({0, 0, 0}));
+        definition.constraints.push_back(to_place(0, {0, 0, 0}, {0, 0, 0}, 1e5));
+        definition.constraints[0].damping_ratio = 2;
+        const double weight = 100 * 4.0 / 3 * M_PI * 0.125 * kG;
+        definition.constraints[0].breaking_force = share * weight;
+        sim::World world(definition);
+        run(world, 300);
+        EXPECT_EQ(world.constraint_holds(0), share > 1);
+        EXPECT_EQ(world.counts().constraints_broken, share > 1 ? 0u : 1u);
+        EXPECT_EQ(world.state(0).position.y() > -1, share > 1);
+    }
+}
+
+TEST(WorldConstraint, AChainKeepsTogetherAndFallsInTwoWhenALinkIsRemoved) {
+    sim::WorldDefinition definition;
+    for (int i = 0; i < 5; ++i) {
+        definition.bodies.push_back(ball({0.0, -1.0 * i, 0}, Fidelity::linear));
+        sim::PointConstraint link;
+        link.name = "link";
+        link.body_a = i;
+        link.point_a = {0, 0.5, 0};
+        link.body_b = i - 1;
+        link.point_b = i == 0 ? Eigen::Vector3d(0, 0.5, 0) : Eigen::Vector3d(0, -0.5, 0);
+        link.stiffness = 1e6;
+        definition.constraints.push_back(link);
+    }
+    sim::World world(definition);
+    for (int k = 0; k < 3000 && !world.all_asleep(); ++k) world.step();
+    ASSERT_TRUE(world.all_asleep());
+    EXPECT_NEAR(world.state(4).position.y(), -4, 0.1);
+    world.remove_constraint(3);
+    run(world, 60);
+    EXPECT_NEAR(world.state(2).position.y(), -2, 0.1) << "the upper part still hangs";
+    EXPECT_LT(world.state(4).position.y(), -8) << "the lower part falls, woken";
+    EXPECT_FALSE(world.constraint_holds(3));
+}
+
+TEST(WorldConstraint, APendulumSwingsWithItsClosedFormPeriodAndLosesLittle) {
+    // A small swing of a ball on a stiff point 2 m above: T = 2 pi sqrt((I + m l^2) / (m g l)).
+    sim::WorldDefinition definition;
+    definition.settings.sleeping = false;
+    definition.settings.substeps = 16;
+    const double l = 2, angle = 0.1;
+    definition.bodies.push_back(ball({l * std::sin(angle), -l * std::cos(angle), 0}));
+    definition.bodies[0].world_from_body.linear() =
+        Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    definition.constraints.push_back(to_place(0, {0, l, 0}, {0, 0, 0}, 1e7));
+    sim::World world(definition);
+    const sim::RigidMass m = world.rigid_mass(0);
+    const double period =
+        2 * M_PI * std::sqrt((m.inertia.z() + m.mass * l * l) / (m.mass * kG * l)) * (1 + angle * angle / 16);
+    double last = world.state(0).position.x(), first_zero = -1, second_zero = -1;
+    for (int k = 0; k < 400 && second_zero < 0; ++k) {
+        world.step();
+        const double x = world.state(0).position.x();
+        if (last > 0 && x <= 0) {
+            const double t = world.time_s() - x / (x - last) * definition.settings.dt;
+            (first_zero < 0 ? first_zero : second_zero) = t;
+        }
+        last = x;
+    }
+    EXPECT_NEAR((second_zero - first_zero) / period, 1, 2e-3);
+}
