@@ -15,6 +15,7 @@
 #include "compare_command.h"
 #include "kit_commands.h"
 #include "latency_command.h"
+#include "modes_command.h"
 #include "play_command.h"
 #include "predict_command.h"
 #include "record_command.h"
@@ -70,6 +71,7 @@ int run(int argc, char** argv) {
     add_latency_command(program);
     add_trace_command(program);
     add_record_command(program);
+    add_modes_command(program);
     add_bench_command(program);
     add_simulate_command(program, status);
     add_worker_command(program, status);

@@ -20,6 +20,17 @@ std::optional<Number> whole(std::string_view text) {
     return value;
 }
 
+/// "0.01" or "1/15".
+std::optional<double> fraction(std::string_view text) {
+    const std::size_t slash = text.find('/');
+    std::optional<double> value = whole<double>(text.substr(0, slash));
+    if (value && slash != std::string_view::npos) {
+        const std::optional<double> divisor = whole<double>(text.substr(slash + 1));
+        value = divisor && *divisor != 0 ? std::optional(*value / *divisor) : std::nullopt;
+    }
+    return value && std::isfinite(*value) ? value : std::nullopt;
+}
+
 [[noreturn]] void refuse(const std::string& text, const std::string& option, const std::string& expected) {
     throw BadInput(fmt::format("error: found {} \"{}\", expected {}", option, text, expected));
 }
@@ -27,14 +38,15 @@ std::optional<Number> whole(std::string_view text) {
 }  // namespace
 
 double parse_number(const std::string& text, const std::string& option) {
-    const std::size_t slash = text.find('/');
-    std::optional<double> value = whole<double>(std::string_view(text).substr(0, slash));
-    if (value && slash != std::string::npos) {
-        const std::optional<double> divisor = whole<double>(std::string_view(text).substr(slash + 1));
-        value = divisor && *divisor != 0 ? std::optional(*value / *divisor) : std::nullopt;
-    }
-    if (!value || !std::isfinite(*value))
-        refuse(text, option, "a number such as 0.05 or a fraction such as 1/15");
+    const std::optional<double> value = fraction(text);
+    if (!value) refuse(text, option, "a number such as 0.05 or a fraction such as 1/15");
+    return *value;
+}
+
+int parse_whole(const std::string& text, const std::string& option, int low, int high) {
+    const std::optional<int> value = whole<int>(text);
+    if (!value || *value < low || *value > high)
+        refuse(text, option, fmt::format("a whole number from {} to {}", low, high));
     return *value;
 }
 
@@ -43,7 +55,7 @@ Eigen::Vector3d parse_vector(const std::string& text, const std::string& option)
     std::string_view rest = text;
     for (int i = 0; i < 3; ++i) {
         const std::size_t comma = rest.find(',');
-        const std::optional<double> value = whole<double>(rest.substr(0, comma));
+        const std::optional<double> value = fraction(rest.substr(0, comma));
         if (!value || !(std::abs(*value) <= 1000) || (comma == std::string_view::npos) != (i == 2))
             refuse(text, option, "three numbers X,Y,Z within 1000");
         result[i] = *value;

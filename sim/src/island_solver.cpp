@@ -67,10 +67,10 @@ void IslandSolver::begin(const Island& island) {
     for (const int id : island.bodies) {
         MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
         local_[static_cast<std::size_t>(id)] = static_cast<int>(rows_of_.size());
-        rows_of_.push_back({&body, offset, body.kind->width});
+        rows_of_.push_back({&body, offset, body.kind->width, body.state.position});
         offset += static_cast<std::uint32_t>(body.kind->width);
     }
-    y_.resize(offset), start_.resize(offset), moved_.resize(offset);
+    y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
     std::fill_n(moved_.data(), offset, 0.f);
 
     std::size_t triples = 0, floats = 0;
@@ -170,9 +170,11 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     c.offset_b = add_rows(b, directions, -1);
     finish_rows(c);
     c.point = &point;
+    c.place = (*bodies_)[static_cast<std::size_t>(manifold.a)].posed.position + point.arm_a.cast<double>();
     c.separation = c.now = point.separation;
     c.friction = manifold.friction, c.restitution = manifold.restitution;
     c.approach = 0, c.largest = 0;
+    c.emerging = manifold.emerging;
     c.inverse_normal = 1 / c.k[0][0];
     const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
     c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
@@ -206,6 +208,7 @@ void IslandSolver::add_spring(HeldConstraint& constraint) {
     s.offset_b = add_rows(b, axes, -1);
     finish_rows(s);
     s.constraint = &constraint;
+    s.place = place_a + (place_b - place_a) / 2;
     const double mass = 3.0 / (s.k[0][0] + s.k[1][1] + s.k[2][2]), k = held.stiffness;
     const double damping = 2 * held.damping_ratio * std::sqrt(k * mass), firm = damping + h_ * k;
     s.gamma = static_cast<float>(1 / (h_ * firm));
@@ -226,19 +229,20 @@ void IslandSolver::add_spring(HeldConstraint& constraint) {
 void IslandSolver::substep(bool last) {
     load_velocities();
     warm_start();
-    sweep(true);
-    move();
-    sweep(false);
+    sweep(Push::soft);
+    push_out();
+    sweep(Push::none);
     if (last) restitute();
     finish();
 }
 
 void IslandSolver::load_velocities() {
-    for (const BodyRows& rows : rows_of_) {
+    for (BodyRows& rows : rows_of_) {
         const MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
         const WorldBodyState& s = body.state;
         const Eigen::Matrix3d& frame = body.posed.rotation;
+        rows.place = s.position;
         Eigen::Vector3d velocity = s.velocity + h_ * body.gravity_scale * settings_->gravity;
         Eigen::Vector3d momentum = s.angular_momentum;
         if (body.pushed) {
@@ -301,7 +305,26 @@ void IslandSolver::warm_start() {
     }
 }
 
-void IslandSolver::sweep(bool push) {
+// Positions move with velocities that also push emerging bodies out; the velocities themselves never see it.
+void IslandSolver::push_out() {
+    const bool emerging = std::any_of(contacts_.begin(), contacts_.end(),
+                                      [](const ContactRows& c) { return c.emerging && c.now < 0; });
+    if (!emerging) return move();
+    auto save = [](auto& rows) {
+        for (auto& row : rows) std::copy_n(row.impulse, 3, row.kept);
+    };
+    auto restore = [](auto& rows) {
+        for (auto& row : rows) std::copy_n(row.kept, 3, row.impulse);
+    };
+    std::copy_n(y_.data(), y_.size(), kept_.data());
+    save(contacts_), save(springs_);
+    sweep(Push::all);
+    move();
+    std::copy_n(kept_.data(), y_.size(), y_.data());
+    restore(contacts_), restore(springs_);
+}
+
+void IslandSolver::sweep(Push push) {
     for (SpringRows& spring : springs_) solve_spring(spring);
     for (ContactRows& contact : contacts_) solve_contact(contact, push);
 }
@@ -330,7 +353,7 @@ void IslandSolver::solve_spring(SpringRows& s) {
     }
 }
 
-void IslandSolver::solve_contact(ContactRows& c, bool push) {
+void IslandSolver::solve_contact(ContactRows& c, Push push) {
     const float* da = jacobians_.data() + c.offset_a;
     const float* db = jacobians_.data() + c.offset_b;
     float v[3] = {0, 0, 0};
@@ -345,7 +368,7 @@ void IslandSolver::solve_contact(ContactRows& c, bool push) {
     float bias = 0, mass_share = 1, impulse_share = 0;
     if (c.now > 0) {
         bias = c.now / static_cast<float>(h_);
-    } else if (push) {
+    } else if (push == Push::all || (push == Push::soft && !c.emerging)) {
         bias = std::max(push_rate_ * c.now, -kPushSpeed);
         mass_share = mass_share_, impulse_share = impulse_share_;
     }
@@ -423,20 +446,35 @@ void IslandSolver::move() {
     }
 }
 
+// In double precision and at one point of space a pair, so that linear and angular momentum are kept to
+// rounding.
+void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point) {
+    for (const bool side : {false, true}) {
+        const int id = side ? rows.b : rows.a;
+        if (id < 0) continue;
+        const BodyRows& at = rows_of_[static_cast<std::size_t>(id)];
+        WorldBodyState& s = at.body->state;
+        const Eigen::Vector3d p = side ? Eigen::Vector3d(-impulse) : impulse;
+        s.velocity += p / at.body->kind->mass.mass;
+        s.angular_momentum += (point - at.place).cross(p);
+    }
+}
+
 void IslandSolver::finish() {
+    for (const ContactRows& c : contacts_) {
+        const Eigen::Vector3f p =
+            c.impulse[0] * c.point->normal + c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1];
+        apply(c, p.cast<double>(), c.place);
+    }
+    for (const SpringRows& s : springs_)
+        apply(s, Eigen::Vector3d(s.impulse[0], s.impulse[1], s.impulse[2]), s.place);
     for (const BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
         const float* y = y_.data() + rows.offset;
         const float* start = start_.data() + rows.offset;
         WorldBodyState& s = body.state;
-        Eigen::Vector3d kick, turn;
-        for (int i = 0; i < 3; ++i) {
-            kick[i] = y[i] - start[i];
-            turn[i] = std::sqrt(kind.mass.inertia[i]) * (y[3 + i] - start[3 + i]);
-        }
-        s.velocity += h_ * body.gravity_scale * settings_->gravity + kick / std::sqrt(kind.mass.mass);
-        s.angular_momentum += body.posed.rotation * turn;
+        s.velocity += h_ * body.gravity_scale * settings_->gravity;
         if (body.pushed) {
             s.velocity += h_ / kind.mass.mass * body.force;
             s.angular_momentum += h_ * body.torque;

@@ -23,7 +23,9 @@ struct Island {
 ///   start)
 ///   2. one sweep over springs and contacts, overlaps pushed out softly (30 Hz, damping 10, at most 3 m/s)
 ///   3. positions and orientations move with these velocities
-///   4. one sweep without the push, so that it leaves no speed behind
+///   4. one sweep without the push, so that it leaves no speed behind (bodies that began their contact deep
+///   inside each
+///      other are pushed in a sweep of their own that only positions see: one sweep could not take it back)
 ///   5. modes step exactly under the force P / h held over h: z1 = z + h G, z1' = c z + d z' + (b / h) P
 /// and at the end of the last substep restitution. Contact forces act on a mode with its compliance over the
 /// substep, w = (1 - a) / (omega h)^2 >= 0 (body_kind.h), so rigid, stiff and soft bodies go through one
@@ -57,26 +59,29 @@ private:
         MovingBody* body;
         std::uint32_t offset;  // of y, start, moved
         int width;
+        Eigen::Vector3d place;  // of the centre, at the start of the substep
     };
     /// Where a row triple lies and whom it joins.
     struct Rows {
         int a = -1, b = -1;  // island-local, -1: does not move
         std::uint32_t offset_a = 0, offset_b = 0;
         float k[3][3];
+        Eigen::Vector3d place;  // of the contact at the start of the step, world
     };
     struct ContactRows : Rows {
         ManifoldPoint* point;
         Eigen::Vector3f tangent[2];
         float separation, now, friction, restitution, approach;
         float inverse_normal, inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
-        float impulse[3], largest;
+        float impulse[3], kept[3], largest;
+        bool emerging;
     };
     struct SpringRows : Rows {
         HeldConstraint* constraint;
         float error[3], now[3];
         float inverse[3][3];  // of K + gamma
         float gamma, pull;    // pull: bias speed per error [1/s]
-        float impulse[3];
+        float impulse[3], kept[3];
     };
     /// A place on a body that rows act on.
     struct Place {
@@ -97,11 +102,14 @@ private:
     void substep(bool last);
     void load_velocities();
     void warm_start();
-    void sweep(bool push);
+    enum class Push { none, soft, all };
+    void sweep(Push push);
+    void push_out();
     void solve_spring(SpringRows& spring);
-    void solve_contact(ContactRows& contact, bool push);
+    void solve_contact(ContactRows& contact, Push push);
     void restitute();
     void move();
+    void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
     void finish();
     void keep_impulses();
 
@@ -115,7 +123,7 @@ private:
     std::vector<int> local_;         // world body -> island body or -1
     std::vector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
-    LaneArray y_, start_, moved_, jacobians_;
+    LaneArray y_, kept_, start_, moved_, jacobians_;
     std::size_t jacobians_used_ = 0;
     double h_ = 0;
     float push_rate_ = 0, mass_share_ = 1, impulse_share_ = 0;

@@ -27,6 +27,7 @@ struct Manifold {
     int count = 0;
     std::array<ManifoldPoint, kManifoldPoints> points;
     float friction = 0, restitution = 0;
+    bool emerging = false;  ///< began deep inside each other, and still overlap
     [[nodiscard]] std::uint64_t key() const noexcept {
         return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);
     }

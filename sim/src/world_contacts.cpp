@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kSlop = 0.005;         // of the smaller half extent: contacts exist from here on
 constexpr double kLargestMargin = 0.2;  // of it
+constexpr float kDeep = 0.04f;  // of it: a contact that begins deeper is one of bodies put inside each other
 constexpr float kManifoldTolerance = 0.02f;
 
 double smallest_half(const MovingBody& body) {
@@ -23,6 +24,13 @@ double reach_of(const MovingBody& body, const WorldSettings& settings) {
 
 double margin_of(double approach, double size, const WorldSettings& settings) {
     return std::min(kSlop * size + std::max(approach, 0.0) * settings.dt, kLargestMargin * size);
+}
+
+void finish(const Manifold* before, float size, Manifold& manifold) {
+    if (manifold.count == 0) return;
+    const float deepest = -manifold.points[0].separation;
+    manifold.emerging = before ? before->emerging && deepest > 0.01f * size : deepest > kDeep * size;
+    if (before) take_impulses(*before, 0.1f * size, manifold);
 }
 
 }  // namespace
@@ -81,7 +89,6 @@ bool WorldContacts::find_once(const WorldSettings& settings, const std::vector<W
         }
         manifold.friction = std::sqrt(a.friction * b.friction);
         manifold.restitution = std::max(a.restitution, b.restitution);
-        if (old) take_impulses(*old, 0.1f * static_cast<float>(smallest_half(a)), manifold);
         manifolds_.push_back(manifold);
     }
     if (woke) return true;
@@ -101,7 +108,6 @@ bool WorldContacts::find_once(const WorldSettings& settings, const std::vector<W
             if (manifold.count == 0) continue;
             manifold.friction = std::sqrt(body.friction * static_cast<float>(plane.friction));
             manifold.restitution = std::max(body.restitution, static_cast<float>(plane.restitution));
-            if (old) take_impulses(*old, 0.1f * static_cast<float>(smallest_half(body)), manifold);
             manifolds_.push_back(manifold);
         }
     }
@@ -151,6 +157,7 @@ void WorldContacts::meet(const WorldSettings& settings, const MovingBody& a, con
         }
     }
     choose_points(candidates_, kManifoldTolerance * static_cast<float>(size), before, manifold);
+    finish(before, static_cast<float>(size), manifold);
 }
 
 void WorldContacts::meet_plane(const WorldSettings& settings, const MovingBody& a, const WorldPlane& plane,
@@ -183,6 +190,7 @@ void WorldContacts::meet_plane(const WorldSettings& settings, const MovingBody& 
         }
     }
     choose_points(candidates_, kManifoldTolerance * static_cast<float>(size), before, manifold);
+    finish(before, static_cast<float>(size), manifold);
 }
 
 }  // namespace sim

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "bad_input.h"
+#include "schema_walk.h"
 #include "written_kit.h"
 
 namespace app {
@@ -18,44 +19,8 @@ json schema() {
     return json::parse(file);
 }
 
-/// Follows a $ref into the schema's definitions.
-const json& resolved(const json& root, const json& node) {
-    return node.contains("$ref") ? root.at(json::json_pointer(node["$ref"].get<std::string>().substr(1)))
-                                 : node;
-}
-
-std::string toml_of(const json& value) {
-    std::string text;
-    if (value.is_object()) {
-        for (const auto& [key, inner] : value.items())
-            text += (text.empty() ? "" : ", ") + ('"' + key + "\" = " + toml_of(inner));
-        return "{ " + text + " }";
-    }
-    if (value.is_array()) {
-        for (const json& inner : value) text += (text.empty() ? "" : ", ") + toml_of(inner);
-        return "[" + text + "]";
-    }
-    return value.dump();
-}
-
-/// A value with every key of an object's schema at its example.
-json example_of(const json& root, const json& node_or_ref) {
-    const json& node = resolved(root, node_or_ref);
-    if (node.contains("examples")) return node["examples"][0];
-    if (node["type"] == "array") return json::array({example_of(root, node["items"])});
-    json value = json::object();
-    for (const auto& [key, inner] : node["properties"].items()) value[key] = example_of(root, inner);
-    return value;
-}
-
-std::string kit_text(const json& kit) {
-    std::string text;
-    for (const auto& [key, value] : kit.items()) text += key + " = " + toml_of(value) + "\n";
-    return text;
-}
-
 std::string refusal_of(const json& kit) {
-    const WrittenKit written(kit_text(kit));
+    const WrittenKit written(toml_text(kit));
     try {
         (void)written.read();
     } catch (const BadInput& wrong) {
@@ -71,19 +36,6 @@ json full_kit(const json& root) {
     for (const char* kind : {"drum", "cymbal", "bell", "string"})
         kit["instrument"].push_back({{"name", kind}, {"kind", kind}});
     return kit;
-}
-
-/// Visits every object of the schema that holds named keys, with the place of such an object in a kit.
-template <class Visit>
-void for_each_table(const json& root, const json& node_or_ref, const json::json_pointer& place,
-                    const Visit& visit) {
-    const json& node = resolved(root, node_or_ref);
-    if (node["type"] == "array" && node["items"].contains("$ref"))
-        for_each_table(root, node["items"], place / 0, visit);
-    if (!node.contains("properties")) return;
-    visit(node, place);
-    for (const auto& [key, inner] : node["properties"].items())
-        for_each_table(root, inner, place / key, visit);
 }
 
 TEST(KitSchema, EveryKeyThatItNamesIsReadAtItsExample) {

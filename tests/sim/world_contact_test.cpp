@@ -13,7 +13,7 @@ TEST(WorldContact, TenBoxesOfOneMetreStandForAMinuteAndDriftLessThanAMillimetre)
     for (int i = 0; i < 10; ++i)
         definition.bodies.push_back(box({0, 0.5 + i, 0}, Eigen::Vector3d::Constant(0.5), 1000));
     sim::World world(definition);
-    run(world, 240);  // contacts settle to their static depth, about a millimetre a box
+    run(world, 480);  // contacts settle to their static depth
     std::vector<Eigen::Vector3d> start;
     for (int i = 0; i < 10; ++i) start.push_back(world.state(i).position);
     for (int k = 0; k < 3600; ++k) {
@@ -76,7 +76,8 @@ TEST_P(WorldOverlap, ABodyStartedHalfInsideAnotherLeavesSlowlyAndGainsNoEnergy) 
         // 52 kg each: a joule is 0.14 m/s. Nothing was moving, so all energy would be a gain.
         ASSERT_LT(world.energy().total(), 1e-3) << "J at step " << k;
     }
-    EXPECT_GT(before, 0.98) << "they have left each other";
+    // Samples of a ball lie up to 1 % deeper than its surface between them.
+    EXPECT_GT(before, 0.97) << "they have left each other";
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, WorldOverlap,
@@ -104,7 +105,7 @@ TEST_P(WorldRestitution, IsAsAskedOnAFloorAndBetweenBodies) {
     sim::World pair(head_on);
     run(pair, 60);
     EXPECT_NEAR((pair.state(1).velocity.y() - pair.state(0).velocity.y()) / 4, e, 1e-2);
-    EXPECT_NEAR(pair.momentum().norm(), 0, 1e-4) << "of 105 kg m/s a body; single precision in the contact";
+    EXPECT_NEAR(pair.momentum().norm(), 0, 1e-12) << "of 105 kg m/s a body";
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, WorldRestitution, testing::Values(0.0, 0.25, 0.5, 0.75, 1.0));
@@ -187,8 +188,9 @@ TEST(WorldContact, CollisionsKeepMomentumAndNeverAddEnergy) {
         }
         EXPECT_LT(energy, 0.9 * start) << "they have collided";
         const double scale = 8 * 38 * 3.0;  // kg m/s in motion
-        EXPECT_LT((world.momentum() - momentum).norm(), 1e-6 * scale);
-        // Arms of contacts are frozen over a step, while the centres move on.
-        EXPECT_LT((world.angular_momentum() - turn).norm(), 1e-2 * scale);
+        // Impulses act in double precision and at one point a pair.
+        EXPECT_LT((world.momentum() - momentum).norm(), 1e-12 * scale);
+        // Restitution comes after the move of the last substep, so centres have moved a little askew.
+        EXPECT_LT((world.angular_momentum() - turn).norm(), 5e-3 * scale);
     }
 }

@@ -1,0 +1,127 @@
+// musicworld simulate, as a user runs it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "program.h"
+
+namespace end_to_end {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+const std::string kScene =
+    "[[body]]\nname = \"b\"\nsize = [1, 0.4, 1]\nexponents = [0.2, 0.2]\nfidelity = \"rigid\"\n"
+    "position = [0, 0.3, 0]\n[[plane]]\n";
+
+void expect_one_line(const Ended& ended, int status, const std::string& what) {
+    EXPECT_EQ(ended.status, status) << ended.err;
+    EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 1) << ended.err;
+    for (const std::string& word : {std::string("error: found "), std::string(", expected "), what})
+        EXPECT_NE(ended.err.find(word), std::string::npos) << word << ": " << ended.err;
+    EXPECT_EQ(ended.err.find("error: found "), ended.err.rfind("error: found "));
+}
+
+TEST(Simulate, EveryBundledSceneRunsAHundredStepsAndLosesNoBody) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(bundled("scenes"))) {
+        if (entry.path().extension() != ".toml") continue;
+        const std::string name = entry.path().stem();
+        const bool large = name == "benchmark1600" || name == "benchmark400";
+        const Ended ended = run({"simulate", name, "--steps", large ? "5" : "100", "--json"});
+        ASSERT_EQ(ended.status, 0) << name << ended.err;
+        EXPECT_EQ(ended.err, "") << name;
+        const json r = json::parse(ended.out);
+        EXPECT_EQ(r["bodies_lost"], 0) << name;
+        EXPECT_EQ(r["scene"], entry.path().string());
+    }
+}
+
+TEST(Simulate, ANewRunGivesTheSameFilesButForTimes) {
+    const Folder folder;
+    std::string hash;
+    for (const std::string name : {"a", "b"}) {
+        const Ended ended = run({"simulate", "spiked", "--steps", "30", "--out", folder / name, "--frames",
+                                 "--size", "160x120", "--fps", "20", "--json"});
+        ASSERT_EQ(ended.status, 0) << ended.err;
+        EXPECT_TRUE(hash.empty() || json::parse(ended.out)["state_hash"] == hash);
+        hash = json::parse(ended.out)["state_hash"];
+    }
+    const auto a = read_tree(folder / "a", {"times.csv", "summary.json"}),
+               b = read_tree(folder / "b", {"times.csv", "summary.json"});
+    EXPECT_EQ(a, b);
+    EXPECT_EQ(a.size(), 2u + 11);  // tables; 0 to 0.5 s, 20 a second
+    EXPECT_TRUE(a.contains("frames/000010.png"));
+    EXPECT_NE(a.at("frames/000000.png"), a.at("frames/000010.png"));
+}
+
+TEST(Simulate, UntilRestEndsWithZeroAtRestAndWithOneWhenTheStepsDoNotSuffice) {
+    const Folder folder;
+    write(folder / "scene.toml", kScene);
+    const Ended rest = run({"simulate", folder / "scene.toml", "--until", "rest"});
+    EXPECT_EQ(rest.status, 0) << rest.err;
+    const Ended early = run({"simulate", folder / "scene.toml", "--until", "rest", "--steps", "5", "--json"});
+    expect_one_line(early, 1, "1 of 1 bodies awake after 5 steps");
+    EXPECT_EQ(json::parse(early.out)["at_rest"], false);
+}
+
+TEST(Simulate, AVideoIsMadeBesideTheFrames) {
+    const Folder folder;
+    write(folder / "scene.toml", kScene);
+    const Ended ended = run({"simulate", folder / "scene.toml", "--steps", "30", "--out", folder / "out",
+                             "--video", folder / "fall.mp4", "--size", "96x64"});
+    EXPECT_EQ(ended.status, 0) << ended.err;
+    EXPECT_EQ(read(folder / "fall.mp4").substr(4, 4), "ftyp");
+    EXPECT_TRUE(fs::exists(folder / "out" / "frames" / "000015.png"));
+}
+
+TEST(Simulate, WrongScenesAreRefusedWithTheirPlaceAndNothingIsWritten) {
+    const Folder folder;
+    const std::vector<std::pair<std::string, std::string>> cases = {
+        {"", ":1:1: error: found no [[body]]"},
+        {"\x7f"
+         "ELF",
+         ":1:1: error: found a syntax error"},
+        {kScene + "[[body]\n", ":8:"},
+        {kScene + "[[body]]\nname = \"b\"\nradius = 1\n", ":8:1: error: found a second body"},
+        {kScene + "[[constraint]]\nbody = \"none\"\n", ":9:8: error: found body = \"none\""},
+        {kScene + "[settings]\ndt = 1\n", ":9:6: error: found dt = 1"},
+        {kScene + "frction = 1\n", ":8:1: error: found unknown key"},
+    };
+    for (const auto& [text, words] : cases) {
+        write(folder / "scene.toml", text);
+        expect_one_line(run({"simulate", folder / "scene.toml", "--out", folder / "out"}), 2, words);
+        EXPECT_FALSE(fs::exists(folder / "out"));
+    }
+    expect_one_line(run({"simulate", folder / "none.toml"}), 2, "no readable file");
+    expect_one_line(run({"simulate", folder / "."}), 2, "a directory");
+}
+
+TEST(Simulate, WrongOptionsAreRefusedInOneLine) {
+    const Folder folder;
+    const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+        {{"--workers", "2"}, "--workers 2"},
+        {{"--workers", "-1"}, "--workers -1"},
+        {{"--mode", "async"}, "--mode async"},
+        {{"--bound", "3"}, "--bound 3"},
+        {{"--steps", "-5"}, "--steps -5"},
+        {{"--dt", "0"}, "--dt 0"},
+        {{"--dt", "1/0"}, "--dt"},
+        {{"--seconds", "nan"}, "--seconds"},
+        {{"--until", "dawn"}, "--until dawn"},
+        {{"--frames"}, "without --out"},
+        {{"--fps", "0"}, "--fps 0"},
+        {{"--frames", "--out", folder / "out", "--size", "1x1"}, "--size 1x1"},
+    };
+    for (const auto& [options, words] : cases) {
+        std::vector<std::string> arguments = {"simulate", "human"};
+        arguments.insert(arguments.end(), options.begin(), options.end());
+        expect_one_line(run(arguments), 2, words);
+    }
+    for (const char* workers : {"0", "1"})
+        EXPECT_EQ(run({"simulate", "human", "--steps", "2", "--workers", workers}).status, 0);
+}
+
+}  // namespace
+}  // namespace end_to_end
