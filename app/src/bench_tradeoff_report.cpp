@@ -117,6 +117,13 @@ std::string plot_commands(const Tradeoff& tradeoff) {
               fmt::format("with linespoints pt 6 ps 0.8 lw 1.5 {} title 'Pareto front'", colour("#d7301f")));
     panel.add(marks({tradeoff.automatic}),
               fmt::format("with points pt 4 ps 1.6 lw 2 {} title 'automatic'", colour("#000000")));
+    const auto [fastest, slowest] = std::minmax_element(
+        tradeoff.points.begin(), tradeoff.points.end(),
+        [](const TradeoffPoint& a, const TradeoffPoint& b) { return a.ms_per_s < b.ms_per_s; });
+    if (fastest != tradeoff.points.end())
+        panel.add(fmt::format("{0:.5g} {2:.5g}\n{1:.5g} {2:.5g}\n", fastest->ms_per_s, slowest->ms_per_s,
+                              100 * tradeoff.converged_error),
+                  fmt::format("with lines dt 2 {} title 'converged to'", colour("#8c8c8c")));
     return plot_axes() +
            "set key outside right top\nset logscale xy\nset xlabel 'processor time for a simulated second "
            "[ms]'\n"

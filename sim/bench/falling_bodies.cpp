@@ -14,7 +14,7 @@ double jitter(std::mt19937& random) {
 sim::WorldBody ball(int modes) {
     sim::WorldBody body;
     body.shape.base.semi_axes.setConstant(kBallRadius_m);
-    body.material = {.young_pa = 1e5, .poisson = 0.3, .density_kg_m3 = 1000};
+    body.material = {.young_pa = 3e5, .poisson = 0.3, .density_kg_m3 = 1000};
     body.damping_ratio = 0.05;
     body.fidelity.fidelity = modes > 0 ? sim::Fidelity::modal : sim::Fidelity::rigid;
     body.fidelity.modes = modes;

@@ -48,7 +48,9 @@ TEST(Bench, FourBallsRunBesideBulletAndEveryFigureIsThere) {
     for (const app::BenchResult& result : report.results) {
         EXPECT_GT(result.value, 0) << result.name;
         names.insert(result.name);
-        if (result.ratio) EXPECT_NEAR(*result.ratio, result.value / *result.peer_value, 1e-9);
+        if (result.ratio) {
+            EXPECT_NEAR(*result.ratio, result.value / *result.peer_value, 1e-9);
+        }
     }
     for (const char* name :
          {"bodies4_modal12_vs_bullet_rigid", "bodies4_modal12_vs_bullet_reduced", "bodies9_modal12_per_body",
@@ -91,7 +93,6 @@ TEST(Bench, TheConvergedRunHasNoErrorAgainstItselfAndARigidBodyHasSome) {
     const Json json = Json::parse(app::format_json(made));
     EXPECT_EQ(json["results"].size(), 2u);
     EXPECT_EQ(json["results"][0]["modes"], 0);
-    EXPECT_EQ(std::count(json["results"].begin(), json["results"].end(), Json()), 0);
     const std::string csv = app::format_csv(made);
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "bullet_peer.h"
 
@@ -19,34 +20,44 @@ TEST(FallingBalls, StartApartFromEachOtherAndWithinTheBoxForAnyNumber) {
         for (std::size_t i = 0; i < world.bodies.size(); ++i) {
             const Vector3d p = world.bodies[i].world_from_body.translation();
             EXPECT_GT(p.y(), 0.5);
-            if (count >= 4)
+            if (count >= 4) {
                 EXPECT_LT(std::max(std::abs(p.x()), std::abs(p.z())), sim_bench::box_side(count) / 2 - 0.4);
+            }
             for (std::size_t j = 0; j < i; ++j)
                 ASSERT_GT((p - world.bodies[j].world_from_body.translation()).norm(), 1.0);
         }
     }
 }
 
-TEST(FallingBalls, AfterFourSecondsOursAndBulletsRigidOnesLieInTheBoxAtTheSameHeightToATenth) {
-    if (!sim_bench::bullet_is_there()) GTEST_SKIP() << "built without Bullet";
-    const int count = 9, steps = 240;
-    const sim::WorldDefinition definition = sim_bench::falling_balls(count);
-    sim::World ours(definition);
-    BulletWorld rigid(definition, BulletKind::rigid);
-    for (int i = 0; i < steps; ++i) ours.step(), rigid.step();
-    double height = 0, rigid_height = 0;
+double mean_height(int count, const std::function<Vector3d(int)>& position) {
+    double sum = 0;
     const double half = sim_bench::box_side(count) / 2;
     for (int i = 0; i < count; ++i) {
-        const Vector3d p = ours.state(i).position, q = rigid.position(i);
-        height += p.y() / count;
-        rigid_height += q.y() / count;
-        for (const Vector3d& at : {p, q}) {
-            EXPECT_GT(at.y(), 0.3);  // a ball of 0.5 m, squashed at most so far
-            EXPECT_LT(std::max(std::abs(at.x()), std::abs(at.z())), half);
-        }
+        const Vector3d at = position(i);
+        EXPECT_GT(at.y(), 0.35) << i;  // a ball of 0.5 m, squashed at most so far
+        EXPECT_LT(std::max(std::abs(at.x()), std::abs(at.z())), half - 0.35) << i;
+        sum += at.y();
     }
-    // The same pile but for softness and chance.
-    EXPECT_NEAR(height, rigid_height, 0.15 * rigid_height);
+    return sum / count;
+}
+
+TEST(FallingBalls, AfterFourSecondsOursAndBulletsLieInTheBoxInPilesOfOneHeight) {
+    if (!sim_bench::bullet_is_there()) GTEST_SKIP() << "built without Bullet";
+    const int count = 9, steps = 240;
+    sim::World soft(sim_bench::falling_balls(count)), stiff(sim_bench::falling_balls(count, 0));
+    BulletWorld bullet(sim_bench::falling_balls(count), BulletKind::rigid);
+    for (int i = 0; i < steps; ++i) {
+        soft.step();
+        stiff.step();
+        bullet.step();
+    }
+    const double bullet_height = mean_height(count, [&](int i) { return bullet.position(i); });
+    const double stiff_height = mean_height(count, [&](int i) { return stiff.state(i).position; });
+    const double soft_height = mean_height(count, [&](int i) { return soft.state(i).position; });
+    // Bullet's hulls are 4 cm thicker all round, soft balls sag; otherwise chance alone tells the piles
+    // apart.
+    EXPECT_NEAR(stiff_height, bullet_height, 0.12 * bullet_height);
+    EXPECT_NEAR(soft_height, bullet_height, 0.2 * bullet_height);
 }
 
 TEST(FallingBalls, BulletsReducedBallsRestOnTheFloorAndDeform) {
