@@ -11,6 +11,8 @@
 namespace sim {
 namespace {
 
+// Longest over shortest extent that double precision bears, with up to three and with more elements a side.
+constexpr double kFlattest = 1000, kFlattestOfMany = 100;
 constexpr int kMostElements = 12, kMostModes = 300, kElementModes = 75;
 constexpr double kEqual = 1e-9;  // relative: eigenvalues of one degenerate group
 
@@ -23,6 +25,11 @@ void expect(bool right, const std::string& what, double found, const std::string
 void check(const ModesRequest& request) {
     for (const double axis : request.shape.semi_axes)
         expect(std::isfinite(axis) && axis > 0, "semi-axis", axis, "more than 0 m");
+    const double aspect = request.shape.semi_axes.maxCoeff() / request.shape.semi_axes.minCoeff();
+    expect(
+        aspect <= (request.elements <= 3 ? kFlattest : kFlattestOfMany), "longest over shortest extent",
+        aspect,
+        "at most 1000, at most 100 with four or more elements a side (the finer mesh for errors included)");
     const Material& m = request.material;
     expect(std::isfinite(m.young_pa) && m.young_pa > 0, "Young's modulus", m.young_pa, "more than 0 Pa");
     expect(m.poisson > -1 && m.poisson < 0.5, "Poisson's ratio", m.poisson,

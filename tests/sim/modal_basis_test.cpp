@@ -192,7 +192,7 @@ InverseTally invert(const Superquadric& shape, int elements, int count, double g
     Random random(seed);
     const ModalBasis basis = modes_of(shape, elements, count);
     InverseTally tally;
-    for (int i = 0; i < 100; ++i) {
+    for (int i = 0; i < 30; ++i) {
         VectorXd nodal = basis.nodal * random.coordinates(count).cwiseQuotient(basis.omega);
         nodal *= gradient / largest_gradient(basis, nodal);
         for (int j = 0; j < 50; ++j) {
@@ -243,7 +243,7 @@ TEST(InverseDisplacement, OfFoldedSpaceStaysFiniteAndSaysWhenItFellBack) {
     Random random(5);
     const ModalBasis basis = modes_of({{1, 1, 1}, 1, 1}, 1, 12);
     int fallbacks = 0;
-    for (int i = 0; i < 1000; ++i) {
+    for (int i = 0; i < 200; ++i) {
         VectorXd nodal = basis.nodal * random.coordinates(12);
         nodal *= random(0.5, 4) / largest_gradient(basis, nodal);
         const Vector3d x = random.vector(2);

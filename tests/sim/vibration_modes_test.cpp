@@ -148,10 +148,10 @@ TEST(DiscretisationErrors, AreWithinAFifthOfTheTrueOnesFor1To4ElementsASide) {
         const std::vector<double> exact = listed[b.name]["converged_eigenvalues_first30"];
         const FreeVibrationModes fine = free_vibration_modes(box(b.size, 8, 30));
         for (const int k : {1, 2, 3, 4}) {
-            const ModesRequest request = box(b.size, k, 75);
+            const ModesRequest request = box(b.size, k, k == 1 ? 75 : 40);
             const FreeVibrationModes modes = free_vibration_modes(request);
             const Eigen::VectorXd errors = discretisation_errors(request, modes);
-            ASSERT_EQ(errors.size(), 75);
+            ASSERT_EQ(errors.size(), modes.basis.count());
             EXPECT_TRUE(errors.allFinite());
             for (Eigen::Index i = 6; i < 26; ++i) {
                 const double eigenvalue = counterpart(modes, fine, i);
@@ -370,6 +370,7 @@ TEST(VibrationModes, RequestsOutOfRangeAreRefused) {
     };
     refuses(box({0, 1, 1}, 1, 12));
     refuses(box({1, std::nan(""), 1}, 1, 12));
+    refuses(box({1, 1, 0.0009}, 1, 12));
     refuses(box({1, 1, 1}, 0, 12));
     refuses(box({1, 1, 1}, 13, 12));
     refuses(box({1, 1, 1}, 1, -2));

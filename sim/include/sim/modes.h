@@ -53,10 +53,11 @@ struct FreeVibrationModes {
     GroupCut cut;
 };
 
-/// Throws std::invalid_argument for a request out of range, std::runtime_error if no solution is found.
-/// Dense (Eigen) up to three elements a side, shift-invert Lanczos (Spectra) beyond. One element costs about
-/// 0.6 ms, 2: 2, 3: 20, 4: 60, 6: 300 ms, 8: 1.3 s, 12: 11 s. For the superquadric with several elements a
-/// side, brick space outside it is massless and has 1e-8 of the stiffness.
+/// Throws std::invalid_argument for a request out of range (extents in a ratio over 1000, or 100 with four or
+/// more elements a side, too), std::runtime_error if no solution is found. Dense (Eigen) up to three elements
+/// a side, shift-invert Lanczos (Spectra) beyond. One element costs about 0.6 ms, 2: 2, 3: 20, 4: 60, 6: 300
+/// ms, 8: 1.3 s, 12: 11 s. For the superquadric with several elements a side, brick space outside it is
+/// massless and has 1e-8 of the stiffness.
 [[nodiscard]] FreeVibrationModes free_vibration_modes(const ModesRequest& request);
 
 /// Elements a side of the mesh that discretisation_errors compares with.
