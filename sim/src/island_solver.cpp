@@ -18,7 +18,9 @@ float dot(const float* a, const float* b, int width) {
 }
 
 /// Three rows against one vector, added to v.
-void dot_rows(const float* rows, const float* y, int width, float (&v)[3]) {
+template <int kWidth>
+void dot_rows(const float* rows, const float* y, int any_width, float (&v)[3]) {
+    const int width = kWidth ? kWidth : any_width;
     Lanes s0 = load_lanes(rows) * load_lanes(y), s1 = load_lanes(rows + width) * load_lanes(y),
           s2 = load_lanes(rows + 2 * width) * load_lanes(y);
     for (int i = kLanes; i < width; i += kLanes) {
@@ -31,10 +33,26 @@ void dot_rows(const float* rows, const float* y, int width, float (&v)[3]) {
 }
 
 /// y += rows^T p.
-void add_rows_to(const float* rows, const float (&p)[3], int width, float* y) {
+template <int kWidth>
+void add_rows_to(const float* rows, const float (&p)[3], int any_width, float* y) {
+    const int width = kWidth ? kWidth : any_width;
     for (int i = 0; i < width; i += kLanes)
         store_lanes(y + i, load_lanes(y + i) + p[0] * load_lanes(rows + i) +
                                p[1] * load_lanes(rows + width + i) + p[2] * load_lanes(rows + 2 * width + i));
+}
+
+// The usual widths (rigid, linear, 9 to 16 modes) unrolled.
+void dot_rows(const float* rows, const float* y, int width, float (&v)[3]) {
+    if (width == 24) return dot_rows<24>(rows, y, width, v);
+    if (width == 8) return dot_rows<8>(rows, y, width, v);
+    if (width == 16) return dot_rows<16>(rows, y, width, v);
+    dot_rows<0>(rows, y, width, v);
+}
+void add_rows_to(const float* rows, const float (&p)[3], int width, float* y) {
+    if (width == 24) return add_rows_to<24>(rows, p, width, y);
+    if (width == 8) return add_rows_to<8>(rows, p, width, y);
+    if (width == 16) return add_rows_to<16>(rows, p, width, y);
+    add_rows_to<0>(rows, p, width, y);
 }
 
 /// Two unit vectors square to n and to each other.
@@ -55,6 +73,7 @@ void IslandSolver::solve(const Island& island) {
 
 void IslandSolver::begin(const Island& island) {
     h_ = settings_->dt / settings_->substeps;
+    inverse_h_ = static_cast<float>(1 / h_);
     const double omega = 2 * std::numbers::pi * std::min(kPushHz, 0.25 / h_);
     const double a1 = 2 * kPushDamping + h_ * omega, a2 = h_ * omega * a1;
     push_rate_ = static_cast<float>(omega / a1);
@@ -93,13 +112,46 @@ void IslandSolver::begin(const Island& island) {
     jacobians_used_ = 0;
     contacts_.clear(), springs_.clear();
     contacts_.reserve(triples);
-    for (const int m : island.manifolds) {
-        Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
-        for (int i = 0; i < manifold.count; ++i)
-            add_contact(manifold, manifold.points[static_cast<std::size_t>(i)]);
-    }
+    for (const Turn& turn : in_turns(island))
+        add_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
     for (const int c : island.constraints) add_spring((*constraints_)[static_cast<std::size_t>(c)]);
     for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
+}
+
+const std::vector<IslandSolver::Turn>& IslandSolver::in_turns(const Island& island) {
+    by_turn_.clear(), window_.clear();
+    next_turn_.assign(rows_of_.size(), 0);
+    for (const int m : island.manifolds) {
+        Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        for (int i = 0; i < manifold.count; ++i) {
+            if (window_.size() == kWindow) flush_window();
+            int turn = 0;
+            for (const int id : {manifold.a, manifold.b})
+                if (id < kFirstPlane && local(id) >= 0)
+                    turn = std::max(turn, next_turn_[static_cast<std::size_t>(local(id))]);
+            for (const int id : {manifold.a, manifold.b})
+                if (id < kFirstPlane && local(id) >= 0)
+                    next_turn_[static_cast<std::size_t>(local(id))] = turn + 1;
+            window_.push_back({&manifold, i, turn});
+        }
+    }
+    flush_window();
+    return by_turn_;
+}
+
+// Appends the window's contacts by turn, each turn's in order of ids, and begins anew.
+void IslandSolver::flush_window() {
+    std::array<int, kWindow + 1> first{};
+    for (const Turn& t : window_) ++first[static_cast<std::size_t>(t.turn) + 1];
+    for (std::size_t t = 1; t < first.size(); ++t) first[t] += first[t - 1];
+    const std::size_t base = by_turn_.size();
+    by_turn_.resize(base + window_.size());
+    for (const Turn& t : window_)
+        by_turn_[base + static_cast<std::size_t>(first[static_cast<std::size_t>(t.turn)]++)] = t;
+    for (const Turn& t : window_)
+        for (const int id : {t.manifold->a, t.manifold->b})
+            if (id < kFirstPlane && local(id) >= 0) next_turn_[static_cast<std::size_t>(local(id))] = 0;
+    window_.clear();
 }
 
 IslandSolver::Place IslandSolver::place(int body, const Eigen::Vector3f& arm, int sample,
@@ -176,6 +228,7 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     c.approach = 0, c.largest = 0;
     c.emerging = manifold.emerging;
     c.inverse_normal = 1 / c.k[0][0];
+    c.slide_mass = 2 / (c.k[1][1] + c.k[2][2]);
     const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
     c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
     c.inverse_tangent[2] = c.k[1][1] / det;
@@ -365,13 +418,10 @@ void IslandSolver::solve_contact(ContactRows& c, Push push) {
         const BodyRows& rows = rows_of_[static_cast<std::size_t>(c.b)];
         dot_rows(db, y_.data() + rows.offset, rows.width, v);
     }
-    float bias = 0, mass_share = 1, impulse_share = 0;
-    if (c.now > 0) {
-        bias = c.now / static_cast<float>(h_);
-    } else if (push == Push::all || (push == Push::soft && !c.emerging)) {
-        bias = std::max(push_rate_ * c.now, -kPushSpeed);
-        mass_share = mass_share_, impulse_share = impulse_share_;
-    }
+    // Selected, not branched: which case it is cannot be foretold.
+    const bool soft = c.now <= 0 && (push == Push::all || (push == Push::soft && !c.emerging));
+    const float bias = c.now > 0 ? c.now * inverse_h_ : soft ? std::max(push_rate_ * c.now, -kPushSpeed) : 0;
+    const float mass_share = soft ? mass_share_ : 1, impulse_share = soft ? impulse_share_ : 0;
     const float normal = std::max(
         c.impulse[0] - mass_share * c.inverse_normal * (v[0] + bias) - impulse_share * c.impulse[0], 0.f);
     float p[3] = {normal - c.impulse[0], 0, 0};
@@ -379,16 +429,14 @@ void IslandSolver::solve_contact(ContactRows& c, Push push) {
     c.largest = std::max(c.largest, normal);
     v[1] += c.k[0][1] * p[0];
     v[2] += c.k[0][2] * p[0];
-    float t0 = c.impulse[1] - (c.inverse_tangent[0] * v[1] + c.inverse_tangent[1] * v[2]);
-    float t1 = c.impulse[2] - (c.inverse_tangent[1] * v[1] + c.inverse_tangent[2] * v[2]);
+    const float stick0 = c.impulse[1] - (c.inverse_tangent[0] * v[1] + c.inverse_tangent[1] * v[2]);
+    const float stick1 = c.impulse[2] - (c.inverse_tangent[1] * v[1] + c.inverse_tangent[2] * v[2]);
+    // If it slides: against the speed, whatever the masses in either direction, so by one mass for both.
     const float most = c.friction * normal;
-    if (t0 * t0 + t1 * t1 > most * most) {
-        // It slides: against the speed, whatever the masses in either direction, so by one mass for both.
-        const float mass = 2 / (c.k[1][1] + c.k[2][2]);
-        t0 = c.impulse[1] - mass * v[1], t1 = c.impulse[2] - mass * v[2];
-        const float scale = most / std::max(std::sqrt(t0 * t0 + t1 * t1), 1e-30f);
-        t0 *= scale, t1 *= scale;
-    }
+    const bool slides = stick0 * stick0 + stick1 * stick1 > most * most;
+    const float slide0 = c.impulse[1] - c.slide_mass * v[1], slide1 = c.impulse[2] - c.slide_mass * v[2];
+    const float scale = most / std::max(std::sqrt(slide0 * slide0 + slide1 * slide1), 1e-30f);
+    const float t0 = slides ? scale * slide0 : stick0, t1 = slides ? scale * slide1 : stick1;
     p[1] = t0 - c.impulse[1], p[2] = t1 - c.impulse[2];
     c.impulse[1] = t0, c.impulse[2] = t1;
     if (c.a >= 0) {

@@ -1,5 +1,5 @@
 #pragma once
-#include <span>
+#include <array>
 #include <vector>
 
 #include "lanes.h"
@@ -38,7 +38,8 @@ struct Island {
 /// K = D D^T between them; friction is a 2 x 2 block limited to the cone. Separations move along with the
 /// rows: s = s0 + D . integral of y. Everything is frozen over the step but velocities and separations.
 ///
-/// Deterministic: sweeps go over springs, then contacts in order. No allocation once the buffers have grown.
+/// Deterministic: sweeps go over springs, then contacts, in the order of ids (see in_turns). No allocation
+/// once the buffers have grown.
 class IslandSolver {
 public:
     IslandSolver(const WorldSettings& settings, std::vector<MovingBody>& bodies,
@@ -72,7 +73,8 @@ private:
         ManifoldPoint* point;
         Eigen::Vector3f tangent[2];
         float separation, now, friction, restitution, approach;
-        float inverse_normal, inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
+        float slide_mass, inverse_normal,
+            inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
         float impulse[3], kept[3], largest;
         bool emerging;
     };
@@ -90,7 +92,19 @@ private:
         const float* shapes;  // phi there, [axis][mode_width]; nullptr without modes
     };
 
+    /// A contact's turn: after every earlier one (by ids) that shares a body with it.
+    struct Turn {
+        Manifold* manifold;
+        int point, turn;
+    };
+
     void begin(const Island& island);
+    /// The contacts in windows of kWindow, within a window by turn, then by ids. Contacts of one turn share
+    /// no body, so sweeping in this order gives the bits of the order by ids, but the processor can work on
+    /// several at once; windows keep the bodies they use in its cache.
+    static constexpr std::size_t kWindow = 64;
+    void flush_window();
+    const std::vector<Turn>& in_turns(const Island& island);
     void add_contact(Manifold& manifold, ManifoldPoint& point);
     void add_spring(HeldConstraint& constraint);
     [[nodiscard]] Place place(int body, const Eigen::Vector3f& arm, int sample, const Eigen::Vector3f& rest,
@@ -121,12 +135,14 @@ private:
 
     std::vector<BodyRows> rows_of_;  // per island body
     std::vector<int> local_;         // world body -> island body or -1
+    std::vector<Turn> window_, by_turn_;
+    std::vector<int> next_turn_;  // per island body
     std::vector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
     LaneArray y_, kept_, start_, moved_, jacobians_;
     std::size_t jacobians_used_ = 0;
     double h_ = 0;
-    float push_rate_ = 0, mass_share_ = 1, impulse_share_ = 0;
+    float inverse_h_ = 0, push_rate_ = 0, mass_share_ = 1, impulse_share_ = 0;
     std::uint64_t limited_ = 0, broken_ = 0;
 };
 

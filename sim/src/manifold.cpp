@@ -74,6 +74,7 @@ void choose_points(std::vector<ManifoldPoint>& candidates, float tolerance, cons
     manifold.points[0] = candidates[static_cast<std::size_t>(deepest)];
     manifold.count = 1;
     const float level = std::max(manifold.points[0].separation, 0.f);
+    std::erase_if(candidates, [&](const ManifoldPoint& p) { return p.separation > level + tolerance; });
     for (const float out : {level + tolerance / 16, level + tolerance})
         while (manifold.count < kManifoldPoints) {
             const int next = next_point(candidates, out, tolerance / 2, manifold);
