@@ -4,24 +4,27 @@
 
 #include <array>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <string_view>
 
 #include "bad_input.h"
 #include "comma_list.h"
+#include "mode_pictures.h"
 #include "mode_report.h"
 #include "numbers.h"
+#include "output_folder.h"
 
 namespace app {
 namespace {
 
-constexpr int kMostElements = 10, kMostModes = 150, kElementModes = 75;
+constexpr int kMostElements = 10, kMostModes = 150, kElementModes = 75, kMostPictures = 75;
 constexpr double kSmallest = 1e-6;  // a size [m]
 
 struct ModesArguments {
-    std::string size, young, poisson, density, shape = "box", exponents, elements = "1", count;
-    bool json = false;
+    std::string size, young, poisson, density, shape = "box", exponents, elements = "1", count, out;
+    bool json = false, frames = false;
 };
 
 /// A shape by name; without exponents they must be given.
@@ -88,9 +91,24 @@ sim::ModesRequest request_of(const ModesArguments& a) {
     return request;
 }
 
+void write_products(const ModesArguments& a, const ModeReport& report) {
+    OutputFolder folder(a.out, modes_products());
+    write_file(folder.path("modes.json"), format_mode_json(report));
+    if (a.frames) {
+        std::filesystem::create_directory(folder.path("frames"));
+        ModePictures(report.request, report.modes.basis, kMostPictures)
+            .write(folder.path("frames"), folder.path("modes.png"));
+    }
+    folder.finish();
+}
+
 void run(const ModesArguments& a) {
+    if (a.frames && a.out.empty())
+        throw BadInput("error: found --frames without --out, expected --out DIR for the pictures");
     const ModeReport report = make_mode_report(request_of(a), a.shape);
+    if (!a.out.empty()) write_products(a, report);
     fmt::print("{}", a.json ? format_mode_json(report) : format_mode_table(report));
+    if (a.frames && !a.json) fmt::print("Pictures: {}/modes.png\n", a.out);
 }
 
 }  // namespace
@@ -109,6 +127,10 @@ void add_modes_command(CLI::App& program) {
         ->capture_default_str();
     command->add_option("--count", a->count, "Lowest modes that are not rigid, to 150; left out: 75");
     command->add_flag("--json", a->json, "Print one JSON document");
+    command->add_option("--out", a->out, "Folder for modes.json and pictures");
+    command->add_flag(
+        "--frames", a->frames,
+        "Draw the lowest 75 mode shapes: frames/000001.png ..., and modes.png with all of them");
     command->callback([a] { run(*a); });
 }
 

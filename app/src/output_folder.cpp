@@ -26,6 +26,7 @@ constexpr std::array<std::string_view, 16> kPlayProducts = {
     "summary.json", "frames",       "audio.wav",    "events.csv",     "contacts.csv", "hits.mid",
     "report.html",  "latency.json", "latency.html", "departures.csv", "samples.csv",  "frames.csv",
     "notes.csv",    "blocks.csv",   "leads.csv",    "errors.csv"};
+constexpr std::array<std::string_view, 3> kModesProducts = {"modes.json", "modes.png", "frames"};
 constexpr std::array<std::string_view, 5> kSimulateProducts = {"summary.json", "frames", "states.csv",
                                                                "energy.csv", "times.csv"};
 constexpr std::array<std::string_view, 3> kCompareProducts = {"compare.json", "compare.csv", "report.html"};
@@ -95,6 +96,9 @@ std::span<const std::string_view> compare_products() {
     return kCompareProducts;
 }
 
+std::span<const std::string_view> modes_products() {
+    return kModesProducts;
+}
 std::span<const std::string_view> simulate_products() {
     return kSimulateProducts;
 }

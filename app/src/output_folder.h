@@ -16,6 +16,9 @@ namespace app {
 /// What `simulate` writes: summary.json, frames, states.csv, energy.csv, times.csv.
 [[nodiscard]] std::span<const std::string_view> simulate_products();
 
+/// What `modes` writes: modes.json, modes.png, frames.
+[[nodiscard]] std::span<const std::string_view> modes_products();
+
 /// The folder that a run writes its products into, all of them or none. They are staged in its hidden
 /// subfolder `.unfinished`; finish() moves them into place by rename, the leading product last, so that
 /// a folder with it is a finished run. A folder serves one run at a time (advisory lock). One thread at a

@@ -55,7 +55,7 @@ std::vector<sim::Bump> read_bumps(TomlReader& reader, const Eigen::Vector3d& sem
         sim::Bump bump;
         bump.direction = entry.vector("direction", -kFarM, kFarM);
         if (bump.direction.norm() < 1e-6) entry.fail("direction", "direction = [0, 0, 0]", "a direction");
-        bump.height_m = entry.number("height", -0.5 * size, 4 * size);
+        bump.height_m = entry.number("height", -0.5 * size, 2 * size);
         bump.width_rad = kDegree * entry.number("width_deg", 1, 90, bump.width_rad / kDegree);
         entry.done();
         bumps.push_back(bump);
@@ -71,8 +71,12 @@ sim::FidelityRequest read_fidelity(TomlReader& reader) {
                        : word == "linear" ? sim::Fidelity::linear
                        : word == "modal"  ? sim::Fidelity::modal
                                           : sim::Fidelity::automatic;
-    request.modes = reader.integer("modes", 1, 300, request.modes);
+    request.modes = reader.integer("modes", 1, 120, request.modes);
     request.elements = reader.integer("elements", 1, 4, request.elements);
+    const int nodes = 2 * request.elements + 1, most = 3 * nodes * nodes * nodes - 6;
+    if (request.modes > most)
+        reader.fail("modes", fmt::format("modes = {}", request.modes),
+                    fmt::format("at most {}, as many as elements = {} has", most, request.elements));
     request.domain = reader.choice("domain", {"superquadric", "box"}, "superquadric") == "box"
                          ? sim::ModeDomain::box
                          : sim::ModeDomain::superquadric;
@@ -141,7 +145,7 @@ std::vector<sim::WorldBody> copies(const sim::WorldBody& body, const Grid& grid)
     const auto [nx, ny, nz] = grid.count;
     const Eigen::Vector3d middle = 0.5 * Eigen::Vector3d(nx - 1, 0, nz - 1);
     for (int k = 0; k < nx * ny * nz; ++k) {
-        const Eigen::Vector3d at(k % nx, k / nx % ny, k / nx / ny);
+        const Eigen::Vector3d at = Eigen::Vector3i(k % nx, k / nx % ny, k / nx / ny).cast<double>();
         sim::WorldBody copy = body;
         copy.name = fmt::format("{}/{}", body.name, k);
         Eigen::Vector3d away;

@@ -242,7 +242,13 @@ void check(const SimulateOptions& options, const Scene& scene) {
 SimulateResult simulate(const SimulateOptions& options) {
     const Scene scene = read_scene(options.scene, options.dt_s);
     check(options, scene);
-    return Run(options, scene).run();
+    std::unique_ptr<Run> run;
+    try {
+        run = std::make_unique<Run>(options, scene);
+    } catch (const std::invalid_argument& wrong) {  // what no single key shows
+        throw BadInput(fmt::format("{}: error: {}", scene.file.string(), wrong.what()));
+    }
+    return run->run();
 }
 
 }  // namespace app

@@ -56,16 +56,32 @@ void set_polynomials(BodyKind& kind) {
     }
 }
 
-// Largest |d phi_k / dr| (Frobenius) over a 5 x 5 x 5 grid of the box.
-void set_gradient_bounds(BodyKind& kind) {
+std::vector<Eigen::Vector3d> probes_of(const BodyKind& kind) {
+    std::vector<Eigen::Vector3d> probes = {Eigen::Vector3d::Zero()};
+    for (int n = 0; n < 27; ++n) {
+        if (n == 13) continue;
+        const Eigen::Vector3d way(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+        const Eigen::Vector3d top =
+            kind.surface.base().onto_surface(way.cwiseProduct(kind.definition.shape.base.semi_axes));
+        probes.push_back(top), probes.push_back(top / 2);
+    }
+    probes.resize(kProbes, probes.front());
+    return probes;
+}
+
+void set_gradients(BodyKind& kind) {
+    const std::vector<Eigen::Vector3d> probes = probes_of(kind);
+    kind.gradients.resize(static_cast<std::size_t>(kind.modes) * 9 * kProbes);
     kind.gradient_bound = Eigen::VectorXd::Zero(kind.modes);
     for (int mode = 0; mode < kind.modes; ++mode) {
         const Eigen::VectorXd nodal = kind.basis.nodal.col(mode);
-        for (int n = 0; n < 125; ++n) {
-            const Eigen::Vector3d xi(n % 5 / 2.0 - 1, n / 5 % 5 / 2.0 - 1, n / 25 / 2.0 - 1);
-            const Displacement u =
-                displacement_at(kind.basis, nodal, kind.basis.half_extents.cwiseProduct(xi));
-            kind.gradient_bound[mode] = std::max(kind.gradient_bound[mode], u.gradient.norm());
+        for (std::size_t p = 0; p < kProbes; ++p) {
+            const Eigen::Matrix3d g = displacement_at(kind.basis, nodal, probes[p]).gradient;
+            kind.gradient_bound[mode] = std::max(kind.gradient_bound[mode], g.norm());
+            for (int e = 0; e < 9; ++e)
+                kind.gradients
+                    .data()[(static_cast<std::size_t>(mode) * 9 + static_cast<std::size_t>(e)) * kProbes +
+                            p] = static_cast<float>(g(e / 3, e % 3));
         }
     }
 }
@@ -141,7 +157,7 @@ BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
     set_samples(kind);
     if (kind.modes > 0) {
         set_polynomials(kind);
-        set_gradient_bounds(kind);
+        set_gradients(kind);
     }
     return kind;
 }

@@ -21,6 +21,8 @@ struct HeldStep {
 [[nodiscard]] HeldStep held_step(double omega, double sigma, double tau) noexcept;
 
 /// What bodies of one shape, material, fidelity and sampling share; computed once.
+constexpr int kProbes = 56;  // 53 in whole lanes, the rest copies
+
 struct BodyKind {
     WorldBody definition;  ///< of the first such body; pose and velocities are not used
     FidelityChoice choice;
@@ -28,7 +30,7 @@ struct BodyKind {
     RigidMass mass;
     ModalBasis basis;
     Eigen::VectorXd sigma;                 ///< decay rates [1/s]
-    Eigen::VectorXd gradient_bound;        ///< largest |d phi_k / dr| over a grid of the box
+    Eigen::VectorXd gradient_bound;        ///< largest |d phi_k / dr| (Frobenius) over the probes
     std::vector<HeldStep> substep, whole;  ///< for a substep, for a step
     Eigen::Vector3d half_box;              ///< of the rest surface, bumps included [m]
     double bounding_radius = 0;            ///< [m]
@@ -40,8 +42,11 @@ struct BodyKind {
     LaneArray shapes = {};                 ///< phi at samples: [mode][axis][8 batches]
     LaneArray sample_shapes = {};          ///< phi at samples: [sample][axis][mode_width]
     LaneArray root_compliance = {};        ///< of a substep: [mode_width]
-    LaneArray polynomials = {};            ///< phi's coefficients: [brick][27][axis][mode_width]
-    int bricks = 1;                        ///< a side
+    /// d phi / dr at 53 points of the body, the probes: centre, and the surface in 26 directions and half-way
+    /// to it: [mode][3 i + j][kProbes].
+    LaneArray gradients = {};
+    LaneArray polynomials = {};  ///< phi's coefficients: [brick][27][axis][mode_width]
+    int bricks = 1;              ///< a side
 
     [[nodiscard]] bool linear() const noexcept { return choice.fidelity == Fidelity::linear; }
     /// phi at a rest point, [axis][mode_width] floats.

@@ -63,8 +63,8 @@ Eigen::VectorXd discretisation_errors(const ModesRequest& request, const FreeVib
             errors[i] = std::numeric_limits<double>::quiet_NaN();
             continue;
         }
-        const double limit = coarse - share * (coarse - fine[p][next[p]++]);
-        errors[i] = std::sqrt(coarse / limit) - 1;
+        const double finer = fine[p][next[p]++], limit = coarse - share * (coarse - finer);
+        errors[i] = std::abs(std::sqrt(coarse / (limit > 0.5 * finer ? limit : finer)) - 1);
     }
     return errors;
 }

@@ -5,17 +5,24 @@
 namespace sim {
 namespace {
 
-// Largest |du/dr| over the grid, from the nodal displacement.
+// Largest |du/dr| over the probes.
 double largest_gradient(const MovingBody& body) {
-    const ModalBasis& basis = body.kind->basis;
-    const Eigen::VectorXd nodal = basis.nodal * body.state.q;
-    double largest = 0;
-    for (int n = 0; n < 125; ++n) {
-        const Eigen::Vector3d xi(n % 5 / 2.0 - 1, n / 5 % 5 / 2.0 - 1, n / 25 / 2.0 - 1);
-        largest = std::max(
-            largest, displacement_at(basis, nodal, basis.half_extents.cwiseProduct(xi)).gradient.norm());
+    const BodyKind& kind = *body.kind;
+    Lanes largest = lanes_of(0);
+    for (int p = 0; p < kProbes; p += kLanes) {
+        Lanes square = lanes_of(0);
+        for (int e = 0; e < 9; ++e) {
+            Lanes sum = lanes_of(0);
+            for (int k = 0; k < kind.modes; ++k)
+                sum += static_cast<float>(body.state.q[k]) *
+                       load_lanes(kind.gradients.data() + (k * 9 + e) * kProbes + p);
+            square += sum * sum;
+        }
+        largest = square > largest ? square : largest;
     }
-    return largest;
+    float top = 0;
+    for (int lane = 0; lane < kLanes; ++lane) top = std::max(top, largest[lane]);
+    return std::sqrt(top);
 }
 
 }  // namespace

@@ -41,8 +41,8 @@ void move_freely(MovingBody& body, const WorldSettings& settings);
 
 /// Brings a deformation that goes beyond the limit back to it: all coordinates are scaled, and the rates lose
 /// what pointed outwards, so neither elastic nor kinetic energy rises. The limit: |du/dr| (Frobenius) at most
-/// 0.5 at the points of a 5 x 5 x 5 grid, so D's singular values lie within 0.5 to 1.5 there and it has an
-/// inverse. Returns whether it acted.
+/// 0.5 at the 53 probes of the body (body_kind.h), so D's singular values lie within 0.5 to 1.5 there and it
+/// has an inverse. Returns whether it acted.
 bool limit_deformation(MovingBody& body);
 constexpr double kGradientLimit = 0.5;
 

@@ -121,11 +121,12 @@ void add_edges_and_corners(SurfaceMesh& mesh, const GeneralizedSuperquadric& sha
                            int meridians) {
     if (std::min(gauge.e1(), gauge.e2()) >= kFlatExponent) return;
     for (int k = 0; k < 27; ++k) {
-        const Vector3d d(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+        const Vector3d d = Eigen::Vector3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1).cast<double>();
         if (d != Vector3d::Zero()) add_feature(mesh, shape, gauge, prism_border(gauge, d.x(), d.y(), d.z()));
     }
     for (int k = 0; gauge.e2() >= kFlatExponent && k < 2 * meridians; ++k) {  // the rims of a drum
-        const double phi = 2 * std::numbers::pi * (k / 2) / meridians;
+        const int meridian = k / 2;
+        const double phi = 2 * std::numbers::pi * meridian / meridians;
         add_feature(mesh, shape, gauge, prism_border(gauge, std::cos(phi), k % 2 ? -1 : 1, std::sin(phi)));
     }
 }

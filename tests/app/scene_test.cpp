@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <random>
 
 #include "kit.h"
 #include "written_scene.h"
@@ -191,7 +192,8 @@ TEST(Scene, WrongOnesAreRefusedAtTheirPlaceInOneLine) {
         {"[material.x]\npoisson = 0.5\n" + kBall, ":2:11:", "to 0.495"},
         {"[[body]]\nname = \"a\"\nradius = 1\nfidelity = \"best\"\n", ":4:12:", "one of rigid"},
         {kBall + "bumps = [ { direction = [0, 0, 0], height = 0.1 } ]\n", ":4:25:", "a direction"},
-        {kBall + "bumps = [ { direction = [0, 1, 0], height = 9 } ]\n", ":4:45:", "to 2"},
+        {kBall + "bumps = [ { direction = [0, 1, 0], height = 9 } ]\n", ":4:45:", "to 1"},
+        {kBall + "modes = 76\n", ":4:9:", "at most 75"},
         {kBall + "triangles = 47\n", ":4:13:", "48"},
         {kBall + "grid = { count = [101, 100, 1], step = [1, 1, 1] }\n", ":4:18:", "10000"},
         {kBall + "grid = { count = [1.5, 1, 1], step = [1, 1, 1] }\n", ":4:18:", "not whole"},
@@ -229,6 +231,41 @@ TEST(Scene, WrongOnesAreRefusedAtTheirPlaceInOneLine) {
         EXPECT_NE(refusal.find(wrong.words), std::string::npos) << wrong.text << refusal;
         EXPECT_EQ(refusal.find('\n'), std::string::npos) << refusal;
     }
+}
+
+TEST(Scene, TwoThousandMutatedOnesAreRefusedInOneLineOrMakeAWorld) {
+    const std::string good =
+        kTwo +
+        "material = \"m\"\nfidelity = \"rigid\"\nbumps = [ { direction = [0, 1, 0], height = 0.1 } ]\n"
+        "grid = { count = [2, 1, 1], step = [2, 0, 0] }\n[material.m]\nyoung_pa = 1e5\n[defaults]\n"
+        "fidelity = \"rigid\"\n[settings]\ndt = \"1/60\"\n[box]\nsize = [9, 9]\n[[constraint]]\n"
+        "name = \"c\"\nbody = \"a\"\nto = \"b/1\"\n[[event]]\ntime = 1\ndelete = [\"c\"]\n";
+    ASSERT_EQ(WrittenScene(good).refusal(), "");
+    constexpr std::string_view kSnippets[] = {
+        "[",       "]",    "{", "}", "=",      "\"", "\n", "nan", "-1e308", "[[body]]", "9999999999",
+        "\\u0000", "\x80", "'", "0", "1e-300", ",",  ".",  "#",   "inf",    "-"};
+    std::mt19937 random(20260101);
+    int refused = 0;
+    for (int i = 0; i < 2000; ++i) {
+        std::string text = good;
+        const std::size_t at = random() % text.size();
+        if (i % 3 == 0) text[at] = static_cast<char>(random() % 256);
+        if (i % 3 == 1) text.erase(at, 1 + random() % 12);
+        if (i % 3 == 2) text.insert(at, kSnippets[random() % std::size(kSnippets)]);
+        const WrittenScene written(text);
+        try {
+            const Scene scene = written.read();
+            const sim::World world(scene.world);
+        } catch (const BadInput& wrong) {
+            ++refused;
+            const std::string what = wrong.what();
+            EXPECT_TRUE(what.starts_with(written.file().string() + ":")) << what;
+            EXPECT_NE(what.find("expected "), std::string::npos) << what;
+            EXPECT_EQ(what.find('\n'), std::string::npos) << what;
+        }
+    }
+    EXPECT_GT(refused, 1000);
+    EXPECT_LT(refused, 2000);
 }
 
 Scene bundled(const std::string& name) {

@@ -92,6 +92,20 @@ TEST(Modes, EstimatedErrorOfASphereLeadsToLambsFrequency) {
     }
 }
 
+TEST(Modes, FramesDrawsAPictureAModeAndAllOfThemInOne) {
+    const Folder folder;
+    const std::string out = (folder / "out").string();
+    const Ended ended = run(modes_of("1,2,3", {"--count", "4", "--frames", "--out", out, "--json"}));
+    ASSERT_EQ(ended.status, 0) << ended.err;
+    EXPECT_EQ(ended.out, read(folder / "out/modes.json"));
+    EXPECT_TRUE(std::filesystem::exists(folder / "out/modes.png"));
+    const auto pictures = read_tree(folder / "out/frames", {});
+    ASSERT_EQ(pictures.size(), 4U);
+    for (const char* name : {"000001.png", "000002.png", "000003.png", "000004.png"})
+        EXPECT_GT(pictures.at(name).size(), 10000U) << name;
+    EXPECT_NE(pictures.at("000001.png"), pictures.at("000002.png"));
+}
+
 TEST(Modes, BadInputIsRefusedInOneLine) {
     const std::vector<std::vector<std::string>> cases = {
         modes_of("1,1", {}),
@@ -108,6 +122,7 @@ TEST(Modes, BadInputIsRefusedInOneLine) {
         modes_of("1,1,1", {"--elements", "11"}),
         modes_of("1,1,1", {"--elements", "1.5"}),
         modes_of("1,1,1", {"--count", "0"}),
+        modes_of("1,1,1", {"--frames"}),
         modes_of("1,1,1", {"--count", "1000000000000"}),
         {"modes", "--size", "1,1,1"},
         {"modes", "--size", "1,1,1", "--young", "0", "--poisson", "0.3", "--density", "1"},

@@ -117,7 +117,7 @@ TEST(World, DeformationDrivenToInversionIsHeldAtTheLimitWithoutGainOfEnergy) {
                 energy = world.energy().elastic + world.energy().kinetic;
                 const Eigen::VectorXd nodal = world.basis(0).nodal * now.q;
                 for (const Eigen::Vector3d& r : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.5, 0, 0),
-                                                 Eigen::Vector3d(0.25, -0.5, 0.5)}) {
+                                                 Eigen::Vector3d(0.2, -0.3, 0.3)}) {
                     const Eigen::Matrix3d f =
                         Eigen::Matrix3d::Identity() + sim::displacement_at(world.basis(0), nodal, r).gradient;
                     ASSERT_GT(f.determinant(), 0.1) << "mode " << mode << " step " << k;

@@ -61,10 +61,12 @@ struct FreeVibrationModes {
 
 /// Elements a side of the mesh that discretisation_errors compares with.
 [[nodiscard]] int finer_elements(int elements) noexcept;
-/// Estimated relative error of each frequency by the mesh, omega / omega_exact - 1: Richardson's
+/// Estimated relative error of each frequency by the mesh, |omega / omega_exact - 1|: Richardson's
 /// extrapolation with a finer mesh (two more elements a side, twice as many for 3; `elements` is 10 at most),
 /// eigenvalues' errors taken to fall at order 4; modes are matched by parity class and their order within it.
-/// NaN where the counterpart lies beyond the finer mesh's 300 lowest modes. Costs the finer mesh's solution.
+/// Where that would take away half of the finer eigenvalue or more (a mode that the mesh cannot show at all),
+/// the finer one itself is taken for exact, so the error is at least that. NaN where the counterpart lies
+/// beyond the finer mesh's 300 lowest modes. Costs the finer mesh's solution.
 [[nodiscard]] Eigen::VectorXd discretisation_errors(const ModesRequest& request,
                                                     const FreeVibrationModes& modes);
 
