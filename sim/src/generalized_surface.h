@@ -17,7 +17,7 @@ namespace sim {
 ///   d1 = d(r + d0 (1, 0.8, 0.6) signs of r)   if an exponent is above 1: beside the ridges; unequal, or ties
 ///                                             of two faces would stay ties
 ///   d2 = d(r + d n)                           the foot by the best of these
-/// is taken. Against the true depth, at 5 % of the smallest semi-axis: within 4 % for exponents to 1, 7 % to
+/// is taken. Against the true depth, at 5 % of the smallest semi-axis: within 4 % for exponents to 1, 8 % to
 /// 1.9; shallower, by ridges, 17 %. Outside d0, a lower bound, is returned.
 ///
 /// Bumps move the surface along its normal by h(p): f = distance(r) - h(p), p = r - distance n the foot,
