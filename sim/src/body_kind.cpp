@@ -141,6 +141,8 @@ BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
                   Eigen::Vector3d::Zero()};
     kind.modes = kind.basis.count();
     kind.choice.modes = kind.modes;
+    kind.step_drag = std::exp(-body.damping_alpha * settings.dt);
+    kind.substep_drag = std::exp(-body.damping_alpha * settings.dt / settings.substeps);
     kind.mode_width = whole_lanes(kind.modes);
     kind.width = 8 + kind.mode_width;
     kind.root_compliance.resize(kind.mode_width);

@@ -29,19 +29,20 @@ struct BodyKind {
     GeneralizedSurface surface;
     RigidMass mass;
     ModalBasis basis;
-    Eigen::VectorXd sigma;                 ///< decay rates [1/s]
-    Eigen::VectorXd gradient_bound;        ///< largest |d phi_k / dr| (Frobenius) over the probes
-    std::vector<HeldStep> substep, whole;  ///< for a substep, for a step
-    Eigen::Vector3d half_box;              ///< of the rest surface, bumps included [m]
-    double bounding_radius = 0;            ///< [m]
-    int modes = 0, width = 8;              ///< width: floats of a Jacobian's row, 8 + mode_width
-    int mode_width = 0;                    ///< modes, whole lanes
-    bool ellipsoid = false;                ///< e1 = e2 = 1 without bumps: gauge in closed form
-    int samples = 0, batches = 0;          ///< batches of eight samples
-    LaneArray rest = {};                   ///< samples: [axis][8 batches]
-    LaneArray shapes = {};                 ///< phi at samples: [mode][axis][8 batches]
-    LaneArray sample_shapes = {};          ///< phi at samples: [sample][axis][mode_width]
-    LaneArray root_compliance = {};        ///< of a substep: [mode_width]
+    Eigen::VectorXd sigma;                   ///< decay rates [1/s]
+    Eigen::VectorXd gradient_bound;          ///< largest |d phi_k / dr| (Frobenius) over the probes
+    std::vector<HeldStep> substep, whole;    ///< for a substep, for a step
+    Eigen::Vector3d half_box;                ///< of the rest surface, bumps included [m]
+    double bounding_radius = 0;              ///< [m]
+    double substep_drag = 1, step_drag = 1;  ///< e^(-alpha tau): what damping_alpha leaves of rigid motion
+    int modes = 0, width = 8;                ///< width: floats of a Jacobian's row, 8 + mode_width
+    int mode_width = 0;                      ///< modes, whole lanes
+    bool ellipsoid = false;                  ///< e1 = e2 = 1 without bumps: gauge in closed form
+    int samples = 0, batches = 0;            ///< batches of eight samples
+    LaneArray rest = {};                     ///< samples: [axis][8 batches]
+    LaneArray shapes = {};                   ///< phi at samples: [mode][axis][8 batches]
+    LaneArray sample_shapes = {};            ///< phi at samples: [sample][axis][mode_width]
+    LaneArray root_compliance = {};          ///< of a substep: [mode_width]
     /// d phi / dr at 53 points of the body, the probes: centre, and the surface in 26 directions and half-way
     /// to it: [mode][3 i + j][kProbes].
     LaneArray gradients = {};

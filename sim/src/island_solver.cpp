@@ -69,6 +69,7 @@ void IslandSolver::solve(const Island& island) {
     begin(island);
     for (int i = 0; i < settings_->substeps; ++i) substep(i + 1 == settings_->substeps);
     keep_impulses();
+    for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
 }
 
 void IslandSolver::begin(const Island& island) {
@@ -86,7 +87,7 @@ void IslandSolver::begin(const Island& island) {
     for (const int id : island.bodies) {
         MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
         local_[static_cast<std::size_t>(id)] = static_cast<int>(rows_of_.size());
-        rows_of_.push_back({&body, offset, body.kind->width, body.state.position});
+        rows_of_.push_back({&body, offset, body.kind->width, body.state.position, body.posed.rotation});
         offset += static_cast<std::uint32_t>(body.kind->width);
     }
     y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
@@ -115,7 +116,6 @@ void IslandSolver::begin(const Island& island) {
     for (const Turn& turn : in_turns(island))
         add_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
     for (const int c : island.constraints) add_spring((*constraints_)[static_cast<std::size_t>(c)]);
-    for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
 }
 
 const std::vector<IslandSolver::Turn>& IslandSolver::in_turns(const Island& island) {
@@ -167,17 +167,23 @@ IslandSolver::Place IslandSolver::place(int body, const Eigen::Vector3f& arm, in
     return {local(body), arm, scratch};
 }
 
-std::uint32_t IslandSolver::add_rows(const Place& place, const Eigen::Matrix3f& directions, float sign) {
+std::uint32_t IslandSolver::reserve_rows(int body) {
     const std::uint32_t offset = static_cast<std::uint32_t>(jacobians_used_);
-    if (place.body < 0) return offset;
+    if (body >= 0)
+        jacobians_used_ += 3 * static_cast<std::size_t>(rows_of_[static_cast<std::size_t>(body)].width);
+    return offset;
+}
+
+void IslandSolver::write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign,
+                              std::uint32_t offset) {
+    if (place.body < 0) return;
     const BodyRows& rows = rows_of_[static_cast<std::size_t>(place.body)];
     const BodyKind& kind = *rows.body->kind;
-    const Eigen::Matrix3f body_from_world = rows.body->posed.rotation.transpose().cast<float>();
+    const Eigen::Matrix3f body_from_world = rows.frame.transpose().cast<float>();
     const Eigen::Vector3f root_inertia = kind.mass.inertia.cwiseSqrt().cwiseInverse().cast<float>();
     const float root_mass = static_cast<float>(1 / std::sqrt(kind.mass.mass));
     for (int r = 0; r < 3; ++r) {
-        float* out = jacobians_.data() + jacobians_used_;
-        jacobians_used_ += static_cast<std::size_t>(rows.width);
+        float* out = jacobians_.data() + offset + r * rows.width;
         const Eigen::Vector3f world = sign * directions.row(r).transpose();
         const Eigen::Vector3f turn = (body_from_world * place.arm.cross(world)).cwiseProduct(root_inertia);
         for (int i = 0; i < 3; ++i) out[i] = root_mass * world[i], out[3 + i] = turn[i];
@@ -191,7 +197,6 @@ std::uint32_t IslandSolver::add_rows(const Place& place, const Eigen::Matrix3f& 
                                           own.y() * load_lanes(place.shapes + width + k) +
                                           own.z() * load_lanes(place.shapes + 2 * width + k)));
     }
-    return offset;
 }
 
 void IslandSolver::finish_rows(Rows& rows) {
@@ -211,15 +216,17 @@ void IslandSolver::finish_rows(Rows& rows) {
 
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     alignas(32) float scratch[2][3 * 128];
-    ContactRows c;
+    ContactRows c{};
     const Place a = place(manifold.a, point.arm_a, point.sample_a, point.rest, scratch[0]);
     const Place b = place(manifold.b, point.arm_b, point.sample_b, point.rest, scratch[1]);
     set_tangents(point.normal, c.tangent);
     Eigen::Matrix3f directions;
     directions << point.normal.transpose(), c.tangent[0].transpose(), c.tangent[1].transpose();
     c.a = a.body, c.b = b.body;
-    c.offset_a = add_rows(a, directions, 1);
-    c.offset_b = add_rows(b, directions, -1);
+    c.offset_a = reserve_rows(c.a);
+    write_rows(a, directions, 1, c.offset_a);
+    c.offset_b = reserve_rows(c.b);
+    write_rows(b, directions, -1, c.offset_b);
     finish_rows(c);
     c.point = &point;
     c.place = (*bodies_)[static_cast<std::size_t>(manifold.a)].posed.position + point.arm_a.cast<double>();
@@ -240,28 +247,43 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
 
 void IslandSolver::add_spring(HeldConstraint& constraint) {
     const PointConstraint& held = constraint.definition;
-    alignas(32) float scratch[2][3 * 128];
-    auto arm_of = [this](int body, const Eigen::Vector3d& rest) -> Eigen::Vector3d {
-        const PosedBody& posed = (*bodies_)[static_cast<std::size_t>(body)].posed;
-        return posed.rotation * posed.deformed(rest);
-    };
-    const Eigen::Vector3d arm_a = arm_of(held.body_a, held.point_a);
-    const Eigen::Vector3d place_a = (*bodies_)[static_cast<std::size_t>(held.body_a)].posed.position + arm_a;
-    Eigen::Vector3d arm_b = Eigen::Vector3d::Zero(), place_b = held.point_b;
-    if (held.body_b >= 0) {
-        arm_b = arm_of(held.body_b, held.point_b);
-        place_b = (*bodies_)[static_cast<std::size_t>(held.body_b)].posed.position + arm_b;
-    }
-    SpringRows s;
-    const Place a = place(held.body_a, arm_a.cast<float>(), -1, held.point_a.cast<float>(), scratch[0]);
-    const Place b = place(held.body_b, arm_b.cast<float>(), -1, held.point_b.cast<float>(), scratch[1]);
-    const Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();
-    s.a = a.body, s.b = b.body;
-    s.offset_a = add_rows(a, axes, 1);
-    s.offset_b = add_rows(b, axes, -1);
-    finish_rows(s);
+    SpringRows s{};
+    s.place.setZero();
+    auto local_of = [this](int body) { return body >= 0 ? local(body) : -1; };
+    s.a = local_of(held.body_a), s.b = local_of(held.body_b);
+    s.offset_a = reserve_rows(s.a);
+    s.offset_b = reserve_rows(s.b);
     s.constraint = &constraint;
-    s.place = place_a + (place_b - place_a) / 2;
+    for (int i = 0; i < 3; ++i) s.impulse[i] = constraint.impulse[i];
+    springs_.push_back(s);
+}
+
+IslandSolver::End IslandSolver::end_of(int body, const Eigen::Vector3d& rest, float* shapes) const {
+    if (body < 0) return {rest, {-1, Eigen::Vector3f::Zero(), nullptr}};
+    const MovingBody& b = (*bodies_)[static_cast<std::size_t>(body)];
+    const BodyKind& kind = *b.kind;
+    Eigen::Vector3d point = rest;
+    if (kind.modes > 0) {
+        kind.shapes_at(rest.cast<float>(), shapes);
+        for (int axis = 0; axis < 3; ++axis)
+            for (int k = 0; k < kind.modes; ++k)
+                point[axis] += static_cast<double>(shapes[axis * kind.mode_width + k]) * b.state.q[k];
+    }
+    const Eigen::Vector3d arm = b.state.orientation * point;
+    return {b.state.position + arm, {local(body), arm.cast<float>(), kind.modes > 0 ? shapes : nullptr}};
+}
+
+// Springs act over large turns, so their arms and rows follow the bodies every substep.
+void IslandSolver::refresh(SpringRows& s) {
+    const PointConstraint& held = s.constraint->definition;
+    alignas(32) float scratch[2][3 * 128];
+    const End a = end_of(held.body_a, held.point_a, scratch[0]);
+    const End b = end_of(held.body_b, held.point_b, scratch[1]);
+    const Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();
+    write_rows(a.place, axes, 1, s.offset_a);
+    write_rows(b.place, axes, -1, s.offset_b);
+    finish_rows(s);
+    s.place = (a.point + b.point) / 2;
     const double mass = 3.0 / (s.k[0][0] + s.k[1][1] + s.k[2][2]), k = held.stiffness;
     const double damping = 2 * held.damping_ratio * std::sqrt(k * mass), firm = damping + h_ * k;
     s.gamma = static_cast<float>(1 / (h_ * firm));
@@ -270,17 +292,16 @@ void IslandSolver::add_spring(HeldConstraint& constraint) {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) soft(i, j) = s.k[i][j] + (i == j ? s.gamma : 0);
     const Eigen::Matrix3d inverse = soft.inverse();
-    const Eigen::Vector3d error = place_a - place_b;
+    const Eigen::Vector3d error = a.point - b.point;
     for (int i = 0; i < 3; ++i) {
-        s.error[i] = s.now[i] = static_cast<float>(error[i]);
-        s.impulse[i] = constraint.impulse[i];
+        s.error[i] = static_cast<float>(error[i]);
         for (int j = 0; j < 3; ++j) s.inverse[i][j] = static_cast<float>(inverse(i, j));
     }
-    springs_.push_back(s);
 }
 
 void IslandSolver::substep(bool last) {
     load_velocities();
+    for (SpringRows& spring : springs_) refresh(spring);
     warm_start();
     sweep(Push::soft);
     push_out();
@@ -294,8 +315,9 @@ void IslandSolver::load_velocities() {
         const MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
         const WorldBodyState& s = body.state;
-        const Eigen::Matrix3d& frame = body.posed.rotation;
         rows.place = s.position;
+        if (contacts_.empty()) rows.frame = s.orientation.toRotationMatrix();
+        const Eigen::Matrix3d& frame = rows.frame;
         Eigen::Vector3d velocity = s.velocity + h_ * body.gravity_scale * settings_->gravity;
         Eigen::Vector3d momentum = s.angular_momentum;
         if (body.pushed) {
@@ -346,13 +368,11 @@ void IslandSolver::warm_start() {
         }
     }
     for (SpringRows& s : springs_) {
-        for (int i = 0; i < 3; ++i) s.now[i] = s.error[i];
         for (const bool side : {false, true}) {
             const int body = side ? s.b : s.a;
             if (body < 0) continue;
             const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
             const float* d = jacobians_.data() + (side ? s.offset_b : s.offset_a);
-            dot_rows(d, moved_.data() + rows.offset, rows.width, s.now);
             add_rows_to(d, s.impulse, rows.width, y_.data() + rows.offset);
         }
     }
@@ -391,7 +411,7 @@ void IslandSolver::solve_spring(SpringRows& s) {
         dot_rows(jacobians_.data() + (side ? s.offset_b : s.offset_a), y_.data() + rows.offset, rows.width,
                  v);
     }
-    for (int i = 0; i < 3; ++i) v[i] += s.pull * s.now[i] + s.gamma * s.impulse[i];
+    for (int i = 0; i < 3; ++i) v[i] += s.pull * s.error[i] + s.gamma * s.impulse[i];
     float p[3];
     for (int i = 0; i < 3; ++i) {
         p[i] = -(s.inverse[i][0] * v[0] + s.inverse[i][1] * v[1] + s.inverse[i][2] * v[2]);
@@ -488,7 +508,7 @@ void IslandSolver::move() {
         s.position += h_ / root_mass * Eigen::Vector3d(y[0], y[1], y[2]);
         Eigen::Vector3d change;
         for (int i = 0; i < 3; ++i) change[i] = std::sqrt(kind.mass.inertia[i]) * (y[3 + i] - start[3 + i]);
-        Eigen::Vector3d momentum = s.angular_momentum + body.posed.rotation * change;
+        Eigen::Vector3d momentum = s.angular_momentum + rows.frame * change;
         if (body.pushed) momentum += h_ * body.torque;
         s.orientation = body.substep_rotation.advance(s.orientation, momentum);
     }
@@ -523,6 +543,7 @@ void IslandSolver::finish() {
         const float* start = start_.data() + rows.offset;
         WorldBodyState& s = body.state;
         s.velocity += h_ * body.gravity_scale * settings_->gravity;
+        s.velocity *= kind.substep_drag, s.angular_momentum *= kind.substep_drag;
         if (body.pushed) {
             s.velocity += h_ / kind.mass.mass * body.force;
             s.angular_momentum += h_ * body.torque;

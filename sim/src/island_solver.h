@@ -36,7 +36,9 @@ struct Island {
 /// inverse mass: D = J M^-1/2, floats in whole lanes, (n, R^T(r x n) / sqrt(I), sqrt(w) phi(r)^T R^T n). So
 /// the same row takes velocities out and puts impulses in. The three rows of a point are read together, with
 /// K = D D^T between them; friction is a 2 x 2 block limited to the cone. Separations move along with the
-/// rows: s = s0 + D . integral of y. Everything is frozen over the step but velocities and separations.
+/// rows: s = s0 + D . integral of y. Contacts are frozen over the step but for velocities and separations;
+/// the rows of springs follow the bodies every substep, as does the frame of angular rows where there is no
+/// contact.
 ///
 /// Deterministic: sweeps go over springs, then contacts, in the order of ids (see in_turns). No allocation
 /// once the buffers have grown.
@@ -61,6 +63,7 @@ private:
         std::uint32_t offset;  // of y, start, moved
         int width;
         Eigen::Vector3d place;  // of the centre, at the start of the substep
+        Eigen::Matrix3d frame;  // body to world, in which angular rows are written
     };
     /// Where a row triple lies and whom it joins.
     struct Rows {
@@ -80,7 +83,7 @@ private:
     };
     struct SpringRows : Rows {
         HeldConstraint* constraint;
-        float error[3], now[3];
+        float error[3];
         float inverse[3][3];  // of K + gamma
         float gamma, pull;    // pull: bias speed per error [1/s]
         float impulse[3], kept[3];
@@ -107,9 +110,17 @@ private:
     const std::vector<Turn>& in_turns(const Island& island);
     void add_contact(Manifold& manifold, ManifoldPoint& point);
     void add_spring(HeldConstraint& constraint);
+    /// An end of a spring, now.
+    struct End {
+        Eigen::Vector3d point;  // world
+        Place place;
+    };
+    [[nodiscard]] End end_of(int body, const Eigen::Vector3d& rest, float* shapes) const;
+    void refresh(SpringRows& spring);
     [[nodiscard]] Place place(int body, const Eigen::Vector3f& arm, int sample, const Eigen::Vector3f& rest,
                               float* scratch);
-    std::uint32_t add_rows(const Place& place, const Eigen::Matrix3f& directions, float sign);
+    std::uint32_t reserve_rows(int body);
+    void write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign, std::uint32_t offset);
     void finish_rows(Rows& rows);
     [[nodiscard]] int local(int body) const noexcept { return local_[static_cast<std::size_t>(body)]; }
 

@@ -32,12 +32,23 @@ void move_freely(MovingBody& body, const WorldSettings& settings) {
     const double dt = settings.dt;
     Eigen::Vector3d acceleration = body.gravity_scale * settings.gravity;
     if (body.pushed) acceleration += body.force / body.kind->mass.mass;
-    s.position += dt * s.velocity + dt * dt / 2 * acceleration;
-    s.velocity += dt * acceleration;
-    // Half the torque's impulse before the turn, half after it.
+    // v' = a - alpha v over dt, exactly: with alpha = 0 the parabola.
+    const double alpha = body.kind->definition.damping_alpha, drag = body.kind->step_drag;
+    if (alpha * dt < 1e-6) {
+        s.position += dt * s.velocity + dt * dt / 2 * acceleration;
+        s.velocity += dt * acceleration;
+    } else {
+        const Eigen::Vector3d terminal = acceleration / alpha;
+        s.position += dt * terminal + (1 - drag) / alpha * (s.velocity - terminal);
+        s.velocity = terminal + drag * (s.velocity - terminal);
+    }
+    // Half the torque's impulse and of the drag before the turn, half after it.
+    const double half_drag = std::sqrt(drag);
+    s.angular_momentum *= half_drag;
     if (body.pushed) s.angular_momentum += dt / 2 * body.torque;
     s.orientation = body.step_rotation.advance(s.orientation, s.angular_momentum);
     if (body.pushed) s.angular_momentum += dt / 2 * body.torque;
+    s.angular_momentum *= half_drag;
     for (int k = 0; k < body.kind->modes; ++k) {
         const HeldStep& h = body.kind->whole[static_cast<std::size_t>(k)];
         const double held = body.pushed ? dt * body.modal_force[k] : 0;

@@ -134,3 +134,58 @@ TEST(WorldConstraint, APendulumSwingsWithItsClosedFormPeriodAndLosesLittle) {
     }
     EXPECT_NEAR((second_zero - first_zero) / period, 1, 2e-3);
 }
+
+TEST(WorldConstraint, ASwingingChainNeverGainsEnergy) {
+    sim::WorldDefinition definition;
+    definition.settings.sleeping = false;
+    for (int i = 0; i < 3; ++i) {
+        definition.bodies.push_back(ball({1.0 * i, 0, 0.1 * i}));
+        definition.bodies.back().shape.base.semi_axes = {0.5, 0.2, 0.3};
+        sim::PointConstraint link;
+        link.name = "link";
+        link.body_a = i;
+        link.point_a = {-0.5, 0, 0};
+        link.body_b = i - 1;
+        link.point_b = i == 0 ? Eigen::Vector3d(-0.5, 0, 0) : Eigen::Vector3d(0.5, 0, 0);
+        link.stiffness = 1e5;
+        definition.constraints.push_back(link);
+    }
+    sim::World world(definition);
+    const double start = world.energy().total(),
+                 swing = 3 * world.rigid_mass(0).mass * kG;  // J, a metre's fall
+    double lowest = start;
+    for (int k = 0; k < 6000; ++k) {
+        world.step();
+        const double energy = world.energy().total();
+        // A symplectic scheme's energy wavers with the step; it may not creep up.
+        ASSERT_LT(energy, lowest + 0.01 * swing) << "step " << k;
+        lowest = std::min(lowest, energy);
+    }
+}
+
+TEST(WorldConstraint, MassProportionalDampingBringsASwingToRest) {
+    sim::WorldDefinition definition;
+    definition.bodies.push_back(ball({1, 0, 0}));
+    definition.bodies[0].damping_alpha = 1;
+    definition.constraints.push_back(to_place(0, {-1, 0, 0}, {0, 0, 0}, 1e6));
+    definition.constraints[0].point_a = {-1, 0, 0};
+    sim::World world(definition);
+    int steps = 0;
+    while (!world.all_asleep() && steps < 3000) world.step(), ++steps;
+    EXPECT_TRUE(world.all_asleep());
+    EXPECT_NEAR(world.state(0).position.y(), -1, 1e-2) << "it hangs straight down";
+}
+
+TEST(World, AFallingBodyWithDragReachesItsTerminalSpeed) {
+    sim::WorldDefinition definition;
+    definition.bodies.push_back(ball({0, 0, 0}));
+    definition.bodies[0].damping_alpha = 2;
+    definition.bodies[0].angular_velocity = {1, 0, 0};
+    sim::World world(definition);
+    run(world, 60);
+    const double fall = kG / 2 * (1 - std::exp(-2.0));
+    EXPECT_NEAR(world.state(0).velocity.y(), -fall, 1e-12);
+    EXPECT_NEAR(world.state(0).position.y(), -(kG / 2 * 1 - fall / 2), 1e-12);
+    EXPECT_NEAR(world.state(0).angular_momentum.norm(), world.rigid_mass(0).inertia.x() * std::exp(-2.0),
+                1e-12);
+}

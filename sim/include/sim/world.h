@@ -41,8 +41,8 @@ struct WorldBody {
     std::string name;
     GeneralizedSuperquadric shape;
     Material material;
-    /// C = damping_alpha M + damping_beta K (2.1): sigma = (alpha + beta omega^2) / 2 a mode. Added to it:
-    /// damping_ratio omega.
+    /// C = damping_alpha M + damping_beta K (2.1): sigma = (alpha + beta omega^2) / 2 a mode, and rigid
+    /// motion decays as e^(-alpha t), as by drag. Added for the modes: damping_ratio omega.
     double damping_alpha = 0, damping_beta = 0, damping_ratio = 0.05;
     FidelityRequest fidelity;
     int triangles = 360;     ///< of the sampled surface
