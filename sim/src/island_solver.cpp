@@ -231,7 +231,9 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     c.point = &point;
     c.place = (*bodies_)[static_cast<std::size_t>(manifold.a)].posed.position + point.arm_a.cast<double>();
     c.separation = c.now = point.separation;
-    c.friction = manifold.friction, c.restitution = manifold.restitution;
+    c.friction = manifold.friction;
+    // Only what comes together rebounds, not what rests and rings.
+    c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
     c.approach = 0, c.largest = 0;
     c.emerging = manifold.emerging;
     c.inverse_normal = 1 / c.k[0][0];
