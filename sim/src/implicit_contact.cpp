@@ -30,18 +30,8 @@ Lanes within(Lanes a, float limit) {
     const Lanes high = lanes_of(limit), low = lanes_of(-limit);
     return a > high ? high : a < low ? low : a;
 }
-// A bit a lane.
-int bits(LaneMask mask) {
-#ifdef __AVX__
-    return _mm256_movemask_ps(reinterpret_cast<__m256>(mask));
-#else
-    int result = 0;
-    for (int i = 0; i < kLanes; ++i) result |= mask[i] ? 1 << i : 0;
-    return result;
-#endif
-}
 bool any(LaneMask mask) {
-    return bits(mask) != 0;
+    return bits_of(mask) != 0;
 }
 
 // Inverse of F = I + G, by cofactors.
@@ -91,9 +81,9 @@ struct SampleFinder::Approach {
         const Lanes a = load_lanes(centres), b = load_lanes(centres + stride),
                     c = load_lanes(centres + 2 * stride), r = radius + ball;
         for (int i = 0; i < 3; ++i) x[i] = turn(i, 0) * a + turn(i, 1) * b + turn(i, 2) * c + shift[i];
-        return static_cast<unsigned>(
-            bits((absolute(x[0]) < radius + box[0]) & (absolute(x[1]) < radius + box[1]) &
-                 (absolute(x[2]) < radius + box[2]) & (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] < r * r)));
+        return bits_of((absolute(x[0]) < radius + box[0]) & (absolute(x[1]) < radius + box[1]) &
+                       (absolute(x[2]) < radius + box[2]) &
+                       (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] < r * r));
     }
     [[nodiscard]] unsigned near(const float* centres, int stride, Lanes radius) const {
         Lanes x[3];
@@ -115,7 +105,7 @@ void SampleFinder::find(const PosedBody& sampled, const PosedBody& implicit, flo
                         batch.normal[2] * batch.normal[2]);
         const Lanes separation = batch.value / steep;
         const LaneMask central = !(steep > 1e-6f);
-        unsigned left = static_cast<unsigned>(bits((separation < margin) | central));
+        unsigned left = bits_of((separation < margin) | central);
         for (left &= (1u << batch.count) - 1; left != 0; left &= left - 1) {
             const int lane = std::countr_zero(left);
             SampleContact& contact = found.emplace_back();
