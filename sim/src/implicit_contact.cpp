@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "shape_polynomial.h"
 
@@ -33,6 +34,17 @@ Lanes within(Lanes a, float limit) {
 bool any(LaneMask mask) {
     return bits_of(mask) != 0;
 }
+
+// For each set of lanes, these first.
+struct Packing {
+    alignas(32) std::int32_t order[256][kLanes];
+    constexpr Packing() : order{} {
+        for (unsigned set = 0; set < 256; ++set)
+            for (int lane = 0, to = 0; lane < kLanes; ++lane)
+                if (set >> lane & 1) order[set][to++] = lane;
+    }
+};
+constexpr Packing kPacking;
 
 // Inverse of F = I + G, by cofactors.
 template <typename T>
@@ -85,18 +97,14 @@ struct SampleFinder::Approach {
                        (absolute(x[2]) < radius + box[2]) &
                        (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] < r * r));
     }
-    [[nodiscard]] unsigned near(const float* centres, int stride, Lanes radius) const {
-        Lanes x[3];
-        return near(centres, stride, radius, x);
-    }
 };
 
 void SampleFinder::find(const PosedBody& sampled, const PosedBody& implicit, float margin,
                         std::vector<SampleContact>& found) {
     gather(sampled, implicit, margin);
-    for (std::size_t first = 0; first < near_.size(); first += kLanes) {
+    for (std::size_t first = 0; first < near_count_; first += kLanes) {
         Batch batch;
-        batch.count = static_cast<int>(std::min<std::size_t>(kLanes, near_.size() - first));
+        batch.count = static_cast<int>(std::min<std::size_t>(kLanes, near_count_ - first));
         for (int i = 0; i < 3; ++i) batch.x[i] = load_lanes(near_place_.data() + i * capacity_ + first);
         invert(implicit, batch);
         measure(*implicit.kind, batch);
@@ -153,37 +161,39 @@ void SampleFinder::gather(const PosedBody& sampled, const PosedBody& implicit, f
     if (capacity_ < static_cast<std::size_t>(stride + kLanes)) {
         capacity_ = static_cast<std::size_t>(stride + kLanes);
         near_place_.resize(3 * capacity_);
-        near_.reserve(capacity_);
+        near_.resize(capacity_);
     }
-    near_.clear();
+    near_count_ = 0;
     const Eigen::Matrix3d into = implicit.rotation.transpose();
     const Approach approach{(into * sampled.rotation).cast<float>(),
                             (into * (sampled.position - implicit.position)).cast<float>(),
                             implicit.half_box.array() + margin, implicit.radius + margin};
-    const float* balls = kind.batch_balls.data();
+    const float *balls = kind.batch_balls.data(), *samples = sampled.sample_data();
+    Lanes x[3];
     for (int first = 0; first < width; first += kLanes) {
         const Lanes grown = load_lanes(balls + 3 * width + first) + sampled.sample_reach;
-        unsigned left = approach.near(balls + first, width, grown);
-        for (; left != 0; left &= left - 1) {
-            const int batch = first + std::countr_zero(left);
-            if (batch < kind.batches) gather_batch(sampled, batch * kLanes, approach);
+        for (unsigned left = approach.near(balls + first, width, grown, x); left != 0; left &= left - 1) {
+            const int at = kLanes * (first + std::countr_zero(left));
+            if (at >= stride) break;
+            const unsigned near = approach.near(samples + at, stride, lanes_of(0), x);
+            if (near != 0) keep(x, at, near & ((1U << std::min(kLanes, kind.samples - at)) - 1));
         }
     }
-    for (std::size_t pad = near_.size(); pad % kLanes != 0; ++pad)
+    for (std::size_t pad = near_count_; pad % kLanes != 0; ++pad)
         for (int i = 0; i < 3; ++i)
-            near_place_.data()[i * capacity_ + pad] = near_place_.data()[i * capacity_ + near_.size() - 1];
+            near_place_.data()[i * capacity_ + pad] = near_place_.data()[i * capacity_ + near_count_ - 1];
 }
 
-void SampleFinder::gather_batch(const PosedBody& sampled, int first, const Approach& approach) {
-    const int stride = sampled.kind->batches * kLanes, samples = sampled.kind->samples;
-    Lanes x[3];
-    unsigned left = approach.near(sampled.sample_data() + first, stride, lanes_of(0), x);
-    for (; left != 0; left &= left - 1) {
-        const int lane = std::countr_zero(left);
-        if (first + lane >= samples) break;
-        for (int i = 0; i < 3; ++i) near_place_.data()[i * capacity_ + near_.size()] = x[i][lane];
-        near_.push_back(first + lane);
+void SampleFinder::keep(const Lanes (&x)[3], int first, unsigned lanes) {
+    const LaneMask order = *reinterpret_cast<const LaneMask*>(kPacking.order[lanes]);
+    for (int i = 0; i < 3; ++i) {
+        const Lanes packed = __builtin_shuffle(x[i], order);
+        std::memcpy(near_place_.data() + static_cast<std::size_t>(i) * capacity_ + near_count_, &packed,
+                    sizeof(packed));
     }
+    const LaneMask samples = order + first;
+    std::memcpy(near_.data() + near_count_, &samples, sizeof(samples));
+    near_count_ += static_cast<std::size_t>(std::popcount(lanes));
 }
 
 void SampleFinder::invert(const PosedBody& implicit, Batch& batch) {
