@@ -65,10 +65,16 @@ private:
         Eigen::Vector3d place;  // of the centre, at the start of the substep
         Eigen::Matrix3d frame;  // body to world, in which angular rows are written
     };
-    /// Where a row triple lies and whom it joins.
+    /// One body's part of a row triple.
+    struct Side {
+        int body = -1;           // island-local, -1: does not move
+        int width = 0;           // of a row
+        std::uint32_t rows = 0;  // where they begin in jacobians_
+        std::uint32_t y = 0;     // where the body begins in y_, start_, moved_
+    };
+    /// A row triple and whom it joins.
     struct Rows {
-        int a = -1, b = -1;  // island-local, -1: does not move
-        std::uint32_t offset_a = 0, offset_b = 0;
+        Side side[2];
         float k[3][3];
         Eigen::Vector3d place;  // of the contact at the start of the step, world
     };
@@ -119,17 +125,19 @@ private:
     void refresh(SpringRows& spring);
     [[nodiscard]] Place place(int body, const Eigen::Vector3f& arm, int sample, const Eigen::Vector3f& rest,
                               float* scratch);
-    std::uint32_t reserve_rows(int body);
-    void write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign, std::uint32_t offset);
+    [[nodiscard]] Side reserve_rows(int body);
+    void write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign, const Side& side);
     void finish_rows(Rows& rows);
     [[nodiscard]] int local(int body) const noexcept { return local_[static_cast<std::size_t>(body)]; }
 
-    void substep(bool last);
+    void substep(bool first, bool last);
     void load_velocities();
-    void warm_start();
+    void warm_start(bool first);
     enum class Push { none, soft, all };
     void sweep(Push push);
     void push_out();
+    void speeds(const Rows& rows, float (&v)[3]) const;
+    void push_by(const Rows& rows, const float (&impulse)[3]);
     void solve_spring(SpringRows& spring);
     void solve_contact(ContactRows& contact, Push push);
     void restitute();

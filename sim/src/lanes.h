@@ -1,4 +1,6 @@
 #pragma once
+#include <immintrin.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -24,6 +26,15 @@ constexpr int kLanes = 8;
 }
 inline void store_lanes(float* aligned, Lanes value) noexcept {
     *reinterpret_cast<Lanes*>(aligned) = value;
+}
+/// a b + c, rounded once where the processor level has the instruction (written out, as the compiler is told
+/// not to contract by itself).
+[[nodiscard]] inline Lanes fused(Lanes a, Lanes b, Lanes c) noexcept {
+#ifdef __FMA__
+    return _mm256_fmadd_ps(a, b, c);
+#else
+    return a * b + c;
+#endif
 }
 /// Sum in a fixed order: ((0 + 4) + (2 + 6)) + ((1 + 5) + (3 + 7)).
 [[nodiscard]] inline float sum_of(Lanes v) noexcept {
