@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <limits>
 
 #include "world_bodies.h"
@@ -28,6 +29,12 @@ bool same(const sim::WorldBodyState& a, const sim::WorldBodyState& b) {
     return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs() &&
            a.velocity == b.velocity && a.angular_momentum == b.angular_momentum && a.q == b.q &&
            a.q_dot == b.q_dot;
+}
+
+long resident_pages() {
+    long all = 0, resident = 0;
+    std::ifstream("/proc/self/statm") >> all >> resident;
+    return resident;
 }
 
 bool long_run() {
@@ -145,7 +152,7 @@ TEST(World, SqueezedBetweenHugeForcesABodyStaysFiniteAndUninverted) {
     EXPECT_GT(world.counts().deformations_limited, 0u);
 }
 
-TEST(World, AtRestAwakeNothingDrifts) {
+TEST(World, AtRestAwakeNothingDriftsAndNoMemoryIsTaken) {
     // 1e7 steps in the long run, of which the last million must not have moved anything either.
     sim::WorldDefinition definition = pile(2, Fidelity::modal);
     definition.settings.sleeping = false;
@@ -154,12 +161,14 @@ TEST(World, AtRestAwakeNothingDrifts) {
     sim::World world(definition);
     run(world, 5000);
     const sim::WorldBodyState start = world.state(0);
+    const long pages = resident_pages();
     run(world, long_run() ? 10'000'000 : 100'000);
     const sim::WorldBodyState end = world.state(0);
     EXPECT_LT((end.position - start.position).norm(), 1e-6) << "m";
     EXPECT_LT(end.orientation.angularDistance(start.orientation), 1e-6) << "rad";
     EXPECT_LT((end.q - start.q).norm(), 1e-6);
     EXPECT_LT(end.velocity.norm(), 1e-6);
+    EXPECT_LT(resident_pages(), pages + 64) << "a quarter of a megabyte for whatever else the process does";
 }
 
 TEST(World, APileFallsAsleepKeepsItsBitsAndWakesAsAWholeWhenItIsTouched) {
@@ -206,6 +215,20 @@ TEST(World, AFreeModalBodyFliesItsParabolaTurnsFreelyAndRingsExactly) {
         const double z = 1e-3 * std::exp(-sigma * 2) * (std::cos(w * 2) + sigma / w * std::sin(w * 2));
         EXPECT_NEAR(world.state(0).q[k], z, 1e-14) << "mode " << k;
     }
+}
+
+TEST(World, AFallingBodyWithDragReachesItsTerminalSpeed) {
+    sim::WorldDefinition definition;
+    definition.bodies.push_back(ball({0, 0, 0}));
+    definition.bodies[0].damping_alpha = 2;
+    definition.bodies[0].angular_velocity = {1, 0, 0};
+    sim::World world(definition);
+    run(world, 60);
+    const double fall = 9.81 / 2 * (1 - std::exp(-2.0));
+    EXPECT_NEAR(world.state(0).velocity.y(), -fall, 1e-12);
+    EXPECT_NEAR(world.state(0).position.y(), -(9.81 / 2 * 1 - fall / 2), 1e-12);
+    EXPECT_NEAR(world.state(0).angular_momentum.norm(), world.rigid_mass(0).inertia.x() * std::exp(-2.0),
+                1e-12);
 }
 
 TEST(World, RefusesWhatMakesNoSenseByName) {
