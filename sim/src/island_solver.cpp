@@ -215,6 +215,24 @@ void IslandSolver::finish_rows(Rows& rows) {
         }
 }
 
+// A plastic impact by the impulse p takes p^2 K_rigid / 2 out of the rigid motion for good; what it gives to
+// the modes they keep. A rebound by e p puts e^2 p^2 (K_rigid + sum phi^2 g) / 2 back, where a mode takes up
+// g = (b / h)^2 + (omega h w)^2 per phi^2. The share that leaves the balance at e^2 is sqrt(K_rigid /
+// (K_rigid + sum phi^2 g)); 1 for rigid bodies.
+float IslandSolver::rebound_share(const Rows& rows) const {
+    float rigid = 0, modal = 0;
+    for (const Side& side : rows.side) {
+        if (side.body < 0) continue;
+        const float* d = jacobians_.data() + side.rows;
+        rigid += dot(d, d, 8);
+        const BodyKind& kind = *rows_of_[static_cast<std::size_t>(side.body)].body->kind;
+        for (int k = 0; k < kind.modes; ++k)
+            modal +=
+                d[8 + k] * d[8 + k] * static_cast<float>(kind.substep[static_cast<std::size_t>(k)].uptake);
+    }
+    return std::sqrt(rigid / (rigid + modal));
+}
+
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     alignas(32) float scratch[2][3 * 128];
     ContactRows c{};
@@ -229,7 +247,6 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     write_rows(b, directions, -1, c.side[1]);
     finish_rows(c);
     c.point = &point;
-    c.place = (*bodies_)[static_cast<std::size_t>(manifold.a)].posed.position + point.arm_a.cast<double>();
     c.separation = c.now = point.separation;
     c.friction = manifold.friction;
     // Only what comes together rebounds, not what rests and rings.
@@ -237,6 +254,7 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     c.approach = 0, c.largest = 0;
     c.emerging = manifold.emerging;
     c.inverse_normal = 1 / c.k[0][0];
+    c.rebound = rebound_share(c);
     c.slide_mass = 2 / (c.k[1][1] + c.k[2][2]);
     const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
     c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
@@ -446,7 +464,7 @@ void IslandSolver::restitute() {
         float v[3];
         speeds(c, v);
         const float normal =
-            std::max(c.impulse[0] - c.inverse_normal * (v[0] + c.restitution * c.approach), 0.f);
+            std::max(c.impulse[0] - c.inverse_normal * (v[0] + c.rebound * c.restitution * c.approach), 0.f);
         const float p[3] = {normal - c.impulse[0], 0, 0};
         c.impulse[0] = normal;
         push_by(c, p);
@@ -473,6 +491,17 @@ void IslandSolver::move() {
     }
 }
 
+// Half-way between where the contact would be if it moved with either centre.
+Eigen::Vector3d IslandSolver::place_now(const ContactRows& c) const {
+    const Side &a = c.side[0], &b = c.side[1];
+    auto with = [this](const Side& side, const Eigen::Vector3f& arm) -> Eigen::Vector3d {
+        return rows_of_[static_cast<std::size_t>(side.body)].place + arm.cast<double>();
+    };
+    if (b.body < 0) return with(a, c.point->arm_a);
+    if (a.body < 0) return with(b, c.point->arm_b);
+    return (with(a, c.point->arm_a) + with(b, c.point->arm_b)) / 2;
+}
+
 // In double precision and at one point of space a pair, so that linear and angular momentum are kept to
 // rounding.
 void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point) {
@@ -487,7 +516,8 @@ void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const
 }
 
 void IslandSolver::finish() {
-    for (const ContactRows& c : contacts_) {
+    for (ContactRows& c : contacts_) {
+        c.place = place_now(c);
         const Eigen::Vector3f p =
             c.impulse[0] * c.point->normal + c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1];
         apply(c, p.cast<double>(), c.place);

@@ -6,9 +6,8 @@
 namespace sim {
 namespace {
 
-constexpr double kSlop = 0.005;         // of the smaller half extent: contacts exist from here on
-constexpr double kLargestMargin = 0.2;  // of it
-constexpr float kDeep = 0.04f;  // of it: a contact that begins deeper is one of bodies put inside each other
+constexpr double kSlop = 0.005;  // of the smaller half extent: contacts exist from here on
+constexpr float kDeep = 0.04f;   // of it: a contact that begins deeper is one of bodies put inside each other
 constexpr float kManifoldTolerance = 0.02f;
 
 double smallest_half(const MovingBody& body) {
@@ -22,8 +21,9 @@ double reach_of(const MovingBody& body, const WorldSettings& settings) {
            (point_speed(body) + settings.dt * std::abs(body.gravity_scale) * settings.gravity.norm());
 }
 
+// All that can be closed within the step, so that nothing passes through unseen.
 double margin_of(double approach, double size, const WorldSettings& settings) {
-    return std::min(kSlop * size + std::max(approach, 0.0) * settings.dt, kLargestMargin * size);
+    return kSlop * size + std::max(approach, 0.0) * settings.dt;
 }
 
 void finish(const Manifold* before, float size, Manifold& manifold) {
