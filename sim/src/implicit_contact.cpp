@@ -11,8 +11,9 @@
 namespace sim {
 namespace {
 
-constexpr int kNewtonSteps = 6;
-constexpr float kResidual = 1e-4f;  // share of the size
+constexpr int kNewtonSteps = 10;
+constexpr float kResidual = 1e-4f;    // share of the size
+constexpr float kLongestStep = 0.5f;  // of Newton, share of the half extents
 
 Lanes absolute(Lanes a) {
     return a < 0 ? -a : a;
@@ -24,6 +25,10 @@ Lanes square_root(Lanes a) {
     for (int i = 0; i < kLanes; ++i) a[i] = std::sqrt(a[i]);
     return a;
 #endif
+}
+Lanes within(Lanes a, float limit) {
+    const Lanes high = lanes_of(limit), low = lanes_of(-limit);
+    return a > high ? high : a < low ? low : a;
 }
 // A bit a lane.
 int bits(LaneMask mask) {
@@ -55,6 +60,14 @@ Inverse<T> inverse_of(const T (&g)[3][3]) {
              {r * scale, (b * h - a * i) * scale, (a * e - b * d) * scale}}};
 }
 
+// At the centre every direction is as good: out by the way the sampled body is.
+void leave_centre(const PosedBody& sampled, const PosedBody& implicit, SampleContact& contact) {
+    const Eigen::Vector3d out = implicit.rotation.transpose() * (sampled.position - implicit.position);
+    contact.separation = -static_cast<float>(implicit.kind->definition.shape.base.semi_axes.minCoeff());
+    contact.normal =
+        out.norm() > 1e-9 ? Eigen::Vector3f(out.normalized().cast<float>()) : Eigen::Vector3f::UnitY();
+}
+
 }  // namespace
 
 /// Eight points on their way from the deformed frame to the rest shape.
@@ -62,59 +75,65 @@ struct SampleFinder::Batch {
     Lanes x[3];           // deformed
     Lanes r[3];           // at rest
     Lanes inverse[3][3];  // F^-1 there
+    Lanes value;          // N(r) - 1, or the distance where that is at hand
+    Lanes normal[3];      // F^-T of its gradient
     int count;
 };
 
 void SampleFinder::find(const PosedBody& sampled, const PosedBody& implicit, float margin,
                         std::vector<SampleContact>& found) {
     gather(sampled, implicit, margin);
-    const BodyKind& kind = *implicit.kind;
-    const Eigen::Vector3f axes = kind.definition.shape.base.semi_axes.cast<float>();
     for (std::size_t first = 0; first < near_.size(); first += kLanes) {
         Batch batch;
         batch.count = static_cast<int>(std::min<std::size_t>(kLanes, near_.size() - first));
         for (int i = 0; i < 3; ++i) batch.x[i] = load_lanes(near_place_.data() + i * capacity_ + first);
         invert(implicit, batch);
-        Lanes value, g[3];
-        if (kind.ellipsoid) {
-            Lanes u[3];
-            for (int i = 0; i < 3; ++i) u[i] = batch.r[i] / axes[i];
-            const Lanes n = square_root(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
-            value = n - 1;
-            const Lanes safe = n < 1e-6f ? lanes_of(1e-6f) : n;
-            for (int i = 0; i < 3; ++i) g[i] = u[i] / (safe * axes[i]);
-        } else {
-            for (int lane = 0; lane < kLanes; ++lane) {
-                const SurfacePoint s = kind.surface.distance(
-                    Eigen::Vector3d(batch.r[0][lane], batch.r[1][lane], batch.r[2][lane]));
-                value[lane] = static_cast<float>(s.distance);
-                for (int i = 0; i < 3; ++i) g[i][lane] = static_cast<float>(s.normal[i]);
-                if (lane + 1 >= batch.count) break;
-            }
-        }
-        Lanes normal[3];
-        for (int i = 0; i < 3; ++i)
-            normal[i] = batch.inverse[0][i] * g[0] + batch.inverse[1][i] * g[1] + batch.inverse[2][i] * g[2];
+        measure(*implicit.kind, batch);
         const Lanes steep =
-            square_root(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
-        for (int lane = 0; lane < batch.count; ++lane) {
-            SampleContact contact;
+            square_root(batch.normal[0] * batch.normal[0] + batch.normal[1] * batch.normal[1] +
+                        batch.normal[2] * batch.normal[2]);
+        const Lanes separation = batch.value / steep;
+        const LaneMask central = !(steep > 1e-6f);
+        unsigned left = static_cast<unsigned>(bits((separation < margin) | central));
+        for (left &= (1u << batch.count) - 1; left != 0; left &= left - 1) {
+            const int lane = std::countr_zero(left);
+            SampleContact& contact = found.emplace_back();
             contact.sample = near_[first + static_cast<std::size_t>(lane)];
             contact.rest = {batch.r[0][lane], batch.r[1][lane], batch.r[2][lane]};
-            if (steep[lane] > 1e-6f) {
-                contact.separation = value[lane] / steep[lane];
-                contact.normal =
-                    Eigen::Vector3f(normal[0][lane], normal[1][lane], normal[2][lane]) / steep[lane];
-            } else {  // at the centre every direction is as good: out by the way the sampled body is
-                const Eigen::Vector3d out =
-                    implicit.rotation.transpose() * (sampled.position - implicit.position);
-                contact.separation = -axes.minCoeff();
-                contact.normal = out.norm() > 1e-9 ? Eigen::Vector3f(out.normalized().cast<float>())
-                                                   : Eigen::Vector3f::UnitY();
+            if (central[lane]) {
+                leave_centre(sampled, implicit, contact);
+                continue;
             }
-            if (contact.separation < margin) found.push_back(contact);
+            contact.separation = separation[lane];
+            contact.normal =
+                Eigen::Vector3f(batch.normal[0][lane], batch.normal[1][lane], batch.normal[2][lane]) /
+                steep[lane];
         }
     }
+}
+
+void SampleFinder::measure(const BodyKind& kind, Batch& batch) {
+    Lanes g[3];
+    if (kind.ellipsoid) {
+        const Eigen::Vector3f scale = kind.definition.shape.base.semi_axes.cwiseInverse().cast<float>();
+        Lanes u[3];
+        for (int i = 0; i < 3; ++i) u[i] = batch.r[i] * scale[i];
+        const Lanes n = square_root(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+        batch.value = n - 1;
+        const Lanes inverse = 1 / (n < 1e-6f ? lanes_of(1e-6f) : n);
+        for (int i = 0; i < 3; ++i) g[i] = u[i] * inverse * scale[i];
+    } else {
+        batch.value = g[0] = g[1] = g[2] = lanes_of(0);
+        for (int lane = 0; lane < batch.count; ++lane) {
+            const SurfacePoint s =
+                kind.surface.distance(Eigen::Vector3d(batch.r[0][lane], batch.r[1][lane], batch.r[2][lane]));
+            batch.value[lane] = static_cast<float>(s.distance);
+            for (int i = 0; i < 3; ++i) g[i][lane] = static_cast<float>(s.normal[i]);
+        }
+    }
+    for (int i = 0; i < 3; ++i)
+        batch.normal[i] =
+            batch.inverse[0][i] * g[0] + batch.inverse[1][i] * g[1] + batch.inverse[2][i] * g[2];
 }
 
 void SampleFinder::gather(const PosedBody& sampled, const PosedBody& implicit, float margin) {
@@ -167,46 +186,40 @@ void SampleFinder::invert(const PosedBody& implicit, Batch& batch) {
 }
 
 void SampleFinder::invert_polynomial(const PosedBody& implicit, Batch& batch) {
-    const Eigen::Vector3f half = implicit.kind->basis.half_extents.cast<float>();
+    const Eigen::Vector3f half = implicit.kind->basis.half_extents.cast<float>(), scale = half.cwiseInverse();
     const float enough = kResidual * half.minCoeff();
-    Lanes residual[3];
+    Lanes first[3];  // x - u(x)
     for (int i = 0; i < 3; ++i) batch.r[i] = batch.x[i];
     for (int step = 0; step < kNewtonSteps; ++step) {
-        Lanes xi[3];
-        for (int i = 0; i < 3; ++i) {
-            const Lanes bare = batch.r[i] / half[i];
-            xi[i] = bare > 1.05f ? lanes_of(1.05f) : bare < -1.05f ? lanes_of(-1.05f) : bare;
-        }
-        PolynomialValue<Lanes> p =
-            evaluate_polynomial<Lanes>(implicit.polynomial.data(), xi[0], xi[1], xi[2]);
+        PolynomialValue<Lanes> p = evaluate_polynomial<Lanes>(
+            implicit.polynomial.data(), batch.r[0] * scale[0], batch.r[1] * scale[1], batch.r[2] * scale[2]);
         for (int i = 0; i < 3; ++i)
-            for (int j = 0; j < 3; ++j) p.gradient[i][j] /= half[j];
+            for (int j = 0; j < 3; ++j) p.gradient[i][j] *= scale[j];
         const Inverse<Lanes> inverse = inverse_of(p.gradient);
-        Lanes worst = lanes_of(0);
+        Lanes residual[3], worst = lanes_of(0);
         for (int i = 0; i < 3; ++i) {
             residual[i] = batch.r[i] + p.u[i] - batch.x[i];
-            const Lanes size = absolute(residual[i]);
-            worst = size > worst ? size : worst;
+            worst = absolute(residual[i]) > worst ? absolute(residual[i]) : worst;
+            if (step == 0) first[i] = batch.x[i] - p.u[i];
         }
         for (int i = 0; i < 3; ++i) {
             for (int j = 0; j < 3; ++j) batch.inverse[i][j] = inverse.m[i][j];
             const Lanes move =
                 inverse.m[i][0] * residual[0] + inverse.m[i][1] * residual[1] + inverse.m[i][2] * residual[2];
-            const float longest = 0.5f * half[i];
-            const Lanes cut = move > longest    ? lanes_of(longest)
-                              : move < -longest ? lanes_of(-longest)
-                                                : move;
-            batch.r[i] -= cut;
+            batch.r[i] -= within(move, kLongestStep * half[i]);
         }
         if (!any(!(worst < enough))) return;
-        if (step + 1 < kNewtonSteps) continue;
-        for (int lane = 0; lane < kLanes; ++lane) {
-            if (worst[lane] < enough) continue;
-            fallbacks_ += lane < batch.count;
-            for (int i = 0; i < 3; ++i) {
-                batch.r[i][lane] = batch.x[i][lane];
-                for (int j = 0; j < 3; ++j) batch.inverse[i][j][lane] = i == j ? 1 : 0;
-            }
+        if (step + 1 == kNewtonSteps) fall_back(batch, worst < enough, first);
+    }
+}
+
+void SampleFinder::fall_back(Batch& batch, LaneMask done, const Lanes (&first)[3]) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+        if (done[lane]) continue;
+        fallbacks_ += lane < batch.count;
+        for (int i = 0; i < 3; ++i) {
+            batch.r[i][lane] = first[i][lane];
+            for (int j = 0; j < 3; ++j) batch.inverse[i][j][lane] = i == j ? 1 : 0;
         }
     }
 }
@@ -214,35 +227,40 @@ void SampleFinder::invert_polynomial(const PosedBody& implicit, Batch& batch) {
 void SampleFinder::invert_bricks(const PosedBody& implicit, Batch& batch) {
     const BodyKind& kind = *implicit.kind;
     const Eigen::Vector3f half = kind.basis.half_extents.cast<float>();
-    const Eigen::Vector3f scale = static_cast<float>(kind.bricks) * half.cwiseInverse();
+    const float bricks = static_cast<float>(kind.bricks);
+    Lanes first[3];
+    LaneMask done{};
+    for (int i = 0; i < 3; ++i) first[i] = batch.r[i] = batch.x[i];
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) batch.inverse[i][j] = lanes_of(i == j ? 1.f : 0.f);
     for (int lane = 0; lane < batch.count; ++lane) {
         const Eigen::Vector3f x(batch.x[0][lane], batch.x[1][lane], batch.x[2][lane]);
         Eigen::Vector3f r = x;
-        Eigen::Matrix3f inverse = Eigen::Matrix3f::Identity();
-        bool done = false;
-        for (int step = 0; step < kNewtonSteps && !done; ++step) {
+        Eigen::Matrix3f inverse;
+        for (int step = 0; step < kNewtonSteps && !done[lane]; ++step) {
             const BodyKind::Local at = kind.locate(r);
+            // Outside the box the border's brick goes on.
+            const Eigen::Vector3f xi =
+                at.xi + bricks * (r - r.cwiseMax(-half).cwiseMin(half)).cwiseQuotient(half);
             PolynomialValue<float> p = evaluate_polynomial<float>(implicit.polynomial.data() + 81 * at.brick,
-                                                                  at.xi.x(), at.xi.y(), at.xi.z());
+                                                                  xi.x(), xi.y(), xi.z());
             for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j) p.gradient[i][j] *= scale[j];
+                for (int j = 0; j < 3; ++j) p.gradient[i][j] *= bricks / half[j];
             const Inverse<float> found = inverse_of(p.gradient);
             for (int i = 0; i < 3; ++i)
                 for (int j = 0; j < 3; ++j) inverse(i, j) = found.m[i][j];
-            const Eigen::Vector3f residual = r + Eigen::Vector3f(p.u[0], p.u[1], p.u[2]) - x;
-            done = residual.cwiseAbs().maxCoeff() < kResidual * half.minCoeff();
-            r -= (inverse * residual).cwiseMax(-0.5f * half).cwiseMin(0.5f * half);
-        }
-        if (!done) {
-            ++fallbacks_;
-            r = x;
-            inverse.setIdentity();
+            const Eigen::Vector3f u(p.u[0], p.u[1], p.u[2]), residual = r + u - x;
+            for (int i = 0; step == 0 && i < 3; ++i) first[i][lane] = x[i] - u[i];
+            done[lane] = residual.cwiseAbs().maxCoeff() < kResidual * half.minCoeff() ? -1 : 0;
+            r -= (inverse * residual).cwiseMax(-kLongestStep * half).cwiseMin(kLongestStep * half);
         }
         for (int i = 0; i < 3; ++i) {
             batch.r[i][lane] = r[i];
             for (int j = 0; j < 3; ++j) batch.inverse[i][j][lane] = inverse(i, j);
         }
     }
+    for (int lane = batch.count; lane < kLanes; ++lane) done[lane] = -1;
+    fall_back(batch, done, first);
 }
 
 }  // namespace sim

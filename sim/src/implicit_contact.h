@@ -18,8 +18,9 @@ struct SampleContact {
 ///   sample -> implicit body's frame -> box test -> inverse deformation -> gauge -> distance to first order,
 ///   s = (N(r) - 1) / |F^-T grad N(r)|,  F = I + du/dr,  normal F^-T grad N / |...|.
 /// Samples and the few that pass the box test go eight at a time. The inverse is closed for rigid and linear
-/// bodies; polynomials take Newton steps from r = x until the residual is below 1e-4 of the size, and one
-/// more (quadratic: about 1e-8). A lane that is not there after 6 steps takes r = x - u(x) and is counted.
+/// bodies; polynomials take Newton steps from r = x (each cut to half the half extents) until the residual is
+/// below 1e-4 of the size, and one more (quadratic: about 1e-8). Outside the bricks' box the polynomials go
+/// on. A lane that is not there after 10 steps takes r = x - u(x), F = I, and is counted.
 /// Single precision: separations err by 1e-6 of the size (tests compare with double precision).
 class SampleFinder {
 public:
@@ -34,6 +35,8 @@ private:
     void invert(const PosedBody& implicit, Batch& batch);
     void invert_polynomial(const PosedBody& implicit, Batch& batch);
     void invert_bricks(const PosedBody& implicit, Batch& batch);
+    void fall_back(Batch& batch, LaneMask done, const Lanes (&first)[3]);
+    static void measure(const BodyKind& kind, Batch& batch);
 
     std::vector<int> near_;
     LaneArray near_place_;  // [axis][capacity]
