@@ -236,6 +236,7 @@ float IslandSolver::rebound_share(const Rows& rows) const {
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     alignas(32) float scratch[2][3 * 128];
     ContactRows c{};
+    c.place.setZero();
     const Place a = place(manifold.a, point.arm_a, point.sample_a, point.rest, scratch[0]);
     const Place b = place(manifold.b, point.arm_b, point.sample_b, point.rest, scratch[1]);
     set_tangents(point.normal, c.tangent);

@@ -100,6 +100,44 @@ TEST(World, ABrokenBodyIsQuarantinedAndTheOthersDoNotNotice) {
     }
 }
 
+TEST(World, ABodyThatBreaksInContactLeavesItsNeighboursWhole) {
+    for (const double rate : {std::numeric_limits<double>::infinity(), 1e200, 1e30}) {
+        sim::WorldDefinition definition = on_floor();
+        for (int i = 0; i < 3; ++i) definition.bodies.push_back(ball({0, 0.5 + i, 0}, Fidelity::modal));
+        sim::PointConstraint link;
+        link.name = "link";
+        link.body_a = 1, link.point_a = {0.5, 0, 0};
+        link.body_b = 2, link.point_b = {0.5, 0, 0};
+        definition.constraints.push_back(link);
+        sim::World world(definition);
+        run(world, 60);
+        sim::WorldBodyState state = world.state(1);
+        state.q_dot[2] = rate;
+        world.set_state(1, state);
+        run(world, 120);
+        ASSERT_EQ(world.quarantined().size(), 1u);
+        EXPECT_EQ(world.quarantined()[0].what, "modal rates");
+        EXPECT_FALSE(world.constraint_holds(0));
+        for (int i = 0; i < 3; ++i)
+            EXPECT_TRUE(world.state(i).position.allFinite() && world.state(i).q.allFinite());
+    }
+}
+
+TEST(World, NothingFallsAsleepInMidAir) {
+    sim::WorldDefinition slow = on_floor();
+    slow.settings.gravity = {0, -0.01, 0};
+    slow.bodies.push_back(ball({0, 3, 0}));
+    sim::World falling(slow);
+    run(falling, 120);
+    EXPECT_FALSE(falling.asleep(0));
+    sim::WorldDefinition drifting = weightless();
+    drifting.bodies.push_back(ball({0, 3, 0}));
+    drifting.bodies[0].velocity = {0.001, 0, 0};
+    sim::World drift(drifting);
+    run(drift, 600);
+    EXPECT_NEAR(drift.state(0).position.x(), 0.01, 1e-12);
+}
+
 TEST(World, DeformationDrivenToInversionIsHeldAtTheLimitWithoutGainOfEnergy) {
     for (const Fidelity fidelity : {Fidelity::linear, Fidelity::modal}) {
         sim::WorldDefinition definition = weightless();
