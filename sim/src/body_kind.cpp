@@ -129,8 +129,7 @@ HeldStep held_step(double omega, double sigma, double tau) noexcept {
     const bool slow = turn < 1e-4 && fade < 1e-4;
     const double exact = slow ? (1 - 2 * fade / 3) / 2 : (1 - s.a) / (turn * turn);
     const double compliance = std::max(exact, 1e-20), rate = s.b / tau;
-    const double uptake = (rate * rate + std::pow(turn * compliance, 2)) / compliance;
-    return {(s.a - 1) / tau, rate, compliance, s.c, s.d, rate, std::sqrt(compliance), uptake};
+    return {(s.a - 1) / tau, rate, compliance, s.c, s.d, rate, std::sqrt(compliance)};
 }
 
 BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {

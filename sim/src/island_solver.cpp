@@ -215,24 +215,6 @@ void IslandSolver::finish_rows(Rows& rows) {
         }
 }
 
-// A plastic impact by the impulse p takes p^2 K_rigid / 2 out of the rigid motion for good; what it gives to
-// the modes they keep. A rebound by e p puts e^2 p^2 (K_rigid + sum phi^2 g) / 2 back, where a mode takes up
-// g = (b / h)^2 + (omega h w)^2 per phi^2. The share that leaves the balance at e^2 is sqrt(K_rigid /
-// (K_rigid + sum phi^2 g)); 1 for rigid bodies.
-float IslandSolver::rebound_share(const Rows& rows) const {
-    float rigid = 0, modal = 0;
-    for (const Side& side : rows.side) {
-        if (side.body < 0) continue;
-        const float* d = jacobians_.data() + side.rows;
-        rigid += dot(d, d, 8);
-        const BodyKind& kind = *rows_of_[static_cast<std::size_t>(side.body)].body->kind;
-        for (int k = 0; k < kind.modes; ++k)
-            modal +=
-                d[8 + k] * d[8 + k] * static_cast<float>(kind.substep[static_cast<std::size_t>(k)].uptake);
-    }
-    return std::sqrt(rigid / (rigid + modal));
-}
-
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     alignas(32) float scratch[2][3 * 128];
     ContactRows c{};
@@ -252,10 +234,9 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     c.friction = manifold.friction;
     // Only what comes together rebounds, not what rests and rings.
     c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
-    c.approach = 0, c.largest = 0;
+    c.approach = 0, c.largest = 0, c.taken = 0;
     c.emerging = manifold.emerging;
     c.inverse_normal = 1 / c.k[0][0];
-    c.rebound = rebound_share(c);
     c.slide_mass = 2 / (c.k[1][1] + c.k[2][2]);
     const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
     c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
@@ -326,6 +307,7 @@ void IslandSolver::substep(bool first, bool last) {
     sweep(Push::soft);
     push_out();
     sweep(Push::none);
+    note_work();
     if (last) restitute();
     finish();
 }
@@ -459,15 +441,40 @@ void IslandSolver::solve_contact(ContactRows& c, Push push) {
     push_by(c, p);
 }
 
+// Energy that a contact's normal impulse takes out in this substep, where it may have to give some back: held
+// over the substep, it does p (v0 + v1) / 2 on the rigid part and p G on the modes.
+void IslandSolver::note_work() {
+    for (ContactRows& c : contacts_) {
+        if (c.restitution == 0 || c.largest == 0) continue;
+        float mean = 0;
+        for (const Side& side : c.side) {
+            if (side.body < 0) continue;
+            const float* d = jacobians_.data() + side.rows;
+            const float *before = start_.data() + side.y, *after = y_.data() + side.y;
+            mean += (dot(d, before, 8) + dot(d, after, 8)) / 2;
+            if (side.width > 8) mean += dot(d + 8, after + 8, side.width - 8);
+        }
+        c.taken -= c.impulse[0] * mean;
+    }
+}
+
+// A rebound to e times the approach, by an impulse p whose work p v + p^2 (K_rigid / 2 + K_modes) is at most
+// e^2 of the energy that the contact has taken. For rigid bodies both say the same.
 void IslandSolver::restitute() {
     for (ContactRows& c : contacts_) {
         if (c.restitution == 0 || c.largest == 0 || c.approach > -kBounceThreshold) continue;
         float v[3];
         speeds(c, v);
-        const float normal =
-            std::max(c.impulse[0] - c.inverse_normal * (v[0] + c.rebound * c.restitution * c.approach), 0.f);
-        const float p[3] = {normal - c.impulse[0], 0, 0};
-        c.impulse[0] = normal;
+        float rigid = 0;
+        for (const Side& side : c.side)
+            if (side.body >= 0) rigid += dot(jacobians_.data() + side.rows, jacobians_.data() + side.rows, 8);
+        // The modes yield to p under the impulse of this substep, too.
+        const float modes = c.k[0][0] - rigid, firm = rigid / 2 + modes, slope = v[0] + modes * c.impulse[0];
+        const float budget = c.restitution * c.restitution * std::max(c.taken, 0.f);
+        const float most = (std::sqrt(slope * slope + 4 * firm * budget) - slope) / (2 * firm);
+        const float wanted = -c.inverse_normal * (v[0] + c.restitution * c.approach);
+        const float p[3] = {std::clamp(wanted, 0.f, std::max(most, 0.f)), 0, 0};
+        c.impulse[0] += p[0];
         push_by(c, p);
     }
 }

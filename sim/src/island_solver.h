@@ -30,7 +30,7 @@ struct Island {
 /// and at the end of the last substep restitution. Contact forces act on a mode with its compliance over the
 /// substep, w = (1 - a) / (omega h)^2 >= 0 (body_kind.h), so rigid, stiff and soft bodies go through one
 /// solver, and the force's work on a pair without push is -1/2 P J M^-1 J^T P of the rigid part: never
-/// positive, for any omega h. Restitution gives back at most e^2 of that (rebound_share).
+/// positive, for any omega h. Restitution gives back at most e^2 of what a contact took.
 ///
 /// Rows. One Jacobian row a direction (normal, two tangents) and body, scaled by the square root of the
 /// inverse mass: D = J M^-1/2, floats in whole lanes, (n, R^T(r x n) / sqrt(I), sqrt(w) phi(r)^T R^T n). So
@@ -82,7 +82,7 @@ private:
         ManifoldPoint* point;
         Eigen::Vector3f tangent[2];
         float separation, now, friction, restitution, approach;
-        float rebound, slide_mass, inverse_normal,
+        float taken, slide_mass, inverse_normal,
             inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
         float impulse[3], kept[3], largest;
         bool emerging;
@@ -140,10 +140,10 @@ private:
     void push_by(const Rows& rows, const float (&impulse)[3]);
     void solve_spring(SpringRows& spring);
     void solve_contact(ContactRows& contact, Push push);
+    void note_work();
     void restitute();
     void move();
     [[nodiscard]] Eigen::Vector3d place_now(const ContactRows& contact) const;
-    [[nodiscard]] float rebound_share(const Rows& rows) const;
     void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
     void finish();
     void keep_impulses();
