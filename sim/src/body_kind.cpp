@@ -1,5 +1,6 @@
 #include "body_kind.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -8,8 +9,46 @@
 namespace sim {
 namespace {
 
+// Orders points so that each eight in a row lie together: halves (of whole eights) along the longest axis of
+// their box, and so on.
+void gather_neighbours(Eigen::Vector3d* points, std::ptrdiff_t count) {
+    if (count <= kLanes) return;
+    Eigen::AlignedBox3d box;
+    for (std::ptrdiff_t i = 0; i < count; ++i) box.extend(points[i]);
+    int axis = 0;
+    box.sizes().maxCoeff(&axis);
+    const std::ptrdiff_t half = (count / 2 + kLanes - 1) / kLanes * kLanes;
+    std::sort(points, points + count, [axis](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+        for (const int i : {axis, (axis + 1) % 3, (axis + 2) % 3})
+            if (a[i] != b[i]) return a[i] < b[i];
+        return false;
+    });
+    gather_neighbours(points, half);
+    gather_neighbours(points + half, count - half);
+}
+
+void set_batch_balls(BodyKind& kind) {
+    const int padded = kind.batches * kLanes, width = whole_lanes(kind.batches);
+    kind.batch_balls.resize(4 * width);
+    for (int batch = 0; batch < width; ++batch) {
+        Eigen::Matrix<float, 3, kLanes> points;
+        const int first = std::min(batch, kind.batches - 1) * kLanes;
+        for (int i = 0; i < 3; ++i)
+            for (int lane = 0; lane < kLanes; ++lane)
+                points(i, lane) = kind.rest.data()[i * padded + first + lane];
+        const Eigen::Vector3f centre = points.rowwise().mean();
+        for (int i = 0; i < 3; ++i) kind.batch_balls.data()[i * width + batch] = centre[i];
+        kind.batch_balls.data()[3 * width + batch] =
+            1.0001f * (points.colwise() - centre).colwise().norm().maxCoeff();
+        kind.sample_box =
+            kind.sample_box.cwiseMax(points.rowwise().maxCoeff()).cwiseMax(-points.rowwise().minCoeff());
+        kind.sample_radius = std::max(kind.sample_radius, points.colwise().norm().maxCoeff());
+    }
+}
+
 void set_samples(BodyKind& kind) {
-    const SurfaceMesh mesh = surface_mesh(kind.definition.shape, kind.definition.triangles);
+    SurfaceMesh mesh = surface_mesh(kind.definition.shape, kind.definition.triangles);
+    gather_neighbours(mesh.vertices.data(), static_cast<std::ptrdiff_t>(mesh.vertices.size()));
     kind.samples = static_cast<int>(mesh.vertices.size());
     kind.batches = whole_lanes(kind.samples) / kLanes;
     const int padded = kind.batches * kLanes;
@@ -34,12 +73,15 @@ void set_samples(BodyKind& kind) {
         }
     }
     kind.bounding_radius = kind.surface.bounding_radius();
+    set_batch_balls(kind);
 }
 
 void set_polynomials(BodyKind& kind) {
     const int k = kind.basis.elements, m = 2 * k + 1;
     kind.bricks = k;
     kind.polynomials.resize(static_cast<std::size_t>(k * k * k) * 81 * kind.mode_width);
+    const int rows = whole_lanes(k * k * k * 81);
+    kind.mode_polynomials.resize(static_cast<std::size_t>(rows) * static_cast<std::size_t>(kind.modes));
     for (int brick = 0; brick < k * k * k; ++brick) {
         const int bx = brick % k, by = brick / k % k, bz = brick / (k * k);
         for (int mode = 0; mode < kind.modes; ++mode) {
@@ -52,8 +94,12 @@ void set_polynomials(BodyKind& kind) {
             float* out =
                 kind.polynomials.data() + static_cast<std::size_t>(brick) * 81 * kind.mode_width + mode;
             for (int n = 0; n < 27; ++n)
-                for (int axis = 0; axis < 3; ++axis)
+                for (int axis = 0; axis < 3; ++axis) {
                     out[(3 * n + axis) * kind.mode_width] = static_cast<float>(c(n, axis));
+                    kind.mode_polynomials
+                        .data()[static_cast<std::ptrdiff_t>(mode) * rows + brick * 81 + 3 * n + axis] =
+                        static_cast<float>(c(n, axis));
+                }
         }
     }
 }

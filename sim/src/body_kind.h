@@ -40,15 +40,19 @@ struct BodyKind {
     int mode_width = 0;                      ///< modes, whole lanes
     bool ellipsoid = false;                  ///< e1 = e2 = 1 without bumps: gauge in closed form
     int samples = 0, batches = 0;            ///< batches of eight samples
-    LaneArray rest = {};                     ///< samples: [axis][8 batches]
-    LaneArray shapes = {};                   ///< phi at samples: [mode][axis][8 batches]
-    LaneArray sample_shapes = {};            ///< phi at samples: [sample][axis][mode_width]
-    LaneArray root_compliance = {};          ///< of a substep: [mode_width]
+    LaneArray rest = {};                     ///< samples, neighbours together: [axis][8 batches]
+    LaneArray batch_balls = {};  ///< that hold a batch at rest: [x, y, z, radius][whole_lanes(batches)]
+    Eigen::Vector3f sample_box = Eigen::Vector3f::Zero();  ///< half extents of the samples at rest [m]
+    float sample_radius = 0;                               ///< [m]
+    LaneArray shapes = {};                                 ///< phi at samples: [mode][axis][8 batches]
+    LaneArray sample_shapes = {};                          ///< phi at samples: [sample][axis][mode_width]
+    LaneArray root_compliance = {};                        ///< of a substep: [mode_width]
     /// d phi / dr at 53 points of the body, the probes: centre, and the surface in 26 directions and half-way
     /// to it: [mode][3 i + j][kProbes].
     LaneArray gradients = {};
-    LaneArray polynomials = {};  ///< phi's coefficients: [brick][27][axis][mode_width]
-    int bricks = 1;              ///< a side
+    LaneArray polynomials = {};       ///< phi's coefficients: [brick][27][axis][mode_width]
+    LaneArray mode_polynomials = {};  ///< the same: [mode][whole_lanes(bricks^3 x 81)]
+    int bricks = 1;                   ///< a side
 
     [[nodiscard]] bool linear() const noexcept { return choice.fidelity == Fidelity::linear; }
     /// phi at a rest point, [axis][mode_width] floats.

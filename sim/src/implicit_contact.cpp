@@ -30,18 +30,8 @@ Lanes within(Lanes a, float limit) {
     const Lanes high = lanes_of(limit), low = lanes_of(-limit);
     return a > high ? high : a < low ? low : a;
 }
-// A bit a lane.
-int bits(LaneMask mask) {
-#ifdef __AVX__
-    return _mm256_movemask_ps(reinterpret_cast<__m256>(mask));
-#else
-    int result = 0;
-    for (int i = 0; i < kLanes; ++i) result |= mask[i] ? 1 << i : 0;
-    return result;
-#endif
-}
 bool any(LaneMask mask) {
-    return bits(mask) != 0;
+    return bits_of(mask) != 0;
 }
 
 // Inverse of F = I + G, by cofactors.
@@ -80,6 +70,27 @@ struct SampleFinder::Batch {
     int count;
 };
 
+/// How the implicit body's frame sees the sampled one's, and what is near it.
+struct SampleFinder::Approach {
+    Eigen::Matrix3f turn;
+    Eigen::Vector3f shift, box;
+    float ball;
+
+    /// A bit for each of eight balls that reach into the box and the ball; x: their centres, there.
+    [[nodiscard]] unsigned near(const float* centres, int stride, Lanes radius, Lanes (&x)[3]) const {
+        const Lanes a = load_lanes(centres), b = load_lanes(centres + stride),
+                    c = load_lanes(centres + 2 * stride), r = radius + ball;
+        for (int i = 0; i < 3; ++i) x[i] = turn(i, 0) * a + turn(i, 1) * b + turn(i, 2) * c + shift[i];
+        return bits_of((absolute(x[0]) < radius + box[0]) & (absolute(x[1]) < radius + box[1]) &
+                       (absolute(x[2]) < radius + box[2]) &
+                       (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] < r * r));
+    }
+    [[nodiscard]] unsigned near(const float* centres, int stride, Lanes radius) const {
+        Lanes x[3];
+        return near(centres, stride, radius, x);
+    }
+};
+
 void SampleFinder::find(const PosedBody& sampled, const PosedBody& implicit, float margin,
                         std::vector<SampleContact>& found) {
     gather(sampled, implicit, margin);
@@ -94,7 +105,7 @@ void SampleFinder::find(const PosedBody& sampled, const PosedBody& implicit, flo
                         batch.normal[2] * batch.normal[2]);
         const Lanes separation = batch.value / steep;
         const LaneMask central = !(steep > 1e-6f);
-        unsigned left = static_cast<unsigned>(bits((separation < margin) | central));
+        unsigned left = bits_of((separation < margin) | central);
         for (left &= (1u << batch.count) - 1; left != 0; left &= left - 1) {
             const int lane = std::countr_zero(left);
             SampleContact& contact = found.emplace_back();
@@ -137,36 +148,42 @@ void SampleFinder::measure(const BodyKind& kind, Batch& batch) {
 }
 
 void SampleFinder::gather(const PosedBody& sampled, const PosedBody& implicit, float margin) {
-    const int stride = sampled.kind->batches * kLanes, samples = sampled.kind->samples;
+    const BodyKind& kind = *sampled.kind;
+    const int stride = kind.batches * kLanes, width = whole_lanes(kind.batches);
     if (capacity_ < static_cast<std::size_t>(stride + kLanes)) {
         capacity_ = static_cast<std::size_t>(stride + kLanes);
         near_place_.resize(3 * capacity_);
         near_.reserve(capacity_);
     }
     near_.clear();
-    const Eigen::Matrix3f turn = (implicit.rotation.transpose() * sampled.rotation).cast<float>();
-    const Eigen::Vector3f shift =
-        (implicit.rotation.transpose() * (sampled.position - implicit.position)).cast<float>();
-    const Eigen::Vector3f box = implicit.half_box.array() + margin;
-    const float ball = (implicit.radius + margin) * (implicit.radius + margin);
-    const float* data = sampled.sample_data();
-    for (int first = 0; first < stride; first += kLanes) {
-        const Lanes a = load_lanes(data + first), b = load_lanes(data + stride + first),
-                    c = load_lanes(data + 2 * stride + first);
-        Lanes x[3];
-        for (int i = 0; i < 3; ++i) x[i] = turn(i, 0) * a + turn(i, 1) * b + turn(i, 2) * c + shift[i];
-        const LaneMask inside = (absolute(x[0]) < box[0]) & (absolute(x[1]) < box[1]) &
-                                (absolute(x[2]) < box[2]) & (x[0] * x[0] + x[1] * x[1] + x[2] * x[2] < ball);
-        for (unsigned left = static_cast<unsigned>(bits(inside)); left != 0; left &= left - 1) {
-            const int lane = std::countr_zero(left);
-            if (first + lane >= samples) break;
-            for (int i = 0; i < 3; ++i) near_place_.data()[i * capacity_ + near_.size()] = x[i][lane];
-            near_.push_back(first + lane);
+    const Eigen::Matrix3d into = implicit.rotation.transpose();
+    const Approach approach{(into * sampled.rotation).cast<float>(),
+                            (into * (sampled.position - implicit.position)).cast<float>(),
+                            implicit.half_box.array() + margin, implicit.radius + margin};
+    const float* balls = kind.batch_balls.data();
+    for (int first = 0; first < width; first += kLanes) {
+        const Lanes grown = load_lanes(balls + 3 * width + first) + sampled.sample_reach;
+        unsigned left = approach.near(balls + first, width, grown);
+        for (; left != 0; left &= left - 1) {
+            const int batch = first + std::countr_zero(left);
+            if (batch < kind.batches) gather_batch(sampled, batch * kLanes, approach);
         }
     }
     for (std::size_t pad = near_.size(); pad % kLanes != 0; ++pad)
         for (int i = 0; i < 3; ++i)
             near_place_.data()[i * capacity_ + pad] = near_place_.data()[i * capacity_ + near_.size() - 1];
+}
+
+void SampleFinder::gather_batch(const PosedBody& sampled, int first, const Approach& approach) {
+    const int stride = sampled.kind->batches * kLanes, samples = sampled.kind->samples;
+    Lanes x[3];
+    unsigned left = approach.near(sampled.sample_data() + first, stride, lanes_of(0), x);
+    for (; left != 0; left &= left - 1) {
+        const int lane = std::countr_zero(left);
+        if (first + lane >= samples) break;
+        for (int i = 0; i < 3; ++i) near_place_.data()[i * capacity_ + near_.size()] = x[i][lane];
+        near_.push_back(first + lane);
+    }
 }
 
 void SampleFinder::invert(const PosedBody& implicit, Batch& batch) {

@@ -31,7 +31,9 @@ public:
 
 private:
     struct Batch;
+    struct Approach;
     void gather(const PosedBody& sampled, const PosedBody& implicit, float margin);
+    void gather_batch(const PosedBody& sampled, int first, const Approach& approach);
     void invert(const PosedBody& implicit, Batch& batch);
     void invert_polynomial(const PosedBody& implicit, Batch& batch);
     void invert_bricks(const PosedBody& implicit, Batch& batch);

@@ -36,6 +36,16 @@ inline void store_lanes(float* aligned, Lanes value) noexcept {
     return a * b + c;
 #endif
 }
+/// A bit a lane.
+[[nodiscard]] inline unsigned bits_of(LaneMask mask) noexcept {
+#ifdef __AVX__
+    return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));
+#else
+    unsigned result = 0;
+    for (int i = 0; i < kLanes; ++i) result |= mask[i] ? 1u << i : 0u;
+    return result;
+#endif
+}
 /// Sum in a fixed order: ((0 + 4) + (2 + 6)) + ((1 + 5) + (3 + 7)).
 [[nodiscard]] inline float sum_of(Lanes v) noexcept {
     const Lanes half = v + __builtin_shuffle(v, LaneMask{4, 5, 6, 7, 4, 5, 6, 7});

@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <array>
 
 #include "implicit_contact.h"
@@ -14,7 +15,6 @@ struct ManifoldPoint {
     Eigen::Vector3f arm_a, arm_b;      ///< from the centres to the contact, half-way through the overlap [m]
     int sample_a = -1, sample_b = -1;  ///< which of the samples, or -1: see rest
     Eigen::Vector3f rest;              ///< place in the implicit body's rest shape
-    bool held = false;                 ///< was among the points of the step before
     float normal_impulse = 0;          ///< of the last substep, to start the next from [N s]
     Eigen::Vector3f friction_impulse = Eigen::Vector3f::Zero();
 };
@@ -34,14 +34,45 @@ struct Manifold {
 };
 constexpr int kFirstPlane = 1 << 30;
 
-/// Keeps up to four of the points: the deepest (first of equals by feature), the one furthest from it, the
+/// A point that may go into a manifold.
+struct ContactCandidate {
+    std::uint32_t feature;
+    float separation;
+    Eigen::Vector3f normal;  ///< from b towards a
+    Eigen::Vector3f arm_a;   ///< from a's centre [m]
+    Eigen::Vector3f rest;    ///< place in the implicit body's rest shape
+};
+
+/// Chooses up to four of a pair's candidates: the deepest (first of equals), the one furthest from it, the
 /// one that makes the largest triangle with both, the one that adds most on the other side of an edge; first
 /// of those that carry load (to tolerance / 16 beyond touching), then, while there are less than four, of
 /// those up to `tolerance`. Points that add less than tolerance / 2 of width do not count. Points of
 /// `before`, the pair's manifold in the last step (nullptr: none), have an advantage of tolerance / 8 in
-/// depth and a fifth in length and area: a flat contact keeps its points.
-void choose_points(std::vector<ManifoldPoint>& candidates, float tolerance, const Manifold* before,
-                   Manifold& manifold);
+/// depth and a fifth in length and area: a flat contact keeps its points. Allocates only while its buffers
+/// grow.
+class PointChooser {
+public:
+    /// Their places among the candidates; returns how many.
+    int choose(const std::vector<ContactCandidate>& candidates, float tolerance, const Manifold* before,
+               std::array<int, kManifoldPoints>& chosen);
+    /// No candidate further out than this can be chosen if one lies at `lowest`.
+    [[nodiscard]] static float reach(float lowest, float tolerance) noexcept {
+        return std::max(lowest + tolerance / 8, 0.f) + tolerance;
+    }
+
+private:
+    struct Spot {
+        float x, y;  // from the first, across its normal
+    };
+    void load(const std::vector<ContactCandidate>& candidates, const Manifold* before);
+    int deepest(float advantage);
+    void spread(const std::vector<ContactCandidate>& candidates, int first);
+    int next(int count, float out, float apart) const;
+
+    std::size_t count_ = 0;
+    LaneArray separation_, favour_, x_, y_;  // of every candidate, whole lanes
+    Spot second_{}, third_{};
+};
 
 /// Takes the impulses of last step's manifold of the same pair: by feature, else from the nearest point left
 /// within `reach`.

@@ -1,5 +1,6 @@
 #include "posed_body.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "shape_polynomial.h"
@@ -13,19 +14,26 @@ float largest(Lanes v) {
     return top;
 }
 
+Lanes larger(Lanes a, Lanes b) {
+    return a > b ? a : b;
+}
+
+constexpr int kMostModes = 2 * 128;
+
 }  // namespace
 
 void PosedBody::set(const Eigen::Vector3d& at, const Eigen::Quaterniond& orientation,
                     const Eigen::VectorXd& q) {
     position = at;
     rotation = orientation.toRotationMatrix();
-    const float reach = kind->modes == 0 ? 0 : kind->linear() ? deform_linear(q) : deform_modal(q);
-    half_box = kind->half_box.cast<float>().array() + reach;
-    radius = static_cast<float>(kind->bounding_radius) + reach;
+    half_box = kind->half_box.cast<float>();
+    radius = static_cast<float>(kind->bounding_radius);
+    sample_reach = 0;
+    if (kind->modes > 0) kind->linear() ? deform_linear(q) : deform_modal(q);
     half_aabb = (rotation.cwiseAbs() * half_box.cast<double>()).cwiseMin(radius);
 }
 
-float PosedBody::deform_linear(const Eigen::VectorXd& q) {
+void PosedBody::deform_linear(const Eigen::VectorXd& q) {
     // Column j of du/dr is the polynomial's linear coefficient along axis j (rows 1, 3 and 9).
     Eigen::Matrix3d d = Eigen::Matrix3d::Identity();
     const int stride = kind->mode_width;
@@ -50,40 +58,49 @@ float PosedBody::deform_linear(const Eigen::VectorXd& q) {
                                                              dy * load_lanes(rest + padded + s) +
                                                              dz * load_lanes(rest + 2 * padded + s));
     }
-    return static_cast<float>((d - Eigen::Matrix3d::Identity()).norm() * kind->bounding_radius);
+    sample_reach = static_cast<float>((d - Eigen::Matrix3d::Identity()).norm() * kind->bounding_radius);
+    half_box.array() += sample_reach;
+    radius += sample_reach;
 }
 
-float PosedBody::deform_modal(const Eigen::VectorXd& q) {
+void PosedBody::deform_modal(const Eigen::VectorXd& q) {
     const int padded = kind->batches * kLanes, modes = kind->modes;
+    alignas(32) float coordinates[kMostModes];
+    for (int k = 0; k < modes; ++k) coordinates[k] = static_cast<float>(q[k]);
     samples.resize(3 * padded);
-    Lanes furthest = lanes_of(0);
+    Lanes furthest = lanes_of(0), far = lanes_of(0), box[3] = {far, far, far};
     for (int s = 0; s < padded; s += kLanes) {
-        Lanes ux = lanes_of(0), uy = lanes_of(0), uz = lanes_of(0);
+        Lanes u[3] = {lanes_of(0), lanes_of(0), lanes_of(0)};
         const float* shape = kind->shapes.data() + s;
         for (int k = 0; k < modes; ++k, shape += 3 * padded) {
-            const Lanes z = lanes_of(static_cast<float>(q[k]));
-            ux += z * load_lanes(shape);
-            uy += z * load_lanes(shape + padded);
-            uz += z * load_lanes(shape + 2 * padded);
+            const Lanes z = lanes_of(coordinates[k]);
+            for (int i = 0; i < 3; ++i) u[i] += z * load_lanes(shape + i * padded);
         }
-        const Lanes square = ux * ux + uy * uy + uz * uz;
-        furthest = square > furthest ? square : furthest;
-        store_lanes(samples.data() + s, load_lanes(kind->rest.data() + s) + ux);
-        store_lanes(samples.data() + padded + s, load_lanes(kind->rest.data() + padded + s) + uy);
-        store_lanes(samples.data() + 2 * padded + s, load_lanes(kind->rest.data() + 2 * padded + s) + uz);
+        furthest = larger(furthest, u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+        for (int i = 0; i < 3; ++i) {
+            u[i] += load_lanes(kind->rest.data() + i * padded + s);
+            box[i] = larger(box[i], larger(u[i], -u[i]));
+            store_lanes(samples.data() + i * padded + s, u[i]);
+        }
+        far = larger(far, u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
     }
-    const int width = kind->mode_width, rows = kind->bricks * kind->bricks * kind->bricks * 81;
+    bend_polynomial(coordinates);
+    sample_reach = std::sqrt(largest(furthest));
+    // Samples stand for the surface between them: a quarter of the displacement more.
+    for (int i = 0; i < 3; ++i)
+        half_box[i] += std::max(largest(box[i]) - kind->sample_box[i], 0.f) + sample_reach / 4;
+    radius += std::max(std::sqrt(largest(far)) - kind->sample_radius, 0.f) + sample_reach / 4;
+}
+
+void PosedBody::bend_polynomial(const float* q) {
+    const int rows = whole_lanes(kind->bricks * kind->bricks * kind->bricks * 81);
     polynomial.resize(rows);
-    alignas(32) float coordinates[2 * 128];
-    for (int k = 0; k < width; ++k) coordinates[k] = k < modes ? static_cast<float>(q[k]) : 0;
-    for (int row = 0; row < rows; ++row) {
-        const float* c = kind->polynomials.data() + static_cast<std::size_t>(row) * width;
+    for (int row = 0; row < rows; row += kLanes) {
+        const float* c = kind->mode_polynomials.data() + row;
         Lanes sum = lanes_of(0);
-        for (int k = 0; k < width; k += kLanes) sum += load_lanes(c + k) * load_lanes(coordinates + k);
-        polynomial.data()[row] = sum_of(sum);
+        for (int k = 0; k < kind->modes; ++k, c += rows) sum += lanes_of(q[k]) * load_lanes(c);
+        store_lanes(polynomial.data() + row, sum);
     }
-    // Samples stand for the surface between them: a quarter more.
-    return 1.25f * std::sqrt(largest(furthest));
 }
 
 Eigen::Vector3d PosedBody::deformed(const Eigen::Vector3d& rest) const noexcept {

@@ -10,11 +10,12 @@ struct PosedBody {
     Eigen::Vector3d position = Eigen::Vector3d::Zero();
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< body to world
     LaneArray samples;     ///< deformed, body frame: [axis][8 batches]; empty: as at rest
-    LaneArray polynomial;  ///< displacement: [brick][27][3]; modal bodies only
+    LaneArray polynomial;  ///< displacement: [brick][27][3], whole lanes in all; modal bodies only
     Eigen::Matrix3f deformation = Eigen::Matrix3f::Identity();  ///< D of (2.12), linear bodies
     Eigen::Matrix3f deformation_inverse = Eigen::Matrix3f::Identity();
     Eigen::Vector3f half_box;                             ///< of the deformed body, its own axes [m]
     float radius = 0;                                     ///< [m]
+    float sample_reach = 0;                               ///< how far samples are from their rest places [m]
     Eigen::Vector3d half_aabb = Eigen::Vector3d::Zero();  ///< world axes [m]
 
     [[nodiscard]] const float* sample_data() const noexcept {
@@ -33,8 +34,9 @@ struct PosedBody {
              const Eigen::VectorXd& q);
 
 private:
-    float deform_linear(const Eigen::VectorXd& q);
-    float deform_modal(const Eigen::VectorXd& q);
+    void deform_linear(const Eigen::VectorXd& q);
+    void deform_modal(const Eigen::VectorXd& q);
+    void bend_polynomial(const float* q);
 };
 
 }  // namespace sim

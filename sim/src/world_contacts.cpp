@@ -1,6 +1,7 @@
 #include "world_contacts.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace sim {
@@ -9,16 +10,16 @@ namespace {
 constexpr double kSlop = 0.005;  // of the smaller half extent: contacts exist from here on
 constexpr float kDeep = 0.04f;   // of it: a contact that begins deeper is one of bodies put inside each other
 constexpr float kManifoldTolerance = 0.02f;
+constexpr std::uint32_t kOfB = 1u << 31;  // feature: a sample of b
 
 double smallest_half(const MovingBody& body) {
     return body.kind->definition.shape.base.semi_axes.minCoeff();
 }
 
 // How far any point may come in a step, against things at rest.
-double reach_of(const MovingBody& body, const WorldSettings& settings) {
+double reach_of(const MovingBody& body, double speed, const WorldSettings& settings) {
     if (!body.moves() || body.asleep) return 0;
-    return settings.dt *
-           (point_speed(body) + settings.dt * std::abs(body.gravity_scale) * settings.gravity.norm());
+    return settings.dt * (speed + settings.dt * std::abs(body.gravity_scale) * settings.gravity.norm());
 }
 
 // All that can be closed within the step, so that nothing passes through unseen.
@@ -57,140 +58,177 @@ bool WorldContacts::find_once(const WorldSettings& settings, const std::vector<W
                               const std::vector<std::pair<int, int>>& joined,
                               std::vector<MovingBody>& bodies) {
     manifolds_.clear();
+    speeds_.clear();
     pairs_ = 0;
-    bool woke = false;
+    next_before_ = 0;
+    woke_ = false;
     auto& boxes = broad_.boxes();
     boxes.clear();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         const MovingBody& body = bodies[i];
+        const double speed = point_speed(body);
+        speeds_.push_back({speed - body.state.velocity.norm(),
+                           kSlop * smallest_half(body) + reach_of(body, speed, settings)});
         if (body.quarantined) continue;
-        const double grown = kSlop * smallest_half(body) + reach_of(body, settings);
-        const Eigen::Vector3d half = body.posed.half_aabb.array() + grown;
+        const Eigen::Vector3d half = body.posed.half_aabb.array() + speeds_.back().grown;
         boxes.push_back({body.posed.position - half, body.posed.position + half, static_cast<int>(i),
                          body.moves() && !body.asleep});
     }
-    auto last = [this](const Manifold& manifold) -> const Manifold* {
-        const auto old = std::lower_bound(before_.begin(), before_.end(), manifold.key(),
-                                          [](const Manifold& m, std::uint64_t key) { return m.key() < key; });
-        return old != before_.end() && old->key() == manifold.key() ? &*old : nullptr;
-    };
-    for (const auto& [i, j] : broad_.find()) {
-        if (std::binary_search(joined.begin(), joined.end(), std::pair(i, j))) continue;
-        const MovingBody &a = bodies[static_cast<std::size_t>(i)], &b = bodies[static_cast<std::size_t>(j)];
-        Manifold manifold;
-        manifold.a = i, manifold.b = j;
-        const Manifold* old = last(manifold);
-        meet(settings, a, b, old, manifold);
-        ++pairs_;
-        if (manifold.count == 0) continue;
-        if (a.asleep || b.asleep) {
-            wake_group(bodies, a.asleep ? i : j);
-            woke = true;
-        }
-        manifold.friction = std::sqrt(a.friction * b.friction);
-        manifold.restitution = std::max(a.restitution, b.restitution);
-        manifolds_.push_back(manifold);
+    // By bodies, each with later bodies and then with planes: in the order of the manifolds' keys.
+    const auto& pairs = broad_.find();
+    auto pair = pairs.begin();
+    for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
+        for (; pair != pairs.end() && pair->first == i; ++pair)
+            if (joined.empty() || !std::binary_search(joined.begin(), joined.end(), *pair))
+                meet_pair(settings, bodies, i, pair->second);
+        if (!woke_) meet_planes(settings, planes, bodies[static_cast<std::size_t>(i)], i);
     }
-    if (woke) return true;
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-        const MovingBody& body = bodies[i];
-        if (!body.moves() || body.asleep) continue;
-        const double grown = kSlop * smallest_half(body) + reach_of(body, settings);
-        for (std::size_t p = 0; p < planes.size(); ++p) {
-            const WorldPlane& plane = planes[p];
-            const double height = plane.normal.dot(body.posed.position) - plane.offset;
-            if (height > plane.normal.cwiseAbs().dot(body.posed.half_aabb) + grown) continue;
-            Manifold manifold;
-            manifold.a = static_cast<int>(i), manifold.b = kFirstPlane + static_cast<int>(p);
-            const Manifold* old = last(manifold);
-            meet_plane(settings, body, plane, old, manifold);
-            ++pairs_;
-            if (manifold.count == 0) continue;
-            manifold.friction = std::sqrt(body.friction * static_cast<float>(plane.friction));
-            manifold.restitution = std::max(body.restitution, static_cast<float>(plane.restitution));
-            manifolds_.push_back(manifold);
-        }
-    }
-    std::sort(manifolds_.begin(), manifolds_.end(),
-              [](const Manifold& a, const Manifold& b) { return a.key() < b.key(); });
-    return false;
+    return woke_;
 }
 
-void WorldContacts::meet(const WorldSettings& settings, const MovingBody& a, const MovingBody& b,
-                         const Manifold* before, Manifold& manifold) {
-    const PosedBody &pa = a.posed, &pb = b.posed;
-    const Eigen::Vector3d apart = pa.position - pb.position;
-    const double distance = apart.norm();
-    const double size = std::min(smallest_half(a), smallest_half(b));
+// Keys must ascend from call to call.
+const Manifold* WorldContacts::last(std::uint64_t key) {
+    while (next_before_ < before_.size() && before_[next_before_].key() < key) ++next_before_;
+    return next_before_ < before_.size() && before_[next_before_].key() == key ? &before_[next_before_]
+                                                                               : nullptr;
+}
+
+void WorldContacts::meet_pair(const WorldSettings& settings, std::vector<MovingBody>& bodies, int i, int j) {
+    const MovingBody &a = bodies[static_cast<std::size_t>(i)], &b = bodies[static_cast<std::size_t>(j)];
+    ++pairs_;
+    const Eigen::Vector3d apart = a.posed.position - b.posed.position;
+    const double distance = apart.norm(), size = std::min(smallest_half(a), smallest_half(b));
     // Speed at which the gap can close: of the centres along their line, and of the surfaces about them.
     const Eigen::Vector3d closing = b.state.velocity - a.state.velocity;
     double approach = distance > 1e-9 ? closing.dot(apart) / distance : closing.norm();
-    approach += point_speed(a) - a.state.velocity.norm() + point_speed(b) - b.state.velocity.norm();
+    approach += speeds_[static_cast<std::size_t>(i)].surface + speeds_[static_cast<std::size_t>(j)].surface;
     const float margin = static_cast<float>(margin_of(approach, size, settings));
-    candidates_.clear();
-    if (distance > pa.radius + pb.radius + margin) return;
-    const Eigen::Vector3f between = apart.cast<float>();
-    for (const bool b_sampled : {false, true}) {
-        const PosedBody &sampled = b_sampled ? pb : pa, &implicit = b_sampled ? pa : pb;
-        found_.clear();
-        finder_.find(sampled, implicit, margin, found_);
-        const Eigen::Matrix3f turn = implicit.rotation.cast<float>(),
-                              turn_sampled = sampled.rotation.cast<float>();
-        for (const SampleContact& contact : found_) {
-            ManifoldPoint point;
-            const Eigen::Vector3f out = turn * contact.normal;
-            const Eigen::Vector3f arm =
-                turn_sampled * sampled.sample(contact.sample) - 0.5f * contact.separation * out;
-            point.feature = static_cast<std::uint32_t>(contact.sample) | (b_sampled ? 1u << 31 : 0u);
-            point.separation = contact.separation;
-            point.rest = contact.rest;
-            if (b_sampled) {
-                point.normal = -out;
-                point.arm_b = arm, point.arm_a = arm - between;
-                point.sample_b = contact.sample;
-            } else {
-                point.normal = out;
-                point.arm_a = arm, point.arm_b = arm + between;
-                point.sample_a = contact.sample;
-            }
-            candidates_.push_back(point);
-        }
+    if (distance > a.posed.radius + b.posed.radius + margin) return;
+    Manifold& manifold = manifolds_.emplace_back();
+    manifold.a = i, manifold.b = j;
+    meet(a, b, margin, manifold);
+    if (manifold.count == 0) {
+        manifolds_.pop_back();
+        return;
     }
-    choose_points(candidates_, kManifoldTolerance * static_cast<float>(size), before, manifold);
-    finish(before, static_cast<float>(size), manifold);
+    manifold.friction = std::sqrt(a.friction * b.friction);
+    manifold.restitution = std::max(a.restitution, b.restitution);
+    if (a.asleep || b.asleep) {
+        wake_group(bodies, a.asleep ? i : j);
+        woke_ = true;
+    }
 }
 
-void WorldContacts::meet_plane(const WorldSettings& settings, const MovingBody& a, const WorldPlane& plane,
-                               const Manifold* before, Manifold& manifold) {
+void WorldContacts::meet_planes(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
+                                const MovingBody& body, int i) {
+    if (!body.moves() || body.asleep) return;
+    const Speed& speed = speeds_[static_cast<std::size_t>(i)];
+    for (std::size_t p = 0; p < planes.size(); ++p) {
+        const WorldPlane& plane = planes[p];
+        const double height = plane.normal.dot(body.posed.position) - plane.offset;
+        if (height > plane.normal.cwiseAbs().dot(body.posed.half_aabb) + speed.grown) continue;
+        ++pairs_;
+        const double approach = -plane.normal.dot(body.state.velocity) + speed.surface;
+        Manifold& manifold = manifolds_.emplace_back();
+        manifold.a = i, manifold.b = kFirstPlane + static_cast<int>(p);
+        meet_plane(body, plane, static_cast<float>(height),
+                   static_cast<float>(margin_of(approach, smallest_half(body), settings)), manifold);
+        if (manifold.count == 0) {
+            manifolds_.pop_back();
+            continue;
+        }
+        manifold.friction = std::sqrt(body.friction * static_cast<float>(plane.friction));
+        manifold.restitution = std::max(body.restitution, static_cast<float>(plane.restitution));
+    }
+}
+
+void WorldContacts::meet(const MovingBody& a, const MovingBody& b, float margin, Manifold& manifold) {
+    const PosedBody &pa = a.posed, &pb = b.posed;
+    const float size = static_cast<float>(std::min(smallest_half(a), smallest_half(b)));
+    found_.clear();
+    finder_.find(pa, pb, margin, found_);
+    const std::size_t of_a = found_.size();
+    finder_.find(pb, pa, margin, found_);
+    float lowest = 1e30f;
+    for (const SampleContact& contact : found_) lowest = std::min(lowest, contact.separation);
+    const float out = PointChooser::reach(lowest, kManifoldTolerance * size);
+    const Eigen::Vector3f between = (pa.position - pb.position).cast<float>();
+    candidates_.clear();
+    for (const bool b_sampled : {false, true}) {
+        const PosedBody &sampled = b_sampled ? pb : pa, &implicit = b_sampled ? pa : pb;
+        const Eigen::Matrix3f turn = implicit.rotation.cast<float>(),
+                              turn_sampled = sampled.rotation.cast<float>();
+        for (std::size_t i = b_sampled ? of_a : 0; i < (b_sampled ? found_.size() : of_a); ++i) {
+            const SampleContact& contact = found_[i];
+            if (contact.separation > out) continue;
+            ContactCandidate& point = candidates_.emplace_back();
+            const Eigen::Vector3f normal = turn * contact.normal;
+            const Eigen::Vector3f arm =
+                turn_sampled * sampled.sample(contact.sample) - 0.5f * contact.separation * normal;
+            point.feature = static_cast<std::uint32_t>(contact.sample) | (b_sampled ? kOfB : 0u);
+            point.separation = contact.separation;
+            point.rest = contact.rest;
+            point.normal = b_sampled ? Eigen::Vector3f(-normal) : normal;
+            point.arm_a = b_sampled ? Eigen::Vector3f(arm - between) : arm;
+        }
+    }
+    fill(size, between, manifold);
+}
+
+void WorldContacts::meet_plane(const MovingBody& a, const WorldPlane& plane, float height, float margin,
+                               Manifold& manifold) {
     const PosedBody& posed = a.posed;
-    const double size = smallest_half(a);
-    const double approach = -plane.normal.dot(a.state.velocity) + point_speed(a) - a.state.velocity.norm();
-    const float margin = static_cast<float>(margin_of(approach, size, settings));
-    const float height = static_cast<float>(plane.normal.dot(posed.position) - plane.offset);
     const Eigen::Vector3f n = (posed.rotation.transpose() * plane.normal).cast<float>();
     const float* x = posed.sample_data();
     const int stride = posed.kind->batches * kLanes;
     const Eigen::Matrix3f turn = posed.rotation.cast<float>();
     const Eigen::Vector3f normal = plane.normal.cast<float>();
+    const float size = static_cast<float>(smallest_half(a)), tolerance = kManifoldTolerance * size;
     candidates_.clear();
+    float lowest = margin;
     for (int first = 0; first < stride; first += kLanes) {
         const Lanes s = n.x() * load_lanes(x + first) + n.y() * load_lanes(x + stride + first) +
                         n.z() * load_lanes(x + 2 * stride + first) + height;
-        for (int lane = 0; lane < kLanes && first + lane < posed.kind->samples; ++lane) {
-            if (!(s[lane] < margin)) continue;
-            ManifoldPoint point;
+        const float out = std::min(margin, PointChooser::reach(lowest, tolerance));
+        for (unsigned left = bits_of(s < out); left != 0; left &= left - 1) {
+            const int lane = std::countr_zero(left);
+            if (first + lane >= posed.kind->samples) break;
+            lowest = std::min(lowest, s[lane]);
+            ContactCandidate& point = candidates_.emplace_back();
             point.feature = static_cast<std::uint32_t>(first + lane);
             point.separation = s[lane];
             point.normal = normal;
             point.arm_a = turn * posed.sample(first + lane) - 0.5f * s[lane] * normal;
-            point.arm_b.setZero();
-            point.sample_a = first + lane;
             point.rest.setZero();
-            candidates_.push_back(point);
         }
     }
-    choose_points(candidates_, kManifoldTolerance * static_cast<float>(size), before, manifold);
-    finish(before, static_cast<float>(size), manifold);
+    fill(size, Eigen::Vector3f::Zero(), manifold);
+}
+
+// The manifold's points out of the candidates, with the impulses of the step before. between: from b's centre
+// to a's.
+void WorldContacts::fill(float size, const Eigen::Vector3f& between, Manifold& manifold) {
+    if (candidates_.empty()) return;
+    const Manifold* before = last(manifold.key());
+    std::array<int, kManifoldPoints> chosen;
+    manifold.count = chooser_.choose(candidates_, kManifoldTolerance * size, before, chosen);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(manifold.count); ++i) {
+        const ContactCandidate& from = candidates_[static_cast<std::size_t>(chosen[i])];
+        ManifoldPoint& point = manifold.points[i];
+        point.feature = from.feature;
+        point.separation = from.separation;
+        point.normal = from.normal;
+        point.arm_a = from.arm_a;
+        if (manifold.b >= kFirstPlane) {
+            point.arm_b.setZero();
+        } else {
+            point.arm_b = from.arm_a + between;
+        }
+        point.rest = from.rest;
+        const int sample = static_cast<int>(from.feature & ~kOfB);
+        (from.feature & kOfB ? point.sample_b : point.sample_a) = sample;
+    }
+    finish(before, size, manifold);
 }
 
 }  // namespace sim

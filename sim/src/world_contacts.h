@@ -17,19 +17,31 @@ public:
     [[nodiscard]] std::uint64_t fallbacks() const noexcept { return finder_.fallbacks(); }
 
 private:
+    struct Speed {
+        double surface;  // of the surface about the centre, at most [m/s]
+        double grown;    // how far any point may come in the step, and the slop [m]
+    };
     bool find_once(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
                    const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies);
-    void meet(const WorldSettings& settings, const MovingBody& a, const MovingBody& b, const Manifold* before,
-              Manifold& manifold);
-    void meet_plane(const WorldSettings& settings, const MovingBody& a, const WorldPlane& plane,
-                    const Manifold* before, Manifold& manifold);
+    void meet_pair(const WorldSettings& settings, std::vector<MovingBody>& bodies, int i, int j);
+    void meet_planes(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
+                     const MovingBody& body, int i);
+    void meet(const MovingBody& a, const MovingBody& b, float margin, Manifold& manifold);
+    void meet_plane(const MovingBody& a, const WorldPlane& plane, float height, float margin,
+                    Manifold& manifold);
+    void fill(float size, const Eigen::Vector3f& between, Manifold& manifold);
+    const Manifold* last(std::uint64_t key);
 
     BroadPhase broad_;
     SampleFinder finder_;
     std::vector<SampleContact> found_;
-    std::vector<ManifoldPoint> candidates_;
-    std::vector<Manifold> manifolds_, before_;
+    std::vector<ContactCandidate> candidates_;
+    PointChooser chooser_;
+    std::vector<Speed> speeds_;                 // of each body
+    std::vector<Manifold> manifolds_, before_;  // by ascending keys
+    std::size_t next_before_ = 0;               // first of before_ whose key has not been passed
     int pairs_ = 0;
+    bool woke_ = false;
 };
 
 /// Wakes every body of the group that fell asleep with this one.
