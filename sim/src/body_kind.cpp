@@ -57,10 +57,12 @@ void set_samples(BodyKind& kind) {
     kind.sample_shapes.resize(static_cast<std::size_t>(padded) * 3 * kind.mode_width);
     kind.half_box = kind.definition.shape.base.semi_axes;
     kind.bounding_radius = 0;
+    kind.shape_bound = Eigen::VectorXd::Zero(kind.modes);
     for (int s = 0; s < padded; ++s) {
         const Eigen::Vector3d& r = mesh.vertices[std::min(s, kind.samples - 1)];
         kind.half_box = kind.half_box.cwiseMax(r.cwiseAbs());
         const Eigen::Matrix3Xd phi = mode_shapes_at(kind.basis, r);
+        kind.shape_bound = kind.shape_bound.cwiseMax(phi.colwise().norm().transpose());
         for (int axis = 0; axis < 3; ++axis) {
             kind.rest.data()[axis * padded + s] = static_cast<float>(r[axis]);
             for (int k = 0; k < kind.modes; ++k) {
@@ -168,9 +170,12 @@ bool same_shape(const GeneralizedSuperquadric& a, const GeneralizedSuperquadric&
 
 HeldStep held_step(double omega, double sigma, double tau) noexcept {
     const OscillatorStep s = oscillator_step(omega, sigma, tau);
-    const double turn = omega * tau;
-    const double compliance = std::max((1 - s.a) / (turn * turn), 1e-20);
-    return {(s.a - 1) / tau, s.b / tau, compliance, s.c, s.d, s.b / tau, std::sqrt(compliance)};
+    const double turn = omega * tau, fade = sigma * tau;
+    // 1 - a cancels for slow modes; there it is turn^2 / 2 (1 - 2 fade / 3) to 1e-8.
+    const bool slow = turn < 1e-4 && fade < 1e-4;
+    const double exact = slow ? (1 - 2 * fade / 3) / 2 : (1 - s.a) / (turn * turn);
+    const double compliance = std::max(exact, 1e-20), rate = s.b / tau;
+    return {(s.a - 1) / tau, rate, compliance, s.c, s.d, rate, std::sqrt(compliance)};
 }
 
 BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {

@@ -35,6 +35,7 @@ struct BodyKind {
     Eigen::Vector3d half_box;                ///< of the rest surface, bumps included [m]
     double bounding_radius = 0;              ///< [m]
     double substep_drag = 1, step_drag = 1;  ///< e^(-alpha tau): what damping_alpha leaves of rigid motion
+    Eigen::VectorXd shape_bound = {};        ///< largest |phi_k| over the samples [kg^-1/2]
     int modes = 0, width = 8;                ///< width: floats of a Jacobian's row, 8 + mode_width
     int mode_width = 0;                      ///< modes, whole lanes
     bool ellipsoid = false;                  ///< e1 = e2 = 1 without bumps: gauge in closed form

@@ -13,46 +13,48 @@ constexpr float kBounceThreshold = 0.1f;  // [m/s]
 
 float dot(const float* a, const float* b, int width) {
     Lanes sum = load_lanes(a) * load_lanes(b);
-    for (int i = kLanes; i < width; i += kLanes) sum += load_lanes(a + i) * load_lanes(b + i);
+    for (int i = kLanes; i < width; i += kLanes) sum = fused(load_lanes(a + i), load_lanes(b + i), sum);
     return sum_of(sum);
 }
 
-/// Three rows against one vector, added to v.
+/// Three rows against one vector, added to three sums.
 template <int kWidth>
-void dot_rows(const float* rows, const float* y, int any_width, float (&v)[3]) {
+void dot_rows(const float* rows, const float* y, int any_width, Lanes (&sum)[3]) {
     const int width = kWidth ? kWidth : any_width;
-    Lanes s0 = load_lanes(rows) * load_lanes(y), s1 = load_lanes(rows + width) * load_lanes(y),
-          s2 = load_lanes(rows + 2 * width) * load_lanes(y);
-    for (int i = kLanes; i < width; i += kLanes) {
+    for (int i = 0; i < width; i += kLanes) {
         const Lanes x = load_lanes(y + i);
-        s0 += load_lanes(rows + i) * x;
-        s1 += load_lanes(rows + width + i) * x;
-        s2 += load_lanes(rows + 2 * width + i) * x;
+        for (int r = 0; r < 3; ++r) sum[r] = fused(load_lanes(rows + r * width + i), x, sum[r]);
     }
-    v[0] += sum_of(s0), v[1] += sum_of(s1), v[2] += sum_of(s2);
 }
 
 /// y += rows^T p.
 template <int kWidth>
 void add_rows_to(const float* rows, const float (&p)[3], int any_width, float* y) {
     const int width = kWidth ? kWidth : any_width;
+    const Lanes p0 = lanes_of(p[0]), p1 = lanes_of(p[1]), p2 = lanes_of(p[2]);
     for (int i = 0; i < width; i += kLanes)
-        store_lanes(y + i, load_lanes(y + i) + p[0] * load_lanes(rows + i) +
-                               p[1] * load_lanes(rows + width + i) + p[2] * load_lanes(rows + 2 * width + i));
+        store_lanes(y + i, fused(p2, load_lanes(rows + 2 * width + i),
+                                 fused(p1, load_lanes(rows + width + i),
+                                       fused(p0, load_lanes(rows + i), load_lanes(y + i)))));
 }
 
-// The usual widths (rigid, linear, 9 to 16 modes) unrolled.
-void dot_rows(const float* rows, const float* y, int width, float (&v)[3]) {
-    if (width == 24) return dot_rows<24>(rows, y, width, v);
-    if (width == 8) return dot_rows<8>(rows, y, width, v);
-    if (width == 16) return dot_rows<16>(rows, y, width, v);
-    dot_rows<0>(rows, y, width, v);
+// The usual widths (9 to 16 modes, rigid, linear) unrolled.
+void dot_rows(const float* rows, const float* y, int width, Lanes (&sum)[3]) {
+    if (width == 24) return dot_rows<24>(rows, y, width, sum);
+    if (width == 8) return dot_rows<8>(rows, y, width, sum);
+    if (width == 16) return dot_rows<16>(rows, y, width, sum);
+    dot_rows<0>(rows, y, width, sum);
 }
 void add_rows_to(const float* rows, const float (&p)[3], int width, float* y) {
     if (width == 24) return add_rows_to<24>(rows, p, width, y);
     if (width == 8) return add_rows_to<8>(rows, p, width, y);
     if (width == 16) return add_rows_to<16>(rows, p, width, y);
     add_rows_to<0>(rows, p, width, y);
+}
+
+// Without the library's check for negative arguments.
+float root(float x) {
+    return _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(x)));
 }
 
 /// Two unit vectors square to n and to each other.
@@ -67,7 +69,7 @@ void set_tangents(const Eigen::Vector3f& n, Eigen::Vector3f (&t)[2]) {
 
 void IslandSolver::solve(const Island& island) {
     begin(island);
-    for (int i = 0; i < settings_->substeps; ++i) substep(i + 1 == settings_->substeps);
+    for (int i = 0; i < settings_->substeps; ++i) substep(i == 0, i + 1 == settings_->substeps);
     keep_impulses();
     for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
 }
@@ -167,15 +169,16 @@ IslandSolver::Place IslandSolver::place(int body, const Eigen::Vector3f& arm, in
     return {local(body), arm, scratch};
 }
 
-std::uint32_t IslandSolver::reserve_rows(int body) {
-    const std::uint32_t offset = static_cast<std::uint32_t>(jacobians_used_);
-    if (body >= 0)
-        jacobians_used_ += 3 * static_cast<std::size_t>(rows_of_[static_cast<std::size_t>(body)].width);
-    return offset;
+IslandSolver::Side IslandSolver::reserve_rows(int body) {
+    if (body < 0) return {};
+    const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+    const Side side{body, rows.width, static_cast<std::uint32_t>(jacobians_used_), rows.offset};
+    jacobians_used_ += 3 * static_cast<std::size_t>(rows.width);
+    return side;
 }
 
 void IslandSolver::write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign,
-                              std::uint32_t offset) {
+                              const Side& side) {
     if (place.body < 0) return;
     const BodyRows& rows = rows_of_[static_cast<std::size_t>(place.body)];
     const BodyKind& kind = *rows.body->kind;
@@ -183,7 +186,7 @@ void IslandSolver::write_rows(const Place& place, const Eigen::Matrix3f& directi
     const Eigen::Vector3f root_inertia = kind.mass.inertia.cwiseSqrt().cwiseInverse().cast<float>();
     const float root_mass = static_cast<float>(1 / std::sqrt(kind.mass.mass));
     for (int r = 0; r < 3; ++r) {
-        float* out = jacobians_.data() + offset + r * rows.width;
+        float* out = jacobians_.data() + side.rows + r * side.width;
         const Eigen::Vector3f world = sign * directions.row(r).transpose();
         const Eigen::Vector3f turn = (body_from_world * place.arm.cross(world)).cwiseProduct(root_inertia);
         for (int i = 0; i < 3; ++i) out[i] = root_mass * world[i], out[3 + i] = turn[i];
@@ -203,12 +206,10 @@ void IslandSolver::finish_rows(Rows& rows) {
     for (int i = 0; i < 3; ++i)
         for (int j = i; j < 3; ++j) {
             float sum = 0;
-            for (const bool side : {false, true}) {
-                const int body = side ? rows.b : rows.a;
-                if (body < 0) continue;
-                const int width = rows_of_[static_cast<std::size_t>(body)].width;
-                const float* d = jacobians_.data() + (side ? rows.offset_b : rows.offset_a);
-                sum += dot(d + i * width, d + j * width, width);
+            for (const Side& side : rows.side) {
+                if (side.body < 0) continue;
+                const float* d = jacobians_.data() + side.rows;
+                sum += dot(d + i * side.width, d + j * side.width, side.width);
             }
             rows.k[i][j] = rows.k[j][i] = sum;
         }
@@ -217,24 +218,23 @@ void IslandSolver::finish_rows(Rows& rows) {
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     alignas(32) float scratch[2][3 * 128];
     ContactRows c{};
+    c.place.setZero();
     const Place a = place(manifold.a, point.arm_a, point.sample_a, point.rest, scratch[0]);
     const Place b = place(manifold.b, point.arm_b, point.sample_b, point.rest, scratch[1]);
     set_tangents(point.normal, c.tangent);
     Eigen::Matrix3f directions;
     directions << point.normal.transpose(), c.tangent[0].transpose(), c.tangent[1].transpose();
-    c.a = a.body, c.b = b.body;
-    c.offset_a = reserve_rows(c.a);
-    write_rows(a, directions, 1, c.offset_a);
-    c.offset_b = reserve_rows(c.b);
-    write_rows(b, directions, -1, c.offset_b);
+    c.side[0] = reserve_rows(a.body);
+    write_rows(a, directions, 1, c.side[0]);
+    c.side[1] = reserve_rows(b.body);
+    write_rows(b, directions, -1, c.side[1]);
     finish_rows(c);
     c.point = &point;
-    c.place = (*bodies_)[static_cast<std::size_t>(manifold.a)].posed.position + point.arm_a.cast<double>();
     c.separation = c.now = point.separation;
     c.friction = manifold.friction;
     // Only what comes together rebounds, not what rests and rings.
     c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
-    c.approach = 0, c.largest = 0;
+    c.approach = 0, c.largest = 0, c.taken = 0;
     c.emerging = manifold.emerging;
     c.inverse_normal = 1 / c.k[0][0];
     c.slide_mass = 2 / (c.k[1][1] + c.k[2][2]);
@@ -252,9 +252,8 @@ void IslandSolver::add_spring(HeldConstraint& constraint) {
     SpringRows s{};
     s.place.setZero();
     auto local_of = [this](int body) { return body >= 0 ? local(body) : -1; };
-    s.a = local_of(held.body_a), s.b = local_of(held.body_b);
-    s.offset_a = reserve_rows(s.a);
-    s.offset_b = reserve_rows(s.b);
+    s.side[0] = reserve_rows(local_of(held.body_a));
+    s.side[1] = reserve_rows(local_of(held.body_b));
     s.constraint = &constraint;
     for (int i = 0; i < 3; ++i) s.impulse[i] = constraint.impulse[i];
     springs_.push_back(s);
@@ -282,8 +281,8 @@ void IslandSolver::refresh(SpringRows& s) {
     const End a = end_of(held.body_a, held.point_a, scratch[0]);
     const End b = end_of(held.body_b, held.point_b, scratch[1]);
     const Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();
-    write_rows(a.place, axes, 1, s.offset_a);
-    write_rows(b.place, axes, -1, s.offset_b);
+    write_rows(a.place, axes, 1, s.side[0]);
+    write_rows(b.place, axes, -1, s.side[1]);
     finish_rows(s);
     s.place = (a.point + b.point) / 2;
     const double mass = 3.0 / (s.k[0][0] + s.k[1][1] + s.k[2][2]), k = held.stiffness;
@@ -301,13 +300,14 @@ void IslandSolver::refresh(SpringRows& s) {
     }
 }
 
-void IslandSolver::substep(bool last) {
+void IslandSolver::substep(bool first, bool last) {
     load_velocities();
     for (SpringRows& spring : springs_) refresh(spring);
-    warm_start();
+    warm_start(first);
     sweep(Push::soft);
     push_out();
     sweep(Push::none);
+    note_work();
     if (last) restitute();
     finish();
 }
@@ -347,37 +347,21 @@ void IslandSolver::load_velocities() {
     }
 }
 
-void IslandSolver::warm_start() {
+void IslandSolver::warm_start(bool first) {
     // Approach speeds first, before any impulse: gravity's share of this substep included, as it is real.
     for (ContactRows& c : contacts_) {
         float speed = 0, moved = 0;
-        for (const bool side : {false, true}) {
-            const int body = side ? c.b : c.a;
-            if (body < 0) continue;
-            const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
-            const float* d = jacobians_.data() + (side ? c.offset_b : c.offset_a);
-            if (c.restitution > 0 && c.largest == 0) speed += dot(d, start_.data() + rows.offset, rows.width);
-            moved += dot(d, moved_.data() + rows.offset, rows.width);
+        for (const Side& side : c.side) {
+            if (side.body < 0) continue;
+            const float* d = jacobians_.data() + side.rows;
+            if (c.restitution > 0 && c.largest == 0) speed += dot(d, start_.data() + side.y, side.width);
+            if (!first) moved += dot(d, moved_.data() + side.y, side.width);
         }
         if (c.largest == 0) c.approach = speed;
         c.now = c.separation + moved;
-        for (const bool side : {false, true}) {
-            const int body = side ? c.b : c.a;
-            if (body < 0) continue;
-            const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
-            add_rows_to(jacobians_.data() + (side ? c.offset_b : c.offset_a), c.impulse, rows.width,
-                        y_.data() + rows.offset);
-        }
+        push_by(c, c.impulse);
     }
-    for (SpringRows& s : springs_) {
-        for (const bool side : {false, true}) {
-            const int body = side ? s.b : s.a;
-            if (body < 0) continue;
-            const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
-            const float* d = jacobians_.data() + (side ? s.offset_b : s.offset_a);
-            add_rows_to(d, s.impulse, rows.width, y_.data() + rows.offset);
-        }
-    }
+    for (SpringRows& s : springs_) push_by(s, s.impulse);
 }
 
 // Positions move with velocities that also push emerging bodies out; the velocities themselves never see it.
@@ -404,42 +388,35 @@ void IslandSolver::sweep(Push push) {
     for (ContactRows& contact : contacts_) solve_contact(contact, push);
 }
 
+// What the rows see of the velocities.
+inline void IslandSolver::speeds(const Rows& rows, float (&v)[3]) const {
+    Lanes sum[3] = {lanes_of(0), lanes_of(0), lanes_of(0)};
+    for (const Side& side : rows.side)
+        if (side.body >= 0) dot_rows(jacobians_.data() + side.rows, y_.data() + side.y, side.width, sum);
+    for (int r = 0; r < 3; ++r) v[r] = sum_of(sum[r]);
+}
+
+inline void IslandSolver::push_by(const Rows& rows, const float (&impulse)[3]) {
+    for (const Side& side : rows.side)
+        if (side.body >= 0)
+            add_rows_to(jacobians_.data() + side.rows, impulse, side.width, y_.data() + side.y);
+}
+
 void IslandSolver::solve_spring(SpringRows& s) {
-    float v[3] = {0, 0, 0};
-    for (const bool side : {false, true}) {
-        const int body = side ? s.b : s.a;
-        if (body < 0) continue;
-        const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
-        dot_rows(jacobians_.data() + (side ? s.offset_b : s.offset_a), y_.data() + rows.offset, rows.width,
-                 v);
-    }
+    float v[3];
+    speeds(s, v);
     for (int i = 0; i < 3; ++i) v[i] += s.pull * s.error[i] + s.gamma * s.impulse[i];
     float p[3];
     for (int i = 0; i < 3; ++i) {
         p[i] = -(s.inverse[i][0] * v[0] + s.inverse[i][1] * v[1] + s.inverse[i][2] * v[2]);
         s.impulse[i] += p[i];
     }
-    for (const bool side : {false, true}) {
-        const int body = side ? s.b : s.a;
-        if (body < 0) continue;
-        const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
-        add_rows_to(jacobians_.data() + (side ? s.offset_b : s.offset_a), p, rows.width,
-                    y_.data() + rows.offset);
-    }
+    push_by(s, p);
 }
 
 void IslandSolver::solve_contact(ContactRows& c, Push push) {
-    const float* da = jacobians_.data() + c.offset_a;
-    const float* db = jacobians_.data() + c.offset_b;
-    float v[3] = {0, 0, 0};
-    if (c.a >= 0) {
-        const BodyRows& rows = rows_of_[static_cast<std::size_t>(c.a)];
-        dot_rows(da, y_.data() + rows.offset, rows.width, v);
-    }
-    if (c.b >= 0) {
-        const BodyRows& rows = rows_of_[static_cast<std::size_t>(c.b)];
-        dot_rows(db, y_.data() + rows.offset, rows.width, v);
-    }
+    float v[3];
+    speeds(c, v);
     // Selected, not branched: which case it is cannot be foretold.
     const bool soft = c.now <= 0 && (push == Push::all || (push == Push::soft && !c.emerging));
     const float bias = c.now > 0 ? c.now * inverse_h_ : soft ? std::max(push_rate_ * c.now, -kPushSpeed) : 0;
@@ -457,42 +434,48 @@ void IslandSolver::solve_contact(ContactRows& c, Push push) {
     const float most = c.friction * normal;
     const bool slides = stick0 * stick0 + stick1 * stick1 > most * most;
     const float slide0 = c.impulse[1] - c.slide_mass * v[1], slide1 = c.impulse[2] - c.slide_mass * v[2];
-    const float scale = most / std::max(std::sqrt(slide0 * slide0 + slide1 * slide1), 1e-30f);
+    const float scale = most / std::max(root(slide0 * slide0 + slide1 * slide1), 1e-30f);
     const float t0 = slides ? scale * slide0 : stick0, t1 = slides ? scale * slide1 : stick1;
     p[1] = t0 - c.impulse[1], p[2] = t1 - c.impulse[2];
     c.impulse[1] = t0, c.impulse[2] = t1;
-    if (c.a >= 0) {
-        const BodyRows& rows = rows_of_[static_cast<std::size_t>(c.a)];
-        add_rows_to(da, p, rows.width, y_.data() + rows.offset);
-    }
-    if (c.b >= 0) {
-        const BodyRows& rows = rows_of_[static_cast<std::size_t>(c.b)];
-        add_rows_to(db, p, rows.width, y_.data() + rows.offset);
+    push_by(c, p);
+}
+
+// Energy that a contact's normal impulse takes out in this substep, where it may have to give some back: held
+// over the substep, it does p (v0 + v1) / 2 on the rigid part and p G on the modes.
+void IslandSolver::note_work() {
+    for (ContactRows& c : contacts_) {
+        if (c.restitution == 0 || c.largest == 0) continue;
+        float mean = 0;
+        for (const Side& side : c.side) {
+            if (side.body < 0) continue;
+            const float* d = jacobians_.data() + side.rows;
+            const float *before = start_.data() + side.y, *after = y_.data() + side.y;
+            mean += (dot(d, before, 8) + dot(d, after, 8)) / 2;
+            if (side.width > 8) mean += dot(d + 8, after + 8, side.width - 8);
+        }
+        c.taken -= c.impulse[0] * mean;
     }
 }
 
+// A rebound to e times the approach, by an impulse p whose work p v + p^2 (K_rigid / 2 + K_modes) is at most
+// e^2 of the energy that the contact has taken. For rigid bodies both say the same.
 void IslandSolver::restitute() {
     for (ContactRows& c : contacts_) {
         if (c.restitution == 0 || c.largest == 0 || c.approach > -kBounceThreshold) continue;
-        float v[3] = {0, 0, 0};
-        for (const bool side : {false, true}) {
-            const int body = side ? c.b : c.a;
-            if (body < 0) continue;
-            const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
-            v[0] += dot(jacobians_.data() + (side ? c.offset_b : c.offset_a), y_.data() + rows.offset,
-                        rows.width);
-        }
-        const float normal =
-            std::max(c.impulse[0] - c.inverse_normal * (v[0] + c.restitution * c.approach), 0.f);
-        const float p[3] = {normal - c.impulse[0], 0, 0};
-        c.impulse[0] = normal;
-        for (const bool side : {false, true}) {
-            const int body = side ? c.b : c.a;
-            if (body < 0) continue;
-            const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
-            add_rows_to(jacobians_.data() + (side ? c.offset_b : c.offset_a), p, rows.width,
-                        y_.data() + rows.offset);
-        }
+        float v[3];
+        speeds(c, v);
+        float rigid = 0;
+        for (const Side& side : c.side)
+            if (side.body >= 0) rigid += dot(jacobians_.data() + side.rows, jacobians_.data() + side.rows, 8);
+        // The modes yield to p under the impulse of this substep, too.
+        const float modes = c.k[0][0] - rigid, firm = rigid / 2 + modes, slope = v[0] + modes * c.impulse[0];
+        const float budget = c.restitution * c.restitution * std::max(c.taken, 0.f);
+        const float most = (std::sqrt(slope * slope + 4 * firm * budget) - slope) / (2 * firm);
+        const float wanted = -c.inverse_normal * (v[0] + c.restitution * c.approach);
+        const float p[3] = {std::clamp(wanted, 0.f, std::max(most, 0.f)), 0, 0};
+        c.impulse[0] += p[0];
+        push_by(c, p);
     }
 }
 
@@ -516,22 +499,33 @@ void IslandSolver::move() {
     }
 }
 
+// Half-way between where the contact would be if it moved with either centre.
+Eigen::Vector3d IslandSolver::place_now(const ContactRows& c) const {
+    const Side &a = c.side[0], &b = c.side[1];
+    auto with = [this](const Side& side, const Eigen::Vector3f& arm) -> Eigen::Vector3d {
+        return rows_of_[static_cast<std::size_t>(side.body)].place + arm.cast<double>();
+    };
+    if (b.body < 0) return with(a, c.point->arm_a);
+    if (a.body < 0) return with(b, c.point->arm_b);
+    return (with(a, c.point->arm_a) + with(b, c.point->arm_b)) / 2;
+}
+
 // In double precision and at one point of space a pair, so that linear and angular momentum are kept to
 // rounding.
 void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point) {
-    for (const bool side : {false, true}) {
-        const int id = side ? rows.b : rows.a;
-        if (id < 0) continue;
-        const BodyRows& at = rows_of_[static_cast<std::size_t>(id)];
+    for (const Side& side : rows.side) {
+        if (side.body < 0) continue;
+        const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
         WorldBodyState& s = at.body->state;
-        const Eigen::Vector3d p = side ? Eigen::Vector3d(-impulse) : impulse;
+        const Eigen::Vector3d p = &side == &rows.side[0] ? impulse : Eigen::Vector3d(-impulse);
         s.velocity += p / at.body->kind->mass.mass;
         s.angular_momentum += (point - at.place).cross(p);
     }
 }
 
 void IslandSolver::finish() {
-    for (const ContactRows& c : contacts_) {
+    for (ContactRows& c : contacts_) {
+        c.place = place_now(c);
         const Eigen::Vector3f p =
             c.impulse[0] * c.point->normal + c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1];
         apply(c, p.cast<double>(), c.place);

@@ -30,7 +30,7 @@ struct Island {
 /// and at the end of the last substep restitution. Contact forces act on a mode with its compliance over the
 /// substep, w = (1 - a) / (omega h)^2 >= 0 (body_kind.h), so rigid, stiff and soft bodies go through one
 /// solver, and the force's work on a pair without push is -1/2 P J M^-1 J^T P of the rigid part: never
-/// positive, for any omega h.
+/// positive, for any omega h. Restitution gives back at most e^2 of what a contact took.
 ///
 /// Rows. One Jacobian row a direction (normal, two tangents) and body, scaled by the square root of the
 /// inverse mass: D = J M^-1/2, floats in whole lanes, (n, R^T(r x n) / sqrt(I), sqrt(w) phi(r)^T R^T n). So
@@ -65,18 +65,24 @@ private:
         Eigen::Vector3d place;  // of the centre, at the start of the substep
         Eigen::Matrix3d frame;  // body to world, in which angular rows are written
     };
-    /// Where a row triple lies and whom it joins.
+    /// One body's part of a row triple.
+    struct Side {
+        int body = -1;           // island-local, -1: does not move
+        int width = 0;           // of a row
+        std::uint32_t rows = 0;  // where they begin in jacobians_
+        std::uint32_t y = 0;     // where the body begins in y_, start_, moved_
+    };
+    /// A row triple and whom it joins.
     struct Rows {
-        int a = -1, b = -1;  // island-local, -1: does not move
-        std::uint32_t offset_a = 0, offset_b = 0;
+        Side side[2];
         float k[3][3];
-        Eigen::Vector3d place;  // of the contact at the start of the step, world
+        Eigen::Vector3d place;  // where the impulse acts in this substep, world
     };
     struct ContactRows : Rows {
         ManifoldPoint* point;
         Eigen::Vector3f tangent[2];
         float separation, now, friction, restitution, approach;
-        float slide_mass, inverse_normal,
+        float taken, slide_mass, inverse_normal,
             inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
         float impulse[3], kept[3], largest;
         bool emerging;
@@ -119,21 +125,25 @@ private:
     void refresh(SpringRows& spring);
     [[nodiscard]] Place place(int body, const Eigen::Vector3f& arm, int sample, const Eigen::Vector3f& rest,
                               float* scratch);
-    std::uint32_t reserve_rows(int body);
-    void write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign, std::uint32_t offset);
+    [[nodiscard]] Side reserve_rows(int body);
+    void write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign, const Side& side);
     void finish_rows(Rows& rows);
     [[nodiscard]] int local(int body) const noexcept { return local_[static_cast<std::size_t>(body)]; }
 
-    void substep(bool last);
+    void substep(bool first, bool last);
     void load_velocities();
-    void warm_start();
+    void warm_start(bool first);
     enum class Push { none, soft, all };
     void sweep(Push push);
     void push_out();
+    void speeds(const Rows& rows, float (&v)[3]) const;
+    void push_by(const Rows& rows, const float (&impulse)[3]);
     void solve_spring(SpringRows& spring);
     void solve_contact(ContactRows& contact, Push push);
+    void note_work();
     void restitute();
     void move();
+    [[nodiscard]] Eigen::Vector3d place_now(const ContactRows& contact) const;
     void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
     void finish();
     void keep_impulses();

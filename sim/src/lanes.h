@@ -1,7 +1,5 @@
 #pragma once
-#ifdef __AVX__
 #include <immintrin.h>
-#endif
 
 #include <cstddef>
 #include <cstdint>
@@ -28,6 +26,15 @@ constexpr int kLanes = 8;
 }
 inline void store_lanes(float* aligned, Lanes value) noexcept {
     *reinterpret_cast<Lanes*>(aligned) = value;
+}
+/// a b + c, rounded once where the processor level has the instruction (written out, as the compiler is told
+/// not to contract by itself).
+[[nodiscard]] inline Lanes fused(Lanes a, Lanes b, Lanes c) noexcept {
+#ifdef __FMA__
+    return _mm256_fmadd_ps(a, b, c);
+#else
+    return a * b + c;
+#endif
 }
 /// A bit a lane.
 [[nodiscard]] inline unsigned bits_of(LaneMask mask) noexcept {

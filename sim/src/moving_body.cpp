@@ -76,9 +76,8 @@ double point_speed(const MovingBody& body) noexcept {
     double speed = body.state.velocity.norm() + body.state.angular_momentum.norm() /
                                                     body.kind->mass.inertia.minCoeff() *
                                                     body.kind->bounding_radius;
-    // |phi| at the surface is at most its gradient times the reach, roughly; good enough for rest.
     for (int k = 0; k < body.kind->modes; ++k)
-        speed += std::abs(body.state.q_dot[k]) * body.kind->gradient_bound[k] * body.kind->bounding_radius;
+        speed += std::abs(body.state.q_dot[k]) * body.kind->shape_bound[k];
     return speed;
 }
 

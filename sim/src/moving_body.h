@@ -46,7 +46,7 @@ void move_freely(MovingBody& body, const WorldSettings& settings);
 bool limit_deformation(MovingBody& body);
 constexpr double kGradientLimit = 0.5;
 
-/// An upper bound of the speed of any point of the body [m/s].
+/// An upper bound of the speed of the body's samples at rest shape [m/s].
 [[nodiscard]] double point_speed(const MovingBody& body) noexcept;
 
 }  // namespace sim

@@ -26,6 +26,9 @@ struct PosedBody {
         const int stride = kind->batches * kLanes;
         return {x[index], x[index + stride], x[index + 2 * stride]};
     }
+    /// Of an ellipsoid: the rest point that is furthest along `direction` (body frame) as deformed, exactly
+    /// for rigid and linear bodies; modal ones are taken as undeformed.
+    [[nodiscard]] Eigen::Vector3f furthest_rest_point(const Eigen::Vector3f& direction) const noexcept;
     /// Deformed place of a rest point, body frame.
     [[nodiscard]] Eigen::Vector3d deformed(const Eigen::Vector3d& rest) const noexcept;
 

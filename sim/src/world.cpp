@@ -123,6 +123,11 @@ void World::Implementation::quarantine_broken() {
         const std::string what = what_is_broken(body);
         if (what.empty()) continue;
         body.quarantined = true;
+        body.asleep = body.pushed = false;
+        stop_body(body);  // where it was last seen whole
+        body.state.position = body.posed.position;
+        body.state.orientation = Eigen::Quaterniond(body.posed.rotation);
+        body.state.q.setZero();
         quarantined.push_back({static_cast<int>(i), counts.steps, what});
         for (HeldConstraint& c : constraints)
             if (c.definition.body_a == static_cast<int>(i) || c.definition.body_b == static_cast<int>(i))
@@ -214,8 +219,12 @@ void World::Implementation::put_to_sleep() {
         const bool still = std::all_of(island.bodies.begin(), island.bodies.end(), [this](int id) {
             return bodies[static_cast<std::size_t>(id)].still_s >= kStillTime;
         });
-        // A body that nothing touches only looks still, at the top of a throw, for less than kStillTime.
         if (!still || island.bodies.empty()) continue;
+        // What nothing holds is at rest only if nothing pulls.
+        const MovingBody& first = bodies[static_cast<std::size_t>(island.bodies.front())];
+        if (island.manifolds.empty() && island.constraints.empty() &&
+            (first.gravity_scale * settings.gravity.norm() != 0 || point_speed(first) > 1e-9))
+            continue;
         for (const int id : island.bodies) {
             MovingBody& body = bodies[static_cast<std::size_t>(id)];
             body.asleep = true;
@@ -325,8 +334,14 @@ WorldBodyState World::state(int body) const {
 
 void World::set_state(int body, const WorldBodyState& state) {
     MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
-    check_state(state, b.kind->modes);
+    check_state(state, b.kind->modes, b.fixed);
     b.state = state;
+    const double norm = state.orientation.norm();
+    if (norm > 0.5 && norm < 2) b.state.orientation.coeffs() /= norm;
+    if (b.fixed) {
+        stop_body(b);
+        implementation_->pose(b);
+    }
     wake(body);
 }
 

@@ -7,7 +7,7 @@
 namespace sim {
 namespace {
 
-constexpr double kFurthest = 1e7, kFastest = 1e6;
+constexpr double kFurthest = 1e7, kFastest = 1e6, kStrongest = 1e8;  // m, m/s, m/s^2
 
 [[noreturn]] void refuse(const std::string& who, const std::string& what, double found,
                          const std::string& expected) {
@@ -28,7 +28,7 @@ void check_vector(const std::string& who, const std::string& what, const Eigen::
 }
 
 void check_shape(const std::string& who, const GeneralizedSuperquadric& shape) {
-    for (int i = 0; i < 3; ++i) check_range(who, "semi-axis [m]", shape.base.semi_axes[i], 1e-4, 1e4);
+    for (int i = 0; i < 3; ++i) check_range(who, "semi-axis [m]", shape.base.semi_axes[i], 1e-4, 1e3);
     check_range(who, "exponent e1", shape.base.e1, 0.1, 1.9);
     check_range(who, "exponent e2", shape.base.e2, 0.1, 1.9);
     const double largest = shape.base.semi_axes.maxCoeff();
@@ -50,13 +50,14 @@ void check_world_body(const WorldBody& body) {
     check_shape(who, body.shape);
     check_range(who, "Young's modulus [Pa]", body.material.young_pa, 1, 1e13);
     check_range(who, "Poisson's ratio", body.material.poisson, -0.9, 0.495);
-    check_range(who, "density [kg/m^3]", body.material.density_kg_m3, 1e-3, 1e9);
+    check_range(who, "density [kg/m^3]", body.material.density_kg_m3, 1e-3, 1e8);
     check_range(who, "damping alpha [1/s]", body.damping_alpha, 0, 1e6);
     check_range(who, "damping beta [s]", body.damping_beta, 0, 1e3);
     check_range(who, "damping ratio", body.damping_ratio, 0, 100);
     if (body.fidelity.fidelity == Fidelity::modal) check_range(who, "modes", body.fidelity.modes, 1, 120);
     check_range(who, "elements a side", body.fidelity.elements, 1, 4);
     check_range(who, "error", body.fidelity.error, 1e-9, 1);
+    check_range(who, "impact speed [m/s]", body.fidelity.impact_mps, 0, kFastest);
     check_range(who, "triangles", body.triangles, 48, 20000);
     check_range(who, "friction", body.friction, 0, 100);
     check_range(who, "restitution", body.restitution, 0, 1);
@@ -98,7 +99,9 @@ void check_world(const WorldDefinition& definition) {
     }
 }
 
-void check_state(const WorldBodyState& state, int modes) {
+void check_state(const WorldBodyState& state, int modes, bool fixed) {
+    if (fixed && !(state.position.allFinite() && state.orientation.coeffs().allFinite()))
+        refuse("state", "place of a fixed body", state.position.sum(), "finite numbers");
     if (state.q.size() != modes || state.q_dot.size() != modes)
         refuse("state", "modal coordinates", static_cast<double>(state.q.size()),
                std::to_string(modes) + ", as the body has modes");
@@ -114,10 +117,16 @@ std::string what_is_broken(const MovingBody& body) {
         return "angular momentum";
     if (!s.q.allFinite() || (body.kind->modes > 0 && s.q.cwiseAbs().dot(body.kind->gradient_bound) > 1e6))
         return "modal coordinates";
-    if (!s.q_dot.allFinite()) return "modal rates";
-    if (body.pushed && !(finite_and_below(body.force / body.kind->mass.mass, 1e12) &&
-                         body.torque.allFinite() && body.modal_force.allFinite()))
-        return "user force";
+    if (!s.q_dot.allFinite() ||
+        (body.kind->modes > 0 && s.q_dot.cwiseAbs().dot(body.kind->shape_bound) > kFastest))
+        return "modal rates";
+    if (!body.pushed) return {};
+    const bool fair =
+        finite_and_below(body.force / body.kind->mass.mass, kStrongest) &&
+        finite_and_below(body.torque / body.kind->mass.inertia.minCoeff(), kStrongest) &&
+        body.modal_force.allFinite() &&
+        (body.kind->modes == 0 || body.modal_force.cwiseAbs().dot(body.kind->shape_bound) < kStrongest);
+    if (!fair) return "user force";
     return {};
 }
 

@@ -7,9 +7,9 @@
 namespace sim {
 namespace {
 
-constexpr double kSlop = 0.005;         // of the smaller half extent: contacts exist from here on
-constexpr double kLargestMargin = 0.2;  // of it
-constexpr float kDeep = 0.04f;  // of it: a contact that begins deeper is one of bodies put inside each other
+constexpr double kSlop = 0.005;  // of the smaller half extent: contacts exist from here on
+constexpr float kDeep = 0.04f;   // of it: a contact that begins deeper is one of bodies put inside each other
+constexpr std::uint32_t kFoot = 0x7fffffff;  // feature of a body's lowest point over a plane
 constexpr float kManifoldTolerance = 0.02f;
 constexpr std::uint32_t kOfB = 1u << 31;  // feature: a sample of b
 
@@ -23,8 +23,9 @@ double reach_of(const MovingBody& body, double speed, const WorldSettings& setti
     return settings.dt * (speed + settings.dt * std::abs(body.gravity_scale) * settings.gravity.norm());
 }
 
+// All that can be closed within the step, so that nothing passes through unseen.
 double margin_of(double approach, double size, const WorldSettings& settings) {
-    return std::min(kSlop * size + std::max(approach, 0.0) * settings.dt, kLargestMargin * size);
+    return kSlop * size + std::max(approach, 0.0) * settings.dt;
 }
 
 void finish(const Manifold* before, float size, Manifold& manifold) {
@@ -186,7 +187,20 @@ void WorldContacts::meet_plane(const MovingBody& a, const WorldPlane& plane, flo
     const float size = static_cast<float>(smallest_half(a)), tolerance = kManifoldTolerance * size;
     candidates_.clear();
     float lowest = margin;
-    for (int first = 0; first < stride; first += kLanes) {
+    // An ellipsoid touches a plane with its lowest point: it rolls as round as it is. Modes may dent it, so
+    // modal ones have their samples besides.
+    const bool modal = posed.kind->modes > 0 && !posed.kind->linear();
+    if (posed.kind->ellipsoid) {
+        ContactCandidate foot;
+        foot.feature = kFoot;
+        foot.rest = posed.furthest_rest_point(-n);
+        const Eigen::Vector3f place = turn * posed.deformed(foot.rest.cast<double>()).cast<float>();
+        foot.separation = normal.dot(place) + height;
+        foot.normal = normal;
+        foot.arm_a = place - 0.5f * foot.separation * normal;
+        if (foot.separation < margin) candidates_.push_back(foot);
+    }
+    for (int first = 0; first < (posed.kind->ellipsoid && !modal ? 0 : stride); first += kLanes) {
         const Lanes s = n.x() * load_lanes(x + first) + n.y() * load_lanes(x + stride + first) +
                         n.z() * load_lanes(x + 2 * stride + first) + height;
         const float out = std::min(margin, PointChooser::reach(lowest, tolerance));
@@ -226,7 +240,7 @@ void WorldContacts::fill(float size, const Eigen::Vector3f& between, Manifold& m
         }
         point.rest = from.rest;
         const int sample = static_cast<int>(from.feature & ~kOfB);
-        (from.feature & kOfB ? point.sample_b : point.sample_a) = sample;
+        if (from.feature != kFoot) (from.feature & kOfB ? point.sample_b : point.sample_a) = sample;
     }
     finish(before, size, manifold);
 }

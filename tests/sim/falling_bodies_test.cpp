@@ -43,7 +43,7 @@ double mean_height(int count, const std::function<Vector3d(int)>& position) {
 
 TEST(FallingBalls, AfterFourSecondsOursAndBulletsLieInTheBoxInPilesOfOneHeight) {
     if (!sim_bench::bullet_is_there()) GTEST_SKIP() << "built without Bullet";
-    const int count = 9, steps = 240;
+    const int count = 25, steps = 240;
     sim::World soft(sim_bench::falling_balls(count)), stiff(sim_bench::falling_balls(count, 0));
     BulletWorld bullet(sim_bench::falling_balls(count), BulletKind::rigid);
     for (int i = 0; i < steps; ++i) {
@@ -54,10 +54,12 @@ TEST(FallingBalls, AfterFourSecondsOursAndBulletsLieInTheBoxInPilesOfOneHeight) 
     const double bullet_height = mean_height(count, [&](int i) { return bullet.position(i); });
     const double stiff_height = mean_height(count, [&](int i) { return stiff.state(i).position; });
     const double soft_height = mean_height(count, [&](int i) { return soft.state(i).position; });
-    // Bullet's hulls are 4 cm thicker all round, soft balls sag; otherwise chance alone tells the piles
-    // apart.
+    // Bullet's hulls are 4 cm thicker all round; otherwise chance alone tells the piles apart.
     EXPECT_NEAR(stiff_height, bullet_height, 0.12 * bullet_height);
-    EXPECT_NEAR(soft_height, bullet_height, 0.2 * bullet_height);
+    // Soft balls of 5 kN carry each other with a contact stiffness of some 50 kN/m: they sag by a tenth and
+    // more.
+    EXPECT_LT(soft_height, stiff_height);
+    EXPECT_GT(soft_height, 0.7 * stiff_height);
 }
 
 TEST(FallingBalls, BulletsReducedBallsRestOnTheFloorAndDeform) {

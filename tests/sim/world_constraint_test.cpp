@@ -175,17 +175,3 @@ TEST(WorldConstraint, MassProportionalDampingBringsASwingToRest) {
     EXPECT_TRUE(world.all_asleep());
     EXPECT_NEAR(world.state(0).position.y(), -1, 1e-2) << "it hangs straight down";
 }
-
-TEST(World, AFallingBodyWithDragReachesItsTerminalSpeed) {
-    sim::WorldDefinition definition;
-    definition.bodies.push_back(ball({0, 0, 0}));
-    definition.bodies[0].damping_alpha = 2;
-    definition.bodies[0].angular_velocity = {1, 0, 0};
-    sim::World world(definition);
-    run(world, 60);
-    const double fall = kG / 2 * (1 - std::exp(-2.0));
-    EXPECT_NEAR(world.state(0).velocity.y(), -fall, 1e-12);
-    EXPECT_NEAR(world.state(0).position.y(), -(kG / 2 * 1 - fall / 2), 1e-12);
-    EXPECT_NEAR(world.state(0).angular_momentum.norm(), world.rigid_mass(0).inertia.x() * std::exp(-2.0),
-                1e-12);
-}

@@ -194,3 +194,77 @@ TEST(WorldContact, CollisionsKeepMomentumAndNeverAddEnergy) {
         EXPECT_LT((world.angular_momentum() - turn).norm(), 5e-3 * scale);
     }
 }
+
+TEST(WorldContact, ACommonVelocityOfFiftyMetresASecondChangesNothing) {
+    // Two boxes, one on the other, without friction on the floor: seen from the moving frame nothing happens.
+    sim::WorldDefinition definition = on_floor();
+    definition.settings.sleeping = false;
+    definition.planes[0].friction = 0;
+    for (int i = 0; i < 2; ++i) {
+        definition.bodies.push_back(box({0, 0.5 + i, 0}, Eigen::Vector3d::Constant(0.5)));
+        definition.bodies.back().velocity = {50, 0, 0};
+    }
+    sim::World world(definition);
+    run(world, 300);
+    for (int i = 0; i < 2; ++i) {
+        EXPECT_NEAR(world.state(i).position.x(), 50 * 5, 1e-3);
+        EXPECT_NEAR(world.state(i).position.y(), 0.5 + i, 3e-3);
+        EXPECT_NEAR(world.state(i).velocity.x(), 50, 1e-3);
+        EXPECT_LT(world.state(i).angular_momentum.norm(), 1e-2) << "of 17 kg m^2: 1e-3 rad/s";
+    }
+}
+
+TEST(WorldContact, ABallRollsForTenSecondsWithoutGainingSpeed) {
+    for (const double speed : {2.0, 10.0, 20.0}) {
+        sim::WorldDefinition definition = on_floor();
+        definition.settings.sleeping = false;
+        definition.bodies.push_back(ball({0, 0.5, 0}));
+        definition.bodies[0].velocity = {speed, 0, 0};
+        definition.bodies[0].angular_velocity = {0, 0, -speed / 0.5};
+        sim::World world(definition);
+        const double start = world.energy().kinetic;
+        double most = 0;
+        for (int k = 0; k < 600; ++k) {
+            world.step();
+            most = std::max(most, world.energy().total() - world.rigid_mass(0).mass * 9.81 * 0.5);
+        }
+        // A ball over a plane touches with its lowest point, not with its samples only.
+        EXPECT_LT(most / start, 1.001) << speed;
+        EXPECT_NEAR(world.state(0).velocity.x() / speed, 1, 0.01) << speed;
+        EXPECT_NEAR(world.state(0).position.x() / (speed * 10), 1, 0.01) << speed;
+    }
+}
+
+TEST(WorldContact, SoftBodiesReboundWithoutGainingEnergy) {
+    for (const double young : {2e4, 2e5, 1e6})
+        for (const double e : {0.0, 0.6, 1.0}) {
+            sim::WorldDefinition definition = weightless();
+            definition.settings.sleeping = false;
+            definition.planes.push_back({});
+            definition.bodies.push_back(ball({0, 0.7, 0}, Fidelity::modal));
+            definition.bodies[0].material.young_pa = young;
+            definition.bodies[0].damping_ratio = 0;
+            definition.bodies[0].velocity = {0, -3, 0};
+            definition.bodies[0].restitution = e;
+            sim::World world(definition);
+            const double start = world.energy().total();
+            for (int k = 0; k < 120; ++k) {
+                world.step();
+                ASSERT_LT(world.energy().total(), 1.01 * start) << young << " Pa, e " << e << ", step " << k;
+            }
+            EXPECT_GT(world.state(0).velocity.y(), 0.05) << "it has come back";
+        }
+}
+
+TEST(WorldContact, FastBodiesDoNotPassThroughAThinWall) {
+    for (const double speed : {5.0, 10.0, 20.0, 40.0, 80.0}) {
+        sim::WorldDefinition definition = weightless();
+        definition.bodies.push_back(box({0, 0, 0}, {0.05, 1, 1}));
+        definition.bodies[0].fixed = true;
+        definition.bodies.push_back(ball({-3, 0.1, 0.05}, Fidelity::rigid, 0.1));
+        definition.bodies[1].velocity = {speed, 0, 0};
+        sim::World world(definition);
+        run(world, 120);
+        EXPECT_LT(world.state(1).position.x(), -0.12) << speed << " m/s";
+    }
+}

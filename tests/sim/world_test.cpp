@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <limits>
 
 #include "world_bodies.h"
@@ -28,6 +29,12 @@ bool same(const sim::WorldBodyState& a, const sim::WorldBodyState& b) {
     return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs() &&
            a.velocity == b.velocity && a.angular_momentum == b.angular_momentum && a.q == b.q &&
            a.q_dot == b.q_dot;
+}
+
+long resident_pages() {
+    long all = 0, resident = 0;
+    std::ifstream("/proc/self/statm") >> all >> resident;
+    return resident;
 }
 
 bool long_run() {
@@ -93,6 +100,44 @@ TEST(World, ABrokenBodyIsQuarantinedAndTheOthersDoNotNotice) {
     }
 }
 
+TEST(World, ABodyThatBreaksInContactLeavesItsNeighboursWhole) {
+    for (const double rate : {std::numeric_limits<double>::infinity(), 1e200, 1e30}) {
+        sim::WorldDefinition definition = on_floor();
+        for (int i = 0; i < 3; ++i) definition.bodies.push_back(ball({0, 0.5 + i, 0}, Fidelity::modal));
+        sim::PointConstraint link;
+        link.name = "link";
+        link.body_a = 1, link.point_a = {0.5, 0, 0};
+        link.body_b = 2, link.point_b = {0.5, 0, 0};
+        definition.constraints.push_back(link);
+        sim::World world(definition);
+        run(world, 60);
+        sim::WorldBodyState state = world.state(1);
+        state.q_dot[2] = rate;
+        world.set_state(1, state);
+        run(world, 120);
+        ASSERT_EQ(world.quarantined().size(), 1u);
+        EXPECT_EQ(world.quarantined()[0].what, "modal rates");
+        EXPECT_FALSE(world.constraint_holds(0));
+        for (int i = 0; i < 3; ++i)
+            EXPECT_TRUE(world.state(i).position.allFinite() && world.state(i).q.allFinite());
+    }
+}
+
+TEST(World, NothingFallsAsleepInMidAir) {
+    sim::WorldDefinition slow = on_floor();
+    slow.settings.gravity = {0, -0.01, 0};
+    slow.bodies.push_back(ball({0, 3, 0}));
+    sim::World falling(slow);
+    run(falling, 120);
+    EXPECT_FALSE(falling.asleep(0));
+    sim::WorldDefinition drifting = weightless();
+    drifting.bodies.push_back(ball({0, 3, 0}));
+    drifting.bodies[0].velocity = {0.001, 0, 0};
+    sim::World drift(drifting);
+    run(drift, 600);
+    EXPECT_NEAR(drift.state(0).position.x(), 0.01, 1e-12);
+}
+
 TEST(World, DeformationDrivenToInversionIsHeldAtTheLimitWithoutGainOfEnergy) {
     for (const Fidelity fidelity : {Fidelity::linear, Fidelity::modal}) {
         sim::WorldDefinition definition = weightless();
@@ -145,7 +190,7 @@ TEST(World, SqueezedBetweenHugeForcesABodyStaysFiniteAndUninverted) {
     EXPECT_GT(world.counts().deformations_limited, 0u);
 }
 
-TEST(World, AtRestAwakeNothingDrifts) {
+TEST(World, AtRestAwakeNothingDriftsAndNoMemoryIsTaken) {
     // 1e7 steps in the long run, of which the last million must not have moved anything either.
     sim::WorldDefinition definition = pile(2, Fidelity::modal);
     definition.settings.sleeping = false;
@@ -154,12 +199,14 @@ TEST(World, AtRestAwakeNothingDrifts) {
     sim::World world(definition);
     run(world, 5000);
     const sim::WorldBodyState start = world.state(0);
+    const long pages = resident_pages();
     run(world, long_run() ? 10'000'000 : 100'000);
     const sim::WorldBodyState end = world.state(0);
     EXPECT_LT((end.position - start.position).norm(), 1e-6) << "m";
     EXPECT_LT(end.orientation.angularDistance(start.orientation), 1e-6) << "rad";
     EXPECT_LT((end.q - start.q).norm(), 1e-6);
     EXPECT_LT(end.velocity.norm(), 1e-6);
+    EXPECT_LT(resident_pages(), pages + 64) << "a quarter of a megabyte for whatever else the process does";
 }
 
 TEST(World, APileFallsAsleepKeepsItsBitsAndWakesAsAWholeWhenItIsTouched) {
@@ -206,6 +253,20 @@ TEST(World, AFreeModalBodyFliesItsParabolaTurnsFreelyAndRingsExactly) {
         const double z = 1e-3 * std::exp(-sigma * 2) * (std::cos(w * 2) + sigma / w * std::sin(w * 2));
         EXPECT_NEAR(world.state(0).q[k], z, 1e-14) << "mode " << k;
     }
+}
+
+TEST(World, AFallingBodyWithDragReachesItsTerminalSpeed) {
+    sim::WorldDefinition definition;
+    definition.bodies.push_back(ball({0, 0, 0}));
+    definition.bodies[0].damping_alpha = 2;
+    definition.bodies[0].angular_velocity = {1, 0, 0};
+    sim::World world(definition);
+    run(world, 60);
+    const double fall = 9.81 / 2 * (1 - std::exp(-2.0));
+    EXPECT_NEAR(world.state(0).velocity.y(), -fall, 1e-12);
+    EXPECT_NEAR(world.state(0).position.y(), -(9.81 / 2 * 1 - fall / 2), 1e-12);
+    EXPECT_NEAR(world.state(0).angular_momentum.norm(), world.rigid_mass(0).inertia.x() * std::exp(-2.0),
+                1e-12);
 }
 
 TEST(World, RefusesWhatMakesNoSenseByName) {
