@@ -192,6 +192,8 @@ BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
                   Eigen::Vector3d::Zero()};
     kind.modes = kind.basis.count();
     kind.choice.modes = kind.modes;
+    kind.root_mass = std::sqrt(kind.mass.mass);
+    kind.root_inertia = kind.mass.inertia.cwiseSqrt();
     kind.step_drag = std::exp(-body.damping_alpha * settings.dt);
     kind.substep_drag = std::exp(-body.damping_alpha * settings.dt / settings.substeps);
     kind.mode_width = whole_lanes(kind.modes);

@@ -35,13 +35,15 @@ struct BodyKind {
     Eigen::Vector3d half_box;                ///< of the rest surface, bumps included [m]
     double bounding_radius = 0;              ///< [m]
     double substep_drag = 1, step_drag = 1;  ///< e^(-alpha tau): what damping_alpha leaves of rigid motion
-    Eigen::VectorXd shape_bound = {};        ///< largest |phi_k| over the samples [kg^-1/2]
-    int modes = 0, width = 8;                ///< width: floats of a Jacobian's row, 8 + mode_width
-    int mode_width = 0;                      ///< modes, whole lanes
-    bool ellipsoid = false;                  ///< e1 = e2 = 1 without bumps: gauge in closed form
-    int samples = 0, batches = 0;            ///< batches of eight samples
-    LaneArray rest = {};                     ///< samples, neighbours together: [axis][8 batches]
-    LaneArray batch_balls = {};  ///< that hold a batch at rest: [x, y, z, radius][whole_lanes(batches)]
+    double root_mass = 0;                    ///< sqrt(m)
+    Eigen::Vector3d root_inertia = Eigen::Vector3d::Zero();  ///< sqrt(I)
+    Eigen::VectorXd shape_bound = {};                        ///< largest |phi_k| over the samples [kg^-1/2]
+    int modes = 0, width = 8;      ///< width: floats of a Jacobian's row, 8 + mode_width
+    int mode_width = 0;            ///< modes, whole lanes
+    bool ellipsoid = false;        ///< e1 = e2 = 1 without bumps: gauge in closed form
+    int samples = 0, batches = 0;  ///< batches of eight samples
+    LaneArray rest = {};           ///< samples, neighbours together: [axis][8 batches]
+    LaneArray batch_balls = {};    ///< that hold a batch at rest: [x, y, z, radius][whole_lanes(batches)]
     Eigen::Vector3f sample_box = Eigen::Vector3f::Zero();  ///< half extents of the samples at rest [m]
     float sample_radius = 0;                               ///< [m]
     LaneArray shapes = {};                                 ///< phi at samples: [mode][axis][8 batches]

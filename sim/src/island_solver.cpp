@@ -89,7 +89,8 @@ void IslandSolver::begin(const Island& island) {
     for (const int id : island.bodies) {
         MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
         local_[static_cast<std::size_t>(id)] = static_cast<int>(rows_of_.size());
-        rows_of_.push_back({&body, offset, body.kind->width, body.state.position, body.posed.rotation});
+        rows_of_.push_back({&body, offset, body.kind->width, body.state.position, body.posed.rotation,
+                            body.posed.rotation.transpose().cast<float>()});
         offset += static_cast<std::uint32_t>(body.kind->width);
     }
     y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
@@ -182,9 +183,9 @@ void IslandSolver::write_rows(const Place& place, const Eigen::Matrix3f& directi
     if (place.body < 0) return;
     const BodyRows& rows = rows_of_[static_cast<std::size_t>(place.body)];
     const BodyKind& kind = *rows.body->kind;
-    const Eigen::Matrix3f body_from_world = rows.frame.transpose().cast<float>();
-    const Eigen::Vector3f root_inertia = kind.mass.inertia.cwiseSqrt().cwiseInverse().cast<float>();
-    const float root_mass = static_cast<float>(1 / std::sqrt(kind.mass.mass));
+    const Eigen::Matrix3f& body_from_world = rows.body_from_world;
+    const Eigen::Vector3f root_inertia = kind.root_inertia.cast<float>().cwiseInverse();
+    const float root_mass = static_cast<float>(1 / kind.root_mass);
     for (int r = 0; r < 3; ++r) {
         float* out = jacobians_.data() + side.rows + r * side.width;
         const Eigen::Vector3f world = sign * directions.row(r).transpose();
@@ -318,7 +319,10 @@ void IslandSolver::load_velocities() {
         const BodyKind& kind = *body.kind;
         const WorldBodyState& s = body.state;
         rows.place = s.position;
-        if (contacts_.empty()) rows.frame = s.orientation.toRotationMatrix();
+        if (contacts_.empty()) {
+            rows.frame = s.orientation.toRotationMatrix();
+            rows.body_from_world = rows.frame.transpose().cast<float>();
+        }
         const Eigen::Matrix3d& frame = rows.frame;
         Eigen::Vector3d velocity = s.velocity + h_ * body.gravity_scale * settings_->gravity;
         Eigen::Vector3d momentum = s.angular_momentum;
@@ -329,11 +333,11 @@ void IslandSolver::load_velocities() {
         const Eigen::Matrix3d turned = s.orientation.toRotationMatrix();
         const Eigen::Vector3d spin =
             frame.transpose() * (turned * (turned.transpose() * momentum).cwiseQuotient(kind.mass.inertia));
-        const double root_mass = std::sqrt(kind.mass.mass);
+        const double root_mass = kind.root_mass;
         float* y = start_.data() + rows.offset;
         for (int i = 0; i < 3; ++i) {
             y[i] = static_cast<float>(root_mass * velocity[i]);
-            y[3 + i] = static_cast<float>(std::sqrt(kind.mass.inertia[i]) * spin[i]);
+            y[3 + i] = static_cast<float>(kind.root_inertia[i] * spin[i]);
         }
         y[6] = y[7] = 0;
         for (int k = 0; k < kind.modes; ++k) {
@@ -438,7 +442,7 @@ void IslandSolver::solve_contact(ContactRows& c, Push push) {
     const float t0 = slides ? scale * slide0 : stick0, t1 = slides ? scale * slide1 : stick1;
     p[1] = t0 - c.impulse[1], p[2] = t1 - c.impulse[2];
     c.impulse[1] = t0, c.impulse[2] = t1;
-    push_by(c, p);
+    if (p[0] != 0 || p[1] != 0 || p[2] != 0) push_by(c, p);
 }
 
 // Energy that a contact's normal impulse takes out in this substep, where it may have to give some back: held
@@ -489,10 +493,10 @@ void IslandSolver::move() {
         const float h = static_cast<float>(h_);
         for (int i = 0; i < rows.width; ++i) moved[i] += h * y[i];
         WorldBodyState& s = body.state;
-        const double root_mass = std::sqrt(kind.mass.mass);
+        const double root_mass = kind.root_mass;
         s.position += h_ / root_mass * Eigen::Vector3d(y[0], y[1], y[2]);
         Eigen::Vector3d change;
-        for (int i = 0; i < 3; ++i) change[i] = std::sqrt(kind.mass.inertia[i]) * (y[3 + i] - start[3 + i]);
+        for (int i = 0; i < 3; ++i) change[i] = kind.root_inertia[i] * (y[3 + i] - start[3 + i]);
         Eigen::Vector3d momentum = s.angular_momentum + rows.frame * change;
         if (body.pushed) momentum += h_ * body.torque;
         s.orientation = body.substep_rotation.advance(s.orientation, momentum);

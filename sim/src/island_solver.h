@@ -64,6 +64,7 @@ private:
         int width;
         Eigen::Vector3d place;  // of the centre, at the start of the substep
         Eigen::Matrix3d frame;  // body to world, in which angular rows are written
+        Eigen::Matrix3f body_from_world;
     };
     /// One body's part of a row triple.
     struct Side {
