@@ -39,13 +39,13 @@ void add_rows_to(const float* rows, const float (&p)[3], int any_width, float* y
 }
 
 // The usual widths (9 to 16 modes, rigid, linear) unrolled.
-void dot_rows(const float* rows, const float* y, int width, Lanes (&sum)[3]) {
+[[gnu::always_inline]] inline void dot_rows(const float* rows, const float* y, int width, Lanes (&sum)[3]) {
     if (width == 24) return dot_rows<24>(rows, y, width, sum);
     if (width == 8) return dot_rows<8>(rows, y, width, sum);
     if (width == 16) return dot_rows<16>(rows, y, width, sum);
     dot_rows<0>(rows, y, width, sum);
 }
-void add_rows_to(const float* rows, const float (&p)[3], int width, float* y) {
+[[gnu::always_inline]] inline void add_rows_to(const float* rows, const float (&p)[3], int width, float* y) {
     if (width == 24) return add_rows_to<24>(rows, p, width, y);
     if (width == 8) return add_rows_to<8>(rows, p, width, y);
     if (width == 16) return add_rows_to<16>(rows, p, width, y);
@@ -363,7 +363,7 @@ void IslandSolver::warm_start(bool first) {
         }
         if (c.largest == 0) c.approach = speed;
         c.now = c.separation + moved;
-        push_by(c, c.impulse);
+        if (c.impulse[0] != 0) push_by(c, c.impulse);
     }
     for (SpringRows& s : springs_) push_by(s, s.impulse);
 }
@@ -529,6 +529,7 @@ void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const
 
 void IslandSolver::finish() {
     for (ContactRows& c : contacts_) {
+        if (c.impulse[0] == 0) continue;
         c.place = place_now(c);
         const Eigen::Vector3f p =
             c.impulse[0] * c.point->normal + c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1];
