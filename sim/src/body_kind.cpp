@@ -178,6 +178,17 @@ HeldStep held_step(double omega, double sigma, double tau) noexcept {
     return {(s.a - 1) / tau, rate, compliance, s.c, s.d, rate, std::sqrt(compliance)};
 }
 
+HeldSteps::HeldSteps(const Eigen::VectorXd& omega, const Eigen::VectorXd& sigma, double tau) {
+    const Eigen::Index n = omega.size();
+    for (Eigen::ArrayXd* values : {&mean_z, &mean_rate, &compliance, &c, &d, &rate, &root_compliance})
+        values->resize(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+        const HeldStep step = held_step(omega[k], sigma[k], tau);
+        mean_z[k] = step.mean_z, mean_rate[k] = step.mean_rate, compliance[k] = step.compliance;
+        c[k] = step.c, d[k] = step.d, rate[k] = step.rate, root_compliance[k] = step.root_compliance;
+    }
+}
+
 BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
     const FidelityChoice choice = choice_of(body);
     BodyKind kind{body,
@@ -203,12 +214,10 @@ BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
     kind.sigma =
         body.damping_alpha / 2 +
         kind.basis.omega.array() * (body.damping_ratio + body.damping_beta / 2 * kind.basis.omega.array());
-    for (int k = 0; k < kind.modes; ++k) {
-        kind.substep.push_back(
-            held_step(kind.basis.omega[k], kind.sigma[k], settings.dt / settings.substeps));
-        kind.root_compliance.data()[k] = static_cast<float>(kind.substep.back().root_compliance);
-        kind.whole.push_back(held_step(kind.basis.omega[k], kind.sigma[k], settings.dt));
-    }
+    kind.substep = HeldSteps(kind.basis.omega, kind.sigma, settings.dt / settings.substeps);
+    kind.whole = HeldSteps(kind.basis.omega, kind.sigma, settings.dt);
+    for (int k = 0; k < kind.modes; ++k)
+        kind.root_compliance.data()[k] = static_cast<float>(kind.substep.root_compliance[k]);
     set_samples(kind);
     if (kind.modes > 0) {
         set_polynomials(kind);

@@ -20,6 +20,13 @@ struct HeldStep {
 };
 [[nodiscard]] HeldStep held_step(double omega, double sigma, double tau) noexcept;
 
+/// The same for all modes of a body, entry k of each for mode k.
+struct HeldSteps {
+    Eigen::ArrayXd mean_z, mean_rate, compliance, c, d, rate, root_compliance;
+    HeldSteps() = default;
+    HeldSteps(const Eigen::VectorXd& omega, const Eigen::VectorXd& sigma, double tau);
+};
+
 /// What bodies of one shape, material, fidelity and sampling share; computed once.
 constexpr int kProbes = 56;  // 53 in whole lanes, the rest copies
 
@@ -31,7 +38,7 @@ struct BodyKind {
     ModalBasis basis;
     Eigen::VectorXd sigma;                   ///< decay rates [1/s]
     Eigen::VectorXd gradient_bound;          ///< largest |d phi_k / dr| (Frobenius) over the probes
-    std::vector<HeldStep> substep, whole;    ///< for a substep, for a step
+    HeldSteps substep, whole;                ///< for a substep, for a step
     Eigen::Vector3d half_box;                ///< of the rest surface, bumps included [m]
     double bounding_radius = 0;              ///< [m]
     double substep_drag = 1, step_drag = 1;  ///< e^(-alpha tau): what damping_alpha leaves of rigid motion

@@ -340,12 +340,11 @@ void IslandSolver::load_velocities() {
             y[3 + i] = static_cast<float>(kind.root_inertia[i] * spin[i]);
         }
         y[6] = y[7] = 0;
-        for (int k = 0; k < kind.modes; ++k) {
-            const HeldStep& step = kind.substep[static_cast<std::size_t>(k)];
-            double mean = step.mean_z * s.q[k] + step.mean_rate * s.q_dot[k];
-            if (body.pushed) mean += step.compliance * h_ * body.modal_force[k];
-            y[8 + k] = static_cast<float>(mean / step.root_compliance);
-        }
+        const HeldSteps& step = kind.substep;
+        Eigen::Map<Eigen::ArrayXf> mean(y + 8, kind.modes);
+        mean = ((step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array()) / step.root_compliance)
+                   .cast<float>();
+        if (body.pushed) mean += (step.root_compliance * h_ * body.modal_force.array()).cast<float>();
         for (int k = kind.modes; k < kind.mode_width; ++k) y[8 + k] = 0;
         std::copy_n(y, rows.width, y_.data() + rows.offset);
     }
@@ -549,14 +548,14 @@ void IslandSolver::finish() {
             s.velocity += h_ / kind.mass.mass * body.force;
             s.angular_momentum += h_ * body.torque;
         }
-        for (int k = 0; k < kind.modes; ++k) {
-            const HeldStep& step = kind.substep[static_cast<std::size_t>(k)];
-            double held = (static_cast<double>(y[8 + k]) - start[8 + k]) / step.root_compliance;
-            if (body.pushed) held += h_ * body.modal_force[k];
-            const double mean = step.mean_z * s.q[k] + step.mean_rate * s.q_dot[k] + step.compliance * held;
-            s.q_dot[k] = step.c * s.q[k] + step.d * s.q_dot[k] + step.rate * held;
-            s.q[k] += h_ * mean;
-        }
+        const HeldSteps& step = kind.substep;
+        const Eigen::Map<const Eigen::ArrayXf> now(y + 8, kind.modes), before(start + 8, kind.modes);
+        held_.resize(kind.modes), mean_.resize(kind.modes);
+        held_ = (now.cast<double>() - before.cast<double>()) / step.root_compliance;
+        if (body.pushed) held_ += h_ * body.modal_force.array();
+        mean_ = step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array() + step.compliance * held_;
+        s.q_dot.array() = step.c * s.q.array() + step.d * s.q_dot.array() + step.rate * held_;
+        s.q.array() += h_ * mean_;
         if (limit_deformation(body)) ++limited_;
     }
 }

@@ -162,6 +162,7 @@ private:
     std::vector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
     LaneArray y_, kept_, start_, moved_, jacobians_;
+    Eigen::ArrayXd held_, mean_;  // of one body's modes
     std::size_t jacobians_used_ = 0;
     double h_ = 0;
     float inverse_h_ = 0, push_rate_ = 0, mass_share_ = 1, impulse_share_ = 0;

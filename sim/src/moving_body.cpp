@@ -49,11 +49,11 @@ void move_freely(MovingBody& body, const WorldSettings& settings) {
     s.orientation = body.step_rotation.advance(s.orientation, s.angular_momentum);
     if (body.pushed) s.angular_momentum += dt / 2 * body.torque;
     s.angular_momentum *= half_drag;
+    const HeldSteps& h = body.kind->whole;
     for (int k = 0; k < body.kind->modes; ++k) {
-        const HeldStep& h = body.kind->whole[static_cast<std::size_t>(k)];
         const double held = body.pushed ? dt * body.modal_force[k] : 0;
-        const double mean = h.mean_z * s.q[k] + h.mean_rate * s.q_dot[k] + h.compliance * held;
-        s.q_dot[k] = h.c * s.q[k] + h.d * s.q_dot[k] + h.rate * held;
+        const double mean = h.mean_z[k] * s.q[k] + h.mean_rate[k] * s.q_dot[k] + h.compliance[k] * held;
+        s.q_dot[k] = h.c[k] * s.q[k] + h.d[k] * s.q_dot[k] + h.rate[k] * held;
         s.q[k] += dt * mean;
     }
 }
