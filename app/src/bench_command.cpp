@@ -1,5 +1,6 @@
 #include "bench_command.h"
 
+#include <falling_bodies.h>
 #include <fmt/format.h>
 
 #include <array>
@@ -17,12 +18,13 @@
 #include "comma_list.h"
 #include "gnuplot.h"
 #include "output_folder.h"
+#include "scene.h"
 
 namespace app {
 namespace {
 
 struct BenchArguments {
-    std::string name, bodies = "25,100,400,1600", out;
+    std::string name, bodies = "25,100,400,1600", out, scene;
     int rounds = 0;
     bool json = false;
 };
@@ -68,6 +70,21 @@ void bench_the_simulation(const BenchArguments& a) {
     SimBenchOptions options;
     options.bodies = parse_bodies(a.bodies);
     options.rounds = a.rounds;
+    if (!a.scene.empty()) {
+        Scene scene = read_scene(find_scene(a.scene));
+        if (scene.world.bodies.empty() || scene.world.planes.empty())
+            throw BadInput(
+                fmt::format("{}: error: found no bodies or no planes, expected balls of one kind in a box",
+                            scene.file.string()));
+        for (const sim::WorldBody& body : scene.world.bodies)
+            if (!sim_bench::is_benchmark_ball(body))
+                throw BadInput(
+                    fmt::format("{}: error: found body '{}', expected balls of 0.5 m with modes, as Bullet's",
+                                scene.file.string(), body.name));
+        scene.world.constraints.clear();
+        scene.world.settings.sleeping = false;
+        options.scene = {scene.name, scene.world};
+    }
     report(bench_sim(options, say), a);
 }
 
@@ -126,6 +143,7 @@ void add_bench_command(CLI::App& program) {
     command->add_option("--bodies", a->bodies, "sim: how many, in turn");
     command->add_option("--rounds", a->rounds, "sim: how often each; 0: five, three for 100, one for more")
         ->check(CLI::Range(0, 1000));
+    command->add_option("--scene", a->scene, "sim: balls of a scene, e.g. benchmark25, instead of the piles");
     command->add_flag("--json", a->json, "Print one JSON document");
     command->add_option("--out", a->out,
                         "Folder for bench.json; of tradeoff for tradeoff.svg, .csv and .json");

@@ -29,8 +29,7 @@ double timed_ms(World& world, int steps) {
     return 1e3 * (thread_cpu_s() - begin);
 }
 
-Round run_round(int bodies, const SimBenchOptions& options) {
-    const sim::WorldDefinition definition = sim_bench::falling_balls(bodies, options.modes);
+Round run_round(const sim::WorldDefinition& definition, const SimBenchOptions& options) {
     sim::World ours(definition);
     std::unique_ptr<sim_bench::BulletWorld> rigid, reduced;
     if (sim_bench::bullet_is_there()) {
@@ -71,9 +70,10 @@ BenchResult against(const std::string& name, const char* peer, const std::vector
     return result;
 }
 
-void add_results(BenchReport& report, int bodies, const SimBenchOptions& options, const MachineSpeed& speed,
-                 const std::vector<Round>& rounds) {
-    const std::string prefix = fmt::format("bodies{}_modal{}", bodies, options.modes);
+void add_results(BenchReport& report, const std::string& prefix, const sim::WorldDefinition& definition,
+                 const MachineSpeed& speed, const std::vector<Round>& rounds) {
+    const int bodies = static_cast<int>(definition.bodies.size());
+    const int modes = definition.bodies.front().fidelity.modes;
     report.results.push_back(
         against(prefix + "_vs_bullet_rigid", "btRigidBody convex hulls", rounds, &Round::rigid));
     report.results.push_back(against(prefix + "_vs_bullet_reduced",
@@ -81,8 +81,7 @@ void add_results(BenchReport& report, int bodies, const SimBenchOptions& options
                                      &Round::reduced));
     const double per_body_us = 1e3 * report.results.back().value / bodies;
     const double contacts = median_over(rounds, [](const Round& r) { return r.contacts; }) / bodies;
-    const sim::WorldDefinition definition = sim_bench::falling_balls(1, options.modes);
-    const LeastWork work = least_work(options.modes, kSamples, definition.settings.substeps, contacts);
+    const LeastWork work = least_work(modes, kSamples, definition.settings.substeps, contacts);
     const double bound_us = 1e6 * std::max(work.flops / speed.flops, work.bytes / speed.bytes_per_second);
     report.results.push_back({prefix + "_per_body", per_body_us, "us a step"});
     report.results.push_back({prefix + "_contacts_per_body", contacts, "points"});
@@ -119,22 +118,32 @@ BenchReport bench_sim(const SimBenchOptions& options,
     const MachineSpeed speed = measure_machine_speed();
     report.results.push_back({"core_peak_single_precision", 1e-9 * speed.flops, "Gflop/s"});
     report.results.push_back({"core_memory_read", 1e-9 * speed.bytes_per_second, "GB/s"});
-    for (const int bodies : options.bodies) {
+    const auto measure = [&](const std::string& prefix, const sim::WorldDefinition& definition) {
         std::vector<Round> rounds;
-        for (int i = 0; i < rounds_for(bodies, options); ++i) {
-            progress(fmt::format("{} bodies, round {}", bodies, i + 1));
-            rounds.push_back(run_round(bodies, options));
+        for (int i = 0; i < rounds_for(static_cast<int>(definition.bodies.size()), options); ++i) {
+            progress(fmt::format("{}, round {}", prefix, i + 1));
+            rounds.push_back(run_round(definition, options));
         }
-        add_results(report, bodies, options, speed, rounds);
+        add_results(report, prefix, definition, speed, rounds);
+    };
+    if (options.scene) {
+        measure(options.scene->name, options.scene->world);
+    } else {
+        for (const int bodies : options.bodies)
+            measure(fmt::format("bodies{}_modal{}", bodies, options.modes),
+                    sim_bench::falling_balls(bodies, options.modes));
+        add_growth(report, options);
     }
-    add_growth(report, options);
     report.notes.push_back(
         fmt::format("{} steps of 1/60 s ({} substeps of ours), one thread, processor time, in turns of {} "
                     "steps; nothing sleeps.",
                     options.steps, sim::WorldSettings{}.substeps, kTurn));
     report.notes.push_back(
-        "Balls of 0.5 m, 182 vertices, 360 triangles, falling into a box whose floor grows with "
-        "their number. Bound: the flops that the method cannot do without (app/src/bench_sim.h) "
+        std::string(options.scene
+                        ? "The scene's bodies and planes, without its constraints."
+                        : "Balls of 0.5 m, 182 vertices, 360 triangles, falling into a box whose floor "
+                          "grows with their number.") +
+        " Bound: the flops that the method cannot do without (app/src/bench_sim.h) "
         "at the core's peak, or its bytes from memory.");
     if (!sim_bench::bullet_is_there())
         report.notes.push_back("This build has no Bullet: no ratios. Install libbullet-dev and build again.");

@@ -1,5 +1,8 @@
 #pragma once
+#include <sim/world.h>
+
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "bench_report.h"
@@ -11,6 +14,12 @@ struct SimBenchOptions {
     int modes = 12;
     int rounds = 0;  ///< of all steps; 0: five for 25 bodies, three for 100, one for more
     int steps = 500;
+    /// Bodies of one kind in a box of planes instead of the piles.
+    struct Scene {
+        std::string name;
+        sim::WorldDefinition world;
+    };
+    std::optional<Scene> scene = std::nullopt;
 };
 
 /// The least work of a step: what the method cannot do without, whoever programs it.

@@ -37,7 +37,7 @@ public:
         for (const sim::PointConstraint& c : scene.world.constraints) closed_ = closed_ && c.body_b >= 0;
         for (int body = 0; closed_ && body < world.bodies(); ++body) {
             const sim::WorldBody& definition = world.definition(body);
-            closed_ = !definition.fixed;
+            closed_ = !definition.fixed && definition.damping_alpha == 0;
             weight_ += world.rigid_mass(body).mass * definition.gravity_scale * scene.world.settings.gravity;
         }
         momentum_ = world.momentum(), angular_ = world.angular_momentum();
@@ -181,7 +181,9 @@ double Run::step() {
 void Run::sum_up() {
     result_.bodies = world_.bodies();
     for (int body = 0; body < world_.bodies(); ++body) {
-        const sim::Fidelity fidelity = world_.fidelity(body).fidelity;
+        const sim::FidelityChoice choice = world_.fidelity(body);
+        const sim::Fidelity fidelity = choice.fidelity;
+        result_.groups_cut += choice.cut.below < choice.cut.count;
         (fidelity == sim::Fidelity::rigid    ? result_.rigid
          : fidelity == sim::Fidelity::linear ? result_.linear
                                              : result_.modal) += 1;

@@ -35,6 +35,7 @@ struct SimulateResult {
     std::string name;
     int bodies = 0;
     int rigid = 0, linear = 0, modal = 0;  ///< bodies by what is computed of them
+    int groups_cut = 0;  ///< modal bodies whose count of modes cuts a group of equal frequencies
     std::uint64_t steps = 0, body_steps = 0;
     double dt_s = 0, time_s = 0;
     double elapsed_s = 0, cpu_s = 0;  ///< of the steps alone

@@ -45,7 +45,8 @@ Json quarantine(const SimulateResult& r) {
 void add_details(const SimulateResult& r, Json& json) {
     json["name"] = r.name;
     json["time_s"] = r.time_s;
-    json["fidelity"] = {{"rigid", r.rigid}, {"linear", r.linear}, {"modal", r.modal}};
+    json["fidelity"] = {
+        {"rigid", r.rigid}, {"linear", r.linear}, {"modal", r.modal}, {"groups_cut", r.groups_cut}};
     json["energy_start_j"] = r.energy_start.total();
     json["energy_parts_j"] = json_of(r.energy);
     json["momentum_kg_m_s"] = json_of(r.momentum);

@@ -24,6 +24,12 @@ sim::WorldBody ball(int modes) {
 
 }  // namespace
 
+bool is_benchmark_ball(const sim::WorldBody& body) {
+    return body.shape.base.semi_axes == Eigen::Vector3d::Constant(kBallRadius_m) && body.shape.base.e1 == 1 &&
+           body.shape.base.e2 == 1 && body.shape.bumps.empty() && body.triangles == kBallTriangles &&
+           body.fidelity.fidelity == sim::Fidelity::modal && !body.fixed;
+}
+
 double box_side(int count) {
     return 0.72 * std::sqrt(count);
 }

@@ -15,6 +15,9 @@ constexpr int kBenchmarkSteps = 500;
 /// layers when they have come to rest. Nothing sleeps, so every step is work.
 [[nodiscard]] sim::WorldDefinition falling_balls(int count, int modes = 12);
 
+/// Whether a body is such a ball, of any material and place.
+[[nodiscard]] bool is_benchmark_ball(const sim::WorldBody& body);
+
 /// Side of the box [m].
 [[nodiscard]] double box_side(int count);
 

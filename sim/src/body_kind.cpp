@@ -134,7 +134,7 @@ void set_gradients(BodyKind& kind) {
     }
 }
 
-ModalBasis basis_of(const WorldBody& body, const FidelityChoice& choice) {
+ModalBasis basis_of(const WorldBody& body, FidelityChoice& choice) {
     if (choice.fidelity == Fidelity::linear) return uniform_strain_basis(body.shape.base, body.material);
     ModalBasis none;
     none.half_extents = body.shape.base.semi_axes;
@@ -145,7 +145,9 @@ ModalBasis basis_of(const WorldBody& body, const FidelityChoice& choice) {
     request.material = body.material;
     request.elements = body.fidelity.elements;
     request.count = choice.modes;
-    return free_vibration_modes(request).basis;
+    FreeVibrationModes modes = free_vibration_modes(request);
+    choice.cut = modes.cut;
+    return std::move(modes.basis);
 }
 
 FidelityChoice choice_of(const WorldBody& body) {
@@ -190,7 +192,7 @@ HeldSteps::HeldSteps(const Eigen::VectorXd& omega, const Eigen::VectorXd& sigma,
 }
 
 BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
-    const FidelityChoice choice = choice_of(body);
+    FidelityChoice choice = choice_of(body);
     BodyKind kind{body,
                   choice,
                   GeneralizedSurface(body.shape),
@@ -203,6 +205,7 @@ BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
                   Eigen::Vector3d::Zero()};
     kind.modes = kind.basis.count();
     kind.choice.modes = kind.modes;
+    kind.choice.cut = choice.cut;
     kind.root_mass = std::sqrt(kind.mass.mass);
     kind.root_inertia = kind.mass.inertia.cwiseSqrt();
     kind.step_drag = std::exp(-body.damping_alpha * settings.dt);

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <limits>
 
+#include "body_kind.h"
 #include "world_bodies.h"
 
 using namespace world_test;
@@ -267,6 +268,25 @@ TEST(World, AFallingBodyWithDragReachesItsTerminalSpeed) {
     EXPECT_NEAR(world.state(0).position.y(), -(9.81 / 2 * 1 - fall / 2), 1e-12);
     EXPECT_NEAR(world.state(0).angular_momentum.norm(), world.rigid_mass(0).inertia.x() * std::exp(-2.0),
                 1e-12);
+}
+
+TEST(HeldStep, IsTheOscillatorUnderAConstantForceForAnyStepAndDamping) {
+    // Against many small exact steps of the free oscillator about the displaced equilibrium f / omega^2.
+    for (const double turn : {1e-6, 1e-3, 0.1, 1.0, 3.0, 30.0, 1e3})
+        for (const double ratio : {0.0, 0.05, 0.9999, 1.0, 3.0}) {
+            const double omega = 50, tau = turn / omega, sigma = ratio * omega, z0 = 0.3, v0 = -2, p = 0.7;
+            const sim::HeldStep step = sim::held_step(omega, sigma, tau);
+            const double mean = step.mean_z * z0 + step.mean_rate * v0 + step.compliance * p;
+            const double rate = step.c * z0 + step.d * v0 + step.rate * p;
+            const double rest = p / tau / (omega * omega);
+            double z = z0 - rest, v = v0;
+            sim::advance(sim::oscillator_step(omega, sigma, tau), z, v);
+            // 1 - a loses what a is close to 1, which 1 / tau then makes larger.
+            EXPECT_NEAR(z0 + tau * mean, z + rest, 1e-9 * (1 + rest)) << turn << " " << ratio;
+            EXPECT_NEAR(rate, v, 1e-9 * (std::abs(v0) + omega * z0 + omega * rest)) << turn << " " << ratio;
+            EXPECT_GE(step.compliance, 0) << "a force never makes a mode give way against it";
+            EXPECT_LE(step.compliance, 0.5 + 1e-9);
+        }
 }
 
 TEST(World, RefusesWhatMakesNoSenseByName) {

@@ -33,7 +33,8 @@ struct FidelityRequest {
 struct FidelityChoice {
     Fidelity fidelity;
     int modes;
-    double expected_error;  ///< share of the largest extent, see choose_fidelity
+    double expected_error;     ///< share of the largest extent, see choose_fidelity
+    GroupCut cut = {0, 0, 0};  ///< modal: whether `modes` cuts a group of equal frequencies
 };
 
 /// One body of a world.
