@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "scene.h"
 #include "scene_stage.h"
 #include "temporary_folder.h"
 #include "written_scene.h"
@@ -172,6 +173,29 @@ TEST(Simulate, UntilRestStopsWhenAllSleepAndSaysWhenTheyDoNot) {
     EXPECT_EQ(r.counts.asleep, 2);
     options.steps = 60;
     EXPECT_FALSE(simulate(options).rest_reached);
+}
+
+TEST(Simulate, TheFigureAndTheLatticeRestBeforeAndAfterTheirConstraintsAreDeleted) {
+    struct Case {
+        const char* name;
+        std::uint64_t before;  // the last step before the event
+        int bodies;
+    };
+    for (const Case& c : {Case{"human", 299, 10}, Case{"lattice", 719, 25}}) {
+        SimulateOptions options;
+        options.scene = find_scene(c.name);
+        options.steps = c.before;
+        const SimulateResult first = simulate(options);
+        EXPECT_EQ(first.counts.asleep, c.bodies) << c.name << " hangs at rest";
+        options.steps.reset();
+        options.until_rest = true;
+        const SimulateResult second = simulate(options);
+        EXPECT_TRUE(second.rest_reached) << c.name;
+        EXPECT_GT(second.steps, c.before);
+        EXPECT_EQ(second.counts.asleep, c.bodies);
+        EXPECT_LT(second.energy.potential, first.energy.potential) << "it has come down";
+        EXPECT_EQ(second.quarantined.size(), 0u);
+    }
 }
 
 TEST(Simulate, TablesGoOnForEveryStepAndReadBackExactly) {
