@@ -33,7 +33,7 @@ void IslandSolver::substep(bool first, bool last) {
     warm_start(first);
     sweep(Push::soft);
     push_out();
-    sweep(Push::none);
+    sweep(Push::none), sweep(Push::none);
     note_work();
     if (last) restitute();
     finish();
