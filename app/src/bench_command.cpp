@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,16 +53,6 @@ std::vector<int> parse_bodies(const std::string& list) {
     return counts;
 }
 
-void report(const BenchReport& measured, const BenchArguments& a) {
-    if (!a.out.empty()) {
-        static constexpr std::array<std::string_view, 1> kProducts = {"bench.json"};
-        OutputFolder out(a.out, kProducts);
-        write_file(out.path("bench.json"), format_json(measured));
-        out.finish();
-    }
-    fmt::print("{}", a.json ? format_json(measured) : format_text(measured));
-}
-
 void say(const std::string& line) {
     fmt::print(stderr, "{}\n", line);
 }
@@ -85,22 +76,32 @@ void bench_the_simulation(const BenchArguments& a) {
         scene.world.settings.sleeping = false;
         options.scene = {scene.name, scene.world};
     }
-    report(bench_sim(options, say), a);
+    // The folder first: a place that cannot be written is known before the minutes of measuring.
+    static constexpr std::array<std::string_view, 1> kProducts = {"bench.json"};
+    std::optional<OutputFolder> out;
+    if (!a.out.empty()) out.emplace(a.out, kProducts);
+    const BenchReport measured = bench_sim(options, say);
+    if (out) {
+        write_file(out->path("bench.json"), format_json(measured));
+        out->finish();
+    }
+    fmt::print("{}", a.json ? format_json(measured) : format_text(measured));
 }
 
 void bench_the_tradeoff(const BenchArguments& a) {
+    static constexpr std::array<std::string_view, 3> kProducts = {"tradeoff.json", "tradeoff.csv",
+                                                                  "tradeoff.svg"};
+    std::optional<OutputFolder> out;
+    if (!a.out.empty()) out.emplace(a.out, kProducts);
     const Tradeoff measured =
         measure_tradeoff(all_tradeoff_settings(), converged_setting(), finer_setting(), say);
-    if (!a.out.empty()) {
-        static constexpr std::array<std::string_view, 3> kProducts = {"tradeoff.json", "tradeoff.csv",
-                                                                      "tradeoff.svg"};
-        OutputFolder out(a.out, kProducts);
-        std::filesystem::create_directories(out.scratch());
-        write_file(out.path("tradeoff.json"), format_json(measured));
-        write_file(out.path("tradeoff.csv"), format_csv(measured));
-        write_file(out.path("tradeoff.svg"),
-                   draw_svg({{900, 560, plot_commands(measured)}}, out.scratch()).front());
-        out.finish();
+    if (out) {
+        std::filesystem::create_directories(out->scratch());
+        write_file(out->path("tradeoff.json"), format_json(measured));
+        write_file(out->path("tradeoff.csv"), format_csv(measured));
+        write_file(out->path("tradeoff.svg"),
+                   draw_svg({{900, 560, plot_commands(measured)}}, out->scratch()).front());
+        out->finish();
     }
     fmt::print("{}", a.json ? format_json(measured) : format_text(measured));
 }

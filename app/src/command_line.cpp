@@ -97,7 +97,11 @@ int run(int argc, char** argv) {
 
 int run_command_line(int argc, char** argv) {
     try {
-        return run(argc, argv);
+        const int status = run(argc, argv);
+        if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+            return complain("error: found standard output that takes no more, expected room for the result",
+                            kFailed);
+        return status;
     } catch (const BadInput& wrong) {
         return complain(wrong.what(), kBadInput);
     } catch (const tracking::TraceError& wrong) {

@@ -15,7 +15,7 @@ namespace {
 /// The options as typed.
 struct Typed {
     std::string scene, dt, seconds, out, video, fps = "30", size = "640x480", until, mode = "sync";
-    std::int64_t steps = -1;  // not given
+    std::optional<std::int64_t> steps;
     int workers = 0, bound = 0;
     bool frames = false, json = false;
 };
@@ -48,8 +48,9 @@ SimulateOptions options_of(const Typed& a) {
             throw BadInput(
                 fmt::format("error: found --seconds {}, expected more than 0 to 360000", a.seconds));
     }
-    if (a.steps >= 0) o.steps = static_cast<std::uint64_t>(a.steps);
-    if (a.steps < -1) throw BadInput(fmt::format("error: found --steps {}, expected 0 or more", a.steps));
+    if (a.steps && (*a.steps < 0 || *a.steps > 1'000'000'000))
+        throw BadInput(fmt::format("error: found --steps {}, expected 0 to 1000000000", *a.steps));
+    if (a.steps) o.steps = static_cast<std::uint64_t>(*a.steps);
     if (!a.until.empty() && a.until != "rest")
         throw BadInput(fmt::format("error: found --until {}, expected rest", a.until));
     o.until_rest = a.until == "rest";
@@ -88,7 +89,8 @@ int run(const Typed& a) {
         print(result, options);
     if (!options.until_rest || result.rest_reached) return 0;
     fmt::print(stderr,
-               "{}: error: found {} of {} bodies awake after {} steps, expected rest; allow more --steps\n",
+               "{}: error: found {} of {} bodies awake after {} steps (or events to come), expected rest; "
+               "allow more --steps, or damp what swings and spins (damping_alpha)\n",
                result.scene.string(), result.bodies - result.counts.asleep, result.bodies, result.steps);
     return 1;
 }

@@ -141,6 +141,10 @@ void IslandSolver::write_rows(const Place& place, const Eigen::Matrix3f& directi
         for (int i = 0; i < 3; ++i) out[i] = root_mass * world[i], out[3 + i] = turn[i];
         out[6] = out[7] = 0;
         if (!place.shapes) continue;
+        if (rows.body->at_limit) {  // what cannot yield any more carries as if it were rigid
+            std::fill_n(out + 8, kind.mode_width, 0.f);
+            continue;
+        }
         const Eigen::Vector3f own = body_from_world * world;
         const int width = kind.mode_width;
         for (int k = 0; k < width; k += kLanes)

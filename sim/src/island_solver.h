@@ -24,8 +24,8 @@ struct Island {
 ///   2. one sweep over springs and contacts, overlaps pushed out softly (30 Hz, damping 10, at most 3 m/s)
 ///   3. positions and orientations move with these velocities
 ///   4. two sweeps without the push, so that it leaves no speed behind; with one, soft piles simmer (bodies
-///      that began their contact deep inside each other are pushed in a sweep of their own that only positions
-///      see)
+///      that began their contact deep inside each other are pushed in a sweep of their own that only
+///      positions see)
 ///   5. modes step exactly under the force P / h held over h: z1 = z + h G, z1' = c z + d z' + (b / h) P
 /// and at the end of the last substep restitution. Contact forces act on a mode with its compliance over the
 /// substep, w = (1 - a) / (omega h)^2 >= 0 (body_kind.h), so rigid, stiff and soft bodies go through one

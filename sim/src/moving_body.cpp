@@ -59,6 +59,7 @@ void move_freely(MovingBody& body, const WorldSettings& settings) {
 }
 
 bool limit_deformation(MovingBody& body) {
+    body.at_limit = false;
     if (body.kind->modes == 0) return false;
     const double bound = body.state.q.cwiseAbs().dot(body.kind->gradient_bound);
     if (!(bound > kGradientLimit) || !std::isfinite(bound)) return false;
@@ -69,6 +70,7 @@ bool limit_deformation(MovingBody& body) {
     const double outwards = q.dot(rate);
     if (outwards > 0) rate -= outwards / q.squaredNorm() * q;
     q *= kGradientLimit / largest;
+    body.at_limit = true;
     return true;
 }
 

@@ -16,9 +16,10 @@ struct MovingBody {
     WorldBodyState state;
     PosedBody posed;
     FreeRotation substep_rotation{Eigen::Vector3d::Ones(), 0}, step_rotation{Eigen::Vector3d::Ones(), 0};
-    double still_s = 0;    ///< how long it has been slower than the sleep speed
-    int sleep_group = -1;  ///< bodies that fell asleep together
-    bool pushed = false;   ///< user forces for the next step
+    bool at_limit = false;  ///< its deformation was held in the last substep: contacts find its modes stiff
+    double still_s = 0;     ///< how long it has been slower than the sleep speed
+    int sleep_group = -1;   ///< bodies that fell asleep together
+    bool pushed = false;    ///< user forces for the next step
     Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();  ///< world axes
     Eigen::VectorXd modal_force;                                                        ///< [N kg^-1/2]
 

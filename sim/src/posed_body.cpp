@@ -103,6 +103,15 @@ void PosedBody::bend_polynomial(const float* q) {
     }
 }
 
+std::pair<int, float> PosedBody::furthest_sample(const Eigen::Vector3f& direction) const noexcept {
+    std::pair<int, float> best{0, -1e30f};
+    for (int i = 0; i < kind->samples; ++i) {
+        const float reach = direction.dot(sample(i));
+        if (reach > best.second) best = {i, reach};
+    }
+    return best;
+}
+
 Eigen::Vector3f PosedBody::furthest_rest_point(const Eigen::Vector3f& direction) const noexcept {
     // max d . D r with |r / a| = 1:  r = a^2 D^T d / |a D^T d|.
     const Eigen::Vector3f axes = kind->definition.shape.base.semi_axes.cast<float>();

@@ -1,4 +1,6 @@
 #pragma once
+#include <utility>
+
 #include "body_kind.h"
 
 namespace sim {
@@ -26,6 +28,8 @@ struct PosedBody {
         const int stride = kind->batches * kLanes;
         return {x[index], x[index + stride], x[index + 2 * stride]};
     }
+    /// The sample furthest along `direction` (unit, body frame), and how far that is [m].
+    [[nodiscard]] std::pair<int, float> furthest_sample(const Eigen::Vector3f& direction) const noexcept;
     /// Of an ellipsoid: the rest point that is furthest along `direction` (body frame) as deformed, exactly
     /// for rigid and linear bodies; modal ones are taken as undeformed.
     [[nodiscard]] Eigen::Vector3f furthest_rest_point(const Eigen::Vector3f& direction) const noexcept;

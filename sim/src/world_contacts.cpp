@@ -9,7 +9,10 @@ namespace {
 
 constexpr double kSlop = 0.005;  // of the smaller half extent: contacts exist from here on
 constexpr float kDeep = 0.04f;   // of it: a contact that begins deeper is one of bodies put inside each other
-constexpr std::uint32_t kFoot = 0x7fffffff;  // feature of a body's lowest point over a plane
+constexpr double kBuried =
+    1.2;  // gauge of a body's centre in another: nearer, samples cannot tell the way out
+constexpr std::uint32_t kParting = 0x7ffffffe;  // feature of the one contact of bodies inside each other
+constexpr std::uint32_t kFoot = 0x7fffffff;     // feature of a body's lowest point over a plane
 constexpr float kManifoldTolerance = 0.02f;
 constexpr std::uint32_t kOfB = 1u << 31;  // feature: a sample of b
 
@@ -26,6 +29,13 @@ double reach_of(const MovingBody& body, double speed, const WorldSettings& setti
 // All that can be closed within the step, so that nothing passes through unseen.
 double margin_of(double approach, double size, const WorldSettings& settings) {
     return kSlop * size + std::max(approach, 0.0) * settings.dt;
+}
+
+// Whether the centre of one is inside the other, or nearly.
+bool is_buried(const PosedBody& a, const PosedBody& b) {
+    const Eigen::Vector3d apart = a.position - b.position;
+    return a.kind->surface.base().value(a.rotation.transpose() * apart) < kBuried ||
+           b.kind->surface.base().value(b.rotation.transpose() * apart) < kBuried;
 }
 
 void finish(const Manifold* before, float size, Manifold& manifold) {
@@ -154,6 +164,9 @@ void WorldContacts::meet(const MovingBody& a, const MovingBody& b, float margin,
     for (const SampleContact& contact : found_) lowest = std::min(lowest, contact.separation);
     const float out = PointChooser::reach(lowest, kManifoldTolerance * size);
     const Eigen::Vector3f between = (pa.position - pb.position).cast<float>();
+    const Manifold* before = last(manifold.key());
+    if (lowest < 0 && (!before || before->emerging) && is_buried(pa, pb))
+        return part(pa, pb, between, before, manifold);
     candidates_.clear();
     for (const bool b_sampled : {false, true}) {
         const PosedBody &sampled = b_sampled ? pb : pa, &implicit = b_sampled ? pa : pb;
@@ -217,6 +230,28 @@ void WorldContacts::meet_plane(const MovingBody& a, const WorldPlane& plane, flo
         }
     }
     fill(size, Eigen::Vector3f::Zero(), manifold);
+}
+
+// Bodies put so deep into each other that surface samples no longer tell which way is out: one contact along
+// the line of the centres (straight up where they coincide), as deep as the bodies overlap along it.
+void WorldContacts::part(const PosedBody& a, const PosedBody& b, const Eigen::Vector3f& between,
+                         const Manifold* before, Manifold& manifold) {
+    ManifoldPoint& point = manifold.points[0];
+    manifold.count = 1;
+    const float distance = between.norm();
+    point.normal =
+        distance > 1e-6f * a.radius ? Eigen::Vector3f(between / distance) : Eigen::Vector3f::UnitY();
+    const auto [sample_a, reach_a] =
+        a.furthest_sample(-(a.rotation.transpose().cast<float>() * point.normal));
+    const auto [sample_b, reach_b] = b.furthest_sample(b.rotation.transpose().cast<float>() * point.normal);
+    point.feature = kParting;
+    point.separation = distance - reach_a - reach_b;
+    point.arm_a = (-reach_a - 0.5f * point.separation) * point.normal;
+    point.arm_b = point.arm_a + between;
+    point.rest.setZero();
+    point.sample_a = sample_a, point.sample_b = sample_b;
+    manifold.emerging = true;
+    if (before) take_impulses(*before, a.radius, manifold);
 }
 
 // The manifold's points out of the candidates, with the impulses of the step before. between: from b's centre

@@ -29,6 +29,8 @@ private:
     void meet(const MovingBody& a, const MovingBody& b, float margin, Manifold& manifold);
     void meet_plane(const MovingBody& a, const WorldPlane& plane, float height, float margin,
                     Manifold& manifold);
+    void part(const PosedBody& a, const PosedBody& b, const Eigen::Vector3f& between, const Manifold* before,
+              Manifold& manifold);
     void fill(float size, const Eigen::Vector3f& between, Manifold& manifold);
     const Manifold* last(std::uint64_t key);
 
