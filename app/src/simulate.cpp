@@ -10,6 +10,7 @@
 
 #include "bad_input.h"
 #include "frame_writer.h"
+#include "machine_speed.h"
 #include "output_folder.h"
 #include "play_products.h"
 #include "play_setup.h"
@@ -22,12 +23,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kLongestRestS = 600;  // --until rest gives up after this much time of the scene
-
-double thread_cpu_s() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
-}
 
 /// Sums over the bodies what the world's total momentum must be if nothing acts but gravity.
 class DriftWatch {

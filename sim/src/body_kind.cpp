@@ -56,7 +56,6 @@ void set_samples(BodyKind& kind) {
     kind.shapes.resize(static_cast<std::size_t>(kind.modes) * 3 * padded);
     kind.sample_shapes.resize(static_cast<std::size_t>(padded) * 3 * kind.mode_width);
     kind.half_box = kind.definition.shape.base.semi_axes;
-    kind.bounding_radius = 0;
     kind.shape_bound = Eigen::VectorXd::Zero(kind.modes);
     for (int s = 0; s < padded; ++s) {
         const Eigen::Vector3d& r = mesh.vertices[std::min(s, kind.samples - 1)];
@@ -72,7 +71,6 @@ void set_samples(BodyKind& kind) {
             }
         }
     }
-    kind.bounding_radius = kind.surface.bounding_radius();
     set_batch_balls(kind);
 }
 

@@ -27,9 +27,10 @@ struct HeldSteps {
     HeldSteps(const Eigen::VectorXd& omega, const Eigen::VectorXd& sigma, double tau);
 };
 
-/// What bodies of one shape, material, fidelity and sampling share; computed once.
-constexpr int kProbes = 56;  // 53 in whole lanes, the rest copies
+constexpr int kProbes = 56;      // 53 in whole lanes, the rest copies
+constexpr int kMostModes = 128;  // of a body, whole lanes (world_check: 120)
 
+/// What bodies of one shape, material, fidelity and sampling share; computed once.
 struct BodyKind {
     WorldBody definition;  ///< of the first such body; pose and velocities are not used
     FidelityChoice choice;
@@ -40,7 +41,6 @@ struct BodyKind {
     Eigen::VectorXd gradient_bound;          ///< largest |d phi_k / dr| (Frobenius) over the probes
     HeldSteps substep, whole;                ///< for a substep, for a step
     Eigen::Vector3d half_box;                ///< of the rest surface, bumps included [m]
-    double bounding_radius = 0;              ///< [m]
     double substep_drag = 1, step_drag = 1;  ///< e^(-alpha tau): what damping_alpha leaves of rigid motion
     double root_mass = 0;                    ///< sqrt(m)
     Eigen::Vector3d root_inertia = Eigen::Vector3d::Zero();  ///< sqrt(I)

@@ -92,8 +92,7 @@ SurfacePoint GeneralizedSurface::distance(const Eigen::Vector3d& r) const noexce
     return peaks_.empty() ? base_distance(r) : bumped(r);
 }
 
-GeneralizedSurface::Displacement GeneralizedSurface::displacement_slope(
-    const Eigen::Vector3d& r) const noexcept {
+GeneralizedSurface::Displacement GeneralizedSurface::displacement(const Eigen::Vector3d& r) const noexcept {
     Displacement sum{0, Eigen::Vector3d::Zero()};
     const Eigen::Vector3d u = r.cwiseQuotient(base_.semi_axes());
     const double length = u.norm();
@@ -111,20 +110,16 @@ GeneralizedSurface::Displacement GeneralizedSurface::displacement_slope(
     return sum;
 }
 
-double GeneralizedSurface::displacement(const Eigen::Vector3d& r) const noexcept {
-    return displacement_slope(r).value;
-}
-
 Eigen::Vector3d GeneralizedSurface::surface_point(const Eigen::Vector3d& r) const noexcept {
     const Eigen::Vector3d p = base_.onto_surface(r);
-    return p + displacement(p) * base_.derivatives(p).gradient.normalized();
+    return p + displacement(p).value * base_.derivatives(p).gradient.normalized();
 }
 
 SurfacePoint GeneralizedSurface::bumped(const Eigen::Vector3d& r) const noexcept {
     SurfacePoint base = base_distance(r);
     if (base.distance > 0) base = towards_foot(r, towards_foot(r, base));
     const Eigen::Vector3d foot = r - base.distance * base.normal;
-    const Displacement moved = displacement_slope(foot);
+    const Displacement moved = displacement(foot);
     // The foot follows r along the surface, slower the farther out r is: by R / (R + distance) on a sphere.
     const Eigen::Vector3d along = moved.gradient - base.normal.dot(moved.gradient) * base.normal;
     const double outer = r.norm(), follow = outer > 1e-100 ? std::min(2.0, foot.norm() / outer) : 0;

@@ -32,12 +32,18 @@ public:
     /// normal: unit gradient of the distance.
     [[nodiscard]] SurfacePoint distance(const Eigen::Vector3d& r) const noexcept;
 
-    /// How far bumps move the surface in the direction of r, along the normal [m].
-    [[nodiscard]] double displacement(const Eigen::Vector3d& r) const noexcept;
+    /// How far bumps move the surface in the direction of r, along the normal [m], with its gradient by r
+    /// [-].
+    struct Displacement {
+        double value;
+        Eigen::Vector3d gradient;
+    };
+    [[nodiscard]] Displacement displacement(const Eigen::Vector3d& r) const noexcept;
     /// The surface point that bumps have moved out of the ray through r.
     [[nodiscard]] Eigen::Vector3d surface_point(const Eigen::Vector3d& r) const noexcept;
 
     [[nodiscard]] const Gauge& base() const noexcept { return base_; }
+    [[nodiscard]] bool has_bumps() const noexcept { return !peaks_.empty(); }
     /// Upper bound of displacement [m]; 0 without spikes.
     [[nodiscard]] double reach() const noexcept { return reach_; }
     /// Radius of a sphere about the centre that holds the body [m].
@@ -52,15 +58,10 @@ private:
         double n;            // N(y); 0: y is the centre, and the plane that of the nearest pole
         SurfacePoint plane;  // of r from the bearing plane by y
     };
-    struct Displacement {
-        double value;
-        Eigen::Vector3d gradient;
-    };
 
     [[nodiscard]] SurfacePoint base_distance(const Eigen::Vector3d& r) const noexcept;
     [[nodiscard]] Bearing bearing(const Eigen::Vector3d& y, const Eigen::Vector3d& r) const noexcept;
     [[nodiscard]] SurfacePoint towards_foot(const Eigen::Vector3d& r, SurfacePoint best) const noexcept;
-    [[nodiscard]] Displacement displacement_slope(const Eigen::Vector3d& r) const noexcept;
     [[nodiscard]] SurfacePoint bumped(const Eigen::Vector3d& r) const noexcept;
 
     Gauge base_;

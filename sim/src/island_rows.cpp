@@ -169,9 +169,8 @@ void IslandSolver::finish_rows(Rows& rows) {
 }
 
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
-    alignas(32) float scratch[2][3 * 128];
+    alignas(32) float scratch[2][3 * kMostModes];
     ContactRows c{};
-    c.place.setZero();
     const Place a = place(manifold.a, point.arm_a, point.sample_a, point.rest, scratch[0]);
     const Place b = place(manifold.b, point.arm_b, point.sample_b, point.rest, scratch[1]);
     set_tangents(point.normal, c.tangent);
@@ -187,7 +186,6 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     c.friction = manifold.friction;
     // Only what comes together rebounds, not what rests and rings.
     c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
-    c.approach = 0, c.largest = 0, c.taken = 0;
     c.emerging = manifold.emerging;
     c.inverse_normal = 1 / c.k[0][0];
     c.slide_mass = 2 / (c.k[1][1] + c.k[2][2]);
@@ -230,7 +228,7 @@ IslandSolver::End IslandSolver::end_of(int body, const Eigen::Vector3d& rest, fl
 // Springs act over large turns, so their arms and rows follow the bodies every substep.
 void IslandSolver::refresh(SpringRows& s) {
     const PointConstraint& held = s.constraint->definition;
-    alignas(32) float scratch[2][3 * 128];
+    alignas(32) float scratch[2][3 * kMostModes];
     const End a = end_of(held.body_a, held.point_a, scratch[0]);
     const End b = end_of(held.body_b, held.point_b, scratch[1]);
     const Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();

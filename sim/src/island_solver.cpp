@@ -8,6 +8,8 @@
 namespace sim {
 namespace {
 
+using ModeArray = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostModes, 1>;  // on the stack
+
 constexpr float kPushSpeed = 3;           // [m/s]
 constexpr float kBounceThreshold = 0.1f;  // [m/s]
 
@@ -15,8 +17,6 @@ constexpr float kBounceThreshold = 0.1f;  // [m/s]
 float root(float x) {
     return _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(x)));
 }
-
-/// Two unit vectors square to n and to each other.
 
 }  // namespace
 
@@ -253,12 +253,11 @@ void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const
 }
 
 void IslandSolver::finish() {
-    for (ContactRows& c : contacts_) {
+    for (const ContactRows& c : contacts_) {
         if (c.impulse[0] == 0) continue;
-        c.place = place_now(c);
         const Eigen::Vector3f p =
             c.impulse[0] * c.point->normal + c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1];
-        apply(c, p.cast<double>(), c.place);
+        apply(c, p.cast<double>(), place_now(c));
     }
     for (const SpringRows& s : springs_)
         apply(s, Eigen::Vector3d(s.impulse[0], s.impulse[1], s.impulse[2]), s.place);
@@ -276,12 +275,12 @@ void IslandSolver::finish() {
         }
         const HeldSteps& step = kind.substep;
         const Eigen::Map<const Eigen::ArrayXf> now(y + 8, kind.modes), before(start + 8, kind.modes);
-        held_.resize(kind.modes), mean_.resize(kind.modes);
-        held_ = (now.cast<double>() - before.cast<double>()) / step.root_compliance;
-        if (body.pushed) held_ += h_ * body.modal_force.array();
-        mean_ = step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array() + step.compliance * held_;
-        s.q_dot.array() = step.c * s.q.array() + step.d * s.q_dot.array() + step.rate * held_;
-        s.q.array() += h_ * mean_;
+        ModeArray held = (now.cast<double>() - before.cast<double>()) / step.root_compliance;
+        if (body.pushed) held += h_ * body.modal_force.array();
+        const ModeArray mean =
+            step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array() + step.compliance * held;
+        s.q_dot.array() = step.c * s.q.array() + step.d * s.q_dot.array() + step.rate * held;
+        s.q.array() += h_ * mean;
         if (limit_deformation(body)) ++limited_;
     }
 }

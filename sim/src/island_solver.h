@@ -45,13 +45,8 @@ struct Island {
 class IslandSolver {
 public:
     IslandSolver(const WorldSettings& settings, std::vector<MovingBody>& bodies,
-                 std::vector<WorldPlane>& planes, std::vector<Manifold>& manifolds,
-                 std::vector<HeldConstraint>& constraints)
-        : settings_(&settings),
-          bodies_(&bodies),
-          planes_(&planes),
-          manifolds_(&manifolds),
-          constraints_(&constraints) {}
+                 std::vector<Manifold>& manifolds, std::vector<HeldConstraint>& constraints)
+        : settings_(&settings), bodies_(&bodies), manifolds_(&manifolds), constraints_(&constraints) {}
 
     void solve(const Island& island);
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
@@ -77,7 +72,6 @@ private:
     struct Rows {
         Side side[2];
         float k[3][3];
-        Eigen::Vector3d place;  // where the impulse acts in this substep, world
     };
     struct ContactRows : Rows {
         ManifoldPoint* point;
@@ -90,6 +84,7 @@ private:
     };
     struct SpringRows : Rows {
         HeldConstraint* constraint;
+        Eigen::Vector3d place;  // where the impulse acts in this substep, world
         float error[3];
         float inverse[3][3];  // of K + gamma
         float gamma, pull;    // pull: bias speed per error [1/s]
@@ -151,7 +146,6 @@ private:
 
     const WorldSettings* settings_;
     std::vector<MovingBody>* bodies_;
-    std::vector<WorldPlane>* planes_;
     std::vector<Manifold>* manifolds_;
     std::vector<HeldConstraint>* constraints_;
 
@@ -162,7 +156,6 @@ private:
     std::vector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
     LaneArray y_, kept_, start_, moved_, jacobians_;
-    Eigen::ArrayXd held_, mean_;  // of one body's modes
     std::size_t jacobians_used_ = 0;
     double h_ = 0;
     float inverse_h_ = 0, push_rate_ = 0, mass_share_ = 1, impulse_share_ = 0;

@@ -77,7 +77,7 @@ bool limit_deformation(MovingBody& body) {
 double point_speed(const MovingBody& body) noexcept {
     double speed = body.state.velocity.norm() + body.state.angular_momentum.norm() /
                                                     body.kind->mass.inertia.minCoeff() *
-                                                    body.kind->bounding_radius;
+                                                    body.kind->surface.bounding_radius();
     for (int k = 0; k < body.kind->modes; ++k)
         speed += std::abs(body.state.q_dot[k]) * body.kind->shape_bound[k];
     return speed;

@@ -1,6 +1,4 @@
 #pragma once
-#include <optional>
-
 #include "free_rotation.h"
 #include "posed_body.h"
 
@@ -9,7 +7,6 @@ namespace sim {
 /// A body of a World as it goes from step to step.
 struct MovingBody {
     const BodyKind* kind = nullptr;
-    std::size_t definition = 0;
     bool fixed = false, quarantined = false, asleep = false;
     double gravity_scale = 1;
     float friction = 0, restitution = 0;
@@ -24,10 +21,6 @@ struct MovingBody {
     Eigen::VectorXd modal_force;                                                        ///< [N kg^-1/2]
 
     [[nodiscard]] bool moves() const noexcept { return !fixed && !quarantined; }
-    [[nodiscard]] Eigen::Vector3d angular_velocity() const noexcept {
-        const Eigen::Matrix3d r = state.orientation.toRotationMatrix();
-        return r * (r.transpose() * state.angular_momentum).cwiseQuotient(kind->mass.inertia);
-    }
 };
 
 /// A point constraint as it is being held.

@@ -18,7 +18,6 @@ Lanes larger(Lanes a, Lanes b) {
     return a > b ? a : b;
 }
 
-constexpr int kMostModes = 2 * 128;
 
 }  // namespace
 
@@ -27,7 +26,7 @@ void PosedBody::set(const Eigen::Vector3d& at, const Eigen::Quaterniond& orienta
     position = at;
     rotation = orientation.toRotationMatrix();
     half_box = kind->half_box.cast<float>();
-    radius = static_cast<float>(kind->bounding_radius);
+    radius = static_cast<float>(kind->surface.bounding_radius());
     sample_reach = 0;
     if (kind->modes > 0) kind->linear() ? deform_linear(q) : deform_modal(q);
     half_aabb = (rotation.cwiseAbs() * half_box.cast<double>()).cwiseMin(radius);
@@ -58,7 +57,8 @@ void PosedBody::deform_linear(const Eigen::VectorXd& q) {
                                                              dy * load_lanes(rest + padded + s) +
                                                              dz * load_lanes(rest + 2 * padded + s));
     }
-    sample_reach = static_cast<float>((d - Eigen::Matrix3d::Identity()).norm() * kind->bounding_radius);
+    sample_reach =
+        static_cast<float>((d - Eigen::Matrix3d::Identity()).norm() * kind->surface.bounding_radius());
     half_box.array() += sample_reach;
     radius += sample_reach;
 }

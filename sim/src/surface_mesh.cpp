@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "superquadric.h"
+#include "generalized_surface.h"
 
 namespace sim {
 namespace {
@@ -16,43 +16,18 @@ using Eigen::Vector3d;
 constexpr double kFlatExponent = 0.5;  // below it a body has faces and edges that the grid of rays may miss
 constexpr double kSamePlace = 1e-6;    // features this near to a vertex are left out, as share of the size
 
-// The displacement along the normal and its gradient over the rest surface.
-struct BumpHeight {
-    double value = 0;
-    Vector3d gradient = Vector3d::Zero();
-};
-
-BumpHeight bump_height(const Bump& bump, const Vector3d& semi_axes, const Vector3d& r) {
-    const Vector3d scaled = r.cwiseQuotient(semi_axes), u = scaled.normalized();
-    const Vector3d v = bump.direction.cwiseQuotient(semi_axes).normalized();
-    const double cosine = u.dot(v), sine = u.cross(v).norm(), angle = std::atan2(sine, cosine);
-    const double share = angle / bump.width_rad;
-    BumpHeight height{bump.height_m * std::exp(-share * share)};
-    if (sine > 1e-12) {
-        const Vector3d towards = (v - cosine * u) / (sine * scaled.norm());
-        height.gradient =
-            2 * height.value * share / bump.width_rad * towards.cwiseQuotient(semi_axes);  // of the angle: -
-    }
-    return height;
-}
-
 struct Sample {
     Vector3d point, normal;
 };
 
 // The bumped surface over the rest point r: p = r + h n. Its normal is that of the image of the tangent
 // plane under I + h Dn + n grad h, with Dn = (I - n n^T) H / |grad N|.
-Sample sample_over(const GeneralizedSuperquadric& shape, const Gauge& gauge, const Vector3d& r) {
-    const GaugeDerivatives d = gauge.derivatives(r);
+Sample sample_over(const GeneralizedSurface& surface, const Vector3d& r) {
+    const GaugeDerivatives d = surface.base().derivatives(r);
     const double slope = d.gradient.norm();
     const Vector3d n = d.gradient / slope;
-    BumpHeight height;
-    for (const Bump& bump : shape.bumps) {
-        const BumpHeight one = bump_height(bump, gauge.semi_axes(), r);
-        height.value += one.value;
-        height.gradient += one.gradient;
-    }
-    if (shape.bumps.empty()) return {r, n};
+    if (!surface.has_bumps()) return {r, n};
+    const GeneralizedSurface::Displacement height = surface.displacement(r);
     const Vector3d t1 = n.unitOrthogonal(), t2 = n.cross(t1);
     const auto image = [&](const Vector3d& t) -> Vector3d {
         const Vector3d turn = d.hessian * t / slope;
@@ -69,10 +44,10 @@ void add(SurfaceMesh& mesh, const Sample& sample) {
 }
 
 // Poles first and last, parallels from the upper pole down, each from +x towards +z.
-void add_grid(SurfaceMesh& mesh, const GeneralizedSuperquadric& shape, const Gauge& gauge, int meridians,
-              int parallels) {
+void add_grid(SurfaceMesh& mesh, const GeneralizedSurface& surface, int meridians, int parallels) {
+    const Gauge& gauge = surface.base();
     const auto over = [&](const Vector3d& direction) {
-        return sample_over(shape, gauge, gauge.onto_surface(direction.cwiseProduct(gauge.semi_axes())));
+        return sample_over(surface, gauge.onto_surface(direction.cwiseProduct(gauge.semi_axes())));
     };
     add(mesh, over(Vector3d::UnitY()));
     for (int j = 1; j <= parallels; ++j) {
@@ -99,10 +74,9 @@ void add_triangles(SurfaceMesh& mesh, int meridians, int parallels) {
     }
 }
 
-void add_feature(SurfaceMesh& mesh, const GeneralizedSuperquadric& shape, const Gauge& gauge,
-                 const Vector3d& direction) {
-    const Sample sample =
-        sample_over(shape, gauge, gauge.onto_surface(direction.cwiseProduct(gauge.semi_axes())));
+void add_feature(SurfaceMesh& mesh, const GeneralizedSurface& surface, const Vector3d& direction) {
+    const Gauge& gauge = surface.base();
+    const Sample sample = sample_over(surface, gauge.onto_surface(direction.cwiseProduct(gauge.semi_axes())));
     const double same = kSamePlace * gauge.semi_axes().maxCoeff();
     for (const Vector3d& other : mesh.vertices) {
         if ((other - sample.point).norm() < same) return;
@@ -117,17 +91,17 @@ Vector3d prism_border(const Gauge& gauge, double x, double y, double z) {
     return flat > 0 ? Vector3d(x / flat, y, z / flat) : Vector3d(x, y, z);
 }
 
-void add_edges_and_corners(SurfaceMesh& mesh, const GeneralizedSuperquadric& shape, const Gauge& gauge,
-                           int meridians) {
+void add_edges_and_corners(SurfaceMesh& mesh, const GeneralizedSurface& surface, int meridians) {
+    const Gauge& gauge = surface.base();
     if (std::min(gauge.e1(), gauge.e2()) >= kFlatExponent) return;
     for (int k = 0; k < 27; ++k) {
         const Vector3d d = Eigen::Vector3i(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1).cast<double>();
-        if (d != Vector3d::Zero()) add_feature(mesh, shape, gauge, prism_border(gauge, d.x(), d.y(), d.z()));
+        if (d != Vector3d::Zero()) add_feature(mesh, surface, prism_border(gauge, d.x(), d.y(), d.z()));
     }
     for (int k = 0; gauge.e2() >= kFlatExponent && k < 2 * meridians; ++k) {  // the rims of a drum
         const int meridian = k / 2;
         const double phi = 2 * std::numbers::pi * meridian / meridians;
-        add_feature(mesh, shape, gauge, prism_border(gauge, std::cos(phi), k % 2 ? -1 : 1, std::sin(phi)));
+        add_feature(mesh, surface, prism_border(gauge, std::cos(phi), k % 2 ? -1 : 1, std::sin(phi)));
     }
 }
 
@@ -139,14 +113,14 @@ SurfaceMesh surface_mesh(const GeneralizedSuperquadric& shape, int triangles) {
                                     " triangles, expected 48 to 20000");
     const int parallels = std::max(4, int(std::lround(std::sqrt(triangles / 3.6))));
     const int meridians = 2 * ((triangles + 4 * parallels - 1) / (4 * parallels));
-    const Gauge gauge(shape.base);
+    const GeneralizedSurface surface(shape);
     SurfaceMesh mesh;
-    add_grid(mesh, shape, gauge, meridians, parallels);
+    add_grid(mesh, surface, meridians, parallels);
     add_triangles(mesh, meridians, parallels);
-    add_edges_and_corners(mesh, shape, gauge, meridians);
+    add_edges_and_corners(mesh, surface, meridians);
     for (const Bump& bump : shape.bumps) {
         if (bump.height_m > 0)
-            add_feature(mesh, shape, gauge, bump.direction.cwiseQuotient(gauge.semi_axes()));
+            add_feature(mesh, surface, bump.direction.cwiseQuotient(surface.base().semi_axes()));
     }
     return mesh;
 }

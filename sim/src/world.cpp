@@ -79,7 +79,6 @@ int World::Implementation::add(const WorldBody& definition) {
     check_world_body(definition);
     MovingBody body;
     body.kind = kind_of(definition);
-    body.definition = definitions.size();
     body.fixed = definition.fixed;
     body.gravity_scale = definition.gravity_scale;
     body.friction = static_cast<float>(definition.friction);
@@ -267,8 +266,7 @@ World::World(const WorldDefinition& definition) : implementation_(std::make_uniq
     Implementation& w = *implementation_;
     w.settings = definition.settings;
     w.planes = definition.planes;
-    w.solver =
-        std::make_unique<IslandSolver>(w.settings, w.bodies, w.planes, w.contacts.manifolds(), w.constraints);
+    w.solver = std::make_unique<IslandSolver>(w.settings, w.bodies, w.contacts.manifolds(), w.constraints);
     for (const WorldBody& body : definition.bodies) w.add(body);
     for (const PointConstraint& constraint : definition.constraints) add_constraint(constraint);
 }

@@ -9,8 +9,8 @@ namespace {
 
 constexpr double kSlop = 0.005;  // of the smaller half extent: contacts exist from here on
 constexpr float kDeep = 0.04f;   // of it: a contact that begins deeper is one of bodies put inside each other
-constexpr double kBuried =
-    1.2;  // gauge of a body's centre in another: nearer, samples cannot tell the way out
+// A body is in another if its centre is, or is nearer to it than this share of its own smallest half extent.
+constexpr double kBuried = 0.2;
 constexpr std::uint32_t kParting = 0x7ffffffe;  // feature of the one contact of bodies inside each other
 constexpr std::uint32_t kFoot = 0x7fffffff;     // feature of a body's lowest point over a plane
 constexpr float kManifoldTolerance = 0.02f;
@@ -31,11 +31,10 @@ double margin_of(double approach, double size, const WorldSettings& settings) {
     return kSlop * size + std::max(approach, 0.0) * settings.dt;
 }
 
-// Whether the centre of one is inside the other, or nearly.
-bool is_buried(const PosedBody& a, const PosedBody& b) {
-    const Eigen::Vector3d apart = a.position - b.position;
-    return a.kind->surface.base().value(a.rotation.transpose() * apart) < kBuried ||
-           b.kind->surface.base().value(b.rotation.transpose() * apart) < kBuried;
+bool is_buried(const PosedBody& body, const PosedBody& in) {
+    const Eigen::Vector3d centre = in.rotation.transpose() * (body.position - in.position);
+    return in.kind->surface.distance(centre).distance <
+           kBuried * body.kind->definition.shape.base.semi_axes.minCoeff();
 }
 
 void finish(const Manifold* before, float size, Manifold& manifold) {
@@ -165,7 +164,7 @@ void WorldContacts::meet(const MovingBody& a, const MovingBody& b, float margin,
     const float out = PointChooser::reach(lowest, kManifoldTolerance * size);
     const Eigen::Vector3f between = (pa.position - pb.position).cast<float>();
     const Manifold* before = last(manifold.key());
-    if (lowest < 0 && (!before || before->emerging) && is_buried(pa, pb))
+    if (lowest < 0 && (!before || before->emerging) && (is_buried(pa, pb) || is_buried(pb, pa)))
         return part(pa, pb, between, before, manifold);
     candidates_.clear();
     for (const bool b_sampled : {false, true}) {

@@ -11,14 +11,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void expect_refused(const Ended& ended, const std::string& found) {
-    EXPECT_EQ(ended.status, 2) << ended.err;
-    EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 1) << ended.err;
-    EXPECT_NE(ended.err.find(found), std::string::npos) << ended.err;
-    EXPECT_NE(ended.err.find("expected"), std::string::npos) << ended.err;
-    EXPECT_EQ(ended.out, "");
-}
-
 TEST(Compare, TwoBundledTracesGiveTheSameFilesTwiceAndSayWhichPredictorWins) {
     const Folder folder;
     const auto compare = [&](const std::string& out) {

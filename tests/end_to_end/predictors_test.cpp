@@ -173,14 +173,7 @@ TEST(Predictors, BadArgumentsOfPredictAreRefusedInOneLine) {
          (folder / "no/where.csv").string()},
         {"predict", (folder / "none.csv").string(), "--predictor", "hold", "--lead", "0.1"},
     };
-    for (const std::vector<std::string>& arguments : cases) {
-        const Ended ended = run(arguments);
-        EXPECT_EQ(ended.status, 2) << ended.err;
-        EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 1) << ended.err;
-        EXPECT_NE(ended.err.find("found"), std::string::npos) << ended.err;
-        EXPECT_NE(ended.err.find("expected"), std::string::npos) << ended.err;
-        EXPECT_TRUE(ended.out.empty());
-    }
+    for (const std::vector<std::string>& arguments : cases) expect_refused(run(arguments));
 }
 
 }  // namespace

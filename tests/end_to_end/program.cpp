@@ -1,6 +1,7 @@
 #include "program.h"
 
 #include <fcntl.h>
+#include <gtest/gtest.h>
 #include <sndfile.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -54,6 +55,14 @@ Ended run(const std::vector<std::string>& arguments, const std::vector<std::stri
     const Folder folder;
     return collect(spawn(arguments, environment, folder / "out", folder / "err"), folder / "out",
                    folder / "err");
+}
+
+void expect_refused(const Ended& ended, const std::string& mentions, int status) {
+    EXPECT_EQ(ended.status, status) << ended.err;
+    EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 1) << ended.err;
+    for (const std::string& part : {std::string("found"), std::string("expected"), mentions})
+        EXPECT_NE(ended.err.find(part), std::string::npos) << part << " in: " << ended.err;
+    EXPECT_EQ(ended.out, "");
 }
 
 Started::Started(const std::vector<std::string>& arguments, const fs::path& folder)

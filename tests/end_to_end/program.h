@@ -16,6 +16,10 @@ struct Ended {
 /// Runs `musicworld ARGS...` and waits. `environment`: NAME=VALUE added to this process's own.
 Ended run(const std::vector<std::string>& arguments, const std::vector<std::string>& environment = {});
 
+/// Expects the one line on standard error that a refusal is: what was found (with `mentions` in it), what was
+/// expected; nothing on standard output.
+void expect_refused(const Ended& ended, const std::string& mentions = "found", int status = 2);
+
 /// Starts it; for tests that meddle with it while it runs.
 class Started {
 public:

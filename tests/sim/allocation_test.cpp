@@ -39,6 +39,24 @@ void* counted(std::size_t size) noexcept {
 [[gnu::noinline]] void operator delete(void* p, const std::nothrow_t&) noexcept {
     std::free(p);
 }
+[[gnu::noinline]] void* operator new[](std::size_t size, std::align_val_t alignment) {
+    ++allocations;
+    const std::size_t step = static_cast<std::size_t>(alignment);
+    if (void* p = std::aligned_alloc(step, (size + step - 1) / step * step)) return p;
+    throw std::bad_alloc();
+}
+[[gnu::noinline]] void operator delete[](void* p, std::align_val_t) noexcept {
+    std::free(p);
+}
+
+// Eigen allocates by malloc, not by operator new. The sanitizers have a malloc of their own.
+#ifndef __SANITIZE_ADDRESS__
+extern "C" void* __libc_malloc(std::size_t size);
+extern "C" void* malloc(std::size_t size) {
+    ++allocations;
+    return __libc_malloc(size);
+}
+#endif
 
 namespace {
 
@@ -74,6 +92,16 @@ TEST(ModalBasis, DisplacementAndItsInverseAllocateNothing) {
         EXPECT_LT((sim::inverse_displacement(basis, nodal, x).r - r).norm(), 1e-9);
     }
     EXPECT_EQ(allocations, before);
+}
+
+TEST(Allocations, ThatEigenMakesAreCounted) {
+#ifdef __SANITIZE_ADDRESS__
+    GTEST_SKIP() << "malloc is the sanitizer's";
+#endif
+    const std::size_t before = allocations;
+    Eigen::VectorXd values(12);
+    values.setOnes();
+    EXPECT_GT(allocations, before) << values.sum();
 }
 
 TEST(World, AWarmStepOfAPileAllocatesNothing) {

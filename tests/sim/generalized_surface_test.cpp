@@ -242,7 +242,7 @@ TEST(GeneralizedSurface, TheSurfaceOfASpikedSphereIsWhereItsPointsAreDisplacedAl
         const sim::GeneralizedSurface surface(spiked(Vector3d(0.5, 0.5, 0.5), height));
         for (const Vector3d& direction : directions_about(Vector3d(0, -1, 0), random)) {
             const Vector3d on = surface.surface_point(direction);
-            EXPECT_NEAR(on.norm(), 0.5 + surface.displacement(direction), 1e-14);
+            EXPECT_NEAR(on.norm(), 0.5 + surface.displacement(direction).value, 1e-14);
             EXPECT_NEAR(surface.distance(on).distance, 0, 1e-12);
         }
     }

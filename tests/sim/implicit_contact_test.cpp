@@ -133,7 +133,7 @@ Compared compare_at_random_poses(const Superquadric& shape, Fidelity fidelity, d
     Compared worst;
     for (int pose = 0; pose < 40; ++pose) {
         Posed a(kind, gradient, random), b(kind, gradient, random);
-        const double distance = (1.1 + 0.9 * random()) * kind.bounding_radius;
+        const double distance = (1.1 + 0.9 * random()) * kind.surface.bounding_radius();
         a.body.position = b.body.position + distance * random.vector().normalized();
         compare(a, b, finder, worst);
         compare(b, a, finder, worst);

@@ -24,6 +24,19 @@ TEST(WorldContact, BodiesPutDeepIntoEachOtherPartWithoutGainingEnergy) {
         }
 }
 
+TEST(WorldContact, ASmallBodyALittleInsideALargeOneComesOutByTheNearestSide) {
+    // A ball of 5 cm, 1 cm deep in the top of a slab of 2 m, far from its middle.
+    sim::WorldDefinition definition = weightless();
+    definition.bodies.push_back(box({0, 0, 0}, {1, 0.5, 1}));
+    definition.bodies[0].fixed = true;
+    definition.bodies.push_back(ball({0.6, 0.54, 0.2}, Fidelity::rigid, 0.05));
+    sim::World world(definition);
+    run(world, 120);
+    EXPECT_GT(world.state(1).position.y(), 0.548);
+    EXPECT_NEAR(world.state(1).position.x(), 0.6, 1e-3);
+    EXPECT_NEAR(world.state(1).position.z(), 0.2, 1e-3);
+}
+
 TEST(WorldContact, ABodyTooSoftForItsWeightStaysOnTheFloor) {
     for (const double young : {1e3, 1e4, 2e4})
         for (const int modes : {12, 40, 75}) {
