@@ -18,7 +18,6 @@ Lanes larger(Lanes a, Lanes b) {
     return a > b ? a : b;
 }
 
-
 }  // namespace
 
 void PosedBody::set(const Eigen::Vector3d& at, const Eigen::Quaterniond& orientation,
