@@ -100,6 +100,70 @@ struct WorldBodyState {
     Eigen::VectorXd q, q_dot;          ///< modal coordinates of mass-normalised modes [m kg^1/2], rates
 };
 
+/// All that a body's next step depends on, but for contacts and constraints.
+struct WorldRecord {
+    int body = 0;
+    WorldBodyState state;
+    bool asleep = false, quarantined = false;
+    bool at_limit = false;          ///< its deformation was held in the last substep
+    std::uint16_t still_steps = 0;  ///< since it was last faster than the sleep speed; stays at the largest
+    std::int32_t sleep_group = -1;  ///< first body of those that fell asleep together
+};
+
+/// What a contact of bodies a < b (b >= kFirstPlane: a plane) hands on to the next step.
+struct ContactRecord {
+    struct Point {
+        std::uint32_t feature = 0;
+        Eigen::Vector3f arm_a = Eigen::Vector3f::Zero();  ///< [m]
+        float normal_impulse = 0;                         ///< [N s]
+        Eigen::Vector3f friction_impulse = Eigen::Vector3f::Zero();
+    };
+    int a = 0, b = 0;
+    bool emerging = false;
+    int count = 0;  ///< of points, at most 4
+    Point points[4];
+};
+
+/// The same of a constraint.
+struct SpringRecord {
+    int constraint = 0;
+    bool holds = true;
+    Eigen::Vector3f impulse = Eigen::Vector3f::Zero();  ///< [N s]
+};
+
+/// Everything that a world's future depends on, at the end of step `step`.
+struct WorldSnapshot {
+    std::uint64_t step = 0;
+    std::vector<WorldRecord> bodies;
+    std::vector<ContactRecord> contacts;
+    std::vector<SpringRecord> springs;
+};
+
+/// What other moving bodies did to a body in one step.
+struct StepImpulse {
+    Eigen::Vector3d linear = Eigen::Vector3d::Zero();   ///< [N s]
+    Eigen::Vector3d angular = Eigen::Vector3d::Zero();  ///< about its centre, world axes [N m s]
+    Eigen::Vector3d displacement =
+        Eigen::Vector3d::Zero();                     ///< by pushing overlaps out, beyond the impulses' [m]
+    Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< likewise, rotation vector, world axes [rad]
+    Eigen::VectorXd modal;                           ///< of the modal coordinates [N s kg^-1/2]
+};
+
+/// A foreign body's whereabouts over the next step.
+struct ForeignBall {
+    int body;
+    Eigen::Vector3d center;
+    double radius;  ///< of the body, and how far it may come [m]
+};
+
+/// How a world is shared with worlds of other processes that hold the same bodies.
+enum class Sharing {
+    alone,    ///< not at all
+    islands,  ///< every island with an own body is solved whole; other bodies' records come from outside
+    pairs  ///< only own bodies are stepped, among ghosts that are placed for each step; of an own and a ghost
+           ///< body that touch, the world that owns the one with the lower number resolves the contact
+};
+
 struct QuarantinedBody {
     int body;
     std::uint64_t step;
@@ -161,6 +225,53 @@ public:
     [[nodiscard]] Eigen::Vector3d angular_momentum() const;  ///< about the origin [kg m^2/s]
     [[nodiscard]] const WorldCounts& counts() const noexcept;
     [[nodiscard]] const std::vector<QuarantinedBody>& quarantined() const noexcept;
+    /// All impulse that came from planes, fixed bodies, places, gravity, drag and user forces onto own bodies
+    /// since the start [kg m/s].
+    [[nodiscard]] Eigen::Vector3d outside_impulse() const;
+
+    // Sharing. At first alone, all bodies own.
+    void share(Sharing sharing);
+    void set_own(int body, bool own);
+    [[nodiscard]] bool own(int body) const;
+    [[nodiscard]] WorldRecord record(int body) const;
+    void restore(const WorldRecord& record);  ///< wakes nobody
+    /// Of the last step: contacts whose first body that moves is own (all: of every contact solved here),
+    /// constraints whose body_a is own.
+    void contact_records(bool all, std::vector<ContactRecord>& out) const;
+    void spring_records(bool all, std::vector<SpringRecord>& out) const;
+    /// islands: contacts solved elsewhere, ascending by (a, b), stand beside the own ones in the next step.
+    void restore_contacts(const std::vector<ContactRecord>& contacts,
+                          const std::vector<SpringRecord>& springs);
+    [[nodiscard]] WorldSnapshot snapshot() const;
+    void rewind(const WorldSnapshot& snapshot);  ///< bodies added later stay as they are
+    void set_step(std::uint64_t step);           ///< what time_s and counts().steps go on from
+
+    // pairs.
+    /// Those of `foreign` that have to be placed for the next step: that may touch an own body of a lower
+    /// number.
+    void near_own(const std::vector<ForeignBall>& foreign, std::vector<int>& near) const;
+    /// A ghost is there for the next step only, under gravity and `held`.
+    void place_ghost(int body, const WorldBodyState& state, const StepImpulse* held);
+    /// Impulse that an own body gets in the course of the next step (its displacement and turn at once).
+    void hold(int body, const StepImpulse& impulse);
+    /// Impulse that an own body should have got in the step that ended `steps_ago` steps ago: the change it
+    /// makes to a free body.
+    void correct(int body, const StepImpulse& impulse, int steps_ago);
+    /// The same for any state of the body.
+    void correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago) const;
+    /// One step of a body that touches nothing, under gravity and `held`.
+    void extrapolate(int body, WorldBodyState& state, const StepImpulse* held) const;
+    /// Keep own body's impulses from other moving bodies and constraints (not what hold and correct gave).
+    void watch(int body, bool watched);
+    /// Of the last step: ghosts (from own bodies) and watched bodies; nullptr where there was none.
+    [[nodiscard]] const StepImpulse* impulse(int body) const;
+    [[nodiscard]] int cross_contacts()
+        const noexcept;  ///< points between own bodies and ghosts in the last step
+    /// Radius of a ball that holds the body with these modal coordinates [m].
+    [[nodiscard]] double ball_radius(int body, const Eigen::VectorXd& q) const;
+    /// What a body took of the last step, in units of an own body without contacts.
+    [[nodiscard]] double work(int body) const;
+
     /// FNV-1a 64 over the exact states in order of bodies, little-endian doubles.
     [[nodiscard]] std::uint64_t state_hash() const;
 
