@@ -63,7 +63,7 @@ namespace sim {
 // made positive and follows from the others), the other three in that order, each 18 bits, 0 to 2^18 - 1 for
 // -1/sqrt 2 to 1/sqrt 2.
 //
-// What an update's numbers are off by, at most: position 2^-24 of each coordinate; orientation 1.2e-5 rad;
+// What an update's numbers are off by, at most: position 2^-24 of each coordinate; orientation 1.9e-5 rad;
 // angular momentum 1/4095 of its largest coordinate (and 2^-45 kg m^2/s; no more than 2.1e9); f16 2^-11 of
 // each (and 3e-8; no more than 65504).
 //
