@@ -35,6 +35,7 @@ public:
         number(static_cast<std::uint32_t>(s.size()));
         bytes_.insert(bytes_.end(), s.begin(), s.end());
     }
+    void append(std::span<const std::uint8_t> more) { bytes_.insert(bytes_.end(), more.begin(), more.end()); }
     void count(std::size_t n) { number(static_cast<std::uint32_t>(n)); }
     [[nodiscard]] std::vector<std::uint8_t>& bytes() { return bytes_; }
 
@@ -83,15 +84,16 @@ public:
     void expect_end() const {
         if (!bytes_.empty()) throw DecodeError(std::to_string(bytes_.size()) + " bytes too many");
     }
-
-private:
-    std::span<const std::uint8_t> take(std::size_t n) {
+    /// The next n bytes.
+    [[nodiscard]] std::span<const std::uint8_t> take(std::size_t n) {
         if (n > bytes_.size())
             throw DecodeError("message ends " + std::to_string(n - bytes_.size()) + " bytes too early");
         const std::span<const std::uint8_t> taken = bytes_.first(n);
         bytes_ = bytes_.subspan(n);
         return taken;
     }
+
+private:
     std::span<const std::uint8_t> bytes_;
 };
 

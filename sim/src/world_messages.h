@@ -10,13 +10,72 @@
 
 namespace sim {
 
-// Messages of a distributed world. (Byte-by-byte table: to be written with the codec.)
+// Messages of a distributed world. One ZeroMQ frame each, little-endian, no padding.
 //
-// Header, 28 bytes: "MWSW", u16 version, u16 type, u32 length of the whole message, u32 worker (sender;
-// 0xffffffff the application), u32 epoch (of ownership, as the sender knows it), u64 step; at the end u32
-// CRC-32C of everything before.
+//   offset  bytes
+//   0       4      "MWSW"
+//   4       2      version, 1
+//   6       2      type
+//   8       4      length of the whole message
+//   12      4      worker: sender; 0xffffffff the application
+//   16      4      epoch of ownership, as the sender knows it
+//   20      8      step: number of steps that the sender has done
+//   28      ...    body, by type
+//   end-4   4      CRC-32C (Castagnoli, reflected) of everything before
+//
+// f64, f32, f16 are IEEE numbers bit by bit, v3 = 3 f64, w3 = 3 f32, flag = u8 of 0 or 1, text = u32 length
+// and bytes, list = u32 count and the elements, b/m = u32: body below 2^24, and number of modes (at most
+// 128) times 2^24.
+//
+//    1 join       worker  u64 fingerprint, u32 process id, text host
+//    2 beat       both    nothing
+//    3 drained    worker  nothing
+//    4 failure    worker  text
+//    5 scene      app     u32 worker, scene, settings
+//    6 refusal    app     text
+//    7 end        app     nothing
+//    8 members    app     list of u32
+//    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of applied
+//   10 snapshot   app     u64 step, list of record, list of contact, list of spring
+//   11 state      worker  report, list of record, list of contact, list of spring
+//   12 update     worker  report, list of applied, list of update, list of push
+//   13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds}
+//   14 answer     worker  u32 to, u32 number, flag accepted
+//   15 handover   worker  u32 to, u32 number, list of record, list of applied
+//
+//   report      56 bytes: f32 seconds, smoothed, waited, bodies' cost; u32 lead, ghost age, cross contacts,
+//               own; v3 outside impulse
+//   applied     12 bytes: u32 worker, u64 step
+//   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8
+//               broken), u16 still steps, i32 sleep group, v3 position, f64 orientation w x y z, v3
+//               velocity, v3 angular momentum, f64 q[m], f64 q'[m]
+//   contact     10 + 32 n bytes: u32 a, u32 b, u8 (1 emerging), u8 n points of {u32 feature, w3 arm, f32
+//               normal impulse, w3 friction impulse}
+//   spring      17 bytes: u32 constraint, flag holds, w3 impulse
+//   update      36 + 4 m bytes, 84 with 12 modes, and 12 + 2 m if held, then 120:
+//               b/m, u8 (1 asleep, 2 still, 4 quarantined, 8 held, and 16 times E), w3 position,
+//               7 bytes orientation, 3 f16 velocity, 3 i16 angular momentum in units of 2^(4 E - 44)
+//               kg m^2/s, f16 q[m], f16 q'[m]; held: 3 f16 linear, 3 f16 angular, f16 modal[m]
+//   push        76 + 4 m bytes: b/m, v3 linear, v3 angular, w3 displacement, w3 turn, f32 modal[m]
+//   scene, settings: see world_scene_codec.cpp
+//
+// The 7 bytes of an orientation: 56 bits, lowest first: which of x, y, z, w is largest in size (2 bits; it is
+// made positive and follows from the others), the other three in that order, each 18 bits, 0 to 2^18 - 1 for
+// -1/sqrt 2 to 1/sqrt 2.
+//
+// What an update's numbers are off by, at most: position 2^-24 of each coordinate; orientation 1.9e-5 rad;
+// angular momentum 1/4095 of its largest coordinate (and 2^-45 kg m^2/s; no more than 2.1e9); f16 2^-11 of
+// each (and 3e-8; no more than 65504).
+//
+// A state that is not finite or beyond 1e7 m or 1e6 m/s is broken; World takes the body out at the next
+// step. Its numbers do not travel: zeros stand for them (and w = 1 for the orientation; in an update the
+// angular momentum is -32768 three times), and the decoder sets the position to NaN.
+//
+// Decoders check length, checksum, counts, flags, that every number is finite and in range, that nothing is
+// left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
+constexpr std::uint16_t kWorldProtocol = 1;  ///< version
 
 struct WorldHeader {
     std::uint32_t worker = kApplication;
