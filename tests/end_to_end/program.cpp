@@ -69,7 +69,8 @@ void expect_refused(const Ended& ended, const std::string& mentions, int status)
     EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 1) << ended.err;
     for (const std::string& part : {std::string("found"), std::string("expected"), mentions})
         EXPECT_NE(ended.err.find(part), std::string::npos) << part << " in: " << ended.err;
-    EXPECT_EQ(ended.out, "");
+    // Csound writes a row of dashes to standard output when it runs under the sanitizer.
+    EXPECT_EQ(ended.out.find_first_not_of('-'), std::string::npos) << ended.out;
 }
 
 Started::Started(const std::vector<std::string>& arguments, const fs::path& folder)
