@@ -27,8 +27,8 @@ constexpr std::array<std::string_view, 16> kPlayProducts = {
     "report.html",  "latency.json", "latency.html", "departures.csv", "samples.csv",  "frames.csv",
     "notes.csv",    "blocks.csv",   "leads.csv",    "errors.csv"};
 constexpr std::array<std::string_view, 3> kModesProducts = {"modes.json", "modes.png", "frames"};
-constexpr std::array<std::string_view, 5> kSimulateProducts = {"summary.json", "frames", "states.csv",
-                                                               "energy.csv", "times.csv"};
+constexpr std::array<std::string_view, 7> kSimulateProducts = {
+    "summary.json", "frames", "states.csv", "energy.csv", "times.csv", "timing.csv", "workers.svg"};
 constexpr std::array<std::string_view, 3> kCompareProducts = {"compare.json", "compare.csv", "report.html"};
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& found) {

@@ -13,7 +13,8 @@ namespace app {
 [[nodiscard]] std::span<const std::string_view> play_products();
 /// What `compare` writes: compare.json, compare.csv, report.html.
 [[nodiscard]] std::span<const std::string_view> compare_products();
-/// What `simulate` writes: summary.json, frames, states.csv, energy.csv, times.csv.
+/// What `simulate` writes: summary.json, frames, states.csv, energy.csv, and times.csv or, with workers,
+/// timing.csv and workers.svg.
 [[nodiscard]] std::span<const std::string_view> simulate_products();
 
 /// What `modes` writes: modes.json, modes.png, frames.

@@ -27,15 +27,16 @@ public:
 
 private:
     void read_settings(TomlReader reader, std::optional<double> dt_s);
+    void read_workers(TomlReader reader);
     void read_planes(TomlReader& top);
     void read_box(TomlReader reader);
     void add_body_table(const toml::node& node, std::vector<sim::WorldBody>& into,
                         std::vector<BodyLook>& looks);
     void read_constraint(TomlReader& reader);
     void read_events();
-    SceneEvent read_event(const toml::table& table);
-    void read_removed(TomlReader& reader, SceneEvent& event);
-    void read_slowing(TomlReader reader, SceneEvent& event);
+    sim::WorldEvent read_event(const toml::table& table);
+    void read_removed(TomlReader& reader, sim::WorldEvent& event);
+    void read_slowing(TomlReader reader, sim::WorldEvent& event);
 
     [[nodiscard]] int body_number(TomlReader& reader, std::string_view key) const;
     [[nodiscard]] const toml::table* defaults() const { return root_["defaults"].as_table(); }
@@ -60,6 +61,7 @@ SceneReader::SceneReader(const fs::path& file, const toml::table& root, std::opt
     scene_.name = top.text("name", file.stem().string());
     scene_.description = top.text("description", "");
     read_settings(top.table("settings"), dt_s);
+    read_workers(top.table("workers"));
     materials_ = read_materials(root);
     (void)top.table("material"), (void)top.table("defaults");
     (void)top.tables("body"), (void)top.tables("event");  // are arrays of tables
@@ -92,6 +94,12 @@ void SceneReader::read_settings(TomlReader reader, std::optional<double> dt_s) {
     settings.sleeping = reader.flag("sleeping", settings.sleeping);
     settings.sleep_speed = reader.number("sleep_speed", 0, 100, settings.sleep_speed);
     scene_.seconds = reader.fraction("seconds", 1e-3, kLongestS, scene_.seconds);
+    reader.done();
+}
+
+void SceneReader::read_workers(TomlReader reader) {
+    scene_.workers.all_to_first = reader.flag("all_to_first", false);
+    scene_.workers.balance_from = std::uint64_t(reader.integer("balance_from", 0, 2000000000, 0));
     reader.done();
 }
 
@@ -197,7 +205,7 @@ void SceneReader::read_constraint(TomlReader& reader) {
     scene_.world.constraints.push_back(c);
 }
 
-void SceneReader::read_removed(TomlReader& reader, SceneEvent& event) {
+void SceneReader::read_removed(TomlReader& reader, sim::WorldEvent& event) {
     const bool one = reader.has("delete") && !reader.is_array("delete");
     for (const std::string& name : one ? std::vector{reader.text("delete")} : reader.texts("delete")) {
         const auto found = constraints_.find(name);
@@ -207,17 +215,17 @@ void SceneReader::read_removed(TomlReader& reader, SceneEvent& event) {
     }
 }
 
-void SceneReader::read_slowing(TomlReader reader, SceneEvent& event) {
-    Slowing slowing;
+void SceneReader::read_slowing(TomlReader reader, sim::WorldEvent& event) {
+    sim::Slowing slowing;
     slowing.worker = reader.integer("worker", 0, 1000);
     slowing.factor = reader.number("factor", 1, 1e6);
     reader.done();
-    event.slowing = slowing;
+    event.slowing.push_back(slowing);
 }
 
-SceneEvent SceneReader::read_event(const toml::table& table) {
+sim::WorldEvent SceneReader::read_event(const toml::table& table) {
     TomlReader reader({&table}, "[[event]]");
-    SceneEvent event;
+    sim::WorldEvent event;
     if (reader.has("time") == reader.has("step"))
         reader.fail("time", reader.has("time") ? "both time and step" : "neither time nor step",
                     "one of them");
@@ -234,14 +242,14 @@ SceneEvent SceneReader::read_event(const toml::table& table) {
     else
         (void)reader.table("slow");
     reader.done();
-    if (event.removed.empty() && !reader.has("add") && !event.slowing)
+    if (event.removed.empty() && !reader.has("add") && event.slowing.empty())
         reader.fail("delete", "an event without effect", "delete, add or slow");
     return event;
 }
 
 /// Bodies that come are numbered in the order in which they come.
 void SceneReader::read_events() {
-    std::vector<std::pair<SceneEvent, const toml::node*>> read;
+    std::vector<std::pair<sim::WorldEvent, const toml::node*>> read;
     for (const toml::node& node : array_at(root_, "event"))
         read.emplace_back(read_event(*node.as_table()), node.as_table()->get("add"));
     std::stable_sort(read.begin(), read.end(),

@@ -1,6 +1,6 @@
 #pragma once
 #include <render/scene.h>
-#include <sim/world.h>
+#include <sim/distributed_world.h>
 
 #include <filesystem>
 #include <optional>
@@ -15,38 +15,27 @@ struct BodyLook {
     std::size_t kind = 0;
 };
 
-/// A worker that is to do every step `factor` times slower.
-struct Slowing {
-    int worker = 0;
-    double factor = 1;
-};
-
 /// A floor with four walls: x and z of its inner size and its centre [m].
 struct SceneBox {
     Eigen::Vector2d size, center;
     double floor;
 };
 
-/// What happens before a step: constraints go, bodies come, a worker slows down.
-struct SceneEvent {
-    std::uint64_t step = 0;          ///< before this one, counted from 0
-    std::vector<int> removed;        ///< constraints, as in world.constraints
-    std::size_t first = 0, end = 0;  ///< bodies that come: of `later`
-    std::optional<Slowing> slowing;
+/// What a scene says of the workers that simulate it, if there are several.
+struct SceneWorkers {
+    bool all_to_first = false;       ///< at first one of them owns every body
+    std::uint64_t balance_from = 0;  ///< [steps] no trade before
 };
 
-/// A scene file, checked and complete. Bodies are numbered as in the world: those of `world`, then `later` in
-/// the order in which they come.
-struct Scene {
+/// A scene file, checked and complete. Events are in order of steps, then of the file.
+struct Scene : sim::WorldScene {
     std::filesystem::path file;
     std::string name, description;
-    sim::WorldDefinition world;
-    std::vector<sim::WorldBody> later;
-    std::vector<BodyLook> looks;     ///< of all bodies
-    std::vector<SceneEvent> events;  ///< in order of steps, then of the file
-    std::optional<SceneBox> box;     ///< its planes are among the world's
-    double seconds = 10;             ///< how long it is worth looking at
-    render::Camera camera;           ///< [m] of the scene, as is the room
+    std::vector<BodyLook> looks;  ///< of all bodies
+    std::optional<SceneBox> box;  ///< its planes are among the world's
+    SceneWorkers workers;
+    double seconds = 10;    ///< how long it is worth looking at
+    render::Camera camera;  ///< [m] of the scene, as is the room
     render::Room room;
     double drawn_scale = 1;  ///< pictures show everything this much larger: the room is a few metres wide
 };

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "scene.h"
+#include "momentum_watch.h"
+#include "worker_options.h"
 
 namespace app {
 
@@ -21,13 +22,7 @@ struct SimulateOptions {
     double fps = 30;
     int width = 640, height = 480;
     bool progress = false;
-};
-
-/// Momentum that came from nowhere. Known only where nothing outside acts but gravity: no planes, fixed
-/// bodies, or constraints to places.
-struct MomentumDrift {
-    double linear = 0, angular = 0;  ///< largest so far [kg m/s], [kg m^2/s]
-    double scale = 0;                ///< largest sum of |m v| over the bodies [kg m/s]
+    std::optional<WorkerOptions> workers;  ///< none: all in this process
 };
 
 struct SimulateResult {
@@ -49,9 +44,11 @@ struct SimulateResult {
     std::size_t frames = 0;
     std::vector<std::string> notes;  ///< what was asked for and had no effect
     double wall_s = 0;               ///< with reading, drawing and writing
+    std::optional<sim::DistributedResult> workers;
+    WorkerOptions worker_options;
 };
 
-/// Runs a scene in this process. Throws BadInput, or std::runtime_error while running.
+/// Runs a scene, in this process or shared out to workers. Throws BadInput, or std::runtime_error while running.
 [[nodiscard]] SimulateResult simulate(const SimulateOptions& options);
 
 /// One JSON object, the keys that scripts rely on first; numbers read back to the same double. Apart from

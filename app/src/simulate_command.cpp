@@ -14,28 +14,15 @@ namespace {
 
 /// The options as typed.
 struct Typed {
-    std::string scene, dt, seconds, out, video, fps = "30", size = "640x480", until, mode = "sync";
+    std::string scene, dt, seconds, out, video, fps = "30", size = "640x480", until;
     std::optional<std::int64_t> steps;
-    int workers = 0, bound = 0;
+    std::shared_ptr<WorkerArguments> workers;
     bool frames = false, json = false;
 };
 
-/// What only a simulation on several processes can do.
-void check_workers(const Typed& a) {
-    const auto refuse = [](const std::string& found) {
-        throw BadInput(
-            fmt::format("error: found {}, expected --workers 0 or 1, --mode sync and --bound 0: scenes run "
-                        "in one process",
-                        found));
-    };
-    if (a.workers < 0 || a.workers > 1) refuse(fmt::format("--workers {}", a.workers));
-    if (a.mode != "sync") refuse(fmt::format("--mode {}", a.mode));
-    if (a.bound != 0) refuse(fmt::format("--bound {}", a.bound));
-}
-
 SimulateOptions options_of(const Typed& a) {
-    check_workers(a);
     SimulateOptions o;
+    o.workers = worker_options_of(*a.workers);
     o.scene = find_scene(a.scene);
     if (!a.dt.empty()) {
         o.dt_s = parse_number(a.dt, "--dt");
@@ -64,6 +51,18 @@ SimulateOptions options_of(const Typed& a) {
     return o;
 }
 
+void print_workers(const SimulateResult& r) {
+    const sim::DistributedResult& w = *r.workers;
+    const WorkerOptions& o = r.worker_options;
+    fmt::print("{} {}, {}, {}: {:.1f} bytes a body's step, {} contacts between workers, {} bodies traded\n",
+               w.workers, o.simulated ? "simulated processors" : "workers", mode_name(o.pace),
+               o.pace == sim::Pace::bounded ? fmt::format("bound {}", o.bound) : "lockstep",
+               r.body_steps > 0 ? double(w.bytes) / double(r.body_steps) : 0.0, w.cross_contacts, w.migrations);
+    if (w.lost + w.left > 0)
+        fmt::print("{} workers were lost, {} left; {} bodies went to others\n", w.lost, w.left,
+                   w.bodies_reowned);
+}
+
 void print(const SimulateResult& r, const SimulateOptions& options) {
     fmt::print(
         "{}: {} bodies ({} rigid, {} linear, {} modal), {} steps of {:.6g} s in {:.2f} s: {:.2f} us a body's "
@@ -72,6 +71,7 @@ void print(const SimulateResult& r, const SimulateOptions& options) {
         r.body_steps > 0 ? 1e6 * r.elapsed_s / double(r.body_steps) : 0.0);
     fmt::print("energy {:.6g} J at first, {:.6g} J at last; {} asleep; state {:016x}\n",
                r.energy_start.total(), r.energy.total(), r.counts.asleep, r.state_hash);
+    if (r.workers) print_workers(r);
     if (r.counts.constraints_broken > 0) fmt::print("{} constraints broke\n", r.counts.constraints_broken);
     for (const auto& [name, q] : r.quarantined)
         fmt::print("body {} was taken out at step {}: {}\n", name, q.step, q.what);
@@ -81,7 +81,7 @@ void print(const SimulateResult& r, const SimulateOptions& options) {
 int run(const Typed& a) {
     const SimulateOptions options = options_of(a);
     const SimulateResult result = simulate(options);
-    for (const std::string& note : result.notes)
+    for (const std::string& note : result.workers ? std::vector<std::string>{} : result.notes)
         fmt::print(stderr, "{}: note: {}\n", result.scene.string(), note);
     if (a.json)
         fmt::print("{}", format_simulate(result));
@@ -107,14 +107,12 @@ void add_simulate_command(CLI::App& program, int& status) {
     command->add_option("--dt", a->dt, "Length of a step [s], such as 1/60; default: the scene's");
     command->add_option("--until", a->until,
                         "rest: until every body sleeps and no event is left, --steps (10 minutes) at most");
-    command->add_option("--out", a->out, "Folder for states.csv, energy.csv, times.csv, summary.json");
+    command->add_option("--out", a->out, "Folder for states.csv, energy.csv, times.csv, summary.json; with workers timing.csv, workers.svg");
     command->add_flag("--frames", a->frames, "Also draw frames/000000.png on");
     command->add_option("--fps", a->fps, "Frames a second, and rows of states.csv")->capture_default_str();
     command->add_option("--size", a->size, "Size of the frames")->capture_default_str();
     command->add_option("--video", a->video, "Also make a video (MP4) of the frames");
-    command->add_option("--workers", a->workers, "0 or 1: in this process")->capture_default_str();
-    command->add_option("--mode", a->mode, "sync")->capture_default_str();
-    command->add_option("--bound", a->bound, "0")->capture_default_str();
+    a->workers = add_worker_options(*command);
     command->add_flag("--json", a->json, "Print one JSON document instead of words");
     command->callback([a, &status] { status = run(*a); });
 }

@@ -18,12 +18,12 @@ std::string cell_of(const std::string& name) {
     return quoted + '"';
 }
 
+}  // namespace
+
 const std::string& name_of(const Scene& scene, std::size_t body) {
     const std::size_t now = scene.world.bodies.size();
     return body < now ? scene.world.bodies[body].name : scene.later[body - now].name;
 }
-
-}  // namespace
 
 GrowingTable::GrowingTable(const std::filesystem::path& file, const std::string& header)
     : file_(file), out_(file, std::ios::binary) {
@@ -73,21 +73,22 @@ std::string energy_header() {
            "asleep\n";
 }
 
-std::string energy_row(const sim::World& world) {
+std::string energy_row(const sim::World& world, bool stepped) {
     const sim::World::Energy e = world.energy();
     const Eigen::Vector3d p = world.momentum(), l = world.angular_momentum();
     const sim::WorldCounts& n = world.counts();
-    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", n.steps, world.time_s(),
-                       e.kinetic, e.potential, e.elastic, e.springs, p.x(), p.y(), p.z(), l.x(), l.y(), l.z(),
-                       n.contacts, n.pairs, n.islands, n.asleep);
+    const std::string found =
+        stepped ? fmt::format("{},{},{},{}", n.contacts, n.pairs, n.islands, n.asleep) : ",,,";
+    return fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", n.steps, world.time_s(), e.kinetic,
+                       e.potential, e.elastic, e.springs, p.x(), p.y(), p.z(), l.x(), l.y(), l.z(), found);
 }
 
 std::string times_header() {
     return "step,elapsed_s\n";
 }
 
-std::string times_row(const sim::World& world, double elapsed_s) {
-    return fmt::format("{},{}\n", world.counts().steps, elapsed_s);
+std::string times_row(std::uint64_t step, double elapsed_s) {
+    return fmt::format("{},{}\n", step, elapsed_s);
 }
 
 }  // namespace app

@@ -23,16 +23,19 @@ private:
     std::ofstream out_;
 };
 
+[[nodiscard]] const std::string& name_of(const Scene& scene, std::size_t body);
+
 // states.csv: a body a row at each frame's time; `modes`: its modal coordinates, separated by blanks.
 [[nodiscard]] std::string states_header();
 [[nodiscard]] std::string state_rows(const Scene& scene, const sim::World& world, std::size_t frame);
 
 // energy.csv: the world before the first step and after each.
 [[nodiscard]] std::string energy_header();
-[[nodiscard]] std::string energy_row(const sim::World& world);
+/// `stepped`: in this process, so that the world knows its contacts; else their cells are empty.
+[[nodiscard]] std::string energy_row(const sim::World& world, bool stepped);
 
 // times.csv: what each step took.
 [[nodiscard]] std::string times_header();
-[[nodiscard]] std::string times_row(const sim::World& world, double elapsed_s);
+[[nodiscard]] std::string times_row(std::uint64_t step, double elapsed_s);
 
 }  // namespace app

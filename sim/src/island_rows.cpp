@@ -63,6 +63,7 @@ void IslandSolver::begin(const Island& island) {
     jacobians_.resize(floats);
     jacobians_used_ = 0;
     contacts_.clear(), springs_.clear();
+    any_told_ = false;
     contacts_.reserve(triples);
     for (const Turn& turn : in_turns(island))
         add_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
@@ -155,6 +156,18 @@ void IslandSolver::write_rows(const Place& place, const Eigen::Matrix3f& directi
     }
 }
 
+// What comes from planes and fixed bodies is not told: whoever has a ghost of the body finds that himself.
+bool IslandSolver::note_told(const Rows& rows, bool contact) {
+    bool watched = false, both = true;
+    for (const Side& side : rows.side) {
+        both = both && side.body >= 0;
+        watched = watched || (side.body >= 0 && rows_of_[static_cast<std::size_t>(side.body)].body->watched);
+    }
+    const bool told = watched && (both || !contact);
+    any_told_ = any_told_ || told;
+    return told;
+}
+
 void IslandSolver::finish_rows(Rows& rows) {
     for (int i = 0; i < 3; ++i)
         for (int j = i; j < 3; ++j) {
@@ -192,6 +205,7 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
     c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
     c.inverse_tangent[2] = c.k[1][1] / det;
+    c.told = note_told(c, true);
     c.impulse[0] = point.normal_impulse;
     c.impulse[1] = point.friction_impulse.dot(c.tangent[0]);
     c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
@@ -206,6 +220,7 @@ void IslandSolver::add_spring(HeldConstraint& constraint) {
     s.side[0] = reserve_rows(local_of(held.body_a));
     s.side[1] = reserve_rows(local_of(held.body_b));
     s.constraint = &constraint;
+    s.told = note_told(s, false);
     for (int i = 0; i < 3; ++i) s.impulse[i] = constraint.impulse[i];
     springs_.push_back(s);
 }

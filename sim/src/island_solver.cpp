@@ -22,7 +22,11 @@ float root(float x) {
 
 void IslandSolver::solve(const Island& island) {
     begin(island);
-    for (int i = 0; i < settings_->substeps; ++i) substep(i == 0, i + 1 == settings_->substeps);
+    for (int i = 0; i < settings_->substeps; ++i) {
+        remaining_ = h_ * (settings_->substeps - 1 - i);
+        substep(i == 0, i + 1 == settings_->substeps);
+    }
+    if (any_told_) settle_given();
     keep_impulses();
     for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
 }
@@ -209,6 +213,8 @@ void IslandSolver::restitute() {
 }
 
 void IslandSolver::move() {
+    if (any_told_)
+        for (ContactRows& c : contacts_) std::copy_n(c.impulse, 3, c.at_move);
     for (const BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
@@ -242,6 +248,9 @@ Eigen::Vector3d IslandSolver::place_now(const ContactRows& c) const {
 // In double precision and at one point of space a pair, so that linear and angular momentum are kept to
 // rounding.
 void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point) {
+    const Side &a = rows.side[0], &b = rows.side[1];
+    if (b.body < 0 && rows_of_[static_cast<std::size_t>(a.body)].body->own) outside_ += impulse;
+    if (a.body < 0 && rows_of_[static_cast<std::size_t>(b.body)].body->own) outside_ -= impulse;
     for (const Side& side : rows.side) {
         if (side.body < 0) continue;
         const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
@@ -252,23 +261,71 @@ void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const
     }
 }
 
+// Adds what a row triple did in this substep to the watched of its two bodies; see settle_given for what the
+// sums stand for.
+void IslandSolver::tell(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
+                        const float (&along)[3], const Eigen::Vector3d& point) {
+    for (const Side& side : rows.side) {
+        if (side.body < 0) continue;
+        const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
+        if (!at.body->watched) continue;
+        const double sign = &side == &rows.side[0] ? 1 : -1;
+        StepImpulse& given = at.body->given;
+        if (!std::exchange(at.body->was_given, true)) {
+            given.linear.setZero(), given.angular.setZero(), given.displacement.setZero();
+            given.turn.setZero(), given.modal.setZero();
+        }
+        const Eigen::Vector3d arm = point - at.place, moved = h_ * at_move + remaining_ * impulse;
+        given.linear += sign * impulse;
+        given.angular += sign * arm.cross(impulse);
+        given.displacement += sign * moved;
+        given.turn += sign * arm.cross(moved);
+        const float* d = jacobians_.data() + side.rows + 8;
+        for (int k = 0; k < at.body->kind->modes; ++k)
+            given.modal[k] += static_cast<double>(along[0] * d[k] + along[1] * d[side.width + k] +
+                                                  along[2] * d[2 * side.width + k]);
+    }
+}
+
+// From sums over the substeps to what is told: displacement and turn beyond those of the impulse acting
+// half-way through the step; rows are scaled by the root of the compliance.
+void IslandSolver::settle_given() {
+    for (const BodyRows& rows : rows_of_) {
+        MovingBody& body = *rows.body;
+        if (!body.was_given) continue;
+        const BodyKind& kind = *body.kind;
+        StepImpulse& given = body.given;
+        given.displacement = (given.displacement - settings_->dt / 2 * given.linear) / kind.mass.mass;
+        given.turn -= settings_->dt / 2 * given.angular;
+        given.turn = rows.frame * (rows.frame.transpose() * given.turn).cwiseQuotient(kind.mass.inertia);
+        given.modal.array() /= kind.substep.root_compliance;
+    }
+}
+
 void IslandSolver::finish() {
     for (const ContactRows& c : contacts_) {
-        if (c.impulse[0] == 0) continue;
-        const Eigen::Vector3f p =
-            c.impulse[0] * c.point->normal + c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1];
-        apply(c, p.cast<double>(), place_now(c));
+        auto world = [&c](const float(&p)[3]) -> Eigen::Vector3d {
+            return (p[0] * c.point->normal + p[1] * c.tangent[0] + p[2] * c.tangent[1]).cast<double>();
+        };
+        if (c.told && (c.impulse[0] != 0 || c.at_move[0] != 0))
+            tell(c, world(c.impulse), world(c.at_move), c.impulse, place_now(c));
+        if (c.impulse[0] != 0) apply(c, world(c.impulse), place_now(c));
     }
-    for (const SpringRows& s : springs_)
-        apply(s, Eigen::Vector3d(s.impulse[0], s.impulse[1], s.impulse[2]), s.place);
+    for (const SpringRows& s : springs_) {
+        const Eigen::Vector3d p(s.impulse[0], s.impulse[1], s.impulse[2]);
+        if (s.told) tell(s, p, p, s.impulse, s.place);
+        apply(s, p, s.place);
+    }
     for (const BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
         const float* y = y_.data() + rows.offset;
         const float* start = start_.data() + rows.offset;
         WorldBodyState& s = body.state;
+        const Eigen::Vector3d entered = s.velocity;
         s.velocity += h_ * body.gravity_scale * settings_->gravity;
         s.velocity *= kind.substep_drag, s.angular_momentum *= kind.substep_drag;
+        if (body.own) outside_ += kind.mass.mass * (s.velocity - entered);
         if (body.pushed) {
             s.velocity += h_ / kind.mass.mass * body.force;
             s.angular_momentum += h_ * body.torque;

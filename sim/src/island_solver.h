@@ -49,6 +49,10 @@ public:
         : settings_(&settings), bodies_(&bodies), manifolds_(&manifolds), constraints_(&constraints) {}
 
     void solve(const Island& island);
+    /// What planes, fixed bodies, places, gravity and drag gave own bodies since the last call [N s].
+    [[nodiscard]] Eigen::Vector3d take_outside_impulse() noexcept {
+        return std::exchange(outside_, Eigen::Vector3d::Zero());
+    }
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
     [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }
 
@@ -72,6 +76,7 @@ private:
     struct Rows {
         Side side[2];
         float k[3][3];
+        bool told = false;  ///< a watched body is among them
     };
     struct ContactRows : Rows {
         ManifoldPoint* point;
@@ -79,7 +84,7 @@ private:
         float separation, now, friction, restitution, approach;
         float taken, slide_mass, inverse_normal,
             inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
-        float impulse[3], kept[3], largest;
+        float impulse[3], kept[3], at_move[3], largest;
         bool emerging;
     };
     struct SpringRows : Rows {
@@ -124,6 +129,7 @@ private:
     [[nodiscard]] Side reserve_rows(int body);
     void write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign, const Side& side);
     void finish_rows(Rows& rows);
+    bool note_told(const Rows& rows, bool contact);  // notes it in any_told_, too
     [[nodiscard]] int local(int body) const noexcept { return local_[static_cast<std::size_t>(body)]; }
 
     void substep(bool first, bool last);
@@ -141,8 +147,11 @@ private:
     void move();
     [[nodiscard]] Eigen::Vector3d place_now(const ContactRows& contact) const;
     void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
+    void tell(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
+              const float (&along)[3], const Eigen::Vector3d& point);
     void finish();
     void keep_impulses();
+    void settle_given();
 
     const WorldSettings* settings_;
     std::vector<MovingBody>* bodies_;
@@ -160,6 +169,9 @@ private:
     double h_ = 0;
     float inverse_h_ = 0, push_rate_ = 0, mass_share_ = 1, impulse_share_ = 0;
     std::uint64_t limited_ = 0, broken_ = 0;
+    Eigen::Vector3d outside_ = Eigen::Vector3d::Zero();
+    bool any_told_ = false;
+    double remaining_ = 0;  // of the step after this substep [s]
 };
 
 }  // namespace sim

@@ -14,14 +14,23 @@ struct MovingBody {
     PosedBody posed;
     FreeRotation substep_rotation{Eigen::Vector3d::Ones(), 0}, step_rotation{Eigen::Vector3d::Ones(), 0};
     bool at_limit = false;  ///< its deformation was held in the last substep: contacts find its modes stiff
-    double still_s = 0;     ///< how long it has been slower than the sleep speed
-    int sleep_group = -1;   ///< bodies that fell asleep together
-    bool pushed = false;    ///< user forces for the next step
+    int still_steps = 0;    ///< since it was faster than the sleep speed, at most kMostStillSteps
+    int sleep_group = -1;   ///< first body of those that fell asleep together
+    bool pushed = false;    ///< forces for the next step: the user's, or what bodies elsewhere do
     Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();  ///< world axes
     Eigen::VectorXd modal_force;                                                        ///< [N kg^-1/2]
 
+    bool own = true;       ///< stepped for good here; else a copy of another world's
+    bool unposed = false;  ///< `posed` is older than `state`
+    bool watched = false;  ///< what other moving bodies do to it in a step is added up in `given`
+    bool was_given = false;
+    StepImpulse given;
+    double work = 0;  ///< see World::work
+
     [[nodiscard]] bool moves() const noexcept { return !fixed && !quarantined; }
 };
+
+constexpr int kMostStillSteps = 65535;
 
 /// A point constraint as it is being held.
 struct HeldConstraint {

@@ -1,5 +1,3 @@
-#include "sim/world.h"
-
 #include <pmmintrin.h>
 
 #include <algorithm>
@@ -9,7 +7,7 @@
 #include <numeric>
 
 #include "world_check.h"
-#include "world_contacts.h"
+#include "world_implementation.h"
 
 namespace sim {
 namespace {
@@ -29,6 +27,8 @@ private:
     unsigned before_;
 };
 
+constexpr double kWorkOfPair = 0.5, kWorkOfPoint = 0.75;  // of a body that touches nothing
+
 void stop_body(MovingBody& body) {
     body.state.velocity.setZero();
     body.state.angular_momentum.setZero();
@@ -36,37 +36,6 @@ void stop_body(MovingBody& body) {
 }
 
 }  // namespace
-
-struct World::Implementation {
-    WorldSettings settings;
-    std::vector<WorldPlane> planes;
-    std::vector<WorldBody> definitions;
-    std::vector<std::unique_ptr<BodyKind>> kinds;
-    std::vector<MovingBody> bodies;
-    std::vector<HeldConstraint> constraints;
-    std::vector<std::pair<int, int>> joined;  // pairs that a constraint joins
-    WorldContacts contacts;
-    std::unique_ptr<IslandSolver> solver;
-    std::vector<Island> islands;
-    std::vector<int> parent, place;  // union-find; a root's island
-    std::size_t islands_used = 0;
-    WorldCounts counts;
-    std::vector<QuarantinedBody> quarantined;
-    int next_sleep_group = 0;
-    std::uint64_t free_limited = 0;
-
-    const BodyKind* kind_of(const WorldBody& body);
-    int add(const WorldBody& body);
-    void set_joined();
-    void pose(MovingBody& body) { body.posed.set(body.state.position, body.state.orientation, body.state.q); }
-    void quarantine_broken();
-    int root(int body);
-    void join(int a, int b);
-    void find_islands();
-    void solve_islands();
-    void put_to_sleep();
-    void step();
-};
 
 const BodyKind* World::Implementation::kind_of(const WorldBody& body) {
     for (const auto& kind : kinds)
@@ -98,6 +67,7 @@ int World::Implementation::add(const WorldBody& definition) {
     body.substep_rotation = FreeRotation(body.kind->mass.inertia, settings.dt / settings.substeps);
     body.step_rotation = FreeRotation(body.kind->mass.inertia, settings.dt);
     body.modal_force = zero;
+    body.given.modal = zero;
     definitions.push_back(definition);
     bodies.push_back(std::move(body));
     pose(bodies.back());
@@ -113,26 +83,59 @@ void World::Implementation::set_joined() {
     std::sort(joined.begin(), joined.end());
 }
 
+void World::Implementation::pose(MovingBody& body) {
+    body.posed.set(body.state.position, body.state.orientation, body.state.q);
+    body.unposed = false;
+}
+
+void World::Implementation::quarantine(int id, const std::string& what) {
+    MovingBody& body = bodies[static_cast<std::size_t>(id)];
+    body.quarantined = true;
+    body.asleep = body.pushed = false;
+    stop_body(body);  // where it was last seen whole
+    body.state.position = body.posed.position;
+    body.state.orientation = Eigen::Quaterniond(body.posed.rotation);
+    body.state.q.setZero();
+    if (body.own) quarantined.push_back({id, counts.steps, what});
+    drop_constraints(id);
+}
+
+void World::Implementation::drop_constraints(int body) {
+    for (HeldConstraint& c : constraints)
+        if (c.definition.body_a == body || c.definition.body_b == body) c.holds = false;
+    set_joined();
+}
+
 // Bodies whose state or forces are not finite, or absurd, take no further part. Before anything else in a
 // step, so that they touch nobody.
 void World::Implementation::quarantine_broken() {
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-        MovingBody& body = bodies[i];
-        if (!body.moves()) continue;
+    for (const int i : here) {
+        const MovingBody& body = bodies[static_cast<std::size_t>(i)];
+        if (!body.moves() || !body.own) continue;
         const std::string what = what_is_broken(body);
-        if (what.empty()) continue;
-        body.quarantined = true;
-        body.asleep = body.pushed = false;
-        stop_body(body);  // where it was last seen whole
-        body.state.position = body.posed.position;
-        body.state.orientation = Eigen::Quaterniond(body.posed.rotation);
-        body.state.q.setZero();
-        quarantined.push_back({static_cast<int>(i), counts.steps, what});
-        for (HeldConstraint& c : constraints)
-            if (c.definition.body_a == static_cast<int>(i) || c.definition.body_b == static_cast<int>(i))
-                c.holds = false;
-        set_joined();
+        if (!what.empty()) quarantine(i, what);
     }
+    std::erase_if(here, [this](int i) { return bodies[static_cast<std::size_t>(i)].quarantined; });
+}
+
+// After a step: what it broke, so that nobody else sees it.
+void World::Implementation::quarantine_results() {
+    for (std::size_t i = 0; i < islands_used; ++i) {
+        if (!is_own(islands[i])) continue;
+        for (const int id : islands[i].bodies) {
+            MovingBody& body = bodies[static_cast<std::size_t>(id)];
+            body.pushed = false;
+            if (sharing == Sharing::pairs && !body.own) continue;  // its owner's affair
+            const std::string what = what_is_broken(body);
+            if (!what.empty()) quarantine(id, what);
+        }
+    }
+}
+
+bool World::Implementation::is_own(const Island& island) const {
+    if (sharing == Sharing::alone) return !island.bodies.empty();
+    return std::any_of(island.bodies.begin(), island.bodies.end(),
+                       [this](int id) { return bodies[static_cast<std::size_t>(id)].own; });
 }
 
 int World::Implementation::root(int body) {
@@ -147,16 +150,37 @@ void World::Implementation::join(int a, int b) {
     parent[static_cast<std::size_t>(std::max(ra, rb))] = std::min(ra, rb);
 }
 
-void World::Implementation::find_islands() {
+void World::Implementation::gather() {
+    if (sharing == Sharing::islands) return gather_islands();
+    if (sharing == Sharing::pairs) return gather_pairs();
+    here.clear();
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+        if (!bodies[i].quarantined) here.push_back(static_cast<int>(i));
+}
+
+void World::Implementation::start_union() {
     parent.resize(bodies.size());
     std::iota(parent.begin(), parent.end(), 0);
+}
+
+void World::Implementation::find_islands() {
+    start_union();
     auto moves = [this](int id) {
         return id >= 0 && id < kFirstPlane && bodies[static_cast<std::size_t>(id)].moves();
+    };
+    auto held_here = [&](const HeldConstraint& c) {
+        const int a = c.definition.body_a, b = c.definition.body_b;
+        const bool away =
+            sharing == Sharing::pairs && !bodies[static_cast<std::size_t>(moves(a) ? a : std::max(b, 0))].own;
+        return c.holds && !away;
+    };
+    auto is_here = [this](int id) {
+        return sharing == Sharing::alone || std::binary_search(here.begin(), here.end(), id);
     };
     for (const Manifold& m : contacts.manifolds())
         if (moves(m.a) && moves(m.b)) join(m.a, m.b);
     for (const HeldConstraint& c : constraints)
-        if (c.holds && moves(c.definition.body_a) && moves(c.definition.body_b))
+        if (held_here(c) && moves(c.definition.body_a) && moves(c.definition.body_b))
             join(c.definition.body_a, c.definition.body_b);
     // An island's place is that of its first body.
     place.assign(bodies.size(), -1);
@@ -171,9 +195,9 @@ void World::Implementation::find_islands() {
         }
         return islands[static_cast<std::size_t>(at)];
     };
-    for (std::size_t i = 0; i < bodies.size(); ++i)
-        if (bodies[i].moves() && !bodies[i].asleep)
-            island_of(static_cast<int>(i)).bodies.push_back(static_cast<int>(i));
+    for (const int i : here)
+        if (const MovingBody& body = bodies[static_cast<std::size_t>(i)]; body.moves() && !body.asleep)
+            island_of(i).bodies.push_back(i);
     auto& manifolds = contacts.manifolds();
     for (std::size_t m = 0; m < manifolds.size(); ++m) {
         const int id = moves(manifolds[m].a) ? manifolds[m].a : manifolds[m].b;
@@ -182,8 +206,9 @@ void World::Implementation::find_islands() {
     for (std::size_t c = 0; c < constraints.size(); ++c) {
         const PointConstraint& held = constraints[c].definition;
         const int id = moves(held.body_a) ? held.body_a : moves(held.body_b) ? held.body_b : -1;
-        if (constraints[c].holds && id >= 0 && !bodies[static_cast<std::size_t>(id)].asleep)
-            island_of(id).constraints.push_back(static_cast<int>(c));
+        if (!held_here(constraints[c]) || id < 0) continue;
+        const MovingBody& first = bodies[static_cast<std::size_t>(id)];
+        if (is_here(id) && !first.asleep) island_of(id).constraints.push_back(static_cast<int>(c));
     }
 }
 
@@ -191,34 +216,49 @@ void World::Implementation::solve_islands() {
     int awake = 0;
     for (std::size_t i = 0; i < islands_used; ++i) {
         const Island& island = islands[i];
-        if (island.bodies.empty()) continue;
+        if (!is_own(island)) continue;
         ++awake;
         if (island.manifolds.empty() && island.constraints.empty()) {
             MovingBody& body = bodies[static_cast<std::size_t>(island.bodies.front())];
+            const Eigen::Vector3d before = body.state.velocity;
             move_freely(body, settings);
             if (limit_deformation(body)) ++free_limited;
+            if (body.own) outside += body.kind->mass.mass * (body.state.velocity - before);
+            if (body.pushed && sharing == Sharing::pairs) outside -= settings.dt * body.force;
         } else {
             solver->solve(island);
+            if (sharing == Sharing::pairs) continue;
+            for (const int id : island.bodies)
+                if (const MovingBody& body = bodies[static_cast<std::size_t>(id)]; body.pushed && body.own)
+                    outside += settings.dt * body.force;
         }
     }
     counts.islands = awake;
+    outside += solver->take_outside_impulse();
     counts.deformations_limited = free_limited + solver->deformations_limited();
     if (counts.constraints_broken != solver->constraints_broken()) set_joined();
     counts.constraints_broken = solver->constraints_broken();
 }
 
+int World::Implementation::still_steps_to_sleep() const {
+    return static_cast<int>(std::ceil(kStillTime / settings.dt - 1e-9));
+}
+
 void World::Implementation::put_to_sleep() {
-    for (MovingBody& body : bodies) {
-        if (!body.moves() || body.asleep) continue;
-        body.still_s = point_speed(body) < settings.sleep_speed ? body.still_s + settings.dt : 0;
-    }
-    if (!settings.sleeping) return;
+    const int wanted = std::min(still_steps_to_sleep(), kMostStillSteps);
     for (std::size_t i = 0; i < islands_used; ++i) {
         const Island& island = islands[i];
-        const bool still = std::all_of(island.bodies.begin(), island.bodies.end(), [this](int id) {
-            return bodies[static_cast<std::size_t>(id)].still_s >= kStillTime;
-        });
-        if (!still || island.bodies.empty()) continue;
+        if (!is_own(island)) continue;
+        bool still = settings.sleeping;
+        for (const int id : island.bodies) {
+            MovingBody& body = bodies[static_cast<std::size_t>(id)];
+            const bool slow = point_speed(body) < settings.sleep_speed;
+            body.still_steps = slow ? std::min(body.still_steps + 1, kMostStillSteps) : 0;
+            still = still && body.still_steps >= wanted;
+            // What bodies of another world touch can rest only with them.
+            if (sharing == Sharing::pairs) still = still && body.own && !body.pushed;
+        }
+        if (!still) continue;
         // What nothing holds is at rest only if nothing pulls.
         const MovingBody& first = bodies[static_cast<std::size_t>(island.bodies.front())];
         if (island.manifolds.empty() && island.constraints.empty() &&
@@ -227,34 +267,66 @@ void World::Implementation::put_to_sleep() {
         for (const int id : island.bodies) {
             MovingBody& body = bodies[static_cast<std::size_t>(id)];
             body.asleep = true;
-            body.sleep_group = next_sleep_group;
+            body.sleep_group = island.bodies.front();
             stop_body(body);
+            pose(body);
         }
-        ++next_sleep_group;
     }
+}
+
+void World::Implementation::count_work() {
+    for (const int i : here) {
+        MovingBody& body = bodies[static_cast<std::size_t>(i)];
+        body.work = body.moves() && !body.asleep ? 1 : 0;
+    }
+    cross_contacts = counts.contacts = 0;
+    auto own = [this](int id) { return id < kFirstPlane && bodies[static_cast<std::size_t>(id)].own; };
+    for (const Manifold& m : contacts.manifolds()) {
+        if (!own(m.a) && !own(m.b)) continue;
+        counts.contacts += m.count;
+        const bool both = m.b < kFirstPlane && bodies[static_cast<std::size_t>(m.b)].moves() &&
+                          bodies[static_cast<std::size_t>(m.a)].moves();
+        if (both && own(m.a) != own(m.b)) cross_contacts += m.count;
+        const double work = kWorkOfPair + kWorkOfPoint * m.count;
+        const bool shared = own(m.a) && own(m.b) && both;
+        if (own(m.a)) bodies[static_cast<std::size_t>(m.a)].work += shared ? work / 2 : work;
+        if (own(m.b)) bodies[static_cast<std::size_t>(m.b)].work += shared ? work / 2 : work;
+    }
+}
+
+// Whether anything happens in this step; in islands that others solve, too, so that contacts are forgotten
+// everywhere at once.
+bool World::Implementation::any_awake() const {
+    auto awake = [](const MovingBody& body) { return body.moves() && !body.asleep; };
+    if (sharing == Sharing::islands) return std::any_of(bodies.begin(), bodies.end(), awake);
+    return std::any_of(here.begin(), here.end(),
+                       [&](int i) { return awake(bodies[static_cast<std::size_t>(i)]); });
 }
 
 void World::Implementation::step() {
     const FlushDenormals flush;
+    outside_before = outside;
     ++counts.steps;
+    gather();
     quarantine_broken();
-    for (std::size_t i = 0; i < bodies.size(); ++i)
-        if (bodies[i].pushed && bodies[i].asleep) wake_group(bodies, static_cast<int>(i));
-    const bool any_awake =
-        std::any_of(bodies.begin(), bodies.end(), [](const MovingBody& b) { return b.moves() && !b.asleep; });
+    for (const int i : here)
+        if (bodies[static_cast<std::size_t>(i)].pushed && bodies[static_cast<std::size_t>(i)].asleep)
+            wake_group(bodies, i);
     counts.contacts = counts.pairs = counts.islands = 0;
-    if (!any_awake) return;
-    for (MovingBody& body : bodies)
-        if (body.moves() && !body.asleep) pose(body);
-    contacts.find(settings, planes, joined, bodies);
+    if (!any_awake()) return dismiss_ghosts();
+    for (const int i : here) {
+        MovingBody& body = bodies[static_cast<std::size_t>(i)];
+        if (body.moves() && (!body.asleep || body.unposed)) pose(body);
+        body.was_given = false;
+    }
+    contacts.find(settings, planes, joined, bodies, here, sharing == Sharing::pairs);
     find_islands();
     solve_islands();
     put_to_sleep();
-    for (MovingBody& body : bodies) {
-        if (body.asleep || !body.moves()) continue;
-        body.pushed = false;
-    }
-    for (const Manifold& m : contacts.manifolds()) counts.contacts += m.count;
+    count_work();
+    quarantine_results();
+    if (sharing == Sharing::islands) forget_foreign_contacts();
+    dismiss_ghosts();
     counts.pairs = contacts.pairs();
     counts.inverse_fallbacks = contacts.fallbacks();
     counts.asleep = static_cast<int>(
@@ -357,7 +429,7 @@ void World::apply_force(int body, const Eigen::Vector3d& force, const Eigen::Vec
 void World::wake(int body) {
     Implementation& w = *implementation_;
     if (w.bodies.at(static_cast<std::size_t>(body)).asleep) wake_group(w.bodies, body);
-    w.bodies[static_cast<std::size_t>(body)].still_s = 0;
+    w.bodies[static_cast<std::size_t>(body)].still_steps = 0;
 }
 
 bool World::asleep(int body) const {

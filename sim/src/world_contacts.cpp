@@ -46,6 +46,10 @@ void finish(const Manifold* before, float size, Manifold& manifold) {
 
 }  // namespace
 
+double contact_reach(const MovingBody& body, const WorldSettings& settings) {
+    return kSlop * smallest_half(body) + reach_of(body, point_speed(body), settings);
+}
+
 void wake_group(std::vector<MovingBody>& bodies, int body) {
     const int group = bodies[static_cast<std::size_t>(body)].sleep_group;
     for (MovingBody& other : bodies) {
@@ -53,47 +57,57 @@ void wake_group(std::vector<MovingBody>& bodies, int body) {
             (other.sleep_group != group && &other != &bodies[static_cast<std::size_t>(body)]))
             continue;
         other.asleep = false;
-        other.still_s = 0;
+        other.still_steps = 0;
     }
 }
 
 void WorldContacts::find(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
-                         const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies) {
+                         const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies,
+                         const std::vector<int>& here, bool among_ghosts) {
+    among_ghosts_ = among_ghosts;
     std::swap(before_, manifolds_);
-    while (find_once(settings, planes, joined, bodies)) {
+    speeds_.resize(bodies.size());
+    while (find_once(settings, planes, joined, bodies, here)) {
     }
 }
 
 bool WorldContacts::find_once(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
-                              const std::vector<std::pair<int, int>>& joined,
-                              std::vector<MovingBody>& bodies) {
+                              const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies,
+                              const std::vector<int>& here) {
     manifolds_.clear();
-    speeds_.clear();
     pairs_ = 0;
     next_before_ = 0;
     woke_ = false;
     auto& boxes = broad_.boxes();
     boxes.clear();
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
+    for (const int id : here) {
+        const auto i = static_cast<std::size_t>(id);
         const MovingBody& body = bodies[i];
         const double speed = point_speed(body);
-        speeds_.push_back({speed - body.state.velocity.norm(),
-                           kSlop * smallest_half(body) + reach_of(body, speed, settings)});
-        if (body.quarantined) continue;
-        const Eigen::Vector3d half = body.posed.half_aabb.array() + speeds_.back().grown;
-        boxes.push_back({body.posed.position - half, body.posed.position + half, static_cast<int>(i),
-                         body.moves() && !body.asleep});
+        speeds_[i] = {speed - body.state.velocity.norm(),
+                      kSlop * smallest_half(body) + reach_of(body, speed, settings)};
+        const Eigen::Vector3d half = body.posed.half_aabb.array() + speeds_[i].grown;
+        boxes.push_back(
+            {body.posed.position - half, body.posed.position + half, id, body.moves() && !body.asleep});
     }
     // By bodies, each with later bodies and then with planes: in the order of the manifolds' keys.
     const auto& pairs = broad_.find();
     auto pair = pairs.begin();
-    for (int i = 0; i < static_cast<int>(bodies.size()); ++i) {
+    for (const int i : here) {
         for (; pair != pairs.end() && pair->first == i; ++pair)
-            if (joined.empty() || !std::binary_search(joined.begin(), joined.end(), *pair))
+            if ((joined.empty() || !std::binary_search(joined.begin(), joined.end(), *pair)) &&
+                resolved_here(bodies, i, pair->second))
                 meet_pair(settings, bodies, i, pair->second);
         if (!woke_) meet_planes(settings, planes, bodies[static_cast<std::size_t>(i)], i);
     }
     return woke_;
+}
+
+// Among ghosts: of an own and a ghost body, those whose lower number is own; a ghost's with what is fixed.
+bool WorldContacts::resolved_here(const std::vector<MovingBody>& bodies, int i, int j) const {
+    if (!among_ghosts_) return true;
+    const MovingBody &a = bodies[static_cast<std::size_t>(i)], &b = bodies[static_cast<std::size_t>(j)];
+    return a.own || !a.moves() || !b.moves();
 }
 
 // Keys must ascend from call to call.

@@ -9,10 +9,14 @@ namespace sim {
 class WorldContacts {
 public:
     /// `joined`: pairs (a < b, ascending) that a constraint joins; they do not collide.
+    /// here: ids of those that take part, ascending. among_ghosts: of an own and a foreign body only the
+    /// pairs of which the lower number is own, and no two foreign ones.
     void find(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
-              const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies);
+              const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies,
+              const std::vector<int>& here, bool among_ghosts);
 
     std::vector<Manifold>& manifolds() noexcept { return manifolds_; }
+    [[nodiscard]] const std::vector<Manifold>& manifolds() const noexcept { return manifolds_; }
     [[nodiscard]] int pairs() const noexcept { return pairs_; }
     [[nodiscard]] std::uint64_t fallbacks() const noexcept { return finder_.fallbacks(); }
 
@@ -22,7 +26,9 @@ private:
         double grown;    // how far any point may come in the step, and the slop [m]
     };
     bool find_once(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
-                   const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies);
+                   const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies,
+                   const std::vector<int>& here);
+    [[nodiscard]] bool resolved_here(const std::vector<MovingBody>& bodies, int i, int j) const;
     void meet_pair(const WorldSettings& settings, std::vector<MovingBody>& bodies, int i, int j);
     void meet_planes(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
                      const MovingBody& body, int i);
@@ -43,8 +49,11 @@ private:
     std::vector<Manifold> manifolds_, before_;  // by ascending keys
     std::size_t next_before_ = 0;               // first of before_ whose key has not been passed
     int pairs_ = 0;
-    bool woke_ = false;
+    bool woke_ = false, among_ghosts_ = false;
 };
+
+/// How far a body's contacts may begin beyond its surface in the next step [m].
+[[nodiscard]] double contact_reach(const MovingBody& body, const WorldSettings& settings);
 
 /// Wakes every body of the group that fell asleep with this one.
 void wake_group(std::vector<MovingBody>& bodies, int body);

@@ -144,6 +144,16 @@ TEST(Scene, ConstraintsGivenByAPlaceMeetThereAtTheStart) {
               1e-12);
 }
 
+TEST(Scene, MigrationStartsOnOneWorkerTradesFromStep50AndLoadsAWorkerFromStep150) {
+    const Scene scene = read_scene(find_scene("migration30"));
+    EXPECT_TRUE(scene.workers.all_to_first);
+    EXPECT_EQ(scene.workers.balance_from, 50u);
+    ASSERT_EQ(scene.events.size(), 1u);
+    EXPECT_EQ(scene.events[0].step, 150u);
+    EXPECT_GT(scene.events[0].slowing.at(0).factor, 1);
+    EXPECT_FALSE(WrittenScene(kBall).read().workers.all_to_first);
+}
+
 TEST(Scene, EventsComeInOrderOfStepsAndLaterBodiesAreNumberedSo) {
     const std::string text =
         kTwo +
@@ -159,7 +169,7 @@ TEST(Scene, EventsComeInOrderOfStepsAndLaterBodiesAreNumberedSo) {
     EXPECT_EQ(scene.events[0].removed, std::vector<int>{1});
     EXPECT_EQ(scene.events[1].step, 30u);
     EXPECT_EQ(scene.events[1].removed, (std::vector<int>{0, 1}));
-    EXPECT_EQ(scene.events[1].slowing->factor, 3);
+    EXPECT_EQ(scene.events[1].slowing.at(0).factor, 3);
     EXPECT_EQ(scene.events[2].step, 120u);
     ASSERT_EQ(scene.later.size(), 3u);
     EXPECT_EQ(scene.later[0].name, "first/0");

@@ -20,10 +20,14 @@ namespace end_to_end {
 namespace fs = std::filesystem;
 namespace {
 
-int spawn(const std::vector<std::string>& arguments, const std::vector<std::string>& environment,
-          const fs::path& out, const fs::path& err) {
+std::vector<std::string> program_with(const std::vector<std::string>& arguments) {
     std::vector<std::string> words = {MUSICWORLD_PROGRAM};
     words.insert(words.end(), arguments.begin(), arguments.end());
+    return words;
+}
+
+int spawn(std::vector<std::string> words, const std::vector<std::string>& environment, const fs::path& out,
+          const fs::path& err) {
     std::vector<char*> argv, envp;
     for (std::string& word : words) argv.push_back(word.data());
     argv.push_back(nullptr);
@@ -37,9 +41,9 @@ int spawn(const std::vector<std::string>& arguments, const std::vector<std::stri
     posix_spawn_file_actions_addopen(&actions, 1, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
     posix_spawn_file_actions_addopen(&actions, 2, err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
     pid_t pid = -1;
-    const int error = posix_spawn(&pid, MUSICWORLD_PROGRAM, &actions, nullptr, argv.data(), envp.data());
+    const int error = posix_spawnp(&pid, argv[0], &actions, nullptr, argv.data(), envp.data());
     posix_spawn_file_actions_destroy(&actions);
-    if (error != 0) throw std::runtime_error("cannot start " MUSICWORLD_PROGRAM);
+    if (error != 0) throw std::runtime_error("cannot start " + words[0]);
     return pid;
 }
 
@@ -52,9 +56,12 @@ Ended collect(int pid, const fs::path& out, const fs::path& err) {
 }  // namespace
 
 Ended run(const std::vector<std::string>& arguments, const std::vector<std::string>& environment) {
+    return run_command(program_with(arguments), environment);
+}
+
+Ended run_command(const std::vector<std::string>& words, const std::vector<std::string>& environment) {
     const Folder folder;
-    return collect(spawn(arguments, environment, folder / "out", folder / "err"), folder / "out",
-                   folder / "err");
+    return collect(spawn(words, environment, folder / "out", folder / "err"), folder / "out", folder / "err");
 }
 
 void expect_refused(const Ended& ended, const std::string& mentions, int status) {
@@ -62,12 +69,13 @@ void expect_refused(const Ended& ended, const std::string& mentions, int status)
     EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 1) << ended.err;
     for (const std::string& part : {std::string("found"), std::string("expected"), mentions})
         EXPECT_NE(ended.err.find(part), std::string::npos) << part << " in: " << ended.err;
-    EXPECT_EQ(ended.out, "");
+    // Csound writes a row of dashes to standard output when it runs under the sanitizer.
+    EXPECT_EQ(ended.out.find_first_not_of('-'), std::string::npos) << ended.out;
 }
 
 Started::Started(const std::vector<std::string>& arguments, const fs::path& folder)
     : out_(folder / "out"), err_(folder / "err") {
-    pid_ = spawn(arguments, {}, out_, err_);
+    pid_ = spawn(program_with(arguments), {}, out_, err_);
 }
 
 Ended Started::wait() {

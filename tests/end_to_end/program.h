@@ -15,6 +15,8 @@ struct Ended {
 
 /// Runs `musicworld ARGS...` and waits. `environment`: NAME=VALUE added to this process's own.
 Ended run(const std::vector<std::string>& arguments, const std::vector<std::string>& environment = {});
+/// The same of any program.
+Ended run_command(const std::vector<std::string>& words, const std::vector<std::string>& environment = {});
 
 /// Expects the one line on standard error that a refusal is: what was found (with `mentions` in it), what was
 /// expected; nothing on standard output.

@@ -235,10 +235,10 @@ public:
     [[nodiscard]] bool own(int body) const;
     [[nodiscard]] WorldRecord record(int body) const;
     void restore(const WorldRecord& record);  ///< wakes nobody
-    /// Of the last step: contacts whose first body that moves is own (all: of every contact solved here),
-    /// constraints whose body_a is own.
-    void contact_records(bool all, std::vector<ContactRecord>& out) const;
-    void spring_records(bool all, std::vector<SpringRecord>& out) const;
+    /// Of the last step: contacts whose first body that moves is own,
+    /// constraints likewise.
+    void contact_records(std::vector<ContactRecord>& out) const;
+    void spring_records(std::vector<SpringRecord>& out) const;
     /// islands: contacts solved elsewhere, ascending by (a, b), stand beside the own ones in the next step.
     void restore_contacts(const std::vector<ContactRecord>& contacts,
                           const std::vector<SpringRecord>& springs);
@@ -251,7 +251,7 @@ public:
     /// number.
     void near_own(const std::vector<ForeignBall>& foreign, std::vector<int>& near) const;
     /// A ghost is there for the next step only, under gravity and `held`.
-    void place_ghost(int body, const WorldBodyState& state, const StepImpulse* held);
+    void place_ghost(int body, const WorldBodyState& state, const StepImpulse* held, bool asleep = false);
     /// Impulse that an own body gets in the course of the next step (its displacement and turn at once).
     void hold(int body, const StepImpulse& impulse);
     /// Impulse that an own body should have got in the step that ended `steps_ago` steps ago: the change it
@@ -260,7 +260,7 @@ public:
     /// The same for any state of the body.
     void correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago) const;
     /// One step of a body that touches nothing, under gravity and `held`.
-    void extrapolate(int body, WorldBodyState& state, const StepImpulse* held) const;
+    void extrapolate(int body, WorldBodyState& state, const StepImpulse* held);
     /// Keep own body's impulses from other moving bodies and constraints (not what hold and correct gave).
     void watch(int body, bool watched);
     /// Of the last step: ghosts (from own bodies) and watched bodies; nullptr where there was none.
