@@ -89,13 +89,15 @@ public:
               DistributedObserver& observer)
         : settings_(settings),
           launch_(launch),
+          processes_(launch.processes.program.empty() ? 0 : launch.processes.count),
           observer_(observer),
           ctrl_c_(launch.stop_with_ctrl_c),
           meeting_(scene, settings, observer),
           gate_(gate_settings(launch)) {
         if (launch.listening)
             launch.listening(launch.listen.empty() ? gate_.private_endpoint() : gate_.endpoint());
-        for (int i = 0; i < launch.processes.count; ++i)
+        children_.reserve(static_cast<std::size_t>(processes_));
+        for (int i = 0; i < processes_; ++i)
             children_.push_back({WorkerProcess(launch.processes, gate_.private_endpoint()), {}, false});
     }
 
@@ -134,7 +136,7 @@ private:
     }
 
     void wait_for_workers() {
-        const auto wanted = static_cast<std::size_t>(std::max({launch_.expect, launch_.processes.count, 1}));
+        const auto wanted = static_cast<std::size_t>(std::max({launch_.expect, processes_, 1}));
         const Clock::time_point start = Clock::now();
         while (meeting_.members().size() + killed_early_ < wanted && !ctrl_c_.pressed()) {
             for (WorldGate::Event& event : gate_.wait(kWait)) take(event);
@@ -240,6 +242,7 @@ private:
 
     const DistributedSettings settings_;
     const DistributedLaunch launch_;
+    const int processes_;  ///< started here
     DistributedObserver& observer_;
     CtrlC ctrl_c_;
     MeetingPoint meeting_;

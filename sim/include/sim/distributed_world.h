@@ -107,7 +107,8 @@ struct DistributedResult {
 
 /// Where workers come from.
 struct DistributedLaunch {
-    WorkerLaunch processes;  ///< started here, joined through a private folder's ipc socket or `listen`
+    WorkerLaunch processes;  ///< started here (none without a program), joined through a private folder's ipc
+                             ///< socket or `listen`
     std::string listen;  ///< empty: ipc in a private folder; else tcp://ADDRESS:PORT (PORT * or 0: any), also
                          ///< for workers started elsewhere
     int expect = 0;      ///< wait for so many workers before the first step (at least processes.count)
