@@ -43,3 +43,27 @@ TEST(Lockstep, EveryStepHasTheHashOfOneProcessWith1To7Workers) {
         for (int i = 0; i < workers; ++i) EXPECT_GT(record.own[i], 0) << i << " of " << workers;
     }
 }
+
+TEST(Lockstep, KeepsItsHashWhenWorkersAreKilledStoppedCutOffOrLeaveAndOthersJoin) {
+    const sim::WorldScene scene = busy_scene();
+    const std::uint64_t steps = 90;
+    const std::vector<std::uint64_t> expected = hashes_alone(scene, steps);
+    Record whole;
+    const double span =
+        sim::simulate_processors(scene, lockstep(steps), processors(3), whole).elapsed_s;
+    for (const Failure::Kind kind : {Failure::Kind::kill, Failure::Kind::stop, Failure::Kind::cut,
+                                     Failure::Kind::drain, Failure::Kind::join})
+        for (int i = 0; i < 12; ++i) {
+            sim::SimulatedProcessors how = processors(3);
+            how.silence_s = span / 10;
+            how.failures = {{span * (i + 0.37) / 12, i % 3, kind}};
+            Record record;
+            const sim::DistributedResult result =
+                sim::simulate_processors(scene, lockstep(steps), how, record);
+            EXPECT_EQ(record.hashes, expected) << static_cast<int>(kind) << " " << i;
+            const bool lost = kind < Failure::Kind::drain && kind != Failure::Kind::resume;
+            EXPECT_EQ(result.lost, lost ? 1 : 0);
+            EXPECT_EQ(result.left, kind == Failure::Kind::drain ? 1 : 0);
+            EXPECT_EQ(result.refused_messages > 0, false) << record.notes;
+        }
+}
