@@ -21,6 +21,7 @@ class LockstepExchange final : public Exchange {
 public:
     explicit LockstepExchange(const SceneMessage& scene);
 
+    using Exchange::take;
     void take(const WorldHeader& header, StateMessage&& message) override;
     void take(SnapshotMessage&& message) override;
     void members(const std::vector<std::uint32_t>& workers) override { (void)workers; }

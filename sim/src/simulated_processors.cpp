@@ -5,6 +5,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "meeting_point.h"
 #include "sim/distributed_world.h"
