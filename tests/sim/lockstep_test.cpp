@@ -49,8 +49,7 @@ TEST(Lockstep, KeepsItsHashWhenWorkersAreKilledStoppedCutOffOrLeaveAndOthersJoin
     const std::uint64_t steps = 90;
     const std::vector<std::uint64_t> expected = hashes_alone(scene, steps);
     Record whole;
-    const double span =
-        sim::simulate_processors(scene, lockstep(steps), processors(3), whole).elapsed_s;
+    const double span = sim::simulate_processors(scene, lockstep(steps), processors(3), whole).elapsed_s;
     for (const Failure::Kind kind : {Failure::Kind::kill, Failure::Kind::stop, Failure::Kind::cut,
                                      Failure::Kind::drain, Failure::Kind::join})
         for (int i = 0; i < 12; ++i) {
