@@ -81,7 +81,11 @@ std::uint32_t MeetingPoint::join(const JoinRequest& request) {
     } else if (started_) {
         catch_up(worker);
         send(members_, Members{members_});
-        share_out(owned_by(kApplication), kApplication);
+        while (!orphans_.empty()) {
+            const auto orphans = std::move(orphans_.back());
+            orphans_.pop_back();
+            share_out(orphans.second, orphans.first);
+        }
     }
     return worker;
 }
@@ -171,7 +175,10 @@ void MeetingPoint::register_owner(const std::vector<int>& bodies, std::uint32_t 
 // To whoever has least, what is joined together.
 void MeetingPoint::share_out(const std::vector<int>& bodies, std::uint32_t from) {
     for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = kApplication;
-    if (members_.empty()) return;
+    if (members_.empty()) {
+        if (!bodies.empty()) orphans_.emplace_back(from, bodies);
+        return;
+    }
     std::map<std::uint32_t, std::size_t> count;
     for (const std::uint32_t worker : members_) count[worker] = owned_by(worker).size();
     std::map<std::uint32_t, std::vector<int>> shares;

@@ -107,6 +107,8 @@ private:
     /// State and update messages of steps that the view has not reached, for who joins.
     std::deque<std::pair<std::uint64_t, std::shared_ptr<const std::vector<std::uint8_t>>>> kept_;
     std::vector<std::uint8_t> quarantined_;
+    std::vector<std::pair<std::uint32_t, std::vector<int>>>
+        orphans_;                                       // by whom they were lost; nobody was left
     std::map<std::uint32_t, Eigen::Vector3d> outside_;  // of each worker since its start
     DistributedResult result_;
 };

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
+#include <random>
 
 #include "shared_scenes.h"
 
@@ -93,6 +95,52 @@ TEST_P(TradeFailures, AtEveryStageOfATradeLeaveEveryBodyWithOneOwnerAndTheRunFin
         reowned += static_cast<std::uint64_t>(result.bodies_reowned);
     }
     EXPECT_GT(reowned, 100u) << "failures met workers that owned bodies";
+}
+
+TEST_P(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerAndTheRunFinished) {
+    const sim::WorldScene scene = busy_scene();
+    sim::DistributedSettings settings = trading(GetParam());
+    settings.steps = 60;
+    const std::vector<std::uint64_t> alone = hashes_alone(scene, settings.steps);
+    const unsigned runs = std::getenv("MUSICWORLD_LONG") ? 400 : 20;
+    std::uint64_t trades = 0, reowned = 0;
+    for (unsigned seed = 0; seed < runs; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        std::mt19937 random(seed);
+        auto uniform = [&random] { return static_cast<double>(random()) / 4294967296.0; };
+        sim::SimulatedProcessors how = processors();
+        how.count = 1 + static_cast<int>(random() % 5);
+        how.latency_s = 1e-5 * std::pow(30, uniform());
+        settings.all_to_first = seed % 2 == 0;
+        settings.bound = GetParam() == sim::Pace::bounded ? static_cast<int>(random() % 6) : 0;
+        // Slow for ten steps at a time, in an order that the seed decides.
+        how.factor = [seed](int worker, std::uint64_t step) {
+            const std::uint64_t mixed =
+                (step / 10 * 31 + static_cast<unsigned>(worker) * 7 + seed) * 2654435761u;
+            return (mixed >> 16) % 3 == 0 ? 3.0 : 1.0;
+        };
+        const double span = 0.015;
+        how.silence_s = span / 12;
+        for (int i = static_cast<int>(random() % 7); i > 0; --i) {
+            const int worker = static_cast<int>(random() % 6);
+            const auto kind = static_cast<Kind>(random() % 6);
+            how.failures.push_back({span * uniform(), worker, kind});
+        }
+        // A stopped processor is either lost or goes on.
+        Record record;
+        const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
+        EXPECT_EQ(result.steps, settings.steps);
+        EXPECT_TRUE(record.in_order);
+        if (GetParam() == sim::Pace::lockstep) {
+            EXPECT_EQ(record.hashes, alone);
+        }
+        const int own = std::accumulate(record.own.begin(), record.own.end(), 0,
+                                        [](int sum, const auto& worker) { return sum + worker.second; });
+        EXPECT_EQ(own, moving_bodies(scene));
+        trades += result.trades, reowned += static_cast<std::uint64_t>(result.bodies_reowned);
+    }
+    EXPECT_GT(trades, runs) << "bodies changed hands all the time";
+    EXPECT_GT(reowned, runs);
 }
 
 INSTANTIATE_TEST_SUITE_P(Paces, TradeFailures, testing::Values(sim::Pace::lockstep, sim::Pace::bounded),
