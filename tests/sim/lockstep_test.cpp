@@ -20,12 +20,6 @@ sim::SimulatedProcessors processors(int count) {
     return how;
 }
 
-std::vector<std::uint64_t> hashes_alone(const sim::WorldScene& scene, std::uint64_t steps) {
-    std::vector<std::uint64_t> hashes;
-    for (std::uint64_t step = 0; step <= steps; ++step) hashes.push_back(alone(scene, step).state_hash());
-    return hashes;
-}
-
 }  // namespace
 
 TEST(Lockstep, EveryStepHasTheHashOfOneProcessWith1To7Workers) {
