@@ -239,7 +239,7 @@ TEST(WorldHost, ThreeHostsWithKeysComeToTheSameBitsAlsoWhenOnesCableIsCut) {
         EXPECT_EQ(watcher.hash, hash_alone(scene, 100));
         EXPECT_EQ(result.workers, 3);
         EXPECT_EQ(result.lost, cut ? 1 : 0);
-        EXPECT_EQ(result.bodies_reowned, cut ? 4 : 0);
+        EXPECT_EQ(result.bodies_reowned > 0, cut);
         for (sim::WorkerProcess& worker : workers)
             EXPECT_TRUE(comes_true([&] { return worker.has_ended(); }));  // the one cut off, too
     }

@@ -41,7 +41,11 @@ sim::WorldBodyState state(Rng& rng, int modes) {
 }
 
 sim::StepImpulse impulse(Rng& rng, int modes) {
-    return {vector(rng, 3), vector(rng, 1), vector(rng, 0.01), vector(rng, 0.01), coordinates(rng, modes, 2), {}, {}};
+    sim::StepImpulse i;
+    i.linear = vector(rng, 3), i.angular = vector(rng, 1);
+    i.displacement = vector(rng, 0.01), i.turn = vector(rng, 0.01);
+    i.modal = i.modal_q = i.modal_rate = coordinates(rng, modes, 2);
+    return i;
 }
 
 sim::WorldRecord record(Rng& rng, int body, int modes) {
