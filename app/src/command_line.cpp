@@ -1,18 +1,17 @@
 #include "command_line.h"
 
 #include <fmt/format.h>
-#include <sim/simulation.h>
 #include <tracking/trace.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
-#include <memory>
 #include <new>
 
 #include "bad_input.h"
 #include "bench_command.h"
 #include "compare_command.h"
+#include "keys_command.h"
 #include "kit_commands.h"
 #include "latency_command.h"
 #include "modes_command.h"
@@ -32,13 +31,6 @@ int complain(std::string message, int status) {
     std::replace(message.begin(), message.end(), '\n', ' ');
     fmt::print(stderr, "{}\n", message);
     return status;
-}
-
-void add_worker_command(CLI::App& program, int& status) {
-    CLI::App* worker = program.add_subcommand("worker", "Join a simulation (started by the program itself)");
-    auto endpoint = std::make_shared<std::string>();
-    worker->add_option("--connect", *endpoint, "ZeroMQ endpoint of the application")->required();
-    worker->callback([endpoint, &status] { status = sim::run_worker(*endpoint); });
 }
 
 std::string full_name(const CLI::App& command) {
@@ -74,6 +66,7 @@ int run(int argc, char** argv) {
     add_modes_command(program);
     add_bench_command(program);
     add_simulate_command(program, status);
+    add_keys_command(program);
     add_worker_command(program, status);
     add_sensor_command(program, status);
     try {

@@ -2,57 +2,96 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "body_kind.h"
 #include "world_record_codec.h"
 
 namespace sim {
 namespace {
 
 constexpr std::uint8_t kAsleep = 1, kStill = 2, kQuarantined = 4, kHeld = 8;
-constexpr std::size_t kSmallestUpdate = 36, kSmallestPush = 76;
+constexpr std::size_t kSmallestUpdate = 36, kSmallestPush = 76, kUsualUpdate = 120;
 constexpr std::int16_t kBroken = std::numeric_limits<std::int16_t>::min();
+
+/// Room for one update: what ByteWriter does, without growing by each number.
+class SmallWriter {
+public:
+    template <typename Number>
+    void number(Number value) {
+        std::memcpy(bytes_.data() + size_, &value, sizeof value);
+        size_ += sizeof value;
+    }
+    void append(std::span<const std::uint8_t> more) {
+        std::copy(more.begin(), more.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(size_));
+        size_ += more.size();
+    }
+    [[nodiscard]] std::span<const std::uint8_t> bytes() const { return {bytes_.data(), size_}; }
+
+private:
+    std::array<std::uint8_t, kSmallestUpdate + 12 + 6 * kMostModes> bytes_;
+    std::size_t size_ = 0;
+};
+
+/// One update's bytes, whose length was checked.
+class SmallReader {
+public:
+    explicit SmallReader(std::span<const std::uint8_t> bytes) : at_(bytes.data()) {}
+    template <typename Number>
+    [[nodiscard]] Number number() {
+        Number value;
+        std::memcpy(&value, at_, sizeof value);
+        at_ += sizeof value;
+        return value;
+    }
+    [[nodiscard]] const std::uint8_t* take(std::size_t n) { return std::exchange(at_, at_ + n); }
+
+private:
+    const std::uint8_t* at_;
+};
 
 // f16: Eigen::half, by the processor where it can.
 
 constexpr float kLargestHalf = 65504;
 
-void write_half(ByteWriter& out, double value) {
+void write_half(SmallWriter& out, double value) {
     const float bounded =
         std::isnan(value) ? 0 : std::clamp(static_cast<float>(value), -kLargestHalf, kLargestHalf);
     out.number(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(bounded)));
 }
 
-double read_half(ByteReader& in) {
+double read_half(SmallReader& in) {
     const auto bits = in.number<std::uint16_t>();
     if ((bits & 0x7C00) == 0x7C00) throw DecodeError("a number that is not finite");
     return static_cast<float>(Eigen::numext::bit_cast<Eigen::half>(bits));
 }
 
 template <typename Vector>
-void write_halves(ByteWriter& out, const Vector& v, bool zeros = false) {
+void write_halves(SmallWriter& out, const Vector& v, bool zeros = false) {
     for (Eigen::Index i = 0; i < v.size(); ++i) write_half(out, zeros ? 0.0 : v[i]);
 }
 
 template <typename Vector>
-void read_halves(ByteReader& in, Vector& v) {
+void read_halves(SmallReader& in, Vector& v) {
     for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = read_half(in);
 }
 
 // Floats of a place or an impulse.
 
-template <typename Vector>
-void write_floats(ByteWriter& out, const Vector& v) {
+template <typename Writer, typename Vector>
+void write_floats(Writer& out, const Vector& v) {
     constexpr double most = std::numeric_limits<float>::max();
     for (Eigen::Index i = 0; i < v.size(); ++i)
         out.number(std::isnan(v[i]) ? 0 : static_cast<float>(std::clamp<double>(v[i], -most, most)));
 }
 
-template <typename Vector>
-void read_floats(ByteReader& in, Vector& v) {
+template <typename Reader, typename Vector>
+void read_floats(Reader& in, Vector& v) {
     for (Eigen::Index i = 0; i < v.size(); ++i) {
-        v[i] = in.number<float>();
+        v[i] = in.template number<float>();
         if (!std::isfinite(v[i])) throw DecodeError("a number that is not finite");
     }
 }
@@ -62,7 +101,7 @@ void read_floats(ByteReader& in, Vector& v) {
 constexpr double kMostOfSmaller = 0.70710678118654752440;
 constexpr std::uint64_t kLevels = (1u << 18) - 1;
 
-void write_orientation(ByteWriter& out, const Eigen::Quaterniond& orientation) {
+void write_orientation(SmallWriter& out, const Eigen::Quaterniond& orientation) {
     Eigen::Vector4d c = orientation.coeffs().normalized();  // x, y, z, w
     Eigen::Index largest = 0;
     c.cwiseAbs().maxCoeff(&largest);
@@ -80,9 +119,9 @@ void write_orientation(ByteWriter& out, const Eigen::Quaterniond& orientation) {
     out.append(std::span(bytes).first(7));
 }
 
-Eigen::Quaterniond read_orientation(ByteReader& in) {
+Eigen::Quaterniond read_orientation(SmallReader& in) {
     std::uint64_t bits = 0;
-    std::memcpy(&bits, in.take(7).data(), 7);
+    std::memcpy(&bits, in.take(7), 7);
     const auto largest = static_cast<Eigen::Index>(bits & 3);
     Eigen::Vector4d c;
     double rest = 1, most = 0;
@@ -105,8 +144,9 @@ struct SharedExponent {
     std::array<std::int16_t, 3> mantissas{};
 };
 
-double unit_of(int exponent) {
-    return std::ldexp(1.0, 4 * exponent - 44);
+/// 2^(4 exponent - 44)
+constexpr double unit_of(int exponent) {
+    return std::bit_cast<double>(static_cast<std::uint64_t>(1023 + 4 * exponent - 44) << 52);
 }
 
 SharedExponent quantised(const Eigen::Vector3d& v) {
@@ -120,7 +160,7 @@ SharedExponent quantised(const Eigen::Vector3d& v) {
 }
 
 /// False: the mark of a broken state.
-bool read_angular(ByteReader& in, int exponent, Eigen::Vector3d& v) {
+bool read_angular(SmallReader& in, int exponent, Eigen::Vector3d& v) {
     int most = 0, broken = 0;
     for (int i = 0; i < 3; ++i) {
         const auto m = in.number<std::int16_t>();
@@ -134,12 +174,13 @@ bool read_angular(ByteReader& in, int exponent, Eigen::Vector3d& v) {
     return !broken;
 }
 
-void write(ByteWriter& out, const Update& u) {
+void write(ByteWriter& all, const Update& u) {
     const WorldBodyState& s = u.state;
+    SmallWriter out;
     const bool broken = is_broken(s), held = u.held && !broken;
     SharedExponent angular;
     broken ? angular.mantissas.fill(kBroken) : (void)(angular = quantised(s.angular_momentum));
-    write_body_and_modes(out, u.body, s.q.size());
+    out.number(body_and_modes(u.body, s.q.size()));
     const int flags = (u.asleep ? kAsleep : 0) | (u.still ? kStill : 0) | (u.quarantined ? kQuarantined : 0) |
                       (held ? kHeld : 0);
     out.number(static_cast<std::uint8_t>(flags | angular.exponent << 4));
@@ -150,18 +191,23 @@ void write(ByteWriter& out, const Update& u) {
     for (const std::int16_t m : angular.mantissas) out.number(m);
     write_halves(out, s.q, broken);
     write_halves(out, s.q_dot, broken);
-    if (!held) return;
-    write_halves(out, u.impulse.linear);
-    write_halves(out, u.impulse.angular);
-    for (Eigen::Index i = 0; i < s.q.size(); ++i)
-        write_half(out, i < u.impulse.modal.size() ? u.impulse.modal[i] : 0);
+    if (held) {
+        write_halves(out, u.impulse.linear);
+        write_halves(out, u.impulse.angular);
+        for (Eigen::Index i = 0; i < s.q.size(); ++i)
+            write_half(out, i < u.impulse.modal.size() ? u.impulse.modal[i] : 0);
+    }
+    all.append(out.bytes());
 }
 
-Update read_update(ByteReader& in) {
+Update read_update(ByteReader& all) {
     Update u;
-    const BodyAndModes which = read_body_and_modes(in);
+    const BodyAndModes which = read_body_and_modes(all);
     u.body = which.body;
-    const auto flags = in.number<std::uint8_t>();
+    const auto flags = all.number<std::uint8_t>();
+    const auto modes = static_cast<std::size_t>(which.modes);
+    const std::size_t head = 5, held = flags & kHeld ? 12 + 2 * modes : 0;
+    SmallReader in(all.take(kSmallestUpdate - head + 4 * modes + held));
     u.asleep = flags & kAsleep, u.still = flags & kStill, u.quarantined = flags & kQuarantined;
     u.held = flags & kHeld;
     WorldBodyState& s = u.state;
@@ -201,13 +247,14 @@ Push read_push(ByteReader& in) {
 
 void write(ByteWriter& out, const std::vector<Update>& updates) {
     out.count(updates.size());
+    out.bytes().reserve(out.bytes().size() + updates.size() * kUsualUpdate);
     for (const Update& u : updates) write(out, u);
 }
 
 void write(ByteWriter& out, const std::vector<Push>& pushes) {
     out.count(pushes.size());
     for (const Push& p : pushes) {
-        write_body_and_modes(out, p.body, p.impulse.modal.size());
+        out.number(body_and_modes(p.body, p.impulse.modal.size()));
         out.matrix(p.impulse.linear);
         out.matrix(p.impulse.angular);
         write_floats(out, p.impulse.displacement);

@@ -68,7 +68,7 @@ WorldBodyState read_state(ByteReader& in, int modes, bool broken) {
 
 void write(ByteWriter& out, const WorldRecord& r) {
     const bool broken = is_broken(r.state);
-    write_body_and_modes(out, static_cast<std::uint32_t>(r.body), r.state.q.size());
+    out.number(body_and_modes(static_cast<std::uint32_t>(r.body), r.state.q.size()));
     out.number(static_cast<std::uint8_t>((r.asleep ? kAsleep : 0) | (r.quarantined ? kQuarantined : 0) |
                                          (r.at_limit ? kAtLimit : 0) | (broken ? kBroken : 0)));
     out.number(r.still_steps);
@@ -132,11 +132,11 @@ SpringRecord read_spring(ByteReader& in) {
 
 }  // namespace
 
-void write_body_and_modes(ByteWriter& out, std::uint32_t body, Eigen::Index modes) {
+std::uint32_t body_and_modes(std::uint32_t body, Eigen::Index modes) {
     if (body >= kMostWorldBodies || modes > kMostModes)
         throw std::invalid_argument("body " + std::to_string(body) + " with " + std::to_string(modes) +
                                     " modes: messages hold bodies below 2^24, 128 modes");
-    out.number(body | static_cast<std::uint32_t>(modes) << 24);
+    return body | static_cast<std::uint32_t>(modes) << 24;
 }
 
 BodyAndModes read_body_and_modes(ByteReader& in) {

@@ -8,7 +8,7 @@ namespace sim {
 constexpr std::uint32_t kMostWorldBodies = 1u << 24;
 
 /// A body's number and its count of modes in four bytes. Throws std::invalid_argument beyond 2^24 or 128.
-void write_body_and_modes(ByteWriter& out, std::uint32_t body, Eigen::Index modes);
+[[nodiscard]] std::uint32_t body_and_modes(std::uint32_t body, Eigen::Index modes);
 struct BodyAndModes {
     std::uint32_t body;
     int modes;

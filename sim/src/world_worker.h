@@ -5,6 +5,10 @@
 namespace sim {
 
 /// One worker without clock and sockets: the same code runs behind ZeroMQ and on simulated processors.
+///
+///   take() ... whenever a message comes, but not between step() and worked()
+///   if (ready()) { step(); worked(seconds, waited); }
+///   outgoing() after each of these
 class WorldWorker {
 public:
     explicit WorldWorker(const SceneMessage& scene);
@@ -18,12 +22,40 @@ public:
     void worked(double seconds, double waited_s);
     /// Encoded messages to the application, in order; empties the queue.
     [[nodiscard]] std::vector<std::vector<std::uint8_t>> outgoing();
-    /// Gives everything away; then left() becomes true.
+    /// Gives everything away, after the step if one is being done; then left() becomes true.
     void drain();
-    [[nodiscard]] bool left() const;
-    [[nodiscard]] bool ended() const;      ///< EndOfRun or Refusal came
+    [[nodiscard]] bool left() const noexcept { return left_; }
+    [[nodiscard]] bool ended() const noexcept { return ended_; }  ///< EndOfRun or Refusal came
     [[nodiscard]] double slowing() const;  ///< factor of the scene's events for this worker's next step
-    [[nodiscard]] std::uint64_t steps_done() const;
+    [[nodiscard]] std::uint64_t steps_done() const { return exchange_->steps_done(); }
+    [[nodiscard]] double work() const;  ///< that the last step took, in units of World::work
+
+private:
+    void take_message(const WorldHeader& header, Members&& message);
+    void take_message(const WorldHeader& header, Ownership&& message);
+    void take_message(const WorldHeader& header, SnapshotMessage&& message);
+    void take_message(const WorldHeader& header, StateMessage&& message);
+    void take_message(const WorldHeader& header, UpdateMessage&& message);
+    void take_message(const WorldHeader& header, Offer&& message);
+    void take_message(const WorldHeader& header, OfferAnswer&& message);
+    void take_message(const WorldHeader& header, EndOfRun&& message);
+    void take_message(const WorldHeader& header, Refusal&& message);
+    void take_message(const WorldHeader& header, WorldBeat&& message);
+    template <typename Other>
+    void take_message(const WorldHeader& header, Other&& message);
+
+    void send(const WorldMessage& message);
+    void trade();
+    void leave();
+
+    std::uint32_t self_;
+    std::vector<WorldEvent> events_;  // those that slow somebody
+    std::unique_ptr<Exchange> exchange_;
+    Market market_;
+    std::vector<std::vector<std::uint8_t>> queue_;
+    std::uint32_t epoch_ = 0;
+    int lead_ = 0;  // at the start of the step
+    bool stepping_ = false, draining_ = false, left_ = false, ended_ = false;
 };
 
 }  // namespace sim

@@ -13,33 +13,14 @@
 #include <zmq.hpp>
 
 #include "messages.h"
+#include "processes.h"
 #include "test_kit.h"
 
 namespace {
 
 using namespace std::chrono_literals;
-using sim_test::Scenario;
+using namespace sim_test;
 namespace fs = std::filesystem;
-
-std::vector<std::string> command_line(const fs::path& process = "/proc/self") {
-    std::ifstream file(process / "cmdline", std::ios::binary);
-    std::vector<std::string> words;
-    for (std::string word; std::getline(file, word, '\0');) words.push_back(word);
-    return words;
-}
-
-std::string option(const std::vector<std::string>& words, const std::string& name) {
-    for (std::size_t i = 0; i + 1 < words.size(); ++i) {
-        if (words[i] == name) return words[i + 1];
-    }
-    return {};
-}
-
-sim::WorkerLaunch run_test(const std::string& test, int count) {
-    return {fs::read_symlink("/proc/self/exe"),
-            {"--gtest_filter=" + test, "--gtest_also_run_disabled_tests"},
-            count};
-}
 
 sim::WorkerLaunch workers(int count) {
     return run_test("WorkerProcess.DISABLED_Serves", count);
@@ -50,22 +31,6 @@ TEST(WorkerProcess, DISABLED_Serves) {
     const std::string endpoint = option(command_line(), "--connect");
     ASSERT_FALSE(endpoint.empty());
     _exit(sim::run_worker(endpoint));
-}
-
-std::vector<pid_t> children_of(pid_t parent) {
-    std::vector<pid_t> children;
-    for (const fs::directory_entry& entry : fs::directory_iterator("/proc")) {
-        std::ifstream file(entry.path() / "stat");
-        std::string stat;
-        if (!std::isdigit(entry.path().filename().string()[0]) || !std::getline(file, stat)) continue;
-        std::istringstream fields(stat.substr(stat.rfind(')') + 1));
-        std::string state;
-        pid_t of = 0;
-        fields >> state >> of;
-        if (of == parent && state != "Z") children.push_back(std::stoi(entry.path().filename()));
-    }
-    std::sort(children.begin(), children.end());
-    return children;
 }
 
 // The exact bits of a reply: what travels in an answer, in order.
@@ -172,17 +137,6 @@ TEST(WorkerPool, AProgramThatIsMissingOrEndsAtOnceIsAnErrorAndLeavesNoFolder) {
     };
     EXPECT_THROW(launch("/nonexistent/program"), std::runtime_error);
     EXPECT_THROW(launch("/bin/false"), std::runtime_error);
-}
-
-// Waits for what another process is to bring about; the limit is the stated one with room for a loaded
-// machine.
-template <typename Condition>
-bool comes_true(Condition condition) {
-    for (int i = 0; i < 1000; ++i) {
-        if (condition()) return true;
-        std::this_thread::sleep_for(10ms);
-    }
-    return false;
 }
 
 TEST(WorkerPool, AtItsEndWorkersAndFolderAreGone) {

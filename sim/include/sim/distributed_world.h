@@ -107,7 +107,8 @@ struct DistributedResult {
 
 /// Where workers come from.
 struct DistributedLaunch {
-    WorkerLaunch processes;  ///< started here, joined through a private folder's ipc socket or `listen`
+    WorkerLaunch processes;  ///< started here (none without a program), joined through a private folder's ipc
+                             ///< socket or `listen`
     std::string listen;  ///< empty: ipc in a private folder; else tcp://ADDRESS:PORT (PORT * or 0: any), also
                          ///< for workers started elsewhere
     int expect = 0;      ///< wait for so many workers before the first step (at least processes.count)
@@ -153,11 +154,13 @@ DistributedResult simulate_processors(const WorldScene& scene, const Distributed
 
 /// Writes CURVE keys into a new folder (0700): application.key (secret, 0600), application.pub, and for each
 /// worker NAME NAME.key (its secret and public keys and the application's public one: all that it needs), and
-/// `allowed`, the public keys, a line each. Throws std::runtime_error; nothing is overwritten.
+/// `allowed`, the public keys and names, a line each. Throws std::invalid_argument for a name or folder that
+/// cannot be (nothing is overwritten), std::runtime_error if it cannot be written.
 void make_keys(const std::filesystem::path& folder, const std::vector<std::string>& workers);
 
-/// A worker's process: joins the application at `endpoint`, serves until told to stop. Returns the exit
-/// status.
+/// A worker's process: joins the application at `endpoint`, of a world or of a kit, and serves until told to
+/// stop. SIGTERM or SIGINT: gives its bodies away and leaves. `key`: file made by make_keys, empty: none.
+/// Returns the exit status. Throws std::invalid_argument for an endpoint or key that is refused.
 [[nodiscard]] int run_worker(const std::string& endpoint, const std::filesystem::path& key);
 
 }  // namespace sim

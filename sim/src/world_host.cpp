@@ -1,0 +1,270 @@
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "meeting_point.h"
+#include "worker_process.h"
+#include "world_gate.h"
+#include "world_scene_codec.h"
+#include "world_worker.h"
+
+namespace sim {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+constexpr auto kWait = 20ms;
+constexpr auto kEndWithin = 1s;
+constexpr int kMostWorkers = 256;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// While it lives, and if asked for, SIGINT and SIGTERM set a mark.
+class CtrlC {
+public:
+    explicit CtrlC(bool wanted) : wanted_(wanted) {
+        asked = 0;
+        if (!wanted_) return;
+        struct sigaction action {};
+        action.sa_handler = [](int) { asked = 1; };
+        sigaction(SIGINT, &action, &interrupt_);
+        sigaction(SIGTERM, &action, &terminate_);
+    }
+    ~CtrlC() {
+        if (!wanted_) return;
+        sigaction(SIGINT, &interrupt_, nullptr);
+        sigaction(SIGTERM, &terminate_, nullptr);
+    }
+    CtrlC(const CtrlC&) = delete;
+    CtrlC& operator=(const CtrlC&) = delete;
+    [[nodiscard]] bool pressed() const { return asked != 0; }
+
+private:
+    static inline volatile std::sig_atomic_t asked = 0;
+    const bool wanted_;
+    struct sigaction interrupt_ {
+    }, terminate_{};
+};
+
+/// A worker in this process, for when no other is left.
+class WorkerHere {
+public:
+    WorkerHere(std::uint32_t number) : number_(number) {}
+    [[nodiscard]] std::uint32_t number() const { return number_; }
+
+    void take(const std::vector<std::uint8_t>& bytes) {
+        DecodedWorldMessage m = decode_world(bytes);
+        if (const auto* scene = std::get_if<SceneMessage>(&m.message))
+            worker_.emplace(*scene);
+        else if (worker_)
+            worker_->take(m.header, std::move(m.message));
+    }
+    /// A step if one can be done; true if it was.
+    bool work() {
+        if (!worker_ || worker_->ended() || !worker_->ready()) return false;
+        const Clock::time_point start = Clock::now();
+        worker_->step();
+        worker_->worked(seconds_since(start), 0);
+        return true;
+    }
+    [[nodiscard]] std::vector<std::vector<std::uint8_t>> outgoing() {
+        return worker_ ? worker_->outgoing() : std::vector<std::vector<std::uint8_t>>();
+    }
+
+private:
+    std::uint32_t number_;
+    std::optional<WorldWorker> worker_;
+};
+
+class WorldHost {
+public:
+    WorldHost(const WorldScene& scene, const DistributedSettings& settings, const DistributedLaunch& launch,
+              DistributedObserver& observer)
+        : settings_(settings),
+          launch_(launch),
+          processes_(launch.processes.program.empty() ? 0 : launch.processes.count),
+          observer_(observer),
+          ctrl_c_(launch.stop_with_ctrl_c),
+          meeting_(scene, settings, observer),
+          gate_(gate_settings(launch)) {
+        if (launch.listening)
+            launch.listening(launch.listen.empty() ? gate_.private_endpoint() : gate_.endpoint());
+        children_.reserve(static_cast<std::size_t>(processes_));
+        for (int i = 0; i < processes_; ++i)
+            children_.push_back({WorkerProcess(launch.processes, gate_.private_endpoint()), {}, false});
+    }
+
+    DistributedResult run() {
+        wait_for_workers();
+        meeting_.start();
+        const Clock::time_point start = Clock::now();
+        while (!meeting_.finished() && !ctrl_c_.pressed()) advance();
+        DistributedResult result = meeting_.result();
+        result.elapsed_s = seconds_since(start);
+        result.refused_messages += gate_.refused_messages() + gate_.refused_keys();
+        end_children();
+        return result;
+    }
+
+private:
+    struct Child {
+        WorkerProcess process;
+        std::optional<std::uint32_t> worker;  ///< once it has joined
+        bool ended;                           ///< has been seen to
+    };
+
+    static WorldGate::Settings gate_settings(const DistributedLaunch& launch) {
+        WorldGate::Settings settings{launch.listen, std::nullopt};
+        if (!launch.keys.empty()) settings.keys = read_application_keys(launch.keys);
+        return settings;
+    }
+
+    void advance() {
+        const bool worked = here_ && here_->work();
+        for (WorldGate::Event& event : gate_.wait(worked ? 0ms : kWait)) take(event);
+        look_after_children();
+        if (meeting_.members().empty() && !meeting_.finished()) take_over();
+        pass_on();
+        note_refusals();
+    }
+
+    void wait_for_workers() {
+        const auto wanted = static_cast<std::size_t>(std::max({launch_.expect, processes_, 1}));
+        const Clock::time_point start = Clock::now();
+        while (meeting_.members().size() + killed_early_ < wanted && !ctrl_c_.pressed()) {
+            for (WorldGate::Event& event : gate_.wait(kWait)) take(event);
+            look_after_children();
+            pass_on();
+            if (seconds_since(start) > launch_.wait_s)
+                throw std::runtime_error("error: found " + std::to_string(meeting_.members().size()) +
+                                         " of " + std::to_string(wanted) + " workers after " +
+                                         std::to_string(launch_.wait_s) + " s, expected all to join");
+        }
+    }
+
+    void take(WorldGate::Event& event) {
+        using Kind = WorldGate::Event::Kind;
+        if (event.kind == Kind::asks_to_join)
+            join(event);
+        else if (event.kind == Kind::message)
+            meeting_.take(event.worker, event.bytes);
+        else if (is_member(event.worker)) {
+            lost_.push_back(event.worker);
+            meeting_.lose(event.worker, event.why);
+        }
+    }
+
+    void join(const WorldGate::Event& event) {
+        if (settings_.pace == Pace::lockstep && event.request.fingerprint != step_fingerprint()) {
+            gate_.refuse(event.stranger,
+                         "another processor, mathematics library or build: lockstep would "
+                         "not be to the bit");
+            observer_.note("a worker of " + event.request.host +
+                           " was refused: its processor, mathematics library or build differs");
+            return;
+        }
+        const std::uint32_t worker = meeting_.join(event.request);
+        gate_.admit(event.stranger, worker);
+        admitted_.push_back(worker);
+        for (Child& child : children_)
+            if (!child.worker && !child.ended && child.process.id() == event.request.process)
+                child.worker = worker;
+    }
+
+    [[nodiscard]] bool is_member(std::uint32_t worker) const {
+        const std::vector<std::uint32_t>& members = meeting_.members();
+        return std::find(members.begin(), members.end(), worker) != members.end();
+    }
+
+    void look_after_children() {
+        for (Child& child : children_) {
+            if (child.worker && !is_member(*child.worker) && was_lost(*child.worker)) child.process.kill();
+            if (child.ended || !child.process.has_ended()) continue;
+            child.ended = true;
+            if (child.worker && is_member(*child.worker))
+                meeting_.lose(*child.worker, child.process.ending());
+            else if (!child.worker && !child.process.was_killed())
+                throw std::runtime_error("a worker ended before it joined: " + child.process.ending());
+            else if (!child.worker)
+                ++killed_early_;
+        }
+    }
+
+    /// Not one that has drained: it ends by itself.
+    [[nodiscard]] bool was_lost(std::uint32_t worker) const {
+        return std::find(lost_.begin(), lost_.end(), worker) != lost_.end();
+    }
+
+    void take_over() {
+        here_.emplace(meeting_.join({step_fingerprint(), static_cast<std::uint32_t>(getpid()), "here"}));
+        observer_.note("no worker is left: the application goes on by itself");
+    }
+
+    void pass_on() {
+        for (bool more = true; more;) {
+            for (MeetingPoint::Outgoing& out : meeting_.outgoing()) deliver(out);
+            more = false;
+            if (here_)
+                for (const std::vector<std::uint8_t>& bytes : here_->outgoing())
+                    meeting_.take(here_->number(), bytes), more = true;
+        }
+        std::erase_if(admitted_, [this](std::uint32_t worker) {
+            if (is_member(worker)) return false;
+            gate_.dismiss(worker);
+            return true;
+        });
+    }
+
+    void deliver(MeetingPoint::Outgoing& out) {
+        if (here_ && std::erase(out.to, here_->number()) > 0) here_->take(*out.bytes);
+        if (!out.to.empty()) gate_.send(out.to, std::move(out.bytes));
+    }
+
+    void note_refusals() {
+        if (std::exchange(noted_, noted_ || gate_.refused_messages() + gate_.refused_keys() > 0) != noted_)
+            observer_.note("messages that are none of ours, or peers without a key, are dropped and counted");
+    }
+
+    void end_children() {
+        pass_on();
+        const Clock::time_point deadline = Clock::now() + kEndWithin;
+        const auto running = [](Child& child) { return !child.process.has_ended(); };
+        while (std::any_of(children_.begin(), children_.end(), running) && Clock::now() < deadline)
+            std::this_thread::sleep_for(2ms);
+    }
+
+    const DistributedSettings settings_;
+    const DistributedLaunch launch_;
+    const int processes_;  ///< started here
+    DistributedObserver& observer_;
+    CtrlC ctrl_c_;
+    MeetingPoint meeting_;
+    WorldGate gate_;
+    std::vector<std::uint32_t> admitted_;  ///< by the gate, now
+    std::vector<std::uint32_t> lost_;      ///< silent or out of reach
+    std::optional<WorkerHere> here_;
+    std::size_t killed_early_ = 0;
+    bool noted_ = false;
+    std::vector<Child> children_;  // last: processes end before the gate goes
+};
+
+}  // namespace
+
+DistributedResult run_distributed(const WorldScene& scene, const DistributedSettings& settings,
+                                  const DistributedLaunch& launch, DistributedObserver& observer) {
+    check_scene(scene);
+    check_settings(settings);
+    if (launch.processes.count < 0 || launch.processes.count > kMostWorkers)
+        throw std::invalid_argument("error: found " + std::to_string(launch.processes.count) +
+                                    " workers, expected 0 to " + std::to_string(kMostWorkers));
+    return WorldHost(scene, settings, launch, observer).run();
+}
+
+}  // namespace sim

@@ -1,0 +1,169 @@
+#include "world_worker.h"
+
+#include <utility>
+
+namespace sim {
+
+WorldWorker::WorldWorker(const SceneMessage& scene)
+    : self_(scene.worker),
+      exchange_(scene.settings.pace == Pace::lockstep ? make_lockstep_exchange(scene)
+                                                      : make_bounded_exchange(scene)),
+      market_(scene.worker, scene.settings.market) {
+    for (const WorldEvent& event : scene.scene.events)
+        if (!event.slowing.empty()) events_.push_back(event);
+}
+
+void WorldWorker::take(const WorldHeader& header, WorldMessage&& message) {
+    if (left_ || ended_) return;
+    std::visit([&](auto&& m) { take_message(header, std::forward<decltype(m)>(m)); }, std::move(message));
+    if (!left_ && !ended_) exchange_->follow();
+}
+
+void WorldWorker::take_message(const WorldHeader& header, Members&& message) {
+    (void)header;
+    exchange_->members(message.workers);
+    market_.members(message.workers);
+}
+
+void WorldWorker::take_message(const WorldHeader& header, Ownership&& message) {
+    epoch_ = header.epoch;
+    exchange_->own(message);
+    market_.registered(header.epoch, message);
+}
+
+void WorldWorker::take_message(const WorldHeader& header, SnapshotMessage&& message) {
+    (void)header;
+    exchange_->take(std::move(message));
+}
+
+void WorldWorker::take_message(const WorldHeader& header, StateMessage&& message) {
+    market_.heard(header.worker, header.epoch, message.report);
+    exchange_->take(header, std::move(message));
+}
+
+void WorldWorker::take_message(const WorldHeader& header, UpdateMessage&& message) {
+    market_.heard(header.worker, header.epoch, message.report);
+    exchange_->take(header, std::move(message));
+}
+
+void WorldWorker::take_message(const WorldHeader& header, Offer&& message) {
+    OfferAnswer answer = {header.worker, message.number, false};
+    if (!draining_ && !exchange_->done()) answer = market_.answer(header.worker, message);
+    send(answer);
+}
+
+void WorldWorker::take_message(const WorldHeader& header, OfferAnswer&& message) {
+    market_.answered(header.worker, message);
+}
+
+void WorldWorker::take_message(const WorldHeader& header, EndOfRun&& message) {
+    (void)header, (void)message;
+    ended_ = true;
+}
+
+void WorldWorker::take_message(const WorldHeader& header, Refusal&& message) {
+    (void)header, (void)message;
+    ended_ = true;
+}
+
+void WorldWorker::take_message(const WorldHeader& header, WorldBeat&& message) {
+    (void)header, (void)message;
+}
+
+template <typename Other>
+void WorldWorker::take_message(const WorldHeader& header, Other&& message) {
+    (void)header, (void)message;
+    throw DecodeError("found a message that no worker gets, expected one for a worker");
+}
+
+bool WorldWorker::ready() const {
+    return !left_ && !ended_ && !stepping_ && exchange_->ready();
+}
+
+void WorldWorker::step() {
+    lead_ = exchange_->lead();
+    stepping_ = true;
+    exchange_->step();
+}
+
+double WorldWorker::work() const {
+    const World& world = exchange_->world();
+    double sum = 0;
+    for (int i = 0; i < world.bodies(); ++i)
+        if (world.own(i)) sum += world.work(i);
+    return sum;
+}
+
+void WorldWorker::worked(double seconds, double waited_s) {
+    const World& world = exchange_->world();
+    exchange_->cost(seconds);
+    market_.worked(exchange_->steps_done(), seconds, exchange_->own_bodies());
+    StepReport report;
+    report.seconds = static_cast<float>(seconds);
+    report.smoothed_s = static_cast<float>(market_.smoothed());
+    report.waited_s = static_cast<float>(waited_s);
+    report.bodies_cost_s = report.smoothed_s;
+    report.lead = static_cast<std::uint32_t>(std::max(0, lead_));
+    report.ghost_age = static_cast<std::uint32_t>(std::max(0, exchange_->ghost_age()));
+    report.cross_contacts = static_cast<std::uint32_t>(world.cross_contacts());
+    report.own = static_cast<std::uint32_t>(exchange_->own_bodies());
+    report.outside_impulse = world.outside_impulse();
+    stepping_ = false;
+    queue_.push_back(exchange_->publish(epoch_, report));
+    if (draining_) return leave();
+    trade();
+    exchange_->follow();
+}
+
+// At the end of a step, after its states are on their way.
+void WorldWorker::trade() {
+    if (exchange_->done()) return;
+    if (const std::optional<Offer> sold = market_.hand_over()) {
+        Handover handover = exchange_->give(sold->bodies);
+        handover.to = sold->to, handover.number = sold->number;
+        send(handover);
+    }
+    if (!market_.wants_to_sell()) return;
+    if (const std::optional<Offer> offer = market_.make_offer(exchange_->lots(market_.fastest())))
+        send(*offer);
+}
+
+void WorldWorker::drain() {
+    draining_ = true;
+    if (!stepping_ && !left_) leave();
+}
+
+// The application shares out what is given to nobody.
+void WorldWorker::leave() {
+    std::vector<std::uint32_t> bodies;
+    const World& world = exchange_->world();
+    for (int i = 0; i < world.bodies(); ++i)
+        if (world.own(i) && !world.definition(i).fixed) bodies.push_back(static_cast<std::uint32_t>(i));
+    if (!bodies.empty()) {
+        Handover handover = exchange_->give(bodies);
+        handover.to = kApplication;
+        send(handover);
+    }
+    send(Drained{});
+    left_ = true;
+}
+
+void WorldWorker::send(const WorldMessage& message) {
+    queue_.push_back(encode({self_, epoch_, exchange_->steps_done()}, message));
+}
+
+std::vector<std::vector<std::uint8_t>> WorldWorker::outgoing() {
+    return std::exchange(queue_, {});
+}
+
+double WorldWorker::slowing() const {
+    double factor = 1;
+    for (const WorldEvent& event : events_) {
+        if (event.step > exchange_->steps_done()) break;
+        for (const Slowing& slowing : event.slowing)
+            if (slowing.worker == static_cast<int>(self_)) factor = slowing.factor;
+    }
+    return factor;
+}
+
+}  // namespace sim
