@@ -2,14 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <utility>
 
 namespace sim {
 namespace {
 
-constexpr double kLevel = 0.15;        // of the average
-constexpr double kLastingLevel = 0.2;  // once level, what lasts this far above the average is not
-constexpr int kLastingSteps = 3;
+constexpr double kLevel = 0.15;  // of the average
+// Once level: what is not any more. Bodies that meet cost more, which comes and goes; a processor that
+// became slower stays so.
+constexpr double kLastingLevel = 0.35;  // of the average, for so many steps in a row
+constexpr int kLastingSteps = 5;
+constexpr double kOtherRate = 0.25;  // change of the seconds a unit of work, for so many steps in a row
+constexpr int kOtherRateSteps = 2;
 constexpr std::uint64_t kTuningSteps = 20;  // once level, at least so many between trades
 
 }  // namespace
@@ -31,8 +37,8 @@ void Market::members(const std::vector<std::uint32_t>& workers) {
     std::erase_if(workers_, [&](const auto& w) { return w.first != self_ && !there(w.first); });
     std::erase_if(promises_, [&](const auto& p) { return !there(p.first); });
     for (const std::uint32_t worker : workers) workers_[worker];
-    // What was handed over is given back or taken: its registration comes in any case.
-    if (sale_ != Sale::handed_over && sale_ != Sale::none && !there(offer_.to)) sale_ = Sale::none;
+    // What was handed over is taken or comes back: its registration arrives in any case.
+    if (!there(offer_.to)) sale_ = Sale::none;
 }
 
 void Market::heard(std::uint32_t worker, std::uint32_t epoch, const StepReport& report) {
@@ -53,7 +59,8 @@ void Market::registered(std::uint32_t epoch, const Ownership& ownership) {
     const int bodies = static_cast<int>(ownership.bodies.size());
     // Seconds a step, at the seller and at the buyer.
     double sold = from == workers_.end() ? 0 : bodies * from->second.body_cost();
-    if (ownership.from == self_) sold = sale_ == Sale::handed_over ? offer_cost_ : 0;
+    const bool own_sale = ownership.from == self_ && handed_over_ > 0;
+    if (own_sale) sold = std::exchange(handed_over_, 0);
     double bought = to == workers_.end() ? 0 : bodies * to->second.body_cost();
     if (from != workers_.end() && to != workers_.end())
         bought = sold * exchange_rate(from->second.body_cost(), to->second.body_cost());
@@ -68,13 +75,12 @@ void Market::registered(std::uint32_t epoch, const Ownership& ownership) {
     }
     if (to != workers_.end()) {
         to->second.epoch = epoch;
-        credit(to->second, bodies, bought);
+        if (!own_sale || ownership.owner == self_) credit(to->second, bodies, bought);
     }
     if (ownership.owner == self_ && bought > 0) known_ = true;
-    if (ownership.from == self_ && sale_ == Sale::handed_over) sale_ = Sale::none;
 }
 
-void Market::worked(std::uint64_t step, double seconds, int own) {
+void Market::worked(std::uint64_t step, double seconds, double work, int own) {
     if (step <= step_) return;  // repeated, with more bodies: not what a step takes
     step_ = step;
     Worker& self = workers_[self_];
@@ -82,7 +88,7 @@ void Market::worked(std::uint64_t step, double seconds, int own) {
     self.smoothed = known_ ? self.smoothed + weight_ * (seconds - self.smoothed) : seconds;
     known_ = own > 0;
     if (own == 0) self.smoothed = 0;
-    watch_level();
+    watch_level(work > 0 ? seconds / work : 0);
 }
 
 double Market::average() const {
@@ -108,24 +114,35 @@ bool Market::slowest() const {
                        [this](const auto& w) { return w.first == self_ || w.second.smoothed < smoothed(); });
 }
 
-void Market::watch_level() {
+void Market::watch_level(double rate) {
     const Worker& self = workers_.at(self_);
     const double excess = self.smoothed - average();
-    const bool far = excess > std::max(kLastingLevel * average(), self.body_cost());
-    unlevel_steps_ = far ? unlevel_steps_ + 1 : 0;
+    const bool far = excess > std::max(kLastingLevel * average(), 1.5 * self.body_cost());
+    far_steps_ = far ? far_steps_ + 1 : 0;
+    const bool other_rate = usual_rate_ > 0 && rate > (1 + kOtherRate) * usual_rate_;
+    other_rate_steps_ = other_rate ? other_rate_steps_ + 1 : 0;
+    if (far_steps_ >= kLastingSteps || other_rate_steps_ >= kOtherRateSteps) {
+        calm_ = false;
+        usual_rate_ = 0;
+    }
+    if (excess > allowance(self)) return;
     if (level()) calm_ = true;
-    if (unlevel_steps_ >= kLastingSteps) calm_ = false;
+    if (calm_ && rate > 0 && !other_rate)
+        usual_rate_ = usual_rate_ > 0 ? usual_rate_ + weight_ * (rate - usual_rate_) : rate;
+}
+
+bool Market::tuning() const {
+    const Worker& self = workers_.at(self_);
+    return calm_ || self.smoothed - average() <= allowance(self);
 }
 
 // Seconds to be sold now.
 double Market::wanted() const {
-    const Worker& self = workers_.at(self_);
-    const double mean = average(), excess = self.smoothed - mean;
+    const double mean = average(), excess = smoothed() - mean;
     if (excess <= settings_.dead_band * mean) return 0;
-    if (!calm_ && excess > allowance(self))
-        return excess / std::max(1.0, static_cast<double>(workers_.size()) - 2);
+    if (!tuning()) return excess / std::max(1.0, static_cast<double>(workers_.size()) - 2);
     const bool due = !traded_ || step_ >= last_trade_ + kTuningSteps;
-    return due && slowest() ? self.body_cost() : 0;
+    return due && slowest() ? workers_.at(self_).body_cost() : 0;
 }
 
 bool Market::wants_to_sell() const {
@@ -146,7 +163,7 @@ std::optional<Offer> Market::make_offer(std::vector<Exchange::Lot> lots) {
     const Worker& buyer = workers_.at(to);
     const double rate = exchange_rate(self.body_cost(), buyer.body_cost());
     const double most = (self.smoothed - buyer.smoothed) / (1 + rate);  // then both take as long
-    const double due = wanted() + carried_;
+    const double due = tuning() ? 1.5 * wanted() : wanted() + carried_;
     std::sort(lots.begin(), lots.end(), [](const auto& a, const auto& b) {
         return std::pair(-a.pull, a.bodies) < std::pair(-b.pull, b.bodies);
     });
@@ -159,8 +176,9 @@ std::optional<Offer> Market::make_offer(std::vector<Exchange::Lot> lots) {
             offer_.bodies.push_back(body);
             offer_.cost_s.push_back(static_cast<float>(lot.cost_s / static_cast<double>(lot.bodies.size())));
         }
+        if (tuning()) break;
     }
-    carried_ = std::clamp(due - offer_cost_, 0.0, self.body_cost());
+    carried_ = tuning() ? 0 : std::clamp(due - offer_cost_, 0.0, self.body_cost());
     if (offer_.bodies.empty()) return std::nullopt;
     ++next_number_;
     sale_ = Sale::offered;
@@ -174,9 +192,15 @@ void Market::answered(std::uint32_t worker, const OfferAnswer& answer) {
 }
 
 std::optional<Offer> Market::hand_over() {
-    if (sale_ != Sale::accepted) return std::nullopt;
-    sale_ = Sale::handed_over;
-    credit(workers_[self_], -static_cast<int>(offer_.bodies.size()), -offer_cost_);
+    if (sale_ != Sale::accepted || handed_over_ > 0) return std::nullopt;
+    sale_ = Sale::none;
+    handed_over_ = offer_cost_;
+    Worker &self = workers_[self_], &buyer = workers_[offer_.to];
+    const int bodies = static_cast<int>(offer_.bodies.size());
+    const double bought = offer_cost_ * exchange_rate(self.body_cost(), buyer.body_cost());
+    credit(self, -bodies, -offer_cost_);
+    credit(buyer, bodies, bought);
+    buyer.epoch = std::numeric_limits<std::uint32_t>::max();  // until it is registered
     return offer_;
 }
 
@@ -184,7 +208,7 @@ OfferAnswer Market::answer(std::uint32_t seller, const Offer& offer) {
     promises_.erase(seller);  // it has one offer at a time
     OfferAnswer answer{seller, offer.number, false};
     const auto found = workers_.find(seller);
-    if (found == workers_.end()) return answer;
+    if (found == workers_.end() || (calm_ && !promises_.empty())) return answer;
     const Worker& self = workers_.at(self_);
     const double cost = std::accumulate(offer.cost_s.begin(), offer.cost_s.end(), 0.0);
     const double here = cost * exchange_rate(found->second.body_cost(), self.body_cost());

@@ -29,16 +29,16 @@ public:
     /// Another worker's report, written when it knew ownership up to `epoch`.
     void heard(std::uint32_t worker, std::uint32_t epoch, const StepReport& report);
     void registered(std::uint32_t epoch, const Ownership& ownership);
-    /// Own step `step` took so long.
-    void worked(std::uint64_t step, double seconds, int own);
+    /// Own step `step` took so long, for so much work (World::work).
+    void worked(std::uint64_t step, double seconds, double work, int own);
 
-    // Selling: one offer at a time, until it is declined or registered.
+    // Selling: one offer at a time, until it is declined or handed over.
     [[nodiscard]] bool wants_to_sell() const;
     [[nodiscard]] std::uint32_t fastest() const;
     /// Of these lots; nothing if none fits.
     [[nodiscard]] std::optional<Offer> make_offer(std::vector<Exchange::Lot> lots);
     void answered(std::uint32_t worker, const OfferAnswer& answer);
-    /// The offer that was accepted, if one was; it counts as handed over.
+    /// The offer that was accepted, if one was; counts as handed over.
     [[nodiscard]] std::optional<Offer> hand_over();
 
     /// Buying.
@@ -53,14 +53,15 @@ private:
         std::uint32_t epoch = 0;  // reports from before do not count
         [[nodiscard]] double body_cost() const { return own > 0 ? smoothed / own : 0; }
     };
-    enum class Sale { none, offered, accepted, handed_over };
+    enum class Sale { none, offered, accepted };
 
     [[nodiscard]] double average() const;
     [[nodiscard]] double allowance(const Worker& worker) const;
     [[nodiscard]] bool level() const;
     [[nodiscard]] bool slowest() const;
+    [[nodiscard]] bool tuning() const;
     [[nodiscard]] double wanted() const;
-    void watch_level();
+    void watch_level(double rate);
     void credit(Worker& worker, int bodies, double cost);
 
     std::uint32_t self_;
@@ -69,13 +70,15 @@ private:
     std::map<std::uint32_t, Worker> workers_;  // members, with this one
     std::uint64_t step_ = 0, last_trade_ = 0, not_before_ = 0;
     bool traded_ = false;
-    bool known_ = false;     // own time
-    bool calm_ = false;      // has been level, and nothing lasting since
-    int unlevel_steps_ = 0;  // in a row
-    double carried_ = 0;     // [s] to be sold with a later offer
+    bool known_ = false;                        // own time
+    bool calm_ = false;                         // has been level, and nothing lasting since
+    int far_steps_ = 0, other_rate_steps_ = 0;  // in a row
+    double usual_rate_ = 0;                     // seconds a unit of work, while calm
+    double carried_ = 0;                        // [s] to be sold with a later offer
     Sale sale_ = Sale::none;
     Offer offer_;
-    double offer_cost_ = 0;  // [s] here
+    double offer_cost_ = 0;   // [s] here
+    double handed_over_ = 0;  // of bodies whose registration has not come [s]
     std::uint32_t next_number_ = 0;
     std::map<std::uint32_t, double> promises_;  // by seller: what it will cost here [s]
 };

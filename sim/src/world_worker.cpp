@@ -97,7 +97,7 @@ double WorldWorker::work() const {
 void WorldWorker::worked(double seconds, double waited_s) {
     const World& world = exchange_->world();
     exchange_->cost(seconds);
-    market_.worked(exchange_->steps_done(), seconds, exchange_->own_bodies());
+    market_.worked(exchange_->steps_done(), seconds, work(), exchange_->own_bodies());
     StepReport report;
     report.seconds = static_cast<float>(seconds);
     report.smoothed_s = static_cast<float>(market_.smoothed());
