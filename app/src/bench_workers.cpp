@@ -2,6 +2,7 @@
 
 #include <falling_bodies.h>
 #include <fmt/format.h>
+#include <update_throughput.h>
 
 #include <algorithm>
 #include <cmath>
@@ -59,6 +60,7 @@ private:
     void bounds();
     void migration();
     void processes();
+    void throughput();
     void note_clock();
 
     struct Way {
@@ -248,6 +250,34 @@ void Bench::processes() {
         fmt::format("processes: real ones by the wall clock, at most {}, this machine's cores.", cores));
 }
 
+/// Messages of all bodies, as many as pass in two seconds.
+void Bench::throughput() {
+    struct Route {
+        const char* name;
+        bool keys, through_application;
+    };
+    for (const Route& route : {Route{"curve_one_hop", true, false},
+                               {"curve_through_application", true, true},
+                               {"plain_through_application", false, true}}) {
+        progress_(fmt::format("throughput: {}", route.name));
+        sim_bench::ThroughputSettings settings;
+        settings.bodies = most_bodies();
+        settings.keys = route.keys, settings.through_application = route.through_application;
+        const sim_bench::Throughput t = sim_bench::measure_update_throughput(settings);
+        const std::string name = fmt::format("tcp_{}", route.name);
+        add(name + "_updates", 1e-6 * t.updates_per_s, "million bodies a second");
+        add(name + "_cpu", t.cpu_ns_per_update, "ns a body, all threads");
+        if (!route.keys) continue;
+        add(name + "_bytes_per_update", t.bytes_per_update, "bytes");
+        add(name + "_encode", t.encode_ns, "ns a body");
+        add(name + "_decode", t.decode_ns, "ns a body");
+    }
+    bench_.report.notes.push_back(fmt::format(
+        "throughput: quantised states of {} modes over tcp on this machine, {} bodies a message, encoded by "
+        "one thread, checked and decoded by another; CURVE encrypts and authenticates.",
+        kModes, most_bodies()));
+}
+
 void Bench::note_clock() {
     const sim::SimulatedProcessors& p = options_.processors;
     bench_.report.notes.push_back(
@@ -268,6 +298,7 @@ WorkersBench Bench::run() {
     if (wants("bound")) bounds();
     if (wants("migration")) migration();
     if (wants("processes")) processes();
+    if (wants("throughput")) throughput();
     note_clock();
     return std::move(bench_);
 }

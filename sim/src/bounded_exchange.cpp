@@ -1,10 +1,469 @@
-// Stands in until the bounded exchange is there.
-#include <stdexcept>
+#include <algorithm>
+#include <array>
+#include <numeric>
 
+#include "body_costs.h"
 #include "exchange.h"
+#include "foreign_bodies.h"
+#include "replica.h"
 
 namespace sim {
-std::unique_ptr<Exchange> make_bounded_exchange(const SceneMessage&) {
-    throw std::logic_error("no bounded exchange yet");
+namespace {
+
+// Every worker is at a step of its own. Its world holds its bodies; of the others' bodies those that may come
+// near are put in as ghosts for each step.
+//
+// A contact between an own body and a ghost is resolved where the lower number is owned: there is one owner,
+// so one resolver. What it does to the ghost is published as a push, in the same message as the states that
+// came of it: either both are there or neither. The ghost's owner holds the push over the same step if it is
+// there in time; else it holds what lasted in the two steps before (PushLog), and puts the difference right
+// when the push comes, as if it had been in time. So every impulse arrives exactly once and momentum is kept;
+// what the states include is told by `applied`, and everybody who looks at a ghost puts it right by the
+// pushes that he knows.
+class BoundedExchange final : public Exchange {
+public:
+    explicit BoundedExchange(const SceneMessage& scene);
+
+    using Exchange::take;
+    void take(const WorldHeader& header, UpdateMessage&& message) override;
+    void members(const std::vector<std::uint32_t>& workers) override;
+    void own(const Ownership& ownership) override;
+    [[nodiscard]] bool ready() const override;
+    void step() override;
+    [[nodiscard]] std::vector<std::uint8_t> publish(std::uint32_t epoch, const StepReport& report) override;
+    void follow() override {}
+    [[nodiscard]] std::vector<Lot> lots(std::uint32_t towards) const override;
+    [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies) override;
+    void cost(double seconds) override { costs_.share(seconds, world_, owned_); }
+    [[nodiscard]] std::uint64_t steps_done() const override { return step_; }
+    [[nodiscard]] bool done() const override { return step_ >= settings_.steps; }
+    [[nodiscard]] int own_bodies() const override { return static_cast<int>(owned_.size()); }
+    [[nodiscard]] int lead() const override;
+    [[nodiscard]] int ghost_age() const override { return ghost_age_; }
+    [[nodiscard]] const World& world() const override { return world_; }
+
+private:
+    struct Felt {  // what other bodies of this worker did to an own one in the last two steps
+        StepImpulse last, before;
+    };
+    void come_to(std::uint64_t step);
+    void list();
+    void set_own(int body, bool own);
+    void take_over(const Ownership& ownership);
+    void put_right();
+    void hold_pushes();
+    void place_ghosts();
+    void keep_pushes();
+    void give_push(int ghost, const StepImpulse& impulse);
+    [[nodiscard]] int resolvers(int own, int ghost) const;
+    void feel();
+    [[nodiscard]] std::uint64_t slowest() const;
+    void applied(std::vector<std::uint32_t>& sources, std::vector<std::uint64_t>& steps) const;
+    [[nodiscard]] Update update_of(int body) const;
+
+    std::uint32_t self_;
+    DistributedSettings settings_;
+    World world_;
+    SceneClock clock_;
+    BodyCosts costs_;
+    PushLog pushes_;
+    ForeignBodies foreign_;
+    std::uint64_t step_ = 0;
+    std::vector<int> lot_;              // of each body: lowest number of those that constraints tie it to
+    std::vector<std::uint32_t> owner_;  // as registered
+    std::vector<std::uint8_t> own_;
+    std::vector<int> owned_, others_;  // there, ascending; moving ones of others
+    std::vector<std::uint32_t> members_;
+    std::map<std::uint32_t, std::uint64_t> applied_;  // pushes that own states include
+    std::vector<Ownership> later_;
+    std::vector<ForeignBall> balls_;
+    std::vector<int> near_;
+    std::vector<int> leant_on_;  // ghosts of this step that others hold, too
+    std::vector<Push> given_;    // in the last step
+    std::map<std::pair<int, int>, CrossImpulse> crossed_;
+    std::map<int, Felt> felt_;
+    std::vector<std::uint8_t> told_asleep_;
+    int ghost_age_ = 0;
+};
+
+constexpr int kMostBound = 64;
+
+// From what was towards what is, by a share; displacement and turn are pushes out of overlaps, which do not
+// last.
+StepImpulse blend(const StepImpulse& before, const StepImpulse& now, double share) {
+    StepImpulse sum;
+    add_impulse(sum, now, share);
+    StepImpulse lasts = before;
+    lasts.displacement.setZero(), lasts.turn.setZero();
+    add_impulse(sum, lasts, 1 - share);
+    return sum;
 }
+
+int keep_steps(int bound) {
+    return 4 * std::min(bound, kMostBound) + 16;
+}
+
+// Bodies that constraints tie together, now or later: the lowest number of each such group.
+std::vector<int> tied(const WorldScene& scene, int bodies) {
+    std::vector<int> root(static_cast<std::size_t>(bodies));
+    std::iota(root.begin(), root.end(), 0);
+    auto find = [&root](int i) {
+        while (root[static_cast<std::size_t>(i)] != i) i = root[static_cast<std::size_t>(i)];
+        return i;
+    };
+    auto fixed = [&scene](int i) { return scene.world.bodies[static_cast<std::size_t>(i)].fixed; };
+    for (const PointConstraint& c : scene.world.constraints) {
+        if (c.body_b < 0 || fixed(c.body_a) || fixed(c.body_b)) continue;
+        const int a = find(c.body_a), b = find(c.body_b);
+        root[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+    }
+    for (int i = 0; i < bodies; ++i) root[static_cast<std::size_t>(i)] = find(i);
+    return root;
+}
+
+BoundedExchange::BoundedExchange(const SceneMessage& scene)
+    : self_(scene.worker),
+      settings_(scene.settings),
+      world_(scene.scene.world),
+      clock_(scene.scene),
+      costs_(clock_.bodies(), scene.settings.market.smoothing_steps),
+      pushes_(clock_.bodies(), keep_steps(scene.settings.bound)),
+      foreign_(world_, pushes_, self_, clock_.bodies()),
+      lot_(tied(scene.scene, clock_.bodies())) {
+    const auto n = static_cast<std::size_t>(clock_.bodies());
+    owner_.assign(n, kApplication), own_.assign(n, 0), told_asleep_.assign(n, 0);
+    world_.share(Sharing::pairs);
+    for (int i = 0; i < world_.bodies(); ++i) {
+        if (!clock_.moves(i)) continue;
+        world_.set_own(i, false);
+        foreign_.take_own(i, 0, {}, {});
+    }
+    list();
+}
+
+void BoundedExchange::list() {
+    owned_.clear(), others_.clear();
+    for (int i = 0; i < world_.bodies(); ++i) {
+        if (!clock_.moves(i)) continue;
+        (own_[static_cast<std::size_t>(i)] != 0 ? owned_ : others_).push_back(i);
+    }
+}
+
+void BoundedExchange::set_own(int body, bool own) {
+    own_[static_cast<std::size_t>(body)] = own;
+    if (body < world_.bodies()) world_.set_own(body, own);
+    felt_.erase(body);
+    told_asleep_[static_cast<std::size_t>(body)] = 0;
+    if (own) costs_.forget(body);
+}
+
+// Without own bodies: events up to there, too.
+void BoundedExchange::come_to(std::uint64_t step) {
+    const int before = world_.bodies();
+    clock_.apply(world_, step);
+    for (int i = before; i < world_.bodies(); ++i) {
+        const bool own = own_[static_cast<std::size_t>(i)] != 0;
+        world_.set_own(i, own);
+        if (clock_.moves(i) && !own && !foreign_.known(i)) foreign_.take_own(i, step, {}, {});
+    }
+    if (world_.bodies() != before) list();
+}
+
+void BoundedExchange::take(const WorldHeader& header, UpdateMessage&& message) {
+    for (Push& push : message.pushes) {
+        if (static_cast<int>(push.body) >= world_.bodies()) continue;
+        world_.spread_modes(static_cast<int>(push.body), push.impulse);
+        pushes_.add(static_cast<int>(push.body), header.worker, header.step, std::move(push.impulse));
+    }
+    message.pushes.clear();
+    pushes_.heard(header.worker, header.step);
+    foreign_.take(header.step, std::make_shared<const UpdateMessage>(std::move(message)));
+}
+
+void BoundedExchange::members(const std::vector<std::uint32_t>& workers) {
+    for (const std::uint32_t was : members_)
+        if (std::find(workers.begin(), workers.end(), was) == workers.end())
+            pushes_.heard(was, PushLog::kForever);
+    members_ = workers;
+}
+
+void BoundedExchange::own(const Ownership& ownership) {
+    const std::uint32_t owner = ownership.owner;
+    const bool first = std::find(owner_.begin(), owner_.end(), owner) == owner_.end();
+    auto message = std::make_shared<UpdateMessage>();
+    message->sources = ownership.sources, message->applied = ownership.applied;
+    for (const WorldRecord& record : ownership.bodies) {
+        owner_[static_cast<std::size_t>(record.body)] = owner;
+        Update& update = message->bodies.emplace_back();
+        update.body = static_cast<std::uint32_t>(record.body);
+        update.asleep = record.asleep, update.quarantined = record.quarantined;
+        update.state = record.state;
+        if (owner != self_ && own_[static_cast<std::size_t>(record.body)] != 0) set_own(record.body, false);
+    }
+    // A worker that owned nothing begins here.
+    if (first && owner != self_) pushes_.heard(owner, ownership.step);
+    // Last published: its own message, with what held the bodies, is known already to who was here.
+    std::erase_if(message->bodies, [&](const Update& u) {
+        return !ownership.traded && foreign_.newest(static_cast<int>(u.body)) >= ownership.step;
+    });
+    foreign_.take(ownership.step, message);
+    if (owner == self_) {
+        if (owned_.empty() && ownership.step > step_ && later_.empty()) {
+            come_to(ownership.step);
+            step_ = ownership.step;
+            world_.set_step(step_);
+        }
+        if (ownership.step > step_)
+            later_.push_back(ownership);
+        else
+            take_over(ownership);
+    }
+    list();
+}
+
+// The bodies as they are at this worker's step.
+void BoundedExchange::take_over(const Ownership& ownership) {
+    put_right();
+    for (const WorldRecord& record : ownership.bodies) {
+        const int body = record.body;
+        if (owner_[static_cast<std::size_t>(body)] != self_) continue;  // gone again
+        if (body < world_.bodies()) {
+            WorldRecord now = record;
+            const ForeignBodies::Ghost ghost = foreign_.at(body, step_);
+            now.state = ghost.state;
+            now.asleep = now.asleep && ghost.asleep;
+            set_own(body, true);
+            world_.restore(now);
+        } else {
+            set_own(body, true);
+        }
+    }
+    list();
+}
+
+std::uint64_t BoundedExchange::slowest() const {
+    std::uint64_t slowest = PushLog::kForever;
+    for (const std::uint32_t worker : members_) {
+        if (worker == self_) continue;
+        if (std::find(owner_.begin(), owner_.end(), worker) == owner_.end()) continue;
+        slowest = std::min(slowest, pushes_.known(worker));
+    }
+    return slowest;
+}
+
+int BoundedExchange::lead() const {
+    const std::uint64_t least = slowest();
+    return least < step_ ? static_cast<int>(step_ - least) : 0;
+}
+
+bool BoundedExchange::ready() const {
+    return !done() && !owned_.empty() && lead() <= settings_.bound;
+}
+
+// Pushes that came since: what was assumed of steps that are over is put right.
+void BoundedExchange::put_right() {
+    for (const auto& [source, known] : pushes_.sources()) {
+        std::uint64_t& then = applied_[source];
+        if (source == self_ || known <= then) continue;
+        for (const int body : owned_) {
+            if (pushes_.quiet(body) || then >= step_) continue;
+            for (std::uint64_t step = pushes_.first_kept(then + 1, step_); step <= step_; ++step) {
+                const StepImpulse right = pushes_.seen(body, source, step, known);
+                const StepImpulse wrong = negative(pushes_.seen(body, source, step, then));
+                if (!is_zero(right)) world_.correct(body, right, static_cast<int>(step_ - step));
+                if (!is_zero(wrong)) world_.correct(body, wrong, static_cast<int>(step_ - step));
+            }
+        }
+        then = known;
+    }
+}
+
+void BoundedExchange::hold_pushes() {
+    for (const int body : owned_) {
+        if (pushes_.quiet(body)) continue;
+        StepImpulse held;
+        for (const std::uint32_t source : pushes_.sources_of(body))
+            if (source != self_) add_impulse(held, pushes_.seen(body, source, step_ + 1, applied_[source]));
+        if (!is_zero(held)) world_.hold(body, held);
+    }
+}
+
+void BoundedExchange::place_ghosts() {
+    balls_.clear();
+    for (const int body : others_)
+        if (foreign_.known(body) && !foreign_.quarantined(body)) balls_.push_back(foreign_.ball(body, step_));
+    world_.near_own(balls_, near_);
+    ghost_age_ = 0;
+    leant_on_.clear();
+    for (const int body : near_) {
+        const ForeignBodies::Ghost ghost = foreign_.at(body, step_);
+        ghost_age_ = std::max(ghost_age_, ghost.age);
+        if (ghost.leant_on) leant_on_.push_back(body);
+        world_.place_ghost(body, ghost.state, is_zero(ghost.held) ? nullptr : &ghost.held, ghost.asleep);
+    }
+}
+
+// What is given to ghosts. Several workers may resolve contacts of one body in the same step, each against
+// what the others did before; all together would overdo it and swing. So a contact that lasts changes by its
+// share only: one in as many as work on either body.
+void BoundedExchange::keep_pushes() {
+    given_.clear();
+    std::map<std::pair<int, int>, CrossImpulse> now;
+    for (CrossImpulse cross : world_.cross_impulses()) {
+        const auto before = crossed_.find({cross.own, cross.ghost});
+        const double share = 1.0 / resolvers(cross.own, cross.ghost);
+        if (before != crossed_.end() && share < 1) {
+            StepImpulse excess = cross.on_own;
+            cross.on_own = blend(before->second.on_own, cross.on_own, share);
+            cross.on_ghost = blend(before->second.on_ghost, cross.on_ghost, share);
+            add_impulse(excess, cross.on_own, -1);
+            world_.correct(cross.own, negative(excess), 0);
+        }
+        give_push(cross.ghost, cross.on_ghost);
+        now.emplace(std::pair(cross.own, cross.ghost), std::move(cross));
+    }
+    crossed_ = std::move(now);
+    // As they travel: all but linear and angular as floats.
+    for (Push& push : given_) {
+        StepImpulse& sent = push.impulse;
+        sent.modal_q = sent.modal_q.cast<float>().cast<double>();
+        sent.modal_rate = sent.modal_rate.cast<float>().cast<double>();
+        world_.spread_modes(static_cast<int>(push.body), sent);
+        sent.displacement = sent.displacement.cast<float>().cast<double>();
+        sent.turn = sent.turn.cast<float>().cast<double>();
+        pushes_.add(static_cast<int>(push.body), self_, step_, sent);
+    }
+    pushes_.heard(self_, step_);
+}
+
+void BoundedExchange::give_push(int ghost, const StepImpulse& impulse) {
+    for (Push& push : given_)
+        if (push.body == static_cast<std::uint32_t>(ghost)) return add_impulse(push.impulse, impulse);
+    given_.push_back({static_cast<std::uint32_t>(ghost), impulse});
+}
+
+int BoundedExchange::resolvers(int own, int ghost) const {
+    const auto recent = static_cast<std::uint64_t>(settings_.bound) + 3;
+    const std::uint64_t since = step_ > recent ? step_ - recent : 0;
+    const bool leant_on = std::find(leant_on_.begin(), leant_on_.end(), ghost) != leant_on_.end();
+    return 1 + std::max(pushes_.count_since(own, since, self_),
+                        pushes_.count_since(ghost, since, self_) + (leant_on ? 1 : 0));
+}
+
+// Of bodies that others push, what own ones do to them: others want to know what holds the ghost.
+void BoundedExchange::feel() {
+    for (const int body : owned_) {
+        const bool pushed = !pushes_.quiet(body);
+        world_.watch(body, pushed);
+        if (!pushed) {
+            felt_.erase(body);
+            continue;
+        }
+        Felt& felt = felt_[body];
+        felt.before = std::move(felt.last);
+        const StepImpulse* now = world_.impulse(body);
+        felt.last = now ? *now : StepImpulse{};
+    }
+}
+
+void BoundedExchange::step() {
+    come_to(step_);
+    put_right();
+    hold_pushes();
+    place_ghosts();
+    world_.step();
+    ++step_;
+    keep_pushes();
+    feel();
+    pushes_.prune(step_);
+    for (std::size_t i = 0; i < later_.size();) {
+        if (later_[i].step > step_) {
+            ++i;
+            continue;
+        }
+        const Ownership ownership = std::move(later_[i]);
+        later_.erase(later_.begin() + static_cast<std::ptrdiff_t>(i));
+        take_over(ownership);
+    }
+}
+
+void BoundedExchange::applied(std::vector<std::uint32_t>& sources, std::vector<std::uint64_t>& steps) const {
+    for (const auto& [source, known] : applied_) {
+        if (source == self_) continue;
+        sources.push_back(source), steps.push_back(known);
+    }
+    sources.push_back(self_), steps.push_back(step_);
+}
+
+Update BoundedExchange::update_of(int body) const {
+    const WorldRecord record = world_.record(body);
+    Update update;
+    update.body = static_cast<std::uint32_t>(body);
+    update.asleep = record.asleep, update.quarantined = record.quarantined;
+    update.still = record.asleep || record.still_steps * world_.settings().dt >= 0.5 - 1e-9;
+    update.state = record.state;
+    if (const auto felt = felt_.find(body); felt != felt_.end()) {
+        update.impulse = lasting(felt->second.last, felt->second.before);
+        update.held = !is_zero(update.impulse);
+    }
+    return update;
+}
+
+std::vector<std::uint8_t> BoundedExchange::publish(std::uint32_t epoch, const StepReport& report) {
+    UpdateMessage message;
+    message.report = report;
+    applied(message.sources, message.applied);
+    for (const int body : owned_) {
+        std::uint8_t& told = told_asleep_[static_cast<std::size_t>(body)];
+        const bool asleep = world_.asleep(body);
+        if (asleep && told != 0) continue;
+        told = asleep;
+        message.bodies.push_back(update_of(body));
+    }
+    message.pushes = std::move(given_);
+    given_.clear();
+    return encode({self_, epoch, step_}, message);
+}
+
+std::vector<Exchange::Lot> BoundedExchange::lots(std::uint32_t towards) const {
+    std::vector<int> others;
+    for (const int i : others_)
+        if (owner_[static_cast<std::size_t>(i)] == towards) others.push_back(i);
+    Eigen::Vector3d theirs = Eigen::Vector3d::Zero();
+    for (const int i : others) theirs += foreign_.last_position(i) / static_cast<double>(others.size());
+    const std::vector<double> pull = pulls(world_, owned_, others);
+    std::map<int, Lot> lots;
+    for (std::size_t i = 0; i < owned_.size(); ++i) {
+        const int body = owned_[i];
+        Lot& lot = lots.try_emplace(lot_[static_cast<std::size_t>(body)], Lot{{}, 0, -1e300}).first->second;
+        lot.bodies.push_back(static_cast<std::uint32_t>(body));
+        lot.cost_s += costs_.of(body);
+        lot.pull = std::max(lot.pull, pull[i]);
+    }
+    std::vector<Lot> all;
+    for (auto& [first, lot] : lots)
+        if (lot.cost_s > 0) all.push_back(std::move(lot));
+    return all;
+}
+
+Handover BoundedExchange::give(const std::vector<std::uint32_t>& bodies) {
+    put_right();
+    Handover handover;
+    applied(handover.sources, handover.applied);
+    for (const std::uint32_t id : bodies) {
+        const int body = static_cast<int>(id);
+        handover.bodies.push_back(world_.record(body));
+        foreign_.take_own(body, step_, handover.sources, handover.applied);
+        set_own(body, false);
+    }
+    list();
+    return handover;
+}
+
+}  // namespace
+
+std::unique_ptr<Exchange> make_bounded_exchange(const SceneMessage& scene) {
+    return std::make_unique<BoundedExchange>(scene);
+}
+
 }  // namespace sim

@@ -64,6 +64,7 @@ void IslandSolver::begin(const Island& island) {
     jacobians_used_ = 0;
     contacts_.clear(), springs_.clear();
     any_told_ = false;
+    first_crossed_ = crossed_.size();
     contacts_.reserve(triples);
     for (const Turn& turn : in_turns(island))
         add_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
@@ -156,6 +157,26 @@ void IslandSolver::write_rows(const Place& place, const Eigen::Matrix3f& directi
     }
 }
 
+// Place in crossed_ of an own body's contact with a ghost, else -1.
+int IslandSolver::note_pair(const Manifold& manifold) {
+    if (!told_crossed_ || manifold.b >= kFirstPlane || local(manifold.a) < 0 || local(manifold.b) < 0)
+        return -1;
+    const MovingBody &a = (*bodies_)[static_cast<std::size_t>(manifold.a)],
+                     &b = (*bodies_)[static_cast<std::size_t>(manifold.b)];
+    if (a.own == b.own) return -1;
+    any_told_ = true;
+    const int own = a.own ? manifold.a : manifold.b, ghost = a.own ? manifold.b : manifold.a;
+    for (std::size_t i = first_crossed_; i < crossed_.size(); ++i)
+        if (crossed_[i].own == own && crossed_[i].ghost == ghost) return static_cast<int>(i);
+    CrossImpulse& cross = crossed_.emplace_back();
+    cross.own = own, cross.ghost = ghost;
+    for (StepImpulse* given : {&cross.on_own, &cross.on_ghost}) {
+        const int modes = (a.own == (given == &cross.on_own) ? a : b).kind->modes;
+        given->modal = given->modal_q = given->modal_rate = Eigen::VectorXd::Zero(modes);
+    }
+    return static_cast<int>(crossed_.size()) - 1;
+}
+
 // What comes from planes and fixed bodies is not told: whoever has a ghost of the body finds that himself.
 bool IslandSolver::note_told(const Rows& rows, bool contact) {
     bool watched = false, both = true;
@@ -205,7 +226,8 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
     c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
     c.inverse_tangent[2] = c.k[1][1] / det;
-    c.told = note_told(c, true);
+    c.pair = note_pair(manifold);
+    c.told = note_told(c, true) || c.pair >= 0;
     c.impulse[0] = point.normal_impulse;
     c.impulse[1] = point.friction_impulse.dot(c.tangent[0]);
     c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);

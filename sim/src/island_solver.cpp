@@ -13,6 +13,11 @@ using ModeArray = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostModes, 1>;  //
 constexpr float kPushSpeed = 3;           // [m/s]
 constexpr float kBounceThreshold = 0.1f;  // [m/s]
 
+void clear(StepImpulse& impulse) {
+    impulse.linear.setZero(), impulse.angular.setZero(), impulse.displacement.setZero();
+    impulse.turn.setZero(), impulse.modal.setZero();
+}
+
 // Without the library's check for negative arguments.
 float root(float x) {
     return _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(x)));
@@ -261,59 +266,95 @@ void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const
     }
 }
 
-// Adds what a row triple did in this substep to the watched of its two bodies; see settle_given for what the
-// sums stand for.
-void IslandSolver::tell(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
-                        const float (&along)[3], const Eigen::Vector3d& point) {
-    for (const Side& side : rows.side) {
-        if (side.body < 0) continue;
-        const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
-        if (!at.body->watched) continue;
-        const double sign = &side == &rows.side[0] ? 1 : -1;
-        StepImpulse& given = at.body->given;
-        if (!std::exchange(at.body->was_given, true)) {
-            given.linear.setZero(), given.angular.setZero(), given.displacement.setZero();
-            given.turn.setZero(), given.modal.setZero();
+// Adds what a row triple did in this substep; see settle for what the sums stand for.
+void IslandSolver::tell_side(const Rows& rows, int which, const Eigen::Vector3d& impulse,
+                             const Eigen::Vector3d& at_move, const float (&along)[3],
+                             const Eigen::Vector3d& point, StepImpulse& given) const {
+    const Side& side = rows.side[which];
+    const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
+    const double sign = which == 0 ? 1 : -1;
+    const Eigen::Vector3d arm = point - at.place, moved = h_ * at_move + remaining_ * impulse;
+    given.linear += sign * impulse;
+    given.angular += sign * arm.cross(impulse);
+    given.displacement += sign * moved;
+    given.turn += sign * arm.cross(moved);
+    const float* d = jacobians_.data() + side.rows + 8;
+    const HeldSteps& step = at.body->kind->substep;
+    for (int k = 0; k < at.body->kind->modes; ++k) {
+        const double held = static_cast<double>(along[0] * d[k] + along[1] * d[side.width + k] +
+                                                along[2] * d[2 * side.width + k]) /
+                            step.root_compliance[k];
+        given.modal[k] += held;
+        if (given.modal_q.size() == 0) continue;
+        given.modal_q[k] += h_ * step.compliance[k] * held;
+        given.modal_rate[k] += step.rate[k] * held;
+    }
+}
+
+// What earlier substeps did to the modes of ghosts rings on.
+void IslandSolver::ring_on() {
+    auto ring = [this](int body, StepImpulse& given) {
+        const HeldSteps& step = (*bodies_)[static_cast<std::size_t>(body)].kind->substep;
+        for (int k = 0; k < given.modal_q.size(); ++k) {
+            const double z = given.modal_q[k], rate = given.modal_rate[k];
+            given.modal_q[k] = z + h_ * (step.mean_z[k] * z + step.mean_rate[k] * rate);
+            given.modal_rate[k] = step.c[k] * z + step.d[k] * rate;
         }
-        const Eigen::Vector3d arm = point - at.place, moved = h_ * at_move + remaining_ * impulse;
-        given.linear += sign * impulse;
-        given.angular += sign * arm.cross(impulse);
-        given.displacement += sign * moved;
-        given.turn += sign * arm.cross(moved);
-        const float* d = jacobians_.data() + side.rows + 8;
-        for (int k = 0; k < at.body->kind->modes; ++k)
-            given.modal[k] += static_cast<double>(along[0] * d[k] + along[1] * d[side.width + k] +
-                                                  along[2] * d[2 * side.width + k]);
+    };
+    for (std::size_t i = first_crossed_; i < crossed_.size(); ++i) {
+        ring(crossed_[i].own, crossed_[i].on_own);
+        ring(crossed_[i].ghost, crossed_[i].on_ghost);
+    }
+}
+
+void IslandSolver::tell(const Rows& rows, int pair, const Eigen::Vector3d& impulse,
+                        const Eigen::Vector3d& at_move, const float (&along)[3],
+                        const Eigen::Vector3d& point) {
+    for (int side = 0; side < 2; ++side) {
+        if (rows.side[side].body < 0) continue;
+        MovingBody& body = *rows_of_[static_cast<std::size_t>(rows.side[side].body)].body;
+        if (pair >= 0) {
+            CrossImpulse& cross = crossed_[static_cast<std::size_t>(pair)];
+            tell_side(rows, side, impulse, at_move, along, point, body.own ? cross.on_own : cross.on_ghost);
+        }
+        if (!body.watched) continue;
+        if (!std::exchange(body.was_given, true)) clear(body.given);
+        tell_side(rows, side, impulse, at_move, along, point, body.given);
     }
 }
 
 // From sums over the substeps to what is told: displacement and turn beyond those of the impulse acting
 // half-way through the step; rows are scaled by the root of the compliance.
+void IslandSolver::settle(const BodyRows& rows, StepImpulse& given) const {
+    const BodyKind& kind = *rows.body->kind;
+    given.displacement = (given.displacement - settings_->dt / 2 * given.linear) / kind.mass.mass;
+    given.turn -= settings_->dt / 2 * given.angular;
+    given.turn = rows.frame * (rows.frame.transpose() * given.turn).cwiseQuotient(kind.mass.inertia);
+}
+
 void IslandSolver::settle_given() {
-    for (const BodyRows& rows : rows_of_) {
-        MovingBody& body = *rows.body;
-        if (!body.was_given) continue;
-        const BodyKind& kind = *body.kind;
-        StepImpulse& given = body.given;
-        given.displacement = (given.displacement - settings_->dt / 2 * given.linear) / kind.mass.mass;
-        given.turn -= settings_->dt / 2 * given.angular;
-        given.turn = rows.frame * (rows.frame.transpose() * given.turn).cwiseQuotient(kind.mass.inertia);
-        given.modal.array() /= kind.substep.root_compliance;
+    for (const BodyRows& rows : rows_of_)
+        if (rows.body->was_given) settle(rows, rows.body->given);
+    for (std::size_t i = first_crossed_; i < crossed_.size(); ++i) {
+        CrossImpulse& cross = crossed_[i];
+        settle(rows_of_[static_cast<std::size_t>(local(cross.own))], cross.on_own);
+        settle(rows_of_[static_cast<std::size_t>(local(cross.ghost))], cross.on_ghost);
     }
 }
 
 void IslandSolver::finish() {
+    ring_on();
     for (const ContactRows& c : contacts_) {
         auto world = [&c](const float(&p)[3]) -> Eigen::Vector3d {
             return (p[0] * c.point->normal + p[1] * c.tangent[0] + p[2] * c.tangent[1]).cast<double>();
         };
         if (c.told && (c.impulse[0] != 0 || c.at_move[0] != 0))
-            tell(c, world(c.impulse), world(c.at_move), c.impulse, place_now(c));
+            tell(c, c.pair, world(c.impulse), world(c.at_move), c.impulse, place_now(c));
         if (c.impulse[0] != 0) apply(c, world(c.impulse), place_now(c));
     }
     for (const SpringRows& s : springs_) {
         const Eigen::Vector3d p(s.impulse[0], s.impulse[1], s.impulse[2]);
-        if (s.told) tell(s, p, p, s.impulse, s.place);
+        if (s.told) tell(s, -1, p, p, s.impulse, s.place);
         apply(s, p, s.place);
     }
     for (const BodyRows& rows : rows_of_) {

@@ -53,6 +53,12 @@ public:
     [[nodiscard]] Eigen::Vector3d take_outside_impulse() noexcept {
         return std::exchange(outside_, Eigen::Vector3d::Zero());
     }
+    [[nodiscard]] const std::vector<CrossImpulse>& crossed() const noexcept { return crossed_; }
+    /// Whether contacts of own bodies with others are told in `crossed`; forgets what was.
+    void cross(bool told) noexcept {
+        crossed_.clear();
+        told_crossed_ = told;
+    }
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
     [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }
 
@@ -86,6 +92,7 @@ private:
             inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
         float impulse[3], kept[3], at_move[3], largest;
         bool emerging;
+        int pair = -1;  // of crossed_
     };
     struct SpringRows : Rows {
         HeldConstraint* constraint;
@@ -147,11 +154,16 @@ private:
     void move();
     [[nodiscard]] Eigen::Vector3d place_now(const ContactRows& contact) const;
     void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
-    void tell(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
+    void tell(const Rows& rows, int pair, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
               const float (&along)[3], const Eigen::Vector3d& point);
+    void tell_side(const Rows& rows, int side, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
+                   const float (&along)[3], const Eigen::Vector3d& point, StepImpulse& given) const;
     void finish();
     void keep_impulses();
+    void ring_on();
     void settle_given();
+    void settle(const BodyRows& rows, StepImpulse& given) const;
+    int note_pair(const Manifold& manifold);
 
     const WorldSettings* settings_;
     std::vector<MovingBody>* bodies_;
@@ -170,8 +182,10 @@ private:
     float inverse_h_ = 0, push_rate_ = 0, mass_share_ = 1, impulse_share_ = 0;
     std::uint64_t limited_ = 0, broken_ = 0;
     Eigen::Vector3d outside_ = Eigen::Vector3d::Zero();
-    bool any_told_ = false;
-    double remaining_ = 0;  // of the step after this substep [s]
+    bool any_told_ = false, told_crossed_ = false;
+    std::vector<CrossImpulse> crossed_;  // of all islands since forget_crossed
+    std::size_t first_crossed_ = 0;      // of this island
+    double remaining_ = 0;               // of the step after this substep [s]
 };
 
 }  // namespace sim

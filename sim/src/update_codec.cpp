@@ -236,8 +236,9 @@ Push read_push(ByteReader& in) {
     in.matrix(p.impulse.angular);
     read_floats(in, p.impulse.displacement);
     read_floats(in, p.impulse.turn);
-    p.impulse.modal.resize(which.modes);
-    read_floats(in, p.impulse.modal);
+    p.impulse.modal_q.resize(which.modes), p.impulse.modal_rate.resize(which.modes);
+    read_floats(in, p.impulse.modal_q);
+    read_floats(in, p.impulse.modal_rate);
     if (!p.impulse.linear.allFinite() || !p.impulse.angular.allFinite())
         throw DecodeError("a push that is not finite");
     return p;
@@ -254,12 +255,13 @@ void write(ByteWriter& out, const std::vector<Update>& updates) {
 void write(ByteWriter& out, const std::vector<Push>& pushes) {
     out.count(pushes.size());
     for (const Push& p : pushes) {
-        out.number(body_and_modes(p.body, p.impulse.modal.size()));
+        out.number(body_and_modes(p.body, p.impulse.modal_q.size()));
         out.matrix(p.impulse.linear);
         out.matrix(p.impulse.angular);
         write_floats(out, p.impulse.displacement);
         write_floats(out, p.impulse.turn);
-        write_floats(out, p.impulse.modal);
+        write_floats(out, p.impulse.modal_q);
+        write_floats(out, p.impulse.modal_rate);
     }
 }
 

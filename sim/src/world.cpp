@@ -305,6 +305,7 @@ bool World::Implementation::any_awake() const {
 
 void World::Implementation::step() {
     const FlushDenormals flush;
+    solver->cross(sharing == Sharing::pairs);
     outside_before = outside;
     ++counts.steps;
     gather();
@@ -376,6 +377,10 @@ void World::remove_constraint(int id) {
 
 bool World::constraint_holds(int id) const {
     return implementation_->constraints.at(static_cast<std::size_t>(id)).holds;
+}
+
+const WorldSettings& World::settings() const noexcept {
+    return implementation_->settings;
 }
 
 int World::bodies() const noexcept {

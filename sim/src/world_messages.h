@@ -56,8 +56,8 @@ namespace sim {
 //               b/m, u8 (1 asleep, 2 still, 4 quarantined, 8 held, and 16 times E), w3 position,
 //               7 bytes orientation, 3 f16 velocity, 3 i16 angular momentum in units of 2^(4 E - 44)
 //               kg m^2/s, f16 q[m], f16 q'[m]; held: 3 f16 linear, 3 f16 angular, f16 modal[m]
-//   push        76 + 4 m bytes: b/m, v3 linear, v3 angular, w3 displacement, w3 turn, f32 modal[m]
-//   scene, settings: see world_scene_codec.cpp
+//   push        76 + 8 m bytes: b/m, v3 linear, v3 angular, w3 displacement, w3 turn, f32 q[m], q'[m] that it
+//   came to scene, settings: see world_scene_codec.cpp
 //
 // The 7 bytes of an orientation: 56 bits, lowest first: which of x, y, z, w is largest in size (2 bits; it is
 // made positive and follows from the others), the other three in that order, each 18 bits, 0 to 2^18 - 1 for

@@ -39,8 +39,10 @@ void respond(const MovingBody& body, double dt, const StepImpulse& impulse, int 
     rotate(s.orientation, time * turned(body, s.orientation, impulse.angular) + impulse.turn);
     s.angular_momentum += impulse.angular;
     const HeldSteps& h = body.kind->whole;
-    for (int k = 0; k < body.kind->modes; ++k) {
-        double z = dt * h.compliance[k] * impulse.modal[k], rate = h.rate[k] * impulse.modal[k];
+    const bool told = impulse.modal_q.size() > 0;
+    for (int k = 0; k < (told ? impulse.modal_q.size() : impulse.modal.size()); ++k) {
+        double z = told ? impulse.modal_q[k] : dt * h.compliance[k] * impulse.modal[k];
+        double rate = told ? impulse.modal_rate[k] : h.rate[k] * impulse.modal[k];
         for (int i = 0; i < steps_ago; ++i) {
             const double next = z + dt * (h.mean_z[k] * z + h.mean_rate[k] * rate);
             rate = h.c[k] * z + h.d[k] * rate;
@@ -55,7 +57,7 @@ void push(MovingBody& body, double dt, const StepImpulse& impulse) {
         body.force.setZero(), body.torque.setZero(), body.modal_force.setZero();
     body.force += impulse.linear / dt;
     body.torque += impulse.angular / dt;
-    if (body.kind->modes > 0) body.modal_force += impulse.modal / dt;
+    if (impulse.modal.size() == body.modal_force.size()) body.modal_force += impulse.modal / dt;
 }
 
 ContactRecord record_of(const Manifold& m) {
@@ -299,8 +301,8 @@ void World::place_ghost(int body, const WorldBodyState& state, const StepImpulse
     b.state = state;
     b.asleep = asleep;
     b.sleep_group = body;
-    b.unposed = b.watched = true;
-    b.pushed = b.was_given = false;
+    b.unposed = true;
+    b.pushed = b.watched = b.was_given = false;
     if (held) push(b, implementation_->settings.dt, *held);
     implementation_->placed.push_back(body);
 }
@@ -323,11 +325,25 @@ void World::correct(int body, WorldBodyState& state, const StepImpulse& impulse,
             steps_ago, state);
 }
 
+void World::spread_modes(int body, StepImpulse& impulse) const {
+    const BodyKind& kind = *implementation_->bodies.at(static_cast<std::size_t>(body)).kind;
+    if (impulse.modal_q.size() != kind.modes) return;
+    const double dt = implementation_->settings.dt;
+    impulse.modal.resize(kind.modes);
+    for (int k = 0; k < kind.modes; ++k) {
+        // Least squares of omega q and q'.
+        const double omega = kind.basis.omega[k];
+        const double place = omega * dt * kind.whole.compliance[k], rate = kind.whole.rate[k];
+        impulse.modal[k] = (place * omega * impulse.modal_q[k] + rate * impulse.modal_rate[k]) /
+                           (place * place + rate * rate);
+    }
+}
+
 void World::extrapolate(int body, WorldBodyState& state, const StepImpulse* held) {
     MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
     std::swap(b.state, state);
     const bool pushed = std::exchange(b.pushed, false);
-    if (held) push(b, implementation_->settings.dt, *held);
+    if (held) hold(body, *held);
     move_freely(b, implementation_->settings);
     (void)limit_deformation(b);
     b.pushed = pushed;
@@ -336,6 +352,10 @@ void World::extrapolate(int body, WorldBodyState& state, const StepImpulse* held
 
 void World::watch(int body, bool watched) {
     implementation_->bodies.at(static_cast<std::size_t>(body)).watched = watched;
+}
+
+const std::vector<CrossImpulse>& World::cross_impulses() const noexcept {
+    return implementation_->solver->crossed();
 }
 
 const StepImpulse* World::impulse(int body) const {

@@ -146,7 +146,15 @@ struct StepImpulse {
     Eigen::Vector3d displacement =
         Eigen::Vector3d::Zero();                     ///< by pushing overlaps out, beyond the impulses' [m]
     Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< likewise, rotation vector, world axes [rad]
-    Eigen::VectorXd modal;                           ///< of the modal coordinates [N s kg^-1/2]
+    /// Of the modal coordinates: an impulse spread over the step [N s kg^-1/2], or, where these are there,
+    /// what it came to at the step's end: q [m kg^1/2] and rates.
+    Eigen::VectorXd modal, modal_q, modal_rate;
+};
+
+/// What an own body and a ghost did to each other in one step.
+struct CrossImpulse {
+    int own, ghost;
+    StepImpulse on_own, on_ghost;
 };
 
 /// A foreign body's whereabouts over the next step.
@@ -201,6 +209,7 @@ public:
     void remove_constraint(int id);
     [[nodiscard]] bool constraint_holds(int id) const;  ///< neither removed nor broken
 
+    [[nodiscard]] const WorldSettings& settings() const noexcept;
     [[nodiscard]] int bodies() const noexcept;
     [[nodiscard]] const WorldBody& definition(int body) const;
     [[nodiscard]] FidelityChoice fidelity(int body) const;  ///< as used; rigid, linear or modal
@@ -259,11 +268,15 @@ public:
     void correct(int body, const StepImpulse& impulse, int steps_ago);
     /// The same for any state of the body.
     void correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago) const;
+    /// Sets `modal` to the steady impulse that comes nearest to modal_q and modal_rate.
+    void spread_modes(int body, StepImpulse& impulse) const;
     /// One step of a body that touches nothing, under gravity and `held`.
     void extrapolate(int body, WorldBodyState& state, const StepImpulse* held);
     /// Keep own body's impulses from other moving bodies and constraints (not what hold and correct gave).
     void watch(int body, bool watched);
-    /// Of the last step: ghosts (from own bodies) and watched bodies; nullptr where there was none.
+    /// Of the last step, every pair of an own body and a ghost that pushed each other.
+    [[nodiscard]] const std::vector<CrossImpulse>& cross_impulses() const noexcept;
+    /// Of a watched body in the last step; nullptr: none.
     [[nodiscard]] const StepImpulse* impulse(int body) const;
     [[nodiscard]] int cross_contacts()
         const noexcept;  ///< points between own bodies and ghosts in the last step

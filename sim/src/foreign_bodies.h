@@ -1,0 +1,61 @@
+#pragma once
+#include <deque>
+#include <memory>
+
+#include "push_log.h"
+#include "world_messages.h"
+
+namespace sim {
+
+/// What one worker knows of the others' bodies in bounded pace: their updates, and where they are at any step
+/// near these.
+class ForeignBodies {
+public:
+    /// The world lends kinds and the free step; its own state is not touched.
+    ForeignBodies(World& world, const PushLog& pushes, std::uint32_t self, int bodies);
+
+    /// An update message of step `step`, or what stands for one.
+    void take(std::uint64_t step, std::shared_ptr<const UpdateMessage> message);
+    /// From now on seen at `step` as the world has it.
+    void take_own(int body, std::uint64_t step, std::vector<std::uint32_t> sources,
+                  std::vector<std::uint64_t> applied);
+
+    /// The body at step `now`, by the last update not later than that (or the earliest there is): what its
+    /// owner assumed of pushes is put right, then it moves freely under what lasts and the pushes.
+    struct Ghost {
+        WorldBodyState state;
+        bool asleep = false;
+        int age = 0;            ///< of the update [steps]
+        bool leant_on = false;  ///< other bodies of its owner touch it
+        StepImpulse held;       ///< over the next step, pushes of this worker's own bodies apart
+    };
+    [[nodiscard]] Ghost at(int body, std::uint64_t now);
+    /// A ball that holds the body over the step after `now`; drops updates that `now` has passed.
+    [[nodiscard]] ForeignBall ball(int body, std::uint64_t now);
+    [[nodiscard]] bool known(int body) const { return !seen_[static_cast<std::size_t>(body)].empty(); }
+    /// Step of the last update; 0: the start, or none.
+    [[nodiscard]] std::uint64_t newest(int body) const {
+        return known(body) ? seen_[static_cast<std::size_t>(body)].back().step : 0;
+    }
+    [[nodiscard]] bool quarantined(int body) const;
+    [[nodiscard]] Eigen::Vector3d last_position(int body) const;
+
+private:
+    struct Seen {
+        std::uint64_t step;
+        std::shared_ptr<const UpdateMessage> message;
+        const Update* update;
+        double radius;
+    };
+    [[nodiscard]] const Seen& seen_at(int body, std::uint64_t now) const;
+    [[nodiscard]] static std::uint64_t applied(const Seen& seen, std::uint32_t source);
+    void put_right(int body, const Seen& seen, WorldBodyState& state);
+
+    World* world_;
+    const PushLog* pushes_;
+    std::uint32_t self_;
+    double dt_ = 0, gravity_ = 0;
+    std::vector<std::deque<Seen>> seen_;  // by body, ascending steps
+};
+
+}  // namespace sim

@@ -1,0 +1,116 @@
+#include "push_log.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace sim {
+namespace {
+
+double common(double a, double b) {
+    if (a * b <= 0) return 0;
+    if (std::abs(a) < 2 * std::abs(b) && std::abs(b) < 2 * std::abs(a)) return (a + b) / 2;
+    return std::abs(a) < std::abs(b) ? a : b;
+}
+
+void add(Eigen::VectorXd& a, const Eigen::VectorXd& b, double factor) {
+    if (b.size() == 0) return;
+    if (a.size() == 0) a = Eigen::VectorXd::Zero(b.size());
+    a += factor * b;
+}
+
+template <typename Vector>
+Vector common(const Vector& a, const Vector& b) {
+    Vector c = a;
+    for (Eigen::Index i = 0; i < c.size(); ++i) c[i] = common(a[i], i < b.size() ? b[i] : 0.0);
+    return c;
+}
+
+}  // namespace
+
+void add_impulse(StepImpulse& a, const StepImpulse& b, double factor) {
+    a.linear += factor * b.linear;
+    a.angular += factor * b.angular;
+    a.displacement += factor * b.displacement;
+    a.turn += factor * b.turn;
+    add(a.modal, b.modal, factor);
+    add(a.modal_q, b.modal_q, factor);
+    add(a.modal_rate, b.modal_rate, factor);
+}
+
+StepImpulse negative(const StepImpulse& a) {
+    StepImpulse n;
+    add_impulse(n, a, -1);
+    return n;
+}
+
+bool is_zero(const StepImpulse& a) {
+    return a.linear.isZero(0) && a.angular.isZero(0) && a.displacement.isZero(0) && a.turn.isZero(0) &&
+           a.modal.isZero(0) && a.modal_q.isZero(0) && a.modal_rate.isZero(0);
+}
+
+StepImpulse lasting(const StepImpulse& a, const StepImpulse& b) {
+    StepImpulse c;
+    c.linear = common(a.linear, b.linear);
+    c.angular = common(a.angular, b.angular);
+    c.modal = common(a.modal, b.modal);
+    return c;
+}
+
+PushLog::PushLog(int bodies, int keep_steps)
+    : keep_(static_cast<std::uint64_t>(keep_steps)), entries_(static_cast<std::size_t>(bodies)) {}
+
+void PushLog::add(int body, std::uint32_t source, std::uint64_t step, StepImpulse impulse) {
+    entries_[static_cast<std::size_t>(body)].push_back({source, step, std::move(impulse)});
+}
+
+void PushLog::heard(std::uint32_t source, std::uint64_t step) {
+    std::uint64_t& known = known_[source];
+    known = std::max(known, step);
+}
+
+std::uint64_t PushLog::known(std::uint32_t source) const {
+    const auto found = known_.find(source);
+    return found == known_.end() ? 0 : found->second;
+}
+
+std::vector<std::uint32_t> PushLog::sources_of(int body) const {
+    std::vector<std::uint32_t> sources;
+    for (const Entry& entry : entries_[static_cast<std::size_t>(body)])
+        if (std::find(sources.begin(), sources.end(), entry.source) == sources.end())
+            sources.push_back(entry.source);
+    std::sort(sources.begin(), sources.end());
+    return sources;
+}
+
+int PushLog::count_since(int body, std::uint64_t step, std::uint32_t self) const {
+    std::vector<std::uint32_t> sources;
+    for (const Entry& entry : entries_[static_cast<std::size_t>(body)])
+        if (entry.step >= step && entry.source != self &&
+            std::find(sources.begin(), sources.end(), entry.source) == sources.end())
+            sources.push_back(entry.source);
+    return static_cast<int>(sources.size());
+}
+
+const StepImpulse* PushLog::find(int body, std::uint32_t source, std::uint64_t step) const {
+    for (const Entry& entry : entries_[static_cast<std::size_t>(body)])
+        if (entry.step == step && entry.source == source) return &entry.impulse;
+    return nullptr;
+}
+
+StepImpulse PushLog::seen(int body, std::uint32_t source, std::uint64_t step, std::uint64_t known) const {
+    if (step <= known) {
+        const StepImpulse* push = find(body, source, step);
+        return push ? *push : StepImpulse{};
+    }
+    const StepImpulse* last = find(body, source, known);
+    const StepImpulse* before = known > 0 ? find(body, source, known - 1) : nullptr;
+    return last && before ? lasting(*last, *before) : StepImpulse{};
+}
+
+void PushLog::prune(std::uint64_t step) {
+    for (std::vector<Entry>& entries : entries_)
+        std::erase_if(entries, [&](const Entry& entry) { return entry.step + keep_ < step; });
+}
+
+}  // namespace sim

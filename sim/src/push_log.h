@@ -1,0 +1,61 @@
+#pragma once
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "sim/world.h"
+
+namespace sim {
+
+/// a += factor b; a's modal part grows to b's size.
+void add_impulse(StepImpulse& a, const StepImpulse& b, double factor = 1);
+[[nodiscard]] StepImpulse negative(const StepImpulse& a);
+[[nodiscard]] bool is_zero(const StepImpulse& a);
+/// What two steps in a row have in common: component by component the smaller, none where signs differ.
+/// Weight that lasts stays, a knock does not. Displacement and turn are none.
+[[nodiscard]] StepImpulse lasting(const StepImpulse& a, const StepImpulse& b);
+
+/// What bodies were given by bodies of each worker, step by step: pushes, known up to some step of each
+/// worker, assumed beyond it. Step s is the one that ends with s steps done. Everybody who knows the same
+/// pushes assumes the same, so nobody has to tell what he assumed.
+class PushLog {
+public:
+    PushLog(int bodies, int keep_steps);
+
+    static constexpr std::uint64_t kForever = ~std::uint64_t{0};
+    void add(int body, std::uint32_t source, std::uint64_t step, StepImpulse impulse);
+    /// All of the source's pushes up to `step` are in; kForever: it has gone.
+    void heard(std::uint32_t source, std::uint64_t step);
+    [[nodiscard]] std::uint64_t known(std::uint32_t source) const;
+    [[nodiscard]] const std::map<std::uint32_t, std::uint64_t>& sources() const noexcept { return known_; }
+
+    /// Sources that pushed the body lately.
+    [[nodiscard]] std::vector<std::uint32_t> sources_of(int body) const;
+    /// How many of them since `step`, `self` apart.
+    [[nodiscard]] int count_since(int body, std::uint64_t step, std::uint32_t self) const;
+    [[nodiscard]] bool quiet(int body) const { return entries_[static_cast<std::size_t>(body)].empty(); }
+    /// Push in step `step` to who knows those up to `known`: as it was, or as assumed.
+    [[nodiscard]] StepImpulse seen(int body, std::uint32_t source, std::uint64_t step,
+                                   std::uint64_t known) const;
+    /// `from`, or the first step before `to` that is not forgotten.
+    [[nodiscard]] std::uint64_t first_kept(std::uint64_t from, std::uint64_t to) const {
+        return to > keep_ ? std::max(from, to - keep_) : from;
+    }
+    /// Forgets what is older than keep_steps before `step`.
+    void prune(std::uint64_t step);
+
+private:
+    struct Entry {
+        std::uint32_t source;
+        std::uint64_t step;
+        StepImpulse impulse;
+    };
+    [[nodiscard]] const StepImpulse* find(int body, std::uint32_t source, std::uint64_t step) const;
+
+    std::uint64_t keep_;
+    std::vector<std::vector<Entry>> entries_;  // by body
+    std::map<std::uint32_t, std::uint64_t> known_;
+};
+
+}  // namespace sim
