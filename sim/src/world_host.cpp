@@ -20,6 +20,7 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 constexpr auto kWait = 20ms;
 constexpr auto kEndWithin = 1s;
+constexpr double kLastWords_s = 0.3;
 constexpr int kMostWorkers = 256;
 
 double seconds_since(Clock::time_point start) {
@@ -98,7 +99,7 @@ public:
             launch.listening(launch.listen.empty() ? gate_.private_endpoint() : gate_.endpoint());
         children_.reserve(static_cast<std::size_t>(processes_));
         for (int i = 0; i < processes_; ++i)
-            children_.push_back({WorkerProcess(launch.processes, gate_.private_endpoint()), {}, false});
+            children_.push_back({WorkerProcess(launch.processes, gate_.private_endpoint())});
     }
 
     DistributedResult run() {
@@ -116,8 +117,8 @@ public:
 private:
     struct Child {
         WorkerProcess process;
-        std::optional<std::uint32_t> worker;  ///< once it has joined
-        bool ended;                           ///< has been seen to
+        std::optional<std::uint32_t> worker = std::nullopt;     ///< once it has joined
+        std::optional<Clock::time_point> ended = std::nullopt;  ///< seen then
     };
 
     static WorldGate::Settings gate_settings(const DistributedLaunch& launch) {
@@ -186,15 +187,22 @@ private:
     void look_after_children() {
         for (Child& child : children_) {
             if (child.worker && !is_member(*child.worker) && was_lost(*child.worker)) child.process.kill();
-            if (child.ended || !child.process.has_ended()) continue;
-            child.ended = true;
-            if (child.worker && is_member(*child.worker))
+            if (!child.process.has_ended()) continue;
+            if (!child.ended) {
+                child.ended = Clock::now();
+                if (!child.worker) note_early_end(child);
+            }
+            // One that ended in order may have said so: that is on its way.
+            const bool settled = child.process.was_killed() || seconds_since(*child.ended) > kLastWords_s;
+            if (settled && child.worker && is_member(*child.worker))
                 meeting_.lose(*child.worker, child.process.ending());
-            else if (!child.worker && !child.process.was_killed())
-                throw std::runtime_error("a worker ended before it joined: " + child.process.ending());
-            else if (!child.worker)
-                ++killed_early_;
         }
+    }
+
+    void note_early_end(const Child& child) {
+        if (!child.process.was_killed())
+            throw std::runtime_error("a worker ended before it joined: " + child.process.ending());
+        ++killed_early_;
     }
 
     /// Not one that has drained: it ends by itself.

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "key_folder.h"
+#include "network_namespace.h"
 #include "processes.h"
 #include "sim/distributed_world.h"
 #include "worker_link.h"
@@ -54,12 +55,12 @@ class Watcher : public sim::DistributedObserver {
 public:
     std::uint64_t last_step = 0, hash = 0;
     std::vector<std::string> notes;
-    std::uint64_t act_at = ~0ull;
+    std::vector<std::uint64_t> act_at;
     std::function<void()> act;
 
     void at(std::uint64_t step, const sim::World& world) override {
         last_step = step, hash = world.state_hash();
-        if (step == act_at) act();
+        if (std::find(act_at.begin(), act_at.end(), step) != act_at.end()) act();
     }
     void note(const std::string& what) override { notes.push_back(what); }
     [[nodiscard]] bool noted(const std::string& part) const {
@@ -93,11 +94,6 @@ sim::DistributedSettings lockstep(std::uint64_t steps) {
     return settings;
 }
 
-struct Run {
-    sim::DistributedResult result;
-    Watcher watcher;
-};
-
 TEST(WorldHost, OneAndThreeProcessesComeToTheSameBitsAsOneWorldAndLeaveNoneBehind) {
     const sim::WorldScene scene = heap(18);
     for (const int count : {1, 3}) {
@@ -116,18 +112,9 @@ TEST(WorldHost, OneAndThreeProcessesComeToTheSameBitsAsOneWorldAndLeaveNoneBehin
 TEST(WorldHost, KilledWorkersBodiesGoOnElsewhereDownToNoneAndTheBitsStay) {
     const sim::WorldScene scene = heap(12);
     Watcher watcher;
-    std::jthread killer;
-    watcher.act_at = 20;
-    watcher.act = [&] {
-        killer = std::jthread([] {
-            for (const pid_t worker : children_of(getpid())) {
-                ::kill(worker, SIGKILL);
-                std::this_thread::sleep_for(15ms);
-            }
-        });
-    };
+    watcher.act_at = {20, 60, 100};
+    watcher.act = [] { ::kill(children_of(getpid()).front(), SIGKILL); };
     const sim::DistributedResult result = sim::run_distributed(scene, lockstep(300), processes(3), watcher);
-    killer.join();
     EXPECT_EQ(watcher.hash, hash_alone(scene, 300));
     EXPECT_EQ(result.steps, 300u);
     EXPECT_EQ(result.lost, 3);
@@ -138,7 +125,7 @@ TEST(WorldHost, KilledWorkersBodiesGoOnElsewhereDownToNoneAndTheBitsStay) {
 TEST(WorldHost, AStoppedWorkerIsGivenUpAndTheBitsStay) {
     const sim::WorldScene scene = heap(9);
     Watcher watcher;
-    watcher.act_at = 10;
+    watcher.act_at = {10};
     watcher.act = [] { ::kill(children_of(getpid()).front(), SIGSTOP); };
     const sim::DistributedResult result = sim::run_distributed(scene, lockstep(60), processes(2), watcher);
     EXPECT_EQ(watcher.hash, hash_alone(scene, 60));
@@ -149,7 +136,7 @@ TEST(WorldHost, AStoppedWorkerIsGivenUpAndTheBitsStay) {
 TEST(WorldHost, AWorkerThatIsToldToEndGivesItsBodiesAwayAndNoneIsLost) {
     const sim::WorldScene scene = heap(9);
     Watcher watcher;
-    watcher.act_at = 10;
+    watcher.act_at = {10};
     watcher.act = [] { ::kill(children_of(getpid()).front(), SIGTERM); };
     const sim::DistributedResult result = sim::run_distributed(scene, lockstep(400), processes(2), watcher);
     EXPECT_EQ(watcher.hash, hash_alone(scene, 400));
@@ -164,7 +151,7 @@ TEST(WorldHost, AWorkerThatJoinsLateTakesPart) {
     launch.listening = [&](const std::string& where) { endpoint = where; };
     std::optional<sim::WorkerProcess> late;
     Watcher watcher;
-    watcher.act_at = 10;
+    watcher.act_at = {10};
     watcher.act = [&] { late.emplace(start_elsewhere(endpoint)); };
     sim::DistributedSettings settings = lockstep(3000);
     const sim::DistributedResult result = sim::run_distributed(scene, settings, launch, watcher);
@@ -190,7 +177,7 @@ TEST(WorldHost, TwoWorkersOverTcpWithKeysJoinAndOneWithoutAKeyAndGarbageChangeNo
             workers.push_back(start_elsewhere(endpoint, (keys.path() / name).string()));
     };
     Watcher watcher;
-    watcher.act_at = 1;
+    watcher.act_at = {1};
     watcher.act = [&] {
         for (int i = 0; i < 100; ++i)
             (void)garbage->send(zmq::str_buffer("GET / HTTP/1.1"), zmq::send_flags::dontwait);
@@ -219,6 +206,79 @@ TEST(WorldHost, AWorkerWithAnotherFingerprintIsRefusedInLockstep) {
     EXPECT_TRUE(watcher.noted("refused"));
     EXPECT_TRUE(comes_true([&] { return other->has_ended(); }));
     EXPECT_EQ(other->ending(), "exit status 1");
+}
+
+std::string port_of(const std::string& endpoint) {
+    return endpoint.substr(endpoint.rfind(':'));
+}
+
+TEST(WorldHost, ThreeHostsWithKeysComeToTheSameBitsAlsoWhenOnesCableIsCut) {
+    if (!OtherHost::possible()) GTEST_SKIP() << "network namespaces are not permitted here";
+    const KeyFolder keys({"one", "two", "three"});
+    const sim::WorldScene scene = heap(12);
+    for (const bool cut : {false, true}) {
+        const OtherHost one(1), two(2), three(3);
+        sim::DistributedLaunch launch;
+        launch.listen = "tcp://0.0.0.0:*", launch.keys = keys.path(), launch.expect = 3;
+        std::vector<sim::WorkerProcess> workers;
+        workers.reserve(3);
+        launch.listening = [&](const std::string& endpoint) {
+            const auto start = [&](const OtherHost& host, const char* key) {
+                sim::WorkerLaunch there = host.there(run_test("WorldProcess.DISABLED_Works", 1));
+                there.arguments.insert(there.arguments.end(), {"--key", (keys.path() / key).string()});
+                workers.emplace_back(there, "tcp://" + host.here() + port_of(endpoint));
+            };
+            start(one, "one.key"), start(two, "two.key"), start(three, "three.key");
+        };
+        Watcher watcher;
+        watcher.act_at = {10};
+        watcher.act = [&] {
+            if (cut) two.cut();
+        };
+        const sim::DistributedResult result = sim::run_distributed(scene, lockstep(100), launch, watcher);
+        EXPECT_EQ(watcher.hash, hash_alone(scene, 100));
+        EXPECT_EQ(result.workers, 3);
+        EXPECT_EQ(result.lost, cut ? 1 : 0);
+        EXPECT_EQ(result.bodies_reowned, cut ? 4 : 0);
+        for (sim::WorkerProcess& worker : workers)
+            EXPECT_TRUE(comes_true([&] { return worker.has_ended(); }));  // the one cut off, too
+    }
+}
+
+// Bodies wander from the first worker to the others all the while, so that what happens falls into trades.
+// Kills and stops: a stop costs a second until it is noticed.
+TEST(WorldHost, TenRandomKillsStopsDrainsAndJoinsWhileBodiesAreTradedLeaveTheBitsAndEveryRunFinishes) {
+    const int count = std::getenv("MUSICWORLD_LONG") ? 100 : 10;
+    const sim::WorldScene scene = heap(9);
+    const std::uint64_t hash = hash_alone(scene, 200);
+    std::mt19937 rng(4);
+    std::uint64_t migrations = 0;
+    for (int i = 0; i < count; ++i) {
+        sim::DistributedLaunch launch = processes(3);
+        std::string endpoint;
+        launch.listening = [&](const std::string& where) { endpoint = where; };
+        std::optional<sim::WorkerProcess> late;
+        const unsigned what = rng() % 8, who = rng() % 3, delay_us = rng() % 3000;
+        Watcher watcher;
+        std::jthread fate;
+        watcher.act_at = {1 + rng() % 150};
+        watcher.act = [&] {
+            if (what == 7) return late.emplace(start_elsewhere(endpoint)), void();
+            fate = std::jthread([=, victim = children_of(getpid()).at(who)] {
+                std::this_thread::sleep_for(std::chrono::microseconds(delay_us));
+                ::kill(victim, what == 6 ? SIGSTOP : what >= 4 ? SIGTERM : SIGKILL);
+            });
+        };
+        sim::DistributedSettings settings = lockstep(200);
+        settings.all_to_first = true;
+        const sim::DistributedResult result = sim::run_distributed(scene, settings, launch, watcher);
+        if (fate.joinable()) fate.join();
+        EXPECT_EQ(watcher.hash, hash) << i;
+        EXPECT_EQ(result.steps, 200u) << i;
+        migrations += result.migrations;
+    }
+    EXPECT_GT(migrations, static_cast<std::uint64_t>(count));
+    EXPECT_TRUE(children_of(getpid()).empty());
 }
 
 // An application for the next test: it starts two workers and goes on until it is killed.
