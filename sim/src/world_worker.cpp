@@ -1,5 +1,6 @@
 #include "world_worker.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace sim {
@@ -8,7 +9,8 @@ WorldWorker::WorldWorker(const SceneMessage& scene)
     : self_(scene.worker),
       exchange_(scene.settings.pace == Pace::lockstep ? make_lockstep_exchange(scene)
                                                       : make_bounded_exchange(scene)),
-      market_(scene.worker, scene.settings.market) {
+      market_(scene.worker, scene.settings.market),
+      meets_(scene.settings.pace == Pace::bounded) {
     for (const WorldEvent& event : scene.scene.events)
         if (!event.slowing.empty()) events_.push_back(event);
 }
@@ -22,6 +24,9 @@ void WorldWorker::take(const WorldHeader& header, WorldMessage&& message) {
 void WorldWorker::take_message(const WorldHeader& header, Members&& message) {
     (void)header;
     exchange_->members(message.workers);
+    std::erase_if(sellers_, [&message](std::uint32_t seller) {
+        return std::find(message.workers.begin(), message.workers.end(), seller) == message.workers.end();
+    });
     market_.members(message.workers);
 }
 
@@ -29,6 +34,7 @@ void WorldWorker::take_message(const WorldHeader& header, Ownership&& message) {
     epoch_ = header.epoch;
     exchange_->own(message);
     market_.registered(header.epoch, message);
+    if (message.traded) std::erase(sellers_, message.from);
 }
 
 void WorldWorker::take_message(const WorldHeader& header, SnapshotMessage&& message) {
@@ -49,11 +55,14 @@ void WorldWorker::take_message(const WorldHeader& header, PackedUpdates&& messag
 void WorldWorker::take_message(const WorldHeader& header, Offer&& message) {
     OfferAnswer answer = {header.worker, message.number, false};
     if (!draining_ && !exchange_->done()) answer = market_.answer(header.worker, message);
+    if (answer.accepted && meets_) sellers_.push_back(header.worker);
     send(answer);
 }
 
 void WorldWorker::take_message(const WorldHeader& header, OfferAnswer&& message) {
     market_.answered(header.worker, message);
+    handover_step_ = header.step;
+    if (meets_) hand_over();  // the next step may have to wait for the buyer
 }
 
 void WorldWorker::take_message(const WorldHeader& header, EndOfRun&& message) {
@@ -77,7 +86,7 @@ void WorldWorker::take_message(const WorldHeader& header, Other&& message) {
 }
 
 bool WorldWorker::ready() const {
-    return !left_ && !ended_ && !stepping_ && exchange_->ready();
+    return !left_ && !ended_ && !stepping_ && sellers_.empty() && exchange_->ready();
 }
 
 void WorldWorker::step() {
@@ -117,15 +126,20 @@ void WorldWorker::worked(double seconds, double waited_s) {
 
 // At the end of a step, after its states are on their way.
 void WorldWorker::trade() {
+    hand_over();
     if (exchange_->done()) return;
-    if (const std::optional<Offer> sold = market_.hand_over()) {
-        Handover handover = exchange_->give(sold->bodies);
-        handover.to = sold->to, handover.number = sold->number;
-        send(handover);
-    }
     if (!market_.wants_to_sell()) return;
     if (const std::optional<Offer> offer = market_.make_offer(exchange_->lots(market_.fastest())))
         send(*offer);
+}
+
+void WorldWorker::hand_over() {
+    if (stepping_ || (meets_ && exchange_->steps_done() < handover_step_)) return;
+    const std::optional<Offer> sold = market_.hand_over();
+    if (!sold) return;
+    Handover handover = exchange_->give(sold->bodies);
+    handover.to = sold->to, handover.number = sold->number;
+    send(handover);
 }
 
 void WorldWorker::drain() {

@@ -46,6 +46,7 @@ private:
 
     void send(const WorldMessage& message);
     void trade();
+    void hand_over();
     void leave();
 
     std::uint32_t self_;
@@ -55,6 +56,11 @@ private:
     std::vector<std::vector<std::uint8_t>> queue_;
     std::uint32_t epoch_ = 0;
     int lead_ = 0;  // at the start of the step
+    // Bounded pace: what is sold goes over at a step that neither has passed, so no body loses time. The buyer waits for
+    // it at its step, the seller goes on to there.
+    bool meets_ = false;
+    std::uint64_t handover_step_ = 0;
+    std::vector<std::uint32_t> sellers_;  // whose offers were accepted, and whose bodies have not come
     bool stepping_ = false, draining_ = false, left_ = false, ended_ = false;
 };
 
