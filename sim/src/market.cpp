@@ -12,8 +12,9 @@ namespace {
 constexpr double kLevel = 0.15;  // of the average
 // Once level: what is not any more. Bodies that meet cost more, which comes and goes; a processor that
 // became slower stays so.
-constexpr double kLastingLevel = 0.35;  // of the average, for so many steps in a row
+constexpr double kLastingLevel = 0.5;  // of the average, for so many steps in a row
 constexpr int kLastingSteps = 5;
+constexpr int kLevelSteps = 3;       // after which it counts as level
 constexpr double kOtherRate = 0.25;  // change of the seconds a unit of work, for so many steps in a row
 constexpr int kOtherRateSteps = 2;
 constexpr std::uint64_t kTuningSteps = 20;  // once level, at least so many between trades
@@ -88,7 +89,21 @@ void Market::worked(std::uint64_t step, double seconds, double work, int own) {
     self.smoothed = known_ ? self.smoothed + weight_ * (seconds - self.smoothed) : seconds;
     known_ = own > 0;
     if (own == 0) self.smoothed = 0;
-    watch_level(work > 0 ? seconds / work : 0);
+    const double rate = work > 0 ? seconds / work : 0;
+    if (changed_speed(rate)) self.smoothed = seconds;
+    watch_level();
+}
+
+bool Market::changed_speed(double rate) {
+    const bool other = usual_rate_ > 0 && std::abs(rate - usual_rate_) > kOtherRate * usual_rate_;
+    other_rate_steps_ = other ? other_rate_steps_ + 1 : 0;
+    if (!other && calm_ && rate > 0)
+        usual_rate_ = usual_rate_ > 0 ? usual_rate_ + weight_ * (rate - usual_rate_) : rate;
+    if (other_rate_steps_ < kOtherRateSteps) return false;
+    calm_ = false;
+    level_steps_ = 0;
+    usual_rate_ = 0;
+    return true;
 }
 
 double Market::average() const {
@@ -114,21 +129,14 @@ bool Market::slowest() const {
                        [this](const auto& w) { return w.first == self_ || w.second.smoothed < smoothed(); });
 }
 
-void Market::watch_level(double rate) {
+void Market::watch_level() {
     const Worker& self = workers_.at(self_);
     const double excess = self.smoothed - average();
     const bool far = excess > std::max(kLastingLevel * average(), 1.5 * self.body_cost());
     far_steps_ = far ? far_steps_ + 1 : 0;
-    const bool other_rate = usual_rate_ > 0 && rate > (1 + kOtherRate) * usual_rate_;
-    other_rate_steps_ = other_rate ? other_rate_steps_ + 1 : 0;
-    if (far_steps_ >= kLastingSteps || other_rate_steps_ >= kOtherRateSteps) {
-        calm_ = false;
-        usual_rate_ = 0;
-    }
-    if (excess > allowance(self)) return;
-    if (level()) calm_ = true;
-    if (calm_ && rate > 0 && !other_rate)
-        usual_rate_ = usual_rate_ > 0 ? usual_rate_ + weight_ * (rate - usual_rate_) : rate;
+    if (far_steps_ >= kLastingSteps) calm_ = false, level_steps_ = 0;
+    level_steps_ = level() ? level_steps_ + 1 : 0;
+    if (level_steps_ >= kLevelSteps) calm_ = true;
 }
 
 bool Market::tuning() const {
@@ -163,14 +171,20 @@ std::optional<Offer> Market::make_offer(std::vector<Exchange::Lot> lots) {
     const Worker& buyer = workers_.at(to);
     const double rate = exchange_rate(self.body_cost(), buyer.body_cost());
     const double most = (self.smoothed - buyer.smoothed) / (1 + rate);  // then both take as long
+    // What makes the buyer as slow as the average, or one lot.
+    const double room = std::max((average() - buyer.smoothed) / rate, self.body_cost());
     const double due = tuning() ? 1.5 * wanted() : wanted() + carried_;
+    // Their costs are smoothed, too; all together they are what a step takes.
+    const double sum = std::accumulate(lots.begin(), lots.end(), 0.0,
+                                       [](double s, const auto& lot) { return s + lot.cost_s; });
+    for (Exchange::Lot& lot : lots) lot.cost_s *= sum > 0 ? self.smoothed / sum : 1;
     std::sort(lots.begin(), lots.end(), [](const auto& a, const auto& b) {
         return std::pair(-a.pull, a.bodies) < std::pair(-b.pull, b.bodies);
     });
     offer_ = {to, next_number_, {}, {}};
     offer_cost_ = 0;
     for (const Exchange::Lot& lot : lots) {
-        if (offer_cost_ + lot.cost_s > std::min(due, most) * (1 + 1e-9)) continue;
+        if (offer_cost_ + lot.cost_s > std::min({due, most, room}) * (1 + 1e-9)) continue;
         offer_cost_ += lot.cost_s;
         for (const std::uint32_t body : lot.bodies) {
             offer_.bodies.push_back(body);
@@ -194,6 +208,7 @@ void Market::answered(std::uint32_t worker, const OfferAnswer& answer) {
 std::optional<Offer> Market::hand_over() {
     if (sale_ != Sale::accepted || handed_over_ > 0) return std::nullopt;
     sale_ = Sale::none;
+    traded_ = true, last_trade_ = step_;
     handed_over_ = offer_cost_;
     Worker &self = workers_[self_], &buyer = workers_[offer_.to];
     const int bodies = static_cast<int>(offer_.bodies.size());

@@ -15,12 +15,12 @@ namespace sim {
 ///   W^i T^i = (T^i - T^avg) / max(1, N - 2)     (2.32)   seconds offered; what is no whole body is carried
 ///   on
 ///
-/// Departures: no more is offered than makes both equally slow; a buyer that would become slower than the
-/// seller declines; what is sold moves from one T to the other at once, not by and by, and reports from
-/// before count no more (epochs tell), or stale figures would sell the same work twice. While anybody is
-/// above the average by more than 15 % and one body, trade is free; once level only what lasts makes it so
-/// again, and else the slowest of all sells one body at a time, beyond the dead band, and not within 20 steps
-/// of anybody's last trade.
+/// Departures: no more is offered than makes both equally slow, or the buyer as slow as the average; a buyer
+/// that would become slower than the seller declines; what is sold moves from one T to the other at once, not
+/// by and by, and reports from before count no more (epochs tell), or stale figures would sell the same work
+/// twice. While anybody is above the average by more than 15 % and one body, trade is free; once level only
+/// what lasts makes it so again, and else the slowest of all sells one body at a time, beyond the dead band,
+/// and not within 20 steps of anybody's last trade.
 class Market {
 public:
     Market(std::uint32_t self, const MarketSettings& settings);
@@ -61,7 +61,8 @@ private:
     [[nodiscard]] bool slowest() const;
     [[nodiscard]] bool tuning() const;
     [[nodiscard]] double wanted() const;
-    void watch_level(double rate);
+    void watch_level();
+    [[nodiscard]] bool changed_speed(double rate);
     void credit(Worker& worker, int bodies, double cost);
 
     std::uint32_t self_;
@@ -70,11 +71,11 @@ private:
     std::map<std::uint32_t, Worker> workers_;  // members, with this one
     std::uint64_t step_ = 0, last_trade_ = 0, not_before_ = 0;
     bool traded_ = false;
-    bool known_ = false;                        // own time
-    bool calm_ = false;                         // has been level, and nothing lasting since
-    int far_steps_ = 0, other_rate_steps_ = 0;  // in a row
-    double usual_rate_ = 0;                     // seconds a unit of work, while calm
-    double carried_ = 0;                        // [s] to be sold with a later offer
+    bool known_ = false;                                          // own time
+    bool calm_ = false;                                           // has been level, and nothing lasting since
+    int far_steps_ = 0, other_rate_steps_ = 0, level_steps_ = 0;  // in a row
+    double usual_rate_ = 0;                                       // seconds a unit of work, while calm
+    double carried_ = 0;                                          // [s] to be sold with a later offer
     Sale sale_ = Sale::none;
     Offer offer_;
     double offer_cost_ = 0;   // [s] here

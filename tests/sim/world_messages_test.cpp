@@ -41,7 +41,7 @@ sim::WorldBodyState state(Rng& rng, int modes) {
 }
 
 sim::StepImpulse impulse(Rng& rng, int modes) {
-    return {vector(rng, 3), vector(rng, 1), vector(rng, 0.01), vector(rng, 0.01), coordinates(rng, modes, 2)};
+    return {vector(rng, 3), vector(rng, 1), vector(rng, 0.01), vector(rng, 0.01), coordinates(rng, modes, 2), {}, {}};
 }
 
 sim::WorldRecord record(Rng& rng, int body, int modes) {
