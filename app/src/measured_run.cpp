@@ -99,17 +99,21 @@ sim::WorldDefinition strip_of(const sim::WorldDefinition& world, int number, int
     sim::WorldDefinition strip;
     strip.settings = world.settings;
     strip.planes = world.planes;
-    const auto wall = [&](std::size_t at, double side) {
-        strip.planes.push_back(
-            {side * Eigen::Vector3d::UnitX(), side * 0.5 * (x(order[at - 1]) + x(order[at]))});
-    };
-    if (number > 0) wall(first, 1);
-    if (number + 1 < of) wall(end, -1);
     std::map<int, int> number_of;
     for (std::size_t k = first; k < end; ++k) {
         number_of[static_cast<int>(order[k])] = static_cast<int>(strip.bodies.size());
         strip.bodies.push_back(world.bodies[order[k]]);
     }
+    // Half-way to the neighbour, but not through the strip's own bodies.
+    const auto wall = [&](std::size_t at, double side) {
+        double offset = side * 0.5 * (x(order[at - 1]) + x(order[at]));
+        for (const sim::WorldBody& body : strip.bodies)
+            offset = std::min(
+                offset, side * body.world_from_body.translation().x() - body.shape.base.semi_axes.maxCoeff());
+        strip.planes.push_back({side * Eigen::Vector3d::UnitX(), offset});
+    };
+    if (number > 0) wall(first, 1);
+    if (number + 1 < of) wall(end, -1);
     for (sim::PointConstraint c : world.constraints) {
         if (!number_of.contains(c.body_a) || (c.body_b >= 0 && !number_of.contains(c.body_b))) continue;
         c.body_a = number_of[c.body_a];
