@@ -143,6 +143,10 @@ std::vector<MeetingPoint::Group> MeetingPoint::groups(const std::vector<int>& bo
             found->bodies.push_back(body);
         }
     }
+    // Who owned nothing begins with the first.
+    std::sort(groups.begin(), groups.end(), [](const Group& a, const Group& b) {
+        return std::pair(a.step, a.bodies.front()) < std::pair(b.step, b.bodies.front());
+    });
     return groups;
 }
 
@@ -200,6 +204,7 @@ void MeetingPoint::remove(std::uint32_t worker) {
     std::erase(members_, worker);
     if (started_) send(members_, Members{members_});
     share_out(owned_by(worker), worker);
+    advance();
 }
 
 void MeetingPoint::lose(std::uint32_t worker, const std::string& why) {
