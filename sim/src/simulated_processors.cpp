@@ -194,7 +194,7 @@ void Machine::end_step(Processor& p) {
 
 void Machine::take_messages(Processor& p) {
     while (!p.inbox.empty() && p.inbox.front().time <= now_) {
-        DecodedWorldMessage decoded = decode_world(*p.inbox.front().bytes);
+        DecodedWorldMessage decoded = decode_for_worker(*p.inbox.front().bytes);
         p.inbox.pop_front();
         if (const auto* scene = std::get_if<SceneMessage>(&decoded.message)) {
             p.worker = std::make_unique<WorldWorker>(*scene);

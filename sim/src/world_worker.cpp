@@ -46,7 +46,7 @@ void WorldWorker::take_message(const WorldHeader& header, StateMessage&& message
     exchange_->take(header, std::move(message));
 }
 
-void WorldWorker::take_message(const WorldHeader& header, UpdateMessage&& message) {
+void WorldWorker::take_message(const WorldHeader& header, PackedUpdates&& message) {
     market_.heard(header.worker, header.epoch, message.report);
     exchange_->take(header, std::move(message));
 }

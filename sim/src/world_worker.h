@@ -35,7 +35,7 @@ private:
     void take_message(const WorldHeader& header, Ownership&& message);
     void take_message(const WorldHeader& header, SnapshotMessage&& message);
     void take_message(const WorldHeader& header, StateMessage&& message);
-    void take_message(const WorldHeader& header, UpdateMessage&& message);
+    void take_message(const WorldHeader& header, PackedUpdates&& message);
     void take_message(const WorldHeader& header, Offer&& message);
     void take_message(const WorldHeader& header, OfferAnswer&& message);
     void take_message(const WorldHeader& header, EndOfRun&& message);
