@@ -26,6 +26,7 @@ public:
 
     using Exchange::take;
     void take(const WorldHeader& header, PackedUpdates&& message) override;
+    void take(SnapshotMessage&& message) override;
     void members(const std::vector<std::uint32_t>& workers) override;
     void own(const Ownership& ownership) override;
     [[nodiscard]] bool ready() const override;
@@ -36,7 +37,8 @@ public:
     [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies) override;
     void cost(double seconds) override { costs_.share(seconds, world_, owned_); }
     [[nodiscard]] std::uint64_t steps_done() const override { return step_; }
-    [[nodiscard]] bool done() const override { return step_ >= settings_.steps; }
+    [[nodiscard]] bool at_end() const override { return step_ >= settings_.steps; }
+    [[nodiscard]] bool done() const override { return at_end() && settled_; }
     [[nodiscard]] int own_bodies() const override { return static_cast<int>(owned_.size()); }
     [[nodiscard]] int lead() const override;
     [[nodiscard]] int ghost_age() const override { return ghost_age_; }
@@ -57,6 +59,7 @@ private:
     void give_push(int ghost, const StepImpulse& impulse);
     [[nodiscard]] int resolvers(int own, int ghost) const;
     void feel();
+    void settle();
     [[nodiscard]] std::uint64_t slowest() const;
     void applied(std::vector<std::uint32_t>& sources, std::vector<std::uint64_t>& steps) const;
     [[nodiscard]] Update update_of(int body) const;
@@ -84,6 +87,7 @@ private:
     std::map<int, Felt> felt_;
     std::vector<std::uint8_t> told_asleep_;
     int ghost_age_ = 0;
+    bool settled_ = false;
 };
 
 constexpr int kMostBound = 64;
@@ -176,6 +180,12 @@ void BoundedExchange::take(const WorldHeader& header, PackedUpdates&& message) {
     foreign_.take(header.step, shared);
 }
 
+// Bodies follow with their owners.
+void BoundedExchange::take(SnapshotMessage&& message) {
+    come_to(message.snapshot.step);
+    world_.restore_contacts({}, message.snapshot.springs);
+}
+
 void BoundedExchange::members(const std::vector<std::uint32_t>& workers) {
     for (const std::uint32_t was : members_)
         if (std::find(workers.begin(), workers.end(), was) == workers.end())
@@ -219,6 +229,7 @@ void BoundedExchange::own(const Ownership& ownership) {
 
 // The bodies as they are at this worker's step.
 void BoundedExchange::take_over(const Ownership& ownership) {
+    settled_ = false;
     put_right();
     for (const WorldRecord& record : ownership.bodies) {
         const int body = record.body;
@@ -253,7 +264,9 @@ int BoundedExchange::lead() const {
 }
 
 bool BoundedExchange::ready() const {
-    return !done() && !owned_.empty() && lead() <= settings_.bound;
+    if (owned_.empty()) return false;
+    if (at_end()) return !settled_ && slowest() >= settings_.steps;
+    return lead() <= settings_.bound;
 }
 
 // Pushes that came since: what was assumed of steps that are over is put right.
@@ -363,7 +376,15 @@ void BoundedExchange::feel() {
     }
 }
 
+// After the last step: pushes that came late. Nobody will hear of these states but the application.
+void BoundedExchange::settle() {
+    put_right();
+    std::fill(told_asleep_.begin(), told_asleep_.end(), std::uint8_t{0});
+    settled_ = true;
+}
+
 void BoundedExchange::step() {
+    if (at_end()) return settle();
     come_to(step_);
     put_right();
     hold_pushes();
@@ -434,7 +455,8 @@ std::vector<Exchange::Lot> BoundedExchange::lots(std::uint32_t towards) const {
         const int body = owned_[i];
         Lot& lot = lots.try_emplace(lot_[static_cast<std::size_t>(body)], Lot{{}, 0, -1e300}).first->second;
         lot.bodies.push_back(static_cast<std::uint32_t>(body));
-        lot.cost_s += costs_.of(body);
+        const bool known = costs_.of(body) >= 0 && lot.cost_s >= 0;
+        lot.cost_s = known ? lot.cost_s + costs_.of(body) : -1;
         lot.pull = std::max(lot.pull, pull[i]);
     }
     std::vector<Lot> all;

@@ -51,7 +51,10 @@ public:
     virtual void cost(double seconds) = 0;
 
     [[nodiscard]] virtual std::uint64_t steps_done() const = 0;
-    [[nodiscard]] virtual bool done() const = 0;  ///< settings.steps reached
+    [[nodiscard]] virtual bool at_end() const = 0;  ///< settings.steps reached
+    /// Nothing more to do. In bounded pace one more publication follows the last step, when all the others
+    /// have done theirs: with the pushes that came late put right.
+    [[nodiscard]] virtual bool done() const = 0;
     [[nodiscard]] virtual int own_bodies() const = 0;
     [[nodiscard]] virtual int lead() const = 0;       ///< over the slowest that owns a body, now
     [[nodiscard]] virtual int ghost_age() const = 0;  ///< of the oldest used in the last step

@@ -34,7 +34,8 @@ public:
     [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies) override;
     void cost(double seconds) override { costs_.share(seconds, replica_.world(), owned_); }
     [[nodiscard]] std::uint64_t steps_done() const override { return replica_.step(); }
-    [[nodiscard]] bool done() const override { return replica_.step() >= steps_; }
+    [[nodiscard]] bool at_end() const override { return replica_.step() >= steps_; }
+    [[nodiscard]] bool done() const override { return at_end(); }
     [[nodiscard]] int own_bodies() const override { return static_cast<int>(owned_.size()); }
     [[nodiscard]] int lead() const override { return replica_.whole() ? 0 : 1; }
     [[nodiscard]] int ghost_age() const override { return 0; }

@@ -14,7 +14,7 @@ constexpr double kLevel = 0.15;  // of the average
 // became slower stays so.
 constexpr double kLastingLevel = 0.5;  // of the average, for so many steps in a row
 constexpr int kLastingSteps = 5;
-constexpr int kLevelSteps = 3;       // after which it counts as level
+constexpr int kLevelSteps = 4;       // after which it counts as level
 constexpr double kOtherRate = 0.25;  // change of the seconds a unit of work, for so many steps in a row
 constexpr int kOtherRateSteps = 2;
 constexpr std::uint64_t kTuningSteps = 20;  // once level, at least so many between trades
@@ -140,8 +140,7 @@ void Market::watch_level() {
 }
 
 bool Market::tuning() const {
-    const Worker& self = workers_.at(self_);
-    return calm_ || self.smoothed - average() <= allowance(self);
+    return calm_ || level();
 }
 
 // Seconds to be sold now.

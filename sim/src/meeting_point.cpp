@@ -143,6 +143,10 @@ std::vector<MeetingPoint::Group> MeetingPoint::groups(const std::vector<int>& bo
             found->bodies.push_back(body);
         }
     }
+    // Who owned nothing begins with the first.
+    std::sort(groups.begin(), groups.end(), [](const Group& a, const Group& b) {
+        return std::pair(a.step, a.bodies.front()) < std::pair(b.step, b.bodies.front());
+    });
     return groups;
 }
 
@@ -200,6 +204,7 @@ void MeetingPoint::remove(std::uint32_t worker) {
     std::erase(members_, worker);
     if (started_) send(members_, Members{members_});
     share_out(owned_by(worker), worker);
+    advance();
 }
 
 void MeetingPoint::lose(std::uint32_t worker, const std::string& why) {
@@ -315,13 +320,18 @@ void MeetingPoint::take_state(const WorldHeader& header, std::span<const std::ui
 
 void MeetingPoint::take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes,
                                UpdateMessage&& message) {
+    Sender& sender = senders_[header.worker];
+    // Of the last step there are two: as done, for the others, and with what came late, for the view.
+    const bool last = header.step == settings_.steps;
+    sender.settled = last && sender.step == header.step;
     const bool own = std::all_of(message.bodies.begin(), message.bodies.end(), [&](const Update& u) {
         return owns(header.worker, u.body) && fits(u.body, u.state.q.size()) &&
                (!u.held || fits(u.body, u.impulse.modal.size()));
     });
     const bool pushes = std::all_of(message.pushes.begin(), message.pushes.end(),
                                     [&](const Push& p) { return fits(p.body, p.impulse.modal_q.size()); });
-    if (settings_.pace != Pace::bounded || !own || !pushes || header.step <= senders_[header.worker].step)
+    if (settings_.pace != Pace::bounded || !own || !pushes || header.step < sender.step ||
+        (header.step == sender.step && header.step != settings_.steps))
         return refuse(header.worker, "found states that are not its to publish");
     const auto applied = std::make_shared<const Applied>(Applied{message.sources, message.applied});
     for (const Update& update : message.bodies) {
@@ -331,10 +341,10 @@ void MeetingPoint::take_update(const WorldHeader& header, std::span<const std::u
         record.asleep = update.asleep, record.quarantined = update.quarantined;
         publish(bodies_[update.body], std::move(record), header.step, applied);
     }
-    extend_sleep(header, applied);
+    if (!last || sender.settled) extend_sleep(header, applied);
     report(header, message.report, message.bodies.size(), bytes.size());
-    pass_on(header, bytes);
-    view_.take(header.step, message.bodies);
+    if (!sender.settled) pass_on(header, bytes);
+    if (!last || sender.settled) view_.take(header.step, message.bodies);
     advance();
 }
 
@@ -443,7 +453,7 @@ void MeetingPoint::advance() {
 void MeetingPoint::release() {
     for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
         const auto sender = senders_.find(owner(i));
-        if (sender != senders_.end() && sender->second.step >= settings_.steps) view_.release(i);
+        if (sender != senders_.end() && sender->second.settled) view_.release(i);
     }
 }
 

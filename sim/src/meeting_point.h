@@ -54,6 +54,7 @@ private:
     struct Sender {
         std::uint64_t step = 0, bytes = 0;  ///< last published; sent since
         bool refused = false;               ///< something, and it was noted
+        bool settled = false;               ///< bounded: has published the last step again
     };
     struct Group {
         std::uint32_t owner;

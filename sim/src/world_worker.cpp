@@ -10,7 +10,7 @@ WorldWorker::WorldWorker(const SceneMessage& scene)
       exchange_(scene.settings.pace == Pace::lockstep ? make_lockstep_exchange(scene)
                                                       : make_bounded_exchange(scene)),
       market_(scene.worker, scene.settings.market),
-      meets_(scene.settings.pace == Pace::bounded) {
+      bounded_(scene.settings.pace == Pace::bounded) {
     for (const WorldEvent& event : scene.scene.events)
         if (!event.slowing.empty()) events_.push_back(event);
 }
@@ -35,6 +35,10 @@ void WorldWorker::take_message(const WorldHeader& header, Ownership&& message) {
     exchange_->own(message);
     market_.registered(header.epoch, message);
     if (message.traded) std::erase(sellers_, message.from);
+    // Who came to the last step by taking bodies over has to say so, once.
+    if (exchange_->at_end() && exchange_->own_bodies() > 0 && published_ < exchange_->steps_done() &&
+        !stepping_ && bounded_)
+        publish(0, 0);
 }
 
 void WorldWorker::take_message(const WorldHeader& header, SnapshotMessage&& message) {
@@ -54,15 +58,15 @@ void WorldWorker::take_message(const WorldHeader& header, PackedUpdates&& messag
 
 void WorldWorker::take_message(const WorldHeader& header, Offer&& message) {
     OfferAnswer answer = {header.worker, message.number, false};
-    if (!draining_ && !exchange_->done()) answer = market_.answer(header.worker, message);
-    if (answer.accepted && meets_) sellers_.push_back(header.worker);
+    if (!draining_ && !exchange_->at_end()) answer = market_.answer(header.worker, message);
+    if (answer.accepted && bounded_) sellers_.push_back(header.worker);
     send(answer);
 }
 
 void WorldWorker::take_message(const WorldHeader& header, OfferAnswer&& message) {
     market_.answered(header.worker, message);
     handover_step_ = header.step;
-    if (meets_) hand_over();  // the next step may have to wait for the buyer
+    if (bounded_) hand_over();  // the next step may have to wait for the buyer
 }
 
 void WorldWorker::take_message(const WorldHeader& header, EndOfRun&& message) {
@@ -104,9 +108,17 @@ double WorldWorker::work() const {
 }
 
 void WorldWorker::worked(double seconds, double waited_s) {
-    const World& world = exchange_->world();
     exchange_->cost(seconds);
     market_.worked(exchange_->steps_done(), seconds, work(), exchange_->own_bodies());
+    stepping_ = false;
+    publish(seconds, waited_s);
+    if (draining_) return leave();
+    trade();
+    exchange_->follow();
+}
+
+void WorldWorker::publish(double seconds, double waited_s) {
+    const World& world = exchange_->world();
     StepReport report;
     report.seconds = static_cast<float>(seconds);
     report.smoothed_s = static_cast<float>(market_.smoothed());
@@ -117,24 +129,20 @@ void WorldWorker::worked(double seconds, double waited_s) {
     report.cross_contacts = static_cast<std::uint32_t>(world.cross_contacts());
     report.own = static_cast<std::uint32_t>(exchange_->own_bodies());
     report.outside_impulse = world.outside_impulse();
-    stepping_ = false;
+    published_ = exchange_->steps_done();
     queue_.push_back(exchange_->publish(epoch_, report));
-    if (draining_) return leave();
-    trade();
-    exchange_->follow();
 }
 
 // At the end of a step, after its states are on their way.
 void WorldWorker::trade() {
     hand_over();
-    if (exchange_->done()) return;
-    if (!market_.wants_to_sell()) return;
+    if (exchange_->at_end() || !market_.wants_to_sell()) return;
     if (const std::optional<Offer> offer = market_.make_offer(exchange_->lots(market_.fastest())))
         send(*offer);
 }
 
 void WorldWorker::hand_over() {
-    if (stepping_ || (meets_ && exchange_->steps_done() < handover_step_)) return;
+    if (stepping_ || (bounded_ && exchange_->steps_done() < handover_step_)) return;
     const std::optional<Offer> sold = market_.hand_over();
     if (!sold) return;
     Handover handover = exchange_->give(sold->bodies);

@@ -45,6 +45,7 @@ private:
     void take_message(const WorldHeader& header, Other&& message);
 
     void send(const WorldMessage& message);
+    void publish(double seconds, double waited_s);
     void trade();
     void hand_over();
     void leave();
@@ -53,12 +54,13 @@ private:
     std::vector<WorldEvent> events_;  // those that slow somebody
     std::unique_ptr<Exchange> exchange_;
     Market market_;
+    bool bounded_;
     std::vector<std::vector<std::uint8_t>> queue_;
     std::uint32_t epoch_ = 0;
-    int lead_ = 0;  // at the start of the step
-    // Bounded pace: what is sold goes over at a step that neither has passed, so no body loses time. The buyer waits for
-    // it at its step, the seller goes on to there.
-    bool meets_ = false;
+    std::uint64_t published_ = 0;  // step
+    int lead_ = 0;                 // at the start of the step
+    // Bounded pace: what is sold goes over at a step that neither has passed, so no body loses time. The
+    // buyer waits for it at its step, the seller goes on to there.
     std::uint64_t handover_step_ = 0;
     std::vector<std::uint32_t> sellers_;  // whose offers were accepted, and whose bodies have not come
     bool stepping_ = false, draining_ = false, left_ = false, ended_ = false;

@@ -128,7 +128,8 @@ TEST_P(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerA
         }
         // A stopped processor is either lost or goes on.
         Record record;
-        const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
+        sim::DistributedResult result;
+        ASSERT_NO_THROW(result = sim::simulate_processors(scene, settings, how, record)) << record.notes;
         EXPECT_EQ(result.steps, settings.steps);
         EXPECT_TRUE(record.in_order);
         if (GetParam() == sim::Pace::lockstep) {
