@@ -208,6 +208,38 @@ TEST(WorldHost, AWorkerWithAnotherFingerprintIsRefusedInLockstep) {
     EXPECT_EQ(other->ending(), "exit status 1");
 }
 
+// Balls on a floor that do not touch, so that only their fall and landing count: with states quantised and
+// contacts solved by whoever has them, they rest where they do in one process. 1 mm: how deep a ball rests
+// in the floor (g / (2 pi 30 Hz)^2 = 0.28 mm) and a float's rounding.
+TEST(WorldHost, BoundedProcessesWithAKillInMidRunBringEveryBodyToItsPlace) {
+    sim::WorldScene scene;
+    scene.world = world_test::on_floor();
+    for (int i = 0; i < 9; ++i)
+        scene.world.bodies.push_back(
+            world_test::ball({1.5 * (i % 3), 0.8 + 0.1 * i, 1.5 * (i / 3)}, sim::Fidelity::modal));
+    struct Places : Watcher {
+        std::vector<Eigen::Vector3d> places;
+        void at(std::uint64_t step, const sim::World& world) override {
+            Watcher::at(step, world);
+            places.clear();
+            for (int b = 0; b < world.bodies(); ++b) places.push_back(world.state(b).position);
+        }
+    } watcher;
+    watcher.act_at = {50};
+    watcher.act = [] { ::kill(children_of(getpid()).front(), SIGKILL); };
+    sim::DistributedSettings settings = lockstep(240);
+    settings.pace = sim::Pace::bounded, settings.bound = 4;
+    const sim::DistributedResult result = sim::run_distributed(scene, settings, processes(3), watcher);
+    EXPECT_EQ(result.steps, 240u);
+    EXPECT_EQ(result.lost, 1);
+    EXPECT_GE(result.bodies_reowned, 1);
+    sim::World alone(scene.world);
+    world_test::run(alone, 240);
+    ASSERT_EQ(watcher.places.size(), 9u);
+    for (int b = 0; b < 9; ++b)
+        EXPECT_LT((watcher.places[static_cast<std::size_t>(b)] - alone.state(b).position).norm(), 1e-3) << b;
+}
+
 std::string port_of(const std::string& endpoint) {
     return endpoint.substr(endpoint.rfind(':'));
 }
