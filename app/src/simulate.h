@@ -48,7 +48,8 @@ struct SimulateResult {
     WorkerOptions worker_options;
 };
 
-/// Runs a scene, in this process or shared out to workers. Throws BadInput, or std::runtime_error while running.
+/// Runs a scene, in this process or shared out to workers. Throws BadInput, or std::runtime_error while
+/// running.
 [[nodiscard]] SimulateResult simulate(const SimulateOptions& options);
 
 /// One JSON object, the keys that scripts rely on first; numbers read back to the same double. Apart from

@@ -57,7 +57,8 @@ void print_workers(const SimulateResult& r) {
     fmt::print("{} {}, {}, {}: {:.1f} bytes a body's step, {} contacts between workers, {} bodies traded\n",
                w.workers, o.simulated ? "simulated processors" : "workers", mode_name(o.pace),
                o.pace == sim::Pace::bounded ? fmt::format("bound {}", o.bound) : "lockstep",
-               r.body_steps > 0 ? double(w.bytes) / double(r.body_steps) : 0.0, w.cross_contacts, w.migrations);
+               r.body_steps > 0 ? double(w.bytes) / double(r.body_steps) : 0.0, w.cross_contacts,
+               w.migrations);
     if (w.lost + w.left > 0)
         fmt::print("{} workers were lost, {} left; {} bodies went to others\n", w.lost, w.left,
                    w.bodies_reowned);
@@ -107,7 +108,9 @@ void add_simulate_command(CLI::App& program, int& status) {
     command->add_option("--dt", a->dt, "Length of a step [s], such as 1/60; default: the scene's");
     command->add_option("--until", a->until,
                         "rest: until every body sleeps and no event is left, --steps (10 minutes) at most");
-    command->add_option("--out", a->out, "Folder for states.csv, energy.csv, times.csv, summary.json; with workers timing.csv, workers.svg");
+    command->add_option(
+        "--out", a->out,
+        "Folder for states.csv, energy.csv, times.csv, summary.json; with workers timing.csv, workers.svg");
     command->add_flag("--frames", a->frames, "Also draw frames/000000.png on");
     command->add_option("--fps", a->fps, "Frames a second, and rows of states.csv")->capture_default_str();
     command->add_option("--size", a->size, "Size of the frames")->capture_default_str();

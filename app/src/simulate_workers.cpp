@@ -102,7 +102,8 @@ void RunObserver::finish(const sim::DistributedResult& run) {
     if (run.lost == 0 && run.quarantined.empty()) result_.drift = watch_->drift(run.outside_impulse);
 }
 
-sim::DistributedResult run_workers(const Scene& scene, const SimulateOptions& options, RunObserver& observer) {
+sim::DistributedResult run_workers(const Scene& scene, const SimulateOptions& options,
+                                   RunObserver& observer) {
     const WorkerOptions& workers = *options.workers;
     const sim::DistributedSettings settings = settings_of(options, scene);
     if (workers.simulated) return sim::simulate_processors(scene, settings, *workers.simulated, observer);

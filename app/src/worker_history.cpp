@@ -58,8 +58,9 @@ std::string worker_colour(std::size_t number) {
 
 PlotScript workers_plot(const WorkerHistory& history) {
     constexpr int kHeight = 2 * kPanel + kFrame;
-    std::string commands = plot_axes() + "set key outside right top\nset multiplot\nset lmargin at screen "
-                                         "0.085\nset rmargin at screen 0.86\nset yrange [0:]\n";
+    std::string commands = plot_axes() +
+                           "set key outside right top\nset multiplot\nset lmargin at screen "
+                           "0.085\nset rmargin at screen 0.86\nset yrange [0:]\n";
     commands += margins(12, kPanel - 12, kHeight) + "set format x ''\nset ylabel 'bodies a worker'\n" +
                 panel(history, false);
     commands += margins(kPanel + 12, 2 * kPanel - 6, kHeight) +

@@ -69,8 +69,9 @@ std::shared_ptr<WorkerArguments> add_worker_options(CLI::App& command) {
 sim::SimulatedProcessors parse_processors(const std::string& text) {
     sim::SimulatedProcessors processors;
     const std::size_t colon = text.find(':');
-    const std::string wanted = "simulated, with latency=SECONDS (to 10), slowdown=TIMES (to 1e6) or "
-                               "cost=measured|modelled after a colon";
+    const std::string wanted =
+        "simulated, with latency=SECONDS (to 10), slowdown=TIMES (to 1e6) or "
+        "cost=measured|modelled after a colon";
     if (text.substr(0, colon) != "simulated") refuse("--processors " + text, wanted);
     if (colon == std::string::npos) return processors;
     for (const std::string& part : split_at_commas(text.substr(colon + 1))) {

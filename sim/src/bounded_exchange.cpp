@@ -25,7 +25,7 @@ public:
     explicit BoundedExchange(const SceneMessage& scene);
 
     using Exchange::take;
-    void take(const WorldHeader& header, UpdateMessage&& message) override;
+    void take(const WorldHeader& header, PackedUpdates&& message) override;
     void members(const std::vector<std::uint32_t>& workers) override;
     void own(const Ownership& ownership) override;
     [[nodiscard]] bool ready() const override;
@@ -127,7 +127,7 @@ BoundedExchange::BoundedExchange(const SceneMessage& scene)
       world_(scene.scene.world),
       clock_(scene.scene),
       costs_(clock_.bodies(), scene.settings.market.smoothing_steps),
-      pushes_(clock_.bodies(), keep_steps(scene.settings.bound)),
+      pushes_(world_, clock_.bodies(), keep_steps(scene.settings.bound)),
       foreign_(world_, pushes_, self_, clock_.bodies()),
       lot_(tied(scene.scene, clock_.bodies())) {
     const auto n = static_cast<std::size_t>(clock_.bodies());
@@ -169,15 +169,11 @@ void BoundedExchange::come_to(std::uint64_t step) {
     if (world_.bodies() != before) list();
 }
 
-void BoundedExchange::take(const WorldHeader& header, UpdateMessage&& message) {
-    for (Push& push : message.pushes) {
-        if (static_cast<int>(push.body) >= world_.bodies()) continue;
-        world_.spread_modes(static_cast<int>(push.body), push.impulse);
-        pushes_.add(static_cast<int>(push.body), header.worker, header.step, std::move(push.impulse));
-    }
-    message.pushes.clear();
+void BoundedExchange::take(const WorldHeader& header, PackedUpdates&& message) {
+    const auto shared = std::make_shared<const PackedUpdates>(std::move(message));
+    pushes_.add(header.worker, header.step, shared);
     pushes_.heard(header.worker, header.step);
-    foreign_.take(header.step, std::make_shared<const UpdateMessage>(std::move(message)));
+    foreign_.take(header.step, shared);
 }
 
 void BoundedExchange::members(const std::vector<std::uint32_t>& workers) {
@@ -190,11 +186,11 @@ void BoundedExchange::members(const std::vector<std::uint32_t>& workers) {
 void BoundedExchange::own(const Ownership& ownership) {
     const std::uint32_t owner = ownership.owner;
     const bool first = std::find(owner_.begin(), owner_.end(), owner) == owner_.end();
-    auto message = std::make_shared<UpdateMessage>();
-    message->sources = ownership.sources, message->applied = ownership.applied;
+    UpdateMessage message;
+    message.sources = ownership.sources, message.applied = ownership.applied;
     for (const WorldRecord& record : ownership.bodies) {
         owner_[static_cast<std::size_t>(record.body)] = owner;
-        Update& update = message->bodies.emplace_back();
+        Update& update = message.bodies.emplace_back();
         update.body = static_cast<std::uint32_t>(record.body);
         update.asleep = record.asleep, update.quarantined = record.quarantined;
         update.state = record.state;
@@ -203,7 +199,7 @@ void BoundedExchange::own(const Ownership& ownership) {
     // A worker that owned nothing begins here.
     if (first && owner != self_) pushes_.heard(owner, ownership.step);
     // Last published: its own message, with what held the bodies, is known already to who was here.
-    std::erase_if(message->bodies, [&](const Update& u) {
+    std::erase_if(message.bodies, [&](const Update& u) {
         return !ownership.traded && foreign_.newest(static_cast<int>(u.body)) >= ownership.step;
     });
     foreign_.take(ownership.step, message);
@@ -297,6 +293,7 @@ void BoundedExchange::place_ghosts() {
     leant_on_.clear();
     for (const int body : near_) {
         const ForeignBodies::Ghost ghost = foreign_.at(body, step_);
+        if (!world_.is_near_own(body, ghost.state)) continue;
         ghost_age_ = std::max(ghost_age_, ghost.age);
         if (ghost.leant_on) leant_on_.push_back(body);
         world_.place_ghost(body, ghost.state, is_zero(ghost.held) ? nullptr : &ghost.held, ghost.asleep);

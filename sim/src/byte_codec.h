@@ -81,6 +81,7 @@ public:
         if (value > 1) throw DecodeError("a flag of " + std::to_string(value) + ", expected 0 or 1");
         return value == 1;
     }
+    [[nodiscard]] std::size_t left() const noexcept { return bytes_.size(); }
     void expect_end() const {
         if (!bytes_.empty()) throw DecodeError(std::to_string(bytes_.size()) + " bytes too many");
     }

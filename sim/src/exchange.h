@@ -15,7 +15,7 @@ public:
 
     /// A state or update message of another worker, in the order in which that one sent them.
     virtual void take(const WorldHeader& header, StateMessage&& message) { (void)header, (void)message; }
-    virtual void take(const WorldHeader& header, UpdateMessage&& message) { (void)header, (void)message; }
+    virtual void take(const WorldHeader& header, PackedUpdates&& message) { (void)header, (void)message; }
     virtual void take(SnapshotMessage&& message) {
         (void)message;
     }  ///< once, before the first step of one who joins late

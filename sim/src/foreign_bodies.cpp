@@ -13,27 +13,31 @@ ForeignBodies::ForeignBodies(World& world, const PushLog& pushes, std::uint32_t 
       gravity_(world.settings().gravity.norm()),
       seen_(static_cast<std::size_t>(bodies)) {}
 
-void ForeignBodies::take(std::uint64_t step, std::shared_ptr<const UpdateMessage> message) {
-    for (const Update& update : message->bodies) {
-        const int body = static_cast<int>(update.body);
-        if (body >= world_->bodies()) continue;  // comes later here
-        auto& seen = seen_[update.body];
+void ForeignBodies::take(std::uint64_t step, const std::shared_ptr<const PackedUpdates>& message) {
+    for (const PackedUpdates::Place& place : message->bodies) {
+        if (static_cast<int>(place.body) >= world_->bodies()) continue;  // comes later here
+        auto& seen = seen_[place.body];
         while (!seen.empty() && seen.back().step >= step) seen.pop_back();
-        seen.push_back({step, message, &update, world_->ball_radius(body, update.state.q)});
+        seen.push_back({step, message, place.offset, message->glance(place.offset)});
     }
+}
+
+void ForeignBodies::take(std::uint64_t step, const UpdateMessage& message) {
+    DecodedWorldMessage packed = decode_for_worker(encode({}, message));
+    take(step, std::make_shared<const PackedUpdates>(std::get<PackedUpdates>(std::move(packed.message))));
 }
 
 void ForeignBodies::take_own(int body, std::uint64_t step, std::vector<std::uint32_t> sources,
                              std::vector<std::uint64_t> applied) {
-    auto message = std::make_shared<UpdateMessage>();
+    UpdateMessage message;
     const WorldRecord record = world_->record(body);
-    Update& update = message->bodies.emplace_back();
+    Update& update = message.bodies.emplace_back();
     update.body = static_cast<std::uint32_t>(body);
     update.asleep = record.asleep, update.quarantined = record.quarantined;
     update.state = record.state;
-    message->sources = std::move(sources), message->applied = std::move(applied);
+    message.sources = std::move(sources), message.applied = std::move(applied);
     seen_[static_cast<std::size_t>(body)].clear();
-    take(step, std::move(message));
+    take(step, message);
 }
 
 const ForeignBodies::Seen& ForeignBodies::seen_at(int body, std::uint64_t now) const {
@@ -66,16 +70,17 @@ void ForeignBodies::put_right(int body, const Seen& seen, WorldBodyState& state)
 ForeignBodies::Ghost ForeignBodies::at(int body, std::uint64_t now) {
     const Seen& seen = seen_at(body, now);
     Ghost ghost;
-    ghost.state = seen.update->state;
+    Update update = seen.message->update(seen.offset);
+    ghost.state = std::move(update.state);
     const std::vector<std::uint32_t> sources = pushes_->sources_of(body);
-    ghost.asleep = seen.update->asleep && sources.empty();
-    if (ghost.asleep || seen.update->quarantined) return ghost;
-    ghost.leant_on = seen.update->held;
+    ghost.asleep = update.asleep && sources.empty();
+    if (ghost.asleep || update.quarantined) return ghost;
+    ghost.leant_on = update.held;
     ghost.age = now > seen.step ? static_cast<int>(now - seen.step) : 0;
     put_right(body, seen, ghost.state);
     for (std::uint64_t step = seen.step + 1; step <= now + 1; ++step) {
         StepImpulse held;
-        if (seen.update->held) held = seen.update->impulse;
+        if (update.held) held = update.impulse;
         for (const std::uint32_t source : sources) {
             if (step > now && source == self_) continue;
             add_impulse(held, pushes_->seen(body, source, step, pushes_->known(source)));
@@ -93,20 +98,19 @@ ForeignBall ForeignBodies::ball(int body, std::uint64_t now) {
     auto& all = seen_[static_cast<std::size_t>(body)];
     while (all.size() > 1 && all[1].step <= now) all.pop_front();
     const Seen& seen = all.front();
-    const WorldBodyState& s = seen.update->state;
-    const double age =
-        seen.update->asleep ? 0 : (static_cast<double>(now) - static_cast<double>(seen.step)) * dt_;
+    const PackedUpdates::Glance& s = seen.glance;
+    const double age = s.asleep ? 0 : (static_cast<double>(now) - static_cast<double>(seen.step)) * dt_;
     const double speed = s.velocity.norm(), fall = gravity_ * (std::abs(age) + dt_);
     return {body, s.position + age * s.velocity,
-            1.02 * seen.radius + dt_ * (speed + fall) + fall * std::abs(age)};
+            1.02 * world_->most_radius(body) + dt_ * (speed + fall) + fall * std::abs(age)};
 }
 
 bool ForeignBodies::quarantined(int body) const {
-    return seen_[static_cast<std::size_t>(body)].back().update->quarantined;
+    return seen_[static_cast<std::size_t>(body)].back().glance.quarantined;
 }
 
 Eigen::Vector3d ForeignBodies::last_position(int body) const {
-    return seen_[static_cast<std::size_t>(body)].back().update->state.position;
+    return seen_[static_cast<std::size_t>(body)].back().glance.position;
 }
 
 }  // namespace sim

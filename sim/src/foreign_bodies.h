@@ -15,7 +15,8 @@ public:
     ForeignBodies(World& world, const PushLog& pushes, std::uint32_t self, int bodies);
 
     /// An update message of step `step`, or what stands for one.
-    void take(std::uint64_t step, std::shared_ptr<const UpdateMessage> message);
+    void take(std::uint64_t step, const std::shared_ptr<const PackedUpdates>& message);
+    void take(std::uint64_t step, const UpdateMessage& message);
     /// From now on seen at `step` as the world has it.
     void take_own(int body, std::uint64_t step, std::vector<std::uint32_t> sources,
                   std::vector<std::uint64_t> applied);
@@ -43,9 +44,9 @@ public:
 private:
     struct Seen {
         std::uint64_t step;
-        std::shared_ptr<const UpdateMessage> message;
-        const Update* update;
-        double radius;
+        std::shared_ptr<const PackedUpdates> message;
+        std::uint32_t offset;
+        PackedUpdates::Glance glance;
     };
     [[nodiscard]] const Seen& seen_at(int body, std::uint64_t now) const;
     [[nodiscard]] static std::uint64_t applied(const Seen& seen, std::uint32_t source);

@@ -36,7 +36,7 @@ MeetingPoint::MeetingPoint(const WorldScene& scene, const DistributedSettings& s
       lots_(joined_lots(scene)) {
     for (WorldRecord& record : first_records(scene)) {
         const std::uint64_t born = view_.clock().born(static_cast<int>(bodies_.size()));
-        bodies_.push_back({kApplication, born, std::move(record), none_});
+        bodies_.push_back({kApplication, born, std::move(record), none_, 0});
     }
     quarantined_.assign(bodies_.size(), 0);
 }
@@ -81,7 +81,11 @@ std::uint32_t MeetingPoint::join(const JoinRequest& request) {
     } else if (started_) {
         catch_up(worker);
         send(members_, Members{members_});
-        share_out(owned_by(kApplication), kApplication);
+        while (!orphans_.empty()) {
+            const auto orphans = std::move(orphans_.back());
+            orphans_.pop_back();
+            share_out(orphans.second, orphans.first);
+        }
     }
     return worker;
 }
@@ -139,6 +143,10 @@ std::vector<MeetingPoint::Group> MeetingPoint::groups(const std::vector<int>& bo
             found->bodies.push_back(body);
         }
     }
+    // Who owned nothing begins with the first.
+    std::sort(groups.begin(), groups.end(), [](const Group& a, const Group& b) {
+        return std::pair(a.step, a.bodies.front()) < std::pair(b.step, b.bodies.front());
+    });
     return groups;
 }
 
@@ -158,6 +166,7 @@ void MeetingPoint::register_owner(const std::vector<int>& bodies, std::uint32_t 
     for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = owner;
     for (const Group& group : groups(bodies)) {
         ++epoch_;
+        for (const int body : group.bodies) bodies_[static_cast<std::size_t>(body)].epoch = epoch_;
         Ownership message = ownership(group);
         message.from = from;
         message.traded = traded;
@@ -170,7 +179,10 @@ void MeetingPoint::register_owner(const std::vector<int>& bodies, std::uint32_t 
 // To whoever has least, what is joined together.
 void MeetingPoint::share_out(const std::vector<int>& bodies, std::uint32_t from) {
     for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = kApplication;
-    if (members_.empty()) return;
+    if (members_.empty()) {
+        if (!bodies.empty()) orphans_.emplace_back(from, bodies);
+        return;
+    }
     std::map<std::uint32_t, std::size_t> count;
     for (const std::uint32_t worker : members_) count[worker] = owned_by(worker).size();
     std::map<std::uint32_t, std::vector<int>> shares;
@@ -192,6 +204,7 @@ void MeetingPoint::remove(std::uint32_t worker) {
     std::erase(members_, worker);
     if (started_) send(members_, Members{members_});
     share_out(owned_by(worker), worker);
+    advance();
 }
 
 void MeetingPoint::lose(std::uint32_t worker, const std::string& why) {
@@ -312,7 +325,7 @@ void MeetingPoint::take_update(const WorldHeader& header, std::span<const std::u
                (!u.held || fits(u.body, u.impulse.modal.size()));
     });
     const bool pushes = std::all_of(message.pushes.begin(), message.pushes.end(),
-                                    [&](const Push& p) { return fits(p.body, p.impulse.modal.size()); });
+                                    [&](const Push& p) { return fits(p.body, p.impulse.modal_q.size()); });
     if (settings_.pace != Pace::bounded || !own || !pushes || header.step <= senders_[header.worker].step)
         return refuse(header.worker, "found states that are not its to publish");
     const auto applied = std::make_shared<const Applied>(Applied{message.sources, message.applied});
@@ -323,10 +336,26 @@ void MeetingPoint::take_update(const WorldHeader& header, std::span<const std::u
         record.asleep = update.asleep, record.quarantined = update.quarantined;
         publish(bodies_[update.body], std::move(record), header.step, applied);
     }
+    extend_sleep(header, applied);
     report(header, message.report, message.bodies.size(), bytes.size());
     pass_on(header, bytes);
     view_.take(header.step, message.bodies);
     advance();
+}
+
+// What sleeps is not published again until it wakes. (Bodies that the sender did not know to be its own when
+// it wrote this are left out.)
+void MeetingPoint::extend_sleep(const WorldHeader& header, const std::shared_ptr<const Applied>& applied) {
+    std::vector<WorldRecord> asleep;
+    for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
+        Body& body = bodies_[static_cast<std::size_t>(i)];
+        if (body.owner != header.worker || body.epoch > header.epoch || body.step >= header.step) continue;
+        if (!body.record.asleep || !view_.clock().moves_at(i, header.step)) continue;
+        body.step = header.step;
+        body.applied = applied;
+        asleep.push_back(body.record);
+    }
+    view_.take(header.step, asleep);
 }
 
 void MeetingPoint::take_handover(const WorldHeader& header, Handover&& message) {
@@ -403,6 +432,7 @@ void MeetingPoint::advance() {
     while (started_ && !finished_) {
         if (settings_.until_rest && view_.at_rest()) return end(true);
         if (view_.step() >= settings_.steps) return end(false);
+        if (settings_.pace == Pace::bounded) release();
         if (!view_.advance()) return;
         const World& world = view_.world();
         for (int i = 0; i < world.bodies(); ++i)
@@ -411,6 +441,14 @@ void MeetingPoint::advance() {
                 result_.quarantined.push_back({i, view_.step(), "state"});
         observer_->at(view_.step(), world);
         std::erase_if(kept_, [this](const auto& kept) { return kept.first <= view_.step(); });
+    }
+}
+
+// A body that came to a worker after its last step is published no more.
+void MeetingPoint::release() {
+    for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
+        const auto sender = senders_.find(owner(i));
+        if (sender != senders_.end() && sender->second.step >= settings_.steps) view_.release(i);
     }
 }
 

@@ -49,6 +49,7 @@ private:
         std::uint64_t step = 0;  ///< of the record
         WorldRecord record;      ///< last published
         std::shared_ptr<const Applied> applied;
+        std::uint32_t epoch = 0;  ///< of its owner
     };
     struct Sender {
         std::uint64_t step = 0, bytes = 0;  ///< last published; sent since
@@ -64,6 +65,7 @@ private:
     void take_message(const WorldHeader& header, std::span<const std::uint8_t> bytes, WorldMessage&& message);
     void take_state(const WorldHeader& header, std::span<const std::uint8_t> bytes, StateMessage&& message);
     void take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes, UpdateMessage&& message);
+    void extend_sleep(const WorldHeader& header, const std::shared_ptr<const Applied>& applied);
     void take_handover(const WorldHeader& header, Handover&& message);
     void take_dealing(const WorldHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
     void report(const WorldHeader& header, const StepReport& report, std::size_t records, std::size_t bytes);
@@ -85,6 +87,7 @@ private:
     [[nodiscard]] Ownership ownership(const Group& group) const;
     void catch_up(std::uint32_t worker);
     void advance();
+    void release();
     void end(bool rest);
 
     void send(std::vector<std::uint32_t> to, const WorldMessage& message);
@@ -104,6 +107,8 @@ private:
     /// State and update messages of steps that the view has not reached, for who joins.
     std::deque<std::pair<std::uint64_t, std::shared_ptr<const std::vector<std::uint8_t>>>> kept_;
     std::vector<std::uint8_t> quarantined_;
+    std::vector<std::pair<std::uint32_t, std::vector<int>>>
+        orphans_;                                       // by whom they were lost; nobody was left
     std::map<std::uint32_t, Eigen::Vector3d> outside_;  // of each worker since its start
     DistributedResult result_;
 };

@@ -57,11 +57,20 @@ StepImpulse lasting(const StepImpulse& a, const StepImpulse& b) {
     return c;
 }
 
-PushLog::PushLog(int bodies, int keep_steps)
-    : keep_(static_cast<std::uint64_t>(keep_steps)), entries_(static_cast<std::size_t>(bodies)) {}
+PushLog::PushLog(const World& world, int bodies, int keep_steps)
+    : world_(&world),
+      keep_(static_cast<std::uint64_t>(keep_steps)),
+      entries_(static_cast<std::size_t>(bodies)) {}
 
 void PushLog::add(int body, std::uint32_t source, std::uint64_t step, StepImpulse impulse) {
-    entries_[static_cast<std::size_t>(body)].push_back({source, step, std::move(impulse)});
+    entries_[static_cast<std::size_t>(body)].push_back({source, 0, step, nullptr, std::move(impulse)});
+}
+
+void PushLog::add(std::uint32_t source, std::uint64_t step,
+                  const std::shared_ptr<const PackedUpdates>& message) {
+    for (const PackedUpdates::Place& push : message->pushes)
+        if (push.body < entries_.size() && static_cast<int>(push.body) < world_->bodies())
+            entries_[push.body].push_back({source, push.offset, step, message, {}});
 }
 
 void PushLog::heard(std::uint32_t source, std::uint64_t step) {
@@ -93,8 +102,15 @@ int PushLog::count_since(int body, std::uint64_t step, std::uint32_t self) const
 }
 
 const StepImpulse* PushLog::find(int body, std::uint32_t source, std::uint64_t step) const {
-    for (const Entry& entry : entries_[static_cast<std::size_t>(body)])
-        if (entry.step == step && entry.source == source) return &entry.impulse;
+    for (Entry& entry : entries_[static_cast<std::size_t>(body)]) {
+        if (entry.step != step || entry.source != source) continue;
+        if (entry.message) {
+            entry.impulse = std::move(entry.message->push(entry.offset).impulse);
+            world_->spread_modes(body, entry.impulse);
+            entry.message.reset();
+        }
+        return &entry.impulse;
+    }
     return nullptr;
 }
 
@@ -109,6 +125,7 @@ StepImpulse PushLog::seen(int body, std::uint32_t source, std::uint64_t step, st
 }
 
 void PushLog::prune(std::uint64_t step) {
+    if (step % (keep_ / 4) != 0) return;
     for (std::vector<Entry>& entries : entries_)
         std::erase_if(entries, [&](const Entry& entry) { return entry.step + keep_ < step; });
 }

@@ -2,9 +2,10 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <vector>
 
-#include "sim/world.h"
+#include "world_messages.h"
 
 namespace sim {
 
@@ -21,10 +22,13 @@ void add_impulse(StepImpulse& a, const StepImpulse& b, double factor = 1);
 /// pushes assumes the same, so nobody has to tell what he assumed.
 class PushLog {
 public:
-    PushLog(int bodies, int keep_steps);
+    /// The world tells what modes a push came to.
+    PushLog(const World& world, int bodies, int keep_steps);
 
     static constexpr std::uint64_t kForever = ~std::uint64_t{0};
     void add(int body, std::uint32_t source, std::uint64_t step, StepImpulse impulse);
+    /// The pushes of a message, read when they are asked for.
+    void add(std::uint32_t source, std::uint64_t step, const std::shared_ptr<const PackedUpdates>& message);
     /// All of the source's pushes up to `step` are in; kForever: it has gone.
     void heard(std::uint32_t source, std::uint64_t step);
     [[nodiscard]] std::uint64_t known(std::uint32_t source) const;
@@ -47,14 +51,16 @@ public:
 
 private:
     struct Entry {
-        std::uint32_t source;
+        std::uint32_t source, offset;
         std::uint64_t step;
-        StepImpulse impulse;
+        std::shared_ptr<const PackedUpdates> message;  // until it was read
+        mutable StepImpulse impulse;
     };
     [[nodiscard]] const StepImpulse* find(int body, std::uint32_t source, std::uint64_t step) const;
 
+    const World* world_;
     std::uint64_t keep_;
-    std::vector<std::vector<Entry>> entries_;  // by body
+    mutable std::vector<std::vector<Entry>> entries_;  // by body
     std::map<std::uint32_t, std::uint64_t> known_;
 };
 

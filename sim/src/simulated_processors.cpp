@@ -74,6 +74,7 @@ private:
     void start_step(std::size_t number);
     void send(Processor& p);
     [[nodiscard]] double factor(std::size_t number) const;
+    [[nodiscard]] std::string stuck() const;
 
     SimulatedProcessors how_;
     DistributedObserver* observer_;
@@ -193,7 +194,7 @@ void Machine::end_step(Processor& p) {
 
 void Machine::take_messages(Processor& p) {
     while (!p.inbox.empty() && p.inbox.front().time <= now_) {
-        DecodedWorldMessage decoded = decode_world(*p.inbox.front().bytes);
+        DecodedWorldMessage decoded = decode_for_worker(*p.inbox.front().bytes);
         p.inbox.pop_front();
         if (const auto* scene = std::get_if<SceneMessage>(&decoded.message)) {
             p.worker = std::make_unique<WorldWorker>(*scene);
@@ -223,15 +224,25 @@ void Machine::send(Processor& p) {
                                 std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))});
 }
 
+// That nothing is left to happen before the end is our own mistake.
+std::string Machine::stuck() const {
+    std::string what = "simulated processors: found nothing left to happen, expected the run's end; members";
+    for (const std::uint32_t worker : meeting_.members()) {
+        const Processor& p = processors_[worker];
+        what.append(" ").append(std::to_string(worker));
+        if (p.worker) what.append(" at step ").append(std::to_string(p.worker->steps_done()));
+        if (p.silent()) what.append(" silent");
+    }
+    return what;
+}
+
 DistributedResult Machine::run() {
     for (int i = 0; i < how_.count; ++i) join();
     meeting_.start();
     deliver();
     while (!meeting_.finished()) {
         const Event event = next();
-        if (event.kind == Event::Kind::none)
-            throw std::logic_error("simulated processors: found nothing left to happen at step " +
-                                   std::to_string(meeting_.result().steps) + ", expected the run's end");
+        if (event.kind == Event::Kind::none) throw std::logic_error(stuck());
         happen(event);
     }
     DistributedResult result = meeting_.result();

@@ -277,4 +277,61 @@ std::vector<Push> read_pushes(ByteReader& in) {
     return pushes;
 }
 
+namespace {
+
+// Steps over records of `fixed` + `each` m bytes; extra(flags, m) more.
+template <typename Extra>
+void find(ByteReader& in, std::span<const std::uint8_t> all, std::size_t smallest, Extra&& length,
+          std::vector<PackedUpdates::Place>& places) {
+    const std::uint32_t count = in.count(smallest);
+    places.resize(count);
+    for (PackedUpdates::Place& place : places) {
+        place.offset = static_cast<std::uint32_t>(all.size() - in.left());
+        const BodyAndModes which = read_body_and_modes(in);
+        place.body = which.body;
+        (void)in.take(length(in, static_cast<std::size_t>(which.modes)));
+    }
+}
+
+}  // namespace
+
+void find_updates(ByteReader& in, std::span<const std::uint8_t> all,
+                  std::vector<PackedUpdates::Place>& places) {
+    find(
+        in, all, kSmallestUpdate,
+        [](ByteReader& at, std::size_t modes) {
+            const bool held = at.number<std::uint8_t>() & kHeld;
+            return kSmallestUpdate - 5 + 4 * modes + (held ? 12 + 2 * modes : 0);
+        },
+        places);
+}
+
+void find_pushes(ByteReader& in, std::span<const std::uint8_t> all,
+                 std::vector<PackedUpdates::Place>& places) {
+    find(
+        in, all, kSmallestPush, [](ByteReader&, std::size_t modes) { return kSmallestPush - 4 + 8 * modes; },
+        places);
+}
+
+Update PackedUpdates::update(std::uint32_t offset) const {
+    ByteReader in(std::span<const std::uint8_t>(bytes).subspan(offset));
+    return read_update(in);
+}
+
+Push PackedUpdates::push(std::uint32_t offset) const {
+    ByteReader in(std::span<const std::uint8_t>(bytes).subspan(offset));
+    return read_push(in);
+}
+
+PackedUpdates::Glance PackedUpdates::glance(std::uint32_t offset) const {
+    SmallReader in(std::span<const std::uint8_t>(bytes).subspan(offset + 4));
+    Glance glance;
+    const auto flags = in.number<std::uint8_t>();
+    glance.asleep = flags & kAsleep, glance.quarantined = flags & kQuarantined;
+    read_floats(in, glance.position);
+    (void)in.take(7);
+    read_halves(in, glance.velocity);
+    return glance;
+}
+
 }  // namespace sim

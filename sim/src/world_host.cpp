@@ -61,7 +61,7 @@ public:
     [[nodiscard]] std::uint32_t number() const { return number_; }
 
     void take(const std::vector<std::uint8_t>& bytes) {
-        DecodedWorldMessage m = decode_world(bytes);
+        DecodedWorldMessage m = decode_for_worker(bytes);
         if (const auto* scene = std::get_if<SceneMessage>(&m.message))
             worker_.emplace(*scene);
         else if (worker_)

@@ -35,6 +35,13 @@ struct World::Implementation {
     std::vector<int> owned;   // pairs: own and fixed bodies, ascending
     std::vector<int> placed;  // pairs: ghosts of the next step
     int cross_contacts = 0;
+    struct LooseBall {
+        Eigen::Vector3d center;
+        double radius;
+        int body;
+    };
+    std::vector<LooseBall> own_balls;  // pairs: of the next step
+    [[nodiscard]] bool near_own(const Eigen::Vector3d& center, double radius, int body) const;
 
     const BodyKind* kind_of(const WorldBody& body);
     int add(const WorldBody& body);

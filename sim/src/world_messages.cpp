@@ -12,6 +12,7 @@ namespace sim {
 namespace {
 
 constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'W'};
+constexpr std::uint16_t kUpdateType = 12;
 constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kChecksumBytes = 4, kAppliedBytes = 12;
 constexpr std::uint32_t kLongestText = 4096;
 
@@ -112,6 +113,9 @@ void write_body(ByteWriter& out, const UpdateMessage& m) {
     write(out, m.bodies);
     write(out, m.pushes);
 }
+void write_body(ByteWriter&, const PackedUpdates&) {
+    throw std::invalid_argument("an update message that is packed already");
+}
 void write_body(ByteWriter& out, const Offer& m) {
     if (m.bodies.size() != m.cost_s.size()) throw std::invalid_argument("an offer without all costs");
     out.number(m.to);
@@ -182,6 +186,9 @@ void read_body(ByteReader& in, UpdateMessage& m) {
     read_applied(in, m.sources, m.applied);
     m.bodies = read_updates(in);
     m.pushes = read_pushes(in);
+}
+void read_body(ByteReader&, PackedUpdates&) {
+    throw DecodeError("a message of no known type");
 }
 void read_body(ByteReader& in, Offer& m) {
     m.to = in.number<std::uint32_t>();
@@ -258,6 +265,22 @@ std::vector<std::uint8_t> encode(const WorldHeader& header, const WorldMessage& 
     std::memcpy(out.bytes().data() + kLengthAt, &length, sizeof length);
     out.number(crc32c(out.bytes()));
     return std::move(out.bytes());
+}
+
+DecodedWorldMessage decode_for_worker(std::vector<std::uint8_t> bytes) {
+    WorldHeader header;
+    const std::uint16_t type = read_header(bytes, header);
+    if (type != kUpdateType) return decode_world(bytes);
+    PackedUpdates packed;
+    const std::span<const std::uint8_t> all = std::span(bytes).first(bytes.size() - kChecksumBytes);
+    ByteReader in(all.subspan(kHeaderBytes));
+    packed.report = read_report(in);
+    read_applied(in, packed.sources, packed.applied);
+    find_updates(in, all, packed.bodies);
+    find_pushes(in, all, packed.pushes);
+    in.expect_end();
+    packed.bytes = std::move(bytes);
+    return {header, std::move(packed)};
 }
 
 DecodedWorldMessage decode_world(std::span<const std::uint8_t> bytes) {

@@ -168,6 +168,29 @@ struct UpdateMessage {
     std::vector<Push> pushes;
 };
 
+/// An UpdateMessage as a worker gets it: of hundreds of bodies it needs the few that are near, so states and
+/// pushes are read one by one when they are needed.
+struct PackedUpdates {
+    struct Place {
+        std::uint32_t body, offset;
+    };
+    StepReport report;
+    std::vector<std::uint32_t> sources;
+    std::vector<std::uint64_t> applied;
+    std::vector<std::uint8_t> bytes;
+    std::vector<Place> bodies, pushes;  ///< in bytes
+
+    /// Throw DecodeError.
+    [[nodiscard]] Update update(std::uint32_t offset) const;
+    [[nodiscard]] Push push(std::uint32_t offset) const;
+    /// What an update tells at a glance.
+    struct Glance {
+        Eigen::Vector3d position, velocity;  ///< [m], [m/s]
+        bool asleep, quarantined;
+    };
+    [[nodiscard]] Glance glance(std::uint32_t offset) const;
+};
+
 // Worker to worker, through the application. The market.
 struct Offer {
     std::uint32_t to = 0, number = 0;  ///< number: of the seller's offers
@@ -187,15 +210,17 @@ struct Handover {
     std::vector<std::uint64_t> applied;
 };
 
-using WorldMessage =
-    std::variant<JoinRequest, WorldBeat, Drained, WorkerFailure, SceneMessage, Refusal, EndOfRun, Members,
-                 Ownership, SnapshotMessage, StateMessage, UpdateMessage, Offer, OfferAnswer, Handover>;
+using WorldMessage = std::variant<JoinRequest, WorldBeat, Drained, WorkerFailure, SceneMessage, Refusal,
+                                  EndOfRun, Members, Ownership, SnapshotMessage, StateMessage, UpdateMessage,
+                                  Offer, OfferAnswer, Handover, PackedUpdates>;
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const WorldHeader& header, const WorldMessage& message);
 struct DecodedWorldMessage {
     WorldHeader header;
     WorldMessage message;
 };
+/// The same, for workers: update messages as PackedUpdates (encode does not take these).
+[[nodiscard]] DecodedWorldMessage decode_for_worker(std::vector<std::uint8_t> bytes);
 /// Throws DecodeError for anything that encode cannot have written.
 [[nodiscard]] DecodedWorldMessage decode_world(std::span<const std::uint8_t> bytes);
 

@@ -60,7 +60,8 @@ private:
     void take_all() {
         zmq::message_t frame;
         while (socket_.recv(frame, zmq::recv_flags::dontwait)) {
-            DecodedWorldMessage m = decode_world({frame.data<std::uint8_t>(), frame.size()});
+            const auto* bytes = frame.data<std::uint8_t>();
+            DecodedWorldMessage m = decode_for_worker({bytes, bytes + frame.size()});
             if (const auto* refusal = std::get_if<Refusal>(&m.message)) {
                 std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
                 refused_ = true;

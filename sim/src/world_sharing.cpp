@@ -264,36 +264,46 @@ double World::work(int body) const {
     return implementation_->bodies.at(static_cast<std::size_t>(body)).work;
 }
 
-double World::ball_radius(int body, const Eigen::VectorXd& q) const {
-    return loose_radius(*implementation_->bodies.at(static_cast<std::size_t>(body)).kind, q);
+double World::most_radius(int body) const {
+    const BodyKind& kind = *implementation_->bodies.at(static_cast<std::size_t>(body)).kind;
+    return kind.surface.bounding_radius() * (kind.modes > 0 ? 1 + kGradientLimit : 1);
 }
 
-void World::near_own(const std::vector<ForeignBall>& foreign, std::vector<int>& near) const {
-    struct Box {
-        Eigen::Vector3d center;
-        double half;
-        int body;
-    };
-    const Implementation& w = *implementation_;
-    std::vector<Box> boxes;
+bool World::Implementation::near_own(const Eigen::Vector3d& center, double radius, int body) const {
+    return std::any_of(own_balls.begin(), own_balls.end(), [&](const LooseBall& ball) {
+        const double reach = ball.radius + radius;
+        return ball.body < body && (ball.center - center).squaredNorm() <= reach * reach;
+    });
+}
+
+void World::near_own(const std::vector<ForeignBall>& foreign, std::vector<int>& near) {
+    Implementation& w = *implementation_;
+    w.own_balls.clear();
     Eigen::AlignedBox3d all;
     for (const int i : w.owned) {
         const MovingBody& body = w.bodies[static_cast<std::size_t>(i)];
         if (!body.moves()) continue;
-        const double half = loose_radius(*body.kind, body.state.q) + contact_reach(body, w.settings);
-        boxes.push_back({body.state.position, half, i});
-        all.extend((body.state.position.array() - half).matrix()),
-            all.extend((body.state.position.array() + half).matrix());
+        const double radius = loose_radius(*body.kind, body.state.q) + contact_reach(body, w.settings);
+        w.own_balls.push_back({body.state.position, radius, i});
+        all.extend((body.state.position.array() - radius).matrix());
+        all.extend((body.state.position.array() + radius).matrix());
     }
     near.clear();
-    for (const ForeignBall& ball : foreign) {
-        if (all.squaredExteriorDistance(ball.center) > ball.radius * ball.radius) continue;
-        const bool touches = std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) {
-            return box.body < ball.body && (box.center - ball.center).squaredNorm() <=
-                                               (box.half + ball.radius) * (box.half + ball.radius);
-        });
-        if (touches) near.push_back(ball.body);
-    }
+    for (const ForeignBall& ball : foreign)
+        if (all.squaredExteriorDistance(ball.center) <= ball.radius * ball.radius &&
+            w.near_own(ball.center, ball.radius, ball.body))
+            near.push_back(ball.body);
+}
+
+bool World::is_near_own(int body, const WorldBodyState& state) const {
+    const MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    const WorldSettings& settings = implementation_->settings;
+    double speed =
+        state.velocity.norm() + settings.dt * std::abs(b.gravity_scale) * settings.gravity.norm() +
+        state.angular_momentum.norm() / b.kind->mass.inertia.minCoeff() * b.kind->surface.bounding_radius();
+    if (b.kind->modes > 0) speed += b.kind->shape_bound.dot(state.q_dot.cwiseAbs());
+    return implementation_->near_own(state.position,
+                                     loose_radius(*b.kind, state.q) * 1.01 + settings.dt * speed, body);
 }
 
 void World::place_ghost(int body, const WorldBodyState& state, const StepImpulse* held, bool asleep) {

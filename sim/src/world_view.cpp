@@ -6,7 +6,7 @@ namespace sim {
 
 WorldView::WorldView(const WorldScene& scene, Pace pace) : pace_(pace), replica_(scene) {
     published_.resize(static_cast<std::size_t>(replica_.clock().bodies()));
-    still_.resize(published_.size(), 0);
+    still_.resize(published_.size(), 0), released_.resize(published_.size(), 0);
 }
 
 void WorldView::take(std::uint64_t step, StateMessage&& message) {
@@ -48,7 +48,9 @@ bool WorldView::advance_bounded() {
     const std::uint64_t next = step_ + 1;
     for (int i = 0; i < clock().bodies(); ++i) {
         const auto& all = published_[static_cast<std::size_t>(i)];
-        if (clock().moves_at(i, next) && (all.empty() || all.back().step < next)) return false;
+        if (released_[static_cast<std::size_t>(i)] == 0 && clock().moves_at(i, next) &&
+            (all.empty() || all.back().step < next))
+            return false;
     }
     replica_.begin_at(step_);
     for (int i = 0; i < replica_.world().bodies(); ++i)

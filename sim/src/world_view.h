@@ -16,6 +16,8 @@ public:
     void take(std::uint64_t step, const std::vector<Update>& updates);
     /// A body's record that was not published: handed over.
     void take(std::uint64_t step, const std::vector<WorldRecord>& records);
+    /// Bounded: nothing more will be published of this body.
+    void release(int body) { released_[static_cast<std::size_t>(body)] = 1; }
     /// One step on, if all that it needs is known.
     [[nodiscard]] bool advance();
 
@@ -40,7 +42,7 @@ private:
     Replica replica_;
     std::uint64_t step_ = 0;
     std::vector<std::deque<Published>> published_;  // bounded: of each body, by ascending steps
-    std::vector<std::uint8_t> still_;
+    std::vector<std::uint8_t> still_, released_;
 };
 
 }  // namespace sim

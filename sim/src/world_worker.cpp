@@ -8,7 +8,8 @@ WorldWorker::WorldWorker(const SceneMessage& scene)
     : self_(scene.worker),
       exchange_(scene.settings.pace == Pace::lockstep ? make_lockstep_exchange(scene)
                                                       : make_bounded_exchange(scene)),
-      market_(scene.worker, scene.settings.market) {
+      market_(scene.worker, scene.settings.market),
+      bounded_(scene.settings.pace == Pace::bounded) {
     for (const WorldEvent& event : scene.scene.events)
         if (!event.slowing.empty()) events_.push_back(event);
 }
@@ -29,6 +30,10 @@ void WorldWorker::take_message(const WorldHeader& header, Ownership&& message) {
     epoch_ = header.epoch;
     exchange_->own(message);
     market_.registered(header.epoch, message);
+    // Who came to the last step by taking bodies over has to say so, once.
+    if (exchange_->done() && exchange_->own_bodies() > 0 && published_ < exchange_->steps_done() &&
+        !stepping_ && bounded_)
+        publish(0, 0);
 }
 
 void WorldWorker::take_message(const WorldHeader& header, SnapshotMessage&& message) {
@@ -41,7 +46,7 @@ void WorldWorker::take_message(const WorldHeader& header, StateMessage&& message
     exchange_->take(header, std::move(message));
 }
 
-void WorldWorker::take_message(const WorldHeader& header, UpdateMessage&& message) {
+void WorldWorker::take_message(const WorldHeader& header, PackedUpdates&& message) {
     market_.heard(header.worker, header.epoch, message.report);
     exchange_->take(header, std::move(message));
 }
@@ -95,9 +100,17 @@ double WorldWorker::work() const {
 }
 
 void WorldWorker::worked(double seconds, double waited_s) {
-    const World& world = exchange_->world();
     exchange_->cost(seconds);
     market_.worked(exchange_->steps_done(), seconds, work(), exchange_->own_bodies());
+    stepping_ = false;
+    publish(seconds, waited_s);
+    if (draining_) return leave();
+    trade();
+    exchange_->follow();
+}
+
+void WorldWorker::publish(double seconds, double waited_s) {
+    const World& world = exchange_->world();
     StepReport report;
     report.seconds = static_cast<float>(seconds);
     report.smoothed_s = static_cast<float>(market_.smoothed());
@@ -108,11 +121,8 @@ void WorldWorker::worked(double seconds, double waited_s) {
     report.cross_contacts = static_cast<std::uint32_t>(world.cross_contacts());
     report.own = static_cast<std::uint32_t>(exchange_->own_bodies());
     report.outside_impulse = world.outside_impulse();
-    stepping_ = false;
+    published_ = exchange_->steps_done();
     queue_.push_back(exchange_->publish(epoch_, report));
-    if (draining_) return leave();
-    trade();
-    exchange_->follow();
 }
 
 // At the end of a step, after its states are on their way.

@@ -35,7 +35,7 @@ private:
     void take_message(const WorldHeader& header, Ownership&& message);
     void take_message(const WorldHeader& header, SnapshotMessage&& message);
     void take_message(const WorldHeader& header, StateMessage&& message);
-    void take_message(const WorldHeader& header, UpdateMessage&& message);
+    void take_message(const WorldHeader& header, PackedUpdates&& message);
     void take_message(const WorldHeader& header, Offer&& message);
     void take_message(const WorldHeader& header, OfferAnswer&& message);
     void take_message(const WorldHeader& header, EndOfRun&& message);
@@ -45,6 +45,7 @@ private:
     void take_message(const WorldHeader& header, Other&& message);
 
     void send(const WorldMessage& message);
+    void publish(double seconds, double waited_s);
     void trade();
     void leave();
 
@@ -52,9 +53,11 @@ private:
     std::vector<WorldEvent> events_;  // those that slow somebody
     std::unique_ptr<Exchange> exchange_;
     Market market_;
+    bool bounded_;
     std::vector<std::vector<std::uint8_t>> queue_;
     std::uint32_t epoch_ = 0;
-    int lead_ = 0;  // at the start of the step
+    std::uint64_t published_ = 0;  // step
+    int lead_ = 0;                 // at the start of the step
     bool stepping_ = false, draining_ = false, left_ = false, ended_ = false;
 };
 

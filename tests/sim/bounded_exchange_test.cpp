@@ -49,8 +49,8 @@ public:
     }
     void deliver(std::size_t w) {
         for (; !inbox_[w].empty(); inbox_[w].pop_front()) {
-            DecodedWorldMessage message = decode_world(inbox_[w].front());
-            exchanges_[w]->take(message.header, std::get<UpdateMessage>(std::move(message.message)));
+            DecodedWorldMessage message = decode_for_worker(inbox_[w].front());
+            exchanges_[w]->take(message.header, std::get<PackedUpdates>(std::move(message.message)));
         }
     }
     void run_in_turn() {

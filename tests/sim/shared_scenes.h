@@ -45,8 +45,10 @@ inline sim::WorldScene busy_scene(int balls = 14) {
 }
 
 /// The scene in one process.
-inline sim::World alone(const sim::WorldScene& scene, std::uint64_t steps) {
+inline sim::World alone(const sim::WorldScene& scene, std::uint64_t steps,
+                        std::vector<std::uint64_t>* hashes = nullptr) {
     sim::World world(scene.world);
+    if (hashes) hashes->assign(1, world.state_hash());
     std::size_t next = 0;
     for (std::uint64_t step = 0; step < steps; ++step) {
         for (; next < scene.events.size() && scene.events[next].step <= step; ++next) {
@@ -55,8 +57,16 @@ inline sim::World alone(const sim::WorldScene& scene, std::uint64_t steps) {
             for (std::size_t i = event.first; i < event.end; ++i) world.add_body(scene.later[i]);
         }
         world.step();
+        if (hashes) hashes->push_back(world.state_hash());
     }
     return world;
+}
+
+/// At the end of every step, from 0.
+inline std::vector<std::uint64_t> hashes_alone(const sim::WorldScene& scene, std::uint64_t steps) {
+    std::vector<std::uint64_t> hashes;
+    (void)alone(scene, steps, &hashes);
+    return hashes;
 }
 
 /// Keeps what a run tells.

@@ -258,7 +258,9 @@ public:
     // pairs.
     /// Those of `foreign` that have to be placed for the next step: that may touch an own body of a lower
     /// number.
-    void near_own(const std::vector<ForeignBall>& foreign, std::vector<int>& near) const;
+    void near_own(const std::vector<ForeignBall>& foreign, std::vector<int>& near);
+    /// The same for one of them whose state is known better, after near_own.
+    [[nodiscard]] bool is_near_own(int body, const WorldBodyState& state) const;
     /// A ghost is there for the next step only, under gravity and `held`.
     void place_ghost(int body, const WorldBodyState& state, const StepImpulse* held, bool asleep = false);
     /// Impulse that an own body gets in the course of the next step (its displacement and turn at once).
@@ -280,8 +282,8 @@ public:
     [[nodiscard]] const StepImpulse* impulse(int body) const;
     [[nodiscard]] int cross_contacts()
         const noexcept;  ///< points between own bodies and ghosts in the last step
-    /// Radius of a ball that holds the body with these modal coordinates [m].
-    [[nodiscard]] double ball_radius(int body, const Eigen::VectorXd& q) const;
+    /// Radius of a ball that holds the body as deformed as it may be [m].
+    [[nodiscard]] double most_radius(int body) const;
     /// What a body took of the last step, in units of an own body without contacts.
     [[nodiscard]] double work(int body) const;
 

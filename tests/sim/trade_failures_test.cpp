@@ -1,0 +1,150 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <random>
+
+#include "shared_scenes.h"
+
+using namespace world_test;
+using Failure = sim::SimulatedProcessors::Failure;
+using Kind = Failure::Kind;
+
+namespace {
+
+constexpr std::uint64_t kSteps = 30;
+constexpr int kWorkers = 3;
+
+// One worker starts with everything; trades from the third step on.
+sim::DistributedSettings trading(sim::Pace pace) {
+    sim::DistributedSettings settings;
+    settings.pace = pace;
+    settings.bound = pace == sim::Pace::bounded ? 4 : 0;
+    settings.steps = kSteps;
+    settings.all_to_first = true;
+    settings.market.from_step = 3;
+    return settings;
+}
+
+sim::SimulatedProcessors processors() {
+    sim::SimulatedProcessors how;
+    how.count = kWorkers;
+    how.modelled = true;
+    return how;
+}
+
+int moving_bodies(const sim::WorldScene& scene) {
+    int count = static_cast<int>(scene.later.size());
+    for (const sim::WorldBody& body : scene.world.bodies) count += !body.fixed;
+    return count;
+}
+
+// Failures of every kind and worker, at times that lie close together over all of the trading.
+std::vector<std::vector<Failure>> failures(double elapsed, double silence) {
+    const int times = std::getenv("MUSICWORLD_LONG") ? 60 : 12;
+    std::vector<std::vector<Failure>> all;
+    for (const Kind kind : {Kind::kill, Kind::stop, Kind::cut, Kind::drain, Kind::join})
+        for (int worker = 0; worker < kWorkers; ++worker)
+            for (int i = 0; i < times; ++i) {
+                const double at = elapsed * (0.08 + 0.5 * (i + 0.3 * worker) / times);
+                all.push_back({{at, worker, kind}});
+                // Half of the stopped ones go on before anybody notices, half after.
+                if (kind == Kind::stop)
+                    all.back().push_back({at + silence * (i % 2 ? 0.5 : 1.5), worker, Kind::resume});
+                // Some lose the next one, too, while their bodies are being shared out.
+                if (i % 3 == 0 && kind != Kind::join)
+                    all.back().push_back({at + silence * 1.01, (worker + 1) % kWorkers, kind});
+                if (i % 4 == 0) all.back().push_back({at + silence * 1.2, 0, Kind::join});
+            }
+    return all;
+}
+
+class TradeFailures : public testing::TestWithParam<sim::Pace> {};
+
+}  // namespace
+
+TEST_P(TradeFailures, AtEveryStageOfATradeLeaveEveryBodyWithOneOwnerAndTheRunFinished) {
+    const sim::WorldScene scene = busy_scene();
+    const sim::DistributedSettings settings = trading(GetParam());
+    Record whole;
+    const auto unharmed = sim::simulate_processors(scene, settings, processors(), whole);
+    ASSERT_GE(unharmed.trades, 2u);
+    EXPECT_EQ(unharmed.refused_messages, 0u) << whole.notes;
+    const double silence = unharmed.elapsed_s / 8;
+    std::uint64_t reowned = 0;
+    for (const std::vector<Failure>& some : failures(unharmed.elapsed_s, silence)) {
+        sim::SimulatedProcessors how = processors();
+        how.silence_s = silence;
+        how.failures = some;
+        Record record;
+        const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
+        SCOPED_TRACE(std::to_string(static_cast<int>(some[0].kind)) + " of " +
+                     std::to_string(some[0].worker) + " at " + std::to_string(some[0].time_s));
+        EXPECT_EQ(result.steps, kSteps);
+        EXPECT_TRUE(record.in_order);
+        ASSERT_EQ(record.hashes.size(), kSteps + 1);
+        if (GetParam() == sim::Pace::lockstep) {
+            EXPECT_EQ(record.hashes, whole.hashes);
+        }
+        int own = 0;
+        for (const auto& [number, bodies] : record.own) {
+            EXPECT_GE(bodies, 0) << "nobody gives what it has not";
+            own += bodies;
+        }
+        EXPECT_EQ(own, moving_bodies(scene));
+        reowned += static_cast<std::uint64_t>(result.bodies_reowned);
+    }
+    EXPECT_GT(reowned, 100u) << "failures met workers that owned bodies";
+}
+
+TEST_P(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerAndTheRunFinished) {
+    const sim::WorldScene scene = busy_scene();
+    sim::DistributedSettings settings = trading(GetParam());
+    settings.steps = 60;
+    const std::vector<std::uint64_t> alone = hashes_alone(scene, settings.steps);
+    const unsigned runs = std::getenv("MUSICWORLD_LONG") ? 400 : 20;
+    std::uint64_t trades = 0, reowned = 0;
+    for (unsigned seed = 0; seed < runs; ++seed) {
+        SCOPED_TRACE("seed " + std::to_string(seed));
+        std::mt19937 random(seed);
+        auto uniform = [&random] { return static_cast<double>(random()) / 4294967296.0; };
+        sim::SimulatedProcessors how = processors();
+        how.count = 1 + static_cast<int>(random() % 5);
+        how.latency_s = 1e-5 * std::pow(30, uniform());
+        settings.all_to_first = seed % 2 == 0;
+        settings.bound = GetParam() == sim::Pace::bounded ? static_cast<int>(random() % 6) : 0;
+        // Slow for ten steps at a time, in an order that the seed decides.
+        how.factor = [seed](int worker, std::uint64_t step) {
+            const std::uint64_t mixed =
+                (step / 10 * 31 + static_cast<unsigned>(worker) * 7 + seed) * 2654435761u;
+            return (mixed >> 16) % 3 == 0 ? 3.0 : 1.0;
+        };
+        const double span = 0.015;
+        how.silence_s = span / 12;
+        for (int i = static_cast<int>(random() % 7); i > 0; --i) {
+            const int worker = static_cast<int>(random() % 6);
+            const auto kind = static_cast<Kind>(random() % 6);
+            how.failures.push_back({span * uniform(), worker, kind});
+        }
+        // A stopped processor is either lost or goes on.
+        Record record;
+        sim::DistributedResult result;
+        ASSERT_NO_THROW(result = sim::simulate_processors(scene, settings, how, record)) << record.notes;
+        EXPECT_EQ(result.steps, settings.steps);
+        EXPECT_TRUE(record.in_order);
+        if (GetParam() == sim::Pace::lockstep) {
+            EXPECT_EQ(record.hashes, alone);
+        }
+        const int own = std::accumulate(record.own.begin(), record.own.end(), 0,
+                                        [](int sum, const auto& worker) { return sum + worker.second; });
+        EXPECT_EQ(own, moving_bodies(scene));
+        trades += result.trades, reowned += static_cast<std::uint64_t>(result.bodies_reowned);
+    }
+    EXPECT_GT(trades, runs) << "bodies changed hands all the time";
+    EXPECT_GT(reowned, runs);
+}
+
+INSTANTIATE_TEST_SUITE_P(Paces, TradeFailures, testing::Values(sim::Pace::lockstep, sim::Pace::bounded),
+                         [](const auto& pace) {
+                             return pace.param == sim::Pace::lockstep ? "Lockstep" : "Bounded";
+                         });
