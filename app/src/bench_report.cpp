@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
@@ -41,8 +42,10 @@ std::string format_text(const BenchReport& report) {
     std::string text = fmt::format("{}, {} cores, {}{}\n\n", report.machine.processor, report.machine.cores,
                                    report.machine.compiler, report.machine.avx2 ? "" : ", without AVX2");
     const auto out = std::back_inserter(text);
+    std::size_t width = 42;
+    for (const BenchResult& r : report.results) width = std::max(width, r.name.size());
     for (const BenchResult& r : report.results) {
-        fmt::format_to(out, "{:<42} {:>10.4g} {:<18}", r.name, r.value, r.unit);
+        fmt::format_to(out, "{:<{}} {:>10.4g} {:<18}", r.name, width, r.value, r.unit);
         if (r.ratio)
             fmt::format_to(out, " {:.3f} x {} {} ({:.4g})", *r.ratio, r.peer, r.peer_version,
                            r.peer_value.value_or(0));

@@ -54,11 +54,14 @@ SimulateOptions options_of(const Typed& a) {
 void print_workers(const SimulateResult& r) {
     const sim::DistributedResult& w = *r.workers;
     const WorkerOptions& o = r.worker_options;
-    fmt::print("{} {}, {}, {}: {:.1f} bytes a body's step, {} contacts between workers, {} bodies traded\n",
-               w.workers, o.simulated ? "simulated processors" : "workers", mode_name(o.pace),
-               o.pace == sim::Pace::bounded ? fmt::format("bound {}", o.bound) : "lockstep",
-               r.body_steps > 0 ? double(w.bytes) / double(r.body_steps) : 0.0, w.cross_contacts,
-               w.migrations);
+    fmt::print(
+        "{} {}, {}, {}: {:.1f} bytes a body's step, {} contacts between workers, {} bodies traded\n",
+        w.workers,
+        o.simulated      ? "simulated processors"
+        : w.workers == 1 ? "worker"
+                         : "workers",
+        mode_name(o.pace), o.pace == sim::Pace::bounded ? fmt::format("bound {}", o.bound) : "lockstep",
+        r.body_steps > 0 ? double(w.bytes) / double(r.body_steps) : 0.0, w.cross_contacts, w.migrations);
     if (w.lost + w.left > 0)
         fmt::print("{} workers were lost, {} left; {} bodies went to others\n", w.lost, w.left,
                    w.bodies_reowned);

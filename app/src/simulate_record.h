@@ -3,6 +3,7 @@
 
 #include "frame_writer.h"
 #include "output_folder.h"
+#include "play_setup.h"
 #include "scene_stage.h"
 #include "simulate.h"
 #include "simulate_tables.h"

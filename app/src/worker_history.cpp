@@ -12,7 +12,7 @@ namespace app {
 namespace {
 
 constexpr std::size_t kMostPoints = 4000;
-constexpr int kWidth = 900, kPanel = 260, kFrame = 40;
+constexpr int kWidth = 900, kPanel = 260, kFrame = 56;
 
 std::string lines(const std::vector<WorkerHistory::Point>& points, bool seconds) {
     std::string text;

@@ -70,10 +70,21 @@ TEST(Simulate, BodiesThatCollideInFreeSpaceKeepTheirMomentum) {
     EXPECT_LT(r.energy.total(), r.energy_start.total());  // the collision was there
 }
 
-TEST(Simulate, WhereWallsActMomentumDriftIsUnknown) {
-    const SimulateResult r = simulate(steps_of(WrittenScene(kFalling + "[[plane]]\n"), 3));
-    EXPECT_FALSE(r.drift);
-    EXPECT_TRUE(json::parse(format_simulate(r))["momentum_drift"].is_null());
+TEST(Simulate, WhereAFloorActsMomentumIsHeldAgainstTheImpulseThatItGave) {
+    const SimulateResult r = simulate(steps_of(WrittenScene(kFalling + "[[plane]]\n"), 120));
+    EXPECT_GT(r.momentum.y(), -0.7 * r.drift->scale) << "it has met the floor";
+    ASSERT_TRUE(r.drift);
+    EXPECT_LT(r.drift->linear, 1e-9 * r.drift->scale);  // rounding over 120 steps
+    EXPECT_TRUE(json::parse(format_simulate(r))["angular_momentum_drift_kg_m2_s"].is_null());
+}
+
+TEST(Simulate, ABodyThatComesBringsItsMomentum) {
+    const SimulateResult r = simulate(
+        steps_of(WrittenScene(kFalling + "[[plane]]\n[[event]]\nstep = 5\nadd = { name = \"late\", radius "
+                                         "= 0.3, position = [5, 9, 0], velocity = [0, 0, 3] }\n"),
+                 30));
+    ASSERT_TRUE(r.drift);
+    EXPECT_LT(r.drift->linear, 1e-9 * r.drift->scale);
 }
 
 TEST(Simulate, JsonHasTheKeysThatScriptsRelyOn) {

@@ -33,7 +33,13 @@ int spawn(std::vector<std::string> words, const std::vector<std::string>& enviro
     argv.push_back(nullptr);
     std::vector<std::string> added = environment;
     for (std::string& entry : added) envp.push_back(entry.data());
-    for (char** e = environ; *e; ++e) envp.push_back(*e);
+    const auto set_anew = [&](const std::string& entry) {
+        const std::string name = entry.substr(0, entry.find('=') + 1);
+        return std::any_of(added.begin(), added.end(),
+                           [&](const std::string& a) { return a.starts_with(name); });
+    };
+    for (char** e = environ; *e; ++e)
+        if (!set_anew(*e)) envp.push_back(*e);
     envp.push_back(nullptr);
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);

@@ -13,7 +13,7 @@ struct Ended {
     std::string out, err;
 };
 
-/// Runs `musicworld ARGS...` and waits. `environment`: NAME=VALUE added to this process's own.
+/// Runs `musicworld ARGS...` and waits. `environment`: NAME=VALUE added to this process's own or in its place.
 Ended run(const std::vector<std::string>& arguments, const std::vector<std::string>& environment = {});
 /// The same of any program.
 Ended run_command(const std::vector<std::string>& words, const std::vector<std::string>& environment = {});

@@ -101,7 +101,6 @@ TEST(Simulate, WrongScenesAreRefusedWithTheirPlaceAndNothingIsWritten) {
 TEST(Simulate, WrongOptionsAreRefusedInOneLine) {
     const Folder folder;
     const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
-        {{"--workers", "2"}, "--workers 2"},
         {{"--workers", "-1"}, "--workers -1"},
         {{"--mode", "async"}, "--mode async"},
         {{"--bound", "3"}, "--bound 3"},
@@ -119,8 +118,27 @@ TEST(Simulate, WrongOptionsAreRefusedInOneLine) {
         arguments.insert(arguments.end(), options.begin(), options.end());
         expect_one_line(run(arguments), 2, words);
     }
-    for (const char* workers : {"0", "1"})
-        EXPECT_EQ(run({"simulate", "human", "--steps", "2", "--workers", workers}).status, 0);
+}
+
+TEST(Simulate, TwoWorkerProcessesInLockstepGiveTheFilesOfOneProcess) {
+    const Folder folder;
+    write(folder / "scene.toml", kScene + "[[body]]\nname = \"c\"\nradius = 0.3\nposition = [0.2, 0.9, 0]\n");
+    std::string hash;
+    for (const std::string workers : {"0", "1", "2"}) {
+        const Ended ended = run({"simulate", folder / "scene.toml", "--steps", "40", "--workers", workers,
+                                 "--out", folder / workers, "--frames", "--size", "96x64", "--json"});
+        ASSERT_EQ(ended.status, 0) << ended.err;
+        EXPECT_EQ(ended.err, "");
+        const json r = json::parse(ended.out);
+        EXPECT_EQ(r["workers"], std::stoi(workers));
+        EXPECT_TRUE(hash.empty() || r["state_hash"] == hash) << workers;
+        hash = r["state_hash"];
+    }
+    const std::vector<std::string> own = {"times.csv", "timing.csv", "workers.svg", "summary.json",
+                                          "energy.csv"};
+    EXPECT_EQ(read_tree(folder / "1", own), read_tree(folder / "0", own));
+    EXPECT_EQ(read_tree(folder / "2", own), read_tree(folder / "0", own));
+    EXPECT_TRUE(fs::exists(folder / "2" / "timing.csv"));
 }
 
 }  // namespace

@@ -42,7 +42,8 @@ public:
     [[nodiscard]] static VectorXd start() {
         VectorXd u(2 * kPoints);
         for (int i = 0; i < kPoints; ++i) {
-            const double x = i % kColumns, y = -(i / kColumns);
+            const int column = i % kColumns, row = i / kColumns;
+            const double x = column, y = -row;
             u.segment<2>(2 * i) = Vector2d(x + 0.15 * std::sin(2.0 * i), y + 0.2 * std::cos(3.0 * i));
         }
         return u;
