@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "signal_mask.h"
+
 namespace sim {
 namespace {
 
@@ -32,6 +34,7 @@ KeyGate::~KeyGate() {
 }
 
 void KeyGate::serve(const std::stop_token& stop) {
+    block_signals();
     while (!stop.stop_requested()) {
         try {
             std::vector<zmq::message_t> request(1);

@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "messages.h"
+#include "signal_mask.h"
 #include "socket_folder.h"
 #include "world_messages.h"
 
@@ -73,6 +74,7 @@ void Pulse::send_beat(zmq::socket_t& socket) const {
 
 void Pulse::beat(zmq::context_t& context, const std::optional<WorkerKeys>& keys,
                  const std::stop_token& stop) {
+    block_signals();
     zmq::socket_t socket = connect_worker(context, endpoint_, keys, 0);
     std::mutex mutex;
     std::unique_lock lock(mutex);

@@ -7,6 +7,8 @@
 #include <cstring>
 #include <utility>
 
+#include "signal_mask.h"
+
 namespace sim {
 namespace {
 
@@ -116,6 +118,7 @@ void WorldGate::dismiss(std::uint32_t worker) {
 // The gate's thread.
 
 void WorldGate::serve(const std::stop_token& stop) {
+    block_signals();
     while (!stop.stop_requested()) {
         poll();
         obey();

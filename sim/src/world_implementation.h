@@ -61,6 +61,7 @@ struct World::Implementation {
     void list_owned();
     void gather_pairs();  // own bodies and the ghosts that were placed
     void forget_foreign_contacts();
+    void stop_at_planes(MovingBody& body, const Eigen::Vector3d& before) const;
     void dismiss_ghosts();
     void find_islands();
     void solve_islands();

@@ -32,6 +32,18 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+/// A ZeroMQ call, again if a signal interrupts it.
+template <typename Call>
+auto through_signals(const Call& call) {
+    for (;;) {
+        try {
+            return call();
+        } catch (const zmq::error_t& e) {
+            if (e.num() != EINTR) throw;
+        }
+    }
+}
+
 /// Sleeps through a signal too.
 void sleep_for(double seconds) {
     std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
@@ -59,7 +71,7 @@ public:
 private:
     void take_all() {
         zmq::message_t frame;
-        while (socket_.recv(frame, zmq::recv_flags::dontwait)) {
+        while (through_signals([&] { return socket_.recv(frame, zmq::recv_flags::dontwait); })) {
             const auto* bytes = frame.data<std::uint8_t>();
             DecodedWorldMessage m = decode_for_worker({bytes, bytes + frame.size()});
             if (const auto* refusal = std::get_if<Refusal>(&m.message)) {
@@ -81,7 +93,7 @@ private:
         for (const std::vector<std::uint8_t>& bytes : worker_.outgoing()) send(bytes);
     }
     void send(const std::vector<std::uint8_t>& bytes) {
-        if (!socket_.send(zmq::buffer(bytes), zmq::send_flags::none))
+        if (!through_signals([&] { return socket_.send(zmq::buffer(bytes), zmq::send_flags::none); }))
             throw std::runtime_error("the application takes no more messages");
     }
     /// Until something comes, or a signal, or a look at the application is due.

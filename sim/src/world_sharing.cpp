@@ -349,12 +349,28 @@ void World::spread_modes(int body, StepImpulse& impulse) const {
     }
 }
 
+// What would go on into a plane stops there: a guess of what its owner finds.
+void World::Implementation::stop_at_planes(MovingBody& body, const Eigen::Vector3d& before) const {
+    WorldBodyState& s = body.state;
+    for (const WorldPlane& plane : planes) {
+        const Eigen::Vector3d own = s.orientation.conjugate() * plane.normal;
+        const double reach = own.cwiseProduct(body.kind->half_box).norm();
+        const double height = plane.normal.dot(s.position) - plane.offset;
+        const double least = std::min(reach, plane.normal.dot(before) - plane.offset);
+        if (height >= least) continue;
+        s.position += (least - height) * plane.normal;
+        s.velocity -= std::min(0.0, s.velocity.dot(plane.normal)) * plane.normal;
+    }
+}
+
 void World::extrapolate(int body, WorldBodyState& state, const StepImpulse* held) {
     MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
     std::swap(b.state, state);
     const bool pushed = std::exchange(b.pushed, false);
     if (held) hold(body, *held);
+    const Eigen::Vector3d before = b.state.position;
     move_freely(b, implementation_->settings);
+    implementation_->stop_at_planes(b, before);
     (void)limit_deformation(b);
     b.pushed = pushed;
     std::swap(b.state, state);

@@ -208,6 +208,26 @@ TEST(WorldHost, AWorkerWithAnotherFingerprintIsRefusedInLockstep) {
     EXPECT_EQ(other->ending(), "exit status 1");
 }
 
+TEST(WorldHost, ABoundedRunOnProcessesWithAKillInMidRunFinishesAllStepsOfEveryBody) {
+    sim::WorldScene scene;
+    scene.world = world_test::on_floor();
+    for (int i = 0; i < 9; ++i)
+        scene.world.bodies.push_back(
+            world_test::ball({1.5 * (i % 3), 0.8 + 0.1 * i, 1.5 * (i / 3)}, sim::Fidelity::modal));
+    Watcher watcher;
+    watcher.act_at = {50};
+    watcher.act = [] { ::kill(children_of(getpid()).front(), SIGKILL); };
+    sim::DistributedSettings settings = lockstep(240);
+    settings.pace = sim::Pace::bounded, settings.bound = 4;
+    const sim::DistributedResult result = sim::run_distributed(scene, settings, processes(3), watcher);
+    EXPECT_EQ(result.steps, 240u);
+    EXPECT_EQ(watcher.last_step, 240u);
+    EXPECT_EQ(result.lost, 1);
+    EXPECT_GE(result.bodies_reowned, 1);
+    EXPECT_LE(result.largest_lead, 4);
+    EXPECT_TRUE(result.quarantined.empty());
+}
+
 std::string port_of(const std::string& endpoint) {
     return endpoint.substr(endpoint.rfind(':'));
 }

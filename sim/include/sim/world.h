@@ -272,7 +272,7 @@ public:
     void correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago) const;
     /// Sets `modal` to the steady impulse that comes nearest to modal_q and modal_rate.
     void spread_modes(int body, StepImpulse& impulse) const;
-    /// One step of a body that touches nothing, under gravity and `held`.
+    /// One step of a body that touches nothing but planes, which stop it, under gravity and `held`.
     void extrapolate(int body, WorldBodyState& state, const StepImpulse* held);
     /// Keep own body's impulses from other moving bodies and constraints (not what hold and correct gave).
     void watch(int body, bool watched);
