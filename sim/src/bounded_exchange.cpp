@@ -94,13 +94,11 @@ constexpr int kMostBound = 64;
 
 // From what was towards what is, by a share; displacement and turn are pushes out of overlaps, which do not
 // last.
-StepImpulse blend(const StepImpulse& before, const StepImpulse& now, double share) {
-    StepImpulse sum;
-    add_impulse(sum, now, share);
-    StepImpulse lasts = before;
-    lasts.displacement.setZero(), lasts.turn.setZero();
-    add_impulse(sum, lasts, 1 - share);
-    return sum;
+void blend(const StepImpulse& before, double share, StepImpulse& now) {
+    const Eigen::Vector3d displacement = share * now.displacement, turn = share * now.turn;
+    add_impulse(now, now, share - 1);
+    add_impulse(now, before, 1 - share);
+    now.displacement = displacement, now.turn = turn;
 }
 
 int keep_steps(int bound) {
@@ -132,7 +130,7 @@ BoundedExchange::BoundedExchange(const SceneMessage& scene)
       clock_(scene.scene),
       costs_(clock_.bodies(), scene.settings.market.smoothing_steps),
       pushes_(world_, clock_.bodies(), keep_steps(scene.settings.bound)),
-      foreign_(world_, pushes_, self_, clock_.bodies()),
+      foreign_(world_, pushes_, self_, clock_.bodies(), settings_.bound),
       lot_(tied(scene.scene, clock_.bodies())) {
     const auto n = static_cast<std::size_t>(clock_.bodies());
     owner_.assign(n, kApplication), own_.assign(n, 0), told_asleep_.assign(n, 0);
@@ -271,16 +269,18 @@ bool BoundedExchange::ready() const {
 
 // Pushes that came since: what was assumed of steps that are over is put right.
 void BoundedExchange::put_right() {
+    StepImpulse scratch;
     for (const auto& [source, known] : pushes_.sources()) {
         std::uint64_t& then = applied_[source];
         if (source == self_ || known <= then) continue;
         for (const int body : owned_) {
             if (pushes_.quiet(body) || then >= step_) continue;
             for (std::uint64_t step = pushes_.first_kept(then + 1, step_); step <= step_; ++step) {
-                const StepImpulse right = pushes_.seen(body, source, step, known);
-                const StepImpulse wrong = negative(pushes_.seen(body, source, step, then));
-                if (!is_zero(right)) world_.correct(body, right, static_cast<int>(step_ - step));
-                if (!is_zero(wrong)) world_.correct(body, wrong, static_cast<int>(step_ - step));
+                const int ago = static_cast<int>(step_ - step);
+                if (const StepImpulse* right = pushes_.seen(body, source, step, known, scratch))
+                    world_.correct(body, *right, ago);
+                if (const StepImpulse* wrong = pushes_.seen(body, source, step, then, scratch))
+                    world_.correct(body, *wrong, ago, -1);
             }
         }
         then = known;
@@ -288,12 +288,17 @@ void BoundedExchange::put_right() {
 }
 
 void BoundedExchange::hold_pushes() {
+    StepImpulse scratch;
     for (const int body : owned_) {
         if (pushes_.quiet(body)) continue;
         StepImpulse held;
+        bool any = false;
         for (const std::uint32_t source : pushes_.sources_of(body))
-            if (source != self_) add_impulse(held, pushes_.seen(body, source, step_ + 1, applied_[source]));
-        if (!is_zero(held)) world_.hold(body, held);
+            if (source != self_)
+                if (const StepImpulse* push =
+                        pushes_.seen(body, source, step_ + 1, applied_[source], scratch))
+                    add_steady(held, *push), any = true;
+        if (any) world_.hold(body, held);
     }
 }
 
@@ -323,11 +328,10 @@ void BoundedExchange::keep_pushes() {
         const auto before = crossed_.find({cross.own, cross.ghost});
         const double share = 1.0 / resolvers(cross.own, cross.ghost);
         if (before != crossed_.end() && share < 1) {
-            StepImpulse excess = cross.on_own;
-            cross.on_own = blend(before->second.on_own, cross.on_own, share);
-            cross.on_ghost = blend(before->second.on_ghost, cross.on_ghost, share);
-            add_impulse(excess, cross.on_own, -1);
-            world_.correct(cross.own, negative(excess), 0);
+            world_.correct(cross.own, cross.on_own, 0, -1);
+            blend(before->second.on_own, share, cross.on_own);
+            blend(before->second.on_ghost, share, cross.on_ghost);
+            world_.correct(cross.own, cross.on_own, 0);
         }
         give_push(cross.ghost, cross.on_ghost);
         now.emplace(std::pair(cross.own, cross.ghost), std::move(cross));
@@ -370,9 +374,11 @@ void BoundedExchange::feel() {
             continue;
         }
         Felt& felt = felt_[body];
-        felt.before = std::move(felt.last);
-        const StepImpulse* now = world_.impulse(body);
-        felt.last = now ? *now : StepImpulse{};
+        std::swap(felt.before, felt.last);
+        if (const StepImpulse* now = world_.impulse(body))
+            felt.last = *now;
+        else
+            felt.last = {};
     }
 }
 
@@ -421,7 +427,7 @@ Update BoundedExchange::update_of(int body) const {
     update.still = record.asleep || record.still_steps * world_.settings().dt >= 0.5 - 1e-9;
     update.state = record.state;
     if (const auto felt = felt_.find(body); felt != felt_.end()) {
-        update.impulse = lasting(felt->second.last, felt->second.before);
+        lasting(felt->second.last, felt->second.before, update.impulse);
         update.held = !is_zero(update.impulse);
     }
     return update;

@@ -5,20 +5,26 @@
 
 namespace sim {
 
-ForeignBodies::ForeignBodies(World& world, const PushLog& pushes, std::uint32_t self, int bodies)
+ForeignBodies::ForeignBodies(World& world, const PushLog& pushes, std::uint32_t self, int bodies, int bound)
     : world_(&world),
       pushes_(&pushes),
       self_(self),
       dt_(world.settings().dt),
       gravity_(world.settings().gravity.norm()),
-      seen_(static_cast<std::size_t>(bodies)) {}
+      newest_(static_cast<std::size_t>(bodies)),
+      seen_(static_cast<std::size_t>(bodies)),
+      keep_(static_cast<std::size_t>(bound) + 3) {}
 
 void ForeignBodies::take(std::uint64_t step, const std::shared_ptr<const PackedUpdates>& message) {
     for (const PackedUpdates::Place& place : message->bodies) {
         if (static_cast<int>(place.body) >= world_->bodies()) continue;  // comes later here
         auto& seen = seen_[place.body];
         while (!seen.empty() && seen.back().step >= step) seen.pop_back();
-        seen.push_back({step, message, place.offset, message->glance(place.offset)});
+        // Nobody is further ahead of this worker than the bound.
+        if (seen.size() >= keep_) seen.erase(seen.begin());
+        seen.push_back({step, message, place.offset});
+        newest_[place.body] = {step, world_->most_radius(static_cast<int>(place.body)),
+                               message->glance(place.offset)};
     }
 }
 
@@ -55,14 +61,16 @@ std::uint64_t ForeignBodies::applied(const Seen& seen, std::uint32_t source) {
 }
 
 void ForeignBodies::put_right(int body, const Seen& seen, WorldBodyState& state) {
+    StepImpulse scratch;
     for (const std::uint32_t source : pushes_->sources_of(body)) {
         const std::uint64_t then = applied(seen, source), now = pushes_->known(source);
         if (now <= then || then >= seen.step) continue;
         for (std::uint64_t step = pushes_->first_kept(then + 1, seen.step); step <= seen.step; ++step) {
-            const StepImpulse right = pushes_->seen(body, source, step, now);
-            const StepImpulse wrong = negative(pushes_->seen(body, source, step, then));
-            if (!is_zero(right)) world_->correct(body, state, right, static_cast<int>(seen.step - step));
-            if (!is_zero(wrong)) world_->correct(body, state, wrong, static_cast<int>(seen.step - step));
+            const int ago = static_cast<int>(seen.step - step);
+            if (const StepImpulse* right = pushes_->seen(body, source, step, now, scratch))
+                world_->correct(body, state, *right, ago);
+            if (const StepImpulse* wrong = pushes_->seen(body, source, step, then, scratch))
+                world_->correct(body, state, *wrong, ago, -1);
         }
     }
 }
@@ -72,18 +80,20 @@ ForeignBodies::Ghost ForeignBodies::at(int body, std::uint64_t now) {
     Ghost ghost;
     Update update = seen.message->update(seen.offset);
     ghost.state = std::move(update.state);
-    const std::vector<std::uint32_t> sources = pushes_->sources_of(body);
-    ghost.asleep = update.asleep && sources.empty();
+    const PushLog::Sources sources = pushes_->sources_of(body);
+    ghost.asleep = update.asleep && sources.count == 0;
     if (ghost.asleep || update.quarantined) return ghost;
     ghost.leant_on = update.held;
     ghost.age = now > seen.step ? static_cast<int>(now - seen.step) : 0;
     put_right(body, seen, ghost.state);
+    StepImpulse scratch;
     for (std::uint64_t step = seen.step + 1; step <= now + 1; ++step) {
         StepImpulse held;
         if (update.held) held = update.impulse;
         for (const std::uint32_t source : sources) {
             if (step > now && source == self_) continue;
-            add_impulse(held, pushes_->seen(body, source, step, pushes_->known(source)));
+            if (const StepImpulse* push = pushes_->seen(body, source, step, pushes_->known(source), scratch))
+                add_steady(held, *push);
         }
         if (step > now) {
             ghost.held = std::move(held);
@@ -94,23 +104,21 @@ ForeignBodies::Ghost ForeignBodies::at(int body, std::uint64_t now) {
     return ghost;
 }
 
-ForeignBall ForeignBodies::ball(int body, std::uint64_t now) {
-    auto& all = seen_[static_cast<std::size_t>(body)];
-    while (all.size() > 1 && all[1].step <= now) all.pop_front();
-    const Seen& seen = all.front();
-    const PackedUpdates::Glance& s = seen.glance;
-    const double age = s.asleep ? 0 : (static_cast<double>(now) - static_cast<double>(seen.step)) * dt_;
+ForeignBall ForeignBodies::ball(int body, std::uint64_t now) const {
+    const Newest& newest = newest_[static_cast<std::size_t>(body)];
+    const PackedUpdates::Glance& s = newest.glance;
+    const double age = s.asleep ? 0 : (static_cast<double>(now) - static_cast<double>(newest.step)) * dt_;
     const double speed = s.velocity.norm(), fall = gravity_ * (std::abs(age) + dt_);
     return {body, s.position + age * s.velocity,
-            1.02 * world_->most_radius(body) + dt_ * (speed + fall) + fall * std::abs(age)};
+            1.02 * newest.radius + dt_ * (speed + fall) + fall * std::abs(age)};
 }
 
 bool ForeignBodies::quarantined(int body) const {
-    return seen_[static_cast<std::size_t>(body)].back().glance.quarantined;
+    return newest_[static_cast<std::size_t>(body)].glance.quarantined;
 }
 
 Eigen::Vector3d ForeignBodies::last_position(int body) const {
-    return seen_[static_cast<std::size_t>(body)].back().glance.position;
+    return newest_[static_cast<std::size_t>(body)].glance.position;
 }
 
 }  // namespace sim

@@ -1,5 +1,4 @@
 #pragma once
-#include <deque>
 #include <memory>
 
 #include "push_log.h"
@@ -12,7 +11,7 @@ namespace sim {
 class ForeignBodies {
 public:
     /// The world lends kinds and the free step; its own state is not touched.
-    ForeignBodies(World& world, const PushLog& pushes, std::uint32_t self, int bodies);
+    ForeignBodies(World& world, const PushLog& pushes, std::uint32_t self, int bodies, int bound);
 
     /// An update message of step `step`, or what stands for one.
     void take(std::uint64_t step, const std::shared_ptr<const PackedUpdates>& message);
@@ -31,12 +30,12 @@ public:
         StepImpulse held;       ///< over the next step, pushes of this worker's own bodies apart
     };
     [[nodiscard]] Ghost at(int body, std::uint64_t now);
-    /// A ball that holds the body over the step after `now`; drops updates that `now` has passed.
-    [[nodiscard]] ForeignBall ball(int body, std::uint64_t now);
-    [[nodiscard]] bool known(int body) const { return !seen_[static_cast<std::size_t>(body)].empty(); }
+    /// A ball that holds the body over the step after `now`.
+    [[nodiscard]] ForeignBall ball(int body, std::uint64_t now) const;
+    [[nodiscard]] bool known(int body) const { return newest_[static_cast<std::size_t>(body)].radius > 0; }
     /// Step of the last update; 0: the start, or none.
     [[nodiscard]] std::uint64_t newest(int body) const {
-        return known(body) ? seen_[static_cast<std::size_t>(body)].back().step : 0;
+        return newest_[static_cast<std::size_t>(body)].step;
     }
     [[nodiscard]] bool quarantined(int body) const;
     [[nodiscard]] Eigen::Vector3d last_position(int body) const;
@@ -46,7 +45,11 @@ private:
         std::uint64_t step;
         std::shared_ptr<const PackedUpdates> message;
         std::uint32_t offset;
-        PackedUpdates::Glance glance;
+    };
+    struct Newest {
+        std::uint64_t step = 0;
+        double radius = 0;  // most; 0: nothing is known
+        PackedUpdates::Glance glance = {};
     };
     [[nodiscard]] const Seen& seen_at(int body, std::uint64_t now) const;
     [[nodiscard]] static std::uint64_t applied(const Seen& seen, std::uint32_t source);
@@ -56,7 +59,9 @@ private:
     const PushLog* pushes_;
     std::uint32_t self_;
     double dt_ = 0, gravity_ = 0;
-    std::vector<std::deque<Seen>> seen_;  // by body, ascending steps
+    std::vector<Newest> newest_;           // by body
+    std::vector<std::vector<Seen>> seen_;  // by body, ascending steps
+    std::size_t keep_;                     // of them
 };
 
 }  // namespace sim

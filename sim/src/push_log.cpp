@@ -20,10 +20,9 @@ void add(Eigen::VectorXd& a, const Eigen::VectorXd& b, double factor) {
 }
 
 template <typename Vector>
-Vector common(const Vector& a, const Vector& b) {
-    Vector c = a;
-    for (Eigen::Index i = 0; i < c.size(); ++i) c[i] = common(a[i], i < b.size() ? b[i] : 0.0);
-    return c;
+void common(const Vector& a, const Vector& b, Vector& c) {
+    c.resize(std::min(a.size(), b.size()));
+    for (Eigen::Index i = 0; i < c.size(); ++i) c[i] = common(a[i], b[i]);
 }
 
 }  // namespace
@@ -38,10 +37,12 @@ void add_impulse(StepImpulse& a, const StepImpulse& b, double factor) {
     add(a.modal_rate, b.modal_rate, factor);
 }
 
-StepImpulse negative(const StepImpulse& a) {
-    StepImpulse n;
-    add_impulse(n, a, -1);
-    return n;
+void add_steady(StepImpulse& a, const StepImpulse& b) {
+    a.linear += b.linear;
+    a.angular += b.angular;
+    a.displacement += b.displacement;
+    a.turn += b.turn;
+    add(a.modal, b.modal, 1);
 }
 
 bool is_zero(const StepImpulse& a) {
@@ -49,12 +50,12 @@ bool is_zero(const StepImpulse& a) {
            a.modal.isZero(0) && a.modal_q.isZero(0) && a.modal_rate.isZero(0);
 }
 
-StepImpulse lasting(const StepImpulse& a, const StepImpulse& b) {
-    StepImpulse c;
-    c.linear = common(a.linear, b.linear);
-    c.angular = common(a.angular, b.angular);
-    c.modal = common(a.modal, b.modal);
-    return c;
+void lasting(const StepImpulse& a, const StepImpulse& b, StepImpulse& out) {
+    common(a.linear, b.linear, out.linear);
+    common(a.angular, b.angular, out.angular);
+    common(a.modal, b.modal, out.modal);
+    out.displacement.setZero(), out.turn.setZero();
+    out.modal_q.resize(0), out.modal_rate.resize(0);
 }
 
 PushLog::PushLog(const World& world, int bodies, int keep_steps)
@@ -63,14 +64,15 @@ PushLog::PushLog(const World& world, int bodies, int keep_steps)
       entries_(static_cast<std::size_t>(bodies)) {}
 
 void PushLog::add(int body, std::uint32_t source, std::uint64_t step, StepImpulse impulse) {
-    entries_[static_cast<std::size_t>(body)].push_back({source, 0, step, nullptr, std::move(impulse)});
+    entries_[static_cast<std::size_t>(body)].push_back(
+        {source, 0, step, nullptr, std::make_unique<StepImpulse>(std::move(impulse))});
 }
 
 void PushLog::add(std::uint32_t source, std::uint64_t step,
                   const std::shared_ptr<const PackedUpdates>& message) {
     for (const PackedUpdates::Place& push : message->pushes)
         if (push.body < entries_.size() && static_cast<int>(push.body) < world_->bodies())
-            entries_[push.body].push_back({source, push.offset, step, message, {}});
+            entries_[push.body].push_back({source, push.offset, step, message, nullptr});
 }
 
 void PushLog::heard(std::uint32_t source, std::uint64_t step) {
@@ -83,45 +85,44 @@ std::uint64_t PushLog::known(std::uint32_t source) const {
     return found == known_.end() ? 0 : found->second;
 }
 
-std::vector<std::uint32_t> PushLog::sources_of(int body) const {
-    std::vector<std::uint32_t> sources;
-    for (const Entry& entry : entries_[static_cast<std::size_t>(body)])
-        if (std::find(sources.begin(), sources.end(), entry.source) == sources.end())
-            sources.push_back(entry.source);
-    std::sort(sources.begin(), sources.end());
+PushLog::Sources PushLog::sources_of(int body, std::uint64_t since) const {
+    Sources sources;
+    for (const Entry& entry : entries_[static_cast<std::size_t>(body)]) {
+        if (entry.step < since || std::find(sources.begin(), sources.end(), entry.source) != sources.end())
+            continue;
+        if (sources.count < kMostSources) sources.source[sources.count++] = entry.source;
+    }
+    std::sort(sources.source, sources.source + sources.count);
     return sources;
 }
 
 int PushLog::count_since(int body, std::uint64_t step, std::uint32_t self) const {
-    std::vector<std::uint32_t> sources;
-    for (const Entry& entry : entries_[static_cast<std::size_t>(body)])
-        if (entry.step >= step && entry.source != self &&
-            std::find(sources.begin(), sources.end(), entry.source) == sources.end())
-            sources.push_back(entry.source);
-    return static_cast<int>(sources.size());
+    const Sources sources = sources_of(body, step);
+    return sources.count - static_cast<int>(std::count(sources.begin(), sources.end(), self));
 }
 
 const StepImpulse* PushLog::find(int body, std::uint32_t source, std::uint64_t step) const {
-    for (Entry& entry : entries_[static_cast<std::size_t>(body)]) {
-        if (entry.step != step || entry.source != source) continue;
-        if (entry.message) {
-            entry.impulse = std::move(entry.message->push(entry.offset).impulse);
-            world_->spread_modes(body, entry.impulse);
-            entry.message.reset();
+    std::vector<Entry>& entries = entries_[static_cast<std::size_t>(body)];
+    for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry) {
+        if (entry->step != step || entry->source != source) continue;
+        if (!entry->impulse) {
+            entry->impulse = std::make_unique<StepImpulse>(entry->message->push(entry->offset).impulse);
+            world_->spread_modes(body, *entry->impulse);
+            entry->message.reset();
         }
-        return &entry.impulse;
+        return entry->impulse.get();
     }
     return nullptr;
 }
 
-StepImpulse PushLog::seen(int body, std::uint32_t source, std::uint64_t step, std::uint64_t known) const {
-    if (step <= known) {
-        const StepImpulse* push = find(body, source, step);
-        return push ? *push : StepImpulse{};
-    }
+const StepImpulse* PushLog::seen(int body, std::uint32_t source, std::uint64_t step, std::uint64_t known,
+                                 StepImpulse& scratch) const {
+    if (step <= known) return find(body, source, step);
     const StepImpulse* last = find(body, source, known);
-    const StepImpulse* before = known > 0 ? find(body, source, known - 1) : nullptr;
-    return last && before ? lasting(*last, *before) : StepImpulse{};
+    const StepImpulse* before = last && known > 0 ? find(body, source, known - 1) : nullptr;
+    if (!before) return nullptr;
+    lasting(*last, *before, scratch);
+    return &scratch;
 }
 
 void PushLog::prune(std::uint64_t step) {

@@ -11,11 +11,12 @@ namespace sim {
 
 /// a += factor b; a's modal part grows to b's size.
 void add_impulse(StepImpulse& a, const StepImpulse& b, double factor = 1);
-[[nodiscard]] StepImpulse negative(const StepImpulse& a);
+/// The same without what the modes came to: for a force that is held.
+void add_steady(StepImpulse& a, const StepImpulse& b);
 [[nodiscard]] bool is_zero(const StepImpulse& a);
 /// What two steps in a row have in common: component by component the smaller, none where signs differ.
 /// Weight that lasts stays, a knock does not. Displacement and turn are none.
-[[nodiscard]] StepImpulse lasting(const StepImpulse& a, const StepImpulse& b);
+void lasting(const StepImpulse& a, const StepImpulse& b, StepImpulse& out);
 
 /// What bodies were given by bodies of each worker, step by step: pushes, known up to some step of each
 /// worker, assumed beyond it. Step s is the one that ends with s steps done. Everybody who knows the same
@@ -34,14 +35,22 @@ public:
     [[nodiscard]] std::uint64_t known(std::uint32_t source) const;
     [[nodiscard]] const std::map<std::uint32_t, std::uint64_t>& sources() const noexcept { return known_; }
 
-    /// Sources that pushed the body lately.
-    [[nodiscard]] std::vector<std::uint32_t> sources_of(int body) const;
+    /// Sources that pushed the body lately, at most kMostSources (more are left out), ascending.
+    static constexpr int kMostSources = 16;
+    struct Sources {
+        std::uint32_t source[kMostSources];
+        int count = 0;
+        [[nodiscard]] const std::uint32_t* begin() const noexcept { return source; }
+        [[nodiscard]] const std::uint32_t* end() const noexcept { return source + count; }
+    };
+    [[nodiscard]] Sources sources_of(int body, std::uint64_t since = 0) const;
     /// How many of them since `step`, `self` apart.
     [[nodiscard]] int count_since(int body, std::uint64_t step, std::uint32_t self) const;
     [[nodiscard]] bool quiet(int body) const { return entries_[static_cast<std::size_t>(body)].empty(); }
-    /// Push in step `step` to who knows those up to `known`: as it was, or as assumed.
-    [[nodiscard]] StepImpulse seen(int body, std::uint32_t source, std::uint64_t step,
-                                   std::uint64_t known) const;
+    /// Push in step `step` to who knows those up to `known`: as it was, or as assumed (in `scratch`);
+    /// nullptr: none.
+    [[nodiscard]] const StepImpulse* seen(int body, std::uint32_t source, std::uint64_t step,
+                                          std::uint64_t known, StepImpulse& scratch) const;
     /// `from`, or the first step before `to` that is not forgotten.
     [[nodiscard]] std::uint64_t first_kept(std::uint64_t from, std::uint64_t to) const {
         return to > keep_ ? std::max(from, to - keep_) : from;
@@ -54,7 +63,7 @@ private:
         std::uint32_t source, offset;
         std::uint64_t step;
         std::shared_ptr<const PackedUpdates> message;  // until it was read
-        mutable StepImpulse impulse;
+        std::unique_ptr<StepImpulse> impulse;
     };
     [[nodiscard]] const StepImpulse* find(int body, std::uint32_t source, std::uint64_t step) const;
 

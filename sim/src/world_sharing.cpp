@@ -31,13 +31,13 @@ void rotate(Eigen::Quaterniond& orientation, const Eigen::Vector3d& by) {
 }
 
 // The change that an impulse, spread over the step that ended `steps_ago` steps ago, makes to a free body.
-void respond(const MovingBody& body, double dt, const StepImpulse& impulse, int steps_ago,
+void respond(const MovingBody& body, double dt, const StepImpulse& impulse, int steps_ago, double factor,
              WorldBodyState& s) {
     const double time = (steps_ago + 0.5) * dt;
-    s.velocity += impulse.linear / body.kind->mass.mass;
-    s.position += time / body.kind->mass.mass * impulse.linear + impulse.displacement;
-    rotate(s.orientation, time * turned(body, s.orientation, impulse.angular) + impulse.turn);
-    s.angular_momentum += impulse.angular;
+    s.velocity += factor / body.kind->mass.mass * impulse.linear;
+    s.position += factor * (time / body.kind->mass.mass * impulse.linear + impulse.displacement);
+    rotate(s.orientation, factor * (time * turned(body, s.orientation, impulse.angular) + impulse.turn));
+    s.angular_momentum += factor * impulse.angular;
     const HeldSteps& h = body.kind->whole;
     const bool told = impulse.modal_q.size() > 0;
     for (int k = 0; k < (told ? impulse.modal_q.size() : impulse.modal.size()); ++k) {
@@ -48,7 +48,7 @@ void respond(const MovingBody& body, double dt, const StepImpulse& impulse, int 
             rate = h.c[k] * z + h.d[k] * rate;
             z = next;
         }
-        s.q[k] += z, s.q_dot[k] += rate;
+        s.q[k] += factor * z, s.q_dot[k] += factor * rate;
     }
 }
 
@@ -324,15 +324,16 @@ void World::hold(int body, const StepImpulse& impulse) {
     push(b, implementation_->settings.dt, impulse);
 }
 
-void World::correct(int body, const StepImpulse& impulse, int steps_ago) {
+void World::correct(int body, const StepImpulse& impulse, int steps_ago, double factor) {
     MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
     if (b.asleep) wake(body);
-    correct(body, b.state, impulse, steps_ago);
+    correct(body, b.state, impulse, steps_ago, factor);
 }
 
-void World::correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago) const {
+void World::correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago,
+                    double factor) const {
     respond(implementation_->bodies.at(static_cast<std::size_t>(body)), implementation_->settings.dt, impulse,
-            steps_ago, state);
+            steps_ago, factor, state);
 }
 
 void World::spread_modes(int body, StepImpulse& impulse) const {

@@ -267,9 +267,10 @@ public:
     void hold(int body, const StepImpulse& impulse);
     /// Impulse that an own body should have got in the step that ended `steps_ago` steps ago: the change it
     /// makes to a free body.
-    void correct(int body, const StepImpulse& impulse, int steps_ago);
+    void correct(int body, const StepImpulse& impulse, int steps_ago, double factor = 1);
     /// The same for any state of the body.
-    void correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago) const;
+    void correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago,
+                 double factor = 1) const;
     /// Sets `modal` to the steady impulse that comes nearest to modal_q and modal_rate.
     void spread_modes(int body, StepImpulse& impulse) const;
     /// One step of a body that touches nothing but planes, which stop it, under gravity and `held`.
