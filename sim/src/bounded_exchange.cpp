@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <array>
+#include <cmath>
 #include <numeric>
 
 #include "body_costs.h"
@@ -81,8 +81,9 @@ private:
     std::vector<Ownership> later_;
     std::vector<ForeignBall> balls_;
     std::vector<int> near_;
-    std::vector<int> leant_on_;  // ghosts of this step that others hold, too
-    std::vector<Push> given_;    // in the last step
+    std::vector<int> leant_on_;                      // ghosts of this step that others hold, too
+    std::vector<Push> given_;                        // in the last step
+    std::vector<std::uint32_t> breakable_, broken_;  // constraints; those that broke in the last step
     std::map<std::pair<int, int>, CrossImpulse> crossed_;
     std::map<int, Felt> felt_;
     std::vector<std::uint8_t> told_asleep_;
@@ -134,6 +135,9 @@ BoundedExchange::BoundedExchange(const SceneMessage& scene)
       lot_(tied(scene.scene, clock_.bodies())) {
     const auto n = static_cast<std::size_t>(clock_.bodies());
     owner_.assign(n, kApplication), own_.assign(n, 0), told_asleep_.assign(n, 0);
+    for (std::size_t c = 0; c < scene.scene.world.constraints.size(); ++c)
+        if (std::isfinite(scene.scene.world.constraints[c].breaking_force))
+            breakable_.push_back(static_cast<std::uint32_t>(c));
     world_.share(Sharing::pairs);
     for (int i = 0; i < world_.bodies(); ++i) {
         if (!clock_.moves(i)) continue;
@@ -176,6 +180,8 @@ void BoundedExchange::take(const WorldHeader& header, PackedUpdates&& message) {
     pushes_.add(header.worker, header.step, shared);
     pushes_.heard(header.worker, header.step);
     foreign_.take(header.step, shared);
+    for (const std::uint32_t constraint : shared->broken)
+        world_.remove_constraint(static_cast<int>(constraint));
 }
 
 // Bodies follow with their owners.
@@ -395,8 +401,13 @@ void BoundedExchange::step() {
     put_right();
     hold_pushes();
     place_ghosts();
+    std::vector<std::uint32_t> breakable;
+    for (const std::uint32_t c : breakable_)
+        if (world_.constraint_holds(static_cast<int>(c))) breakable.push_back(c);
     world_.step();
     ++step_;
+    for (const std::uint32_t c : breakable)
+        if (!world_.constraint_holds(static_cast<int>(c))) broken_.push_back(c);
     keep_pushes();
     feel();
     pushes_.prune(step_);
@@ -446,6 +457,8 @@ std::vector<std::uint8_t> BoundedExchange::publish(std::uint32_t epoch, const St
     }
     message.pushes = std::move(given_);
     given_.clear();
+    message.broken = std::move(broken_);
+    broken_.clear();
     return encode({self_, epoch, step_}, message);
 }
 

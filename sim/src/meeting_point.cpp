@@ -323,16 +323,22 @@ void MeetingPoint::take_update(const WorldHeader& header, std::span<const std::u
     Sender& sender = senders_[header.worker];
     // Of the last step there are two: as done, for the others, and with what came late, for the view.
     const bool last = header.step == settings_.steps;
-    sender.settled = last && sender.step == header.step;
+    const bool settled = last && sender.step == header.step;
     const bool own = std::all_of(message.bodies.begin(), message.bodies.end(), [&](const Update& u) {
         return owns(header.worker, u.body) && fits(u.body, u.state.q.size()) &&
                (!u.held || fits(u.body, u.impulse.modal.size()));
     });
     const bool pushes = std::all_of(message.pushes.begin(), message.pushes.end(),
                                     [&](const Push& p) { return fits(p.body, p.impulse.modal_q.size()); });
-    if (settings_.pace != Pace::bounded || !own || !pushes || header.step < sender.step ||
+    const bool constraints = std::all_of(message.broken.begin(), message.broken.end(), [&](std::uint32_t c) {
+        return c < scene_.world.constraints.size();
+    });
+    if (settings_.pace != Pace::bounded || !own || !pushes || !constraints || header.step < sender.step ||
         (header.step == sender.step && header.step != settings_.steps))
         return refuse(header.worker, "found states that are not its to publish");
+    sender.settled = settled;
+    for (const std::uint32_t constraint : message.broken)
+        view_.break_constraint(static_cast<int>(constraint));
     const auto applied = std::make_shared<const Applied>(Applied{message.sources, message.applied});
     for (const Update& update : message.bodies) {
         WorldRecord record;

@@ -83,9 +83,16 @@ void write_body(ByteWriter& out, const Refusal& m) {
     out.text(shortened(m.why));
 }
 void write_body(ByteWriter&, const EndOfRun&) {}
+void write_numbers(ByteWriter& out, const std::vector<std::uint32_t>& numbers) {
+    out.count(numbers.size());
+    for (const std::uint32_t number : numbers) out.number(number);
+}
+void read_numbers(ByteReader& in, std::vector<std::uint32_t>& numbers) {
+    numbers.resize(in.count(4));
+    for (std::uint32_t& number : numbers) number = in.number<std::uint32_t>();
+}
 void write_body(ByteWriter& out, const Members& m) {
-    out.count(m.workers.size());
-    for (const std::uint32_t worker : m.workers) out.number(worker);
+    write_numbers(out, m.workers);
 }
 void write_body(ByteWriter& out, const Ownership& m) {
     out.number(m.owner);
@@ -112,6 +119,7 @@ void write_body(ByteWriter& out, const UpdateMessage& m) {
     write_applied(out, m.sources, m.applied);
     write(out, m.bodies);
     write(out, m.pushes);
+    write_numbers(out, m.broken);
 }
 void write_body(ByteWriter&, const PackedUpdates&) {
     throw std::invalid_argument("an update message that is packed already");
@@ -158,8 +166,7 @@ void read_body(ByteReader& in, Refusal& m) {
 }
 void read_body(ByteReader&, EndOfRun&) {}
 void read_body(ByteReader& in, Members& m) {
-    m.workers.resize(in.count(4));
-    for (std::uint32_t& worker : m.workers) worker = in.number<std::uint32_t>();
+    read_numbers(in, m.workers);
 }
 void read_body(ByteReader& in, Ownership& m) {
     m.owner = in.number<std::uint32_t>();
@@ -186,6 +193,7 @@ void read_body(ByteReader& in, UpdateMessage& m) {
     read_applied(in, m.sources, m.applied);
     m.bodies = read_updates(in);
     m.pushes = read_pushes(in);
+    read_numbers(in, m.broken);
 }
 void read_body(ByteReader&, PackedUpdates&) {
     throw DecodeError("a message of no known type");
@@ -278,6 +286,7 @@ DecodedWorldMessage decode_for_worker(std::vector<std::uint8_t> bytes) {
     read_applied(in, packed.sources, packed.applied);
     find_updates(in, all, packed.bodies);
     find_pushes(in, all, packed.pushes);
+    read_numbers(in, packed.broken);
     in.expect_end();
     packed.bytes = std::move(bytes);
     return {header, std::move(packed)};

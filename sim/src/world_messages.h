@@ -38,10 +38,10 @@ namespace sim {
 //    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of applied
 //   10 snapshot   app     u64 step, list of record, list of contact, list of spring
 //   11 state      worker  report, list of record, list of contact, list of spring
-//   12 update     worker  report, list of applied, list of update, list of push
-//   13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds}
-//   14 answer     worker  u32 to, u32 number, flag accepted
-//   15 handover   worker  u32 to, u32 number, list of record, list of applied
+//   12 update     worker  report, list of applied, list of update, list of push, list of u32 broken
+//   constraint 13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds} 14 answer     worker
+//   u32 to, u32 number, flag accepted 15 handover   worker  u32 to, u32 number, list of record, list of
+//   applied
 //
 //   report      56 bytes: f32 seconds, smoothed, waited, bodies' cost; u32 lead, ghost age, cross contacts,
 //               own; v3 outside impulse
@@ -166,6 +166,7 @@ struct UpdateMessage {
     std::vector<std::uint64_t> applied;
     std::vector<Update> bodies;
     std::vector<Push> pushes;
+    std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
 };
 
 /// An UpdateMessage as a worker gets it: of hundreds of bodies it needs the few that are near, so states and
@@ -177,6 +178,7 @@ struct PackedUpdates {
     StepReport report;
     std::vector<std::uint32_t> sources;
     std::vector<std::uint64_t> applied;
+    std::vector<std::uint32_t> broken;
     std::vector<std::uint8_t> bytes;
     std::vector<Place> bodies, pushes;  ///< in bytes
 

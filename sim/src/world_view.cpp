@@ -37,6 +37,10 @@ void WorldView::keep(int body, Published&& published) {
     all.insert(at, std::move(published));
 }
 
+void WorldView::break_constraint(int constraint) {
+    replica_.world().remove_constraint(constraint);
+}
+
 bool WorldView::advance() {
     if (pace_ == Pace::bounded) return advance_bounded();
     if (!replica_.advance(true)) return false;

@@ -18,6 +18,7 @@ public:
     void take(std::uint64_t step, const std::vector<WorldRecord>& records);
     /// Bounded: nothing more will be published of this body.
     void release(int body) { released_[static_cast<std::size_t>(body)] = 1; }
+    void break_constraint(int constraint);  ///< bounded: its owner says so
     /// One step on, if all that it needs is known.
     [[nodiscard]] bool advance();
 
