@@ -178,7 +178,9 @@ void WorldContacts::meet(const MovingBody& a, const MovingBody& b, float margin,
     const float out = PointChooser::reach(lowest, kManifoldTolerance * size);
     const Eigen::Vector3f between = (pa.position - pb.position).cast<float>();
     const Manifold* before = last(manifold.key());
-    if (lowest < 0 && (!before || before->emerging) && (is_buried(pa, pb) || is_buried(pb, pa)))
+    // Among ghosts a body that was put right may find itself inside another at any time.
+    if (lowest < 0 && (!before || before->emerging || among_ghosts_) &&
+        (is_buried(pa, pb) || is_buried(pb, pa)))
         return part(pa, pb, between, before, manifold);
     candidates_.clear();
     for (const bool b_sampled : {false, true}) {

@@ -18,7 +18,9 @@ WorldWorker::WorldWorker(const SceneMessage& scene)
 void WorldWorker::take(const WorldHeader& header, WorldMessage&& message) {
     if (left_ || ended_) return;
     std::visit([&](auto&& m) { take_message(header, std::forward<decltype(m)>(m)); }, std::move(message));
-    if (!left_ && !ended_) exchange_->follow();
+    if (left_ || ended_) return;
+    exchange_->follow();
+    if (bounded_) hand_over();  // the next step may have to wait for the buyer
 }
 
 void WorldWorker::take_message(const WorldHeader& header, Members&& message) {
@@ -66,7 +68,6 @@ void WorldWorker::take_message(const WorldHeader& header, Offer&& message) {
 void WorldWorker::take_message(const WorldHeader& header, OfferAnswer&& message) {
     market_.answered(header.worker, message);
     handover_step_ = header.step;
-    if (bounded_) hand_over();  // the next step may have to wait for the buyer
 }
 
 void WorldWorker::take_message(const WorldHeader& header, EndOfRun&& message) {
