@@ -32,7 +32,7 @@ public:
     [[nodiscard]] bool ready() const override;
     void step() override;
     [[nodiscard]] std::vector<std::uint8_t> publish(std::uint32_t epoch, const StepReport& report) override;
-    void follow() override {}
+    void follow() override;
     [[nodiscard]] std::vector<Lot> lots(std::uint32_t towards) const override;
     [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies) override;
     void cost(double seconds) override { costs_.share(seconds, world_, owned_); }
@@ -52,6 +52,7 @@ private:
     void list();
     void set_own(int body, bool own);
     void take_over(const Ownership& ownership);
+    void take_due();
     void put_right();
     void hold_pushes();
     void place_ghosts();
@@ -61,6 +62,7 @@ private:
     void feel();
     void settle();
     [[nodiscard]] std::uint64_t slowest() const;
+    [[nodiscard]] bool owns_any(std::uint32_t worker) const;
     void applied(std::vector<std::uint32_t>& sources, std::vector<std::uint64_t>& steps) const;
     [[nodiscard]] Update update_of(int body) const;
 
@@ -87,11 +89,14 @@ private:
     std::map<std::pair<int, int>, CrossImpulse> crossed_;
     std::map<int, Felt> felt_;
     std::vector<std::uint8_t> told_asleep_;
+    std::map<std::uint32_t, std::uint64_t>
+        touched_;  // workers: step of the last push between their bodies and own ones
     int ghost_age_ = 0;
     bool settled_ = false;
 };
 
 constexpr int kMostBound = 64;
+constexpr std::uint64_t kTouchingLead = 1, kTouchingSteps = 4;
 
 // From what was towards what is, by a share; displacement and turn are pushes out of overlaps, which do not
 // last.
@@ -180,14 +185,17 @@ void BoundedExchange::take(const WorldHeader& header, PackedUpdates&& message) {
     pushes_.add(header.worker, header.step, shared);
     pushes_.heard(header.worker, header.step);
     foreign_.take(header.step, shared);
+    for (const PackedUpdates::Place& push : shared->pushes)
+        if (push.body < own_.size() && own_[push.body] != 0)
+            touched_[header.worker] = std::max(step_, header.step);
     for (const std::uint32_t constraint : shared->broken)
         world_.remove_constraint(static_cast<int>(constraint));
 }
 
 // Bodies follow with their owners.
 void BoundedExchange::take(SnapshotMessage&& message) {
-    come_to(message.snapshot.step);
     world_.restore_contacts({}, message.snapshot.springs);
+    come_to(message.snapshot.step);
 }
 
 void BoundedExchange::members(const std::vector<std::uint32_t>& workers) {
@@ -218,17 +226,35 @@ void BoundedExchange::own(const Ownership& ownership) {
     });
     foreign_.take(ownership.step, message);
     if (owner == self_) {
-        if (owned_.empty() && ownership.step > step_ && later_.empty()) {
-            come_to(ownership.step);
-            step_ = ownership.step;
-            world_.set_step(step_);
-        }
-        if (ownership.step > step_)
-            later_.push_back(ownership);
-        else
-            take_over(ownership);
+        later_.push_back(ownership);
+        follow();
+        take_due();
     }
     list();
+}
+
+// Without bodies that are there: on to the first that come, but not past anybody.
+void BoundedExchange::follow() {
+    if (!owned_.empty() || later_.empty()) return;
+    std::uint64_t next = slowest();
+    for (const Ownership& later : later_) next = std::min(next, later.step);
+    if (next <= step_) return;
+    come_to(next);
+    step_ = next;
+    world_.set_step(step_);
+    take_due();
+}
+
+void BoundedExchange::take_due() {
+    for (std::size_t i = 0; i < later_.size();) {
+        if (later_[i].step > step_) {
+            ++i;
+            continue;
+        }
+        const Ownership ownership = std::move(later_[i]);
+        later_.erase(later_.begin() + static_cast<std::ptrdiff_t>(i));
+        take_over(ownership);
+    }
 }
 
 // The bodies as they are at this worker's step.
@@ -252,11 +278,15 @@ void BoundedExchange::take_over(const Ownership& ownership) {
     list();
 }
 
+bool BoundedExchange::owns_any(std::uint32_t worker) const {
+    return std::find(members_.begin(), members_.end(), worker) != members_.end() &&
+           std::find(owner_.begin(), owner_.end(), worker) != owner_.end();
+}
+
 std::uint64_t BoundedExchange::slowest() const {
     std::uint64_t slowest = PushLog::kForever;
     for (const std::uint32_t worker : members_) {
-        if (worker == self_) continue;
-        if (std::find(owner_.begin(), owner_.end(), worker) == owner_.end()) continue;
+        if (worker == self_ || !owns_any(worker)) continue;
         slowest = std::min(slowest, pushes_.known(worker));
     }
     return slowest;
@@ -270,7 +300,12 @@ int BoundedExchange::lead() const {
 bool BoundedExchange::ready() const {
     if (owned_.empty()) return false;
     if (at_end()) return !settled_ && slowest() >= settings_.steps;
-    return lead() <= settings_.bound;
+    if (lead() > settings_.bound) return false;
+    // Bodies that touch across workers hold each other up by what was: the older, the less steady.
+    return std::all_of(touched_.begin(), touched_.end(), [this](const auto& t) {
+        return t.second + kTouchingSteps < step_ || !owns_any(t.first) ||
+               pushes_.known(t.first) + kTouchingLead >= step_;
+    });
 }
 
 // Pushes that came since: what was assumed of steps that are over is put right.
@@ -331,6 +366,7 @@ void BoundedExchange::keep_pushes() {
     given_.clear();
     std::map<std::pair<int, int>, CrossImpulse> now;
     for (CrossImpulse cross : world_.cross_impulses()) {
+        if (!is_finite(cross.on_ghost) || !is_finite(cross.on_own)) continue;  // of a body that is broken
         const auto before = crossed_.find({cross.own, cross.ghost});
         const double share = 1.0 / resolvers(cross.own, cross.ghost);
         if (before != crossed_.end() && share < 1) {
@@ -340,6 +376,7 @@ void BoundedExchange::keep_pushes() {
             world_.correct(cross.own, cross.on_own, 0);
         }
         give_push(cross.ghost, cross.on_ghost);
+        touched_[owner_[static_cast<std::size_t>(cross.ghost)]] = step_;
         now.emplace(std::pair(cross.own, cross.ghost), std::move(cross));
     }
     crossed_ = std::move(now);
@@ -411,15 +448,7 @@ void BoundedExchange::step() {
     keep_pushes();
     feel();
     pushes_.prune(step_);
-    for (std::size_t i = 0; i < later_.size();) {
-        if (later_[i].step > step_) {
-            ++i;
-            continue;
-        }
-        const Ownership ownership = std::move(later_[i]);
-        later_.erase(later_.begin() + static_cast<std::ptrdiff_t>(i));
-        take_over(ownership);
-    }
+    take_due();
 }
 
 void BoundedExchange::applied(std::vector<std::uint32_t>& sources, std::vector<std::uint64_t>& steps) const {

@@ -17,14 +17,13 @@ ForeignBodies::ForeignBodies(World& world, const PushLog& pushes, std::uint32_t 
 
 void ForeignBodies::take(std::uint64_t step, const std::shared_ptr<const PackedUpdates>& message) {
     for (const PackedUpdates::Place& place : message->bodies) {
-        if (static_cast<int>(place.body) >= world_->bodies()) continue;  // comes later here
+        if (place.body >= seen_.size()) continue;
         auto& seen = seen_[place.body];
         while (!seen.empty() && seen.back().step >= step) seen.pop_back();
         // Nobody is further ahead of this worker than the bound.
         if (seen.size() >= keep_) seen.erase(seen.begin());
         seen.push_back({step, message, place.offset});
-        newest_[place.body] = {step, world_->most_radius(static_cast<int>(place.body)),
-                               message->glance(place.offset)};
+        newest_[place.body] = {step, true, message->glance(place.offset)};
     }
 }
 
@@ -81,13 +80,16 @@ ForeignBodies::Ghost ForeignBodies::at(int body, std::uint64_t now) {
     Update update = seen.message->update(seen.offset);
     ghost.state = std::move(update.state);
     const PushLog::Sources sources = pushes_->sources_of(body);
-    ghost.asleep = update.asleep && sources.count == 0;
+    // A sleeper stays where it is until it is pushed.
+    std::uint64_t since = seen.step;
+    if (update.asleep) since = std::max(since, std::min(now, pushes_->first_after(body, seen.step) - 1));
+    ghost.asleep = update.asleep && since >= now;
     if (ghost.asleep || update.quarantined) return ghost;
     ghost.leant_on = update.held;
-    ghost.age = now > seen.step ? static_cast<int>(now - seen.step) : 0;
+    ghost.age = now > since ? static_cast<int>(now - since) : 0;
     put_right(body, seen, ghost.state);
     StepImpulse scratch;
-    for (std::uint64_t step = seen.step + 1; step <= now + 1; ++step) {
+    for (std::uint64_t step = since + 1; step <= now + 1; ++step) {
         StepImpulse held;
         if (update.held) held = update.impulse;
         for (const std::uint32_t source : sources) {
@@ -110,7 +112,7 @@ ForeignBall ForeignBodies::ball(int body, std::uint64_t now) const {
     const double age = s.asleep ? 0 : (static_cast<double>(now) - static_cast<double>(newest.step)) * dt_;
     const double speed = s.velocity.norm(), fall = gravity_ * (std::abs(age) + dt_);
     return {body, s.position + age * s.velocity,
-            1.02 * newest.radius + dt_ * (speed + fall) + fall * std::abs(age)};
+            1.02 * world_->most_radius(body) + dt_ * (speed + fall) + fall * std::abs(age)};
 }
 
 bool ForeignBodies::quarantined(int body) const {

@@ -32,7 +32,7 @@ public:
     [[nodiscard]] Ghost at(int body, std::uint64_t now);
     /// A ball that holds the body over the step after `now`.
     [[nodiscard]] ForeignBall ball(int body, std::uint64_t now) const;
-    [[nodiscard]] bool known(int body) const { return newest_[static_cast<std::size_t>(body)].radius > 0; }
+    [[nodiscard]] bool known(int body) const { return newest_[static_cast<std::size_t>(body)].known; }
     /// Step of the last update; 0: the start, or none.
     [[nodiscard]] std::uint64_t newest(int body) const {
         return newest_[static_cast<std::size_t>(body)].step;
@@ -48,7 +48,7 @@ private:
     };
     struct Newest {
         std::uint64_t step = 0;
-        double radius = 0;  // most; 0: nothing is known
+        bool known = false;
         PackedUpdates::Glance glance = {};
     };
     [[nodiscard]] const Seen& seen_at(int body, std::uint64_t now) const;

@@ -113,7 +113,11 @@ void MeetingPoint::start() {
     started_ = true;
     observer_->at(0, view_.world());
     send(members_, Members{members_});
-    if (!members_.empty()) {
+    if (members_.empty()) {  // all lost before: the next to join gets everything
+        std::vector<int> all;
+        for (const std::vector<int>& lot : lots_) all.insert(all.end(), lot.begin(), lot.end());
+        orphans_.emplace_back(kApplication, std::move(all));
+    } else {
         const int workers = settings_.all_to_first ? 1 : static_cast<int>(members_.size());
         const std::vector<int> first = first_owners(scene_, lots_, workers);
         std::vector<std::vector<int>> bodies(members_.size());
@@ -225,6 +229,12 @@ void MeetingPoint::refuse(std::uint32_t worker, const std::string& why) {
     observer_->note("a message of " + name(worker) + " is refused: " + why);
 }
 
+// A member that publishes what cannot be: the others would wait for its step for ever.
+void MeetingPoint::expel(std::uint32_t worker, const std::string& why) {
+    refuse(worker, why);
+    lose(worker, "its message was refused: " + why);
+}
+
 void MeetingPoint::take(std::uint32_t worker, std::span<const std::uint8_t> bytes) {
     if (finished_) return;
     if (!is_member(worker)) return refuse(worker, "found a worker that is no member, expected a member");
@@ -234,10 +244,10 @@ void MeetingPoint::take(std::uint32_t worker, std::span<const std::uint8_t> byte
         DecodedWorldMessage decoded = decode_world(bytes);
         if (decoded.header.worker != worker || decoded.header.epoch > epoch_ ||
             decoded.header.step > settings_.steps)
-            return refuse(worker, "found another worker's number, or a step or epoch to come");
+            return expel(worker, "found another worker's number, or a step or epoch to come");
         take_message(decoded.header, bytes, std::move(decoded.message));
     } catch (const DecodeError& error) {
-        refuse(worker, error.what());
+        expel(worker, error.what());
     }
 }
 
@@ -277,7 +287,7 @@ bool MeetingPoint::fits(std::uint32_t worker, const std::vector<WorldRecord>& re
     return std::all_of(records.begin(), records.end(), [&](const WorldRecord& r) {
         const auto body = static_cast<std::uint32_t>(r.body);
         return owns(worker, body) && fits(body, r.state.q.size()) && r.sleep_group >= -1 &&
-               r.sleep_group < static_cast<int>(bodies_.size());
+               r.sleep_group <= r.body;
     });
 }
 
@@ -308,8 +318,8 @@ void MeetingPoint::take_state(const WorldHeader& header, std::span<const std::ui
                               StateMessage&& message) {
     if (settings_.pace != Pace::lockstep || header.step == 0 || header.step > view_.step() + 1 ||
         !fits(header.worker, message.bodies))
-        return refuse(header.worker, "found states that are not its to publish");
-    if (!known_contacts(message)) return refuse(header.worker, "found contacts of unknown bodies");
+        return expel(header.worker, "found states that are not its to publish");
+    if (!known_contacts(message)) return expel(header.worker, "found contacts of unknown bodies");
     for (const WorldRecord& record : message.bodies)
         publish(bodies_[static_cast<std::size_t>(record.body)], WorldRecord(record), header.step, none_);
     report(header, message.report, message.bodies.size(), bytes.size());
@@ -335,7 +345,7 @@ void MeetingPoint::take_update(const WorldHeader& header, std::span<const std::u
     });
     if (settings_.pace != Pace::bounded || !own || !pushes || !constraints || header.step < sender.step ||
         (header.step == sender.step && header.step != settings_.steps))
-        return refuse(header.worker, "found states that are not its to publish");
+        return expel(header.worker, "found states that are not its to publish");
     sender.settled = settled;
     for (const std::uint32_t constraint : message.broken)
         view_.break_constraint(static_cast<int>(constraint));

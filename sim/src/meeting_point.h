@@ -72,6 +72,7 @@ private:
     void report(const WorldHeader& header, const StepReport& report, std::size_t records, std::size_t bytes);
     void pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes);
     void refuse(std::uint32_t worker, const std::string& why);
+    void expel(std::uint32_t worker, const std::string& why);
     [[nodiscard]] bool is_member(std::uint32_t worker) const;
     [[nodiscard]] bool owns(std::uint32_t worker, std::uint32_t body) const;
     [[nodiscard]] bool fits(std::uint32_t body, Eigen::Index modes) const;

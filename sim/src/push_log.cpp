@@ -45,6 +45,11 @@ void add_steady(StepImpulse& a, const StepImpulse& b) {
     add(a.modal, b.modal, 1);
 }
 
+bool is_finite(const StepImpulse& a) {
+    return a.linear.allFinite() && a.angular.allFinite() && a.displacement.allFinite() &&
+           a.turn.allFinite() && a.modal.allFinite() && a.modal_q.allFinite() && a.modal_rate.allFinite();
+}
+
 bool is_zero(const StepImpulse& a) {
     return a.linear.isZero(0) && a.angular.isZero(0) && a.displacement.isZero(0) && a.turn.isZero(0) &&
            a.modal.isZero(0) && a.modal_q.isZero(0) && a.modal_rate.isZero(0);
@@ -71,7 +76,7 @@ void PushLog::add(int body, std::uint32_t source, std::uint64_t step, StepImpuls
 void PushLog::add(std::uint32_t source, std::uint64_t step,
                   const std::shared_ptr<const PackedUpdates>& message) {
     for (const PackedUpdates::Place& push : message->pushes)
-        if (push.body < entries_.size() && static_cast<int>(push.body) < world_->bodies())
+        if (push.body < entries_.size())
             entries_[push.body].push_back({source, push.offset, step, message, nullptr});
 }
 
@@ -94,6 +99,13 @@ PushLog::Sources PushLog::sources_of(int body, std::uint64_t since) const {
     }
     std::sort(sources.source, sources.source + sources.count);
     return sources;
+}
+
+std::uint64_t PushLog::first_after(int body, std::uint64_t step) const {
+    std::uint64_t first = kForever;
+    for (const Entry& entry : entries_[static_cast<std::size_t>(body)])
+        if (entry.step > step) first = std::min(first, entry.step);
+    return first;
 }
 
 int PushLog::count_since(int body, std::uint64_t step, std::uint32_t self) const {

@@ -13,6 +13,7 @@ namespace sim {
 void add_impulse(StepImpulse& a, const StepImpulse& b, double factor = 1);
 /// The same without what the modes came to: for a force that is held.
 void add_steady(StepImpulse& a, const StepImpulse& b);
+[[nodiscard]] bool is_finite(const StepImpulse& a);
 [[nodiscard]] bool is_zero(const StepImpulse& a);
 /// What two steps in a row have in common: component by component the smaller, none where signs differ.
 /// Weight that lasts stays, a knock does not. Displacement and turn are none.
@@ -36,7 +37,7 @@ public:
     [[nodiscard]] const std::map<std::uint32_t, std::uint64_t>& sources() const noexcept { return known_; }
 
     /// Sources that pushed the body lately, at most kMostSources (more are left out), ascending.
-    static constexpr int kMostSources = 16;
+    static constexpr int kMostSources = 64;
     struct Sources {
         std::uint32_t source[kMostSources];
         int count = 0;
@@ -51,6 +52,8 @@ public:
     /// nullptr: none.
     [[nodiscard]] const StepImpulse* seen(int body, std::uint32_t source, std::uint64_t step,
                                           std::uint64_t known, StepImpulse& scratch) const;
+    /// First step after `step` with a push on the body; kForever: none.
+    [[nodiscard]] std::uint64_t first_after(int body, std::uint64_t step) const;
     /// `from`, or the first step before `to` that is not forgotten.
     [[nodiscard]] std::uint64_t first_kept(std::uint64_t from, std::uint64_t to) const {
         return to > keep_ ? std::max(from, to - keep_) : from;

@@ -230,7 +230,11 @@ std::string Machine::stuck() const {
     for (const std::uint32_t worker : meeting_.members()) {
         const Processor& p = processors_[worker];
         what.append(" ").append(std::to_string(worker));
-        if (p.worker) what.append(" at step ").append(std::to_string(p.worker->steps_done()));
+        if (p.worker)
+            what.append(" at step ")
+                .append(std::to_string(p.worker->steps_done()))
+                .append(" waits for ")
+                .append(p.worker->waits_for());
         if (p.silent()) what.append(" silent");
     }
     return what;

@@ -235,6 +235,7 @@ void World::Implementation::solve_islands() {
     }
     counts.islands = awake;
     outside += solver->take_outside_impulse();
+    if (!outside.allFinite()) outside = outside_before;  // of a body that is broken
     counts.deformations_limited = free_limited + solver->deformations_limited();
     if (counts.constraints_broken != solver->constraints_broken()) set_joined();
     counts.constraints_broken = solver->constraints_broken();

@@ -216,6 +216,13 @@ void WorldGate::take_beat(const std::string& identity, const zmq::message_t& fra
     try {
         const auto found = members_.find(decoded(frame).header.worker);
         if (found == members_.end()) return;  // it learns so when it sends something else
+        // Nobody beats for another: the first who beat for this member goes on.
+        std::string& from = found->second.beats_from;
+        if (from.empty()) from = identity;
+        if (from != identity) {
+            ++refused_messages_;
+            return;
+        }
         found->second.heard = Clock::now();
         zmq::message_t answer = framed(WorldBeat{});
         send_to(identity, answer);

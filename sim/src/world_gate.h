@@ -64,6 +64,7 @@ private:
         std::string identity;
         Clock::time_point heard;
         bool lost = false;
+        std::string beats_from = {};  ///< identity of its socket for beats
     };
     struct Command {
         enum class Kind { admit, refuse, send, dismiss } kind;

@@ -104,6 +104,7 @@ public:
 
     DistributedResult run() {
         wait_for_workers();
+        started_ = true;
         meeting_.start();
         const Clock::time_point start = Clock::now();
         while (!meeting_.finished() && !ctrl_c_.pressed()) advance();
@@ -139,7 +140,7 @@ private:
     void wait_for_workers() {
         const auto wanted = static_cast<std::size_t>(std::max({launch_.expect, processes_, 1}));
         const Clock::time_point start = Clock::now();
-        while (meeting_.members().size() + killed_early_ < wanted && !ctrl_c_.pressed()) {
+        while (meeting_.members().size() + ended_early_ < wanted && !ctrl_c_.pressed()) {
             for (WorldGate::Event& event : gate_.wait(kWait)) take(event);
             look_after_children();
             pass_on();
@@ -190,7 +191,10 @@ private:
             if (!child.process.has_ended()) continue;
             if (!child.ended) {
                 child.ended = Clock::now();
-                if (!child.worker) note_early_end(child);
+                if (!child.worker)
+                    note_early_end(child);
+                else if (!started_)
+                    ++ended_early_;
             }
             // One that ended in order may have said so: that is on its way.
             const bool settled = child.process.was_killed() || seconds_since(*child.ended) > kLastWords_s;
@@ -202,7 +206,7 @@ private:
     void note_early_end(const Child& child) {
         if (!child.process.was_killed())
             throw std::runtime_error("a worker ended before it joined: " + child.process.ending());
-        ++killed_early_;
+        ++ended_early_;
     }
 
     /// Not one that has drained: it ends by itself.
@@ -258,7 +262,8 @@ private:
     std::vector<std::uint32_t> admitted_;  ///< by the gate, now
     std::vector<std::uint32_t> lost_;      ///< silent or out of reach
     std::optional<WorkerHere> here_;
-    std::size_t killed_early_ = 0;
+    std::size_t ended_early_ = 0;
+    bool started_ = false;
     bool noted_ = false;
     std::vector<Child> children_;  // last: processes end before the gate goes
 };

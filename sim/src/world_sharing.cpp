@@ -83,7 +83,7 @@ Manifold manifold_of(const ContactRecord& record) {
 }
 
 int first_mover(const std::vector<MovingBody>& bodies, const PointConstraint& c) {
-    return bodies[static_cast<std::size_t>(c.body_a)].moves() || c.body_b < 0 ? c.body_a : c.body_b;
+    return !bodies[static_cast<std::size_t>(c.body_a)].fixed || c.body_b < 0 ? c.body_a : c.body_b;
 }
 
 }  // namespace
@@ -132,7 +132,8 @@ void World::Implementation::gather_pairs() {
 // Contacts of islands that were not solved here come from where they were.
 void World::Implementation::forget_foreign_contacts() {
     std::erase_if(contacts.manifolds(), [this](const Manifold& m) {
-        const int id = bodies[static_cast<std::size_t>(m.a)].moves() ? m.a : m.b;
+        const int id =
+            bodies[static_cast<std::size_t>(m.a)].fixed ? m.b : m.a;  // some may be quarantined by now
         const int island = place[static_cast<std::size_t>(root(id))];
         return island < 0 || !is_own(islands[static_cast<std::size_t>(island)]);
     });
@@ -189,7 +190,7 @@ void World::contact_records(std::vector<ContactRecord>& out) const {
     const auto& bodies = implementation_->bodies;
     out.clear();
     for (const Manifold& m : implementation_->contacts.manifolds()) {
-        const int first = bodies[static_cast<std::size_t>(m.a)].moves() ? m.a : m.b;
+        const int first = bodies[static_cast<std::size_t>(m.a)].fixed ? m.b : m.a;
         if (bodies[static_cast<std::size_t>(first)].own) out.push_back(record_of(m));
     }
 }

@@ -94,6 +94,16 @@ bool WorldWorker::ready() const {
     return !left_ && !ended_ && !stepping_ && sellers_.empty() && exchange_->ready();
 }
 
+std::string WorldWorker::waits_for() const {
+    if (ready()) return "nothing";
+    if (left_ || ended_) return "nobody any more";
+    if (exchange_->own_bodies() == 0) return "bodies";
+    if (sellers_.empty()) return std::to_string(exchange_->lead()).append(" steps for the slowest");
+    std::string who = "bodies from";
+    for (const std::uint32_t seller : sellers_) who.append(" ").append(std::to_string(seller));
+    return who;
+}
+
 void WorldWorker::step() {
     lead_ = exchange_->lead();
     stepping_ = true;

@@ -28,6 +28,8 @@ public:
     [[nodiscard]] bool ended() const noexcept { return ended_; }  ///< EndOfRun or Refusal came
     [[nodiscard]] double slowing() const;  ///< factor of the scene's events for this worker's next step
     [[nodiscard]] std::uint64_t steps_done() const { return exchange_->steps_done(); }
+    /// Why ready() is false, in words.
+    [[nodiscard]] std::string waits_for() const;
     [[nodiscard]] double work() const;  ///< that the last step took, in units of World::work
 
 private:
