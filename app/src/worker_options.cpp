@@ -9,7 +9,7 @@
 namespace app {
 namespace {
 
-constexpr int kMostWorkers = 256, kMostBound = 10000, kUsualBound = 4;
+constexpr int kMostWorkers = 256, kMostBound = 64, kUsualBound = 4;
 
 [[noreturn]] void refuse(const std::string& found, const std::string& expected) {
     throw BadInput(fmt::format("error: found {}, expected {}", found, expected));

@@ -220,6 +220,14 @@ void MeetingPoint::lose(std::uint32_t worker, const std::string& why) {
     remove(worker);
 }
 
+void MeetingPoint::lose_slowest(const std::string& why) {
+    const std::uint32_t* slowest = nullptr;
+    for (const std::uint32_t& worker : members_)
+        if (!owned_by(worker).empty() && (!slowest || senders_[worker].step < senders_[*slowest].step))
+            slowest = &worker;
+    if (slowest) lose(std::uint32_t(*slowest), why);
+}
+
 // What members say.
 
 void MeetingPoint::refuse(std::uint32_t worker, const std::string& why) {

@@ -29,6 +29,11 @@ public:
     void take(std::uint32_t worker, std::span<const std::uint8_t> bytes);
     void lose(std::uint32_t worker,
               const std::string& why);  ///< its bodies go to the others; its messages count no more
+    /// Of those who own bodies the one that has published least is lost: for when nothing has been published
+    /// for long, though all are heard.
+    void lose_slowest(const std::string& why);
+    /// Grows with everything that is published.
+    [[nodiscard]] std::uint64_t published() const noexcept { return result_.records; }
     [[nodiscard]] std::vector<Outgoing> outgoing();
     [[nodiscard]] const std::vector<std::uint32_t>& members() const noexcept { return members_; }
     [[nodiscard]] bool finished() const noexcept { return finished_; }

@@ -97,12 +97,14 @@ void World::Implementation::quarantine(int id, const std::string& what) {
     body.state.orientation = Eigen::Quaterniond(body.posed.rotation);
     body.state.q.setZero();
     if (body.own) quarantined.push_back({id, counts.steps, what});
+    // What it did to others may be as broken as it is.
+    std::erase_if(contacts.manifolds(), [id](const Manifold& m) { return m.a == id || m.b == id; });
     drop_constraints(id);
 }
 
 void World::Implementation::drop_constraints(int body) {
     for (HeldConstraint& c : constraints)
-        if (c.definition.body_a == body || c.definition.body_b == body) c.holds = false;
+        if (c.definition.body_a == body || c.definition.body_b == body) c.holds = false, c.impulse.setZero();
     set_joined();
 }
 

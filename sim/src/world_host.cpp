@@ -20,6 +20,7 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 constexpr auto kWait = 20ms;
 constexpr auto kEndWithin = 1s;
+constexpr double kLongestStep_s = 30;
 constexpr double kLastWords_s = 0.3;
 constexpr int kMostWorkers = 256;
 
@@ -105,6 +106,7 @@ public:
     DistributedResult run() {
         wait_for_workers();
         started_ = true;
+        progressed_ = Clock::now();
         meeting_.start();
         const Clock::time_point start = Clock::now();
         while (!meeting_.finished() && !ctrl_c_.pressed()) advance();
@@ -133,8 +135,18 @@ private:
         for (WorldGate::Event& event : gate_.wait(worked ? 0ms : kWait)) take(event);
         look_after_children();
         if (meeting_.members().empty() && !meeting_.finished()) take_over();
+        look_after_progress();
         pass_on();
         note_refusals();
+    }
+
+    /// A worker may be heard and yet publish nothing: all would wait for it.
+    void look_after_progress() {
+        if (std::exchange(published_, meeting_.published()) != meeting_.published())
+            progressed_ = Clock::now();
+        if (seconds_since(progressed_) < kLongestStep_s) return;
+        progressed_ = Clock::now();
+        meeting_.lose_slowest("it was the slowest, and nobody has published anything for 30 s");
     }
 
     void wait_for_workers() {
@@ -264,6 +276,8 @@ private:
     std::optional<WorkerHere> here_;
     std::size_t ended_early_ = 0;
     bool started_ = false;
+    std::uint64_t published_ = 0;
+    Clock::time_point progressed_ = Clock::now();
     bool noted_ = false;
     std::vector<Child> children_;  // last: processes end before the gate goes
 };
