@@ -73,8 +73,9 @@ void print(const SimulateResult& r, const SimulateOptions& options) {
         "step\n",
         r.name, r.bodies, r.rigid, r.linear, r.modal, r.steps, r.dt_s, r.elapsed_s,
         r.body_steps > 0 ? 1e6 * r.elapsed_s / double(r.body_steps) : 0.0);
-    fmt::print("energy {:.6g} J at first, {:.6g} J at last; {} asleep; state {:016x}\n",
-               r.energy_start.total(), r.energy.total(), r.counts.asleep, r.state_hash);
+    fmt::print("energy {:.6g} J at first, {:.6g} J at last; ", r.energy_start.total(), r.energy.total());
+    if (!r.workers) fmt::print("{} asleep; ", r.counts.asleep);
+    fmt::print("state {:016x}\n", r.state_hash);
     if (r.workers) print_workers(r);
     if (r.counts.constraints_broken > 0) fmt::print("{} constraints broke\n", r.counts.constraints_broken);
     for (const auto& [name, q] : r.quarantined)
@@ -92,10 +93,14 @@ int run(const Typed& a) {
     else
         print(result, options);
     if (!options.until_rest || result.rest_reached) return 0;
-    fmt::print(stderr,
-               "{}: error: found {} of {} bodies awake after {} steps (or events to come), expected rest; "
-               "allow more --steps, or damp what swings and spins (damping_alpha)\n",
-               result.scene.string(), result.bodies - result.counts.asleep, result.bodies, result.steps);
+    const std::string awake =
+        result.workers ? "bodies"
+                       : fmt::format("{} of {} bodies", result.bodies - result.counts.asleep, result.bodies);
+    fmt::print(
+        stderr,
+        "{}: error: found {} awake after {} steps (or events to come), expected rest; allow more --steps, or "
+        "damp what swings and spins (damping_alpha)\n",
+        result.scene.string(), awake, result.steps);
     return 1;
 }
 

@@ -53,7 +53,7 @@ void add_details(const SimulateResult& r, Json& json) {
     json["angular_momentum_kg_m2_s"] = json_of(r.angular_momentum);
     json["momentum_drift_kg_m_s"] = r.drift ? Json(r.drift->linear) : Json();
     json["angular_momentum_drift_kg_m2_s"] = r.drift && r.drift->angular ? Json(*r.drift->angular) : Json();
-    json["counts"] = json_of(r.counts);
+    json["counts"] = r.workers ? Json() : json_of(r.counts);  // workers do not tell theirs
     json["quarantined"] = quarantine(r);
     json["at_rest"] = r.rest_reached;
     json["frames"] = r.frames;

@@ -120,7 +120,9 @@ SimulateResult simulate_with_workers(const SimulateOptions& options, const Scene
     try {
         observer.finish(run_workers(scene, options, observer));
     } catch (const std::invalid_argument& wrong) {
-        throw BadInput(fmt::format("{}: error: {}", scene.file.string(), wrong.what()));
+        const std::string_view what = wrong.what();
+        throw BadInput(
+            fmt::format("{}: {}{}", scene.file.string(), what.starts_with("error: ") ? "" : "error: ", what));
     }
     result.wall_s = wall.seconds();
     observer.write(wall);

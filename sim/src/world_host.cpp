@@ -28,33 +28,6 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// While it lives, and if asked for, SIGINT and SIGTERM set a mark.
-class CtrlC {
-public:
-    explicit CtrlC(bool wanted) : wanted_(wanted) {
-        asked = 0;
-        if (!wanted_) return;
-        struct sigaction action {};
-        action.sa_handler = [](int) { asked = 1; };
-        sigaction(SIGINT, &action, &interrupt_);
-        sigaction(SIGTERM, &action, &terminate_);
-    }
-    ~CtrlC() {
-        if (!wanted_) return;
-        sigaction(SIGINT, &interrupt_, nullptr);
-        sigaction(SIGTERM, &terminate_, nullptr);
-    }
-    CtrlC(const CtrlC&) = delete;
-    CtrlC& operator=(const CtrlC&) = delete;
-    [[nodiscard]] bool pressed() const { return asked != 0; }
-
-private:
-    static inline volatile std::sig_atomic_t asked = 0;
-    const bool wanted_;
-    struct sigaction interrupt_ {
-    }, terminate_{};
-};
-
 /// A worker in this process, for when no other is left.
 class WorkerHere {
 public:
@@ -93,7 +66,6 @@ public:
           launch_(launch),
           processes_(launch.processes.program.empty() ? 0 : launch.processes.count),
           observer_(observer),
-          ctrl_c_(launch.stop_with_ctrl_c),
           meeting_(scene, settings, observer),
           gate_(gate_settings(launch)) {
         if (launch.listening)
@@ -109,7 +81,7 @@ public:
         progressed_ = Clock::now();
         meeting_.start();
         const Clock::time_point start = Clock::now();
-        while (!meeting_.finished() && !ctrl_c_.pressed()) advance();
+        while (!meeting_.finished()) advance();
         DistributedResult result = meeting_.result();
         result.elapsed_s = seconds_since(start);
         result.refused_messages += gate_.refused_messages() + gate_.refused_keys();
@@ -152,7 +124,7 @@ private:
     void wait_for_workers() {
         const auto wanted = static_cast<std::size_t>(std::max({launch_.expect, processes_, 1}));
         const Clock::time_point start = Clock::now();
-        while (meeting_.members().size() + ended_early_ < wanted && !ctrl_c_.pressed()) {
+        while (meeting_.members().size() + ended_early_ < wanted) {
             for (WorldGate::Event& event : gate_.wait(kWait)) take(event);
             look_after_children();
             pass_on();
@@ -268,7 +240,6 @@ private:
     const DistributedLaunch launch_;
     const int processes_;  ///< started here
     DistributedObserver& observer_;
-    CtrlC ctrl_c_;
     MeetingPoint meeting_;
     WorldGate gate_;
     std::vector<std::uint32_t> admitted_;  ///< by the gate, now

@@ -19,14 +19,14 @@ constexpr std::uint32_t kLongestText = 4096;
 // What several messages hold.
 
 void write(ByteWriter& out, const StepReport& r) {
-    for (const float x : {r.seconds, r.smoothed_s, r.waited_s, r.bodies_cost_s}) out.number(x);
+    for (const float x : {r.seconds, r.smoothed_s, r.waited_s}) out.number(x);
     for (const std::uint32_t n : {r.lead, r.ghost_age, r.cross_contacts, r.own}) out.number(n);
     out.matrix(r.outside_impulse);
 }
 
 StepReport read_report(ByteReader& in) {
     StepReport r;
-    for (float* x : {&r.seconds, &r.smoothed_s, &r.waited_s, &r.bodies_cost_s}) {
+    for (float* x : {&r.seconds, &r.smoothed_s, &r.waited_s}) {
         *x = in.number<float>();
         if (!(*x >= 0 && *x <= 1e9f)) throw DecodeError("a report of a time out of range");
     }

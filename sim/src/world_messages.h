@@ -43,7 +43,7 @@ namespace sim {
 //   u32 to, u32 number, flag accepted 15 handover   worker  u32 to, u32 number, list of record, list of
 //   applied
 //
-//   report      56 bytes: f32 seconds, smoothed, waited, bodies' cost; u32 lead, ghost age, cross contacts,
+//   report      52 bytes: f32 seconds, smoothed, waited; u32 lead, ghost age, cross contacts,
 //               own; v3 outside impulse
 //   applied     12 bytes: u32 worker, u64 step
 //   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8
@@ -86,7 +86,7 @@ struct WorldHeader {
 
 /// What a worker tells of its last step, in every state and update message.
 struct StepReport {
-    float seconds = 0, smoothed_s = 0, waited_s = 0, bodies_cost_s = 0;
+    float seconds = 0, smoothed_s = 0, waited_s = 0;
     std::uint32_t lead = 0, ghost_age = 0, cross_contacts = 0;
     std::uint32_t own = 0;
     Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< since this worker's start

@@ -134,7 +134,6 @@ void WorldWorker::publish(double seconds, double waited_s) {
     report.seconds = static_cast<float>(seconds);
     report.smoothed_s = static_cast<float>(market_.smoothed());
     report.waited_s = static_cast<float>(waited_s);
-    report.bodies_cost_s = report.smoothed_s;
     report.lead = static_cast<std::uint32_t>(std::max(0, lead_));
     report.ghost_age = static_cast<std::uint32_t>(std::max(0, exchange_->ghost_age()));
     report.cross_contacts = static_cast<std::uint32_t>(world.cross_contacts());

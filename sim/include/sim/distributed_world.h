@@ -114,7 +114,6 @@ struct DistributedLaunch {
     int expect = 0;      ///< wait for so many workers before the first step (at least processes.count)
     double wait_s = 60;  ///< for them
     std::filesystem::path keys;  ///< folder made by make_keys; needed unless ipc or loopback
-    bool stop_with_ctrl_c = false;
     std::function<void(const std::string& endpoint)> listening;  ///< told where, once
 };
 
