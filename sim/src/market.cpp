@@ -183,6 +183,8 @@ std::optional<Offer> Market::make_offer(std::vector<Exchange::Lot> lots) {
     offer_ = {to, next_number_, {}, {}};
     offer_cost_ = 0;
     for (const Exchange::Lot& lot : lots) {
+        // Far from the buyer's bodies it would cost both more than it takes off one.
+        if (tuning() && lot.pull < 0) break;
         if (offer_cost_ + lot.cost_s > std::min({due, most, room}) * (1 + 1e-9)) continue;
         offer_cost_ += lot.cost_s;
         for (const std::uint32_t body : lot.bodies) {
