@@ -86,7 +86,7 @@ sim::WorldScene scene() {
 }
 
 sim::StepReport report() {
-    return {0.001f, 0.002f, 0.0003f, 0.0009f, 3, 2, 17, 25, {1, -2, 3}};
+    return {0.001f, 0.002f, 0.0003f, 3, 2, 17, 25, {1, -2, 3}};
 }
 
 std::vector<sim::WorldMessage> samples() {
