@@ -26,8 +26,11 @@ double exchange_rate(double seller_body_cost, double buyer_body_cost) {
     return std::clamp(buyer_body_cost / seller_body_cost, 0.1, 10.0);
 }
 
-Market::Market(std::uint32_t self, const MarketSettings& settings)
-    : self_(self), settings_(settings), weight_(1 - std::exp(-1 / std::max(settings.smoothing_steps, 1e-3))) {
+Market::Market(std::uint32_t self, const MarketSettings& settings, bool near_only)
+    : self_(self),
+      settings_(settings),
+      near_only_(near_only),
+      weight_(1 - std::exp(-1 / std::max(settings.smoothing_steps, 1e-3))) {
     workers_[self];
 }
 
@@ -182,9 +185,10 @@ std::optional<Offer> Market::make_offer(std::vector<Exchange::Lot> lots) {
     });
     offer_ = {to, next_number_, {}, {}};
     offer_cost_ = 0;
+    const bool level = self.smoothed - average() <= allowance(self);
     for (const Exchange::Lot& lot : lots) {
-        // Far from the buyer's bodies it would cost both more than it takes off one.
-        if (tuning() && lot.pull < 0) break;
+        // Far from the buyer's bodies it costs both more: only where times differ too much.
+        if (near_only_ && level && lot.pull < 0) break;
         if (offer_cost_ + lot.cost_s > std::min({due, most, room}) * (1 + 1e-9)) continue;
         offer_cost_ += lot.cost_s;
         for (const std::uint32_t body : lot.bodies) {

@@ -23,7 +23,8 @@ namespace sim {
 /// and not within 20 steps of anybody's last trade.
 class Market {
 public:
-    Market(std::uint32_t self, const MarketSettings& settings);
+    /// near_only: once level, bodies go only to who owns what is near them.
+    Market(std::uint32_t self, const MarketSettings& settings, bool near_only);
 
     void members(const std::vector<std::uint32_t>& workers);
     /// Another worker's report, written when it knew ownership up to `epoch`.
@@ -67,6 +68,7 @@ private:
 
     std::uint32_t self_;
     MarketSettings settings_;
+    bool near_only_;
     double weight_;
     std::map<std::uint32_t, Worker> workers_;  // members, with this one
     std::uint64_t step_ = 0, last_trade_ = 0, not_before_ = 0;

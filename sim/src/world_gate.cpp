@@ -14,6 +14,7 @@ namespace {
 
 using namespace std::chrono_literals;
 constexpr auto kPoll = 20ms;
+constexpr auto kLastWords = 300ms;
 constexpr auto kPaused = 250ms;  // a longer gap between two looks is ours, not the workers' silence
 constexpr int kFramesBetweenLooks = 1000;
 constexpr std::size_t kMostStrangersWaiting = 1000;
@@ -165,10 +166,11 @@ void WorldGate::obey(const Command& command) {
         const zmq::message_t whole(command.bytes->data(), command.bytes->size());
         for (const std::uint32_t worker : command.workers) {
             const auto found = members_.find(worker);
-            if (found == members_.end() || found->second.lost) continue;
+            if (found == members_.end() || found->second.lost || found->second.broken) continue;
             zmq::message_t frame;
             frame.copy(const_cast<zmq::message_t&>(whole));  // shares the bytes
-            if (!send_to(found->second.identity, frame)) lose(worker, found->second, "its link broke");
+            // Who has drained and gone may have said so: that is on its way.
+            if (!send_to(found->second.identity, frame)) found->second.broken = Clock::now();
         }
     }
 }
@@ -258,7 +260,11 @@ void WorldGate::look_for_silence() {
     const bool paused = now - std::exchange(looked_, now) > kPaused;
     for (auto& [worker, member] : members_) {
         if (paused) member.heard = now;
-        if (!member.lost && now - member.heard > silence_) lose(worker, member, "silent for too long");
+        if (member.lost) continue;
+        if (member.broken && now - *member.broken > kLastWords)
+            lose(worker, member, "its link broke");
+        else if (now - member.heard > silence_)
+            lose(worker, member, "silent for too long");
     }
 }
 

@@ -64,7 +64,8 @@ private:
         std::string identity;
         Clock::time_point heard;
         bool lost = false;
-        std::string beats_from = {};  ///< identity of its socket for beats
+        std::optional<Clock::time_point> broken = {};  ///< since when nothing can be sent to it
+        std::string beats_from = {};                   ///< identity of its socket for beats
     };
     struct Command {
         enum class Kind { admit, refuse, send, dismiss } kind;

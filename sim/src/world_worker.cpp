@@ -9,7 +9,7 @@ WorldWorker::WorldWorker(const SceneMessage& scene)
     : self_(scene.worker),
       exchange_(scene.settings.pace == Pace::lockstep ? make_lockstep_exchange(scene)
                                                       : make_bounded_exchange(scene)),
-      market_(scene.worker, scene.settings.market),
+      market_(scene.worker, scene.settings.market, scene.settings.pace == Pace::bounded),
       bounded_(scene.settings.pace == Pace::bounded) {
     for (const WorldEvent& event : scene.scene.events)
         if (!event.slowing.empty()) events_.push_back(event);

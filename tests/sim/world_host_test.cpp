@@ -140,7 +140,7 @@ TEST(WorldHost, AWorkerThatIsToldToEndGivesItsBodiesAwayAndNoneIsLost) {
     watcher.act = [] { ::kill(children_of(getpid()).front(), SIGTERM); };
     const sim::DistributedResult result = sim::run_distributed(scene, lockstep(400), processes(2), watcher);
     EXPECT_EQ(watcher.hash, hash_alone(scene, 400));
-    EXPECT_EQ(result.lost, 0);
+    EXPECT_EQ(result.lost, 0) << testing::PrintToString(watcher.notes);
     EXPECT_EQ(result.left, 1);
 }
 

@@ -44,7 +44,7 @@ struct MarketSettings {
     bool trade = true;
     std::uint64_t from_step = 0;  ///< no offers before the seller's step
     double smoothing_steps = 3;   ///< time constant of the smoothed seconds a step
-    double dead_band = 0.12;      ///< share of the average by which a worker must be slower to offer
+    double dead_band = 0.08;      ///< share of the average by which a worker must be slower to offer
 };
 
 struct DistributedSettings {
