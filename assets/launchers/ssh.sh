@@ -23,7 +23,7 @@ for host in "$@"; do
     ssh -o BatchMode=yes "$host" "umask 077; key=\$(mktemp); trap 'rm -f \$key' EXIT; cat >\$key
         $musicworld worker --connect tcp://$address:$port --key \$key" <"$folder/keys/worker$worker.key" &
 done
-# Workers wait for the application, so it may start last; they end when it does.
+# Workers look for the application for 10 s, so it may start last; they end when it does.
 "$musicworld" simulate "$scene" --listen "tcp://0.0.0.0:$port" --keys "$folder/keys" --expect "$#" \
     --mode "${MODE:-async}" --out "$out"
 wait
