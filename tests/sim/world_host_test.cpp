@@ -267,8 +267,8 @@ TEST(WorldHost, ThreeHostsWithKeysComeToTheSameBitsAlsoWhenOnesCableIsCut) {
 
 // Bodies wander from the first worker to the others all the while, so that what happens falls into trades.
 // Kills and stops: a stop costs a second until it is noticed.
-TEST(WorldHost, TenRandomKillsStopsDrainsAndJoinsWhileBodiesAreTradedLeaveTheBitsAndEveryRunFinishes) {
-    const int count = std::getenv("MUSICWORLD_LONG") ? 100 : 10;
+TEST(WorldHost, TwentyRandomKillsStopsDrainsAndJoinsWhileBodiesAreTradedLeaveTheBitsAndEveryRunFinishes) {
+    const int count = std::getenv("MUSICWORLD_LONG") ? 100 : 20;
     const sim::WorldScene scene = heap(9);
     const std::uint64_t hash = hash_alone(scene, 200);
     std::mt19937 rng(4);
