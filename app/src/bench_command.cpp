@@ -201,7 +201,7 @@ void add_bench_command(CLI::App& program) {
         ->check(CLI::Range(1, 1000000))
         ->capture_default_str();
     command->add_option("--bound", a->bound, "workers: steps ahead")
-        ->check(CLI::Range(1, 10000))
+        ->check(CLI::Range(1, 64))
         ->capture_default_str();
     command->add_option("--processors", a->processors,
                         "workers: simulated[:latency=S,slowdown=X,cost=measured|modelled]");

@@ -51,9 +51,9 @@ std::shared_ptr<WorkerArguments> add_worker_options(CLI::App& command) {
         .add_option("--mode", a->mode,
                     "sync: in lockstep, to the bit as in one process; async: boundedly out of step")
         ->capture_default_str();
-    command.add_option("--bound", a->bound,
-                       "async: steps that a worker may be ahead of the slowest, and greatest age of what it "
-                       "knows of others' bodies; default: 4");
+    command.add_option(
+        "--bound", a->bound,
+        "async: steps that a worker may be ahead of the slowest, 1 to 64, default 4; 0 is lockstep");
     command.add_option("--balance", a->balance, "on or off: workers trade bodies to be equally fast")
         ->capture_default_str();
     command.add_option("--listen", a->listen,

@@ -299,19 +299,27 @@ bool MeetingPoint::fits(std::uint32_t worker, const std::vector<WorldRecord>& re
     });
 }
 
-bool MeetingPoint::known_contacts(const StateMessage& message) const {
+bool MeetingPoint::owns_constraint(std::uint32_t worker, int constraint) const {
+    if (constraint < 0 || constraint >= static_cast<int>(scene_.world.constraints.size())) return false;
+    const PointConstraint& c = scene_.world.constraints[static_cast<std::size_t>(constraint)];
+    const int first = view_.clock().moves(c.body_a) || c.body_b < 0 ? c.body_a : c.body_b;
+    return owns(worker, static_cast<std::uint32_t>(first));
+}
+
+// Contacts and constraints travel with their first body that moves.
+bool MeetingPoint::own_contacts(std::uint32_t worker, const StateMessage& message) const {
     const auto bodies = static_cast<int>(bodies_.size());
     const auto planes = static_cast<int>(scene_.world.planes.size());
-    const auto constraints = static_cast<int>(scene_.world.constraints.size());
     const bool contacts =
         std::all_of(message.contacts.begin(), message.contacts.end(), [&](const ContactRecord& c) {
             const bool b = c.b >= kFirstPlane ? c.b - kFirstPlane < planes : c.b < bodies;
-            return c.a >= 0 && c.a < bodies && c.b > c.a && b;
+            if (c.a < 0 || c.a >= bodies || c.b <= c.a || !b) return false;
+            const int first = view_.clock().moves(c.a) ? c.a : c.b;
+            return owns(worker, static_cast<std::uint32_t>(first));
         });
     return contacts &&
-           std::all_of(message.springs.begin(), message.springs.end(), [&](const SpringRecord& s) {
-               return s.constraint >= 0 && s.constraint < constraints;
-           });
+           std::all_of(message.springs.begin(), message.springs.end(),
+                       [&](const SpringRecord& s) { return owns_constraint(worker, s.constraint); });
 }
 
 void MeetingPoint::publish(Body& body, WorldRecord&& record, std::uint64_t step,
@@ -327,7 +335,8 @@ void MeetingPoint::take_state(const WorldHeader& header, std::span<const std::ui
     if (settings_.pace != Pace::lockstep || header.step == 0 || header.step > view_.step() + 1 ||
         !fits(header.worker, message.bodies))
         return expel(header.worker, "found states that are not its to publish");
-    if (!known_contacts(message)) return expel(header.worker, "found contacts of unknown bodies");
+    if (!own_contacts(header.worker, message))
+        return expel(header.worker, "found contacts that are not its to publish");
     for (const WorldRecord& record : message.bodies)
         publish(bodies_[static_cast<std::size_t>(record.body)], WorldRecord(record), header.step, none_);
     report(header, message.report, message.bodies.size(), bytes.size());
@@ -349,7 +358,7 @@ void MeetingPoint::take_update(const WorldHeader& header, std::span<const std::u
     const bool pushes = std::all_of(message.pushes.begin(), message.pushes.end(),
                                     [&](const Push& p) { return fits(p.body, p.impulse.modal_q.size()); });
     const bool constraints = std::all_of(message.broken.begin(), message.broken.end(), [&](std::uint32_t c) {
-        return c < scene_.world.constraints.size();
+        return owns_constraint(header.worker, static_cast<int>(c));
     });
     if (settings_.pace != Pace::bounded || !own || !pushes || !constraints || header.step < sender.step ||
         (header.step == sender.step && header.step != settings_.steps))

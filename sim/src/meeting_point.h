@@ -82,7 +82,8 @@ private:
     [[nodiscard]] bool owns(std::uint32_t worker, std::uint32_t body) const;
     [[nodiscard]] bool fits(std::uint32_t body, Eigen::Index modes) const;
     [[nodiscard]] bool fits(std::uint32_t worker, const std::vector<WorldRecord>& records) const;
-    [[nodiscard]] bool known_contacts(const StateMessage& message) const;
+    [[nodiscard]] bool owns_constraint(std::uint32_t worker, int constraint) const;
+    [[nodiscard]] bool own_contacts(std::uint32_t worker, const StateMessage& message) const;
     void publish(Body& body, WorldRecord&& record, std::uint64_t step,
                  std::shared_ptr<const Applied> applied);
 
