@@ -167,8 +167,8 @@ TEST(BoundedExchange, StacksAcrossWorkersStandAsHighAsInOneProcess) {
             world_test::run(alone, 400);
             Crew crew(d, 2, bound, 400, owner);
             crew.run_in_turn(bound);  // one is always as far ahead as it may be
-            // Two workers that hold one box between them swing a little: centimetres a second with three
-            // boxes.
+            // Two workers that hold one box between them make it sway: tenths of a metre a second with
+            // three boxes, at other times with other rounding.
             for (int b = 0; b < boxes; ++b) {
                 EXPECT_NEAR(crew.state(b).position.y(), alone.state(b).position.y(),
                             boxes == 2 ? 2e-3 : 0.04);
