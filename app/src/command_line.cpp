@@ -8,19 +8,19 @@
 #include <cstdio>
 #include <new>
 
-#include "bad_input.h"
-#include "bench_command.h"
-#include "compare_command.h"
-#include "keys_command.h"
-#include "kit_commands.h"
-#include "latency_command.h"
-#include "modes_command.h"
-#include "play_command.h"
-#include "predict_command.h"
-#include "record_command.h"
-#include "sensor_command.h"
-#include "simulate_command.h"
-#include "trace_commands.h"
+#include "commands/bench_command.h"
+#include "commands/compare_command.h"
+#include "commands/keys_command.h"
+#include "commands/kit_commands.h"
+#include "commands/latency_command.h"
+#include "commands/modes_command.h"
+#include "commands/play_command.h"
+#include "commands/predict_command.h"
+#include "commands/record_command.h"
+#include "commands/simulate_command.h"
+#include "commands/trace_commands.h"
+#include "files/bad_input.h"
+#include "sensors/sensor_command.h"
 
 namespace app {
 namespace {

@@ -10,8 +10,8 @@
 #include <optional>
 #include <thread>
 
-#include "worker_link.h"
-#include "world_gate.h"
+#include "workers/heartbeat.h"
+#include "workers/worker_gate.h"
 
 namespace sim_bench {
 namespace {
@@ -123,10 +123,10 @@ Throughput in_one_hop(const ThroughputSettings& settings, const sim::WorldMessag
 }
 
 /// Passes everything that the sender sends on to the receiver, as the application does.
-void pass_on(sim::WorldGate& gate, Shared& shared) {
+void pass_on(sim::WorkerGate& gate, Shared& shared) {
     while (!shared.stop) {
-        for (sim::WorldGate::Event& event : gate.wait(20ms)) {
-            using Kind = sim::WorldGate::Event::Kind;
+        for (sim::WorkerGate::Event& event : gate.wait(20ms)) {
+            using Kind = sim::WorkerGate::Event::Kind;
             if (event.kind == Kind::asks_to_join) gate.admit(event.stranger, event.request.process);
             if (event.kind == Kind::message)
                 gate.send({kReceiver},
@@ -137,13 +137,13 @@ void pass_on(sim::WorldGate& gate, Shared& shared) {
 
 Throughput through_application(const ThroughputSettings& settings, const sim::WorldMessage& message) {
     const Keys keys;
-    sim::WorldGate::Settings open{"tcp://127.0.0.1:*", std::nullopt, 3600};
+    sim::WorkerGate::Settings open{"tcp://127.0.0.1:*", std::nullopt, 3600};
     std::optional<sim::WorkerKeys> one, other;
     if (settings.keys) {
         open.keys = {keys.application, {keys.sender.shown, keys.receiver.shown}};
         one = {keys.sender, keys.application.shown}, other = {keys.receiver, keys.application.shown};
     }
-    sim::WorldGate gate(open);
+    sim::WorkerGate gate(open);
     zmq::context_t here, there;
     zmq::socket_t sender = sim::connect_worker(here, gate.endpoint(), one, 0);
     zmq::socket_t receiver = sim::connect_worker(there, gate.endpoint(), other, 0);

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <functional>
 
-#include "kit.h"
-#include "play_result.h"
-#include "realtime_result.h"
-#include "tip_track.h"
+#include "kit/kit.h"
+#include "kit/stick_geometry.h"
+#include "latency/realtime_result.h"
+#include "play/play_result.h"
 
 /// Made-up runs in real time whose figures are known in closed form.
 namespace sample {

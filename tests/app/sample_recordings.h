@@ -6,7 +6,7 @@
 #include <numbers>
 #include <string>
 
-#include "recording.h"
+#include "compare/recording.h"
 
 /// Recordings whose truth is known in closed form.
 namespace sample {

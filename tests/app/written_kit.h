@@ -6,7 +6,7 @@
 #include <fstream>
 #include <string>
 
-#include "kit.h"
+#include "kit/kit.h"
 
 namespace app {
 

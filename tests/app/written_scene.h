@@ -6,8 +6,8 @@
 #include <fstream>
 #include <string>
 
-#include "bad_input.h"
-#include "scene.h"
+#include "files/bad_input.h"
+#include "scene/scene.h"
 
 namespace app {
 

@@ -1,0 +1,21 @@
+#pragma once
+#include <string>
+
+namespace app {
+
+/// What one core of this machine can do at most, measured in a few tenths of a second of processor time.
+struct MachineSpeed {
+    double flops = 0;  ///< single-precision operations a second, a fused multiply-add counted as two
+    double bytes_per_second = 0;  ///< read in order from an array that no cache holds
+};
+[[nodiscard]] MachineSpeed measure_machine_speed();
+
+/// Processor, cores and compiler.
+struct MachineName {
+    std::string processor, compiler;
+    unsigned cores = 0;
+    bool avx2 = true;  ///< false: built for any x86-64
+};
+[[nodiscard]] MachineName machine_name();
+
+}  // namespace app

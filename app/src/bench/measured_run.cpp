@@ -1,0 +1,165 @@
+#include "bench/measured_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+namespace app {
+namespace {
+
+/// Sums of m v and |m v| and the mean height.
+class BodiesWatch : public sim::DistributedObserver {
+public:
+    BodiesWatch(MeasuredRun& run, const sim::DistributedSettings& settings, double dt)
+        : run_(run), last_(settings.steps), second_(std::uint64_t(std::lround(1 / dt))) {}
+
+    void at(std::uint64_t step, const sim::World& world) override {
+        if (step > 0) run_.body_steps += std::uint64_t(world.bodies());
+        if (step == 0) start_ = world.momentum();
+        if (step % 10 == 0) look(world);
+        if (step == std::min(second_, last_)) keep_centres(world);
+        if (step != last_) return;
+        gained_ = world.momentum() - start_;
+        for (int body = 0; body < world.bodies(); ++body)
+            run_.mean_height += world.state(body).position.y() / world.bodies();
+    }
+    void worked(const sim::WorkerStep& step) override {
+        run_.steps.push_back(step);
+        run_.history.add(step);
+    }
+    void moved(std::uint64_t step, int bodies, int from, int to) override {
+        run_.trades.push_back({step, bodies, from, to});
+    }
+    void finish() {
+        const double drift = (gained_ - run_.result.outside_impulse).norm();
+        run_.momentum_drift = scale_ > 0 ? drift / scale_ : drift;
+    }
+
+private:
+    void look(const sim::World& world) {
+        double sum = 0;
+        for (int body = 0; body < world.bodies(); ++body)
+            sum += world.rigid_mass(body).mass * world.state(body).velocity.norm();
+        scale_ = std::max(scale_, sum);
+    }
+    void keep_centres(const sim::World& world) {
+        for (int body = 0; body < world.bodies(); ++body)
+            run_.after_a_second.push_back(world.state(body).position);
+    }
+
+    MeasuredRun& run_;
+    std::uint64_t last_, second_;
+    Eigen::Vector3d start_ = Eigen::Vector3d::Zero(), gained_ = Eigen::Vector3d::Zero();
+    double scale_ = 0;
+};
+
+template <typename Start>
+MeasuredRun measure(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
+                    const Start& start) {
+    MeasuredRun run;
+    BodiesWatch watch(run, settings, scene.world.settings.dt);
+    run.result = start(watch);
+    watch.finish();
+    return run;
+}
+
+}  // namespace
+
+double MeasuredRun::with_barrier_s() const {
+    std::map<std::uint64_t, double> longest;
+    for (const sim::WorkerStep& s : steps) longest[s.step] = std::max(longest[s.step], s.seconds);
+    return std::accumulate(longest.begin(), longest.end(), 0.0,
+                           [](double sum, const auto& step) { return sum + step.second; });
+}
+
+MeasuredRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
+                        const sim::SimulatedProcessors& processors) {
+    return measure(scene, settings, [&](sim::DistributedObserver& observer) {
+        return sim::simulate_processors(scene, settings, processors, observer);
+    });
+}
+
+MeasuredRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
+                        const sim::DistributedLaunch& launch) {
+    return measure(scene, settings, [&](sim::DistributedObserver& observer) {
+        return sim::run_distributed(scene, settings, launch, observer);
+    });
+}
+
+sim::WorldDefinition strip_of(const sim::WorldDefinition& world, int number, int of) {
+    std::vector<std::size_t> order(world.bodies.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    const auto x = [&](std::size_t body) { return world.bodies[body].world_from_body.translation().x(); };
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return x(a) != x(b) ? x(a) < x(b) : a < b; });
+    const auto border = [&](int k) { return order.size() * std::size_t(k) / std::size_t(of); };
+    const std::size_t first = border(number), end = border(number + 1);
+
+    sim::WorldDefinition strip;
+    strip.settings = world.settings;
+    strip.planes = world.planes;
+    std::map<int, int> number_of;
+    for (std::size_t k = first; k < end; ++k) {
+        number_of[static_cast<int>(order[k])] = static_cast<int>(strip.bodies.size());
+        strip.bodies.push_back(world.bodies[order[k]]);
+    }
+    // Half-way to the neighbour, but not through the strip's own bodies.
+    const auto wall = [&](std::size_t at, double side) {
+        double offset = side * 0.5 * (x(order[at - 1]) + x(order[at]));
+        for (const sim::WorldBody& body : strip.bodies)
+            offset = std::min(
+                offset, side * body.world_from_body.translation().x() - body.shape.base.semi_axes.maxCoeff());
+        strip.planes.push_back({side * Eigen::Vector3d::UnitX(), offset});
+    };
+    if (number > 0) wall(first, 1);
+    if (number + 1 < of) wall(end, -1);
+    for (sim::PointConstraint c : world.constraints) {
+        if (!number_of.contains(c.body_a) || (c.body_b >= 0 && !number_of.contains(c.body_b))) continue;
+        c.body_a = number_of[c.body_a];
+        if (c.body_b >= 0) c.body_b = number_of[c.body_b];
+        strip.constraints.push_back(c);
+    }
+    return strip;
+}
+
+namespace {
+
+double unevenness(const std::map<int, sim::WorkerStep>& now) {
+    double sum = 0, per_body = 0, worst = 0;
+    for (const auto& [worker, step] : now) {
+        sum += step.smoothed_s;
+        if (step.bodies > 0) per_body = std::max(per_body, step.smoothed_s / step.bodies);
+    }
+    const double average = sum / static_cast<double>(now.size());
+    for (const auto& [worker, step] : now) worst = std::max(worst, std::abs(step.smoothed_s - average));
+    const double allowed = std::max(0.15 * average, per_body);
+    return allowed > 0 ? worst / allowed : 0;
+}
+
+}  // namespace
+
+double unevenness_at(const MeasuredRun& run, std::uint64_t step) {
+    std::map<int, sim::WorkerStep> now;
+    for (const auto& [worker, points] : run.history.workers()) now[worker] = {};
+    for (const sim::WorkerStep& told : run.steps) {
+        now[told.worker] = told;
+        if (std::all_of(now.begin(), now.end(), [&](const auto& n) { return n.second.step >= step; })) break;
+    }
+    return unevenness(now);
+}
+
+int most_trades(const MeasuredRun& run, std::uint64_t from, std::uint64_t to, std::uint64_t window) {
+    int most = 0;
+    for (const MeasuredRun::Trade& first : run.trades) {
+        if (first.step < from || first.step >= to) continue;
+        most =
+            std::max(most, static_cast<int>(std::count_if(
+                               run.trades.begin(), run.trades.end(), [&](const MeasuredRun::Trade& t) {
+                                   return t.step >= first.step && t.step < std::min(first.step + window, to);
+                               })));
+    }
+    return most;
+}
+
+}  // namespace app

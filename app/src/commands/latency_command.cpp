@@ -1,0 +1,107 @@
+#include "commands/latency_command.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+#include <memory>
+
+#include "commands/play_arguments.h"
+#include "commands/realtime_arguments.h"
+#include "files/output_folder.h"
+#include "latency/latency_comparison.h"
+#include "latency/latency_tables.h"
+
+namespace app {
+namespace fs = std::filesystem;
+namespace {
+
+/// The options as typed.
+struct Typed {
+    PlayArguments play;
+    RealtimeArguments in_time;
+    std::vector<std::string> compare;
+    bool json = false;
+};
+
+/// A folder for the products of a run that nobody asked for; gone at the end.
+class PassingFolder {
+public:
+    PassingFolder() {
+        std::string name = (fs::temp_directory_path() / "musicworld_latency_XXXXXX").string();
+        if (::mkdtemp(name.data()) == nullptr)
+            throw std::runtime_error(fmt::format(
+                "{}: error: found no way to make a folder there, expected one for the run; use --out DIR",
+                fs::temp_directory_path().string()));
+        path_ = name;
+    }
+    ~PassingFolder() {
+        std::error_code ignored;
+        fs::remove_all(path_, ignored);
+    }
+    PassingFolder(const PassingFolder&) = delete;
+    PassingFolder& operator=(const PassingFolder&) = delete;
+    [[nodiscard]] const fs::path& path() const { return path_; }
+
+private:
+    fs::path path_;
+};
+
+void compare(const Typed& typed) {
+    const LatencyComparison comparison = compare_latency(typed.compare[0], typed.compare[1]);
+    if (!typed.play.out.empty()) {
+        static constexpr std::array<std::string_view, 2> kProducts = {"comparison.json", "report.html"};
+        OutputFolder out(typed.play.out, kProducts);
+        write_file(out.path("comparison.json"), format_json(comparison));
+        write_file(out.path("report.html"), format_page(comparison));
+        out.finish();
+    }
+    fmt::print("{}", typed.json ? format_json(comparison) : format_text(comparison));
+}
+
+void measure(const Typed& typed, const RunInTime& run) {
+    std::unique_ptr<PassingFolder> passing;
+    RealtimeOptions options = realtime_options(play_options(typed.play), typed.in_time);
+    if (typed.play.out.empty()) {
+        passing = std::make_unique<PassingFolder>();
+        options.play.out = passing->path();
+    }
+    const RealtimeOutcome outcome = run(options);
+    fmt::print("{}", typed.json ? format_latency_json(outcome.latency, outcome.play, outcome.realtime)
+                                : format_latency_text(outcome.latency, outcome.realtime));
+    if (!typed.play.out.empty() && !typed.json)
+        fmt::print("Look at {}\n", (options.play.out / "latency.html").string());
+    if (!outcome.failure.empty()) throw std::runtime_error(outcome.failure);
+}
+
+RealtimeOutcome run_and_warn(const RealtimeOptions& options) {
+    return play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
+}
+
+}  // namespace
+
+void add_latency_command(CLI::App& program, const RunInTime& run) {
+    CLI::App* command = program.add_subcommand(
+        "latency",
+        "Play in real time and measure: each stage's latency, deadlines missed, sound against picture, leads "
+        "needed");
+    auto typed = std::make_shared<Typed>();
+    add_play_options(*command, typed->play);
+    add_realtime_options(*command, typed->in_time);
+    command->add_flag("--json", typed->json, "Print one JSON document");
+    command->add_option("--out", typed->play.out,
+                        "Folder for what play writes, latency.json, latency.html and the rows as CSV");
+    command
+        ->add_option("--compare", typed->compare,
+                     "Two such folders of earlier runs: their figures side by side (--out: comparison.json, "
+                     "report.html)")
+        ->expected(2);
+    command->callback([typed, run] {
+        if (typed->compare.empty())
+            measure(*typed, run ? run : run_and_warn);
+        else
+            compare(*typed);
+    });
+}
+
+}  // namespace app

@@ -1,0 +1,15 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <functional>
+
+#include "realtime/play_realtime.h"
+
+namespace app {
+
+/// Plays in real time into the folder of the options.
+using RunInTime = std::function<RealtimeOutcome(const RealtimeOptions&)>;
+
+/// Adds `latency` to the program: play_realtime(), or `run` in its place, and what it measured.
+void add_latency_command(CLI::App& program, const RunInTime& run = {});
+
+}  // namespace app

@@ -1,0 +1,74 @@
+#pragma once
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "compare/comparison.h"
+#include "compare/recording.h"
+#include "compare/sensed_stick.h"
+#include "sticks/prediction_file.h"
+
+namespace app {
+
+/// Recordings and what the sensor sees of them.
+struct Field {
+    std::vector<Recording> recordings;
+    std::vector<SensedStick> sticks;
+};
+
+/// Throws tracking::TraceError, and BadInput, also where two files hold the same samples.
+[[nodiscard]] Field read_field(const std::vector<std::string>& files, const ComparisonOptions& options);
+
+/// Where a predictor's parameters come from.
+enum class Tuning {
+    none,              ///< as named
+    other_recordings,  ///< `NAME*`: least RMS on recordings other than the one scored
+    other_persons,     ///< `NAME**`: least RMS on recordings of other persons
+};
+
+/// A predictor that takes part in a comparison.
+struct Entrant {
+    std::string name;         ///< as shown: `naive`, `naive*`
+    std::string description;  ///< one line
+    Tuning tuning = Tuning::none;
+    bool baseline = false, external = false;
+    std::string strikes_by;       ///< the specification that is scored on strikes, where it differs (`auto`)
+    std::string confirmed_by;     ///< the one that confirms them (`auto`), else empty
+    bool learns_advance = false;  ///< of the strikes' times, from other recordings (`auto`)
+    /// Recording x lead: the specification that runs, or the file that answers; empty: does not take part.
+    std::vector<std::vector<std::string>> used;
+    std::map<std::pair<std::size_t, std::size_t>, StickPredictions>
+        replays;  ///< (stick among all, lead): the file's answers
+};
+
+/// A fresh predictor for the stick numbered `place` among all, at a lead; `used` of that place is not empty.
+[[nodiscard]] std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant,
+                                                                const SensedStick& stick, std::size_t place,
+                                                                std::size_t lead);
+/// The same for strikes, whose path is asked at `leads_s`.
+[[nodiscard]] std::unique_ptr<tracking::Predictor> make_striker(const Entrant& entrant,
+                                                                const SensedStick& stick, std::size_t place,
+                                                                std::size_t lead,
+                                                                std::span<const double> leads_s);
+
+struct EntrantList {
+    std::vector<Entrant> entrants;
+    std::string tuned_on;  ///< what the tuned ones were tuned on, one sentence
+};
+
+/// The predictors named, without repetitions, and the baselines (naive, difference, the parabola).
+[[nodiscard]] std::vector<std::string> specifications_of(const ComparisonOptions& options);
+
+/// Those named, then the baselines that were not (naive, difference, the parabola), then the tuned ones of
+/// each family among them: on the `--tune` recordings without the one scored (known by its samples), or on
+/// all others compared (two recordings or more), and on those of other persons (two persons or more); last
+/// the files of
+/// `--predictions`, each at its lead on the recording whose samples it answers. Throws BadInput for a
+/// predictor that is not known and a file that fits no recording or lead.
+[[nodiscard]] EntrantList enter(const ComparisonOptions& options, std::span<const Recording> recordings,
+                                std::span<const SensedStick> sticks);
+
+}  // namespace app

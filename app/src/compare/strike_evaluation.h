@@ -1,0 +1,79 @@
+#pragma once
+#include <tracking/predictor.h>
+#include <tracking/trace.h>
+
+#include <Eigen/Core>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "kit/kit.h"
+#include "kit/stick_geometry.h"
+#include "sticks/auto_predictor.h"
+
+namespace app {
+
+/// What a stick strikes when predictors are compared: a horizontal plane, one for each stick, or a kit.
+struct StrikeSurface {
+    enum class Kind { none, plane, above_contact, kit } kind = Kind::none;
+    double height_m = 0;  ///< plane: its height; above_contact: above the stick's contact height
+    Kit kit;              ///< kit only
+};
+
+/// The strikes that a predictor commits `lead_s` ahead, against the true contacts of the recorded path.
+struct HitScore {
+    int true_contacts = 0, predicted = 0, matched = 0;
+    int false_without_cancel = 0;   ///< committed notes without a contact when nothing is cancelled
+    double minutes = 0;             ///< of the recording
+    std::vector<double> errors_ms;  ///< committed minus true time, signed, of the matched notes
+
+    [[nodiscard]] int false_notes() const { return predicted - matched; }
+    [[nodiscard]] double precision() const;  ///< 1 when nothing was predicted
+    [[nodiscard]] double recall() const;     ///< 1 when there was nothing to find
+    [[nodiscard]] double f1() const;         ///< 2 matched / (true + predicted); 1 when both are 0
+    [[nodiscard]] double median_ms() const;  ///< of |error|; 0 when nothing matched
+    [[nodiscard]] double p95_ms() const;
+    [[nodiscard]] double false_per_min() const;
+    [[nodiscard]] double false_per_min_without_cancel() const;
+    /// What the strikes cost: 1 for each missed contact and each false note, |error| / 60 ms for the others
+    /// (a note at the edge of the 30 ms window is half a miss).
+    [[nodiscard]] double loss() const;
+    /// Both together, as if one recording followed the other.
+    void add(const HitScore& other);
+};
+
+/// Who says when a stick strikes.
+struct StrikePredictors {
+    tracking::Predictor& timing;                ///< whose path is swept
+    tracking::Predictor* confirming = nullptr;  ///< whose path must bear it out (keep_confirmed); may be none
+};
+
+struct StrikeTiming {
+    double lead_s = 1.0 / 15;         ///< a strike's time is fixed this long before
+    double release_margin_s = 0.010;  ///< and cancelled until this long before
+    double advance_s = 0;             ///< predicted contacts are taken to come earlier by this
+};
+
+/// The leads at which evaluate_strikes asks the timing predictor: 0 to a little beyond the strike's lead.
+/// External predictors are told these.
+[[nodiscard]] std::vector<double> strike_leads(const StrikeTiming& timing);
+
+/// Strikes of one stick (the strike rules of the README): at each sample the path that the predictor states
+/// until a little beyond the lead is swept against the surface; a contact's time is re-timed at each sample
+/// until the lead before it, then fixed; it may be cancelled, and taken up again, until the release margin
+/// before it. Each model of a predictor of several keeps its own pending contacts; those of the model that is
+/// selected when they must be released count. Without cancelling every contact whose time was fixed is
+/// played. The true contacts are those of the recorded path, straight between samples, 3 mm deep. A pure
+/// function, but for `exec:` predictors with a state of their own.
+///
+///   recorded    the stick as recorded, for the truth
+///
+///   samples     what the sensor reports, in order of arrival
+///
+///   predictors  made by the caller for this run; fed from their start
+[[nodiscard]] HitScore evaluate_strikes(const tracking::StickTrace& recorded,
+                                        std::span<const tracking::PoseSample> samples,
+                                        const StrikePredictors& predictors, const StickGeometry& geometry,
+                                        const StrikeSurface& surface, const StrikeTiming& timing);
+
+}  // namespace app

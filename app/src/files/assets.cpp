@@ -1,0 +1,27 @@
+#include "files/assets.h"
+
+#include <cstdlib>
+
+namespace app {
+namespace fs = std::filesystem;
+
+fs::path assets_folder() {
+    const char* chosen = std::getenv("MUSICWORLD_ASSETS");
+    return chosen && *chosen ? fs::path(chosen) : fs::path(MUSICWORLD_ASSETS);
+}
+
+fs::path find_kit(const std::string& name_or_path) {
+    fs::path bundled = assets_folder() / "kits" / (name_or_path + ".toml");
+    if (name_or_path.find('/') == std::string::npos && fs::is_regular_file(bundled)) return bundled;
+    return name_or_path;
+}
+
+fs::path find_trace(const std::string& name_or_path) {
+    fs::path bundled = assets_folder() / "traces" / (name_or_path + ".csv");
+    const bool name = name_or_path.find('/') == std::string::npos;
+    std::error_code ignored;
+    if (name && !fs::exists(name_or_path, ignored) && fs::is_regular_file(bundled, ignored)) return bundled;
+    return name_or_path;
+}
+
+}  // namespace app

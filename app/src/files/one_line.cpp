@@ -1,0 +1,14 @@
+#include "files/one_line.h"
+
+namespace app {
+
+std::string one_line(std::string_view text, std::size_t longest) {
+    std::string line(text.substr(0, longest));
+    if (line.size() < text.size())  // no part of a character at the end
+        while (!line.empty() && (static_cast<unsigned char>(line.back()) & 0x80) != 0) line.pop_back();
+    for (char& c : line)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+    return line.size() < text.size() ? line + "..." : line;
+}
+
+}  // namespace app

@@ -1,0 +1,59 @@
+#pragma once
+#include <audio/performance.h>
+#include <render/scene.h>
+#include <sim/modal_body.h>
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace app {
+
+/// What a zone of an instrument sends to MIDI.
+struct ZoneSound {
+    std::string name;
+    int midi_note = 38;
+};
+
+/// One playable thing of a kit: its body, its look and its sound.
+struct Instrument {
+    std::string name;
+    std::string kind;  ///< drum | bell | string | cymbal
+    sim::BodyDefinition body;
+    std::filesystem::path mesh;  ///< unit mesh, scaled to the body's semi-axes
+    render::Look look;
+    audio::Voice voice;
+    std::vector<ZoneSound> zones;  ///< as body.zones
+    double velocity_gamma = 1;     ///< loudness speed = 5 (speed / 5)^gamma [m/s]
+    bool drawn_stand = true;       ///< a stand is drawn from the body down to the floor
+};
+
+/// The stick as the kit wants it; unset values come from the trace.
+struct StickDefinition {
+    double length_m = 0.40;                ///< of the drawn stick, hand to tip
+    std::optional<Eigen::Vector3d> tip;    ///< in the tracked body's frame [m]
+    std::optional<Eigen::Vector3d> shaft;  ///< unit, hand to tip
+    double radius_m = 0.006;
+    double mass_kg = 0.05;
+    std::filesystem::path mesh;
+};
+
+/// A kit file, checked and complete.
+struct Kit {
+    std::filesystem::path file;
+    std::vector<std::filesystem::path> files;  ///< it and all that it includes, for provenance
+    std::string name, description;
+    std::vector<Instrument> instruments;
+    StickDefinition stick;
+    render::Camera camera;
+    render::Room room;
+};
+
+/// Reads a kit (TOML). `defaults.toml` of the assets stands under every kit; `include` names further files,
+/// relative to the kit or to the assets. Throws BadInput with FILE:LINE:COLUMN for whatever is unknown,
+/// missing or out of range.
+[[nodiscard]] Kit read_kit(const std::filesystem::path& file);
+
+}  // namespace app

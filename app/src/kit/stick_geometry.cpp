@@ -1,0 +1,43 @@
+#include "kit/stick_geometry.h"
+
+#include "kit/tip_track.h"
+
+namespace app {
+
+StickGeometry stick_geometry(const tracking::Trace& trace, const StickDefinition& stick,
+                             const std::optional<Eigen::Vector3d>& tip_option,
+                             const std::optional<Eigen::Vector3d>& shaft_option) {
+    StickGeometry geometry;
+    geometry.radius_m = stick.radius_m;
+    geometry.length_m = stick.length_m;
+    for (const auto& tip : {tip_option, stick.tip, trace.tip})
+        if (tip) {
+            geometry.tip = *tip;
+            break;
+        }
+    for (const auto& shaft : {shaft_option, stick.shaft, trace.shaft})
+        if (shaft) {
+            geometry.shaft = shaft->normalized();
+            break;
+        }
+    return geometry;
+}
+
+TipTrack tip_track(const tracking::StickTrace& stick, const StickGeometry& geometry) {
+    TipTrack track{stick.name, {}, {}};
+    track.t_s.reserve(stick.samples.size());
+    track.tip.reserve(stick.samples.size());
+    for (const tracking::PoseSample& sample : stick.samples) {
+        track.t_s.push_back(sample.t_s);
+        track.tip.push_back(sample.position + sample.orientation * geometry.tip);
+    }
+    return track;
+}
+
+std::vector<TipTrack> tip_tracks(const tracking::Trace& trace, const StickGeometry& geometry) {
+    std::vector<TipTrack> tracks;
+    for (const tracking::StickTrace& stick : trace.sticks) tracks.push_back(tip_track(stick, geometry));
+    return tracks;
+}
+
+}  // namespace app

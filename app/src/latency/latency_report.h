@@ -1,0 +1,108 @@
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kit/kit.h"
+#include "latency/drawn_error.h"
+#include "latency/realtime_result.h"
+#include "latency/sound_picture.h"
+#include "play/play_result.h"
+
+namespace app {
+
+/// How values spread, by nearest rank.
+class Spread {
+public:
+    Spread() = default;
+    explicit Spread(std::vector<double> values);
+
+    [[nodiscard]] bool empty() const { return sorted_.empty(); }
+    [[nodiscard]] std::size_t count() const { return sorted_.size(); }
+    /// The smallest value that at least `percent` % do not exceed; 0 < percent <= 100. 0 for no values.
+    [[nodiscard]] double percentile(double percent) const;
+    [[nodiscard]] double min() const { return sorted_.empty() ? 0 : sorted_.front(); }
+    [[nodiscard]] double max() const { return sorted_.empty() ? 0 : sorted_.back(); }
+    /// Share of the values within [low, high].
+    [[nodiscard]] double share_within(double low, double high) const;
+    [[nodiscard]] const std::vector<double>& sorted() const { return sorted_; }
+
+private:
+    std::vector<double> sorted_;
+};
+
+/// One step on the way from a sensor to ear or eye, over all that took it.
+struct LatencyStage {
+    enum class Kind { sound, picture, age };
+    std::string name, meaning;  ///< meaning: from what to what, a few words
+    Kind kind = Kind::sound;
+    Spread ms;
+};
+
+/// How often something had to be done by a time, and was not.
+struct Deadline {
+    std::string name, meaning;
+    std::size_t total = 0, missed = 0;
+};
+
+/// What was between sound and picture that people hear and see: in time for ATSC's production limit and ITU-R
+/// BT.1359's detectability, as sound minus picture [ms] (sound may be early by the first, late by the
+/// second).
+struct AvLimits {
+    double early_ms, late_ms;
+};
+inline constexpr AvLimits kAtscLimits{-15, 45}, kItuLimits{-45, 125};
+/// Latency that drummers rate as none, and the jitter beside it that they do not [ms].
+inline constexpr double kDrummersLatencyMs = 10, kDrummersJitterMs = 3;
+
+/// What `latency` says of a run in real time.
+struct LatencyReport {
+    // clang-format off
+    /// In order of the way; those that nothing took are left out:
+    ///
+    ///   sensor to filter     sample due to all its filters done
+    ///   filter to app        that to the application having it
+    ///   query                of the shared memory
+    ///   contact              the application having it to the simulation's answer
+    ///   note hand-over       that to its notes being with the audio
+    ///   sample to notes      due to notes being with the audio
+    ///   block computed       planned to done
+    ///   frame query          poses and simulation asked
+    ///   frame drawn          drawing begun to ended
+    ///   frame read back      that to pixels being there
+    ///   frame in all         query begun to pixels there
+    ///   frame written        pixels there to the file written
+    ///   pose age in frames   shown minus the oldest stick's sample
+    ///   pose age in notes    onset minus the newest sample that could change it
+    // clang-format on
+    std::vector<LatencyStage> stages;
+    Deadline frames;  ///< asked for; missed: late or not drawn
+    Deadline notes;   ///< sounded; missed: later than planned
+    Deadline samples, blocks;
+    std::size_t frames_left_out = 0;     ///< since the rate was lowered
+    std::vector<SoundPicture> pictures;  ///< of the notes that the drawn sticks play, too
+    std::size_t notes_without_picture = 0;
+    Spread sound_minus_picture_ms, sound_minus_frame_ms;
+    /// Share of the notes within ATSC's limit; one without a picture is not.
+    [[nodiscard]] double share_within_atsc() const;
+    /// Share of those with a picture within ITU-R BT.1359's limits.
+    [[nodiscard]] double share_within_itu() const;
+    std::vector<DrawnError> errors;
+    /// p99 of "frame in all": what the render lead must cover so that 99 of 100 frames are in time.
+    std::optional<double> render_lead_needed_ms;
+    /// p99 of "sample to notes" plus the output lead plus p99 of "block computed": what the sound lead must
+    /// cover so that a contact predicted at a sample can still sound on time. Blocks that are done within the
+    /// output lead are counted twice, to be on the safe side.
+    std::optional<double> sound_lead_needed_ms;
+};
+
+/// `play.tracks` are on the run's clock, t0 + time since the epoch; of `play.strikes` stick and instrument
+/// count.
+[[nodiscard]] LatencyReport latency_report(const PlayResult& play, const RealtimeResult& realtime,
+                                           const Kit& kit, double tip_radius_m);
+
+/// By name; null if nothing took it.
+[[nodiscard]] const LatencyStage* find_stage(const LatencyReport& report, std::string_view name);
+
+}  // namespace app

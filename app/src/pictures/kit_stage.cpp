@@ -1,0 +1,136 @@
+#include "pictures/kit_stage.h"
+
+#include <fmt/format.h>
+#include <sim/simulation.h>
+
+#include <cmath>
+
+#include "files/assets.h"
+
+namespace app {
+namespace {
+
+constexpr int kKitShadowTexels = 512;       // a side: 1024 costs a tenth of a frame more and shows no more
+constexpr double kMeshStickLengthM = 0.40;  // of stick.obj and mallet.obj, hand to tip
+
+render::Look chrome() {
+    render::Look look;
+    look.body = {Eigen::Vector3f(0.72f, 0.73f, 0.75f), 1.0f, 0.20f};
+    look.parts = {{"rubber", {Eigen::Vector3f(0.02f, 0.02f, 0.02f), 0.0f, 0.7f}}};
+    return look;
+}
+
+render::Look hickory() {
+    render::Look look;
+    look.body = {Eigen::Vector3f(0.62f, 0.40f, 0.20f), 0.0f, 0.38f};
+    return look;
+}
+
+render::Look walnut() {
+    render::Look look;
+    look.body = {Eigen::Vector3f(0.26f, 0.13f, 0.06f), 0.0f, 0.4f};
+    return look;
+}
+
+}  // namespace
+
+KitStage::KitStage(const Kit& kit, std::size_t sticks, const StickGeometry& stick)
+    : kit_(kit), sticks_(sticks), stick_(stick) {
+    for (const Instrument& instrument : kit_.instruments)
+        if (instrument.drawn_stand && instrument.kind != "string") add_stand(instrument);
+    add_string_frame();
+}
+
+void KitStage::add_stand(const Instrument& instrument) {
+    const sim::BodyDefinition& body = instrument.body;
+    const bool below = instrument.kind == "drum";
+    const Eigen::Vector3d hold(0, below ? -body.shape.semi_axes.y() : 0, 0);
+    const Eigen::Vector3d top = body.world_from_body * hold;
+    const double height = top.y() - kit_.room.floor_height;
+    if (height < 0.05) return;
+    const double spread = below ? std::max(1.0, 2.2 * body.shape.semi_axes.x() / 0.5) : 1.0;
+    Eigen::Matrix4f matrix = Eigen::Matrix4f::Identity();
+    matrix.topLeftCorner<3, 3>() = Eigen::Vector3d(spread, height, spread).cast<float>().asDiagonal();
+    matrix.topRightCorner<3, 1>() = top.cast<float>();
+    props_.push_back(
+        {instrument.name + " stand", assets_folder() / "meshes" / "stand.obj", chrome(), matrix});
+}
+
+void KitStage::add_string_frame() {
+    Eigen::AlignedBox3d box;
+    for (const Instrument& instrument : kit_.instruments)
+        if (instrument.kind == "string" && instrument.drawn_stand)
+            for (const double side : {-1.0, 1.0})
+                box.extend(instrument.body.world_from_body *
+                           Eigen::Vector3d(side * instrument.body.shape.semi_axes.x(), 0, 0));
+    if (box.isEmpty()) return;
+    const double thickness = 0.03, gap = 0.05;
+    const Eigen::Vector3d size(box.sizes().x() + 0.12, thickness, box.sizes().z() + 0.12);
+    Eigen::Matrix4f matrix = Eigen::Matrix4f::Identity();
+    matrix.topLeftCorner<3, 3>() = (0.5 * size).cast<float>().asDiagonal();
+    matrix.topRightCorner<3, 1>() =
+        Eigen::Vector3d(box.center().x(), box.min().y() - gap, box.center().z()).cast<float>();
+    props_.push_back({"soundboard", assets_folder() / "meshes" / "string_frame.obj", walnut(), matrix});
+    const double height = box.min().y() - gap - kit_.room.floor_height;
+    Eigen::Matrix4f stand = Eigen::Matrix4f::Identity();
+    stand.topLeftCorner<3, 3>() =
+        Eigen::Vector3d(1.5, std::max(0.05, height), 1.5).cast<float>().asDiagonal();
+    stand.topRightCorner<3, 1>() = matrix.topRightCorner<3, 1>();
+    props_.push_back({"soundboard stand", assets_folder() / "meshes" / "stand.obj", chrome(), stand});
+}
+
+render::SceneDescription KitStage::scene(int width, int height) const {
+    render::SceneDescription scene;
+    for (const Instrument& instrument : kit_.instruments)
+        scene.objects.push_back({instrument.name, instrument.mesh, instrument.look});
+    for (const Prop& prop : props_) scene.objects.push_back({prop.name, prop.mesh, prop.look});
+    for (std::size_t i = 0; i < sticks_; ++i)
+        scene.objects.push_back({fmt::format("stick {}", i), kit_.stick.mesh, hickory()});
+    scene.camera = kit_.camera;
+    scene.room = kit_.room;
+    scene.width = width;
+    scene.height = height;
+    scene.shadow_size = kKitShadowTexels;
+    return scene;
+}
+
+Eigen::Matrix4f KitStage::stick_matrix(const tracking::PosePrediction& pose) const {
+    // The mesh runs along -z and has its bead's centre at (0, 0, -0.40).
+    const Eigen::Quaterniond body_from_mesh =
+        Eigen::Quaterniond::FromTwoVectors(-Eigen::Vector3d::UnitZ(), stick_.shaft);
+    const double scale = stick_.length_m / kMeshStickLengthM;
+    Eigen::Isometry3d world_from_body = Eigen::Isometry3d::Identity();
+    world_from_body.linear() = pose.orientation.toRotationMatrix();
+    world_from_body.translation() = pose.position;
+    Eigen::Affine3d body_from_stick = Eigen::Affine3d::Identity();
+    body_from_stick.linear() = body_from_mesh.toRotationMatrix() * scale;
+    body_from_stick.translation() = stick_.tip + stick_.shaft * -stick_.length_m;
+    return (world_from_body * body_from_stick).matrix().cast<float>();
+}
+
+render::FrameState KitStage::frame(std::span<const sim::ModalState> bodies,
+                                   std::span<const std::optional<tracking::PosePrediction>> sticks) const {
+    render::FrameState state;
+    for (std::size_t i = 0; i < kit_.instruments.size(); ++i) {
+        const sim::BodyDefinition& body = kit_.instruments[i].body;
+        Eigen::Matrix4d size = Eigen::Matrix4d::Identity();
+        size.topLeftCorner<3, 3>() = body.shape.semi_axes.asDiagonal();
+        const Eigen::Matrix4d matrix =
+            sim::body_matrix(body, bodies.empty() ? sim::ModalState{} : bodies[i]) * size;
+        state.world_from_object.push_back(matrix.cast<float>());
+        state.visible.push_back(true);
+    }
+    for (const Prop& prop : props_) {
+        state.world_from_object.push_back(prop.matrix);
+        state.visible.push_back(true);
+    }
+    for (std::size_t i = 0; i < sticks_; ++i) {
+        const bool visible = i < sticks.size() && sticks[i].has_value();
+        state.world_from_object.push_back(visible ? stick_matrix(*sticks[i])
+                                                  : Eigen::Matrix4f(Eigen::Matrix4f::Identity()));
+        state.visible.push_back(visible);
+    }
+    return state;
+}
+
+}  // namespace app

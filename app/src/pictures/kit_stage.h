@@ -1,0 +1,46 @@
+#pragma once
+#include <render/scene.h>
+#include <sim/modal_body.h>
+#include <tracking/predictor.h>
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "kit/kit.h"
+#include "kit/stick_geometry.h"
+
+namespace app {
+
+/// What is on stage: the kit's instruments, their stands, and the sticks; how a state of the bodies and
+/// sticks becomes matrices.
+class KitStage {
+public:
+    KitStage(const Kit& kit, std::size_t sticks, const StickGeometry& stick);
+
+    /// Where tip and shaft are in the tracked body, once that is known of live sticks.
+    void set_stick(const StickGeometry& stick) { stick_ = stick; }
+    [[nodiscard]] render::SceneDescription scene(int width, int height) const;
+    /// Bodies in the kit's order (empty: all at rest); a stick without a pose is not drawn.
+    [[nodiscard]] render::FrameState frame(
+        std::span<const sim::ModalState> bodies,
+        std::span<const std::optional<tracking::PosePrediction>> sticks) const;
+
+private:
+    struct Prop {  // does not move
+        std::string name;
+        std::filesystem::path mesh;
+        render::Look look;
+        Eigen::Matrix4f matrix;
+    };
+    void add_stand(const Instrument& instrument);
+    void add_string_frame();
+    [[nodiscard]] Eigen::Matrix4f stick_matrix(const tracking::PosePrediction& pose) const;
+
+    Kit kit_;
+    std::size_t sticks_;
+    StickGeometry stick_;
+    std::vector<Prop> props_;
+};
+
+}  // namespace app

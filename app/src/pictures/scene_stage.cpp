@@ -1,0 +1,144 @@
+#include "pictures/scene_stage.h"
+
+#include <sim/surface_mesh.h>
+
+#include <algorithm>
+
+namespace app {
+namespace {
+
+constexpr int kSceneShadowTexels = 1024;
+constexpr double kKerb = 0.03;  // half height and half thickness, as share of the box's longer side
+
+render::Look kerb_wood() {
+    return {{Eigen::Vector3f(0.10f, 0.045f, 0.02f), 0.0f, 0.5f}, {}};
+}
+
+render::Mesh mesh_of(const sim::SurfaceMesh& surface) {
+    render::MeshPart part;
+    const std::size_t drawn = surface.vertices.size() - surface.features;
+    for (std::size_t k = 0; k < drawn; ++k) {
+        part.positions.push_back(surface.vertices[k].cast<float>());
+        part.normals.push_back(surface.normals[k].cast<float>());
+    }
+    for (const auto& triangle : surface.triangles)
+        part.indices.insert(part.indices.end(), triangle.begin(), triangle.end());
+    return {{part}};
+}
+
+render::ModeShapes shapes_of(const sim::SurfaceMesh& surface, const sim::ModalBasis& basis) {
+    render::ModeShapes modes;
+    modes.count = basis.count();
+    const std::size_t drawn = surface.vertices.size() - surface.features;
+    for (std::size_t v = 0; v < drawn; ++v) {
+        for (int k = 0; k < modes.count; ++k) {
+            const sim::Displacement u = sim::displacement_at(basis, basis.nodal.col(k), surface.vertices[v]);
+            modes.displacement.push_back(u.value.cast<float>());
+            modes.gradient.push_back(u.gradient.cast<float>());
+        }
+    }
+    return modes;
+}
+
+/// I + du/dr of a body whose strain is uniform.
+Eigen::Matrix3d uniform_strain(const sim::ModalBasis& basis, const Eigen::VectorXd& q) {
+    const Eigen::VectorXd nodal = basis.nodal * q;
+    return Eigen::Matrix3d::Identity() + sim::displacement_at(basis, nodal, Eigen::Vector3d::Zero()).gradient;
+}
+
+}  // namespace
+
+SceneStage::SceneStage(const Scene& scene, const sim::World& world) : scene_(scene) {
+    const std::size_t now = scene.world.bodies.size();
+    sim::WorldDefinition later;
+    later.bodies = scene.later;
+    const sim::World coming(later);
+    for (std::size_t body = 0; body < scene.looks.size(); ++body) {
+        const std::size_t kind = scene.looks[body].kind;
+        if (kind < solid_of_kind_.size()) continue;
+        solid_of_kind_.push_back(static_cast<int>(solids_.size()));
+        if (body < now)
+            add_solid(world, static_cast<int>(body));
+        else
+            add_solid(coming, static_cast<int>(body - now));
+    }
+    if (scene.box) add_kerbs();
+}
+
+void SceneStage::add_solid(const sim::World& world, int body) {
+    const sim::WorldBody& definition = world.definition(body);
+    const sim::SurfaceMesh surface = sim::surface_mesh(definition.shape, definition.triangles);
+    const bool bends = world.fidelity(body).fidelity == sim::Fidelity::modal && world.basis(body).count() > 0;
+    solids_.push_back(
+        {mesh_of(surface), bends ? shapes_of(surface, world.basis(body)) : render::ModeShapes{}});
+}
+
+void SceneStage::add_kerbs() {
+    kerb_solid_ = static_cast<int>(solids_.size());
+    const sim::SurfaceMesh bar = sim::surface_mesh({{Eigen::Vector3d::Ones(), 0.1, 0.1}, {}}, 1000);
+    solids_.push_back({mesh_of(bar), {}});
+    const SceneBox& box = *scene_.box;
+    const double thick = kKerb * box.size.maxCoeff();
+    for (const int side : {0, 1}) {
+        for (const double sign : {-1.0, 1.0}) {
+            Eigen::Vector3d half(0.5 * box.size[0] + 2 * thick, thick, 0.5 * box.size[1] + 2 * thick);
+            Eigen::Vector3d at(box.center[0], box.floor, box.center[1]);
+            at[2 * side] += sign * (0.5 * box.size[side] + thick);
+            half[2 * side] = thick;
+            kerbs_.push_back(matrix(Eigen::Isometry3d(Eigen::Translation3d(at)), half.asDiagonal()));
+        }
+    }
+}
+
+render::SceneDescription SceneStage::description(int width, int height) const {
+    render::SceneDescription description;
+    const auto scale = static_cast<float>(scene_.drawn_scale);
+    for (const BodyLook& look : scene_.looks)
+        description.objects.push_back({"body", {}, {look.appearance, {}}, solid_of_kind_[look.kind]});
+    for (std::size_t k = 0; k < kerbs_.size(); ++k)
+        description.objects.push_back({"kerb", {}, kerb_wood(), kerb_solid_});
+    description.solids = solids_;
+    description.camera = scene_.camera;
+    description.camera.eye *= scale, description.camera.target *= scale;
+    description.room = scene_.room;
+    description.room.floor_height *= scale;
+    description.width = width, description.height = height;
+    description.shadow_size = kSceneShadowTexels;
+    return description;
+}
+
+Eigen::Matrix4f SceneStage::matrix(const Eigen::Isometry3d& pose, const Eigen::Matrix3d& strain) const {
+    Eigen::Matrix4f result = Eigen::Matrix4f::Identity();
+    result.topLeftCorner<3, 3>() = (scene_.drawn_scale * pose.linear() * strain).cast<float>();
+    result.topRightCorner<3, 1>() = (scene_.drawn_scale * pose.translation()).cast<float>();
+    return result;
+}
+
+render::FrameState SceneStage::frame(const sim::World& world) const {
+    render::FrameState frame;
+    const auto now = static_cast<std::size_t>(world.bodies());
+    for (std::size_t k = 0; k < scene_.looks.size(); ++k) {
+        frame.visible.push_back(k < now);
+        frame.world_from_object.push_back(Eigen::Matrix4f::Identity());
+        const int modes = solids_[static_cast<std::size_t>(solid_of_kind_[scene_.looks[k].kind])].modes.count;
+        frame.modal.push_back(Eigen::VectorXf::Zero(modes));
+        if (k >= now) continue;
+        const auto body = static_cast<int>(k);
+        const sim::WorldBodyState state = world.state(body);
+        Eigen::Isometry3d pose = Eigen::Translation3d(state.position) * state.orientation;
+        Eigen::Matrix3d strain = Eigen::Matrix3d::Identity();
+        if (modes > 0)
+            frame.modal.back() = state.q.cast<float>();
+        else if (state.q.size() > 0)
+            strain = uniform_strain(world.basis(body), state.q);
+        frame.world_from_object.back() = matrix(pose, strain);
+    }
+    for (const Eigen::Matrix4f& kerb : kerbs_) {
+        frame.world_from_object.push_back(kerb);
+        frame.visible.push_back(true);
+        frame.modal.emplace_back();
+    }
+    return frame;
+}
+
+}  // namespace app

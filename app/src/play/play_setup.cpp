@@ -1,0 +1,116 @@
+#include "play/play_setup.h"
+
+#include <fmt/format.h>
+
+#include "files/assets.h"
+#include "files/bad_input.h"
+#include "files/checksum.h"
+#include "sticks/auto_predictor.h"
+#include "sticks/predictors.h"
+#include "sticks/stick_tracker.h"
+
+namespace app {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kLongestHours = 3;
+
+void refuse(bool wrong, const std::string& found, const std::string& expected) {
+    if (wrong) throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
+}
+
+}  // namespace
+
+void check_options(const PlayOptions& o) {
+    refuse(!(o.fps >= 1 && o.fps <= 1000), fmt::format("--fps {}", o.fps), "1 to 1000 frames a second");
+    refuse(o.width < 16 || o.height < 16 || o.width > 4096 || o.height > 4096,
+           fmt::format("--size {}x{}", o.width, o.height), "16x16 to 4096x4096");
+    refuse(o.workers < 0 || o.workers > 64, fmt::format("--workers {}", o.workers), "0 to 64");
+    for (const auto& [name, lead] :
+         {std::pair{"--render-lead", o.render_lead_s}, {"--sound-lead", o.sound_lead_s}})
+        refuse(!(lead >= (name == std::string_view("--sound-lead") ? 0.001 : 0) && lead <= 1),
+               fmt::format("{} {}", name, lead), "0 to 1 s (of sound at least 0.001 s)");
+    refuse(!(o.release_margin_s >= 0 && o.release_margin_s <= o.sound_lead_s),
+           fmt::format("--release-margin {}", o.release_margin_s), "0 s to the sound lead");
+    for (const std::string& name : {o.picture_predictor, o.sound_predictor}) check_specification(name);
+    if (!o.video) return;
+    const std::string video = fmt::format("--video {}", o.video->string());
+    refuse(!o.frames, "--video with --no-frames", "one of them");
+    refuse(o.width % 2 != 0 || o.height % 2 != 0, fmt::format("--video with --size {}x{}", o.width, o.height),
+           "even sides");
+    std::error_code error;
+    refuse(fs::is_directory(*o.video, error), video + ", which is a directory", "a file");
+    const fs::path parent = o.video->parent_path();
+    refuse(!parent.empty() && !fs::is_directory(parent, error), video + " in a folder that is not there",
+           "an existing folder");
+}
+
+tracking::Trace read_played_trace(const fs::path& file) {
+    tracking::Trace trace = tracking::read_trace(file);
+    if (const double hours = (trace.t_end_s() - trace.t0_s()) / 3600; hours > kLongestHours)
+        throw BadInput(fmt::format(
+            "{}: error: found {:.3g} hours between the first sample and the last, expected at most {}; "
+            "are there two clocks in it?",
+            file.string(), hours, kLongestHours));
+    return trace;
+}
+
+StrikeRules strike_rules(const PlayOptions& options, double t0_s) {
+    StrikeRules rules;
+    rules.t0_s = t0_s;
+    rules.release_margin_s = rules.commit_lead_s = options.release_margin_s;
+    rules.cancelling = options.cancelling;
+    return rules;
+}
+
+std::vector<sim::BodyDefinition> bodies_of(const Kit& kit) {
+    std::vector<sim::BodyDefinition> bodies;
+    for (const Instrument& instrument : kit.instruments) bodies.push_back(instrument.body);
+    return bodies;
+}
+
+std::vector<audio::Voice> voices_of(const Kit& kit) {
+    std::vector<audio::Voice> voices;
+    for (const Instrument& instrument : kit.instruments) voices.push_back(instrument.voice);
+    return voices;
+}
+
+fs::path orchestra_file() {
+    return assets_folder() / "orchestra" / "musicworld.orc";
+}
+
+std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers) {
+    if (workers == 0) return sim::make_local_simulation(bodies_of(kit));
+    return sim::make_distributed_simulation(
+        bodies_of(kit), {fs::read_symlink("/proc/self/exe").string(), {"worker"}, workers});
+}
+
+PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
+                    bool trace_is_file) {
+    PlayResult result;
+    result.trace = trace.file;
+    result.kit = options.kit.string();
+    result.kit_name = kit.name;
+    result.trace_source = trace.source;
+    result.picture_predictor = picture_specification(options.picture_predictor);
+    result.sound_predictor = sound_specification(options.sound_predictor);
+    if (!is_external(result.sound_predictor))
+        result.sound_models = tracking::make_predictor(result.sound_predictor)->models();
+    result.t0_s = trace.t0_s();
+    result.t_end_s = trace.t_end_s();
+    result.fps = options.fps;
+    result.render_lead_s = options.render_lead_s;
+    result.sound_lead_s = options.sound_lead_s;
+    result.release_margin_s = options.release_margin_s;
+    result.cancelling = options.cancelling;
+    result.width = options.width;
+    result.height = options.height;
+    result.workers = options.workers;
+    for (const tracking::StickTrace& stick : trace.sticks) result.sticks.push_back(stick.name);
+    for (const Instrument& instrument : kit.instruments) result.instruments.push_back(instrument.name);
+    if (trace_is_file) result.inputs.push_back({options.trace.string(), sha256_of_file(options.trace)});
+    for (const fs::path& file : kit.files) result.inputs.push_back({file.string(), sha256_of_file(file)});
+    return result;
+}
+
+}  // namespace app

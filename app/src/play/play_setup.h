@@ -1,0 +1,36 @@
+#pragma once
+#include <audio/performance.h>
+#include <sim/simulation.h>
+#include <tracking/trace.h>
+
+#include <chrono>
+#include <memory>
+#include <vector>
+
+#include "kit/kit.h"
+#include "kit/stick_geometry.h"
+#include "play/play.h"
+#include "strikes/strike_scheduler.h"
+
+namespace app {
+
+/// Sound goes on this long after the last sample, then until it is silent, at most so long.
+inline constexpr double kSoundTailS = 0.5, kLongestSoundTailS = 10;
+
+/// Throws BadInput for options out of range.
+void check_options(const PlayOptions& options);
+/// Reads a trace that is to be played: at most three hours (a WAV file holds four). Throws BadInput.
+[[nodiscard]] tracking::Trace read_played_trace(const std::filesystem::path& file);
+/// What is known of a run before it begins.
+[[nodiscard]] PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
+                                  bool trace_is_file = true);
+
+/// The rules of a strike's life that the options ask for.
+[[nodiscard]] StrikeRules strike_rules(const PlayOptions& options, double t0_s);
+
+[[nodiscard]] std::vector<sim::BodyDefinition> bodies_of(const Kit& kit);
+[[nodiscard]] std::vector<audio::Voice> voices_of(const Kit& kit);
+[[nodiscard]] std::filesystem::path orchestra_file();
+[[nodiscard]] std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers);
+
+}  // namespace app

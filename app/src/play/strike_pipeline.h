@@ -1,0 +1,104 @@
+#pragma once
+#include <sim/simulation.h>
+
+#include <chrono>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <vector>
+
+#include "kit/kit.h"
+#include "sticks/stick_outlook.h"
+#include "sticks/stick_tracker.h"
+#include "strikes/drawn_strikes.h"
+#include "strikes/strike_scheduler.h"
+
+namespace app {
+
+/// Seconds of wall time in each part of the loop.
+struct LoopTimes {
+    double tracking = 0, simulation = 0, strikes = 0, waiting_for_frames = 0;
+};
+
+/// Adds the time of its life to a sum.
+class Stopwatch {
+public:
+    explicit Stopwatch(double& sum) : sum_(sum), start_(std::chrono::steady_clock::now()) {}
+    ~Stopwatch() { sum_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    Stopwatch(const Stopwatch&) = delete;
+    Stopwatch& operator=(const Stopwatch&) = delete;
+
+private:
+    double& sum_;
+    std::chrono::steady_clock::time_point start_;
+};
+
+/// How a stick is drawn in a frame.
+struct DrawnStick {
+    tracking::PosePrediction pose;  ///< as drawn: held on a surface that it meets
+    /// The tip that was predicted for the frame's time, before it is held: by the pictures' filter, or, where
+    /// the frame holds the stick at a coming contact, by the sound's, which has predicted that contact.
+    tracking::PointMotion tip;
+    bool held = false;
+};
+
+/// What a frame shows.
+struct FrameContents {
+    std::vector<std::optional<DrawnStick>> sticks;  ///< none before its first sample
+    std::vector<sim::ModalState> bodies;            ///< empty: at rest
+};
+
+/// From what is known of the sticks to strikes, notes and pictures, on a clock that somebody else keeps:
+/// contacts of predicted paths (sim), their life as strikes (StrikeScheduler), the bodies' response, and what
+/// a frame shows of both. Begins with all bodies at rest. Offline and in real time the same.
+class StrikePipeline {
+public:
+    /// A note's change, for the sound: the strike as it stands; `scheduled` false: cancelled.
+    using Notify = std::function<void(const Strike& strike, bool scheduled)>;
+
+    /// `simulation` begins anew with the first step.
+    StrikePipeline(const Kit& kit, const StrikeRules& rules, double tip_radius_m,
+                   std::vector<const StickOutlook*> sticks, sim::Simulation& simulation, Notify notify);
+
+    /// Before the samples at s (StrikeScheduler::advance_to).
+    void advance_to(double s, double fixed_s = -std::numeric_limits<double>::infinity());
+    /// The filter of a stick has started anew.
+    void restart(std::uint32_t stick) { scheduler_.restart(stick); }
+    /// New samples of these sticks at s: contacts, strikes, notes.
+    void take(double s, std::span<const std::uint32_t> moved);
+    /// After the last sample.
+    void finish();
+    /// What the frame shown at T >= s shows, known at s. Frames come in order of T.
+    [[nodiscard]] FrameContents scene(double s, double T);
+
+    [[nodiscard]] const std::vector<Strike>& strikes() const { return scheduler_.strikes(); }
+    [[nodiscard]] const LoopTimes& times() const { return times_; }
+
+private:
+    [[nodiscard]] sim::StepReply step(sim::StepRequest& request);
+    [[nodiscard]] std::vector<sim::TipPath> paths_of(std::span<const std::uint32_t> moved) const;
+    void take_contacts(double s, std::span<const std::uint32_t> moved, const sim::StepReply& reply);
+    void send_notes();
+    void settle_impulses(double s, sim::StepRequest& request);
+    [[nodiscard]] const Strike* struck_by(std::uint32_t stick, double s, double T);
+    [[nodiscard]] DrawnStick drawn(std::uint32_t stick, double s, double T);
+
+    const Kit& kit_;
+    bool cancelling_;
+    double tip_radius_m_;
+    std::vector<const StickOutlook*> sticks_;
+    sim::Simulation& simulation_;
+    Notify notify_;
+    StrikeScheduler scheduler_;
+    DrawnStrikes drawn_;
+    std::vector<std::uint64_t> unfolded_;  // released strikes whose impulses lie ahead
+    std::set<std::uint64_t> touching_;     // strikes that a frame has shown the stick at
+    bool begun_ = false;
+    double simulated_s_ = 0;
+    LoopTimes times_;
+};
+
+}  // namespace app

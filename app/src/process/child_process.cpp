@@ -1,0 +1,138 @@
+#include "process/child_process.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include "files/one_line.h"
+
+extern char** environ;
+
+namespace app {
+namespace fs = std::filesystem;
+namespace {
+
+class FileActions {
+public:
+    FileActions() { posix_spawn_file_actions_init(&actions_); }
+    ~FileActions() { posix_spawn_file_actions_destroy(&actions_); }
+    FileActions(const FileActions&) = delete;
+    FileActions& operator=(const FileActions&) = delete;
+    void become(int descriptor, int of_child) {
+        if (descriptor >= 0) posix_spawn_file_actions_adddup2(&actions_, descriptor, of_child);
+    }
+    [[nodiscard]] const posix_spawn_file_actions_t* get() const { return &actions_; }
+
+private:
+    posix_spawn_file_actions_t actions_{};
+};
+
+class Attributes {
+public:
+    explicit Attributes(bool own_group) {
+        posix_spawnattr_init(&attributes_);
+        if (own_group) posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETPGROUP);
+    }
+    ~Attributes() { posix_spawnattr_destroy(&attributes_); }
+    Attributes(const Attributes&) = delete;
+    Attributes& operator=(const Attributes&) = delete;
+    [[nodiscard]] const posix_spawnattr_t* get() const { return &attributes_; }
+
+private:
+    posix_spawnattr_t attributes_{};
+};
+
+/// An open file that closes.
+class File {
+public:
+    File(const fs::path& file, int flags) : descriptor_(open(file.c_str(), flags | O_CLOEXEC, 0600)) {
+        if (descriptor_ < 0)
+            throw std::runtime_error(
+                fmt::format("{}: error: found no way to open it ({})", file.string(), std::strerror(errno)));
+    }
+    ~File() { close(descriptor_); }
+    File(const File&) = delete;
+    File& operator=(const File&) = delete;
+    [[nodiscard]] int get() const { return descriptor_; }
+
+private:
+    int descriptor_;
+};
+
+std::vector<char*> pointers(const std::vector<std::string>& words) {
+    std::vector<char*> result;
+    result.reserve(words.size() + 1);
+    for (const std::string& word : words) result.push_back(const_cast<char*>(word.c_str()));
+    result.push_back(nullptr);
+    return result;
+}
+
+/// This process's environment with `variables` in the place of its own of these names.
+std::vector<std::string> environment_with(const std::vector<std::string>& variables) {
+    std::vector<std::string> all = variables;
+    for (char** own = environ; *own != nullptr; ++own) {
+        const std::string_view entry = *own;
+        const auto replaced = [&](const std::string& v) {
+            return entry.starts_with(std::string_view(v).substr(0, v.find('=') + 1));
+        };
+        if (std::none_of(variables.begin(), variables.end(), replaced)) all.emplace_back(entry);
+    }
+    return all;
+}
+
+std::string read_text(const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+}  // namespace
+
+int start_child(const ChildStart& start) {
+    FileActions files;
+    files.become(start.in, STDIN_FILENO);
+    files.become(start.out, STDOUT_FILENO);
+    files.become(start.err, STDERR_FILENO);
+    for (const int descriptor : start.inherited)
+        files.become(descriptor, descriptor);  // onto itself: open across exec in the child alone
+    const Attributes attributes(start.own_group);
+    const std::vector<char*> arguments = pointers(start.command);
+    const std::vector<std::string> variables = environment_with(start.variables);
+    const std::vector<char*> environment = pointers(variables);
+    pid_t child = 0;
+    const int error = posix_spawnp(&child, arguments[0], files.get(), attributes.get(), arguments.data(),
+                                   environment.data());
+    if (error != 0)
+        throw std::runtime_error(fmt::format("error: found no way to start {} ({}), expected it installed",
+                                             start.command[0], std::strerror(error)));
+    return child;
+}
+
+int wait_for_child(int pid) {
+    int status = 0;
+    while (waitpid(pid, &status, 0) < 0)
+        if (errno != EINTR)
+            throw std::runtime_error(
+                fmt::format("error: lost the process {}: {}", pid, std::strerror(errno)));
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+void run_child(const std::vector<std::string>& command, const fs::path& log,
+               const std::vector<std::string>& variables) {
+    const File none("/dev/null", O_RDONLY);
+    const File messages(log, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND);
+    const int child = start_child({command, variables, none.get(), messages.get(), messages.get(), false});
+    if (const int status = wait_for_child(child); status != 0)
+        throw std::runtime_error(fmt::format("error: found {} ended with status {}, expected 0; it said: {}",
+                                             command[0], status, one_line(read_text(log), 400)));
+}
+
+}  // namespace app

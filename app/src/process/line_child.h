@@ -1,0 +1,55 @@
+#pragma once
+#include <array>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "process/group_keeper.h"
+
+namespace app {
+
+/// A program run by `sh -c COMMAND` with which lines are exchanged: its standard input and output are one
+/// socket, its standard error is kept for messages. It runs in a process group of its own; the destructor
+/// ends its input, gives it kFarewellS to leave, and kills and collects what is left of it. If the program is
+/// killed, the group is, too (GroupKeeper).
+///
+/// All faults are thrown as std::runtime_error "found ..., expected ...; ...", one line.
+class LineChild {
+public:
+    static constexpr double kFarewellS = 1;
+    static constexpr std::size_t kLongestLine = std::size_t{1} << 20;
+
+    explicit LineChild(const std::string& command);
+    ~LineChild();
+    LineChild(const LineChild&) = delete;
+    LineChild& operator=(const LineChild&) = delete;
+
+    /// Sends a line (text with its line end), waiting at most `timeout_s` for the child to make room.
+    void send(std::string_view text, double timeout_s);
+    /// The next line, without its end, valid until the next call. Waits at most `timeout_s`; a second line
+    /// that follows it at once is a fault.
+    [[nodiscard]] std::string_view receive(double timeout_s);
+
+private:
+    struct CloseFile {
+        void operator()(std::FILE* file) const { (void)std::fclose(file); }
+    };
+    /// Waits until the socket can be read (or written); throws if that takes longer than until `deadline_s`.
+    void wait_for(short event, double deadline_s, double timeout_s);
+    [[noreturn]] void fail_ended();
+    /// Kills what is left of the child and collects it; returns how it ended by itself (as wait_for_child()).
+    std::optional<int> collect();
+    [[nodiscard]] std::string last_words() const;
+
+    std::unique_ptr<std::FILE, CloseFile> errors_;
+    int socket_ = -1;
+    int pid_ = -1;
+    std::optional<GroupKeeper> keeper_;  // of its group; ends before the group's leader is collected
+    std::array<char, std::size_t{1} << 16> chunk_{};
+    std::string received_;
+    std::size_t taken_ = 0;  // bytes of it that were handed out
+};
+
+}  // namespace app

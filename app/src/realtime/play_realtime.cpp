@@ -1,0 +1,294 @@
+#include "realtime/play_realtime.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "files/bad_input.h"
+#include "files/checksum.h"
+#include "files/output_folder.h"
+#include "kit/tip_track.h"
+#include "pictures/video.h"
+#include "play/play_products.h"
+#include "play/play_setup.h"
+#include "process/clock.h"
+#include "process/progress_bar.h"
+#include "process/stop_signals.h"
+#include "process/thread_priority.h"
+#include "realtime/divergence.h"
+#include "realtime/realtime_products.h"
+#include "realtime/realtime_session.h"
+#include "sticks/auto_predictor.h"
+#include "sticks/stick_tracker.h"
+
+namespace app {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kStartS = 0.7;  // from starting the sensors to the epoch, at first
+constexpr double kAheadS = 0.1;  // the epoch lies at least that far ahead when all is ready
+constexpr int kStarts = 3;
+
+/// Sensors have to know the epoch when they are started; where starting takes until then, they are started
+/// once more with more time (of a live source, whose first samples then count from before the epoch, that
+/// does no harm).
+std::unique_ptr<SensorHub> start_sensors(const RealtimeSession& session, std::int64_t& epoch_ns) {
+    double ahead_s = session.live ? 2 * kStartS : kStartS;
+    for (int i = 1;; ++i, ahead_s *= 4) {
+        epoch_ns = monotonic_ns() + to_ns(ahead_s);
+        auto hub = std::make_unique<SensorHub>(sensors_of(session, epoch_ns));
+        if (session.live || monotonic_ns() < epoch_ns - to_ns(kAheadS)) return hub;
+        if (i == kStarts)
+            throw std::runtime_error(fmt::format(
+                "error: found sensors that took more than {:.1f} s to start, expected a machine less busy",
+                ahead_s));
+    }
+}
+
+/// The strikes of all laps: as on their laps' clocks, and on the run's. What the sound says was played was
+/// played.
+void collect_strikes(RealtimeOutcome& outcome, std::vector<LapStrikes>& laps, std::int64_t period_samples,
+                     bool sound) {
+    std::map<std::uint64_t, const audio::PlayedNote*> played;
+    for (const NoteTiming& note : outcome.realtime.notes) played[note.played.id] = &note.played;
+    const double period_s = outcome.realtime.period_s;
+    for (LapStrikes& lap : laps)
+        for (Strike& strike : lap.strikes) {
+            strike.id += lap.first_id;
+            const auto note = played.find(strike.id);
+            if (sound) strike.outcome = note == played.end() ? Outcome::cancelled : Outcome::released;
+            if (note != played.end()) {
+                strike.onset_sample =
+                    note->second->onset_sample - static_cast<std::int64_t>(lap.lap) * period_samples;
+                strike.onset_s =
+                    outcome.play.t0_s + static_cast<double>(strike.onset_sample) / audio::kSampleRate;
+            }
+            outcome.lap_strikes.push_back(strike);
+            const double shift_s = static_cast<double>(lap.lap) * period_s;
+            strike.onset_sample += static_cast<std::int64_t>(lap.lap) * period_samples;
+            strike.onset_s =
+                outcome.play.t0_s + static_cast<double>(strike.onset_sample) / audio::kSampleRate;
+            for (double* t : {&strike.contact_s, &strike.scheduled_at_s, &strike.decided_at_s}) *t += shift_s;
+            outcome.play.strikes.push_back(strike);
+        }
+    for (NoteTiming& note : outcome.realtime.notes) {
+        note.strike = static_cast<std::size_t>(note.played.id - 1);
+        const auto lap = std::ranges::find_if(laps, [&](const LapStrikes& l) {
+            return note.played.id > l.first_id && note.played.id <= l.first_id + l.strikes.size();
+        });
+        note.lap = lap == laps.end() ? 0 : lap->lap;
+    }
+}
+
+/// Age of the newest sample that a note could use: its onset less the sample's time.
+void age_notes(RealtimeOutcome& outcome) {
+    const std::vector<SampleTiming>& samples = outcome.realtime.samples;  // by time of their hand-over
+    for (NoteTiming& note : outcome.realtime.notes) {
+        const Strike& strike = outcome.lap_strikes[note.strike];
+        double newest_s = strike.scheduled_at_s;
+        auto sample = std::ranges::upper_bound(samples, note.played.taken_ns, {}, &SampleTiming::handed_ns);
+        while (sample != samples.begin() && (--sample)->lap == note.lap)
+            if (sample->stick == strike.stick) {
+                newest_s = std::max(newest_s, sample->t_s);
+                break;
+            }
+        note.pose_age_s = strike.onset_s - newest_s;
+    }
+}
+
+/// The recorded paths on the run's clock: the trace lap by lap, or what a live source gave.
+std::vector<TipTrack> tracks_of(const RealtimeSession& session, const RealtimeRun& run) {
+    tracking::Trace trace = session.trace;
+    const double t0_s = trace.t0_s(), end_s = t0_s + run.end_s();
+    const double period_s = static_cast<double>(session.period_samples) / audio::kSampleRate;
+    for (std::size_t i = 0; i < trace.sticks.size(); ++i) {
+        std::vector<tracking::PoseSample> samples;
+        if (session.live) {
+            samples = run.seen()[i];
+        } else {
+            for (std::uint64_t lap = 0; static_cast<double>(lap) * period_s < run.end_s(); ++lap)
+                for (tracking::PoseSample sample : session.trace.sticks[i].samples) {
+                    sample.t_s += static_cast<double>(lap) * period_s;
+                    if (sample.t_s <= end_s) samples.push_back(sample);
+                }
+        }
+        trace.sticks[i].samples = std::move(samples);
+    }
+    return tip_tracks(trace, session.stick);
+}
+
+/// What stayed on the screen instead of a frame that is not there: the frame before; before the first, the
+/// stage at rest.
+void fill_gaps(const fs::path& folder, std::size_t frames, const render::Image& rest) {
+    fs::path last;
+    for (std::size_t k = 0; k < frames; ++k) {
+        const fs::path file = folder / fmt::format("{:06}.png", k);
+        std::error_code error;
+        if (!fs::exists(file, error)) {
+            if (last.empty())
+                write_file(file, render::encode_png(rest));
+            else
+                fs::create_hard_link(last, file, error);
+        }
+        last = file;
+    }
+}
+
+void finish_frames(RealtimeFrames& frames, RealtimeResult& result) {
+    frames.finish();
+    for (const FrameTiming& done : frames.take_done()) {
+        const auto at = std::ranges::lower_bound(result.frames, done.index, {}, &FrameTiming::index);
+        if (at != result.frames.end() && at->index == done.index) *at = done;
+    }
+    for (const auto& [index, written_ns] : frames.written()) {
+        const auto at = std::ranges::lower_bound(result.frames, index, {}, &FrameTiming::index);
+        if (at != result.frames.end() && at->index == index) at->written_ns = written_ns;
+    }
+    result.frames_not_written = frames.not_written();
+    std::map<std::uint64_t, bool> in_time;
+    for (const FrameTiming& frame : result.frames) in_time[frame.index] = frame.fate == FrameFate::in_time;
+    for (DrawnTip& tip : result.tips) tip.shown = in_time[tip.frame];
+}
+
+void finish_sound(audio::LivePerformance& sound, RealtimeOutcome& outcome, const OutputFolder& folder,
+                  std::int64_t epoch_ns) {
+    const double length = (outcome.realtime.seconds + kSoundTailS) * audio::kSampleRate;
+    outcome.play.audio = sound.finish(static_cast<std::int64_t>(std::ceil(length)),
+                                      static_cast<std::int64_t>(kLongestSoundTailS * audio::kSampleRate));
+    for (const audio::PlayedNote& played : sound.take_played()) {
+        NoteTiming note;
+        note.played = played;
+        note.late_s = static_cast<double>(played.onset_sample - played.planned_sample) / audio::kSampleRate;
+        outcome.realtime.notes.push_back(note);
+    }
+    for (NoteTiming& note : outcome.realtime.notes) {
+        note.played.taken_ns -= epoch_ns;
+        if (note.played.midi_sent_ns != 0) note.played.midi_sent_ns -= epoch_ns;
+    }
+    for (audio::BlockTiming block : sound.blocks()) {
+        block.planned_ns -= epoch_ns, block.started_ns -= epoch_ns, block.done_ns -= epoch_ns;
+        outcome.realtime.blocks.push_back(block);
+    }
+    RealtimeResult& result = outcome.realtime;
+    result.audio_device = sound.device();
+    result.refused_changes = sound.refused_changes();
+    result.queue_overflows = sound.queue_overflows();
+    result.device_underruns = sound.device_underruns();
+    result.device_corrections = sound.device_corrections();
+    result.midi_late = sound.late_strokes();
+    result.midi_lost = sound.lost_strokes();
+    outcome.play.clipped_samples = audio::write_wav(folder.path("audio.wav"), outcome.play.audio);
+    outcome.play.stages_s.emplace_back("sound (own thread)", sound.busy_s());
+    outcome.play.versions.emplace_back("csound", sound.version());
+}
+
+}  // namespace
+
+RealtimeOutcome play_realtime(const RealtimeOptions& options,
+                              const std::function<void(const std::string&)>& warn) {
+    const WallTimer wall;
+    RealtimeSession session = open_session(options);
+    RealtimeOutcome outcome;
+    outcome.play = describe(session.options.play, session.trace, session.kit, !session.live);
+    outcome.kit = session.kit;
+    outcome.stick = session.stick;
+    PlayResult& result = outcome.play;
+    OutputFolder folder(options.play.out);
+
+    std::string sound_priority, control_priority;
+    KitStage stage(session.kit, session.trace.sticks.size(), session.stick);
+    // Worker processes and ZeroMQ's threads inherit it.
+    const std::string simulation_priority =
+        set_thread_priority(ThreadRole::simulation, options.realtime_priority);
+    const std::unique_ptr<sim::Simulation> simulation = make_simulation(session.kit, options.play.workers);
+    leave_thread_priority();
+    std::unique_ptr<audio::LivePerformance> sound =
+        options.play.audio ? make_live_sound(session, sound_priority) : nullptr;
+    if (sound && !sound->midi_problem().empty()) warn(sound->midi_problem());
+    std::unique_ptr<RealtimeFrames> frames;
+    if (options.play.frames) {
+        fs::create_directory(folder.path("frames"));
+        frames = std::make_unique<RealtimeFrames>(
+            scenes_of(stage, options.play.width, options.play.height), stage.frame({}, {}),
+            options.play.width, options.play.height, folder.path("frames"), options.realtime_priority);
+    }
+    std::int64_t epoch_ns = 0;
+    const std::unique_ptr<SensorHub> hub = start_sensors(session, epoch_ns);
+    SensorHub& sensors = *hub;
+    result.stages_s.emplace_back("start", wall.seconds());
+    {
+        RealtimeRun run(session.kit, options, session.stick, session.trace.t0_s(), session.period_samples,
+                        {*simulation, stage, sensors, sound.get(), frames.get()}, session.trace.sticks.size(),
+                        !confirming_specification(options.play.sound_predictor).empty(), epoch_ns);
+        if (sound) sound->start(epoch_ns);
+        if (frames) frames->start(epoch_ns, options.disturbance);
+        const BusyThreads load(options.disturbance, epoch_ns);
+        control_priority = set_thread_priority(ThreadRole::control, options.realtime_priority);
+        ProgressBar bar(options.play.progress);
+        const StopSignals signals;
+        run.run(
+            session.seconds, [] { return StopSignals::stopped(); }, warn,
+            [&](double done) { bar.show(done); });
+        bar.clear();
+        leave_thread_priority();
+        if (run.end_s() <= 0)
+            throw std::runtime_error(
+                "error: found an interruption before anything was played, expected a run");
+        outcome.realtime = std::move(run.result());
+        RealtimeResult& realtime = outcome.realtime;
+        realtime.disturbed_by = options.disturbed_by;
+        realtime.clocks = sensors.clocks();
+        result.samples_refused = run.refused();
+        for (std::size_t i = 0; i < session.trace.sticks.size(); ++i)
+            if (run.seen()[i].empty())
+                warn(fmt::format("stick {}: found no sample in {:.1f} s, expected some of that name",
+                                 session.trace.sticks[i].name, run.end_s()));
+        if (frames) finish_frames(*frames, realtime);
+        if (sound) finish_sound(*sound, outcome, folder, epoch_ns);
+        outcome.stick = session.stick = run.geometry();
+        result.t_end_s = result.t0_s + run.end_s();
+        result.tracks = tracks_of(session, run);
+        collect_strikes(outcome, run.laps(), session.period_samples, sound != nullptr);
+    }
+    age_notes(outcome);
+    outcome.realtime.priorities = {
+        {"control", control_priority},
+        {"simulation", options.play.workers > 0 ? simulation_priority : control_priority}};
+    if (sound) outcome.realtime.priorities.emplace_back("sound", sound_priority);
+    if (frames) outcome.realtime.priorities.emplace_back("drawing", frames->priority());
+    const sim::WorkerReport workers = simulation->report();
+    result.workers_lost = workers.lost;
+    result.bodies_reowned = workers.bodies_reowned;
+    if (!session.live) find_departures(outcome, session.trace, session.options.play);
+
+    score(result, session.kit, session.stick);
+    write_hits(folder.path("hits.mid"), result, session.kit);
+    std::vector<std::uint8_t> test_frame;
+    if (frames) {
+        result.frames = outcome.realtime.frames.size();
+        fill_gaps(folder.path("frames"), result.frames, frames->rest_image());
+        result.versions.emplace_back("renderer", frames->version());
+        result.stages_s.emplace_back("drawing (own thread)", frames->draw_s());
+        result.stages_s.emplace_back("writing frames (own thread)", frames->write_s());
+        test_frame = frames->rest_image().rgb;
+        result.report_frames = frames_to_show(result, folder.path("frames"));
+        std::erase_if(result.report_frames, [](const fs::path& file) { return !fs::exists(file); });
+    }
+    result.fingerprint = fingerprint(test_frame);
+    result.versions.emplace_back("musicworld", MUSICWORLD_VERSION);
+    if (options.play.video)
+        make_video(*options.play.video, options.play.fps, options.play.audio, folder.path("."));
+    result.wall_s = wall.seconds();
+    outcome.latency = latency_report(result, outcome.realtime, session.kit, session.stick.radius_m);
+    write_latency_products(outcome, folder);
+    write_realtime_products(outcome, folder);
+    folder.finish();
+    if (options.play.video) fs::rename(options.play.video->string() + ".partial", *options.play.video);
+    for (const SensorEvent& event : outcome.realtime.events)
+        if (event.kind == SensorEvent::Kind::failed) outcome.failure = event.message;
+    return outcome;
+}
+
+}  // namespace app

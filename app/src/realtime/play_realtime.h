@@ -1,0 +1,44 @@
+#pragma once
+#include <functional>
+#include <string>
+
+#include "latency/latency_report.h"
+#include "play/play_result.h"
+#include "realtime/realtime_run.h"
+
+namespace app {
+
+/// A difference between the run in real time and the offline run of the same trace.
+struct Divergence {
+    std::uint64_t lap = 0;
+    std::uint32_t stick = 0, instrument = 0;
+    std::string what;                         ///< e.g. "onset later", "cancelled offline", one word or two
+    double offline_onset_s = 0, onset_s = 0;  ///< on the lap's clock; NaN: there is none
+    double delay_s = 0;                       ///< the delay that explains it; 0: none was found
+    std::string cause;  ///< "sample late", "samples skipped", "the run ended", "unexplained"
+};
+
+/// What a run in real time gave.
+struct RealtimeOutcome {
+    PlayResult
+        play;  ///< strikes, contacts and tracks over all laps, on the run's clock (t0 + time since the epoch)
+    RealtimeResult realtime;
+    std::vector<Strike> lap_strikes;  ///< those of `play`, on their laps' clocks
+    Kit kit;
+    StickGeometry stick;
+    std::vector<Divergence> departures;  ///< traces only
+    LatencyReport latency;
+    std::string failure;  ///< a sensor that could not go on: the products hold what was played until then;
+                          ///< empty: none
+    std::size_t offline_strikes = 0;  ///< released ones of the offline run over the same laps
+};
+
+/// Plays in real time: sensor processes, contacts, strikes, sound and frames against the wall clock, into the
+/// folder `out` as play() does (frames in time only; what stayed on the screen instead of a dropped one is
+/// linked in its place), with the measurements of latency beside (latency.json and its tables). Then plays
+/// the trace offline, without frames and sound, and says where and why the two differ. `warn` gets one line
+/// for each thing that went wrong on the way. Throws as play() does.
+RealtimeOutcome play_realtime(const RealtimeOptions& options,
+                              const std::function<void(const std::string&)>& warn);
+
+}  // namespace app

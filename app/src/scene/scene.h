@@ -1,0 +1,52 @@
+#pragma once
+#include <render/scene.h>
+#include <sim/distributed_world.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace app {
+
+inline constexpr double kFarM = 1000;  ///< everything of a scene lies within this of the origin
+
+/// How a body is drawn. Bodies of one kind (copies of one table) have the same shape, material and modes.
+struct BodyLook {
+    render::Appearance appearance;
+    std::size_t kind = 0;
+};
+
+/// A floor with four walls: x and z of its inner size and its centre [m].
+struct SceneBox {
+    Eigen::Vector2d size, center;
+    double floor;
+};
+
+/// What a scene says of the workers that simulate it, if there are several.
+struct SceneWorkers {
+    bool all_to_first = false;       ///< at first one of them owns every body
+    std::uint64_t balance_from = 0;  ///< [steps] no trade before
+};
+
+/// A scene file, checked and complete. Events are in order of steps, then of the file.
+struct Scene : sim::WorldScene {
+    std::filesystem::path file;
+    std::string name, description;
+    std::vector<BodyLook> looks;  ///< of all bodies
+    std::optional<SceneBox> box;  ///< its planes are among the world's
+    SceneWorkers workers;
+    double seconds = 10;    ///< how long it is worth looking at
+    render::Camera camera;  ///< [m] of the scene, as is the room
+    render::Room room;
+    double drawn_scale = 1;  ///< pictures show everything this much larger: the room is a few metres wide
+};
+
+/// Reads a scene (TOML, see assets/README.md). `dt_s` stands in for the file's. Throws BadInput with
+/// FILE:LINE:COLUMN for whatever is unknown, missing or out of range.
+[[nodiscard]] Scene read_scene(const std::filesystem::path& file, std::optional<double> dt_s = {});
+
+/// A scene by path, or by the name of a bundled one ("human" is assets/scenes/human.toml).
+[[nodiscard]] std::filesystem::path find_scene(const std::string& name_or_path);
+
+}  // namespace app

@@ -1,0 +1,359 @@
+#include "sensors/sensor_process.h"
+
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/resource.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "files/one_line.h"
+#include "process/child_process.h"
+#include "process/clock.h"
+#include "process/thread_priority.h"
+#include "sensors/sample_queue.h"
+#include "sensors/sensor_memory.h"
+#include "sensors/source_clock.h"
+
+namespace app {
+namespace {
+
+constexpr std::int64_t kSettlingNs = 250'000'000;
+
+constexpr int kReportEveryMs = 50;
+constexpr double kSmoothing = 0.1;       // of the interval between samples
+constexpr double kLongestIntervalS = 1;  // longer ones are pauses
+
+class Descriptor {
+public:
+    explicit Descriptor(int descriptor) : descriptor_(descriptor) {}
+    ~Descriptor() { close(descriptor_); }
+    Descriptor(const Descriptor&) = delete;
+    Descriptor& operator=(const Descriptor&) = delete;
+    [[nodiscard]] int get() const { return descriptor_; }
+
+private:
+    int descriptor_;
+};
+
+void add_one(int eventfd) {
+    const std::uint64_t one = 1;
+    (void)!write(eventfd, &one, sizeof one);
+}
+
+/// Blocks the signals that end this process, in this thread and those it starts; readable when one came.
+int make_signal_fd() {
+    sigset_t ending;
+    sigemptyset(&ending);
+    for (const int signal : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&ending, signal);
+    pthread_sigmask(SIG_BLOCK, &ending, nullptr);
+    return signalfd(-1, &ending, SFD_CLOEXEC | SFD_NONBLOCK);
+}
+
+class Sensor {
+public:
+    explicit Sensor(const SensorTask& task);
+    int run();
+
+private:
+    struct Stick {
+        SharedSensorMemory memory;
+        StickFilters filters, fresh;  // `fresh`: for the next lap
+        tracking::StickState state;
+        std::uint64_t lap = 0;
+        std::uint64_t missed = 0;  // samples while no process ran, which are still to be counted
+    };
+    /// What the reader knows, for reports.
+    struct Reading {
+        SampleClock clock = SampleClock::replayed;
+        ClockEstimate estimate;
+        std::int64_t quiet_until_ns = 0;
+        SourceFaults faults;
+        std::vector<std::uint64_t> read;
+        std::vector<double> interval_s;
+    };
+
+    void read(const std::stop_token& stop);
+    void filter(const std::stop_token& stop);
+    void take(const SourceSample& sample);
+    void pass(SourceSample sample, const std::stop_token& stop);
+    /// True for what a live source with a clock of its own sends in the first moments.
+    bool settling(const SourceSample& sample);
+    void put_on_our_clock(SourceSample& sample);
+    void note(const SourceSample& sample);
+    void note_source();
+    /// True if the reader was held up just now.
+    bool stall_if_due(const std::stop_token& stop);
+    void report();
+    void keep_head();
+    void count_missed();
+    [[nodiscard]] SourceOptions source_options() const;
+    void fail(const char* what);
+    [[nodiscard]] double since_epoch_s(std::int64_t ns) const {
+        return static_cast<double>(ns - task_.source.epoch_ns) * 1e-9;
+    }
+
+    const SensorTask& task_;
+    std::vector<Stick> sticks_;
+    std::unique_ptr<SampleSource> source_;
+    SampleQueue queue_;
+    std::int64_t first_read_ns_ = 0;  // of a live source; the reader's
+    SourceClock clock_;               // the reader's
+    DelayPercentile delays_;          // of replayed samples; the reader's
+    std::vector<double> last_s_;      // times of the sticks' newest samples; the reader's
+    double replay_offset_s_ = 0;      // the reader's, as the next four
+    std::string head_;
+    std::int64_t noted_ns_ = 0;
+    std::uint64_t dropped_ = 0;
+    bool stalled_ = false;
+    std::mutex mutex_;  // of what follows
+    Reading reading_;
+    std::string failure_;
+    std::atomic<SensorPhase> phase_ = SensorPhase::starting;
+    Descriptor changed_;  // eventfd: there is something to report
+    std::jthread reader_, filter_;
+};
+
+Sensor::Sensor(const SensorTask& task) : task_(task), changed_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    sticks_.reserve(task.state_fds.size());
+    for (const int descriptor : task.state_fds) {
+        sticks_.push_back({SharedSensorMemory(descriptor),
+                           StickFilters(task.predictors),
+                           StickFilters(task.predictors),
+                           {},
+                           0,
+                           0});
+        sticks_.back().state = sticks_.back().memory->state.read().value_or(tracking::StickState{});
+    }
+    reading_.read.resize(sticks_.size());
+    reading_.interval_s.resize(sticks_.size());
+    last_s_.resize(sticks_.size());
+}
+
+int Sensor::run() {
+    const Descriptor signals(make_signal_fd());
+    report();
+    try {
+        source_ = open_source(source_options());
+        if (source_->sticks().names().size() != sticks_.size())
+            throw std::runtime_error("error: found sticks without shared memory, expected one a stick");
+        count_missed();
+        note_source();
+        phase_ = SensorPhase::running;
+        reader_ = std::jthread([this](const std::stop_token& stop) { read(stop); });
+        filter_ = std::jthread([this](const std::stop_token& stop) { filter(stop); });
+    } catch (const std::exception& wrong) {
+        fail(wrong.what());
+    }
+    pollfd watched[] = {{changed_.get(), POLLIN, 0}, {task_.life_fd, 0, 0}, {signals.get(), POLLIN, 0}};
+    while (phase_ == SensorPhase::running) {
+        report();
+        (void)poll(watched, std::size(watched), kReportEveryMs);
+        if (watched[1].revents != 0 || watched[2].revents != 0) break;
+        std::uint64_t ignored = 0;
+        (void)!::read(changed_.get(), &ignored, sizeof ignored);
+    }
+    reader_ = {};  // stops and joins
+    filter_ = {};
+    report();
+    add_one(task_.wake_fd);
+    return phase_ == SensorPhase::failed ? 1 : 0;
+}
+
+SourceOptions Sensor::source_options() const {
+    SourceOptions options = task_.source;
+    if (options.resume)
+        if (const std::optional<StreamHead> head = sticks_.front().memory->head.read())
+            options.stream_head = head->text.data();
+    return options;
+}
+
+/// What a replay passed over after the newest state of the process before this one.
+void Sensor::count_missed() {
+    if (!task_.source.resume) return;
+    for (std::size_t i = 0; i < sticks_.size(); ++i) {
+        const tracking::StickState& state = sticks_[i].state;
+        const bool any = state.samples > 0;
+        sticks_[i].missed = source_->passed_over(i, state.lap, any ? std::optional(state.t_s) : std::nullopt);
+    }
+}
+
+/// The stream's key lines and header, for the hub and for the process that follows this one: in the shared
+/// memory before the first sample that they hold for.
+void Sensor::keep_head() {
+    const std::string text = source_->stream_head();
+    if (text.empty() || text == head_ || text.size() >= StreamHead{}.text.size()) return;
+    head_ = text;
+    StreamHead head;
+    std::copy(text.begin(), text.end(), head.text.begin());
+    sticks_.front().memory->head.publish(head);
+}
+
+void Sensor::fail(const char* what) {
+    {
+        const std::lock_guard lock(mutex_);
+        if (failure_.empty()) failure_ = one_line(what, 240);
+    }
+    phase_ = SensorPhase::failed;
+    add_one(changed_.get());
+}
+
+// The reader.
+
+void Sensor::read(const std::stop_token& stop) {
+    (void)set_thread_priority(ThreadRole::sensing, task_.realtime);
+    try {
+        SourceSample sample;
+        while (!stop.stop_requested()) {
+            const SourceStatus status = source_->next(sample, monotonic_ns() + kSourcePatienceNs);
+            if (stall_if_due(stop)) sample.read_ns = monotonic_ns();
+            if (status == SourceStatus::sample) pass(sample, stop);
+            if (status != SourceStatus::sample || monotonic_ns() - noted_ns_ > kSourcePatienceNs)
+                note_source();
+            if (status == SourceStatus::ended) break;
+        }
+        queue_.close();
+    } catch (const std::exception& wrong) {
+        fail(wrong.what());
+    }
+}
+
+void Sensor::pass(SourceSample sample, const std::stop_token& stop) {
+    note(sample);
+    keep_head();
+    if (settling(sample)) return;
+    put_on_our_clock(sample);
+    if (source_->quiet_until_ns() != 0) note_source();
+    if (source_->replayed())
+        (void)queue_.push(sample, stop);
+    else if (!queue_.try_push(sample))
+        ++dropped_;
+}
+
+/// What had piled up before this process was ready arrives all at once and says nothing of the clocks'
+/// offset; it would be played late, too. So the first moments are let go.
+bool Sensor::settling(const SourceSample& sample) {
+    if (source_->replayed() || !sample.has_time) return false;
+    if (first_read_ns_ == 0) first_read_ns_ = sample.read_ns;
+    return sample.read_ns - first_read_ns_ < kSettlingNs;
+}
+
+void Sensor::put_on_our_clock(SourceSample& sample) {
+    const double arrival_s = since_epoch_s(sample.read_ns);
+    if (source_->replayed()) {
+        delays_.add(static_cast<double>(sample.read_ns - sample.due_ns) * 1e-9);
+        replay_offset_s_ = since_epoch_s(sample.due_ns) - sample.sample.t_s -
+                           static_cast<double>(sample.lap) * task_.source.period_s;
+        return;
+    }
+    sample.sample.t_s = sample.has_time ? clock_.map(sample.stick, sample.sample.t_s, arrival_s) : arrival_s;
+    sample.due_ns = task_.source.epoch_ns + std::llround(sample.sample.t_s * 1e9);
+    const std::lock_guard lock(mutex_);
+    reading_.clock = sample.has_time ? SampleClock::source : SampleClock::arrival;
+}
+
+void Sensor::note(const SourceSample& sample) {
+    const double interval_s = since_epoch_s(sample.read_ns) - last_s_[sample.stick];
+    last_s_[sample.stick] = since_epoch_s(sample.read_ns);
+    const std::lock_guard lock(mutex_);
+    if (reading_.read[sample.stick]++ == 0 || !(interval_s < kLongestIntervalS)) return;
+    double& smoothed = reading_.interval_s[sample.stick];
+    smoothed += (smoothed == 0 ? 1 : kSmoothing) * (interval_s - smoothed);
+}
+
+void Sensor::note_source() {
+    ClockEstimate estimate = clock_.estimate();
+    if (source_->replayed()) estimate = {replay_offset_s_, 0, delays_.p95(), 0, 0};
+    noted_ns_ = monotonic_ns();
+    keep_head();
+    const std::lock_guard lock(mutex_);
+    const std::int64_t quiet_before_ns = reading_.quiet_until_ns;
+    reading_.faults = source_->faults();
+    reading_.faults.lost += dropped_;
+    reading_.estimate = estimate;
+    reading_.quiet_until_ns = source_->quiet_until_ns();
+    if (reading_.quiet_until_ns != quiet_before_ns) add_one(changed_.get());
+}
+
+bool Sensor::stall_if_due(const std::stop_token& stop) {
+    if (stalled_ || task_.stall_at_s < 0 || since_epoch_s(monotonic_ns()) < task_.stall_at_s) return false;
+    const std::int64_t until = monotonic_ns() + std::llround(task_.stall_s * 1e9);
+    while (monotonic_ns() < until && !stop.stop_requested())
+        sleep_until_ns(std::min(until, monotonic_ns() + kSourcePatienceNs));
+    stalled_ = true;
+    return true;
+}
+
+// The filters.
+
+void Sensor::filter(const std::stop_token& stop) {
+    (void)set_thread_priority(ThreadRole::sensing, task_.realtime);
+    try {
+        while (const std::optional<SourceSample> sample = queue_.pop(stop)) take(*sample);
+        if (!stop.stop_requested() && phase_ == SensorPhase::running) phase_ = SensorPhase::ended;
+        add_one(changed_.get());
+    } catch (const std::exception& wrong) {
+        fail(wrong.what());
+    }
+}
+
+void Sensor::take(const SourceSample& sample) {
+    Stick& stick = sticks_[sample.stick];
+    const bool anew = sample.lap != stick.lap;
+    if (anew) stick.filters = std::move(stick.fresh);
+    stick.lap = sample.lap;
+    const std::uint64_t before = stick.state.samples;
+    (void)stick.filters.correct(sample.sample, stick.state);
+    if (stick.state.samples != before) {
+        stick.state.samples += std::exchange(stick.missed, 0);
+        stick.state.lap = sample.lap;
+        stick.state.due_ns = sample.due_ns;
+        stick.state.read_ns = sample.read_ns;
+        stick.state.filtered_ns = monotonic_ns();
+    }
+    stick.memory->state.publish(stick.state);
+    if (stick.state.samples != before) add_one(task_.wake_fd);
+    if (anew) stick.fresh = StickFilters(task_.predictors);
+}
+
+// Reports.
+
+void Sensor::report() {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t i = 0; i < sticks_.size(); ++i) {
+        SensorReport report;
+        report.pid = static_cast<std::uint64_t>(getpid());
+        report.phase = phase_;
+        report.quiet_until_ns = reading_.quiet_until_ns;
+        report.interval_s = reading_.interval_s[i];
+        report.read = reading_.read[i];
+        report.malformed = reading_.faults.malformed;
+        report.foreign = reading_.faults.foreign;
+        report.lost = reading_.faults.lost;
+        report.clock = reading_.clock;
+        report.offset_s = reading_.estimate.offset_s;
+        report.drift_ppm = reading_.estimate.drift_ppm;
+        report.delay_p95_ms = reading_.estimate.delay_p95_s * 1e3;
+        report.jumps = reading_.estimate.jumps;
+        report.last_jump_s = reading_.estimate.last_jump_s;
+        report.set_text(failure_.empty() ? one_line(reading_.faults.first, 240) : failure_);
+        sticks_[i].memory->report.publish(report);
+    }
+}
+
+}  // namespace
+
+int run_sensor(const SensorTask& task) {
+    const rlimit no_core{0, 0};
+    (void)setrlimit(RLIMIT_CORE, &no_core);
+    return Sensor(task).run();
+}
+
+}  // namespace app

@@ -1,0 +1,93 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include "sensors/stick_names.h"
+
+namespace app {
+
+/// The 95th percentile of the newest values.
+class DelayPercentile {
+public:
+    void add(double value) noexcept { values_[count_++ % values_.size()] = value; }
+    [[nodiscard]] double p95() const noexcept;
+    void clear() noexcept { count_ = 0; }
+
+private:
+    std::array<double, 1024> values_{};
+    std::size_t count_ = 0;
+};
+
+/// What is known of a source's clock.
+struct ClockEstimate {
+    double offset_s = 0;  ///< ours minus the source's, the least delay included, which cannot be told from it
+    double drift_ppm = 0;    ///< of the source's clock against ours; 0 in the first seconds
+    double delay_p95_s = 0;  ///< of arrival beyond the least delay
+    std::uint64_t jumps = 0;
+    double last_jump_s = 0;  ///< by which the source's clock jumped, > 0: forwards
+};
+
+/// Puts the times of a source's samples on our clock.
+///
+/// Of each sample the arrival minus its own time is the clocks' offset and the delay on the way, which is
+/// >= 0: the least of a window is the offset (one-way minimum filter: Paxson 1998, Cristian's lower bound
+/// without the way back).
+///
+///   target     the least arrival - time of the newest 2 s
+///   offset     starts at the first sample's; follows the target by at most half of the time that passes for
+///              kSettlingS, then by at most 200 ppm of it: differences of mapped times stay true
+///   mapped     sample's time + offset, strictly increasing for samples that come in order
+///   drift      slope of the least arrival - time of each second (least squares, 64 s)
+///
+/// A jump is a step of more than kJumpS between two samples of a stick by which they would arrive that much
+/// before they were taken; three samples in a row in order among themselves but before an older one; or
+/// samples that all come kJumpS later than they used to for half a second. The offset is then estimated anew
+/// from that sample's arrival. A single late sample is none: its mapped time is late, too.
+/// Bounded memory; no allocation. One thread.
+class SourceClock {
+public:
+    static constexpr double kSettlingS = 0.25, kJumpS = 0.25;
+
+    /// The sample's time on our clock. `arrival_s` does not decrease.
+    [[nodiscard]] double map(std::size_t stick, double source_s, double arrival_s) noexcept;
+    [[nodiscard]] ClockEstimate estimate() const noexcept;
+    /// What jumps have added to the source's times, so that these go on increasing: minus all jumps.
+    [[nodiscard]] double shift_s() const noexcept { return shift_s_; }
+
+private:
+    static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+    struct Bucket {
+        std::int64_t index = kNever;
+        double least = 0;
+    };
+    struct Stick {
+        double newest = 0, previous = 0;  ///< source times: the latest, and that of the sample before
+        int behind = 0;                   ///< samples in a row before `newest`, in order among themselves
+        bool started = false;
+    };
+
+    [[nodiscard]] bool jumped(Stick& stick, double source_s, double arrival_s) noexcept;
+    [[nodiscard]] bool stays_late(double delay, double arrival_s) noexcept;
+    void begin(double source_s, double arrival_s) noexcept;
+    void jump(double source_s, double arrival_s) noexcept;
+    void take(double delay, double arrival_s) noexcept;
+    void steer(double source_s) noexcept;
+    [[nodiscard]] double target(double arrival_s) const noexcept;
+    [[nodiscard]] double drift_ppm() const noexcept;
+
+    std::array<Stick, StickNames::kMostSticks> sticks_{};
+    std::array<Bucket, 20> window_{};   // of 0.1 s
+    std::array<Bucket, 64> seconds_{};  // of 1 s
+    DelayPercentile delays_;
+    bool started_ = false;
+    double offset_s_ = 0, target_s_ = 0;
+    double begun_s_ = 0, newest_s_ = 0;  // source times
+    double latest_mapped_s_ = 0;
+    double late_since_s_ = -1;
+    std::uint64_t jumps_ = 0;
+    double last_jump_s_ = 0, shift_s_ = 0;
+};
+
+}  // namespace app

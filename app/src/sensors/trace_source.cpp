@@ -1,0 +1,107 @@
+#include "sensors/trace_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+#include "files/assets.h"
+#include "files/bad_input.h"
+#include "process/clock.h"
+
+namespace app {
+namespace {
+
+const tracking::StickTrace& stick_called(const tracking::Trace& trace, const std::string& name) {
+    const auto found = std::find_if(trace.sticks.begin(), trace.sticks.end(),
+                                    [&](const tracking::StickTrace& stick) { return stick.name == name; });
+    if (found != trace.sticks.end()) return *found;
+    std::vector<std::string> names;
+    for (const tracking::StickTrace& stick : trace.sticks) names.push_back(stick.name);
+    throw BadInput(fmt::format("{}: error: found no stick \"{}\", expected one of {}", trace.file, name,
+                               fmt::join(names, ", ")));
+}
+
+std::vector<std::string> wanted_sticks(const tracking::Trace& trace, const SourceOptions& options) {
+    if (!options.sticks.empty()) return options.sticks;
+    std::vector<std::string> names;
+    for (const tracking::StickTrace& stick : trace.sticks) names.push_back(stick.name);
+    return names;
+}
+
+}  // namespace
+
+TraceSource::TraceSource(const std::string& file, const SourceOptions& options) : options_(options) {
+    const tracking::Trace trace = tracking::read_trace(find_trace(file));
+    const std::vector<std::string> wanted = wanted_sticks(trace, options);
+    names_ = StickNames(wanted);
+    t0_s_ = trace.t0_s();
+    head_ = {trace.rate_hz, trace.tip, trace.shaft, false, trace.source, 0};
+    for (std::size_t i = 0; i < wanted.size(); ++i)
+        for (const tracking::PoseSample& sample : stick_called(trace, wanted[i]).samples) {
+            rows_.push_back({i, sample});
+            head_.oriented = head_.oriented || sample.has_orientation;
+        }
+    // A stick's times differ. (stable_sort's buffer is not aligned for what holds Eigen's types.)
+    std::ranges::sort(rows_, {}, [](const Row& row) { return std::tuple(row.sample.t_s, row.stick); });
+    if (options_.period_s > 0 && !(options_.period_s > trace.t_end_s() - t0_s_))
+        throw BadInput(fmt::format("{}: error: found a period of {} s, expected more than its {} s",
+                                   trace.file, options_.period_s, trace.t_end_s() - t0_s_));
+    if (options_.resume) skip_until(monotonic_ns());
+}
+
+std::int64_t TraceSource::due_ns(const Row& row) const {
+    const double since_epoch_s = static_cast<double>(lap_) * options_.period_s + (row.sample.t_s - t0_s_);
+    return options_.epoch_ns + std::llround(since_epoch_s / options_.speed * 1e9);
+}
+
+void TraceSource::pass_on() {
+    ++next_;
+    if (next_ == rows_.size() && options_.period_s > 0) {
+        next_ = 0;
+        ++lap_;
+    }
+}
+
+void TraceSource::skip_until(std::int64_t now_ns) {
+    if (options_.period_s > 0) {  // not lap by lap through the night
+        const double since_epoch_s = static_cast<double>(now_ns - options_.epoch_ns) * 1e-9 * options_.speed;
+        lap_ = static_cast<std::uint64_t>(std::max(0.0, std::floor(since_epoch_s / options_.period_s)));
+    }
+    while (next_ < rows_.size() && due_ns(rows_[next_]) < now_ns) pass_on();
+}
+
+SourceStatus TraceSource::next(SourceSample& sample, std::int64_t deadline_ns) {
+    if (next_ == rows_.size()) return SourceStatus::ended;
+    const Row& row = rows_[next_];
+    const std::int64_t due = due_ns(row);
+    sleep_until_ns(std::min(due, deadline_ns));
+    const std::int64_t now = monotonic_ns();
+    if (now < due) return SourceStatus::waiting;
+    sample = {row.stick, row.sample, true, lap_, due, now};
+    pass_on();
+    return SourceStatus::sample;
+}
+
+std::int64_t TraceSource::quiet_until_ns() const {
+    return next_ == 0 && !rows_.empty() ? due_ns(rows_[0]) : 0;  // before it begins, and between laps
+}
+
+std::uint64_t TraceSource::passed_over(std::size_t stick, std::uint64_t lap,
+                                       std::optional<double> t_s) const {
+    const auto end = rows_.begin() + static_cast<std::ptrdiff_t>(next_);
+    const auto count = [&](auto last, double until_s) {
+        return static_cast<std::uint64_t>(std::count_if(rows_.begin(), last, [&](const Row& row) {
+            return row.stick == stick && row.sample.t_s <= until_s;
+        }));
+    };
+    constexpr double kAll = std::numeric_limits<double>::infinity();
+    const std::uint64_t a_lap = count(rows_.end(), kAll);
+    const std::uint64_t given = t_s ? lap * a_lap + count(rows_.end(), *t_s) : 0;
+    const std::uint64_t gone = lap_ * a_lap + count(end, kAll);
+    return gone > given ? gone - given : 0;
+}
+
+}  // namespace app

@@ -1,0 +1,59 @@
+#pragma once
+#include <sim/world.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "simulate/momentum_watch.h"
+#include "simulate/worker_options.h"
+
+namespace app {
+
+struct SimulateOptions {
+    std::filesystem::path scene;
+    std::optional<double> dt_s, seconds;
+    std::optional<std::uint64_t> steps;
+    bool until_rest = false;
+    std::optional<std::filesystem::path> out, video;
+    bool frames = false;
+    double fps = 30;
+    int width = 640, height = 480;
+    bool progress = false;
+    std::optional<WorkerOptions> workers;  ///< none: all in this process
+};
+
+struct SimulateResult {
+    std::filesystem::path scene;
+    std::string name;
+    int bodies = 0;
+    int rigid = 0, linear = 0, modal = 0;  ///< bodies by what is computed of them
+    int groups_cut = 0;  ///< modal bodies whose count of modes cuts a group of equal frequencies
+    std::uint64_t steps = 0, body_steps = 0;
+    double dt_s = 0, time_s = 0;
+    double elapsed_s = 0, cpu_s = 0;  ///< of the steps alone
+    std::optional<MomentumDrift> drift;
+    sim::World::Energy energy_start{}, energy{};
+    Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
+    std::uint64_t state_hash = 0;
+    sim::WorldCounts counts;
+    std::vector<std::pair<std::string, sim::QuarantinedBody>> quarantined;
+    bool rest_wanted = false, rest_reached = false;
+    std::size_t frames = 0;
+    std::vector<std::string> notes;  ///< what was asked for and had no effect
+    double wall_s = 0;               ///< with reading, drawing and writing
+    std::optional<sim::DistributedResult> workers;
+    WorkerOptions worker_options;
+};
+
+/// Runs a scene, in this process or shared out to workers. Throws BadInput, or std::runtime_error while
+/// running.
+[[nodiscard]] SimulateResult simulate(const SimulateOptions& options);
+
+/// One JSON object, the keys that scripts rely on first; numbers read back to the same double. Apart from
+/// elapsed_s, cpu_s, ns_per_body_step and wall_s a pure function of the scene and the options.
+[[nodiscard]] std::string format_simulate(const SimulateResult& result);
+
+}  // namespace app

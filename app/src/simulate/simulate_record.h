@@ -1,0 +1,40 @@
+#pragma once
+#include <memory>
+
+#include "files/output_folder.h"
+#include "pictures/frame_writer.h"
+#include "pictures/scene_stage.h"
+#include "play/play_setup.h"
+#include "process/clock.h"
+#include "simulate/simulate.h"
+#include "simulate/simulate_tables.h"
+#include "simulate/worker_history.h"
+
+namespace app {
+
+/// What a run writes while it goes on. Without a folder: nothing.
+class SimulateRecord {
+public:
+    SimulateRecord(const SimulateOptions& options, const Scene& scene);
+
+    void start(const sim::World& world);        ///< before the first step
+    void take_frames(const sim::World& world);  ///< the first state that is not before a frame's time
+    void take_step(const sim::World& world);    ///< after each
+    void take_time(std::uint64_t step, double elapsed_s);
+    void take_worker(const sim::WorkerStep& step);
+    void finish(SimulateResult& result, const WallTimer& wall);
+
+private:
+    void draw_workers();
+
+    const SimulateOptions& options_;
+    const Scene& scene_;
+    std::unique_ptr<OutputFolder> folder_;
+    std::unique_ptr<GrowingTable> states_, energy_, times_, timing_;
+    std::unique_ptr<SceneStage> stage_;
+    std::unique_ptr<FrameWriter> frames_;
+    WorkerHistory history_;
+    std::size_t next_frame_ = 0;
+};
+
+}  // namespace app

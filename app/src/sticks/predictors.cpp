@@ -1,0 +1,99 @@
+#include "sticks/predictors.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "files/bad_input.h"
+#include "sticks/external_predictor.h"
+
+namespace app {
+namespace {
+
+constexpr std::string_view kExternal = "exec:";
+
+std::string command_of(const std::string& specification) {
+    std::string command = specification.substr(kExternal.size());
+    if (command.find_first_not_of(" \t") == std::string::npos)
+        throw BadInput(
+            fmt::format("error: found predictor \"{}\" without a command, expected exec:CMD such as "
+                        "\"exec:python3 mine.py\"",
+                        specification));
+    return command;
+}
+
+std::unique_ptr<tracking::Predictor> make_internal(const std::string& specification) {
+    const std::vector<std::string>& names = tracking::predictor_names();
+    if (const std::string name = specification.substr(0, specification.find(':'));
+        std::find(names.begin(), names.end(), name) == names.end())
+        throw BadInput(fmt::format("error: found predictor \"{}\", expected auto, exec:CMD or one of {}",
+                                   name, fmt::join(names, ", ")));
+    try {
+        return tracking::make_predictor(specification);
+    } catch (const std::invalid_argument& wrong) {
+        throw BadInput(fmt::format("error: {}", wrong.what()));
+    }
+}
+
+/// The end of the part that begins at `begin`: its comma, or the list's end.
+std::size_t end_of_part(const std::string& list, std::size_t begin) {
+    const bool external = list.compare(begin, kExternal.size(), kExternal) == 0;
+    std::size_t end = list.find(',', begin);
+    while (external && end != std::string::npos && list[end - 1] == '\\') end = list.find(',', end + 1);
+    return std::min(end, list.size());
+}
+
+std::string unescaped(std::string part) {
+    for (std::size_t at = part.find("\\,"); at != std::string::npos; at = part.find("\\,", at + 1))
+        part.erase(at, 1);
+    return part;
+}
+
+}  // namespace
+
+bool is_external(const std::string& specification) {
+    return specification.starts_with(kExternal);
+}
+
+std::unique_ptr<tracking::Predictor> make_any_predictor(const std::string& specification,
+                                                        std::span<const double> leads_s,
+                                                        const std::string& stick) {
+    if (!is_external(specification)) return make_internal(specification);
+    return std::make_unique<ExternalPredictor>(command_of(specification), leads_s, stick);
+}
+
+void check_specification(const std::string& specification) {
+    if (is_external(specification))
+        (void)command_of(specification);
+    else if (specification != "auto")
+        (void)make_internal(specification);
+}
+
+void require_working(const tracking::Predictor& predictor) {
+    if (const auto* external = dynamic_cast<const ExternalPredictor*>(&predictor);
+        external && external->failure())
+        std::rethrow_exception(external->failure());
+}
+
+std::vector<std::string> split_specifications(const std::string& list) {
+    std::vector<std::string> parts;
+    for (std::size_t begin = 0; begin <= list.size();) {
+        const std::size_t end = end_of_part(list, begin);
+        std::string part = list.substr(begin, end - begin);
+        if (part.empty())
+            throw BadInput(fmt::format(
+                "error: found an empty name in the list of predictors \"{}\", expected names between commas",
+                list));
+        const bool continues = !parts.empty() && !is_external(parts.back()) &&
+                               part.find('=') != std::string::npos && part.find(':') == std::string::npos;
+        if (continues)
+            parts.back() += "," + part;
+        else
+            parts.push_back(is_external(part) ? unescaped(std::move(part)) : std::move(part));
+        begin = end + 1;
+    }
+    return parts;
+}
+
+}  // namespace app

@@ -1,0 +1,75 @@
+#include "traces/predict.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <memory>
+#include <tuple>
+#include <vector>
+
+#include "sticks/auto_predictor.h"
+#include "sticks/predictors.h"
+#include "sticks/stick_tracker.h"
+
+namespace app {
+namespace {
+
+struct Row {
+    double sample_t_s;
+    std::size_t stick;
+    tracking::PoseSample predicted;  // t_s: the time predicted for
+};
+
+/// Appends a row for every sample of a stick that is newer than all before it, but the first.
+void predict_stick(const tracking::StickTrace& stick, std::size_t index, tracking::Predictor& predictor,
+                   double lead_s, std::vector<Row>& rows) {
+    bool oriented = false;
+    double newest_s = 0;
+    for (std::size_t i = 0; i < stick.samples.size(); ++i) {
+        const tracking::PoseSample& sample = stick.samples[i];
+        (void)predictor.correct(sample);
+        require_working(predictor);
+        oriented = oriented || sample.has_orientation;
+        if (i > 0 && !(sample.t_s > newest_s)) continue;
+        newest_s = sample.t_s;
+        if (i == 0) continue;
+        const double t_s = sample.t_s + lead_s;
+        const bool taken = predictor.time_s() == sample.t_s;
+        const tracking::PosePrediction pose = predictor.predict(taken ? lead_s : t_s - predictor.time_s());
+        rows.push_back({sample.t_s, index, {t_s, pose.position, pose.orientation, oriented}});
+    }
+}
+
+std::string format_rows(const tracking::Trace& seen, const std::vector<Row>& rows) {
+    std::string text = "t,stick,px,py,pz,qw,qx,qy,qz\n";
+    auto out = std::back_inserter(text);
+    for (const Row& row : rows) {
+        const Eigen::Vector3d& p = row.predicted.position;
+        const Eigen::Quaterniond& q = row.predicted.orientation;
+        fmt::format_to(out, "{},{},{},{},{},", row.predicted.t_s, seen.sticks[row.stick].name, p.x(), p.y(),
+                       p.z());
+        if (row.predicted.has_orientation)
+            fmt::format_to(out, "{},{},{},{}\n", q.w(), q.x(), q.y(), q.z());
+        else
+            text += ",,,\n";
+    }
+    return text;
+}
+
+}  // namespace
+
+std::string predict_table(const tracking::Trace& seen, const std::string& specification, double lead_s) {
+    const std::vector<double> leads = {lead_s};
+    std::vector<Row> rows;
+    for (std::size_t i = 0; i < seen.sticks.size(); ++i) {
+        const std::unique_ptr<tracking::Predictor> predictor =
+            make_any_predictor(picture_specification(specification), leads, seen.sticks[i].name);
+        predict_stick(seen.sticks[i], i, *predictor, lead_s, rows);
+    }
+    // A stick's times differ. (stable_sort's buffer is not aligned for what holds Eigen's types.)
+    std::ranges::sort(rows, {}, [](const Row& row) { return std::tuple(row.sample_t_s, row.stick); });
+    return format_rows(seen, rows);
+}
+
+}  // namespace app

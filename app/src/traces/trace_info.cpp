@@ -1,0 +1,129 @@
+#include "traces/trace_info.h"
+
+#include <fmt/format.h>
+#include <tracking/plausibility.h>
+#include <tracking/predictor.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "kit/stick_geometry.h"
+#include "kit/tip_track.h"
+#include "statistics/statistics.h"
+#include "strikes/stroke_lows.h"
+
+namespace app {
+namespace {
+
+constexpr double kFlip = 1.5707963267948966;  // rad between two samples
+
+StickInfo info_of(const tracking::StickTrace& stick, const TipTrack& track) {
+    StickInfo info;
+    info.name = stick.name;
+    info.samples = stick.samples.size();
+    info.t0_s = track.t_s.front();
+    info.t_end_s = track.t_s.back();
+    std::vector<double> dt, speed;
+    info.low = info.high = track.tip.front();
+    for (std::size_t i = 1; i < track.t_s.size(); ++i) {
+        dt.push_back(track.t_s[i] - track.t_s[i - 1]);
+        speed.push_back((track.tip[i] - track.tip[i - 1]).norm() / dt.back());
+        info.gaps += dt.back() > tracking::kGapS;
+        info.low = info.low.cwiseMin(track.tip[i]);
+        info.high = info.high.cwiseMax(track.tip[i]);
+    }
+    info.dt_min_s = quantile(dt, 0);
+    info.dt_median_s = quantile(dt, 0.5);
+    info.dt_max_s = quantile(dt, 1);
+    info.rate_hz = 1 / info.dt_median_s;
+    info.speed_median_mps = quantile(speed, 0.5);
+    info.speed_p95_mps = quantile(speed, 0.95);
+    info.speed_max_mps = quantile(speed, 1);
+    info.orientation = std::all_of(stick.samples.begin(), stick.samples.end(),
+                                   [](const tracking::PoseSample& sample) { return sample.has_orientation; });
+    for (std::size_t i = 1; i < stick.samples.size(); ++i) {
+        if (stick.samples[i].orientation.angularDistance(stick.samples[i - 1].orientation) <= kFlip) continue;
+        if (info.flips++ == 0) info.first_flip_s = stick.samples[i].t_s;
+    }
+    info.strokes = static_cast<int>(find_lows(track).size());
+    return info;
+}
+
+std::string point(const Eigen::Vector3d& p) {
+    return fmt::format("({:.3f}, {:.3f}, {:.3f})", p.x(), p.y(), p.z());
+}
+
+nlohmann::ordered_json numbers(const Eigen::Vector3d& p) {
+    return {p.x(), p.y(), p.z()};
+}
+
+nlohmann::ordered_json json_of(const StickInfo& s) {
+    return {
+        {"name", s.name},
+        {"samples", s.samples},
+        {"t0_s", s.t0_s},
+        {"t_end_s", s.t_end_s},
+        {"duration_s", s.t_end_s - s.t0_s},
+        {"rate_hz", s.rate_hz},
+        {"dt_s", {{"min", s.dt_min_s}, {"median", s.dt_median_s}, {"max", s.dt_max_s}}},
+        {"gaps", s.gaps},
+        {"tip_min_m", numbers(s.low)},
+        {"tip_max_m", numbers(s.high)},
+        {"speed_mps", {{"median", s.speed_median_mps}, {"p95", s.speed_p95_mps}, {"max", s.speed_max_mps}}},
+        {"has_orientation", s.orientation},
+        {"flips", s.flips},
+        {"strokes", s.strokes}};
+}
+
+}  // namespace
+
+std::vector<StickInfo> trace_info(const tracking::Trace& trace) {
+    const std::vector<TipTrack> tracks = tip_tracks(trace, stick_geometry(trace, {}, {}, {}));
+    std::vector<StickInfo> sticks;
+    for (std::size_t i = 0; i < tracks.size(); ++i) sticks.push_back(info_of(trace.sticks[i], tracks[i]));
+    return sticks;
+}
+
+std::string format_info(const tracking::Trace& trace, const std::vector<StickInfo>& sticks) {
+    std::string text =
+        fmt::format("{}: {:.3f} s, {} sticks\n", trace.file, trace.t_end_s() - trace.t0_s(), sticks.size());
+    text += fmt::format("  source       {}\n", trace.source.empty() ? "(not said)" : trace.source);
+    text += fmt::format("  nominal rate {}\n",
+                        trace.rate_hz > 0 ? fmt::format("{} Hz", trace.rate_hz) : "(not said)");
+    text += fmt::format("  tip          {}\n",
+                        trace.tip ? point(*trace.tip) + " m" : "(not said; the tracked point)");
+    for (const std::string& remark : trace.remarks) text += fmt::format("  remark       {}\n", remark);
+    for (const StickInfo& s : sticks) {
+        text +=
+            fmt::format("\n{}: {} samples from {:.6f} to {:.6f} s\n", s.name, s.samples, s.t0_s, s.t_end_s);
+        text += fmt::format(
+            "  rate         {:.2f} Hz; steps {:.3f}, {:.3f}, {:.3f} ms (shortest, median, longest)\n",
+            s.rate_hz, 1e3 * s.dt_min_s, 1e3 * s.dt_median_s, 1e3 * s.dt_max_s);
+        text += fmt::format("  gaps         {} over {} s\n", s.gaps, tracking::kGapS);
+        text += fmt::format("  tip within   {} to {} m\n", point(s.low), point(s.high));
+        text += fmt::format("  tip speed    {:.2f}, {:.2f}, {:.2f} m/s (median, 95 %, fastest)\n",
+                            s.speed_median_mps, s.speed_p95_mps, s.speed_max_mps);
+        text += fmt::format("  strokes      {} (falls and rises of 25 mm and more)\n", s.strokes);
+        text += fmt::format("  orientation  {}\n", s.orientation ? "yes" : "no, or not throughout");
+        if (s.flips > 0)
+            text +=
+                fmt::format("  flips        {} steps turn by more than 90 degrees, the first at {:.6f} s\n",
+                            s.flips, s.first_flip_s);
+    }
+    return text;
+}
+
+std::string format_info_json(const tracking::Trace& trace, const std::vector<StickInfo>& sticks) {
+    nlohmann::ordered_json json = {
+        {"trace", trace.file},  {"source", trace.source},     {"rate_hz", trace.rate_hz},
+        {"t0_s", trace.t0_s()}, {"t_end_s", trace.t_end_s()}, {"duration_s", trace.t_end_s() - trace.t0_s()},
+        {"tip_m", nullptr},     {"shaft", nullptr},           {"sticks", nlohmann::ordered_json::array()}};
+    json["remarks"] = trace.remarks;
+    json["warnings"] = tracking::implausible(trace);
+    if (trace.tip) json["tip_m"] = numbers(*trace.tip);
+    if (trace.shaft) json["shaft"] = numbers(*trace.shaft);
+    for (const StickInfo& stick : sticks) json["sticks"].push_back(json_of(stick));
+    return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace app

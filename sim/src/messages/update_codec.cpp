@@ -1,0 +1,338 @@
+#include "messages/update_codec.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "messages/world_record_codec.h"
+#include "world/body_kind.h"
+
+namespace sim {
+namespace {
+
+constexpr std::uint8_t kUpdateAsleep = 1, kUpdateStill = 2, kUpdateQuarantined = 4, kUpdateHeld = 8;
+constexpr std::size_t kSmallestUpdate = 36, kSmallestPush = 76, kUsualUpdate = 120;
+constexpr std::int16_t kUpdateBroken = std::numeric_limits<std::int16_t>::min();
+
+/// Room for one update: what ByteWriter does, without growing by each number.
+class SmallWriter {
+public:
+    template <typename Number>
+    void number(Number value) {
+        std::memcpy(bytes_.data() + size_, &value, sizeof value);
+        size_ += sizeof value;
+    }
+    void append(std::span<const std::uint8_t> more) {
+        std::copy(more.begin(), more.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(size_));
+        size_ += more.size();
+    }
+    [[nodiscard]] std::span<const std::uint8_t> bytes() const { return {bytes_.data(), size_}; }
+
+private:
+    std::array<std::uint8_t, kSmallestUpdate + 12 + 6 * kMostModes> bytes_;
+    std::size_t size_ = 0;
+};
+
+/// One update's bytes, whose length was checked.
+class SmallReader {
+public:
+    explicit SmallReader(std::span<const std::uint8_t> bytes) : at_(bytes.data()) {}
+    template <typename Number>
+    [[nodiscard]] Number number() {
+        Number value;
+        std::memcpy(&value, at_, sizeof value);
+        at_ += sizeof value;
+        return value;
+    }
+    [[nodiscard]] const std::uint8_t* take(std::size_t n) { return std::exchange(at_, at_ + n); }
+
+private:
+    const std::uint8_t* at_;
+};
+
+// f16: Eigen::half, by the processor where it can.
+
+constexpr float kLargestHalf = 65504;
+
+void write_half(SmallWriter& out, double value) {
+    const float bounded =
+        std::isnan(value) ? 0 : std::clamp(static_cast<float>(value), -kLargestHalf, kLargestHalf);
+    out.number(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(bounded)));
+}
+
+double read_half(SmallReader& in) {
+    const auto bits = in.number<std::uint16_t>();
+    if ((bits & 0x7C00) == 0x7C00) throw DecodeError("a number that is not finite");
+    return static_cast<float>(Eigen::numext::bit_cast<Eigen::half>(bits));
+}
+
+template <typename Vector>
+void write_halves(SmallWriter& out, const Vector& v, bool zeros = false) {
+    for (Eigen::Index i = 0; i < v.size(); ++i) write_half(out, zeros ? 0.0 : v[i]);
+}
+
+template <typename Vector>
+void read_halves(SmallReader& in, Vector& v) {
+    for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = read_half(in);
+}
+
+// Floats of a place or an impulse.
+
+template <typename Writer, typename Vector>
+void write_floats(Writer& out, const Vector& v) {
+    constexpr double most = std::numeric_limits<float>::max();
+    for (Eigen::Index i = 0; i < v.size(); ++i)
+        out.number(std::isnan(v[i]) ? 0 : static_cast<float>(std::clamp<double>(v[i], -most, most)));
+}
+
+template <typename Reader, typename Vector>
+void read_floats(Reader& in, Vector& v) {
+    for (Eigen::Index i = 0; i < v.size(); ++i) {
+        v[i] = in.template number<float>();
+        if (!std::isfinite(v[i])) throw DecodeError("a number that is not finite");
+    }
+}
+
+// Orientation: the three smaller components.
+
+constexpr double kMostOfSmaller = 0.70710678118654752440;
+constexpr std::uint64_t kLevels = (1u << 18) - 1;
+
+void write_orientation(SmallWriter& out, const Eigen::Quaterniond& orientation) {
+    Eigen::Vector4d c = orientation.coeffs().normalized();  // x, y, z, w
+    Eigen::Index largest = 0;
+    c.cwiseAbs().maxCoeff(&largest);
+    if (c[largest] < 0) c = -c;
+    std::uint64_t bits = static_cast<std::uint64_t>(largest);
+    int at = 2;
+    for (Eigen::Index i = 0; i < 4; ++i) {
+        if (i == largest) continue;
+        const double share = std::clamp((c[i] / kMostOfSmaller + 1) / 2, 0.0, 1.0);
+        bits |= static_cast<std::uint64_t>(std::llround(share * double(kLevels))) << at;
+        at += 18;
+    }
+    std::array<std::uint8_t, 8> bytes;
+    std::memcpy(bytes.data(), &bits, 8);
+    out.append(std::span(bytes).first(7));
+}
+
+Eigen::Quaterniond read_orientation(SmallReader& in) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, in.take(7), 7);
+    const auto largest = static_cast<Eigen::Index>(bits & 3);
+    Eigen::Vector4d c;
+    double rest = 1, most = 0;
+    int at = 2;
+    for (Eigen::Index i = 0; i < 4; ++i) {
+        if (i == largest) continue;
+        c[i] = (2 * (double((bits >> at) & kLevels) / double(kLevels)) - 1) * kMostOfSmaller;
+        rest -= c[i] * c[i], most = std::max(most, std::abs(c[i]));
+        at += 18;
+    }
+    c[largest] = std::sqrt(std::max(0.0, rest));
+    if (c[largest] < most - 2e-5) throw DecodeError("an orientation that is none");
+    return Eigen::Quaterniond(c).normalized();
+}
+
+// Angular momentum: three mantissas of 16 bits, one exponent of 4, to base 16.
+
+struct SharedExponent {
+    int exponent = 0;
+    std::array<std::int16_t, 3> mantissas{};
+};
+
+/// 2^(4 exponent - 44)
+constexpr double unit_of(int exponent) {
+    return std::bit_cast<double>(static_cast<std::uint64_t>(1023 + 4 * exponent - 44) << 52);
+}
+
+SharedExponent quantised(const Eigen::Vector3d& v) {
+    SharedExponent s;
+    const double most = v.cwiseAbs().maxCoeff();
+    while (s.exponent < 15 && std::rint(most / unit_of(s.exponent)) > 32767) ++s.exponent;
+    for (int i = 0; i < 3; ++i)
+        s.mantissas[static_cast<std::size_t>(i)] =
+            static_cast<std::int16_t>(std::clamp(std::rint(v[i] / unit_of(s.exponent)), -32767.0, 32767.0));
+    return s;
+}
+
+/// False: the mark of a broken state.
+bool read_angular(SmallReader& in, int exponent, Eigen::Vector3d& v) {
+    int most = 0, broken = 0;
+    for (int i = 0; i < 3; ++i) {
+        const auto m = in.number<std::int16_t>();
+        most = std::max(most, std::abs(int(m))), broken += m == kUpdateBroken;
+        v[i] = m * unit_of(exponent);
+    }
+    const bool smallest = exponent == 0 || most >= 2048;
+    if (broken == 3 ? exponent != 0 : broken != 0 || !smallest)
+        throw DecodeError("an angular momentum that is none");
+    if (broken) v.setZero();
+    return !broken;
+}
+
+void write(ByteWriter& all, const Update& u) {
+    const WorldBodyState& s = u.state;
+    SmallWriter out;
+    const bool broken = is_broken(s), held = u.held && !broken;
+    SharedExponent angular;
+    broken ? angular.mantissas.fill(kUpdateBroken) : (void)(angular = quantised(s.angular_momentum));
+    out.number(body_and_modes(u.body, s.q.size()));
+    const int flags = (u.asleep ? kUpdateAsleep : 0) | (u.still ? kUpdateStill : 0) |
+                      (u.quarantined ? kUpdateQuarantined : 0) | (held ? kUpdateHeld : 0);
+    out.number(static_cast<std::uint8_t>(flags | angular.exponent << 4));
+    const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+    write_floats(out, broken ? none : s.position);
+    write_orientation(out, broken ? Eigen::Quaterniond::Identity() : s.orientation);
+    write_halves(out, s.velocity, broken);
+    for (const std::int16_t m : angular.mantissas) out.number(m);
+    write_halves(out, s.q, broken);
+    write_halves(out, s.q_dot, broken);
+    if (held) {
+        write_halves(out, u.impulse.linear);
+        write_halves(out, u.impulse.angular);
+        for (Eigen::Index i = 0; i < s.q.size(); ++i)
+            write_half(out, i < u.impulse.modal.size() ? u.impulse.modal[i] : 0);
+    }
+    all.append(out.bytes());
+}
+
+Update read_update(ByteReader& all) {
+    Update u;
+    const BodyAndModes which = read_body_and_modes(all);
+    u.body = which.body;
+    const auto flags = all.number<std::uint8_t>();
+    const auto modes = static_cast<std::size_t>(which.modes);
+    const std::size_t head = 5, held = flags & kUpdateHeld ? 12 + 2 * modes : 0;
+    SmallReader in(all.take(kSmallestUpdate - head + 4 * modes + held));
+    u.asleep = flags & kUpdateAsleep, u.still = flags & kUpdateStill,
+    u.quarantined = flags & kUpdateQuarantined;
+    u.held = flags & kUpdateHeld;
+    WorldBodyState& s = u.state;
+    read_floats(in, s.position);
+    s.orientation = read_orientation(in);
+    read_halves(in, s.velocity);
+    const bool whole = read_angular(in, flags >> 4, s.angular_momentum);
+    s.q.resize(which.modes), s.q_dot.resize(which.modes);
+    read_halves(in, s.q);
+    read_halves(in, s.q_dot);
+    if (is_broken(s)) throw DecodeError("an update out of range");
+    if (!whole) s.position.setConstant(std::numeric_limits<double>::quiet_NaN());
+    if (!u.held) return u;
+    u.impulse.modal.resize(which.modes);
+    read_halves(in, u.impulse.linear);
+    read_halves(in, u.impulse.angular);
+    read_halves(in, u.impulse.modal);
+    return u;
+}
+
+Push read_push(ByteReader& in) {
+    Push p;
+    const BodyAndModes which = read_body_and_modes(in);
+    p.body = which.body;
+    in.matrix(p.impulse.linear);
+    in.matrix(p.impulse.angular);
+    read_floats(in, p.impulse.displacement);
+    read_floats(in, p.impulse.turn);
+    p.impulse.modal_q.resize(which.modes), p.impulse.modal_rate.resize(which.modes);
+    read_floats(in, p.impulse.modal_q);
+    read_floats(in, p.impulse.modal_rate);
+    if (!p.impulse.linear.allFinite() || !p.impulse.angular.allFinite())
+        throw DecodeError("a push that is not finite");
+    return p;
+}
+
+}  // namespace
+
+void write(ByteWriter& out, const std::vector<Update>& updates) {
+    out.count(updates.size());
+    out.bytes().reserve(out.bytes().size() + updates.size() * kUsualUpdate);
+    for (const Update& u : updates) write(out, u);
+}
+
+void write(ByteWriter& out, const std::vector<Push>& pushes) {
+    out.count(pushes.size());
+    for (const Push& p : pushes) {
+        out.number(body_and_modes(p.body, p.impulse.modal_q.size()));
+        out.matrix(p.impulse.linear);
+        out.matrix(p.impulse.angular);
+        write_floats(out, p.impulse.displacement);
+        write_floats(out, p.impulse.turn);
+        write_floats(out, p.impulse.modal_q);
+        write_floats(out, p.impulse.modal_rate);
+    }
+}
+
+std::vector<Update> read_updates(ByteReader& in) {
+    std::vector<Update> updates(in.count(kSmallestUpdate));
+    for (Update& u : updates) u = read_update(in);
+    return updates;
+}
+
+std::vector<Push> read_pushes(ByteReader& in) {
+    std::vector<Push> pushes(in.count(kSmallestPush));
+    for (Push& p : pushes) p = read_push(in);
+    return pushes;
+}
+
+namespace {
+
+// Steps over records of `fixed` + `each` m bytes; extra(flags, m) more.
+template <typename Extra>
+void find(ByteReader& in, std::span<const std::uint8_t> all, std::size_t smallest, Extra&& length,
+          std::vector<PackedUpdates::Place>& places) {
+    const std::uint32_t count = in.count(smallest);
+    places.resize(count);
+    for (PackedUpdates::Place& place : places) {
+        place.offset = static_cast<std::uint32_t>(all.size() - in.left());
+        const BodyAndModes which = read_body_and_modes(in);
+        place.body = which.body;
+        (void)in.take(length(in, static_cast<std::size_t>(which.modes)));
+    }
+}
+
+}  // namespace
+
+void find_updates(ByteReader& in, std::span<const std::uint8_t> all,
+                  std::vector<PackedUpdates::Place>& places) {
+    find(
+        in, all, kSmallestUpdate,
+        [](ByteReader& at, std::size_t modes) {
+            const bool held = at.number<std::uint8_t>() & kUpdateHeld;
+            return kSmallestUpdate - 5 + 4 * modes + (held ? 12 + 2 * modes : 0);
+        },
+        places);
+}
+
+void find_pushes(ByteReader& in, std::span<const std::uint8_t> all,
+                 std::vector<PackedUpdates::Place>& places) {
+    find(
+        in, all, kSmallestPush, [](ByteReader&, std::size_t modes) { return kSmallestPush - 4 + 8 * modes; },
+        places);
+}
+
+Update PackedUpdates::update(std::uint32_t offset) const {
+    ByteReader in(std::span<const std::uint8_t>(bytes).subspan(offset));
+    return read_update(in);
+}
+
+Push PackedUpdates::push(std::uint32_t offset) const {
+    ByteReader in(std::span<const std::uint8_t>(bytes).subspan(offset));
+    return read_push(in);
+}
+
+PackedUpdates::Glance PackedUpdates::glance(std::uint32_t offset) const {
+    SmallReader in(std::span<const std::uint8_t>(bytes).subspan(offset + 4));
+    Glance glance;
+    const auto flags = in.number<std::uint8_t>();
+    glance.asleep = flags & kUpdateAsleep, glance.quarantined = flags & kUpdateQuarantined;
+    read_floats(in, glance.position);
+    (void)in.take(7);
+    read_halves(in, glance.velocity);
+    return glance;
+}
+
+}  // namespace sim

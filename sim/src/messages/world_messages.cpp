@@ -1,0 +1,308 @@
+#include "messages/world_messages.h"
+
+#include <array>
+#include <cmath>
+
+#include "messages/crc32c.h"
+#include "messages/update_codec.h"
+#include "messages/world_record_codec.h"
+#include "messages/world_scene_codec.h"
+
+namespace sim {
+namespace {
+
+constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'W'};
+constexpr std::uint16_t kUpdateType = 12;
+constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kChecksumBytes = 4, kAppliedBytes = 12;
+constexpr std::uint32_t kLongestText = 4096;
+
+// What several messages hold.
+
+void write(ByteWriter& out, const StepReport& r) {
+    for (const float x : {r.seconds, r.smoothed_s, r.waited_s}) out.number(x);
+    for (const std::uint32_t n : {r.lead, r.ghost_age, r.cross_contacts, r.own}) out.number(n);
+    out.matrix(r.outside_impulse);
+}
+
+StepReport read_report(ByteReader& in) {
+    StepReport r;
+    for (float* x : {&r.seconds, &r.smoothed_s, &r.waited_s}) {
+        *x = in.number<float>();
+        if (!(*x >= 0 && *x <= 1e9f)) throw DecodeError("a report of a time out of range");
+    }
+    for (std::uint32_t* n : {&r.lead, &r.ghost_age, &r.cross_contacts, &r.own})
+        *n = in.number<std::uint32_t>();
+    in.matrix(r.outside_impulse);
+    if (!r.outside_impulse.allFinite()) throw DecodeError("a report that is not finite");
+    return r;
+}
+
+void write_applied(ByteWriter& out, const std::vector<std::uint32_t>& sources,
+                   const std::vector<std::uint64_t>& applied) {
+    if (sources.size() != applied.size())
+        throw std::invalid_argument(std::to_string(sources.size()) + " sources with " +
+                                    std::to_string(applied.size()) + " steps");
+    out.count(sources.size());
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+        out.number(sources[i]);
+        out.number(applied[i]);
+    }
+}
+
+void read_applied(ByteReader& in, std::vector<std::uint32_t>& sources, std::vector<std::uint64_t>& applied) {
+    sources.resize(in.count(kAppliedBytes));
+    applied.resize(sources.size());
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+        sources[i] = in.number<std::uint32_t>();
+        applied[i] = in.number<std::uint64_t>();
+    }
+}
+
+std::string shortened(const std::string& text) {
+    return text.substr(0, kLongestText);
+}
+
+// Bodies of messages, in order of types.
+
+void write_body(ByteWriter& out, const JoinRequest& m) {
+    out.number(m.fingerprint);
+    out.number(m.process);
+    out.text(shortened(m.host));
+}
+void write_body(ByteWriter&, const WorldBeat&) {}
+void write_body(ByteWriter&, const Drained&) {}
+void write_body(ByteWriter& out, const WorkerFailure& m) {
+    out.text(shortened(m.what));
+}
+void write_body(ByteWriter& out, const SceneMessage& m) {
+    out.number(m.worker);
+    write(out, m.scene);
+    write(out, m.settings);
+}
+void write_body(ByteWriter& out, const Refusal& m) {
+    out.text(shortened(m.why));
+}
+void write_body(ByteWriter&, const EndOfRun&) {}
+void write_numbers(ByteWriter& out, const std::vector<std::uint32_t>& numbers) {
+    out.count(numbers.size());
+    for (const std::uint32_t number : numbers) out.number(number);
+}
+void read_numbers(ByteReader& in, std::vector<std::uint32_t>& numbers) {
+    numbers.resize(in.count(4));
+    for (std::uint32_t& number : numbers) number = in.number<std::uint32_t>();
+}
+void write_body(ByteWriter& out, const Members& m) {
+    write_numbers(out, m.workers);
+}
+void write_body(ByteWriter& out, const Ownership& m) {
+    out.number(m.owner);
+    out.number(m.from);
+    out.number<std::uint8_t>(m.traded);
+    out.number(m.step);
+    write(out, m.bodies);
+    write_applied(out, m.sources, m.applied);
+}
+void write_body(ByteWriter& out, const SnapshotMessage& m) {
+    out.number(m.snapshot.step);
+    write(out, m.snapshot.bodies);
+    write(out, m.snapshot.contacts);
+    write(out, m.snapshot.springs);
+}
+void write_body(ByteWriter& out, const StateMessage& m) {
+    write(out, m.report);
+    write(out, m.bodies);
+    write(out, m.contacts);
+    write(out, m.springs);
+}
+void write_body(ByteWriter& out, const UpdateMessage& m) {
+    write(out, m.report);
+    write_applied(out, m.sources, m.applied);
+    write(out, m.bodies);
+    write(out, m.pushes);
+    write_numbers(out, m.broken);
+}
+void write_body(ByteWriter&, const PackedUpdates&) {
+    throw std::invalid_argument("an update message that is packed already");
+}
+void write_body(ByteWriter& out, const Offer& m) {
+    if (m.bodies.size() != m.cost_s.size()) throw std::invalid_argument("an offer without all costs");
+    out.number(m.to);
+    out.number(m.number);
+    out.count(m.bodies.size());
+    for (std::size_t i = 0; i < m.bodies.size(); ++i) {
+        out.number(m.bodies[i]);
+        out.number(m.cost_s[i]);
+    }
+}
+void write_body(ByteWriter& out, const OfferAnswer& m) {
+    out.number(m.to);
+    out.number(m.number);
+    out.number<std::uint8_t>(m.accepted);
+}
+void write_body(ByteWriter& out, const Handover& m) {
+    out.number(m.to);
+    out.number(m.number);
+    write(out, m.bodies);
+    write_applied(out, m.sources, m.applied);
+}
+
+void read_body(ByteReader& in, JoinRequest& m) {
+    m.fingerprint = in.number<std::uint64_t>();
+    m.process = in.number<std::uint32_t>();
+    m.host = in.text(kLongestText);
+}
+void read_body(ByteReader&, WorldBeat&) {}
+void read_body(ByteReader&, Drained&) {}
+void read_body(ByteReader& in, WorkerFailure& m) {
+    m.what = in.text(kLongestText);
+}
+void read_body(ByteReader& in, SceneMessage& m) {
+    m.worker = in.number<std::uint32_t>();
+    m.scene = read_scene(in);
+    m.settings = read_settings(in);
+}
+void read_body(ByteReader& in, Refusal& m) {
+    m.why = in.text(kLongestText);
+}
+void read_body(ByteReader&, EndOfRun&) {}
+void read_body(ByteReader& in, Members& m) {
+    read_numbers(in, m.workers);
+}
+void read_body(ByteReader& in, Ownership& m) {
+    m.owner = in.number<std::uint32_t>();
+    m.from = in.number<std::uint32_t>();
+    m.traded = in.flag();
+    m.step = in.number<std::uint64_t>();
+    m.bodies = read_world_records(in);
+    read_applied(in, m.sources, m.applied);
+}
+void read_body(ByteReader& in, SnapshotMessage& m) {
+    m.snapshot.step = in.number<std::uint64_t>();
+    m.snapshot.bodies = read_world_records(in);
+    m.snapshot.contacts = read_contact_records(in);
+    m.snapshot.springs = read_spring_records(in);
+}
+void read_body(ByteReader& in, StateMessage& m) {
+    m.report = read_report(in);
+    m.bodies = read_world_records(in);
+    m.contacts = read_contact_records(in);
+    m.springs = read_spring_records(in);
+}
+void read_body(ByteReader& in, UpdateMessage& m) {
+    m.report = read_report(in);
+    read_applied(in, m.sources, m.applied);
+    m.bodies = read_updates(in);
+    m.pushes = read_pushes(in);
+    read_numbers(in, m.broken);
+}
+void read_body(ByteReader&, PackedUpdates&) {
+    throw DecodeError("a message of no known type");
+}
+void read_body(ByteReader& in, Offer& m) {
+    m.to = in.number<std::uint32_t>();
+    m.number = in.number<std::uint32_t>();
+    m.bodies.resize(in.count(8));
+    m.cost_s.resize(m.bodies.size());
+    for (std::size_t i = 0; i < m.bodies.size(); ++i) {
+        m.bodies[i] = in.number<std::uint32_t>();
+        m.cost_s[i] = in.number<float>();
+        if (m.bodies[i] >= kMostWorldBodies || !(m.cost_s[i] >= 0 && m.cost_s[i] <= 1e9f))
+            throw DecodeError("an offer out of range");
+    }
+}
+void read_body(ByteReader& in, OfferAnswer& m) {
+    m.to = in.number<std::uint32_t>();
+    m.number = in.number<std::uint32_t>();
+    m.accepted = in.flag();
+}
+void read_body(ByteReader& in, Handover& m) {
+    m.to = in.number<std::uint32_t>();
+    m.number = in.number<std::uint32_t>();
+    m.bodies = read_world_records(in);
+    read_applied(in, m.sources, m.applied);
+}
+
+/// The variant's alternative of index `type` - 1.
+template <std::size_t I = 0>
+WorldMessage read_message(std::size_t type, ByteReader& in) {
+    if constexpr (I < std::variant_size_v<WorldMessage>) {
+        if (type != I + 1) return read_message<I + 1>(type, in);
+        std::variant_alternative_t<I, WorldMessage> m;
+        read_body(in, m);
+        return m;
+    } else {
+        throw DecodeError("message type " + std::to_string(type) + ", expected 1 to " + std::to_string(I));
+    }
+}
+
+void expect(const char* what, std::uint64_t found, std::uint64_t expected) {
+    if (found == expected) return;
+    throw DecodeError(std::string(what) + " " + std::to_string(found) + ", expected " +
+                      std::to_string(expected));
+}
+
+/// Checks length and checksum; returns the type.
+std::uint16_t read_header(std::span<const std::uint8_t> bytes, WorldHeader& header) {
+    if (bytes.size() < kHeaderBytes + kChecksumBytes)
+        throw DecodeError("a message of " + std::to_string(bytes.size()) + " bytes");
+    ByteReader in(bytes.first(kHeaderBytes)), trailer(bytes.last(kChecksumBytes));
+    for (const std::uint8_t letter : kMagic) expect("first letters:", in.number<std::uint8_t>(), letter);
+    expect("version", in.number<std::uint16_t>(), kWorldProtocol);
+    const auto type = in.number<std::uint16_t>();
+    expect("length", in.number<std::uint32_t>(), bytes.size());
+    expect("checksum", trailer.number<std::uint32_t>(), crc32c(bytes.first(bytes.size() - kChecksumBytes)));
+    header.worker = in.number<std::uint32_t>();
+    header.epoch = in.number<std::uint32_t>();
+    header.step = in.number<std::uint64_t>();
+    return type;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encode(const WorldHeader& header, const WorldMessage& message) {
+    ByteWriter out;
+    for (const std::uint8_t letter : kMagic) out.number(letter);
+    out.number(kWorldProtocol);
+    out.number(static_cast<std::uint16_t>(message.index() + 1));
+    out.number<std::uint32_t>(0);
+    out.number(header.worker);
+    out.number(header.epoch);
+    out.number(header.step);
+    std::visit([&](const auto& m) { write_body(out, m); }, message);
+    const auto length = static_cast<std::uint32_t>(out.bytes().size() + kChecksumBytes);
+    std::memcpy(out.bytes().data() + kLengthAt, &length, sizeof length);
+    out.number(crc32c(out.bytes()));
+    return std::move(out.bytes());
+}
+
+DecodedWorldMessage decode_for_worker(std::vector<std::uint8_t> bytes) {
+    WorldHeader header;
+    const std::uint16_t type = read_header(bytes, header);
+    if (type != kUpdateType) return decode_world(bytes);
+    PackedUpdates packed;
+    const std::span<const std::uint8_t> all = std::span(bytes).first(bytes.size() - kChecksumBytes);
+    ByteReader in(all.subspan(kHeaderBytes));
+    packed.report = read_report(in);
+    read_applied(in, packed.sources, packed.applied);
+    find_updates(in, all, packed.bodies);
+    find_pushes(in, all, packed.pushes);
+    read_numbers(in, packed.broken);
+    in.expect_end();
+    packed.bytes = std::move(bytes);
+    return {header, std::move(packed)};
+}
+
+DecodedWorldMessage decode_world(std::span<const std::uint8_t> bytes) {
+    WorldHeader header;
+    const std::uint16_t type = read_header(bytes, header);
+    ByteReader body(bytes.subspan(kHeaderBytes, bytes.size() - kHeaderBytes - kChecksumBytes));
+    try {
+        WorldMessage message = read_message(type, body);
+        body.expect_end();
+        return {header, std::move(message)};
+    } catch (const std::invalid_argument& e) {
+        throw DecodeError(e.what());
+    }
+}
+
+}  // namespace sim

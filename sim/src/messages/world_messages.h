@@ -1,0 +1,229 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "messages/byte_codec.h"
+#include "sim/distributed_world.h"
+
+namespace sim {
+
+// Messages of a distributed world. One ZeroMQ frame each, little-endian, no padding.
+//
+//   offset  bytes
+//   0       4      "MWSW"
+//   4       2      version, 1
+//   6       2      type
+//   8       4      length of the whole message
+//   12      4      worker: sender; 0xffffffff the application
+//   16      4      epoch of ownership, as the sender knows it
+//   20      8      step: number of steps that the sender has done
+//   28      ...    body, by type
+//   end-4   4      CRC-32C (Castagnoli, reflected) of everything before
+//
+// f64, f32, f16 are IEEE numbers bit by bit, v3 = 3 f64, w3 = 3 f32, flag = u8 of 0 or 1, text = u32 length
+// and bytes, list = u32 count and the elements, b/m = u32: body below 2^24, and number of modes (at most
+// 128) times 2^24.
+//
+//    1 join       worker  u64 fingerprint, u32 process id, text host
+//    2 beat       both    nothing
+//    3 drained    worker  nothing
+//    4 failure    worker  text
+//    5 scene      app     u32 worker, scene, settings
+//    6 refusal    app     text
+//    7 end        app     nothing
+//    8 members    app     list of u32
+//    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of applied
+//   10 snapshot   app     u64 step, list of record, list of contact, list of spring
+//   11 state      worker  report, list of record, list of contact, list of spring
+//   12 update     worker  report, list of applied, list of update, list of push, list of u32 broken
+//   constraint 13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds} 14 answer     worker
+//   u32 to, u32 number, flag accepted 15 handover   worker  u32 to, u32 number, list of record, list of
+//   applied
+//
+//   report      52 bytes: f32 seconds, smoothed, waited; u32 lead, ghost age, cross contacts,
+//               own; v3 outside impulse
+//   applied     12 bytes: u32 worker, u64 step
+//   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8
+//               broken), u16 still steps, i32 sleep group, v3 position, f64 orientation w x y z, v3
+//               velocity, v3 angular momentum, f64 q[m], f64 q'[m]
+//   contact     10 + 32 n bytes: u32 a, u32 b, u8 (1 emerging), u8 n points of {u32 feature, w3 arm, f32
+//               normal impulse, w3 friction impulse}
+//   spring      17 bytes: u32 constraint, flag holds, w3 impulse
+//   update      36 + 4 m bytes, 84 with 12 modes, and 12 + 2 m if held, then 120:
+//               b/m, u8 (1 asleep, 2 still, 4 quarantined, 8 held, and 16 times E), w3 position,
+//               7 bytes orientation, 3 f16 velocity, 3 i16 angular momentum in units of 2^(4 E - 44)
+//               kg m^2/s, f16 q[m], f16 q'[m]; held: 3 f16 linear, 3 f16 angular, f16 modal[m]
+//   push        76 + 8 m bytes: b/m, v3 linear, v3 angular, w3 displacement, w3 turn, f32 q[m], q'[m] that
+//               it came to
+//   scene, settings: see world_scene_codec.cpp
+//
+// The 7 bytes of an orientation: 56 bits, lowest first: which of x, y, z, w is largest in size (2 bits; it is
+// made positive and follows from the others), the other three in that order, each 18 bits, 0 to 2^18 - 1 for
+// -1/sqrt 2 to 1/sqrt 2.
+//
+// What an update's numbers are off by, at most: position 2^-24 of each coordinate; orientation 1.9e-5 rad;
+// angular momentum 1/4095 of its largest coordinate (and 2^-45 kg m^2/s; no more than 2.1e9); f16 2^-11 of
+// each (and 3e-8; no more than 65504).
+//
+// A state that is not finite or beyond 1e7 m or 1e6 m/s is broken; World takes the body out at the next
+// step. Its numbers do not travel: zeros stand for them (and w = 1 for the orientation; in an update the
+// angular momentum is -32768 three times), and the decoder sets the position to NaN.
+//
+// Decoders check length, checksum, counts, flags, that every number is finite and in range, that nothing is
+// left over, and a scene as World would; else they throw DecodeError.
+
+constexpr std::uint32_t kApplication = 0xffffffff;
+constexpr std::uint16_t kWorldProtocol = 1;  ///< version
+
+struct WorldHeader {
+    std::uint32_t worker = kApplication;
+    std::uint32_t epoch = 0;
+    std::uint64_t step = 0;  ///< the sender's: number of steps it has done
+};
+
+/// What a worker tells of its last step, in every state and update message.
+struct StepReport {
+    float seconds = 0, smoothed_s = 0, waited_s = 0;
+    std::uint32_t lead = 0, ghost_age = 0, cross_contacts = 0;
+    std::uint32_t own = 0;
+    Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< since this worker's start
+};
+
+// Worker to application.
+struct JoinRequest {
+    std::uint64_t fingerprint = 0;
+    std::uint32_t process = 0;
+    std::string host;
+};
+struct WorldBeat {};    ///< both ways, every 0.1 s
+struct Drained {};      ///< worker: has given away all it owned and leaves
+struct WorkerFailure {  ///< worker: cannot go on
+    std::string what;
+};
+
+// Application to one worker.
+
+struct SceneMessage {
+    std::uint32_t worker = 0;  ///< the number of the one who joins
+    WorldScene scene;
+    DistributedSettings settings;
+};
+struct Refusal {  ///< of a join, or: you were given up
+    std::string why;
+};
+struct EndOfRun {};
+
+// Application to all workers.
+struct Members {
+    std::vector<std::uint32_t> workers;
+};
+/// Registered ownership: from the end of step `step` on `owner` steps these bodies. The header's epoch is the
+/// new one.
+struct Ownership {
+    std::uint32_t owner = 0;
+    std::uint32_t from = kApplication;  ///< who owned them before; kApplication: nobody
+    bool traded = false;                ///< by handover; else at the start or after a loss
+    std::uint64_t step = 0;
+    std::vector<WorldRecord> bodies;     ///< exact; without a handover in bounded pace as last published
+    std::vector<std::uint64_t> applied;  ///< bounded: see UpdateMessage; one for each entry of `sources`
+    std::vector<std::uint32_t> sources;
+};
+/// Everything at the end of a step that all have done, for who joins late.
+struct SnapshotMessage {
+    WorldSnapshot snapshot;
+};
+
+// Worker to all, through the application, after each step.
+
+/// Lockstep. All own bodies, and the contacts and constraints that belong to them.
+struct StateMessage {
+    StepReport report;
+    std::vector<WorldRecord> bodies;
+    std::vector<ContactRecord> contacts;
+    std::vector<SpringRecord> springs;
+};
+
+/// Bounded. A push: what the sender's bodies did to a body of another in the step that ended.
+struct Push {
+    std::uint32_t body = 0;
+    StepImpulse impulse;  ///< linear and angular exact, the rest as floats
+};
+/// One body's state, quantised: at most 120 bytes with 12 modes.
+struct Update {
+    std::uint32_t body = 0;
+    bool asleep = false, still = false, quarantined = false;
+    WorldBodyState state;
+    bool held = false;    ///< whether `impulse` is there
+    StepImpulse impulse;  ///< from the owner's other bodies, lasting; linear, angular, modal
+};
+struct UpdateMessage {
+    StepReport report;
+    /// Pushes that the states include: for each source worker all of its messages up to this step.
+    std::vector<std::uint32_t> sources;
+    std::vector<std::uint64_t> applied;
+    std::vector<Update> bodies;
+    std::vector<Push> pushes;
+    std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
+};
+
+/// An UpdateMessage as a worker gets it: of hundreds of bodies it needs the few that are near, so states and
+/// pushes are read one by one when they are needed.
+struct PackedUpdates {
+    struct Place {
+        std::uint32_t body, offset;
+    };
+    StepReport report;
+    std::vector<std::uint32_t> sources;
+    std::vector<std::uint64_t> applied;
+    std::vector<std::uint32_t> broken;
+    std::vector<std::uint8_t> bytes;
+    std::vector<Place> bodies, pushes;  ///< in bytes
+
+    /// Throw DecodeError.
+    [[nodiscard]] Update update(std::uint32_t offset) const;
+    [[nodiscard]] Push push(std::uint32_t offset) const;
+    /// What an update tells at a glance.
+    struct Glance {
+        Eigen::Vector3d position, velocity;  ///< [m], [m/s]
+        bool asleep, quarantined;
+    };
+    [[nodiscard]] Glance glance(std::uint32_t offset) const;
+};
+
+// Worker to worker, through the application. The market.
+struct Offer {
+    std::uint32_t to = 0, number = 0;  ///< number: of the seller's offers
+    std::vector<std::uint32_t> bodies;
+    std::vector<float> cost_s;  ///< of each, at the seller
+};
+struct OfferAnswer {
+    std::uint32_t to = 0, number = 0;
+    bool accepted = false;
+};
+/// To the application, which registers it or gives the bodies back: exact states at the end of the header's
+/// step.
+struct Handover {
+    std::uint32_t to = 0, number = 0;
+    std::vector<WorldRecord> bodies;
+    std::vector<std::uint32_t> sources;
+    std::vector<std::uint64_t> applied;
+};
+
+using WorldMessage = std::variant<JoinRequest, WorldBeat, Drained, WorkerFailure, SceneMessage, Refusal,
+                                  EndOfRun, Members, Ownership, SnapshotMessage, StateMessage, UpdateMessage,
+                                  Offer, OfferAnswer, Handover, PackedUpdates>;
+
+[[nodiscard]] std::vector<std::uint8_t> encode(const WorldHeader& header, const WorldMessage& message);
+struct DecodedWorldMessage {
+    WorldHeader header;
+    WorldMessage message;
+};
+/// The same, for workers: update messages as PackedUpdates (encode does not take these).
+[[nodiscard]] DecodedWorldMessage decode_for_worker(std::vector<std::uint8_t> bytes);
+/// Throws DecodeError for anything that encode cannot have written.
+[[nodiscard]] DecodedWorldMessage decode_world(std::span<const std::uint8_t> bytes);
+
+}  // namespace sim

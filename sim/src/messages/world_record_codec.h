@@ -1,0 +1,28 @@
+#pragma once
+#include "messages/world_messages.h"
+
+namespace sim {
+
+// Records of bodies, contacts and constraints, exact; see world_messages.h for the layout.
+
+constexpr std::uint32_t kMostWorldBodies = 1u << 24;
+
+/// A body's number and its count of modes in four bytes. Throws std::invalid_argument beyond 2^24 or 128.
+[[nodiscard]] std::uint32_t body_and_modes(std::uint32_t body, Eigen::Index modes);
+struct BodyAndModes {
+    std::uint32_t body;
+    int modes;
+};
+[[nodiscard]] BodyAndModes read_body_and_modes(ByteReader& in);
+
+/// Not finite, or beyond what World lets go on.
+[[nodiscard]] bool is_broken(const WorldBodyState& state);
+
+void write(ByteWriter& out, const std::vector<WorldRecord>& records);
+void write(ByteWriter& out, const std::vector<ContactRecord>& contacts);
+void write(ByteWriter& out, const std::vector<SpringRecord>& springs);
+[[nodiscard]] std::vector<WorldRecord> read_world_records(ByteReader& in);
+[[nodiscard]] std::vector<ContactRecord> read_contact_records(ByteReader& in);
+[[nodiscard]] std::vector<SpringRecord> read_spring_records(ByteReader& in);
+
+}  // namespace sim

@@ -1,0 +1,502 @@
+#include "shared/coordinator.h"
+
+#include <algorithm>
+
+#include "shared/initial_partition.h"
+#include "world/manifold.h"
+
+namespace sim {
+namespace {
+
+// Records of all bodies before their first step, those to come too.
+std::vector<WorldRecord> first_records(const WorldScene& scene) {
+    World world(scene.world);
+    for (const WorldBody& body : scene.later) world.add_body(body);
+    std::vector<WorldRecord> records;
+    for (int i = 0; i < world.bodies(); ++i) records.push_back(world.record(i));
+    return records;
+}
+
+std::shared_ptr<const std::vector<std::uint8_t>> shared(std::span<const std::uint8_t> bytes) {
+    return std::make_shared<const std::vector<std::uint8_t>>(bytes.begin(), bytes.end());
+}
+
+std::string name(std::uint32_t worker) {
+    return "worker " + std::to_string(worker);
+}
+
+}  // namespace
+
+Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& settings,
+                         DistributedObserver& observer)
+    : scene_(scene),
+      settings_(settings),
+      observer_(&observer),
+      view_(scene, settings.pace),
+      lots_(joined_lots(scene)) {
+    for (WorldRecord& record : first_records(scene)) {
+        const std::uint64_t born = view_.clock().born(static_cast<int>(bodies_.size()));
+        bodies_.push_back({kApplication, born, std::move(record), none_, 0});
+    }
+    quarantined_.assign(bodies_.size(), 0);
+}
+
+void Coordinator::send(std::vector<std::uint32_t> to, const WorldMessage& message) {
+    if (to.empty()) return;
+    const std::vector<std::uint8_t> bytes = encode({kApplication, epoch_, view_.step()}, message);
+    queue_.push_back({std::move(to), shared(bytes)});
+}
+
+std::vector<Coordinator::Outgoing> Coordinator::outgoing() {
+    return std::exchange(queue_, {});
+}
+
+bool Coordinator::is_member(std::uint32_t worker) const {
+    return std::find(members_.begin(), members_.end(), worker) != members_.end();
+}
+
+bool Coordinator::owns(std::uint32_t worker, std::uint32_t body) const {
+    return body < bodies_.size() && bodies_[body].owner == worker;
+}
+
+std::vector<int> Coordinator::owned_by(std::uint32_t worker) const {
+    std::vector<int> owned;
+    for (int i = 0; i < static_cast<int>(bodies_.size()); ++i)
+        if (view_.clock().moves(i) && owner(i) == worker) owned.push_back(i);
+    return owned;
+}
+
+// Joining and first owners.
+
+std::uint32_t Coordinator::join(const JoinRequest& request) {
+    const std::uint32_t worker = next_worker_++;
+    send({worker}, SceneMessage{worker, scene_, settings_});
+    observer_->note(name(worker) + " joins: process " + std::to_string(request.process) +
+                    (request.host.empty() ? "" : " on " + request.host));
+    members_.push_back(worker);
+    senders_[worker];
+    result_.workers = std::max(result_.workers, static_cast<int>(members_.size()));
+    if (finished_) {
+        send({worker}, EndOfRun{});
+    } else if (started_) {
+        catch_up(worker);
+        send(members_, Members{members_});
+        while (!orphans_.empty()) {
+            const auto orphans = std::move(orphans_.back());
+            orphans_.pop_back();
+            share_out(orphans.second, orphans.first);
+        }
+    }
+    return worker;
+}
+
+// A snapshot at the view's step and everything published of later ones. In lockstep a record that came with
+// ownership must not be known before the contacts that were published with it; in bounded pace an update
+// means something only with its owner known.
+void Coordinator::catch_up(std::uint32_t worker) {
+    send({worker}, SnapshotMessage{view_.snapshot()});
+    auto updates = [&] {
+        for (const auto& [step, bytes] : kept_) queue_.push_back({{worker}, bytes});
+    };
+    auto owners = [&] {
+        std::vector<int> all;
+        for (int i = 0; i < static_cast<int>(bodies_.size()); ++i)
+            if (view_.clock().moves(i) && owner(i) != kApplication) all.push_back(i);
+        for (const Group& group : groups(all)) send({worker}, ownership(group));
+    };
+    if (settings_.pace == Pace::bounded) owners();
+    updates();
+    if (settings_.pace == Pace::lockstep) owners();
+}
+
+void Coordinator::start() {
+    started_ = true;
+    observer_->at(0, view_.world());
+    send(members_, Members{members_});
+    if (members_.empty()) {  // all lost before: the next to join gets everything
+        std::vector<int> all;
+        for (const std::vector<int>& lot : lots_) all.insert(all.end(), lot.begin(), lot.end());
+        orphans_.emplace_back(kApplication, std::move(all));
+    } else {
+        const int workers = settings_.all_to_first ? 1 : static_cast<int>(members_.size());
+        const std::vector<int> first = first_owners(scene_, lots_, workers);
+        std::vector<std::vector<int>> bodies(members_.size());
+        for (std::size_t i = 0; i < lots_.size(); ++i) {
+            auto& mine = bodies[static_cast<std::size_t>(first[i])];
+            mine.insert(mine.end(), lots_[i].begin(), lots_[i].end());
+        }
+        for (std::size_t i = 0; i < members_.size(); ++i)
+            register_owner(bodies[i], members_[i], kApplication, false);
+    }
+    advance();
+}
+
+// The register.
+
+std::vector<Coordinator::Group> Coordinator::groups(const std::vector<int>& bodies) const {
+    std::vector<Group> groups;
+    for (const int body : bodies) {
+        const Body& b = bodies_[static_cast<std::size_t>(body)];
+        auto same = [&b](const Group& g) {
+            return g.owner == b.owner && g.step == b.step && g.applied == b.applied;
+        };
+        const auto found = std::find_if(groups.begin(), groups.end(), same);
+        if (found == groups.end()) {
+            groups.push_back({b.owner, b.step, b.applied, {body}});
+        } else {
+            found->bodies.push_back(body);
+        }
+    }
+    // Who owned nothing begins with the first.
+    std::sort(groups.begin(), groups.end(), [](const Group& a, const Group& b) {
+        return std::pair(a.step, a.bodies.front()) < std::pair(b.step, b.bodies.front());
+    });
+    return groups;
+}
+
+Ownership Coordinator::ownership(const Group& group) const {
+    Ownership message;
+    message.owner = group.owner;
+    message.step = group.step;
+    message.sources = group.applied->sources;
+    message.applied = group.applied->steps;
+    for (const int body : group.bodies)
+        message.bodies.push_back(bodies_[static_cast<std::size_t>(body)].record);
+    return message;
+}
+
+void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t owner, std::uint32_t from,
+                                 bool traded) {
+    for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = owner;
+    for (const Group& group : groups(bodies)) {
+        ++epoch_;
+        for (const int body : group.bodies) bodies_[static_cast<std::size_t>(body)].epoch = epoch_;
+        Ownership message = ownership(group);
+        message.from = from;
+        message.traded = traded;
+        send(members_, message);
+        observer_->moved(group.step, static_cast<int>(group.bodies.size()),
+                         from == kApplication ? -1 : static_cast<int>(from), static_cast<int>(owner));
+    }
+}
+
+// To whoever has least, what is joined together.
+void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from) {
+    for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = kApplication;
+    if (members_.empty()) {
+        if (!bodies.empty()) orphans_.emplace_back(from, bodies);
+        return;
+    }
+    std::map<std::uint32_t, std::size_t> count;
+    for (const std::uint32_t worker : members_) count[worker] = owned_by(worker).size();
+    std::map<std::uint32_t, std::vector<int>> shares;
+    for (const std::vector<int>& lot : lots_) {
+        std::vector<int> some;
+        for (const int body : lot)
+            if (std::binary_search(bodies.begin(), bodies.end(), body)) some.push_back(body);
+        if (some.empty()) continue;
+        const auto least = std::min_element(count.begin(), count.end(),
+                                            [](const auto& a, const auto& b) { return a.second < b.second; });
+        least->second += some.size();
+        auto& share = shares[least->first];
+        share.insert(share.end(), some.begin(), some.end());
+    }
+    for (const auto& [worker, share] : shares) register_owner(share, worker, from, false);
+}
+
+void Coordinator::remove(std::uint32_t worker) {
+    std::erase(members_, worker);
+    if (started_) send(members_, Members{members_});
+    share_out(owned_by(worker), worker);
+    advance();
+}
+
+void Coordinator::lose(std::uint32_t worker, const std::string& why) {
+    if (!is_member(worker)) return;
+    observer_->note(name(worker) + " is lost: " + why);
+    ++result_.lost;
+    result_.bodies_reowned += static_cast<int>(owned_by(worker).size());
+    send({worker}, Refusal{why});
+    remove(worker);
+}
+
+void Coordinator::lose_slowest(const std::string& why) {
+    const std::uint32_t* slowest = nullptr;
+    for (const std::uint32_t& worker : members_)
+        if (!owned_by(worker).empty() && (!slowest || senders_[worker].step < senders_[*slowest].step))
+            slowest = &worker;
+    if (slowest) lose(std::uint32_t(*slowest), why);
+}
+
+// What members say.
+
+void Coordinator::refuse(std::uint32_t worker, const std::string& why) {
+    ++result_.refused_messages;
+    const auto sender = senders_.find(worker);
+    if (sender == senders_.end() || std::exchange(sender->second.refused, true)) return;
+    observer_->note("a message of " + name(worker) + " is refused: " + why);
+}
+
+// A member that publishes what cannot be: the others would wait for its step for ever.
+void Coordinator::expel(std::uint32_t worker, const std::string& why) {
+    refuse(worker, why);
+    lose(worker, "its message was refused: " + why);
+}
+
+void Coordinator::take(std::uint32_t worker, std::span<const std::uint8_t> bytes) {
+    if (finished_) return;
+    if (!is_member(worker)) return refuse(worker, "found a worker that is no member, expected a member");
+    result_.bytes += bytes.size();
+    senders_[worker].bytes += bytes.size();
+    try {
+        DecodedWorldMessage decoded = decode_world(bytes);
+        if (decoded.header.worker != worker || decoded.header.epoch > epoch_ ||
+            decoded.header.step > settings_.steps)
+            return expel(worker, "found another worker's number, or a step or epoch to come");
+        take_message(decoded.header, bytes, std::move(decoded.message));
+    } catch (const DecodeError& error) {
+        expel(worker, error.what());
+    }
+}
+
+void Coordinator::take_message(const WorldHeader& header, std::span<const std::uint8_t> bytes,
+                               WorldMessage&& message) {
+    const std::uint32_t worker = header.worker;
+    if (auto* state = std::get_if<StateMessage>(&message))
+        return take_state(header, bytes, std::move(*state));
+    if (auto* update = std::get_if<UpdateMessage>(&message))
+        return take_update(header, bytes, std::move(*update));
+    if (auto* handover = std::get_if<Handover>(&message)) return take_handover(header, std::move(*handover));
+    if (const auto* offer = std::get_if<Offer>(&message)) return take_dealing(header, bytes, offer->to);
+    if (const auto* answer = std::get_if<OfferAnswer>(&message))
+        return take_dealing(header, bytes, answer->to);
+    if (std::holds_alternative<WorldBeat>(message)) return;
+    if (const auto* failure = std::get_if<WorkerFailure>(&message)) return lose(worker, failure->what);
+    if (std::holds_alternative<Drained>(message)) {
+        observer_->note(name(worker) + " leaves");
+        ++result_.left;
+        return remove(worker);
+    }
+    refuse(worker, "found a message that no worker sends, expected one of a worker");
+}
+
+void Coordinator::take_dealing(const WorldHeader& header, std::span<const std::uint8_t> bytes,
+                               std::uint32_t to) {
+    if (to == header.worker) return refuse(header.worker, "found a dealing with itself");
+    if (is_member(to)) queue_.push_back({{to}, shared(bytes)});  // else it has left meanwhile
+}
+
+bool Coordinator::fits(std::uint32_t body, Eigen::Index modes) const {
+    return body < bodies_.size() && bodies_[body].record.state.q.size() == modes;
+}
+
+// Whether these are the worker's bodies, as they may be.
+bool Coordinator::fits(std::uint32_t worker, const std::vector<WorldRecord>& records) const {
+    return std::all_of(records.begin(), records.end(), [&](const WorldRecord& r) {
+        const auto body = static_cast<std::uint32_t>(r.body);
+        return owns(worker, body) && fits(body, r.state.q.size()) && r.sleep_group >= -1 &&
+               r.sleep_group <= r.body;
+    });
+}
+
+bool Coordinator::owns_constraint(std::uint32_t worker, int constraint) const {
+    if (constraint < 0 || constraint >= static_cast<int>(scene_.world.constraints.size())) return false;
+    const PointConstraint& c = scene_.world.constraints[static_cast<std::size_t>(constraint)];
+    const int first = view_.clock().moves(c.body_a) || c.body_b < 0 ? c.body_a : c.body_b;
+    return owns(worker, static_cast<std::uint32_t>(first));
+}
+
+// Contacts and constraints travel with their first body that moves.
+bool Coordinator::own_contacts(std::uint32_t worker, const StateMessage& message) const {
+    const auto bodies = static_cast<int>(bodies_.size());
+    const auto planes = static_cast<int>(scene_.world.planes.size());
+    const bool contacts =
+        std::all_of(message.contacts.begin(), message.contacts.end(), [&](const ContactRecord& c) {
+            const bool b = c.b >= kFirstPlane ? c.b - kFirstPlane < planes : c.b < bodies;
+            if (c.a < 0 || c.a >= bodies || c.b <= c.a || !b) return false;
+            const int first = view_.clock().moves(c.a) ? c.a : c.b;
+            return owns(worker, static_cast<std::uint32_t>(first));
+        });
+    return contacts &&
+           std::all_of(message.springs.begin(), message.springs.end(),
+                       [&](const SpringRecord& s) { return owns_constraint(worker, s.constraint); });
+}
+
+void Coordinator::publish(Body& body, WorldRecord&& record, std::uint64_t step,
+                          std::shared_ptr<const Applied> applied) {
+    if (step < body.step) return;
+    body.record = std::move(record);
+    body.step = step;
+    body.applied = std::move(applied);
+}
+
+void Coordinator::take_state(const WorldHeader& header, std::span<const std::uint8_t> bytes,
+                             StateMessage&& message) {
+    if (settings_.pace != Pace::lockstep || header.step == 0 || header.step > view_.step() + 1 ||
+        !fits(header.worker, message.bodies))
+        return expel(header.worker, "found states that are not its to publish");
+    if (!own_contacts(header.worker, message))
+        return expel(header.worker, "found contacts that are not its to publish");
+    for (const WorldRecord& record : message.bodies)
+        publish(bodies_[static_cast<std::size_t>(record.body)], WorldRecord(record), header.step, none_);
+    report(header, message.report, message.bodies.size(), bytes.size());
+    pass_on(header, bytes);
+    view_.take(header.step, std::move(message));
+    advance();
+}
+
+void Coordinator::take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes,
+                              UpdateMessage&& message) {
+    Sender& sender = senders_[header.worker];
+    // Of the last step there are two: as done, for the others, and with what came late, for the view.
+    const bool last = header.step == settings_.steps;
+    const bool settled = last && sender.step == header.step;
+    const bool own = std::all_of(message.bodies.begin(), message.bodies.end(), [&](const Update& u) {
+        return owns(header.worker, u.body) && fits(u.body, u.state.q.size()) &&
+               (!u.held || fits(u.body, u.impulse.modal.size()));
+    });
+    const bool pushes = std::all_of(message.pushes.begin(), message.pushes.end(),
+                                    [&](const Push& p) { return fits(p.body, p.impulse.modal_q.size()); });
+    const bool constraints = std::all_of(message.broken.begin(), message.broken.end(), [&](std::uint32_t c) {
+        return owns_constraint(header.worker, static_cast<int>(c));
+    });
+    if (settings_.pace != Pace::bounded || !own || !pushes || !constraints || header.step < sender.step ||
+        (header.step == sender.step && header.step != settings_.steps))
+        return expel(header.worker, "found states that are not its to publish");
+    sender.settled = settled;
+    for (const std::uint32_t constraint : message.broken)
+        view_.break_constraint(static_cast<int>(constraint));
+    const auto applied = std::make_shared<const Applied>(Applied{message.sources, message.applied});
+    for (const Update& update : message.bodies) {
+        WorldRecord record;
+        record.body = static_cast<int>(update.body);
+        record.state = update.state;
+        record.asleep = update.asleep, record.quarantined = update.quarantined;
+        publish(bodies_[update.body], std::move(record), header.step, applied);
+    }
+    if (!last || sender.settled) extend_sleep(header, applied);
+    report(header, message.report, message.bodies.size(), bytes.size());
+    if (!sender.settled) pass_on(header, bytes);
+    if (!last || sender.settled) view_.take(header.step, message.bodies);
+    advance();
+}
+
+// What sleeps is not published again until it wakes. (Bodies that the sender did not know to be its own when
+// it wrote this are left out.)
+void Coordinator::extend_sleep(const WorldHeader& header, const std::shared_ptr<const Applied>& applied) {
+    std::vector<WorldRecord> asleep;
+    for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
+        Body& body = bodies_[static_cast<std::size_t>(i)];
+        if (body.owner != header.worker || body.epoch > header.epoch || body.step >= header.step) continue;
+        if (!body.record.asleep || !view_.clock().moves_at(i, header.step)) continue;
+        body.step = header.step;
+        body.applied = applied;
+        asleep.push_back(body.record);
+    }
+    view_.take(header.step, asleep);
+}
+
+void Coordinator::take_handover(const WorldHeader& header, Handover&& message) {
+    if (!fits(header.worker, message.bodies))
+        return refuse(header.worker, "found bodies that are not its to hand over");
+    std::vector<int> bodies;
+    for (const WorldRecord& record : message.bodies) {
+        // In lockstep what is handed over was published before, with its contacts.
+        if (settings_.pace == Pace::lockstep &&
+            header.step > bodies_[static_cast<std::size_t>(record.body)].step)
+            return refuse(header.worker, "found bodies that it has not published");
+        bodies.push_back(record.body);
+    }
+    std::sort(bodies.begin(), bodies.end());
+    if (std::adjacent_find(bodies.begin(), bodies.end()) != bodies.end())
+        return refuse(header.worker, "found a body twice");
+    view_.take(header.step, message.bodies);
+    const auto applied = std::make_shared<const Applied>(Applied{message.sources, message.applied});
+    for (WorldRecord& record : message.bodies) {
+        Body& body = bodies_[static_cast<std::size_t>(record.body)];
+        publish(body, std::move(record), header.step,
+                settings_.pace == Pace::lockstep ? body.applied : applied);
+    }
+    const bool traded = is_member(message.to) && message.to != header.worker;
+    if (traded) {
+        ++result_.trades;
+        result_.migrations += bodies.size();
+        register_owner(bodies, message.to, header.worker, true);
+    } else if (message.to == kApplication && members_.size() > 1) {
+        // Of one who leaves: not back to it.
+        const std::vector<std::uint32_t> all = members_;
+        std::erase(members_, header.worker);
+        share_out(bodies, header.worker);
+        members_ = all;
+    } else {
+        register_owner(bodies, header.worker, header.worker, false);
+    }
+    advance();
+}
+
+void Coordinator::pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes) {
+    const auto copy = shared(bytes);
+    std::vector<std::uint32_t> others = members_;
+    std::erase(others, header.worker);
+    if (!others.empty()) queue_.push_back({std::move(others), copy});
+    kept_.emplace_back(header.step, copy);
+}
+
+void Coordinator::report(const WorldHeader& header, const StepReport& report, std::size_t records,
+                         std::size_t bytes) {
+    Sender& sender = senders_[header.worker];
+    sender.step = std::max(sender.step, header.step);
+    WorkerStep step;
+    step.worker = static_cast<int>(header.worker);
+    step.step = header.step;
+    step.seconds = report.seconds, step.smoothed_s = report.smoothed_s, step.waited_s = report.waited_s;
+    step.bodies = static_cast<int>(report.own);
+    step.lead = static_cast<int>(report.lead), step.ghost_age = static_cast<int>(report.ghost_age);
+    step.bytes = std::exchange(sender.bytes, 0);
+    step.cross_contacts = static_cast<int>(report.cross_contacts);
+    result_.cpu_s += report.seconds;
+    result_.cross_contacts += report.cross_contacts;
+    result_.bytes_states += bytes;
+    result_.records += records;
+    result_.largest_lead = std::max(result_.largest_lead, step.lead);
+    result_.largest_ghost_age = std::max(result_.largest_ghost_age, step.ghost_age);
+    outside_[header.worker] = report.outside_impulse;
+    observer_->worked(step);
+}
+
+// The view.
+
+void Coordinator::advance() {
+    while (started_ && !finished_) {
+        if (settings_.until_rest && view_.at_rest()) return end(true);
+        if (view_.step() >= settings_.steps) return end(false);
+        if (settings_.pace == Pace::bounded) release();
+        if (!view_.advance()) return;
+        const World& world = view_.world();
+        for (int i = 0; i < world.bodies(); ++i)
+            if (Body& body = bodies_[static_cast<std::size_t>(i)];
+                body.record.quarantined && std::exchange(quarantined_[static_cast<std::size_t>(i)], 1) == 0)
+                result_.quarantined.push_back({i, view_.step(), "state"});
+        observer_->at(view_.step(), world);
+        std::erase_if(kept_, [this](const auto& kept) { return kept.first <= view_.step(); });
+    }
+}
+
+// A body that came to a worker after its last step is published no more.
+void Coordinator::release() {
+    for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
+        const auto sender = senders_.find(owner(i));
+        if (sender != senders_.end() && sender->second.settled) view_.release(i);
+    }
+}
+
+void Coordinator::end(bool rest) {
+    finished_ = true;
+    result_.steps = view_.step();
+    result_.rest_reached = rest;
+    result_.counts = view_.world().counts();
+    for (const auto& [worker, impulse] : outside_) result_.outside_impulse += impulse;
+    send(members_, EndOfRun{});
+}
+
+}  // namespace sim

@@ -1,0 +1,124 @@
+#pragma once
+#include <deque>
+#include <map>
+#include <memory>
+
+#include "shared/world_view.h"
+
+namespace sim {
+
+/// The application's part without clock and sockets: members, the register of owners, passing on, the view of
+/// the whole world. All traffic goes through it, so it is one order of events for all: a worker is reachable
+/// for everybody or for nobody, and a body has the owner that the register says.
+///
+/// Bodies that do not move belong to nobody. Bodies to come have owners from the start, from the step before
+/// which they come.
+class Coordinator {
+public:
+    Coordinator(const WorldScene& scene, const DistributedSettings& settings, DistributedObserver& observer);
+
+    struct Outgoing {
+        std::vector<std::uint32_t> to;
+        std::shared_ptr<const std::vector<std::uint8_t>> bytes;
+    };
+    /// Number of the new worker. Queues its scene, then what it has to know.
+    std::uint32_t join(const JoinRequest& request);
+    void start();  ///< first owners; bodies go to who is there
+    /// What a member sent, as it came. Anything that is malformed, not the member's to say, or stale is
+    /// counted and dropped.
+    void take(std::uint32_t worker, std::span<const std::uint8_t> bytes);
+    void lose(std::uint32_t worker,
+              const std::string& why);  ///< its bodies go to the others; its messages count no more
+    /// Of those who own bodies the one that has published least is lost: for when nothing has been published
+    /// for long, though all are heard.
+    void lose_slowest(const std::string& why);
+    /// Grows with everything that is published.
+    [[nodiscard]] std::uint64_t published() const noexcept { return result_.records; }
+    [[nodiscard]] std::vector<Outgoing> outgoing();
+    [[nodiscard]] const std::vector<std::uint32_t>& members() const noexcept { return members_; }
+    [[nodiscard]] bool finished() const noexcept { return finished_; }
+    [[nodiscard]] const DistributedResult& result() const noexcept { return result_; }  ///< no elapsed_s
+    /// By the register; kApplication: nobody.
+    [[nodiscard]] std::uint32_t owner(int body) const {
+        return bodies_[static_cast<std::size_t>(body)].owner;
+    }
+
+private:
+    /// Pushes that published states include, see UpdateMessage.
+    struct Applied {
+        std::vector<std::uint32_t> sources;
+        std::vector<std::uint64_t> steps;
+    };
+    struct Body {
+        std::uint32_t owner = kApplication;
+        std::uint64_t step = 0;  ///< of the record
+        WorldRecord record;      ///< last published
+        std::shared_ptr<const Applied> applied;
+        std::uint32_t epoch = 0;  ///< of its owner
+    };
+    struct Sender {
+        std::uint64_t step = 0, bytes = 0;  ///< last published; sent since
+        bool refused = false;               ///< something, and it was noted
+        bool settled = false;               ///< bounded: has published the last step again
+    };
+    struct Group {
+        std::uint32_t owner;
+        std::uint64_t step;
+        std::shared_ptr<const Applied> applied;
+        std::vector<int> bodies;
+    };
+
+    void take_message(const WorldHeader& header, std::span<const std::uint8_t> bytes, WorldMessage&& message);
+    void take_state(const WorldHeader& header, std::span<const std::uint8_t> bytes, StateMessage&& message);
+    void take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes, UpdateMessage&& message);
+    void extend_sleep(const WorldHeader& header, const std::shared_ptr<const Applied>& applied);
+    void take_handover(const WorldHeader& header, Handover&& message);
+    void take_dealing(const WorldHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
+    void report(const WorldHeader& header, const StepReport& report, std::size_t records, std::size_t bytes);
+    void pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes);
+    void refuse(std::uint32_t worker, const std::string& why);
+    void expel(std::uint32_t worker, const std::string& why);
+    [[nodiscard]] bool is_member(std::uint32_t worker) const;
+    [[nodiscard]] bool owns(std::uint32_t worker, std::uint32_t body) const;
+    [[nodiscard]] bool fits(std::uint32_t body, Eigen::Index modes) const;
+    [[nodiscard]] bool fits(std::uint32_t worker, const std::vector<WorldRecord>& records) const;
+    [[nodiscard]] bool owns_constraint(std::uint32_t worker, int constraint) const;
+    [[nodiscard]] bool own_contacts(std::uint32_t worker, const StateMessage& message) const;
+    void publish(Body& body, WorldRecord&& record, std::uint64_t step,
+                 std::shared_ptr<const Applied> applied);
+
+    void remove(std::uint32_t worker);
+    void share_out(const std::vector<int>& bodies, std::uint32_t from);
+    [[nodiscard]] std::vector<int> owned_by(std::uint32_t worker) const;
+    [[nodiscard]] std::vector<Group> groups(const std::vector<int>& bodies) const;
+    void register_owner(const std::vector<int>& bodies, std::uint32_t owner, std::uint32_t from, bool traded);
+    [[nodiscard]] Ownership ownership(const Group& group) const;
+    void catch_up(std::uint32_t worker);
+    void advance();
+    void release();
+    void end(bool rest);
+
+    void send(std::vector<std::uint32_t> to, const WorldMessage& message);
+
+    const std::shared_ptr<const Applied> none_ = std::make_shared<const Applied>();
+    WorldScene scene_;
+    DistributedSettings settings_;
+    DistributedObserver* observer_;
+    WorldView view_;
+    std::vector<std::vector<int>> lots_;
+    std::vector<Body> bodies_;
+    std::vector<std::uint32_t> members_;
+    std::map<std::uint32_t, Sender> senders_;
+    std::uint32_t next_worker_ = 0, epoch_ = 0;
+    bool started_ = false, finished_ = false;
+    std::vector<Outgoing> queue_;
+    /// State and update messages of steps that the view has not reached, for who joins.
+    std::deque<std::pair<std::uint64_t, std::shared_ptr<const std::vector<std::uint8_t>>>> kept_;
+    std::vector<std::uint8_t> quarantined_;
+    std::vector<std::pair<std::uint32_t, std::vector<int>>>
+        orphans_;                                       // by whom they were lost; nobody was left
+    std::map<std::uint32_t, Eigen::Vector3d> outside_;  // of each worker since its start
+    DistributedResult result_;
+};
+
+}  // namespace sim

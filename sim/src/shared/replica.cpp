@@ -1,0 +1,136 @@
+#include "shared/replica.h"
+
+#include <algorithm>
+
+namespace sim {
+
+SceneClock::SceneClock(const WorldScene& scene) {
+    scene_.later = scene.later;
+    scene_.events = scene.events;
+    born_.assign(scene.world.bodies.size() + scene.later.size(), 0);
+    for (const WorldEvent& event : scene.events)
+        for (std::size_t i = event.first; i < event.end; ++i)
+            born_[scene.world.bodies.size() + i] = event.step;
+    for (const WorldBody& body : scene.world.bodies) {
+        moves_.push_back(!body.fixed);
+        moving_at_first_ += !body.fixed;
+    }
+    for (const WorldBody& body : scene.later) moves_.push_back(!body.fixed);
+    first_later_ = static_cast<int>(scene.world.bodies.size());
+}
+
+void SceneClock::apply(World& world, std::uint64_t step) {
+    for (; next_ < scene_.events.size() && scene_.events[next_].step <= step; ++next_) {
+        const WorldEvent& event = scene_.events[next_];
+        for (const int constraint : event.removed) world.remove_constraint(constraint);
+        for (std::size_t i = event.first; i < event.end; ++i)
+            world.set_own(world.add_body(scene_.later[i]), false);
+    }
+}
+
+bool SceneClock::moves_at(int body, std::uint64_t step) const {
+    return moves(body) && (body < first_later_ || born(body) < step);
+}
+
+int SceneClock::moving(std::uint64_t step) const {
+    int count = moving_at_first_;
+    for (int i = first_later_; i < bodies(); ++i) count += moves_at(i, step);
+    return count;
+}
+
+Replica::Replica(const WorldScene& scene) : world_(scene.world), clock_(scene) {
+    world_.share(Sharing::islands);
+    for (int i = 0; i < world_.bodies(); ++i) world_.set_own(i, false);
+}
+
+Replica::Known& Replica::at(std::uint64_t step) {
+    Known& known = known_[step];
+    if (known.body.empty()) known.body.assign(static_cast<std::size_t>(clock_.bodies()), 0);
+    return known;
+}
+
+void Replica::mark(Known& known, std::uint64_t step, int body) const {
+    std::uint8_t& there = known.body[static_cast<std::size_t>(body)];
+    if (there == 0 && clock_.moves_at(body, step)) ++known.moving;
+    there = 1;
+}
+
+void Replica::note(std::uint64_t step, std::vector<WorldRecord>&& bodies,
+                   std::vector<ContactRecord>&& contacts, std::vector<SpringRecord>&& springs) {
+    if (step < step_ || (step == step_ && whole_)) return;
+    Known& known = at(step);
+    for (WorldRecord& record : bodies) {
+        if (known.body[static_cast<std::size_t>(record.body)] != 0) continue;
+        if (!clock_.moves_at(record.body, step)) continue;
+        mark(known, step, record.body);
+        known.bodies.push_back(std::move(record));
+    }
+    known.contacts.insert(known.contacts.end(), contacts.begin(), contacts.end());
+    known.springs.insert(known.springs.end(), springs.begin(), springs.end());
+}
+
+bool Replica::all_known(std::uint64_t step) const {
+    const auto found = known_.find(step);
+    return (found == known_.end() ? 0 : found->second.moving) == clock_.moving(step);
+}
+
+void Replica::sort_contacts(Known& known) const {
+    auto key = [](const ContactRecord& c) { return std::pair(c.a, c.b); };
+    std::sort(known.contacts.begin(), known.contacts.end(),
+              [&](const ContactRecord& a, const ContactRecord& b) { return key(a) < key(b); });
+    known.contacts.erase(
+        std::unique(known.contacts.begin(), known.contacts.end(),
+                    [&](const ContactRecord& a, const ContactRecord& b) { return key(a) == key(b); }),
+        known.contacts.end());
+}
+
+bool Replica::advance(bool along) {
+    if (!whole_) {
+        if (!all_known(step_)) return false;
+        Known& known = at(step_);
+        sort_contacts(known);
+        for (const WorldRecord& record : known.bodies) world_.restore(record);
+        world_.restore_contacts(known.contacts, known.springs);
+    } else {
+        if (!along || !all_known(step_ + 1)) return false;
+        begin();
+        ++step_;
+        Known& known = at(step_);
+        sort_contacts(known);
+        world_.rewind({step_, std::move(known.bodies), std::move(known.contacts), std::move(known.springs)});
+    }
+    whole_ = true;
+    known_.erase(known_.begin(), known_.upper_bound(step_));
+    return true;
+}
+
+void Replica::stepped(std::span<const std::uint8_t> own) {
+    ++step_;
+    whole_ = false;
+    Known& known = at(step_);
+    for (int i = 0; i < world_.bodies(); ++i)
+        if (own[static_cast<std::size_t>(i)] != 0) mark(known, step_, i);
+}
+
+void Replica::undo(const WorldSnapshot& before, std::span<const std::uint8_t> own,
+                   const std::vector<SpringRecord>& springs) {
+    Known& known = at(step_);
+    for (int i = 0; i < world_.bodies(); ++i)
+        if (own[static_cast<std::size_t>(i)] != 0) known.bodies.push_back(world_.record(i));
+    const WorldSnapshot now = world_.snapshot();
+    known.contacts.insert(known.contacts.end(), now.contacts.begin(), now.contacts.end());
+    known.springs.insert(known.springs.end(), springs.begin(), springs.end());
+    world_.rewind(before);
+    --step_;
+    whole_ = true;
+}
+
+void Replica::jump(const WorldSnapshot& snapshot) {
+    if (snapshot.step > 0) clock_.apply(world_, snapshot.step - 1);
+    world_.rewind(snapshot);
+    step_ = snapshot.step;
+    whole_ = true;
+    known_.erase(known_.begin(), known_.upper_bound(step_));
+}
+
+}  // namespace sim

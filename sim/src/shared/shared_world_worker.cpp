@@ -1,0 +1,201 @@
+#include "shared/shared_world_worker.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace sim {
+
+SharedWorldWorker::SharedWorldWorker(const SceneMessage& scene)
+    : self_(scene.worker),
+      exchange_(scene.settings.pace == Pace::lockstep ? make_lockstep_exchange(scene)
+                                                      : make_bounded_exchange(scene)),
+      market_(scene.worker, scene.settings.market, scene.settings.pace == Pace::bounded),
+      bounded_(scene.settings.pace == Pace::bounded) {
+    for (const WorldEvent& event : scene.scene.events)
+        if (!event.slowing.empty()) events_.push_back(event);
+}
+
+void SharedWorldWorker::take(const WorldHeader& header, WorldMessage&& message) {
+    if (left_ || ended_) return;
+    std::visit([&](auto&& m) { take_message(header, std::forward<decltype(m)>(m)); }, std::move(message));
+    if (left_ || ended_) return;
+    exchange_->follow();
+    if (bounded_) hand_over();  // the next step may have to wait for the buyer
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, Members&& message) {
+    (void)header;
+    exchange_->members(message.workers);
+    std::erase_if(sellers_, [&message](std::uint32_t seller) {
+        return std::find(message.workers.begin(), message.workers.end(), seller) == message.workers.end();
+    });
+    market_.members(message.workers);
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, Ownership&& message) {
+    epoch_ = header.epoch;
+    exchange_->own(message);
+    market_.registered(header.epoch, message);
+    if (message.traded) std::erase(sellers_, message.from);
+    // Who came to the last step by taking bodies over has to say so, once.
+    if (exchange_->at_end() && exchange_->own_bodies() > 0 && published_ < exchange_->steps_done() &&
+        !stepping_ && bounded_)
+        publish(0, 0);
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, SnapshotMessage&& message) {
+    (void)header;
+    exchange_->take(std::move(message));
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, StateMessage&& message) {
+    market_.heard(header.worker, header.epoch, message.report);
+    exchange_->take(header, std::move(message));
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, PackedUpdates&& message) {
+    market_.heard(header.worker, header.epoch, message.report);
+    exchange_->take(header, std::move(message));
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, Offer&& message) {
+    OfferAnswer answer = {header.worker, message.number, false};
+    if (!draining_ && !exchange_->at_end()) answer = market_.answer(header.worker, message);
+    if (answer.accepted && bounded_) sellers_.push_back(header.worker);
+    send(answer);
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, OfferAnswer&& message) {
+    market_.answered(header.worker, message);
+    handover_step_ = header.step;
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, EndOfRun&& message) {
+    (void)header, (void)message;
+    ended_ = true;
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, Refusal&& message) {
+    (void)header, (void)message;
+    ended_ = true;
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, WorldBeat&& message) {
+    (void)header, (void)message;
+}
+
+template <typename Other>
+void SharedWorldWorker::take_message(const WorldHeader& header, Other&& message) {
+    (void)header, (void)message;
+    throw DecodeError("found a message that no worker gets, expected one for a worker");
+}
+
+bool SharedWorldWorker::ready() const {
+    return !left_ && !ended_ && !stepping_ && sellers_.empty() && exchange_->ready();
+}
+
+std::string SharedWorldWorker::waits_for() const {
+    if (ready()) return "nothing";
+    if (left_ || ended_) return "nobody any more";
+    if (exchange_->own_bodies() == 0) return "bodies";
+    if (sellers_.empty()) return std::to_string(exchange_->lead()).append(" steps for the slowest");
+    std::string who = "bodies from";
+    for (const std::uint32_t seller : sellers_) who.append(" ").append(std::to_string(seller));
+    return who;
+}
+
+void SharedWorldWorker::step() {
+    lead_ = exchange_->lead();
+    stepping_ = true;
+    exchange_->step();
+}
+
+double SharedWorldWorker::work() const {
+    const World& world = exchange_->world();
+    double sum = 0;
+    for (int i = 0; i < world.bodies(); ++i)
+        if (world.own(i)) sum += world.work(i);
+    return sum;
+}
+
+void SharedWorldWorker::worked(double seconds, double waited_s) {
+    exchange_->cost(seconds);
+    market_.worked(exchange_->steps_done(), seconds, work(), exchange_->own_bodies());
+    stepping_ = false;
+    publish(seconds, waited_s);
+    if (draining_) return leave();
+    trade();
+    exchange_->follow();
+}
+
+void SharedWorldWorker::publish(double seconds, double waited_s) {
+    const World& world = exchange_->world();
+    StepReport report;
+    report.seconds = static_cast<float>(seconds);
+    report.smoothed_s = static_cast<float>(market_.smoothed());
+    report.waited_s = static_cast<float>(waited_s);
+    report.lead = static_cast<std::uint32_t>(std::max(0, lead_));
+    report.ghost_age = static_cast<std::uint32_t>(std::max(0, exchange_->ghost_age()));
+    report.cross_contacts = static_cast<std::uint32_t>(world.cross_contacts());
+    report.own = static_cast<std::uint32_t>(exchange_->own_bodies());
+    report.outside_impulse = world.outside_impulse();
+    published_ = exchange_->steps_done();
+    queue_.push_back(exchange_->publish(epoch_, report));
+}
+
+// At the end of a step, after its states are on their way.
+void SharedWorldWorker::trade() {
+    hand_over();
+    if (exchange_->at_end() || !market_.wants_to_sell()) return;
+    if (const std::optional<Offer> offer = market_.make_offer(exchange_->lots(market_.fastest())))
+        send(*offer);
+}
+
+void SharedWorldWorker::hand_over() {
+    if (stepping_ || (bounded_ && exchange_->steps_done() < handover_step_)) return;
+    const std::optional<Offer> sold = market_.hand_over();
+    if (!sold) return;
+    Handover handover = exchange_->give(sold->bodies);
+    handover.to = sold->to, handover.number = sold->number;
+    send(handover);
+}
+
+void SharedWorldWorker::drain() {
+    draining_ = true;
+    if (!stepping_ && !left_) leave();
+}
+
+// The application shares out what is given to nobody.
+void SharedWorldWorker::leave() {
+    std::vector<std::uint32_t> bodies;
+    const World& world = exchange_->world();
+    for (int i = 0; i < world.bodies(); ++i)
+        if (world.own(i) && !world.definition(i).fixed) bodies.push_back(static_cast<std::uint32_t>(i));
+    if (!bodies.empty()) {
+        Handover handover = exchange_->give(bodies);
+        handover.to = kApplication;
+        send(handover);
+    }
+    send(Drained{});
+    left_ = true;
+}
+
+void SharedWorldWorker::send(const WorldMessage& message) {
+    queue_.push_back(encode({self_, epoch_, exchange_->steps_done()}, message));
+}
+
+std::vector<std::vector<std::uint8_t>> SharedWorldWorker::outgoing() {
+    return std::exchange(queue_, {});
+}
+
+double SharedWorldWorker::slowing() const {
+    double factor = 1;
+    for (const WorldEvent& event : events_) {
+        if (event.step > exchange_->steps_done()) break;
+        for (const Slowing& slowing : event.slowing)
+            if (slowing.worker == static_cast<int>(self_)) factor = slowing.factor;
+    }
+    return factor;
+}
+
+}  // namespace sim

@@ -1,0 +1,49 @@
+#pragma once
+#include <deque>
+#include <vector>
+
+#include "shared/replica.h"
+
+namespace sim {
+
+/// All bodies as they were published, step by step: exact in lockstep. In bounded pace a body that was not
+/// published at a step (it was changing hands) goes there from its last state by itself.
+class WorldView {
+public:
+    WorldView(const WorldScene& scene, Pace pace);
+
+    void take(std::uint64_t step, StateMessage&& message);
+    void take(std::uint64_t step, const std::vector<Update>& updates);
+    /// A body's record that was not published: handed over.
+    void take(std::uint64_t step, const std::vector<WorldRecord>& records);
+    /// Bounded: nothing more will be published of this body.
+    void release(int body) { released_[static_cast<std::size_t>(body)] = 1; }
+    void break_constraint(int constraint);  ///< bounded: its owner says so
+    /// One step on, if all that it needs is known.
+    [[nodiscard]] bool advance();
+
+    [[nodiscard]] const World& world() const noexcept { return replica_.world(); }
+    [[nodiscard]] std::uint64_t step() const noexcept { return step_; }
+    [[nodiscard]] const SceneClock& clock() const noexcept { return replica_.clock(); }
+    /// Every body still for half a second and no event left.
+    [[nodiscard]] bool at_rest() const;
+    [[nodiscard]] WorldSnapshot snapshot() const { return replica_.world().snapshot(); }
+
+private:
+    struct Published {
+        std::uint64_t step;
+        WorldRecord record;
+        bool still;
+    };
+    void keep(int body, Published&& published);
+    [[nodiscard]] bool advance_bounded();
+    void show(int body, std::uint64_t step);
+
+    Pace pace_;
+    Replica replica_;
+    std::uint64_t step_ = 0;
+    std::vector<std::deque<Published>> published_;  // bounded: of each body, by ascending steps
+    std::vector<std::uint8_t> still_, released_;
+};
+
+}  // namespace sim

@@ -1,0 +1,44 @@
+#pragma once
+#include <sys/types.h>
+
+#include <atomic>
+#include <optional>
+#include <string>
+#include <thread>
+#include <zmq.hpp>
+
+#include "workers/curve_keys.h"
+
+namespace sim {
+
+/// A worker's socket to the application.
+[[nodiscard]] zmq::socket_t connect_worker(zmq::context_t& context, const std::string& endpoint,
+                                           const std::optional<WorkerKeys>& keys, int linger_ms);
+
+/// Sends heartbeats from a thread of its own, so that long work is not taken for death, and watches for the
+/// application's end. Where the application is on this machine (ipc) that is the end of its process; else,
+/// once in a world, 1.5 s without an answer to a heartbeat.
+class Pulse {
+public:
+    Pulse(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys);
+
+    /// From now on heartbeats are a world's. A worker that has not ended 0.4 s after the application's end
+    /// is ended.
+    void join_world(std::uint32_t worker) noexcept { worker_ = worker; }
+    [[nodiscard]] bool application_gone() const noexcept { return gone_; }
+
+private:
+    void beat(zmq::context_t& context, const std::optional<WorkerKeys>& keys, const std::stop_token& stop);
+    void send_beat(zmq::socket_t& socket) const;
+    [[nodiscard]] bool application_process_ended() const noexcept;
+
+    static constexpr std::int64_t kNoWorld = -1;
+    const std::string endpoint_;
+    const pid_t application_;  ///< 0: not known
+    const bool child_;         ///< of the application
+    std::atomic<std::int64_t> worker_ = kNoWorld;
+    std::atomic<bool> gone_ = false;
+    std::jthread thread_;  // last: starts when the rest is there, joins before it goes
+};
+
+}  // namespace sim

@@ -1,0 +1,265 @@
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "messages/world_scene_codec.h"
+#include "shared/coordinator.h"
+#include "shared/shared_world_worker.h"
+#include "workers/elapsed.h"
+#include "workers/worker_gate.h"
+#include "workers/worker_process.h"
+
+namespace sim {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+constexpr auto kWait = 20ms;
+constexpr auto kEndWithin = 1s;
+constexpr double kLongestStep_s = 30;
+constexpr double kLastWords_s = 0.3;
+constexpr int kMostWorkers = 256;
+
+/// A worker in this process, for when no other is left.
+class WorkerHere {
+public:
+    WorkerHere(std::uint32_t number) : number_(number) {}
+    [[nodiscard]] std::uint32_t number() const { return number_; }
+
+    void take(const std::vector<std::uint8_t>& bytes) {
+        DecodedWorldMessage m = decode_for_worker(bytes);
+        if (const auto* scene = std::get_if<SceneMessage>(&m.message))
+            worker_.emplace(*scene);
+        else if (worker_)
+            worker_->take(m.header, std::move(m.message));
+    }
+    /// A step if one can be done; true if it was.
+    bool work() {
+        if (!worker_ || worker_->ended() || !worker_->ready()) return false;
+        const Clock::time_point start = Clock::now();
+        worker_->step();
+        worker_->worked(seconds_since(start), 0);
+        return true;
+    }
+    [[nodiscard]] std::vector<std::vector<std::uint8_t>> outgoing() {
+        return worker_ ? worker_->outgoing() : std::vector<std::vector<std::uint8_t>>();
+    }
+
+private:
+    std::uint32_t number_;
+    std::optional<SharedWorldWorker> worker_;
+};
+
+class SharedWorldRun {
+public:
+    SharedWorldRun(const WorldScene& scene, const DistributedSettings& settings,
+                   const DistributedLaunch& launch, DistributedObserver& observer)
+        : settings_(settings),
+          launch_(launch),
+          processes_(launch.processes.program.empty() ? 0 : launch.processes.count),
+          observer_(observer),
+          meeting_(scene, settings, observer),
+          gate_(gate_settings(launch)) {
+        if (launch.listening)
+            launch.listening(launch.listen.empty() ? gate_.private_endpoint() : gate_.endpoint());
+        children_.reserve(static_cast<std::size_t>(processes_));
+        for (int i = 0; i < processes_; ++i)
+            children_.push_back({WorkerProcess(launch.processes, gate_.private_endpoint())});
+    }
+
+    DistributedResult run() {
+        wait_for_workers();
+        started_ = true;
+        progressed_ = Clock::now();
+        meeting_.start();
+        const Clock::time_point start = Clock::now();
+        while (!meeting_.finished()) advance();
+        DistributedResult result = meeting_.result();
+        result.elapsed_s = seconds_since(start);
+        result.refused_messages += gate_.refused_messages() + gate_.refused_keys();
+        end_children();
+        return result;
+    }
+
+private:
+    struct Child {
+        WorkerProcess process;
+        std::optional<std::uint32_t> worker = std::nullopt;     ///< once it has joined
+        std::optional<Clock::time_point> ended = std::nullopt;  ///< seen then
+    };
+
+    static WorkerGate::Settings gate_settings(const DistributedLaunch& launch) {
+        WorkerGate::Settings settings{launch.listen, std::nullopt};
+        if (!launch.keys.empty()) settings.keys = read_application_keys(launch.keys);
+        return settings;
+    }
+
+    void advance() {
+        const bool worked = here_ && here_->work();
+        for (WorkerGate::Event& event : gate_.wait(worked ? 0ms : kWait)) take(event);
+        look_after_children();
+        if (meeting_.members().empty() && !meeting_.finished()) take_over();
+        look_after_progress();
+        pass_on();
+        note_refusals();
+    }
+
+    /// A worker may be heard and yet publish nothing: all would wait for it.
+    void look_after_progress() {
+        if (std::exchange(published_, meeting_.published()) != meeting_.published())
+            progressed_ = Clock::now();
+        if (seconds_since(progressed_) < kLongestStep_s) return;
+        progressed_ = Clock::now();
+        meeting_.lose_slowest("it was the slowest, and nobody has published anything for 30 s");
+    }
+
+    void wait_for_workers() {
+        const auto wanted = static_cast<std::size_t>(std::max({launch_.expect, processes_, 1}));
+        const Clock::time_point start = Clock::now();
+        while (meeting_.members().size() + ended_early_ < wanted) {
+            for (WorkerGate::Event& event : gate_.wait(kWait)) take(event);
+            look_after_children();
+            pass_on();
+            if (seconds_since(start) > launch_.wait_s)
+                throw std::runtime_error("error: found " + std::to_string(meeting_.members().size()) +
+                                         " of " + std::to_string(wanted) + " workers after " +
+                                         std::to_string(launch_.wait_s) + " s, expected all to join");
+        }
+    }
+
+    void take(WorkerGate::Event& event) {
+        using Kind = WorkerGate::Event::Kind;
+        if (event.kind == Kind::asks_to_join)
+            join(event);
+        else if (event.kind == Kind::message)
+            meeting_.take(event.worker, event.bytes);
+        else if (is_member(event.worker)) {
+            lost_.push_back(event.worker);
+            meeting_.lose(event.worker, event.why);
+        }
+    }
+
+    void join(const WorkerGate::Event& event) {
+        if (settings_.pace == Pace::lockstep && event.request.fingerprint != step_fingerprint()) {
+            gate_.refuse(event.stranger,
+                         "another processor, mathematics library or build: lockstep would "
+                         "not be to the bit");
+            observer_.note("a worker of " + event.request.host +
+                           " was refused: its processor, mathematics library or build differs");
+            return;
+        }
+        const std::uint32_t worker = meeting_.join(event.request);
+        gate_.admit(event.stranger, worker);
+        admitted_.push_back(worker);
+        for (Child& child : children_)
+            if (!child.worker && !child.ended && child.process.id() == event.request.process)
+                child.worker = worker;
+    }
+
+    [[nodiscard]] bool is_member(std::uint32_t worker) const {
+        const std::vector<std::uint32_t>& members = meeting_.members();
+        return std::find(members.begin(), members.end(), worker) != members.end();
+    }
+
+    void look_after_children() {
+        for (Child& child : children_) {
+            if (child.worker && !is_member(*child.worker) && was_lost(*child.worker)) child.process.kill();
+            if (!child.process.has_ended()) continue;
+            if (!child.ended) {
+                child.ended = Clock::now();
+                if (!child.worker)
+                    note_early_end(child);
+                else if (!started_)
+                    ++ended_early_;
+            }
+            // One that ended in order may have said so: that is on its way.
+            const bool settled = child.process.was_killed() || seconds_since(*child.ended) > kLastWords_s;
+            if (settled && child.worker && is_member(*child.worker))
+                meeting_.lose(*child.worker, child.process.ending());
+        }
+    }
+
+    void note_early_end(const Child& child) {
+        if (!child.process.was_killed())
+            throw std::runtime_error("a worker ended before it joined: " + child.process.ending());
+        ++ended_early_;
+    }
+
+    /// Not one that has drained: it ends by itself.
+    [[nodiscard]] bool was_lost(std::uint32_t worker) const {
+        return std::find(lost_.begin(), lost_.end(), worker) != lost_.end();
+    }
+
+    void take_over() {
+        here_.emplace(meeting_.join({step_fingerprint(), static_cast<std::uint32_t>(getpid()), "here"}));
+        observer_.note("no worker is left: the application goes on by itself");
+    }
+
+    void pass_on() {
+        for (bool more = true; more;) {
+            for (Coordinator::Outgoing& out : meeting_.outgoing()) deliver(out);
+            more = false;
+            if (here_)
+                for (const std::vector<std::uint8_t>& bytes : here_->outgoing())
+                    meeting_.take(here_->number(), bytes), more = true;
+        }
+        std::erase_if(admitted_, [this](std::uint32_t worker) {
+            if (is_member(worker)) return false;
+            gate_.dismiss(worker);
+            return true;
+        });
+    }
+
+    void deliver(Coordinator::Outgoing& out) {
+        if (here_ && std::erase(out.to, here_->number()) > 0) here_->take(*out.bytes);
+        if (!out.to.empty()) gate_.send(out.to, std::move(out.bytes));
+    }
+
+    void note_refusals() {
+        if (std::exchange(noted_, noted_ || gate_.refused_messages() + gate_.refused_keys() > 0) != noted_)
+            observer_.note("messages that are none of ours, or peers without a key, are dropped and counted");
+    }
+
+    void end_children() {
+        pass_on();
+        const Clock::time_point deadline = Clock::now() + kEndWithin;
+        const auto running = [](Child& child) { return !child.process.has_ended(); };
+        while (std::any_of(children_.begin(), children_.end(), running) && Clock::now() < deadline)
+            std::this_thread::sleep_for(2ms);
+    }
+
+    const DistributedSettings settings_;
+    const DistributedLaunch launch_;
+    const int processes_;  ///< started here
+    DistributedObserver& observer_;
+    Coordinator meeting_;
+    WorkerGate gate_;
+    std::vector<std::uint32_t> admitted_;  ///< by the gate, now
+    std::vector<std::uint32_t> lost_;      ///< silent or out of reach
+    std::optional<WorkerHere> here_;
+    std::size_t ended_early_ = 0;
+    bool started_ = false;
+    std::uint64_t published_ = 0;
+    Clock::time_point progressed_ = Clock::now();
+    bool noted_ = false;
+    std::vector<Child> children_;  // last: processes end before the gate goes
+};
+
+}  // namespace
+
+DistributedResult run_distributed(const WorldScene& scene, const DistributedSettings& settings,
+                                  const DistributedLaunch& launch, DistributedObserver& observer) {
+    check_scene(scene);
+    check_settings(settings);
+    if (launch.processes.count < 0 || launch.processes.count > kMostWorkers)
+        throw std::invalid_argument("error: found " + std::to_string(launch.processes.count) +
+                                    " workers, expected 0 to " + std::to_string(kMostWorkers));
+    return SharedWorldRun(scene, settings, launch, observer).run();
+}
+
+}  // namespace sim

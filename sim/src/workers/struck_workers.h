@@ -1,0 +1,84 @@
+#pragma once
+#include <chrono>
+#include <string>
+#include <vector>
+#include <zmq.hpp>
+
+#include "messages/struck_messages.h"
+#include "workers/socket_folder.h"
+#include "workers/worker_process.h"
+
+namespace sim {
+
+/// Bodies shared out to worker processes. One thread: all traffic happens inside step(), construction and
+/// destruction.
+///
+/// The application holds every body's definition and its record after the last answer. A worker that exits,
+/// is silent for 1 s while an answer is awaited, breaks the protocol or does not answer within 30 s is
+/// killed; its bodies are assigned, from those records, to the other workers in turn (to this process when
+/// none is left), and the step is asked for again for those of them that had not been answered. Records are
+/// exact, each body's step depends on nothing else, and merge() orders by body: the reply has the same bits
+/// in every case. Every assignment has a new epoch; an answer counts only if its worker lives and was asked
+/// for that step under that epoch. Wall time decides only who computes, never what.
+class StruckWorkers final : public Simulation {
+public:
+    StruckWorkers(std::vector<BodyDefinition> bodies, const WorkerLaunch& launch);
+    ~StruckWorkers() override;
+
+    StepReply step(const StepRequest& request) override;
+    WorkerReport report() const override { return report_; }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    struct Pending {
+        std::uint32_t epoch;
+        std::vector<std::uint32_t> bodies;
+        Clock::time_point since;
+    };
+    struct Slot {
+        WorkerProcess process;
+        std::string identity;  ///< ROUTER's name for it; empty until its hello
+        bool alive = true;
+        Clock::time_point heard = Clock::now();
+        std::vector<std::uint32_t> bodies;
+        std::vector<Pending> pending;
+    };
+
+    void bind();
+    void wait_for_hellos();
+    void share_out();
+    void dispatch(Slot& slot, const std::vector<std::uint32_t>& bodies);
+    void assign(Slot& slot, const std::vector<std::uint32_t>& bodies);
+    [[nodiscard]] StepRequest request_for(const std::vector<std::uint32_t>& bodies) const;
+    bool send(Slot& slot, const Message& message);
+    void receive(std::chrono::milliseconds timeout);
+    void take(const std::string& identity, const zmq::message_t& frame);
+    void accept(Slot& slot, Answer& answer);
+    [[nodiscard]] bool fits(const Pending& pending, const Answer& answer) const;
+    void look_after_workers();
+    void lose(Slot& slot);
+    void settle_losses();
+    void own_here(const std::vector<std::uint32_t>& bodies);
+    void step_here(std::uint32_t body);
+    [[nodiscard]] bool waiting() const;
+
+    std::vector<BodyDefinition> definitions_;
+    std::vector<BodyRecord> records_;
+    std::vector<BodyOutcome> outcomes_;
+    std::vector<std::uint64_t> answered_;             ///< per body: number of the last step it has made
+    std::vector<std::unique_ptr<SteppedBody>> here_;  ///< bodies stepped in this process
+    std::vector<std::uint32_t> orphans_;              ///< bodies of workers just lost
+    const StepRequest* request_ = nullptr;            ///< of the step under way
+    std::uint64_t step_ = 0;
+    double last_t_s_ = 0;
+    std::uint32_t epoch_ = 0;
+    std::size_t next_slot_ = 0;
+    Clock::time_point last_look_;
+    WorkerReport report_;
+    SocketFolder folder_;
+    zmq::context_t context_;
+    zmq::socket_t router_;
+    std::vector<Slot> slots_;  ///< last: processes end before the socket and its folder go
+};
+
+}  // namespace sim

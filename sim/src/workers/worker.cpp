@@ -1,0 +1,135 @@
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <map>
+
+#include "messages/struck_messages.h"
+#include "sim/distributed_world.h"
+#include "struck/stepped_body.h"
+#include "workers/heartbeat.h"
+#include "workers/socket_folder.h"
+#include "workers/world_service.h"
+
+namespace sim {
+namespace {
+
+using namespace std::chrono_literals;
+constexpr auto kAnswerWithin = 10s;
+constexpr int kLookMs = 100, kLingerMs = 500;
+
+void send(zmq::socket_t& socket, const std::vector<std::uint8_t>& bytes) {
+    (void)socket.send(zmq::buffer(bytes), zmq::send_flags::none);
+}
+
+/// False after a while without a message.
+bool receive(zmq::socket_t& socket, zmq::message_t& frame) {
+    try {
+        return socket.recv(frame).has_value();
+    } catch (const zmq::error_t& e) {
+        if (e.num() == EINTR) return false;
+        throw;
+    }
+}
+
+/// Serves a kit's StruckWorkers.
+class KitWorker {
+public:
+    KitWorker(zmq::socket_t& socket, const Pulse& pulse) : socket_(socket), pulse_(pulse) {}
+
+    /// `frame`: the first message. 0 when told to stop, 1 when the application is gone.
+    int serve(zmq::message_t& frame) {
+        do {
+            const Message message = decode({frame.data<std::uint8_t>(), frame.size()});
+            if (std::holds_alternative<Stop>(message)) return 0;
+            std::visit([this](const auto& m) { handle(m); }, message);
+            while (!pulse_.application_gone() && !receive(socket_, frame)) {
+            }
+        } while (!pulse_.application_gone());
+        return 1;
+    }
+
+private:
+    void handle(const Welcome&) {}
+    void handle(const Assign& assign) {
+        for (const Assignment& a : assign.bodies)
+            bodies_.insert_or_assign(a.body, SteppedBody(a.body, a.definition, a.record));
+    }
+    void handle(const Step& step) {
+        Answer answer{step.epoch, step.step, std::vector<BodyOutcome>(step.bodies.size())};
+        for (std::size_t i = 0; i < step.bodies.size(); ++i) {
+            const auto found = bodies_.find(step.bodies[i]);
+            if (found == bodies_.end())
+                throw DecodeError("a step of body " + std::to_string(step.bodies[i]) + ", not assigned");
+            found->second.step(step.request, answer.outcomes[i]);
+        }
+        send(socket_, encode(answer));
+    }
+    template <typename Other>
+    void handle(const Other&) {
+        throw DecodeError("a message that only workers send");
+    }
+
+    zmq::socket_t& socket_;
+    const Pulse& pulse_;
+    std::map<std::uint32_t, SteppedBody> bodies_;
+};
+
+/// Until the application has answered: whether it is a world's shows then.
+bool wait_for_answer(zmq::socket_t& socket, const Pulse& pulse, zmq::message_t& frame) {
+    const auto started = std::chrono::steady_clock::now();
+    while (!pulse.application_gone() && std::chrono::steady_clock::now() - started < kAnswerWithin)
+        if (receive(socket, frame)) return true;
+    return false;
+}
+
+bool is_of_a_world(const zmq::message_t& frame) {
+    return frame.to_string_view().starts_with("MWSW");
+}
+
+/// Asks a world first, so that a kit's application takes that for noise.
+int serve(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys) {
+    zmq::socket_t socket = connect_worker(context, endpoint, keys, kLingerMs);
+    socket.set(zmq::sockopt::rcvtimeo, kLookMs);
+    Pulse pulse(context, endpoint, keys);
+    send(socket, join_request());
+    send(socket, encode(Hello{static_cast<std::uint32_t>(getpid())}));
+    zmq::message_t frame;
+    int status = 1;
+    if (wait_for_answer(socket, pulse, frame)) {
+        if (is_of_a_world(frame)) {
+            status = serve_world(socket, pulse, frame);
+        } else
+            try {
+                status = KitWorker(socket, pulse).serve(frame);
+            } catch (const DecodeError& e) {
+                send(socket, encode(Failure{e.what()}));
+                throw std::runtime_error(std::string("bad message: ") + e.what());
+            }
+    } else if (!pulse.application_gone()) {
+        throw std::runtime_error("no answer from " + endpoint + " within 10 s");
+    }
+    if (status != 0 && pulse.application_gone()) remove_left_socket(endpoint);
+    return status;
+}
+
+}  // namespace
+
+int run_worker(const std::string& endpoint) {
+    return run_worker(endpoint, {});
+}
+
+int run_worker(const std::string& endpoint, const std::filesystem::path& key) {
+    std::optional<WorkerKeys> keys;
+    if (!key.empty()) keys = read_worker_keys(key);
+    check_endpoint(endpoint, keys.has_value());
+    try {
+        zmq::context_t context;
+        return serve(context, endpoint, keys);
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "worker: %s\n", e.what());
+    }
+    return 1;
+}
+
+}  // namespace sim

@@ -1,0 +1,284 @@
+#include "workers/worker_gate.h"
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstring>
+#include <utility>
+
+#include "workers/signal_mask.h"
+
+namespace sim {
+namespace {
+
+using namespace std::chrono_literals;
+constexpr auto kPoll = 20ms;
+constexpr auto kLastWords = 300ms;
+constexpr auto kPaused = 250ms;  // a longer gap between two looks is ours, not the workers' silence
+constexpr int kFramesBetweenLooks = 1000;
+constexpr std::size_t kMostStrangersWaiting = 1000;
+constexpr std::int64_t kLargestMessage = 256 << 20;
+constexpr int kHighWater = 100000;
+
+enum class Type : std::uint16_t { join = 1, beat = 2 };
+
+bool is_world(const zmq::message_t& frame) {
+    return frame.size() >= 12 && frame.to_string_view().starts_with("MWSW");
+}
+bool is_kit(const zmq::message_t& frame) {
+    return frame.to_string_view().starts_with("MWSM");
+}
+bool is(const zmq::message_t& frame, Type type) {
+    std::uint16_t found = 0;
+    if (is_world(frame)) std::memcpy(&found, frame.data<std::uint8_t>() + 6, sizeof found);
+    return found == static_cast<std::uint16_t>(type);
+}
+
+DecodedWorldMessage decoded(const zmq::message_t& frame) {
+    return decode_world({frame.data<std::uint8_t>(), frame.size()});
+}
+
+zmq::message_t framed(const WorldMessage& message) {
+    const std::vector<std::uint8_t> bytes = encode(WorldHeader{}, message);
+    return {bytes.data(), bytes.size()};
+}
+
+}  // namespace
+
+WorkerGate::WorkerGate(const Settings& settings)
+    : silence_(settings.silence_s),
+      router_(context_, zmq::socket_type::router),
+      wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+    if (!settings.listen.empty()) check_endpoint(settings.listen, settings.keys.has_value());
+    bind(settings);
+    thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
+}
+
+// Options count for what is bound after them: the private folder's socket needs no keys.
+void WorkerGate::bind(const Settings& settings) {
+    router_.set(zmq::sockopt::linger, 1000);
+    router_.set(zmq::sockopt::sndhwm, kHighWater);
+    router_.set(zmq::sockopt::rcvhwm, kHighWater);
+    router_.set(zmq::sockopt::maxmsgsize, kLargestMessage);
+    router_.set(zmq::sockopt::router_mandatory, true);
+    router_.bind(folder_.endpoint());
+    if (settings.listen.empty()) return;
+    if (settings.keys) {
+        keys_ = std::make_unique<KeyGate>(context_, settings.keys->allowed);
+        router_.set(zmq::sockopt::zap_domain, KeyGate::kDomain);
+        router_.set(zmq::sockopt::curve_server, true);
+        router_.set(zmq::sockopt::curve_secretkey, settings.keys->pair.secret);
+    }
+    std::string listen = settings.listen;
+    if (listen.ends_with(":0")) listen.replace(listen.size() - 1, 1, "*");
+    router_.set(zmq::sockopt::ipv6, listen.find('[') != std::string::npos);
+    try {
+        router_.bind(listen);
+    } catch (const zmq::error_t& e) {
+        throw std::invalid_argument("error: found endpoint " + settings.listen + " that cannot be used (" +
+                                    e.what() + "), expected a free port of an address of this machine");
+    }
+    endpoint_ = router_.get(zmq::sockopt::last_endpoint);
+}
+
+WorkerGate::~WorkerGate() {
+    thread_.request_stop();
+    thread_.join();
+    close(wake_);
+    router_.close();
+}
+
+// Calls of the application's thread.
+
+std::deque<WorkerGate::Event> WorkerGate::wait(std::chrono::milliseconds most) {
+    std::unique_lock lock(mutex_);
+    came_.wait_for(lock, most, [this] { return !events_.empty(); });
+    return std::exchange(events_, {});
+}
+
+void WorkerGate::order(Command&& command) {
+    const std::lock_guard lock(mutex_);
+    commands_.push_back(std::move(command));
+    if (commands_.size() == 1) (void)eventfd_write(wake_, 1);
+}
+
+void WorkerGate::admit(const std::string& stranger, std::uint32_t worker) {
+    order({Command::Kind::admit, stranger, {}, {worker}, {}});
+}
+void WorkerGate::refuse(const std::string& stranger, const std::string& why) {
+    order({Command::Kind::refuse, stranger, why, {}, {}});
+}
+void WorkerGate::send(const std::vector<std::uint32_t>& workers, Bytes bytes) {
+    order({Command::Kind::send, {}, {}, workers, std::move(bytes)});
+}
+void WorkerGate::dismiss(std::uint32_t worker) {
+    order({Command::Kind::dismiss, {}, {}, {worker}, {}});
+}
+
+// The gate's thread.
+
+void WorkerGate::serve(const std::stop_token& stop) {
+    block_signals();
+    while (!stop.stop_requested()) {
+        poll();
+        obey();
+        receive();
+        look_for_silence();
+    }
+    obey();
+}
+
+void WorkerGate::poll() {
+    std::array<zmq::pollitem_t, 2> items = {
+        {{router_.handle(), 0, ZMQ_POLLIN, 0}, {nullptr, wake_, ZMQ_POLLIN, 0}}};
+    try {
+        zmq::poll(items.data(), items.size(), kPoll);
+    } catch (const zmq::error_t& e) {
+        if (e.num() != EINTR) throw;
+    }
+}
+
+void WorkerGate::obey() {
+    std::vector<Command> commands;
+    {
+        const std::lock_guard lock(mutex_);
+        commands.swap(commands_);
+        eventfd_t count = 0;
+        (void)eventfd_read(wake_, &count);
+    }
+    for (const Command& command : commands) obey(command);
+}
+
+void WorkerGate::obey(const Command& command) {
+    if (command.kind == Command::Kind::refuse) {
+        zmq::message_t frame = framed(Refusal{command.why});
+        send_to(command.stranger, frame);
+    } else if (command.kind == Command::Kind::admit) {
+        members_[command.workers[0]] = {command.stranger, Clock::now()};
+        numbers_[command.stranger] = command.workers[0];
+    } else if (command.kind == Command::Kind::dismiss) {
+        const auto found = members_.find(command.workers[0]);
+        if (found == members_.end()) return;
+        numbers_.erase(found->second.identity);
+        members_.erase(found);
+    } else {
+        const zmq::message_t whole(command.bytes->data(), command.bytes->size());
+        for (const std::uint32_t worker : command.workers) {
+            const auto found = members_.find(worker);
+            if (found == members_.end() || found->second.lost || found->second.broken) continue;
+            zmq::message_t frame;
+            frame.copy(const_cast<zmq::message_t&>(whole));  // shares the bytes
+            // Who has drained and gone may have said so: that is on its way.
+            if (!send_to(found->second.identity, frame)) found->second.broken = Clock::now();
+        }
+    }
+}
+
+bool WorkerGate::send_to(const std::string& identity, zmq::message_t& frame) {
+    try {
+        return router_.send(zmq::buffer(identity), zmq::send_flags::sndmore | zmq::send_flags::dontwait) &&
+               router_.send(frame, zmq::send_flags::dontwait);
+    } catch (const zmq::error_t&) {  // gone
+        return false;
+    }
+}
+
+void WorkerGate::receive() {
+    zmq::message_t identity, frame;
+    for (int i = 0; i < kFramesBetweenLooks; ++i) {
+        if (!router_.recv(identity, zmq::recv_flags::dontwait)) return;
+        bool single = identity.more() && router_.recv(frame, zmq::recv_flags::dontwait).has_value();
+        for (; single && frame.more(); (void)router_.recv(frame, zmq::recv_flags::dontwait)) single = false;
+        while (!single && frame.more() && router_.recv(frame, zmq::recv_flags::dontwait)) {
+        }
+        if (single)
+            take(identity.to_string(), frame);
+        else
+            ++refused_messages_;
+    }
+}
+
+void WorkerGate::take(std::string&& identity, const zmq::message_t& frame) {
+    if (is(frame, Type::beat)) return take_beat(identity, frame);
+    const auto known = numbers_.find(identity);
+    if (known == numbers_.end()) return take_from_stranger(std::move(identity), frame);
+    if (is_kit(frame)) return;  // a worker asks both kinds of application at first
+    Member& member = members_.at(known->second);
+    member.heard = Clock::now();
+    if (member.lost) return;
+    const auto* bytes = frame.data<std::uint8_t>();
+    Event event;
+    event.worker = known->second;
+    event.bytes.assign(bytes, bytes + frame.size());
+    tell(std::move(event));
+}
+
+void WorkerGate::take_beat(const std::string& identity, const zmq::message_t& frame) {
+    try {
+        const auto found = members_.find(decoded(frame).header.worker);
+        if (found == members_.end()) return;  // it learns so when it sends something else
+        // Nobody beats for another: the first who beat for this member goes on.
+        std::string& from = found->second.beats_from;
+        if (from.empty()) from = identity;
+        if (from != identity) {
+            ++refused_messages_;
+            return;
+        }
+        found->second.heard = Clock::now();
+        zmq::message_t answer = framed(WorldBeat{});
+        send_to(identity, answer);
+    } catch (const DecodeError&) {
+        ++refused_messages_;
+    }
+}
+
+void WorkerGate::take_from_stranger(std::string&& identity, const zmq::message_t& frame) {
+    if (is_kit(frame)) return;
+    try {
+        DecodedWorldMessage m = decoded(frame);
+        auto* request = std::get_if<JoinRequest>(&m.message);
+        const std::lock_guard lock(mutex_);
+        if (request && events_.size() < kMostStrangersWaiting) {
+            Event& event = events_.emplace_back();
+            event.kind = Event::Kind::asks_to_join;
+            event.stranger = std::move(identity), event.request = std::move(*request);
+            came_.notify_one();
+            return;
+        }
+    } catch (const DecodeError&) {
+        ++refused_messages_;
+        return;
+    }
+    ++refused_messages_;
+    zmq::message_t answer = framed(Refusal{"not a member, or given up"});
+    send_to(identity, answer);
+}
+
+void WorkerGate::look_for_silence() {
+    const Clock::time_point now = Clock::now();
+    const bool paused = now - std::exchange(looked_, now) > kPaused;
+    for (auto& [worker, member] : members_) {
+        if (paused) member.heard = now;
+        if (member.lost) continue;
+        if (member.broken && now - *member.broken > kLastWords)
+            lose(worker, member, "its link broke");
+        else if (now - member.heard > silence_)
+            lose(worker, member, "silent for too long");
+    }
+}
+
+void WorkerGate::lose(std::uint32_t worker, Member& member, const std::string& why) {
+    member.lost = true;
+    Event event;
+    event.kind = Event::Kind::lost, event.worker = worker, event.why = why;
+    tell(std::move(event));
+}
+
+void WorkerGate::tell(Event&& event) {
+    const std::lock_guard lock(mutex_);
+    events_.push_back(std::move(event));
+    came_.notify_one();
+}
+
+}  // namespace sim

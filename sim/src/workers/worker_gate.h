@@ -1,0 +1,111 @@
+#pragma once
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+#include <zmq.hpp>
+
+#include "messages/world_messages.h"
+#include "workers/curve_keys.h"
+#include "workers/key_gate.h"
+#include "workers/socket_folder.h"
+
+namespace sim {
+
+/// The application's ROUTER, on a thread of its own, so that heartbeats are answered and silence is noticed
+/// whatever the application does meanwhile. Peers are strangers (known by ROUTER's identity) until admitted
+/// under a worker's number. Strangers can only ask to join: other messages of theirs are answered with a
+/// refusal if they are a world's, else dropped and counted.
+class WorkerGate {
+public:
+    struct Settings {
+        std::string listen;                   ///< tcp endpoint beside the private folder's; empty: none
+        std::optional<ApplicationKeys> keys;  ///< for `listen`
+        double silence_s = 1;                 ///< a worker unheard for so long is lost
+    };
+    /// Throws std::invalid_argument for an endpoint that is refused or taken.
+    explicit WorkerGate(const Settings& settings);
+    ~WorkerGate();  ///< what was sent goes out first, for at most a second
+
+    [[nodiscard]] std::string private_endpoint() const { return folder_.endpoint(); }
+    [[nodiscard]] const std::string& endpoint() const { return endpoint_; }  ///< of `listen`, with its port
+
+    struct Event {
+        enum class Kind { asks_to_join, message, lost };
+        Kind kind = Kind::message;
+        std::string stranger;             ///< asks_to_join: identity
+        JoinRequest request;              ///< asks_to_join
+        std::uint32_t worker = 0;         ///< message, lost
+        std::vector<std::uint8_t> bytes;  ///< message, as it came
+        std::string why;                  ///< lost
+    };
+    /// What has come; waits for it up to `most`.
+    [[nodiscard]] std::deque<Event> wait(std::chrono::milliseconds most);
+
+    void admit(const std::string& stranger, std::uint32_t worker);
+    void refuse(const std::string& stranger, const std::string& why);
+    void send(const std::vector<std::uint32_t>& workers,
+              std::shared_ptr<const std::vector<std::uint8_t>> bytes);
+    void dismiss(std::uint32_t worker);  ///< a stranger from now on
+
+    [[nodiscard]] std::uint64_t refused_messages() const noexcept { return refused_messages_; }
+    [[nodiscard]] std::uint64_t refused_keys() const noexcept { return keys_ ? keys_->refused() : 0; }
+
+private:
+    using Clock = std::chrono::steady_clock;
+    using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
+    struct Member {
+        std::string identity;
+        Clock::time_point heard;
+        bool lost = false;
+        std::optional<Clock::time_point> broken = {};  ///< since when nothing can be sent to it
+        std::string beats_from = {};                   ///< identity of its socket for beats
+    };
+    struct Command {
+        enum class Kind { admit, refuse, send, dismiss } kind;
+        std::string stranger, why;
+        std::vector<std::uint32_t> workers;
+        Bytes bytes;
+    };
+
+    void bind(const Settings& settings);
+    void order(Command&& command);
+    void serve(const std::stop_token& stop);
+    void poll();
+    void obey();
+    void obey(const Command& command);
+    void receive();
+    void take(std::string&& identity, const zmq::message_t& frame);
+    void take_beat(const std::string& identity, const zmq::message_t& frame);
+    void take_from_stranger(std::string&& identity, const zmq::message_t& frame);
+    bool send_to(const std::string& identity, zmq::message_t& frame);
+    void look_for_silence();
+    void lose(std::uint32_t worker, Member& member, const std::string& why);
+    void tell(Event&& event);
+
+    const std::chrono::duration<double> silence_;
+    SocketFolder folder_;
+    zmq::context_t context_;
+    std::unique_ptr<KeyGate> keys_;
+    zmq::socket_t router_;
+    std::string endpoint_;
+    int wake_;  ///< eventfd: commands are there
+    std::mutex mutex_;
+    std::condition_variable came_;
+    std::deque<Event> events_;       ///< under mutex_
+    std::vector<Command> commands_;  ///< under mutex_
+    std::atomic<std::uint64_t> refused_messages_ = 0;
+    // The thread's own.
+    std::map<std::uint32_t, Member> members_;
+    std::map<std::string, std::uint32_t> numbers_;  ///< of identities
+    Clock::time_point looked_ = Clock::now();
+    std::jthread thread_;  // last: starts when the rest is there
+};
+
+}  // namespace sim

@@ -1,0 +1,291 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "world/island_solver.h"
+#include "world/row_kernels.h"
+
+// What an island's rows are made of; island_solver.cpp sweeps over them.
+
+namespace sim {
+namespace {
+
+constexpr double kPushHz = 30, kPushDamping = 10;
+
+/// Two unit vectors square to n and to each other.
+void set_tangents(const Eigen::Vector3f& n, Eigen::Vector3f (&t)[2]) {
+    const Eigen::Vector3f axis =
+        std::abs(n.x()) < 0.6f ? Eigen::Vector3f::UnitX() : Eigen::Vector3f(Eigen::Vector3f::UnitZ());
+    t[0] = (axis - axis.dot(n) * n).normalized();
+    t[1] = n.cross(t[0]);
+}
+
+}  // namespace
+
+void IslandSolver::begin(const Island& island) {
+    h_ = settings_->dt / settings_->substeps;
+    inverse_h_ = static_cast<float>(1 / h_);
+    const double omega = 2 * std::numbers::pi * std::min(kPushHz, 0.25 / h_);
+    const double a1 = 2 * kPushDamping + h_ * omega, a2 = h_ * omega * a1;
+    push_rate_ = static_cast<float>(omega / a1);
+    mass_share_ = static_cast<float>(a2 / (1 + a2));
+    impulse_share_ = static_cast<float>(1 / (1 + a2));
+
+    local_.resize(bodies_->size(), -1);
+    rows_of_.clear();
+    std::uint32_t offset = 0;
+    for (const int id : island.bodies) {
+        MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        local_[static_cast<std::size_t>(id)] = static_cast<int>(rows_of_.size());
+        rows_of_.push_back({&body, offset, body.kind->width, body.state.position, body.posed.rotation,
+                            body.posed.rotation.transpose().cast<float>()});
+        offset += static_cast<std::uint32_t>(body.kind->width);
+    }
+    y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
+    std::fill_n(moved_.data(), offset, 0.f);
+
+    std::size_t triples = 0, floats = 0;
+    auto width_of = [this](int id) {
+        return id >= 0 && id < kFirstPlane && local(id) >= 0
+                   ? static_cast<std::size_t>((*bodies_)[static_cast<std::size_t>(id)].kind->width)
+                   : 0;
+    };
+    for (const int m : island.manifolds) {
+        const Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        triples += static_cast<std::size_t>(manifold.count);
+        floats +=
+            static_cast<std::size_t>(manifold.count) * 3 * (width_of(manifold.a) + width_of(manifold.b));
+    }
+    for (const int c : island.constraints) {
+        const PointConstraint& held = (*constraints_)[static_cast<std::size_t>(c)].definition;
+        floats += 3 * (width_of(held.body_a) + width_of(held.body_b));
+    }
+    jacobians_.resize(floats);
+    jacobians_used_ = 0;
+    contacts_.clear(), springs_.clear();
+    any_told_ = false;
+    first_crossed_ = crossed_.size();
+    contacts_.reserve(triples);
+    for (const Turn& turn : in_turns(island))
+        add_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
+    for (const int c : island.constraints) add_spring((*constraints_)[static_cast<std::size_t>(c)]);
+}
+
+const std::vector<IslandSolver::Turn>& IslandSolver::in_turns(const Island& island) {
+    by_turn_.clear(), window_.clear();
+    next_turn_.assign(rows_of_.size(), 0);
+    for (const int m : island.manifolds) {
+        Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        for (int i = 0; i < manifold.count; ++i) {
+            if (window_.size() == kWindow) flush_window();
+            int turn = 0;
+            for (const int id : {manifold.a, manifold.b})
+                if (id < kFirstPlane && local(id) >= 0)
+                    turn = std::max(turn, next_turn_[static_cast<std::size_t>(local(id))]);
+            for (const int id : {manifold.a, manifold.b})
+                if (id < kFirstPlane && local(id) >= 0)
+                    next_turn_[static_cast<std::size_t>(local(id))] = turn + 1;
+            window_.push_back({&manifold, i, turn});
+        }
+    }
+    flush_window();
+    return by_turn_;
+}
+
+// Appends the window's contacts by turn, each turn's in order of ids, and begins anew.
+void IslandSolver::flush_window() {
+    std::array<int, kWindow + 1> first{};
+    for (const Turn& t : window_) ++first[static_cast<std::size_t>(t.turn) + 1];
+    for (std::size_t t = 1; t < first.size(); ++t) first[t] += first[t - 1];
+    const std::size_t base = by_turn_.size();
+    by_turn_.resize(base + window_.size());
+    for (const Turn& t : window_)
+        by_turn_[base + static_cast<std::size_t>(first[static_cast<std::size_t>(t.turn)]++)] = t;
+    for (const Turn& t : window_)
+        for (const int id : {t.manifold->a, t.manifold->b})
+            if (id < kFirstPlane && local(id) >= 0) next_turn_[static_cast<std::size_t>(local(id))] = 0;
+    window_.clear();
+}
+
+IslandSolver::Place IslandSolver::place(int body, const Eigen::Vector3f& arm, int sample,
+                                        const Eigen::Vector3f& rest, float* scratch) {
+    const bool moves = body >= 0 && body < kFirstPlane && local(body) >= 0;
+    if (!moves) return {-1, arm, nullptr};
+    const BodyKind& kind = *(*bodies_)[static_cast<std::size_t>(body)].kind;
+    if (kind.modes == 0) return {local(body), arm, nullptr};
+    if (sample >= 0)
+        return {local(body), arm,
+                kind.sample_shapes.data() + static_cast<std::size_t>(sample) * 3 * kind.mode_width};
+    kind.shapes_at(rest, scratch);
+    return {local(body), arm, scratch};
+}
+
+IslandSolver::Side IslandSolver::reserve_rows(int body) {
+    if (body < 0) return {};
+    const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+    const Side side{body, rows.width, static_cast<std::uint32_t>(jacobians_used_), rows.offset};
+    jacobians_used_ += 3 * static_cast<std::size_t>(rows.width);
+    return side;
+}
+
+void IslandSolver::write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign,
+                              const Side& side) {
+    if (place.body < 0) return;
+    const BodyRows& rows = rows_of_[static_cast<std::size_t>(place.body)];
+    const BodyKind& kind = *rows.body->kind;
+    const Eigen::Matrix3f& body_from_world = rows.body_from_world;
+    const Eigen::Vector3f root_inertia = kind.root_inertia.cast<float>().cwiseInverse();
+    const float root_mass = static_cast<float>(1 / kind.root_mass);
+    for (int r = 0; r < 3; ++r) {
+        float* out = jacobians_.data() + side.rows + r * side.width;
+        const Eigen::Vector3f world = sign * directions.row(r).transpose();
+        const Eigen::Vector3f turn = (body_from_world * place.arm.cross(world)).cwiseProduct(root_inertia);
+        for (int i = 0; i < 3; ++i) out[i] = root_mass * world[i], out[3 + i] = turn[i];
+        out[6] = out[7] = 0;
+        if (!place.shapes) continue;
+        if (rows.body->at_limit) {  // what cannot yield any more carries as if it were rigid
+            std::fill_n(out + 8, kind.mode_width, 0.f);
+            continue;
+        }
+        const Eigen::Vector3f own = body_from_world * world;
+        const int width = kind.mode_width;
+        for (int k = 0; k < width; k += kLanes)
+            store_lanes(out + 8 + k, load_lanes(kind.root_compliance.data() + k) *
+                                         (own.x() * load_lanes(place.shapes + k) +
+                                          own.y() * load_lanes(place.shapes + width + k) +
+                                          own.z() * load_lanes(place.shapes + 2 * width + k)));
+    }
+}
+
+// Place in crossed_ of an own body's contact with a ghost, else -1.
+int IslandSolver::note_pair(const Manifold& manifold) {
+    if (!told_crossed_ || manifold.b >= kFirstPlane || local(manifold.a) < 0 || local(manifold.b) < 0)
+        return -1;
+    const MovingBody &a = (*bodies_)[static_cast<std::size_t>(manifold.a)],
+                     &b = (*bodies_)[static_cast<std::size_t>(manifold.b)];
+    if (a.own == b.own) return -1;
+    any_told_ = true;
+    const int own = a.own ? manifold.a : manifold.b, ghost = a.own ? manifold.b : manifold.a;
+    for (std::size_t i = first_crossed_; i < crossed_.size(); ++i)
+        if (crossed_[i].own == own && crossed_[i].ghost == ghost) return static_cast<int>(i);
+    CrossImpulse& cross = crossed_.emplace_back();
+    cross.own = own, cross.ghost = ghost;
+    for (StepImpulse* given : {&cross.on_own, &cross.on_ghost}) {
+        const int modes = (a.own == (given == &cross.on_own) ? a : b).kind->modes;
+        given->modal = given->modal_q = given->modal_rate = Eigen::VectorXd::Zero(modes);
+    }
+    return static_cast<int>(crossed_.size()) - 1;
+}
+
+// What comes from planes and fixed bodies is not told: whoever has a ghost of the body finds that himself.
+bool IslandSolver::note_told(const Rows& rows, bool contact) {
+    bool watched = false, both = true;
+    for (const Side& side : rows.side) {
+        both = both && side.body >= 0;
+        watched = watched || (side.body >= 0 && rows_of_[static_cast<std::size_t>(side.body)].body->watched);
+    }
+    const bool told = watched && (both || !contact);
+    any_told_ = any_told_ || told;
+    return told;
+}
+
+void IslandSolver::finish_rows(Rows& rows) {
+    for (int i = 0; i < 3; ++i)
+        for (int j = i; j < 3; ++j) {
+            float sum = 0;
+            for (const Side& side : rows.side) {
+                if (side.body < 0) continue;
+                const float* d = jacobians_.data() + side.rows;
+                sum += dot(d + i * side.width, d + j * side.width, side.width);
+            }
+            rows.k[i][j] = rows.k[j][i] = sum;
+        }
+}
+
+void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
+    alignas(32) float scratch[2][3 * kMostModes];
+    ContactRows c{};
+    const Place a = place(manifold.a, point.arm_a, point.sample_a, point.rest, scratch[0]);
+    const Place b = place(manifold.b, point.arm_b, point.sample_b, point.rest, scratch[1]);
+    set_tangents(point.normal, c.tangent);
+    Eigen::Matrix3f directions;
+    directions << point.normal.transpose(), c.tangent[0].transpose(), c.tangent[1].transpose();
+    c.side[0] = reserve_rows(a.body);
+    write_rows(a, directions, 1, c.side[0]);
+    c.side[1] = reserve_rows(b.body);
+    write_rows(b, directions, -1, c.side[1]);
+    finish_rows(c);
+    c.point = &point;
+    c.separation = c.now = point.separation;
+    c.friction = manifold.friction;
+    // Only what comes together rebounds, not what rests and rings.
+    c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
+    c.emerging = manifold.emerging;
+    c.inverse_normal = 1 / c.k[0][0];
+    c.slide_mass = 2 / (c.k[1][1] + c.k[2][2]);
+    const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
+    c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
+    c.inverse_tangent[2] = c.k[1][1] / det;
+    c.pair = note_pair(manifold);
+    c.told = note_told(c, true) || c.pair >= 0;
+    c.impulse[0] = point.normal_impulse;
+    c.impulse[1] = point.friction_impulse.dot(c.tangent[0]);
+    c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
+    contacts_.push_back(c);
+}
+
+void IslandSolver::add_spring(HeldConstraint& constraint) {
+    const PointConstraint& held = constraint.definition;
+    SpringRows s{};
+    s.place.setZero();
+    auto local_of = [this](int body) { return body >= 0 ? local(body) : -1; };
+    s.side[0] = reserve_rows(local_of(held.body_a));
+    s.side[1] = reserve_rows(local_of(held.body_b));
+    s.constraint = &constraint;
+    s.told = note_told(s, false);
+    for (int i = 0; i < 3; ++i) s.impulse[i] = constraint.impulse[i];
+    springs_.push_back(s);
+}
+
+IslandSolver::End IslandSolver::end_of(int body, const Eigen::Vector3d& rest, float* shapes) const {
+    if (body < 0) return {rest, {-1, Eigen::Vector3f::Zero(), nullptr}};
+    const MovingBody& b = (*bodies_)[static_cast<std::size_t>(body)];
+    const BodyKind& kind = *b.kind;
+    Eigen::Vector3d point = rest;
+    if (kind.modes > 0) {
+        kind.shapes_at(rest.cast<float>(), shapes);
+        for (int axis = 0; axis < 3; ++axis)
+            for (int k = 0; k < kind.modes; ++k)
+                point[axis] += static_cast<double>(shapes[axis * kind.mode_width + k]) * b.state.q[k];
+    }
+    const Eigen::Vector3d arm = b.state.orientation * point;
+    return {b.state.position + arm, {local(body), arm.cast<float>(), kind.modes > 0 ? shapes : nullptr}};
+}
+
+// Springs act over large turns, so their arms and rows follow the bodies every substep.
+void IslandSolver::refresh(SpringRows& s) {
+    const PointConstraint& held = s.constraint->definition;
+    alignas(32) float scratch[2][3 * kMostModes];
+    const End a = end_of(held.body_a, held.point_a, scratch[0]);
+    const End b = end_of(held.body_b, held.point_b, scratch[1]);
+    const Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();
+    write_rows(a.place, axes, 1, s.side[0]);
+    write_rows(b.place, axes, -1, s.side[1]);
+    finish_rows(s);
+    s.place = (a.point + b.point) / 2;
+    const double mass = 3.0 / (s.k[0][0] + s.k[1][1] + s.k[2][2]), k = held.stiffness;
+    const double damping = 2 * held.damping_ratio * std::sqrt(k * mass), firm = damping + h_ * k;
+    s.gamma = static_cast<float>(1 / (h_ * firm));
+    s.pull = static_cast<float>(k / firm);
+    Eigen::Matrix3d soft;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) soft(i, j) = s.k[i][j] + (i == j ? s.gamma : 0);
+    const Eigen::Matrix3d inverse = soft.inverse();
+    const Eigen::Vector3d error = a.point - b.point;
+    for (int i = 0; i < 3; ++i) {
+        s.error[i] = static_cast<float>(error[i]);
+        for (int j = 0; j < 3; ++j) s.inverse[i][j] = static_cast<float>(inverse(i, j));
+    }
+}
+
+}  // namespace sim

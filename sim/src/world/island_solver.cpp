@@ -1,0 +1,400 @@
+#include "world/island_solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "world/row_kernels.h"
+
+namespace sim {
+namespace {
+
+using ModeArray = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostModes, 1>;  // on the stack
+
+constexpr float kPushSpeed = 3;           // [m/s]
+constexpr float kBounceThreshold = 0.1f;  // [m/s]
+
+void clear(StepImpulse& impulse) {
+    impulse.linear.setZero(), impulse.angular.setZero(), impulse.displacement.setZero();
+    impulse.turn.setZero(), impulse.modal.setZero();
+}
+
+// Without the library's check for negative arguments.
+float root(float x) {
+    return _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(x)));
+}
+
+}  // namespace
+
+void IslandSolver::solve(const Island& island) {
+    begin(island);
+    for (int i = 0; i < settings_->substeps; ++i) {
+        remaining_ = h_ * (settings_->substeps - 1 - i);
+        substep(i == 0, i + 1 == settings_->substeps);
+    }
+    if (any_told_) settle_given();
+    keep_impulses();
+    for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
+}
+
+void IslandSolver::substep(bool first, bool last) {
+    load_velocities();
+    for (SpringRows& spring : springs_) refresh(spring);
+    warm_start(first);
+    sweep(Push::soft);
+    push_out();
+    sweep(Push::none), sweep(Push::none);
+    note_work();
+    if (last) restitute();
+    finish();
+}
+
+void IslandSolver::load_velocities() {
+    for (BodyRows& rows : rows_of_) {
+        const MovingBody& body = *rows.body;
+        const BodyKind& kind = *body.kind;
+        const WorldBodyState& s = body.state;
+        rows.place = s.position;
+        if (contacts_.empty()) {
+            rows.frame = s.orientation.toRotationMatrix();
+            rows.body_from_world = rows.frame.transpose().cast<float>();
+        }
+        const Eigen::Matrix3d& frame = rows.frame;
+        Eigen::Vector3d velocity = s.velocity + h_ * body.gravity_scale * settings_->gravity;
+        Eigen::Vector3d momentum = s.angular_momentum;
+        if (body.pushed) {
+            velocity += h_ / kind.mass.mass * body.force;
+            momentum += h_ * body.torque;
+        }
+        const Eigen::Matrix3d turned = s.orientation.toRotationMatrix();
+        const Eigen::Vector3d spin =
+            frame.transpose() * (turned * (turned.transpose() * momentum).cwiseQuotient(kind.mass.inertia));
+        const double root_mass = kind.root_mass;
+        float* y = start_.data() + rows.offset;
+        for (int i = 0; i < 3; ++i) {
+            y[i] = static_cast<float>(root_mass * velocity[i]);
+            y[3 + i] = static_cast<float>(kind.root_inertia[i] * spin[i]);
+        }
+        y[6] = y[7] = 0;
+        const HeldSteps& step = kind.substep;
+        Eigen::Map<Eigen::ArrayXf> mean(y + 8, kind.modes);
+        mean = ((step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array()) / step.root_compliance)
+                   .cast<float>();
+        if (body.pushed) mean += (step.root_compliance * h_ * body.modal_force.array()).cast<float>();
+        for (int k = kind.modes; k < kind.mode_width; ++k) y[8 + k] = 0;
+        std::copy_n(y, rows.width, y_.data() + rows.offset);
+    }
+}
+
+void IslandSolver::warm_start(bool first) {
+    // Approach speeds first, before any impulse: gravity's share of this substep included, as it is real.
+    for (ContactRows& c : contacts_) {
+        float speed = 0, moved = 0;
+        for (const Side& side : c.side) {
+            if (side.body < 0) continue;
+            const float* d = jacobians_.data() + side.rows;
+            if (c.restitution > 0 && c.largest == 0) speed += dot(d, start_.data() + side.y, side.width);
+            if (!first) moved += dot(d, moved_.data() + side.y, side.width);
+        }
+        if (c.largest == 0) c.approach = speed;
+        c.now = c.separation + moved;
+        if (c.impulse[0] != 0) push_by(c, c.impulse);
+    }
+    for (SpringRows& s : springs_) push_by(s, s.impulse);
+}
+
+// Positions move with velocities that also push emerging bodies out; the velocities themselves never see it.
+void IslandSolver::push_out() {
+    const bool emerging = std::any_of(contacts_.begin(), contacts_.end(),
+                                      [](const ContactRows& c) { return c.emerging && c.now < 0; });
+    if (!emerging) return move();
+    auto save = [](auto& rows) {
+        for (auto& row : rows) std::copy_n(row.impulse, 3, row.kept);
+    };
+    auto restore = [](auto& rows) {
+        for (auto& row : rows) std::copy_n(row.kept, 3, row.impulse);
+    };
+    std::copy_n(y_.data(), y_.size(), kept_.data());
+    save(contacts_), save(springs_);
+    sweep(Push::all);
+    move();
+    std::copy_n(kept_.data(), y_.size(), y_.data());
+    restore(contacts_), restore(springs_);
+}
+
+void IslandSolver::sweep(Push push) {
+    for (SpringRows& spring : springs_) solve_spring(spring);
+    for (ContactRows& contact : contacts_) solve_contact(contact, push);
+}
+
+// What the rows see of the velocities.
+inline void IslandSolver::speeds(const Rows& rows, float (&v)[3]) const {
+    Lanes sum[3] = {lanes_of(0), lanes_of(0), lanes_of(0)};
+    for (const Side& side : rows.side)
+        if (side.body >= 0) dot_rows(jacobians_.data() + side.rows, y_.data() + side.y, side.width, sum);
+    for (int r = 0; r < 3; ++r) v[r] = sum_of(sum[r]);
+}
+
+inline void IslandSolver::push_by(const Rows& rows, const float (&impulse)[3]) {
+    for (const Side& side : rows.side)
+        if (side.body >= 0)
+            add_rows_to(jacobians_.data() + side.rows, impulse, side.width, y_.data() + side.y);
+}
+
+void IslandSolver::solve_spring(SpringRows& s) {
+    float v[3];
+    speeds(s, v);
+    for (int i = 0; i < 3; ++i) v[i] += s.pull * s.error[i] + s.gamma * s.impulse[i];
+    float p[3];
+    for (int i = 0; i < 3; ++i) {
+        p[i] = -(s.inverse[i][0] * v[0] + s.inverse[i][1] * v[1] + s.inverse[i][2] * v[2]);
+        s.impulse[i] += p[i];
+    }
+    push_by(s, p);
+}
+
+void IslandSolver::solve_contact(ContactRows& c, Push push) {
+    float v[3];
+    speeds(c, v);
+    // Selected, not branched: which case it is cannot be foretold.
+    const bool soft = c.now <= 0 && (push == Push::all || (push == Push::soft && !c.emerging));
+    const float bias = c.now > 0 ? c.now * inverse_h_ : soft ? std::max(push_rate_ * c.now, -kPushSpeed) : 0;
+    const float mass_share = soft ? mass_share_ : 1, impulse_share = soft ? impulse_share_ : 0;
+    const float normal = std::max(
+        c.impulse[0] - mass_share * c.inverse_normal * (v[0] + bias) - impulse_share * c.impulse[0], 0.f);
+    float p[3] = {normal - c.impulse[0], 0, 0};
+    c.impulse[0] = normal;
+    c.largest = std::max(c.largest, normal);
+    v[1] += c.k[0][1] * p[0];
+    v[2] += c.k[0][2] * p[0];
+    const float stick0 = c.impulse[1] - (c.inverse_tangent[0] * v[1] + c.inverse_tangent[1] * v[2]);
+    const float stick1 = c.impulse[2] - (c.inverse_tangent[1] * v[1] + c.inverse_tangent[2] * v[2]);
+    // If it slides: against the speed, whatever the masses in either direction, so by one mass for both.
+    const float most = c.friction * normal;
+    const bool slides = stick0 * stick0 + stick1 * stick1 > most * most;
+    const float slide0 = c.impulse[1] - c.slide_mass * v[1], slide1 = c.impulse[2] - c.slide_mass * v[2];
+    const float scale = most / std::max(root(slide0 * slide0 + slide1 * slide1), 1e-30f);
+    const float t0 = slides ? scale * slide0 : stick0, t1 = slides ? scale * slide1 : stick1;
+    p[1] = t0 - c.impulse[1], p[2] = t1 - c.impulse[2];
+    c.impulse[1] = t0, c.impulse[2] = t1;
+    if (p[0] != 0 || p[1] != 0 || p[2] != 0) push_by(c, p);
+}
+
+// Energy that a contact's normal impulse takes out in this substep, where it may have to give some back: held
+// over the substep, it does p (v0 + v1) / 2 on the rigid part and p G on the modes.
+void IslandSolver::note_work() {
+    for (ContactRows& c : contacts_) {
+        if (c.restitution == 0 || c.largest == 0) continue;
+        float mean = 0;
+        for (const Side& side : c.side) {
+            if (side.body < 0) continue;
+            const float* d = jacobians_.data() + side.rows;
+            const float *before = start_.data() + side.y, *after = y_.data() + side.y;
+            mean += (dot(d, before, 8) + dot(d, after, 8)) / 2;
+            if (side.width > 8) mean += dot(d + 8, after + 8, side.width - 8);
+        }
+        c.taken -= c.impulse[0] * mean;
+    }
+}
+
+// A rebound to e times the approach, by an impulse p whose work p v + p^2 (K_rigid / 2 + K_modes) is at most
+// e^2 of the energy that the contact has taken. For rigid bodies both say the same.
+void IslandSolver::restitute() {
+    for (ContactRows& c : contacts_) {
+        if (c.restitution == 0 || c.largest == 0 || c.approach > -kBounceThreshold) continue;
+        float v[3];
+        speeds(c, v);
+        float rigid = 0;
+        for (const Side& side : c.side)
+            if (side.body >= 0) rigid += dot(jacobians_.data() + side.rows, jacobians_.data() + side.rows, 8);
+        // The modes yield to p under the impulse of this substep, too.
+        const float modes = c.k[0][0] - rigid, firm = rigid / 2 + modes, slope = v[0] + modes * c.impulse[0];
+        const float budget = c.restitution * c.restitution * std::max(c.taken, 0.f);
+        const float most = (std::sqrt(slope * slope + 4 * firm * budget) - slope) / (2 * firm);
+        const float wanted = -c.inverse_normal * (v[0] + c.restitution * c.approach);
+        const float p[3] = {std::clamp(wanted, 0.f, std::max(most, 0.f)), 0, 0};
+        c.impulse[0] += p[0];
+        push_by(c, p);
+    }
+}
+
+void IslandSolver::move() {
+    if (any_told_)
+        for (ContactRows& c : contacts_) std::copy_n(c.impulse, 3, c.at_move);
+    for (const BodyRows& rows : rows_of_) {
+        MovingBody& body = *rows.body;
+        const BodyKind& kind = *body.kind;
+        const float* y = y_.data() + rows.offset;
+        const float* start = start_.data() + rows.offset;
+        float* moved = moved_.data() + rows.offset;
+        const float h = static_cast<float>(h_);
+        for (int i = 0; i < rows.width; ++i) moved[i] += h * y[i];
+        WorldBodyState& s = body.state;
+        const double root_mass = kind.root_mass;
+        s.position += h_ / root_mass * Eigen::Vector3d(y[0], y[1], y[2]);
+        Eigen::Vector3d change;
+        for (int i = 0; i < 3; ++i) change[i] = kind.root_inertia[i] * (y[3 + i] - start[3 + i]);
+        Eigen::Vector3d momentum = s.angular_momentum + rows.frame * change;
+        if (body.pushed) momentum += h_ * body.torque;
+        s.orientation = body.substep_rotation.advance(s.orientation, momentum);
+    }
+}
+
+// Half-way between where the contact would be if it moved with either centre.
+Eigen::Vector3d IslandSolver::place_now(const ContactRows& c) const {
+    const Side &a = c.side[0], &b = c.side[1];
+    auto with = [this](const Side& side, const Eigen::Vector3f& arm) -> Eigen::Vector3d {
+        return rows_of_[static_cast<std::size_t>(side.body)].place + arm.cast<double>();
+    };
+    if (b.body < 0) return with(a, c.point->arm_a);
+    if (a.body < 0) return with(b, c.point->arm_b);
+    return (with(a, c.point->arm_a) + with(b, c.point->arm_b)) / 2;
+}
+
+// In double precision and at one point of space a pair, so that linear and angular momentum are kept to
+// rounding.
+void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point) {
+    const Side &a = rows.side[0], &b = rows.side[1];
+    if (b.body < 0 && rows_of_[static_cast<std::size_t>(a.body)].body->own) outside_ += impulse;
+    if (a.body < 0 && rows_of_[static_cast<std::size_t>(b.body)].body->own) outside_ -= impulse;
+    for (const Side& side : rows.side) {
+        if (side.body < 0) continue;
+        const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
+        WorldBodyState& s = at.body->state;
+        const Eigen::Vector3d p = &side == &rows.side[0] ? impulse : Eigen::Vector3d(-impulse);
+        s.velocity += p / at.body->kind->mass.mass;
+        s.angular_momentum += (point - at.place).cross(p);
+    }
+}
+
+// Adds what a row triple did in this substep; see settle for what the sums stand for.
+void IslandSolver::tell_side(const Rows& rows, int which, const Eigen::Vector3d& impulse,
+                             const Eigen::Vector3d& at_move, const float (&along)[3],
+                             const Eigen::Vector3d& point, StepImpulse& given) const {
+    const Side& side = rows.side[which];
+    const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
+    const double sign = which == 0 ? 1 : -1;
+    const Eigen::Vector3d arm = point - at.place, moved = h_ * at_move + remaining_ * impulse;
+    given.linear += sign * impulse;
+    given.angular += sign * arm.cross(impulse);
+    given.displacement += sign * moved;
+    given.turn += sign * arm.cross(moved);
+    const float* d = jacobians_.data() + side.rows + 8;
+    const HeldSteps& step = at.body->kind->substep;
+    for (int k = 0; k < at.body->kind->modes; ++k) {
+        const double held = static_cast<double>(along[0] * d[k] + along[1] * d[side.width + k] +
+                                                along[2] * d[2 * side.width + k]) /
+                            step.root_compliance[k];
+        given.modal[k] += held;
+        if (given.modal_q.size() == 0) continue;
+        given.modal_q[k] += h_ * step.compliance[k] * held;
+        given.modal_rate[k] += step.rate[k] * held;
+    }
+}
+
+// What earlier substeps did to the modes of ghosts rings on.
+void IslandSolver::ring_on() {
+    auto ring = [this](int body, StepImpulse& given) {
+        const HeldSteps& step = (*bodies_)[static_cast<std::size_t>(body)].kind->substep;
+        for (int k = 0; k < given.modal_q.size(); ++k) {
+            const double z = given.modal_q[k], rate = given.modal_rate[k];
+            given.modal_q[k] = z + h_ * (step.mean_z[k] * z + step.mean_rate[k] * rate);
+            given.modal_rate[k] = step.c[k] * z + step.d[k] * rate;
+        }
+    };
+    for (std::size_t i = first_crossed_; i < crossed_.size(); ++i) {
+        ring(crossed_[i].own, crossed_[i].on_own);
+        ring(crossed_[i].ghost, crossed_[i].on_ghost);
+    }
+}
+
+void IslandSolver::tell(const Rows& rows, int pair, const Eigen::Vector3d& impulse,
+                        const Eigen::Vector3d& at_move, const float (&along)[3],
+                        const Eigen::Vector3d& point) {
+    for (int side = 0; side < 2; ++side) {
+        if (rows.side[side].body < 0) continue;
+        MovingBody& body = *rows_of_[static_cast<std::size_t>(rows.side[side].body)].body;
+        if (pair >= 0) {
+            CrossImpulse& cross = crossed_[static_cast<std::size_t>(pair)];
+            tell_side(rows, side, impulse, at_move, along, point, body.own ? cross.on_own : cross.on_ghost);
+        }
+        if (!body.watched) continue;
+        if (!std::exchange(body.was_given, true)) clear(body.given);
+        tell_side(rows, side, impulse, at_move, along, point, body.given);
+    }
+}
+
+// From sums over the substeps to what is told: displacement and turn beyond those of the impulse acting
+// half-way through the step; rows are scaled by the root of the compliance.
+void IslandSolver::settle(const BodyRows& rows, StepImpulse& given) const {
+    const BodyKind& kind = *rows.body->kind;
+    given.displacement = (given.displacement - settings_->dt / 2 * given.linear) / kind.mass.mass;
+    given.turn -= settings_->dt / 2 * given.angular;
+    given.turn = rows.frame * (rows.frame.transpose() * given.turn).cwiseQuotient(kind.mass.inertia);
+}
+
+void IslandSolver::settle_given() {
+    for (const BodyRows& rows : rows_of_)
+        if (rows.body->was_given) settle(rows, rows.body->given);
+    for (std::size_t i = first_crossed_; i < crossed_.size(); ++i) {
+        CrossImpulse& cross = crossed_[i];
+        settle(rows_of_[static_cast<std::size_t>(local(cross.own))], cross.on_own);
+        settle(rows_of_[static_cast<std::size_t>(local(cross.ghost))], cross.on_ghost);
+    }
+}
+
+void IslandSolver::finish() {
+    ring_on();
+    for (const ContactRows& c : contacts_) {
+        auto world = [&c](const float(&p)[3]) -> Eigen::Vector3d {
+            return (p[0] * c.point->normal + p[1] * c.tangent[0] + p[2] * c.tangent[1]).cast<double>();
+        };
+        if (c.told && (c.impulse[0] != 0 || c.at_move[0] != 0))
+            tell(c, c.pair, world(c.impulse), world(c.at_move), c.impulse, place_now(c));
+        if (c.impulse[0] != 0) apply(c, world(c.impulse), place_now(c));
+    }
+    for (const SpringRows& s : springs_) {
+        const Eigen::Vector3d p(s.impulse[0], s.impulse[1], s.impulse[2]);
+        if (s.told) tell(s, -1, p, p, s.impulse, s.place);
+        apply(s, p, s.place);
+    }
+    for (const BodyRows& rows : rows_of_) {
+        MovingBody& body = *rows.body;
+        const BodyKind& kind = *body.kind;
+        const float* y = y_.data() + rows.offset;
+        const float* start = start_.data() + rows.offset;
+        WorldBodyState& s = body.state;
+        const Eigen::Vector3d entered = s.velocity;
+        s.velocity += h_ * body.gravity_scale * settings_->gravity;
+        s.velocity *= kind.substep_drag, s.angular_momentum *= kind.substep_drag;
+        if (body.own) outside_ += kind.mass.mass * (s.velocity - entered);
+        if (body.pushed) {
+            s.velocity += h_ / kind.mass.mass * body.force;
+            s.angular_momentum += h_ * body.torque;
+        }
+        const HeldSteps& step = kind.substep;
+        const Eigen::Map<const Eigen::ArrayXf> now(y + 8, kind.modes), before(start + 8, kind.modes);
+        ModeArray held = (now.cast<double>() - before.cast<double>()) / step.root_compliance;
+        if (body.pushed) held += h_ * body.modal_force.array();
+        const ModeArray mean =
+            step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array() + step.compliance * held;
+        s.q_dot.array() = step.c * s.q.array() + step.d * s.q_dot.array() + step.rate * held;
+        s.q.array() += h_ * mean;
+        if (limit_deformation(body)) ++limited_;
+    }
+}
+
+void IslandSolver::keep_impulses() {
+    for (const ContactRows& c : contacts_) {
+        c.point->normal_impulse = c.impulse[0];
+        c.point->friction_impulse = c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1];
+    }
+    for (const SpringRows& s : springs_) {
+        for (int i = 0; i < 3; ++i) s.constraint->impulse[i] = s.impulse[i];
+        const double force = s.constraint->impulse.norm() / h_;
+        if (!(force > s.constraint->definition.breaking_force)) continue;
+        s.constraint->holds = false;
+        ++broken_;
+    }
+}
+
+}  // namespace sim

@@ -1,0 +1,191 @@
+#pragma once
+#include <array>
+#include <vector>
+
+#include "shape/lanes.h"
+#include "world/manifold.h"
+#include "world/moving_body.h"
+
+namespace sim {
+
+/// What touches or hangs together in one step, in order of ids.
+struct Island {
+    std::vector<int> bodies;       ///< that move, ascending
+    std::vector<int> manifolds;    ///< indices, ascending by (a, b)
+    std::vector<int> constraints;  ///< indices, ascending
+};
+
+/// Moves one island over one step by substeps with soft contacts (Catto 2024, "Solver2D: soft step"; Macklin
+/// et al. 2019, "Small steps in physics simulation"), for bodies with modes.
+///
+/// A substep of h, for every body with coordinates y = (sqrt(m) v, sqrt(I) w, G):
+///   1. v <- v + h g; modes: free mean rate G0 = (z_free(h) - z) / h; last impulses applied again (warm
+///   start)
+///   2. one sweep over springs and contacts, overlaps pushed out softly (30 Hz, damping 10, at most 3 m/s)
+///   3. positions and orientations move with these velocities
+///   4. two sweeps without the push, so that it leaves no speed behind; with one, soft piles simmer (bodies
+///      that began their contact deep inside each other are pushed in a sweep of their own that only
+///      positions see)
+///   5. modes step exactly under the force P / h held over h: z1 = z + h G, z1' = c z + d z' + (b / h) P
+/// and at the end of the last substep restitution. Contact forces act on a mode with its compliance over the
+/// substep, w = (1 - a) / (omega h)^2 >= 0 (body_kind.h), so rigid, stiff and soft bodies go through one
+/// solver, and the force's work on a pair without push is -1/2 P J M^-1 J^T P of the rigid part: never
+/// positive, for any omega h. Restitution gives back at most e^2 of what a contact took.
+///
+/// Rows. One Jacobian row a direction (normal, two tangents) and body, scaled by the square root of the
+/// inverse mass: D = J M^-1/2, floats in whole lanes, (n, R^T(r x n) / sqrt(I), sqrt(w) phi(r)^T R^T n). So
+/// the same row takes velocities out and puts impulses in. The three rows of a point are read together, with
+/// K = D D^T between them; friction is a 2 x 2 block limited to the cone. Separations move along with the
+/// rows: s = s0 + D . integral of y. Contacts are frozen over the step but for velocities and separations;
+/// the rows of springs follow the bodies every substep, as does the frame of angular rows where there is no
+/// contact.
+///
+/// Deterministic: sweeps go over springs, then contacts, in the order of ids (see in_turns). No allocation
+/// once the buffers have grown.
+class IslandSolver {
+public:
+    IslandSolver(const WorldSettings& settings, std::vector<MovingBody>& bodies,
+                 std::vector<Manifold>& manifolds, std::vector<HeldConstraint>& constraints)
+        : settings_(&settings), bodies_(&bodies), manifolds_(&manifolds), constraints_(&constraints) {}
+
+    void solve(const Island& island);
+    /// What planes, fixed bodies, places, gravity and drag gave own bodies since the last call [N s].
+    [[nodiscard]] Eigen::Vector3d take_outside_impulse() noexcept {
+        return std::exchange(outside_, Eigen::Vector3d::Zero());
+    }
+    [[nodiscard]] const std::vector<CrossImpulse>& crossed() const noexcept { return crossed_; }
+    /// Whether contacts of own bodies with others are told in `crossed`; forgets what was.
+    void cross(bool told) noexcept {
+        crossed_.clear();
+        told_crossed_ = told;
+    }
+    [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
+    [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }
+
+private:
+    struct BodyRows {
+        MovingBody* body;
+        std::uint32_t offset;  // of y, start, moved
+        int width;
+        Eigen::Vector3d place;  // of the centre, at the start of the substep
+        Eigen::Matrix3d frame;  // body to world, in which angular rows are written
+        Eigen::Matrix3f body_from_world;
+    };
+    /// One body's part of a row triple.
+    struct Side {
+        int body = -1;           // island-local, -1: does not move
+        int width = 0;           // of a row
+        std::uint32_t rows = 0;  // where they begin in jacobians_
+        std::uint32_t y = 0;     // where the body begins in y_, start_, moved_
+    };
+    /// A row triple and whom it joins.
+    struct Rows {
+        Side side[2];
+        float k[3][3];
+        bool told = false;  ///< a watched body is among them
+    };
+    struct ContactRows : Rows {
+        ManifoldPoint* point;
+        Eigen::Vector3f tangent[2];
+        float separation, now, friction, restitution, approach;
+        float taken, slide_mass, inverse_normal,
+            inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
+        float impulse[3], kept[3], at_move[3], largest;
+        bool emerging;
+        int pair = -1;  // of crossed_
+    };
+    struct SpringRows : Rows {
+        HeldConstraint* constraint;
+        Eigen::Vector3d place;  // where the impulse acts in this substep, world
+        float error[3];
+        float inverse[3][3];  // of K + gamma
+        float gamma, pull;    // pull: bias speed per error [1/s]
+        float impulse[3], kept[3];
+    };
+    /// A place on a body that rows act on.
+    struct Place {
+        int body;             // island-local, -1
+        Eigen::Vector3f arm;  // world axes, from the centre
+        const float* shapes;  // phi there, [axis][mode_width]; nullptr without modes
+    };
+
+    /// A contact's turn: after every earlier one (by ids) that shares a body with it.
+    struct Turn {
+        Manifold* manifold;
+        int point, turn;
+    };
+
+    void begin(const Island& island);
+    /// The contacts in windows of kWindow, within a window by turn, then by ids. Contacts of one turn share
+    /// no body, so sweeping in this order gives the bits of the order by ids, but the processor can work on
+    /// several at once; windows keep the bodies they use in its cache.
+    static constexpr std::size_t kWindow = 64;
+    void flush_window();
+    const std::vector<Turn>& in_turns(const Island& island);
+    void add_contact(Manifold& manifold, ManifoldPoint& point);
+    void add_spring(HeldConstraint& constraint);
+    /// An end of a spring, now.
+    struct End {
+        Eigen::Vector3d point;  // world
+        Place place;
+    };
+    [[nodiscard]] End end_of(int body, const Eigen::Vector3d& rest, float* shapes) const;
+    void refresh(SpringRows& spring);
+    [[nodiscard]] Place place(int body, const Eigen::Vector3f& arm, int sample, const Eigen::Vector3f& rest,
+                              float* scratch);
+    [[nodiscard]] Side reserve_rows(int body);
+    void write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign, const Side& side);
+    void finish_rows(Rows& rows);
+    bool note_told(const Rows& rows, bool contact);  // notes it in any_told_, too
+    [[nodiscard]] int local(int body) const noexcept { return local_[static_cast<std::size_t>(body)]; }
+
+    void substep(bool first, bool last);
+    void load_velocities();
+    void warm_start(bool first);
+    enum class Push { none, soft, all };
+    void sweep(Push push);
+    void push_out();
+    void speeds(const Rows& rows, float (&v)[3]) const;
+    void push_by(const Rows& rows, const float (&impulse)[3]);
+    void solve_spring(SpringRows& spring);
+    void solve_contact(ContactRows& contact, Push push);
+    void note_work();
+    void restitute();
+    void move();
+    [[nodiscard]] Eigen::Vector3d place_now(const ContactRows& contact) const;
+    void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
+    void tell(const Rows& rows, int pair, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
+              const float (&along)[3], const Eigen::Vector3d& point);
+    void tell_side(const Rows& rows, int side, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
+                   const float (&along)[3], const Eigen::Vector3d& point, StepImpulse& given) const;
+    void finish();
+    void keep_impulses();
+    void ring_on();
+    void settle_given();
+    void settle(const BodyRows& rows, StepImpulse& given) const;
+    int note_pair(const Manifold& manifold);
+
+    const WorldSettings* settings_;
+    std::vector<MovingBody>* bodies_;
+    std::vector<Manifold>* manifolds_;
+    std::vector<HeldConstraint>* constraints_;
+
+    std::vector<BodyRows> rows_of_;  // per island body
+    std::vector<int> local_;         // world body -> island body or -1
+    std::vector<Turn> window_, by_turn_;
+    std::vector<int> next_turn_;  // per island body
+    std::vector<ContactRows> contacts_;
+    std::vector<SpringRows> springs_;
+    LaneArray y_, kept_, start_, moved_, jacobians_;
+    std::size_t jacobians_used_ = 0;
+    double h_ = 0;
+    float inverse_h_ = 0, push_rate_ = 0, mass_share_ = 1, impulse_share_ = 0;
+    std::uint64_t limited_ = 0, broken_ = 0;
+    Eigen::Vector3d outside_ = Eigen::Vector3d::Zero();
+    bool any_told_ = false, told_crossed_ = false;
+    std::vector<CrossImpulse> crossed_;  // of all islands since forget_crossed
+    std::size_t first_crossed_ = 0;      // of this island
+    double remaining_ = 0;               // of the step after this substep [s]
+};
+
+}  // namespace sim

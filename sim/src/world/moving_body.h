@@ -1,0 +1,55 @@
+#pragma once
+#include "world/free_rotation.h"
+#include "world/posed_body.h"
+
+namespace sim {
+
+/// A body of a World as it goes from step to step.
+struct MovingBody {
+    const BodyKind* kind = nullptr;
+    bool fixed = false, quarantined = false, asleep = false;
+    double gravity_scale = 1;
+    float friction = 0, restitution = 0;
+    WorldBodyState state;
+    PosedBody posed;
+    FreeRotation substep_rotation{Eigen::Vector3d::Ones(), 0}, step_rotation{Eigen::Vector3d::Ones(), 0};
+    bool at_limit = false;  ///< its deformation was held in the last substep: contacts find its modes stiff
+    int still_steps = 0;    ///< since it was faster than the sleep speed, at most kMostStillSteps
+    int sleep_group = -1;   ///< first body of those that fell asleep together
+    bool pushed = false;    ///< forces for the next step: the user's, or what bodies elsewhere do
+    Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();  ///< world axes
+    Eigen::VectorXd modal_force;                                                        ///< [N kg^-1/2]
+
+    bool own = true;       ///< stepped for good here; else a copy of another world's
+    bool unposed = false;  ///< `posed` is older than `state`
+    bool watched = false;  ///< what other moving bodies do to it in a step is added up in `given`
+    bool was_given = false;
+    StepImpulse given;
+    double work = 0;  ///< see World::work
+
+    [[nodiscard]] bool moves() const noexcept { return !fixed && !quarantined; }
+};
+
+constexpr int kMostStillSteps = 65535;
+
+/// A point constraint as it is being held.
+struct HeldConstraint {
+    PointConstraint definition;
+    bool holds = true;
+    Eigen::Vector3f impulse = Eigen::Vector3f::Zero();  ///< of the last substep on a, world [N s]
+};
+
+/// Free motion over a whole step: parabola, free rotation, exact modes. For bodies that touch nothing.
+void move_freely(MovingBody& body, const WorldSettings& settings);
+
+/// Brings a deformation that goes beyond the limit back to it: all coordinates are scaled, and the rates lose
+/// what pointed outwards, so neither elastic nor kinetic energy rises. The limit: |du/dr| (Frobenius) at most
+/// 0.5 at the 53 probes of the body (body_kind.h), so D's singular values lie within 0.5 to 1.5 there and it
+/// has an inverse. Returns whether it acted.
+bool limit_deformation(MovingBody& body);
+constexpr double kGradientLimit = 0.5;
+
+/// An upper bound of the speed of the body's samples at rest shape [m/s].
+[[nodiscard]] double point_speed(const MovingBody& body) noexcept;
+
+}  // namespace sim

@@ -1,0 +1,530 @@
+#include <pmmintrin.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <memory>
+#include <numeric>
+
+#include "world/world_check.h"
+#include "world/world_implementation.h"
+
+namespace sim {
+namespace {
+
+constexpr double kStillTime = 0.5;  // [s]
+
+// Numbers below 1e-308 (1e-38 in single precision) count as zero within a step: they slow the processor down
+// and mean nothing. Also makes the result independent of how the thread was set up.
+class FlushDenormals {
+public:
+    FlushDenormals() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040); }
+    ~FlushDenormals() { _mm_setcsr(before_); }
+    FlushDenormals(const FlushDenormals&) = delete;
+    FlushDenormals& operator=(const FlushDenormals&) = delete;
+
+private:
+    unsigned before_;
+};
+
+constexpr double kWorkOfPair = 0.5, kWorkOfPoint = 0.75;  // of a body that touches nothing
+
+void stop_body(MovingBody& body) {
+    body.state.velocity.setZero();
+    body.state.angular_momentum.setZero();
+    body.state.q_dot.setZero();
+}
+
+}  // namespace
+
+const BodyKind* World::Implementation::kind_of(const WorldBody& body) {
+    for (const auto& kind : kinds)
+        if (same_kind(kind->definition, body)) return kind.get();
+    kinds.push_back(std::make_unique<BodyKind>(make_body_kind(body, settings)));
+    return kinds.back().get();
+}
+
+int World::Implementation::add(const WorldBody& definition) {
+    check_world_body(definition);
+    MovingBody body;
+    body.kind = kind_of(definition);
+    body.fixed = definition.fixed;
+    body.gravity_scale = definition.gravity_scale;
+    body.friction = static_cast<float>(definition.friction);
+    body.restitution = static_cast<float>(definition.restitution);
+    const Eigen::Quaterniond orientation(definition.world_from_body.rotation());
+    const Eigen::Matrix3d r = orientation.toRotationMatrix();
+    const Eigen::Vector3d momentum =
+        r * body.kind->mass.inertia.cwiseProduct(r.transpose() * definition.angular_velocity);
+    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(body.kind->modes);
+    body.state = {definition.world_from_body.translation(),
+                  orientation,
+                  definition.fixed ? Eigen::Vector3d::Zero() : definition.velocity,
+                  definition.fixed ? Eigen::Vector3d::Zero() : momentum,
+                  zero,
+                  zero};
+    body.posed.kind = body.kind;
+    body.substep_rotation = FreeRotation(body.kind->mass.inertia, settings.dt / settings.substeps);
+    body.step_rotation = FreeRotation(body.kind->mass.inertia, settings.dt);
+    body.modal_force = zero;
+    body.given.modal = zero;
+    definitions.push_back(definition);
+    bodies.push_back(std::move(body));
+    pose(bodies.back());
+    return static_cast<int>(bodies.size()) - 1;
+}
+
+void World::Implementation::set_joined() {
+    joined.clear();
+    for (const HeldConstraint& c : constraints)
+        if (c.holds && c.definition.body_b >= 0)
+            joined.emplace_back(std::min(c.definition.body_a, c.definition.body_b),
+                                std::max(c.definition.body_a, c.definition.body_b));
+    std::sort(joined.begin(), joined.end());
+}
+
+void World::Implementation::pose(MovingBody& body) {
+    body.posed.set(body.state.position, body.state.orientation, body.state.q);
+    body.unposed = false;
+}
+
+void World::Implementation::quarantine(int id, const std::string& what) {
+    MovingBody& body = bodies[static_cast<std::size_t>(id)];
+    body.quarantined = true;
+    body.asleep = body.pushed = false;
+    stop_body(body);  // where it was last seen whole
+    body.state.position = body.posed.position;
+    body.state.orientation = Eigen::Quaterniond(body.posed.rotation);
+    body.state.q.setZero();
+    if (body.own) quarantined.push_back({id, counts.steps, what});
+    // What it did to others may be as broken as it is.
+    std::erase_if(contacts.manifolds(), [id](const Manifold& m) { return m.a == id || m.b == id; });
+    drop_constraints(id);
+}
+
+void World::Implementation::drop_constraints(int body) {
+    for (HeldConstraint& c : constraints)
+        if (c.definition.body_a == body || c.definition.body_b == body) c.holds = false, c.impulse.setZero();
+    set_joined();
+}
+
+// Bodies whose state or forces are not finite, or absurd, take no further part. Before anything else in a
+// step, so that they touch nobody.
+void World::Implementation::quarantine_broken() {
+    for (const int i : here) {
+        const MovingBody& body = bodies[static_cast<std::size_t>(i)];
+        if (!body.moves() || !body.own) continue;
+        const std::string what = what_is_broken(body);
+        if (!what.empty()) quarantine(i, what);
+    }
+    std::erase_if(here, [this](int i) { return bodies[static_cast<std::size_t>(i)].quarantined; });
+}
+
+// After a step: what it broke, so that nobody else sees it.
+void World::Implementation::quarantine_results() {
+    for (std::size_t i = 0; i < islands_used; ++i) {
+        if (!is_own(islands[i])) continue;
+        for (const int id : islands[i].bodies) {
+            MovingBody& body = bodies[static_cast<std::size_t>(id)];
+            body.pushed = false;
+            if (sharing == Sharing::pairs && !body.own) continue;  // its owner's affair
+            const std::string what = what_is_broken(body);
+            if (!what.empty()) quarantine(id, what);
+        }
+    }
+}
+
+bool World::Implementation::is_own(const Island& island) const {
+    if (sharing == Sharing::alone) return !island.bodies.empty();
+    return std::any_of(island.bodies.begin(), island.bodies.end(),
+                       [this](int id) { return bodies[static_cast<std::size_t>(id)].own; });
+}
+
+int World::Implementation::root(int body) {
+    while (parent[static_cast<std::size_t>(body)] != body)
+        body = parent[static_cast<std::size_t>(body)] =
+            parent[static_cast<std::size_t>(parent[static_cast<std::size_t>(body)])];
+    return body;
+}
+
+void World::Implementation::join(int a, int b) {
+    const int ra = root(a), rb = root(b);
+    parent[static_cast<std::size_t>(std::max(ra, rb))] = std::min(ra, rb);
+}
+
+void World::Implementation::gather() {
+    if (sharing == Sharing::islands) return gather_islands();
+    if (sharing == Sharing::pairs) return gather_pairs();
+    here.clear();
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+        if (!bodies[i].quarantined) here.push_back(static_cast<int>(i));
+}
+
+void World::Implementation::start_union() {
+    parent.resize(bodies.size());
+    std::iota(parent.begin(), parent.end(), 0);
+}
+
+void World::Implementation::find_islands() {
+    start_union();
+    auto moves = [this](int id) {
+        return id >= 0 && id < kFirstPlane && bodies[static_cast<std::size_t>(id)].moves();
+    };
+    auto held_here = [&](const HeldConstraint& c) {
+        const int a = c.definition.body_a, b = c.definition.body_b;
+        const bool away =
+            sharing == Sharing::pairs && !bodies[static_cast<std::size_t>(moves(a) ? a : std::max(b, 0))].own;
+        return c.holds && !away;
+    };
+    auto is_here = [this](int id) {
+        return sharing == Sharing::alone || std::binary_search(here.begin(), here.end(), id);
+    };
+    for (const Manifold& m : contacts.manifolds())
+        if (moves(m.a) && moves(m.b)) join(m.a, m.b);
+    for (const HeldConstraint& c : constraints)
+        if (held_here(c) && moves(c.definition.body_a) && moves(c.definition.body_b))
+            join(c.definition.body_a, c.definition.body_b);
+    // An island's place is that of its first body.
+    place.assign(bodies.size(), -1);
+    islands_used = 0;
+    auto island_of = [&](int id) -> Island& {
+        int& at = place[static_cast<std::size_t>(root(id))];
+        if (at < 0) {
+            at = static_cast<int>(islands_used++);
+            if (islands.size() < islands_used) islands.emplace_back();
+            Island& fresh = islands[static_cast<std::size_t>(at)];
+            fresh.bodies.clear(), fresh.manifolds.clear(), fresh.constraints.clear();
+        }
+        return islands[static_cast<std::size_t>(at)];
+    };
+    for (const int i : here)
+        if (const MovingBody& body = bodies[static_cast<std::size_t>(i)]; body.moves() && !body.asleep)
+            island_of(i).bodies.push_back(i);
+    auto& manifolds = contacts.manifolds();
+    for (std::size_t m = 0; m < manifolds.size(); ++m) {
+        const int id = moves(manifolds[m].a) ? manifolds[m].a : manifolds[m].b;
+        island_of(id).manifolds.push_back(static_cast<int>(m));
+    }
+    for (std::size_t c = 0; c < constraints.size(); ++c) {
+        const PointConstraint& held = constraints[c].definition;
+        const int id = moves(held.body_a) ? held.body_a : moves(held.body_b) ? held.body_b : -1;
+        if (!held_here(constraints[c]) || id < 0) continue;
+        const MovingBody& first = bodies[static_cast<std::size_t>(id)];
+        if (is_here(id) && !first.asleep) island_of(id).constraints.push_back(static_cast<int>(c));
+    }
+}
+
+void World::Implementation::solve_islands() {
+    int awake = 0;
+    for (std::size_t i = 0; i < islands_used; ++i) {
+        const Island& island = islands[i];
+        if (!is_own(island)) continue;
+        ++awake;
+        if (island.manifolds.empty() && island.constraints.empty()) {
+            MovingBody& body = bodies[static_cast<std::size_t>(island.bodies.front())];
+            const Eigen::Vector3d before = body.state.velocity;
+            move_freely(body, settings);
+            if (limit_deformation(body)) ++free_limited;
+            if (body.own) outside += body.kind->mass.mass * (body.state.velocity - before);
+            if (body.pushed && sharing == Sharing::pairs) outside -= settings.dt * body.force;
+        } else {
+            solver->solve(island);
+            if (sharing == Sharing::pairs) continue;
+            for (const int id : island.bodies)
+                if (const MovingBody& body = bodies[static_cast<std::size_t>(id)]; body.pushed && body.own)
+                    outside += settings.dt * body.force;
+        }
+    }
+    counts.islands = awake;
+    outside += solver->take_outside_impulse();
+    if (!outside.allFinite()) outside = outside_before;  // of a body that is broken
+    counts.deformations_limited = free_limited + solver->deformations_limited();
+    if (counts.constraints_broken != solver->constraints_broken()) set_joined();
+    counts.constraints_broken = solver->constraints_broken();
+}
+
+int World::Implementation::still_steps_to_sleep() const {
+    return static_cast<int>(std::ceil(kStillTime / settings.dt - 1e-9));
+}
+
+void World::Implementation::put_to_sleep() {
+    const int wanted = std::min(still_steps_to_sleep(), kMostStillSteps);
+    for (std::size_t i = 0; i < islands_used; ++i) {
+        const Island& island = islands[i];
+        if (!is_own(island)) continue;
+        bool still = settings.sleeping;
+        for (const int id : island.bodies) {
+            MovingBody& body = bodies[static_cast<std::size_t>(id)];
+            const bool slow = point_speed(body) < settings.sleep_speed;
+            body.still_steps = slow ? std::min(body.still_steps + 1, kMostStillSteps) : 0;
+            still = still && body.still_steps >= wanted;
+            // What bodies of another world touch can rest only with them.
+            if (sharing == Sharing::pairs) still = still && body.own && !body.pushed;
+        }
+        if (!still) continue;
+        // What nothing holds is at rest only if nothing pulls.
+        const MovingBody& first = bodies[static_cast<std::size_t>(island.bodies.front())];
+        if (island.manifolds.empty() && island.constraints.empty() &&
+            (first.gravity_scale * settings.gravity.norm() != 0 || point_speed(first) > 1e-9))
+            continue;
+        for (const int id : island.bodies) {
+            MovingBody& body = bodies[static_cast<std::size_t>(id)];
+            body.asleep = true;
+            body.sleep_group = island.bodies.front();
+            stop_body(body);
+            pose(body);
+        }
+    }
+}
+
+void World::Implementation::count_work() {
+    for (const int i : here) {
+        MovingBody& body = bodies[static_cast<std::size_t>(i)];
+        body.work = body.moves() && !body.asleep ? 1 : 0;
+    }
+    cross_contacts = counts.contacts = 0;
+    auto own = [this](int id) { return id < kFirstPlane && bodies[static_cast<std::size_t>(id)].own; };
+    for (const Manifold& m : contacts.manifolds()) {
+        if (!own(m.a) && !own(m.b)) continue;
+        counts.contacts += m.count;
+        const bool both = m.b < kFirstPlane && bodies[static_cast<std::size_t>(m.b)].moves() &&
+                          bodies[static_cast<std::size_t>(m.a)].moves();
+        if (both && own(m.a) != own(m.b)) cross_contacts += m.count;
+        const double work = kWorkOfPair + kWorkOfPoint * m.count;
+        const bool shared = own(m.a) && own(m.b) && both;
+        if (own(m.a)) bodies[static_cast<std::size_t>(m.a)].work += shared ? work / 2 : work;
+        if (own(m.b)) bodies[static_cast<std::size_t>(m.b)].work += shared ? work / 2 : work;
+    }
+}
+
+// Whether anything happens in this step; in islands that others solve, too, so that contacts are forgotten
+// everywhere at once.
+bool World::Implementation::any_awake() const {
+    auto awake = [](const MovingBody& body) { return body.moves() && !body.asleep; };
+    if (sharing == Sharing::islands) return std::any_of(bodies.begin(), bodies.end(), awake);
+    return std::any_of(here.begin(), here.end(),
+                       [&](int i) { return awake(bodies[static_cast<std::size_t>(i)]); });
+}
+
+void World::Implementation::step() {
+    const FlushDenormals flush;
+    solver->cross(sharing == Sharing::pairs);
+    outside_before = outside;
+    ++counts.steps;
+    gather();
+    quarantine_broken();
+    for (const int i : here)
+        if (bodies[static_cast<std::size_t>(i)].pushed && bodies[static_cast<std::size_t>(i)].asleep)
+            wake_group(bodies, i);
+    counts.contacts = counts.pairs = counts.islands = 0;
+    if (!any_awake()) return dismiss_ghosts();
+    for (const int i : here) {
+        MovingBody& body = bodies[static_cast<std::size_t>(i)];
+        if (body.moves() && (!body.asleep || body.unposed)) pose(body);
+        body.was_given = false;
+    }
+    contacts.find(settings, planes, joined, bodies, here, sharing == Sharing::pairs);
+    find_islands();
+    solve_islands();
+    put_to_sleep();
+    count_work();
+    quarantine_results();
+    if (sharing == Sharing::islands) forget_foreign_contacts();
+    dismiss_ghosts();
+    counts.pairs = contacts.pairs();
+    counts.inverse_fallbacks = contacts.fallbacks();
+    counts.asleep = static_cast<int>(
+        std::count_if(bodies.begin(), bodies.end(), [](const MovingBody& b) { return b.asleep; }));
+}
+
+World::World(const WorldDefinition& definition) : implementation_(std::make_unique<Implementation>()) {
+    check_world(definition);
+    Implementation& w = *implementation_;
+    w.settings = definition.settings;
+    w.planes = definition.planes;
+    w.solver = std::make_unique<IslandSolver>(w.settings, w.bodies, w.contacts.manifolds(), w.constraints);
+    for (const WorldBody& body : definition.bodies) w.add(body);
+    for (const PointConstraint& constraint : definition.constraints) add_constraint(constraint);
+}
+
+World::~World() = default;
+World::World(World&&) noexcept = default;
+World& World::operator=(World&&) noexcept = default;
+
+void World::step() {
+    implementation_->step();
+}
+
+int World::add_body(const WorldBody& body) {
+    return implementation_->add(body);
+}
+
+int World::add_constraint(const PointConstraint& constraint) {
+    Implementation& w = *implementation_;
+    check_constraint(constraint, bodies());
+    w.constraints.push_back({constraint});
+    w.set_joined();
+    for (const int body : {constraint.body_a, constraint.body_b})
+        if (body >= 0) wake(body);
+    return static_cast<int>(w.constraints.size()) - 1;
+}
+
+void World::remove_constraint(int id) {
+    Implementation& w = *implementation_;
+    HeldConstraint& constraint = w.constraints.at(static_cast<std::size_t>(id));
+    constraint.holds = false;
+    w.set_joined();
+    for (const int body : {constraint.definition.body_a, constraint.definition.body_b})
+        if (body >= 0) wake(body);
+}
+
+bool World::constraint_holds(int id) const {
+    return implementation_->constraints.at(static_cast<std::size_t>(id)).holds;
+}
+
+const WorldSettings& World::settings() const noexcept {
+    return implementation_->settings;
+}
+
+int World::bodies() const noexcept {
+    return static_cast<int>(implementation_->bodies.size());
+}
+
+const WorldBody& World::definition(int body) const {
+    return implementation_->definitions.at(static_cast<std::size_t>(body));
+}
+
+FidelityChoice World::fidelity(int body) const {
+    return implementation_->bodies.at(static_cast<std::size_t>(body)).kind->choice;
+}
+
+RigidMass World::rigid_mass(int body) const {
+    return implementation_->bodies.at(static_cast<std::size_t>(body)).kind->mass;
+}
+
+const ModalBasis& World::basis(int body) const {
+    return implementation_->bodies.at(static_cast<std::size_t>(body)).kind->basis;
+}
+
+WorldBodyState World::state(int body) const {
+    return implementation_->bodies.at(static_cast<std::size_t>(body)).state;
+}
+
+void World::set_state(int body, const WorldBodyState& state) {
+    MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    check_state(state, b.kind->modes, b.fixed);
+    b.state = state;
+    const double norm = state.orientation.norm();
+    if (norm > 0.5 && norm < 2) b.state.orientation.coeffs() /= norm;
+    if (b.fixed) {
+        stop_body(b);
+        implementation_->pose(b);
+    }
+    wake(body);
+}
+
+void World::apply_force(int body, const Eigen::Vector3d& force, const Eigen::Vector3d& point_body) {
+    MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    if (!b.pushed) b.force.setZero(), b.torque.setZero(), b.modal_force.setZero();
+    const Eigen::Matrix3d r = b.state.orientation.toRotationMatrix();
+    b.pushed = true;
+    b.force += force;
+    b.torque += (r * b.posed.deformed(point_body)).cross(force);
+    if (b.kind->modes > 0)
+        b.modal_force += mode_shapes_at(b.kind->basis, point_body).transpose() * (r.transpose() * force);
+}
+
+void World::wake(int body) {
+    Implementation& w = *implementation_;
+    if (w.bodies.at(static_cast<std::size_t>(body)).asleep) wake_group(w.bodies, body);
+    w.bodies[static_cast<std::size_t>(body)].still_steps = 0;
+}
+
+bool World::asleep(int body) const {
+    return implementation_->bodies.at(static_cast<std::size_t>(body)).asleep;
+}
+
+bool World::all_asleep() const {
+    const auto& bodies = implementation_->bodies;
+    return std::all_of(bodies.begin(), bodies.end(),
+                       [](const MovingBody& b) { return b.asleep || !b.moves(); });
+}
+
+double World::time_s() const noexcept {
+    return static_cast<double>(implementation_->counts.steps) * implementation_->settings.dt;
+}
+
+World::Energy World::energy() const {
+    const Implementation& w = *implementation_;
+    Energy e{0, 0, 0, 0};
+    for (const MovingBody& body : w.bodies) {
+        if (!body.moves()) continue;
+        const WorldBodyState& s = body.state;
+        const double mass = body.kind->mass.mass;
+        const Eigen::Vector3d own = s.orientation.conjugate() * s.angular_momentum;
+        e.kinetic += mass / 2 * s.velocity.squaredNorm() +
+                     own.cwiseAbs2().cwiseQuotient(body.kind->mass.inertia).sum() / 2 +
+                     s.q_dot.squaredNorm() / 2;
+        e.potential -= mass * body.gravity_scale * w.settings.gravity.dot(s.position);
+        e.elastic += s.q.cwiseProduct(body.kind->basis.omega).squaredNorm() / 2;
+    }
+    auto at = [&w](int body, const Eigen::Vector3d& rest) -> Eigen::Vector3d {
+        const MovingBody& b = w.bodies[static_cast<std::size_t>(body)];
+        PosedBody posed;
+        posed.kind = b.kind;
+        posed.set(b.state.position, b.state.orientation, b.state.q);
+        return posed.position + posed.rotation * posed.deformed(rest);
+    };
+    for (const HeldConstraint& c : w.constraints) {
+        if (!c.holds) continue;
+        const Eigen::Vector3d b =
+            c.definition.body_b >= 0 ? at(c.definition.body_b, c.definition.point_b) : c.definition.point_b;
+        e.springs +=
+            c.definition.stiffness / 2 * (at(c.definition.body_a, c.definition.point_a) - b).squaredNorm();
+    }
+    return e;
+}
+
+Eigen::Vector3d World::momentum() const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const MovingBody& body : implementation_->bodies)
+        if (body.moves()) sum += body.kind->mass.mass * body.state.velocity;
+    return sum;
+}
+
+Eigen::Vector3d World::angular_momentum() const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const MovingBody& body : implementation_->bodies)
+        if (body.moves())
+            sum += body.state.angular_momentum +
+                   body.kind->mass.mass * body.state.position.cross(body.state.velocity);
+    return sum;
+}
+
+const WorldCounts& World::counts() const noexcept {
+    return implementation_->counts;
+}
+
+const std::vector<QuarantinedBody>& World::quarantined() const noexcept {
+    return implementation_->quarantined;
+}
+
+std::uint64_t World::state_hash() const {
+    std::uint64_t hash = 0xcbf29ce484222325u;
+    auto mix = [&hash](double value) {
+        std::uint64_t bits = std::bit_cast<std::uint64_t>(value);
+        for (int byte = 0; byte < 8; ++byte, bits >>= 8) hash = (hash ^ (bits & 255)) * 0x100000001b3u;
+    };
+    for (const MovingBody& body : implementation_->bodies) {
+        const WorldBodyState& s = body.state;
+        for (int i = 0; i < 3; ++i) mix(s.position[i]);
+        mix(s.orientation.w()), mix(s.orientation.x()), mix(s.orientation.y()), mix(s.orientation.z());
+        for (int i = 0; i < 3; ++i) mix(s.velocity[i]);
+        for (int i = 0; i < 3; ++i) mix(s.angular_momentum[i]);
+        for (const double q : s.q) mix(q);
+        for (const double q : s.q_dot) mix(q);
+    }
+    return hash;
+}
+
+}  // namespace sim

@@ -1,0 +1,74 @@
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "sim/world.h"
+#include "world/world_contacts.h"
+
+namespace sim {
+
+/// What world.cpp (one world's step) and world_sharing.cpp (several worlds of the same bodies) work on.
+struct World::Implementation {
+    WorldSettings settings;
+    std::vector<WorldPlane> planes;
+    std::vector<WorldBody> definitions;
+    std::vector<std::unique_ptr<BodyKind>> kinds;
+    std::vector<MovingBody> bodies;
+    std::vector<HeldConstraint> constraints;
+    std::vector<std::pair<int, int>> joined;  // pairs that a constraint joins
+    WorldContacts contacts;
+    std::unique_ptr<IslandSolver> solver;
+    std::vector<Island> islands;
+    std::vector<int> parent, place;  // union-find; a root's island
+    std::size_t islands_used = 0;
+    WorldCounts counts;
+    std::vector<QuarantinedBody> quarantined;
+    std::uint64_t free_limited = 0;
+    Eigen::Vector3d outside = Eigen::Vector3d::Zero();         // impulse, see World::outside_impulse
+    Eigen::Vector3d outside_before = Eigen::Vector3d::Zero();  // when the last step began
+
+    std::vector<int> here;  // bodies that take part in the step, ascending
+
+    // Sharing.
+    Sharing sharing = Sharing::alone;
+    BroadPhase neighbours;    // loose boxes, to find what may reach own islands
+    std::vector<int> owned;   // pairs: own and fixed bodies, ascending
+    std::vector<int> placed;  // pairs: ghosts of the next step
+    int cross_contacts = 0;
+    struct LooseBall {
+        Eigen::Vector3d center;
+        double radius;
+        int body;
+    };
+    std::vector<LooseBall> own_balls;  // pairs: of the next step
+    [[nodiscard]] bool near_own(const Eigen::Vector3d& center, double radius, int body) const;
+
+    const BodyKind* kind_of(const WorldBody& body);
+    int add(const WorldBody& body);
+    void set_joined();
+    void drop_constraints(int body);
+    void pose(MovingBody& body);
+    void quarantine(int body, const std::string& what);
+    void quarantine_broken();
+    void quarantine_results();
+    [[nodiscard]] bool is_own(const Island& island) const;
+    int root(int body);
+    void join(int a, int b);
+    void start_union();
+    [[nodiscard]] bool any_awake() const;
+    void gather();          // who takes part in the step
+    void gather_islands();  // who may reach an own body's island
+    void list_owned();
+    void gather_pairs();  // own bodies and the ghosts that were placed
+    void forget_foreign_contacts();
+    void stop_at_planes(MovingBody& body, const Eigen::Vector3d& before) const;
+    void dismiss_ghosts();
+    void find_islands();
+    void solve_islands();
+    void put_to_sleep();
+    void count_work();
+    void step();
+    [[nodiscard]] int still_steps_to_sleep() const;
+};
+
+}  // namespace sim

@@ -1,0 +1,394 @@
+#include <algorithm>
+#include <cmath>
+
+#include "world/world_implementation.h"
+
+// What several worlds of the same bodies, each of which owns some, need of a World. `islands`: whole islands
+// are solved wherever one of their bodies is own, out of exact states, so all owners get the same bits.
+// `pairs`: own bodies among ghosts.
+
+namespace sim {
+namespace {
+
+// Radius of a ball about the centre that holds the body's samples and surface, however they are posed.
+double loose_radius(const BodyKind& kind, const Eigen::VectorXd& q) {
+    const double radius = kind.surface.bounding_radius() * (1 + 1e-5);
+    if (kind.modes == 0) return radius;
+    const double bent = kind.linear() ? kind.gradient_bound.dot(q.cwiseAbs()) * radius
+                                      : 1.25 * kind.shape_bound.dot(q.cwiseAbs());
+    return radius + bent;
+}
+
+Eigen::Vector3d turned(const MovingBody& body, const Eigen::Quaterniond& orientation,
+                       const Eigen::Vector3d& angular) {
+    return orientation * (orientation.conjugate() * angular).cwiseQuotient(body.kind->mass.inertia);
+}
+
+void rotate(Eigen::Quaterniond& orientation, const Eigen::Vector3d& by) {
+    const double angle = by.norm();
+    if (angle > 1e-12)
+        orientation = (Eigen::Quaterniond(Eigen::AngleAxisd(angle, by / angle)) * orientation).normalized();
+}
+
+// The change that an impulse, spread over the step that ended `steps_ago` steps ago, makes to a free body.
+void respond(const MovingBody& body, double dt, const StepImpulse& impulse, int steps_ago, double factor,
+             WorldBodyState& s) {
+    const double time = (steps_ago + 0.5) * dt;
+    s.velocity += factor / body.kind->mass.mass * impulse.linear;
+    s.position += factor * (time / body.kind->mass.mass * impulse.linear + impulse.displacement);
+    rotate(s.orientation, factor * (time * turned(body, s.orientation, impulse.angular) + impulse.turn));
+    s.angular_momentum += factor * impulse.angular;
+    const HeldSteps& h = body.kind->whole;
+    const bool told = impulse.modal_q.size() > 0;
+    for (int k = 0; k < (told ? impulse.modal_q.size() : impulse.modal.size()); ++k) {
+        double z = told ? impulse.modal_q[k] : dt * h.compliance[k] * impulse.modal[k];
+        double rate = told ? impulse.modal_rate[k] : h.rate[k] * impulse.modal[k];
+        for (int i = 0; i < steps_ago; ++i) {
+            const double next = z + dt * (h.mean_z[k] * z + h.mean_rate[k] * rate);
+            rate = h.c[k] * z + h.d[k] * rate;
+            z = next;
+        }
+        s.q[k] += factor * z, s.q_dot[k] += factor * rate;
+    }
+}
+
+void push(MovingBody& body, double dt, const StepImpulse& impulse) {
+    if (!std::exchange(body.pushed, true))
+        body.force.setZero(), body.torque.setZero(), body.modal_force.setZero();
+    body.force += impulse.linear / dt;
+    body.torque += impulse.angular / dt;
+    if (impulse.modal.size() == body.modal_force.size()) body.modal_force += impulse.modal / dt;
+}
+
+ContactRecord record_of(const Manifold& m) {
+    ContactRecord record;
+    record.a = m.a, record.b = m.b, record.emerging = m.emerging, record.count = m.count;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(m.count); ++i) {
+        const ManifoldPoint& p = m.points[i];
+        record.points[i] = {p.feature, p.arm_a, p.normal_impulse, p.friction_impulse};
+    }
+    return record;
+}
+
+Manifold manifold_of(const ContactRecord& record) {
+    Manifold m;
+    m.a = record.a, m.b = record.b, m.emerging = record.emerging, m.count = record.count;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(m.count); ++i) {
+        ManifoldPoint& p = m.points[i];
+        p.feature = record.points[i].feature, p.arm_a = record.points[i].arm_a;
+        p.normal_impulse = record.points[i].normal_impulse,
+        p.friction_impulse = record.points[i].friction_impulse;
+    }
+    return m;
+}
+
+int first_mover(const std::vector<MovingBody>& bodies, const PointConstraint& c) {
+    return !bodies[static_cast<std::size_t>(c.body_a)].fixed || c.body_b < 0 ? c.body_a : c.body_b;
+}
+
+}  // namespace
+
+// Bodies that may be in an island with an own body: joined by overlapping loose boxes, constraints, or having
+// fallen asleep together. A superset of the islands is enough: what is left out can neither touch nor wake an
+// own body in this step.
+void World::Implementation::gather_islands() {
+    start_union();
+    auto& boxes = neighbours.boxes();
+    boxes.clear();
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        const MovingBody& body = bodies[i];
+        if (!body.moves()) continue;
+        const double half = loose_radius(*body.kind, body.state.q) + contact_reach(body, settings);
+        boxes.push_back({body.state.position.array() - half, body.state.position.array() + half,
+                         static_cast<int>(i), !body.asleep});
+        if (body.asleep && body.sleep_group >= 0) join(static_cast<int>(i), body.sleep_group);
+    }
+    for (const auto& [a, b] : neighbours.find()) join(a, b);
+    for (const HeldConstraint& c : constraints) {
+        const int a = c.definition.body_a, b = c.definition.body_b;
+        if (c.holds && b >= 0 && bodies[static_cast<std::size_t>(a)].moves() &&
+            bodies[static_cast<std::size_t>(b)].moves())
+            join(a, b);
+    }
+    place.assign(bodies.size(), 0);
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+        if (bodies[i].own && bodies[i].moves())
+            place[static_cast<std::size_t>(root(static_cast<int>(i)))] = 1;
+    here.clear();
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (bodies[i].quarantined) continue;
+        if (bodies[i].fixed || place[static_cast<std::size_t>(root(static_cast<int>(i)))] != 0)
+            here.push_back(static_cast<int>(i));
+    }
+}
+
+void World::Implementation::gather_pairs() {
+    std::sort(placed.begin(), placed.end());
+    here.clear();
+    std::merge(owned.begin(), owned.end(), placed.begin(), placed.end(), std::back_inserter(here));
+    std::erase_if(here, [this](int i) { return bodies[static_cast<std::size_t>(i)].quarantined; });
+}
+
+// Contacts of islands that were not solved here come from where they were.
+void World::Implementation::forget_foreign_contacts() {
+    std::erase_if(contacts.manifolds(), [this](const Manifold& m) {
+        const int id =
+            bodies[static_cast<std::size_t>(m.a)].fixed ? m.b : m.a;  // some may be quarantined by now
+        const int island = place[static_cast<std::size_t>(root(id))];
+        return island < 0 || !is_own(islands[static_cast<std::size_t>(island)]);
+    });
+}
+
+void World::Implementation::dismiss_ghosts() {
+    for (const int i : placed) bodies[static_cast<std::size_t>(i)].pushed = false;
+    placed.clear();
+}
+
+void World::share(Sharing sharing) {
+    implementation_->sharing = sharing;
+    implementation_->list_owned();
+}
+
+void World::Implementation::list_owned() {
+    owned.clear();
+    if (sharing != Sharing::pairs) return;
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+        if (bodies[i].own || bodies[i].fixed) owned.push_back(static_cast<int>(i));
+}
+
+void World::set_own(int body, bool own) {
+    MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    if (b.own == own) return;
+    b.own = own;
+    b.watched = b.was_given = b.pushed = false;
+    implementation_->list_owned();
+}
+
+bool World::own(int body) const {
+    return implementation_->bodies.at(static_cast<std::size_t>(body)).own;
+}
+
+WorldRecord World::record(int body) const {
+    const MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    return {body,          b.state,    b.asleep,
+            b.quarantined, b.at_limit, static_cast<std::uint16_t>(b.still_steps),
+            b.sleep_group};
+}
+
+void World::restore(const WorldRecord& record) {
+    MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(record.body));
+    b.state = record.state;
+    b.asleep = record.asleep, b.at_limit = record.at_limit;
+    b.still_steps = record.still_steps, b.sleep_group = record.sleep_group;
+    b.pushed = b.was_given = false;
+    b.unposed = true;
+    if (record.quarantined && !b.quarantined) implementation_->drop_constraints(record.body);
+    b.quarantined = record.quarantined;
+}
+
+void World::contact_records(std::vector<ContactRecord>& out) const {
+    const auto& bodies = implementation_->bodies;
+    out.clear();
+    for (const Manifold& m : implementation_->contacts.manifolds()) {
+        const int first = bodies[static_cast<std::size_t>(m.a)].fixed ? m.b : m.a;
+        if (bodies[static_cast<std::size_t>(first)].own) out.push_back(record_of(m));
+    }
+}
+
+void World::spring_records(std::vector<SpringRecord>& out) const {
+    out.clear();
+    const Implementation& w = *implementation_;
+    for (std::size_t i = 0; i < w.constraints.size(); ++i) {
+        const HeldConstraint& c = w.constraints[i];
+        if (w.bodies[static_cast<std::size_t>(first_mover(w.bodies, c.definition))].own)
+            out.push_back({static_cast<int>(i), c.holds, c.impulse});
+    }
+}
+
+void World::restore_contacts(const std::vector<ContactRecord>& foreign,
+                             const std::vector<SpringRecord>& springs) {
+    Implementation& w = *implementation_;
+    auto& manifolds = w.contacts.manifolds();
+    const std::size_t own = manifolds.size();
+    for (const ContactRecord& record : foreign) manifolds.push_back(manifold_of(record));
+    auto before = [](const Manifold& a, const Manifold& b) { return a.key() < b.key(); };
+    std::inplace_merge(manifolds.begin(), manifolds.begin() + static_cast<std::ptrdiff_t>(own),
+                       manifolds.end(), before);
+    // Solved here and elsewhere: the same.
+    manifolds.erase(std::unique(manifolds.begin(), manifolds.end(),
+                                [](const Manifold& a, const Manifold& b) { return a.key() == b.key(); }),
+                    manifolds.end());
+    bool changed = false;
+    for (const SpringRecord& record : springs) {
+        HeldConstraint& c = w.constraints.at(static_cast<std::size_t>(record.constraint));
+        changed = changed || c.holds != record.holds;
+        c.holds = record.holds, c.impulse = record.impulse;
+    }
+    if (changed) w.set_joined();
+}
+
+WorldSnapshot World::snapshot() const {
+    const Implementation& w = *implementation_;
+    WorldSnapshot s;
+    s.step = w.counts.steps;
+    s.bodies.reserve(w.bodies.size());
+    for (int i = 0; i < bodies(); ++i) s.bodies.push_back(record(i));
+    for (const Manifold& m : w.contacts.manifolds()) s.contacts.push_back(record_of(m));
+    for (std::size_t i = 0; i < w.constraints.size(); ++i)
+        s.springs.push_back({static_cast<int>(i), w.constraints[i].holds, w.constraints[i].impulse});
+    return s;
+}
+
+void World::rewind(const WorldSnapshot& snapshot) {
+    Implementation& w = *implementation_;
+    if (snapshot.step + 1 == w.counts.steps) w.outside = w.outside_before;
+    set_step(snapshot.step);
+    for (const WorldRecord& record : snapshot.bodies) restore(record);
+    w.contacts.manifolds().clear();
+    restore_contacts(snapshot.contacts, snapshot.springs);
+    std::erase_if(w.quarantined, [&](const QuarantinedBody& q) { return q.step > snapshot.step; });
+}
+
+void World::set_step(std::uint64_t step) {
+    implementation_->counts.steps = step;
+}
+
+Eigen::Vector3d World::outside_impulse() const {
+    return implementation_->outside;
+}
+
+int World::cross_contacts() const noexcept {
+    return implementation_->cross_contacts;
+}
+
+double World::work(int body) const {
+    return implementation_->bodies.at(static_cast<std::size_t>(body)).work;
+}
+
+double World::most_radius(int body) const {
+    const BodyKind& kind = *implementation_->bodies.at(static_cast<std::size_t>(body)).kind;
+    return kind.surface.bounding_radius() * (kind.modes > 0 ? 1 + kGradientLimit : 1);
+}
+
+bool World::Implementation::near_own(const Eigen::Vector3d& center, double radius, int body) const {
+    return std::any_of(own_balls.begin(), own_balls.end(), [&](const LooseBall& ball) {
+        const double reach = ball.radius + radius;
+        return ball.body < body && (ball.center - center).squaredNorm() <= reach * reach;
+    });
+}
+
+void World::near_own(const std::vector<ForeignBall>& foreign, std::vector<int>& near) {
+    Implementation& w = *implementation_;
+    w.own_balls.clear();
+    Eigen::AlignedBox3d all;
+    for (const int i : w.owned) {
+        const MovingBody& body = w.bodies[static_cast<std::size_t>(i)];
+        if (!body.moves()) continue;
+        const double radius = loose_radius(*body.kind, body.state.q) + contact_reach(body, w.settings);
+        w.own_balls.push_back({body.state.position, radius, i});
+        all.extend((body.state.position.array() - radius).matrix());
+        all.extend((body.state.position.array() + radius).matrix());
+    }
+    near.clear();
+    for (const ForeignBall& ball : foreign)
+        if (all.squaredExteriorDistance(ball.center) <= ball.radius * ball.radius &&
+            w.near_own(ball.center, ball.radius, ball.body))
+            near.push_back(ball.body);
+}
+
+bool World::is_near_own(int body, const WorldBodyState& state) const {
+    const MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    const WorldSettings& settings = implementation_->settings;
+    double speed =
+        state.velocity.norm() + settings.dt * std::abs(b.gravity_scale) * settings.gravity.norm() +
+        state.angular_momentum.norm() / b.kind->mass.inertia.minCoeff() * b.kind->surface.bounding_radius();
+    if (b.kind->modes > 0) speed += b.kind->shape_bound.dot(state.q_dot.cwiseAbs());
+    return implementation_->near_own(state.position,
+                                     loose_radius(*b.kind, state.q) * 1.01 + settings.dt * speed, body);
+}
+
+void World::place_ghost(int body, const WorldBodyState& state, const StepImpulse* held, bool asleep) {
+    MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    b.state = state;
+    b.asleep = asleep;
+    b.sleep_group = body;
+    b.unposed = true;
+    b.pushed = b.watched = b.was_given = false;
+    if (held) push(b, implementation_->settings.dt, *held);
+    implementation_->placed.push_back(body);
+}
+
+void World::hold(int body, const StepImpulse& impulse) {
+    MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    b.state.position += impulse.displacement;
+    rotate(b.state.orientation, impulse.turn);
+    push(b, implementation_->settings.dt, impulse);
+}
+
+void World::correct(int body, const StepImpulse& impulse, int steps_ago, double factor) {
+    MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    if (b.asleep) wake(body);
+    correct(body, b.state, impulse, steps_ago, factor);
+}
+
+void World::correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago,
+                    double factor) const {
+    respond(implementation_->bodies.at(static_cast<std::size_t>(body)), implementation_->settings.dt, impulse,
+            steps_ago, factor, state);
+}
+
+void World::spread_modes(int body, StepImpulse& impulse) const {
+    const BodyKind& kind = *implementation_->bodies.at(static_cast<std::size_t>(body)).kind;
+    if (impulse.modal_q.size() != kind.modes) return;
+    const double dt = implementation_->settings.dt;
+    impulse.modal.resize(kind.modes);
+    for (int k = 0; k < kind.modes; ++k) {
+        // Least squares of omega q and q'.
+        const double omega = kind.basis.omega[k];
+        const double place = omega * dt * kind.whole.compliance[k], rate = kind.whole.rate[k];
+        impulse.modal[k] = (place * omega * impulse.modal_q[k] + rate * impulse.modal_rate[k]) /
+                           (place * place + rate * rate);
+    }
+}
+
+// What would go on into a plane stops there: a guess of what its owner finds.
+void World::Implementation::stop_at_planes(MovingBody& body, const Eigen::Vector3d& before) const {
+    WorldBodyState& s = body.state;
+    for (const WorldPlane& plane : planes) {
+        const Eigen::Vector3d own = s.orientation.conjugate() * plane.normal;
+        const double reach = own.cwiseProduct(body.kind->half_box).norm();
+        const double height = plane.normal.dot(s.position) - plane.offset;
+        const double least = std::min(reach, plane.normal.dot(before) - plane.offset);
+        if (height >= least) continue;
+        s.position += (least - height) * plane.normal;
+        s.velocity -= std::min(0.0, s.velocity.dot(plane.normal)) * plane.normal;
+    }
+}
+
+void World::extrapolate(int body, WorldBodyState& state, const StepImpulse* held) {
+    MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    std::swap(b.state, state);
+    const bool pushed = std::exchange(b.pushed, false);
+    if (held) hold(body, *held);
+    const Eigen::Vector3d before = b.state.position;
+    move_freely(b, implementation_->settings);
+    implementation_->stop_at_planes(b, before);
+    (void)limit_deformation(b);
+    b.pushed = pushed;
+    std::swap(b.state, state);
+}
+
+void World::watch(int body, bool watched) {
+    implementation_->bodies.at(static_cast<std::size_t>(body)).watched = watched;
+}
+
+const std::vector<CrossImpulse>& World::cross_impulses() const noexcept {
+    return implementation_->solver->crossed();
+}
+
+const StepImpulse* World::impulse(int body) const {
+    const MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    return b.was_given ? &b.given : nullptr;
+}
+
+}  // namespace sim

@@ -1,0 +1,132 @@
+#include "latency/sound_picture.h"
+
+#include <gtest/gtest.h>
+
+#include "latency/drawn_path.h"
+#include "sample_realtime.h"
+
+namespace app {
+namespace {
+
+/// Roots are found to 1e-10 of the time between frames; the surface's place to rounding.
+constexpr double kRootMs = 1e-5;
+
+class SoundAndPicture : public testing::Test {
+protected:
+    std::vector<SoundPicture> match(const std::vector<double>& onsets_s, std::uint32_t stick = 0,
+                                    std::uint64_t lap = 0) {
+        play.strikes.clear();
+        run.notes.clear();
+        sample::sound(play, run, onsets_s, stick, lap);
+        return sound_and_picture(play, run, kit, sample::kTipRadius);
+    }
+
+    Kit kit = sample::one_drum();
+    double touch_m = sample::touch_height(kit);
+    PlayResult play;
+    RealtimeResult run;
+};
+
+TEST_F(SoundAndPicture, AStickThatFallsEvenlyTouchesBetweenItsFrames) {
+    sample::draw(run, sample::falling(1.013, touch_m, 2), 0.9, 1.1);
+    const auto matched = match({1.020});
+    ASSERT_EQ(matched.size(), 1U);
+    EXPECT_NEAR(matched[0].touch_s, 1.013, 1e-3 * kRootMs);
+    EXPECT_NEAR(matched[0].sound_minus_picture_ms(), 7, kRootMs);
+}
+
+TEST_F(SoundAndPicture, AnEarlySoundIsNegative) {
+    sample::draw(run, sample::falling(1.013, touch_m, 2), 0.9, 1.1);
+    EXPECT_NEAR(match({1.0})[0].sound_minus_picture_ms(), -13, kRootMs);
+}
+
+TEST_F(SoundAndPicture, AParabolaOfTwoFramesIsExact) {
+    // A cubic through places and velocities holds every parabola: -40 m/s^2 from rest, 1 m/s at the surface.
+    const double fall_s = 0.025;
+    const auto since = [](double t) { return t - 0.985; };
+    sample::draw(run,
+                 {[&](double t) { return touch_m + 20 * fall_s * fall_s - 20 * since(t) * since(t); },
+                  [&](double t) { return -40 * since(t); }},
+                 0.99, 1.03);
+    ASSERT_EQ(run.tips.size(), 2U);
+    EXPECT_NEAR(match({1.012})[0].sound_minus_picture_ms(), 2, kRootMs);
+}
+
+TEST_F(SoundAndPicture, FollowsTheClocksOfTraceAndLap) {
+    play.t0_s = 0.25;
+    run.period_s = 2;
+    sample::draw(run, sample::falling(1.013, touch_m, 2), 0.9, 1.1, 30, 0, 3);
+    const auto matched = match({1.020}, 0, 3);
+    ASSERT_EQ(matched.size(), 1U);
+    EXPECT_NEAR(matched[0].onset_s, 1.020, 1e-12);
+    EXPECT_NEAR(matched[0].sound_minus_picture_ms(), 7, kRootMs);
+    EXPECT_EQ(run.notes[0].played.onset_sample, 48000 * 677 / 100);  // 0.77 s into the fourth lap
+}
+
+/// Frames every 1/30 s from 0.9: the first one behind the surface after 1.013 is that at 1.0333.
+TEST_F(SoundAndPicture, TheFirstFrameBehindTheSurfaceIsUpToAFrameLater) {
+    sample::draw(run, sample::falling(1.013, touch_m, 2), 0.9, 1.1);
+    const SoundPicture one = match({1.020})[0];
+    ASSERT_TRUE(one.frame_s);
+    EXPECT_NEAR(*one.frame_s, 0.9 + 4.0 / 30, 1e-12);
+    EXPECT_NEAR(*one.sound_minus_frame_ms(), 1e3 * (1.020 - 0.9 - 4.0 / 30), 1e-9);
+}
+
+TEST_F(SoundAndPicture, AHeldStickShowsItsContactThoughItsPoseIsOutAgain) {
+    // In and out again between two frames.
+    const auto height = [this](double t) { return touch_m + 40 * (t - 1.01) * (t - 1.02); };
+    sample::draw(run, {height, [](double t) { return 40 * (2 * t - 2.03); }}, 0.9, 1.1);
+    run.tips[4].held = true;  // at 1.0333
+    const auto matched = match({1.010});
+    ASSERT_EQ(matched.size(), 1U);
+    EXPECT_NEAR(matched[0].sound_minus_picture_ms(), 0, kRootMs);
+    EXPECT_NEAR(*matched[0].frame_s, 0.9 + 4.0 / 30, 1e-12);
+    run.tips[4].held = false;
+    EXPECT_FALSE(match({1.010})[0].frame_s);
+}
+
+TEST_F(SoundAndPicture, TakesTheNearestOfSeveralStrokes) {
+    // Down through the surface at 1.0, 1.1, 1.2: 15 cm of amplitude at 10 Hz.
+    const double w = 2 * std::acos(-1.0) * 10;
+    sample::draw(run,
+                 {[&](double t) { return touch_m - 0.15 * std::sin(w * (t - 1)); },
+                  [&](double t) { return -0.15 * w * std::cos(w * (t - 1)); }},
+                 0.8, 1.4, 480);
+    const auto matched = match({1.003, 1.097, 1.149});
+    ASSERT_EQ(matched.size(), 3U);
+    // The cubic between frames 2 ms apart differs from the sine by 1e-6 of its amplitude.
+    EXPECT_NEAR(matched[0].sound_minus_picture_ms(), 3, 1e-3);
+    EXPECT_NEAR(matched[1].sound_minus_picture_ms(), -3, 1e-3);
+    EXPECT_NEAR(matched[2].sound_minus_picture_ms(), 49, 1e-3);
+}
+
+TEST_F(SoundAndPicture, AStrokeThatStopsShortOrIsFarInTimeMatchesNothing) {
+    sample::draw(run, sample::falling(1.2, touch_m + 0.01, 0.05), 0.9, 1.3);
+    EXPECT_TRUE(match({1.2}).empty());
+    run.tips.clear();
+    sample::draw(run, sample::falling(1.0, touch_m, 2), 0.5, 1.5);
+    EXPECT_TRUE(match({1.151}).empty());
+    EXPECT_EQ(match({1.149}).size(), 1U);
+}
+
+TEST_F(SoundAndPicture, OtherSticksAndLapsDoNotCount) {
+    sample::draw(run, sample::falling(1.013, touch_m, 2), 0.9, 1.1, 30, 1, 2);
+    EXPECT_TRUE(match({1.020}, 0, 2).empty());
+    EXPECT_TRUE(match({1.020}, 1, 1).empty());
+    EXPECT_EQ(match({1.020}, 1, 2).size(), 1U);
+}
+
+TEST_F(SoundAndPicture, LeavesOutFramesThatWereNotShown) {
+    sample::draw(run, sample::falling(1.013, touch_m, 2), 0.9, 1.1);
+    run.tips[3].tip.y() += 0.5;  // of a late frame
+    run.tips[3].shown = false;
+    EXPECT_NEAR(match({1.020})[0].sound_minus_picture_ms(), 7, kRootMs);
+}
+
+TEST_F(SoundAndPicture, NoCurveJoinsFramesThatLieFarApart) {
+    sample::draw(run, sample::falling(1.013, touch_m, 2), 0.8, 1.3, 1 / 0.26);
+    EXPECT_TRUE(match({1.020}).empty());
+}
+
+}  // namespace
+}  // namespace app

@@ -1,0 +1,284 @@
+#include "play/play_report.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <optional>
+#include <sstream>
+
+#include "files/output_folder.h"
+#include "kit/tip_track.h"
+#include "play/play_plots.h"
+#include "report/gnuplot.h"
+#include "report/html.h"
+#include "report/plot_panel.h"
+#include "sample_play_result.h"
+
+namespace {
+namespace fs = std::filesystem;
+
+std::string report_of(const app::PlayResult& result) {
+    const TemporaryFolder scratch;
+    return app::format_report(result, scratch.path());
+}
+
+std::size_t count(const std::string& text, const std::string& part) {
+    std::size_t found = 0;
+    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
+    return found;
+}
+
+bool holds(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+/// An environment variable for the length of a test.
+class Variable {
+public:
+    Variable(const char* name, const std::string& value) : name_(name) {
+        if (const char* old = std::getenv(name)) old_ = old;
+        ::setenv(name, value.c_str(), 1);
+    }
+    ~Variable() { old_ ? ::setenv(name_, old_->c_str(), 1) : ::unsetenv(name_); }
+    Variable(const Variable&) = delete;
+    Variable& operator=(const Variable&) = delete;
+
+private:
+    const char* name_;
+    std::optional<std::string> old_;
+};
+
+TEST(Report, NeedsNothingBesideItself) {
+    const std::string page = report_of(sample_play_result());
+    for (const char* outside :
+         {"http:", "https:", "<script", "<link", "@import", "url(", "src=\"/", "file:", "<?xml", "<!ENTITY"})
+        EXPECT_FALSE(holds(page, outside)) << outside;
+    EXPECT_EQ(count(page, " src="), count(page, " src=\"data:image/png;base64,"));
+}
+
+TEST(Report, EveryPlotIsAWholeSvgWithALabelAndFollowsThePagesColours) {
+    const std::string page = report_of(sample_play_result());
+    // One row of timeline, two of timing, the leads and the sound; every mark in the legend and the symbols
+    // are more.
+    EXPECT_EQ(count(page, "<svg role=\"img\" aria-label=\""), 5U);
+    EXPECT_EQ(count(page, "<svg"), count(page, "</svg>"));
+    EXPECT_EQ(count(page, "<g>") + count(page, "<g "), count(page, "</g>"));
+    EXPECT_EQ(count(page, "id='gpPt6'"), 1U) << "the symbols are defined once";
+    EXPECT_FALSE(holds(page, "rgb(")) << "a colour that does not follow";
+    EXPECT_FALSE(holds(page, "<title>gnuplot"));
+    for (const char* colour : {"var(--stick-1)", "var(--stick-2)", "var(--released)", "var(--wrong)",
+                               "var(--missed)", "var(--cancelled)", "var(--contact)", "var(--wave)"})
+        EXPECT_TRUE(holds(page, "'" + std::string(colour) + "'")) << colour << " is drawn by gnuplot";
+    EXPECT_TRUE(holds(page, "prefers-color-scheme:dark"));
+}
+
+TEST(Report, ShowsTheFiguresAndTheProvenance) {
+    const std::string page = report_of(sample_play_result());
+    for (const char* text : {"<b>3</b><span>true contacts", "<b>1</b><span>cancelled", "<b>2</b><span>moved",
+                             "<b>1</b><span>false", "<b>1</b><span>missed", "<b>3.0 ms</b><span>median error",
+                             "<b>4.0 ms</b><span>95 % error", "drums &amp; bells", "33.3 ms ahead",
+                             "up to 66.7 ms ahead", "0123456789abcdef", "Heard: 66.7 %", "False: 33.3 %"})
+        EXPECT_TRUE(holds(page, text)) << text;
+    EXPECT_TRUE(holds(page, std::string(64, 'a')));
+}
+
+/// snare: onset 0.1 + 9600 / 48000 = 0.300 s against 0.298 s; tom: 0.500 s against 0.504 s.
+TEST(Report, TheTableByInstrumentHasTheSignedErrors) {
+    const std::string page = report_of(sample_play_result());
+    EXPECT_TRUE(holds(page,
+                      "<tr><td>snare<td class=n>1<td class=n>1<td class=n>0<td class=n>0<td class=n>0"
+                      "<td class=n>2.0</td><td class=n>+2.0</td></tr>"));
+    EXPECT_TRUE(holds(page, "<td class=n>4.0</td><td class=n>-4.0</td>"));
+    EXPECT_TRUE(holds(page,
+                      "&lt;/b&gt;<td class=n>1<td class=n>1<td class=n>1<td class=n>1<td class=n>1"
+                      "<td class=n>&ndash;"));
+}
+
+TEST(Report, IsTheSameForTheSameResultInAnyLocaleAndFolder) {
+    const std::string first = report_of(sample_play_result());
+    const Variable locale("LC_ALL", "de_DE.UTF-8");
+    EXPECT_EQ(report_of(sample_play_result()), first);
+}
+
+TEST(Report, DoesNotDependOnTimesAndWorkers) {
+    app::PlayResult other = sample_play_result();
+    other.wall_s = 123;
+    other.stages_s = {{"drawing", 45}};
+    other.workers = 3, other.workers_lost = 1, other.bodies_reowned = 4;
+    EXPECT_EQ(report_of(other), report_of(sample_play_result()));
+}
+
+TEST(Report, NamesAreTextWhateverTheyHold) {
+    const TemporaryFolder here;
+    const std::string touched = (here.path() / "touched").string();
+    app::PlayResult result = sample_play_result();
+    const std::string hostile =
+        "'; system('touch " + touched + "'); `touch " + touched + "`\nset output <script>alert(1)</script>";
+    result.trace = result.kit = result.kit_name = result.trace_source = result.picture_predictor = hostile;
+    result.sound_predictor = result.fingerprint = hostile;
+    for (std::string& name : result.instruments) name = hostile;
+    for (std::string& name : result.sticks) name = hostile;
+    for (app::TipTrack& track : result.tracks) track.stick = hostile;
+    result.inputs = {{hostile, hostile}};
+    result.versions = {{hostile, hostile}};
+    const std::string page = report_of(result);
+    EXPECT_FALSE(holds(page, "<script"));
+    EXPECT_FALSE(fs::exists(touched));
+}
+
+TEST(Report, OfARunWithoutAnythingIsAPageNonetheless) {
+    app::PlayResult nothing;
+    nothing.trace = "empty.csv";
+    const std::string page = report_of(nothing);
+    EXPECT_TRUE(holds(page, "<b>0</b><span>true contacts"));
+    EXPECT_TRUE(holds(page, "<b>none</b><span>median error"));
+    EXPECT_FALSE(holds(page, "<h2>Sound"));
+    EXPECT_FALSE(holds(page, "<h2>Frames"));
+    app::PlayResult silent = sample_play_result();
+    silent.audio.assign(2 * 48000, 0.0F);
+    EXPECT_TRUE(holds(report_of(silent), "Silence"));
+}
+
+/// RFC 4648: "Man" is TWFu, "Ma" is TWE=. Frame 7 at 30 a second from 0.1 s is shown at 0.333 s, 33 ms after
+/// the note at 0.3 s.
+TEST(Report, FramesAreWithinWithTheirTimeAndTheNearestNote) {
+    const TemporaryFolder here;
+    app::PlayResult result = sample_play_result();
+    for (const auto& [name, bytes] : {std::pair{"000007.png", "Man"}, {"000029.png", "Ma"}}) {
+        app::write_file(here.path() / name, std::string_view(bytes));
+        result.report_frames.push_back(here.path() / name);
+    }
+    const std::string page = report_of(result);
+    EXPECT_TRUE(holds(page, "base64,TWFu\">"));
+    EXPECT_TRUE(holds(page, "base64,TWE=\">"));
+    EXPECT_TRUE(holds(page, "<figcaption>0.333 s: 33 ms after snare (left)</figcaption>"));
+    EXPECT_TRUE(holds(page, "<figcaption>1.067 s</figcaption>"));
+    result.report_frames.push_back(here.path() / "000030.png");
+    try {
+        (void)report_of(result);
+        FAIL();
+    } catch (const std::runtime_error& error) {
+        EXPECT_TRUE(holds(error.what(), "000030.png")) << error.what();
+    }
+}
+
+TEST(Report, WithoutGnuplotSaysWhatToInstall) {
+    const TemporaryFolder empty;
+    const Variable path("PATH", empty.path().string());
+    try {
+        (void)report_of(sample_play_result());
+        FAIL();
+    } catch (const std::runtime_error& error) {
+        EXPECT_TRUE(holds(error.what(), "gnuplot-nox")) << error.what();
+    }
+}
+
+TEST(Report, AnHourIsTwelveRowsAndUnder4Megabytes) {
+    app::PlayResult hour = sample_play_result();
+    hour.t_end_s = hour.t0_s + 3600;
+    app::Strike strike = hour.strikes[0];
+    app::TrueContact contact = hour.contacts[0];
+    hour.strikes.clear();
+    hour.contacts.clear();
+    for (std::uint64_t id = 1; id <= 36000; ++id) {
+        strike.id = id;
+        strike.outcome = id % 3 == 0 ? app::Outcome::cancelled : app::Outcome::released;
+        strike.onset_s = hour.t0_s + static_cast<double>(id) * 0.1;
+        strike.scheduled_at_s = strike.onset_s - 0.001 * static_cast<double>(10 + id % 57);
+        contact.t_s = strike.onset_s - 0.001 * static_cast<double>(id % 25);
+        contact.matched_id = id % 3 != 0 && id % 7 != 0 ? id : 0;
+        hour.strikes.push_back(strike);
+        hour.contacts.push_back(contact);
+    }
+    for (app::TipTrack& track : hour.tracks) {
+        track.t_s.clear();
+        track.tip.clear();
+        for (int i = 0; i < 3600 * 60; ++i) {
+            track.t_s.push_back(hour.t0_s + i / 60.0);
+            track.tip.emplace_back(0, 1 + 0.2 * std::sin(i * 0.4), 0);
+        }
+    }
+    const std::string page = report_of(hour);
+    EXPECT_EQ(count(page, "aria-label=\"timeline from"), 12U);
+    EXPECT_EQ(count(page, "aria-label=\"notes heard"), 1U);
+    EXPECT_LT(page.size(), 4U << 20);
+}
+
+TEST(Timeline, ShowsAllRowsOf48SecondsAndOfMoreTheOnesWithTheMostErrors) {
+    app::PlayResult result;
+    result.t0_s = 10;
+    result.t_end_s = 58;
+    EXPECT_TRUE(app::timeline_of(result).whole);
+    EXPECT_EQ(app::timeline_of(result).starts_s.size(), 12U);
+    result.t_end_s = 12.5;
+    EXPECT_EQ(app::timeline_of(result).row_s, 2.5);
+    result.t_end_s =
+        410;  // a hundred rows; two missed contacts in the last, one false note in the row from 50 s on
+    result.contacts.resize(3);
+    result.contacts[0].t_s = 20;
+    result.contacts[0].matched_id = 5;
+    result.contacts[1].t_s = 409;
+    result.contacts[2].t_s = 410;
+    result.strikes.resize(1);
+    result.strikes[0].id = 1;
+    result.strikes[0].outcome = app::Outcome::released;
+    result.strikes[0].onset_s = 53.9;
+    const app::Timeline timeline = app::timeline_of(result);
+    EXPECT_FALSE(timeline.whole);
+    EXPECT_EQ(timeline.starts_s, (std::vector<double>{10, 14, 18, 22, 26, 30, 34, 38, 42, 46, 50, 406}));
+}
+
+TEST(PlotPanel, RoundStepsAreOneTwoOrFiveTimesAPowerOfTen) {
+    EXPECT_DOUBLE_EQ(app::round_step(4, 8), 0.5);
+    EXPECT_DOUBLE_EQ(app::round_step(100, 10), 10);
+    EXPECT_DOUBLE_EQ(app::round_step(0.7, 4), 0.2);
+    EXPECT_DOUBLE_EQ(app::round_step(600, 12), 50);
+}
+
+TEST(PlotPanel, MarksWithinAPixelAreThinnedAndThoseOutsideLeftOut) {
+    app::ThinnedMarks marks({0, 10, 0, 1, 100, 100});
+    marks.add(5.01, 0.501);
+    marks.add(5.02, 0.502);
+    marks.add(5.02, 0.9);
+    marks.add(10.1, 0.5);
+    marks.add(std::nan(""), 0.5);
+    EXPECT_EQ(marks.text(), "5.0100 0.5010 \n5.0200 0.9000 \n");
+}
+
+/// A ramp of a second: column i of ten holds the samples i / 10 to (i + 1) / 10 - 1 / 48000, the right
+/// channel their negatives.
+TEST(PlotPanel, TheEnvelopeIsTheLowestAndHighestSampleOfBothChannels) {
+    std::vector<float> stereo;
+    for (int i = 0; i < 48000; ++i) {
+        const float ramp = static_cast<float>(i) / 48000;
+        stereo.insert(stereo.end(), {ramp, -ramp});
+    }
+    std::istringstream lines(app::sound_envelope(stereo, 2, 2, 4, 20));
+    for (int i = 0; i < 10; ++i) {
+        double t = 0, low = 0, high = 0;
+        ASSERT_TRUE(lines >> t >> low >> high) << i;
+        EXPECT_NEAR(t, 2.05 + 0.1 * i, 1e-4);  // four decimals are written
+        EXPECT_NEAR(high, 0.1 * (i + 1) - 1.0 / 48000, 1e-4);
+        EXPECT_NEAR(low, -high, 1e-4);
+    }
+    std::string more;
+    EXPECT_FALSE(lines >> more) << "nothing is drawn where there is no sound";
+}
+
+TEST(Gnuplot, AMistakeInAScriptIsReportedInOneLineWithItsMessage) {
+    const TemporaryFolder here;
+    try {
+        (void)app::draw_svg({{100, 100, "plot no_such_thing"}}, here.path());
+        FAIL();
+    } catch (const std::runtime_error& error) {
+        EXPECT_TRUE(holds(error.what(), "no_such_thing")) << error.what();
+        EXPECT_FALSE(holds(error.what(), "\n"));
+    }
+}
+
+TEST(Html, EscapesMarkupAndControlCharacters) {
+    EXPECT_EQ(app::html("<a href='x'>\"&\"</a>\n\x7f"),
+              "&lt;a href=&#39;x&#39;&gt;&quot;&amp;&quot;&lt;/a&gt;  ");
+}
+
+}  // namespace

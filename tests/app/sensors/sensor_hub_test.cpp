@@ -1,0 +1,453 @@
+// Real sensor processes that replay traces. Waits are bounded by seconds, so that a loaded machine passes; no
+// delay is asserted.
+#include "sensors/sensor_hub.h"
+
+#include <gtest/gtest.h>
+#include <lo/lo.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+#include <zmq.hpp>
+
+#include "files/assets.h"
+#include "files/bad_input.h"
+#include "free_port.h"
+#include "process/clock.h"
+#include "sticks/auto_predictor.h"
+#include "sticks/predictors.h"
+#include "sticks/stick_tracker.h"
+#include "temporary_folder.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using app::SensorEvent;
+using app::SensorHub;
+using Kind = app::SensorEvent::Kind;
+
+std::string cut_of(const std::string& trace, double from_s, double until_s) {
+    tracking::Trace cut = tracking::read_trace(app::find_trace(trace));
+    for (tracking::StickTrace& stick : cut.sticks)
+        std::erase_if(stick.samples,
+                      [&](const tracking::PoseSample& s) { return s.t_s < from_s || s.t_s >= until_s; });
+    return tracking::format_trace(cut);
+}
+
+app::SensorOptions options_for(const std::string& source,
+                               std::vector<std::string> sticks = {"left", "right"}) {
+    app::SensorOptions options;
+    options.source = source;
+    options.sticks = std::move(sticks);
+    options.picture_predictor = app::picture_specification("auto");
+    options.sound_predictor = app::sound_specification("auto");
+    options.confirming_predictor = app::confirming_specification("auto");
+    options.program = MUSICWORLD_PROGRAM;
+    options.epoch_ns = app::monotonic_ns() + 300'000'000;
+    return options;
+}
+
+/// What a process has left in /dev/shm.
+std::vector<std::string> shared_memory_files(int pid = getpid()) {
+    const std::string prefix = "musicworld." + std::to_string(pid) + ".";
+    std::vector<std::string> names;
+    for (const fs::directory_entry& entry : fs::directory_iterator("/dev/shm"))
+        if (entry.path().filename().string().starts_with(prefix)) names.push_back(entry.path());
+    return names;
+}
+
+/// The processes that this one has started and not yet collected.
+std::vector<int> children() {
+    std::ifstream list("/proc/self/task/" + std::to_string(getpid()) + "/children");
+    std::vector<int> pids;
+    for (int pid = 0; list >> pid;) pids.push_back(pid);
+    return pids;
+}
+
+/// Collects all states that are seen, and all events, until `enough` or 20 s are over.
+struct Watched {
+    std::vector<std::vector<tracking::StickState>> states;
+    std::vector<SensorEvent> events;
+
+    [[nodiscard]] std::size_t count(Kind kind) const {
+        return static_cast<std::size_t>(std::count_if(events.begin(), events.end(),
+                                                      [&](const SensorEvent& e) { return e.kind == kind; }));
+    }
+    [[nodiscard]] std::string all_messages() const {
+        std::string text;
+        for (const SensorEvent& e : events) text += e.message + "\n";
+        return text;
+    }
+    /// A machine that is held up for 100 ms makes silences that no test here is about.
+    [[nodiscard]] std::string messages_but_of_silence() const {
+        std::string text;
+        for (const SensorEvent& e : events)
+            if (e.kind != Kind::silent && e.kind != Kind::back) text += e.message + "\n";
+        return text;
+    }
+};
+
+template <class Enough>
+void watch_until(SensorHub& hub, std::size_t sticks, Watched& seen, Enough enough) {
+    seen.states.resize(sticks);
+    const std::int64_t until = app::monotonic_ns() + 20'000'000'000;
+    while (app::monotonic_ns() < until) {
+        pollfd wake{hub.wake_fd(), POLLIN, 0};
+        poll(&wake, 1, 10);
+        hub.clear_wake();
+        for (std::size_t stick = 0; stick < sticks; ++stick) {
+            const auto state = hub.newest(stick);
+            if (state && (seen.states[stick].empty() || seen.states[stick].back().samples != state->samples))
+                seen.states[stick].push_back(*state);
+        }
+        for (SensorEvent& event : hub.watch()) seen.events.push_back(std::move(event));
+        if (enough()) return;
+    }
+    ADD_FAILURE() << "waited 20 s in vain; messages:\n" << seen.all_messages();
+}
+
+/// Bit by bit.
+void expect_same(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    EXPECT_EQ(std::memcmp(a.data(), b.data(), sizeof a), 0) << a.transpose() << " against " << b.transpose();
+}
+
+TEST(SensorHub, StatesEqualAnOfflineRunToTheBit) {
+    const TemporaryFolder folder;
+    const fs::path file = folder.write("short.csv", cut_of("flourish", 0, 1.0));
+    const tracking::Trace trace = tracking::read_trace(file);
+    app::SensorOptions options = options_for("trace:" + file.string());
+    options.period_s = 1.5;
+    SensorHub hub(options);
+    Watched seen;
+    const auto laps = [&](std::size_t stick) {
+        return seen.states[stick].empty() ? 0 : seen.states[stick].back().lap;
+    };
+    watch_until(hub, 2, seen, [&] { return laps(0) >= 2 && laps(1) >= 2; });
+    for (std::size_t stick = 0; stick < 2; ++stick) {
+        // Each state that was seen, against filters of this process that were given the same samples.
+        std::unique_ptr<tracking::Predictor> sound;
+        std::uint64_t lap = 99, count = 0;
+        std::size_t next = 0, compared = 0;
+        for (const tracking::StickState& state : seen.states[stick]) {
+            const auto& samples = trace.sticks[stick].samples;
+            if (state.lap != lap) {
+                sound = app::make_any_predictor(options.sound_predictor, {});
+                lap = state.lap;
+                next = 0;
+            }
+            while (next < samples.size() && samples[next].t_s <= state.t_s)
+                (void)sound->correct(samples[next++]);
+            count = state.lap * samples.size() + next;
+            ASSERT_EQ(state.t_s, sound->time_s());
+            EXPECT_EQ(state.samples, count);  // none was refused, none left out
+            EXPECT_EQ(state.starts, state.lap + 1);
+            expect_same(state.sound.position, sound->motion()->position);
+            expect_same(state.sound.velocity, sound->motion()->velocity);
+            expect_same(state.sound.acceleration, sound->motion()->acceleration);
+            EXPECT_EQ(state.due_ns,
+                      options.epoch_ns +
+                          std::llround((static_cast<double>(lap) * 1.5 + state.t_s - trace.t0_s()) * 1e9));
+            EXPECT_LE(state.due_ns, state.read_ns);
+            EXPECT_LE(state.read_ns, state.filtered_ns);
+            ++compared;
+        }
+        EXPECT_GT(compared, 100u);
+    }
+    EXPECT_EQ(seen.messages_but_of_silence(), "");
+    // The pauses between the laps are no silences: there were two for each stick, from 1 to 1.5 s in each
+    // lap. One may be told of where the machine is held up just then.
+    const auto in_pauses = std::count_if(seen.events.begin(), seen.events.end(), [](const SensorEvent& e) {
+        return e.kind == Kind::silent && std::fmod(e.at_s, 1.5) > 1;
+    });
+    EXPECT_LE(in_pauses, 1) << seen.all_messages();
+    for (const app::ClockReport& clock : hub.clocks()) EXPECT_EQ(clock.clock, "the trace's own, replayed");
+}
+
+TEST(SensorHub, EndsWithItsSourceAndLeavesNothing) {
+    const TemporaryFolder folder;
+    const fs::path file = folder.write("short.csv", cut_of("roll", 0, 0.5));
+    {
+        SensorHub hub(options_for("trace:" + file.string()));
+        EXPECT_EQ(shared_memory_files(), std::vector<std::string>{});
+        EXPECT_EQ(children().size(), 2u);
+        Watched seen;
+        watch_until(hub, 2, seen, [&] { return hub.ended() && seen.count(Kind::ended) == 2; });
+        const std::string left = "sensor left: the source has ended after 60 samples\n",
+                          right = "sensor right: the source has ended after 60 samples\n",
+                          messages = seen.messages_but_of_silence();
+        EXPECT_TRUE(messages == left + right || messages == right + left) << messages;
+        EXPECT_EQ(hub.newest(0)->samples, 60u);
+        EXPECT_EQ(hub.newest(1)->samples, 60u);
+        EXPECT_EQ(hub.restarts(), 0);
+    }
+    EXPECT_EQ(children(), std::vector<int>{});
+}
+
+TEST(SensorHub, KilledSensorIsStartedAgainAndGoesOnAtTheCurrentTime) {
+    SensorHub hub(options_for("trace:flourish"));
+    Watched seen;
+    watch_until(hub, 2, seen, [&] { return !seen.states[0].empty() && seen.states[0].back().samples > 30; });
+    const int victim = children().front();
+    const std::uint64_t before = hub.newest(0)->samples;
+    ASSERT_EQ(kill(victim, SIGKILL), 0);
+    const std::int64_t killed_ns = app::monotonic_ns();
+    watch_until(hub, 2, seen, [&] { return seen.states[0].back().samples > before + 30; });
+    ASSERT_EQ(seen.count(Kind::restarted), 1u) << seen.all_messages();
+    const auto event = std::find_if(seen.events.begin(), seen.events.end(),
+                                    [](const SensorEvent& e) { return e.kind == Kind::restarted; });
+    EXPECT_EQ(
+        event->message,
+        "sensor left: its process was killed by signal 9; started again (1 of at most 5 times in 10 s)");
+    EXPECT_EQ(event->sticks, std::vector<std::string>{"left"});
+    EXPECT_EQ(hub.restarts(), 1);
+    const tracking::Trace trace = tracking::read_trace(app::find_trace("flourish"));
+    const auto due_until = [&](double t_s) {
+        const auto& rows = trace.sticks[0].samples;
+        return static_cast<std::uint64_t>(
+            std::count_if(rows.begin(), rows.end(), [&](const auto& row) { return row.t_s <= t_s; }));
+    };
+    std::uint64_t samples = 0, starts = 0;
+    for (const tracking::StickState& state : seen.states[0]) {
+        EXPECT_GT(state.samples, samples);
+        samples = state.samples;
+        // Those that were due in the gap are counted, too.
+        EXPECT_EQ(state.samples + state.refused, due_until(state.t_s));
+        if (state.starts != starts && starts != 0) {
+            EXPECT_GE(state.due_ns, killed_ns - 100'000'000);
+        }
+        starts = state.starts;
+    }
+    EXPECT_EQ(starts, 2u);
+    EXPECT_EQ(shared_memory_files(), std::vector<std::string>{});
+}
+
+TEST(SensorHub, GivesUpOnASensorThatDiesAgainAndAgain) {
+    SensorHub hub(options_for("trace:flourish", {"left"}));
+    Watched seen;
+    watch_until(hub, 1, seen, [&] {
+        if (seen.count(Kind::failed) == 0)
+            for (const int child : children()) kill(child, SIGKILL);
+        return seen.count(Kind::failed) != 0;
+    });
+    EXPECT_EQ(hub.restarts(), 5);
+    EXPECT_EQ(seen.events.back().message,
+              "sensor left: failed: its process was killed by signal 9 after 5 restarts in 10 s; it is not "
+              "started again");
+    EXPECT_TRUE(hub.ended());
+    EXPECT_EQ(children(), std::vector<int>{});
+}
+
+TEST(SensorHub, TellsOfAStallAndLosesNoSample) {
+    const TemporaryFolder folder;
+    const fs::path file = folder.write("short.csv", cut_of("roll", 0, 1.5));
+    app::SensorOptions options = options_for("trace:" + file.string(), {"right"});
+    options.stall_at_s = 0.5;
+    options.stall_s = 0.3;
+    SensorHub hub(options);
+    Watched seen;
+    watch_until(hub, 1, seen, [&] { return seen.count(Kind::ended) == 1; });
+    ASSERT_GE(seen.count(Kind::silent), 1u);
+    ASSERT_GE(seen.count(Kind::back), 1u);
+    EXPECT_TRUE(seen.events[0].message.starts_with("sensor right: silent for 0.")) << seen.events[0].message;
+    EXPECT_NE(seen.events[0].message.find("(last sample at 0."), std::string::npos) << seen.events[0].message;
+    EXPECT_TRUE(seen.events[1].message.starts_with("sensor right: back after 0.")) << seen.events[1].message;
+    EXPECT_EQ(hub.newest(0)->samples, 180u);
+}
+
+TEST(SensorHub, SensorsEndWithTheirApplication) {
+    int ends[2];
+    ASSERT_EQ(pipe(ends), 0);
+    const pid_t application = fork();
+    if (application == 0) {
+        SensorHub hub(options_for("trace:flourish"));
+        const std::vector<int> sensors = children();
+        (void)!write(ends[1], sensors.data(), sensors.size() * sizeof(int));
+        pause();
+    }
+    int sensors[2] = {};
+    ASSERT_EQ(read(ends[0], sensors, sizeof sensors), static_cast<ssize_t>(sizeof sensors));
+    close(ends[0]);
+    close(ends[1]);
+    kill(application, SIGKILL);
+    waitpid(application, nullptr, 0);
+    const std::int64_t until = app::monotonic_ns() + 10'000'000'000;
+    const auto runs = [](int pid) {
+        std::ifstream status("/proc/" + std::to_string(pid) + "/stat");
+        std::string text;
+        std::getline(status, text);
+        return !text.empty() && text.find(") Z") == std::string::npos;
+    };
+    while ((runs(sensors[0]) || runs(sensors[1])) && app::monotonic_ns() < until) usleep(10'000);
+    EXPECT_FALSE(runs(sensors[0]));
+    EXPECT_FALSE(runs(sensors[1]));
+    EXPECT_EQ(shared_memory_files(application), std::vector<std::string>{});
+}
+
+TEST(SensorHub, SweepsMemoryOfProgramsThatWereKilled) {
+    const pid_t gone = fork();
+    if (gone == 0) _exit(0);
+    waitpid(gone, nullptr, 0);
+    const std::string left = "/dev/shm/musicworld." + std::to_string(gone) + ".0";
+    std::ofstream(left) << "left";
+    const std::string other = "/dev/shm/musicworld." + std::to_string(getpid()) + ".7";  // of one that lives
+    std::ofstream(other) << "in use";
+    SensorHub hub(options_for("trace:flourish", {"left"}));
+    EXPECT_FALSE(fs::exists(left));
+    EXPECT_TRUE(fs::exists(other));
+    fs::remove(other);
+}
+
+void expect_refused(const app::SensorOptions& options, const std::string& message) {
+    try {
+        SensorHub hub(options);
+        FAIL() << "not refused";
+    } catch (const app::BadInput& wrong) {
+        EXPECT_NE(std::string(wrong.what()).find(message), std::string::npos) << wrong.what();
+    }
+    EXPECT_EQ(children(), std::vector<int>{});
+}
+
+TEST(SensorHub, RefusesWhatCannotBe) {
+    expect_refused(options_for("trace:flourish", {"left", "middle"}),
+                   "found no stick \"middle\", expected one of left, right");
+    expect_refused(options_for("tape:x"),
+                   "found source \"tape:x\", expected trace:FILE, stdin, zmq:ENDPOINT or osc:PORT");
+    app::SensorOptions options = options_for("trace:flourish");
+    options.sound_predictor = "exec:cat";
+    expect_refused(options, "found predictor \"exec:cat\" in real time");
+    options.sound_predictor = "least-squares:degree=3,n=8";
+    expect_refused(options, "found predictor \"least-squares:degree=3,n=8\" in real time");
+    options = options_for("trace:flourish");
+    options.period_s = 2;
+    expect_refused(options, "found a period of 2 s, expected more than its");
+}
+
+// A live source that serves two sticks from one process.
+
+/// Sends poses of both sticks over OSC with a clock of its own, from a thread.
+class OscSender {
+public:
+    explicit OscSender(int port) : to_(lo_address_new("127.0.0.1", std::to_string(port).c_str())) {
+        thread_ = std::jthread([this](const std::stop_token& stop) {
+            while (!stop.stop_requested()) {
+                send();
+                app::sleep_until_ns(app::monotonic_ns() + 5'000'000);
+            }
+        });
+    }
+    ~OscSender() {
+        thread_ = {};
+        lo_address_free(to_);
+    }
+    OscSender(const OscSender&) = delete;
+    OscSender& operator=(const OscSender&) = delete;
+    void turn_clock_by(double seconds) { ahead_s_ = ahead_s_ + seconds; }
+    void pause(bool paused) { paused_ = paused; }
+    void send_rubbish() { lo_send(to_, "/left", "s", "rubbish"); }
+
+private:
+    void send() {
+        if (paused_) return;
+        const double t = static_cast<double>(app::monotonic_ns()) * 1e-9;
+        for (const char* stick : {"/left", "/right"})
+            lo_send(to_, stick, "dfff", t + ahead_s_, 0.1F, 1 + 0.1F * static_cast<float>(std::sin(9 * t)),
+                    0.0F);
+    }
+
+    lo_address to_;
+    std::atomic<double> ahead_s_ = 1e9;
+    std::atomic<bool> paused_ = false;
+    std::jthread thread_;
+};
+
+TEST(SensorHub, LiveSticksShareAProcessAndSurviveWhatHappensToIt) {
+    const int port = app::free_udp_port();
+    const app::SensorOptions options = options_for("osc:" + std::to_string(port));
+    SensorHub hub(options);
+    EXPECT_EQ(children().size(), 1u);
+    OscSender sender(port);
+    Watched seen;
+    const auto grown_by = [&](std::uint64_t more) {
+        return [&seen, more, left = seen.states[0].empty() ? 0 : seen.states[0].back().samples,
+                right = seen.states[1].empty() ? 0 : seen.states[1].back().samples] {
+            return !seen.states[0].empty() && !seen.states[1].empty() &&
+                   seen.states[0].back().samples > left + more &&
+                   seen.states[1].back().samples > right + more;
+        };
+    };
+    seen.states.resize(2);
+    watch_until(hub, 2, seen, grown_by(100));
+    EXPECT_EQ(seen.messages_but_of_silence(), "");
+    EXPECT_EQ(hub.clocks().at(0).clock, "the source's");
+
+    sender.turn_clock_by(-7);
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::clock_jumped) == 1; });
+    sender.send_rubbish();
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::malformed) == 1; });
+    sender.pause(true);
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::silent) >= 2; });
+    sender.pause(false);
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::back) >= 2; });
+    kill(children().front(), SIGKILL);
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::restarted) == 1; });
+    watch_until(hub, 2, seen, grown_by(100));
+
+    const std::string messages = seen.all_messages();
+    EXPECT_NE(messages.find("sensor left, right: the source's clock jumped by -7.0"), std::string::npos)
+        << messages;
+    EXPECT_NE(messages.find("sensor left, right: left out what it could not read: osc /left: error: found 1 "
+                            "arguments, expected 3"),
+              std::string::npos)
+        << messages;
+    EXPECT_EQ(hub.restarts(), 1);
+    for (std::size_t stick = 0; stick < 2; ++stick) {
+        const tracking::StickState* before = nullptr;
+        for (const tracking::StickState& state : seen.states[stick]) {
+            // The times are ours, counted from the epoch.
+            EXPECT_NEAR(static_cast<double>(state.due_ns - options.epoch_ns) * 1e-9, state.t_s, 1e-9);
+            EXPECT_NEAR(static_cast<double>(state.read_ns - options.epoch_ns) * 1e-9, state.t_s, 5);
+            if (before && before->starts == state.starts) {
+                EXPECT_GT(state.t_s, before->t_s);
+            }
+            before = &state;
+        }
+    }
+}
+
+TEST(SensorHub, HeadOfAStreamIsThereBeforeItsFirstStateAndOutlivesTheSensor) {
+    zmq::context_t context;
+    zmq::socket_t publisher(context, zmq::socket_type::pub);
+    publisher.set(zmq::sockopt::linger, 0);
+    publisher.bind("tcp://127.0.0.1:*");
+    SensorHub hub(options_for("zmq:" + publisher.get(zmq::sockopt::last_endpoint), {"left"}));
+    const std::string head = "# units: mm\n# tip_m: 0,0,-0.4\nt,stick,px,py,pz\n";
+    Watched seen;
+    seen.states.resize(1);
+    // The head only until the first state is seen: a message before the subscription is lost.
+    const auto send = [&] {
+        const std::string row =
+            std::to_string(1e-9 * static_cast<double>(app::monotonic_ns())) + ",left,1000,1500,0\n";
+        publisher.send(zmq::buffer(seen.states[0].empty() ? head + row : row));
+    };
+    watch_until(hub, 1, seen, [&] { return send(), !seen.states[0].empty(); });
+    EXPECT_EQ(hub.stream_head(), head);
+    kill(children().front(), SIGKILL);
+    watch_until(hub, 1, seen, [&] { return send(), seen.count(Kind::restarted) == 1; });
+    const std::size_t before = seen.states[0].size();
+    watch_until(hub, 1, seen, [&] { return send(), seen.states[0].size() > before + 10; });
+    EXPECT_EQ(hub.stream_head(), head);
+    EXPECT_EQ(seen.states[0].back().starts, 2u);
+    for (const tracking::StickState& state : seen.states[0])
+        EXPECT_EQ(state.position, Eigen::Vector3d(1, 1.5, 0));
+}
+
+}  // namespace

@@ -1,0 +1,89 @@
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <deque>
+#include <random>
+
+#include "messages/crc32c.h"
+#include "shared/coordinator.h"
+#include "shared/shared_world_worker.h"
+#include "shared_scenes.h"
+
+// What a member may send that no honest one would: damaged messages with a right checksum, past the sockets,
+// into the application's and the workers' logic.
+
+namespace sim {
+namespace {
+
+class Damage : public testing::TestWithParam<Pace> {};
+
+void seal(std::vector<std::uint8_t>& bytes) {
+    if (bytes.size() < 32) return;
+    const auto length = static_cast<std::uint32_t>(bytes.size());
+    std::memcpy(bytes.data() + 8, &length, sizeof length);
+    const std::uint32_t sum = crc32c(std::span(bytes).first(bytes.size() - 4));
+    std::memcpy(bytes.data() + bytes.size() - 4, &sum, sizeof sum);
+}
+
+// Three workers, of which the first lies; the others have to finish with every body.
+void run_with_a_liar(Pace pace, unsigned seed, int messages, int& sent) {
+    DistributedSettings settings;
+    settings.pace = pace;
+    settings.bound = pace == Pace::bounded ? 2 : 0;
+    settings.steps = 60;
+    world_test::Record record;
+    Coordinator meeting(world_test::busy_scene(), settings, record);
+    std::map<std::uint32_t, std::unique_ptr<SharedWorldWorker>> workers;
+    std::mt19937 random(seed);
+    for (int i = 0; i < 3; ++i) (void)meeting.join({});
+    auto deliver = [&] {
+        for (const Coordinator::Outgoing& out : meeting.outgoing())
+            for (const std::uint32_t to : out.to) {
+                DecodedWorldMessage message = decode_for_worker(*out.bytes);
+                if (const auto* scene = std::get_if<SceneMessage>(&message.message))
+                    workers[to] = std::make_unique<SharedWorldWorker>(*scene);
+                else if (workers.count(to) > 0)
+                    workers[to]->take(message.header, std::move(message.message));
+            }
+    };
+    deliver();
+    meeting.start();
+    int damaged = 0, idle = 0;
+    for (int turn = 0; turn < 2000 && !meeting.finished(); ++turn) {
+        deliver();
+        // As the application does after 30 s.
+        if (++idle > 20) meeting.lose_slowest("nothing was published"), idle = 0;
+        for (auto& [number, worker] : workers) {
+            if (worker->ready()) {
+                worker->step();
+                worker->worked(1e-3 * (number + 1), 0);
+                idle = 0;
+            }
+            for (std::vector<std::uint8_t>& bytes : worker->outgoing()) {
+                const bool lies = number == 0 && turn > 5 && damaged < messages && random() % 4 == 0;
+                for (unsigned n = lies ? 1 + random() % 3 : 0; n > 0; --n)
+                    bytes[12 + random() % (bytes.size() - 16)] = static_cast<std::uint8_t>(random());
+                if (lies) seal(bytes), ++damaged;
+                meeting.take(number, bytes);
+            }
+        }
+    }
+    sent += damaged;
+    EXPECT_TRUE(meeting.finished()) << "seed " << seed << ": " << record.notes;
+    EXPECT_EQ(meeting.result().steps, 60u) << "seed " << seed;
+}
+
+TEST_P(Damage, OfAMembersMessagesCrashesNobodyAndTheOthersFinish) {
+    const int runs = std::getenv("MUSICWORLD_LONG") ? 2000 : 60;
+    int sent = 0;
+    for (int seed = 0; seed < runs; ++seed)
+        run_with_a_liar(GetParam(), static_cast<unsigned>(seed), 20, sent);
+    EXPECT_GT(sent, runs / 2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Paces, Damage, testing::Values(Pace::lockstep, Pace::bounded), [](const auto& pace) {
+    return pace.param == Pace::lockstep ? "Lockstep" : "Bounded";
+});
+
+}  // namespace
+}  // namespace sim

@@ -1,0 +1,342 @@
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <atomic>
+#include <future>
+#include <mutex>
+#include <random>
+
+#include "key_folder.h"
+#include "messages/world_messages.h"
+#include "network_namespace.h"
+#include "processes.h"
+#include "sim/distributed_world.h"
+#include "workers/heartbeat.h"
+#include "workers/worker_process.h"
+#include "world_bodies.h"
+
+// Real processes. What must be to the bit is compared with a World alone, so it does not matter when exactly
+// a worker is killed or stopped.
+namespace {
+
+using namespace std::chrono_literals;
+using namespace sim_test;
+
+/// A heap of soft balls and rigid boxes that falls, touches and is joined: contacts between all workers.
+sim::WorldScene heap(int bodies) {
+    sim::WorldScene scene;
+    scene.world = world_test::on_floor();
+    for (int i = 0; i < bodies; ++i) {
+        const Eigen::Vector3d at(0.95 * (i % 3), 0.6 + 1.05 * (i / 9), 0.95 * (i / 3 % 3));
+        scene.world.bodies.push_back(i % 4 == 3 ? world_test::box(at, {0.4, 0.5, 0.4})
+                                                : world_test::ball(at, sim::Fidelity::modal));
+        scene.world.bodies.back().name += std::to_string(i);
+        scene.world.bodies.back().velocity = Eigen::Vector3d(0.1 * (i % 5) - 0.2, 0, 0.05 * (i % 7));
+    }
+    scene.world.constraints.push_back({"hangs", 0, {0, 0.5, 0}, -1, {0, 2.5, 0}});
+    scene.events = {{40, {0}, 0, 0, {}}};
+    return scene;
+}
+
+std::uint64_t hash_alone(const sim::WorldScene& scene, std::uint64_t steps) {
+    sim::World world(scene.world);
+    for (std::uint64_t i = 0; i < steps; ++i) {
+        for (const sim::WorldEvent& event : scene.events)
+            if (event.step == i)
+                for (const int c : event.removed) world.remove_constraint(c);
+        world.step();
+    }
+    return world.state_hash();
+}
+
+/// Keeps the hash of the last step, and does something at a step, once.
+class Watcher : public sim::DistributedObserver {
+public:
+    std::uint64_t last_step = 0, hash = 0;
+    std::vector<std::string> notes;
+    std::vector<std::uint64_t> act_at;
+    std::function<void()> act;
+
+    void at(std::uint64_t step, const sim::World& world) override {
+        last_step = step, hash = world.state_hash();
+        if (std::find(act_at.begin(), act_at.end(), step) != act_at.end()) act();
+    }
+    void note(const std::string& what) override { notes.push_back(what); }
+    [[nodiscard]] bool noted(const std::string& part) const {
+        return std::any_of(notes.begin(), notes.end(),
+                           [&](const std::string& n) { return n.find(part) != std::string::npos; });
+    }
+};
+
+// The programs that the tests start; these tests are never run by themselves.
+TEST(WorldProcess, DISABLED_Works) {
+    const std::vector<std::string> words = command_line();
+    _exit(sim::run_worker(option(words, "--connect"), option(words, "--key")));
+}
+
+sim::DistributedLaunch processes(int count) {
+    sim::DistributedLaunch launch;
+    launch.processes = run_test("WorldProcess.DISABLED_Works", count);
+    return launch;
+}
+
+/// A worker started by somebody else.
+sim::WorkerProcess start_elsewhere(const std::string& endpoint, const std::string& key = {}) {
+    sim::WorkerLaunch launch = run_test("WorldProcess.DISABLED_Works", 1);
+    if (!key.empty()) launch.arguments.insert(launch.arguments.end(), {"--key", key});
+    return {launch, endpoint};
+}
+
+sim::DistributedSettings lockstep(std::uint64_t steps) {
+    sim::DistributedSettings settings;
+    settings.steps = steps;
+    return settings;
+}
+
+TEST(SharedWorldRun, OneAndThreeProcessesComeToTheSameBitsAsOneWorldAndLeaveNoneBehind) {
+    const sim::WorldScene scene = heap(18);
+    for (const int count : {1, 3}) {
+        Watcher watcher;
+        const sim::DistributedResult result =
+            sim::run_distributed(scene, lockstep(80), processes(count), watcher);
+        EXPECT_EQ(result.steps, 80u);
+        EXPECT_EQ(watcher.last_step, 80u);
+        EXPECT_EQ(watcher.hash, hash_alone(scene, 80));
+        EXPECT_EQ(result.workers, count);
+        EXPECT_EQ(result.lost, 0);
+        EXPECT_TRUE(children_of(getpid()).empty());
+    }
+}
+
+TEST(SharedWorldRun, KilledWorkersBodiesGoOnElsewhereDownToNoneAndTheBitsStay) {
+    const sim::WorldScene scene = heap(12);
+    Watcher watcher;
+    watcher.act_at = {20, 60, 100};
+    watcher.act = [] { ::kill(children_of(getpid()).front(), SIGKILL); };
+    const sim::DistributedResult result = sim::run_distributed(scene, lockstep(300), processes(3), watcher);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, 300));
+    EXPECT_EQ(result.steps, 300u);
+    EXPECT_EQ(result.lost, 3);
+    EXPECT_GE(result.bodies_reowned, 12);
+    EXPECT_TRUE(watcher.noted("no worker is left"));
+}
+
+TEST(SharedWorldRun, AStoppedWorkerIsGivenUpAndTheBitsStay) {
+    const sim::WorldScene scene = heap(9);
+    Watcher watcher;
+    watcher.act_at = {10};
+    watcher.act = [] { ::kill(children_of(getpid()).front(), SIGSTOP); };
+    const sim::DistributedResult result = sim::run_distributed(scene, lockstep(60), processes(2), watcher);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, 60));
+    EXPECT_EQ(result.lost, 1);
+    EXPECT_TRUE(children_of(getpid()).empty());
+}
+
+TEST(SharedWorldRun, AWorkerThatIsToldToEndGivesItsBodiesAwayAndNoneIsLost) {
+    const sim::WorldScene scene = heap(9);
+    Watcher watcher;
+    watcher.act_at = {10};
+    watcher.act = [] { ::kill(children_of(getpid()).front(), SIGTERM); };
+    const sim::DistributedResult result = sim::run_distributed(scene, lockstep(400), processes(2), watcher);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, 400));
+    EXPECT_EQ(result.lost, 0) << testing::PrintToString(watcher.notes);
+    EXPECT_EQ(result.left, 1);
+}
+
+TEST(SharedWorldRun, AWorkerThatJoinsLateTakesPart) {
+    const sim::WorldScene scene = heap(9);
+    sim::DistributedLaunch launch = processes(1);
+    std::string endpoint;
+    launch.listening = [&](const std::string& where) { endpoint = where; };
+    std::optional<sim::WorkerProcess> late;
+    Watcher watcher;
+    watcher.act_at = {10};
+    watcher.act = [&] { late.emplace(start_elsewhere(endpoint)); };
+    sim::DistributedSettings settings = lockstep(3000);
+    const sim::DistributedResult result = sim::run_distributed(scene, settings, launch, watcher);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, 3000));
+    EXPECT_EQ(result.workers, 2);
+    EXPECT_TRUE(comes_true([&] { return late->has_ended(); }));
+    EXPECT_EQ(late->ending(), "exit status 0");
+}
+
+TEST(SharedWorldRun, TwoWorkersOverTcpWithKeysJoinAndOneWithoutAKeyAndGarbageChangeNothing) {
+    const KeyFolder keys({"left", "right"});
+    const sim::WorldScene scene = heap(9);
+    sim::DistributedLaunch launch;
+    launch.listen = "tcp://127.0.0.1:*", launch.keys = keys.path(), launch.expect = 2;
+    std::vector<sim::WorkerProcess> workers;
+    workers.reserve(3);
+    zmq::context_t context;
+    std::optional<zmq::socket_t> garbage;
+    launch.listening = [&](const std::string& endpoint) {
+        workers.push_back(start_elsewhere(endpoint));  // without a key
+        garbage = sim::connect_worker(context, endpoint, {}, 0);
+        for (const char* name : {"left.key", "right.key"})
+            workers.push_back(start_elsewhere(endpoint, (keys.path() / name).string()));
+    };
+    Watcher watcher;
+    watcher.act_at = {1};
+    watcher.act = [&] {
+        for (int i = 0; i < 100; ++i)
+            (void)garbage->send(zmq::str_buffer("GET / HTTP/1.1"), zmq::send_flags::dontwait);
+    };
+    const sim::DistributedResult result = sim::run_distributed(scene, lockstep(100), launch, watcher);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, 100));
+    EXPECT_EQ(result.workers, 2);
+    EXPECT_EQ(result.lost, 0);
+    EXPECT_FALSE(workers[0].has_ended());  // it still waits for an answer
+    for (int i : {1, 2}) EXPECT_TRUE(comes_true([&] { return workers[i].has_ended(); }));
+}
+
+TEST(SharedWorldRun, AWorkerWithAnotherFingerprintIsRefusedInLockstep) {
+    const sim::WorldScene scene = heap(4);
+    sim::DistributedLaunch launch = processes(1);
+    std::optional<sim::WorkerProcess> other;
+    launch.listening = [&](const std::string& endpoint) {
+        setenv("MUSICWORLD_OTHER_FINGERPRINT", "other", 1);
+        other.emplace(start_elsewhere(endpoint));
+        unsetenv("MUSICWORLD_OTHER_FINGERPRINT");
+    };
+    Watcher watcher;
+    sim::DistributedSettings settings = lockstep(2000);
+    const sim::DistributedResult result = sim::run_distributed(scene, settings, launch, watcher);
+    EXPECT_EQ(result.workers, 1);
+    EXPECT_TRUE(watcher.noted("refused"));
+    EXPECT_TRUE(comes_true([&] { return other->has_ended(); }));
+    EXPECT_EQ(other->ending(), "exit status 1");
+}
+
+TEST(SharedWorldRun, ABoundedRunOnProcessesWithAKillInMidRunFinishesAllStepsOfEveryBody) {
+    sim::WorldScene scene;
+    scene.world = world_test::on_floor();
+    for (int i = 0; i < 9; ++i)
+        scene.world.bodies.push_back(
+            world_test::ball({1.5 * (i % 3), 0.8 + 0.1 * i, 1.5 * (i / 3)}, sim::Fidelity::modal));
+    Watcher watcher;
+    watcher.act_at = {50};
+    watcher.act = [] { ::kill(children_of(getpid()).front(), SIGKILL); };
+    sim::DistributedSettings settings = lockstep(240);
+    settings.pace = sim::Pace::bounded, settings.bound = 4;
+    const sim::DistributedResult result = sim::run_distributed(scene, settings, processes(3), watcher);
+    EXPECT_EQ(result.steps, 240u);
+    EXPECT_EQ(watcher.last_step, 240u);
+    EXPECT_EQ(result.lost, 1);
+    EXPECT_GE(result.bodies_reowned, 1);
+    EXPECT_LE(result.largest_lead, 4);
+    EXPECT_TRUE(result.quarantined.empty());
+}
+
+std::string port_of(const std::string& endpoint) {
+    return endpoint.substr(endpoint.rfind(':'));
+}
+
+TEST(SharedWorldRun, ThreeHostsWithKeysComeToTheSameBitsAlsoWhenOnesCableIsCut) {
+    if (!OtherHost::possible()) GTEST_SKIP() << "network namespaces are not permitted here";
+    const KeyFolder keys({"one", "two", "three"});
+    const sim::WorldScene scene = heap(12);
+    for (const bool cut : {false, true}) {
+        const OtherHost one(1), two(2), three(3);
+        sim::DistributedLaunch launch;
+        launch.listen = "tcp://0.0.0.0:*", launch.keys = keys.path(), launch.expect = 3;
+        std::vector<sim::WorkerProcess> workers;
+        workers.reserve(3);
+        launch.listening = [&](const std::string& endpoint) {
+            const auto start = [&](const OtherHost& host, const char* key) {
+                sim::WorkerLaunch there = host.there(run_test("WorldProcess.DISABLED_Works", 1));
+                there.arguments.insert(there.arguments.end(), {"--key", (keys.path() / key).string()});
+                workers.emplace_back(there, "tcp://" + host.here() + port_of(endpoint));
+            };
+            start(one, "one.key"), start(two, "two.key"), start(three, "three.key");
+        };
+        Watcher watcher;
+        watcher.act_at = {10};
+        watcher.act = [&] {
+            if (cut) two.cut();
+        };
+        const sim::DistributedResult result = sim::run_distributed(scene, lockstep(100), launch, watcher);
+        EXPECT_EQ(watcher.hash, hash_alone(scene, 100));
+        EXPECT_EQ(result.workers, 3);
+        EXPECT_EQ(result.lost, cut ? 1 : 0);
+        EXPECT_EQ(result.bodies_reowned > 0, cut);
+        for (sim::WorkerProcess& worker : workers)
+            EXPECT_TRUE(comes_true([&] { return worker.has_ended(); }));  // the one cut off, too
+    }
+}
+
+// Bodies wander from the first worker to the others all the while, so that what happens falls into trades.
+// Kills and stops: a stop costs a second until it is noticed.
+TEST(SharedWorldRun,
+     TwentyRandomKillsStopsDrainsAndJoinsWhileBodiesAreTradedLeaveTheBitsAndEveryRunFinishes) {
+    const int count = std::getenv("MUSICWORLD_LONG") ? 100 : 20;
+    const sim::WorldScene scene = heap(9);
+    const std::uint64_t hash = hash_alone(scene, 200);
+    std::mt19937 rng(4);
+    std::uint64_t migrations = 0;
+    for (int i = 0; i < count; ++i) {
+        sim::DistributedLaunch launch = processes(3);
+        std::string endpoint;
+        launch.listening = [&](const std::string& where) { endpoint = where; };
+        std::optional<sim::WorkerProcess> late;
+        const unsigned what = rng() % 8, who = rng() % 3, delay_us = rng() % 3000;
+        Watcher watcher;
+        std::jthread fate;
+        watcher.act_at = {1 + rng() % 150};
+        watcher.act = [&] {
+            if (what == 7) return late.emplace(start_elsewhere(endpoint)), void();
+            fate = std::jthread([=, victim = children_of(getpid()).at(who)] {
+                std::this_thread::sleep_for(std::chrono::microseconds(delay_us));
+                ::kill(victim, what == 6 ? SIGSTOP : what >= 4 ? SIGTERM : SIGKILL);
+            });
+        };
+        sim::DistributedSettings settings = lockstep(200);
+        settings.all_to_first = true;
+        const sim::DistributedResult result = sim::run_distributed(scene, settings, launch, watcher);
+        if (fate.joinable()) fate.join();
+        EXPECT_EQ(watcher.hash, hash) << i;
+        EXPECT_EQ(result.steps, 200u) << i;
+        migrations += result.migrations;
+    }
+    EXPECT_GT(migrations, static_cast<std::uint64_t>(count));
+    EXPECT_TRUE(children_of(getpid()).empty());
+}
+
+// An application for the next test: it starts two workers and goes on until it is killed.
+TEST(WorldProcess, DISABLED_IsAnApplication) {
+    sim::DistributedLaunch launch = processes(2);
+    Watcher watcher;
+    (void)sim::run_distributed(heap(6), lockstep(~0ull >> 1), launch, watcher);
+}
+
+TEST(SharedWorldRun, WorkersEndAndTheFolderGoesWhenTheApplicationIsKilled) {
+    sim::WorkerProcess application(run_test("WorldProcess.DISABLED_IsAnApplication", 1), "none");
+    std::vector<pid_t> ids;
+    ASSERT_TRUE(comes_true([&] {
+        ids = children_of(static_cast<pid_t>(application.id()));
+        return ids.size() == 2 &&
+               !option(command_line("/proc/" + std::to_string(ids[0])), "--connect").empty();
+    }));
+    const std::filesystem::path socket =
+        option(command_line("/proc/" + std::to_string(ids[0])), "--connect").substr(6);
+    std::this_thread::sleep_for(500ms);  // most likely in mid-run; either way they have to end
+    application.kill();
+    const auto ended = [](pid_t id) { return command_line("/proc/" + std::to_string(id)).empty(); };
+    EXPECT_TRUE(comes_true([&] { return std::all_of(ids.begin(), ids.end(), ended); }));
+    EXPECT_TRUE(comes_true([&] { return !std::filesystem::exists(socket.parent_path()); }));
+}
+
+TEST(SharedWorldRun, NobodyWhoJoinsAndAProgramThatEndsAtOnceAreErrors) {
+    Watcher watcher;
+    sim::DistributedLaunch launch;
+    launch.expect = 1, launch.wait_s = 0.1;
+    EXPECT_THROW((void)sim::run_distributed(heap(2), lockstep(5), launch, watcher), std::runtime_error);
+    launch = {};
+    launch.processes = {"/bin/false", {}, 1};
+    EXPECT_THROW((void)sim::run_distributed(heap(2), lockstep(5), launch, watcher), std::runtime_error);
+    launch = {};
+    launch.listen = "tcp://0.0.0.0:*";
+    EXPECT_THROW((void)sim::run_distributed(heap(2), lockstep(5), launch, watcher), std::invalid_argument);
+}
+
+}  // namespace
