@@ -104,6 +104,7 @@ RigidMass rigid_mass(const Superquadric& shape, const Material& material) {
 }
 
 Eigen::Matrix3Xd mode_shapes_at(const ModalBasis& basis, const Eigen::Vector3d& r) {
+    if (basis.count() == 0) return Eigen::Matrix3Xd(3, 0);  // a rigid body has no nodes either
     const Located at = locate_in(basis, r);
     const Eigen::Index m = at.nodes_a_line;
     Eigen::Matrix3Xd shapes = Eigen::Matrix3Xd::Zero(3, basis.count());
