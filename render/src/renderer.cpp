@@ -16,14 +16,14 @@ namespace {
 
 constexpr GLuint kMatrixUnit = 0, kShadowUnit = 1, kObjectsUnit = 2, kLitUnit = 3, kDarkUnit = 4,
                  kModesUnit = 5;
-constexpr int kMaxSide = 8192;  // pixels
+constexpr int kMostPixels = 8192;  // pixels
 
 SceneDescription checked(const SceneDescription& scene) {
-    if (scene.width < 1 || scene.height < 1 || scene.width > kMaxSide || scene.height > kMaxSide) {
+    if (scene.width < 1 || scene.height < 1 || scene.width > kMostPixels || scene.height > kMostPixels) {
         throw std::runtime_error("picture: error: found a size of " + std::to_string(scene.width) + "x" +
                                  std::to_string(scene.height) + ", expected 1x1 to 8192x8192");
     }
-    if (scene.shadow_size < 0 || scene.shadow_size > kMaxSide) {
+    if (scene.shadow_size < 0 || scene.shadow_size > kMostPixels) {
         throw std::runtime_error("shadow: error: found a size of " + std::to_string(scene.shadow_size) +
                                  ", expected 0 to 8192");
     }

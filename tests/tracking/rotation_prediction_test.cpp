@@ -78,6 +78,22 @@ TEST_P(Turning, ConstantRatesAboutAnyAxisArePredictedTo1e9thOfARadian) {
 // Errors of a rate act along a turn; a filter that took them as if they did not was unstable from 0.55 rad a
 // sample on. Rounding must not grow over a minute. (Nearer to pi the start overshoots half a turn and starts
 // anew.)
+TEST(Rotation, BetweenTwoDirectionsTurnsOneIntoTheOtherAlsoOppositeOnes) {
+    std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> pairs = {{{0, 0, -1}, {0, 0, 1}},
+                                                                      {{0, 0, -1}, {0, 0, -1}},
+                                                                      {{3, 0, 0}, {-2, 1e-9, 0}},
+                                                                      {{1, 2, 3}, {-3, 1, 0.5}}};
+    for (const auto& [from, to] : pairs) {
+        const Eigen::Quaterniond q = rotation_between(from, to);
+        EXPECT_NEAR(q.norm(), 1, 1e-14);
+        // Near opposite directions the half turn is taken for them: off by what lies between, 1e-9 here.
+        EXPECT_LT((q * from.normalized() - to.normalized()).norm(), 2e-9);
+    }
+    // Elsewhere the same numbers as Eigen's.
+    const Eigen::Vector3d from(0, 0, -1), to(0.3, -0.8, 0.1);
+    EXPECT_EQ(rotation_between(from, to).coeffs(), Eigen::Quaterniond::FromTwoVectors(from, to).coeffs());
+}
+
 TEST(Orientation, FiltersAreStableOnTurnsOfUpTo2Point3RadiansASample) {
     for (const char* name : {"cv", "ca", "singer", "thesis", "imm", "ca:q=1e11"})
         for (const double a_sample : {0.3, 0.6, 1.0, 1.7, 2.3}) {

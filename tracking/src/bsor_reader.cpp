@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "text_cursor.h"
+#include "trace_limits.h"
 
 namespace tracking {
 namespace {
@@ -13,11 +14,8 @@ namespace {
 constexpr std::uint32_t kMagic = 0x442d3d69;
 constexpr std::size_t kFrameBytes = 92;  // time, frames a second, three poses of seven floats
 constexpr std::array<std::size_t, 2> kHandOffset = {36, 64};
-constexpr double kStartUp = 0.5;    // s
-constexpr double kTeleport = 30;    // m/s
-constexpr double kFarthest = 1000;  // m
-constexpr double kLatest = 1e7;     // s
-constexpr double kNormTolerance = 0.01;
+constexpr double kStartUp = 0.5;  // s
+constexpr double kTeleport = 30;  // m/s
 
 /// Bytes with a place in a file. Little endian throughout.
 class Bytes {

@@ -78,7 +78,7 @@ PoseSample pose_at(const TipPath& path, double t, double length) {
     PoseSample sample;
     sample.t_s = t;
     sample.position = tip + length * back;
-    sample.orientation = Eigen::Quaterniond::FromTwoVectors(kTipAxis, -back).normalized();
+    sample.orientation = rotation_between(kTipAxis, -back).normalized();
     sample.has_orientation = true;
     return sample;
 }

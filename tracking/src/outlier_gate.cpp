@@ -6,17 +6,17 @@ namespace tracking {
 namespace {
 constexpr int kPersisting = 3;
 constexpr int kSettled = 2;
-constexpr double kFastest = 25;       // m/s, of a tracked hand or tip
-constexpr double kStrongest = 3000;   // m/s^2, apart from contacts
-constexpr double kFastestTurn = 120;  // rad/s, with room to spare for a wrist
+constexpr double kFastest = 25;          // m/s, of a tracked hand or tip
+constexpr double kStrongestMps2 = 3000;  // m/s^2, apart from contacts
+constexpr double kFastestTurn = 120;     // rad/s, with room to spare for a wrist
 }  // namespace
 
 OutlierGate OutlierGate::of_positions(double sigmas) noexcept {
-    return {sigmas, kFastest, kStrongest};
+    return {sigmas, kFastest, kStrongestMps2};
 }
 
 OutlierGate OutlierGate::of_rotations(double sigmas) noexcept {
-    return {sigmas, kFastestTurn, kStrongest / kLever};
+    return {sigmas, kFastestTurn, kStrongestMps2 / kLever};
 }
 
 bool OutlierGate::possible(const Eigen::Vector3d& step, double dt, double innovation_square,

@@ -17,10 +17,10 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kSmallRange = 0.1, kSlow = 0.5, kLargeRange = 3, kFast = 30;  // m, m/s
-constexpr std::size_t kFewest = 1000;  // accelerations, and pairs of poses, for a judgement
-constexpr double kStrongest = 0.002;   // share of the accelerations
-constexpr double kOneSided = 0.45;     // length of the mean of unit vectors
-constexpr double kPair = 1.0 / 30;     // s between poses that are compared
+constexpr std::size_t kFewest = 1000;      // accelerations, and pairs of poses, for a judgement
+constexpr double kStrongestShare = 0.002;  // share of the accelerations
+constexpr double kOneSided = 0.45;         // length of the mean of unit vectors
+constexpr double kPair = 1.0 / 30;         // s between poses that are compared
 constexpr double kMostlyExplained = 0.5, kMuchBetter = 0.25;
 constexpr double kWrongSide = 0.05;  // m
 
@@ -93,7 +93,7 @@ void judge_gravity(const Trace& trace, std::vector<std::string>& lines) {
     std::vector<Vector3d> all = accelerations(trace);
     if (all.size() < kFewest) return;
     const auto count =
-        std::max<std::ptrdiff_t>(20, std::lround(kStrongest * static_cast<double>(all.size())));
+        std::max<std::ptrdiff_t>(20, std::lround(kStrongestShare * static_cast<double>(all.size())));
     std::nth_element(all.begin(), all.begin() + count, all.end(),
                      [](const Vector3d& a, const Vector3d& b) { return a.squaredNorm() > b.squaredNorm(); });
     Vector3d mean = Vector3d::Zero();

@@ -22,4 +22,19 @@ Eigen::Vector3d logarithm(const Eigen::Quaterniond& q) noexcept {
     return 2 * sign * half_angle_over_sine * q.vec();
 }
 
+Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) noexcept {
+    const Eigen::Vector3d a = from.normalized(), b = to.normalized();
+    const double cosine = b.dot(a);
+    Eigen::Quaterniond rotation;
+    if (cosine < -1 + 1e-12) {  // as good as opposite
+        rotation.vec() = a.unitOrthogonal();
+        rotation.w() = 0;
+        return rotation;
+    }
+    const double s = std::sqrt((1 + cosine) * 2);
+    rotation.vec() = a.cross(b) * (1 / s);
+    rotation.w() = s * 0.5;
+    return rotation;
+}
+
 }  // namespace tracking

@@ -5,12 +5,8 @@
 namespace tracking {
 namespace {
 
-constexpr std::size_t kLongestName = 256;  // bytes of a header's cell that count
+constexpr std::size_t kLongestCell = 256;  // bytes of a header's cell that count
 constexpr std::size_t kMostHeaderLines = 200;
-
-bool is_blank(char c) {
-    return c == ' ' || c == '\t';
-}
 
 Field unquoted(std::string_view whole, std::size_t from, std::size_t to) {
     while (from < to && is_blank(whole[from])) ++from;
@@ -95,9 +91,9 @@ private:
         head_.names.resize(std::max(head_.names.size(), cells_.size()));
         for (std::size_t i = 0; i < cells_.size(); ++i) {
             std::string& name = head_.names[i];
-            if (cells_[i].text.empty() || name.size() > kLongestName) continue;
+            if (cells_[i].text.empty() || name.size() > kLongestCell) continue;
             if (!name.empty()) name += '/';
-            name.append(cells_[i].text.substr(0, kLongestName));
+            name.append(cells_[i].text.substr(0, kLongestCell));
         }
     }
 

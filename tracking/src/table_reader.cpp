@@ -7,17 +7,14 @@
 #include "column_finder.h"
 #include "orientation_forms.h"
 #include "table_lines.h"
+#include "trace_limits.h"
 #include "tracking/import.h"
 
 namespace tracking {
 namespace {
 
-constexpr double kLatest = 1e7;     // s
-constexpr double kFarthest = 1000;  // m
-constexpr double kLargest = 1e19;   // of a time or frame as the file has it
-constexpr double kLargestAngle = 1e6;
-constexpr double kNormTolerance = 0.01;  // of quaternions, and of a matrix's products of columns
-constexpr std::size_t kMostSticks = 64, kLongestName = 64;
+constexpr double kLargest = 1e19;  // of a time or frame as the file has it
+constexpr std::size_t kMostSticks = 64;
 
 /// One stick while tables are read.
 struct Reading {

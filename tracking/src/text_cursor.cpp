@@ -13,10 +13,6 @@ bool is_continuation(char c) {
     return (static_cast<unsigned char>(c) & 0xC0u) == 0x80u;
 }
 
-bool is_blank(char c) {
-    return c == ' ' || c == '\t';
-}
-
 std::string byte_name(char c) {
     constexpr char kHex[] = "0123456789abcdef";
     const auto byte = static_cast<unsigned char>(c);

@@ -5,6 +5,10 @@
 
 namespace tracking {
 
+[[nodiscard]] inline bool is_blank(char c) {
+    return c == ' ' || c == '\t';
+}
+
 /// A field of a line: its text without surrounding blanks, and where it starts in the line (0-based byte).
 struct Field {
     std::string_view text;

@@ -7,19 +7,16 @@
 #include "orientation_forms.h"
 #include "text_cursor.h"
 #include "trace_keys.h"
+#include "trace_limits.h"
 #include "tracking/rotation.h"
 
 namespace tracking {
 namespace {
 
-constexpr double kLatest = 1e7, kLatestLive = 1e11;  // s
-constexpr double kFarthest = 1000;                   // m
-constexpr double kLargestAngle = 1e6;                // degrees
-constexpr double kLargestIncrement = 100;            // rad
-constexpr double kNormTolerance = 0.01;
+constexpr double kLatestLive = 1e11;       // s
+constexpr double kLargestIncrement = 100;  // rad
 constexpr double kUnitTolerance =
     1e-14;  // of the squared norm: left as it is, so that written traces read back exactly
-constexpr std::size_t kLongestName = 64;
 
 enum class Orientation { absent, quaternion, increment, euler };
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <sim/simulation.h>
+#include <tracking/rotation.h>
 
 #include <cmath>
 
@@ -97,7 +98,7 @@ render::SceneDescription KitStage::scene(int width, int height) const {
 Eigen::Matrix4f KitStage::stick_matrix(const tracking::PosePrediction& pose) const {
     // The mesh runs along -z and has its bead's centre at (0, 0, -0.40).
     const Eigen::Quaterniond body_from_mesh =
-        Eigen::Quaterniond::FromTwoVectors(-Eigen::Vector3d::UnitZ(), stick_.shaft);
+        tracking::rotation_between(-Eigen::Vector3d::UnitZ(), stick_.shaft);
     const double scale = stick_.length_m / kMeshStickLengthM;
     Eigen::Isometry3d world_from_body = Eigen::Isometry3d::Identity();
     world_from_body.linear() = pose.orientation.toRotationMatrix();

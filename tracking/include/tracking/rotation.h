@@ -10,4 +10,10 @@ namespace tracking {
 /// Rotation vector of the shorter of the two ways that q stands for, |v| <= pi. Inverse of exponential().
 [[nodiscard]] Eigen::Vector3d logarithm(const Eigen::Quaterniond& q) noexcept;
 
+/// Shortest rotation that turns the direction of `from` into that of `to`, neither of them zero; a half turn about
+/// some axis across `from` where they are opposite. As Eigen's FromTwoVectors, which needs a singular value
+/// decomposition for that case alone and takes seconds to compile wherever it stands.
+[[nodiscard]] Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from,
+                                                  const Eigen::Vector3d& to) noexcept;
+
 }  // namespace tracking
