@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "program.h"
+#include "shared_folder.h"
 
 namespace end_to_end {
 namespace {
@@ -162,9 +163,9 @@ void expect_same_numbers(const std::filesystem::path& a, const std::filesystem::
 }
 
 TEST(TraceConvert, OriginalRecordingsReadToTheNumbersOfTheirConvertedFiles) {
-    const char* shared = std::getenv("MUSICWORLD_SHARED");
-    if (shared == nullptr) GTEST_SKIP() << "MUSICWORLD_SHARED names no folder of recordings";
-    const std::filesystem::path traces = std::filesystem::path(shared) / "traces";
+    const std::optional<std::filesystem::path> shared = shared_folder();
+    if (!shared) GTEST_SKIP() << "there are no recordings beside the checkout";
+    const std::filesystem::path traces = *shared / "traces";
     const Folder folder;
     const auto same = [&](const std::vector<std::string>& originals, const std::string& converted,
                           const std::vector<std::string>& options) {
@@ -183,12 +184,11 @@ TEST(TraceConvert, OriginalRecordingsReadToTheNumbersOfTheirConvertedFiles) {
 }
 
 TEST(TraceCheck, NoRecordingIsTakenForImplausible) {
-    const char* shared = std::getenv("MUSICWORLD_SHARED");
-    if (shared == nullptr) GTEST_SKIP() << "MUSICWORLD_SHARED names no folder of recordings";
+    const std::optional<std::filesystem::path> shared = shared_folder();
+    if (!shared) GTEST_SKIP() << "there are no recordings beside the checkout";
     std::vector<std::string> arguments = {"trace", "check", "flourish", "feints", "roll"};
     for (const char* folder : {"beatsaber", "timpani", "drumstick"})
-        for (const auto& entry :
-             std::filesystem::directory_iterator(std::filesystem::path(shared) / "traces" / folder)) {
+        for (const auto& entry : std::filesystem::directory_iterator(*shared / "traces" / folder)) {
             const std::string name = entry.path().filename().string();
             if (name.find(".hits.") == std::string::npos && name.find(".flags.") == std::string::npos)
                 arguments.push_back(entry.path().string());

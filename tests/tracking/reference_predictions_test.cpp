@@ -1,12 +1,12 @@
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <ostream>
 #include <sstream>
 
+#include "shared_folder.h"
 #include "tracking/predictor.h"
 #include "tracking/trace.h"
 
@@ -30,17 +30,20 @@ struct Row {
     std::array<double, 9> mm{};  // x, y, z (z up) at 1/30, 1/15 and 1/10 s
 };
 
-std::vector<Row> read_rows(const std::filesystem::path& file) {
+/// Rows `t,stick,x30,...`; of a file for several predictors, those that begin with `predictor` in place of the stick's column.
+std::vector<Row> read_rows(const std::filesystem::path& file, const std::string& predictor = {}) {
     std::ifstream in(file);
     std::string line;
     std::getline(in, line);
     std::vector<Row> rows;
     while (std::getline(in, line)) {
         std::istringstream fields(line);
-        std::string field;
+        std::string first, second, field;
+        std::getline(fields, first, ',');
+        std::getline(fields, second, ',');
+        if (!predictor.empty() && first != predictor) continue;
         Row row;
-        std::getline(fields, field, ',');
-        std::getline(fields, row.stick, ',');
+        row.stick = predictor.empty() ? second : "mallet";
         for (double& value : row.mm) {
             std::getline(fields, field, ',');
             value = std::stod(field);
@@ -78,13 +81,21 @@ double worst_difference(const Trace& input, const std::vector<Row>& rows, const 
     return worst;
 }
 
-// Independent double-precision computations: 1e-6 mm leaves room for other orders of summation only. The
-// numbers of `imm` carry up to 1.8e-5 mm of rounding of their own: a computation with 64-bit mantissas agrees
-// with ours to 2e-10 mm and differs from the file by 7.5e-6 mm at 60 Hz (InteractingModels has that oracle).
-TEST_P(ReferencePredictions, AreReproduced) {
-    const char* shared = std::getenv("MUSICWORLD_SHARED");
-    if (shared == nullptr) GTEST_SKIP() << "MUSICWORLD_SHARED does not name the folder of reference numbers";
-    const std::filesystem::path folder = std::filesystem::path(shared) / "reference" / "predictors";
+// tests/reference/predictions.py computes with 50 digits: 1e-6 mm leaves room for the rounding of filters in double precision alone.
+TEST_P(ReferencePredictions, OfASyntheticStrokeAreReproduced) {
+    const std::filesystem::path folder = MUSICWORLD_SOURCE_DIR "/tests/reference";
+    const Trace input = read_trace(folder / "stroke_60.csv");
+    const std::vector<Row> rows = read_rows(folder / "predictions_60.csv", GetParam().file);
+    ASSERT_EQ(rows.size(), 39U);
+    EXPECT_LT(worst_difference(input, rows, GetParam().specification), 1e-6);
+}
+
+// Computed by others in double precision. The numbers of `imm` carry up to 1.8e-5 mm of rounding of their own: a computation with
+// 64-bit mantissas agrees with ours to 2e-10 mm and differs from the file by 7.5e-6 mm at 60 Hz (InteractingModels has that oracle).
+TEST_P(ReferencePredictions, OfARecordingAreReproduced) {
+    const std::optional<std::filesystem::path> shared = shared_folder();
+    if (!shared) GTEST_SKIP() << "there are no recordings beside the checkout";
+    const std::filesystem::path folder = *shared / "reference" / "predictors";
     for (const char* rate : {"60", "120"}) {
         const Trace input = read_trace(folder / (std::string("input_") + rate + ".csv"));
         const std::vector<Row> rows =

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "kalman_predictor.h"
+#include "shared_folder.h"
 #include "simulated_motion.h"
 #include "tracking/drummer.h"
 #include "tracking/predictor.h"
@@ -269,11 +270,10 @@ TEST(DropOuts, OfATenthInBurstsCostWhatTheLostInformationDoes) {
 
 std::vector<StickTrace> timpani() {
     std::vector<StickTrace> sticks;
-    const char* shared = std::getenv("MUSICWORLD_SHARED");
-    if (shared == nullptr) return sticks;
+    const std::optional<std::filesystem::path> shared = shared_folder();
+    if (!shared) return sticks;
     std::vector<std::filesystem::path> files;
-    for (const auto& entry :
-         std::filesystem::directory_iterator(std::filesystem::path(shared) / "traces/timpani"))
+    for (const auto& entry : std::filesystem::directory_iterator(*shared / "traces/timpani"))
         if (entry.path().stem().extension().empty() && entry.path().extension() == ".csv")
             files.push_back(entry.path());
     std::sort(files.begin(), files.end());
@@ -284,7 +284,7 @@ std::vector<StickTrace> timpani() {
 
 TEST(Recordings, JitterOfThreeMillisecondsCostsUnderThreePercentAt60Hertz) {
     const std::vector<StickTrace> sticks = timpani();
-    if (sticks.empty()) GTEST_SKIP() << "MUSICWORLD_SHARED names no recordings";
+    if (sticks.empty()) GTEST_SKIP() << "there are no recordings beside the checkout";
     for (const char* name : {"cv", "cv:decay=10", "ca", "singer", "thesis", "bank", "imm"})
         for (const double lead : {1.0 / 30, 1.0 / 15}) {
             JitterCost cost;
@@ -318,7 +318,7 @@ void add_recorded(Statement& sum, const char* name, const StickTrace& stick, dou
 // or less, but for a twentieth.
 TEST(Recordings, DropOutsCostNoMoreThanStated) {
     const std::vector<StickTrace> sticks = timpani();
-    if (sticks.empty()) GTEST_SKIP() << "MUSICWORLD_SHARED names no recordings";
+    if (sticks.empty()) GTEST_SKIP() << "there are no recordings beside the checkout";
     for (const char* name : {"cv", "cv:decay=10", "ca", "singer", "bank", "imm"}) {
         Statement full, losing;
         for (const StickTrace& stick : sticks) {

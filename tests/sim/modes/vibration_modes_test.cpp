@@ -20,12 +20,10 @@ ModesRequest box(const Vector3d& size, int elements, int count, const Material& 
     return {{size / 2, 0.1, 0.1}, ModeDomain::box, material, elements, count};
 }
 
-/// reference/free_vibration_modes.json of MUSICWORLD_SHARED; null without it.
+/// Eigenvalues of free elastic boxes, computed independently: tests/reference/README.md.
 nlohmann::json reference() {
-    const char* shared = std::getenv("MUSICWORLD_SHARED");
-    if (shared == nullptr) return nullptr;
-    std::ifstream file(std::string(shared) + "/reference/free_vibration_modes.json");
-    return file ? nlohmann::json::parse(file) : nlohmann::json(nullptr);
+    std::ifstream file(MUSICWORLD_SOURCE_DIR "/tests/reference/free_vibration_modes.json");
+    return nlohmann::json::parse(file);
 }
 
 struct ReferenceBox {
@@ -49,7 +47,6 @@ void expect_rigid(const Eigen::VectorXd& eigenvalues) {
 
 TEST(VibrationModes, AllEigenvaluesOfOneElementMatchTheReferenceTo1em9) {
     const nlohmann::json listed = reference();
-    if (listed.is_null()) GTEST_SKIP() << "needs MUSICWORLD_SHARED";
     for (const ReferenceBox& b : kReferenceBoxes) {
         const FreeVibrationModes modes = free_vibration_modes(box(b.size, 1, -1));
         ASSERT_EQ(modes.eigenvalues.size(), 81);
@@ -60,7 +57,6 @@ TEST(VibrationModes, AllEigenvaluesOfOneElementMatchTheReferenceTo1em9) {
 
 TEST(VibrationModes, EigenvaluesOf2And4And6ElementsASideMatchTheReferenceTo1em9) {
     const nlohmann::json listed = reference();
-    if (listed.is_null()) GTEST_SKIP() << "needs MUSICWORLD_SHARED";
     for (const ReferenceBox& b : kReferenceBoxes)
         for (const int k : {2, 4, 6}) {
             const FreeVibrationModes modes = free_vibration_modes(box(b.size, k, 18));
@@ -122,7 +118,6 @@ Eigen::Index counterpart(const FreeVibrationModes& coarse, const FreeVibrationMo
 // Other modes are a little less smooth at the edges and corners, so the order is somewhat below 4.
 TEST(VibrationModes, TwelveLowestModesConvergeFromAboveAtOrders3p3To4OnTheMean3p8) {
     const nlohmann::json listed = reference();
-    if (listed.is_null()) GTEST_SKIP() << "needs MUSICWORLD_SHARED";
     for (const ReferenceBox& b : kReferenceBoxes) {
         const std::vector<double> exact = listed[b.name]["converged_eigenvalues_first30"];
         const FreeVibrationModes coarse = free_vibration_modes(box(b.size, 4, 18)),
@@ -144,7 +139,6 @@ TEST(VibrationModes, TwelveLowestModesConvergeFromAboveAtOrders3p3To4OnTheMean3p
 // Against the converged values: the estimate is 0.85 to 1.01 of the true error for the twenty lowest modes.
 TEST(DiscretisationErrors, AreWithinAFifthOfTheTrueOnesFor1To4ElementsASide) {
     const nlohmann::json listed = reference();
-    if (listed.is_null()) GTEST_SKIP() << "needs MUSICWORLD_SHARED";
     for (const ReferenceBox& b : kReferenceBoxes) {
         const std::vector<double> exact = listed[b.name]["converged_eigenvalues_first30"];
         const FreeVibrationModes fine = free_vibration_modes(box(b.size, 8, 30));
