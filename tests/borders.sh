@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Fails on an include that crosses the borders: tracking, sim, render and audio know themselves alone, app knows all, nobody includes app or tests.
+# Fails on an include that crosses the borders: tracking, sim, render and audio know themselves alone, app knows all, nothing includes app or tests;
+# and within app and sim on an arrow from a folder to one above it.
 set -u
 cd "$(dirname "$0")/.."
 status=0
@@ -23,4 +24,25 @@ Spectra/:sim
 zmq:sim|app
 CLI/|toml\+\+/|nlohmann/|lo/:app
 LIST
+# The folders of a library, from the ground up: each includes those before it in the list alone, so there is no circle.
+floors() {
+    local area=$1 below=" " folder line
+    shift
+    for folder in "$@"; do
+        while IFS= read -r line; do
+            local other=${line##*include \"}
+            other=${other%%/*}
+            [ "$other" = "$folder" ] && continue
+            case " $* " in *" $other "*) ;; *) continue ;; esac
+            case "$below" in *" $other "*) ;; *) complain "$line: $folder stands below $other" ;; esac
+        done < <(grep -rnE '^#include "[a-z_]+/' "$area/src/$folder" --include='*.h' --include='*.cpp')
+        below="$below$folder "
+    done
+    for folder in "$area"/src/*/; do
+        folder=$(basename "$folder")
+        case " $* " in *" $folder "*) ;; *) complain "$area/src/$folder has no place among the floors" ;; esac
+    done
+}
+floors app statistics files process report scene kit sticks strikes pictures sensors play traces simulate bench compare latency realtime commands
+floors sim shape modes struck world messages shared workers
 exit $status
