@@ -11,7 +11,7 @@ namespace sim {
 /// Which matter the mass and stiffness integrals run over. The displacement is always that of
 /// elements x elements x elements 27-node bricks (triquadratic Lagrange) that fill the body's bounding box.
 enum class ModeDomain {
-    box,          ///< the whole brick, 3x3x3 Gauss points an element: exact
+    box,          ///< the whole brick, 3x3x3 Gauss points per element: exact
     superquadric  ///< the superquadric's volume, by quadrature of stated accuracy
 };
 
@@ -19,7 +19,7 @@ struct ModesRequest {
     Superquadric shape;  ///< box: only the semi-axes count
     ModeDomain domain = ModeDomain::superquadric;
     Material material;
-    int elements = 1;  ///< a side, 1 to 12
+    int elements = 1;  ///< per side, 1 to 12
     int count = 12;    ///< lowest non-rigid modes wanted, to 300; -1: as many as one element has (75)
 };
 
@@ -30,22 +30,22 @@ struct ModesRequest {
 /// projections of the nodal axes in order; the largest entry (first of equals) is positive.
 struct ModalBasis {
     Eigen::Vector3d half_extents = Eigen::Vector3d::Ones();  ///< of the bricks' box [m]
-    int elements = 1;                                        ///< a side
+    int elements = 1;                                        ///< per side
     Eigen::VectorXd omega;                                   ///< [rad/s], ascending
     /// Nodal shapes, 3 (2 elements + 1)^3 x n [kg^-1/2]; row 3 k + axis, node k = ix + m (iy + m iz), m = 2
     /// elements + 1, at x = half_extents.x (2 ix / (m - 1) - 1) and so on.
     Eigen::MatrixXd nodal;
-    [[nodiscard]] int count() const noexcept { return static_cast<int>(omega.size()); }
+    [[nodiscard]] int count() const noexcept { return static_cast<int>(omega.size()); }  ///< of modes
 };
 
-/// What `count` cut: the borders of the degenerate groups around it. below == count: nothing was cut.
+/// Borders of the groups of equal frequencies around `count`. below == count: no group is cut.
 struct GroupCut {
     int count, below, above;
 };
 
-struct FreeVibrationModes {
-    ModalBasis basis;
-    Eigen::VectorXd eigenvalues;  ///< [rad^2/s^2], ascending, all that were computed, the six rigid first
+struct FreeVibrationModes {       ///< the solution of a ModesRequest
+    ModalBasis basis;             ///< the lowest `count` non-rigid modes
+    Eigen::VectorXd eigenvalues;  ///< [rad^2/s^2], all computed ones, ascending, the six rigid first
     /// Parity class of each eigenvalue: bit j is set if u_j is even along its own axis j and the other
     /// components are odd in it. 0: stretching; 1, 2, 4: bending towards x, y, z (rigid: translation); 3, 5,
     /// 6: shear xy, xz, yz (rigid: rotation); 7: twisting.
@@ -60,7 +60,7 @@ struct FreeVibrationModes {
 /// massless and has 1e-8 of the stiffness.
 [[nodiscard]] FreeVibrationModes free_vibration_modes(const ModesRequest& request);
 
-/// Elements a side of the mesh that discretisation_errors compares with.
+/// Elements per side of the mesh that discretisation_errors compares with.
 [[nodiscard]] int finer_elements(int elements) noexcept;
 /// Estimated relative error of each frequency by the mesh, |omega / omega_exact - 1|: Richardson's
 /// extrapolation with a finer mesh (two more elements a side, twice as many for 3; `elements` is 10 at most),

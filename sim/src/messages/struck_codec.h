@@ -3,7 +3,7 @@
 
 namespace sim {
 
-// The parts of a message's body; see messages.h for the layout.
+// The parts of a message's body; see struck_messages.h for the layout.
 
 void write(ByteWriter& out, const BodyDefinition& body);
 void write(ByteWriter& out, const StepRequest& request);

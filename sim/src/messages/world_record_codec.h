@@ -15,7 +15,7 @@ struct BodyAndModes {
 };
 [[nodiscard]] BodyAndModes read_body_and_modes(ByteReader& in);
 
-/// Not finite, or beyond what World lets go on.
+/// Whether a state is not finite or out of the range in which World keeps a body.
 [[nodiscard]] bool is_broken(const WorldBodyState& state);
 
 void write(ByteWriter& out, const std::vector<WorldRecord>& records);

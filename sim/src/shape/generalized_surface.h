@@ -8,7 +8,7 @@ namespace sim {
 /// Inside-outside function of a generalized superquadric (thesis 2.6 to 2.8), as a signed distance right to
 /// first order, in the rest frame.
 ///
-/// The gauge N is convex and homogeneous, so for any y the plane grad N(y) . r = 1 bears the body, and
+/// The gauge N is convex and homogeneous, so for any y the plane grad N(y) . r = 1 supports the body, and
 ///   d(y) = (1 - grad N(y) . r) / |grad N(y)|
 /// is at least r's depth, equal to it for y the nearest surface point (outside, -d is at most the distance).
 /// d(r) = (1 - N) / |grad N| alone is up to 1.6 times the depth for exponents to 1, and 6 times beyond, where

@@ -11,7 +11,7 @@ struct GaugeDerivatives {
     Eigen::Matrix3d hessian;   ///< [1/m^2]
 };
 
-/// Value and gradient of the gauge: the plane gradient . y = 1 bears the body at its point in that direction.
+/// Value and gradient of the gauge: the plane gradient . y = 1 supports the body at that point.
 struct GaugeSlope {
     double value;
     Eigen::Vector3d gradient;  ///< [1/m]

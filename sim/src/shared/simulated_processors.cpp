@@ -140,7 +140,7 @@ void Machine::happen(const Event& event) {
         meeting_.take(static_cast<std::uint32_t>(event.who), *bytes);
     }
     if (event.kind == Event::Kind::worker) run_worker(event.who);
-    // When nobody is left, the application's own process goes on.
+    // If no worker is left, the application's own process continues.
     if (meeting_.members().empty() && !meeting_.finished()) join();
     deliver();
 }
