@@ -36,7 +36,7 @@ namespace sim {
 //   picture          112 bytes: a record's doubles
 //   definition       text name, f64 a b c e1 e2, f64 young poisson density,
 //                    flag visual, f64 frequency displacement decay, flag hinged, v3 pivot, v3 axis,
-//                    f64 frequency damping, f64 rotation[9] by columns, v3 translation, f64 stick mass, restitution,
+//                    f64 frequency damping, f64 rotation[9] by columns, v3 translation, f64 mass restitution,
 //                    list of zone {text name, f64 min radius, max radius, min height, max height}
 //   request          f64 t_s, flag anew, lists of impulse (folded), impulse (confirmed), path, wanted
 //   impulse          60 bytes: u32 body, f64 t_s, v3 point, v3 impulse

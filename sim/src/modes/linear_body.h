@@ -9,7 +9,7 @@ namespace sim {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// Volume [m^3] and second moments of volume, the integrals of x^2, y^2, z^2 [m^5], in closed form (Jaklic,
-/// Leonardis, Solina 2000, "Segmentation and Recovery of Superquadrics", 2.4.6, y as the polar axis, B: beta).
+/// Leonardis, Solina 2000, "Segmentation and Recovery of Superquadrics", 2.4.6, polar axis y, B: beta function).
 ///   V = 2 a b c e1 e2 B(e1/2 + 1, e1) B(e2/2, e2/2)
 ///   integral of x^2 = 1/2 a^2 (a b c e1 e2) B(3 e2/2, e2/2) B(e1/2, 2 e1 + 1)     (z^2: c^2 for a^2)
 ///   integral of y^2 =     b^2 (a b c e1 e2) B(e2/2, e2/2) B(3 e1/2, e1 + 1)

@@ -226,7 +226,7 @@ void Machine::send(Processor& p) {
 
 // That nothing is left to happen before the end is our own mistake.
 std::string Machine::stuck() const {
-    std::string what = "simulated processors: found nothing left to happen, expected the run's end; members";
+    std::string what = "simulated processors: no event is left before the run's end; members";
     for (const std::uint32_t worker : meeting_.members()) {
         const Processor& p = processors_[worker];
         what.append(" ").append(std::to_string(worker));
