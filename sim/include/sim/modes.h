@@ -79,7 +79,7 @@ struct RigidMass {
     double mass;
     Eigen::Vector3d inertia;
 };
-[[nodiscard]] RigidMass rigid_mass(const Superquadric& shape, const Material& material);
+[[nodiscard]] RigidMass rigid_mass(const Superquadric& shape, const Material& material);  ///< rest shape
 
 /// phi(r), 3 x n [kg^-1/2]: the displacement at r by each mode; r outside the box is taken at its border (a
 /// coordinate that is no number at the lower one).

@@ -82,9 +82,9 @@ struct Failure {
 
 using Message = std::variant<Hello, Heartbeat, Welcome, Assign, Step, Answer, Stop, Failure>;
 
-[[nodiscard]] std::vector<std::uint8_t> encode(const Message& message);
-[[nodiscard]] Message decode(std::span<const std::uint8_t> bytes);  ///< throws DecodeError
+[[nodiscard]] std::vector<std::uint8_t> encode(const Message& message);  ///< one frame, checksum included
+[[nodiscard]] Message decode(std::span<const std::uint8_t> bytes);       ///< throws DecodeError
 
-[[nodiscard]] std::uint32_t crc32(std::span<const std::uint8_t> bytes) noexcept;
+[[nodiscard]] std::uint32_t crc32(std::span<const std::uint8_t> bytes) noexcept;  ///< IEEE 802.3
 
 }  // namespace sim

@@ -190,7 +190,7 @@ struct PackedUpdates {
         Eigen::Vector3d position, velocity;  ///< [m], [m/s]
         bool asleep, quarantined;
     };
-    [[nodiscard]] Glance glance(std::uint32_t offset) const;
+    [[nodiscard]] Glance glance(std::uint32_t offset) const;  ///< of the update at `offset`
 };
 
 // Worker to worker, through the application. The market.

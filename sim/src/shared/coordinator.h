@@ -34,9 +34,9 @@ public:
     void lose_slowest(const std::string& why);
     /// Number of records published so far.
     [[nodiscard]] std::uint64_t published() const noexcept { return result_.records; }
-    [[nodiscard]] std::vector<Outgoing> outgoing();
+    [[nodiscard]] std::vector<Outgoing> outgoing();  ///< queued messages; empties the queue
     [[nodiscard]] const std::vector<std::uint32_t>& members() const noexcept { return members_; }
-    [[nodiscard]] bool finished() const noexcept { return finished_; }
+    [[nodiscard]] bool finished() const noexcept { return finished_; }  ///< all steps are done
     [[nodiscard]] const DistributedResult& result() const noexcept { return result_; }  ///< no elapsed_s
     /// Owner by the register; kApplication: none.
     [[nodiscard]] std::uint32_t owner(int body) const {

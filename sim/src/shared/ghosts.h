@@ -37,8 +37,8 @@ public:
     [[nodiscard]] std::uint64_t newest(int body) const {
         return newest_[static_cast<std::size_t>(body)].step;
     }
-    [[nodiscard]] bool quarantined(int body) const;
-    [[nodiscard]] Eigen::Vector3d last_position(int body) const;
+    [[nodiscard]] bool quarantined(int body) const;               ///< as last published
+    [[nodiscard]] Eigen::Vector3d last_position(int body) const;  ///< as last published [m]
 
 private:
     struct Seen {

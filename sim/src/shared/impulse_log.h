@@ -28,7 +28,7 @@ public:
     ImpulseLog(const World& world, int bodies, int keep_steps);
 
     static constexpr std::uint64_t kForever = ~std::uint64_t{0};
-    void add(int body, std::uint32_t source, std::uint64_t step, StepImpulse impulse);
+    void add(int body, std::uint32_t source, std::uint64_t step, StepImpulse impulse);  ///< adds one impulse
     /// Adds the impulses of a message; they are decoded when they are needed.
     void add(std::uint32_t source, std::uint64_t step, const std::shared_ptr<const PackedUpdates>& message);
     /// Marks the source's impulses up to `step` as complete; kForever: the source has left.

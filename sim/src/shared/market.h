@@ -26,7 +26,7 @@ public:
     /// near_only: once level, a body is sold only to the owner of bodies near it.
     Market(std::uint32_t self, const MarketSettings& settings, bool near_only);
 
-    void members(const std::vector<std::uint32_t>& workers);
+    void members(const std::vector<std::uint32_t>& workers);  ///< sets the members
     /// Takes another worker's report, written when it knew ownership up to `epoch`.
     void heard(std::uint32_t worker, std::uint32_t epoch, const StepReport& report);
     void registered(std::uint32_t epoch, const Ownership& ownership);
@@ -45,7 +45,7 @@ public:
     /// Buying.
     [[nodiscard]] OfferAnswer answer(std::uint32_t seller, const Offer& offer);
 
-    [[nodiscard]] double smoothed() const { return workers_.at(self_).smoothed; }
+    [[nodiscard]] double smoothed() const { return workers_.at(self_).smoothed; }  ///< own seconds per step
 
 private:
     struct Worker {

@@ -10,7 +10,7 @@ namespace sim {
 /// A scene's schedule: applies its events and knows at which step each body is added.
 class SceneClock {
 public:
-    explicit SceneClock(const WorldScene& scene);
+    explicit SceneClock(const WorldScene& scene);  ///< at the start
 
     /// Applies the events due before step `step` + 1: removes constraints, adds bodies.
     void apply(World& world, std::uint64_t step);
@@ -35,13 +35,13 @@ private:
 /// It is whole when it has every moving body's record of its step.
 class Replica {
 public:
-    explicit Replica(const WorldScene& scene);
+    explicit Replica(const WorldScene& scene);  ///< at the start
 
-    [[nodiscard]] World& world() noexcept { return world_; }
+    [[nodiscard]] World& world() noexcept { return world_; }  ///< the copy
     [[nodiscard]] const World& world() const noexcept { return world_; }
     [[nodiscard]] const SceneClock& clock() const noexcept { return clock_; }
-    [[nodiscard]] std::uint64_t step() const noexcept { return step_; }
-    [[nodiscard]] bool whole() const noexcept { return whole_; }
+    [[nodiscard]] std::uint64_t step() const noexcept { return step_; }  ///< that the copy is at
+    [[nodiscard]] bool whole() const noexcept { return whole_; }         ///< see above
 
     /// Stores what was published of step `step`. The first record of a body counts.
     void note(std::uint64_t step, std::vector<WorldRecord>&& bodies, std::vector<ContactRecord>&& contacts,

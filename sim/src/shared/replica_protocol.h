@@ -50,8 +50,8 @@ public:
     /// Seconds that the last step took; distributed to the own bodies by World::work.
     virtual void cost(double seconds) = 0;
 
-    [[nodiscard]] virtual std::uint64_t steps_done() const = 0;
-    [[nodiscard]] virtual bool at_end() const = 0;  ///< settings.steps reached
+    [[nodiscard]] virtual std::uint64_t steps_done() const = 0;  ///< by this worker
+    [[nodiscard]] virtual bool at_end() const = 0;               ///< settings.steps reached
     /// Nothing is left to do. In bounded pace one more publication follows the last step, once all others
     /// have done theirs: corrected by the impulses that arrived late.
     [[nodiscard]] virtual bool done() const = 0;

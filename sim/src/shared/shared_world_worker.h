@@ -11,7 +11,7 @@ namespace sim {
 ///   outgoing() after each of these
 class SharedWorldWorker {
 public:
-    explicit SharedWorldWorker(const SceneMessage& scene);
+    explicit SharedWorldWorker(const SceneMessage& scene);  ///< from the first message
 
     /// Handles a message relayed by the application, decoded. Throws DecodeError if it is inconsistent.
     void take(const WorldHeader& header, WorldMessage&& message);
@@ -27,7 +27,7 @@ public:
     [[nodiscard]] bool left() const noexcept { return left_; }
     [[nodiscard]] bool ended() const noexcept { return ended_; }  ///< EndOfRun or Refusal came
     [[nodiscard]] double slowing() const;  ///< factor of the scene's events for this worker's next step
-    [[nodiscard]] std::uint64_t steps_done() const { return exchange_->steps_done(); }
+    [[nodiscard]] std::uint64_t steps_done() const { return exchange_->steps_done(); }  ///< by this worker
     /// Why ready() is false, in words.
     [[nodiscard]] std::string waits_for() const;
     [[nodiscard]] double work() const;  ///< work of the last step, in units of World::work

@@ -12,8 +12,8 @@ class WorldView {
 public:
     WorldView(const WorldScene& scene, Pace pace);
 
-    void take(std::uint64_t step, StateMessage&& message);
-    void take(std::uint64_t step, const std::vector<Update>& updates);
+    void take(std::uint64_t step, StateMessage&& message);              ///< lockstep
+    void take(std::uint64_t step, const std::vector<Update>& updates);  ///< bounded
     /// Records that were handed over instead of published.
     void take(std::uint64_t step, const std::vector<WorldRecord>& records);
     /// Bounded: nothing more will be published of this body.
@@ -22,8 +22,8 @@ public:
     /// Advances by one step if all its states are known; returns whether it did.
     [[nodiscard]] bool advance();
 
-    [[nodiscard]] const World& world() const noexcept { return replica_.world(); }
-    [[nodiscard]] std::uint64_t step() const noexcept { return step_; }
+    [[nodiscard]] const World& world() const noexcept { return replica_.world(); }  ///< all bodies at step()
+    [[nodiscard]] std::uint64_t step() const noexcept { return step_; }             ///< shown
     [[nodiscard]] const SceneClock& clock() const noexcept { return replica_.clock(); }
     /// Every body has been still for half a second and no event is left.
     [[nodiscard]] bool at_rest() const;

@@ -37,7 +37,7 @@ struct MotionBounds {
     double turn = 0;                                  ///< hinge rate [rad/s]
     double swing = 0;                                 ///< hinge angle [rad]
 
-    void widen(const MotionBounds& other) noexcept;
+    void widen(const MotionBounds& other) noexcept;  ///< to hold both
 };
 
 /// Pose of a state; where the limit on strains and swing acts (see BodyModel).
@@ -55,16 +55,16 @@ class BodyModel {
 public:
     explicit BodyModel(const BodyDefinition& definition);  ///< throws std::invalid_argument, see check_body
 
-    [[nodiscard]] const BodyDefinition& definition() const noexcept { return definition_; }
-    [[nodiscard]] const Gauge& gauge() const noexcept { return gauge_; }
-    [[nodiscard]] const LinearBody& linear() const noexcept { return linear_; }
+    [[nodiscard]] const BodyDefinition& definition() const noexcept { return definition_; }  ///< as given
+    [[nodiscard]] const Gauge& gauge() const noexcept { return gauge_; }                     ///< rest shape
+    [[nodiscard]] const LinearBody& linear() const noexcept { return linear_; }  ///< mass and modes
     [[nodiscard]] const Eigen::Isometry3d& body_from_world() const noexcept { return body_from_world_; }
     /// Angular frequencies and decay rates of the visible modes, then of the hinge.
     [[nodiscard]] const OscillatorVector& omega() const noexcept { return omega_; }
     [[nodiscard]] const OscillatorVector& sigma() const noexcept { return sigma_; }
 
     [[nodiscard]] OscillatorState to_oscillators(const ModalState& state) const noexcept;
-    [[nodiscard]] ModalState to_modal(const OscillatorState& state) const noexcept;
+    [[nodiscard]] ModalState to_modal(const OscillatorState& state) const noexcept;  ///< modes to strains
     /// Exact free motion over dt; a negative dt counts as zero.
     [[nodiscard]] OscillatorState after(const OscillatorState& state, double dt) const noexcept;
     /// State just after `impulse` on the body at rest:

@@ -37,7 +37,7 @@ public:
     /// Steps and fills `outcome`, reusing its memory. Ignores impulses on other bodies.
     void step(const StepRequest& request, BodyOutcome& outcome);
     [[nodiscard]] std::uint32_t index() const noexcept { return index_; }
-    [[nodiscard]] const BodyRecord& record() const noexcept { return record_; }
+    [[nodiscard]] const BodyRecord& record() const noexcept { return record_; }  ///< after the last step
 
 private:
     [[nodiscard]] OscillatorState folded(const StepRequest& request) const;

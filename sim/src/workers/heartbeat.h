@@ -25,7 +25,7 @@ public:
     /// From now on sends heartbeats of worker `worker` of a world. If this process has not ended 0.4 s after
     /// the application's end, it is ended.
     void join_world(std::uint32_t worker) noexcept { worker_ = worker; }
-    [[nodiscard]] bool application_gone() const noexcept { return gone_; }
+    [[nodiscard]] bool application_gone() const noexcept { return gone_; }  ///< set once
 
 private:
     void beat(zmq::context_t& context, const std::optional<WorkerKeys>& keys, const std::stop_token& stop);

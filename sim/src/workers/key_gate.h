@@ -19,7 +19,7 @@ public:
     KeyGate(const KeyGate&) = delete;
     KeyGate& operator=(const KeyGate&) = delete;
 
-    [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
+    [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }  ///< handshakes
 
 private:
     void serve(const std::stop_token& stop);

@@ -33,7 +33,7 @@ public:
     explicit WorkerGate(const Settings& settings);
     ~WorkerGate();  ///< waits at most a second for queued messages to go out
 
-    [[nodiscard]] std::string private_endpoint() const { return folder_.endpoint(); }
+    [[nodiscard]] std::string private_endpoint() const { return folder_.endpoint(); }  ///< ipc
     [[nodiscard]] const std::string& endpoint() const { return endpoint_; }  ///< of `listen`, with its port
 
     struct Event {
@@ -48,13 +48,13 @@ public:
     /// Events that have arrived; waits for the first for at most `most`.
     [[nodiscard]] std::deque<Event> wait(std::chrono::milliseconds most);
 
-    void admit(const std::string& stranger, std::uint32_t worker);
-    void refuse(const std::string& stranger, const std::string& why);
+    void admit(const std::string& stranger, std::uint32_t worker);     ///< makes it a member
+    void refuse(const std::string& stranger, const std::string& why);  ///< answers its request
     void send(const std::vector<std::uint32_t>& workers,
               std::shared_ptr<const std::vector<std::uint8_t>> bytes);
     void dismiss(std::uint32_t worker);  ///< makes it a stranger again
 
-    [[nodiscard]] std::uint64_t refused_messages() const noexcept { return refused_messages_; }
+    [[nodiscard]] std::uint64_t refused_messages() const noexcept { return refused_messages_; }  ///< dropped
     [[nodiscard]] std::uint64_t refused_keys() const noexcept { return keys_ ? keys_->refused() : 0; }
 
 private:

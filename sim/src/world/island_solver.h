@@ -48,7 +48,7 @@ public:
                  std::vector<Manifold>& manifolds, std::vector<HeldConstraint>& constraints)
         : settings_(&settings), bodies_(&bodies), manifolds_(&manifolds), constraints_(&constraints) {}
 
-    void solve(const Island& island);
+    void solve(const Island& island);  ///< over one step
     /// What planes, fixed bodies, places, gravity and drag gave own bodies since the last call [N s].
     [[nodiscard]] Eigen::Vector3d take_outside_impulse() noexcept {
         return std::exchange(outside_, Eigen::Vector3d::Zero());
@@ -60,7 +60,7 @@ public:
         told_crossed_ = told;
     }
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
-    [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }
+    [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }  ///< since the start
 
 private:
     struct BodyRows {

@@ -27,7 +27,7 @@ struct MovingBody {
     StepImpulse given;
     double work = 0;  ///< see World::work
 
-    [[nodiscard]] bool moves() const noexcept { return !fixed && !quarantined; }
+    [[nodiscard]] bool moves() const noexcept { return !fixed && !quarantined; }  ///< takes part in steps
 };
 
 constexpr int kMostStillSteps = 65535;
