@@ -8,8 +8,8 @@
 #include "compare/comparison_map.h"
 #include "compare/comparison_map_grid.h"
 #include "compare/comparison_pairs.h"
-#include "files/csv.h"
 #include "play/tables.h"
+#include "report/table.h"
 
 namespace app {
 namespace {

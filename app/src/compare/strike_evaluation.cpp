@@ -151,7 +151,7 @@ double HitScore::median_ms() const {
 }
 
 double HitScore::p95_ms() const {
-    return nearest_rank(absolute(errors_ms), 95);
+    return quantile(absolute(errors_ms), 0.95);
 }
 
 double HitScore::false_per_min() const {

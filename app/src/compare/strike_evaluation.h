@@ -31,7 +31,7 @@ struct HitScore {
     [[nodiscard]] double precision() const;  ///< 1 when nothing was predicted
     [[nodiscard]] double recall() const;     ///< 1 when there was nothing to find
     [[nodiscard]] double f1() const;         ///< 2 matched / (true + predicted); 1 when both are 0
-    [[nodiscard]] double median_ms() const;  ///< of |error|; 0 when nothing matched
+    [[nodiscard]] double median_ms() const;  ///< of |error|; NaN when nothing matched
     [[nodiscard]] double p95_ms() const;
     [[nodiscard]] double false_per_min() const;
     [[nodiscard]] double false_per_min_without_cancel() const;
