@@ -251,14 +251,6 @@ std::unique_ptr<tracking::Predictor> make_striker(const Entrant& entrant, const 
     return make_any_predictor(entrant.strikes_by.empty() ? named : entrant.strikes_by, leads_s, stick.name);
 }
 
-Field read_field(const std::vector<std::string>& files, const ComparisonOptions& options) {
-    Field field;
-    for (const std::string& file : files) field.recordings.push_back(read_recording(file, options.persons));
-    require_distinct(field.recordings);
-    if (!files.empty()) field.sticks = sense_all(field.recordings, options.sensor, options.leads_s);
-    return field;
-}
-
 std::vector<std::string> specifications_of(const ComparisonOptions& options) {
     std::vector<std::string> all;
     const auto add = [&](const std::string& specification) {

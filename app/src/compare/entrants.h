@@ -13,15 +13,6 @@
 
 namespace app {
 
-/// Recordings and what the sensor sees of them.
-struct Field {
-    std::vector<Recording> recordings;
-    std::vector<SensedStick> sticks;
-};
-
-/// Throws tracking::TraceError, and BadInput, also where two files hold the same samples.
-[[nodiscard]] Field read_field(const std::vector<std::string>& files, const ComparisonOptions& options);
-
 /// Where a predictor's parameters come from.
 enum class Tuning {
     none,              ///< as named

@@ -71,4 +71,12 @@ std::vector<SensedStick> sense_all(std::span<const Recording> recordings, const 
     return sticks;
 }
 
+Field read_field(const std::vector<std::string>& files, const ComparisonOptions& options) {
+    Field field;
+    for (const std::string& file : files) field.recordings.push_back(read_recording(file, options.persons));
+    require_distinct(field.recordings);
+    if (!files.empty()) field.sticks = sense_all(field.recordings, options.sensor, options.leads_s);
+    return field;
+}
+
 }  // namespace app

@@ -1,0 +1,18 @@
+#pragma once
+#include <vector>
+
+#include "compare/comparison.h"
+#include "compare/entrants.h"
+#include "compare/sensed_stick.h"
+
+namespace app {
+
+/// Runs every entrant over every stick of the field at every lead: errors and calibration; strikes, if there
+/// is a surface, those of an entrant that learns an advance with the one that it learned (on the `--tune`
+/// recordings, or on all others compared, never on the one that is scored); cost, if asked for. By stick,
+/// entrant, lead, but where an entrant does not take part. The rows do not depend on `options.threads`.
+[[nodiscard]] std::vector<ComparisonRow> score_entrants(const Field& field,
+                                                        const std::vector<Entrant>& entrants,
+                                                        const ComparisonOptions& options);
+
+}  // namespace app
