@@ -39,15 +39,19 @@ std::string panel(const SpeedUp& s, const Shown& of) {
 }
 
 Table table_of(const SpeedUp& s) {
-    const auto unfiled = [](const char* text) { return Column(text, false); };
-    Table table =
-        Table::of({"bodies:d", "workers:d", "ideal_s:.3g", "ceiling_s:.3g", "async_s:.3g", "lockstep_s:.3g",
-                   "bytes_per_body_step:.0f", unfiled("async_speed_up:.2f"), unfiled("ceiling_speed_up:.2f"),
-                   unfiled("lockstep_speed_up:.2f"), unfiled("async_of_ceiling:.2f")});
+    Table table;
     for (const SpeedUp::Row& r : s.rows)
-        table.add({s.bodies, r.workers, s.alone_s / r.workers, r.ceiling_s, r.async_s, r.lockstep_s, r.bytes,
-                   s.alone_s / r.async_s, s.alone_s / r.ceiling_s, s.alone_s / r.lockstep_s,
-                   r.ceiling_s / r.async_s});
+        table.add_figures({{"bodies:d", s.bodies},
+                           {"workers:d", r.workers},
+                           {"ideal_s:.3g", s.alone_s / r.workers},
+                           {"ceiling_s:.3g", r.ceiling_s},
+                           {"async_s:.3g", r.async_s},
+                           {"lockstep_s:.3g", r.lockstep_s},
+                           {"bytes_per_body_step:.0f", r.bytes},
+                           {"async_speed_up:.2f", s.alone_s / r.async_s, false},
+                           {"ceiling_speed_up:.2f", s.alone_s / r.ceiling_s, false},
+                           {"lockstep_speed_up:.2f", s.alone_s / r.lockstep_s, false},
+                           {"async_of_ceiling:.2f", r.ceiling_s / r.async_s, false}});
     return table;
 }
 

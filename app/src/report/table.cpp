@@ -51,15 +51,17 @@ bool empty_object(const nlohmann::ordered_json& json) {
     return json.is_object() && std::ranges::all_of(json, [](const auto& value) { return value.is_null(); });
 }
 
-}  // namespace
-
-Column::Column(std::string_view text, bool csv) : in_csv(csv) {
-    for (std::string* part : {&name, &format, &unit}) {
+Column column_of(std::string_view text) {
+    Column column;
+    for (std::string* part : {&column.name, &column.format, &column.unit}) {
         const std::size_t end = std::min(text.find(':'), text.size());
         *part = text.substr(0, end);
         text.remove_prefix(std::min(end + 1, text.size()));
     }
+    return column;
 }
+
+}  // namespace
 
 std::string Cell::plain() const {
     return std::visit(Visitor{[](std::monostate) { return std::string(); },
@@ -99,6 +101,12 @@ std::string csv_line(std::initializer_list<Cell> cells) {
     return csv_line(std::span(cells.begin(), cells.size()));
 }
 
+Table Table::of(std::initializer_list<std::string_view> columns) {
+    Table table;
+    for (const std::string_view column : columns) table.columns.push_back(column_of(column));
+    return table;
+}
+
 void Table::add(std::vector<Cell> row) {
     assert(row.size() == columns.size() && "a row has a cell for every column");
     rows.push_back(std::move(row));
@@ -107,7 +115,10 @@ void Table::add(std::vector<Cell> row) {
 void Table::add_figures(const std::vector<Figure>& row) {
     std::vector<Cell> cells;
     for (const Figure& figure : row) {
-        if (rows.empty()) columns.push_back(figure.column);
+        if (rows.empty()) {
+            columns.push_back(column_of(figure.column));
+            columns.back().in_csv = figure.in_csv;
+        }
         cells.push_back(figure.cell);
     }
     add(std::move(cells));

@@ -41,23 +41,19 @@ private:
 
 /// A column with a format holds numbers and stands to the right; one without holds text.
 struct Column {
-    /// "NAME", "NAME:FORMAT" or "NAME:FORMAT:UNIT", e.g. "rms_mm:.2f", "error:.1f:%".
-    Column(std::string_view text, bool csv = true);
-    Column(const char* text) : Column(std::string_view(text)) {}
-    Column(const std::string& text) : Column(std::string_view(text)) {}
-
     /// The column of CSV and key of JSON; "hits/f1" is the column f1, or the key f1 of an object hits. Readers
     /// see it with blanks for / and _, and behind it the unit, where the name does not end in it (rms_mm).
     std::string name;
-    std::string format;  ///< of fmt without braces; integers are shown in full
-    std::string unit;
-    bool in_csv;
+    std::string format = {};  ///< of fmt without braces (".2f"); integers are shown in full
+    std::string unit = {};
+    bool in_csv = true;
 };
 
-/// A cell and its column.
+/// A cell and its column: "NAME", "NAME:FORMAT" or "NAME:FORMAT:UNIT", e.g. "rms_mm:.2f", "error:.1f:%".
 struct Figure {
-    Column column;
+    std::string column;
     Cell cell;
+    bool in_csv = true;
 };
 
 /// Columns and rows, rendered in four ways.
@@ -65,7 +61,8 @@ struct Table {
     std::vector<Column> columns = {};
     std::vector<std::vector<Cell>> rows = {};  ///< of as many cells as there are columns
 
-    [[nodiscard]] static Table of(std::vector<Column> columns) { return {std::move(columns)}; }
+    /// Columns as a Figure has them.
+    [[nodiscard]] static Table of(std::initializer_list<std::string_view> columns);
 
     void add(std::vector<Cell> row);
     /// A row of cells with their columns; those of the first row are the table's.

@@ -91,7 +91,7 @@ TEST(Table, APartLeavesOutRowsWithoutValues) {
     Table table;
     for (const bool struck : {true, false, true})
         table.add_figures({{"predictor", "cv"},
-                           {{"external", false}, false},
+                           {"external", false, false},
                            {"hits/f1:.3f", struck ? Cell(0.5) : Cell()},
                            {"hits/p95_ms:.1f", {}},
                            {"rms_mm:.2f", 4.0}});
