@@ -161,12 +161,13 @@ Comparison compare(const ComparisonOptions& options) {
     comparison.options = options;
     const Field field = read_scored(options);
     comparison.persons = persons_of(field.recordings);
-    const EntrantList list = enter(options, field.recordings, field.sticks);
+    const Field tuning = options.tuning ? read_field(options.tune_traces, options) : Field();
+    const EntrantList list = enter(options, field, tuning);
     const std::vector<Entrant>& entrants = list.entrants;
     comparison.tuned_on = list.tuned_on;
     for (const Entrant& entrant : entrants)
         comparison.predictors.emplace_back(entrant.name, entrant.description);
-    comparison.rows = score_entrants(field, entrants, options);
+    comparison.rows = score_entrants(field, tuning, entrants, options);
     comparison.summaries = summarise(comparison, entrants);
     comparison.paired = pair_with_baselines(comparison, entrants);
     comparison.curves = lead_curves(field.recordings, entrants, options);

@@ -157,14 +157,11 @@ private:
 /// costs least (HitScore::loss) at that lead on the `--tune` recordings, or on all others compared, never on
 /// the one that is scored.
 void advance_strikes(std::vector<std::vector<ComparisonRow>>& parts, const Runs& runs, const Field& field,
-                     const std::vector<Entrant>& entrants, const ComparisonOptions& options) {
-    const auto learns = [](const Entrant& entrant) { return entrant.learns_advance; };
-    if (options.surface.kind == StrikeSurface::Kind::none || !options.tuning ||
-        std::none_of(entrants.begin(), entrants.end(), learns))
-        return;
-    const Field own = read_field(options.tune_traces, options);
-    const Field& others = options.tune_traces.empty() ? field : own;
-    if (&others == &field && field.recordings.size() < 2) return;
+                     const Field& tuning, const std::vector<Entrant>& entrants,
+                     const ComparisonOptions& options) {
+    if (options.surface.kind == StrikeSurface::Kind::none || !options.tuning) return;
+    if (tuning.recordings.empty() && field.recordings.size() < 2) return;
+    const Field& others = tuning.recordings.empty() ? field : tuning;
     const std::size_t leads = options.leads_s.size();
     for (std::size_t entrant = 0; entrant < entrants.size(); ++entrant) {
         if (!entrants[entrant].learns_advance) continue;
@@ -197,13 +194,14 @@ void measure_costs(std::vector<ComparisonRow>& rows, const Field& field, std::si
 
 }  // namespace
 
-std::vector<ComparisonRow> score_entrants(const Field& field, const std::vector<Entrant>& entrants,
+std::vector<ComparisonRow> score_entrants(const Field& field, const Field& tuning,
+                                          const std::vector<Entrant>& entrants,
                                           const ComparisonOptions& options) {
     const Runs runs(field, entrants, options);
     std::vector<std::vector<ComparisonRow>> parts(runs.count());
     parallel_for(
         parts.size(), options.threads, [&](std::size_t i) { parts[i] = runs.rows(i); }, options.progress);
-    advance_strikes(parts, runs, field, entrants, options);
+    advance_strikes(parts, runs, field, tuning, entrants, options);
     std::vector<ComparisonRow> rows;
     for (std::vector<ComparisonRow>& part : parts)
         for (ComparisonRow& row : part) rows.push_back(std::move(row));

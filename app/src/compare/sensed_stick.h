@@ -54,6 +54,9 @@ inline constexpr double kSettlingS = 0.5;
                                                  const tracking::SensorModel& sensor,
                                                  std::span<const double> leads_s);
 
+/// Whether `t_s` lies within +-50 ms of one of `times` (ascending).
+[[nodiscard]] bool near_any(const std::vector<double>& times, double t_s);
+
 /// Recordings and what the sensor sees of them.
 struct Field {
     std::vector<Recording> recordings;
