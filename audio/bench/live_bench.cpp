@@ -5,6 +5,7 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <stdexcept>
@@ -28,11 +29,13 @@ void ask_for_realtime() {
     }
 }
 
-double ms_at(std::vector<std::int64_t>& values, double fraction) {
-    const auto at =
-        values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
-    std::ranges::nth_element(values, at);
-    return 1e-6 * static_cast<double>(*at);
+/// Quantile, linear between the order statistics (Hyndman and Fan 1996, definition 7); sorts the values.
+double ms_at(std::vector<std::int64_t>& values, double p) {
+    std::ranges::sort(values);
+    const double at = p * static_cast<double>(values.size() - 1);
+    const auto below = static_cast<std::size_t>(at), above = std::min(below + 1, values.size() - 1);
+    return 1e-6 * std::lerp(static_cast<double>(values[below]), static_cast<double>(values[above]),
+                            at - static_cast<double>(below));
 }
 
 void print(const char* what, std::vector<std::int64_t> values) {

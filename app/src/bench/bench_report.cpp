@@ -2,22 +2,24 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <iterator>
 #include <nlohmann/json.hpp>
+
+#include "report/table.h"
 
 namespace app {
 namespace {
 
-using Json = nlohmann::ordered_json;
+Cell text_or_none(const std::string& text) {
+    return text.empty() ? Cell() : Cell(text);
+}
 
-Json result_json(const BenchResult& result) {
-    Json json{{"name", result.name}, {"value", result.value}, {"unit", result.unit}};
-    json["peer"] = result.peer.empty() ? Json() : Json(result.peer);
-    json["peer_version"] = result.peer_version.empty() ? Json() : Json(result.peer_version);
-    json["peer_value"] = result.peer_value ? Json(*result.peer_value) : Json();
-    json["ratio"] = result.ratio ? Json(*result.ratio) : Json();
-    return json;
+Table table_of(const std::vector<BenchResult>& results) {
+    Table table =
+        Table::of({"name", "value:.4g", "unit", "peer", "peer_version", "peer_value:.4g", "ratio:.3f"});
+    for (const BenchResult& r : results)
+        table.add({r.name, r.value, r.unit, text_or_none(r.peer), text_or_none(r.peer_version), r.peer_value,
+                   r.ratio});
+    return table;
 }
 
 }  // namespace
@@ -30,28 +32,16 @@ nlohmann::ordered_json machine_json(const MachineName& machine) {
 }
 
 std::string format_json(const BenchReport& report) {
-    Json json;
-    json["machine"] = machine_json(report.machine);
-    json["results"] = Json::array();
-    for (const BenchResult& result : report.results) json["results"].push_back(result_json(result));
-    json["notes"] = report.notes;
+    const nlohmann::ordered_json json = {{"machine", machine_json(report.machine)},
+                                         {"results", table_of(report.results).json()},
+                                         {"notes", report.notes}};
     return json.dump(2) + "\n";
 }
 
 std::string format_text(const BenchReport& report) {
-    std::string text = fmt::format("{}, {} cores, {}{}\n\n", report.machine.processor, report.machine.cores,
-                                   report.machine.compiler, report.machine.avx2 ? "" : ", without AVX2");
-    const auto out = std::back_inserter(text);
-    std::size_t width = 42;
-    for (const BenchResult& r : report.results) width = std::max(width, r.name.size());
-    for (const BenchResult& r : report.results) {
-        fmt::format_to(out, "{:<{}} {:>10.4g} {:<18}", r.name, width, r.value, r.unit);
-        if (r.ratio)
-            fmt::format_to(out, " {:.3f} x {} {} ({:.4g})", *r.ratio, r.peer, r.peer_version,
-                           r.peer_value.value_or(0));
-        text += '\n';
-    }
-    text += '\n';
+    std::string text = fmt::format(
+        "{}, {} cores, {}{}\n\n{}\n", report.machine.processor, report.machine.cores, report.machine.compiler,
+        report.machine.avx2 ? "" : ", without AVX2", table_of(report.results).text());
     for (const std::string& note : report.notes) text += note + '\n';
     return text;
 }

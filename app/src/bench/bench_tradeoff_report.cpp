@@ -8,6 +8,7 @@
 #include "bench/bench_report.h"
 #include "bench/bench_tradeoff.h"
 #include "report/plot_panel.h"
+#include "report/table.h"
 
 namespace app {
 namespace {
@@ -36,9 +37,18 @@ std::vector<TradeoffPoint> front_of(const Tradeoff& tradeoff) {
     return front;
 }
 
-std::string row(const TradeoffPoint& point) {
-    return fmt::format("{:<46} {:>10.3f} {:>10.3f}\n", name_of(point.setting), point.ms_per_s,
-                       100 * point.error);
+Table table_of(const std::vector<TradeoffPoint>& points) {
+    Table table = Table::of({"name", "modes:d", "step_s:.5f", "elements:d", "triangles:d", "ms_per_s:.3f",
+                             "error:.3g", "pareto"});
+    for (const TradeoffPoint& p : points)
+        table.add({name_of(p.setting), modes_of(p.setting), 1.0 / p.setting.steps_per_s, p.setting.elements,
+                   p.setting.triangles, p.ms_per_s, p.error, p.pareto});
+    return table;
+}
+
+/// For a terminal.
+std::string lines_of(const std::vector<TradeoffPoint>& points) {
+    return table_of(points).part({"name", "ms_per_s", "error"}).text();
 }
 
 std::string marks(const std::vector<TradeoffPoint>& points) {
@@ -55,12 +65,7 @@ std::string colour(const char* rgb) {
 }  // namespace
 
 std::string format_csv(const Tradeoff& tradeoff) {
-    std::string text = "name,modes,step_s,elements,triangles,ms_per_s,error,pareto\n";
-    for (const TradeoffPoint& p : tradeoff.points)
-        fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{}\n", name_of(p.setting),
-                       modes_of(p.setting), 1.0 / p.setting.steps_per_s, p.setting.elements,
-                       p.setting.triangles, p.ms_per_s, p.error, p.pareto ? 1 : 0);
-    return text;
+    return table_of(tradeoff.points).csv();
 }
 
 std::string format_json(const Tradeoff& tradeoff) {
@@ -77,10 +82,9 @@ std::string format_json(const Tradeoff& tradeoff) {
 }
 
 std::string format_text(const Tradeoff& tradeoff) {
-    std::string text = fmt::format("{:<46} {:>10} {:>10}\n", "Pareto front", "ms/s", "error %");
-    for (const TradeoffPoint& point : front_of(tradeoff)) text += row(point);
-    text += fmt::format("\nautomatic ({} % asked of the displacement) takes\n{}",
-                        100 * tradeoff.requested_error, row(tradeoff.automatic));
+    std::string text = fmt::format("Pareto front\n{}\nautomatic ({} % asked of the displacement) takes\n{}",
+                                   lines_of(front_of(tradeoff)), 100 * tradeoff.requested_error,
+                                   lines_of({tradeoff.automatic}));
     text += fmt::format(
         "\n{} points. Time: processor time for a simulated second of two touching bodies. Error: rms "
         "distance of their\n"

@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iterator>
 
 #include "bench/bench_workers.h"
 #include "report/plot_panel.h"
+#include "report/table.h"
 
 namespace app {
 namespace {
@@ -36,6 +38,32 @@ std::string panel(const SpeedUp& s, const Shown& of) {
     return panel.text();
 }
 
+Table table_of(const SpeedUp& s) {
+    Table table;
+    for (const SpeedUp::Row& r : s.rows)
+        table.add_figures({{"bodies:d", s.bodies},
+                           {"workers:d", r.workers},
+                           {"ideal_s:.3g", s.alone_s / r.workers},
+                           {"ceiling_s:.3g", r.ceiling_s},
+                           {"async_s:.3g", r.async_s},
+                           {"lockstep_s:.3g", r.lockstep_s},
+                           {"bytes_per_body_step:.0f", r.bytes},
+                           {"async_speed_up:.2f", s.alone_s / r.async_s, false},
+                           {"ceiling_speed_up:.2f", s.alone_s / r.ceiling_s, false},
+                           {"lockstep_speed_up:.2f", s.alone_s / r.lockstep_s, false},
+                           {"async_of_ceiling:.2f", r.ceiling_s / r.async_s, false}});
+    return table;
+}
+
+Table table_of(const std::vector<BoundRow>& rows) {
+    Table table = Table::of({"bound:d", "elapsed_s:.3g", "elapsed_unsteady_s:.3g", "momentum_drift:.2g",
+                             "apart_m:.2g", "height:.4f", "ghost_age:d"});
+    for (const BoundRow& r : rows)
+        table.add(
+            {r.bound, r.elapsed_s, r.elapsed_unsteady_s, r.momentum_drift, r.apart_m, r.height, r.ghost_age});
+    return table;
+}
+
 }  // namespace
 
 PlotScript speed_up_plot(const SpeedUp& s) {
@@ -49,41 +77,28 @@ PlotScript speed_up_plot(const SpeedUp& s) {
 }
 
 std::string speed_up_csv(const std::vector<SpeedUp>& speed_ups) {
-    std::string text = "bodies,workers,ideal_s,ceiling_s,async_s,lockstep_s,bytes_per_body_step\n";
-    for (const SpeedUp& s : speed_ups)
-        for (const SpeedUp::Row& r : s.rows)
-            fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{}\n", s.bodies, r.workers,
-                           s.alone_s / r.workers, r.ceiling_s, r.async_s, r.lockstep_s, r.bytes);
-    return text;
+    Table all;
+    for (const SpeedUp& s : speed_ups) {
+        Table table = table_of(s);
+        all.columns = std::move(table.columns);
+        std::ranges::move(table.rows, std::back_inserter(all.rows));
+    }
+    return all.csv();
 }
 
 std::string bound_csv(const std::vector<BoundRow>& rows) {
-    std::string text = "bound,elapsed_s,elapsed_unsteady_s,momentum_drift,apart_m,height,ghost_age\n";
-    for (const BoundRow& r : rows)
-        fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{}\n", r.bound, r.elapsed_s,
-                       r.elapsed_unsteady_s, r.momentum_drift, r.apart_m, r.height, r.ghost_age);
-    return text;
+    return table_of(rows).csv();
 }
 
 std::string format_text(const WorkersBench& bench) {
     std::string text;
-    const auto out = std::back_inserter(text);
-    for (const SpeedUp& s : bench.speed_ups) {
-        fmt::format_to(
-            out, "{} bodies: speed-up over one processor, {:.3g} s\n{:>8} {:>8} {:>8} {:>8} {:>9} {:>12}\n",
-            s.bodies, s.alone_s, "workers", "async", "ceiling", "lockstep", "of ceil.", "bytes/body");
-        for (const SpeedUp::Row& r : s.rows)
-            fmt::format_to(out, "{:>8} {:>8.2f} {:>8.2f} {:>8.2f} {:>9.2f} {:>12.0f}\n", r.workers,
-                           s.alone_s / r.async_s, s.alone_s / r.ceiling_s, s.alone_s / r.lockstep_s,
-                           r.ceiling_s / r.async_s, r.bytes);
-        text += '\n';
-    }
-    if (!bench.bounds.empty())
-        fmt::format_to(out, "{:>8} {:>10} {:>14} {:>10} {:>14} {:>10} {:>10}\n", "bound", "elapsed s",
-                       "unsteady s", "drift", "apart m, 1 s", "height", "ghost age");
-    for (const BoundRow& r : bench.bounds)
-        fmt::format_to(out, "{:>8} {:>10.3g} {:>14.3g} {:>10.2g} {:>14.2g} {:>10.4f} {:>10}\n", r.bound,
-                       r.elapsed_s, r.elapsed_unsteady_s, r.momentum_drift, r.apart_m, r.height, r.ghost_age);
+    for (const SpeedUp& s : bench.speed_ups)
+        text += fmt::format("{} bodies: {:.3g} s on one processor\n{}\n", s.bodies, s.alone_s,
+                            table_of(s)
+                                .part({"workers", "async_speed_up", "ceiling_speed_up", "lockstep_speed_up",
+                                       "async_of_ceiling", "bytes_per_body_step"})
+                                .text());
+    text += table_of(bench.bounds).text();
     return (text.empty() ? text : text + '\n') + format_text(bench.report);
 }
 

@@ -17,7 +17,7 @@ constexpr double kMm2 = 1e6, kDegrees = 180 / std::numbers::pi;
 constexpr double kRadius50 = 2.3659738843753377, kRadius95 = 7.814727903251179;
 
 double root_mean(double sum, std::size_t count) {
-    return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
+    return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : kNoValue;
 }
 
 /// Takes a sample; answers how far the predictor's state lies behind it.
@@ -90,7 +90,7 @@ void add(ErrorScore& sum, const ErrorScore& other) {
     sum.tip_sum_mm2 += other.tip_sum_mm2;
     sum.errors_mm.insert(sum.errors_mm.end(), other.errors_mm.begin(), other.errors_mm.end());
     sum.rms_mm = root_mean(sum.sum_square_mm2, sum.count);
-    sum.p95_mm = sum.errors_mm.empty() ? 0 : quantile(sum.errors_mm, 0.95);
+    sum.p95_mm = quantile(sum.errors_mm, 0.95);
     sum.free_rms_mm = root_mean(sum.free_sum_mm2, sum.free_count);
     sum.unflagged_rms_mm = root_mean(sum.unflagged_sum_mm2, sum.unflagged_count);
     sum.rotation_rms_deg = root_mean(sum.rotation_sum_deg2, sum.rotation_count);
@@ -131,7 +131,7 @@ std::vector<LeadScore> score_predictor(const SensedStick& stick, tracking::Predi
 }
 
 double SquareSum::rms_mm() const {
-    return root_mean(sum_mm2, count);
+    return count > 0 ? root_mean(sum_mm2, count) : 0;
 }
 
 std::vector<SquareSum> score_positions(const SensedStick& stick, tracking::Predictor& predictor) {

@@ -134,16 +134,16 @@ std::vector<double> absolute(std::vector<double> values) {
 }  // namespace
 
 double HitScore::precision() const {
-    return predicted > 0 ? static_cast<double>(matched) / predicted : 1;
+    return predicted > 0 ? static_cast<double>(matched) / predicted : kNoValue;
 }
 
 double HitScore::recall() const {
-    return true_contacts > 0 ? static_cast<double>(matched) / true_contacts : 1;
+    return true_contacts > 0 ? static_cast<double>(matched) / true_contacts : kNoValue;
 }
 
 double HitScore::f1() const {
     const int both = true_contacts + predicted;
-    return both > 0 ? 2.0 * matched / both : 1;
+    return both > 0 ? 2.0 * matched / both : kNoValue;
 }
 
 double HitScore::median_ms() const {
@@ -151,7 +151,7 @@ double HitScore::median_ms() const {
 }
 
 double HitScore::p95_ms() const {
-    return nearest_rank(absolute(errors_ms), 95);
+    return quantile(absolute(errors_ms), 0.95);
 }
 
 double HitScore::false_per_min() const {

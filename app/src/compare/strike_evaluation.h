@@ -28,10 +28,10 @@ struct HitScore {
     std::vector<double> errors_ms;  ///< committed minus true time, signed, of the matched notes
 
     [[nodiscard]] int false_notes() const { return predicted - matched; }
-    [[nodiscard]] double precision() const;  ///< 1 when nothing was predicted
-    [[nodiscard]] double recall() const;     ///< 1 when there was nothing to find
-    [[nodiscard]] double f1() const;         ///< 2 matched / (true + predicted); 1 when both are 0
-    [[nodiscard]] double median_ms() const;  ///< of |error|; 0 when nothing matched
+    [[nodiscard]] double precision() const;  ///< kNoValue when nothing was predicted
+    [[nodiscard]] double recall() const;     ///< kNoValue when there was nothing to find
+    [[nodiscard]] double f1() const;         ///< 2 matched / (true + predicted); kNoValue when both are 0
+    [[nodiscard]] double median_ms() const;  ///< of |error|; kNoValue when nothing matched
     [[nodiscard]] double p95_ms() const;
     [[nodiscard]] double false_per_min() const;
     [[nodiscard]] double false_per_min_without_cancel() const;

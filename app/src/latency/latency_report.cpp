@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "statistics/statistics.h"
+
 namespace app {
 namespace {
 
@@ -119,9 +121,7 @@ Spread::Spread(std::vector<double> values) : sorted_(std::move(values)) {
 }
 
 double Spread::percentile(double percent) const {
-    if (sorted_.empty()) return 0;
-    const double rank = std::ceil(percent / 100 * static_cast<double>(sorted_.size()) - 1e-9);
-    return sorted_[std::min(sorted_.size() - 1, static_cast<std::size_t>(std::max(rank - 1, 0.0)))];
+    return quantile_of_sorted(sorted_, percent / 100);
 }
 
 double LatencyReport::share_within_atsc() const {

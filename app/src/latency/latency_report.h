@@ -12,7 +12,7 @@
 
 namespace app {
 
-/// How values spread, by nearest rank.
+/// How values spread.
 class Spread {
 public:
     Spread() = default;
@@ -20,7 +20,7 @@ public:
 
     [[nodiscard]] bool empty() const { return sorted_.empty(); }
     [[nodiscard]] std::size_t count() const { return sorted_.size(); }
-    /// The smallest value that at least `percent` % do not exceed; 0 < percent <= 100. 0 for no values.
+    /// The quantile of percent / 100; NaN for no values.
     [[nodiscard]] double percentile(double percent) const;
     [[nodiscard]] double min() const { return sorted_.empty() ? 0 : sorted_.front(); }
     [[nodiscard]] double max() const { return sorted_.empty() ? 0 : sorted_.back(); }

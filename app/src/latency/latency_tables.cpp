@@ -4,8 +4,8 @@
 
 #include <iterator>
 
-#include "files/csv.h"
 #include "play/tables.h"
+#include "report/table.h"
 
 namespace app {
 namespace {

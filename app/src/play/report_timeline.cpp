@@ -26,7 +26,8 @@ std::pair<double, double> height_range(const PlayResult& result) {
     std::vector<double> heights;
     for (const TipTrack& track : result.tracks)
         for (const Eigen::Vector3d& tip : track.tip) heights.push_back(tip.y());
-    double low = nearest_rank(heights, 0.1), high = nearest_rank(heights, 99.9);
+    if (heights.empty()) heights = {0};
+    double low = quantile(heights, 0.001), high = quantile(heights, 0.999);
     for (const TrueContact& contact : result.contacts) {
         low = std::min(low, contact.point_world.y());
         high = std::max(high, contact.point_world.y());

@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <iterator>
 #include <stdexcept>
 #include <string_view>
 
-#include "files/csv.h"
+#include "report/table.h"
 
 namespace app {
 namespace {
@@ -27,28 +26,26 @@ std::string_view outcome_word(const Strike& strike) {
 }  // namespace
 
 std::string format_events(const PlayResult& result) {
-    std::string text =
-        "id,stick,instrument,onset_s,speed_mps,px,py,pz,scheduled_at_s,outcome,moves,decided_at_s,model\n";
+    Table table = Table::of({"id", "stick", "instrument", "onset_s", "speed_mps", "px", "py", "pz",
+                             "scheduled_at_s", "outcome", "moves", "decided_at_s", "model"});
     // Of several models in parallel, the number of the one that the note's time comes from.
     const auto model = [&](const Strike& s) {
-        return csv_field(result.sound_models > 1 ? fmt::format("{}#{}", result.sound_predictor, s.model)
-                                                 : result.sound_predictor);
+        return result.sound_models > 1 ? fmt::format("{}#{}", result.sound_predictor, s.model)
+                                       : result.sound_predictor;
     };
     for (const Strike& s : result.strikes)
-        fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{},{},{},{},{}\n", s.id,
-                       csv_field(result.sticks.at(s.stick)), csv_field(result.instruments.at(s.instrument)),
-                       s.onset_s, s.speed_mps, s.point_world.x(), s.point_world.y(), s.point_world.z(),
-                       s.scheduled_at_s, outcome_word(s), s.moves, s.decided_at_s, model(s));
-    return text;
+        table.add({s.id, result.sticks.at(s.stick), result.instruments.at(s.instrument), s.onset_s,
+                   s.speed_mps, s.point_world.x(), s.point_world.y(), s.point_world.z(), s.scheduled_at_s,
+                   outcome_word(s), s.moves, s.decided_at_s, model(s)});
+    return table.csv();
 }
 
 std::string format_contacts(const PlayResult& result) {
-    std::string text = "t,stick,instrument,speed_mps,px,py,pz,matched_id\n";
+    Table table = Table::of({"t", "stick", "instrument", "speed_mps", "px", "py", "pz", "matched_id"});
     for (const TrueContact& c : result.contacts)
-        fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{}\n", c.t_s,
-                       csv_field(result.sticks.at(c.stick)), csv_field(result.instruments.at(c.instrument)),
-                       c.speed_mps, c.point_world.x(), c.point_world.y(), c.point_world.z(), c.matched_id);
-    return text;
+        table.add({c.t_s, result.sticks.at(c.stick), result.instruments.at(c.instrument), c.speed_mps,
+                   c.point_world.x(), c.point_world.y(), c.point_world.z(), c.matched_id});
+    return table.csv();
 }
 
 }  // namespace app

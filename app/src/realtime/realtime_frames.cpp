@@ -7,6 +7,7 @@
 #include "files/output_folder.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
+#include "statistics/statistics.h"
 
 namespace app {
 namespace {
@@ -109,8 +110,7 @@ void RealtimeFrames::draw_all(const std::vector<render::SceneDescription>& scene
             const render::DrawTimes drawn = renderers.back()->draw(rest, image);
             if (i >= kWarmFrames) times.push_back(std::chrono::duration<double>(drawn.read - start).count());
         }
-        std::ranges::sort(times);
-        trial_s_.push_back(times[times.size() / 4]);  // busy moments of the start aside
+        trial_s_.push_back(quantile(std::move(times), 0.25));  // busy moments of the start aside
         if (rest_image_.rgb.empty()) rest_image_ = image;
     }
     version_ = renderers.front()->version();

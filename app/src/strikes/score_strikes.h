@@ -17,7 +17,7 @@ inline constexpr double kMatchWindow_s = 0.030;
 ///   moved   released strikes with moves > 0
 ///   false   released strikes without a contact
 ///   missed  contacts without a released strike
-///   timing  median and p95 of |onset - contact| [ms] over the matched notes; 0 when nothing matched
+///   timing  median and p95 of |onset - contact| [ms] over the matched notes; kNoValue when nothing matched
 /// The false_turned_* counts are left at 0: they need the recorded path.
 /// `contacts` must be sorted by time. A pure function of its input; O((n + m) log n) for n contacts and m
 /// strikes that are not denser than a few in the window.

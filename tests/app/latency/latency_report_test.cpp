@@ -91,18 +91,18 @@ double p(const LatencyReport& report, const char* stage, double percent) {
 
 constexpr double kRounding = 1e-9;  // ns to ms
 
-TEST(Spread, IsByNearestRank) {
+TEST(Spread, IsLinearBetweenTheOrderedValues) {
     std::vector<double> values;
     for (int i = 100; i >= 1; --i) values.push_back(i);
     const Spread spread(values);
-    EXPECT_EQ(spread.percentile(50), 50);
-    EXPECT_EQ(spread.percentile(99), 99);
-    EXPECT_EQ(spread.percentile(99.5), 100);
-    EXPECT_EQ(spread.percentile(5), 5);
+    EXPECT_EQ(spread.percentile(50), 50.5);
+    EXPECT_NEAR(spread.percentile(99), 99.01, kRounding);
+    EXPECT_NEAR(spread.percentile(99.5), 99.505, kRounding);
+    EXPECT_NEAR(spread.percentile(5), 5.95, kRounding);
     EXPECT_EQ(spread.max(), 100);
     EXPECT_EQ(spread.share_within(10, 19), 0.1);
     EXPECT_EQ(Spread({7}).percentile(1), 7);
-    EXPECT_EQ(Spread().percentile(99), 0);
+    EXPECT_TRUE(std::isnan(Spread().percentile(99)));
 }
 
 TEST(LatencyReport, SaysHowLongEachStageOfASampleTook) {

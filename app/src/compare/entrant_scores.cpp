@@ -1,38 +1,17 @@
-#include "compare/comparison.h"
+#include "compare/entrant_scores.h"
 
 #include <algorithm>
 #include <array>
 #include <span>
 
-#include "compare/comparison_figures.h"
-#include "compare/comparison_map.h"
-#include "compare/comparison_pairs.h"
-#include "compare/entrants.h"
 #include "compare/prediction_cost.h"
 #include "compare/prediction_error.h"
-#include "files/bad_input.h"
 #include "process/parallel.h"
-#include "statistics/statistics.h"
 #include "sticks/predictors.h"
 #include "sticks/stick_tracker.h"
-#include "strikes/stroke_lows.h"
 
 namespace app {
 namespace {
-
-Field read_scored(const ComparisonOptions& options) {
-    Field field = read_field(options.traces, options);
-    const auto scored = [](const SensedStick& stick) {
-        return std::any_of(stick.truths.begin(), stick.truths.end(),
-                           [](const std::optional<Truth>& truth) { return truth.has_value(); });
-    };
-    if (std::none_of(field.sticks.begin(), field.sticks.end(), scored))
-        throw BadInput(
-            "error: found no sample whose prediction could be held against the recording (the first 0.5 s, "
-            "gaps, and leads beyond the end do not count), expected some; give longer recordings, shorter "
-            "leads or a faster sensor");
-    return field;
-}
 
 /// The leads that one predictor serves in one pass: those for which the same specification runs.
 std::vector<std::vector<std::size_t>> passes_of(const Entrant& entrant, std::size_t recording) {
@@ -127,18 +106,18 @@ constexpr double advance_s(std::size_t k) {
 /// The advance whose loss, averaged with those up to 2 ms off, is least: single notes that match or just miss
 /// decide nothing. None if that saves less than 5 % against none.
 std::size_t least_smoothed(std::span<const double, kAdvances> loss) {
-    constexpr std::size_t kReach = 2, kNone = 8;
+    constexpr std::size_t kReach = 2, kUnchanged = 8;
     constexpr double kWorthwhile = 0.95;
-    static_assert(advance_s(kNone) == 0);
+    static_assert(advance_s(kUnchanged) == 0);
     const auto smoothed = [&](std::size_t k) {
         double sum = 0;
         for (std::size_t near = k - kReach; near <= k + kReach; ++near) sum += loss[near];
         return sum;
     };
-    std::size_t best = kNone;
+    std::size_t best = kUnchanged;
     for (std::size_t k = kReach; k + kReach < kAdvances; ++k)
         if (smoothed(k) < smoothed(best)) best = k;
-    return smoothed(best) < kWorthwhile * smoothed(kNone) ? best : kNone;
+    return smoothed(best) < kWorthwhile * smoothed(kUnchanged) ? best : kUnchanged;
 }
 
 /// What the strikes of one entrant cost on recordings, by advance.
@@ -178,14 +157,11 @@ private:
 /// costs least (HitScore::loss) at that lead on the `--tune` recordings, or on all others compared, never on
 /// the one that is scored.
 void advance_strikes(std::vector<std::vector<ComparisonRow>>& parts, const Runs& runs, const Field& field,
-                     const std::vector<Entrant>& entrants, const ComparisonOptions& options) {
-    const auto learns = [](const Entrant& entrant) { return entrant.learns_advance; };
-    if (options.surface.kind == StrikeSurface::Kind::none || !options.tuning ||
-        std::none_of(entrants.begin(), entrants.end(), learns))
-        return;
-    const Field own = read_field(options.tune_traces, options);
-    const Field& others = options.tune_traces.empty() ? field : own;
-    if (&others == &field && field.recordings.size() < 2) return;
+                     const Field& tuning, const std::vector<Entrant>& entrants,
+                     const ComparisonOptions& options) {
+    if (options.surface.kind == StrikeSurface::Kind::none || !options.tuning) return;
+    if (tuning.recordings.empty() && field.recordings.size() < 2) return;
+    const Field& others = tuning.recordings.empty() ? field : tuning;
     const std::size_t leads = options.leads_s.size();
     for (std::size_t entrant = 0; entrant < entrants.size(); ++entrant) {
         if (!entrants[entrant].learns_advance) continue;
@@ -199,85 +175,39 @@ void advance_strikes(std::vector<std::vector<ComparisonRow>>& parts, const Runs&
     }
 }
 
+/// A specification that runs at several leads of a pass is measured once.
 void measure_costs(std::vector<ComparisonRow>& rows, const Field& field, std::size_t entrants) {
     const std::size_t leads = field.sticks.front().leads_s.size();
     for (std::size_t i = 0; i < rows.size(); ++i) {
         ComparisonRow& row = rows[i];
         if (row.external || row.used.empty()) continue;
-        const std::size_t lead = i % leads;
-        for (std::size_t before = i - lead; before < i && row.ns_per_sample == 0; ++before)
-            if (rows[before].used == row.used) row.ns_per_sample = rows[before].ns_per_sample;
+        const auto same = [&](const ComparisonRow& other) { return other.used == row.used; };
+        const auto own = rows.begin() + static_cast<std::ptrdiff_t>(i),
+                   first = own - static_cast<std::ptrdiff_t>(i % leads);
         const SensedStick& stick = field.sticks[i / (entrants * leads)];
-        if (row.ns_per_sample == 0)
+        if (const auto before = std::find_if(first, own, same); before != own)
+            row.ns_per_sample = before->ns_per_sample;
+        else
             row.ns_per_sample = nanoseconds_per_sample(row.used, stick.samples, stick.leads_s);
     }
 }
 
-void widen(std::optional<std::pair<double, double>>& range, double value) {
-    if (!range) range = {value, value};
-    range = {std::min(range->first, value), std::max(range->second, value)};
-}
-
-std::vector<ComparisonSummary> summarise(const Comparison& comparison, const std::vector<Entrant>& entrants) {
-    std::vector<ComparisonSummary> summaries;
-    for (const Entrant& entrant : entrants)
-        for (const double lead_s : comparison.options.leads_s) {
-            ComparisonSummary summary;
-            summary.predictor = entrant.name;
-            summary.lead_s = lead_s;
-            summary.baseline = entrant.baseline;
-            summary.external = entrant.external;
-            std::vector<double> costs;
-            for (const ComparisonRow& row : comparison.rows) {
-                if (row.predictor != entrant.name || row.lead_s != lead_s) continue;
-                add(summary.error, row.error);
-                add(summary.calibration, row.calibration);
-                if (row.hits && !summary.hits) summary.hits = HitScore{};
-                if (row.hits) summary.hits->add(*row.hits);
-                if (row.advance_s) widen(summary.advance_s, *row.advance_s);
-                if (row.ns_per_sample > 0) costs.push_back(row.ns_per_sample);
-            }
-            if (!costs.empty()) summary.ns_per_sample = quantile(std::move(costs), 0.5);
-            if (summary.error.count > 0) summaries.push_back(std::move(summary));
-        }
-    return summaries;
-}
-
-std::vector<std::string> persons_of(const std::vector<Recording>& recordings) {
-    std::vector<std::string> persons;
-    for (const Recording& recording : recordings)
-        if (std::find(persons.begin(), persons.end(), recording.person) == persons.end())
-            persons.push_back(recording.person);
-    return persons;
-}
-
 }  // namespace
 
-Comparison compare(const ComparisonOptions& options) {
-    Comparison comparison;
-    comparison.options = options;
-    const Field field = read_scored(options);
-    comparison.persons = persons_of(field.recordings);
-    const EntrantList list = enter(options, field.recordings, field.sticks);
-    comparison.tuned_on = list.tuned_on;
-    const std::vector<Entrant>& entrants = list.entrants;
-    for (const Entrant& entrant : entrants)
-        comparison.predictors.emplace_back(entrant.name, entrant.description);
+std::vector<ComparisonRow> score_entrants(const Field& field, const Field& tuning,
+                                          const std::vector<Entrant>& entrants,
+                                          const ComparisonOptions& options) {
     const Runs runs(field, entrants, options);
     std::vector<std::vector<ComparisonRow>> parts(runs.count());
     parallel_for(
         parts.size(), options.threads, [&](std::size_t i) { parts[i] = runs.rows(i); }, options.progress);
-    advance_strikes(parts, runs, field, entrants, options);
+    advance_strikes(parts, runs, field, tuning, entrants, options);
+    std::vector<ComparisonRow> rows;
     for (std::vector<ComparisonRow>& part : parts)
-        for (ComparisonRow& row : part) comparison.rows.push_back(std::move(row));
-    if (options.cost) measure_costs(comparison.rows, field, entrants.size());
-    std::erase_if(comparison.rows, [](const ComparisonRow& row) { return row.used.empty(); });
-    comparison.summaries = summarise(comparison, entrants);
-    comparison.paired = pair_with_baselines(comparison, entrants);
-    comparison.curves = lead_curves(field.recordings, entrants, options);
-    comparison.figure = stick_figure(field.recordings, field.sticks, entrants, comparison);
-    if (options.map) comparison.map = map_sensors(field.recordings, options);
-    return comparison;
+        for (ComparisonRow& row : part) rows.push_back(std::move(row));
+    if (options.cost) measure_costs(rows, field, entrants.size());
+    std::erase_if(rows, [](const ComparisonRow& row) { return row.used.empty(); });
+    return rows;
 }
 
 }  // namespace app
