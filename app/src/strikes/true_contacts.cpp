@@ -95,12 +95,15 @@ private:
         entry_.emplace();
         entry_->t_s = ta + (tb - ta) * share;
         entry_->point_world = track_.tip[to - 1] + (track_.tip[to] - track_.tip[to - 1]) * share;
-        // The piece that enters may hold the rebound, too: the speed is that of the piece before, where there is
-        // one.
-        const std::size_t last = to - 1 > first_ ? to - 1 : to;
-        entry_->speed_mps =
-            -(track_.tip[last] - track_.tip[last - 1]).dot(surface_.normal(entry_->point_world)) /
-            (track_.t_s[last] - track_.t_s[last - 1]);
+        // The piece that enters may hold the rebound, too: the last one before it does not.
+        const Eigen::Vector3d normal = surface_.normal(entry_->point_world);
+        entry_->speed_mps = inward_speed(to, normal);
+        if (to - 1 > first_) entry_->speed_mps = std::max(entry_->speed_mps, inward_speed(to - 1, normal));
+    }
+
+    /// Mean over the piece that ends at sample `to` [m/s].
+    [[nodiscard]] double inward_speed(std::size_t to, const Eigen::Vector3d& normal) const {
+        return -(track_.tip[to] - track_.tip[to - 1]).dot(normal) / (track_.t_s[to] - track_.t_s[to - 1]);
     }
 
     const TipTrack& track_;

@@ -69,6 +69,12 @@ TEST(TrueContacts, WithoutAPieceBeforeItTheSpeedIsThatOfThePieceThatEnters) {
     EXPECT_NEAR(find_plane_contacts(track, 0).at(0).speed_mps, 2, 1e-9);
 }
 
+TEST(TrueContacts, OfAStrokeThatStillAcceleratesTheSpeedIsThatOfThePieceThatEnters) {
+    // 60 m/s^2 from rest at 0: 0.3 m/s on average from 0 to 10 ms, 0.9 m/s to 20 ms, where it goes in.
+    const TipTrack track = track_of([](double t) { return 0.01 - 30 * t * std::abs(t); }, 0, 0.05, 0.01);
+    EXPECT_NEAR(find_plane_contacts(track, 0).at(0).speed_mps, 0.9, 1e-9);
+}
+
 TEST(TrueContacts, TheTimeIsThatOfTheStraightPathBetweenTheSamples) {
     const TipTrack track = track_of([](double t) { return 0.3 - 3 * t; }, 0.001, 0.2, kIntervalS);
     const std::vector<TrueContact> contacts = find_plane_contacts(track, 0.1);
