@@ -241,8 +241,9 @@ void StrikeScheduler::play_selected(Pair& pair, double s) {
     std::vector<std::uint64_t> played;
     for (Approach& a : pair.approaches)
         for (Strike& pending : a.pending) {
-            if (!is_selected(pair, pending) || pair.is_closed_to(a.model) || contains(played, pending.id))
-                continue;
+            const bool same_stroke =
+                pair.is_closed() && pending.onset_s <= pair.struck->onset_s + rules_.late_s;
+            if (!is_selected(pair, pending) || same_stroke || contains(played, pending.id)) continue;
             play(pair, pending, s, played);
             played.push_back(pending.id);
         }
@@ -310,13 +311,13 @@ void StrikeScheduler::release(Pair& pair, Approach& a, const Strike& pending) {
     }
     if (pending.id == 0 || strike(pending.id).outcome != Outcome::pending) return;
     const double release_s = pending.onset_s - rules_.release_margin_s;
-    if (pair.is_closed_to(a.model)) return withdraw(pending.id, release_s);
+    if (pair.is_closed()) return withdraw(pending.id, release_s);
     Strike& released = strike(pending.id);
     released.outcome = Outcome::released;
     released.decided_at_s = release_s;
     released_.push_back(released.id);
     std::erase(pair.strikes, released.id);
-    pair.struck = {released.onset_s, a.model};
+    pair.struck = {released.onset_s};
 }
 
 std::vector<NoteChange> StrikeScheduler::take_changes() {

@@ -54,7 +54,7 @@ struct ModelContacts {
 /// Strikes: the pending contacts of the selected model are those that are played. When the selection changes, a
 /// strike goes on with the new model's contact within `revive_s` of it, or is cancelled. A model that was not
 /// selected when its own contact was released stands by that stroke: another model's contact within `late_s` of
-/// it is played. One stroke makes one note: after a note of one model the others make none until the measured tip
+/// it is played. One stroke makes one note: of several models none is released after a note until the measured tip
 /// has risen `rearm_m`. With one model every pending contact is a strike.
 ///
 /// Causal: the call for a sample at s changes only notes with onset >= s + release margin. Times in seconds of
@@ -101,19 +101,17 @@ private:
     /// The last note of a stick on an instrument, until the tip has risen.
     struct Struck {
         double onset_s;
-        std::uint32_t model;
         double lowest_m = std::numeric_limits<double>::infinity();  ///< of the measured tip since the onset
     };
     /// One stick and one instrument.
     struct Pair {
-        std::vector<Approach> approaches;    ///< a model each; none before the first sample
-        std::size_t selected = 0;            ///< model
-        std::optional<Struck> struck;        ///< closes the surface for the other models
+        std::vector<Approach> approaches;  ///< a model each; none before the first sample
+        std::size_t selected = 0;          ///< model
+        std::optional<Struck> struck;
         std::vector<std::uint64_t> strikes;  ///< ids of those pending or cancelled, newest last; a few
 
-        [[nodiscard]] bool is_closed_to(std::uint32_t model) const {
-            return struck && struck->model != model;
-        }
+        /// One model's own arming prevents doubles; that of several does not know what the others have played.
+        [[nodiscard]] bool is_closed() const { return struck && approaches.size() > 1; }
     };
     /// A contact of the predicted path that may be a strike.
     struct Candidate {
