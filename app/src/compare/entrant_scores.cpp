@@ -46,7 +46,6 @@ public:
         for (const std::vector<std::size_t>& pass : passes_of(entrant, stick.recording)) {
             const auto predictor = make_entrant(entrant, stick, place, pass.front());
             const std::vector<LeadScore> scores = score_predictor(stick, *predictor);
-            require_working(*predictor);
             for (const std::size_t lead : pass) {
                 rows[lead] = labelled(stick, entrant, lead);
                 rows[lead].error = scores[lead].error;
@@ -68,11 +67,8 @@ public:
         std::unique_ptr<tracking::Predictor> confirming;
         if (!entrant.confirmed_by.empty())
             confirming = make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), stick.name);
-        HitScore score =
-            evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples, {*timing, confirming.get()},
-                             recording.geometry, options_.surface, when);
-        require_working(*timing);
-        return score;
+        return evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples,
+                                {*timing, confirming.get()}, recording.geometry, options_.surface, when);
     }
 
 private:

@@ -79,8 +79,19 @@ public:
 
 private:
     [[nodiscard]] sim::StepReply step(sim::StepRequest& request);
-    [[nodiscard]] std::vector<sim::TipPath> paths_of(std::span<const std::uint32_t> moved) const;
-    void take_contacts(double s, std::span<const std::uint32_t> moved, const sim::StepReply& reply);
+    /// Where the paths of a stick stand in a request; each path's `stick` is its own place there, so that its
+    /// contacts are told apart.
+    struct StickPaths {
+        std::uint32_t stick;
+        std::size_t predicted;                  ///< the first of the models' paths, which follow each other
+        std::size_t measured;                   ///< stands still: makes no contact but by starting inside
+        std::optional<std::size_t> confirming;  ///< where a second filter confirms
+    };
+    [[nodiscard]] std::vector<StickPaths> add_paths(std::span<const std::uint32_t> moved,
+                                                    std::vector<sim::TipPath>& paths) const;
+    void take_contacts(double s, const StickPaths& paths, const sim::StepReply& reply);
+    [[nodiscard]] std::vector<double> measured_clearance(const StickPaths& paths,
+                                                         const sim::StepReply& reply) const;
     void send_notes();
     void settle_impulses(double s, sim::StepRequest& request);
     [[nodiscard]] const Strike* struck_by(std::uint32_t stick, double s, double T);

@@ -11,7 +11,6 @@
 
 #include "sample_recordings.h"
 #include "sticks/auto_predictor.h"
-#include "sticks/stick_tracker.h"
 #include "written_kit.h"
 
 namespace app {
@@ -253,7 +252,7 @@ TEST(StrikeEvaluation, AWideFlatDrumIsStruckAsAPlaneATipsRadiusAboveIt) {
         }
 }
 
-TEST(StrikeEvaluation, AStrikeIsPlayedOnlyIfTheConfirmingFilterBearsItOut) {
+TEST(StrikeEvaluation, AStrikeIsPlayedOnlyIfTheConfirmingFilterConfirmsIt) {
     const tracking::StickTrace stick = stick_of(fall(2, 0.5), 0.6);
     const auto with = [&](const char* confirming) {
         const auto timing = tracking::make_predictor("difference"),
@@ -312,9 +311,9 @@ sim::Contact contact_at(double t_s, std::uint32_t body = 0) {
     return contact;
 }
 
-bool is_kept(const sim::Contact& contact, const std::vector<sim::Contact>& borne_out) {
+bool is_kept(const sim::Contact& contact, const std::vector<sim::Contact>& confirming) {
     std::vector<sim::Contact> contacts = {contact};
-    keep_confirmed(contacts, borne_out, 1.0);
+    keep_confirmed(contacts, confirming, 1.0);
     return !contacts.empty();
 }
 
@@ -332,8 +331,8 @@ TEST(KeepConfirmed, NearOnesNeedTheSameBodyAtMost50MsLater) {
 
 TEST(KeepConfirmed, EachContactIsJudgedByItself) {
     std::vector<sim::Contact> contacts = {contact_at(1.01, 0), contact_at(1.02, 1), contact_at(1.06, 2)};
-    const std::vector<sim::Contact> borne_out = {contact_at(1.03, 1)};
-    keep_confirmed(contacts, borne_out, 1.0);
+    const std::vector<sim::Contact> confirming = {contact_at(1.03, 1)};
+    keep_confirmed(contacts, confirming, 1.0);
     ASSERT_EQ(contacts.size(), 2U);
     EXPECT_EQ(contacts[0].body, 1U);
     EXPECT_EQ(contacts[1].body, 2U);
