@@ -17,6 +17,7 @@
 #include "commands/play_command.h"
 #include "commands/predict_command.h"
 #include "commands/record_command.h"
+#include "commands/schema_command.h"
 #include "commands/simulate_command.h"
 #include "commands/trace_commands.h"
 #include "files/bad_input.h"
@@ -67,6 +68,7 @@ int run(int argc, char** argv) {
     add_bench_command(program);
     add_simulate_command(program, status);
     add_keys_command(program);
+    add_schema_command(program);
     add_worker_command(program, status);
     add_sensor_command(program, status);
     try {
