@@ -43,7 +43,7 @@ void print(const char* what, std::vector<std::int64_t> values) {
                 ms_at(values, 0.95), ms_at(values, 0.99), ms_at(values, 1));
 }
 
-/// A kit's worth of voices, sixteen strokes a second.
+/// A kit's worth of voices, sixteen strokes per second.
 std::vector<audio::Voice> voices() {
     const auto voice = [](const char* instrument) {
         return audio::Voice{instrument, instrument, {}, 0.5, 0, ""};

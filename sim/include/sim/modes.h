@@ -54,16 +54,16 @@ struct FreeVibrationModes {       ///< the solution of a ModesRequest
 };
 
 /// Throws std::invalid_argument for a request out of range (extents in a ratio over 1000, or 100 with four or
-/// more elements a side, too), std::runtime_error if no solution is found. Dense (Eigen) up to three elements
-/// a side, shift-invert Lanczos (Spectra) beyond. One element costs about 0.6 ms, 2: 2, 3: 20, 4: 60, 6: 300
-/// ms, 8: 1.3 s, 12: 11 s. For the superquadric with several elements a side, brick space outside it is
+/// more elements per side), std::runtime_error if no solution is found. Dense (Eigen) up to three elements
+/// per side, shift-invert Lanczos (Spectra) beyond. One element costs about 0.6 ms, 2: 2, 3: 20, 4: 60, 6: 300
+/// ms, 8: 1.3 s, 12: 11 s. For the superquadric with several elements per side, brick space outside it is
 /// massless and has 1e-8 of the stiffness.
 [[nodiscard]] FreeVibrationModes free_vibration_modes(const ModesRequest& request);
 
 /// Elements per side of the mesh that discretisation_errors compares with.
 [[nodiscard]] int finer_elements(int elements) noexcept;
 /// Estimated relative error of each frequency by the mesh, |omega / omega_exact - 1|: Richardson's
-/// extrapolation with a finer mesh (two more elements a side, twice as many for 3; `elements` is 10 at most),
+/// extrapolation with a finer mesh (two more per side, twice as many for 3; `elements` is 10 at most),
 /// eigenvalues' errors taken to fall at order 4; modes are matched by parity class and their order within it.
 /// Where that would take away half of the finer eigenvalue or more (a mode that the mesh cannot show at all),
 /// the finer one itself is taken for exact, so the error is at least that. NaN where the counterpart lies

@@ -36,7 +36,7 @@ inline void store_lanes(float* aligned, Lanes value) noexcept {  ///< eight floa
     return a * b + c;
 #endif
 }
-/// A bit a lane.
+/// One bit per lane.
 [[nodiscard]] inline unsigned bits_of(LaneMask mask) noexcept {
 #ifdef __AVX__
     return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));

@@ -15,8 +15,8 @@ struct BodyOutcome {
     };
     std::uint32_t body = 0;
     ModalState state;
-    std::vector<ModalState> pictures;   ///< one a request
-    std::vector<double> clearance_m;    ///< one a path
+    std::vector<ModalState> pictures;   ///< one per request
+    std::vector<double> clearance_m;    ///< one per path
     std::vector<PathContact> contacts;  ///< by path, then time
 };
 
