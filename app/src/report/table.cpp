@@ -23,11 +23,18 @@ std::string last_part(const std::string& name) {
     return name.substr(name.rfind('/') + 1);
 }
 
-std::string heading(const Column& column) {
-    std::string name = column.name;
-    std::ranges::replace_if(
-        name, [](char c) { return c == '/' || c == '_'; }, ' ');
-    return column.unit.empty() ? name : name + " " + column.unit;
+/// What readers see above each column.
+std::vector<std::string> headings_of(const std::vector<Column>& columns) {
+    std::vector<std::string> headings;
+    for (const Column& column : columns) {
+        std::string name = last_part(column.name);
+        const auto same = [&](const Column& other) { return last_part(other.name) == name; };
+        if (std::ranges::count_if(columns, same) > 1) name = column.name;
+        std::ranges::replace(name, '/', ' ');
+        std::ranges::replace(name, '_', ' ');
+        headings.push_back(column.unit.empty() ? name : name + " " + column.unit);
+    }
+    return headings;
 }
 
 /// Characters of UTF-8.
@@ -145,8 +152,7 @@ Table Table::part(std::initializer_list<std::string_view> names) const {
 
 std::string Table::text() const {
     if (rows.empty()) return {};
-    std::vector<std::vector<std::string>> lines(1);
-    for (const Column& column : columns) lines.front().push_back(heading(column));
+    std::vector<std::vector<std::string>> lines = {headings_of(columns)};
     for (const auto& row : rows) {
         std::vector<std::string>& line = lines.emplace_back();
         for (std::size_t i = 0; i < row.size(); ++i) line.push_back(row[i].shown(columns[i].format, "-"));
@@ -177,8 +183,9 @@ std::string Table::html() const {
     if (rows.empty()) return {};
     const auto kind = [&](std::size_t column) { return columns[column].format.empty() ? "" : " class=n"; };
     std::string text = "<div class=scroll><table class=wide><tr>";
+    const std::vector<std::string> headings = headings_of(columns);
     for (std::size_t i = 0; i < columns.size(); ++i)
-        text += fmt::format("<th{}>{}", kind(i), app::html(heading(columns[i])));
+        text += fmt::format("<th{}>{}", kind(i), app::html(headings[i]));
     for (const auto& row : rows) {
         text += "</tr>\n<tr>";
         for (std::size_t i = 0; i < row.size(); ++i) {

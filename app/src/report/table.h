@@ -42,7 +42,8 @@ private:
 /// A column with a format holds numbers and stands to the right; one without holds text.
 struct Column {
     /// The column of CSV and key of JSON; "hits/f1" is the column f1, or the key f1 of an object hits. Readers
-    /// see it with blanks for / and _, and behind it the unit, where the name does not end in it (rms_mm).
+    /// see "f1", or "hits f1" if there is another f1, blanks for _, and behind it the unit, where the name
+    /// does not end in it (rms_mm).
     std::string name;
     std::string format = {};  ///< of fmt without braces (".2f"); integers are shown in full
     std::string unit = {};

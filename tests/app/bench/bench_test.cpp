@@ -28,7 +28,8 @@ TEST(Bench, JsonHasTheContractsKeysAndNullWhereThereIsNoPeer) {
         for (const Json& result : json["results"]) EXPECT_TRUE(result.contains(key)) << key;
     EXPECT_TRUE(json["results"][0]["ratio"].is_null());
     EXPECT_EQ(json["results"][1]["ratio"], 0.5);
-    EXPECT_NE(app::format_text(report).find("btRigidBody  Bullet 3.24              4  0.500"), std::string::npos);
+    EXPECT_NE(app::format_text(report).find("btRigidBody  Bullet 3.24              4  0.500"),
+              std::string::npos);
 }
 
 TEST(Bench, LeastWorkGrowsByWhatEachPartNeeds) {

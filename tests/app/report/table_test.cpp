@@ -96,11 +96,17 @@ TEST(Table, APartLeavesOutRowsWithoutValues) {
                            {"hits/p95_ms:.1f", {}},
                            {"rms_mm:.2f", 4.0}});
     EXPECT_EQ(table.part({"predictor", "hits/p95_ms", "hits/f1"}).text(),
-              "predictor  hits p95 ms  hits f1\ncv                   -    0.500\ncv                   -    "
-              "0.500\n");
+              "predictor  p95 ms     f1\ncv              -  0.500\ncv              -  0.500\n");
     EXPECT_EQ(table.part({"predictor", "hits/p95_ms"}).text(), "");
     EXPECT_EQ(table.csv(), "predictor,f1,p95_ms,rms_mm\ncv,0.5,,4\ncv,,,4\ncv,0.5,,4\n");
     EXPECT_EQ(table.json()[1].dump(), R"({"predictor":"cv","external":false,"hits":null,"rms_mm":4.0})");
+}
+
+TEST(Table, HeadingsOfTheSameNameSayToWhichObjectTheyBelong) {
+    Table table = Table::of({"n:d", "by_recording/low:.1f", "by_person/low:.1f", "by_person/high:.1f"});
+    table.add({3, 0.1, 0.2, 0.3});
+    EXPECT_EQ(table.text(),
+              "n  by recording low  by person low  high\n3               0.1            0.2   0.3\n");
 }
 
 TEST(Table, WithoutRowsIsNothingToReadersAndAHeaderInAFile) {
