@@ -28,8 +28,9 @@ TEST(Bench, JsonHasTheContractsKeysAndNullWhereThereIsNoPeer) {
         for (const Json& result : json["results"]) EXPECT_TRUE(result.contains(key)) << key;
     EXPECT_TRUE(json["results"][0]["ratio"].is_null());
     EXPECT_EQ(json["results"][1]["ratio"], 0.5);
-    EXPECT_NE(app::format_text(report).find("btRigidBody  Bullet 3.24              4  0.500"),
-              std::string::npos);
+    const std::string text = app::format_text(report);
+    for (const char* cell : {"btRigidBody", "Bullet 3.24", "  0.500\n"})
+        EXPECT_NE(text.find(cell), std::string::npos) << cell;
 }
 
 TEST(Bench, LeastWorkGrowsByWhatEachPartNeeds) {
