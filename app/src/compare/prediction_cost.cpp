@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kPasses = 7, kMostSamples = 4096;
 
-/// Keeps the compiler from leaving out what nobody reads.
+/// Keeps the compiler from removing an unread result.
 void keep(double value) {
     asm volatile("" : : "g"(value) : "memory");
 }

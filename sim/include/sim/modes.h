@@ -55,8 +55,8 @@ struct FreeVibrationModes {       ///< the solution of a ModesRequest
 
 /// Throws std::invalid_argument for a request out of range (extents in a ratio over 1000, or 100 with four or
 /// more elements per side), std::runtime_error if no solution is found. Dense (Eigen) up to three elements
-/// per side, shift-invert Lanczos (Spectra) beyond. One element costs about 0.6 ms, 2: 2, 3: 20, 4: 60, 6: 300
-/// ms, 8: 1.3 s, 12: 11 s. For the superquadric with several elements per side, brick space outside it is
+/// per side, shift-invert Lanczos (Spectra) beyond. One element costs about 0.6 ms, 2: 2, 3: 20, 4: 60,
+/// 6: 300 ms, 8: 1.3 s, 12: 11 s. For the superquadric with several elements per side, brick space outside it is
 /// massless and has 1e-8 of the stiffness.
 [[nodiscard]] FreeVibrationModes free_vibration_modes(const ModesRequest& request);
 
