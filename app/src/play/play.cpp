@@ -32,11 +32,12 @@ PlayResult play(const PlayOptions& options) {
     OutputFolder folder(options.out);
 
     const KitStage stage(kit, trace.sticks.size(), stick);
-    std::unique_ptr<FrameWriter> frames;
+    std::unique_ptr<FrameThread> frames;
     if (options.frames) {
         fs::create_directory(folder.path("frames"));
-        frames = std::make_unique<FrameWriter>(stage.scene(options.width, options.height),
-                                               stage.frame({}, {}), folder.path("frames"));
+        const FrameThreadOptions where{options.width, options.height, folder.path("frames")};
+        frames = std::make_unique<FrameThread>(std::vector{stage.scene(options.width, options.height)},
+                                               stage.frame({}, {}), where);
     }
     std::unique_ptr<audio::Performance> performance =
         options.audio ? std::make_unique<audio::Performance>(orchestra_file(), voices_of(kit)) : nullptr;
@@ -79,7 +80,7 @@ PlayResult play(const PlayOptions& options) {
     if (frames) {
         const WallTimer waiting;
         frames->finish();
-        result.frames = frames->frames();
+        result.frames = frames->written().size();
         result.stages_s.emplace_back("drawing (own thread)", frames->draw_s());
         result.stages_s.emplace_back("writing frames (own thread)", frames->write_s());
         result.stages_s.emplace_back("frames (waiting at the end)", waiting.seconds());

@@ -4,7 +4,7 @@
 
 #include "kit/kit.h"
 #include "kit/stick_geometry.h"
-#include "play/play.h"
+#include "play/play_options.h"
 
 namespace app {
 

@@ -9,7 +9,7 @@
 
 #include "kit/kit.h"
 #include "kit/stick_geometry.h"
-#include "play/play.h"
+#include "play/play_options.h"
 #include "strikes/strike_scheduler.h"
 
 namespace app {

@@ -136,22 +136,6 @@ void fill_gaps(const fs::path& folder, std::size_t frames, const render::Image& 
     }
 }
 
-void finish_frames(RealtimeFrames& frames, RealtimeResult& result) {
-    frames.finish();
-    for (const FrameTiming& done : frames.take_done()) {
-        const auto at = std::ranges::lower_bound(result.frames, done.index, {}, &FrameTiming::index);
-        if (at != result.frames.end() && at->index == done.index) *at = done;
-    }
-    for (const auto& [index, written_ns] : frames.written()) {
-        const auto at = std::ranges::lower_bound(result.frames, index, {}, &FrameTiming::index);
-        if (at != result.frames.end() && at->index == index) at->written_ns = written_ns;
-    }
-    result.frames_not_written = frames.not_written();
-    std::map<std::uint64_t, bool> in_time;
-    for (const FrameTiming& frame : result.frames) in_time[frame.index] = frame.fate == FrameFate::in_time;
-    for (DrawnTip& tip : result.tips) tip.shown = in_time[tip.frame];
-}
-
 void finish_sound(audio::LivePerformance& sound, RealtimeOutcome& outcome, const OutputFolder& folder,
                   std::int64_t epoch_ns) {
     const double length = (outcome.realtime.seconds + kSoundTailS) * audio::kSampleRate;
@@ -207,12 +191,13 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
     std::unique_ptr<audio::LivePerformance> sound =
         options.play.audio ? make_live_sound(session, sound_priority) : nullptr;
     if (sound && !sound->midi_problem().empty()) warn(sound->midi_problem());
-    std::unique_ptr<RealtimeFrames> frames;
+    std::unique_ptr<FrameThread> frames;
     if (options.play.frames) {
         fs::create_directory(folder.path("frames"));
-        frames = std::make_unique<RealtimeFrames>(
-            scenes_of(stage, options.play.width, options.play.height), stage.frame({}, {}),
-            options.play.width, options.play.height, folder.path("frames"), options.realtime_priority);
+        const FrameThreadOptions where{options.play.width, options.play.height, folder.path("frames"),
+                                       FramePolicy::refuse, options.realtime_priority};
+        frames = std::make_unique<FrameThread>(scenes_of(stage, options.play.width, options.play.height),
+                                               stage.frame({}, {}), where);
     }
     std::int64_t epoch_ns = 0;
     const std::unique_ptr<SensorHub> hub = start_sensors(session, epoch_ns);
@@ -223,7 +208,6 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
                         {*simulation, stage, sensors, sound.get(), frames.get()}, session.trace.sticks.size(),
                         !confirming_specification(options.play.sound_predictor).empty(), epoch_ns);
         if (sound) sound->start(epoch_ns);
-        if (frames) frames->start(epoch_ns, options.disturbance);
         const BusyThreads load(options.disturbance, epoch_ns);
         control_priority = set_thread_priority(ThreadRole::control, options.realtime_priority);
         ProgressBar bar(options.play.progress);
@@ -236,6 +220,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
         if (run.end_s() <= 0)
             throw std::runtime_error(
                 "error: found an interruption before anything was played, expected a run");
+        if (frames) run.finish_frames();
         outcome.realtime = std::move(run.result());
         RealtimeResult& realtime = outcome.realtime;
         realtime.disturbed_by = options.disturbed_by;
@@ -245,7 +230,6 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
             if (run.seen()[i].empty())
                 warn(fmt::format("stick {}: found no sample in {:.1f} s, expected some of that name",
                                  session.trace.sticks[i].name, run.end_s()));
-        if (frames) finish_frames(*frames, realtime);
         if (sound) finish_sound(*sound, outcome, folder, epoch_ns);
         outcome.stick = session.stick = run.geometry();
         result.t_end_s = result.t0_s + run.end_s();
