@@ -34,6 +34,14 @@ private:
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+/// Seconds of wall time that `work()` takes.
+template <class Work>
+[[nodiscard]] double seconds_of(const Work& work) {
+    const WallTimer timer;
+    work();
+    return timer.seconds();
+}
+
 /// Adds the seconds of wall time of its life to a sum.
 class Stopwatch {
 public:

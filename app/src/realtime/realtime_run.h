@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "kit/kit.h"
-#include "latency/realtime_result.h"
+#include "latency/timings.h"
 #include "pictures/frame_thread.h"
 #include "pictures/kit_stage.h"
 #include "play/play_options.h"
