@@ -57,7 +57,7 @@ inline constexpr AvLimits kAtscLimits{-15, 45}, kItuLimits{-45, 125};
 /// Latency that drummers rate as none, and the jitter beside it that they do not [ms].
 inline constexpr double kDrummersLatencyMs = 10, kDrummersJitterMs = 3;
 
-/// What `latency` says of a run in real time.
+/// The latency measured in a run in real time.
 struct LatencyReport {
     // clang-format off
     /// In order of the way; those that nothing took are left out:

@@ -257,7 +257,7 @@ std::string timeline_section(const PlayResult& result, const Timeline& timeline,
             "marked under the axis.</p>\n<div class=plot>\n{}</div>\n",
             plots.rows.size(), timeline.row_s, plots.overview);
     text += fmt::format(
-        "<p class=note>Height of the tips as recorded over the trace's clock, {:g} s a row. A note stands "
+        "<p class=note>Height of the tips as recorded over the trace's clock, {:g} s per row. A note stands "
         "at its onset, at the point where it was predicted to strike.{}</p>\n{}<div class=plot>\n",
         timeline.row_s, result.audio.empty() ? "" : " Under it the sound; vertical lines are onsets.",
         legend(result));

@@ -44,8 +44,8 @@ std::unique_ptr<SensorHub> start_sensors(const RealtimeSession& session, std::in
     }
 }
 
-/// The strikes of all laps: as on their laps' clocks, and on the run's. What the sound says was played was
-/// played.
+/// The strikes of all laps, on their laps' clocks and on the run's. The sound decides which of them were played,
+/// and when.
 void collect_strikes(RealtimeOutcome& outcome, std::vector<LapStrikes>& laps, std::int64_t period_samples,
                      bool sound) {
     std::map<std::uint64_t, const audio::PlayedNote*> played;
