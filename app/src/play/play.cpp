@@ -10,7 +10,7 @@
 #include "play/offline_run.h"
 #include "play/play_products.h"
 #include "play/play_setup.h"
-#include "process/clock.h"
+#include "process/stopwatch.h"
 #include "process/progress_bar.h"
 
 namespace app {

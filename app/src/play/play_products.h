@@ -14,6 +14,7 @@
 #include "play/play_result.h"
 #include "play/play_setup.h"
 #include "process/clock.h"
+#include "process/stopwatch.h"
 
 namespace app {
 

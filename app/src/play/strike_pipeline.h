@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "kit/kit.h"
-#include "process/clock.h"
+#include "process/stopwatch.h"
 #include "sticks/stick_outlook.h"
 #include "sticks/stick_tracker.h"
 #include "strikes/drawn_strikes.h"
