@@ -70,7 +70,7 @@ std::vector<std::string> stage_names(const Json& a, const Json& b) {
 }
 
 Table compared_stages(const Json& a, const Json& b) {
-    Table table{{{"name"}}};
+    Table table = Table::of({"name"});
     for (const std::string key : kQuantiles)
         table.columns.insert(table.columns.end(),
                              {{"a/" + key, ".3f"}, {"b/" + key, ".3f"}, {"ratio/" + key, ".2f"}});
@@ -102,7 +102,7 @@ Table compared_figures(const Json& a, const Json& b) {
         {"lead that pictures need, ms", "/lead_needed_ms/render"},
         {"lead that sound needs, ms", "/lead_needed_ms/sound"},
         {"RMS error on the screen, mm", "/drawn_error_mm/rms"}};
-    Table table{{{"name"}, {"a", ".1f"}, {"b", ".1f"}, {"ratio", ".2f"}}};
+    Table table = Table::of({"name", "a:.1f", "b:.1f", "ratio:.2f"});
     for (const auto& [name, pointer] : kFigures) {
         const auto [in_a, in_b, ratio] = compared(number(a, pointer), number(b, pointer));
         table.add({name, in_a, in_b, ratio});

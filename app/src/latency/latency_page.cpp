@@ -298,7 +298,7 @@ std::string sound_picture_note(const LatencyReport& report) {
 
 /// What the sensors and the rule of quality did.
 std::string remarks(const RealtimeResult& realtime) {
-    Table table{{{"s", ".2f"}, {"event"}}};
+    Table table = Table::of({"s:.2f", "event"});
     for (const SensorEvent& event : realtime.events) table.add({event.at_s, event.message});
     for (const LeadStep& step : realtime.leads)
         if (!step.why.empty()) table.add({step.at_s, step.why});

@@ -72,13 +72,8 @@ std::string milliseconds(const std::optional<double>& value) {
 }  // namespace
 
 Table stage_table(const LatencyReport& report) {
-    Table table{{{"name"},
-                 {"meaning"},
-                 {"count", "d"},
-                 {"p50_ms", ".3f"},
-                 {"p95_ms", ".3f"},
-                 {"p99_ms", ".3f"},
-                 {"max_ms", ".3f"}}};
+    Table table =
+        Table::of({"name", "meaning", "count:d", "p50_ms:.3f", "p95_ms:.3f", "p99_ms:.3f", "max_ms:.3f"});
     for (const LatencyStage& s : report.stages)
         table.add({s.name, s.meaning, s.ms.count(), s.ms.percentile(50), s.ms.percentile(95),
                    s.ms.percentile(99), s.ms.max()});
@@ -86,20 +81,15 @@ Table stage_table(const LatencyReport& report) {
 }
 
 Table deadline_table(const LatencyReport& report) {
-    Table table{{{"name"}, {"meaning"}, {"total", "d"}, {"met", "d"}, {"missed", "d"}}};
+    Table table = Table::of({"name", "meaning", "total:d", "met:d", "missed:d"});
     for (const Deadline* d : report.deadlines())
         table.add({d->name, d->meaning, d->total, d->total - d->missed, d->missed});
     return table;
 }
 
 Table spread_table(const LatencyReport& report) {
-    Table table{{{"sound minus"},
-                 {"p5", "+.1f", "ms"},
-                 {"median", "+.1f", "ms"},
-                 {"p95", "+.1f", "ms"},
-                 {"min", "+.1f", "ms"},
-                 {"max", "+.1f", "ms"},
-                 {"count", "d"}}};
+    Table table = Table::of({"sound minus", "p5:+.1f:ms", "median:+.1f:ms", "p95:+.1f:ms", "min:+.1f:ms",
+                             "max:+.1f:ms", "count:d"});
     const auto add = [&](const char* name, const Spread& ms) {
         table.add({name, ms.percentile(5), ms.percentile(50), ms.percentile(95), ms.percentile(0),
                    ms.percentile(100), ms.count()});
@@ -110,8 +100,7 @@ Table spread_table(const LatencyReport& report) {
 }
 
 Table clock_table(const RealtimeResult& realtime) {
-    Table table{
-        {{"clock"}, {"offset_s", ".6f"}, {"drift_ppm", ".1f"}, {"delay_p95_ms", ".2f"}, {"jumps", "d"}}};
+    Table table = Table::of({"clock", "offset_s:.6f", "drift_ppm:.1f", "delay_p95_ms:.2f", "jumps:d"});
     for (const ClockReport& c : realtime.clocks)
         table.add({c.clock, c.offset_s, c.drift_ppm, c.delay_p95_ms, c.jumps});
     return table;

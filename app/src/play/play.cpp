@@ -10,8 +10,8 @@
 #include "play/offline_run.h"
 #include "play/play_products.h"
 #include "play/play_setup.h"
-#include "process/stopwatch.h"
 #include "process/progress_bar.h"
+#include "process/stopwatch.h"
 
 namespace app {
 namespace {

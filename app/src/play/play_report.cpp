@@ -186,14 +186,8 @@ std::string figures(const PlayResult& r) {
 /// A row for each instrument that was struck or meant to be.
 std::string instruments_section(const PlayResult& result) {
     const std::vector<InstrumentRow> rows = count_by_instrument(result);
-    Table table{{{"instrument"},
-                 {"true", "d"},
-                 {"released", "d"},
-                 {"cancelled", "d"},
-                 {"false", "d"},
-                 {"missed", "d"},
-                 {"median |ms|", ".1f"},
-                 {"median ms", "+.1f"}}};
+    Table table = Table::of({"instrument", "true:d", "released:d", "cancelled:d", "false:d", "missed:d",
+                             "median |ms|:.1f", "median ms:+.1f"});
     for (std::size_t i = 0; i < rows.size(); ++i) {
         const InstrumentRow& row = rows[i];
         if (row.contacts + row.released + row.cancelled == 0) continue;
@@ -210,7 +204,7 @@ std::string instruments_section(const PlayResult& result) {
 
 /// Inputs and versions.
 std::string provenance(const PlayResult& r) {
-    Table inputs{{{"file"}, {"SHA-256"}}}, versions{{{"part"}, {"version"}}};
+    Table inputs = Table::of({"file", "SHA-256"}), versions = Table::of({"part", "version"});
     for (const InputFile& input : r.inputs) inputs.add({input.file, input.sha256});
     for (const auto& [name, version] : r.versions) versions.add({name, version});
     versions.add({"fingerprint of this machine and build", r.fingerprint});
