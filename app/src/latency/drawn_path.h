@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "latency/realtime_result.h"
+#include "latency/timings.h"
 
 namespace app {
 

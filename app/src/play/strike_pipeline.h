@@ -1,7 +1,6 @@
 #pragma once
 #include <sim/simulation.h>
 
-#include <chrono>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "kit/kit.h"
+#include "process/stopwatch.h"
 #include "sticks/stick_outlook.h"
 #include "sticks/stick_tracker.h"
 #include "strikes/drawn_strikes.h"
@@ -21,19 +21,6 @@ namespace app {
 /// Seconds of wall time in each part of the loop.
 struct LoopTimes {
     double tracking = 0, simulation = 0, strikes = 0, waiting_for_frames = 0;
-};
-
-/// Adds the time of its life to a sum.
-class Stopwatch {
-public:
-    explicit Stopwatch(double& sum) : sum_(sum), start_(std::chrono::steady_clock::now()) {}
-    ~Stopwatch() { sum_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-    Stopwatch(const Stopwatch&) = delete;
-    Stopwatch& operator=(const Stopwatch&) = delete;
-
-private:
-    double& sum_;
-    std::chrono::steady_clock::time_point start_;
 };
 
 /// How a stick is drawn in a frame.
