@@ -11,9 +11,9 @@ namespace audio {
 /// lies in slot i mod capacity. The writer owns the slots from written_ on, the reader those from read_ to
 /// written_; the release of a position by its owner hands the slot over.
 ///
-/// A queue is used either by push and pop or by try_push and try_pop, which never wait, wake nobody and make
-/// no system call (real time). Their positions are sequentially consistent: what try_push has returned from
-/// is found by every try_pop that follows, in the single order of such operations, any later one of the
+/// A queue is used either by push and pop or by try_push and try_pop, which never wait, wake no thread and
+/// make no system call (real time). Their positions are sequentially consistent: what try_push has returned
+/// from is found by every try_pop that follows, in the single order of such operations, any later one of the
 /// writer.
 template <class T>
 class CommandQueue {

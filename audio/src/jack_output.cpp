@@ -33,16 +33,15 @@ jack_client_t* open_client() {
     jack_status_t status{};
     jack_client_t* client = jack_client_open("musicworld", JackNoStartServer, &status);
     if (client != nullptr) return client;
-    throw std::runtime_error(
-        "JACK: found no running server" + server_name() +
-        ", expected one; start it (jackd -d alsa -r 48000 -p 128) or leave the option out");
+    throw std::runtime_error("JACK: no server" + server_name() +
+                             " is running; start it (jackd -d alsa -r 48000 -p 128) or leave the option out");
 }
 
 jack_port_t* open_port(jack_client_t* client, const std::string& name, const char* type) {
     jack_port_t* port = jack_port_register(client, name.c_str(), type, JackPortIsOutput, 0);
     if (port != nullptr) return port;
-    throw std::runtime_error("JACK: found no way to make the port `" + name +
-                             "`, expected a name that is new and short; choose another one");
+    throw std::runtime_error("JACK: cannot make the port `" + name +
+                             "`; choose a name that is new and short");
 }
 
 /// The first two physical outputs for sound; fewer where there are fewer.

@@ -41,8 +41,8 @@ public:
     JackOutput(const JackOutput&) = delete;
     JackOutput& operator=(const JackOutput&) = delete;
 
-    /// From here on sound is played: interleaved stereo that stays where it is and of which `publish` tells
-    /// how much is there; sample 0 is due at epoch_ns.
+    /// From here on sound is played: interleaved stereo that stays where it is; `publish` sets how much of
+    /// it is ready; sample 0 is due at epoch_ns.
     void start(const float* recording, std::int64_t epoch_ns) noexcept;
     void publish(std::int64_t frames) noexcept { published_.store(frames, std::memory_order_release); }
     /// Hands a stroke over; false where that cannot be. Wait-free.

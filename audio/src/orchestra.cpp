@@ -107,7 +107,7 @@ std::vector<Instrument> parse_instruments(std::string_view orchestra, const std:
 std::string read_text(const std::filesystem::path& file) {
     std::ifstream stream(file, std::ios::binary);
     if (!stream || std::filesystem::is_directory(file)) {
-        throw std::runtime_error(file.string() + ": cannot be opened, expected a readable file");
+        throw std::runtime_error("cannot read the orchestra " + file.string());
     }
     std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
     if (stream.bad()) throw std::runtime_error(file.string() + ": reading failed");

@@ -12,8 +12,8 @@ template <typename Function>
 void load(Function& function, const char* name) {
     function = reinterpret_cast<Function>(OsmesaContext::function(name));
     if (function == nullptr) {
-        throw std::runtime_error(std::string("OSMesa: error: found no function ") + name +
-                                 ", expected OpenGL 3.3 core");
+        throw std::runtime_error(std::string("OSMesa: error: no function ") + name +
+                                 "; OpenGL 3.3 core is needed");
     }
 }
 

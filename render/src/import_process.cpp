@@ -42,8 +42,7 @@ private:
 ImportProcess::ImportProcess(const std::filesystem::path& file) {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0) {
-        throw std::runtime_error(std::string("found no pipe (") + std::strerror(errno) +
-                                 "), expected one to the importer");
+        throw std::runtime_error(std::string("cannot make a pipe to the importer: ") + std::strerror(errno));
     }
     pipe_ = ends[0];
     const SpawnActions actions(ends[1]);
@@ -54,8 +53,7 @@ ImportProcess::ImportProcess(const std::filesystem::path& file) {
     if (error != 0) {
         child_ = -1;
         close(pipe_);
-        throw std::runtime_error("found no mesh importer (" + std::string(std::strerror(error)) +
-                                 "), expected " + program);
+        throw std::runtime_error("cannot start " + program + ": " + std::strerror(error));
     }
 }
 
@@ -96,8 +94,7 @@ void ImportProcess::read_until_closed(std::string& bytes) {
         if (count == 0) return;
         if (count < 0) {
             if (errno == EINTR || errno == EAGAIN) continue;
-            throw std::runtime_error(std::string("found a broken pipe (") + std::strerror(errno) +
-                                     "), expected a mesh");
+            throw std::runtime_error(std::string("cannot read from the importer: ") + std::strerror(errno));
         }
         bytes.append(block.data(), static_cast<std::size_t>(count));
         if (bytes.size() > kMostBytes)

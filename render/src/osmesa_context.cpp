@@ -33,7 +33,7 @@ OsmesaContext::OsmesaContext() {
                               0};
     context_ = OSMesaCreateContextAttribs(attributes, nullptr);
     if (context_ == nullptr)
-        throw std::runtime_error("OSMesa: error: found no context, expected OpenGL 3.3 core");
+        throw std::runtime_error("OSMesa: error: cannot make a context of OpenGL 3.3 core");
     make_current();
 }
 
@@ -44,8 +44,7 @@ OsmesaContext::~OsmesaContext() {
 void OsmesaContext::make_current() {
     if (OSMesaGetCurrentContext() == context_) return;
     if (OSMesaMakeCurrent(context_, front_buffer_, GL_UNSIGNED_BYTE, 1, 1) != GL_TRUE) {
-        throw std::runtime_error(
-            "OSMesa: error: found a context that cannot be made current, expected one that can");
+        throw std::runtime_error("OSMesa: error: cannot make the context current");
     }
 }
 

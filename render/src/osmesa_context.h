@@ -9,7 +9,7 @@ namespace render {
 /// An off-screen OpenGL 3.3 core context of OSMesa (software). Objects made in it end with it.
 class OsmesaContext {
 public:
-    /// Makes the context and makes it current. Throws std::runtime_error when there is none to be had.
+    /// Makes the context and makes it current. Throws std::runtime_error if OSMesa makes none.
     OsmesaContext();
     ~OsmesaContext();
     OsmesaContext(const OsmesaContext&) = delete;

@@ -25,7 +25,7 @@ void require(int error) {
 
 Context make_context(int flags) {
     Context context(spng_ctx_new(flags), spng_ctx_free);
-    if (!context) throw std::runtime_error("PNG: error: found no memory, expected enough for an image");
+    if (!context) throw std::runtime_error("PNG: error: out of memory");
     return context;
 }
 
@@ -72,7 +72,7 @@ std::vector<std::uint8_t> compressed(std::vector<std::uint8_t> lines) {
     stream.next_out = out.data();
     stream.avail_out = static_cast<std::uint32_t>(out.size());
     if (isal_deflate(&stream) != COMP_OK || stream.avail_in != 0 || stream.internal_state.state != ZSTATE_END)
-        throw std::runtime_error("PNG: error: found an image that does not compress, expected a PNG stream");
+        throw std::runtime_error("PNG: error: cannot compress the image");
     out.resize(stream.total_out);
     return out;
 }

@@ -8,9 +8,8 @@ namespace render {
 
 void require_complete(const GlFunctions& gl, const char* what, int width, int height) {
     if (gl.CheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE) return;
-    throw std::runtime_error(std::string("OSMesa: error: found no framebuffer for a ") + what + " of " +
-                             std::to_string(width) + "x" + std::to_string(height) +
-                             ", expected a smaller one");
+    throw std::runtime_error(std::string("OSMesa: error: cannot make a framebuffer for a ") + what + " of " +
+                             std::to_string(width) + "x" + std::to_string(height));
 }
 
 GLuint make_framebuffer(const GlFunctions& gl) {

@@ -10,8 +10,8 @@ namespace render {
 /// Throws std::runtime_error unless the bound framebuffer is complete.
 void require_complete(const GlFunctions& gl, const char* what, int width, int height);
 
-/// The framebuffers of one picture. The objects are drawn with several samples a pixel over nothing (0, 0, 0,
-/// 0), resolved into a texture, and a second pass with one sample a pixel puts them before the background:
+/// The framebuffers of one picture. The objects are drawn with several samples per pixel over nothing (all
+/// 0), resolved into a texture, and a second pass with one sample per pixel puts them before the background:
 /// the background costs no samples. End with their context.
 class PictureTarget {
 public:

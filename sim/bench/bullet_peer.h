@@ -6,7 +6,7 @@
 
 namespace sim_bench {
 
-/// The same balls in the Bullet library, as it is installed (single precision). One thread, 1/60 s a step,
+/// The same balls in the Bullet library, as it is installed (single precision). One thread, 1/60 s per step,
 /// ten solver iterations (its default), nothing is put to sleep. The box is made of btBoxShapes.
 enum class BulletKind {
     rigid,   ///< btRigidBody with the btConvexHullShape of the 182 vertices

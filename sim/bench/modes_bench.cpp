@@ -1,4 +1,4 @@
-// Cost of the modes of a body (k elements a side), of a displacement and of its inverse.
+// Cost of the modes of a body (k elements per side), of a displacement and of its inverse.
 #include <benchmark/benchmark.h>
 
 #include <random>
@@ -17,7 +17,7 @@ sim::ModalBasis basis_of(int elements) {
     return sim::free_vibration_modes({kShape, sim::ModeDomain::superquadric, kRubber, elements, 12}).basis;
 }
 
-// Arguments: elements a side; 1 for the superquadric, 0 for its box.
+// Arguments: elements per side; 1 for the superquadric, 0 for its box.
 void modes(benchmark::State& state) {
     const auto domain = state.range(1) == 1 ? sim::ModeDomain::superquadric : sim::ModeDomain::box;
     const sim::ModesRequest request{kShape, domain, kRubber, static_cast<int>(state.range(0)), 12};

@@ -6,7 +6,7 @@
 
 #include "kit/kit.h"
 #include "kit/stick_geometry.h"
-#include "latency/realtime_result.h"
+#include "latency/timings.h"
 #include "play/play_result.h"
 
 /// Made-up runs in real time whose figures are known in closed form.

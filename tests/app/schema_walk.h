@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 
@@ -7,55 +8,35 @@ namespace app {
 using nlohmann::json;
 
 /// Follows a $ref into the schema's definitions.
-inline const json& resolved(const json& root, const json& node) {
-    return node.contains("$ref") ? root.at(json::json_pointer(node["$ref"].get<std::string>().substr(1)))
-                                 : node;
-}
+const json& resolved(const json& root, const json& node);
 
-inline std::string toml_of(const json& value) {
-    std::string text;
-    if (value.is_object()) {
-        for (const auto& [key, inner] : value.items())
-            text += (text.empty() ? "" : ", ") + ('"' + key + "\" = " + toml_of(inner));
-        return "{ " + text + " }";
-    }
-    if (value.is_array()) {
-        for (const json& inner : value) text += (text.empty() ? "" : ", ") + toml_of(inner);
-        return "[" + text + "]";
-    }
-    return value.dump();
-}
+/// A value with every key of an object's schema at its example, or else at its default.
+json example_of(const json& root, const json& node_or_ref);
 
-/// A value with every key of an object's schema at its example.
-inline json example_of(const json& root, const json& node_or_ref) {
-    const json& node = resolved(root, node_or_ref);
-    if (node.contains("examples")) return node["examples"][0];
-    if (node["type"] == "array") return json::array({example_of(root, node["items"])});
-    json value = json::object();
-    for (const auto& [key, inner] : node["properties"].items()) value[key] = example_of(root, inner);
-    return value;
-}
+/// A file's text as TOML.
+std::string toml_text(const json& file);
 
-inline std::string toml_text(const json& file) {
-    std::string text;
-    for (const auto& [key, value] : file.items()) text += key + " = " + toml_of(value) + "\n";
-    return text;
-}
+/// A format's schema, a file that names (almost) all of its keys, and the reader.
+struct FormatCase {
+    json schema, full;
+    std::function<std::string(const json& file)> refusal;  ///< empty: it is read
+    /// Takes away what hides the value at a place from the reader, e.g. a body's own value before the defaults'.
+    std::function<void(json& file, const json::json_pointer& place)> uncover;
+};
 
-/// Visits every object of the schema that holds named keys, with the place of such an object in a file:
-/// the first of an array, the one named by the first example where names are free.
-template <class Visit>
-void for_each_table(const json& root, const json& node_or_ref, const json::json_pointer& place,
-                    const Visit& visit) {
-    const json& node = resolved(root, node_or_ref);
-    if (node["type"] == "array" && node["items"].contains("$ref"))
-        for_each_table(root, node["items"], place / 0, visit);
-    if (node.contains("additionalProperties") && node["additionalProperties"].contains("$ref"))
-        for_each_table(root, node["additionalProperties"], place / node["examples"][0].begin().key(), visit);
-    if (!node.contains("properties")) return;
-    visit(node, place);
-    for (const auto& [key, inner] : node["properties"].items())
-        for_each_table(root, inner, place / key, visit);
-}
+// The schema and the reader know the same. Each is a test of its own for kits, scenes and maps; they return how
+// many keys or tables they tried.
+
+int expect_every_key_is_described(const FormatCase& format);
+/// In every table a further key is refused, with a list of exactly the schema's keys (but for `own`, which
+/// tables that have defaults may name and the defaults may not).
+int expect_unknown_keys_are_refused(const FormatCase& format, const std::vector<std::string>& own);
+/// At the limits of every range the reader complains of no range, just beyond them it names them.
+int expect_ranges_are_the_readers(const FormatCase& format);
+/// Every word of a choice is taken, no other; a value of another type is refused where it stands.
+int expect_types_are_the_readers(const FormatCase& format);
+/// Without a key that the schema requires the file is refused for it; without any other it is read, but for
+/// `needed` ones.
+int expect_required_keys_are_the_readers(const FormatCase& format, const std::vector<std::string>& needed);
 
 }  // namespace app

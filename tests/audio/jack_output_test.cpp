@@ -92,7 +92,7 @@ TEST_F(JackOutput, WithoutServerOneLineSaysWhatToDo) {
     setenv("JACK_DEFAULT_SERVER", "musicworld-nobody", 1);
     const std::string message = message_of({.jack_audio = true});
     unsetenv("JACK_DEFAULT_SERVER");
-    EXPECT_NE(message.find("found no running server `musicworld-nobody`"), std::string::npos) << message;
+    EXPECT_NE(message.find("no server `musicworld-nobody` is running"), std::string::npos) << message;
     EXPECT_NE(message.find("start it (jackd"), std::string::npos) << message;
     EXPECT_EQ(message.find('\n'), std::string::npos);
 }

@@ -12,7 +12,7 @@ namespace tracking {
 namespace {
 
 constexpr std::uint32_t kMagic = 0x442d3d69;
-constexpr std::size_t kFrameBytes = 92;  // time, frames a second, three poses of seven floats
+constexpr std::size_t kFrameBytes = 92;  // time, frames per second, three poses of seven floats
 constexpr std::array<std::size_t, 2> kHandOffset = {36, 64};
 constexpr double kStartUp = 0.5;  // s
 constexpr double kTeleport = 30;  // m/s

@@ -12,8 +12,8 @@ namespace tracking {
 ///   mix   w_ij = pi_ij mu_i / c_j, c_j = sum_i pi_ij mu_i; x_0j = sum_i w_ij x_i,
 ///         P_0j = sum_i w_ij (P_i + (x_i - x_0j)(x_i - x_0j)^T)
 ///   then  each mode propagates and corrects its mixed state; mu_j ~ c_j times the likelihood of its
-///   innovation,
-///         joint over the axes, not below kLeastProbability
+///         innovation, joint over the axes,
+///         not below kLeastProbability
 ///   out   x = sum_j mu_j x_j, and the covariance of that mixture
 ///
 /// The spread of the modes differs between the axes, so each axis has its own covariance, in lanes. The

@@ -7,7 +7,7 @@
 
 namespace tracking {
 
-/// What a Kalman predictor is told beyond its model of motion.
+/// Settings of a Kalman predictor beyond its model of motion.
 struct KalmanOptions {
     double gate_sigmas = 0;  ///< <= 0: no gate. Otherwise impossible samples (OutlierGate) answer `outlier`
     double steady_rate_hz = 0;  ///< > 0: the steady gain of this rate (PositionFilter)

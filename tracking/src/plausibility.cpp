@@ -30,11 +30,13 @@ std::string number(double value) {
     return text;
 }
 
-double quantile(std::vector<double> values, double share) {
-    const auto index = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1));
-    const auto place = values.begin() + static_cast<std::ptrdiff_t>(index);
-    std::nth_element(values.begin(), place, values.end());
-    return *place;
+/// Linear between the order statistics (Hyndman and Fan 1996, definition 7, as app/src/statistics has it).
+/// `values` is not empty.
+double quantile(std::vector<double> values, double p) {
+    std::sort(values.begin(), values.end());
+    const double at = p * static_cast<double>(values.size() - 1);
+    const auto below = static_cast<std::size_t>(at), above = std::min(below + 1, values.size() - 1);
+    return std::lerp(values[below], values[above], at - static_cast<double>(below));
 }
 
 /// Range along the axis of the largest, of the middle 98 % of positions [m].

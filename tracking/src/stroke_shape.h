@@ -10,7 +10,7 @@ namespace tracking {
 ///          release h = -d cos(e s tau / d)    back to the surface at speed e s: lasts (pi/2) d / (e s)
 ///          (a linear spring met at s and left at e s: half-sines of force, as in Hertz's impact made linear)
 ///   feint  brake   speed v to 0 along 3u^2 - 2u^3 over 1.5 v / kBrake, so that it decelerates by at most
-///   kBrake
+///                  kBrake
 ///
 /// The downstroke before either is the same: from the apex H at rest to the surface at speed s over 2 H / s,
 /// with the constant acceleration s^2 / 2 H. A feint leaves it where the way left down to the turn is the way

@@ -15,7 +15,7 @@ void split_cells(const Line& line, char separator, std::vector<Field>& cells);
 struct TableHead {
     std::vector<std::string> names;  ///< of the columns, empty without a header
     Line header;                     ///< its last line (for a table without one, an empty first line)
-    std::optional<double> metres_per_unit, rate_hz;  ///< where the map says that the file tells
+    std::optional<double> metres_per_unit, rate_hz;  ///< if the map says where the file has them
 };
 
 /// Reads up to and including the header. Throws TraceError where there is none.

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <memory>
 
-#include "compare/comparison.h"
+#include "compare/compare.h"
 #include "compare/comparison_report.h"
 #include "compare/comparison_tables.h"
 #include "files/assets.h"
@@ -134,7 +134,7 @@ void run(const CompareArguments& a, const SensorArguments& sensor) {
     options.progress = [&bar](double share) { bar.show(share); };
     const Comparison comparison = compare(options);
     write_file(out.path("compare.json"), format_comparison_json(comparison));
-    write_file(out.path("compare.csv"), format_comparison_csv(comparison));
+    write_file(out.path("compare.csv"), result_table(comparison).csv());
     write_file(out.path("report.html"), format_comparison_report(comparison, out.scratch()));
     out.finish();
     bar.clear();

@@ -121,7 +121,7 @@ void fit(const FitArguments& a) {
 /// A small kit to start from.
 constexpr std::string_view kNewKit =
     R"(# A MusicWorld kit. Units: m, s, Hz; y is up, the player at the origin looks along -z.
-# Every key is described in kit.schema.json; what is not said here comes from defaults.toml (both among the bundled kits).
+# Every key is listed by `musicworld schema kit`; what is not said here comes from defaults.toml among the bundled kits.
 
 name = "{}"
 description = "a drum, a cymbal and a bell"

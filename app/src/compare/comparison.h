@@ -1,11 +1,8 @@
 #pragma once
+// What is compared and what comes of it: settings and results, without behaviour.
 #include <tracking/sensor.h>
-#include <tracking/trace.h>
 
-#include <filesystem>
 #include <functional>
-#include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -17,15 +14,15 @@
 
 namespace app {
 
-/// Errors of one predictor at one lead on one stick of one recording. Lengths in mm, as compare.json's keys.
+/// Errors of one predictor at one lead. Lengths in mm, as compare.json's keys; of nothing kNoValue.
 struct ErrorScore {
     std::size_t count = 0;      ///< predictions scored
     double sum_square_mm2 = 0;  ///< of the tracked point's position error
-    double rms_mm = 0, p95_mm = 0;
-    double free_rms_mm = 0;       ///< truth outside +-50 ms of impacts and of flagged times
-    double unflagged_rms_mm = 0;  ///< sample and truth outside +-50 ms of flagged times
-    double rotation_rms_deg = 0;  ///< 0 without orientation; without flagged orientations
-    double tip_rms_mm = 0;        ///< position and rotation together, at the tip; where rotations count
+    double rms_mm = kNoValue, p95_mm = kNoValue;
+    double free_rms_mm = kNoValue;       ///< truth outside +-50 ms of impacts and of flagged times
+    double unflagged_rms_mm = kNoValue;  ///< sample and truth outside +-50 ms of flagged times
+    double rotation_rms_deg = kNoValue;  ///< without flagged orientations
+    double tip_rms_mm = kNoValue;  ///< position and rotation together, at the tip; where rotations count
 
     // What the figures are made of, so that scores can be put together.
     std::size_t free_count = 0, unflagged_count = 0, rotation_count = 0;
@@ -42,33 +39,33 @@ struct Calibration {
     double negative_log_likelihood = 0;  ///< mean, nats, positions in m
 };
 
-/// One row of compare.json's `results`.
-struct ComparisonRow {
-    std::string trace;   ///< as given on the command line
-    std::string person;  ///< who plays (Recording::person)
-    std::string stick, predictor;
-    std::string used;  ///< the specification that ran: `predictor`, or what tuning chose for it
-    double lead_s = 0, rate_hz = 0, noise_mm = 0;
+/// A predictor's figures at one lead.
+struct PredictorScore {
+    std::string predictor;
+    double lead_s = 0;
     ErrorScore error;
     std::optional<Calibration> calibration;
     std::optional<HitScore> hits;
-    std::optional<double> advance_s;  ///< of the strikes, if it was learned (on the recordings that tune)
-    double ns_per_sample =
-        0;  ///< update and the prediction at every lead; median of several runs; 0 where not measured
+    /// Update and the prediction at every lead; the median of several runs, and over recordings. kNoValue
+    /// where not measured.
+    double ns_per_sample = kNoValue;
     bool external = false;  ///< exec:, or predictions from a file: no cost is measured
 };
 
-/// A predictor at a lead over all recordings: errors pooled over samples, strikes added, the median cost.
-struct ComparisonSummary {
-    std::string predictor;
-    double lead_s = 0;
+/// On one stick of one recording: a row of compare.json's `results`.
+struct ComparisonRow : PredictorScore {
+    std::string trace;   ///< as given on the command line
+    std::string person;  ///< who plays (Recording::person)
+    std::string stick;
+    std::string used;  ///< the specification that ran: `predictor`, or what tuning chose for it
+    double rate_hz = 0, noise_mm = 0;
+    std::optional<double> advance_s;  ///< of the strikes, if it was learned (on the recordings that tune)
+};
+
+/// Over all recordings: errors pooled over samples, strikes added.
+struct ComparisonSummary : PredictorScore {
     bool baseline = false;
-    ErrorScore error;
-    std::optional<Calibration> calibration;
-    std::optional<HitScore> hits;
     std::optional<std::pair<double, double>> advance_s;  ///< least and most that was learned; none if not
-    double ns_per_sample = 0;
-    bool external = false;
 };
 
 /// An estimator against the best baseline at a lead.
@@ -139,17 +136,5 @@ struct Comparison {
     std::vector<MapCell> map;
     std::string tuned_on;  ///< one sentence
 };
-
-/// Compares. A pure function of the files and options but for ns_per_sample and `exec:` predictors with a
-/// state of their own. Predictors named bare or with
-/// parameters run as they are; of each family that has parameters to tune, `NAME*` runs those that erred
-/// least (RMS, at that lead) on other recordings (the `--tune` ones, or all others that are compared), and
-/// `NAME**` those from the recordings of other persons; the advance of `auto`'s strikes is learned on the
-/// same recordings as `NAME*`. A map tunes on all others that are compared, `--tune` or not. Throws BadInput
-/// (also where nothing can be scored, or two files hold the same samples), tracking::TraceError.
-[[nodiscard]] Comparison compare(const ComparisonOptions& options);
-
-/// "33.3 ms ahead singer* errs least, ...; of 292 true strikes ca predicts most, ...", a sentence a lead.
-[[nodiscard]] std::vector<std::string> winners(const Comparison& comparison);
 
 }  // namespace app

@@ -5,7 +5,7 @@
 
 #include "compare/prediction_error.h"
 #include "process/parallel.h"
-#include "sticks/predictors.h"
+#include "sticks/replay.h"
 
 namespace app {
 namespace {
@@ -69,12 +69,11 @@ FigurePath path_of(const Entrant& entrant, const SensedStick& stick, std::size_t
                    const StickFigure& figure) {
     FigurePath path{entrant.name, entrant.used[stick.recording][lead], stick.leads_s[lead], {}};
     const auto predictor = make_entrant(entrant, stick, 0, lead);
-    for (const tracking::PoseSample& sample : stick.samples) {
-        (void)predictor->correct(sample);
-        const double t_s = predictor->time_s() + path.lead_s;
+    replay(*predictor, stick.samples, [&](const ReplayedSample& now) {
+        const double t_s = predictor->time_s() + now.behind_s + path.lead_s;
         if (t_s >= figure.from_s && t_s <= figure.to_s)
-            path.height_m.emplace_back(t_s, predictor->predict(path.lead_s).position.y());
-    }
+            path.height_m.emplace_back(t_s, predictor->predict(path.lead_s + now.behind_s).position.y());
+    });
     return path;
 }
 

@@ -3,13 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <iterator>
+#include <cmath>
+#include <map>
+#include <tuple>
 #include <vector>
 
-#include "compare/comparison_map_grid.h"
-#include "compare/comparison_pairs.h"
+#include "compare/comparison_map.h"
 #include "compare/comparison_plots.h"
-#include "compare/comparison_report_tables.h"
+#include "compare/comparison_tables.h"
+#include "compare/findings.h"
 #include "report/html.h"
 #include "report/report_style.h"
 #include "traces/sensor_model_options.h"
@@ -57,7 +59,8 @@ std::vector<const ComparisonSummary*> shown_strikes(const Comparison& comparison
     for (const double lead_s : comparison.options.leads_s) {
         const ComparisonSummary* best = nullptr;
         for (const ComparisonSummary& s : comparison.summaries)
-            if (s.lead_s == lead_s && s.hits && (best == nullptr || s.hits->f1() > best->hits->f1()))
+            if (s.lead_s == lead_s && s.hits && s.hits->true_contacts > 0 &&
+                (best == nullptr || s.hits->f1() > best->hits->f1()))
                 best = &s;
         if (best != nullptr) shown.push_back(best);
         for (const ComparisonSummary& s : comparison.summaries)
@@ -104,12 +107,53 @@ std::string section(std::string_view title, std::string_view note, const std::st
 }
 
 /// A table a lead.
-std::string by_lead(const Comparison& c, std::string (*table)(const Comparison&, double)) {
+std::string by_lead(const Comparison& c, Table (*table)(const Comparison&, double)) {
     std::string text;
     for (const double lead_s : c.options.leads_s)
-        if (const std::string rows = table(c, lead_s); !rows.empty())
+        if (const std::string rows = table(c, lead_s).html(); !rows.empty())
             text += fmt::format("<h3>{:.1f} ms ahead</h3>\n{}", 1e3 * lead_s, rows);
     return text;
+}
+
+using Sensor = std::tuple<double, double, double>;  // rate [Hz], jitter [ms], share lost
+
+/// The best estimators of one lead by sensor and noise [mm].
+std::map<Sensor, std::map<double, const MapCell*>> rows_of(const Comparison& comparison, double lead_s) {
+    std::map<Sensor, std::map<double, const MapCell*>> rows;
+    for (const MapCell* cell : best_cells(comparison.map))
+        if (cell->result.lead_s == lead_s)
+            rows[{cell->rate_hz, cell->jitter_ms, cell->drop_out}][cell->noise_mm] = cell;
+    return rows;
+}
+
+/// The gain in % of the RMS error and its interval.
+std::string cell_of(const PairedResult& result) {
+    const PairedDifference& d = result.by_recording;
+    const std::string name = html(result.predictor), gain = fmt::format("{:.1f} %", gain_percent(d.ratio));
+    if (std::isinf(d.ratio)) return "<td class=none>the baseline errs nothing";
+    if (!d.has_interval()) return fmt::format("<td>{} {}", name, gain);
+    const std::string range = fmt::format("({:.1f} to {:.1f})", gain_percent(d.high), gain_percent(d.low));
+    if (d.gain()) return fmt::format("<td class=gain>{} <b>{}</b> {}", name, gain, range);
+    return fmt::format("<td class=none>{} {}", d.loss() ? "loss" : "no measurable gain", range);
+}
+
+std::string grid(const Comparison& comparison, double lead_s) {
+    const auto rows = rows_of(comparison, lead_s);
+    if (rows.empty()) return {};
+    std::string text = fmt::format("<p>{}</p>\n<div class=scroll><table class=grid><tr><th>sensor",
+                                   html(map_sentence(comparison, lead_s)));
+    for (const auto& [noise_mm, cell] : rows.begin()->second)
+        text += fmt::format("<th>noise {:g} mm", noise_mm);
+    text += "</tr>\n";
+    for (const auto& [sensor, cells] : rows) {
+        const auto& [rate_hz, jitter_ms, lost] = sensor;
+        text += fmt::format("<tr><td>{:g} Hz{}{}", rate_hz,
+                            jitter_ms > 0 ? fmt::format(", jitter {:g} ms", jitter_ms) : "",
+                            lost > 0 ? fmt::format(", {:g} % lost", 100 * lost) : "");
+        for (const auto& [noise_mm, cell] : cells) text += cell_of(cell->result);
+        text += "</tr>\n";
+    }
+    return text + "</table></div>\n";
 }
 
 std::string strike_note(const Comparison& c) {
@@ -128,7 +172,7 @@ std::string strike_note(const Comparison& c) {
 std::string map_section(const Comparison& c) {
     const std::string grids = map_grids(c);
     if (grids.empty()) return {};
-    return grids + "<details><summary>All sensors with errors in mm</summary>\n" + map_table(c) +
+    return grids + "<details><summary>All sensors with errors in mm</summary>\n" + map_table(c).html() +
            "</details>\n";
 }
 
@@ -169,10 +213,16 @@ std::string sections(const Comparison& c, const PlotGallery& plots, const Placed
                 "best baseline, with the 95 % interval by recording (of the gain in RMS error). The best is "
                 "picked on the scored recordings; the intervals do not correct for that.",
                 map_section(c));
-    return text + section("Predictors", "Parameters in mm and s.", predictor_table(c));
+    return text + section("Predictors", "Parameters in mm and s.", predictor_table(c).html());
 }
 
 }  // namespace
+
+std::string map_grids(const Comparison& comparison) {
+    std::string text;
+    for (const double lead_s : comparison.options.leads_s) text += grid(comparison, lead_s);
+    return text;
+}
 
 std::string format_comparison_report(const Comparison& comparison, const std::filesystem::path& scratch) {
     PlotGallery plots;

@@ -12,4 +12,9 @@ namespace app {
 [[nodiscard]] std::string format_comparison_report(const Comparison& comparison,
                                                    const std::filesystem::path& scratch);
 
+/// The map on one screen: a sentence a lead (in how many sensors which estimator gains), then a table a lead,
+/// sensors down (rate, jitter, drop-outs), noise across; a cell names the best estimator and its gain over
+/// the best baseline with the 95 % interval. Empty without a map.
+[[nodiscard]] std::string map_grids(const Comparison& comparison);
+
 }  // namespace app

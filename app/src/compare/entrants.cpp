@@ -111,29 +111,27 @@ std::string tuned_sentence(std::size_t named, std::size_t others, bool by_person
 }
 
 void enter_tuned(EntrantList& list, const std::vector<std::string>& families,
-                 const ComparisonOptions& options, std::span<const Recording> scored,
-                 std::span<const SensedStick> sticks) {
-    const Field own = read_field(options.tune_traces, options);
-    const std::span<const Recording> field = own.recordings.empty() ? scored : own.recordings;
-    const std::span<const SensedStick> seen = own.recordings.empty() ? sticks : own.sticks;
-    if (own.recordings.empty() && scored.size() < 2) {
+                 const ComparisonOptions& options, const Field& scored, const Field& named) {
+    const Field& field = named.recordings.empty() ? scored : named;
+    if (named.recordings.empty() && scored.recordings.size() < 2) {
         list.tuned_on = "nothing is tuned: one recording, and no others by --tune";
         return;
     }
-    const TuningTable table(candidates_of(families, 1e3 * options.sensor.noise_m), seen, field.size(),
-                            options.threads);
+    const TuningTable table(candidates_of(families, 1e3 * options.sensor.noise_m), field.sticks,
+                            field.recordings.size(), options.threads);
     std::vector<Tuning> splits = {Tuning::other_recordings};
-    if (count_persons(scored, field) >= 2) splits.push_back(Tuning::other_persons);
+    if (count_persons(scored.recordings, field.recordings) >= 2) splits.push_back(Tuning::other_persons);
     bool any = false, by_person = false;
     for (const Tuning split : splits)
         for (const std::string& family : families) {
-            Entrant entrant = tuned(family, split, table, scored, field, options.leads_s.size());
+            Entrant entrant =
+                tuned(family, split, table, scored.recordings, field.recordings, options.leads_s.size());
             if (entrant.used.empty()) continue;
             any = true;
             by_person = by_person || split == Tuning::other_persons;
             list.entrants.push_back(std::move(entrant));
         }
-    list.tuned_on = any ? tuned_sentence(own.recordings.size(), scored.size() - 1, by_person)
+    list.tuned_on = any ? tuned_sentence(named.recordings.size(), scored.recordings.size() - 1, by_person)
                         : "nothing is tuned: a recording has no others to be tuned on";
 }
 
@@ -251,14 +249,6 @@ std::unique_ptr<tracking::Predictor> make_striker(const Entrant& entrant, const 
     return make_any_predictor(entrant.strikes_by.empty() ? named : entrant.strikes_by, leads_s, stick.name);
 }
 
-Field read_field(const std::vector<std::string>& files, const ComparisonOptions& options) {
-    Field field;
-    for (const std::string& file : files) field.recordings.push_back(read_recording(file, options.persons));
-    require_distinct(field.recordings);
-    if (!files.empty()) field.sticks = sense_all(field.recordings, options.sensor, options.leads_s);
-    return field;
-}
-
 std::vector<std::string> specifications_of(const ComparisonOptions& options) {
     std::vector<std::string> all;
     const auto add = [&](const std::string& specification) {
@@ -270,19 +260,18 @@ std::vector<std::string> specifications_of(const ComparisonOptions& options) {
     return all;
 }
 
-EntrantList enter(const ComparisonOptions& options, std::span<const Recording> recordings,
-                  std::span<const SensedStick> sticks) {
+EntrantList enter(const ComparisonOptions& options, const Field& scored, const Field& tuning) {
     EntrantList list;
     const std::vector<std::string> specifications = specifications_of(options);
     for (const std::string& specification : specifications) {
         check_specification(specification);
-        list.entrants.push_back(named(specification, recordings.size(), options.leads_s.size()));
+        list.entrants.push_back(named(specification, scored.recordings.size(), options.leads_s.size()));
     }
     if (options.tuning)
-        enter_tuned(list, tunable_families(specifications), options, recordings, sticks);
+        enter_tuned(list, tunable_families(specifications), options, scored, tuning);
     else
         list.tuned_on = "nothing is tuned, as asked";
-    enter_files(list, options, sticks, recordings);
+    enter_files(list, options, scored.sticks, scored.recordings);
     return list;
 }
 

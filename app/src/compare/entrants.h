@@ -13,15 +13,6 @@
 
 namespace app {
 
-/// Recordings and what the sensor sees of them.
-struct Field {
-    std::vector<Recording> recordings;
-    std::vector<SensedStick> sticks;
-};
-
-/// Throws tracking::TraceError, and BadInput, also where two files hold the same samples.
-[[nodiscard]] Field read_field(const std::vector<std::string>& files, const ComparisonOptions& options);
-
 /// Where a predictor's parameters come from.
 enum class Tuning {
     none,              ///< as named
@@ -63,12 +54,10 @@ struct EntrantList {
 [[nodiscard]] std::vector<std::string> specifications_of(const ComparisonOptions& options);
 
 /// Those named, then the baselines that were not (naive, difference, the parabola), then the tuned ones of
-/// each family among them: on the `--tune` recordings without the one scored (known by its samples), or on
-/// all others compared (two recordings or more), and on those of other persons (two persons or more); last
-/// the files of
-/// `--predictions`, each at its lead on the recording whose samples it answers. Throws BadInput for a
-/// predictor that is not known and a file that fits no recording or lead.
-[[nodiscard]] EntrantList enter(const ComparisonOptions& options, std::span<const Recording> recordings,
-                                std::span<const SensedStick> sticks);
+/// each family among them: on `tuning` (of --tune) without the one scored (known by its samples), or, if that
+/// is empty, on all others scored (two recordings or more), and on those of other persons (two persons or
+/// more); last the files of `--predictions`, each at its lead on the recording whose samples it answers.
+/// Throws BadInput for a predictor that is not known and a file that fits no recording or lead.
+[[nodiscard]] EntrantList enter(const ComparisonOptions& options, const Field& scored, const Field& tuning);
 
 }  // namespace app

@@ -5,15 +5,14 @@
 #include <vector>
 
 #include "statistics/statistics.h"
-#include "sticks/predictors.h"
-#include "strikes/stroke_lows.h"
+#include "sticks/replay.h"
 
 namespace app {
 namespace {
 
 constexpr std::size_t kPasses = 7, kMostSamples = 4096;
 
-/// Keeps the compiler from leaving out what nobody reads.
+/// Keeps the compiler from removing an unread result.
 void keep(double value) {
     asm volatile("" : : "g"(value) : "memory");
 }
@@ -27,10 +26,9 @@ double nanoseconds_per_sample(const std::string& specification, std::span<const 
     for (std::size_t pass = 0; pass < kPasses; ++pass) {
         const auto predictor = make_any_predictor(specification, leads_s);
         const auto start = std::chrono::steady_clock::now();
-        for (const tracking::PoseSample& sample : timed) {
-            (void)predictor->correct(sample);
-            for (const double lead_s : leads_s) keep(predictor->predict(lead_s).position.x());
-        }
+        replay(*predictor, timed, [&](const ReplayedSample& now) {
+            for (const double lead_s : leads_s) keep(predictor->predict(lead_s + now.behind_s).position.x());
+        });
         const std::chrono::duration<double, std::nano> spent = std::chrono::steady_clock::now() - start;
         costs.push_back(spent.count() / static_cast<double>(timed.size()));
     }

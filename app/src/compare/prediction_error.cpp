@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "statistics/statistics.h"
-#include "strikes/stroke_lows.h"
+#include "sticks/replay.h"
 
 namespace app {
 namespace {
@@ -17,13 +17,28 @@ constexpr double kMm2 = 1e6, kDegrees = 180 / std::numbers::pi;
 constexpr double kRadius50 = 2.3659738843753377, kRadius95 = 7.814727903251179;
 
 double root_mean(double sum, std::size_t count) {
-    return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
+    return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : kNoValue;
 }
 
-/// Takes a sample; answers how far the predictor's state lies behind it.
-double take(tracking::Predictor& predictor, const tracking::PoseSample& sample) {
-    const tracking::SampleStatus status = predictor.correct(sample);
-    return status == tracking::SampleStatus::accepted ? 0 : std::max(0.0, sample.t_s - predictor.time_s());
+/// Feeds samples of a stick and calls score(lead, ahead_s, truth) for each truth: predict(ahead_s) is held
+/// against it.
+template <class Score>
+void replay_truths(const SensedStick& stick, std::span<const tracking::PoseSample> samples,
+                   tracking::Predictor& predictor, const Score& score) {
+    replay(predictor, samples, [&](const ReplayedSample& now) {
+        for (std::size_t lead = 0; lead < stick.leads_s.size(); ++lead)
+            if (const std::optional<Truth>& truth = stick.truth(now.index, lead))
+                score(lead, stick.leads_s[lead] + now.behind_s, *truth);
+    });
+}
+
+std::vector<tracking::PoseSample> positions_of(std::span<const tracking::PoseSample> samples) {
+    std::vector<tracking::PoseSample> positions(samples.size());
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        positions[i].t_s = samples[i].t_s;
+        positions[i].position = samples[i].position;
+    }
+    return positions;
 }
 
 }  // namespace
@@ -90,7 +105,7 @@ void add(ErrorScore& sum, const ErrorScore& other) {
     sum.tip_sum_mm2 += other.tip_sum_mm2;
     sum.errors_mm.insert(sum.errors_mm.end(), other.errors_mm.begin(), other.errors_mm.end());
     sum.rms_mm = root_mean(sum.sum_square_mm2, sum.count);
-    sum.p95_mm = sum.errors_mm.empty() ? 0 : quantile(sum.errors_mm, 0.95);
+    sum.p95_mm = quantile(sum.errors_mm, 0.95);
     sum.free_rms_mm = root_mean(sum.free_sum_mm2, sum.free_count);
     sum.unflagged_rms_mm = root_mean(sum.unflagged_sum_mm2, sum.unflagged_count);
     sum.rotation_rms_deg = root_mean(sum.rotation_sum_deg2, sum.rotation_count);
@@ -115,15 +130,9 @@ void add(std::optional<Calibration>& sum, const std::optional<Calibration>& othe
 
 std::vector<LeadScore> score_predictor(const SensedStick& stick, tracking::Predictor& predictor) {
     std::vector<ErrorGatherer> gatherers(stick.leads_s.size());
-    for (std::size_t i = 0; i < stick.samples.size(); ++i) {
-        const double behind_s = take(predictor, stick.samples[i]);
-        for (std::size_t lead = 0; lead < gatherers.size(); ++lead) {
-            const std::optional<Truth>& truth = stick.truth(i, lead);
-            if (!truth) continue;
-            const double ahead_s = stick.leads_s[lead] + behind_s;
-            gatherers[lead].add(predictor.predict(ahead_s), *truth, stick.tip, predictor.covariance(ahead_s));
-        }
-    }
+    replay_truths(stick, stick.samples, predictor, [&](std::size_t lead, double ahead_s, const Truth& truth) {
+        gatherers[lead].add(predictor.predict(ahead_s), truth, stick.tip, predictor.covariance(ahead_s));
+    });
     std::vector<LeadScore> scores;
     for (const ErrorGatherer& gatherer : gatherers)
         scores.push_back({gatherer.error(), gatherer.calibration()});
@@ -131,24 +140,16 @@ std::vector<LeadScore> score_predictor(const SensedStick& stick, tracking::Predi
 }
 
 double SquareSum::rms_mm() const {
-    return root_mean(sum_mm2, count);
+    return count > 0 ? root_mean(sum_mm2, count) : 0;
 }
 
 std::vector<SquareSum> score_positions(const SensedStick& stick, tracking::Predictor& predictor) {
     std::vector<SquareSum> sums(stick.leads_s.size());
-    for (std::size_t i = 0; i < stick.samples.size(); ++i) {
-        tracking::PoseSample sample;
-        sample.t_s = stick.samples[i].t_s;
-        sample.position = stick.samples[i].position;
-        const double behind_s = take(predictor, sample);
-        for (std::size_t lead = 0; lead < sums.size(); ++lead) {
-            const std::optional<Truth>& truth = stick.truth(i, lead);
-            if (!truth) continue;
-            const Eigen::Vector3d error =
-                predictor.predict(stick.leads_s[lead] + behind_s).position - truth->pose.position;
-            sums[lead].add({kMm2 * error.squaredNorm(), 1});
-        }
-    }
+    const std::vector<tracking::PoseSample> positions = positions_of(stick.samples);
+    replay_truths(stick, positions, predictor, [&](std::size_t lead, double ahead_s, const Truth& truth) {
+        const Eigen::Vector3d error = predictor.predict(ahead_s).position - truth.pose.position;
+        sums[lead].add({kMm2 * error.squaredNorm(), 1});
+    });
     return sums;
 }
 

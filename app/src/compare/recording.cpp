@@ -18,8 +18,6 @@ namespace app {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kNearS = 0.050;
-
 struct MarkedTime {
     double t_s;
     std::string stick, kind;
@@ -164,11 +162,6 @@ void require_distinct(std::span<const Recording> recordings) {
                     fmt::format("{}: error: found the samples of {} again, expected every recording once; "
                                 "leave one of them out",
                                 recordings[i].file, recordings[before].file));
-}
-
-bool near_any(const std::vector<double>& times, double t_s) {
-    const auto next = std::lower_bound(times.begin(), times.end(), t_s - kNearS);
-    return next != times.end() && *next <= t_s + kNearS;
 }
 
 }  // namespace app

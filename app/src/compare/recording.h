@@ -46,7 +46,4 @@ struct Recording {
 /// Throws BadInput if two of them hold the same samples.
 void require_distinct(std::span<const Recording> recordings);
 
-/// Whether `t_s` lies within +-50 ms of one of `times` (ascending).
-[[nodiscard]] bool near_any(const std::vector<double>& times, double t_s);
-
 }  // namespace app

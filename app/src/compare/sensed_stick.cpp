@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 #include <stdexcept>
 
@@ -11,6 +12,8 @@
 
 namespace app {
 namespace {
+
+constexpr double kNearS = 0.050;
 
 double median_rate(const std::vector<tracking::PoseSample>& samples) {
     std::vector<double> dt;
@@ -33,6 +36,11 @@ std::optional<Truth> truth_at(const Recording& recording, std::size_t stick, dou
 }
 
 }  // namespace
+
+bool near_any(const std::vector<double>& times, double t_s) {
+    const auto next = std::lower_bound(times.begin(), times.end(), t_s - kNearS);
+    return next != times.end() && *next <= t_s + kNearS;
+}
 
 SensedStick sense_stick(const Recording& recording, std::size_t stick, const tracking::SensorModel& sensor,
                         std::span<const double> leads_s) {
@@ -69,6 +77,14 @@ std::vector<SensedStick> sense_all(std::span<const Recording> recordings, const 
             sticks.back().recording = r;
         }
     return sticks;
+}
+
+Field read_field(const std::vector<std::string>& files, const ComparisonOptions& options) {
+    Field field;
+    for (const std::string& file : files) field.recordings.push_back(read_recording(file, options.persons));
+    require_distinct(field.recordings);
+    if (!files.empty()) field.sticks = sense_all(field.recordings, options.sensor, options.leads_s);
+    return field;
 }
 
 }  // namespace app

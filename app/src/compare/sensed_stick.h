@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "compare/comparison.h"
 #include "compare/recording.h"
 #include "statistics/statistics.h"
 
@@ -52,5 +53,17 @@ inline constexpr double kSettlingS = 0.5;
 [[nodiscard]] std::vector<SensedStick> sense_all(std::span<const Recording> recordings,
                                                  const tracking::SensorModel& sensor,
                                                  std::span<const double> leads_s);
+
+/// Whether `t_s` lies within +-50 ms of one of `times` (ascending).
+[[nodiscard]] bool near_any(const std::vector<double>& times, double t_s);
+
+/// Recordings and what the sensor sees of them.
+struct Field {
+    std::vector<Recording> recordings;
+    std::vector<SensedStick> sticks;
+};
+
+/// Throws tracking::TraceError, and BadInput, also where two files hold the same samples.
+[[nodiscard]] Field read_field(const std::vector<std::string>& files, const ComparisonOptions& options);
 
 }  // namespace app

@@ -11,8 +11,8 @@
 #include "kit/tip_track.h"
 #include "statistics/statistics.h"
 #include "sticks/auto_predictor.h"
-#include "sticks/stick_tracker.h"
-#include "strikes/played_strikes.h"
+#include "sticks/replay.h"
+#include "sticks/stick_outlook.h"
 #include "strikes/score_strikes.h"
 #include "strikes/strike_scheduler.h"
 #include "strikes/strike_score.h"
@@ -134,16 +134,16 @@ std::vector<double> absolute(std::vector<double> values) {
 }  // namespace
 
 double HitScore::precision() const {
-    return predicted > 0 ? static_cast<double>(matched) / predicted : 1;
+    return predicted > 0 ? static_cast<double>(matched) / predicted : kNoValue;
 }
 
 double HitScore::recall() const {
-    return true_contacts > 0 ? static_cast<double>(matched) / true_contacts : 1;
+    return true_contacts > 0 ? static_cast<double>(matched) / true_contacts : kNoValue;
 }
 
 double HitScore::f1() const {
     const int both = true_contacts + predicted;
-    return both > 0 ? 2.0 * matched / both : 1;
+    return both > 0 ? 2.0 * matched / both : kNoValue;
 }
 
 double HitScore::median_ms() const {
@@ -151,7 +151,7 @@ double HitScore::median_ms() const {
 }
 
 double HitScore::p95_ms() const {
-    return nearest_rank(absolute(errors_ms), 95);
+    return quantile(absolute(errors_ms), 0.95);
 }
 
 double HitScore::false_per_min() const {
@@ -179,6 +179,13 @@ void HitScore::add(const HitScore& other) {
 
 namespace {
 
+/// What a model predicts at a sample.
+struct Expected {
+    std::vector<sim::Contact> contacts;
+    std::vector<double> clearance_m;
+    operator ModelContacts() const { return {contacts, clearance_m}; }  // NOLINT(google-explicit-constructor)
+};
+
 /// The paths of a run, at each sample, against a surface.
 class Sweeps {
 public:
@@ -191,26 +198,26 @@ public:
           leads_(strike_leads(timing)),
           confirming_leads_(path_leads(kConfirmingLeadS)) {}
 
-    /// Contacts that a model predicts from its newest sample.
-    [[nodiscard]] std::vector<sim::Contact> of_model(std::size_t model) const {
-        std::vector<sim::Contact> contacts;
+    /// What a model predicts from its newest sample.
+    [[nodiscard]] Expected of_model(std::size_t model) const {
         const tracking::Predictor& timing = predictors_.timing;
         const auto pose = [&](double lead) { return timing.predict_model(model, lead); };
+        Expected expected{{}, surface_.clearances(tracking::point_of(pose(0), geometry_.tip).position)};
         if (const auto path = predicted_path(pose, timing.time_s(), geometry_, 0, leads_))
-            contacts = surface_.sweep(*path);
-        for (sim::Contact& contact : contacts)
+            expected.contacts = surface_.sweep(*path);
+        for (sim::Contact& contact : expected.contacts)
             if (!contact.starts_inside) contact.t_s = std::max(timing.time_s(), contact.t_s - advance_s_);
-        return contacts;
+        return expected;
     }
-    [[nodiscard]] std::vector<sim::Contact> confirmed(std::vector<sim::Contact> contacts) const {
-        if (!predictors_.confirming) return contacts;
+    [[nodiscard]] Expected confirmed(Expected expected) const {
+        if (!predictors_.confirming) return expected;
         const tracking::Predictor& other = *predictors_.confirming;
         const auto pose = [&](double lead) { return other.predict(lead); };
-        std::vector<sim::Contact> borne_out;
+        std::vector<sim::Contact> confirming;
         if (const auto path = predicted_path(pose, other.time_s(), geometry_, 0, confirming_leads_))
-            borne_out = surface_.sweep(*path);
-        keep_confirmed(contacts, borne_out, predictors_.timing.time_s());
-        return contacts;
+            confirming = surface_.sweep(*path);
+        keep_confirmed(expected.contacts, confirming, predictors_.timing.time_s());
+        return expected;
     }
 
 private:
@@ -237,35 +244,32 @@ HitScore evaluate_strikes(const tracking::StickTrace& recorded, std::span<const 
     if (!surface) return hits;
     tracking::Predictor& predictor = predictors.timing;
     const std::size_t models = predictor.models();
-    PlayedStrikes played(rules_at(timing, true, track.t_s.front()), surface->parts(), models);
-    PlayedStrikes uncancelled(rules_at(timing, false, track.t_s.front()), surface->parts(), models);
+    StrikeScheduler played(rules_at(timing, true, track.t_s.front()), 1, surface->parts());
+    StrikeScheduler uncancelled(rules_at(timing, false, track.t_s.front()), 1, surface->parts());
     const Sweeps sweeps(predictors, geometry, *surface, timing);
-    for (const tracking::PoseSample& sample : samples) {
-        if (predictors.confirming) (void)predictors.confirming->correct(sample);
-        const tracking::SampleStatus status = predictor.correct(sample);
-        const bool restarted = status == tracking::SampleStatus::reinitialised;
-        if (!restarted && status != tracking::SampleStatus::accepted) continue;
-        const double s = sample.t_s;
+    replay(predictor, samples, [&](const ReplayedSample& now) {
+        if (predictors.confirming) (void)predictors.confirming->correct(now.sample);
+        if (!is_taken(now.status)) return;
         const std::vector<double> measured =
-            surface->clearances(sample.position + sample.orientation * geometry.tip);
-        for (PlayedStrikes* strikes : {&played, &uncancelled}) {
-            strikes->advance_to(s);
-            if (restarted) strikes->restart();
-        }
+            surface->clearances(now.sample.position + now.sample.orientation * geometry.tip);
+        std::vector<Expected> all, confirmed;
         for (std::size_t model = 0; model < models; ++model) {
-            const std::vector<double> filtered = surface->clearances(
-                tracking::point_of(predictor.predict_model(model, 0), geometry.tip).position);
-            const std::vector<sim::Contact> contacts = sweeps.of_model(model);
-            uncancelled.sample(model, s, contacts, measured, filtered);
-            played.sample(model, s, sweeps.confirmed(contacts), measured, filtered);
+            all.push_back(sweeps.of_model(model));
+            confirmed.push_back(sweeps.confirmed(all.back()));
         }
-        played.select(predictor.selected(), s, measured);
-        uncancelled.select(predictor.selected(), s, measured);
-    }
+        for (const auto& [strikes, expected] : {std::pair(&played, &confirmed), {&uncancelled, &all}}) {
+            strikes->advance_to(now.sample.t_s);
+            if (now.status == tracking::SampleStatus::reinitialised) strikes->restart(0);
+            const std::vector<ModelContacts> views(expected->begin(), expected->end());
+            strikes->sample(0, now.sample.t_s, views, predictor.selected(), measured);
+        }
+    });
     std::vector<TrueContact> contacts = surface->true_contacts(track);
-    const int without_cancel = score_of(uncancelled.finish(), contacts).false_notes();
+    played.finish();
+    uncancelled.finish();
+    const int without_cancel = score_of(uncancelled.strikes(), contacts).false_notes();
     const double minutes = hits.minutes;
-    hits = score_of(played.finish(), contacts);
+    hits = score_of(played.strikes(), contacts);
     hits.false_without_cancel = without_cancel;
     hits.minutes = minutes;
     return hits;

@@ -28,10 +28,10 @@ struct HitScore {
     std::vector<double> errors_ms;  ///< committed minus true time, signed, of the matched notes
 
     [[nodiscard]] int false_notes() const { return predicted - matched; }
-    [[nodiscard]] double precision() const;  ///< 1 when nothing was predicted
-    [[nodiscard]] double recall() const;     ///< 1 when there was nothing to find
-    [[nodiscard]] double f1() const;         ///< 2 matched / (true + predicted); 1 when both are 0
-    [[nodiscard]] double median_ms() const;  ///< of |error|; 0 when nothing matched
+    [[nodiscard]] double precision() const;  ///< kNoValue when nothing was predicted
+    [[nodiscard]] double recall() const;     ///< kNoValue when there was nothing to find
+    [[nodiscard]] double f1() const;         ///< 2 matched / (true + predicted); kNoValue when both are 0
+    [[nodiscard]] double median_ms() const;  ///< of |error|; kNoValue when nothing matched
     [[nodiscard]] double p95_ms() const;
     [[nodiscard]] double false_per_min() const;
     [[nodiscard]] double false_per_min_without_cancel() const;
@@ -45,7 +45,7 @@ struct HitScore {
 /// Who says when a stick strikes.
 struct StrikePredictors {
     tracking::Predictor& timing;                ///< whose path is swept
-    tracking::Predictor* confirming = nullptr;  ///< whose path must bear it out (keep_confirmed); may be none
+    tracking::Predictor* confirming = nullptr;  ///< must confirm near contacts (keep_confirmed); may be none
 };
 
 struct StrikeTiming {
@@ -61,8 +61,7 @@ struct StrikeTiming {
 /// Strikes of one stick (the strike rules of the README): at each sample the path that the predictor states
 /// until a little beyond the lead is swept against the surface; a contact's time is re-timed at each sample
 /// until the lead before it, then fixed; it may be cancelled, and taken up again, until the release margin
-/// before it. Each model of a predictor of several keeps its own pending contacts; those of the model that is
-/// selected when they must be released count. Without cancelling every contact whose time was fixed is
+/// before it (StrikeScheduler, which `play` runs, too). Without cancelling every contact whose time was fixed is
 /// played. The true contacts are those of the recorded path, straight between samples, 3 mm deep. A pure
 /// function, but for `exec:` predictors with a state of their own.
 ///

@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
-#include <map>
+#include <sstream>
 
 #include "process/parallel.h"
 #include "sticks/predictors.h"
@@ -15,85 +16,46 @@ namespace {
 
 constexpr double kNoiseMm = 0.25;  // what the filters assume unless told
 
-/// Two values a decade: 1e4, 3e4, 1e5, ... up to `last` (powers of ten).
-std::vector<std::string> densities(int first, int last) {
-    std::vector<std::string> values;
-    for (int power = first; power <= last; ++power) {
-        values.push_back(fmt::format("1e{}", power));
-        if (power < last) values.push_back(fmt::format("3e{}", power));
-    }
-    return values;
-}
+/// What tuning tries of a family: every combination of one of each axis, the last axis fastest. An axis is words
+/// with blanks between; a first one that ends in = stands before each of the others; - is the default.
+struct Grid {
+    const char* family;
+    std::vector<const char*> axes;
+};
 
-/// FORMAT with each value in place of its {}.
-std::vector<std::string> filled(const std::string& before, const std::vector<std::string>& values) {
-    std::vector<std::string> specifications;
-    specifications.reserve(values.size());
-    for (const std::string& value : values) specifications.push_back(before + value);
-    return specifications;
-}
-
-/// Every combination of one of `a` before one of `b`.
-std::vector<std::string> crossed(const std::vector<std::string>& a, const std::vector<std::string>& b) {
-    std::vector<std::string> specifications;
-    for (const std::string& x : a)
-        for (const std::string& specification : filled(x, b)) specifications.push_back(specification);
-    return specifications;
-}
-
-std::vector<std::string> least_squares_grid() {
-    std::vector<std::string> grid =
-        filled("least-squares:degree=1,n=", {"2", "3", "4", "5", "6", "8", "12", "16"});
-    for (const std::string& parabola :
-         filled("least-squares:degree=2,n=", {"3", "4", "5", "6", "8", "12", "16", "24"}))
-        grid.push_back(parabola);
-    return grid;
-}
-
-/// Singer's densities: a decade each, from a slow hand to contacts.
-std::vector<std::string> singer_grid() {
-    return crossed(filled("singer:alpha=", {"3", "10", "30", "100", "300"}),
-                   filled(",q=", {"1e7", "1e8", "1e9", "1e10", "1e11", "1e12", "1e13", "1e14"}));
-}
-
-std::vector<std::string> bank_grid() {
-    return crossed(crossed(filled("bank:cv=", {"1e7", "1e8", "1e9"}), filled(",alpha=", {"10", "30", "100"})),
-                   filled(",singer=", {"1e10", "1e11", "1e12"}));
-}
-
-std::vector<std::string> imm_grid() {
-    return crossed(filled("imm:alpha=", {"3", "10", "30", "100"}),
-                   {",q1=1e8,q2=3e9,q3=1e11", ",q1=1e9,q2=3e10,q3=1e12", ",q1=1e10,q2=3e11,q3=1e13"});
-}
-
-std::vector<std::string> one_euro_grid() {
-    return crossed(crossed(filled("one-euro:min=", {"1", "2", "3", "5", "10", "20", "40"}),
-                           filled(",beta=", {"0", "0.01", "0.1"})),
-                   filled(",d=", {"10", "30", "100", "1000"}));
-}
-
-const std::map<std::string, std::function<std::vector<std::string>()>>& grids() {
-    static const std::map<std::string, std::function<std::vector<std::string>()>> all = {
-        {"naive",
-         [] {
-             return filled("naive:n=", {"1", "2", "3", "4", "5", "6", "8", "11", "16"});
-         }},
-        {"least-squares", least_squares_grid},
-        {"double-exponential",
-         [] {
-             return filled("double-exponential:a=",
-                           {"0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "0.95", "0.98"});
-         }},
-        {"one-euro", one_euro_grid},
+/// Densities are two values a decade, of Singer's one, from a slow hand to contacts.
+const std::vector<Grid>& grids() {
+    static const std::vector<Grid> all = {
+        {"naive", {"n= 1 2 3 4 5 6 8 11 16"}},
+        {"least-squares", {"degree=1", "n= 2 3 4 5 6 8 12 16"}},
+        {"least-squares", {"degree=2", "n= 3 4 5 6 8 12 16 24"}},
+        {"double-exponential", {"a= 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9 0.95 0.98"}},
+        {"one-euro", {"min= 1 2 3 5 10 20 40", "beta= 0 0.01 0.1", "d= 10 30 100 1000"}},
         {"cv",
-         [] {
-             return crossed(filled("cv:q=", densities(4, 12)),
-                            {"", ",decay=2", ",decay=4", ",decay=8", ",decay=16", ",decay=32"});
-         }},
-        {"ca", [] { return filled("ca:q=", densities(5, 14)); }},
-        {"singer", singer_grid},
-        {"bank", bank_grid},
-        {"imm", imm_grid}};
+         {"q= 1e4 3e4 1e5 3e5 1e6 3e6 1e7 3e7 1e8 3e8 1e9 3e9 1e10 3e10 1e11 3e11 1e12",
+          "- decay=2 decay=4 decay=8 decay=16 decay=32"}},
+        {"ca", {"q= 1e5 3e5 1e6 3e6 1e7 3e7 1e8 3e8 1e9 3e9 1e10 3e10 1e11 3e11 1e12 3e12 1e13 3e13 1e14"}},
+        {"singer", {"alpha= 3 10 30 100 300", "q= 1e7 1e8 1e9 1e10 1e11 1e12 1e13 1e14"}},
+        {"bank", {"cv= 1e7 1e8 1e9", "alpha= 10 30 100", "singer= 1e10 1e11 1e12"}},
+        {"imm",
+         {"alpha= 3 10 30 100", "q1=1e8,q2=3e9,q3=1e11 q1=1e9,q2=3e10,q3=1e12 q1=1e10,q2=3e11,q3=1e13"}}};
+    return all;
+}
+
+/// Each specification with each parameter of an axis.
+std::vector<std::string> crossed(const std::vector<std::string>& specifications, const std::string& axis) {
+    std::vector<std::string> all;
+    for (const std::string& specification : specifications) {
+        std::istringstream words(axis);
+        std::string name;
+        for (std::string word; words >> word;) {
+            const char* before = specification.find(':') == std::string::npos ? ":" : ",";
+            if (word.ends_with('='))
+                name = word;
+            else
+                all.push_back(word == "-" ? specification : specification + before + name + word);
+        }
+    }
     return all;
 }
 
@@ -114,10 +76,16 @@ bool is_baseline(const std::string& specification) {
 }
 
 std::vector<std::string> tuning_grid(const std::string& family, double noise_mm) {
-    const auto grid = grids().find(family);
-    if (grid == grids().end()) return {};
     const bool told = knows_noise(family) && noise_mm > 0 && noise_mm != kNoiseMm;
-    return told ? crossed(grid->second(), {fmt::format(",r={}", noise_mm)}) : grid->second();
+    std::vector<std::string> all;
+    for (const Grid& grid : grids()) {
+        if (grid.family != family) continue;
+        std::vector<std::string> specifications = {family};
+        for (const char* axis : grid.axes) specifications = crossed(specifications, axis);
+        if (told) specifications = crossed(specifications, fmt::format("r={}", noise_mm));
+        std::ranges::move(specifications, std::back_inserter(all));
+    }
+    return all;
 }
 
 std::vector<std::string> candidates_of(const std::vector<std::string>& families, double noise_mm) {

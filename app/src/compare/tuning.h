@@ -15,7 +15,7 @@ namespace app {
 [[nodiscard]] std::string family_of(const std::string& specification);
 
 /// The specifications among which tuning chooses for a family: a small grid, its densities logarithmic. The
-/// filters are told the sensor's noise (0: not known, their own 0.25 mm). Empty for a family without
+/// filters get the sensor's noise (0: not known, their own 0.25 mm). Empty for a family without
 /// parameters.
 [[nodiscard]] std::vector<std::string> tuning_grid(const std::string& family, double noise_mm = 0);
 

@@ -1,62 +1,43 @@
 #pragma once
-#include <toml++/toml.h>
-
-#include <Eigen/Core>
-#include <initializer_list>
-#include <optional>
+#include <filesystem>
+#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "files/fields.h"
+
 namespace app {
 
-/// Reads the keys of a stack of TOML tables (the first that has a key gives its value: an instrument, then
-/// the defaults of its kind) and holds them to what is known: every value is checked where it is read, and
-/// done() refuses keys that nobody asked for. All failures are BadInput with FILE:LINE:COLUMN. The tables
-/// must outlive the reader.
-class TomlReader {
-public:
-    /// `where` names the table in messages, e.g. "[[instrument]] snare".
-    TomlReader(std::vector<const toml::table*> layers, std::string where);
-
-    [[nodiscard]] bool has(std::string_view key) const { return get(key) != nullptr; }
-    [[nodiscard]] bool is_array(std::string_view key) const { return has(key) && get(key)->is_array(); }
-    [[nodiscard]] std::string text(std::string_view key, std::optional<std::string> fallback = {});
-    [[nodiscard]] std::string choice(std::string_view key, std::initializer_list<std::string_view> allowed,
-                                     std::optional<std::string> fallback = {});
-    [[nodiscard]] double number(std::string_view key, double low, double high,
-                                std::optional<double> fallback = {});
-    /// A number, or a text with a fraction: "1/60".
-    [[nodiscard]] double fraction(std::string_view key, double low, double high,
-                                  std::optional<double> fallback = {});
-    [[nodiscard]] int integer(std::string_view key, int low, int high, std::optional<int> fallback = {});
-    [[nodiscard]] bool flag(std::string_view key, std::optional<bool> fallback = {});
-    /// `size` numbers, each in [low, high].
-    [[nodiscard]] Eigen::VectorXd numbers(std::string_view key, int size, double low, double high,
-                                          std::optional<Eigen::VectorXd> fallback = {});
-    [[nodiscard]] Eigen::Vector3d vector(std::string_view key, double low, double high,
-                                         std::optional<Eigen::Vector3d> fallback = {});
-    /// The table at a key, through all layers; an empty one where it is missing.
-    [[nodiscard]] TomlReader table(std::string_view key);
-    [[nodiscard]] std::vector<TomlReader> tables(std::string_view key);
-    [[nodiscard]] std::vector<std::string> texts(std::string_view key);
-
-    /// Refuses keys that were not read.
-    void done() const;
-    /// Throws BadInput at a key's place (at the table's when it is absent).
-    [[noreturn]] void fail(std::string_view key, const std::string& found, const std::string& expected) const;
-
-private:
-    [[nodiscard]] const toml::node* get(std::string_view key) const;
-    const toml::node* find(std::string_view key);
-    [[noreturn]] void missing(std::string_view key, const std::string& expected) const;
-
-    std::vector<const toml::table*> layers_;
-    std::string where_;
-    std::vector<std::string> read_;
+/// What a file should be, for messages.
+struct TomlKind {
+    std::string name;  ///< "a kit"
+    std::string help;  ///< what to do when there is no such file
 };
 
-/// "FILE:LINE:COLUMN: error: found F, expected E" as BadInput.
-[[noreturn]] void fail_at(const toml::source_region& place, const std::string& found,
-                          const std::string& expected);
+/// A TOML document in memory, with the places of its keys.
+class TomlFile {
+public:
+    /// Throws BadInput: no file, a folder, a syntax error (with its place).
+    TomlFile(const std::filesystem::path& file, const TomlKind& kind);
+    /// `name` stands for the file in messages.
+    TomlFile(std::string_view text, const std::string& name);
+    TomlFile(TomlFile&&) noexcept;
+    TomlFile& operator=(TomlFile&&) noexcept;
+    ~TomlFile();
+
+private:
+    friend void read_toml(const std::vector<TomlFile>& layers, const std::string& where,
+                          const std::function<void(Fields&)>& keys, bool all);
+    struct Document;
+    std::unique_ptr<Document> document_;
+};
+
+/// Runs a declaration of keys on a stack of files: the first that has a key gives its value, tables are merged
+/// key by key. Every value is checked where it is read, and keys that were not declared are refused, unless
+/// `all` is false. `where` names the file in messages, e.g. "the kit". All failures are BadInput with
+/// FILE:LINE:COLUMN: error: found F, expected E.
+void read_toml(const std::vector<TomlFile>& layers, const std::string& where,
+               const std::function<void(Fields&)>& keys, bool all = true);
 
 }  // namespace app

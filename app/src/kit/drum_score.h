@@ -18,8 +18,8 @@ struct DrumScore {
 /// The scores that make_score knows:
 ///   flourish  a groove, fills over the whole kit, both sticks on the crash at the end
 ///   feints    every other stroke, on average, is a feint; 12 of 20 turn 35 ms or more before the contact
-///   that they feint, the others close to the head roll      single strokes at 6 to 8 Hz a hand, then 15 Hz
-///   from two hands, then 15 Hz from one
+///             that they feint, the others close to the head
+///   roll      single strokes at 6 to 8 Hz per hand, then 15 Hz from two hands, then 15 Hz from one
 [[nodiscard]] const std::vector<std::string>& score_names();
 
 /// The score on a kit. Targets lie on the instruments' surfaces at rest, grown by the tip's radius. Parts are

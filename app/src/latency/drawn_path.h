@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "latency/realtime_result.h"
+#include "latency/timings.h"
 
 namespace app {
 
@@ -23,7 +23,7 @@ public:
     void add(const DrawnTip& tip);
 
     /// When the curve comes into `body`'s rest surface grown by `radius_m` from outside, within [from_s,
-    /// to_s], by time; to 1e-9 of a piece. Dips of less than 0.5 mm along the path may be passed over.
+    /// to_s], by time; to 1e-11 s. Dips of less than 0.5 mm along the path may be passed over.
     [[nodiscard]] std::vector<double> touches(const sim::BodyDefinition& body, double radius_m, double from_s,
                                               double to_s) const;
     /// The first node from `from_s` to `to_s` at which the stick is drawn at or behind that surface: behind

@@ -1,32 +1,18 @@
 #pragma once
-#include <array>
 #include <filesystem>
-#include <optional>
 #include <string>
-#include <vector>
+
+#include "report/table.h"
 
 namespace app {
 
-/// A figure of two runs. None: the run does not have it.
-struct ComparedFigure {
-    std::string name;
-    std::optional<double> a, b;
-
-    /// b over a; none where either is missing or a is 0.
-    [[nodiscard]] std::optional<double> ratio() const;
-};
-
-/// p50, p95, p99, max [ms] of a stage of two runs.
-struct ComparedStage {
-    std::string name;
-    std::array<ComparedFigure, 4> figures;
-};
-
-/// Two runs of `latency` side by side.
+/// Two runs of `latency` side by side. A ratio is B over A, none where either is missing or A is 0.
 struct LatencyComparison {
-    std::string a, b;                     ///< folders
-    std::vector<ComparedStage> stages;    ///< in the order of the first run, then what the second has alone
-    std::vector<ComparedFigure> figures;  ///< misses, sound minus picture, leads needed, errors
+    std::string a, b;  ///< folders
+    /// `name`, then `a/p50_ms`, `b/p50_ms`, `ratio/p50_ms` and so on for p95, p99 and max; in the order of
+    /// the first run, then what the second has alone.
+    Table stages;
+    Table figures;  ///< `name`, `a`, `b`, `ratio`: misses, sound minus picture, leads needed, errors
 };
 
 /// Reads latency.json of both folders. Throws BadInput for what `latency` did not write.

@@ -2,14 +2,242 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <iterator>
+#include <map>
 
-#include "latency/latency_plots.h"
+#include "latency/latency_tables.h"
+#include "report/plot_gallery.h"
+#include "report/plot_panel.h"
 #include "report/report_style.h"
-#include "statistics/statistics.h"
 
 namespace app {
 namespace {
+
+constexpr int kWide = 1040, kHalf = 520;
+
+std::string axes(const char* x, const char* y) {
+    return plot_axes() + fmt::format("set xlabel '{}'\nset ylabel '{}'\n", x, y);
+}
+
+std::string range(const char* axis, double low, double high) {
+    return fmt::format("set {}range [{}:{}]\n", axis, low, high);
+}
+
+/// Lines "x y" of the longest values that 1 in 1, 2, 3, ... exceeds, thinned to about 50 a factor of ten.
+std::string longer_shares(const Spread& ms, double least_ms) {
+    const std::vector<double>& sorted = ms.sorted();
+    const double n = static_cast<double>(sorted.size());
+    std::string text;
+    double last = 2;
+    for (std::size_t i = 0; i < sorted.size(); ++i) {
+        const double share = (n - static_cast<double>(i)) / n;
+        if (share > last * 0.955 && i + 1 != sorted.size()) continue;
+        last = share;
+        fmt::format_to(std::back_inserter(text), "{:.6g} {:.6g}\n", std::max(sorted[i], least_ms), share);
+    }
+    return text;
+}
+
+/// Counts in bins of a width, as boxes.
+struct Histogram {
+    std::string data;
+    int highest = 1;
+};
+Histogram histogram(const Spread& ms, double bin_ms, double low_ms, double high_ms) {
+    std::map<int, int> bins;
+    for (const double value : ms.sorted())
+        if (value >= low_ms && value <= high_ms) ++bins[static_cast<int>(std::floor(value / bin_ms))];
+    Histogram made;
+    if (bins.empty()) return made;
+    for (int bin = bins.begin()->first - 1; bin <= bins.rbegin()->first + 1; ++bin) {
+        const auto found = bins.find(bin);
+        const int count = found == bins.end() ? 0 : found->second;
+        fmt::format_to(std::back_inserter(made.data), "{} {}\n", (bin + 0.5) * bin_ms, count);
+        made.highest = std::max(made.highest, count);
+    }
+    return made;
+}
+
+/// A vertical line.
+void add_line(PlotPanel& panel, double x, double height, const PlotLine& look) {
+    panel.add(fmt::format("{} 0\n{} {}\n", x, x, height), style_of(look, 1.4));
+}
+
+/// The shaded place of what drummers call no latency: 10 +- 3 ms after the picture.
+std::string drummers_box(double height) {
+    return fmt::format("set object 1 rect from {},0 to {},{} fc {} fs solid 0.18 noborder behind\n",
+                       kDrummersLatencyMs - kDrummersJitterMs, kDrummersLatencyMs + kDrummersJitterMs, height,
+                       gnuplot_colour(colours::sticks[1]));
+}
+
+const PlotLine kPicture{"against the drawn path", colours::released},
+    kFrame{"against the first frame behind the surface", colours::wave},
+    kAtsc{"ATSC production limit (-15, +45 ms)", colours::sticks[2]},
+    kItu{"ITU-R BT.1359 detectable (-45, +125 ms)", colours::wrong},
+    kDrummers{"drummers: 10 +- 3 ms passes for none", colours::sticks[1]};
+
+std::string boxes(const PlotLine& look) {
+    return "with boxes fs solid 0.75 noborder lc " + gnuplot_colour(look.colour);
+}
+
+double pixels_ms_after_due(const FrameTiming& frame) {
+    return 1e-6 * static_cast<double>(frame.read_ns - frame.shown_ns);
+}
+
+double seconds(std::int64_t ns) {
+    return 1e-9 * static_cast<double>(ns);
+}
+
+/// Share of the values that are longer, over the value; a line for each stage of that kind. Both axes
+/// logarithmic, so that a straight look shows 1 in 2, in 20, in 100 and the rare ones.
+PlotWithLegend stage_plot(const LatencyReport& report, LatencyStage::Kind kind) {
+    constexpr double kLeastMs = 1e-5;
+    PlotWithLegend plot;
+    PlotPanel panel;
+    double low = 1e9, high = 1e-3, rarest = 0.1;
+    for (const LatencyStage& stage : report.stages) {
+        if (stage.kind != kind) continue;
+        plot.legend.push_back(line_of(plot.legend.size(), stage.name));
+        panel.add(longer_shares(stage.ms, kLeastMs), style_of(plot.legend.back(), 1.6));
+        low = std::min(low, std::max(stage.ms.percentile(5), kLeastMs));
+        high = std::max(high, stage.ms.max());
+        rarest = std::min(rarest, 1 / static_cast<double>(stage.ms.count()));
+    }
+    plot.script = {kHalf, 320,
+                   axes("ms", "share that took longer") + "set logscale xy\nset format '%g'\n" +
+                       range("x", std::min(low, high) / 1.5, high * 1.5) + range("y", rarest / 1.5, 1) +
+                       panel.text()};
+    return plot;
+}
+
+/// Leads in force and the delays that they follow over the run.
+PlotWithLegend leads_plot(const RealtimeResult& realtime) {
+    struct Series {
+        const char* name;
+        double LeadStep::*value;
+        ReportColour colour;
+        bool dashed;
+    };
+    constexpr Series kSeries[] = {{"lead of pictures", &LeadStep::render_lead_s, colours::sticks[0], false},
+                                  {"their delay", &LeadStep::render_delay_s, colours::sticks[0], true},
+                                  {"lead of sound", &LeadStep::sound_lead_s, colours::sticks[1], false},
+                                  {"its delay", &LeadStep::sound_delay_s, colours::sticks[1], true}};
+    PlotWithLegend plot;
+    PlotPanel panel;
+    double highest = 10;
+    for (const Series& series : kSeries) {
+        const auto ms = [&](const LeadStep& step) { return 1e3 * step.*series.value; };
+        // Delays are measured where leads follow them.
+        if (std::all_of(realtime.leads.begin(), realtime.leads.end(),
+                        [&](const LeadStep& step) { return ms(step) == 0; }))
+            continue;
+        std::string data;
+        for (const LeadStep& step : realtime.leads) {
+            fmt::format_to(std::back_inserter(data), "{:.3f} {:.4f}\n", step.at_s, ms(step));
+            highest = std::max(highest, ms(step));
+        }
+        fmt::format_to(std::back_inserter(data), "{:.3f} {:.4f}\n",
+                       std::max(realtime.seconds, realtime.leads.back().at_s), ms(realtime.leads.back()));
+        plot.legend.push_back({series.name, series.colour, series.dashed});
+        panel.add(data, fmt::format("with steps lt 1 lw 1.6{} lc {}", series.dashed ? " dt '-'" : "",
+                                    gnuplot_colour(series.colour)));
+    }
+    plot.script = {kWide, 260,
+                   axes("time, s", "ms") + range("x", 0, std::max(realtime.seconds, 1e-3)) +
+                       range("y", 0, highest * 1.1) + round_tics("y", highest * 1.1, 6) + panel.text()};
+    return plot;
+}
+
+/// Sound minus picture, with the limits of ITU-R BT.1359 and ATSC and the 10 +- 3 ms of drummers beside it.
+PlotWithLegend sound_picture_plot(const LatencyReport& report) {
+    const double low = std::min(-60.0, std::floor(report.sound_minus_picture_ms.min())),
+                 high = std::max(140.0, std::ceil(report.sound_minus_picture_ms.max()));
+    const Histogram counts = histogram(report.sound_minus_picture_ms, 2, low, high);
+    const double top = 1.08 * counts.highest;
+    PlotPanel panel;
+    panel.add(counts.data, boxes(kPicture));
+    for (const double x : {kAtscLimits.early_ms, kAtscLimits.late_ms}) add_line(panel, x, top, kAtsc);
+    for (const double x : {kItuLimits.early_ms, kItuLimits.late_ms}) add_line(panel, x, top, kItu);
+    return {
+        {kHalf, 260,
+         axes("sound - picture, ms (positive: sound late)", "strikes in 2 ms") + drummers_box(top) +
+             range("x", low, high) + range("y", 0, top) + "set xtics 20\nset boxwidth 1.8\n" + panel.text()},
+        {kPicture, kAtsc, kItu, kDrummers}};
+}
+
+/// The same close up: 80 ms about the median, 1 ms a bin; and against the first frame behind the surface.
+PlotWithLegend sound_picture_close_plot(const LatencyReport& report) {
+    const Spread& ms = report.sound_minus_picture_ms;
+    const double middle = ms.empty() ? 0 : std::round(ms.percentile(50) / 10) * 10;
+    const double low = middle - 40, high = middle + 40;
+    const Histogram path = histogram(report.sound_minus_picture_ms, 1, low, high),
+                    frame = histogram(report.sound_minus_frame_ms, 1, low, high);
+    const double top = 1.08 * std::max(path.highest, frame.highest);
+    PlotPanel panel;
+    panel.add(path.data, boxes(kPicture));
+    panel.add(frame.data, "with histeps lt 1 lw 1.4 lc " + gnuplot_colour(kFrame.colour));
+    return {
+        {kHalf, 260,
+         axes("sound - picture, ms (positive: sound late)", "strikes in 1 ms") + drummers_box(top) +
+             range("x", low, high) + range("y", 0, top) + "set xtics 10\nset boxwidth 0.9\n" + panel.text()},
+        {kPicture, kFrame, kDrummers}};
+}
+
+/// When each frame's pixels were there, before (below 0) or after it was due; missed ones marked.
+PlotWithLegend frames_plot(const RealtimeResult& realtime) {
+    double low = -5, high = 5, last_s = realtime.seconds;
+    for (const FrameTiming& frame : realtime.frames) {
+        last_s = std::max(last_s, seconds(frame.shown_ns));
+        if (frame.read_ns == 0) continue;
+        low = std::min(low, pixels_ms_after_due(frame) - 2);
+        high = std::max(high, pixels_ms_after_due(frame) + 2);
+    }
+    const PlotArea area{0, std::max(last_s, 1e-3), low, high, kWide, 240};
+    ThinnedMarks in_time(area), late(area), skipped(area);
+    for (const FrameTiming& frame : realtime.frames) {
+        const double at_s = seconds(frame.shown_ns);
+        if (!frame.asked_for) continue;
+        if (frame.fate == FrameFate::skipped)
+            skipped.add(at_s, 0);
+        else
+            (frame.fate == FrameFate::late ? late : in_time).add(at_s, pixels_ms_after_due(frame));
+    }
+    const PlotLine shown{"in time", colours::released}, missed{"late: not shown", colours::wrong},
+        never{"skipped: not drawn", colours::missed};
+    PlotPanel panel;
+    panel.add(in_time.text(), "with points pt 7 ps 0.25 lc " + gnuplot_colour(shown.colour));
+    panel.add(late.text(), "with points pt 7 ps 0.5 lc " + gnuplot_colour(missed.colour));
+    panel.add(skipped.text(), "with points pt 7 ps 0.5 lc " + gnuplot_colour(never.colour));
+    panel.add(fmt::format("0 0\n{} 0\n", area.x_high),
+              "with lines lt 1 lw 1 lc " + gnuplot_colour(colours::axis));
+    return {{kWide, 260,
+             axes("due on the screen, s", "pixels there after that, ms") + range("x", 0, area.x_high) +
+                 range("y", low, high) + round_tics("y", high - low, 6) + panel.text()},
+            {shown, missed, never}};
+}
+
+/// RMS error of the drawn sticks, a point for each half second.
+PlotWithLegend error_plot(const LatencyReport& report) {
+    constexpr double kWindowS = 0.5;
+    std::string data;
+    double highest = 1;
+    const double end_s = report.errors.empty() ? 1 : report.errors.back().at_s;
+    for (int window = 0; window * kWindowS < end_s; ++window) {
+        const double from_s = window * kWindowS;
+        const double rms = rms_mm(report.errors, from_s, from_s + kWindowS);
+        fmt::format_to(std::back_inserter(data), "{:.3f} {:.4f}\n", from_s + kWindowS / 2, rms);
+        highest = std::max(highest, rms);
+    }
+    const PlotLine line{"RMS over 0.5 s, all sticks", colours::sticks[0]};
+    PlotPanel panel;
+    panel.add(data, style_of(line, 1.6));
+    return {{kWide, 220,
+             axes("time, s", "mm") + range("x", 0, end_s) + range("y", 0, 1.1 * highest) +
+                 round_tics("y", 1.1 * highest, 5) + panel.text()},
+            {line}};
+}
 
 std::string heading(const PlayResult& play, const RealtimeResult& r) {
     const std::string name = std::filesystem::path(play.trace).filename().string();
@@ -17,19 +245,13 @@ std::string heading(const PlayResult& play, const RealtimeResult& r) {
         fmt::format("<header><h1>Latency of {}</h1>\n<p>on {} in real time, by MusicWorld</p>\n", html(name),
                     html(play.kit_name));
     text += "<dl class=facts>\n" + report_fact("source", play.trace) + report_fact("kit", play.kit);
-    text += report_fact("run", fmt::format("{:.1f} s, {} laps", r.seconds, r.laps));
+    text += report_fact("run", fmt::format("{:.1f} s, {} lap{}", r.seconds, r.laps, r.laps == 1 ? "" : "s"));
     text += report_fact("pictures predicted by", play.picture_predictor);
     text += report_fact("sounds predicted by", play.sound_predictor);
     text += report_fact("sound goes to", fmt::format("{}; a block is begun {:.1f} ms before it is due",
                                                      r.audio_device, 1e3 * r.output_lead_s));
     for (const auto& [thread, obtained] : r.priorities)
         text += report_fact("priority of " + thread, obtained);
-    for (const ClockReport& clock : r.clocks)
-        text +=
-            report_fact("clock", fmt::format("{}: offset {:.3f} ms, drift {:.1f} ppm, arrival p95 {:.2f} ms "
-                                             "behind the earliest, {} jumps",
-                                             clock.clock, 1e3 * clock.offset_s, clock.drift_ppm,
-                                             clock.delay_p95_ms, clock.jumps));
     return text + "</dl></header>\n";
 }
 
@@ -49,60 +271,38 @@ std::string figures(const LatencyReport& r) {
     text += report_figure(missed(r.notes), "notes late", tone(r.notes));
     text += report_figure(missed(r.blocks), "blocks late", tone(r.blocks));
     text += report_figure(missed(r.samples), "samples late", tone(r.samples));
+    text += report_figure(missed(r.skipped), "samples skipped", tone(r.skipped));
+    text += report_figure(missed(r.strokes), "strokes missed", tone(r.strokes));
     text += report_figure(signed_ms(r.sound_minus_picture_ms, 50), "sound - picture", "axis");
     text += report_figure(needed(r.render_lead_needed_ms), "lead pictures need", "axis");
     text += report_figure(needed(r.sound_lead_needed_ms), "lead sound needs", "axis");
-    if (!r.errors.empty())
-        text +=
-            report_figure(fmt::format("{:.1f} mm", rms_mm(r.errors, 0, 1e300)), "RMS on the screen", "axis");
+    if (r.rms_error_mm)
+        text += report_figure(fmt::format("{:.1f} mm", *r.rms_error_mm), "RMS on the screen", "axis");
     return text + "</section>\n";
-}
-
-std::string stage_table(const LatencyReport& report) {
-    std::string text =
-        "<div class=scroll><table><tr><th>stage<th>from what to what<th class=n>count<th class=n>p50 ms<th "
-        "class=n>p95"
-        "<th class=n>p99<th class=n>max</tr>\n";
-    for (const LatencyStage& s : report.stages)
-        fmt::format_to(
-            std::back_inserter(text),
-            "<tr><td>{}<td>{}<td class=n>{}<td class=n>{:.3f}<td class=n>{:.3f}<td class=n>{:.3f}<td "
-            "class=n>{:.3f}</tr>\n",
-            html(s.name), html(s.meaning), s.ms.count(), s.ms.percentile(50), s.ms.percentile(95),
-            s.ms.percentile(99), s.ms.max());
-    return text + "</table></div>\n";
 }
 
 std::string sound_picture_note(const LatencyReport& report) {
     return fmt::format(
-        "<p class=note>A note's onset in the output minus the time at which the drawn path of its stick, a "
-        "cubic "
-        "Hermite curve through the tips predicted for the frames shown, comes into the instrument's surface. "
-        "Frames "
-        "that hold a stick at a coming contact count with the prediction of that contact, which the sound's "
-        "filter "
-        "made a render lead before. The screen shows no time between frames: the first frame that shows the "
-        "stick at "
-        "or behind the surface is up to a frame later (p5 {}, median {}, p95 {} against that). {:.1f} % of "
-        "all notes "
-        "lie within ATSC's limit, {:.1f} % of those with a picture within ITU's; of {} notes the drawn stick "
-        "did not "
-        "strike within {:g} ms.</p>\n",
+        "<p class=note>A note's onset in the output minus the time at which the drawn path of its stick, "
+        "a cubic Hermite curve through the tips predicted for the frames shown, comes into the "
+        "instrument's surface. Frames that hold a stick at a coming contact count with the prediction of "
+        "that contact, which the sound's filter made a render lead before. The screen shows no time "
+        "between frames: the first frame that shows the stick at or behind the surface is up to a frame "
+        "later (p5 {}, median {}, p95 {} against that). {:.1f} % of all notes lie within ATSC's limit, "
+        "{:.1f} % of those with a picture within ITU's; of {} notes the drawn stick did not strike "
+        "within {:g} ms.</p>\n",
         signed_ms(report.sound_minus_frame_ms, 5), signed_ms(report.sound_minus_frame_ms, 50),
         signed_ms(report.sound_minus_frame_ms, 95), 100 * report.share_within_atsc(),
         100 * report.share_within_itu(), report.notes_without_picture, 1e3 * kPictureWindowS);
 }
 
+/// What the sensors and the rule of quality did.
 std::string remarks(const RealtimeResult& realtime) {
-    std::string rows;
-    for (const SensorEvent& event : realtime.events)
-        rows += fmt::format("<tr><td class=n>{:.2f}<td>{}</tr>\n", event.at_s, html(event.message));
+    Table table = Table::of({"s:.2f", "event"});
+    for (const SensorEvent& event : realtime.events) table.add({event.at_s, event.message});
     for (const LeadStep& step : realtime.leads)
-        if (!step.why.empty())
-            rows += fmt::format("<tr><td class=n>{:.2f}<td>{}</tr>\n", step.at_s, html(step.why));
-    if (rows.empty()) return {};
-    return "<h2>What happened</h2>\n<div class=scroll><table><tr><th class=n>s<th>event</tr>\n" + rows +
-           "</table></div>\n";
+        if (!step.why.empty()) table.add({step.at_s, step.why});
+    return table.rows.empty() ? std::string() : "<h2>What happened</h2>\n" + table.html();
 }
 
 }  // namespace
@@ -120,9 +320,12 @@ std::string format_latency_page(const LatencyReport& report, const PlayResult& p
                       errors = plots.add(error_plot(report), "Error of the drawn sticks");
     plots.draw(scratch);
     std::string body = heading(play, realtime) + figures(report) + plots.symbols();
-    body += "<h2>Stages</h2>\n" + stage_table(report) + plots.pair({sound, picture});
+    body += "<h2>Stages</h2>\n<p class=note>Milliseconds.</p>\n" + stage_table(report).html() +
+            plots.pair({sound, picture});
+    body += "<h2>Deadlines</h2>\n" + deadline_table(report).html();
     body += "<h2>Sound and picture</h2>\n" + sound_picture_note(report) + plots.pair({apart, close});
     body += "<h2>Over time</h2>\n" + plots.element(leads) + plots.element(frames) + plots.element(errors);
+    if (!realtime.clocks.empty()) body += "<h2>Clocks</h2>\n" + clock_table(realtime).html();
     body += remarks(realtime);
     return report_page("Latency of " + std::filesystem::path(play.trace).filename().string(), body);
 }

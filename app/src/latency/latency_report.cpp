@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "statistics/statistics.h"
+
 namespace app {
 namespace {
 
@@ -71,22 +73,30 @@ Deadline deadline(const char* name, const char* meaning, const Items& items, con
     return {name, meaning, items.size(), static_cast<std::size_t>(count)};
 }
 
-void add_deadlines(LatencyReport& report, const RealtimeResult& realtime) {
-    constexpr double kHalfASampleS = 0.5 / 48000;
+void add_deadlines(LatencyReport& report, const PlayResult& play, const RealtimeResult& realtime) {
+    constexpr double kHalfASampleS = 0.5 / audio::kSampleRate;
     report.samples = deadline("samples", "taken before what they may change is fixed", realtime.samples,
                               [](const SampleTiming& s) { return s.late_s > 0; });
+    std::size_t skipped = 0;
+    for (const SampleTiming& sample : realtime.samples) skipped += sample.skipped;
+    report.skipped = {"samples seen", "by the application, before the next one came",
+                      realtime.samples.size() + skipped, skipped};
     report.notes = deadline("notes", "sounded when they were planned", realtime.notes,
                             [](const NoteTiming& n) { return n.late_s > kHalfASampleS; });
-    const auto output_lead_ns = static_cast<std::int64_t>(std::llround(1e9 * realtime.output_lead_s));
+    report.strokes = {"strokes", "sounded, by a note within 30 ms",
+                      static_cast<std::size_t>(play.score.true_contacts),
+                      static_cast<std::size_t>(play.score.missed)};
+    const auto output_lead_ns = std::llround(1e9 * realtime.output_lead_s);
     report.blocks =
         deadline("blocks", "of sound, done before they are due", realtime.blocks,
                  [&](const audio::BlockTiming& b) { return b.done_ns - b.planned_ns > output_lead_ns; });
-    report.frames =
-        deadline("frames", "there before they are shown", realtime.frames,
-                 [](const FrameTiming& f) { return f.asked_for && f.fate != FrameFate::in_time; });
-    report.frames_left_out = static_cast<std::size_t>(std::count_if(
-        realtime.frames.begin(), realtime.frames.end(), [](const FrameTiming& f) { return !f.asked_for; }));
-    report.frames.total -= report.frames_left_out;
+    for (const FrameTiming& frame : realtime.frames) {
+        report.frames_left_out += !frame.asked_for;
+        report.frames_late += frame.asked_for && frame.fate == FrameFate::late;
+        report.frames_skipped += frame.asked_for && frame.fate == FrameFate::skipped;
+    }
+    report.frames = {"frames", "there before they are shown", realtime.frames.size() - report.frames_left_out,
+                     report.frames_late + report.frames_skipped};
 }
 
 void add_sound_and_picture(LatencyReport& report, const PlayResult& play, const RealtimeResult& realtime,
@@ -119,9 +129,7 @@ Spread::Spread(std::vector<double> values) : sorted_(std::move(values)) {
 }
 
 double Spread::percentile(double percent) const {
-    if (sorted_.empty()) return 0;
-    const double rank = std::ceil(percent / 100 * static_cast<double>(sorted_.size()) - 1e-9);
-    return sorted_[std::min(sorted_.size() - 1, static_cast<std::size_t>(std::max(rank - 1, 0.0)))];
+    return quantile_of_sorted(sorted_, percent / 100);
 }
 
 double LatencyReport::share_within_atsc() const {
@@ -151,9 +159,10 @@ LatencyReport latency_report(const PlayResult& play, const RealtimeResult& realt
         [](const audio::BlockTiming& b) { return MaybeMs(ms(b.done_ns - b.planned_ns)); });
     add_frame_stages(report, realtime.frames);
     add_ages(report, realtime);
-    add_deadlines(report, realtime);
+    add_deadlines(report, play, realtime);
     add_sound_and_picture(report, play, realtime, kit, tip_radius_m);
     report.errors = drawn_errors(realtime, play.tracks, play.t0_s);
+    if (!report.errors.empty()) report.rms_error_mm = rms_mm(report.errors, 0, 1e300);
     add_needed_leads(report, realtime.output_lead_s);
     return report;
 }

@@ -1,18 +1,20 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "kit/kit.h"
 #include "latency/drawn_error.h"
-#include "latency/realtime_result.h"
 #include "latency/sound_picture.h"
+#include "latency/timings.h"
 #include "play/play_result.h"
 
 namespace app {
 
-/// How values spread, by nearest rank.
+/// How values spread.
 class Spread {
 public:
     Spread() = default;
@@ -20,7 +22,7 @@ public:
 
     [[nodiscard]] bool empty() const { return sorted_.empty(); }
     [[nodiscard]] std::size_t count() const { return sorted_.size(); }
-    /// The smallest value that at least `percent` % do not exceed; 0 < percent <= 100. 0 for no values.
+    /// The quantile of percent / 100; NaN for no values.
     [[nodiscard]] double percentile(double percent) const;
     [[nodiscard]] double min() const { return sorted_.empty() ? 0 : sorted_.front(); }
     [[nodiscard]] double max() const { return sorted_.empty() ? 0 : sorted_.back(); }
@@ -46,9 +48,8 @@ struct Deadline {
     std::size_t total = 0, missed = 0;
 };
 
-/// What was between sound and picture that people hear and see: in time for ATSC's production limit and ITU-R
-/// BT.1359's detectability, as sound minus picture [ms] (sound may be early by the first, late by the
-/// second).
+/// Limits of sound minus picture [ms]: sound may be early by the first and late by the second. ATSC's is for
+/// production, ITU-R BT.1359's is where people begin to notice.
 struct AvLimits {
     double early_ms, late_ms;
 };
@@ -56,7 +57,7 @@ inline constexpr AvLimits kAtscLimits{-15, 45}, kItuLimits{-45, 125};
 /// Latency that drummers rate as none, and the jitter beside it that they do not [ms].
 inline constexpr double kDrummersLatencyMs = 10, kDrummersJitterMs = 3;
 
-/// What `latency` says of a run in real time.
+/// The latency measured in a run in real time.
 struct LatencyReport {
     // clang-format off
     /// In order of the way; those that nothing took are left out:
@@ -77,11 +78,18 @@ struct LatencyReport {
     ///   pose age in notes    onset minus the newest sample that could change it
     // clang-format on
     std::vector<LatencyStage> stages;
-    Deadline frames;  ///< asked for; missed: late or not drawn
-    Deadline notes;   ///< sounded; missed: later than planned
-    Deadline samples, blocks;
-    std::size_t frames_left_out = 0;     ///< since the rate was lowered
-    std::vector<SoundPicture> pictures;  ///< of the notes that the drawn sticks play, too
+    Deadline samples;  ///< taken; missed: too late to change the sound
+    Deadline skipped;  ///< given by the sensors; missed: never seen by the application
+    Deadline notes;    ///< sounded; missed: later than planned
+    Deadline strokes;  ///< true contacts; missed: no note belongs to it
+    Deadline blocks;   ///< of sound; missed: done after they were due
+    Deadline frames;   ///< asked for; missed: late or not drawn
+    [[nodiscard]] std::array<const Deadline*, 6> deadlines() const {
+        return {&samples, &skipped, &notes, &strokes, &blocks, &frames};
+    }
+    std::size_t frames_late = 0, frames_skipped = 0;  ///< of those asked for: drawn too late, not drawn
+    std::size_t frames_left_out = 0;                  ///< not asked for since the rate was lowered
+    std::vector<SoundPicture> pictures;               ///< of the notes that the drawn sticks play, too
     std::size_t notes_without_picture = 0;
     Spread sound_minus_picture_ms, sound_minus_frame_ms;
     /// Share of the notes within ATSC's limit; one without a picture is not.
@@ -89,6 +97,7 @@ struct LatencyReport {
     /// Share of those with a picture within ITU-R BT.1359's limits.
     [[nodiscard]] double share_within_itu() const;
     std::vector<DrawnError> errors;
+    std::optional<double> rms_error_mm;  ///< of all of them
     /// p99 of "frame in all": what the render lead must cover so that 99 of 100 frames are in time.
     std::optional<double> render_lead_needed_ms;
     /// p99 of "sample to notes" plus the output lead plus p99 of "block computed": what the sound lead must
@@ -98,7 +107,7 @@ struct LatencyReport {
 };
 
 /// `play.tracks` are on the run's clock, t0 + time since the epoch; of `play.strikes` stick and instrument
-/// count.
+/// count. The strikes have been scored (`play.score`).
 [[nodiscard]] LatencyReport latency_report(const PlayResult& play, const RealtimeResult& realtime,
                                            const Kit& kit, double tip_radius_m);
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "kit/kit.h"
-#include "latency/realtime_result.h"
+#include "latency/timings.h"
 #include "play/play_result.h"
 
 namespace app {

@@ -7,11 +7,12 @@
 #include <cmath>
 
 #include "files/assets.h"
+#include "pictures/stage_parts.h"
 
 namespace app {
 namespace {
 
-constexpr int kKitShadowTexels = 512;       // a side: 1024 costs a tenth of a frame more and shows no more
+constexpr int kKitShadowTexels = 512;       // per side: 1024 costs a tenth of a frame more and shows no more
 constexpr double kMeshStickLengthM = 0.40;  // of stick.obj and mallet.obj, hand to tip
 
 render::Look chrome() {
@@ -22,15 +23,11 @@ render::Look chrome() {
 }
 
 render::Look hickory() {
-    render::Look look;
-    look.body = {Eigen::Vector3f(0.62f, 0.40f, 0.20f), 0.0f, 0.38f};
-    return look;
+    return wood(0.62f, 0.40f, 0.20f, 0.38f);
 }
 
 render::Look walnut() {
-    render::Look look;
-    look.body = {Eigen::Vector3f(0.26f, 0.13f, 0.06f), 0.0f, 0.4f};
-    return look;
+    return wood(0.26f, 0.13f, 0.06f, 0.4f);
 }
 
 }  // namespace
@@ -50,11 +47,8 @@ void KitStage::add_stand(const Instrument& instrument) {
     const double height = top.y() - kit_.room.floor_height;
     if (height < 0.05) return;
     const double spread = below ? std::max(1.0, 2.2 * body.shape.semi_axes.x() / 0.5) : 1.0;
-    Eigen::Matrix4f matrix = Eigen::Matrix4f::Identity();
-    matrix.topLeftCorner<3, 3>() = Eigen::Vector3d(spread, height, spread).cast<float>().asDiagonal();
-    matrix.topRightCorner<3, 1>() = top.cast<float>();
-    props_.push_back(
-        {instrument.name + " stand", assets_folder() / "meshes" / "stand.obj", chrome(), matrix});
+    props_.push_back({instrument.name + " stand", assets_folder() / "meshes" / "stand.obj", chrome(),
+                      affine_matrix(Eigen::Vector3d(spread, height, spread).asDiagonal(), top)});
 }
 
 void KitStage::add_string_frame() {
@@ -67,17 +61,12 @@ void KitStage::add_string_frame() {
     if (box.isEmpty()) return;
     const double thickness = 0.03, gap = 0.05;
     const Eigen::Vector3d size(box.sizes().x() + 0.12, thickness, box.sizes().z() + 0.12);
-    Eigen::Matrix4f matrix = Eigen::Matrix4f::Identity();
-    matrix.topLeftCorner<3, 3>() = (0.5 * size).cast<float>().asDiagonal();
-    matrix.topRightCorner<3, 1>() =
-        Eigen::Vector3d(box.center().x(), box.min().y() - gap, box.center().z()).cast<float>();
-    props_.push_back({"soundboard", assets_folder() / "meshes" / "string_frame.obj", walnut(), matrix});
-    const double height = box.min().y() - gap - kit_.room.floor_height;
-    Eigen::Matrix4f stand = Eigen::Matrix4f::Identity();
-    stand.topLeftCorner<3, 3>() =
-        Eigen::Vector3d(1.5, std::max(0.05, height), 1.5).cast<float>().asDiagonal();
-    stand.topRightCorner<3, 1>() = matrix.topRightCorner<3, 1>();
-    props_.push_back({"soundboard stand", assets_folder() / "meshes" / "stand.obj", chrome(), stand});
+    const Eigen::Vector3d place(box.center().x(), box.min().y() - gap, box.center().z());
+    props_.push_back({"soundboard", assets_folder() / "meshes" / "string_frame.obj", walnut(),
+                      affine_matrix((0.5 * size).asDiagonal(), place)});
+    const double height = std::max(0.05, place.y() - kit_.room.floor_height);
+    props_.push_back({"soundboard stand", assets_folder() / "meshes" / "stand.obj", chrome(),
+                      affine_matrix(Eigen::Vector3d(1.5, height, 1.5).asDiagonal(), place)});
 }
 
 render::SceneDescription KitStage::scene(int width, int height) const {

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "pictures/stage_parts.h"
+
 namespace app {
 namespace {
 
@@ -11,7 +13,7 @@ constexpr int kSceneShadowTexels = 1024;
 constexpr double kKerb = 0.03;  // half height and half thickness, as share of the box's longer side
 
 render::Look kerb_wood() {
-    return {{Eigen::Vector3f(0.10f, 0.045f, 0.02f), 0.0f, 0.5f}, {}};
+    return wood(0.10f, 0.045f, 0.02f, 0.5f);
 }
 
 render::Mesh mesh_of(const sim::SurfaceMesh& surface) {
@@ -108,10 +110,8 @@ render::SceneDescription SceneStage::description(int width, int height) const {
 }
 
 Eigen::Matrix4f SceneStage::matrix(const Eigen::Isometry3d& pose, const Eigen::Matrix3d& strain) const {
-    Eigen::Matrix4f result = Eigen::Matrix4f::Identity();
-    result.topLeftCorner<3, 3>() = (scene_.drawn_scale * pose.linear() * strain).cast<float>();
-    result.topRightCorner<3, 1>() = (scene_.drawn_scale * pose.translation()).cast<float>();
-    return result;
+    return affine_matrix(scene_.drawn_scale * pose.linear() * strain,
+                         scene_.drawn_scale * pose.translation());
 }
 
 render::FrameState SceneStage::frame(const sim::World& world) const {

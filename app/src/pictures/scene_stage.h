@@ -8,8 +8,8 @@
 
 namespace app {
 
-/// How the bodies of a scene and its box are drawn: one mesh (and its modes) a kind, and how states become
-/// matrices and modal coordinates. Bodies that are to come later are not drawn before.
+/// How the bodies of a scene and its box are drawn: one mesh (and its modes) for each kind, and how states
+/// become matrices and modal coordinates. Bodies that come later are not drawn before.
 class SceneStage {
 public:
     SceneStage(const Scene& scene, const sim::World& world);

@@ -33,7 +33,7 @@ std::vector<const StickOutlook*> outlooks(std::span<const std::unique_ptr<StickT
 
 OfflineRun::OfflineRun(const tracking::Trace& trace, const Kit& kit, const PlayOptions& options,
                        const StickGeometry& stick, sim::Simulation& simulation, const KitStage& stage,
-                       FrameWriter* frames, audio::Performance* performance)
+                       FrameThread* frames, audio::Performance* performance)
     : trace_(trace),
       kit_(kit),
       options_(options),
@@ -139,7 +139,7 @@ void OfflineRun::draw_frame(double s, double T) {
         bodies = std::move(scene.bodies);
     }
     const Stopwatch watch(times_.waiting_for_frames);
-    frames_->push(stage_.frame(bodies, poses));
+    frames_->push({.index = next_frame_, .state = stage_.frame(bodies, poses)});
 }
 
 }  // namespace app

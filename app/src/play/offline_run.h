@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "kit/kit.h"
-#include "pictures/frame_writer.h"
+#include "pictures/frame_thread.h"
 #include "pictures/kit_stage.h"
-#include "play/play.h"
+#include "play/play_options.h"
 #include "play/strike_pipeline.h"
 #include "sticks/stick_tracker.h"
 
@@ -23,7 +23,7 @@ class OfflineRun {
 public:
     OfflineRun(const tracking::Trace& trace, const Kit& kit, const PlayOptions& options,
                const StickGeometry& stick, sim::Simulation& simulation, const KitStage& stage,
-               FrameWriter* frames, audio::Performance* performance);
+               FrameThread* frames, audio::Performance* performance);
 
     /// Runs to the end; `progress` gets the share done, now and then.
     void run(const std::function<void(double)>& progress);
@@ -49,7 +49,7 @@ private:
     const Kit& kit_;
     const PlayOptions& options_;
     const KitStage& stage_;
-    FrameWriter* frames_;
+    FrameThread* frames_;
     audio::Performance* performance_;
     double t0_s_, t_end_s_;
     std::vector<std::unique_ptr<StickTracker>> sticks_;

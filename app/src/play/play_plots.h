@@ -35,8 +35,8 @@ struct Timeline {
 // Scripts of the report's plots. Times on the trace's clock. Of many marks within a pixel one is kept, so
 // that the size is bounded for any length.
 
-/// Tip heights of all sticks with the marks, under it the envelope of the sound with the onsets: a script a
-/// row.
+/// Tip heights of all sticks with the marks, under it the envelope of the sound with the onsets: a script for
+/// each row.
 [[nodiscard]] std::vector<PlotScript> timeline_plots(const PlayResult& result, const Timeline& timeline);
 /// Notes heard, false and missed over the whole recording, with the rows of the timeline marked.
 [[nodiscard]] PlotScript overview_plot(const PlayResult& result, const Timeline& timeline);
@@ -45,7 +45,7 @@ struct Timeline {
 /// Histogram of onset - true contact [ms]: +-30 ms in bins of 1 ms; +-10 or +-5 ms in finer ones where all
 /// errors are smaller.
 [[nodiscard]] PlotScript timing_plot(const PlayResult& result);
-/// The same a point a note and a line an instrument.
+/// The same with a point for each note and a line for each instrument.
 [[nodiscard]] PlotScript timing_by_instrument_plot(const PlayResult& result);
 /// For each note, first prediction and decision relative to its onset [ms]; notes by outcome, then by lead.
 [[nodiscard]] PlotScript lead_plot(const PlayResult& result);

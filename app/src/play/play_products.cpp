@@ -3,11 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string_view>
+#include <vector>
 
+#include "files/checksum.h"
+#include "pictures/video.h"
 #include "play/note_of_strike.h"
-#include "play/play_setup.h"
-#include "process/child_process.h"
+#include "play/play_report.h"
+#include "report/table.h"
 #include "strikes/score_strikes.h"
 #include "strikes/true_contacts.h"
 
@@ -17,8 +22,7 @@ namespace {
 
 constexpr double kApartS = 0.5;  // between the notes whose frames the report shows
 
-}  // namespace
-
+/// True contacts of the recorded paths, and how the notes compare with them.
 void score(PlayResult& result, const Kit& kit, const StickGeometry& stick) {
     const std::vector<sim::BodyDefinition> bodies = bodies_of(kit);
     result.contacts = find_true_contacts(result.tracks, bodies, stick.radius_m);
@@ -27,6 +31,7 @@ void score(PlayResult& result, const Kit& kit, const StickGeometry& stick) {
                 result.release_margin_s);
 }
 
+/// The released notes, by onset.
 void write_hits(const fs::path& file, const PlayResult& result, const Kit& kit) {
     std::vector<audio::Note> notes;
     for (const Strike& strike : result.strikes)
@@ -38,6 +43,7 @@ void write_hits(const fs::path& file, const PlayResult& result, const Kit& kit) 
     audio::write_midi(file, notes);
 }
 
+/// Frames for the report: before, at and after the two loudest notes that lie apart.
 std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& folder) {
     std::vector<const Strike*> loudest;
     for (const Strike& strike : result.strikes)
@@ -57,6 +63,151 @@ std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& f
                 files.push_back(folder / fmt::format("{:06}.png", k));
     }
     return files;
+}
+
+/// Waits for the last frames; their measurements, and what the report shows of them.
+void take_frames(PlayResult& result, FrameThread& frames, const fs::path& folder) {
+    const double waited_s = seconds_of([&] { frames.finish(); });
+    if (result.frames == 0) result.frames = frames.written().size();
+    result.stages_s.emplace_back("drawing (own thread)", frames.draw_s());
+    result.stages_s.emplace_back("writing frames (own thread)", frames.write_s());
+    result.stages_s.emplace_back("frames (waiting at the end)", waited_s);
+    result.versions.emplace_back("renderer", frames.version());
+    result.report_frames = frames_to_show(result, folder);
+}
+
+using Json = nlohmann::ordered_json;
+
+Json strikes_json(const StrikeScore& score) {
+    return {{"true", score.true_contacts},
+            {"released", score.released},
+            {"cancelled", score.cancelled},
+            {"moved", score.moved},
+            {"false", score.false_notes},
+            {"missed", score.missed},
+            {"false_turned_early", score.false_turned_early},
+            {"false_turned_late", score.false_turned_late}};
+}
+
+Json timing_json(const StrikeScore& score) {
+    const bool any_matched = score.released > score.false_notes;
+    return {{"median", any_matched ? Json(score.timing_median_ms) : Json()},
+            {"p95", any_matched ? Json(score.timing_p95_ms) : Json()}};
+}
+
+template <typename Value>
+Json object_json(const std::vector<std::pair<std::string, Value>>& pairs) {
+    Json out = Json::object();
+    for (const auto& [name, value] : pairs) out[name] = value;
+    return out;
+}
+
+Json inputs_json(const std::vector<InputFile>& files) {
+    Json out = Json::array();
+    for (const InputFile& input : files) out.push_back({{"file", input.file}, {"sha256", input.sha256}});
+    return out;
+}
+
+std::string_view outcome_word(const Strike& strike) {
+    switch (strike.outcome) {
+        case Outcome::released:
+            return "released";
+        case Outcome::cancelled:
+            return "cancelled";
+        case Outcome::pending:
+            break;
+    }
+    throw std::logic_error(
+        fmt::format("strike {} of a finished run is neither released nor cancelled", strike.id));
+}
+
+}  // namespace
+
+void write_products(PlayResult& result, const RunParts& parts, OutputFolder& folder,
+                    const std::function<std::string()>& realtime_part) {
+    const PlayOptions& options = parts.options;
+    const auto stage = [&](const char* name, const auto& work) {
+        result.stages_s.emplace_back(name, seconds_of(work));
+    };
+    write_hits(folder.path("hits.mid"), result, parts.kit);
+    stage("scoring", [&] { score(result, parts.kit, parts.stick); });
+    if (parts.frames) take_frames(result, *parts.frames, folder.path("frames"));
+    result.fingerprint =
+        fingerprint(parts.frames ? parts.frames->rest_image().rgb : std::vector<std::uint8_t>{});
+    const sim::WorkerReport workers = parts.simulation.report();
+    result.workers_lost = workers.lost;
+    result.bodies_reowned = workers.bodies_reowned;
+    result.versions.emplace_back("musicworld", MUSICWORLD_VERSION);
+    if (options.video)
+        stage("video", [&] { make_video(*options.video, options.fps, options.audio, folder.path(".")); });
+    const std::string realtime_json = realtime_part ? realtime_part() : std::string();
+    write_file(folder.path("events.csv"), format_events(result));
+    write_file(folder.path("contacts.csv"), format_contacts(result));
+    stage("report", [&] { write_file(folder.path("report.html"), format_report(result, folder.scratch())); });
+    result.wall_s = parts.wall.seconds();
+    write_file(folder.path("summary.json"), format_summary(result, realtime_json));
+    folder.finish();
+    if (options.video) fs::rename(options.video->string() + ".partial", *options.video);
+}
+
+std::string format_summary(const PlayResult& r, const std::string& realtime_json) {
+    const double duration_s = r.t_end_s - r.t0_s;
+    Json summary = {
+        {"trace", r.trace},
+        {"kit", r.kit},
+        {"duration_s", duration_s},
+        {"frames", r.frames},
+        {"picture_predictor", r.picture_predictor},
+        {"sound_predictor", r.sound_predictor},
+        {"render_lead_s", r.render_lead_s},
+        {"sound_lead_s", r.sound_lead_s},
+        {"release_margin_s", r.release_margin_s},
+        {"strikes", strikes_json(r.score)},
+        {"timing_ms", timing_json(r.score)},
+        {"realtime_factor", r.wall_s > 0 ? Json(duration_s / r.wall_s) : Json()},
+        {"stages_s", object_json(r.stages_s)},
+        {"workers", {{"count", r.workers}, {"lost", r.workers_lost}, {"bodies_reowned", r.bodies_reowned}}},
+        {"inputs", inputs_json(r.inputs)},
+        {"fingerprint", r.fingerprint},
+        {"versions", object_json(r.versions)},
+        {"kit_name", r.kit_name},
+        {"trace_source", r.trace_source},
+        {"t0_s", r.t0_s},
+        {"t_end_s", r.t_end_s},
+        {"fps", r.fps},
+        {"size", {{"width", r.width}, {"height", r.height}}},
+        {"cancelling", r.cancelling},
+        {"sticks", r.sticks},
+        {"samples_refused", r.samples_refused},
+        {"clipped_samples", r.clipped_samples},
+        {"wall_s", r.wall_s},
+    };
+    if (!realtime_json.empty()) summary["realtime"] = Json::parse(realtime_json);
+    // File names are bytes: what is not UTF-8 in them becomes U+FFFD.
+    return summary.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string format_events(const PlayResult& result) {
+    Table table = Table::of({"id", "stick", "instrument", "onset_s", "speed_mps", "px", "py", "pz",
+                             "scheduled_at_s", "outcome", "moves", "decided_at_s", "model"});
+    // Of several models in parallel, the number of the one that the note's time comes from.
+    const auto model = [&](const Strike& s) {
+        return result.sound_models > 1 ? fmt::format("{}#{}", result.sound_predictor, s.model)
+                                       : result.sound_predictor;
+    };
+    for (const Strike& s : result.strikes)
+        table.add({s.id, result.sticks.at(s.stick), result.instruments.at(s.instrument), s.onset_s,
+                   s.speed_mps, s.point_world.x(), s.point_world.y(), s.point_world.z(), s.scheduled_at_s,
+                   outcome_word(s), s.moves, s.decided_at_s, model(s)});
+    return table.csv();
+}
+
+std::string format_contacts(const PlayResult& result) {
+    Table table = Table::of({"t", "stick", "instrument", "speed_mps", "px", "py", "pz", "matched_id"});
+    for (const TrueContact& c : result.contacts)
+        table.add({c.t_s, result.sticks.at(c.stick), result.instruments.at(c.instrument), c.speed_mps,
+                   c.point_world.x(), c.point_world.y(), c.point_world.z(), c.matched_id});
+    return table.csv();
 }
 
 }  // namespace app

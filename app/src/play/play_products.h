@@ -1,18 +1,71 @@
 #pragma once
-#include <filesystem>
-#include <vector>
+#include <audio/performance.h>
+#include <sim/simulation.h>
 
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "files/output_folder.h"
 #include "kit/kit.h"
 #include "kit/stick_geometry.h"
-#include "play/play.h"
+#include "pictures/frame_thread.h"
+#include "play/play_options.h"
+#include "play/play_result.h"
+#include "play/play_setup.h"
+#include "process/clock.h"
+#include "process/stopwatch.h"
 
 namespace app {
 
-/// True contacts of the recorded paths (PlayResult::tracks), and how the notes compare with them.
-void score(PlayResult& result, const Kit& kit, const StickGeometry& stick);
-/// The released notes as a MIDI file.
-void write_hits(const std::filesystem::path& file, const PlayResult& result, const Kit& kit);
-/// Frames for the report: before, at and after the two loudest notes that lie apart.
-[[nodiscard]] std::vector<std::filesystem::path> frames_to_show(const PlayResult& result,
-                                                                const std::filesystem::path& folder);
+/// What a run's products are made from, beside its result.
+struct RunParts {
+    const PlayOptions& options;
+    const Kit& kit;
+    const StickGeometry& stick;
+    const sim::Simulation& simulation;
+    FrameThread* frames = nullptr;  ///< absent: nothing is drawn
+    const WallTimer& wall;          ///< since the start of the run
+};
+
+/// Ends the sound of a run that lasted `seconds`: result.audio, audio.wav, version and time of the thread.
+/// Sound: audio::Performance or audio::LivePerformance.
+template <class Sound>
+void finish_sound(Sound& sound, double seconds, PlayResult& result, const OutputFolder& folder) {
+    const double length = (seconds + kSoundTailS) * audio::kSampleRate;
+    result.audio = sound.finish(static_cast<std::int64_t>(std::ceil(length)),
+                                static_cast<std::int64_t>(kLongestSoundTailS * audio::kSampleRate));
+    result.clipped_samples = audio::write_wav(folder.path("audio.wav"), result.audio);
+    result.stages_s.emplace_back("sound (own thread)", sound.busy_s());
+    result.versions.emplace_back("csound", sound.version());
+}
+
+/// From a run whose strikes, tracks and sound are in `result` to a finished folder: scores the strikes
+/// against the true contacts, then writes hits.mid, the video, events.csv, contacts.csv, report.html and
+/// summary.json. `realtime_part`, of a run in real time: called once the strikes are scored, writes what such
+/// a run has beside and returns summary.json's object `realtime`.
+void write_products(PlayResult& result, const RunParts& parts, OutputFolder& folder,
+                    const std::function<std::string()>& realtime_part = {});
+
+/// Text of summary.json: one object, keys in a fixed order, numbers that read back to the same double. The
+/// keys that scripts rely on come first; times in seconds unless the name says _ms. timing_ms.median and .p95
+/// are null when no note matched a contact, realtime_factor when no wall time was measured. Apart from
+/// realtime_factor, stages_s and wall_s the text is a pure function of the input.
+[[nodiscard]] std::string format_summary(const PlayResult& result, const std::string& realtime_json = {});
+
+// Both tables: numbers read back to the same double; a name that holds a comma, a quote or a line break is
+// quoted (RFC 4180); lines end in "\n".
+
+/// Text of events.csv: a row for every note that was scheduled, by id. Columns
+///   id,stick,instrument,onset_s,speed_mps,px,py,pz,scheduled_at_s,outcome,moves,decided_at_s,model
+/// stick and instrument by name; onset_s, scheduled_at_s and decided_at_s on the trace's clock [s]; px,py,pz
+/// the struck point on the surface [m], world; outcome released|cancelled; model the predictor that played
+/// it. Throws std::logic_error for a strike that is still pending: every note of a finished run was decided.
+[[nodiscard]] std::string format_events(const PlayResult& result);
+
+/// Text of contacts.csv: a row for every true contact, by time. Columns
+///   t,stick,instrument,speed_mps,px,py,pz,matched_id
+/// px,py,pz the centre of the tip [m]; matched_id the note that sounded it, 0 for a missed one.
+[[nodiscard]] std::string format_contacts(const PlayResult& result);
+
 }  // namespace app

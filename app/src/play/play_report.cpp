@@ -8,13 +8,16 @@
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "play/play_plots.h"
-#include "play/report_tables.h"
 #include "report/html.h"
 #include "report/report_style.h"
+#include "report/table.h"
+#include "statistics/statistics.h"
+#include "strikes/strike_score.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -97,6 +100,119 @@ std::string legend(const PlayResult& result) {
     return text + "</ul>\n";
 }
 
+std::string percent(int part, int whole) {
+    return whole > 0 ? fmt::format("{:.1f} %", 100.0 * part / whole) : "none";
+}
+
+struct InstrumentRow {
+    int contacts = 0, released = 0, cancelled = 0, wrong = 0, missed = 0;
+    std::vector<double> errors_ms;
+};
+
+std::vector<InstrumentRow> count_by_instrument(const PlayResult& result) {
+    std::vector<InstrumentRow> rows(result.instruments.size());
+    const std::vector<Mark> marks = strike_marks(result);
+    for (std::size_t i = 0; i < marks.size(); ++i) {
+        InstrumentRow& row = rows.at(result.strikes[i].instrument);
+        row.cancelled += marks[i] == Mark::cancelled;
+        row.released += marks[i] != Mark::cancelled;
+        row.wrong += marks[i] == Mark::wrong;
+    }
+    for (const TrueContact& contact : result.contacts) {
+        InstrumentRow& row = rows.at(contact.instrument);
+        ++row.contacts;
+        row.missed += contact.matched_id == 0;
+    }
+    for (const MatchedNote& note : matched_notes(result))
+        rows.at(note.instrument).errors_ms.push_back(note.error_ms);
+    return rows;
+}
+
+/// Rounded to tenths, without a negative zero.
+double tenths(double value) {
+    return std::round(value * 10) / 10 + 0.0;
+}
+
+std::string heading(const PlayResult& r) {
+    std::string text =
+        fmt::format("<header><h1>{}</h1>\n<p>played on {} by MusicWorld</p>\n<dl class=facts>\n",
+                    html(std::filesystem::path(r.trace).filename().string()), html(r.kit_name));
+    text += report_fact("trace", r.trace);
+    if (!r.trace_source.empty()) text += report_fact("recorded from", r.trace_source);
+    text += report_fact("kit", r.kit);
+    text += report_fact(
+        "duration", fmt::format("{:.3f} s ({:.3f} s to {:.3f} s)", r.t_end_s - r.t0_s, r.t0_s, r.t_end_s));
+    text += report_fact("pictures predicted by",
+                        fmt::format("{}, {:.1f} ms ahead", r.picture_predictor, r.render_lead_s * 1e3));
+    text += report_fact("sounds predicted by",
+                        fmt::format("{}, up to {:.1f} ms ahead", r.sound_predictor, r.sound_lead_s * 1e3));
+    text +=
+        report_fact("sounds are fixed", fmt::format("{:.1f} ms before their onset; cancelling is {}",
+                                                    r.release_margin_s * 1e3, r.cancelling ? "on" : "off"));
+    text += report_fact("frames",
+                        fmt::format("{} of {} x {}, {:g} per second", r.frames, r.width, r.height, r.fps));
+    return text + "</dl></header>\n";
+}
+
+std::string figures(const PlayResult& r) {
+    const StrikeScore& s = r.score;
+    const bool matched = s.released > s.false_notes;
+    const auto ms = [&](double value) {
+        return matched ? fmt::format("{:.1f} ms", value) : std::string("none");
+    };
+    const auto count = [](int value) { return fmt::format("{}", value); };
+    const std::tuple<std::string, const char*, const char*> cards[] = {
+        {count(s.true_contacts), "true contacts", "contact"},
+        {count(s.released), "released", "released"},
+        {count(s.cancelled), "cancelled", "cancelled"},
+        {count(s.moved), "moved", "axis"},
+        {count(s.false_notes), "false", "wrong"},
+        {count(s.missed), "missed", "missed"},
+        {ms(s.timing_median_ms), "median error", "axis"},
+        {ms(s.timing_p95_ms), "95 % error", "axis"}};
+    std::string text = "<section class=figures>\n";
+    for (const auto& [value, name, tone] : cards) text += report_figure(value, name, tone);
+    text += "</section>\n";
+    return text +
+           fmt::format(
+               "<p class=note>Heard: {} of the true contacts. False: {} of the notes, {} after a stroke that "
+               "turned back at least 25 ms before the release point, {} later. The error is |onset - true "
+               "contact| of the notes that belong to a contact (same stick and instrument, within 30 "
+               "ms).</p>\n",
+               percent(s.true_contacts - s.missed, s.true_contacts), percent(s.false_notes, s.released),
+               s.false_turned_early, s.false_turned_late);
+}
+
+/// A row for each instrument that was struck or meant to be.
+std::string instruments_section(const PlayResult& result) {
+    const std::vector<InstrumentRow> rows = count_by_instrument(result);
+    Table table = Table::of({"instrument", "true:d", "released:d", "cancelled:d", "false:d", "missed:d",
+                             "median |ms|:.1f", "median ms:+.1f"});
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        const InstrumentRow& row = rows[i];
+        if (row.contacts + row.released + row.cancelled == 0) continue;
+        std::vector<double> sizes_ms = row.errors_ms;
+        for (double& size : sizes_ms) size = std::abs(size);
+        table.add({result.instruments[i], row.contacts, row.released, row.cancelled, row.wrong, row.missed,
+                   median(sizes_ms), tenths(median(row.errors_ms))});
+    }
+    std::string text = "<h2>By instrument</h2>\n" + table.html();
+    if (const std::size_t silent = rows.size() - table.rows.size(); silent > 0)
+        text += fmt::format("<p class=note>{} more of the kit were not struck.</p>\n", silent);
+    return text;
+}
+
+/// Inputs and versions.
+std::string provenance(const PlayResult& r) {
+    Table inputs = Table::of({"file", "SHA-256"}), versions = Table::of({"part", "version"});
+    for (const InputFile& input : r.inputs) inputs.add({input.file, input.sha256});
+    for (const auto& [name, version] : r.versions) versions.add({name, version});
+    versions.add({"fingerprint of this machine and build", r.fingerprint});
+    return "<p class=note>Times and workers, which differ between runs, are in summary.json.</p>\n"
+           "<h2>Inputs</h2>\n" +
+           inputs.html() + "<h2>Versions</h2>\n" + versions.html();
+}
+
 /// The plots as elements of the page; `sound` and `overview` are empty where there is nothing to show.
 struct DrawnPlots {
     std::vector<std::string> rows;
@@ -130,15 +246,13 @@ std::string timeline_section(const PlayResult& result, const Timeline& timeline,
     std::string text = "<h2>Timeline</h2>\n";
     if (!timeline.whole)
         text += fmt::format(
-            "<p class=note>The whole recording: notes heard (green), false (red) and missed (purple) in each "
-            "stretch. "
-            "Enlarged below are the {} rows of {:g} s with the most false and missed ones, marked under the "
-            "axis.</p>\n<div class=plot>\n{}</div>\n",
+            "<p class=note>The whole recording: notes heard (green), false (red) and missed (purple) in "
+            "each stretch. Enlarged below are the {} rows of {:g} s with the most false and missed ones, "
+            "marked under the axis.</p>\n<div class=plot>\n{}</div>\n",
             plots.rows.size(), timeline.row_s, plots.overview);
     text += fmt::format(
-        "<p class=note>Height of the tips as recorded over the trace's clock, {:g} s a row. A note stands at "
-        "its onset, "
-        "at the point where it was predicted to strike.{}</p>\n{}<div class=plot>\n",
+        "<p class=note>Height of the tips as recorded over the trace's clock, {:g} s per row. A note stands "
+        "at its onset, at the point where it was predicted to strike.{}</p>\n{}<div class=plot>\n",
         timeline.row_s, result.audio.empty() ? "" : " Under it the sound; vertical lines are onsets.",
         legend(result));
     for (const std::string& row : plots.rows) text += row;
@@ -150,9 +264,8 @@ std::string sound_section(const PlayResult& result, const std::string& plot) {
     for (const float sample : result.audio) peak = std::max(peak, std::abs(sample));
     const std::string level = peak > 0 ? fmt::format("Peak {:.1f} dBFS", 20 * std::log10(peak)) : "Silence";
     return fmt::format(
-        "<h2>Sound</h2>\n<p class=note>The whole file, both channels together: lowest and highest sample of "
-        "each "
-        "column; ticks below are onsets. {}, {} samples clipped.</p>\n<div class=plot>\n{}</div>\n",
+        "<h2>Sound</h2>\n<p class=note>The whole file, both channels together: lowest and highest sample "
+        "of each column; ticks below are onsets. {}, {} samples clipped.</p>\n<div class=plot>\n{}</div>\n",
         level, result.clipped_samples, plot);
 }
 
@@ -164,13 +277,11 @@ std::string plot_sections(const PlayResult& result, const fs::path& scratch) {
         "<h2>Timing</h2>\n<p class=note>How far each note lies from the contact that it belongs to.</p>\n";
     text += fmt::format("<div class=pair><div class=plot>\n{}</div><div class=plot>\n{}</div></div>\n",
                         plots.timing, plots.instruments);
-    text += "<h2>By instrument</h2>\n" + report_instruments(result);
+    text += instruments_section(result);
     text += fmt::format(
         "<h2>When notes were decided</h2>\n<p class=note>From its first prediction (ring) to its release "
-        "(disc) or "
-        "cancellation (cross); 0 is the onset. Dashed: the sound lead of {:.1f} ms and the release margin of "
-        "{:.1f} "
-        "ms.</p>\n<div class=plot>\n{}</div>\n",
+        "(disc) or cancellation (cross); 0 is the onset. Dashed: the sound lead of {:.1f} ms and the "
+        "release margin of {:.1f} ms.</p>\n<div class=plot>\n{}</div>\n",
         result.sound_lead_s * 1e3, result.release_margin_s * 1e3, plots.leads);
     if (!result.audio.empty()) text += sound_section(result, plots.sound);
     return text;
@@ -181,8 +292,8 @@ std::string plot_sections(const PlayResult& result, const fs::path& scratch) {
 std::string format_report(const PlayResult& result, const fs::path& scratch) {
     const std::string name = fs::path(result.trace).filename().string();
     return report_page(fmt::format("{} on {}", name, result.kit_name),
-                       report_heading(result) + report_figures(result) + frames_section(result) +
-                           plot_sections(result, scratch) + report_provenance(result));
+                       heading(result) + figures(result) + frames_section(result) +
+                           plot_sections(result, scratch) + provenance(result));
 }
 
 }  // namespace app

@@ -85,6 +85,17 @@ std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers) {
         bodies_of(kit), {fs::read_symlink("/proc/self/exe").string(), {"worker"}, workers});
 }
 
+std::unique_ptr<FrameThread> start_frames(const PlayOptions& options,
+                                          const std::vector<render::SceneDescription>& scenes,
+                                          const render::FrameState& rest, const OutputFolder& folder,
+                                          FramePolicy policy, bool realtime_priority) {
+    if (!options.frames) return nullptr;
+    const FrameThreadOptions where{options.width, options.height, folder.path("frames"), policy,
+                                   realtime_priority};
+    fs::create_directory(where.folder);
+    return std::make_unique<FrameThread>(scenes, rest, where);
+}
+
 PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
                     bool trace_is_file) {
     PlayResult result;

@@ -7,9 +7,12 @@
 #include <memory>
 #include <vector>
 
+#include "files/output_folder.h"
 #include "kit/kit.h"
 #include "kit/stick_geometry.h"
-#include "play/play.h"
+#include "pictures/frame_thread.h"
+#include "play/play_options.h"
+#include "play/play_result.h"
 #include "strikes/strike_scheduler.h"
 
 namespace app {
@@ -32,5 +35,13 @@ void check_options(const PlayOptions& options);
 [[nodiscard]] std::vector<audio::Voice> voices_of(const Kit& kit);
 [[nodiscard]] std::filesystem::path orchestra_file();
 [[nodiscard]] std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers);
+/// The thread that draws into the run's folder `frames`; null with --no-frames. `scenes`: one for each level
+/// of picture quality.
+[[nodiscard]] std::unique_ptr<FrameThread> start_frames(const PlayOptions& options,
+                                                        const std::vector<render::SceneDescription>& scenes,
+                                                        const render::FrameState& rest,
+                                                        const OutputFolder& folder,
+                                                        FramePolicy policy = FramePolicy::wait,
+                                                        bool realtime_priority = false);
 
 }  // namespace app

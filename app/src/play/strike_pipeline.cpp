@@ -1,6 +1,7 @@
 #include "play/strike_pipeline.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "sticks/auto_predictor.h"
 
@@ -24,6 +25,7 @@ StrikePipeline::StrikePipeline(const Kit& kit, const StrikeRules& rules, double 
 
 void StrikePipeline::advance_to(double s, double fixed_s) {
     scheduler_.advance_to(s, fixed_s);
+    send_notes();
 }
 
 sim::StepReply StrikePipeline::step(sim::StepRequest& request) {
@@ -36,21 +38,24 @@ sim::StepReply StrikePipeline::step(sim::StepRequest& request) {
     return simulation_.step(request);
 }
 
-std::vector<sim::TipPath> StrikePipeline::paths_of(std::span<const std::uint32_t> moved) const {
-    const auto sticks = static_cast<std::uint32_t>(sticks_.size());
-    std::vector<sim::TipPath> paths;
+std::vector<StrikePipeline::StickPaths> StrikePipeline::add_paths(std::span<const std::uint32_t> moved,
+                                                                  std::vector<sim::TipPath>& paths) const {
+    const auto add = [&](sim::TipPath path) {
+        path.stick = static_cast<std::uint32_t>(paths.size());
+        paths.push_back(std::move(path));
+        return paths.size() - 1;
+    };
+    std::vector<StickPaths> all;
     for (const std::uint32_t stick : moved) {
         const StickOutlook& outlook = *sticks_[stick];
-        paths.push_back(outlook.predicted_path());
-        paths.push_back(outlook.measured_path());
-        // Numbered beyond the sticks, so that its contacts are told apart.
-        paths.back().stick += sticks;
-        if (std::optional<sim::TipPath> confirming = outlook.confirming_path()) {
-            paths.push_back(std::move(*confirming));
-            paths.back().stick += 2 * sticks;
-        }
+        StickPaths own{stick, paths.size(), 0, std::nullopt};
+        add(outlook.predicted_path());
+        own.measured = add(outlook.measured_path());
+        if (std::optional<sim::TipPath> confirming = outlook.confirming_path())
+            own.confirming = add(std::move(*confirming));
+        all.push_back(own);
     }
-    return paths;
+    return all;
 }
 
 void StrikePipeline::settle_impulses(double s, sim::StepRequest& request) {
@@ -72,49 +77,52 @@ void StrikePipeline::settle_impulses(double s, sim::StepRequest& request) {
 void StrikePipeline::take(double s, std::span<const std::uint32_t> moved) {
     sim::StepRequest request;
     request.t_s = s;
+    std::vector<StickPaths> paths;
     {
         const Stopwatch watch(times_.tracking);
-        request.paths = paths_of(moved);
+        paths = add_paths(moved, request.paths);
     }
     settle_impulses(s, request);
     const sim::StepReply reply = step(request);
     const Stopwatch watch(times_.strikes);
-    take_contacts(s, moved, reply);
+    for (const StickPaths& stick : paths) take_contacts(s, stick, reply);
     send_notes();
 }
 
-void StrikePipeline::take_contacts(double s, std::span<const std::uint32_t> moved,
-                                   const sim::StepReply& reply) {
+std::vector<double> StrikePipeline::measured_clearance(const StickPaths& paths,
+                                                       const sim::StepReply& reply) const {
     const std::size_t bodies = kit_.instruments.size();
-    const auto sticks = static_cast<std::uint32_t>(sticks_.size());
-    const auto contacts_of = [&](std::uint32_t number) {
+    const Eigen::Vector3d& tip = sticks_[paths.stick]->measured_tip();
+    std::vector<double> measured(bodies);
+    for (std::size_t b = 0; b < bodies; ++b) {
+        // The nearer of the surface as it vibrates and at rest: a vibrating head does not arm a stick that lies
+        // on it.
+        const double rest = sim::rest_distance(kit_.instruments[b].body, tip, tip_radius_m_).distance;
+        measured[b] = std::min(rest, reply.clearance_m[paths.measured * bodies + b]);
+    }
+    return measured;
+}
+
+void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim::StepReply& reply) {
+    const std::size_t bodies = kit_.instruments.size();
+    const auto contacts_of = [&](std::size_t path) {
         std::vector<sim::Contact> own;
-        for (const sim::Contact& contact : reply.contacts)
-            if (contact.stick == number) own.push_back(contact);
+        std::ranges::copy_if(reply.contacts, std::back_inserter(own),
+                             [&](const sim::Contact& contact) { return contact.stick == path; });
         return own;
     };
-    std::size_t path = 0;
-    for (const std::uint32_t stick : moved) {
-        // Two paths a stick: the predicted one, and the measured tip, which stands still and makes no contact
-        // but by starting inside; a third where another filter confirms.
-        const std::span<const double> filtered(reply.clearance_m.data() + path * bodies, bodies);
-        std::vector<double> measured(bodies);
-        for (std::size_t b = 0; b < bodies; ++b) {
-            // The nearer of the surface as it vibrates and at rest: a vibrating head does not arm a stick
-            // that lies on it.
-            const double rest =
-                sim::rest_distance(kit_.instruments[b].body, sticks_[stick]->measured_tip(), tip_radius_m_)
-                    .distance;
-            measured[b] = std::min(rest, reply.clearance_m[(path + 1) * bodies + b]);
-        }
-        std::vector<sim::Contact> contacts = contacts_of(stick);
-        if (sticks_[stick]->confirms()) {
-            if (cancelling_) keep_confirmed(contacts, contacts_of(stick + 2 * sticks), s);
-            ++path;
-        }
-        path += 2;
-        scheduler_.sample(stick, s, contacts, measured, filtered, sticks_[stick]->selected_model());
+    std::vector<std::vector<sim::Contact>> contacts;
+    for (std::size_t path = paths.predicted; path < paths.measured; ++path) {
+        contacts.push_back(contacts_of(path));
+        if (paths.confirming && cancelling_)
+            keep_confirmed(contacts.back(), contacts_of(*paths.confirming), s);
     }
+    std::vector<ModelContacts> expected;
+    for (std::size_t model = 0; model < contacts.size(); ++model)
+        expected.push_back(
+            {contacts[model],
+             std::span(reply.clearance_m).subspan((paths.predicted + model) * bodies, bodies)});
+    scheduler_.sample(paths.stick, s, expected, 0, measured_clearance(paths, reply));
 }
 
 void StrikePipeline::send_notes() {

@@ -1,7 +1,6 @@
 #pragma once
 #include <sim/simulation.h>
 
-#include <chrono>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "kit/kit.h"
+#include "process/stopwatch.h"
 #include "sticks/stick_outlook.h"
 #include "sticks/stick_tracker.h"
 #include "strikes/drawn_strikes.h"
@@ -21,19 +21,6 @@ namespace app {
 /// Seconds of wall time in each part of the loop.
 struct LoopTimes {
     double tracking = 0, simulation = 0, strikes = 0, waiting_for_frames = 0;
-};
-
-/// Adds the time of its life to a sum.
-class Stopwatch {
-public:
-    explicit Stopwatch(double& sum) : sum_(sum), start_(std::chrono::steady_clock::now()) {}
-    ~Stopwatch() { sum_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
-    Stopwatch(const Stopwatch&) = delete;
-    Stopwatch& operator=(const Stopwatch&) = delete;
-
-private:
-    double& sum_;
-    std::chrono::steady_clock::time_point start_;
 };
 
 /// How a stick is drawn in a frame.
@@ -79,8 +66,19 @@ public:
 
 private:
     [[nodiscard]] sim::StepReply step(sim::StepRequest& request);
-    [[nodiscard]] std::vector<sim::TipPath> paths_of(std::span<const std::uint32_t> moved) const;
-    void take_contacts(double s, std::span<const std::uint32_t> moved, const sim::StepReply& reply);
+    /// Where the paths of a stick stand in a request; each path's `stick` is its own place there, so that its
+    /// contacts are told apart.
+    struct StickPaths {
+        std::uint32_t stick;
+        std::size_t predicted;                  ///< the first of the models' paths, which follow each other
+        std::size_t measured;                   ///< stands still: makes no contact but by starting inside
+        std::optional<std::size_t> confirming;  ///< where a second filter confirms
+    };
+    [[nodiscard]] std::vector<StickPaths> add_paths(std::span<const std::uint32_t> moved,
+                                                    std::vector<sim::TipPath>& paths) const;
+    void take_contacts(double s, const StickPaths& paths, const sim::StepReply& reply);
+    [[nodiscard]] std::vector<double> measured_clearance(const StickPaths& paths,
+                                                         const sim::StepReply& reply) const;
     void send_notes();
     void settle_impulses(double s, sim::StepRequest& request);
     [[nodiscard]] const Strike* struck_by(std::uint32_t stick, double s, double T);

@@ -6,7 +6,7 @@
 
 namespace app {
 
-/// What a run in real time is made to bear, for tests: parts separated by commas.
+/// Artificial load injected into a run in real time, for tests: parts separated by commas.
 ///
 ///   load:N@A-B       N threads that compute without pause from second A to B
 ///   renderer:MS@A-B  every frame takes MS milliseconds longer
@@ -27,7 +27,7 @@ struct ArtificialLoad {
 /// Throws BadInput with what was found and expected.
 [[nodiscard]] ArtificialLoad parse_disturbance(const std::string& text);
 
-/// The load: threads of ordinary priority, asleep but in its time. Ends them when it ends.
+/// Threads of ordinary priority that compute during the time of the load. The destructor ends them.
 class BusyThreads {
 public:
     BusyThreads(const ArtificialLoad& disturbance, std::int64_t epoch_ns);

@@ -5,9 +5,9 @@ namespace app {
 
 /// Keeps a lead as long as the delay that it hides, which changes with the scene and the machine (Friedmann
 /// 1992, the end of section 3.4). The lead follows the 98th percentile of the last 2 s of delays and a
-/// reserve, never below the lead that was asked for, in steps that nobody sees or hears: at most 1.5 ms a
-/// frame (delay) up and 0.5 ms down. If the median of the last 5 delays is beyond the lead, it is followed at
-/// once: a delay that has come to stay is made good within its size / 1.5 ms frames. Pure.
+/// reserve, never below the lead that was asked for, in steps that cannot be seen or heard: at most 1.5 ms per
+/// measured delay up and 0.5 ms down. If the median of the last 5 delays is beyond the lead, it is followed at
+/// once: a lasting delay is covered after (its size / 1.5 ms) measurements. Pure.
 class LeadControl {
 public:
     /// `least_s`: the lead asked for; `rate_hz`: of the delays; `reserve_s` on top of them.

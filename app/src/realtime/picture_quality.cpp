@@ -21,9 +21,9 @@ constexpr double kNewestWeight = 0.1;  // weight of the newest drawing time
 
 const std::vector<QualityLevel>& quality_levels() {
     static const std::vector<QualityLevel> levels = {
-        {"4 samples a pixel, shadows", 4, 512, 1, 1},
-        {"1 sample a pixel, shadows", 1, 512, 1, 1},
-        {"1 sample a pixel, no shadows", 1, 0, 1, 1},
+        {"4 samples per pixel, shadows", 4, 512, 1, 1},
+        {"1 sample per pixel, shadows", 1, 512, 1, 1},
+        {"1 sample per pixel, no shadows", 1, 0, 1, 1},
         {"half the size, no shadows", 1, 0, 2, 1},
         {"a quarter of the size, no shadows", 1, 0, 4, 1},
         {"a quarter of the size, half the rate", 1, 0, 4, 2},

@@ -6,13 +6,13 @@
 
 namespace app {
 
-/// One level of picture quality, the dearest first.
+/// One level of picture quality, the most expensive first.
 struct QualityLevel {
     std::string name;
     int samples = 4;          ///< of multisampling, 1: none
     int shadow_texels = 512;  ///< 0: no shadows
-    int size_divisor = 1;     ///< drawn smaller by this, and enlarged
-    int rate_divisor = 1;     ///< every so-many-th frame only
+    int size_divisor = 1;     ///< drawn smaller by this factor and enlarged
+    int rate_divisor = 1;     ///< only every rate_divisor-th frame is drawn
 };
 
 [[nodiscard]] const std::vector<QualityLevel>& quality_levels();
@@ -29,7 +29,7 @@ struct QualityLevel {
 ///           level at hand (1.4 before anything was drawn: the trial runs alone), is less than 0.6 of the time
 ///           between two frames
 ///
-/// Begins at the best level that fits. Pure: times come from outside.
+/// Begins at the best level that fits. Pure: times come from the caller.
 // clang-format on
 class QualityRule {
 public:
@@ -39,7 +39,7 @@ public:
     [[nodiscard]] std::size_t level() const { return level_; }
     /// Whether frame `index` is drawn at the level's rate.
     [[nodiscard]] bool wants(std::uint64_t index) const;
-    /// A frame that was asked for at `at_s`; draw_s < 0: it was skipped. Answers why the level changed, if it
+    /// A frame that was asked for at `at_s`; draw_s < 0: it was skipped. Returns why the level changed, if it
     /// did.
     std::optional<std::string> frame(double at_s, bool in_time, double draw_s);
     /// The delay of pictures has outgrown the lead asked for (`--lead auto`): simpler pictures come before a

@@ -6,11 +6,8 @@
 #include <cmath>
 #include <map>
 
-#include "files/bad_input.h"
-#include "files/checksum.h"
 #include "files/output_folder.h"
 #include "kit/tip_track.h"
-#include "pictures/video.h"
 #include "play/play_products.h"
 #include "play/play_setup.h"
 #include "process/clock.h"
@@ -47,8 +44,8 @@ std::unique_ptr<SensorHub> start_sensors(const RealtimeSession& session, std::in
     }
 }
 
-/// The strikes of all laps: as on their laps' clocks, and on the run's. What the sound says was played was
-/// played.
+/// The strikes of all laps, on their laps' clocks and on the run's. The sound decides which of them were played,
+/// and when.
 void collect_strikes(RealtimeOutcome& outcome, std::vector<LapStrikes>& laps, std::int64_t period_samples,
                      bool sound) {
     std::map<std::uint64_t, const audio::PlayedNote*> played;
@@ -125,53 +122,106 @@ void fill_gaps(const fs::path& folder, std::size_t frames, const render::Image& 
     fs::path last;
     for (std::size_t k = 0; k < frames; ++k) {
         const fs::path file = folder / fmt::format("{:06}.png", k);
-        std::error_code error;
-        if (!fs::exists(file, error)) {
+        if (!fs::exists(file)) {
+            std::error_code no_links;
             if (last.empty())
                 write_file(file, render::encode_png(rest));
-            else
-                fs::create_hard_link(last, file, error);
+            else if (fs::create_hard_link(last, file, no_links); no_links)
+                fs::copy_file(last, file);
         }
         last = file;
     }
 }
 
-void finish_frames(RealtimeFrames& frames, RealtimeResult& result) {
-    frames.finish();
-    for (const FrameTiming& done : frames.take_done()) {
-        const auto at = std::ranges::lower_bound(result.frames, done.index, {}, &FrameTiming::index);
-        if (at != result.frames.end() && at->index == done.index) *at = done;
+/// Everything that plays, made before the run's clock starts.
+struct Players {
+    Players(const RealtimeSession& session, const OutputFolder& folder)
+        : stage(session.kit, session.trace.sticks.size(), session.stick) {
+        const RealtimeOptions& options = session.options;
+        // Worker processes and ZeroMQ's threads inherit it.
+        simulation_priority = set_thread_priority(ThreadRole::simulation, options.realtime_priority);
+        simulation = make_simulation(session.kit, options.play.workers);
+        leave_thread_priority();
+        if (options.play.audio) sound = make_live_sound(session, sound_priority);
+        frames = start_frames(options.play, scenes_of(stage, options.play.width, options.play.height),
+                              stage.frame({}, {}), folder, FramePolicy::refuse, options.realtime_priority);
     }
-    for (const auto& [index, written_ns] : frames.written()) {
-        const auto at = std::ranges::lower_bound(result.frames, index, {}, &FrameTiming::index);
-        if (at != result.frames.end() && at->index == index) at->written_ns = written_ns;
-    }
-    result.frames_not_written = frames.not_written();
-    std::map<std::uint64_t, bool> in_time;
-    for (const FrameTiming& frame : result.frames) in_time[frame.index] = frame.fate == FrameFate::in_time;
-    for (DrawnTip& tip : result.tips) tip.shown = in_time[tip.frame];
+    Players(const Players&) = delete;
+    Players& operator=(const Players&) = delete;
+
+    KitStage stage;
+    std::string simulation_priority, sound_priority, control_priority;
+    std::unique_ptr<sim::Simulation> simulation;
+    std::unique_ptr<audio::LivePerformance> sound;  ///< absent with --no-audio
+    std::unique_ptr<FrameThread> frames;            ///< absent with --no-frames
+};
+
+std::vector<std::pair<std::string, std::string>> priorities_of(const Players& players, int workers) {
+    std::vector<std::pair<std::string, std::string>> all = {
+        {"control", players.control_priority},
+        {"simulation", workers > 0 ? players.simulation_priority : players.control_priority}};
+    if (players.sound) all.emplace_back("sound", players.sound_priority);
+    if (players.frames) all.emplace_back("drawing", players.frames->priority());
+    return all;
 }
 
-void finish_sound(audio::LivePerformance& sound, RealtimeOutcome& outcome, const OutputFolder& folder,
-                  std::int64_t epoch_ns) {
-    const double length = (outcome.realtime.seconds + kSoundTailS) * audio::kSampleRate;
-    outcome.play.audio = sound.finish(static_cast<std::int64_t>(std::ceil(length)),
-                                      static_cast<std::int64_t>(kLongestSoundTailS * audio::kSampleRate));
+/// The loop, from samples to notes and frames.
+void play_through(RealtimeRun& run, const RealtimeSession& session, Players& players, std::int64_t epoch_ns,
+                  const std::function<void(const std::string&)>& warn) {
+    const RealtimeOptions& options = session.options;
+    if (players.sound) players.sound->start(epoch_ns);
+    const BusyThreads load(options.disturbance, epoch_ns);
+    players.control_priority = set_thread_priority(ThreadRole::control, options.realtime_priority);
+    ProgressBar bar(options.play.progress);
+    const StopSignals signals;
+    run.run(
+        session.seconds, [] { return StopSignals::stopped(); }, warn, [&](double done) { bar.show(done); });
+    bar.clear();
+    leave_thread_priority();
+    if (run.end_s() <= 0) throw std::runtime_error("error: interrupted before anything was played");
+}
+
+std::string failure_of(const RealtimeResult& realtime) {
+    std::string failure;
+    for (const SensorEvent& event : realtime.events)
+        if (event.kind == SensorEvent::Kind::failed) failure = event.message;
+    return failure;
+}
+
+/// Warns of each stick without a sample. A live run without any sample has nothing to show: that is an error.
+void check_samples(const RealtimeSession& session, RealtimeRun& run,
+                   const std::function<void(const std::string&)>& warn) {
+    const auto silent = [](const auto& samples) { return samples.empty(); };
+    if (session.live && std::ranges::all_of(run.seen(), silent)) {
+        const std::string failure = failure_of(run.result());
+        throw std::runtime_error(
+            failure.empty() ? fmt::format("error: no sample came from {} in {:.1f} s; nothing was written",
+                                          session.options.source, run.end_s())
+                            : failure);
+    }
+    for (std::size_t i = 0; i < session.trace.sticks.size(); ++i)
+        if (silent(run.seen()[i]))
+            warn(fmt::format("stick {}: no sample in {:.1f} s", session.trace.sticks[i].name, run.end_s()));
+}
+
+void take_sound(audio::LivePerformance& sound, RealtimeOutcome& outcome, const OutputFolder& folder,
+                std::int64_t epoch_ns) {
+    RealtimeResult& result = outcome.realtime;
+    finish_sound(sound, result.seconds, outcome.play, folder);
     for (const audio::PlayedNote& played : sound.take_played()) {
         NoteTiming note;
         note.played = played;
         note.late_s = static_cast<double>(played.onset_sample - played.planned_sample) / audio::kSampleRate;
-        outcome.realtime.notes.push_back(note);
+        result.notes.push_back(note);
     }
-    for (NoteTiming& note : outcome.realtime.notes) {
+    for (NoteTiming& note : result.notes) {
         note.played.taken_ns -= epoch_ns;
         if (note.played.midi_sent_ns != 0) note.played.midi_sent_ns -= epoch_ns;
     }
     for (audio::BlockTiming block : sound.blocks()) {
         block.planned_ns -= epoch_ns, block.started_ns -= epoch_ns, block.done_ns -= epoch_ns;
-        outcome.realtime.blocks.push_back(block);
+        result.blocks.push_back(block);
     }
-    RealtimeResult& result = outcome.realtime;
     result.audio_device = sound.device();
     result.refused_changes = sound.refused_changes();
     result.queue_overflows = sound.queue_overflows();
@@ -179,9 +229,26 @@ void finish_sound(audio::LivePerformance& sound, RealtimeOutcome& outcome, const
     result.device_corrections = sound.device_corrections();
     result.midi_late = sound.late_strokes();
     result.midi_lost = sound.lost_strokes();
-    outcome.play.clipped_samples = audio::write_wav(folder.path("audio.wav"), outcome.play.audio);
-    outcome.play.stages_s.emplace_back("sound (own thread)", sound.busy_s());
-    outcome.play.versions.emplace_back("csound", sound.version());
+}
+
+/// What the finished run gave, on the run's clock.
+void collect(RealtimeOutcome& outcome, RealtimeSession& session, RealtimeRun& run, Players& players,
+             const OutputFolder& folder, std::int64_t epoch_ns) {
+    if (players.frames) run.finish_frames();
+    outcome.realtime = std::move(run.result());
+    outcome.realtime.disturbed_by = session.options.disturbed_by;
+    outcome.realtime.priorities = priorities_of(players, session.options.play.workers);
+    outcome.failure = failure_of(outcome.realtime);
+    if (players.sound) take_sound(*players.sound, outcome, folder, epoch_ns);
+    outcome.stick = session.stick = run.geometry();
+    PlayResult& result = outcome.play;
+    result.samples_refused = run.refused();
+    result.frames = outcome.realtime.frames.size();
+    result.t_end_s = result.t0_s + run.end_s();
+    result.tracks = tracks_of(session, run);
+    collect_strikes(outcome, run.laps(), session.period_samples, players.sound != nullptr);
+    age_notes(outcome);
+    if (players.frames) fill_gaps(folder.path("frames"), result.frames, players.frames->rest_image());
 }
 
 }  // namespace
@@ -194,100 +261,27 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
     outcome.play = describe(session.options.play, session.trace, session.kit, !session.live);
     outcome.kit = session.kit;
     outcome.stick = session.stick;
-    PlayResult& result = outcome.play;
     OutputFolder folder(options.play.out);
-
-    std::string sound_priority, control_priority;
-    KitStage stage(session.kit, session.trace.sticks.size(), session.stick);
-    // Worker processes and ZeroMQ's threads inherit it.
-    const std::string simulation_priority =
-        set_thread_priority(ThreadRole::simulation, options.realtime_priority);
-    const std::unique_ptr<sim::Simulation> simulation = make_simulation(session.kit, options.play.workers);
-    leave_thread_priority();
-    std::unique_ptr<audio::LivePerformance> sound =
-        options.play.audio ? make_live_sound(session, sound_priority) : nullptr;
-    if (sound && !sound->midi_problem().empty()) warn(sound->midi_problem());
-    std::unique_ptr<RealtimeFrames> frames;
-    if (options.play.frames) {
-        fs::create_directory(folder.path("frames"));
-        frames = std::make_unique<RealtimeFrames>(
-            scenes_of(stage, options.play.width, options.play.height), stage.frame({}, {}),
-            options.play.width, options.play.height, folder.path("frames"), options.realtime_priority);
-    }
+    Players players(session, folder);
+    if (players.sound && !players.sound->midi_problem().empty()) warn(players.sound->midi_problem());
     std::int64_t epoch_ns = 0;
-    const std::unique_ptr<SensorHub> hub = start_sensors(session, epoch_ns);
-    SensorHub& sensors = *hub;
-    result.stages_s.emplace_back("start", wall.seconds());
+    const std::unique_ptr<SensorHub> sensors = start_sensors(session, epoch_ns);
+    outcome.play.stages_s.emplace_back("start", wall.seconds());
     {
-        RealtimeRun run(session.kit, options, session.stick, session.trace.t0_s(), session.period_samples,
-                        {*simulation, stage, sensors, sound.get(), frames.get()}, session.trace.sticks.size(),
-                        !confirming_specification(options.play.sound_predictor).empty(), epoch_ns);
-        if (sound) sound->start(epoch_ns);
-        if (frames) frames->start(epoch_ns, options.disturbance);
-        const BusyThreads load(options.disturbance, epoch_ns);
-        control_priority = set_thread_priority(ThreadRole::control, options.realtime_priority);
-        ProgressBar bar(options.play.progress);
-        const StopSignals signals;
-        run.run(
-            session.seconds, [] { return StopSignals::stopped(); }, warn,
-            [&](double done) { bar.show(done); });
-        bar.clear();
-        leave_thread_priority();
-        if (run.end_s() <= 0)
-            throw std::runtime_error(
-                "error: found an interruption before anything was played, expected a run");
-        outcome.realtime = std::move(run.result());
-        RealtimeResult& realtime = outcome.realtime;
-        realtime.disturbed_by = options.disturbed_by;
-        realtime.clocks = sensors.clocks();
-        result.samples_refused = run.refused();
-        for (std::size_t i = 0; i < session.trace.sticks.size(); ++i)
-            if (run.seen()[i].empty())
-                warn(fmt::format("stick {}: found no sample in {:.1f} s, expected some of that name",
-                                 session.trace.sticks[i].name, run.end_s()));
-        if (frames) finish_frames(*frames, realtime);
-        if (sound) finish_sound(*sound, outcome, folder, epoch_ns);
-        outcome.stick = session.stick = run.geometry();
-        result.t_end_s = result.t0_s + run.end_s();
-        result.tracks = tracks_of(session, run);
-        collect_strikes(outcome, run.laps(), session.period_samples, sound != nullptr);
+        RealtimeRun run(
+            session.kit, session.options, session.stick, session.trace.t0_s(), session.period_samples,
+            {*players.simulation, players.stage, *sensors, players.sound.get(), players.frames.get()},
+            session.trace.sticks.size(), !confirming_specification(options.play.sound_predictor).empty(),
+            epoch_ns);
+        play_through(run, session, players, epoch_ns, warn);
+        check_samples(session, run, warn);
+        collect(outcome, session, run, players, folder, epoch_ns);
     }
-    age_notes(outcome);
-    outcome.realtime.priorities = {
-        {"control", control_priority},
-        {"simulation", options.play.workers > 0 ? simulation_priority : control_priority}};
-    if (sound) outcome.realtime.priorities.emplace_back("sound", sound_priority);
-    if (frames) outcome.realtime.priorities.emplace_back("drawing", frames->priority());
-    const sim::WorkerReport workers = simulation->report();
-    result.workers_lost = workers.lost;
-    result.bodies_reowned = workers.bodies_reowned;
+    outcome.realtime.clocks = sensors->clocks();
     if (!session.live) find_departures(outcome, session.trace, session.options.play);
-
-    score(result, session.kit, session.stick);
-    write_hits(folder.path("hits.mid"), result, session.kit);
-    std::vector<std::uint8_t> test_frame;
-    if (frames) {
-        result.frames = outcome.realtime.frames.size();
-        fill_gaps(folder.path("frames"), result.frames, frames->rest_image());
-        result.versions.emplace_back("renderer", frames->version());
-        result.stages_s.emplace_back("drawing (own thread)", frames->draw_s());
-        result.stages_s.emplace_back("writing frames (own thread)", frames->write_s());
-        test_frame = frames->rest_image().rgb;
-        result.report_frames = frames_to_show(result, folder.path("frames"));
-        std::erase_if(result.report_frames, [](const fs::path& file) { return !fs::exists(file); });
-    }
-    result.fingerprint = fingerprint(test_frame);
-    result.versions.emplace_back("musicworld", MUSICWORLD_VERSION);
-    if (options.play.video)
-        make_video(*options.play.video, options.play.fps, options.play.audio, folder.path("."));
-    result.wall_s = wall.seconds();
-    outcome.latency = latency_report(result, outcome.realtime, session.kit, session.stick.radius_m);
-    write_latency_products(outcome, folder);
-    write_realtime_products(outcome, folder);
-    folder.finish();
-    if (options.play.video) fs::rename(options.play.video->string() + ".partial", *options.play.video);
-    for (const SensorEvent& event : outcome.realtime.events)
-        if (event.kind == SensorEvent::Kind::failed) outcome.failure = event.message;
+    const RunParts parts{session.options.play, session.kit,          session.stick,
+                         *players.simulation,  players.frames.get(), wall};
+    write_products(outcome.play, parts, folder, [&] { return write_realtime_products(outcome, folder); });
     return outcome;
 }
 

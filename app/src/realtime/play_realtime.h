@@ -18,7 +18,7 @@ struct Divergence {
     std::string cause;  ///< "sample late", "samples skipped", "the run ended", "unexplained"
 };
 
-/// What a run in real time gave.
+/// The results of a run in real time.
 struct RealtimeOutcome {
     PlayResult
         play;  ///< strikes, contacts and tracks over all laps, on the run's clock (t0 + time since the epoch)
@@ -36,8 +36,8 @@ struct RealtimeOutcome {
 /// Plays in real time: sensor processes, contacts, strikes, sound and frames against the wall clock, into the
 /// folder `out` as play() does (frames in time only; what stayed on the screen instead of a dropped one is
 /// linked in its place), with the measurements of latency beside (latency.json and its tables). Then plays
-/// the trace offline, without frames and sound, and says where and why the two differ. `warn` gets one line
-/// for each thing that went wrong on the way. Throws as play() does.
+/// the trace offline, without frames and sound, and finds where and why the two differ. `warn` gets one line
+/// for each problem on the way. Throws as play() does, and std::runtime_error for a live run without a sample.
 RealtimeOutcome play_realtime(const RealtimeOptions& options,
                               const std::function<void(const std::string&)>& warn);
 

@@ -7,9 +7,7 @@
 
 #include "latency/latency_page.h"
 #include "latency/latency_tables.h"
-#include "play/play_report.h"
-#include "play/summary.h"
-#include "play/tables.h"
+#include "report/table.h"
 
 namespace app {
 namespace {
@@ -36,40 +34,28 @@ const char* name_of(SensorEvent::Kind kind) {
     return "";
 }
 
-Json frames(const RealtimeResult& r) {
-    std::uint64_t total = 0, late = 0, skipped = 0, left_out = 0;
-    for (const FrameTiming& frame : r.frames) {
-        if (!frame.asked_for) {
-            ++left_out;
-            continue;
-        }
-        ++total;
-        late += frame.fate == FrameFate::late;
-        skipped += frame.fate == FrameFate::skipped;
-    }
-    return {{"total", total},     {"missed", late + skipped},     {"late", late},
-            {"skipped", skipped}, {"left_out_by_rate", left_out}, {"not_written", r.frames_not_written}};
+Json frames(const RealtimeOutcome& o) {
+    const LatencyReport& report = o.latency;
+    return {{"total", report.frames.total},
+            {"missed", report.frames.missed},
+            {"late", report.frames_late},
+            {"skipped", report.frames_skipped},
+            {"left_out_by_rate", report.frames_left_out},
+            {"not_written", o.realtime.frames_not_written}};
 }
 
-Json notes(const RealtimeResult& r) {
-    const auto late = std::ranges::count_if(r.notes, [](const NoteTiming& note) { return note.late_s > 0; });
-    return {{"total", r.notes.size()},
-            {"late", late},
-            {"changes_refused", r.refused_changes},
-            {"queue_overflows", r.queue_overflows}};
+Json notes(const RealtimeOutcome& o) {
+    return {{"total", o.latency.notes.total},
+            {"late", o.latency.notes.missed},
+            {"changes_refused", o.realtime.refused_changes},
+            {"queue_overflows", o.realtime.queue_overflows}};
 }
 
 Json sensors(const RealtimeResult& r) {
-    Json clocks = Json::array(), events = Json::array();
-    for (const ClockReport& clock : r.clocks)
-        clocks.push_back({{"clock", clock.clock},
-                          {"offset_s", clock.offset_s},
-                          {"drift_ppm", clock.drift_ppm},
-                          {"delay_p95_ms", clock.delay_p95_ms},
-                          {"jumps", clock.jumps}});
+    Json events = Json::array();
     for (const SensorEvent& event : r.events)
         events.push_back({{"at_s", event.at_s}, {"kind", name_of(event.kind)}, {"message", event.message}});
-    return {{"clocks", clocks}, {"events", events}};
+    return {{"clocks", clock_table(r).json()}, {"events", events}};
 }
 
 Json quality(const RealtimeResult& r) {
@@ -99,8 +85,8 @@ Json section(const RealtimeOutcome& o) {
             {"laps", r.laps},
             {"period_s", r.period_s},
             {"output_lead_s", r.output_lead_s},
-            {"frames", frames(r)},
-            {"notes", notes(r)},
+            {"frames", frames(o)},
+            {"notes", notes(o)},
             {"against_offline", departures(o)},
             {"quality", quality(r)},
             {"sensors", sensors(r)},
@@ -113,40 +99,31 @@ Json section(const RealtimeOutcome& o) {
             {"midi_lost", r.midi_lost}};
 }
 
+Table departure_table(const RealtimeOutcome& o) {
+    Table table =
+        Table::of({"lap", "stick", "instrument", "what", "offline_onset_s", "onset_s", "cause", "delay_ms"});
+    for (const Divergence& d : o.departures)
+        table.add({d.lap, o.play.sticks[d.stick], o.play.instruments[d.instrument], d.what, d.offline_onset_s,
+                   d.onset_s, d.cause, fmt::format("{:.3f}", 1e3 * d.delay_s)});
+    return table;
+}
+
 }  // namespace
 
-std::string format_realtime_section(const RealtimeOutcome& outcome) {
-    return section(outcome).dump(2, ' ', false, Json::error_handler_t::replace);
-}
-
-std::string format_departures(const RealtimeOutcome& outcome) {
-    std::string text = "lap,stick,instrument,what,offline_onset_s,onset_s,cause,delay_ms\n";
-    const auto time = [](double s) { return std::isnan(s) ? std::string() : fmt::format("{}", s); };
-    for (const Divergence& d : outcome.departures)
-        text += fmt::format("{},{},{},{},{},{},{},{:.3f}\n", d.lap, outcome.play.sticks[d.stick],
-                            outcome.play.instruments[d.instrument], d.what, time(d.offline_onset_s),
-                            time(d.onset_s), d.cause, 1e3 * d.delay_s);
-    return text;
-}
-
-void write_latency_products(const RealtimeOutcome& o, const OutputFolder& folder) {
-    write_file(folder.path("samples.csv"), format_samples_csv(o.play, o.realtime));
-    write_file(folder.path("frames.csv"), format_frames_csv(o.realtime));
-    write_file(folder.path("notes.csv"), format_notes_csv(o.latency, o.play, o.realtime));
-    write_file(folder.path("blocks.csv"), format_blocks_csv(o.realtime));
-    write_file(folder.path("leads.csv"), format_leads_csv(o.realtime));
-    write_file(folder.path("errors.csv"), format_errors_csv(o.latency, o.play));
+std::string write_realtime_products(RealtimeOutcome& o, const OutputFolder& folder) {
+    o.latency = latency_report(o.play, o.realtime, o.kit, o.stick.radius_m);
+    const std::pair<const char*, Table> tables[] = {{"departures.csv", departure_table(o)},
+                                                    {"samples.csv", sample_table(o.play, o.realtime)},
+                                                    {"frames.csv", frame_table(o.realtime)},
+                                                    {"notes.csv", note_table(o.latency, o.play, o.realtime)},
+                                                    {"blocks.csv", block_table(o.realtime)},
+                                                    {"leads.csv", lead_table(o.realtime)},
+                                                    {"errors.csv", error_table(o.latency, o.play)}};
+    for (const auto& [name, table] : tables) write_file(folder.path(name), table.csv());
     write_file(folder.path("latency.json"), format_latency_json(o.latency, o.play, o.realtime));
     write_file(folder.path("latency.html"),
                format_latency_page(o.latency, o.play, o.realtime, folder.scratch()));
-}
-
-void write_realtime_products(const RealtimeOutcome& outcome, const OutputFolder& folder) {
-    write_file(folder.path("events.csv"), format_events(outcome.play));
-    write_file(folder.path("contacts.csv"), format_contacts(outcome.play));
-    write_file(folder.path("departures.csv"), format_departures(outcome));
-    write_file(folder.path("report.html"), format_report(outcome.play, folder.scratch()));
-    write_file(folder.path("summary.json"), format_summary(outcome.play, format_realtime_section(outcome)));
+    return section(o).dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace app

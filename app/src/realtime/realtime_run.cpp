@@ -22,7 +22,7 @@ constexpr std::int64_t kLongestWaitNs = 20'000'000;
 constexpr double kWatchS = 0.05;
 constexpr double kGraceS = 0.001, kJitterS = 1e-5;
 
-std::vector<double> trial_of(const RealtimeFrames* frames) {
+std::vector<double> trial_of(const FrameThread* frames) {
     std::vector<double> trial = frames ? frames->trial_s() : std::vector<double>{0.0};
     trial.resize(quality_levels().size(), trial.back());
     return trial;
@@ -232,8 +232,7 @@ void RealtimeRun::ask_for_frames() {
 }
 
 void RealtimeRun::ask_for_frame(std::uint64_t index) {
-    FrameJob job;
-    FrameTiming& timing = job.timing;
+    FrameTiming timing;
     timing.index = index;
     const double shown_s = static_cast<double>(index) / fps_;
     timing.shown_ns = to_ns(shown_s);
@@ -262,10 +261,11 @@ void RealtimeRun::ask_for_frame(std::uint64_t index) {
             if (stick->started()) oldest_s = std::min(oldest_s, stick->state().t_s);
         timing.oldest_sample_age_s = T - oldest_s;
     }
-    job.state = parts_.stage.frame(bodies, poses);
+    FrameJob job{index, quality_.level(), epoch_ns_ + timing.shown_ns,
+                 options_.disturbance.slower_at(to_s(start)), parts_.stage.frame(bodies, poses)};
     timing.query_ns = now_ns() - start;
     result_.frames.push_back(timing);
-    if (parts_.frames->offer(std::move(job)))
+    if (parts_.frames->push(std::move(job)))
         drawing_quality_ = timing.quality;
     else
         skipped(shown_s);
@@ -286,16 +286,31 @@ void RealtimeRun::record_tips(const FrameContents& scene, std::uint64_t index, d
     }
 }
 
+/// Enters what the drawing thread measured of a frame.
+FrameTiming& RealtimeRun::settle(const DrawnFrame& drawn) {
+    FrameTiming& frame = *std::ranges::lower_bound(result_.frames, drawn.index, {}, &FrameTiming::index);
+    frame.fate = drawn.in_time ? FrameFate::in_time : FrameFate::late;
+    frame.started_ns = drawn.started_ns - epoch_ns_;
+    frame.drawn_ns = drawn.drawn_ns - epoch_ns_;
+    frame.read_ns = drawn.read_ns - epoch_ns_;
+    for (DrawnTip& tip : std::ranges::equal_range(result_.tips, drawn.index, {}, &DrawnTip::frame))
+        tip.shown = drawn.in_time;
+    return frame;
+}
+
+void RealtimeRun::finish_frames() {
+    parts_.frames->finish();
+    for (const DrawnFrame& drawn : parts_.frames->take_done()) settle(drawn);
+    for (const auto& [index, written_ns] : parts_.frames->written())
+        std::ranges::lower_bound(result_.frames, index, {}, &FrameTiming::index)->written_ns =
+            written_ns - epoch_ns_;
+    result_.frames_not_written = parts_.frames->not_written();
+}
+
 void RealtimeRun::take_frames() {
     if (!parts_.frames) return;
-    for (const FrameTiming& done : parts_.frames->take_done()) {
-        const auto at = std::ranges::lower_bound(result_.frames, done.index, {}, &FrameTiming::index);
-        *at = done;
-        const bool in_time = done.fate == FrameFate::in_time;
-        while (first_tip_ < result_.tips.size() && result_.tips[first_tip_].frame <= done.index) {
-            DrawnTip& tip = result_.tips[first_tip_++];
-            tip.shown = tip.frame == done.index && in_time;
-        }
+    for (const DrawnFrame& drawn : parts_.frames->take_done()) {
+        const FrameTiming& done = settle(drawn);
         const double query_start_s = to_s(done.started_ns - done.query_ns);
         const double delay_s = to_s(done.read_ns) - query_start_s;
         const double shown_s = to_s(done.shown_ns);
@@ -303,7 +318,7 @@ void RealtimeRun::take_frames() {
         if (render_lead_.measured(delay_s) > options_.play.render_lead_s && options_.lead_auto)
             if (const auto why = quality_.outgrown(shown_s)) note_step(*why);
         if (static_cast<std::size_t>(done.quality) != quality_.level()) continue;
-        if (const auto why = quality_.frame(shown_s, in_time, to_s(done.read_ns - done.started_ns)))
+        if (const auto why = quality_.frame(shown_s, drawn.in_time, to_s(done.read_ns - done.started_ns)))
             note_step(*why);
     }
 }

@@ -7,14 +7,14 @@
 #include <vector>
 
 #include "kit/kit.h"
-#include "latency/realtime_result.h"
+#include "latency/timings.h"
+#include "pictures/frame_thread.h"
 #include "pictures/kit_stage.h"
-#include "play/play.h"
+#include "play/play_options.h"
 #include "play/strike_pipeline.h"
 #include "realtime/artificial_load.h"
 #include "realtime/lead_control.h"
 #include "realtime/picture_quality.h"
-#include "realtime/realtime_frames.h"
 #include "sensors/sensor_hub.h"
 #include "sticks/state_stick.h"
 
@@ -47,7 +47,7 @@ struct RealtimeParts {
     KitStage& stage;
     SensorHub& sensors;
     audio::LivePerformance* sound = nullptr;  ///< may be absent
-    RealtimeFrames* frames = nullptr;         ///< may be absent
+    FrameThread* frames = nullptr;            ///< may be absent
 };
 
 /// A strike of a run in real time, on its lap's clock.
@@ -79,6 +79,9 @@ public:
              const std::function<void(const std::string&)>& warn,
              const std::function<void(double)>& progress);
 
+    /// Waits until the frames at hand are drawn and written, and completes their timings.
+    void finish_frames();
+
     [[nodiscard]] RealtimeResult& result() { return result_; }
     [[nodiscard]] std::vector<LapStrikes>& laps() { return laps_; }
     /// Measured poses as the loop saw them, by stick, on the run's clock: the trace of a live source.
@@ -109,6 +112,7 @@ private:
     void skipped(double shown_s);
     void record_tips(const FrameContents& scene, std::uint64_t index, double T);
     void take_frames();
+    FrameTiming& settle(const DrawnFrame& drawn);
     void take_notes();
     void follow_delays();
     [[nodiscard]] double render_lead_s() const {
@@ -136,7 +140,7 @@ private:
     std::vector<std::uint64_t> samples_seen_, starts_seen_;
 
     double fps_;
-    std::uint64_t next_frame_ = 0, first_tip_ = 0;
+    std::uint64_t next_frame_ = 0;
     int drawing_quality_ = 0;  // of the frame at hand
     QualityRule quality_;
     // Measured always; followed with --lead auto.

@@ -24,11 +24,11 @@ struct RealtimeSession {
 /// Reads trace and kit. Throws BadInput for options that cannot be.
 [[nodiscard]] RealtimeSession open_session(const RealtimeOptions& options);
 
-/// What the sensor processes are told.
+/// The options of the sensor processes.
 [[nodiscard]] SensorOptions sensors_of(const RealtimeSession& session, std::int64_t epoch_ns);
 /// The stage for each level of picture quality that is drawn differently.
 [[nodiscard]] std::vector<render::SceneDescription> scenes_of(const KitStage& stage, int width, int height);
-/// `priority` will say what the audio thread obtained; it must outlive the performance.
+/// Sets `priority` to what the audio thread obtained; `priority` must outlive the performance.
 [[nodiscard]] std::unique_ptr<audio::LivePerformance> make_live_sound(const RealtimeSession& session,
                                                                       std::string& priority);
 

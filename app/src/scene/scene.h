@@ -23,7 +23,7 @@ struct SceneBox {
     double floor;
 };
 
-/// What a scene says of the workers that simulate it, if there are several.
+/// A scene's settings of its workers, if there are several.
 struct SceneWorkers {
     bool all_to_first = false;       ///< at first one of them owns every body
     std::uint64_t balance_from = 0;  ///< [steps] no trade before

@@ -1,34 +1,16 @@
 #pragma once
-#include <sim/world.h>
-
-#include <map>
-#include <string>
 #include <vector>
 
-#include "files/toml_reader.h"
-#include "scene/scene.h"
+#include "scene/scene_keys.h"
 
 namespace app {
 
-/// A material of a scene, with its damping.
-struct SceneMaterial {
-    sim::Material material;
-    double damping_alpha = 0, damping_beta = 0, damping_ratio = 0.05;
-};
-using SceneMaterials = std::map<std::string, SceneMaterial>;
-
-/// `[material.NAME]` tables.
-[[nodiscard]] SceneMaterials read_materials(const toml::table& scene);
-
-inline constexpr std::size_t kMostBodies = 10000;
-
 /// One table of a body: one body, or the copies of its `grid`, named NAME/0, NAME/1, ... (x fastest, then y,
-/// then z). Values that it leaves out come from `defaults` (may be null).
-struct ReadBodies {
-    std::vector<sim::WorldBody> bodies;
-    std::vector<render::Appearance> looks;
-};
-[[nodiscard]] ReadBodies read_bodies(const toml::table& table, const toml::table* defaults,
-                                     const SceneMaterials& materials, std::size_t kind);
+/// then z). The name of its material must be among `materials`, or BadInput is thrown at the table's place.
+[[nodiscard]] std::vector<sim::WorldBody> bodies_of(const BodyDraft& draft, const SceneMaterials& materials,
+                                                    const Fields& at);
+
+/// The look of copy k of a body of the given kind: bodies without a colour take one of eight.
+[[nodiscard]] render::Appearance look_of(const BodyDraft& draft, std::size_t kind, std::size_t k);
 
 }  // namespace app

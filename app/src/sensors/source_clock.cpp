@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "statistics/statistics.h"
+
 namespace app {
 namespace {
 
@@ -16,12 +18,8 @@ constexpr double kLeastStepS = 1e-6;
 }  // namespace
 
 double DelayPercentile::p95() const noexcept {
-    std::array<double, 1024> sorted = values_;
-    const std::size_t count = std::min(count_, sorted.size());
-    if (count == 0) return 0;
-    const auto at = sorted.begin() + static_cast<std::ptrdiff_t>((count - 1) * 95 / 100);
-    std::nth_element(sorted.begin(), at, sorted.begin() + static_cast<std::ptrdiff_t>(count));
-    return *at;
+    std::array<double, 1024> values = values_;
+    return quantile_in_place(std::span(values).first(std::min(count_, values.size())), 0.95);
 }
 
 double SourceClock::map(std::size_t stick, double source_s, double arrival_s) noexcept {

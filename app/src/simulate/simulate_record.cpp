@@ -26,15 +26,16 @@ void SimulateRecord::start(const sim::World& world) {
     if (!options_.frames) return;
     fs::create_directory(folder_->path("frames"));
     stage_ = std::make_unique<SceneStage>(scene_, world);
-    frames_ = std::make_unique<FrameWriter>(stage_->description(options_.width, options_.height),
-                                            stage_->frame(world), folder_->path("frames"));
+    const FrameThreadOptions where{options_.width, options_.height, folder_->path("frames")};
+    frames_ = std::make_unique<FrameThread>(std::vector{stage_->description(options_.width, options_.height)},
+                                            stage_->frame(world), where);
 }
 
 void SimulateRecord::take_frames(const sim::World& world) {
     if (!folder_) return;
     while (double(next_frame_) / options_.fps <= world.time_s() + 1e-9) {
         states_->add(state_rows(scene_, world, next_frame_));
-        if (frames_) frames_->push(stage_->frame(world));
+        if (frames_) frames_->push({.index = next_frame_, .state = stage_->frame(world)});
         ++next_frame_;
     }
 }
@@ -64,7 +65,7 @@ void SimulateRecord::finish(SimulateResult& result, const WallTimer& wall) {
         if (table) table->finish();
     if (frames_) frames_->finish();
     if (timing_) draw_workers();
-    result.frames = frames_ ? frames_->frames() : 0;
+    result.frames = frames_ ? frames_->written().size() : 0;
     if (options_.video) make_video(*options_.video, options_.fps, false, folder_->path("."));
     result.wall_s = wall.seconds();
     write_file(folder_->path("summary.json"), format_simulate(result));

@@ -2,7 +2,7 @@
 #include <memory>
 
 #include "files/output_folder.h"
-#include "pictures/frame_writer.h"
+#include "pictures/frame_thread.h"
 #include "pictures/scene_stage.h"
 #include "play/play_setup.h"
 #include "process/clock.h"
@@ -32,7 +32,7 @@ private:
     std::unique_ptr<OutputFolder> folder_;
     std::unique_ptr<GrowingTable> states_, energy_, times_, timing_;
     std::unique_ptr<SceneStage> stage_;
-    std::unique_ptr<FrameWriter> frames_;
+    std::unique_ptr<FrameThread> frames_;
     WorkerHistory history_;
     std::size_t next_frame_ = 0;
 };

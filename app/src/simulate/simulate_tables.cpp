@@ -7,18 +7,9 @@
 #include <iterator>
 #include <stdexcept>
 
+#include "report/table.h"
+
 namespace app {
-namespace {
-
-// As a cell of a CSV file (RFC 4180): in quotes where it needs them.
-std::string cell_of(const std::string& name) {
-    if (name.find_first_of(",\"\n\r") == std::string::npos) return name;
-    std::string quoted = "\"";
-    for (const char c : name) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-    return quoted + '"';
-}
-
-}  // namespace
 
 const std::string& name_of(const Scene& scene, std::size_t body) {
     const std::size_t now = scene.world.bodies.size();
@@ -60,7 +51,7 @@ std::string state_rows(const Scene& scene, const sim::World& world, std::size_t 
         const Eigen::Vector3d &p = s.position, &v = s.velocity, &l = s.angular_momentum;
         const Eigen::Quaterniond& q = s.orientation;
         fmt::format_to(out, "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},", frame, world.time_s(),
-                       cell_of(name_of(scene, static_cast<std::size_t>(body))), p.x(), p.y(), p.z(), q.w(),
+                       csv_field(name_of(scene, static_cast<std::size_t>(body))), p.x(), p.y(), p.z(), q.w(),
                        q.x(), q.y(), q.z(), v.x(), v.y(), v.z(), l.x(), l.y(), l.z());
         for (Eigen::Index k = 0; k < s.q.size(); ++k) fmt::format_to(out, "{}{}", k > 0 ? " " : "", s.q[k]);
         rows.push_back('\n');

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "statistics/statistics.h"
+
 namespace app {
 namespace {
 
@@ -34,13 +36,10 @@ void add(PairedSums& sum, const PairedSums& other) {
     sum.count += other.count;
 }
 
-/// Between the values at 2.5 and 97.5 %.
+/// Of 95 %.
 std::pair<double, double> interval(std::vector<double>& values) {
     std::sort(values.begin(), values.end());
-    const auto at = [&](double p) {
-        return values[static_cast<std::size_t>(std::lround(p * static_cast<double>(values.size() - 1)))];
-    };
-    return {at(0.025), at(0.975)};
+    return {quantile_of_sorted(values, 0.025), quantile_of_sorted(values, 0.975)};
 }
 
 }  // namespace

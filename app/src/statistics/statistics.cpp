@@ -5,29 +5,48 @@
 #include <cmath>
 
 namespace app {
+namespace {
 
-double median(std::vector<double> values) {
-    if (values.empty()) return 0;
-    std::sort(values.begin(), values.end());
-    const std::size_t half = values.size() / 2;
-    return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
+struct Place {
+    std::size_t below;  ///< index of x_k, from 0
+    double fraction;    ///< h - k
+};
+
+Place place_of(std::size_t count, double p) {
+    assert(p >= 0 && p <= 1 && "a quantile is of a share from 0 to 1");
+    const double at = p * static_cast<double>(count - 1);
+    const auto below = static_cast<std::size_t>(at);
+    return {below, at - static_cast<double>(below)};
 }
 
-double nearest_rank(std::vector<double> values, double percent) {
-    assert(percent > 0 && percent <= 100 && "a percentile lies in (0, 100]");
-    if (values.empty()) return 0;
-    // Multiplied before it is divided: 95 * 20 / 100 is 19 exactly, 0.95 * 20 may round up beyond it.
-    const auto rank = static_cast<std::size_t>(std::ceil(percent * static_cast<double>(values.size()) / 100));
-    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(std::max<std::size_t>(rank, 1) - 1);
+/// Infinite neighbours, too, have what lies between them.
+double between(double low, double high, double fraction) {
+    return low == high ? low : std::lerp(low, high, fraction);
+}
+
+}  // namespace
+
+double quantile_of_sorted(std::span<const double> sorted, double p) noexcept {
+    if (sorted.empty()) return kNoValue;
+    const auto [below, fraction] = place_of(sorted.size(), p);
+    return between(sorted[below], sorted[std::min(below + 1, sorted.size() - 1)], fraction);
+}
+
+double quantile_in_place(std::span<double> values, double p) noexcept {
+    if (values.empty()) return kNoValue;
+    const auto [below, fraction] = place_of(values.size(), p);
+    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(below);
     std::nth_element(values.begin(), nth, values.end());
-    return *nth;
+    if (fraction == 0) return *nth;
+    return between(*nth, *std::min_element(nth + 1, values.end()), fraction);
 }
 
 double quantile(std::vector<double> values, double p) {
-    const double place = p * static_cast<double>(values.size() - 1);
-    const auto nth = values.begin() + std::lround(place);
-    std::nth_element(values.begin(), nth, values.end());
-    return *nth;
+    return quantile_in_place(values, p);
+}
+
+double median(std::vector<double> values) {
+    return quantile(std::move(values), 0.5);
 }
 
 }  // namespace app

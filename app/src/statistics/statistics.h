@@ -1,17 +1,25 @@
 #pragma once
+#include <limits>
+#include <span>
 #include <vector>
 
 namespace app {
 
-/// The middle value; the mean of the two middle ones for an even count. 0 for no values.
-[[nodiscard]] double median(std::vector<double> values);
+// Quantiles as everywhere in the program: definition 7 of Hyndman and Fan, "Sample Quantiles in Statistical
+// Packages", 1996 (numpy's default), linear between the order statistics x_1 <= ... <= x_n:
+//   Q(p) = x_k + (h - k) (x_(k+1) - x_k),  h = 1 + (n - 1) p,  k = floor(h),  0 <= p <= 1
+// A quantile of no values is kNoValue, NaN, which tables, CSV and JSON show as none.
 
-/// Nearest-rank percentile: the smallest value that at least percent % of the values do not exceed, i.e. the
-/// ceil(percent/100 n)-th. 0 for no values; percent in (0, 100].
-[[nodiscard]] double nearest_rank(std::vector<double> values, double percent);
+/// What a figure of nothing is.
+inline constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 
-/// Value below which the share `p` of the values lies (the nearest of them, no interpolation). `values` is
-/// not empty.
 [[nodiscard]] double quantile(std::vector<double> values, double p);
+/// The same without a copy: reorders `values`.
+[[nodiscard]] double quantile_in_place(std::span<double> values, double p) noexcept;
+/// The same of values that ascend.
+[[nodiscard]] double quantile_of_sorted(std::span<const double> sorted, double p) noexcept;
+
+/// Q(0.5): the middle value, or the mean of the two in the middle.
+[[nodiscard]] double median(std::vector<double> values);
 
 }  // namespace app

@@ -13,15 +13,15 @@ constexpr const char* kAutoPicture = "cv:q=1e7,decay=8,r=0.5,gate=5";
 constexpr const char* kAutoSound = "ca:q=7e8,gate=5";
 constexpr const char* kAutoConfirming = "cv:q=1e8,gate=5";
 
-constexpr double kNearS = 0.05;   // a contact that near must be borne out
+constexpr double kNearS = 0.05;   // a contact nearer than this must be confirmed
 constexpr double kLaterS = 0.05;  // constant velocity meets the surface later than a stroke that accelerates
 
 }  // namespace
 
-void keep_confirmed(std::vector<sim::Contact>& contacts, std::span<const sim::Contact> borne_out, double s) {
+void keep_confirmed(std::vector<sim::Contact>& contacts, std::span<const sim::Contact> confirming, double s) {
     std::erase_if(contacts, [&](const sim::Contact& contact) {
         if (contact.t_s - s > kNearS) return false;
-        return std::none_of(borne_out.begin(), borne_out.end(), [&](const sim::Contact& other) {
+        return std::none_of(confirming.begin(), confirming.end(), [&](const sim::Contact& other) {
             return other.body == contact.body && other.t_s <= contact.t_s + kLaterS;
         });
     });

@@ -11,11 +11,12 @@ namespace app {
 [[nodiscard]] std::string picture_specification(const std::string& specification);
 [[nodiscard]] std::string sound_specification(const std::string& specification);
 
-/// What confirms the strikes of a sound predictor's specification: empty for none. `auto` finds contacts with
-/// one filter and believes them, when they are near, only if another bears them out (keep_confirmed).
+/// The filter that confirms the strikes of a sound predictor's specification; empty for none. With `auto`,
+/// contacts less than 50 ms ahead must be confirmed by a second filter (keep_confirmed).
 [[nodiscard]] std::string confirming_specification(const std::string& sound_specification);
-/// Keeps of `contacts`, predicted at s, those that are not yet near (50 ms) and those that the confirming
-/// predictor bears out: its path meets the same body too, at most 50 ms later.
-void keep_confirmed(std::vector<sim::Contact>& contacts, std::span<const sim::Contact> borne_out, double s);
+/// Removes those of `contacts`, predicted at s, that are less than 50 ms ahead and not confirmed: a contact is
+/// confirmed by one of `confirming`, the contacts of the second filter's path, with the same body at most 50 ms
+/// later.
+void keep_confirmed(std::vector<sim::Contact>& contacts, std::span<const sim::Contact> confirming, double s);
 
 }  // namespace app

@@ -33,7 +33,7 @@ struct StickPredictions {
 [[nodiscard]] StickPredictions match_predictions(const PredictionFile& file, const std::string& stick,
                                                  std::span<const tracking::PoseSample> samples);
 
-/// Replays predictions to whoever feeds the samples they were matched to: exact at their lead; nearer leads
+/// Replays predictions to a caller that feeds the samples they were matched to: exact at their lead; nearer leads
 /// lie on the straight way there from the newest sample (orientation: slerp), farther ones on its
 /// continuation. States no covariance.
 [[nodiscard]] std::unique_ptr<tracking::Predictor> make_replay(StickPredictions predictions);

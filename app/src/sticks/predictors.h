@@ -11,7 +11,7 @@ namespace app {
 /// Makes any predictor that the command line may name: those of tracking::make_predictor and `exec:CMD`, a
 /// child process (ExternalPredictor). `auto` must have been resolved before. `leads_s` are the leads that
 /// will be asked for: an external predictor computes these, in between its answers are interpolated. `stick`
-/// is the name an external predictor is told. Throws BadInput with one line; std::runtime_error when the
+/// is the name that an external predictor gets. Throws BadInput with one line; std::runtime_error when the
 /// child fails.
 [[nodiscard]] std::unique_ptr<tracking::Predictor> make_any_predictor(const std::string& specification,
                                                                       std::span<const double> leads_s,

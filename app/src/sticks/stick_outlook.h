@@ -28,7 +28,7 @@ inline constexpr double kLongestPredictionS = 0.15;
 inline constexpr double kConfirmingLeadS = 0.1;
 
 /// What is known of one stick after its newest sample, and where it is expected to go: the questions that
-/// strikes and pictures ask, whoever filters.
+/// strikes and pictures need, offline and in real time.
 class StickOutlook {
 public:
     StickOutlook(std::uint32_t stick, const StickGeometry& geometry) : stick_(stick), geometry_(geometry) {}

@@ -31,11 +31,11 @@ struct KitFit {
 /// tip 0.1 m and more above the tracked point, where a stick swings back overhead) are clustered in the
 /// horizontal plane by mean shift (flat kernel, 0.2 m); clusters nearer than 0.2 m are one, clusters of fewer
 /// than three lows are dropped unless there are no others, and the 16 largest are kept.
-///   struck    at least 15 % of a cluster's lows (and three) lie within 50 mm of its lowest, their
-///   inter-quartile range is at most 30 mm and
-///             the median of their turning times at most 20 ms. The surface is then 25 mm above
-///             contact_height.
-///   otherwise the surface is at the 80th percentile of the cluster's lows.
+///   struck     at least 15 % of a cluster's lows (and three) lie within 50 mm of its lowest, their
+///              inter-quartile range is at most 30 mm and the median of their turning times at most 20 ms.
+///              The surface is then 25 mm above contact_height.
+///
+///   otherwise  the surface is at the 80th percentile of the cluster's lows.
 /// The surface is what the tip's centre meets: the body's head lies the tip's radius below. Deterministic.
 /// O(n) for n samples and at most 1000 m for m lows. Throws BadInput when no stick makes a stroke.
 [[nodiscard]] KitFit fit_kit(std::span<const tracking::Trace> traces, const StickGeometry& geometry);

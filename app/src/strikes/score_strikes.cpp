@@ -73,7 +73,7 @@ StrikeScore score_strikes(const std::vector<Strike>& strikes, std::vector<TrueCo
     score.false_notes = score.released - matched;
     score.missed = score.true_contacts - matched;
     score.timing_median_ms = median(errors_ms);
-    score.timing_p95_ms = nearest_rank(errors_ms, 95);
+    score.timing_p95_ms = quantile(errors_ms, 0.95);
     return score;
 }
 

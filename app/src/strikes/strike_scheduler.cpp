@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numeric>
 #include <utility>
 
 namespace app {
@@ -21,65 +23,67 @@ void copy_contact(Strike& strike, const sim::Contact& contact) {
     strike.impulse_body = contact.impulse_body;
 }
 
+bool sounds_the_same(const Strike& a, const Strike& b) {
+    return a.onset_sample == b.onset_sample && a.speed_mps == b.speed_mps && a.zone == b.zone;
+}
+
+bool contains(std::span<const std::uint64_t> ids, std::uint64_t id) {
+    return std::ranges::find(ids, id) != ids.end();
+}
+
 }  // namespace
 
 StrikeScheduler::StrikeScheduler(const StrikeRules& rules, std::size_t sticks, std::size_t instruments)
     : rules_(rules),
       instruments_(instruments),
-      approaches_(sticks * instruments),
+      pairs_(sticks * instruments),
       samples_since_start_(sticks, 0) {}
 
-StrikeScheduler::Approach& StrikeScheduler::approach(std::uint32_t stick, std::uint32_t instrument) {
-    return approaches_[stick * instruments_ + instrument];
+void StrikeScheduler::advance_to(double s, double fixed_s) {
+    fixed_s_ = fixed_s;
+    release_before(std::max(s + rules_.release_margin_s, fixed_s));
+}
+
+void StrikeScheduler::finish() {
+    release_before(std::numeric_limits<double>::infinity());
+}
+
+void StrikeScheduler::restart(std::uint32_t stick) {
+    samples_since_start_[stick] = 0;
+}
+
+void StrikeScheduler::sample(std::uint32_t stick, double s, std::span<const ModelContacts> expected,
+                             std::size_t selected, std::span<const double> measured_clearance) {
+    const int number = samples_since_start_[stick]++;
+    std::vector<sim::Contact> own;
+    for (std::uint32_t instrument = 0; instrument < instruments_; ++instrument) {
+        Pair& pair = pairs_[stick * instruments_ + instrument];
+        const double measured = measured_clearance[instrument];
+        pair.approaches.resize(expected.size());
+        for (std::uint32_t model = 0; model < expected.size(); ++model) {
+            Approach& a = pair.approaches[model];
+            a.stick = stick;
+            a.model = model;
+            own.clear();
+            if (number >= rules_.settling_samples)
+                std::ranges::copy_if(expected[model].contacts, std::back_inserter(own),
+                                     [&](const sim::Contact& contact) { return contact.body == instrument; });
+            update_arming(a, s, measured, expected[model].clearance_m[instrument], number == 0);
+            follow_path(a, s, own);
+            // A stroke that was not found in time is missed; the stick lies in the head until it rises again.
+            if (a.entered_s && a.pending.empty() && s + rules_.commit_lead_s - *a.entered_s > rules_.late_s)
+                disarm(a);
+        }
+        pair.selected = selected;
+        open_again(pair, s, measured);
+        play_selected(pair, s);
+    }
 }
 
 void StrikeScheduler::disarm(Approach& a) {
     a.armed = false;
     a.entered_s.reset();
     a.lowest_measured = a.lowest_filtered = std::numeric_limits<double>::infinity();
-}
-
-void StrikeScheduler::place_onset(Strike& strike, double s) const {
-    // Rounded up, so that the onset never lies nearer to the sample than it may.
-    const double earliest = std::max(strike.contact_s, earliest_onset(s));
-    strike.onset_sample = static_cast<std::int64_t>(std::ceil((earliest - rules_.t0_s) * audio::kSampleRate));
-    strike.onset_s = rules_.t0_s + static_cast<double>(strike.onset_sample) / audio::kSampleRate;
-}
-
-bool StrikeScheduler::is_committed(const Strike& strike, double s) const {
-    return strike.onset_s < s + rules_.commit_lead_s;
-}
-
-void StrikeScheduler::release(std::uint64_t id) {
-    Strike& released = strike(id);
-    released.outcome = Outcome::released;
-    released.decided_at_s = released.onset_s - rules_.release_margin_s;
-    released_.push_back(id);
-}
-
-void StrikeScheduler::advance_to(double s, double fixed_s) {
-    fixed_s_ = fixed_s;
-    const double until = std::max(s + rules_.release_margin_s, fixed_s);
-    for (Approach& a : approaches_) {
-        const auto fixed = [&](std::uint64_t id) { return strike(id).onset_s < until; };
-        bool any = false;
-        for (const std::uint64_t id : a.pending)
-            if (fixed(id)) release(id), any = true;
-        if (!any) continue;
-        std::erase_if(a.pending, fixed);
-        disarm(a);
-    }
-}
-
-void StrikeScheduler::finish() {
-    for (Approach& a : approaches_) {
-        for (const std::uint64_t id : a.pending) release(id);
-        a.pending.clear();
-    }
-}
-
-void StrikeScheduler::restart(std::uint32_t stick) {
-    samples_since_start_[stick] = 0;
 }
 
 void StrikeScheduler::update_arming(Approach& a, double s, double measured, double filtered,
@@ -120,136 +124,200 @@ std::vector<StrikeScheduler::Candidate> StrikeScheduler::candidates(
     return result;
 }
 
-void StrikeScheduler::update(Strike& moved, double s, const sim::Contact& contact) {
-    if (is_committed(moved, s)) return;
-    const std::int64_t onset = moved.onset_sample;
-    const double speed = moved.speed_mps;
-    const std::int32_t zone = moved.zone;
-    copy_contact(moved, contact);
-    moved.model = model_;
-    place_onset(moved, s);
-    if (onset == moved.onset_sample && speed == moved.speed_mps && zone == moved.zone) return;
-    ++moved.moves;
-    changes_.push_back({moved.id, true});
-}
-
-void StrikeScheduler::create(Approach& a, double s, std::uint32_t stick, const sim::Contact& contact) {
-    Strike fresh;
-    fresh.stick = stick;
-    fresh.instrument = contact.body;
-    copy_contact(fresh, contact);
-    fresh.model = model_;
-    place_onset(fresh, s);
-    fresh.scheduled_at_s = s;
-    const auto again = std::find_if(a.cancelled.rbegin(), a.cancelled.rend(), [&](std::uint64_t id) {
-        return std::abs(strike(id).onset_s - contact.t_s) <= rules_.revive_s;
-    });
-    if (again != a.cancelled.rend()) {
-        const Strike old = strike(*again);
-        // A time that stood when it was cancelled stands again, as long as it can be met.
-        if (is_committed(old, s) && old.onset_s >= s + rules_.release_margin_s) {
-            fresh.contact_s = old.contact_s;
-            fresh.onset_sample = old.onset_sample;
-            fresh.onset_s = old.onset_s;
-        }
-        a.cancelled.erase(std::next(again).base());
-        fresh.id = old.id;
-        fresh.scheduled_at_s = old.scheduled_at_s;
-        fresh.moves = old.moves + 1;
-        strike(fresh.id) = fresh;
-    } else {
-        fresh.id = strikes_.size() + 1;
-        strikes_.push_back(fresh);
-    }
-    a.pending.push_back(fresh.id);
-    changes_.push_back({fresh.id, true});
-}
-
-void StrikeScheduler::cancel(Approach& a, double s, std::uint64_t id) {
-    strike(id).outcome = Outcome::cancelled;
-    strike(id).decided_at_s = s;
-    changes_.push_back({id, false});
-    a.cancelled.push_back(id);
-    if (a.cancelled.size() > kRememberedCancellations) a.cancelled.erase(a.cancelled.begin());
-}
-
-void StrikeScheduler::keep_or_cancel(Approach& a, double s, std::uint64_t id, bool may_keep) {
-    if (a.entered_s && may_keep) {
-        // The measured tip has met the surface: the stroke came, whatever the path now says. It sounds as
-        // soon as it may.
-        Strike& kept = strike(id);
-        if (is_committed(kept, s)) {
-            // Its time cannot be mended: a note far from its stroke is not played.
-            if (rules_.cancelling && kept.onset_s - *a.entered_s > rules_.late_s) cancel(a, s, id);
-            return;
-        }
-        const std::int64_t onset = kept.onset_sample;
-        kept.contact_s = std::min(kept.contact_s, *a.entered_s);
-        place_onset(kept, s);
-        if (kept.onset_sample < onset) {
-            ++kept.moves;
-            changes_.push_back({id, true});
-        } else {
-            kept.onset_sample = onset;
-            kept.onset_s = rules_.t0_s + static_cast<double>(onset) / audio::kSampleRate;
-        }
-    } else if (rules_.cancelling || strike(id).onset_s >= s + rules_.sent_lead_s) {
-        cancel(a, s, id);
-    }
-}
-
-bool StrikeScheduler::may_be(const Strike& strike, const Candidate& candidate, double s) const {
-    if (!is_committed(strike, s)) return !candidate.late;
-    return candidate.happens_s - strike.onset_s <= rules_.late_s;
-}
-
-void StrikeScheduler::follow(Approach& a, double s, std::uint32_t stick,
-                             std::span<const sim::Contact> contacts, bool settled) {
-    std::vector<Candidate> found;
-    if (settled) found = candidates(a, s, contacts);
-    std::vector<std::uint64_t> waiting = a.pending;
+void StrikeScheduler::follow_path(Approach& a, double s, std::span<const sim::Contact> contacts) {
+    std::vector<Candidate> found = candidates(a, s, contacts);
+    std::vector<std::size_t> waiting(a.pending.size());
+    std::iota(waiting.begin(), waiting.end(), std::size_t{0});
     // Nearest pairs first: the lists hold one or two entries.
     while (!found.empty() && !waiting.empty()) {
         std::size_t best_p = 0, best_c = 0;
         double best = std::numeric_limits<double>::infinity();
         for (std::size_t p = 0; p < waiting.size(); ++p)
             for (std::size_t c = 0; c < found.size(); ++c) {
-                if (!may_be(strike(waiting[p]), found[c], s)) continue;
-                const double apart = std::abs(strike(waiting[p]).contact_s - found[c].contact->t_s);
+                const Strike& pending = a.pending[waiting[p]];
+                if (!may_be(pending, found[c], s)) continue;
+                const double apart = std::abs(pending.contact_s - found[c].contact->t_s);
                 if (apart < best) best = apart, best_p = p, best_c = c;
             }
         if (!std::isfinite(best)) break;
-        update(strike(waiting[best_p]), s, *found[best_c].contact);
+        update(a.pending[waiting[best_p]], s, *found[best_c].contact);
         waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(best_p));
         found.erase(found.begin() + static_cast<std::ptrdiff_t>(best_c));
     }
     // One stroke has come when the tip is in: the earliest note is its own, unless the path has confirmed
     // another.
     bool may_keep = waiting.size() == a.pending.size();
-    std::ranges::sort(waiting, {}, [this](std::uint64_t id) { return strike(id).contact_s; });
-    for (const std::uint64_t id : waiting) keep_or_cancel(a, s, id, std::exchange(may_keep, false));
-    std::erase_if(a.pending, [&](std::uint64_t id) { return strike(id).outcome == Outcome::cancelled; });
+    std::ranges::sort(waiting, {}, [&](std::size_t p) { return a.pending[p].contact_s; });
+    for (const std::size_t p : waiting) keep_or_cancel(a, s, a.pending[p], std::exchange(may_keep, false));
+    std::erase_if(a.pending, [](const Strike& pending) { return pending.outcome == Outcome::cancelled; });
     for (const Candidate& candidate : found)
-        if (!candidate.late) create(a, s, stick, *candidate.contact);
+        if (!candidate.late) a.pending.push_back(new_contact(a, s, *candidate.contact));
 }
 
-void StrikeScheduler::sample(std::uint32_t stick, double s, std::span<const sim::Contact> contacts,
-                             std::span<const double> measured_clearance,
-                             std::span<const double> filtered_clearance, std::size_t model) {
-    model_ = static_cast<std::uint32_t>(model);
-    const int number = samples_since_start_[stick]++;
-    std::vector<sim::Contact> own;
-    for (std::uint32_t instrument = 0; instrument < instruments_; ++instrument) {
-        Approach& a = approach(stick, instrument);
-        update_arming(a, s, measured_clearance[instrument], filtered_clearance[instrument], number == 0);
-        own.clear();
-        for (const sim::Contact& contact : contacts)
-            if (contact.body == instrument) own.push_back(contact);
-        follow(a, s, stick, own, number >= rules_.settling_samples);
-        // A stroke that was not found in time is missed; the stick lies in the head until it rises again.
-        if (a.entered_s && a.pending.empty() && s + rules_.commit_lead_s - *a.entered_s > rules_.late_s)
-            disarm(a);
+void StrikeScheduler::place_onset(Strike& pending, double s) const {
+    // Rounded up, so that the onset never lies nearer to the sample than it may.
+    const double earliest = std::max(pending.contact_s, earliest_onset(s));
+    pending.onset_sample =
+        static_cast<std::int64_t>(std::ceil((earliest - rules_.t0_s) * audio::kSampleRate));
+    pending.onset_s = rules_.t0_s + static_cast<double>(pending.onset_sample) / audio::kSampleRate;
+}
+
+bool StrikeScheduler::is_committed(const Strike& pending, double s) const {
+    return pending.onset_s < s + rules_.commit_lead_s;
+}
+
+bool StrikeScheduler::may_be(const Strike& pending, const Candidate& candidate, double s) const {
+    if (!is_committed(pending, s)) return !candidate.late;
+    return candidate.happens_s - pending.onset_s <= rules_.late_s;
+}
+
+void StrikeScheduler::update(Strike& pending, double s, const sim::Contact& contact) const {
+    if (is_committed(pending, s)) return;
+    copy_contact(pending, contact);
+    place_onset(pending, s);
+}
+
+Strike StrikeScheduler::new_contact(Approach& a, double s, const sim::Contact& contact) const {
+    Strike fresh;
+    fresh.stick = a.stick;
+    fresh.instrument = contact.body;
+    fresh.model = a.model;
+    copy_contact(fresh, contact);
+    place_onset(fresh, s);
+    const auto again = std::find_if(a.cancelled.rbegin(), a.cancelled.rend(), [&](const Strike& old) {
+        return std::abs(old.onset_s - contact.t_s) <= rules_.revive_s;
+    });
+    if (again == a.cancelled.rend()) return fresh;
+    // A time that stood when it was cancelled stands again, as long as it can be met.
+    if (is_committed(*again, s) && again->onset_s >= s + rules_.release_margin_s) {
+        fresh.contact_s = again->contact_s;
+        fresh.onset_sample = again->onset_sample;
+        fresh.onset_s = again->onset_s;
     }
+    fresh.id = again->id;
+    a.cancelled.erase(std::next(again).base());
+    return fresh;
+}
+
+void StrikeScheduler::keep_or_cancel(Approach& a, double s, Strike& pending, bool may_keep) const {
+    if (a.entered_s && may_keep) {
+        // The measured tip has met the surface: the stroke came, whatever the path now says. It sounds as
+        // soon as it may.
+        if (is_committed(pending, s)) {
+            // Its time cannot be mended: a note far from its stroke is not played.
+            if (rules_.cancelling && pending.onset_s - *a.entered_s > rules_.late_s) cancel(a, pending);
+            return;
+        }
+        const Strike before = pending;
+        pending.contact_s = std::min(pending.contact_s, *a.entered_s);
+        place_onset(pending, s);
+        if (pending.onset_sample < before.onset_sample) return;
+        pending.onset_sample = before.onset_sample;
+        pending.onset_s = before.onset_s;
+    } else if (rules_.cancelling || pending.onset_s >= s + rules_.sent_lead_s) {
+        cancel(a, pending);
+    }
+}
+
+void StrikeScheduler::cancel(Approach& a, Strike& pending) {
+    a.cancelled.push_back(pending);
+    pending.outcome = Outcome::cancelled;
+    if (a.cancelled.size() > kRememberedCancellations) a.cancelled.erase(a.cancelled.begin());
+}
+
+bool StrikeScheduler::is_selected(const Pair& pair, const Strike& pending) const {
+    const double passed_by_s = pair.approaches[pair.selected].passed_by_s;
+    return pending.model == pair.selected || std::abs(pending.onset_s - passed_by_s) <= rules_.late_s;
+}
+
+void StrikeScheduler::open_again(Pair& pair, double s, double measured) const {
+    if (!pair.struck || s < pair.struck->onset_s) return;
+    double& lowest = pair.struck->lowest_m;
+    lowest = std::min(lowest, measured);
+    if (measured >= rules_.rearm_m && measured >= lowest + rules_.rearm_m) pair.struck.reset();
+}
+
+void StrikeScheduler::play_selected(Pair& pair, double s) {
+    std::vector<std::uint64_t> played;
+    for (Approach& a : pair.approaches)
+        for (Strike& pending : a.pending) {
+            const bool same_stroke =
+                pair.is_closed() && pending.onset_s <= pair.struck->onset_s + rules_.late_s;
+            if (!is_selected(pair, pending) || same_stroke || contains(played, pending.id)) continue;
+            play(pair, pending, s, played);
+            played.push_back(pending.id);
+        }
+    for (const std::uint64_t id : pair.strikes)
+        if (!contains(played, id)) withdraw(id, s);
+    while (pair.strikes.size() > kRememberedCancellations &&
+           strike(pair.strikes.front()).outcome == Outcome::cancelled)
+        pair.strikes.erase(pair.strikes.begin());
+}
+
+void StrikeScheduler::play(Pair& pair, Strike& pending, double s, std::span<const std::uint64_t> played) {
+    if (pending.id == 0 || strike(pending.id).outcome == Outcome::released)
+        pending.id = taken_over(pair, pending, played);
+    if (pending.id == 0) {
+        pending.id = strikes_.size() + 1;
+        pending.scheduled_at_s = s;
+        pending.moves = 0;
+        strikes_.push_back(pending);
+        pair.strikes.push_back(pending.id);
+        changes_.push_back({pending.id, true});
+        return;
+    }
+    Strike& known = strike(pending.id);
+    const bool moves = known.outcome == Outcome::cancelled || !sounds_the_same(known, pending);
+    if (moves) changes_.push_back({pending.id, true});
+    pending.scheduled_at_s = known.scheduled_at_s;
+    pending.moves = known.moves + (moves ? 1 : 0);
+    known = pending;
+}
+
+std::uint64_t StrikeScheduler::taken_over(const Pair& pair, const Strike& pending,
+                                          std::span<const std::uint64_t> played) const {
+    const auto goes_on = [&](std::uint64_t id) {
+        const Strike& other = strike(id);
+        return other.model != pending.model && !contains(played, id) &&
+               std::abs(other.onset_s - pending.contact_s) <= rules_.revive_s;
+    };
+    const auto newest = std::find_if(pair.strikes.rbegin(), pair.strikes.rend(), goes_on);
+    return newest == pair.strikes.rend() ? 0 : *newest;
+}
+
+void StrikeScheduler::withdraw(std::uint64_t id, double s) {
+    if (strike(id).outcome != Outcome::pending) return;
+    strike(id).outcome = Outcome::cancelled;
+    strike(id).decided_at_s = s;
+    changes_.push_back({id, false});
+}
+
+void StrikeScheduler::release_before(double until) {
+    const auto due = [&](const Strike& pending) { return pending.onset_s < until; };
+    for (Pair& pair : pairs_)
+        for (Approach& a : pair.approaches) {
+            if (std::ranges::none_of(a.pending, due)) continue;
+            for (const Strike& pending : a.pending)
+                if (due(pending)) release(pair, a, pending);
+            std::erase_if(a.pending, due);
+            disarm(a);
+        }
+}
+
+void StrikeScheduler::release(Pair& pair, Approach& a, const Strike& pending) {
+    if (!is_selected(pair, pending)) {
+        a.passed_by_s = pending.onset_s;
+        return;
+    }
+    if (pending.id == 0 || strike(pending.id).outcome != Outcome::pending) return;
+    const double release_s = pending.onset_s - rules_.release_margin_s;
+    if (pair.is_closed()) return withdraw(pending.id, release_s);
+    Strike& released = strike(pending.id);
+    released.outcome = Outcome::released;
+    released.decided_at_s = release_s;
+    released_.push_back(released.id);
+    std::erase(pair.strikes, released.id);
+    pair.struck = {released.onset_s};
 }
 
 std::vector<NoteChange> StrikeScheduler::take_changes() {

@@ -16,8 +16,10 @@ namespace app {
 struct StrikeRules {
     double t0_s = 0;                  ///< time of audio sample 0
     double release_margin_s = 0.010;  ///< a note is fixed this long before its onset
-    double commit_lead_s = 0.010;     ///< its time is fixed this long before, >= release_margin_s
-    double late_s = 0.030;            ///< a stroke found later than this after its contact is not played
+    /// Its time is fixed this long before its onset, >= release_margin_s: `play` moves a note until its release,
+    /// `compare` fixes the time the lead ahead.
+    double commit_lead_s = 0.010;
+    double late_s = 0.030;    ///< a stroke found later than this after its contact is not played
     double revive_s = 0.030;  ///< a contact predicted again this near to a cancelled onset keeps its id
     double rearm_m =
         0.003;  ///< the tip must rise this far, and be this far outside, before it can strike again
@@ -34,13 +36,29 @@ struct NoteChange {
     bool scheduled = true;  ///< added, moved or re-weighted; false: cancelled
 };
 
-/// Turns predicted contacts into strikes: every (stick, instrument) pair holds a list of pending contacts
-/// that each new sample confirms, moves or cancels until their release point. Doubles are prevented by
-/// geometry alone: after a release the pair makes no strike until the tip, as measured and as filtered, has
-/// risen `rearm_m` from its lowest point and is `rearm_m` outside the surface. With a commit lead beyond the
-/// release margin a note's time stands from that lead on, while it may still be cancelled, and taken up
-/// again. Causal: the call for a sample at s changes only notes with onset >= s + release margin. Times in
-/// seconds of the trace's clock.
+/// What one of a predictor's models expects after a sample.
+struct ModelContacts {
+    std::span<const sim::Contact> contacts;  ///< of its predicted path, by time
+    /// [m] signed, of its tip at lead 0 from each instrument's surface grown by the tip's radius
+    std::span<const double> clearance_m;
+};
+
+/// Turns predicted contacts into strikes.
+///
+/// Contacts: every (stick, instrument, model) holds a list of pending contacts that each new sample confirms,
+/// moves or cancels until their release point. Doubles are prevented by geometry alone: after a release the list
+/// takes no contact until the tip, as measured and as filtered, has risen `rearm_m` from its lowest point and is
+/// `rearm_m` outside the surface. With a commit lead beyond the release margin a contact's time stands from that
+/// lead on, while it may still be cancelled, and taken up again.
+///
+/// Strikes: the pending contacts of the selected model are those that are played. When the selection changes, a
+/// strike goes on with the new model's contact within `revive_s` of it, or is cancelled. A model that was not
+/// selected when its own contact was released stands by that stroke: another model's contact within `late_s` of
+/// it is played. One stroke makes one note: of several models none is released after a note until the measured tip
+/// has risen `rearm_m`. With one model every pending contact is a strike.
+///
+/// Causal: the call for a sample at s changes only notes with onset >= s + release margin. Times in seconds of
+/// the trace's clock.
 class StrikeScheduler {
 public:
     StrikeScheduler(const StrikeRules& rules, std::size_t sticks, std::size_t instruments);
@@ -51,19 +69,11 @@ public:
     void advance_to(double s, double fixed_s = -std::numeric_limits<double>::infinity());
     /// The filter of `stick` starts anew: its next sample is a first sample.
     void restart(std::uint32_t stick);
-    /// The sample of `stick` at time s.
-    ///
-    ///   contacts            of its predicted path, by time
-    ///
-    ///   measured_clearance  [m] signed, of the measured tip from each instrument's surface grown by the
-    ///   tip's radius
-    ///
-    ///   filtered_clearance  the same of the filtered tip at lead 0
-    ///
-    ///   model               that predicts the contacts, of a predictor of several
-    void sample(std::uint32_t stick, double s, std::span<const sim::Contact> contacts,
-                std::span<const double> measured_clearance, std::span<const double> filtered_clearance,
-                std::size_t model = 0);
+    /// The sample of `stick` at time s: what each model expects (as many at every sample), the model that is
+    /// selected, and the distance of the measured tip from each instrument's surface grown by the tip's radius
+    /// [m, signed].
+    void sample(std::uint32_t stick, double s, std::span<const ModelContacts> expected, std::size_t selected,
+                std::span<const double> measured_clearance);
     /// After the last sample: what is pending is released, as when a sensor falls silent.
     void finish();
 
@@ -74,51 +84,84 @@ public:
     [[nodiscard]] std::vector<std::uint64_t> take_released();
 
 private:
-    /// What one stick is doing above one instrument.
+    /// What one stick is doing above one instrument, as one model sees it. A contact is kept as the strike that
+    /// it would make; its id is that of the strike that it has made, 0 for none.
     struct Approach {
+        std::uint32_t stick = 0, model = 0;
         bool armed = false;
         double lowest_measured = std::numeric_limits<double>::infinity();  ///< since it was disarmed [m]
         double lowest_filtered = std::numeric_limits<double>::infinity();
         std::optional<double> entered_s;  ///< the measured tip entered the surface since it was armed
         double last_clearance = 0, last_s = 0;
-        std::vector<std::uint64_t> pending;    ///< ids by contact time
-        std::vector<std::uint64_t> cancelled;  ///< ids, newest last; a few
+        std::vector<Strike> pending;    ///< in order of first prediction
+        std::vector<Strike> cancelled;  ///< newest last; a few
+        /// Onset of its contact that was released last while another model was selected.
+        double passed_by_s = -std::numeric_limits<double>::infinity();
     };
+    /// The last note of a stick on an instrument, until the tip has risen.
+    struct Struck {
+        double onset_s;
+        double lowest_m = std::numeric_limits<double>::infinity();  ///< of the measured tip since the onset
+    };
+    /// One stick and one instrument.
+    struct Pair {
+        std::vector<Approach> approaches;  ///< a model each; none before the first sample
+        std::size_t selected = 0;          ///< model
+        std::optional<Struck> struck;
+        std::vector<std::uint64_t> strikes;  ///< ids of those pending or cancelled, newest last; a few
 
-    Approach& approach(std::uint32_t stick, std::uint32_t instrument);
-    Strike& strike(std::uint64_t id) { return strikes_[id - 1]; }
-    void update_arming(Approach& a, double s, double measured, double filtered, bool first) const;
-    void follow(Approach& a, double s, std::uint32_t stick, std::span<const sim::Contact> contacts,
-                bool settled);
+        /// One model's own arming prevents doubles; that of several does not know what the others have played.
+        [[nodiscard]] bool is_closed() const { return struck && approaches.size() > 1; }
+    };
     /// A contact of the predicted path that may be a strike.
     struct Candidate {
         const sim::Contact* contact;
         double happens_s;  ///< its time, or that at which the measured tip entered
         bool late;         ///< too late for a new note; it may confirm one whose time stands
     };
+
+    Strike& strike(std::uint64_t id) { return strikes_[id - 1]; }
+    [[nodiscard]] const Strike& strike(std::uint64_t id) const { return strikes_[id - 1]; }
+
+    void follow_path(Approach& a, double s, std::span<const sim::Contact> contacts);
+    void update_arming(Approach& a, double s, double measured, double filtered, bool first) const;
+    static void disarm(Approach& a);
     [[nodiscard]] std::vector<Candidate> candidates(const Approach& a, double s,
                                                     std::span<const sim::Contact> contacts) const;
-    void create(Approach& a, double s, std::uint32_t stick, const sim::Contact& contact);
-    void update(Strike& strike, double s, const sim::Contact& contact);
+    [[nodiscard]] Strike new_contact(Approach& a, double s, const sim::Contact& contact) const;
+    void update(Strike& pending, double s, const sim::Contact& contact) const;
     /// Earliest onset that the sample at s may ask for.
     [[nodiscard]] double earliest_onset(double s) const {
         return std::max(s + rules_.commit_lead_s, fixed_s_);
     }
-    void place_onset(Strike& strike, double s) const;
-    [[nodiscard]] bool is_committed(const Strike& strike, double s) const;
-    /// Whether a candidate may be the strike's own contact. A note whose time stands is not borne out by a
-    /// contact that would come more than late_s after it; one that would come sooner will sound late.
-    [[nodiscard]] bool may_be(const Strike& strike, const Candidate& candidate, double s) const;
-    void keep_or_cancel(Approach& a, double s, std::uint64_t id, bool may_keep);
-    void cancel(Approach& a, double s, std::uint64_t id);
-    void release(std::uint64_t id);
-    static void disarm(Approach& a);
+    void place_onset(Strike& pending, double s) const;
+    [[nodiscard]] bool is_committed(const Strike& pending, double s) const;
+    /// Whether a candidate may be the pending contact itself. A contact whose time stands is not confirmed by
+    /// one that would come more than late_s after it; one that would come sooner will sound late.
+    [[nodiscard]] bool may_be(const Strike& pending, const Candidate& candidate, double s) const;
+    /// Of a pending contact that the path no longer shows.
+    void keep_or_cancel(Approach& a, double s, Strike& pending, bool may_keep) const;
+    static void cancel(Approach& a, Strike& pending);
+
+    /// Makes the strikes of a pair those that are to be played of its pending contacts.
+    void play_selected(Pair& pair, double s);
+    /// Opens the surface to all models when the tip has risen since the last note.
+    void open_again(Pair& pair, double s, double measured) const;
+    /// Whether a contact's model is selected, or the selected model stands by the same stroke.
+    [[nodiscard]] bool is_selected(const Pair& pair, const Strike& pending) const;
+    /// The pending contact becomes a strike, or the strike that it has made follows it.
+    void play(Pair& pair, Strike& pending, double s, std::span<const std::uint64_t> played);
+    /// The strike that a contact of a newly selected model goes on with; 0 for none.
+    [[nodiscard]] std::uint64_t taken_over(const Pair& pair, const Strike& pending,
+                                           std::span<const std::uint64_t> played) const;
+    void withdraw(std::uint64_t id, double s);
+    void release_before(double until);
+    void release(Pair& pair, Approach& a, const Strike& pending);
 
     StrikeRules rules_;
     std::size_t instruments_;
     double fixed_s_ = -std::numeric_limits<double>::infinity();
-    std::uint32_t model_ = 0;           // of the sample at hand
-    std::vector<Approach> approaches_;  // stick-major
+    std::vector<Pair> pairs_;  // stick-major
     std::vector<int> samples_since_start_;
     std::vector<Strike> strikes_;
     std::vector<NoteChange> changes_;

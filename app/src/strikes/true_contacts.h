@@ -14,7 +14,8 @@ namespace app {
 /// Contacts of the measured tip paths, straight between samples, with the instruments at rest, for scoring
 /// only: the tip's centre enters the rest surface grown by the tip's radius in a zone that sounds and goes at
 /// least 3 mm deep; armed again 3 mm outside. Not armed inside at the first sample or after a gap of more
-/// than tracking::kGapS. By time.
+/// than tracking::kGapS. The speed is that of the piece before the contact, which holds no rebound, or of the
+/// piece that holds the contact where that is faster (a stroke that still accelerates). By time.
 [[nodiscard]] std::vector<TrueContact> find_true_contacts(std::span<const TipTrack> tracks,
                                                           std::span<const sim::BodyDefinition> bodies,
                                                           double tip_radius_m);

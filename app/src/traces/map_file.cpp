@@ -4,35 +4,35 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <array>
 #include <fstream>
 #include <sstream>
 
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/option_values.h"
 #include "files/toml_reader.h"
-#include "kit/kit.h"
 
 namespace fs = std::filesystem;
 
 namespace app {
 namespace {
 
-/// A word of a map file and what it stands for.
 template <class Value>
-using Words = std::vector<std::pair<std::string, Value>>;
+using Words = std::vector<Word<Value>>;
 
 const Words<double> kMetres = {{"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}};
 const Words<double> kSeconds = {{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}};
 const Words<char> kSeparators = {{"comma", ','}, {"semicolon", ';'}, {"tab", '\t'}, {"space", ' '}};
+const Words<std::optional<Eigen::Vector3d>> kAxes = {
+    {"+x", Eigen::Vector3d(1, 0, 0)},  {"-x", Eigen::Vector3d(-1, 0, 0)}, {"+y", Eigen::Vector3d(0, 1, 0)},
+    {"-y", Eigen::Vector3d(0, -1, 0)}, {"+z", Eigen::Vector3d(0, 0, 1)},  {"-z", Eigen::Vector3d(0, 0, -1)}};
 
 template <class Value>
 Value meaning(const Words<Value>& words, const std::string& word, const std::string& option) {
     std::string known;
     for (const auto& [name, value] : words) {
         if (name == word) return value;
-        known += (known.empty() ? "" : ", ") + name;
+        known += known.empty() ? "" : ", ";
+        known += name;
     }
     throw BadInput(fmt::format("error: found {} \"{}\", expected one of {}", option, word, known));
 }
@@ -41,62 +41,81 @@ template <class Value>
 std::string word_for(const Words<Value>& words, Value value) {
     for (const auto& [name, meant] : words)
         if (meant == value) return name;
-    return words.front().first;
+    return words.front().name;
 }
 
-toml::table parse(const fs::path& file) {
-    std::ifstream in(file);
-    std::error_code ignored;
-    if (!in.good() || fs::is_directory(file, ignored))
-        throw BadInput(fmt::format(
-            "{}: error: found no readable file, expected a map: NAME=COLUMN,.., a TOML file, or one of {}",
-            file.string(), fmt::join(map_names(), ", ")));
-    try {
-        return toml::parse(in, file.string());
-    } catch (const toml::parse_error& wrong) {
-        std::string what(wrong.description());
-        std::replace(what.begin(), what.end(), '\n', ' ');
-        throw BadInput(fmt::format("{}:{}:{}: error: found a syntax error ({}), expected TOML", file.string(),
-                                   wrong.source().begin.line, wrong.source().begin.column, what));
-    }
+void unit_keys(Fields& keys, tracking::ColumnMap& map) {
+    keys.choice("units", map.metres_per_unit, kMetres, "Unit of positions.");
+    keys.text("units_from", map.units_from,
+              "Above the header, a cell of this text stands before the unit's name; it goes before `units`.");
+    keys.choice("up", map.z_up, {{"y", false}, {"z", true}}, "The axis that points up.");
+    keys.choice("euler", map.euler,
+                {{"", ""},
+                 {"XYZ", "XYZ"},
+                 {"XZY", "XZY"},
+                 {"YXZ", "YXZ"},
+                 {"YZX", "YZX"},
+                 {"ZXY", "ZXY"},
+                 {"ZYX", "ZYX"}},
+                "Order of the intrinsic turns, where columns ex, ey, ez hold Euler angles (extrinsic ones: "
+                "write the order "
+                "backwards).");
+    keys.choice("angles", map.radians, {{"degrees", false}, {"radians", true}}, "Unit of Euler angles.");
+    keys.choice("time_unit", map.seconds_per_unit, kSeconds, "Unit of times.");
+    keys.flag("from_zero", map.from_zero, "Times count from the first row's.");
+    keys.number("rate_hz", map.rate_hz, {0, 1e5, "Hz"},
+                "Rate of frames, where there are no times; 0: not known.");
+    keys.text("rate_from", map.rate_from,
+              "Above the header, a cell of this text stands before the rate, unless the rate is given.");
+    keys.choice(
+        "lost", map.zero_is_lost, {{"empty", false}, {"zeros", true}},
+        "What stands for a stick that is not seen: empty cells and NaN, or also a position of three zeros.");
+    keys.vector("tip_m", map.tip, {-3, 3, "m"}, "Centre of the tip in the tracked body's frame.",
+                {.example = "[0, 0, -0.4]"});
+    keys.choice("shaft", map.shaft, kAxes, "Axis of the tracked body from hand to tip.",
+                {.example = "\"-z\""});
 }
 
-/// [columns]: role = "column", or a table of them for each stick.
-void read_columns(const toml::table& table, const std::string& prefix, tracking::ColumnMap& map) {
-    for (const auto& [key, node] : table) {
-        const std::string role = prefix + std::string(key.str());
-        if (node.is_table() && prefix.empty())
-            read_columns(*node.as_table(), role + ".", map);
-        else if (node.is_string())
-            map.columns[role] = node.as_string()->get();
-        else
-            fail_at(node.source(), fmt::format("no text for column \"{}\"", role),
-                    "a column's name in quotes, #N or +N");
-    }
+void map_keys(Fields& keys, tracking::ColumnMap& map) {
+    std::string description;
+    keys.text("description", description, "One line about it.");
+    keys.text(
+        "signature", map.signature,
+        "Text within a file's first 2000 bytes that tells this kind of file: then the map is found without "
+        "naming it.");
+    keys.choice("separator", map.separator, kSeparators,
+                "Between columns; space: any run of blanks and tabs.");
+    std::string comment = map.comment == '\0' ? "" : std::string(1, map.comment);
+    keys.text("comment", comment, "Lines that begin with this character are left out.");
+    keys.require(comment.size() <= 1, "comment", fmt::format("comment = \"{}\"", comment), "one character");
+    map.comment = comment.empty() ? '\0' : comment[0];
+    keys.choice("decimal", map.decimal_comma, {{"point", false}, {"comma", true}},
+                "Decimal sign of numbers.");
+    keys.text(
+        "header", map.header,
+        "First cell of the header's last line; empty: the first line that is no comment, or none where all "
+        "columns are numbers.");
+    keys.text("header_from", map.header_from,
+              "A cell of the header's first line, among its first two; empty: as `header`.");
+    unit_keys(keys, map);
+    keys.columns(
+        "columns", map.columns,
+        "The column of each role, or of the roles of each stick: `t` or `frame` (neither: rows are frames), "
+        "`stick` (a row a stick), `px py pz`, and one of `qw qx qy qz`, `ex ey ez` (with `euler`), `m00 m01 "
+        ".. "
+        "m22` (rotation matrix, row and column), or nothing. A column is its header's cell (of a header of "
+        "several lines: the cells joined by '/'; '*' stands for anything, {stick} for a stick's name), #N: "
+        "the "
+        "N-th column, or +N: N columns right of the same stick's px. [columns.left] holds the roles of the "
+        "stick left. "
+        "Rotations turn body to world.",
+        {.need = Need::given, .example = "{\"t\": \"Time\", \"px\": \"X\", \"py\": \"Y\", \"pz\": \"Z\"}"});
 }
-
-void read_units(TomlReader& top, tracking::ColumnMap& map) {
-    map.metres_per_unit = meaning(kMetres, top.choice("units", {"m", "cm", "mm"}, "m"), "units");
-    map.units_from = top.text("units_from", "");
-    map.z_up = top.choice("up", {"y", "z"}, "y") == "z";
-    map.euler = top.choice("euler", {"", "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"}, "");
-    map.radians = top.choice("angles", {"degrees", "radians"}, "degrees") == "radians";
-    map.seconds_per_unit =
-        meaning(kSeconds, top.choice("time_unit", {"s", "ms", "us", "ns"}, "s"), "time_unit");
-    map.from_zero = top.flag("from_zero", false);
-    map.rate_hz = top.number("rate_hz", 0, 1e5, 0.0);
-    map.rate_from = top.text("rate_from", "");
-    map.zero_is_lost = top.choice("lost", {"empty", "zeros"}, "empty") == "zeros";
-    if (top.has("tip_m")) map.tip = top.vector("tip_m", -3, 3);
-    if (top.has("shaft"))
-        map.shaft = parse_axis(top.choice("shaft", {"+x", "-x", "+y", "-y", "+z", "-z"}), "shaft");
-}
-
-std::string axis_word(const Eigen::Vector3d& shaft) {
-    Eigen::Index axis = 0;
-    const double size = shaft.cwiseAbs().maxCoeff(&axis);
-    return std::string(shaft[axis] < 0 && size > 0 ? "-" : "+") + "xyz"[axis];
-}
+const TableKind<tracking::ColumnMap> kMapFile = {{"map",
+                                                  "A map file (TOML) for `musicworld trace convert --map`: "
+                                                  "where a table of another program keeps what a trace "
+                                                  "needs, and in which units and axes."},
+                                                 map_keys};
 
 /// "t=Time,px=X": role by role.
 tracking::ColumnMap spelt_out(const std::string& text) {
@@ -126,24 +145,16 @@ double seconds_per(const std::string& unit, const std::string& option) {
     return meaning(kSeconds, unit, option);
 }
 
+FormatDescription map_format() {
+    return describe_format(kMapFile);
+}
+
 tracking::ColumnMap read_map(const fs::path& file) {
-    const toml::table table = parse(file);
-    TomlReader top({&table}, "the map");
     tracking::ColumnMap map;
-    static_cast<void>(top.text("description", ""));
-    map.signature = top.text("signature", "");
-    map.separator = meaning(
-        kSeparators, top.choice("separator", {"comma", "semicolon", "tab", "space"}, "comma"), "separator");
-    const std::string comment = top.text("comment", "");
-    if (comment.size() > 1) top.fail("comment", fmt::format("comment = \"{}\"", comment), "one character");
-    map.comment = comment.empty() ? '\0' : comment[0];
-    map.decimal_comma = top.choice("decimal", {"point", "comma"}, "point") == "comma";
-    map.header = top.text("header", "");
-    map.header_from = top.text("header_from", "");
-    read_units(top, map);
-    static_cast<void>(top.table("columns"));
-    top.done();
-    if (const toml::table* columns = table["columns"].as_table()) read_columns(*columns, "", map);
+    std::vector<TomlFile> layers;
+    layers.emplace_back(file, TomlKind{"a map: NAME=COLUMN,.., or a file",
+                                       fmt::format("the bundled ones are {}", fmt::join(map_names(), ", "))});
+    read_toml(layers, "the map", [&](Fields& keys) { map_keys(keys, map); });
     try {
         map.check();
     } catch (const std::invalid_argument& wrong) {
@@ -174,7 +185,7 @@ std::string format_map(const tracking::ColumnMap& map) {
     say("rate_from", map.rate_from);
     if (map.zero_is_lost) say("lost", "zeros");
     if (map.tip) top.insert("tip_m", toml::array{map.tip->x(), map.tip->y(), map.tip->z()});
-    if (map.shaft) say("shaft", axis_word(*map.shaft));
+    if (map.shaft) say("shaft", word_for(kAxes, map.shaft));
     toml::table columns;
     for (const auto& [role, column] : map.columns) {
         const std::size_t dot = role.rfind('.');

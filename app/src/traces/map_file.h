@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "files/format_description.h"
+
 namespace app {
 
 /// A map by path, or by the name of a bundled one ("optitrack" is assets/maps/optitrack.toml), or spelt out:
@@ -16,6 +18,9 @@ namespace app {
 [[nodiscard]] tracking::ColumnMap read_map(const std::filesystem::path& file);
 /// Its text; reads back to the same map.
 [[nodiscard]] std::string format_map(const tracking::ColumnMap& map);
+
+/// Keys, ranges and defaults of map files.
+[[nodiscard]] FormatDescription map_format();
 
 /// The bundled map for a file that begins so; none if it has none of their signatures.
 [[nodiscard]] std::optional<tracking::ColumnMap> map_for(std::string_view text);

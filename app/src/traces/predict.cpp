@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "sticks/auto_predictor.h"
-#include "sticks/predictors.h"
-#include "sticks/stick_tracker.h"
+#include "sticks/replay.h"
 
 namespace app {
 namespace {
@@ -26,19 +25,14 @@ void predict_stick(const tracking::StickTrace& stick, std::size_t index, trackin
                    double lead_s, std::vector<Row>& rows) {
     bool oriented = false;
     double newest_s = 0;
-    for (std::size_t i = 0; i < stick.samples.size(); ++i) {
-        const tracking::PoseSample& sample = stick.samples[i];
-        (void)predictor.correct(sample);
-        require_working(predictor);
-        oriented = oriented || sample.has_orientation;
-        if (i > 0 && !(sample.t_s > newest_s)) continue;
-        newest_s = sample.t_s;
-        if (i == 0) continue;
-        const double t_s = sample.t_s + lead_s;
-        const bool taken = predictor.time_s() == sample.t_s;
-        const tracking::PosePrediction pose = predictor.predict(taken ? lead_s : t_s - predictor.time_s());
-        rows.push_back({sample.t_s, index, {t_s, pose.position, pose.orientation, oriented}});
-    }
+    replay(predictor, stick.samples, [&](const ReplayedSample& now) {
+        oriented = oriented || now.sample.has_orientation;
+        if (now.index > 0 && !(now.sample.t_s > newest_s)) return;
+        newest_s = now.sample.t_s;
+        if (now.index == 0) return;
+        const tracking::PosePrediction pose = predictor.predict(lead_s + now.behind_s);
+        rows.push_back({newest_s, index, {newest_s + lead_s, pose.position, pose.orientation, oriented}});
+    });
 }
 
 std::string format_rows(const tracking::Trace& seen, const std::vector<Row>& rows) {

@@ -51,14 +51,14 @@ struct PlayedNote {
 /// leaves it alone. The recorded samples equal those of the offline Performance for the same notes, with the
 /// onsets that were played.
 ///
-/// Bounds: 1024 commands between two blocks, 4096 notes ahead, 1000 notes a second on average. Once running,
+/// Bounds: 1024 commands between two blocks, 4096 notes ahead, 1000 notes per second on average. Running,
 /// the audio thread allocates nothing, takes no lock and makes no system call but the clock's (Csound's own
 /// code excepted).
 class LivePerformance {
 public:
-    /// Compiles the orchestra, warms it up, connects to JACK where asked for. Throws std::runtime_error
-    /// (also: no JACK server, or one whose period the
-    /// output lead does not cover, with what to do).
+    /// Compiles the orchestra, warms it up, connects to JACK if asked for. Throws std::runtime_error, also if
+    /// there is no JACK server, or one whose period the output lead does not cover; the text says what to
+    /// do.
     LivePerformance(const std::filesystem::path& orchestra, const std::vector<Voice>& voices,
                     const LiveOptions& options);
     ~LivePerformance();
@@ -68,7 +68,7 @@ public:
     /// Sample 0 is due at epoch_ns of CLOCK_MONOTONIC, which lies ahead. Once; throws std::logic_error.
     void start(std::int64_t epoch_ns);
     /// Adds or replaces (same id) a note. Wait-free, allocates nothing; one thread at a time. False: the
-    /// queue is full (counted), the note is none (as Performance::schedule tells), or the audio thread has
+    /// queue is full (counted), the note is invalid (see Performance::schedule), or the audio thread has
     /// failed.
     bool schedule(const Note& note) noexcept;
     bool cancel(std::uint64_t id) noexcept;

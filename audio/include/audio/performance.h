@@ -48,9 +48,9 @@ public:
     Performance(const Performance&) = delete;
     Performance& operator=(const Performance&) = delete;
 
-    /// Adds or replaces (same id) a note. Its onset must not lie before the sample given to advance_to, nor
-    /// may the note that it replaces; a note without id or voice or with a value out of range is no note:
-    /// such calls throw std::logic_error.
+    /// Adds or replaces (same id) a note. Throws std::logic_error if its onset, or that of the note that it
+    /// replaces, lies before the sample given to advance_to, and for an invalid note: without id or voice, or
+    /// with a value out of range.
     void schedule(const Note& note);
     /// Removes a note that has not been reached by advance_to; throws std::logic_error for another id.
     void cancel(std::uint64_t id);
@@ -79,7 +79,7 @@ private:
 /// std::runtime_error (disk full, no permission).
 std::size_t write_wav(const std::filesystem::path& file, const std::vector<float>& interleaved);
 
-/// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, so 1920 ticks a second), channel 10,
+/// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, so 1920 per second), channel 10,
 /// one note-on per note and its note-off 0.1 s later.
 void write_midi(const std::filesystem::path& file, const std::vector<Note>& notes);
 

@@ -11,7 +11,7 @@ namespace render {
 struct MeshPart {
     std::string material;
     std::vector<Eigen::Vector3f> positions, normals;  ///< same length; normals have unit length
-    std::vector<std::uint32_t> indices;               ///< three a triangle
+    std::vector<std::uint32_t> indices;               ///< three per triangle
 };
 struct Mesh {
     std::vector<MeshPart> parts;

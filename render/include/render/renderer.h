@@ -13,7 +13,7 @@ struct DrawTimes {
 
 /// Draws a scene off screen with OSMesa. Owns the one context of its thread: construct, use and destroy it on
 /// one thread. Throws std::runtime_error ("FILE: error: found ..., expected ...") for a mesh that is missing,
-/// malformed or too large, and when no context can be had.
+/// malformed or too large, and if no context can be made.
 class Renderer {
 public:
     explicit Renderer(const SceneDescription& scene);

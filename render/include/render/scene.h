@@ -39,7 +39,7 @@ struct Solid {
     ModeShapes modes;
 };
 
-/// One drawn object: a mesh, drawn with one 4x4 matrix a frame.
+/// One drawn object: a mesh, drawn with one 4x4 matrix per frame.
 struct SceneObject {
     std::string name;
     std::filesystem::path mesh;  ///< OBJ, GLB or glTF, STL
@@ -75,10 +75,10 @@ struct SceneDescription {
     KeyLight key_light;
     int width = 640, height = 480;
     int samples = 4;         ///< of MSAA, 0 or 1: off
-    int shadow_size = 1024;  ///< texels a side, 0: no shadow
+    int shadow_size = 1024;  ///< texels per side, 0: no shadow
 };
 
-/// One frame: a matrix an object in the order of the description (w row 0 0 0 1; scale and shear allowed),
+/// One frame: per object, in the order of the description, a matrix (w row 0 0 0 1; scale and shear allowed)
 /// and whether it is drawn.
 struct FrameState {
     std::vector<Eigen::Matrix4f> world_from_object;

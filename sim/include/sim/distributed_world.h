@@ -10,25 +10,25 @@
 namespace sim {
 
 // One world simulated by several workers (thesis 2.1, 2.3, 2.4). Every worker is a process that knows the
-// whole scene and owns some of its bodies; the application is where they meet: it keeps who is there and who
-// owns what, and passes messages on.
+// whole scene and owns some of its bodies. The application is the coordinator: it keeps the members and the
+// owners of bodies, and relays messages. SI units, world frame, y up.
 
-/// A worker does every step `factor` times slower from a step on.
+/// From a step on, worker `worker` takes `factor` times as long per step; 1 ends that.
 struct Slowing {
     int worker = 0;
     double factor = 1;
 };
 
-/// What happens before a step: constraints go, bodies come, a worker slows down.
+/// An event before a step: constraints are removed, bodies added, a worker slowed down.
 struct WorldEvent {
     std::uint64_t step = 0;          ///< before this one, counted from 0
     std::vector<int> removed;        ///< constraints, by number
-    std::size_t first = 0, end = 0;  ///< of `later`
+    std::size_t first = 0, end = 0;  ///< bodies added: indices of `later`, from first to before end
     std::vector<Slowing> slowing;
 };
 
-/// A world with its future. Bodies are numbered: those of `world`, then `later` in the order in which they
-/// come.
+/// A world and its events. Bodies are numbered: those of `world`, then those of `later` in the order of
+/// their addition.
 struct WorldScene {
     WorldDefinition world;
     std::vector<WorldBody> later;
@@ -40,14 +40,14 @@ enum class Pace {
     bounded    ///< each worker as fast as it can, at most `bound` steps ahead of the slowest that owns a body
 };
 
-struct MarketSettings {
+struct MarketSettings {  ///< of the load balancing, thesis 2.4
     bool trade = true;
     std::uint64_t from_step = 0;  ///< no offers before the seller's step
-    double smoothing_steps = 3;   ///< time constant of the smoothed seconds a step
+    double smoothing_steps = 3;   ///< time constant of the smoothed seconds per step
     double dead_band = 0.08;      ///< share of the average by which a worker must be slower to offer
 };
 
-struct DistributedSettings {
+struct DistributedSettings {  ///< of a run; refused settings throw std::invalid_argument
     Pace pace = Pace::lockstep;
     int bound = 0;            ///< [steps]; also the greatest age of a ghost
     std::uint64_t steps = 0;  ///< at most
@@ -62,9 +62,9 @@ struct DistributedSettings {
 struct WorkerStep {
     int worker = 0;          ///< number in order of joining, never used again
     std::uint64_t step = 0;  ///< number of the step that ended
-    double seconds = 0;      ///< that it worked
-    double smoothed_s = 0;   ///< the market's view of it
-    double waited_s = 0;     ///< before it, for others
+    double seconds = 0;      ///< worked, without waiting
+    double smoothed_s = 0;   ///< the same, as smoothed for load balancing
+    double waited_s = 0;     ///< waited before it, for other workers
     int bodies = 0;          ///< own
     int lead = 0;       ///< steps ahead of the slowest that owned a body, as this worker knew at the start
     int ghost_age = 0;  ///< of the oldest used [steps]
@@ -72,37 +72,37 @@ struct WorkerStep {
     int cross_contacts = 0;   ///< points between bodies of different owners that it resolved
 };
 
-/// Told in order, from one thread.
+/// Receives a run's progress. Calls come in order, from one thread.
 class DistributedObserver {
 public:
     virtual ~DistributedObserver() = default;
     /// `world`: all bodies at the end of step `step` (0: the start), exact in lockstep, else as published.
     virtual void at(std::uint64_t step, const World& world) { (void)step, (void)world; }
-    virtual void worked(const WorkerStep& step) { (void)step; }
-    virtual void moved(std::uint64_t step, int bodies, int from, int to) {
+    virtual void worked(const WorkerStep& step) { (void)step; }             ///< a worker has published a step
+    virtual void moved(std::uint64_t step, int bodies, int from, int to) {  ///< from -1: none
         (void)step, (void)bodies, (void)from, (void)to;
     }
     virtual void note(const std::string& what) { (void)what; }  ///< joins, losses, refusals, in words
 };
 
-struct DistributedResult {
-    std::uint64_t steps = 0;  ///< that every body has done
+struct DistributedResult {    ///< of a whole run
+    std::uint64_t steps = 0;  ///< done by every body
     double elapsed_s = 0;  ///< from the first step's start to the last one's end, of the clock that was used
     double cpu_s = 0;      ///< of all workers' steps
-    int workers = 0;       ///< most at a time
-    int lost = 0, left = 0;  ///< workers that died, that drained
-    int bodies_reowned = 0;
-    std::uint64_t migrations = 0;  ///< bodies that changed hands by trade
-    std::uint64_t trades = 0;
-    std::uint64_t cross_contacts = 0;           ///< points, summed over steps
-    std::uint64_t bytes = 0, bytes_states = 0;  ///< sent by workers; of them state or update records
-    std::uint64_t records = 0;                  ///< state or update records sent
-    std::uint64_t refused_messages = 0;
-    int largest_lead = 0, largest_ghost_age = 0;
+    int workers = 0;       ///< the largest number at a time
+    int lost = 0, left = 0;                       ///< workers that died; that handed over and left
+    int bodies_reowned = 0;                       ///< bodies of those, given to other workers
+    std::uint64_t migrations = 0;                 ///< bodies that changed hands by trade
+    std::uint64_t trades = 0;                     ///< accepted offers
+    std::uint64_t cross_contacts = 0;             ///< points, summed over steps
+    std::uint64_t bytes = 0, bytes_states = 0;    ///< sent by workers; of them state or update records
+    std::uint64_t records = 0;                    ///< state or update records sent
+    std::uint64_t refused_messages = 0;           ///< malformed or stale ones
+    int largest_lead = 0, largest_ghost_age = 0;  ///< [steps]
     Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< see World::outside_impulse
     WorldCounts counts;                                         ///< summed over workers
     std::vector<QuarantinedBody> quarantined;
-    bool rest_reached = false;
+    bool rest_reached = false;  ///< until_rest: every body came to rest
 };
 
 /// Where workers come from.
@@ -114,21 +114,21 @@ struct DistributedLaunch {
     int expect = 0;      ///< wait for so many workers before the first step (at least processes.count)
     double wait_s = 60;  ///< for them
     std::filesystem::path keys;  ///< folder made by make_keys; needed unless ipc or loopback
-    std::function<void(const std::string& endpoint)> listening;  ///< told where, once
+    std::function<void(const std::string& endpoint)> listening;  ///< called once, with the bound endpoint
 };
 
 /// Runs a scene on worker processes over ZeroMQ. Returns when all steps are done. A lost worker's bodies go
 /// on elsewhere; if none is left, in this process. Throws std::invalid_argument for a scene or setting that
-/// is refused, std::runtime_error if nobody joins.
+/// is refused, std::runtime_error if no worker joins.
 DistributedResult run_distributed(const WorldScene& scene, const DistributedSettings& settings,
                                   const DistributedLaunch& launch, DistributedObserver& observer);
 
-/// Simulated processors: workers in this process, each with a clock of its own that goes on by what its work
-/// costs; messages arrive `latency_s` after they were sent; events happen in the order of simulated time.
+/// Simulated processors: workers in this process, each with a clock of its own that advances by the cost of
+/// its work. Messages arrive `latency_s` after they were sent; events happen in the order of simulated time.
 struct SimulatedProcessors {
     int count = 1;
     double latency_s = 2e-4;  ///< from worker to worker
-    double slowdown = 1;      ///< simulated seconds a second of this thread's processor time
+    double slowdown = 1;      ///< simulated seconds per second of this thread's processor time
     bool modelled =
         false;  ///< costs are counted (World::work), not measured: results are a pure function of the input
     double seconds_per_work = 2e-6;  ///< modelled: of one unit of work
@@ -140,15 +140,15 @@ struct SimulatedProcessors {
         int worker;
         enum class Kind { kill, stop, resume, cut, drain, join } kind;
     };
-    std::vector<Failure> failures;
-    double silence_s = 1;  ///< a worker unheard for so long is dead
+    std::vector<Failure> failures;  ///< in any order
+    double silence_s = 1;           ///< a worker silent for so long is lost
 };
 
 DistributedResult simulate_processors(const WorldScene& scene, const DistributedSettings& settings,
                                       const SimulatedProcessors& processors, DistributedObserver& observer);
 
 /// Hash of a libm probe, the processor's features in use, the compiler, the protocol's version and a small
-/// world's state after some steps: equal where lockstep is to the bit.
+/// world's state after some steps. Hosts with equal fingerprints get equal bits in lockstep.
 [[nodiscard]] std::uint64_t step_fingerprint();
 
 /// Writes CURVE keys into a new folder (0700): application.key (secret, 0600), application.pub, and for each
@@ -157,8 +157,8 @@ DistributedResult simulate_processors(const WorldScene& scene, const Distributed
 /// cannot be (nothing is overwritten), std::runtime_error if it cannot be written.
 void make_keys(const std::filesystem::path& folder, const std::vector<std::string>& workers);
 
-/// A worker's process: joins the application at `endpoint`, of a world or of a kit, and serves until told to
-/// stop. SIGTERM or SIGINT: gives its bodies away and leaves. `key`: file made by make_keys, empty: none.
+/// A worker's process: joins the application at `endpoint`, of a world or of a kit, and serves until the run
+/// ends. SIGTERM or SIGINT: hands its bodies over and leaves. `key`: file made by make_keys, empty: none.
 /// Returns the exit status. Throws std::invalid_argument for an endpoint or key that is refused.
 [[nodiscard]] int run_worker(const std::string& endpoint, const std::filesystem::path& key);
 

@@ -9,9 +9,9 @@ namespace sim {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// Scale and shear of (2.12) as modal coordinates, with their rates; all zero at rest.
-///   D = I + [[q0, q5, q4], [q5, q1, q3], [q4, q3, q2]]    (scale x, y, z; shear yz, xz, xy), dimensionless
-///   strains
+/// Scale and shear of (2.12) as modal coordinates (strains), with their rates; all zero at rest.
+///   D = I + [[q0, q5, q4], [q5, q1, q3], [q4, q3, q2]]
+///   q0 q1 q2 scale along x, y, z;  q3 q4 q5 shear yz, xz, xy;  dimensionless
 /// The state is linear in the impulses, so responses add up exactly. body_matrix and contacts limit it
 /// smoothly, each scale to 0.4, each shear to 0.15, the swing to 1 rad (exact up to half of that): the
 /// eigenvalues of D stay within 0.3 to 1.7.

@@ -11,7 +11,7 @@ namespace sim {
 /// Which matter the mass and stiffness integrals run over. The displacement is always that of
 /// elements x elements x elements 27-node bricks (triquadratic Lagrange) that fill the body's bounding box.
 enum class ModeDomain {
-    box,          ///< the whole brick, 3x3x3 Gauss points an element: exact
+    box,          ///< the whole brick, 3x3x3 Gauss points per element: exact
     superquadric  ///< the superquadric's volume, by quadrature of stated accuracy
 };
 
@@ -19,7 +19,7 @@ struct ModesRequest {
     Superquadric shape;  ///< box: only the semi-axes count
     ModeDomain domain = ModeDomain::superquadric;
     Material material;
-    int elements = 1;  ///< a side, 1 to 12
+    int elements = 1;  ///< per side, 1 to 12
     int count = 12;    ///< lowest non-rigid modes wanted, to 300; -1: as many as one element has (75)
 };
 
@@ -30,22 +30,22 @@ struct ModesRequest {
 /// projections of the nodal axes in order; the largest entry (first of equals) is positive.
 struct ModalBasis {
     Eigen::Vector3d half_extents = Eigen::Vector3d::Ones();  ///< of the bricks' box [m]
-    int elements = 1;                                        ///< a side
+    int elements = 1;                                        ///< per side
     Eigen::VectorXd omega;                                   ///< [rad/s], ascending
     /// Nodal shapes, 3 (2 elements + 1)^3 x n [kg^-1/2]; row 3 k + axis, node k = ix + m (iy + m iz), m = 2
     /// elements + 1, at x = half_extents.x (2 ix / (m - 1) - 1) and so on.
     Eigen::MatrixXd nodal;
-    [[nodiscard]] int count() const noexcept { return static_cast<int>(omega.size()); }
+    [[nodiscard]] int count() const noexcept { return static_cast<int>(omega.size()); }  ///< of modes
 };
 
-/// What `count` cut: the borders of the degenerate groups around it. below == count: nothing was cut.
+/// Borders of the groups of equal frequencies around `count`. below == count: no group is cut.
 struct GroupCut {
     int count, below, above;
 };
 
-struct FreeVibrationModes {
-    ModalBasis basis;
-    Eigen::VectorXd eigenvalues;  ///< [rad^2/s^2], ascending, all that were computed, the six rigid first
+struct FreeVibrationModes {       ///< the solution of a ModesRequest
+    ModalBasis basis;             ///< the lowest `count` non-rigid modes
+    Eigen::VectorXd eigenvalues;  ///< [rad^2/s^2], all computed ones, ascending, the six rigid first
     /// Parity class of each eigenvalue: bit j is set if u_j is even along its own axis j and the other
     /// components are odd in it. 0: stretching; 1, 2, 4: bending towards x, y, z (rigid: translation); 3, 5,
     /// 6: shear xy, xz, yz (rigid: rotation); 7: twisting.
@@ -54,16 +54,16 @@ struct FreeVibrationModes {
 };
 
 /// Throws std::invalid_argument for a request out of range (extents in a ratio over 1000, or 100 with four or
-/// more elements a side, too), std::runtime_error if no solution is found. Dense (Eigen) up to three elements
-/// a side, shift-invert Lanczos (Spectra) beyond. One element costs about 0.6 ms, 2: 2, 3: 20, 4: 60, 6: 300
-/// ms, 8: 1.3 s, 12: 11 s. For the superquadric with several elements a side, brick space outside it is
+/// more elements per side), std::runtime_error if no solution is found. Dense (Eigen) up to three elements
+/// per side, shift-invert Lanczos (Spectra) beyond. One element costs about 0.6 ms, 2: 2, 3: 20, 4: 60,
+/// 6: 300 ms, 8: 1.3 s, 12: 11 s. For the superquadric with several elements per side, brick space outside it is
 /// massless and has 1e-8 of the stiffness.
 [[nodiscard]] FreeVibrationModes free_vibration_modes(const ModesRequest& request);
 
-/// Elements a side of the mesh that discretisation_errors compares with.
+/// Elements per side of the mesh that discretisation_errors compares with.
 [[nodiscard]] int finer_elements(int elements) noexcept;
 /// Estimated relative error of each frequency by the mesh, |omega / omega_exact - 1|: Richardson's
-/// extrapolation with a finer mesh (two more elements a side, twice as many for 3; `elements` is 10 at most),
+/// extrapolation with a finer mesh (two more per side, twice as many for 3; `elements` is 10 at most),
 /// eigenvalues' errors taken to fall at order 4; modes are matched by parity class and their order within it.
 /// Where that would take away half of the finer eigenvalue or more (a mode that the mesh cannot show at all),
 /// the finer one itself is taken for exact, so the error is at least that. NaN where the counterpart lies
@@ -79,7 +79,7 @@ struct RigidMass {
     double mass;
     Eigen::Vector3d inertia;
 };
-[[nodiscard]] RigidMass rigid_mass(const Superquadric& shape, const Material& material);
+[[nodiscard]] RigidMass rigid_mass(const Superquadric& shape, const Material& material);  ///< rest shape
 
 /// phi(r), 3 x n [kg^-1/2]: the displacement at r by each mode; r outside the box is taken at its border (a
 /// coordinate that is no number at the lower one).

@@ -22,7 +22,7 @@ struct TipPath {
     std::vector<PathNode> nodes;
 };
 
-/// An instantaneous push on a body by a stick.
+/// An instantaneous impulse that a stick gives a body.
 struct Impulse {
     std::uint32_t body = 0;
     double t_s = 0;
@@ -30,7 +30,7 @@ struct Impulse {
     Eigen::Vector3d impulse_body = Eigen::Vector3d::Zero();  ///< [N s], body frame
 };
 
-/// The tip's surface (grown by its radius) crossed inwards on a path.
+/// A path of a tip enters a body's surface grown by the tip's radius.
 struct Contact {
     std::uint32_t stick = 0;
     std::uint32_t body = 0;
@@ -64,13 +64,13 @@ struct StepRequest {
     double t_s = 0;  ///< not earlier than the last step's
     std::vector<Impulse>
         folded;  ///< impulses that become part of the bodies' exact states; t_s <= this step's time
-    std::vector<Impulse> confirmed;  ///< fixed but not yet folded: contacts feel them from their time on
-    std::vector<TipPath> paths;
-    std::vector<PictureRequest> pictures = {};
+    std::vector<Impulse> confirmed;  ///< fixed, not yet folded: contacts see them from their time on
+    std::vector<TipPath> paths;      ///< each swept as a whole for contacts
+    std::vector<PictureRequest> pictures = {};  ///< states wanted for pictures
     bool anew = false;  ///< the bodies are at rest before this step, which may have any time
 };
 
-struct StepReply {
+struct StepReply {                   ///< a pure function of the bodies and the requests so far
     std::vector<Contact> contacts;   ///< ordered by stick's place in paths, then time, then body
     std::vector<ModalState> states;  ///< every body's exact state at t_s, in order of definition
     std::vector<std::vector<ModalState>>
@@ -86,23 +86,23 @@ struct WorkerReport {
     int bodies_reowned = 0;  ///< bodies that went on elsewhere
 };
 
-/// Steps a fixed set of bodies. The reply is a pure function of the bodies and the requests so far, whoever
-/// computes it.
+/// Steps a fixed set of bodies. The reply is a pure function of the bodies and the requests so far, whichever
+/// process computes it. One thread at a time.
 class Simulation {
 public:
     virtual ~Simulation() = default;
-    [[nodiscard]] virtual StepReply step(const StepRequest& request) = 0;
-    [[nodiscard]] virtual WorkerReport report() const = 0;
+    [[nodiscard]] virtual StepReply step(const StepRequest& request) = 0;  ///< throws std::invalid_argument
+    [[nodiscard]] virtual WorkerReport report() const = 0;                 ///< all zero without workers
 };
 
-/// In the calling thread.
+/// Computes in the calling thread. Throws std::invalid_argument for a definition out of range.
 [[nodiscard]] std::unique_ptr<Simulation> make_local_simulation(std::vector<BodyDefinition> bodies);
 
 /// How to start a worker process: `program arguments... --connect ENDPOINT`.
 struct WorkerLaunch {
     std::string program;                 ///< absolute path
     std::vector<std::string> arguments;  ///< e.g. {"worker"}
-    int count = 1;
+    int count = 1;                       ///< processes
 };
 
 /// Bodies shared out to worker processes over ZeroMQ (ipc in a private 0700 folder, removed at the end; also
@@ -112,7 +112,7 @@ struct WorkerLaunch {
 [[nodiscard]] std::unique_ptr<Simulation> make_distributed_simulation(std::vector<BodyDefinition> bodies,
                                                                       const WorkerLaunch& launch);
 
-/// The worker process: joins at `endpoint` and serves until told to stop or until its application is gone.
+/// The worker process: joins at `endpoint` and serves until its application ends the run or is gone.
 /// Returns an exit status.
 [[nodiscard]] int run_worker(const std::string& endpoint);
 

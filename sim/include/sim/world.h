@@ -21,18 +21,18 @@ enum class Fidelity {
     automatic  ///< the cheapest of these that meets `error` (choose_fidelity)
 };
 
-struct FidelityRequest {
+struct FidelityRequest {  ///< how much of one body to compute
     Fidelity fidelity = Fidelity::automatic;
-    int modes = 12;
-    int elements = 1;
-    ModeDomain domain = ModeDomain::superquadric;
+    int modes = 12;                                ///< modal: the lowest of the non-rigid ones
+    int elements = 1;                              ///< per side of the finite-element mesh
+    ModeDomain domain = ModeDomain::superquadric;  ///< matter of the mass and stiffness integrals
     double error = 0.01;    ///< automatic: displacement error allowed, share of the largest extent
     double impact_mps = 5;  ///< automatic: the fastest impact expected [m/s]
 };
 
-struct FidelityChoice {
-    Fidelity fidelity;
-    int modes;
+struct FidelityChoice {        ///< see choose_fidelity
+    Fidelity fidelity;         ///< rigid, linear or modal
+    int modes;                 ///< number; 0 rigid, 6 linear
     double expected_error;     ///< share of the largest extent, see choose_fidelity
     GroupCut cut = {0, 0, 0};  ///< modal: whether `modes` cuts a group of equal frequencies
 };
@@ -42,7 +42,7 @@ struct WorldBody {
     std::string name;
     GeneralizedSuperquadric shape;
     Material material;
-    /// C = damping_alpha M + damping_beta K (2.1): sigma = (alpha + beta omega^2) / 2 a mode, and rigid
+    /// C = damping_alpha M + damping_beta K (2.1): sigma = (alpha + beta omega^2) / 2 per mode, and rigid
     /// motion decays as e^(-alpha t), as by drag. Added for the modes: damping_ratio omega.
     double damping_alpha = 0, damping_beta = 0, damping_ratio = 0.05;
     FidelityRequest fidelity;
@@ -73,18 +73,18 @@ struct PointConstraint {
     Eigen::Vector3d point_b = Eigen::Vector3d::Zero();
     double stiffness = 1e4;                                           ///< [N/m]
     double damping_ratio = 1;                                         ///< against the effective mass
-    double breaking_force = std::numeric_limits<double>::infinity();  ///< [N]; beyond it the constraint goes
+    double breaking_force = std::numeric_limits<double>::infinity();  ///< [N]; above it the constraint breaks
 };
 
-struct WorldSettings {
-    double dt = 1.0 / 60;  ///< [s]
-    int substeps = 4;      ///< of each step
-    Eigen::Vector3d gravity = Eigen::Vector3d(0, -9.81, 0);
+struct WorldSettings {                                       ///< of all bodies
+    double dt = 1.0 / 60;                                    ///< [s]
+    int substeps = 4;                                        ///< of each step
+    Eigen::Vector3d gravity = Eigen::Vector3d(0, -9.81, 0);  ///< [m/s^2]
     bool sleeping = true;
     double sleep_speed = 0.02;  ///< [m/s], of any point of a body; half a second below it: asleep
 };
 
-struct WorldDefinition {
+struct WorldDefinition {  ///< numbers of bodies and constraints are their indices
     WorldSettings settings;
     std::vector<WorldBody> bodies;
     std::vector<WorldPlane> planes;
@@ -100,38 +100,38 @@ struct WorldBodyState {
     Eigen::VectorXd q, q_dot;          ///< modal coordinates of mass-normalised modes [m kg^1/2], rates
 };
 
-/// All that a body's next step depends on, but for contacts and constraints.
+/// Everything a body's next step depends on, apart from contacts and constraints.
 struct WorldRecord {
     int body = 0;
     WorldBodyState state;
     bool asleep = false, quarantined = false;
     bool at_limit = false;          ///< its deformation was held in the last substep
-    std::uint16_t still_steps = 0;  ///< since it was last faster than the sleep speed; stays at the largest
+    std::uint16_t still_steps = 0;  ///< since it was last faster than the sleep speed; saturates
     std::int32_t sleep_group = -1;  ///< first body of those that fell asleep together
 };
 
-/// What a contact of bodies a < b (b >= kFirstPlane: a plane) hands on to the next step.
+/// State of a contact of bodies a < b (b >= kFirstPlane: a plane) that the next step starts from.
 struct ContactRecord {
     struct Point {
-        std::uint32_t feature = 0;
+        std::uint32_t feature = 0;                        ///< sample, the same from step to step
         Eigen::Vector3f arm_a = Eigen::Vector3f::Zero();  ///< [m]
         float normal_impulse = 0;                         ///< [N s]
         Eigen::Vector3f friction_impulse = Eigen::Vector3f::Zero();
     };
     int a = 0, b = 0;
-    bool emerging = false;
-    int count = 0;  ///< of points, at most 4
+    bool emerging = false;  ///< began deep inside each other, and still overlap
+    int count = 0;          ///< of points, at most 4
     Point points[4];
 };
 
-/// The same of a constraint.
+/// State of a constraint that the next step starts from.
 struct SpringRecord {
     int constraint = 0;
     bool holds = true;
     Eigen::Vector3f impulse = Eigen::Vector3f::Zero();  ///< [N s]
 };
 
-/// Everything that a world's future depends on, at the end of step `step`.
+/// Complete state of a world at the end of step `step`, apart from its definition.
 struct WorldSnapshot {
     std::uint64_t step = 0;
     std::vector<WorldRecord> bodies;
@@ -139,55 +139,55 @@ struct WorldSnapshot {
     std::vector<SpringRecord> springs;
 };
 
-/// What other moving bodies did to a body in one step.
+/// Impulse that other moving bodies gave a body in one step.
 struct StepImpulse {
     Eigen::Vector3d linear = Eigen::Vector3d::Zero();   ///< [N s]
     Eigen::Vector3d angular = Eigen::Vector3d::Zero();  ///< about its centre, world axes [N m s]
     Eigen::Vector3d displacement =
         Eigen::Vector3d::Zero();                     ///< by pushing overlaps out, beyond the impulses' [m]
     Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< likewise, rotation vector, world axes [rad]
-    /// Of the modal coordinates: an impulse spread over the step [N s kg^-1/2], or, where these are there,
-    /// what it came to at the step's end: q [m kg^1/2] and rates.
+    /// Of the modal coordinates: an impulse spread over the step [N s kg^-1/2] or, if these are not empty,
+    /// its effect at the step's end: modal_q [m kg^1/2] and modal_rate.
     Eigen::VectorXd modal, modal_q, modal_rate;
 };
 
-/// What an own body and a ghost did to each other in one step.
+/// Impulses that an own body and a ghost gave each other in one step.
 struct CrossImpulse {
     int own, ghost;
     StepImpulse on_own, on_ghost;
 };
 
-/// A foreign body's whereabouts over the next step.
+/// A ball that holds a foreign body over the next step.
 struct ForeignBall {
     int body;
     Eigen::Vector3d center;
-    double radius;  ///< of the body, and how far it may come [m]
+    double radius;  ///< of the body, plus the distance it may travel [m]
 };
 
 /// How a world is shared with worlds of other processes that hold the same bodies.
 enum class Sharing {
     alone,    ///< not at all
-    islands,  ///< every island with an own body is solved whole; other bodies' records come from outside
+    islands,  ///< every island with an own body is solved whole; other bodies' records are restored
     pairs  ///< only own bodies are stepped, among ghosts that are placed for each step; of an own and a ghost
            ///< body that touch, the world that owns the one with the lower number resolves the contact
 };
 
-struct QuarantinedBody {
+struct QuarantinedBody {  ///< taken out of the world
     int body;
-    std::uint64_t step;
-    std::string what;  ///< which value was not finite
+    std::uint64_t step;  ///< in which it was noticed
+    std::string what;    ///< which value was not finite
 };
 
 /// Totals since the start, but where said otherwise.
 struct WorldCounts {
-    std::uint64_t steps = 0;
+    std::uint64_t steps = 0;              ///< done
     int contacts = 0;                     ///< points in the last step
     int pairs = 0;                        ///< of bodies and planes whose samples were tested in the last step
     int islands = 0;                      ///< awake, in the last step
     int asleep = 0;                       ///< bodies, now
     std::uint64_t inverse_fallbacks = 0;  ///< inverse mappings without convergence
-    std::uint64_t deformations_limited = 0;
-    std::uint64_t constraints_broken = 0;
+    std::uint64_t deformations_limited = 0;  ///< bodies held at the limit of deformation, per substep
+    std::uint64_t constraints_broken = 0;    ///< by their breaking force
 };
 
 /// Many modal bodies that fall, touch, deform and hang together (thesis 2.2, 2.3.1, 2.6). See world.cpp and
@@ -201,39 +201,39 @@ public:
     World(World&&) noexcept;
     World& operator=(World&&) noexcept;
 
-    void step();
+    void step();  ///< by settings().dt; allocates nothing once its buffers have grown
 
     /// Ids are indices, never used again.
     int add_body(const WorldBody& body);
     int add_constraint(const PointConstraint& constraint);
-    void remove_constraint(int id);
+    void remove_constraint(int id);                     ///< wakes its bodies
     [[nodiscard]] bool constraint_holds(int id) const;  ///< neither removed nor broken
 
-    [[nodiscard]] const WorldSettings& settings() const noexcept;
-    [[nodiscard]] int bodies() const noexcept;
-    [[nodiscard]] const WorldBody& definition(int body) const;
-    [[nodiscard]] FidelityChoice fidelity(int body) const;  ///< as used; rigid, linear or modal
-    [[nodiscard]] RigidMass rigid_mass(int body) const;
-    [[nodiscard]] const ModalBasis& basis(int body) const;  ///< no modes for a rigid body
-    [[nodiscard]] WorldBodyState state(int body) const;
-    void set_state(int body, const WorldBodyState& state);  ///< wakes it; sizes of q must match
+    [[nodiscard]] const WorldSettings& settings() const noexcept;  ///< as constructed
+    [[nodiscard]] int bodies() const noexcept;                     ///< number, quarantined ones included
+    [[nodiscard]] const WorldBody& definition(int body) const;     ///< as added
+    [[nodiscard]] FidelityChoice fidelity(int body) const;         ///< as used; rigid, linear or modal
+    [[nodiscard]] RigidMass rigid_mass(int body) const;            ///< of the rest shape
+    [[nodiscard]] const ModalBasis& basis(int body) const;         ///< no modes for a rigid body
+    [[nodiscard]] WorldBodyState state(int body) const;            ///< at the end of the last step
+    void set_state(int body, const WorldBodyState& state);         ///< wakes it; sizes of q must match
     void apply_force(int body, const Eigen::Vector3d& force,
                      const Eigen::Vector3d& point_body);  ///< [N],
                                                           ///< world axes, at a rest point, for the next step
-    void wake(int body);
+    void wake(int body);                                  ///< and the bodies that fell asleep with it
     [[nodiscard]] bool asleep(int body) const;
-    [[nodiscard]] bool all_asleep() const;  ///< fixed and quarantined bodies count as asleep
-    [[nodiscard]] double time_s() const noexcept;
+    [[nodiscard]] bool all_asleep() const;         ///< fixed and quarantined bodies count as asleep
+    [[nodiscard]] double time_s() const noexcept;  ///< steps done times dt
 
     struct Energy {
         double kinetic, potential, elastic, springs;  ///< [J]; potential of gravity against the origin
         [[nodiscard]] double total() const { return kinetic + potential + elastic + springs; }
     };
-    [[nodiscard]] Energy energy() const;
-    [[nodiscard]] Eigen::Vector3d momentum() const;          ///< of bodies that are not fixed [kg m/s]
-    [[nodiscard]] Eigen::Vector3d angular_momentum() const;  ///< about the origin [kg m^2/s]
-    [[nodiscard]] const WorldCounts& counts() const noexcept;
-    [[nodiscard]] const std::vector<QuarantinedBody>& quarantined() const noexcept;
+    [[nodiscard]] Energy energy() const;                       ///< of bodies that move
+    [[nodiscard]] Eigen::Vector3d momentum() const;            ///< of bodies that are not fixed [kg m/s]
+    [[nodiscard]] Eigen::Vector3d angular_momentum() const;    ///< about the origin [kg m^2/s]
+    [[nodiscard]] const WorldCounts& counts() const noexcept;  ///< so far
+    [[nodiscard]] const std::vector<QuarantinedBody>& quarantined() const noexcept;  ///< in order of steps
     /// All impulse that came from planes, fixed bodies, places, gravity, drag and user forces onto own bodies
     /// since the start [kg m/s].
     [[nodiscard]] Eigen::Vector3d outside_impulse() const;
@@ -242,8 +242,8 @@ public:
     void share(Sharing sharing);
     void set_own(int body, bool own);
     [[nodiscard]] bool own(int body) const;
-    [[nodiscard]] WorldRecord record(int body) const;
-    void restore(const WorldRecord& record);  ///< wakes nobody
+    [[nodiscard]] WorldRecord record(int body) const;  ///< at the end of the last step
+    void restore(const WorldRecord& record);           ///< sets a body's state; wakes no other body
     /// Of the last step: contacts whose first body that moves is own,
     /// constraints likewise.
     void contact_records(std::vector<ContactRecord>& out) const;
@@ -253,39 +253,39 @@ public:
                           const std::vector<SpringRecord>& springs);
     [[nodiscard]] WorldSnapshot snapshot() const;
     void rewind(const WorldSnapshot& snapshot);  ///< bodies added later stay as they are
-    void set_step(std::uint64_t step);           ///< what time_s and counts().steps go on from
+    void set_step(std::uint64_t step);           ///< time_s and counts().steps continue from here
 
     // pairs.
-    /// Those of `foreign` that have to be placed for the next step: that may touch an own body of a lower
-    /// number.
+    /// Those of `foreign` that have to be placed for the next step, because they may touch an own body of a
+    /// lower number.
     void near_own(const std::vector<ForeignBall>& foreign, std::vector<int>& near);
     /// The same for one of them whose state is known better, after near_own.
     [[nodiscard]] bool is_near_own(int body, const WorldBodyState& state) const;
-    /// A ghost is there for the next step only, under gravity and `held`.
+    /// Places a ghost for the next step only; it moves under gravity and `held`.
     void place_ghost(int body, const WorldBodyState& state, const StepImpulse* held, bool asleep = false);
-    /// Impulse that an own body gets in the course of the next step (its displacement and turn at once).
+    /// Gives an own body an impulse spread over the next step (its displacement and turn at once).
     void hold(int body, const StepImpulse& impulse);
-    /// Impulse that an own body should have got in the step that ended `steps_ago` steps ago: the change it
-    /// makes to a free body.
+    /// Applies an impulse that an own body should have received in the step that ended `steps_ago` steps ago,
+    /// by the change that it makes to a free body.
     void correct(int body, const StepImpulse& impulse, int steps_ago, double factor = 1);
-    /// The same for any state of the body.
+    /// The same for a given state of the body.
     void correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago,
                  double factor = 1) const;
-    /// Sets `modal` to the steady impulse that comes nearest to modal_q and modal_rate.
+    /// Sets `modal` to the steady impulse whose effect is nearest to modal_q and modal_rate.
     void spread_modes(int body, StepImpulse& impulse) const;
     /// One step of a body that touches nothing but planes, which stop it, under gravity and `held`.
     void extrapolate(int body, WorldBodyState& state, const StepImpulse* held);
-    /// Keep own body's impulses from other moving bodies and constraints (not what hold and correct gave).
+    /// Records an own body's impulses from other moving bodies and constraints (without hold and correct).
     void watch(int body, bool watched);
-    /// Of the last step, every pair of an own body and a ghost that pushed each other.
+    /// Every pair of an own body and a ghost that gave each other an impulse in the last step.
     [[nodiscard]] const std::vector<CrossImpulse>& cross_impulses() const noexcept;
-    /// Of a watched body in the last step; nullptr: none.
+    /// Impulse on a watched body in the last step; nullptr: none.
     [[nodiscard]] const StepImpulse* impulse(int body) const;
     [[nodiscard]] int cross_contacts()
         const noexcept;  ///< points between own bodies and ghosts in the last step
     /// Radius of a ball that holds the body as deformed as it may be [m].
     [[nodiscard]] double most_radius(int body) const;
-    /// What a body took of the last step, in units of an own body without contacts.
+    /// A body's share of the last step's work, in units of an own body without contacts.
     [[nodiscard]] double work(int body) const;
 
     /// FNV-1a 64 over the exact states in order of bodies, little-endian doubles.
@@ -300,7 +300,7 @@ private:
 /// request.error. Expected error of a basis: an impact at v displaces the struck point by v sqrt(m c), c =
 /// sum (n . phi_k)^2 / omega_k^2 its modal compliance, largest over the surface's six poles; the error is the
 /// difference of that with all 75 modes of an element (of `elements` a side if more) and with the basis's, as
-/// share of the largest extent. A named fidelity is kept and only its error told. Solves for the 75 modes
+/// share of the largest extent. A named fidelity is kept; its error is computed. Solves for the 75 modes
 /// each time: 0.7 ms with one element a side.
 [[nodiscard]] FidelityChoice choose_fidelity(const Superquadric& shape, const Material& material,
                                              const FidelityRequest& request);

@@ -38,35 +38,35 @@ namespace sim {
 //    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of applied
 //   10 snapshot   app     u64 step, list of record, list of contact, list of spring
 //   11 state      worker  report, list of record, list of contact, list of spring
-//   12 update     worker  report, list of applied, list of update, list of push, list of u32 broken
-//   constraint 13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds} 14 answer     worker
-//   u32 to, u32 number, flag accepted 15 handover   worker  u32 to, u32 number, list of record, list of
-//   applied
+//   12 update     worker  report, lists of applied, update, push, u32 (constraints that broke)
+//   13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds}
+//   14 answer     worker  u32 to, u32 number, flag accepted
+//   15 handover   worker  u32 to, u32 number, list of record, list of applied
 //
-//   report      52 bytes: f32 seconds, smoothed, waited; u32 lead, ghost age, cross contacts,
-//               own; v3 outside impulse
+//   report      52 bytes: f32 seconds, smoothed, waited; u32 lead, ghost age, cross contacts, own;
+//               v3 outside impulse
 //   applied     12 bytes: u32 worker, u64 step
-//   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8
-//               broken), u16 still steps, i32 sleep group, v3 position, f64 orientation w x y z, v3
-//               velocity, v3 angular momentum, f64 q[m], f64 q'[m]
-//   contact     10 + 32 n bytes: u32 a, u32 b, u8 (1 emerging), u8 n points of {u32 feature, w3 arm, f32
-//               normal impulse, w3 friction impulse}
+//   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8 broken),
+//               u16 still steps, i32 sleep group, v3 position, f64 orientation w x y z, v3 velocity,
+//               v3 angular momentum, f64 q[m], f64 q'[m]
+//   contact     10 + 32 n bytes: u32 a, u32 b, u8 (1 emerging),
+//               u8 n points of {u32 feature, w3 arm, f32 normal impulse, w3 friction impulse}
 //   spring      17 bytes: u32 constraint, flag holds, w3 impulse
-//   update      36 + 4 m bytes, 84 with 12 modes, and 12 + 2 m if held, then 120:
+//   update      36 + 4 m bytes, 84 with 12 modes; if held, 12 + 2 m more, 120 in all:
 //               b/m, u8 (1 asleep, 2 still, 4 quarantined, 8 held, and 16 times E), w3 position,
-//               7 bytes orientation, 3 f16 velocity, 3 i16 angular momentum in units of 2^(4 E - 44)
-//               kg m^2/s, f16 q[m], f16 q'[m]; held: 3 f16 linear, 3 f16 angular, f16 modal[m]
-//   push        76 + 8 m bytes: b/m, v3 linear, v3 angular, w3 displacement, w3 turn, f32 q[m], q'[m] that
-//               it came to
+//               7 bytes orientation, 3 f16 velocity, 3 i16 angular momentum in units of
+//               2^(4 E - 44) kg m^2/s, f16 q[m], f16 q'[m]; held: 3 f16 linear, 3 f16 angular, f16 modal[m]
+//   push        76 + 8 m bytes: b/m, v3 linear, v3 angular, w3 displacement, w3 turn, f32 q[m] and q'[m] at
+//               the end of the step
 //   scene, settings: see world_scene_codec.cpp
 //
 // The 7 bytes of an orientation: 56 bits, lowest first: which of x, y, z, w is largest in size (2 bits; it is
 // made positive and follows from the others), the other three in that order, each 18 bits, 0 to 2^18 - 1 for
 // -1/sqrt 2 to 1/sqrt 2.
 //
-// What an update's numbers are off by, at most: position 2^-24 of each coordinate; orientation 1.9e-5 rad;
-// angular momentum 1/4095 of its largest coordinate (and 2^-45 kg m^2/s; no more than 2.1e9); f16 2^-11 of
-// each (and 3e-8; no more than 65504).
+// Largest quantisation errors of an update: position 2^-24 of each coordinate; orientation 1.9e-5 rad;
+// angular momentum 1/4095 of its largest coordinate (plus 2^-45 kg m^2/s; range 2.1e9); f16 2^-11 of each
+// number (plus 3e-8; range 65504).
 //
 // A state that is not finite or beyond 1e7 m or 1e6 m/s is broken; World takes the body out at the next
 // step. Its numbers do not travel: zeros stand for them (and w = 1 for the orientation; in an update the
@@ -84,7 +84,7 @@ struct WorldHeader {
     std::uint64_t step = 0;  ///< the sender's: number of steps it has done
 };
 
-/// What a worker tells of its last step, in every state and update message.
+/// A worker's report of its last step, in every state and update message.
 struct StepReport {
     float seconds = 0, smoothed_s = 0, waited_s = 0;
     std::uint32_t lead = 0, ghost_age = 0, cross_contacts = 0;
@@ -107,11 +107,11 @@ struct WorkerFailure {  ///< worker: cannot go on
 // Application to one worker.
 
 struct SceneMessage {
-    std::uint32_t worker = 0;  ///< the number of the one who joins
+    std::uint32_t worker = 0;  ///< number of the joining worker
     WorldScene scene;
     DistributedSettings settings;
 };
-struct Refusal {  ///< of a join, or: you were given up
+struct Refusal {  ///< of a join; or the worker was given up
     std::string why;
 };
 struct EndOfRun {};
@@ -120,18 +120,18 @@ struct EndOfRun {};
 struct Members {
     std::vector<std::uint32_t> workers;
 };
-/// Registered ownership: from the end of step `step` on `owner` steps these bodies. The header's epoch is the
+/// Registered ownership: `owner` steps these bodies from the end of step `step` on. The header's epoch is the
 /// new one.
 struct Ownership {
     std::uint32_t owner = 0;
-    std::uint32_t from = kApplication;  ///< who owned them before; kApplication: nobody
+    std::uint32_t from = kApplication;  ///< the owner before; kApplication: none
     bool traded = false;                ///< by handover; else at the start or after a loss
     std::uint64_t step = 0;
     std::vector<WorldRecord> bodies;     ///< exact; without a handover in bounded pace as last published
     std::vector<std::uint64_t> applied;  ///< bounded: see UpdateMessage; one for each entry of `sources`
     std::vector<std::uint32_t> sources;
 };
-/// Everything at the end of a step that all have done, for who joins late.
+/// Everything at the end of a step that all have done, for a worker that joins late.
 struct SnapshotMessage {
     WorldSnapshot snapshot;
 };
@@ -146,7 +146,7 @@ struct StateMessage {
     std::vector<SpringRecord> springs;
 };
 
-/// Bounded. A push: what the sender's bodies did to a body of another in the step that ended.
+/// Bounded. A push: the impulse that the sender's bodies gave to another worker's body in the last step.
 struct Push {
     std::uint32_t body = 0;
     StepImpulse impulse;  ///< linear and angular exact, the rest as floats
@@ -185,12 +185,12 @@ struct PackedUpdates {
     /// Throw DecodeError.
     [[nodiscard]] Update update(std::uint32_t offset) const;
     [[nodiscard]] Push push(std::uint32_t offset) const;
-    /// What an update tells at a glance.
+    /// The part of an update that is needed to find near bodies.
     struct Glance {
         Eigen::Vector3d position, velocity;  ///< [m], [m/s]
         bool asleep, quarantined;
     };
-    [[nodiscard]] Glance glance(std::uint32_t offset) const;
+    [[nodiscard]] Glance glance(std::uint32_t offset) const;  ///< of the update at `offset`
 };
 
 // Worker to worker, through the application. The market.

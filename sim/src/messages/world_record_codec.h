@@ -13,15 +13,15 @@ struct BodyAndModes {
     std::uint32_t body;
     int modes;
 };
-[[nodiscard]] BodyAndModes read_body_and_modes(ByteReader& in);
+[[nodiscard]] BodyAndModes read_body_and_modes(ByteReader& in);  ///< throws DecodeError
 
-/// Not finite, or beyond what World lets go on.
+/// Whether a state is not finite or out of the range in which World keeps a body.
 [[nodiscard]] bool is_broken(const WorldBodyState& state);
 
 void write(ByteWriter& out, const std::vector<WorldRecord>& records);
 void write(ByteWriter& out, const std::vector<ContactRecord>& contacts);
 void write(ByteWriter& out, const std::vector<SpringRecord>& springs);
-[[nodiscard]] std::vector<WorldRecord> read_world_records(ByteReader& in);
+[[nodiscard]] std::vector<WorldRecord> read_world_records(ByteReader& in);  ///< all readers throw DecodeError
 [[nodiscard]] std::vector<ContactRecord> read_contact_records(ByteReader& in);
 [[nodiscard]] std::vector<SpringRecord> read_spring_records(ByteReader& in);
 

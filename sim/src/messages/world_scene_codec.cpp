@@ -8,20 +8,20 @@
 namespace sim {
 namespace {
 
-//   scene       f64 dt, u32 substeps, v3 gravity, flag sleeping, f64 sleep speed, list of body, list of
-//   plane,
-//               list of constraint, list of body (later), list of event
+//   scene       f64 dt, u32 substeps, v3 gravity, flag sleeping, f64 sleep speed, list of body,
+//               list of plane, list of constraint, list of body (added later), list of event
 //   body        text name, v3 semi-axes, f64 e1 e2, list of bump {v3 direction, f64 height width},
-//               f64 young poisson density, f64 damping alpha beta ratio, u8 fidelity, i32 modes, i32
-//               elements, u8 domain, f64 error, f64 impact speed, i32 triangles, f64 friction restitution,
-//               flag fixed, f64 gravity scale, f64 rotation[9] by columns, v3 translation, v3 velocity, v3
-//               angular velocity
+//               f64 young poisson density, f64 damping alpha beta ratio,
+//               u8 fidelity, i32 modes, i32 elements, u8 domain, f64 error, f64 impact speed,
+//               i32 triangles, f64 friction restitution, flag fixed, f64 gravity scale,
+//               f64 rotation[9] by columns, v3 translation, v3 velocity, v3 angular velocity
 //   plane       v3 normal, f64 offset friction restitution
-//   constraint  text name, i32 body a, v3 point a, i32 body b, v3 point b, f64 stiffness damping breaking
-//               force (may be infinite)
+//   constraint  text name, i32 body a, v3 point a, i32 body b, v3 point b,
+//               f64 stiffness damping breaking force (may be infinite)
 //   event       u64 step, list of i32 constraint, u32 first, u32 end, list of {i32 worker, f64 factor}
 //   settings    u8 pace, i32 bound, u64 steps, flag until rest, flag all to first, flag trade, u64 from step,
-//               f64 smoothing steps, f64 dead band
+//               f64 smoothing steps,
+//               f64 dead band
 
 constexpr std::uint32_t kLongestName = 65536;
 constexpr std::size_t kSmallestBody = 295, kPlaneBytes = 48, kSmallestConstraint = 84, kSmallestEvent = 24,

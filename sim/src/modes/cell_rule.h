@@ -10,7 +10,7 @@ namespace sim {
 /// element `element`. With an odd number of elements the first cell is half an element.
 struct OctantAxis {
     int elements;
-    [[nodiscard]] int cells() const noexcept { return (elements + 1) / 2; }
+    [[nodiscard]] int cells() const noexcept { return (elements + 1) / 2; }  ///< number
     [[nodiscard]] int element(int cell) const noexcept { return elements / 2 + cell; }
     [[nodiscard]] double upper(int cell) const noexcept { return 2.0 * (element(cell) + 1) / elements - 1; }
     [[nodiscard]] double lower(int cell) const noexcept { return cell == 0 ? 0 : upper(cell - 1); }

@@ -38,7 +38,7 @@ ParitySolution solve_dense(const ParityProblem& problem, double shift) {
     const Eigen::MatrixXd mass = problem.mass, stiffness = problem.stiffness;
     const Eigen::LLT<Eigen::MatrixXd> factor(stiffness + shift * mass);
     if (factor.info() != Eigen::Success)
-        throw std::runtime_error("vibration modes: found a stiffness that is not positive");
+        throw std::runtime_error("vibration modes: the stiffness is not positive definite");
     // theta y = L^-1 M L^-T y, x = L^-T y
     Eigen::MatrixXd inverse = factor.matrixL().solve(mass);
     inverse = factor.matrixL().solve(inverse.transpose().eval());
@@ -51,7 +51,8 @@ ParitySolution solve_dense(const ParityProblem& problem, double shift) {
     }
     const Eigen::Index n = mass.rows() - first;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(inverse.bottomRightCorner(n, n));
-    if (solver.info() != Eigen::Success) throw std::runtime_error("vibration modes: found no solution");
+    if (solver.info() != Eigen::Success)
+        throw std::runtime_error("vibration modes: the eigenproblem has no solution");
     const Eigen::VectorXd theta = solver.eigenvalues().reverse();
     const Eigen::Index kept = (theta.array() > kNoMass / shift).count();
     ParitySolution solution;
@@ -103,7 +104,7 @@ public:
     SparseSolver(const ParityProblem& problem, double shift)
         : problem_(problem), shift_(shift), factor_(problem.stiffness + shift * problem.mass) {
         if (factor_.info() != Eigen::Success)
-            throw std::runtime_error("vibration modes: found a stiffness that is not positive");
+            throw std::runtime_error("vibration modes: the stiffness is not positive definite");
         found_.resize(problem.mass.rows(), rigid_motions());
         if (problem.rigid.size() > 0)
             found_.col(0) = problem.rigid / std::sqrt(problem.rigid.dot(problem.mass * problem.rigid));
@@ -116,8 +117,8 @@ public:
         const int there = count_below(sigma);
         for (int i = 0; i < kSearches && found_below(sigma) < there; ++i) search(there - found_below(sigma));
         if (found_below(sigma) != there)
-            throw std::runtime_error("vibration modes: found " + std::to_string(found_below(sigma)) +
-                                     " solutions where " + std::to_string(there) + " are");
+            throw std::runtime_error("vibration modes: Lanczos found " + std::to_string(found_below(sigma)) +
+                                     " of " + std::to_string(there) + " solutions");
         return sorted();
     }
 
@@ -133,7 +134,7 @@ private:
         solver.init();
         solver.compute(Spectra::SortRule::LargestMagn, 1000, 1e-14);
         if (solver.info() != Spectra::CompInfo::Successful)
-            throw std::runtime_error("vibration modes: found that Lanczos does not converge");
+            throw std::runtime_error("vibration modes: Lanczos does not converge");
         add(solver.eigenvectors(count));
     }
 
@@ -155,7 +156,7 @@ private:
     [[nodiscard]] int count_below(double sigma) const {
         const Factor inertia(problem_.stiffness - sigma * problem_.mass);
         if (inertia.info() != Eigen::Success)
-            throw std::runtime_error("vibration modes: found no inertia of the stiffness");
+            throw std::runtime_error("vibration modes: the inertia of the stiffness cannot be computed");
         return static_cast<int>((inertia.vectorD().array() < 0).count() - rigid_motions());
     }
     [[nodiscard]] int found_below(double sigma) const {

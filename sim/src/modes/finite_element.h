@@ -32,8 +32,8 @@ class FiniteElementModel {
 public:
     FiniteElementModel(const Superquadric& shape, ModeDomain domain, const Material& material, int elements);
 
-    [[nodiscard]] ParityProblem problem(ParityClass parity) const;
-    [[nodiscard]] int unknowns(ParityClass parity) const;
+    [[nodiscard]] ParityProblem problem(ParityClass parity) const;  ///< K and M of the class
+    [[nodiscard]] int unknowns(ParityClass parity) const;           ///< degrees of freedom of the class
     /// Nodal values, 3 (2 elements + 1)^3, of a solution of the class.
     [[nodiscard]] Eigen::VectorXd expand(ParityClass parity, const Eigen::VectorXd& solution) const;
     /// About the square of the lowest bending frequency of a compact body [rad^2/s^2].

@@ -3,10 +3,10 @@
 namespace sim {
 
 /// Exact step of z'' + 2 sigma z' + omega^2 z = 0 over dt:  z <- a z + b z',  z' <- c z + d z'.
-///   Delta = omega^2 - sigma^2,  C = cos(sqrt(Delta) dt),  S = sin(sqrt(Delta) dt) / sqrt(Delta)  (cosh, sinh
-///   for Delta < 0) a = e^(-sigma dt) (C + sigma S),  b = e^(-sigma dt) S,  c = -omega^2 b,  d = e^(-sigma
-///   dt) (C - sigma S)
-/// Near critical damping C and S come from their series in Delta dt^2, so nothing is lost there.
+///   Delta = omega^2 - sigma^2,  C = cos(sqrt(Delta) dt),  S = sin(sqrt(Delta) dt) / sqrt(Delta)
+///   a = e^(-sigma dt) (C + sigma S),  b = e^(-sigma dt) S,  c = -omega^2 b,  d = e^(-sigma dt) (C - sigma S)
+/// For Delta < 0 C and S are of cosh and sinh of sqrt(-Delta) dt.
+/// Near critical damping C and S come from their series in Delta dt^2, so no digits are lost there.
 struct OscillatorStep {
     double a, b, c, d;
 };

@@ -11,7 +11,7 @@
 namespace sim {
 namespace {
 
-// Longest over shortest extent that double precision bears, with up to three and with more elements a side.
+// Largest ratio of extents that double precision allows, with up to three and with more elements per side.
 constexpr double kFlattest = 1000, kFlattestOfMany = 100;
 constexpr int kMostElements = 12, kMostModes = 300, kElementModes = 75;
 constexpr double kEqual = 1e-9;  // relative: eigenvalues of one degenerate group

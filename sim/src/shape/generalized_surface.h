@@ -8,7 +8,7 @@ namespace sim {
 /// Inside-outside function of a generalized superquadric (thesis 2.6 to 2.8), as a signed distance right to
 /// first order, in the rest frame.
 ///
-/// The gauge N is convex and homogeneous, so for any y the plane grad N(y) . r = 1 bears the body, and
+/// The gauge N is convex and homogeneous, so for any y the plane grad N(y) . r = 1 supports the body, and
 ///   d(y) = (1 - grad N(y) . r) / |grad N(y)|
 /// is at least r's depth, equal to it for y the nearest surface point (outside, -d is at most the distance).
 /// d(r) = (1 - N) / |grad N| alone is up to 1.6 times the depth for exponents to 1, and 6 times beyond, where
@@ -27,7 +27,7 @@ namespace sim {
 /// allocation, never NaN for finite r.
 class GeneralizedSurface {
 public:
-    explicit GeneralizedSurface(const GeneralizedSuperquadric& shape);
+    explicit GeneralizedSurface(const GeneralizedSuperquadric& shape);  ///< exponents are clamped
 
     /// normal: unit gradient of the distance.
     [[nodiscard]] SurfacePoint distance(const Eigen::Vector3d& r) const noexcept;
@@ -38,12 +38,12 @@ public:
         double value;
         Eigen::Vector3d gradient;
     };
-    [[nodiscard]] Displacement displacement(const Eigen::Vector3d& r) const noexcept;
+    [[nodiscard]] Displacement displacement(const Eigen::Vector3d& r) const noexcept;  ///< sum over the bumps
     /// The surface point that bumps have moved out of the ray through r.
     [[nodiscard]] Eigen::Vector3d surface_point(const Eigen::Vector3d& r) const noexcept;
 
-    [[nodiscard]] const Gauge& base() const noexcept { return base_; }
-    [[nodiscard]] bool has_bumps() const noexcept { return !peaks_.empty(); }
+    [[nodiscard]] const Gauge& base() const noexcept { return base_; }  ///< the superquadric without bumps
+    [[nodiscard]] bool has_bumps() const noexcept { return !peaks_.empty(); }  ///< one or more
     /// Upper bound of displacement [m]; 0 without spikes.
     [[nodiscard]] double reach() const noexcept { return reach_; }
     /// Radius of a sphere about the centre that holds the body [m].

@@ -14,17 +14,17 @@ using Lanes = float __attribute__((vector_size(32)));
 using LaneMask = std::int32_t __attribute__((vector_size(32)));
 constexpr int kLanes = 8;
 
-[[nodiscard]] constexpr int whole_lanes(int count) noexcept {
+[[nodiscard]] constexpr int whole_lanes(int count) noexcept {  ///< rounded up to whole lanes
     return (count + kLanes - 1) / kLanes * kLanes;
 }
 
-[[nodiscard]] inline Lanes lanes_of(float value) noexcept {
+[[nodiscard]] inline Lanes lanes_of(float value) noexcept {  ///< the same in each lane
     return Lanes{value, value, value, value, value, value, value, value};
 }
-[[nodiscard]] inline Lanes load_lanes(const float* aligned) noexcept {
+[[nodiscard]] inline Lanes load_lanes(const float* aligned) noexcept {  ///< eight floats
     return *reinterpret_cast<const Lanes*>(aligned);
 }
-inline void store_lanes(float* aligned, Lanes value) noexcept {
+inline void store_lanes(float* aligned, Lanes value) noexcept {  ///< eight floats
     *reinterpret_cast<Lanes*>(aligned) = value;
 }
 /// a b + c, rounded once where the processor level has the instruction (written out, as the compiler is told
@@ -36,7 +36,7 @@ inline void store_lanes(float* aligned, Lanes value) noexcept {
     return a * b + c;
 #endif
 }
-/// A bit a lane.
+/// One bit per lane.
 [[nodiscard]] inline unsigned bits_of(LaneMask mask) noexcept {
 #ifdef __AVX__
     return static_cast<unsigned>(_mm256_movemask_ps(reinterpret_cast<__m256>(mask)));

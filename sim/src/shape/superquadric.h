@@ -11,7 +11,7 @@ struct GaugeDerivatives {
     Eigen::Matrix3d hessian;   ///< [1/m^2]
 };
 
-/// Value and gradient of the gauge: the plane gradient . y = 1 bears the body at its point in that direction.
+/// Value and gradient of the gauge: the plane gradient . y = 1 supports the body at that point.
 struct GaugeSlope {
     double value;
     Eigen::Vector3d gradient;  ///< [1/m]
@@ -28,9 +28,9 @@ struct GaugeSlope {
 /// derivatives stay finite.
 class Gauge {
 public:
-    explicit Gauge(const Superquadric& shape);
+    explicit Gauge(const Superquadric& shape);  ///< clamps the exponents
 
-    [[nodiscard]] double value(const Eigen::Vector3d& r) const noexcept;
+    [[nodiscard]] double value(const Eigen::Vector3d& r) const noexcept;  ///< N(r), 1 on the surface
     [[nodiscard]] GaugeDerivatives derivatives(const Eigen::Vector3d& r) const noexcept;  ///< r not zero
     /// Without the curvature, and not made linear near the coordinate planes: at a kink a subgradient. Zero
     /// at the centre.
@@ -52,9 +52,9 @@ public:
     /// (e1 < 0.6) that of r brought into the straight prism, each of height and cross-section by itself.
     [[nodiscard]] Eigen::Vector3d near_outside(const Eigen::Vector3d& r) const noexcept;
 
-    [[nodiscard]] const Eigen::Vector3d& semi_axes() const noexcept { return semi_axes_; }
-    [[nodiscard]] double e1() const noexcept { return e1_; }
-    [[nodiscard]] double e2() const noexcept { return e2_; }
+    [[nodiscard]] const Eigen::Vector3d& semi_axes() const noexcept { return semi_axes_; }  ///< (a, b, c) [m]
+    [[nodiscard]] double e1() const noexcept { return e1_; }                                ///< as clamped
+    [[nodiscard]] double e2() const noexcept { return e2_; }                                ///< as clamped
     /// Radius of a sphere about the centre that holds the body [m].
     [[nodiscard]] double bounding_radius() const noexcept { return bounding_radius_; }
 

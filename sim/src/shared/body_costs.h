@@ -6,14 +6,14 @@
 
 namespace sim {
 
-/// What each body costs its worker [s a step], smoothed; and which of a worker's bodies go first.
+/// Smoothed cost of each body [s per step], for load balancing.
 class BodyCosts {
 public:
     /// `smoothing_steps`: time constant.
     BodyCosts(int bodies, double smoothing_steps);
-    /// Shares a step's seconds out to the bodies by World::work.
+    /// Distributes a step's seconds to the bodies by World::work.
     void share(double seconds, const World& world, std::span<const int> bodies);
-    /// That of a body which was not known here starts anew.
+    /// Forgets a body's cost; its smoothing starts anew.
     void forget(int body);
     [[nodiscard]] double of(int body) const { return cost_[static_cast<std::size_t>(body)]; }
 
@@ -22,8 +22,8 @@ private:
     std::vector<double> cost_;  // negative: unknown
 };
 
-/// How much nearer a place is to the centre of `others` than to that of `own` [m]. Without others: how far it
-/// is out along the longest extent of `own`, so that what goes lies together.
+/// For each own body, how much nearer it is to the centre of `others` than to that of `own` [m]. Without
+/// others: its coordinate along the longest extent of `own`, so that bodies that are sold lie together.
 [[nodiscard]] std::vector<double> pulls(const World& world, std::span<const int> own,
                                         std::span<const int> others);
 

@@ -13,13 +13,13 @@ namespace {
 // Every worker is at a step of its own. Its world holds its bodies; of the others' bodies those that may come
 // near are put in as ghosts for each step.
 //
-// A contact between an own body and a ghost is resolved where the lower number is owned: there is one owner,
-// so one resolver. What it does to the ghost is published as a push, in the same message as the states that
-// came of it: either both are there or neither. The ghost's owner holds the push over the same step if it is
-// there in time; else it holds what lasted in the two steps before (ImpulseLog), and puts the difference right
-// when the push comes, as if it had been in time. So every impulse arrives exactly once and momentum is kept;
-// what the states include is told by `applied`, and everybody who looks at a ghost puts it right by the
-// pushes that he knows.
+// A contact between an own body and a ghost is resolved by the owner of the lower number: one owner, so one
+// resolver. The impulse on the ghost is published as a push, in the same message as the states that result
+// from it: either both arrive or neither. The ghost's owner holds the push over the same step if it arrives
+// in time; otherwise it holds the lasting part of the two steps before (ImpulseLog), and corrects by the
+// difference when the push arrives. So every impulse arrives exactly once and momentum is kept. `applied`
+// says which pushes a state includes; every reader of a ghost corrects it by the pushes that it
+// knows.
 class BoundedExchange final : public ReplicaProtocol {
 public:
     explicit BoundedExchange(const SceneMessage& scene);
@@ -220,7 +220,7 @@ void BoundedExchange::own(const Ownership& ownership) {
     }
     // A worker that owned nothing begins here.
     if (first && owner != self_) pushes_.heard(owner, ownership.step);
-    // Last published: its own message, with what held the bodies, is known already to who was here.
+    // State as last published: members already have that message, with the forces that held the bodies.
     std::erase_if(message.bodies, [&](const Update& u) {
         return !ownership.traded && foreign_.newest(static_cast<int>(u.body)) >= ownership.step;
     });

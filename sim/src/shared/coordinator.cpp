@@ -180,7 +180,7 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
     }
 }
 
-// To whoever has least, what is joined together.
+// Each group of joined bodies goes to the worker with the fewest bodies.
 void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from) {
     for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = kApplication;
     if (members_.empty()) {

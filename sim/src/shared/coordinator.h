@@ -7,12 +7,12 @@
 
 namespace sim {
 
-/// The application's part without clock and sockets: members, the register of owners, passing on, the view of
-/// the whole world. All traffic goes through it, so it is one order of events for all: a worker is reachable
-/// for everybody or for nobody, and a body has the owner that the register says.
+/// Coordinator of a shared world, without clock or transport: keeps membership and the register of owners,
+/// relays messages, and assembles the view of the whole world. All traffic goes through it, so all workers
+/// see one order of events: a worker is reachable for all or for none, and each body has one owner.
 ///
-/// Bodies that do not move belong to nobody. Bodies to come have owners from the start, from the step before
-/// which they come.
+/// Bodies that do not move have no owner. Bodies that are added later have owners from the start, effective
+/// from the step before which they are added.
 class Coordinator {
 public:
     Coordinator(const WorldScene& scene, const DistributedSettings& settings, DistributedObserver& observer);
@@ -21,30 +21,30 @@ public:
         std::vector<std::uint32_t> to;
         std::shared_ptr<const std::vector<std::uint8_t>> bytes;
     };
-    /// Number of the new worker. Queues its scene, then what it has to know.
+    /// Admits a worker and returns its number. Queues its scene, then the present ownership and states.
     std::uint32_t join(const JoinRequest& request);
-    void start();  ///< first owners; bodies go to who is there
-    /// What a member sent, as it came. Anything that is malformed, not the member's to say, or stale is
-    /// counted and dropped.
+    void start();  ///< assigns the bodies to the members present
+    /// Handles a member's message, encoded. A message that is malformed, stale, or about bodies of others
+    /// is counted and dropped.
     void take(std::uint32_t worker, std::span<const std::uint8_t> bytes);
     void lose(std::uint32_t worker,
-              const std::string& why);  ///< its bodies go to the others; its messages count no more
-    /// Of those who own bodies the one that has published least is lost: for when nothing has been published
-    /// for long, though all are heard.
+              const std::string& why);  ///< its bodies go to the others; its later messages are dropped
+    /// Removes the owner that has published least: for when nothing is published although all heartbeats
+    /// arrive.
     void lose_slowest(const std::string& why);
-    /// Grows with everything that is published.
+    /// Number of records published so far.
     [[nodiscard]] std::uint64_t published() const noexcept { return result_.records; }
-    [[nodiscard]] std::vector<Outgoing> outgoing();
+    [[nodiscard]] std::vector<Outgoing> outgoing();  ///< queued messages; empties the queue
     [[nodiscard]] const std::vector<std::uint32_t>& members() const noexcept { return members_; }
-    [[nodiscard]] bool finished() const noexcept { return finished_; }
+    [[nodiscard]] bool finished() const noexcept { return finished_; }  ///< all steps are done
     [[nodiscard]] const DistributedResult& result() const noexcept { return result_; }  ///< no elapsed_s
-    /// By the register; kApplication: nobody.
+    /// Owner by the register; kApplication: none.
     [[nodiscard]] std::uint32_t owner(int body) const {
         return bodies_[static_cast<std::size_t>(body)].owner;
     }
 
 private:
-    /// Pushes that published states include, see UpdateMessage.
+    /// Impulses that published states include, see UpdateMessage.
     struct Applied {
         std::vector<std::uint32_t> sources;
         std::vector<std::uint64_t> steps;
@@ -112,11 +112,11 @@ private:
     std::uint32_t next_worker_ = 0, epoch_ = 0;
     bool started_ = false, finished_ = false;
     std::vector<Outgoing> queue_;
-    /// State and update messages of steps that the view has not reached, for who joins.
+    /// State and update messages of steps that the view has not reached, for workers that join later.
     std::deque<std::pair<std::uint64_t, std::shared_ptr<const std::vector<std::uint8_t>>>> kept_;
     std::vector<std::uint8_t> quarantined_;
     std::vector<std::pair<std::uint32_t, std::vector<int>>>
-        orphans_;                                       // by whom they were lost; nobody was left
+        orphans_;  // by the lost worker that owned them; if none was left
     std::map<std::uint32_t, Eigen::Vector3d> outside_;  // of each worker since its start
     DistributedResult result_;
 };

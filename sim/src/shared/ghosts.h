@@ -6,28 +6,28 @@
 
 namespace sim {
 
-/// What one worker knows of the others' bodies in bounded pace: their updates, and where they are at any step
-/// near these.
+/// One worker's knowledge of other workers' bodies in bounded pace: their updates, and their extrapolated
+/// states at any step near these.
 class Ghosts {
 public:
-    /// The world lends kinds and the free step; its own state is not touched.
+    /// `world` provides body kinds and the step of free motion; its state is not changed.
     Ghosts(World& world, const ImpulseLog& pushes, std::uint32_t self, int bodies, int bound);
 
-    /// An update message of step `step`, or what stands for one.
+    /// Stores an update message of step `step`, packed or decoded.
     void take(std::uint64_t step, const std::shared_ptr<const PackedUpdates>& message);
     void take(std::uint64_t step, const UpdateMessage& message);
-    /// From now on seen at `step` as the world has it.
+    /// Sets the body's last known state to the world's current one, stamped `step`.
     void take_own(int body, std::uint64_t step, std::vector<std::uint32_t> sources,
                   std::vector<std::uint64_t> applied);
 
-    /// The body at step `now`, by the last update not later than that (or the earliest there is): what its
-    /// owner assumed of pushes is put right, then it moves freely under what lasts and the pushes.
+    /// State at step `now`: the last update not later than that (or the earliest there is), corrected by
+    /// impulses that arrived late, then integrated freely under lasting forces and known impulses.
     struct Ghost {
         WorldBodyState state;
         bool asleep = false;
         int age = 0;            ///< of the update [steps]
-        bool leant_on = false;  ///< other bodies of its owner touch it
-        StepImpulse held;       ///< over the next step, pushes of this worker's own bodies apart
+        bool leant_on = false;  ///< other bodies of its owner are in contact with it
+        StepImpulse held;       ///< force over the next step, without this worker's own impulses
     };
     [[nodiscard]] Ghost at(int body, std::uint64_t now);
     /// A ball that holds the body over the step after `now`.
@@ -37,8 +37,8 @@ public:
     [[nodiscard]] std::uint64_t newest(int body) const {
         return newest_[static_cast<std::size_t>(body)].step;
     }
-    [[nodiscard]] bool quarantined(int body) const;
-    [[nodiscard]] Eigen::Vector3d last_position(int body) const;
+    [[nodiscard]] bool quarantined(int body) const;               ///< as last published
+    [[nodiscard]] Eigen::Vector3d last_position(int body) const;  ///< as last published [m]
 
 private:
     struct Seen {

@@ -6,12 +6,12 @@
 
 namespace sim {
 
-/// Bodies that have to stay on one worker: joined by constraints, directly or through others; both move.
-/// Ascending, by first bodies. Bodies that do not move are in none. With the bodies to come.
+/// Groups of moving bodies that have to stay on one worker, because constraints join them directly or through
+/// others. Ascending, by first bodies. Bodies added later are included; bodies that do not move are not.
 [[nodiscard]] std::vector<std::vector<int>> joined_lots(const WorldScene& scene);
 
-/// A worker (0 to workers - 1) for each lot: recursive coordinate bisection of the places at the start into
-/// equal numbers of bodies, so that neighbours share a worker.
+/// A worker (0 to workers - 1) per lot: recursive coordinate bisection of the first positions into equal
+/// numbers of bodies, so that neighbours share a worker.
 [[nodiscard]] std::vector<int> first_owners(const WorldScene& scene,
                                             const std::vector<std::vector<int>>& lots, int workers);
 

@@ -13,7 +13,7 @@ namespace {
 // there.
 //
 // Ownership comes with a record at some step s, the last that was published. Nobody can be further than
-// s + 1, and whoever is there waits for these very bodies:
+// s + 1, and a worker that is already there waits for these bodies:
 //   s = own step        they are own from here on
 //   s = own step - 1    the step is undone and repeated with them; the other bodies get the same bits again
 //   s > own step        waits until this worker is there

@@ -8,35 +8,35 @@
 
 namespace sim {
 
-/// One worker's dealings (thesis 2.4): whoever needs more time a step than the average offers some of its
-/// work to the fastest, by what everybody tells of themselves. No planner. T^i [s]: smoothed time worked a
-/// step, not waited.
+/// One worker's load-balancing policy, a market without a planner (thesis 2.4): a worker that needs more time
+/// per step than the average offers some of its work to the fastest, by the workers' own reports.
 ///
-///   W^i T^i = (T^i - T^avg) / max(1, N - 2)     (2.32)   seconds offered; what is no whole body is carried
-///   on
+///   W^i T^i = (T^i - T^avg) / max(1, N - 2)     (2.32)
+///   T^i  smoothed seconds that worker i works per step (not waits), N workers
+///   W^i T^i  seconds offered; what is less than a whole body is carried to the next offer
 ///
-/// Departures: no more is offered than makes both equally slow, or the buyer as slow as the average; a buyer
-/// that would become slower than the seller declines; what is sold moves from one T to the other at once, not
-/// by and by, and reports from before count no more (epochs tell), or stale figures would sell the same work
-/// twice. While anybody is above the average by more than 15 % and one body, trade is free; once level only
-/// what lasts makes it so again, and else the slowest of all sells one body at a time, beyond the dead band,
-/// and not within 20 steps of anybody's last trade.
+/// Departures: an offer never makes the buyer slower than the seller or than the average; a buyer that would
+/// become slower than the seller declines; sold work counts for the buyer at once, and reports written before
+/// the registration (older epoch) are ignored, otherwise stale figures would sell the same work twice. While
+/// any worker is above the average by more than 15 % and one body, trade is free. Once level, only a lasting
+/// difference frees it again; otherwise the slowest worker sells one body at a time, beyond the dead band,
+/// and not within 20 steps of the last trade of any worker.
 class Market {
 public:
-    /// near_only: once level, bodies go only to who owns what is near them.
+    /// near_only: once level, a body is sold only to the owner of bodies near it.
     Market(std::uint32_t self, const MarketSettings& settings, bool near_only);
 
-    void members(const std::vector<std::uint32_t>& workers);
-    /// Another worker's report, written when it knew ownership up to `epoch`.
+    void members(const std::vector<std::uint32_t>& workers);  ///< sets the members
+    /// Takes another worker's report, written when it knew ownership up to `epoch`.
     void heard(std::uint32_t worker, std::uint32_t epoch, const StepReport& report);
     void registered(std::uint32_t epoch, const Ownership& ownership);
-    /// Own step `step` took so long, for so much work (World::work).
+    /// Takes own step `step`: its seconds, its work (World::work), the number of own bodies.
     void worked(std::uint64_t step, double seconds, double work, int own);
 
     // Selling: one offer at a time, until it is declined or handed over.
     [[nodiscard]] bool wants_to_sell() const;
     [[nodiscard]] std::uint32_t fastest() const;
-    /// Of these lots; nothing if none fits.
+    /// An offer of some of these lots; none if no lot fits.
     [[nodiscard]] std::optional<Offer> make_offer(std::vector<ReplicaProtocol::Lot> lots);
     void answered(std::uint32_t worker, const OfferAnswer& answer);
     /// The offer that was accepted, if one was; counts as handed over.
@@ -45,7 +45,7 @@ public:
     /// Buying.
     [[nodiscard]] OfferAnswer answer(std::uint32_t seller, const Offer& offer);
 
-    [[nodiscard]] double smoothed() const { return workers_.at(self_).smoothed; }
+    [[nodiscard]] double smoothed() const { return workers_.at(self_).smoothed; }  ///< own seconds per step
 
 private:
     struct Worker {
@@ -76,7 +76,7 @@ private:
     bool known_ = false;                                          // own time
     bool calm_ = false;                                           // has been level, and nothing lasting since
     int far_steps_ = 0, other_rate_steps_ = 0, level_steps_ = 0;  // in a row
-    double usual_rate_ = 0;                                       // seconds a unit of work, while calm
+    double usual_rate_ = 0;                                       // seconds per unit of work, while calm
     double carried_ = 0;                                          // [s] to be sold with a later offer
     Sale sale_ = Sale::none;
     Offer offer_;
@@ -86,7 +86,7 @@ private:
     std::map<std::uint32_t, double> promises_;  // by seller: what it will cost here [s]
 };
 
-/// Seconds a step that the seller's bodies take at the buyer, for each at the seller.
+/// Seconds that the seller's bodies take at the buyer, per second at the seller.
 [[nodiscard]] double exchange_rate(double seller_body_cost, double buyer_body_cost);
 
 }  // namespace sim

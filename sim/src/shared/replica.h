@@ -7,19 +7,19 @@
 
 namespace sim {
 
-/// Where in its future a scene's world is: applies events, knows when each body comes.
+/// A scene's schedule: applies its events and knows at which step each body is added.
 class SceneClock {
 public:
-    explicit SceneClock(const WorldScene& scene);
+    explicit SceneClock(const WorldScene& scene);  ///< at the start
 
-    /// Events before step `step` + 1 that have not been applied yet: constraints go, bodies come.
+    /// Applies the events due before step `step` + 1: removes constraints, adds bodies.
     void apply(World& world, std::uint64_t step);
     [[nodiscard]] bool events_left() const noexcept { return next_ < scene_.events.size(); }
-    [[nodiscard]] int bodies() const noexcept { return static_cast<int>(born_.size()); }  ///< and to come
-    /// Step at whose end the body is first known; its first step is the next one.
+    [[nodiscard]] int bodies() const noexcept { return static_cast<int>(born_.size()); }  ///< with later ones
+    /// Step at whose end the body first exists; the next step is the first it takes part in.
     [[nodiscard]] std::uint64_t born(int body) const { return born_[static_cast<std::size_t>(body)]; }
     [[nodiscard]] bool moves(int body) const { return moves_[static_cast<std::size_t>(body)] != 0; }
-    /// Bodies that move and are there at the end of step `step`.
+    /// Number of moving bodies that exist at the end of step `step`.
     [[nodiscard]] int moving(std::uint64_t step) const;
     [[nodiscard]] bool moves_at(int body, std::uint64_t step) const;
 
@@ -31,34 +31,34 @@ private:
     std::vector<std::uint8_t> moves_;
 };
 
-/// A copy of a world in lockstep, whose bodies' exact records come from outside or from steps of its own. It
-/// is whole when every moving body's record at its step is there.
+/// A copy of a world in lockstep. Exact records of its bodies come from other workers or from its own steps.
+/// It is whole when it has every moving body's record of its step.
 class Replica {
 public:
-    explicit Replica(const WorldScene& scene);
+    explicit Replica(const WorldScene& scene);  ///< at the start
 
-    [[nodiscard]] World& world() noexcept { return world_; }
+    [[nodiscard]] World& world() noexcept { return world_; }  ///< the copy
     [[nodiscard]] const World& world() const noexcept { return world_; }
     [[nodiscard]] const SceneClock& clock() const noexcept { return clock_; }
-    [[nodiscard]] std::uint64_t step() const noexcept { return step_; }
-    [[nodiscard]] bool whole() const noexcept { return whole_; }
+    [[nodiscard]] std::uint64_t step() const noexcept { return step_; }  ///< that the copy is at
+    [[nodiscard]] bool whole() const noexcept { return whole_; }         ///< see above
 
-    /// What was published of step `step`. The first record of a body counts.
+    /// Stores what was published of step `step`. The first record of a body counts.
     void note(std::uint64_t step, std::vector<WorldRecord>&& bodies, std::vector<ContactRecord>&& contacts,
               std::vector<SpringRecord>&& springs);
-    /// All known of the world's step: it becomes whole. All known of the next (and the world whole): goes
-    /// there without a step of its own, when `along`. Returns whether anything changed.
+    /// Becomes whole if every record of its step has arrived. If it is whole, `along` is set and every
+    /// record of the next step has arrived, it goes there by copying. Returns whether anything changed.
     bool advance(bool along);
-    /// Before a step of the world: events.
+    /// Applies the events before a step.
     void begin() { begin_at(step_); }
     void begin_at(std::uint64_t step) { clock_.apply(world_, step); }
-    /// After a step of the world: the records of own bodies are there.
+    /// After a step of the world: marks the records of own bodies as present.
     void stepped(std::span<const std::uint8_t> own);
-    /// Back to the snapshot that was taken before the step that stepped() ended. What was published of it
-    /// stays known: the bodies `own`, these springs, and whatever contacts the world has.
+    /// Goes back to the snapshot taken before the step that stepped() ended. What was published of that step
+    /// stays known: the bodies `own`, these springs, and the world's contacts.
     void undo(const WorldSnapshot& before, std::span<const std::uint8_t> own,
               const std::vector<SpringRecord>& springs);
-    /// Everything at the end of a later step.
+    /// Goes to the end of a later step by its snapshot.
     void jump(const WorldSnapshot& snapshot);
 
 private:

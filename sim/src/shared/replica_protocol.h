@@ -6,9 +6,9 @@
 
 namespace sim {
 
-/// How one worker keeps its copy of the world in step with the others': one for each Pace. Knows no clock, no
-/// sockets, no market. Bodies are own, foreign, or given (handed over, not yet registered elsewhere: nobody
-/// steps them).
+/// How one worker keeps its copy of the world consistent with the others': one implementation per Pace. Uses
+/// no clock, no sockets and no load balancing. A body is own, foreign, or given (handed over, but not yet
+/// registered elsewhere: no worker steps it).
 class ReplicaProtocol {
 public:
     virtual ~ReplicaProtocol() = default;
@@ -19,44 +19,44 @@ public:
     virtual void take(SnapshotMessage&& message) {
         (void)message;
     }  ///< once, before the first step of one who joins late
-    /// Who is there now. Workers that went own nothing from here on; whose their bodies are follows by
-    /// Ownership.
+    /// The members now. Workers that left own nothing from here on; Ownership messages say who owns their
+    /// bodies.
     virtual void members(const std::vector<std::uint32_t>& workers) = 0;
     /// Registered owners. Becomes effective at the message's step: may make this worker repeat its last step
     /// (lockstep), or take bodies over that are some steps away (bounded).
     virtual void own(const Ownership& ownership) = 0;
 
-    /// Whether the next step can be done now: what it needs is there and the bound allows it. False when
-    /// done() or nothing is own (lockstep: then too it follows what the others publish, see follow).
+    /// Whether the next step can be done now: its inputs have arrived and the bound allows it. False if
+    /// done(), or if no body is own (lockstep then follows what the others publish, see follow).
     [[nodiscard]] virtual bool ready() const = 0;
     virtual void step() = 0;  ///< requires ready()
     /// Message of the step just done: StateMessage or UpdateMessage, encoded. Called once after step().
     [[nodiscard]] virtual std::vector<std::uint8_t> publish(std::uint32_t epoch,
                                                             const StepReport& report) = 0;
-    /// Without own bodies: goes along as far as the others' messages allow.
+    /// Without own bodies: advances as far as the others' messages allow.
     virtual void follow() = 0;
 
-    /// Own bodies that move, for the market; those that must stay together (joined by constraints, in bounded
-    /// pace) as one lot.
+    /// Own bodies that move, for load balancing; bodies that must stay together (joined by constraints, in
+    /// bounded pace) form one lot.
     struct Lot {
         std::vector<std::uint32_t> bodies;
-        double cost_s;  ///< smoothed seconds a step
-        double pull;    ///< the larger, the nearer to the bodies of the worker asked about than to own ones
+        double cost_s;  ///< smoothed seconds per step
+        double pull;    ///< larger if nearer to the bodies of the worker `towards` than to own ones
     };
     [[nodiscard]] virtual std::vector<Lot> lots(std::uint32_t towards) const = 0;
     /// Stops owning: their exact records at the end of this worker's last step. The caller sends the
     /// Handover.
     [[nodiscard]] virtual Handover give(const std::vector<std::uint32_t>& bodies) = 0;
-    /// What the last step cost, to be shared out to the own bodies by World::work.
+    /// Seconds that the last step took; distributed to the own bodies by World::work.
     virtual void cost(double seconds) = 0;
 
-    [[nodiscard]] virtual std::uint64_t steps_done() const = 0;
-    [[nodiscard]] virtual bool at_end() const = 0;  ///< settings.steps reached
-    /// Nothing more to do. In bounded pace one more publication follows the last step, when all the others
-    /// have done theirs: with the pushes that came late put right.
+    [[nodiscard]] virtual std::uint64_t steps_done() const = 0;  ///< by this worker
+    [[nodiscard]] virtual bool at_end() const = 0;               ///< settings.steps reached
+    /// Nothing is left to do. In bounded pace one more publication follows the last step, once all others
+    /// have done theirs: corrected by the impulses that arrived late.
     [[nodiscard]] virtual bool done() const = 0;
     [[nodiscard]] virtual int own_bodies() const = 0;
-    [[nodiscard]] virtual int lead() const = 0;       ///< over the slowest that owns a body, now
+    [[nodiscard]] virtual int lead() const = 0;       ///< steps ahead of the slowest owner, now
     [[nodiscard]] virtual int ghost_age() const = 0;  ///< of the oldest used in the last step
     [[nodiscard]] virtual const World& world() const = 0;
 };

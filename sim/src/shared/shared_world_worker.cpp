@@ -165,7 +165,7 @@ void SharedWorldWorker::drain() {
     if (!stepping_ && !left_) leave();
 }
 
-// The application shares out what is given to nobody.
+// Bodies handed over without a buyer are distributed by the application.
 void SharedWorldWorker::leave() {
     std::vector<std::uint32_t> bodies;
     const World& world = exchange_->world();

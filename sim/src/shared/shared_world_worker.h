@@ -4,33 +4,33 @@
 
 namespace sim {
 
-/// One worker without clock and sockets: the same code runs behind ZeroMQ and on simulated processors.
+/// One worker, without clock or transport: the same code runs behind ZeroMQ and on simulated processors.
 ///
 ///   take() ... whenever a message comes, but not between step() and worked()
 ///   if (ready()) { step(); worked(seconds, waited); }
 ///   outgoing() after each of these
 class SharedWorldWorker {
 public:
-    explicit SharedWorldWorker(const SceneMessage& scene);
+    explicit SharedWorldWorker(const SceneMessage& scene);  ///< from the first message
 
-    /// A message passed on by the application, decoded. Throws DecodeError if it can only be a mistake.
+    /// Handles a message relayed by the application, decoded. Throws DecodeError if it is inconsistent.
     void take(const WorldHeader& header, WorldMessage&& message);
     [[nodiscard]] bool ready() const;
     void step();
-    /// After step(): what it cost and how long the worker had waited before it. Queues what it publishes,
-    /// then trades.
+    /// After step(): the seconds it took, and those the worker had waited before it. Queues the message to
+    /// publish, then balances the load.
     void worked(double seconds, double waited_s);
     /// Encoded messages to the application, in order; empties the queue.
     [[nodiscard]] std::vector<std::vector<std::uint8_t>> outgoing();
-    /// Gives everything away, after the step if one is being done; then left() becomes true.
+    /// Hands all bodies over, after the step if one is under way; then left() becomes true.
     void drain();
     [[nodiscard]] bool left() const noexcept { return left_; }
     [[nodiscard]] bool ended() const noexcept { return ended_; }  ///< EndOfRun or Refusal came
     [[nodiscard]] double slowing() const;  ///< factor of the scene's events for this worker's next step
-    [[nodiscard]] std::uint64_t steps_done() const { return exchange_->steps_done(); }
+    [[nodiscard]] std::uint64_t steps_done() const { return exchange_->steps_done(); }  ///< by this worker
     /// Why ready() is false, in words.
     [[nodiscard]] std::string waits_for() const;
-    [[nodiscard]] double work() const;  ///< that the last step took, in units of World::work
+    [[nodiscard]] double work() const;  ///< work of the last step, in units of World::work
 
 private:
     void take_message(const WorldHeader& header, Members&& message);
@@ -53,7 +53,7 @@ private:
     void leave();
 
     std::uint32_t self_;
-    std::vector<WorldEvent> events_;  // those that slow somebody
+    std::vector<WorldEvent> events_;  // those that slow a worker
     std::unique_ptr<ReplicaProtocol> exchange_;
     Market market_;
     bool bounded_;
@@ -61,8 +61,8 @@ private:
     std::uint32_t epoch_ = 0;
     std::uint64_t published_ = 0;  // step
     int lead_ = 0;                 // at the start of the step
-    // Bounded pace: what is sold goes over at a step that neither has passed, so no body loses time. The
-    // buyer waits for it at its step, the seller goes on to there.
+    // Bounded pace: sold bodies change owners at a step that neither side has passed, so no body skips a
+    // step. The buyer waits there; the seller goes on to it.
     std::uint64_t handover_step_ = 0;
     std::vector<std::uint32_t> sellers_;  // whose offers were accepted, and whose bodies have not come
     bool stepping_ = false, draining_ = false, left_ = false, ended_ = false;

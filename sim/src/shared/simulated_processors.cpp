@@ -140,7 +140,7 @@ void Machine::happen(const Event& event) {
         meeting_.take(static_cast<std::uint32_t>(event.who), *bytes);
     }
     if (event.kind == Event::Kind::worker) run_worker(event.who);
-    // When nobody is left, the application's own process goes on.
+    // If no worker is left, the application's own process continues.
     if (meeting_.members().empty() && !meeting_.finished()) join();
     deliver();
 }
@@ -226,7 +226,7 @@ void Machine::send(Processor& p) {
 
 // That nothing is left to happen before the end is our own mistake.
 std::string Machine::stuck() const {
-    std::string what = "simulated processors: found nothing left to happen, expected the run's end; members";
+    std::string what = "simulated processors: no event is left before the run's end; members";
     for (const std::uint32_t worker : meeting_.members()) {
         const Processor& p = processors_[worker];
         what.append(" ").append(std::to_string(worker));

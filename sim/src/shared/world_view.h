@@ -6,26 +6,26 @@
 
 namespace sim {
 
-/// All bodies as they were published, step by step: exact in lockstep. In bounded pace a body that was not
-/// published at a step (it was changing hands) goes there from its last state by itself.
+/// All bodies as published, step by step: exact in lockstep. In bounded pace a body that was not published at
+/// a step (it was changing owners) is extrapolated from its last state.
 class WorldView {
 public:
     WorldView(const WorldScene& scene, Pace pace);
 
-    void take(std::uint64_t step, StateMessage&& message);
-    void take(std::uint64_t step, const std::vector<Update>& updates);
-    /// A body's record that was not published: handed over.
+    void take(std::uint64_t step, StateMessage&& message);              ///< lockstep
+    void take(std::uint64_t step, const std::vector<Update>& updates);  ///< bounded
+    /// Records that were handed over instead of published.
     void take(std::uint64_t step, const std::vector<WorldRecord>& records);
     /// Bounded: nothing more will be published of this body.
     void release(int body) { released_[static_cast<std::size_t>(body)] = 1; }
-    void break_constraint(int constraint);  ///< bounded: its owner says so
-    /// One step on, if all that it needs is known.
+    void break_constraint(int constraint);  ///< bounded: its owner reported the break
+    /// Advances by one step if all its states are known; returns whether it did.
     [[nodiscard]] bool advance();
 
-    [[nodiscard]] const World& world() const noexcept { return replica_.world(); }
-    [[nodiscard]] std::uint64_t step() const noexcept { return step_; }
+    [[nodiscard]] const World& world() const noexcept { return replica_.world(); }  ///< all bodies at step()
+    [[nodiscard]] std::uint64_t step() const noexcept { return step_; }             ///< shown
     [[nodiscard]] const SceneClock& clock() const noexcept { return replica_.clock(); }
-    /// Every body still for half a second and no event left.
+    /// Every body has been still for half a second and no event is left.
     [[nodiscard]] bool at_rest() const;
     [[nodiscard]] WorldSnapshot snapshot() const { return replica_.world().snapshot(); }
 

@@ -28,8 +28,8 @@ struct BodyPose {
         Eigen::Vector3d::Zero();  ///< angular velocity [rad/s], frame of world_from_body
 };
 
-/// What a motion never exceeds. |Ddot r| and |(D - I) r| for r in the rest shape's box, axis by axis: sum_j
-/// |E_ij| a_j.
+/// Upper bounds of a motion: of |Ddot r| and |(D - I) r| for r in the rest shape's box, axis by axis
+/// sum_j |E_ij| a_j.
 struct MotionBounds {
     Eigen::Vector3d speed =
         Eigen::Vector3d::Zero();  ///< of a material point by deformation [m/s], before the hinge
@@ -37,7 +37,7 @@ struct MotionBounds {
     double turn = 0;                                  ///< hinge rate [rad/s]
     double swing = 0;                                 ///< hinge angle [rad]
 
-    void widen(const MotionBounds& other) noexcept;
+    void widen(const MotionBounds& other) noexcept;  ///< to hold both
 };
 
 /// Pose of a state; where the limit on strains and swing acts (see BodyModel).
@@ -46,29 +46,29 @@ struct MotionBounds {
 /// Everything about a body that its definition settles, computed once.
 ///
 /// Linear and limited: the state is linear in the impulses and never cut, so responses superpose exactly.
-/// What is seen and touched (body_matrix, contacts) applies a limit coordinate by coordinate,
-///   |s| <= L/2: s;  beyond: sign(s) (L/2 + L/2 tanh(2|s|/L - 1)),   L = 0.4 for scales, 0.15 for shears, 1
-///   rad for the swing,
-/// so each eigenvalue of D lies within 1 -+ (0.4 + 2 * 0.15) = 0.3 to 1.7 (Gershgorin) however strong or many
-/// the strikes are.
+/// What is seen and touched (body_matrix, contacts) limits each coordinate s:
+///   |s| <= L/2: s;  beyond: sign(s) (L/2 + L/2 tanh(2 |s| / L - 1))
+///   L = 0.4 for scales, 0.15 for shears, 1 rad for the swing
+/// so each eigenvalue of D lies within 1 -+ (0.4 + 2 * 0.15), that is 0.3 to 1.7 (Gershgorin), however strong
+/// or many the strikes are.
 class BodyModel {
 public:
     explicit BodyModel(const BodyDefinition& definition);  ///< throws std::invalid_argument, see check_body
 
-    [[nodiscard]] const BodyDefinition& definition() const noexcept { return definition_; }
-    [[nodiscard]] const Gauge& gauge() const noexcept { return gauge_; }
-    [[nodiscard]] const LinearBody& linear() const noexcept { return linear_; }
+    [[nodiscard]] const BodyDefinition& definition() const noexcept { return definition_; }  ///< as given
+    [[nodiscard]] const Gauge& gauge() const noexcept { return gauge_; }                     ///< rest shape
+    [[nodiscard]] const LinearBody& linear() const noexcept { return linear_; }  ///< mass and modes
     [[nodiscard]] const Eigen::Isometry3d& body_from_world() const noexcept { return body_from_world_; }
     /// Angular frequencies and decay rates of the visible modes, then of the hinge.
     [[nodiscard]] const OscillatorVector& omega() const noexcept { return omega_; }
     [[nodiscard]] const OscillatorVector& sigma() const noexcept { return sigma_; }
 
     [[nodiscard]] OscillatorState to_oscillators(const ModalState& state) const noexcept;
-    [[nodiscard]] ModalState to_modal(const OscillatorState& state) const noexcept;
+    [[nodiscard]] ModalState to_modal(const OscillatorState& state) const noexcept;  ///< modes to strains
     /// Exact free motion over dt; a negative dt counts as zero.
     [[nodiscard]] OscillatorState after(const OscillatorState& state, double dt) const noexcept;
-    /// State just after `impulse` on the body at rest: z_dot = gain Phi^T Q, swing_dot = axis . ((r - pivot)
-    /// x J) / I.
+    /// State just after `impulse` on the body at rest:
+    ///   z_dot = gain Phi^T Q,  swing_dot = axis . ((r - pivot) x J) / I.
     [[nodiscard]] OscillatorState kick(const Impulse& impulse) const noexcept;
     [[nodiscard]] BodyPose pose(const OscillatorState& state) const noexcept {
         return pose_of(definition_.stand, to_modal(state));

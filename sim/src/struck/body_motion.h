@@ -18,7 +18,7 @@ public:
     /// its response by then.
     void add(const Impulse& impulse);
 
-    [[nodiscard]] BodyPose pose_at(double t_s) const noexcept;
+    [[nodiscard]] BodyPose pose_at(double t_s) const noexcept;  ///< at any time from the start on
     /// Bounds over the whole motion.
     [[nodiscard]] const MotionBounds& bounds() const noexcept { return bounds_; }
 

@@ -15,8 +15,8 @@ struct BodyOutcome {
     };
     std::uint32_t body = 0;
     ModalState state;
-    std::vector<ModalState> pictures;   ///< one a request
-    std::vector<double> clearance_m;    ///< one a path
+    std::vector<ModalState> pictures;   ///< one per request
+    std::vector<double> clearance_m;    ///< one per path
     std::vector<PathContact> contacts;  ///< by path, then time
 };
 
@@ -37,7 +37,7 @@ public:
     /// Steps and fills `outcome`, reusing its memory. Ignores impulses on other bodies.
     void step(const StepRequest& request, BodyOutcome& outcome);
     [[nodiscard]] std::uint32_t index() const noexcept { return index_; }
-    [[nodiscard]] const BodyRecord& record() const noexcept { return record_; }
+    [[nodiscard]] const BodyRecord& record() const noexcept { return record_; }  ///< after the last step
 
 private:
     [[nodiscard]] OscillatorState folded(const StepRequest& request) const;

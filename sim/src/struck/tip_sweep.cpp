@@ -16,24 +16,6 @@ constexpr double kDistanceTolerance_m = 1e-11;
 
 }  // namespace
 
-// Cubic Bezier form of one Hermite segment, frame of world_from_body.
-struct TipSweep::Segment {
-    double t0, t1;
-    Eigen::Vector3d b[4];
-
-    Eigen::Vector3d position(double t) const {
-        const double s = (t - t0) / (t1 - t0), r = 1 - s;
-        return r * r * r * b[0] + 3 * r * r * s * b[1] + 3 * r * s * s * b[2] + s * s * s * b[3];
-    }
-    Eigen::Vector3d velocity(double t) const {
-        const double s = (t - t0) / (t1 - t0), r = 1 - s;
-        return 3 / (t1 - t0) * (r * r * (b[1] - b[0]) + 2 * r * s * (b[2] - b[1]) + s * s * (b[3] - b[2]));
-    }
-    double greatest_speed() const {
-        return 3 / (t1 - t0) * std::max({(b[1] - b[0]).norm(), (b[2] - b[1]).norm(), (b[3] - b[2]).norm()});
-    }
-};
-
 struct TipSweep::Evaluation {
     double t;
     double s;  // signed distance less the radius
@@ -49,16 +31,13 @@ struct TipSweep::Walk {
     bool armed;
 };
 
-TipSweep::Segment TipSweep::segment(const PathNode& from, const PathNode& to) const noexcept {
-    const Eigen::Isometry3d& frame = model_->body_from_world();
-    const double third = (to.t_s - from.t_s) / 3;
-    return {from.t_s,
-            to.t_s,
-            {frame * from.position, frame * (from.position + third * from.velocity),
-             frame * (to.position - third * to.velocity), frame * to.position}};
+HermitePiece TipSweep::segment(const PathNode& from, const PathNode& to) const noexcept {
+    HermitePiece piece(from, to);
+    for (Eigen::Vector3d& b : piece.control) b = (model_->body_from_world() * b).eval();
+    return piece;
 }
 
-TipSweep::Evaluation TipSweep::evaluate(const Segment& segment, double t, double radius,
+TipSweep::Evaluation TipSweep::evaluate(const HermitePiece& segment, double t, double radius,
                                         const Eigen::Vector3d* start) const noexcept {
     Evaluation e{t, 0, motion_->pose_at(t), {}};
     const Eigen::Vector3d& pivot = model_->definition().stand.pivot_body;
@@ -77,8 +56,8 @@ double TipSweep::box_distance(const Eigen::Vector3d& low, const Eigen::Vector3d&
     return (low - half).cwiseMax(-half - high).cwiseMax(0).norm();
 }
 
-TipSweep::Evaluation TipSweep::close_in(const Segment& segment, const Walk& walk, const Evaluation& outside,
-                                        const Evaluation& inside) const noexcept {
+TipSweep::Evaluation TipSweep::close_in(const HermitePiece& segment, const Walk& walk,
+                                        const Evaluation& outside, const Evaluation& inside) const noexcept {
     const double radius = walk.path.tip_radius_m;
     const auto at = [&](double t) { return evaluate(segment, t, radius, &outside.foot.rest_point); };
     if (outside.s <= kDistanceTolerance_m) return at(outside.t);
@@ -101,7 +80,7 @@ TipSweep::Evaluation TipSweep::close_in(const Segment& segment, const Walk& walk
     return b;
 }
 
-Contact TipSweep::contact(const Segment& segment, const Evaluation& at, const TipPath& path,
+Contact TipSweep::contact(const HermitePiece& segment, const Evaluation& at, const TipPath& path,
                           std::uint32_t body) const {
     const Eigen::Isometry3d& world = model_->definition().world_from_body;
     const Eigen::Vector3d& pivot = model_->definition().stand.pivot_body;
@@ -122,19 +101,19 @@ Contact TipSweep::contact(const Segment& segment, const Evaluation& at, const Ti
     return c;
 }
 
-void TipSweep::march(const Segment& segment, Walk& walk) const {
+void TipSweep::march(const HermitePiece& segment, Walk& walk) const {
     const Eigen::Vector3d& pivot = model_->definition().stand.pivot_body;
     double arm = 0;
-    for (const Eigen::Vector3d& b : segment.b) arm = std::max(arm, (b - pivot).norm());
+    for (const Eigen::Vector3d& b : segment.control) arm = std::max(arm, (b - pivot).norm());
     const MotionBounds& bounds = motion_->bounds();
     const double speed = segment.greatest_speed() + bounds.speed.norm() + bounds.turn * arm;
     if (speed == 0) return;
     const double shortest =
-        std::max(kShortestTravel_m, speed * (segment.t1 - segment.t0) / kMostStepsASegment);
+        std::max(kShortestTravel_m, speed * (segment.t1_s - segment.t0_s) / kMostStepsASegment);
     const double radius = walk.path.tip_radius_m;
-    while (walk.last.t < segment.t1) {
+    while (walk.last.t < segment.t1_s) {
         const double travel = std::max(walk.armed ? walk.last.s : kRearm_m - walk.last.s, shortest);
-        const double t = std::min(segment.t1, walk.last.t + travel / speed);
+        const double t = std::min(segment.t1_s, walk.last.t + travel / speed);
         const Eigen::Vector3d x = segment.position(t);
         const double far = box_distance(x, x) - radius;
         if (far > kBoxOnly_m) {
@@ -154,8 +133,8 @@ void TipSweep::march(const Segment& segment, Walk& walk) const {
 }
 
 double TipSweep::sweep(const TipPath& path, std::uint32_t body, std::vector<Contact>& contacts) const {
-    const Segment first = segment(path.nodes[0], path.nodes[1]);
-    Walk walk{path, body, contacts, evaluate(first, first.t0, path.tip_radius_m, nullptr), true};
+    const HermitePiece first = segment(path.nodes[0], path.nodes[1]);
+    Walk walk{path, body, contacts, evaluate(first, first.t0_s, path.tip_radius_m, nullptr), true};
     const double clearance = walk.last.s;
     if (clearance < 0) {
         Contact c = contact(first, walk.last, path, body);
@@ -165,12 +144,13 @@ double TipSweep::sweep(const TipPath& path, std::uint32_t body, std::vector<Cont
         walk.armed = false;
     }
     for (std::size_t i = 0; i + 1 < path.nodes.size(); ++i) {
-        const Segment s = segment(path.nodes[i], path.nodes[i + 1]);
-        const Eigen::Vector3d low = s.b[0].cwiseMin(s.b[1]).cwiseMin(s.b[2]).cwiseMin(s.b[3]);
-        const Eigen::Vector3d high = s.b[0].cwiseMax(s.b[1]).cwiseMax(s.b[2]).cwiseMax(s.b[3]);
+        const HermitePiece s = segment(path.nodes[i], path.nodes[i + 1]);
+        const auto& b = s.control;
+        const Eigen::Vector3d low = b[0].cwiseMin(b[1]).cwiseMin(b[2]).cwiseMin(b[3]);
+        const Eigen::Vector3d high = b[0].cwiseMax(b[1]).cwiseMax(b[2]).cwiseMax(b[3]);
         const double far = box_distance(low, high) - path.tip_radius_m;
         if (far > kRearm_m) {
-            walk.last.t = s.t1, walk.last.s = far, walk.armed = true;
+            walk.last.t = s.t1_s, walk.last.s = far, walk.armed = true;
         } else {
             march(s, walk);
         }

@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "sim/hermite_piece.h"
 #include "struck/body_motion.h"
 
 namespace sim {
@@ -25,18 +26,18 @@ public:
     double sweep(const TipPath& path, std::uint32_t body, std::vector<Contact>& contacts) const;
 
 private:
-    struct Segment;
     struct Walk;
     struct Evaluation;
 
-    [[nodiscard]] Segment segment(const PathNode& from, const PathNode& to) const noexcept;
-    [[nodiscard]] Evaluation evaluate(const Segment& segment, double t, double radius,
+    /// The piece in the frame of world_from_body.
+    [[nodiscard]] HermitePiece segment(const PathNode& from, const PathNode& to) const noexcept;
+    [[nodiscard]] Evaluation evaluate(const HermitePiece& segment, double t, double radius,
                                       const Eigen::Vector3d* start) const noexcept;
     [[nodiscard]] double box_distance(const Eigen::Vector3d& low, const Eigen::Vector3d& high) const noexcept;
-    void march(const Segment& segment, Walk& walk) const;
-    [[nodiscard]] Evaluation close_in(const Segment& segment, const Walk& walk, const Evaluation& outside,
-                                      const Evaluation& inside) const noexcept;
-    [[nodiscard]] Contact contact(const Segment& segment, const Evaluation& at, const TipPath& path,
+    void march(const HermitePiece& segment, Walk& walk) const;
+    [[nodiscard]] Evaluation close_in(const HermitePiece& segment, const Walk& walk,
+                                      const Evaluation& outside, const Evaluation& inside) const noexcept;
+    [[nodiscard]] Contact contact(const HermitePiece& segment, const Evaluation& at, const TipPath& path,
                                   std::uint32_t body) const;
 
     const BodyModel* model_;

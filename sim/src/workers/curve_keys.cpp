@@ -38,8 +38,7 @@ void write_new(const fs::path& file, const std::string& text, mode_t mode) {
     if (written) written = write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size());
     if (descriptor >= 0) written = close(descriptor) == 0 && written;
     if (!written)
-        throw std::runtime_error("error: found that " + file.string() +
-                                 " cannot be written: " + std::strerror(errno) + ", expected room for keys");
+        throw std::runtime_error("error: cannot write " + file.string() + ": " + std::strerror(errno));
 }
 
 std::vector<std::array<std::string, 2>> read_lines(const fs::path& file) {
@@ -121,8 +120,7 @@ bool is_loopback(const std::string& address) {
 KeyPair make_key_pair() {
     std::array<char, kKeyLength + 1> shown{}, secret{};
     if (zmq_curve_keypair(shown.data(), secret.data()) != 0)
-        throw std::runtime_error(
-            "error: found a ZeroMQ without CURVE, expected one that is built with libsodium");
+        throw std::runtime_error("error: cannot make CURVE keys: this ZeroMQ is built without libsodium");
     return {shown.data(), secret.data()};
 }
 
@@ -156,8 +154,8 @@ void make_keys(const fs::path& folder, const std::vector<std::string>& workers) 
     if (mkdir(folder.c_str(), 0700) != 0) {
         if (errno == EEXIST)
             refuse(folder.string() + ", which is there already", "a new folder; nothing is overwritten");
-        refuse("that folder " + folder.string() + " cannot be made: " + std::strerror(errno),
-               "a place where it can");
+        throw std::invalid_argument("error: cannot make folder " + folder.string() + ": " +
+                                    std::strerror(errno) + "; choose another");
     }
     try {
         write_keys(folder, workers);

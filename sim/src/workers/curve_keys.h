@@ -14,7 +14,7 @@ namespace sim {
 struct KeyPair {
     std::string shown, secret;
 };
-[[nodiscard]] KeyPair make_key_pair();
+[[nodiscard]] KeyPair make_key_pair();  ///< throws std::runtime_error
 
 struct ApplicationKeys {
     KeyPair pair;

@@ -11,21 +11,21 @@
 
 namespace sim {
 
-/// A worker's socket to the application.
+/// Connects a worker's DEALER socket to the application; `keys` for CURVE, linger [ms].
 [[nodiscard]] zmq::socket_t connect_worker(zmq::context_t& context, const std::string& endpoint,
                                            const std::optional<WorkerKeys>& keys, int linger_ms);
 
-/// Sends heartbeats from a thread of its own, so that long work is not taken for death, and watches for the
-/// application's end. Where the application is on this machine (ipc) that is the end of its process; else,
-/// once in a world, 1.5 s without an answer to a heartbeat.
+/// Sends a worker's heartbeats from a thread of its own, so that a long step is not taken for a failure, and
+/// detects the application's end. On the same machine (ipc) that is the end of its process; otherwise, once
+/// in a world, 1.5 s without an answer to a heartbeat.
 class Pulse {
 public:
     Pulse(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys);
 
-    /// From now on heartbeats are a world's. A worker that has not ended 0.4 s after the application's end
-    /// is ended.
+    /// From now on sends heartbeats of worker `worker` of a world. If this process has not ended 0.4 s after
+    /// the application's end, it is ended.
     void join_world(std::uint32_t worker) noexcept { worker_ = worker; }
-    [[nodiscard]] bool application_gone() const noexcept { return gone_; }
+    [[nodiscard]] bool application_gone() const noexcept { return gone_; }  ///< set once
 
 private:
     void beat(zmq::context_t& context, const std::optional<WorkerKeys>& keys, const std::stop_token& stop);

@@ -8,8 +8,8 @@
 
 namespace sim {
 
-/// Lets only peers with a listed key through CURVE's handshake (ZeroMQ's ZAP, RFC 27), from a thread of its
-/// own. One for a context, made before its sockets are bound; sockets need `kDomain`.
+/// Admits only peers with a listed key in CURVE's handshake (ZeroMQ's ZAP, RFC 27), on a thread of its own.
+/// One per context, made before its sockets are bound; sockets need `kDomain`.
 class KeyGate {
 public:
     static constexpr const char* kDomain = "musicworld";
@@ -19,7 +19,7 @@ public:
     KeyGate(const KeyGate&) = delete;
     KeyGate& operator=(const KeyGate&) = delete;
 
-    [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
+    [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }  ///< handshakes
 
 private:
     void serve(const std::stop_token& stop);

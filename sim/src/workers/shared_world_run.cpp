@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <csignal>
 #include <optional>
 #include <stdexcept>
@@ -126,9 +127,9 @@ private:
             look_after_children();
             pass_on();
             if (seconds_since(start) > launch_.wait_s)
-                throw std::runtime_error("error: found " + std::to_string(meeting_.members().size()) +
-                                         " of " + std::to_string(wanted) + " workers after " +
-                                         std::to_string(launch_.wait_s) + " s, expected all to join");
+                throw std::runtime_error("error: " + std::to_string(meeting_.members().size()) + " of " +
+                                         std::to_string(wanted) + " workers joined within " +
+                                         std::to_string(std::lround(launch_.wait_s)) + " s");
         }
     }
 

@@ -3,7 +3,7 @@
 
 namespace sim {
 
-/// Signals are for the main thread: a ZeroMQ call that one interrupts fails. For the start of any other.
+/// Blocks all signals in the calling thread: a signal would make a ZeroMQ call fail. Main threads take them.
 inline void block_signals() noexcept {
     sigset_t all;
     sigfillset(&all);

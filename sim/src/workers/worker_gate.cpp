@@ -76,8 +76,8 @@ void WorkerGate::bind(const Settings& settings) {
     try {
         router_.bind(listen);
     } catch (const zmq::error_t& e) {
-        throw std::invalid_argument("error: found endpoint " + settings.listen + " that cannot be used (" +
-                                    e.what() + "), expected a free port of an address of this machine");
+        throw std::invalid_argument("error: cannot listen at " + settings.listen + ": " + e.what() +
+                                    "; choose a free port of an address of this machine");
     }
     endpoint_ = router_.get(zmq::sockopt::last_endpoint);
 }

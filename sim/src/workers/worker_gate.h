@@ -18,22 +18,22 @@
 
 namespace sim {
 
-/// The application's ROUTER, on a thread of its own, so that heartbeats are answered and silence is noticed
-/// whatever the application does meanwhile. Peers are strangers (known by ROUTER's identity) until admitted
-/// under a worker's number. Strangers can only ask to join: other messages of theirs are answered with a
-/// refusal if they are a world's, else dropped and counted.
+/// The application's ROUTER socket on a thread of its own, so that heartbeats are answered and silence is
+/// noticed while the application is busy. A peer is a stranger (known by its ROUTER identity) until it is
+/// admitted under a worker's number. Strangers can only ask to join: other messages of a world are answered
+/// with a refusal, anything else is dropped and counted.
 class WorkerGate {
 public:
     struct Settings {
         std::string listen;                   ///< tcp endpoint beside the private folder's; empty: none
         std::optional<ApplicationKeys> keys;  ///< for `listen`
-        double silence_s = 1;                 ///< a worker unheard for so long is lost
+        double silence_s = 1;                 ///< a worker that is silent for so long is lost
     };
     /// Throws std::invalid_argument for an endpoint that is refused or taken.
     explicit WorkerGate(const Settings& settings);
-    ~WorkerGate();  ///< what was sent goes out first, for at most a second
+    ~WorkerGate();  ///< waits at most a second for queued messages to go out
 
-    [[nodiscard]] std::string private_endpoint() const { return folder_.endpoint(); }
+    [[nodiscard]] std::string private_endpoint() const { return folder_.endpoint(); }  ///< ipc
     [[nodiscard]] const std::string& endpoint() const { return endpoint_; }  ///< of `listen`, with its port
 
     struct Event {
@@ -45,16 +45,16 @@ public:
         std::vector<std::uint8_t> bytes;  ///< message, as it came
         std::string why;                  ///< lost
     };
-    /// What has come; waits for it up to `most`.
+    /// Events that have arrived; waits for the first for at most `most`.
     [[nodiscard]] std::deque<Event> wait(std::chrono::milliseconds most);
 
-    void admit(const std::string& stranger, std::uint32_t worker);
-    void refuse(const std::string& stranger, const std::string& why);
+    void admit(const std::string& stranger, std::uint32_t worker);     ///< makes it a member
+    void refuse(const std::string& stranger, const std::string& why);  ///< answers its request
     void send(const std::vector<std::uint32_t>& workers,
               std::shared_ptr<const std::vector<std::uint8_t>> bytes);
-    void dismiss(std::uint32_t worker);  ///< a stranger from now on
+    void dismiss(std::uint32_t worker);  ///< makes it a stranger again
 
-    [[nodiscard]] std::uint64_t refused_messages() const noexcept { return refused_messages_; }
+    [[nodiscard]] std::uint64_t refused_messages() const noexcept { return refused_messages_; }  ///< dropped
     [[nodiscard]] std::uint64_t refused_keys() const noexcept { return keys_ ? keys_->refused() : 0; }
 
 private:
@@ -64,8 +64,8 @@ private:
         std::string identity;
         Clock::time_point heard;
         bool lost = false;
-        std::optional<Clock::time_point> broken = {};  ///< since when nothing can be sent to it
-        std::string beats_from = {};                   ///< identity of its socket for beats
+        std::optional<Clock::time_point> broken = {};  ///< time since which sending to it fails
+        std::string beats_from = {};                   ///< identity of its heartbeat socket
     };
     struct Command {
         enum class Kind { admit, refuse, send, dismiss } kind;

@@ -18,7 +18,7 @@ struct HeldStep {
     double mean_z, mean_rate, compliance, c, d, rate;
     double root_compliance;
 };
-[[nodiscard]] HeldStep held_step(double omega, double sigma, double tau) noexcept;
+[[nodiscard]] HeldStep held_step(double omega, double sigma, double tau) noexcept;  ///< tau [s] > 0
 
 /// The same for all modes of a body, entry k of each for mode k.
 struct HeldSteps {
@@ -71,7 +71,7 @@ struct BodyKind {
         int brick;
         Eigen::Vector3f xi;
     };
-    [[nodiscard]] Local locate(const Eigen::Vector3f& r) const noexcept;
+    [[nodiscard]] Local locate(const Eigen::Vector3f& r) const noexcept;  ///< r in the rest shape [m]
 };
 
 /// Throws std::invalid_argument naming the body, what was found and expected.

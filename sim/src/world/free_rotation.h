@@ -5,8 +5,8 @@ namespace sim {
 
 /// Torque-free rotation of a rigid body over a fixed time.
 ///
-///   R  body to world,  L  angular momentum, world axes, constant [kg m^2/s],  m = R^T L,  I  principal
-///   moments H = 1/2 sum m_i^2 / I_i = |m|^2 / (2 I_a) + 1/2 sum_i (1 / I_i - 1 / I_a) m_i^2
+///   R body to world;  L angular momentum, world axes, constant [kg m^2/s];  m = R^T L;  I principal moments
+///   H = 1/2 sum_i m_i^2 / I_i = |m|^2 / (2 I_a) + 1/2 sum_i (1 / I_i - 1 / I_a) m_i^2
 ///
 /// a is the axis of the middle moment, b and c the others. The first term's flow is a turn of the whole body
 /// about L by |L| dt / I_a; it commutes with the rest. Each of the other two is a turn about a body axis by

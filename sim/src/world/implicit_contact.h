@@ -20,9 +20,9 @@ struct SampleContact {
 /// Batches of eight samples are passed over by the balls that hold them; the few samples that pass the box
 /// test go on eight at a time. The inverse is closed for rigid and linear bodies; polynomials take Newton
 /// steps from r = x (each cut to half the half extents) until the residual is below 1e-4 of the size, and one
-/// more (quadratic: about 1e-8; F is that before it). Outside the bricks' box the polynomials go on. A lane
-/// that is not there after 10 steps takes r = x - u(x), F = I, and is counted. Single precision: separations
-/// err by 1e-6 of the size, 1e-5 a size deep (tests compare with double precision).
+/// more (quadratic: about 1e-8; F is that before it). Outside the bricks' box the polynomials are continued.
+/// A lane that has not converged after 10 steps takes r = x - u(x), F = I, and is counted. Single precision:
+/// separations err by 1e-6 of the size, 1e-5 a size deep (tests compare with double precision).
 class SampleFinder {
 public:
     /// Appends to `found`, in order of samples. Allocates only while its buffers grow.

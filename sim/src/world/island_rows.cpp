@@ -177,7 +177,7 @@ int IslandSolver::note_pair(const Manifold& manifold) {
     return static_cast<int>(crossed_.size()) - 1;
 }
 
-// What comes from planes and fixed bodies is not told: whoever has a ghost of the body finds that himself.
+// Impulses of planes and fixed bodies are not recorded: a worker with a ghost of the body computes them.
 bool IslandSolver::note_told(const Rows& rows, bool contact) {
     bool watched = false, both = true;
     for (const Side& side : rows.side) {

@@ -323,8 +323,8 @@ void IslandSolver::tell(const Rows& rows, int pair, const Eigen::Vector3d& impul
     }
 }
 
-// From sums over the substeps to what is told: displacement and turn beyond those of the impulse acting
-// half-way through the step; rows are scaled by the root of the compliance.
+// From sums over the substeps to the recorded impulse: displacement and turn beyond those of an impulse that
+// acts half-way through the step; rows are scaled by the root of the compliance.
 void IslandSolver::settle(const BodyRows& rows, StepImpulse& given) const {
     const BodyKind& kind = *rows.body->kind;
     given.displacement = (given.displacement - settings_->dt / 2 * given.linear) / kind.mass.mass;

@@ -8,7 +8,7 @@
 
 namespace sim {
 
-/// What touches or hangs together in one step, in order of ids.
+/// Bodies joined by contacts or constraints in one step, in order of ids.
 struct Island {
     std::vector<int> bodies;       ///< that move, ascending
     std::vector<int> manifolds;    ///< indices, ascending by (a, b)
@@ -19,8 +19,8 @@ struct Island {
 /// et al. 2019, "Small steps in physics simulation"), for bodies with modes.
 ///
 /// A substep of h, for every body with coordinates y = (sqrt(m) v, sqrt(I) w, G):
-///   1. v <- v + h g; modes: free mean rate G0 = (z_free(h) - z) / h; last impulses applied again (warm
-///   start)
+///   1. v <- v + h g; modes: free mean rate G0 = (z_free(h) - z) / h; last impulses applied
+///      (warm start)
 ///   2. one sweep over springs and contacts, overlaps pushed out softly (30 Hz, damping 10, at most 3 m/s)
 ///   3. positions and orientations move with these velocities
 ///   4. two sweeps without the push, so that it leaves no speed behind; with one, soft piles simmer (bodies
@@ -48,19 +48,19 @@ public:
                  std::vector<Manifold>& manifolds, std::vector<HeldConstraint>& constraints)
         : settings_(&settings), bodies_(&bodies), manifolds_(&manifolds), constraints_(&constraints) {}
 
-    void solve(const Island& island);
+    void solve(const Island& island);  ///< over one step
     /// What planes, fixed bodies, places, gravity and drag gave own bodies since the last call [N s].
     [[nodiscard]] Eigen::Vector3d take_outside_impulse() noexcept {
         return std::exchange(outside_, Eigen::Vector3d::Zero());
     }
     [[nodiscard]] const std::vector<CrossImpulse>& crossed() const noexcept { return crossed_; }
-    /// Whether contacts of own bodies with others are told in `crossed`; forgets what was.
+    /// Clears `crossed` and sets whether contacts of own bodies with others are recorded in it.
     void cross(bool told) noexcept {
         crossed_.clear();
         told_crossed_ = told;
     }
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
-    [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }
+    [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }  ///< since the start
 
 private:
     struct BodyRows {
@@ -78,7 +78,7 @@ private:
         std::uint32_t rows = 0;  // where they begin in jacobians_
         std::uint32_t y = 0;     // where the body begins in y_, start_, moved_
     };
-    /// A row triple and whom it joins.
+    /// A row triple and the bodies it joins.
     struct Rows {
         Side side[2];
         float k[3][3];

@@ -27,8 +27,8 @@ struct Manifold {
     int count = 0;
     std::array<ManifoldPoint, kManifoldPoints> points;
     float friction = 0, restitution = 0;
-    bool emerging = false;  ///< began deep inside each other, and still overlap
-    [[nodiscard]] std::uint64_t key() const noexcept {
+    bool emerging = false;                              ///< began deep inside each other, and still overlap
+    [[nodiscard]] std::uint64_t key() const noexcept {  ///< orders pairs by (a, b)
         return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);
     }
 };

@@ -4,7 +4,7 @@
 
 namespace sim {
 
-/// A body of a World as it goes from step to step.
+/// A body of a World, with its state between steps.
 struct MovingBody {
     const BodyKind* kind = nullptr;
     bool fixed = false, quarantined = false, asleep = false;
@@ -16,18 +16,18 @@ struct MovingBody {
     bool at_limit = false;  ///< its deformation was held in the last substep: contacts find its modes stiff
     int still_steps = 0;    ///< since it was faster than the sleep speed, at most kMostStillSteps
     int sleep_group = -1;   ///< first body of those that fell asleep together
-    bool pushed = false;    ///< forces for the next step: the user's, or what bodies elsewhere do
+    bool pushed = false;    ///< forces act in the next step: the user's, or of bodies elsewhere
     Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();  ///< world axes
     Eigen::VectorXd modal_force;                                                        ///< [N kg^-1/2]
 
-    bool own = true;       ///< stepped for good here; else a copy of another world's
+    bool own = true;       ///< stepped here; else a copy of another world's body
     bool unposed = false;  ///< `posed` is older than `state`
-    bool watched = false;  ///< what other moving bodies do to it in a step is added up in `given`
+    bool watched = false;  ///< impulses of other moving bodies in a step are summed in `given`
     bool was_given = false;
     StepImpulse given;
     double work = 0;  ///< see World::work
 
-    [[nodiscard]] bool moves() const noexcept { return !fixed && !quarantined; }
+    [[nodiscard]] bool moves() const noexcept { return !fixed && !quarantined; }  ///< takes part in steps
 };
 
 constexpr int kMostStillSteps = 65535;

@@ -20,10 +20,10 @@ struct PosedBody {
     float sample_reach = 0;                               ///< how far samples are from their rest places [m]
     Eigen::Vector3d half_aabb = Eigen::Vector3d::Zero();  ///< world axes [m]
 
-    [[nodiscard]] const float* sample_data() const noexcept {
+    [[nodiscard]] const float* sample_data() const noexcept {  ///< [axis][8 batches]
         return kind->modes > 0 ? samples.data() : kind->rest.data();
     }
-    [[nodiscard]] Eigen::Vector3f sample(int index) const noexcept {
+    [[nodiscard]] Eigen::Vector3f sample(int index) const noexcept {  ///< as deformed, body frame [m]
         const float* x = sample_data();
         const int stride = kind->batches * kLanes;
         return {x[index], x[index + stride], x[index + 2 * stride]};

@@ -109,7 +109,7 @@ void World::Implementation::drop_constraints(int body) {
 }
 
 // Bodies whose state or forces are not finite, or absurd, take no further part. Before anything else in a
-// step, so that they touch nobody.
+// step, before they can touch another body.
 void World::Implementation::quarantine_broken() {
     for (const int i : here) {
         const MovingBody& body = bodies[static_cast<std::size_t>(i)];
@@ -120,7 +120,7 @@ void World::Implementation::quarantine_broken() {
     std::erase_if(here, [this](int i) { return bodies[static_cast<std::size_t>(i)].quarantined; });
 }
 
-// After a step: what it broke, so that nobody else sees it.
+// After a step: bodies that it broke, before any reader sees them.
 void World::Implementation::quarantine_results() {
     for (std::size_t i = 0; i < islands_used; ++i) {
         if (!is_own(islands[i])) continue;

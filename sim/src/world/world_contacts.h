@@ -15,9 +15,9 @@ public:
               const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies,
               const std::vector<int>& here, bool among_ghosts);
 
-    std::vector<Manifold>& manifolds() noexcept { return manifolds_; }
+    std::vector<Manifold>& manifolds() noexcept { return manifolds_; }  ///< of the last step
     [[nodiscard]] const std::vector<Manifold>& manifolds() const noexcept { return manifolds_; }
-    [[nodiscard]] int pairs() const noexcept { return pairs_; }
+    [[nodiscard]] int pairs() const noexcept { return pairs_; }  ///< tested in the last step
     [[nodiscard]] std::uint64_t fallbacks() const noexcept { return finder_.fallbacks(); }
 
 private:

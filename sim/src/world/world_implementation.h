@@ -44,31 +44,31 @@ struct World::Implementation {
     [[nodiscard]] bool near_own(const Eigen::Vector3d& center, double radius, int body) const;
 
     const BodyKind* kind_of(const WorldBody& body);
-    int add(const WorldBody& body);
-    void set_joined();
-    void drop_constraints(int body);
-    void pose(MovingBody& body);
-    void quarantine(int body, const std::string& what);
-    void quarantine_broken();
-    void quarantine_results();
-    [[nodiscard]] bool is_own(const Island& island) const;
-    int root(int body);
-    void join(int a, int b);
-    void start_union();
+    int add(const WorldBody& body);                         ///< returns its id
+    void set_joined();                                      ///< by constraints
+    void drop_constraints(int body);                        ///< of a body that is taken out
+    void pose(MovingBody& body);                            ///< for contact tests
+    void quarantine(int body, const std::string& what);     ///< takes it out of the world
+    void quarantine_broken();                               ///< before the step
+    void quarantine_results();                              ///< after the step
+    [[nodiscard]] bool is_own(const Island& island) const;  ///< has an own body
+    int root(int body);                                     ///< of its set, union-find
+    void join(int a, int b);                                ///< union-find
+    void start_union();                                     ///< union-find: each body alone
     [[nodiscard]] bool any_awake() const;
-    void gather();          // who takes part in the step
-    void gather_islands();  // who may reach an own body's island
-    void list_owned();
-    void gather_pairs();  // own bodies and the ghosts that were placed
-    void forget_foreign_contacts();
+    void gather();                   // who takes part in the step
+    void gather_islands();           // who may reach an own body's island
+    void list_owned();               ///< fills `owned`
+    void gather_pairs();             // own bodies and the ghosts that were placed
+    void forget_foreign_contacts();  ///< at the end of a step
     void stop_at_planes(MovingBody& body, const Eigen::Vector3d& before) const;
-    void dismiss_ghosts();
-    void find_islands();
-    void solve_islands();
-    void put_to_sleep();
-    void count_work();
-    void step();
-    [[nodiscard]] int still_steps_to_sleep() const;
+    void dismiss_ghosts();                           ///< at the end of a step
+    void find_islands();                             ///< of contacts and constraints
+    void solve_islands();                            ///< in order of ids
+    void put_to_sleep();                             ///< islands that are still
+    void count_work();                               ///< see World::work
+    void step();                                     ///< see World::step
+    [[nodiscard]] int still_steps_to_sleep() const;  ///< half a second
 };
 
 }  // namespace sim

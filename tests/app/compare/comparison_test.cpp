@@ -1,5 +1,3 @@
-#include "compare/comparison.h"
-
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -10,8 +8,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "compare/comparison_map_grid.h"
+#include "compare/compare.h"
+#include "compare/comparison_report.h"
 #include "compare/comparison_tables.h"
+#include "compare/findings.h"
 #include "files/bad_input.h"
 #include "sample_recordings.h"
 #include "statistics/statistics.h"
@@ -118,7 +118,7 @@ TEST_F(Comparisons, CostIsMeasuredOnlyWhenAskedFor) {
 
 TEST_F(Comparisons, CsvHasARowAResultAndAsManyColumnsAsItsHeader) {
     const app::Comparison comparison = app::compare(options_);
-    std::istringstream csv(app::format_comparison_csv(comparison));
+    std::istringstream csv(app::result_table(comparison).csv());
     std::string line, header;
     std::getline(csv, header);
     std::size_t rows = 0;
@@ -269,15 +269,38 @@ TEST_F(Advances, AreStatedInEveryProduct) {
             EXPECT_TRUE(hits.contains(key)) << key;
         EXPECT_EQ(hits["true"], 2 * (5 + static_cast<int>(i * 3 / comparison.rows.size())));
     }
-    std::istringstream csv(app::format_comparison_csv(comparison));
+    std::istringstream csv(app::result_table(comparison).csv());
     std::string line, header;
     std::getline(csv, header);
     EXPECT_TRUE(header.ends_with(",advance_ms"));
     while (std::getline(csv, line)) EXPECT_EQ(columns_after_first(line), columns_after_first(header)) << line;
-    EXPECT_NE(app::format_comparison_text(comparison)
-                  .find("auto: its contacts are brought forward (negative: put back) by"),
-              std::string::npos);
+    const app::Table strikes = app::strike_table(comparison, options_.leads_s[0]);
+    EXPECT_NE(app::format_comparison_text(comparison).find(strikes.text()), std::string::npos);
+    EXPECT_NE(strikes.text().find("advance low ms"), std::string::npos);
+    for (const auto& row : strikes.rows)
+        EXPECT_EQ(row.back().none(), row.front().plain() != "auto") << row.front().plain();
+    for (const auto& row : json["summary"])
+        EXPECT_EQ(row["hits"].contains("advance_low_ms"), row["predictor"] == "auto") << row["predictor"];
     EXPECT_NE(app::winners(comparison)[0].find("true strikes"), std::string::npos);
+}
+
+TEST_F(Advances, WhereThereIsNothingToStrikeF1PrecisionAndRecallAreNone) {
+    options_.predictors = {"cv"};
+    options_.tuning = false;
+    options_.surface.height_m = -10;  // below every tip
+    const app::Comparison comparison = app::compare(options_);
+    const auto json = nlohmann::json::parse(app::format_comparison_json(comparison));
+    for (const auto& row : json["results"]) {
+        EXPECT_EQ(row["hits"]["true"], 0);
+        EXPECT_EQ(row["hits"]["predicted"], 0);
+        for (const char* key : {"precision", "recall", "f1", "median_ms", "p95_ms"})
+            EXPECT_TRUE(row["hits"][key].is_null()) << key;
+    }
+    EXPECT_NE(app::result_table(comparison).csv().find(",0,0,0,,,,,,0,0,0\n"), std::string::npos);
+    const app::Table strikes = app::strike_table(comparison, options_.leads_s[0]);
+    const auto f1 = std::ranges::find(strikes.columns, "hits/f1", &app::Column::name);
+    for (const auto& row : strikes.rows)
+        EXPECT_EQ(row[static_cast<std::size_t>(f1 - strikes.columns.begin())].shown(".3f", "-"), "-");
 }
 
 TEST_F(Advances, NothingIsLearnedFromOneRecording) {

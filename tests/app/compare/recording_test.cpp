@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "compare/sensed_stick.h"
 #include "files/bad_input.h"
 
 namespace {

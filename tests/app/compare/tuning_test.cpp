@@ -41,8 +41,7 @@ app::ComparisonOptions options_of(std::vector<std::string> predictors) {
 
 app::EntrantList entrants_of(const std::vector<app::Recording>& recordings,
                              const app::ComparisonOptions& options) {
-    const auto sticks = app::sense_all(recordings, options.sensor, options.leads_s);
-    return app::enter(options, recordings, sticks);
+    return app::enter(options, {recordings, app::sense_all(recordings, options.sensor, options.leads_s)}, {});
 }
 
 const app::Entrant& named(const app::EntrantList& list, const std::string& name) {

@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "latency/latency_comparison.h"
 #include "latency/latency_page.h"
 #include "latency/latency_tables.h"
 #include "sample_realtime.h"
@@ -91,29 +90,29 @@ double p(const LatencyReport& report, const char* stage, double percent) {
 
 constexpr double kRounding = 1e-9;  // ns to ms
 
-TEST(Spread, IsByNearestRank) {
+TEST(Spread, IsLinearBetweenTheOrderedValues) {
     std::vector<double> values;
     for (int i = 100; i >= 1; --i) values.push_back(i);
     const Spread spread(values);
-    EXPECT_EQ(spread.percentile(50), 50);
-    EXPECT_EQ(spread.percentile(99), 99);
-    EXPECT_EQ(spread.percentile(99.5), 100);
-    EXPECT_EQ(spread.percentile(5), 5);
+    EXPECT_EQ(spread.percentile(50), 50.5);
+    EXPECT_NEAR(spread.percentile(99), 99.01, kRounding);
+    EXPECT_NEAR(spread.percentile(99.5), 99.505, kRounding);
+    EXPECT_NEAR(spread.percentile(5), 5.95, kRounding);
     EXPECT_EQ(spread.max(), 100);
     EXPECT_EQ(spread.share_within(10, 19), 0.1);
     EXPECT_EQ(Spread({7}).percentile(1), 7);
-    EXPECT_EQ(Spread().percentile(99), 0);
+    EXPECT_TRUE(std::isnan(Spread().percentile(99)));
 }
 
 TEST(LatencyReport, SaysHowLongEachStageOfASampleTook) {
     const LatencyReport report = SampleRun().report();
-    EXPECT_NEAR(p(report, "sensor to filter", 50), 50, kRounding);
-    EXPECT_NEAR(p(report, "filter to app", 99), 198, kRounding);
-    EXPECT_NEAR(p(report, "contact", 95), 285, kRounding);
+    EXPECT_NEAR(p(report, "sensor to filter", 50), 50.5, kRounding);
+    EXPECT_NEAR(p(report, "filter to app", 99), 198.02, kRounding);
+    EXPECT_NEAR(p(report, "contact", 95), 285.15, kRounding);
     EXPECT_NEAR(p(report, "note hand-over", 100), 400, kRounding);
-    EXPECT_NEAR(p(report, "sample to notes", 50), 500, kRounding);
-    EXPECT_NEAR(p(report, "query", 99), 99e-6, kRounding);
-    EXPECT_NEAR(p(report, "block computed", 99), 99.0 / 20, kRounding);
+    EXPECT_NEAR(p(report, "sample to notes", 50), 505, kRounding);
+    EXPECT_NEAR(p(report, "query", 99), 99.01e-6, kRounding);
+    EXPECT_NEAR(p(report, "block computed", 99), 99.01 / 20, kRounding);
 }
 
 TEST(LatencyReport, SaysHowLongEachStageOfAFrameThatWasDrawnTook) {
@@ -141,10 +140,46 @@ TEST(LatencyReport, CountsDeadlines) {
     EXPECT_EQ(report.blocks.missed, 20U);  // done more than 4 ms after the plan: 4.05 to 5 ms
 }
 
+/// 807 of 2400 samples skipped, 3 of 12 strokes missed: what the run did not do stands wherever it is shown.
+TEST(LatencyReport, SkippedSamplesAndMissedStrokesStandInEveryForm) {
+    const TemporaryFolder folder;
+    SampleRun run;
+    run.realtime.samples[10].skipped = 800;
+    run.realtime.samples[50].skipped = 7;
+    run.play.score.true_contacts = 12;
+    run.play.score.missed = 3;
+    const LatencyReport report = run.report();
+    EXPECT_EQ(report.skipped.total, 907U);
+    const std::string text = format_latency_text(report, run.realtime);
+    const auto row = [&](const std::string& name) {  // words, one blank between them
+        const std::size_t at = text.find("\n" + name + " ");
+        if (at == std::string::npos) return "no " + name;
+        std::istringstream words(text.substr(at + 1, text.find('\n', at + 1) - at - 1));
+        std::string line;
+        for (std::string word; words >> word;) line += ' ' + word;
+        return line;
+    };
+    EXPECT_TRUE(row("samples seen").ends_with(" 907 100 807")) << row("samples seen");
+    EXPECT_TRUE(row("strokes").ends_with(" 12 9 3")) << row("strokes");
+    const std::string page = format_latency_page(report, run.play, run.realtime, folder.path());
+    EXPECT_NE(page.find("<b>807 of 907</b><span>samples skipped"), std::string::npos);
+    EXPECT_NE(page.find("<b>3 of 12</b><span>strokes missed"), std::string::npos);
+    const Json json = Json::parse(format_latency_json(report, run.play, run.realtime));
+    EXPECT_EQ(json["samples"]["skipped"], 807);
+    EXPECT_EQ(json["strokes"]["missed"], 3);
+}
+
+TEST(LatencyReport, OneLapIsOneLap) {
+    SampleRun run;
+    EXPECT_TRUE(format_latency_text(run.report(), run.realtime).starts_with("1.0 s, 1 lap, file only\n"));
+    run.realtime.laps = 2;
+    EXPECT_TRUE(format_latency_text(run.report(), run.realtime).starts_with("1.0 s, 2 laps, "));
+}
+
 TEST(LatencyReport, SaysWhichLeadsWouldDo) {
     const LatencyReport report = SampleRun().report();
-    EXPECT_NEAR(*report.render_lead_needed_ms, 11, kRounding);  // of 98 frames the 98th: the late one
-    EXPECT_NEAR(*report.sound_lead_needed_ms, 990 + 4 + 99.0 / 20, kRounding);
+    EXPECT_NEAR(*report.render_lead_needed_ms, 6.15, kRounding);  // 97 of 6 ms, the late one of 11
+    EXPECT_NEAR(*report.sound_lead_needed_ms, 990.1 + 4 + 99.01 / 20, kRounding);
 }
 
 TEST(LatencyReport, ComparesSoundAndPicture) {
@@ -181,7 +216,7 @@ TEST(LatencyJson, HasTheKeysThatScriptsRelyOn) {
     EXPECT_EQ(json["notes"]["late"], 1);
     for (const char* key : {"p5", "median", "p95", "min", "max"})
         EXPECT_NEAR(json["sound_minus_picture_ms"][key].get<double>(), 7, 1e-5) << key;
-    EXPECT_NEAR(json["lead_needed_ms"]["render"].get<double>(), 11, kRounding);
+    EXPECT_NEAR(json["lead_needed_ms"]["render"].get<double>(), 6.15, kRounding);
     EXPECT_GT(json["lead_needed_ms"]["sound"].get<double>(), 900);
     EXPECT_EQ(json["leads"][1]["why"], "frames are late: no shadows");
 }
@@ -208,12 +243,12 @@ TEST(LatencyTables, HaveARowForEverythingThatWasTimed) {
     const SampleRun run;
     const LatencyReport report = run.report();
     const std::pair<std::string, std::size_t> tables[] = {
-        {format_samples_csv(run.play, run.realtime), 100},
-        {format_frames_csv(run.realtime), 100},
-        {format_notes_csv(report, run.play, run.realtime), 2},
-        {format_blocks_csv(run.realtime), 100},
-        {format_leads_csv(run.realtime), 2},
-        {format_errors_csv(report, run.play), report.errors.size()}};
+        {sample_table(run.play, run.realtime).csv(), 100},
+        {frame_table(run.realtime).csv(), 100},
+        {note_table(report, run.play, run.realtime).csv(), 2},
+        {block_table(run.realtime).csv(), 100},
+        {lead_table(run.realtime).csv(), 2},
+        {error_table(report, run.play).csv(), report.errors.size()}};
     for (const auto& [text, rows] : tables) {
         const std::vector<std::string> lines = lines_of(text);
         ASSERT_EQ(lines.size(), rows + 1) << lines[0];
@@ -223,7 +258,7 @@ TEST(LatencyTables, HaveARowForEverythingThatWasTimed) {
 
 TEST(LatencyTables, SayWhereANoteHasNoPicture) {
     const SampleRun run;
-    const std::vector<std::string> lines = lines_of(format_notes_csv(run.report(), run.play, run.realtime));
+    const std::vector<std::string> lines = lines_of(note_table(run.report(), run.play, run.realtime).csv());
     EXPECT_FALSE(lines[1].ends_with(",,,"));
     EXPECT_TRUE(lines[2].ends_with(",,,")) << lines[2];
 }

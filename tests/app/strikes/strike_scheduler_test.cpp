@@ -9,6 +9,7 @@
 #include <functional>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <span>
 
 namespace app {
@@ -58,6 +59,13 @@ std::vector<sim::Contact> contacts_of(const Motion& m, double t) {
     return found;
 }
 
+/// A sample of stick 0 over instrument 0, of a predictor with one model.
+void take_sample(StrikeScheduler& scheduler, double s, std::span<const sim::Contact> contacts,
+                 double clearance) {
+    const ModelContacts model{contacts, std::span(&clearance, 1)};
+    scheduler.sample(0, s, std::span(&model, 1), 0, std::span(&clearance, 1));
+}
+
 struct Notes {
     std::vector<Strike> strikes;
     bool causal = true;  // no sample changed a note nearer than the release margin
@@ -79,8 +87,7 @@ Notes play(const Height& height, double duration, double rate = 120, bool cancel
         const double s = i / rate;
         const Motion m = motion_at(height, s);
         scheduler.advance_to(s);
-        const double clearance[] = {m.y};
-        scheduler.sample(0, s, contacts_of(m, s), clearance, clearance);
+        take_sample(scheduler, s, contacts_of(m, s), m.y);
         for (const NoteChange& change : scheduler.take_changes())
             if (scheduler.strikes()[change.id - 1].onset_s < s + kMarginS - 1e-9) run.causal = false;
     }
@@ -185,33 +192,32 @@ TEST(StrikeScheduler, AContactFoundMoreThan30MsLateIsNotPlayed) {
 
 TEST(StrikeScheduler, AContactPredictedAgainWithin30MsOfItsCancelledOnsetKeepsItsId) {
     StrikeScheduler scheduler({}, 1, 1);
-    const double clearance[] = {0.05};
+    const double clearance = 0.05;
     sim::Contact contact;
     contact.zone = 0;
     contact.speed_mps = 2;
-    for (int i = 0; i < 4; ++i) scheduler.sample(0, 0.01 * i, {}, clearance, clearance);
+    for (int i = 0; i < 4; ++i) take_sample(scheduler, 0.01 * i, {}, clearance);
     contact.t_s = 0.100;
-    scheduler.sample(0, 0.04, std::span(&contact, 1), clearance, clearance);
-    scheduler.sample(0, 0.05, {}, clearance, clearance);
+    take_sample(scheduler, 0.04, std::span(&contact, 1), clearance);
+    take_sample(scheduler, 0.05, {}, clearance);
     ASSERT_EQ(scheduler.strikes()[0].outcome, Outcome::cancelled);
     contact.t_s = 0.115;
-    scheduler.sample(0, 0.06, std::span(&contact, 1), clearance, clearance);
+    take_sample(scheduler, 0.06, std::span(&contact, 1), clearance);
     ASSERT_EQ(scheduler.strikes().size(), 1U);
     EXPECT_EQ(scheduler.strikes()[0].outcome, Outcome::pending);
-    scheduler.sample(0, 0.07, {}, clearance, clearance);
+    take_sample(scheduler, 0.07, {}, clearance);
     contact.t_s = 0.160;
-    scheduler.sample(0, 0.10, std::span(&contact, 1), clearance, clearance);
+    take_sample(scheduler, 0.10, std::span(&contact, 1), clearance);
     EXPECT_EQ(scheduler.strikes().size(), 2U) << "45 ms away is another contact";
 }
 
 TEST(StrikeScheduler, SilentZonesMakeNoNote) {
     StrikeScheduler scheduler({}, 1, 1);
-    const double clearance[] = {0.05};
     sim::Contact contact;
     contact.zone = -1;
     contact.speed_mps = 2;
     contact.t_s = 0.08;
-    for (int i = 0; i < 6; ++i) scheduler.sample(0, 0.01 * i, std::span(&contact, 1), clearance, clearance);
+    for (int i = 0; i < 6; ++i) take_sample(scheduler, 0.01 * i, std::span(&contact, 1), 0.05);
     EXPECT_TRUE(scheduler.strikes().empty());
 }
 
@@ -228,8 +234,7 @@ public:
         contact.speed_mps = 2;
         contact.t_s = contact_s.value_or(0);
         scheduler_.advance_to(s);
-        scheduler_.sample(0, s, std::span(&contact, contact_s ? 1 : 0), std::span(&clearance, 1),
-                          std::span(&clearance, 1));
+        take_sample(scheduler_, s, std::span(&contact, contact_s ? 1 : 0), clearance);
     }
     [[nodiscard]] const std::vector<Strike>& strikes() const { return scheduler_.strikes(); }
     [[nodiscard]] const Strike& first() const { return scheduler_.strikes().at(0); }
@@ -342,7 +347,6 @@ struct Late {
     void sample(double s, std::optional<double> contact_s,
                 double fixed_s = -std::numeric_limits<double>::infinity()) {
         scheduler.advance_to(s, fixed_s);
-        const double clearance[] = {0.1};
         std::vector<sim::Contact> contacts;
         if (contact_s) {
             contacts.emplace_back();
@@ -350,7 +354,7 @@ struct Late {
             contacts[0].zone = 0;
             contacts[0].speed_mps = 3;
         }
-        scheduler.sample(0, s, contacts, clearance, clearance);
+        take_sample(scheduler, s, contacts, 0.1);
     }
     [[nodiscard]] const Strike& first() const { return scheduler.strikes().at(0); }
 };
@@ -384,6 +388,115 @@ TEST(LateSample, AFixedTimeBehindTheMarginChangesNothing) {
     }
     EXPECT_EQ(plain.first().onset_sample, fixed.first().onset_sample);
     EXPECT_EQ(plain.first().moves, fixed.first().moves);
+}
+
+/// Two models over one instrument, each told one contact or none at each sample. Settled at 0.035 s.
+class TwoModels {
+public:
+    TwoModels() {
+        for (int i = 0; i < 4; ++i) sample(0.01 * i, 0, std::nullopt, std::nullopt);
+    }
+    void sample(double s, std::size_t selected, std::optional<double> first_s, std::optional<double> second_s,
+                double clearance = 0.05) {
+        std::vector<sim::Contact> contacts[2];
+        const std::span<const double> distance(&clearance, 1);
+        std::vector<ModelContacts> expected;
+        for (const std::optional<double>& contact_s : {first_s, second_s}) {
+            std::vector<sim::Contact>& own = contacts[expected.size()];
+            if (contact_s) {
+                own.emplace_back();
+                own[0].t_s = *contact_s;
+                own[0].zone = 0;
+                own[0].speed_mps = 2;
+            }
+            expected.push_back({own, distance});
+        }
+        scheduler_.advance_to(s);
+        scheduler_.sample(0, s, expected, selected, distance);
+        for (const NoteChange& change : scheduler_.take_changes())
+            if (change.scheduled)
+                sounding_.insert(change.id);
+            else
+                sounding_.erase(change.id);
+    }
+    [[nodiscard]] const std::vector<Strike>& strikes() const { return scheduler_.strikes(); }
+    [[nodiscard]] const Strike& first() const { return strikes().at(0); }
+    /// Ids of the notes that the audio has.
+    [[nodiscard]] const std::set<std::uint64_t>& sounding() const { return sounding_; }
+
+private:
+    StrikeScheduler scheduler_{{}, 1, 1};
+    std::set<std::uint64_t> sounding_;
+};
+
+constexpr double kAudioSampleS = 1.0 / 48000 + 1e-9;
+
+TEST(SeveralModels, OnlyTheSelectedModelsContactsAreStrikes) {
+    TwoModels run;
+    run.sample(0.040, 1, 0.100, std::nullopt);
+    EXPECT_TRUE(run.strikes().empty());
+    run.sample(0.050, 1, 0.100, 0.110);
+    ASSERT_EQ(run.strikes().size(), 1U);
+    EXPECT_NEAR(run.first().onset_s, 0.110, kAudioSampleS);
+    EXPECT_EQ(run.first().model, 1U);
+    EXPECT_EQ(run.first().scheduled_at_s, 0.050);
+}
+
+TEST(SeveralModels, AStrikeGoesOnWithTheContactThatANewlySelectedModelHasReady) {
+    TwoModels run;
+    run.sample(0.040, 0, 0.100, 0.112);
+    run.sample(0.050, 0, 0.100, 0.112);
+    EXPECT_EQ(run.first().moves, 0);
+    run.sample(0.060, 1, 0.100, 0.112);
+    ASSERT_EQ(run.strikes().size(), 1U) << "the same stroke";
+    EXPECT_NEAR(run.first().onset_s, 0.112, kAudioSampleS);
+    EXPECT_EQ(run.first().model, 1U);
+    EXPECT_EQ(run.first().moves, 1);
+    EXPECT_EQ(run.first().scheduled_at_s, 0.040);
+    run.sample(0.070, 0, 0.101, 0.112);
+    EXPECT_NEAR(run.first().onset_s, 0.101, kAudioSampleS);
+    EXPECT_EQ(run.first().moves, 2);
+    run.sample(0.095, 0, 0.101, 0.112);
+    EXPECT_EQ(run.first().outcome, Outcome::released);
+    EXPECT_EQ(run.sounding(), std::set<std::uint64_t>{1});
+}
+
+TEST(SeveralModels, AStrikeThatTheNewlySelectedModelDoesNotExpectIsCancelledAndComesBackWithItsOwnModel) {
+    TwoModels run;
+    run.sample(0.040, 0, 0.100, std::nullopt);
+    run.sample(0.050, 1, 0.100, std::nullopt);
+    EXPECT_EQ(run.first().outcome, Outcome::cancelled);
+    EXPECT_EQ(run.first().decided_at_s, 0.050);
+    EXPECT_TRUE(run.sounding().empty());
+    run.sample(0.060, 0, 0.100, std::nullopt);
+    ASSERT_EQ(run.strikes().size(), 1U);
+    EXPECT_EQ(run.first().outcome, Outcome::pending);
+    EXPECT_EQ(run.sounding(), std::set<std::uint64_t>{1});
+}
+
+TEST(SeveralModels, AStrokeThatOneModelHasPlayedIsNotPlayedByAnotherUntilTheTipHasRisen) {
+    TwoModels run;
+    run.sample(0.040, 0, 0.100, 0.118);
+    run.sample(0.095, 1, std::nullopt, 0.118,
+               0.010);  // the first's note is released, then the second selected
+    run.sample(0.105, 1, std::nullopt, 0.118, -0.003);
+    run.sample(0.115, 1, std::nullopt, std::nullopt, -0.002);
+    ASSERT_EQ(run.strikes().size(), 1U);
+    EXPECT_EQ(run.first().outcome, Outcome::released);
+    for (const double s : {0.125, 0.135, 0.145}) run.sample(s, 1, std::nullopt, std::nullopt, 0.020);
+    run.sample(0.155, 1, std::nullopt, 0.200, 0.020);
+    EXPECT_EQ(run.strikes().size(), 2U) << "another stroke";
+}
+
+TEST(SeveralModels, AModelThatReleasedItsContactUnselectedStandsByTheStroke) {
+    TwoModels run;
+    run.sample(0.040, 1, 0.100, 0.118);
+    run.sample(0.095, 0, 0.100, 0.118);  // the first's has just been released, unheard
+    EXPECT_EQ(run.first().outcome, Outcome::pending);
+    EXPECT_EQ(run.sounding(), std::set<std::uint64_t>{1});
+    run.sample(0.110, 0, std::nullopt, 0.118, -0.001);
+    EXPECT_EQ(run.first().outcome, Outcome::released);
+    EXPECT_NEAR(run.first().onset_s, 0.118, kAudioSampleS);
 }
 
 }  // namespace

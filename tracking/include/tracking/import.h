@@ -10,9 +10,9 @@ namespace tracking {
 
 /// Where a table of another program keeps what a trace needs, and in which units and axes.
 ///
-/// `columns` maps roles to columns. Roles: `t` or `frame` (neither: rows are frames), `stick` (a row a
-/// stick), px py pz, and one of qw qx qy qz | ex ey ez (with `euler`) | m00 m01 .. m22 (rotation matrix, row
-/// and column) | nothing. All turn body to world. A role may name its stick: `left.px`. Columns are
+/// `columns` maps roles to columns. Roles: `t` or `frame` (neither: rows are frames), `stick` (one row
+/// per stick), px py pz, and one of qw qx qy qz | ex ey ez (with `euler`) | m00 m01 .. m22 (rotation matrix,
+/// row and column) | nothing. All turn body to world. A role may name its stick: `left.px`. Columns are
 ///
 ///   NAME    the header's cell; a header of several lines: its cells from top to bottom, joined by '/',
 ///           empty ones left out. '*' stands for anything; {stick} for a name without '/': a stick each
@@ -36,7 +36,7 @@ struct ColumnMap {
     double rate_hz = 0;      ///< of frames
     std::string rate_from;   ///< above the header, a cell of this text stands before the rate, unless given
     bool zero_is_lost = false;  ///< a position of three zeros means: not seen
-    std::string signature;      ///< text within a file's first 2000 bytes that tells this kind of file
+    std::string signature;      ///< text within a file's first 2000 bytes that identifies this kind of file
     std::optional<Eigen::Vector3d> tip, shaft;
 
     /// Throws std::invalid_argument (found, expected) for what cannot be a map.

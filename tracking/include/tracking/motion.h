@@ -19,8 +19,8 @@ enum class MotionLaw : std::uint64_t { constant, decaying_velocity, decaying_acc
 /// All that an estimator's predictions depend on, as a value that can be copied bit by bit between processes:
 /// the state at the newest sample and how it goes on. World frame, SI.
 ///
-///   [position, velocity, acceleration] and [turn, angular velocity, angular acceleration] <- F(lead) of each
-///   axis; orientation <- exp(turn) orientation
+///   [position, velocity, acceleration], [turn, angular velocity, angular acceleration] <- F(lead) per axis
+///   orientation <- exp(turn) orientation
 struct Motion {
     Eigen::Vector3d position = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero(),
                     acceleration = Eigen::Vector3d::Zero();

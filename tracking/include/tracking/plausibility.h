@@ -6,7 +6,7 @@
 
 namespace tracking {
 
-/// What a trace holds that recordings of drummers do not, a line each with its evidence; empty for nothing.
+/// Warnings about implausible units, axes or orientation, one line each with the evidence; empty if none.
 /// Wrong units, axes and conventions look like this:
 ///
 ///   units        no stick ranges over 0.1 m nor moves at 0.5 m/s (both as the 98 % in the middle, and the

@@ -45,21 +45,21 @@ public:
     using std::runtime_error::runtime_error;
 };
 
-/// Reads the native CSV format: optional `# key: value` lines, then the header t,stick,px,py,pz[,qw,qx,qy,qz
-/// | ,rx,ry,rz | ,ex,ey,ez] and a row a sample. Nothing is guessed: the first bad line throws TraceError with
-/// its place.
+/// Reads the native CSV format: optional `# key: value` lines, then the header t,stick,px,py,pz and, if the
+/// orientation is known, one of ,qw,qx,qy,qz | ,rx,ry,rz | ,ex,ey,ez; then one row per sample. Nothing is
+/// guessed: the first bad line throws TraceError with its place.
 ///
-///   keys         units (m|mm, of px, py, pz), up (y|z), rate_hz, source, tip_m (x,y,z in metres whatever
-///   `units` says), shaft
-///                (+x|-x|+y|-y|+z|-z); tip and shaft are in the body's frame, so `up` does not turn them.
+///   keys         units (m|mm, of px, py, pz), up (y|z), rate_hz, source,
+///                tip_m (x,y,z in metres whatever `units` says), shaft (+x|-x|+y|-y|+z|-z);
+///                tip and shaft are in the body's frame, so `up` does not turn them.
 ///                Other keys are comments, except near misses of these (`unit:`), which are errors.
 ///   q columns    body to world, norm within 1 % of 1 (then normalised; the sign that continues the sample
-///   before is taken);
-///                all four empty: position only
-///   r columns    rotation vector [rad, body frame] since the stick's sample before, q_k = q_(k-1) exp(r_k),
-///   q_(-1) = 1 e columns    degrees, intrinsic X-Y-Z: q = q_x q_y q_z; all three empty: position only up: z
-///   (x, y, z) becomes (x, z, -y) and q becomes (sqrt 1/2, -sqrt 1/2, 0, 0) q limits       |coordinate| <=
-///   1000 m, |t| <= 1e7 s, t strictly increasing within a stick, at least two samples a stick,
+///                before is taken); all four empty: position only
+///   r columns    rotation vector [rad, body frame] since the stick's sample before,
+///                q_k = q_(k-1) exp(r_k), q_(-1) = 1
+///   e columns    degrees, intrinsic X-Y-Z: q = q_x q_y q_z; all three empty: position only
+///   up: z        (x, y, z) becomes (x, z, -y) and q becomes (sqrt 1/2, -sqrt 1/2, 0, 0) q
+///   limits       |coordinate| <= 1000 m, |t| <= 1e7 s; per stick t increases strictly, at least two samples;
 ///                UTF-8 without control characters, at most 1 GiB; LF or CRLF; a byte order mark is skipped
 ///
 /// A file that begins as a Beat Saber Open Replay (`*.bsor`) is read as one: the sabers `left` and `right`,

@@ -1,0 +1,49 @@
+#include "bench/bench_report.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "report/table.h"
+
+namespace app {
+namespace {
+
+Cell text_or_none(const std::string& text) {
+    return text.empty() ? Cell() : Cell(text);
+}
+
+Table table_of(const std::vector<BenchResult>& results) {
+    Table table =
+        Table::of({"name", "value:.4g", "unit", "peer", "peer_version", "peer_value:.4g", "ratio:.3f"});
+    for (const BenchResult& r : results)
+        table.add({r.name, r.value, r.unit, text_or_none(r.peer), text_or_none(r.peer_version), r.peer_value,
+                   r.ratio});
+    return table;
+}
+
+}  // namespace
+
+nlohmann::ordered_json machine_json(const MachineName& machine) {
+    return {{"processor", machine.processor},
+            {"cores", machine.cores},
+            {"compiler", machine.compiler},
+            {"avx2", machine.avx2}};
+}
+
+std::string format_json(const BenchReport& report) {
+    const nlohmann::ordered_json json = {{"machine", machine_json(report.machine)},
+                                         {"results", table_of(report.results).json()},
+                                         {"notes", report.notes}};
+    return json.dump(2) + "\n";
+}
+
+std::string format_text(const BenchReport& report) {
+    std::string text = fmt::format(
+        "{}, {} cores, {}{}\n\n{}\n", report.machine.processor, report.machine.cores, report.machine.compiler,
+        report.machine.avx2 ? "" : ", without AVX2", table_of(report.results).text());
+    for (const std::string& note : report.notes) text += note + '\n';
+    return text;
+}
+
+}  // namespace app

@@ -1,0 +1,174 @@
+#include "pictures/frame_thread.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "files/output_folder.h"
+#include "process/clock.h"
+#include "process/stopwatch.h"
+#include "process/thread_priority.h"
+#include "statistics/statistics.h"
+
+namespace app {
+namespace {
+
+constexpr int kTrialFrames = 8, kWarmFrames = 2;
+constexpr double kLongestTrialS = 0.5;
+
+/// Every pixel as wide and high as it takes, cut or padded to the size shown.
+render::Image enlarged(render::Image small, int width, int height) {
+    if (small.width == width) return small;
+    const int times = (width + small.width - 1) / small.width;
+    render::Image image{width, height, {}};
+    image.rgb.resize(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    auto to = image.rgb.begin();
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+            const std::ptrdiff_t row = std::min(y / times, small.height - 1),
+                                 column = std::min(x / times, small.width - 1);
+            to = std::copy_n(small.rgb.begin() + 3 * (row * small.width + column), 3, to);
+        }
+    return image;
+}
+
+}  // namespace
+
+FrameThread::FrameThread(std::vector<render::SceneDescription> scenes, const render::FrameState& rest,
+                         FrameThreadOptions options)
+    : options_(std::move(options)) {
+    drawing_ =
+        std::thread([this, scenes = std::move(scenes), rest] { run([&] { draw_all(scenes, rest); }); });
+    writing_ = std::thread([this] { run([&] { write_all(); }); });
+    if (options_.policy == FramePolicy::wait) return;
+    ready_.wait(false);
+    if (!failed_) return;
+    join();
+    rethrow();
+}
+
+FrameThread::~FrameThread() {
+    pictures_.close();  // without finish(), what is still to be drawn is not needed
+    join();
+}
+
+void FrameThread::join() {
+    jobs_.close();
+    if (drawing_.joinable()) drawing_.join();
+    pictures_.close();
+    if (writing_.joinable()) writing_.join();
+}
+
+void FrameThread::run(const std::function<void()>& work) {
+    try {
+        work();
+        return;
+    } catch (...) {
+        const std::scoped_lock lock(error_mutex_);
+        if (!error_) error_ = std::current_exception();
+    }
+    failed_ = true;
+    jobs_.close();
+    pictures_.close();
+    ready_ = true;
+    ready_.notify_one();
+}
+
+void FrameThread::rethrow() {
+    if (!failed_) return;
+    const std::scoped_lock lock(error_mutex_);
+    std::rethrow_exception(error_);
+}
+
+void FrameThread::draw_all(const std::vector<render::SceneDescription>& scenes,
+                           const render::FrameState& rest) {
+    const bool refuses = options_.policy == FramePolicy::refuse;
+    // The rasteriser's threads, started below, inherit it.
+    if (refuses) priority_ = set_thread_priority(ThreadRole::drawing, options_.realtime_priority);
+    std::vector<std::unique_ptr<render::Renderer>> renderers;
+    for (const render::SceneDescription& scene : scenes) {
+        renderers.push_back(std::make_unique<render::Renderer>(scene));
+        try_out(*renderers.back(), rest);
+    }
+    version_ = renderers.front()->version();
+    ready_ = true;
+    ready_.notify_one();
+    FrameJob job;
+    while (jobs_.pop(job))
+        if (!draw_one(*renderers[std::min(job.level, renderers.size() - 1)], job)) return;
+}
+
+void FrameThread::try_out(render::Renderer& renderer, const render::FrameState& rest) {
+    render::Image image;
+    const WallTimer all;
+    std::vector<double> times_s;
+    const int frames = options_.policy == FramePolicy::refuse ? kWarmFrames + kTrialFrames : 1;
+    for (int i = 0; i < frames && (times_s.empty() || all.seconds() < kLongestTrialS); ++i) {
+        const WallTimer one;
+        renderer.draw(rest, image);
+        if (i >= kWarmFrames) times_s.push_back(one.seconds());
+    }
+    if (!times_s.empty()) trial_s_.push_back(quantile(times_s, 0.25));  // busy moments of the start aside
+    if (rest_image_.rgb.empty()) rest_image_ = std::move(image);
+}
+
+/// False: the pictures are not wanted any more.
+bool FrameThread::draw_one(render::Renderer& renderer, FrameJob& job) {
+    DrawnFrame drawn{job.index, monotonic_ns()};
+    if (job.slower_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(job.slower_s));
+    Picture picture{job.index, {}};
+    const render::DrawTimes times = renderer.draw(job.state, picture.image);
+    drawn.drawn_ns = monotonic_ns(times.drawn);
+    drawn.read_ns = monotonic_ns(times.read);
+    drawn.in_time = drawn.read_ns <= job.shown_ns;
+    draw_s_ += to_s(drawn.read_ns - drawn.started_ns);
+    if (options_.policy == FramePolicy::wait) return pictures_.push(std::move(picture));
+    if (drawn.in_time && !pictures_.try_push(std::move(picture))) ++not_written_;
+    drawn_ = drawn;
+    turn_ = Turn::done;
+    return true;
+}
+
+void FrameThread::write_all() {
+    if (options_.policy == FramePolicy::refuse)
+        set_thread_priority(ThreadRole::writing, options_.realtime_priority);
+    Picture picture;
+    while (pictures_.pop(picture)) {
+        const Stopwatch watch(write_s_);
+        write_file(options_.folder / fmt::format("{:06}.png", picture.index),
+                   render::encode_png(enlarged(std::move(picture.image), options_.width, options_.height)));
+        written_.emplace_back(picture.index, monotonic_ns());
+    }
+}
+
+bool FrameThread::push(FrameJob job) {
+    rethrow();
+    if (options_.policy == FramePolicy::refuse) {
+        collect();
+        if (turn_ != Turn::free) return false;
+        turn_ = Turn::drawing;
+    }
+    if (!jobs_.push(std::move(job))) rethrow();
+    return true;
+}
+
+/// The timing of the frame that was drawn last, unless it was taken already.
+void FrameThread::collect() {
+    if (turn_ != Turn::done) return;
+    done_.push_back(drawn_);
+    turn_ = Turn::free;
+}
+
+std::vector<DrawnFrame> FrameThread::take_done() {
+    rethrow();
+    collect();
+    return std::exchange(done_, {});
+}
+
+void FrameThread::finish() {
+    join();
+    rethrow();
+}
+
+}  // namespace app

@@ -1,0 +1,129 @@
+#pragma once
+#include <render/renderer.h>
+
+#include <atomic>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "process/bounded_queue.h"
+
+namespace app {
+
+/// A frame to be drawn.
+struct FrameJob {
+    std::uint64_t index = 0;  ///< written as FOLDER/000000.png
+    std::size_t level = 0;    ///< of picture quality: which of the scenes is drawn
+    /// CLOCK_MONOTONIC when it is shown: one that is drawn later is not written.
+    std::int64_t shown_ns = std::numeric_limits<std::int64_t>::max();
+    double slower_s = 0;  ///< artificial load: wait this long before drawing [s]
+    render::FrameState state;
+};
+
+/// When a frame was drawn. Times of CLOCK_MONOTONIC [ns].
+struct DrawnFrame {
+    std::uint64_t index = 0;
+    std::int64_t started_ns = 0, drawn_ns = 0, read_ns = 0;  ///< drawing began, ended, pixels were there
+    bool in_time = true;
+};
+
+/// What happens to a frame that is asked for while others are being drawn or written.
+enum class FramePolicy {
+    wait,    ///< offline: every frame is drawn and written; push() waits for room
+    refuse,  ///< real time: one frame at a time, push() never waits, late frames are dropped
+};
+
+/// Where frames are drawn and written.
+struct FrameThreadOptions {
+    int width = 640, height = 480;  ///< of the files; pictures of smaller scenes are enlarged
+    std::filesystem::path folder;   ///< exists
+    FramePolicy policy = FramePolicy::wait;
+    bool realtime_priority = false;  ///< of the policy `refuse`: what set_thread_priority() is asked for
+};
+
+/// Draws frames on a thread of its own, which owns the renderers, and encodes and writes them as
+/// FOLDER/000000.png on another. push(), take_done() and finish() are for one thread; failures of either
+/// thread are thrown by the next call of these. With the policy `refuse` none of them waits for a lock.
+class FrameThread {
+public:
+    /// `scenes`: one for each level of picture quality. `rest`: the frame drawn first, to warm up and for the
+    /// fingerprint; it is not written. With the policy `refuse`, waits until each scene has been drawn a few
+    /// times, and throws what went wrong.
+    FrameThread(std::vector<render::SceneDescription> scenes, const render::FrameState& rest,
+                FrameThreadOptions options);
+    ~FrameThread();
+    FrameThread(const FrameThread&) = delete;
+    FrameThread& operator=(const FrameThread&) = delete;
+
+    /// False: refused, the frame before is still being drawn.
+    bool push(FrameJob job);
+    /// With the policy `refuse`: frames drawn since the last call, in time or late.
+    [[nodiscard]] std::vector<DrawnFrame> take_done();
+    /// Lets the frames at hand be drawn and written. Then take_done() has the rest.
+    void finish();
+
+    /// With the policy `refuse`: lower quartile of drawing times at the start, by level [s].
+    [[nodiscard]] const std::vector<double>& trial_s() const { return trial_s_; }
+    /// What the drawing thread obtained; empty with the policy `wait`.
+    [[nodiscard]] const std::string& priority() const { return priority_; }
+
+    // After finish():
+    [[nodiscard]] const std::string& version() const { return version_; }
+    [[nodiscard]] const render::Image& rest_image() const { return rest_image_; }
+    [[nodiscard]] double draw_s() const { return draw_s_; }
+    [[nodiscard]] double write_s() const { return write_s_; }
+    /// Frames written, in order: index, CLOCK_MONOTONIC when the file was complete [ns].
+    [[nodiscard]] const std::vector<std::pair<std::uint64_t, std::int64_t>>& written() const {
+        return written_;
+    }
+    /// Frames in time for which writing had fallen behind by 8: not written.
+    [[nodiscard]] std::uint64_t not_written() const { return not_written_; }
+
+private:
+    struct Picture {
+        std::uint64_t index = 0;
+        render::Image image;
+    };
+    /// Of the one frame at a time of the policy `refuse`: who may touch drawn_.
+    enum class Turn : std::uint8_t { free, drawing, done };
+
+    void run(const std::function<void()>& work);
+    void draw_all(const std::vector<render::SceneDescription>& scenes, const render::FrameState& rest);
+    void try_out(render::Renderer& renderer, const render::FrameState& rest);
+    bool draw_one(render::Renderer& renderer, FrameJob& job);
+    void write_all();
+    void collect();
+    void rethrow();
+    void join();
+
+    FrameThreadOptions options_;
+    BoundedQueue<FrameJob> jobs_{16};
+    BoundedQueue<Picture> pictures_{8};
+    std::atomic<bool> ready_ = false;
+
+    std::atomic<Turn> turn_ = Turn::free;
+    DrawnFrame drawn_;
+    std::vector<DrawnFrame> done_;  // of the pushing thread
+
+    std::atomic<bool> failed_ = false;
+    std::mutex error_mutex_;
+    std::exception_ptr error_;
+
+    std::vector<double> trial_s_;
+    std::string version_, priority_;
+    render::Image rest_image_;
+    std::uint64_t not_written_ = 0;
+    std::vector<std::pair<std::uint64_t, std::int64_t>> written_;
+    double draw_s_ = 0, write_s_ = 0;
+    std::thread drawing_, writing_;
+};
+
+}  // namespace app

@@ -1,0 +1,206 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "simulate/simulate.h"
+#include "simulate/worker_history.h"
+#include "temporary_folder.h"
+#include "written_scene.h"
+
+namespace app {
+namespace {
+
+using nlohmann::json;
+
+std::string text_of(const std::filesystem::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    std::ostringstream text;
+    text << in.rdbuf();
+    return text.str();
+}
+
+/// Rows of a CSV text by column.
+std::vector<std::map<std::string, double>> table_of(const std::filesystem::path& file) {
+    std::istringstream lines(text_of(file));
+    const auto cells = [](const std::string& line) {
+        std::vector<std::string> all;
+        std::istringstream in(line);
+        for (std::string cell; std::getline(in, cell, ',');) all.push_back(cell);
+        return all;
+    };
+    std::string line;
+    std::getline(lines, line);
+    const std::vector<std::string> names = cells(line);
+    std::vector<std::map<std::string, double>> rows;
+    while (std::getline(lines, line)) {
+        rows.emplace_back();
+        const std::vector<std::string> values = cells(line);
+        for (std::size_t k = 0; k < names.size(); ++k) rows.back()[names[k]] = std::stod(values.at(k));
+    }
+    return rows;
+}
+
+/// Two layers that fall on each other in a box; contacts cross any division of the bodies.
+const std::string kPile =
+    "[settings]\nsleeping = false\n[box]\nsize = [2.6, 2.6]\n[[body]]\nname = \"b\"\nradius = 0.5\n"
+    "fidelity = \"linear\"\nposition = [0, 0.8, 0]\ngrid = { count = [2, 2, 2], step = [1.1, 1.1, 1.1], "
+    "jitter = 0.05, seed = 3 }\n";
+
+/// Simulated processors whose costs are counted, so that a run is a function of the scene.
+WorkerOptions processors(int count, const std::string& mode) {
+    WorkerArguments typed;
+    typed.workers = count;
+    typed.mode = mode;
+    typed.processors = "simulated:cost=modelled";
+    return worker_options_of(typed).value();
+}
+
+SimulateOptions options_for(const WrittenScene& scene, std::uint64_t steps) {
+    SimulateOptions options;
+    options.scene = scene.file();
+    options.steps = steps;
+    return options;
+}
+
+TEST(SimulateWorkers, LockstepOnThreeProcessorsWritesTheStatesOfOneProcessToTheLastDigit) {
+    const WrittenScene scene(kPile);
+    const TemporaryFolder folder;
+    SimulateOptions options = options_for(scene, 60);
+    options.out = folder.path() / "one";
+    const SimulateResult one = simulate(options);
+    options.out = folder.path() / "three";
+    options.workers = processors(3, "sync");
+    const SimulateResult three = simulate(options);
+    EXPECT_EQ(three.state_hash, one.state_hash);
+    EXPECT_EQ(text_of(folder.path() / "three/states.csv"), text_of(folder.path() / "one/states.csv"));
+    EXPECT_EQ(three.steps, 60u);
+    EXPECT_EQ(three.body_steps, 480u);
+    ASSERT_TRUE(three.drift);  // by the impulse of walls, floor and gravity: rounding and the like
+    EXPECT_LT(three.drift->linear, 1e-6 * three.drift->scale);
+}
+
+TEST(SimulateWorkers, TimingHasARowAWorkersStepAndEachStepsBodiesAreAllThere) {
+    const WrittenScene scene(kPile);
+    const TemporaryFolder folder;
+    SimulateOptions options = options_for(scene, 40);
+    options.out = folder.path() / "run";
+    options.workers = processors(3, "sync");
+    options.workers->balance = false;
+    (void)simulate(options);
+    std::map<double, double> bodies_at;
+    std::map<double, int> rows_of;
+    for (const auto& row : table_of(*options.out / "timing.csv")) {
+        bodies_at[row.at("step")] += row.at("bodies");
+        ++rows_of[row.at("worker")];
+        EXPECT_GE(row.at("seconds"), 0);
+        EXPECT_GE(row.at("waited_s"), 0);
+    }
+    EXPECT_EQ(rows_of, (std::map<double, int>{{0, 40}, {1, 40}, {2, 40}}));
+    ASSERT_EQ(bodies_at.size(), 40u);
+    for (const auto& [step, bodies] : bodies_at) EXPECT_EQ(bodies, 8) << step;
+    EXPECT_NE(text_of(*options.out / "workers.svg").find("worker 2"), std::string::npos);
+    const json summary = json::parse(text_of(*options.out / "summary.json"));
+    EXPECT_EQ(summary["workers"], 3);
+    EXPECT_EQ(summary["mode"], "sync");
+    EXPECT_EQ(summary["bodies_lost"], 0);
+    EXPECT_GT(summary["bytes_per_body_update"], 0);
+    EXPECT_EQ(summary["clock"],
+              "simulated processors, modelled costs, 1 times slower, 0.0002 s from worker to worker");
+}
+
+TEST(SimulateWorkers, AsynchronouslyNoWorkerLeadsByMoreThanTheBoundAndMomentumIsKept) {
+    const WrittenScene scene(kPile);
+    const TemporaryFolder folder;
+    SimulateOptions options = options_for(scene, 120);
+    options.out = folder.path() / "run";
+    options.workers = processors(4, "async");
+    const SimulateResult r = simulate(options);
+    EXPECT_EQ(r.worker_options.bound, 4);
+    int most = 0;
+    for (const auto& row : table_of(*options.out / "timing.csv")) {
+        EXPECT_LE(row.at("lead"), 4);
+        EXPECT_LE(row.at("ghost_age"), 4);
+        most = std::max(most, int(row.at("lead")));
+    }
+    EXPECT_GT(r.workers->cross_contacts, 0u);
+    ASSERT_TRUE(r.drift);
+    EXPECT_LT(r.drift->linear, 1e-3 * r.drift->scale);  // what is promised of asynchronous contacts
+}
+
+TEST(SimulateWorkers, WhatMakesNoSenseTogetherIsRefusedInOneLine) {
+    struct Case {
+        std::function<void(WorkerArguments&)> type;
+        const char* words;
+    };
+    const std::vector<Case> cases = {
+        {[](WorkerArguments& a) { a.workers = -1; }, "--workers -1"},
+        {[](WorkerArguments& a) { a.workers = 257; }, "0 to 256"},
+        {[](WorkerArguments& a) { a.mode = "async"; }, "--mode async"},
+        {[](WorkerArguments& a) { a.bound = 3; }, "--bound 3"},
+        {[](WorkerArguments& a) { a.workers = 2, a.bound = 3; }, "--bound 3 with --mode sync"},
+        {[](WorkerArguments& a) { a.workers = 2, a.mode = "fast"; }, "sync or async"},
+        {[](WorkerArguments& a) { a.workers = 2, a.balance = "maybe"; }, "on or off"},
+        {[](WorkerArguments& a) { a.keys = "k"; }, "--listen ENDPOINT"},
+        {[](WorkerArguments& a) { a.expect = 2; }, "--listen ENDPOINT"},
+        {[](WorkerArguments& a) { a.workers = 3, a.listen = "tcp://127.0.0.1:0", a.expect = 2; },
+         "at least the 3"},
+        {[](WorkerArguments& a) { a.processors = "simulated"; }, "how many of them"},
+        {[](WorkerArguments& a) { a.workers = 2, a.processors = "real"; }, "--processors real"},
+        {[](WorkerArguments& a) { a.workers = 2, a.processors = "simulated:latency=-1"; }, "latency=SECONDS"},
+        {[](WorkerArguments& a) { a.workers = 2, a.processors = "simulated:cost=free"; },
+         "measured|modelled"},
+        {[](WorkerArguments& a) { a.workers = 2, a.processors = "simulated", a.listen = "tcp://*:0"; },
+         "one of them"},
+    };
+    for (const Case& c : cases) {
+        WorkerArguments typed;
+        c.type(typed);
+        try {
+            (void)worker_options_of(typed);
+            ADD_FAILURE() << c.words;
+        } catch (const BadInput& wrong) {
+            const std::string message = wrong.what();
+            EXPECT_NE(message.find(c.words), std::string::npos) << message;
+            EXPECT_EQ(message.find("error: found "), 0u) << message;
+            EXPECT_NE(message.find(", expected "), std::string::npos) << message;
+        }
+    }
+}
+
+TEST(SimulateWorkers, OptionsSayHowManyHowAndOfWhichClock) {
+    WorkerArguments typed;
+    EXPECT_FALSE(worker_options_of(typed));  // in this process
+    typed.listen = "tcp://127.0.0.1:0", typed.expect = 4;
+    EXPECT_EQ(worker_options_of(typed)->count, 0);
+    typed = {};
+    typed.workers = 2, typed.mode = "async", typed.bound = 0;
+    EXPECT_EQ(worker_options_of(typed)->pace, sim::Pace::lockstep);  // nobody may be ahead
+    typed.bound = 16;
+    EXPECT_EQ(worker_options_of(typed)->pace, sim::Pace::bounded);
+    const sim::SimulatedProcessors p = parse_processors("simulated:latency=1/100,slowdown=50,cost=modelled");
+    EXPECT_EQ(p.latency_s, 0.01);
+    EXPECT_EQ(p.slowdown, 50);
+    EXPECT_TRUE(p.modelled);
+}
+
+TEST(WorkerHistory, AMillionStepsOfTwoWorkersStayUnder4000PointsEachEquallyFarApart) {
+    WorkerHistory history;
+    for (std::uint64_t step = 1; step <= 1000000; ++step)
+        for (int worker = 0; worker < 2; ++worker)
+            history.add({.worker = worker, .step = step, .seconds = 1e-3, .bodies = int(step % 7)});
+    ASSERT_EQ(history.workers().size(), 2u);
+    const std::uint64_t every = history.workers().at(0)[1].step - history.workers().at(0)[0].step;
+    for (const auto& [worker, points] : history.workers()) {
+        EXPECT_LT(points.size(), 4000u);
+        EXPECT_GT(points.size(), 1900u);
+        for (std::size_t k = 1; k < points.size(); ++k)
+            ASSERT_EQ(points[k].step - points[k - 1].step, every) << worker << ' ' << k;
+    }
+}
+
+}  // namespace
+}  // namespace app
