@@ -24,7 +24,7 @@ struct ErrorScore {
     double rotation_rms_deg = kNoValue;  ///< without flagged orientations
     double tip_rms_mm = kNoValue;  ///< position and rotation together, at the tip; where rotations count
 
-    // What the figures are made of, so that scores can be put together.
+    // What the figures are made of, so that scores can be combined.
     std::size_t free_count = 0, unflagged_count = 0, rotation_count = 0;
     double free_sum_mm2 = 0, unflagged_sum_mm2 = 0, rotation_sum_deg2 = 0, tip_sum_mm2 = 0;
     std::vector<double> errors_mm;

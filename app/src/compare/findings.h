@@ -11,7 +11,7 @@ namespace app {
 /// "33.3 ms ahead singer* errs least, ...; of 292 true strikes ca predicts most, ...", a sentence a lead.
 [[nodiscard]] std::vector<std::string> winners(const Comparison& comparison);
 
-/// What the winners' intervals do not say: among how many they were picked.
+/// A caution: the winners' intervals do not include among how many they were picked.
 [[nodiscard]] std::string selection_caution(const Comparison& comparison);
 
 /// "66.7 ms ahead an estimator gains in 40 of 64 sensors, 3.1 % in the median (cv* 30, singer* 10)", of one

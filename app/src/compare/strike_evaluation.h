@@ -42,7 +42,7 @@ struct HitScore {
     void add(const HitScore& other);
 };
 
-/// Who says when a stick strikes.
+/// The predictors that decide when a stick strikes.
 struct StrikePredictors {
     tracking::Predictor& timing;                ///< whose path is swept
     tracking::Predictor* confirming = nullptr;  ///< must confirm near contacts (keep_confirmed); may be none
@@ -55,7 +55,7 @@ struct StrikeTiming {
 };
 
 /// The leads at which evaluate_strikes asks the timing predictor: 0 to a little beyond the strike's lead.
-/// External predictors are told these.
+/// External predictors get these.
 [[nodiscard]] std::vector<double> strike_leads(const StrikeTiming& timing);
 
 /// Strikes of one stick (the strike rules of the README): at each sample the path that the predictor states

@@ -14,7 +14,7 @@
 namespace app {
 namespace {
 
-constexpr double kNoiseMm = 0.25;  // what the filters assume unless told
+constexpr double kNoiseMm = 0.25;  // what the filters assume by default
 
 /// What tuning tries of a family: every combination of one of each axis, the last axis fastest. An axis is words
 /// with blanks between; a first one that ends in = stands before each of the others; - is the default.
@@ -59,7 +59,7 @@ std::vector<std::string> crossed(const std::vector<std::string>& specifications,
     return all;
 }
 
-/// The families that are told the sensor's noise.
+/// The families that get the sensor's noise.
 bool knows_noise(const std::string& family) {
     return family == "cv" || family == "ca" || family == "singer" || family == "bank" || family == "imm";
 }

@@ -59,8 +59,9 @@ inline constexpr double kDrummersLatencyMs = 10, kDrummersJitterMs = 3;
 
 /// The latency measured in a run in real time.
 struct LatencyReport {
-    // clang-format off
-    /// In order of the way; those that nothing took are left out:
+    /// Durations [ms], in the order in which a sample takes them: from sensor to filter, application,
+    /// simulation and sound, then from the query for a frame to its file. A stage that nothing took is left
+    /// out.
     ///
     ///   sensor to filter     sample due to all its filters done
     ///   filter to app        that to the application having it
@@ -76,7 +77,6 @@ struct LatencyReport {
     ///   frame written        pixels there to the file written
     ///   pose age in frames   shown minus the oldest stick's sample
     ///   pose age in notes    onset minus the newest sample that could change it
-    // clang-format on
     std::vector<LatencyStage> stages;
     Deadline samples;  ///< taken; missed: too late to change the sound
     Deadline skipped;  ///< given by the sensors; missed: never seen by the application

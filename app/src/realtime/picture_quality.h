@@ -17,20 +17,20 @@ struct QualityLevel {
 
 [[nodiscard]] const std::vector<QualityLevel>& quality_levels();
 
-// clang-format off
-/// Lowers the quality of pictures, then their rate, before the sound suffers, and raises it again. The rule:
+/// Lowers the quality of pictures, then their rate, before the sound suffers, and raises it again.
 ///
-///   lower   when 3 of the last 90 frames that were asked for were late or skipped, or when 5 % of the last 200
-///           blocks of sound were late beyond what their lead allows (and, with leads that adapt, when the delay
-///           outgrows the lead asked for). Frames that wait for one of another level do not count.
+/// The rule:
+///
+///   lower   when 3 of the last 90 frames that were asked for were late or skipped, or when 5 % of the last
+///           200 blocks of sound were late beyond what their lead allows (and, with leads that adapt, when
+///           the delay outgrows the lead asked for). Frames that wait for one of another level do not count.
 ///   raise   when for 8 s nothing was late and the next better level would fit; after a rise that had to be
 ///           taken back, the wait doubles (up to 64 s)
 ///   fits    what the level took in its trial, times how much slower drawing is now than in the trial of the
-///           level at hand (1.4 before anything was drawn: the trial runs alone), is less than 0.6 of the time
-///           between two frames
+///           level at hand (1.4 before anything was drawn: the trial runs alone), is less than 0.6 of the
+///           time between two frames
 ///
 /// Begins at the best level that fits. Pure: times come from the caller.
-// clang-format on
 class QualityRule {
 public:
     /// `frame_s`: time between two frames; `trial_s`: what drawing a frame took at each level in a trial.

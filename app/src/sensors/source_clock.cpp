@@ -12,7 +12,7 @@ constexpr double kBucketS = 0.1;
 constexpr double kSettlingRate = 0.5, kSlewRate = 200e-6;
 constexpr int kBehindInARow = 3;
 constexpr double kLateForS = 0.5;
-constexpr std::int64_t kFewestSeconds = 5;  // that a drift is told from
+constexpr std::int64_t kFewestSeconds = 5;  // that a drift is estimated from
 constexpr double kLeastStepS = 1e-6;
 
 }  // namespace

@@ -243,7 +243,7 @@ void StrikeScheduler::play_selected(Pair& pair, double s) {
         for (Strike& pending : a.pending) {
             const bool same_stroke =
                 pair.is_closed() && pending.onset_s <= pair.struck->onset_s + rules_.late_s;
-            if (!is_selected(pair, pending) || same_stroke || contains(played, pending.id)) continue;
+            if (!is_selected(pair, pending) || same_stroke) continue;
             play(pair, pending, s, played);
             played.push_back(pending.id);
         }
@@ -255,8 +255,8 @@ void StrikeScheduler::play_selected(Pair& pair, double s) {
 }
 
 void StrikeScheduler::play(Pair& pair, Strike& pending, double s, std::span<const std::uint64_t> played) {
-    if (pending.id == 0 || strike(pending.id).outcome == Outcome::released)
-        pending.id = taken_over(pair, pending, played);
+    const bool has_strike = pending.id != 0 && strike(pending.id).outcome != Outcome::released;
+    if (!has_strike || contains(played, pending.id)) pending.id = taken_over(pair, pending, played);
     if (pending.id == 0) {
         pending.id = strikes_.size() + 1;
         pending.scheduled_at_s = s;

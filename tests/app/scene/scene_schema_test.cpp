@@ -41,6 +41,8 @@ void uncover(json& scene, const json::json_pointer& place) {
     const std::string at = place.to_string(), defaults = "/defaults/";
     if (!at.starts_with(defaults)) return;
     const std::string key = at.substr(defaults.size(), at.find('/', defaults.size()) - defaults.size());
+    if (key == "grid") scene["defaults"][key] = {{"count", {2, 1, 2}}, {"step", {1, 1, 1}}};
+    if (key == "bumps") scene["defaults"][key] = json::array({{{"direction", {0, 1, 0}}, {"height", 0.1}}});
     for (json& body : scene["body"]) body.erase(key);
     scene["event"][0]["add"].erase(key);
     if (key == "size" || key == "radius")

@@ -247,7 +247,8 @@ TEST(Maps, FaultsInMapFilesAreRefusedWithTheirPlace) {
         {"[columns]\npx = 3\n", ":2:"},
         {"[columns]\npx = \"X\"\n", "no column for py"},
         {"[columns\n", ":1:"},
-        {"", "no columns of positions"},
+        {"", ":1:1: error: found no key \"columns\""},
+        {"[columns]\n", "no columns of positions"},
     };
     for (const auto& [text, place] : cases) {
         std::ofstream(file) << text;
