@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <new>
 
@@ -50,7 +51,51 @@ std::string what_to_say(const CLI::App& program) {
     return fmt::format("`{}` and one of {}", full_name(*at), fmt::join(names, ", "));
 }
 
-int run(int argc, char** argv) {
+int parse(CLI::App& program, int argc, char** argv, const int& status) {
+    try {
+        program.parse(argc, argv);
+    } catch (const CLI::CallForHelp& help) {
+        return program.exit(help);
+    } catch (const CLI::CallForAllHelp& help) {
+        return program.exit(help);
+    } catch (const CLI::CallForVersion& version) {
+        return program.exit(version);
+    } catch (const CLI::ParseError& wrong) {
+        const std::string typed =
+            fmt::format("{} {}", program.get_name(), fmt::join(argv + 1, argv + argc, " "));
+        return complain(fmt::format("error: found bad usage in `{}` ({}), expected {}", typed, wrong.what(),
+                                    what_to_say(program)),
+                        kBadInput);
+    }
+    return status;
+}
+
+}  // namespace
+
+int run_commands(CLI::App& program, int argc, char** argv, const int& status) {
+    // A file that may not grow and a reader that went away are errors to report, not reasons to die.
+    std::signal(SIGXFSZ, SIG_IGN);
+    std::signal(SIGPIPE, SIG_IGN);
+    try {
+        const int status_at_end = parse(program, argc, argv, status);
+        if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+            return complain("error: found standard output that takes no more, expected room for the result",
+                            kFailed);
+        return status_at_end;
+    } catch (const BadInput& wrong) {
+        return complain(wrong.what(), kBadInput);
+    } catch (const tracking::TraceError& wrong) {
+        return complain(wrong.what(), kBadInput);
+    } catch (const std::invalid_argument& wrong) {
+        return complain(wrong.what(), kBadInput);
+    } catch (const std::bad_alloc&) {
+        return complain("error: found too little memory, expected enough for this input", kFailed);
+    } catch (const std::exception& wrong) {
+        return complain(wrong.what(), kFailed);
+    }
+}
+
+int run_command_line(int argc, char** argv) {
     CLI::App program("MusicWorld: tracked drumsticks play a virtual kit, predicted ahead of the lag",
                      "musicworld");
     program.set_version_flag("--version", MUSICWORLD_VERSION);
@@ -69,43 +114,7 @@ int run(int argc, char** argv) {
     add_keys_command(program);
     add_worker_command(program, status);
     add_sensor_command(program, status);
-    try {
-        program.parse(argc, argv);
-    } catch (const CLI::CallForHelp& help) {
-        return program.exit(help);
-    } catch (const CLI::CallForAllHelp& help) {
-        return program.exit(help);
-    } catch (const CLI::CallForVersion& version) {
-        return program.exit(version);
-    } catch (const CLI::ParseError& wrong) {
-        const std::string typed = fmt::format("musicworld {}", fmt::join(argv + 1, argv + argc, " "));
-        return complain(fmt::format("error: found bad usage in `{}` ({}), expected {}", typed, wrong.what(),
-                                    what_to_say(program)),
-                        kBadInput);
-    }
-    return status;
-}
-
-}  // namespace
-
-int run_command_line(int argc, char** argv) {
-    try {
-        const int status = run(argc, argv);
-        if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
-            return complain("error: found standard output that takes no more, expected room for the result",
-                            kFailed);
-        return status;
-    } catch (const BadInput& wrong) {
-        return complain(wrong.what(), kBadInput);
-    } catch (const tracking::TraceError& wrong) {
-        return complain(wrong.what(), kBadInput);
-    } catch (const std::invalid_argument& wrong) {
-        return complain(wrong.what(), kBadInput);
-    } catch (const std::bad_alloc&) {
-        return complain("error: found too little memory, expected enough for this input", kFailed);
-    } catch (const std::exception& wrong) {
-        return complain(wrong.what(), kFailed);
-    }
+    return run_commands(program, argc, argv, status);
 }
 
 }  // namespace app

@@ -1,6 +1,6 @@
 // Lateness of live sound: some seconds of notes on the wall clock; how much later than planned blocks began
-// and were done. `live_bench [SECONDS] [--realtime]`; with --realtime the audio thread asks for
-// SCHED_FIFO 70.
+// and were done. `musicworld_audio_bench [SECONDS] [--realtime] [--benchmark_format=json]`; with --realtime
+// the audio thread asks for SCHED_FIFO 70; the last prints JSON as Google Benchmark does.
 #include <pthread.h>
 #include <sched.h>
 
@@ -35,9 +35,26 @@ double ms_at(std::vector<std::int64_t>& values, double fraction) {
     return 1e-6 * static_cast<double>(*at);
 }
 
-void print(const char* what, std::vector<std::int64_t> values) {
-    std::printf("%-18s p50 %7.3f  p95 %7.3f  p99 %7.3f  max %7.3f ms\n", what, ms_at(values, 0.5),
-                ms_at(values, 0.95), ms_at(values, 0.99), ms_at(values, 1));
+struct Lateness {
+    const char* name;
+    std::vector<std::int64_t> ns;
+};
+
+void print(Lateness& of) {
+    std::printf("%-18s p50 %7.3f  p95 %7.3f  p99 %7.3f  max %7.3f ms\n", of.name, ms_at(of.ns, 0.5),
+                ms_at(of.ns, 0.95), ms_at(of.ns, 0.99), ms_at(of.ns, 1));
+}
+
+void print_json(Lateness& of, bool first) {
+    const struct {
+        const char* name;
+        double fraction;
+    } kinds[] = {{"p50", 0.5}, {"p95", 0.95}, {"p99", 0.99}, {"max", 1}};
+    for (const auto& kind : kinds) {
+        std::printf("%s\n{\"name\": \"%s/%s\", \"cpu_time\": %.6f, \"time_unit\": \"ms\"}", first ? "" : ",",
+                    of.name, kind.name, ms_at(of.ns, kind.fraction));
+        first = false;
+    }
 }
 
 /// A kit's worth of voices, sixteen strokes per second.
@@ -61,18 +78,22 @@ void play(audio::LivePerformance& live, double seconds) {
     audio::sleep_until_ns(epoch + static_cast<std::int64_t>(1e9 * seconds));
 }
 
-void report(const audio::LivePerformance& live) {
-    std::vector<std::int64_t> started, computed, done;
+void report(const audio::LivePerformance& live, bool json) {
+    Lateness all[] = {{"started - planned", {}}, {"done - started", {}}, {"done - planned", {}}};
     for (const BlockTiming& block : live.blocks()) {
-        started.push_back(block.started_ns - block.planned_ns);
-        computed.push_back(block.done_ns - block.started_ns);
-        done.push_back(block.done_ns - block.planned_ns);
+        all[0].ns.push_back(block.started_ns - block.planned_ns);
+        all[1].ns.push_back(block.done_ns - block.started_ns);
+        all[2].ns.push_back(block.done_ns - block.planned_ns);
     }
-    std::printf("%s, %zu blocks of %d samples (%.3f ms)\n", live.version().c_str(), done.size(),
+    if (json) {
+        std::printf("{\"benchmarks\": [");
+        for (Lateness& one : all) print_json(one, &one == all);
+        std::printf("]}\n");
+        return;
+    }
+    std::printf("%s, %zu blocks of %d samples (%.3f ms)\n", live.version().c_str(), all[0].ns.size(),
                 live.block_size(), 1e3 * live.block_size() / audio::kSampleRate);
-    print("started - planned", started);
-    print("done - started", computed);
-    print("done - planned", done);
+    for (Lateness& one : all) print(one);
     std::printf("processor time %.3f s\n", live.busy_s());
 }
 
@@ -80,10 +101,13 @@ void report(const audio::LivePerformance& live) {
 
 int main(int count, char** arguments) {
     double seconds = 10;
+    bool json = false;
     audio::LiveOptions options;
     for (int i = 1; i < count; ++i) {
         if (std::strcmp(arguments[i], "--realtime") == 0) {
             options.on_thread_start = ask_for_realtime;
+        } else if (std::strcmp(arguments[i], "--benchmark_format=json") == 0) {
+            json = true;
         } else {
             seconds = std::stod(arguments[i]);
         }
@@ -94,7 +118,7 @@ int main(int count, char** arguments) {
                                     options);
         play(live, seconds);
         (void)live.finish(0, 0);
-        report(live);
+        report(live, json);
     } catch (const std::exception& error) {
         std::fprintf(stderr, "error: %s\n", error.what());
         return 1;

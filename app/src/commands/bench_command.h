@@ -3,7 +3,8 @@
 
 namespace app {
 
-/// `musicworld bench NAME`: our speed beside peers', and what accuracy costs.
+/// `musicworld bench ...`: becomes musicworld_bench, a program beside this one, with the same arguments. The
+/// benchmarks and their peers are not part of this program.
 void add_bench_command(CLI::App& program);
 
 }  // namespace app

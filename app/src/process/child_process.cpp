@@ -96,6 +96,10 @@ std::string read_text(const fs::path& file) {
 
 }  // namespace
 
+fs::path program_beside(const std::string& name) {
+    return fs::read_symlink("/proc/self/exe").parent_path() / name;
+}
+
 int start_child(const ChildStart& start) {
     FileActions files;
     files.become(start.in, STDIN_FILENO);

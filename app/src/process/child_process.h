@@ -5,6 +5,9 @@
 
 namespace app {
 
+/// The program of this name in the folder of the running one. It need not exist.
+[[nodiscard]] std::filesystem::path program_beside(const std::string& name);
+
 /// How a child process is started.
 struct ChildStart {
     std::vector<std::string> command;    ///< a program found on PATH, and its arguments

@@ -8,7 +8,6 @@
 #include <memory>
 #include <stdexcept>
 
-#include "bench/machine_speed.h"
 #include "files/bad_input.h"
 #include "play/play_setup.h"
 #include "process/clock.h"

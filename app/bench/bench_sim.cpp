@@ -145,7 +145,7 @@ BenchReport bench_sim(const SimBenchOptions& options,
                         ? "The scene's bodies and planes, without its constraints."
                         : "Balls of 0.5 m, 182 vertices, 360 triangles, falling into a box whose floor "
                           "grows with their number.") +
-        " Bound: the flops that the method cannot do without (app/src/bench_sim.h) "
+        " Bound: the flops that the method cannot do without (app/bench/bench_sim.h) "
         "at the core's peak, or its bytes from memory.");
     if (!sim_bench::bullet_is_there())
         report.notes.push_back("This build has no Bullet: no ratios. Install libbullet-dev and build again.");

@@ -1,0 +1,10 @@
+#include <CLI/CLI.hpp>
+
+#include "bench/bench_command.h"
+#include "command_line.h"
+
+int main(int argc, char** argv) {
+    CLI::App program("Measure speed beside peers, and speed against error", "musicworld bench");
+    app::add_bench_options(program);
+    return app::run_commands(program, argc, argv, 0);
+}
