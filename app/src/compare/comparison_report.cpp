@@ -12,7 +12,7 @@
 #include "compare/comparison_report_tables.h"
 #include "report/html.h"
 #include "report/report_style.h"
-#include "traces/sensor_model_options.h"
+#include "traces/sensor_model.h"
 
 namespace app {
 namespace {

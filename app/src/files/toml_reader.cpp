@@ -113,7 +113,7 @@ double TomlReader::fraction(std::string_view key, double low, double high, std::
     read_.emplace_back(key);
     std::optional<double> value;
     try {
-        value = parse_number(checked_text(*node), std::string(key));
+        value = as::number().parse(checked_text(*node), std::string(key));
     } catch (const BadInput&) {  // said below, with its place
     }
     if (!value || !(*value >= low && *value <= high))

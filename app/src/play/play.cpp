@@ -23,7 +23,6 @@ namespace app {
 namespace fs = std::filesystem;
 PlayResult play(const PlayOptions& options) {
     const WallTimer wall;
-    check_options(options);
     const tracking::Trace trace = read_played_trace(options.trace);
     const Kit kit = read_kit(options.kit);
     const StickGeometry stick = stick_geometry(trace, kit.stick, options.tip, options.shaft);

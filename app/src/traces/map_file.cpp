@@ -89,7 +89,7 @@ void read_units(TomlReader& top, tracking::ColumnMap& map) {
     map.zero_is_lost = top.choice("lost", {"empty", "zeros"}, "empty") == "zeros";
     if (top.has("tip_m")) map.tip = top.vector("tip_m", -3, 3);
     if (top.has("shaft"))
-        map.shaft = parse_axis(top.choice("shaft", {"+x", "-x", "+y", "-y", "+z", "-z"}), "shaft");
+        map.shaft = as::axis().parse(top.choice("shaft", {"+x", "-x", "+y", "-y", "+z", "-z"}), "shaft");
 }
 
 std::string axis_word(const Eigen::Vector3d& shaft) {
@@ -115,16 +115,6 @@ tracking::ColumnMap spelt_out(const std::string& text) {
 }
 
 }  // namespace
-
-double metres_per(const std::string& unit, const std::string& option) {
-    return meaning(kMetres, unit, option);
-}
-char separator_called(const std::string& name, const std::string& option) {
-    return meaning(kSeparators, name, option);
-}
-double seconds_per(const std::string& unit, const std::string& option) {
-    return meaning(kSeconds, unit, option);
-}
 
 tracking::ColumnMap read_map(const fs::path& file) {
     const toml::table table = parse(file);
