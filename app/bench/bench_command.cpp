@@ -3,10 +3,7 @@
 #include <falling_bodies.h>
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
-#include <charconv>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -19,20 +16,20 @@
 #include "bench/bench_tradeoff.h"
 #include "bench/bench_workers.h"
 #include "bench/google_bench.h"
+#include "commands/worker_options.h"
 #include "files/bad_input.h"
-#include "files/comma_list.h"
 #include "files/output_folder.h"
 #include "process/child_process.h"
 #include "report/gnuplot.h"
 #include "scene/scene.h"
-#include "simulate/worker_options.h"
 
 namespace app {
 namespace {
 
-struct BenchArguments {
-    std::string name, bodies, out, scene, workers = "1,2,3,5,10", only, processors = "simulated";
-    int rounds = 0, steps = 500, bound = 4;
+struct BenchOptions {
+    std::string name, out;
+    SimBenchOptions sim;
+    WorkersBenchOptions workers;
     bool json = false;
 };
 
@@ -43,23 +40,6 @@ struct Figures {
 
 Figures figures_of(const auto& measured) {
     return {format_text(measured), format_json(measured)};
-}
-
-/// "25,100" of an option that means so many of something.
-std::vector<int> parse_counts(const std::string& option, const std::string& list) {
-    constexpr int kMost = 100000;
-    std::vector<int> counts;
-    for (const std::string& part : split_at_commas(list)) {
-        int count = 0;
-        const auto [end, wrong] = std::from_chars(part.data(), part.data() + part.size(), count);
-        if (wrong != std::errc() || end != part.data() + part.size() || count < 1 || count > kMost)
-            throw BadInput(
-                fmt::format("error: found {} {}, expected whole numbers from 1 to {} with "
-                            "commas between them, e.g. 25,100",
-                            option, list, kMost));
-        counts.push_back(count);
-    }
-    return counts;
 }
 
 void say(const std::string& line) {
@@ -100,11 +80,7 @@ Figures write_report(const std::unique_ptr<OutputFolder>& folder, const BenchRep
 
 constexpr std::array<std::string_view, 1> kReportAlone = {"bench.json"};
 
-Figures bench_the_simulation(const BenchArguments& a, const std::string& out) {
-    SimBenchOptions options;
-    if (!a.bodies.empty()) options.bodies = parse_counts("--bodies", a.bodies);
-    options.rounds = a.rounds;
-    if (!a.scene.empty()) options.scene = balls_of(a.scene);
+Figures bench_the_simulation(const SimBenchOptions& options, const std::string& out) {
     const std::unique_ptr<OutputFolder> folder = open_folder(out, kReportAlone);
     return write_report(folder, bench_sim(options, say));
 }
@@ -126,23 +102,6 @@ Figures bench_the_tradeoff(const std::string& out) {
     return figures_of(measured);
 }
 
-WorkersBenchOptions workers_options_of(const BenchArguments& a) {
-    WorkersBenchOptions options;
-    if (!a.bodies.empty()) options.bodies = parse_counts("--bodies", a.bodies);
-    options.workers = parse_counts("--workers", a.workers);
-    options.steps = a.steps, options.bound = a.bound;
-    options.processors = parse_processors(a.processors);
-    options.program = program_beside("musicworld").string();
-    const std::vector<std::string>& parts = workers_bench_parts();
-    for (const std::string& part : a.only.empty() ? parts : split_at_commas(a.only)) {
-        if (std::find(parts.begin(), parts.end(), part) == parts.end())
-            throw BadInput(
-                fmt::format("error: found --only {}, expected some of {}", a.only, fmt::join(parts, ",")));
-        options.only.insert(part);
-    }
-    return options;
-}
-
 void write_workers(OutputFolder& out, const WorkersBench& measured) {
     std::filesystem::create_directories(out.scratch());
     write_file(out.path("bench.json"), format_json(measured.report));
@@ -160,21 +119,20 @@ void write_workers(OutputFolder& out, const WorkersBench& measured) {
     out.finish();
 }
 
-Figures bench_the_workers(const BenchArguments& a, const std::string& out) {
+Figures bench_the_workers(const WorkersBenchOptions& options, const std::string& out) {
     static constexpr std::array<std::string_view, 5> kProducts = {"bench.json", "speed_up", "speed_up.csv",
                                                                   "bound.csv", "migration.svg"};
-    const WorkersBenchOptions options = workers_options_of(a);
     const std::unique_ptr<OutputFolder> folder = open_folder(out, kProducts);
     const WorkersBench measured = bench_workers(options, say);
     if (folder) write_workers(*folder, measured);
     return {format_text(measured), format_json(measured.report)};
 }
 
-constexpr std::array<const char*, 6> kNames = {"tracking", "sim", "workers", "render", "audio", "tradeoff"};
+const std::vector<std::string> kNames = {"tracking", "sim", "workers", "render", "audio", "tradeoff"};
 
-Figures bench_one(const std::string& name, const BenchArguments& a, const std::string& out) {
-    if (name == "sim") return bench_the_simulation(a, out);
-    if (name == "workers") return bench_the_workers(a, out);
+Figures bench_one(const std::string& name, const BenchOptions& o, const std::string& out) {
+    if (name == "sim") return bench_the_simulation(o.sim, out);
+    if (name == "workers") return bench_the_workers(o.workers, out);
     if (name == "tradeoff") return bench_the_tradeoff(out);
     const std::unique_ptr<OutputFolder> folder = open_folder(out, kReportAlone);
     return write_report(folder, run_bench_program("musicworld_" + name + "_bench"));
@@ -189,13 +147,13 @@ void merge(nlohmann::ordered_json& all, const nlohmann::ordered_json& one) {
             all[key].insert(all[key].end(), value.begin(), value.end());
 }
 
-Figures bench_all(const BenchArguments& a) {
+Figures bench_all(const BenchOptions& o) {
     nlohmann::ordered_json json;
     Figures all;
-    for (const std::string name : kNames) {
+    for (const std::string& name : kNames) {
         say(name);
-        const std::string out = a.out.empty() ? "" : (std::filesystem::path(a.out) / name).string();
-        const Figures one = bench_one(name, a, out);
+        const std::string out = o.out.empty() ? "" : (std::filesystem::path(o.out) / name).string();
+        const Figures one = bench_one(name, o, out);
         all.text += fmt::format("== {}\n{}\n", name, one.text);
         merge(json, nlohmann::ordered_json::parse(one.json));
     }
@@ -205,37 +163,48 @@ Figures bench_all(const BenchArguments& a) {
 
 }  // namespace
 
-void add_bench_options(CLI::App& program) {
-    auto a = std::make_shared<BenchArguments>();
-    program
-        .add_option("NAME", a->name,
-                    "tracking, sim, workers, render, audio, tradeoff: what is measured; all: each in turn")
-        ->required()
-        ->check(CLI::IsMember({"tracking", "sim", "workers", "render", "audio", "tradeoff", "all"}));
-    program.add_option("--bodies", a->bodies,
-                       "sim, workers: how many, in turn; default: 25,100,400,1600; 25,400");
-    program.add_option("--workers", a->workers, "workers: how many, in turn")->capture_default_str();
-    program.add_option("--steps", a->steps, "workers: of each run")
-        ->check(CLI::Range(1, 1000000))
-        ->capture_default_str();
-    program.add_option("--bound", a->bound, "workers: steps ahead")
-        ->check(CLI::Range(1, 64))
-        ->capture_default_str();
-    program.add_option("--processors", a->processors,
-                       "workers: simulated[:latency=S,slowdown=X,cost=measured|modelled]");
-    program.add_option("--only", a->only,
-                       "workers: some of speedup,stragglers,bound,migration,processes,throughput");
-    program.add_option("--rounds", a->rounds, "sim: how often each; 0: five, three for 100, one for more")
-        ->check(CLI::Range(0, 1000));
-    program.add_option("--scene", a->scene, "sim: balls of a scene, e.g. benchmark25, instead of the piles");
-    program.add_flag("--json", a->json, "Print one JSON document");
-    program.add_option(
-        "--out", a->out,
-        "Folder for bench.json and plots; of tradeoff for tradeoff.svg, .csv and .json; of all a "
-        "folder for each");
-    program.callback([a] {
-        const Figures figures = a->name == "all" ? bench_all(*a) : bench_one(a->name, *a, a->out);
-        fmt::print("{}", a->json ? figures.json : figures.text);
+void add_bench_options(Command& program) {
+    auto o = std::make_shared<BenchOptions>();
+    o->workers.program = program_beside("musicworld").string();
+    std::vector<std::string> names = kNames;
+    names.emplace_back("all");
+    program.option("NAME", o->name, as::choice(names), "What is measured: " + one_of(names)).required();
+    using Counts = std::vector<std::int64_t>;
+    const auto counts = as::list_of(as::whole(1, 100000));
+    program.option<Counts>(
+        "--bodies", counts, "sim, workers: how many, in turn",
+        [o](const Counts& bodies) {
+            o->sim.bodies.assign(bodies.begin(), bodies.end());
+            o->workers.bodies = o->sim.bodies;
+        },
+        "25,100,400,1600 of sim, 25,400 of workers");
+    program.option<Counts>(
+        "--workers", counts, "workers: how many, in turn",
+        [o](const Counts& workers) { o->workers.workers.assign(workers.begin(), workers.end()); },
+        "1,2,3,5,10");
+    program.option("--steps", o->workers.steps, as::whole(1, 1000000), "workers: of each run");
+    program.option("--bound", o->workers.bound, as::whole(1, 64, "steps"),
+                   "workers: how far one may be ahead");
+    program.option("--processors", o->workers.processors, as::processors(),
+                   "workers: simulated[:latency=S,slowdown=X,cost=measured|modelled]");
+    program.option<std::vector<std::string>>(
+        "--only", as::list_of(as::choice(workers_bench_parts())), "workers: some parts",
+        [o](const std::vector<std::string>& parts) {
+            o->workers.only = {parts.begin(), parts.end()};
+        },
+        "all");
+    program.option("--rounds", o->sim.rounds, as::whole(0, 1000),
+                   "sim: how often each; 0: five, three for 100, one for more");
+    program.option<std::string>("--scene", as::text("SCENE"),
+                                "sim: balls of a scene, e.g. benchmark25, instead of the piles",
+                                [o](const std::string& name) { o->sim.scene = balls_of(name); });
+    program.flag("--json", o->json, "Print one JSON document");
+    program.option("--out", o->out, as::text("DIR"),
+                   "Folder for bench.json and plots; of tradeoff for tradeoff.svg, .csv and .json; of all a "
+                   "folder for each");
+    program.runs([o] {
+        const Figures figures = o->name == "all" ? bench_all(*o) : bench_one(o->name, *o, o->out);
+        fmt::print("{}", o->json ? figures.json : figures.text);
     });
 }
 

@@ -1,9 +1,9 @@
 #pragma once
-#include <CLI/CLI.hpp>
+#include "commands/command.h"
 
 namespace app {
 
 /// Makes `program` that of `musicworld bench NAME`: our speed beside peers', and what accuracy costs.
-void add_bench_options(CLI::App& program);
+void add_bench_options(Command& program);
 
 }  // namespace app

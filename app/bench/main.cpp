@@ -5,6 +5,7 @@
 
 int main(int argc, char** argv) {
     CLI::App program("Measure speed beside peers, and speed against error", "musicworld bench");
-    app::add_bench_options(program);
-    return app::run_commands(program, argc, argv, 0);
+    app::Command command(program);
+    app::add_bench_options(command);
+    return app::run_commands(program, argc, argv);
 }

@@ -1,28 +1,24 @@
 #include "command_line.h"
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <tracking/trace.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <new>
+#include <numeric>
 
-#include "commands/bench_command.h"
-#include "commands/compare_command.h"
-#include "commands/keys_command.h"
-#include "commands/kit_commands.h"
+#include "commands/command.h"
+#include "commands/commands.h"
 #include "commands/latency_command.h"
-#include "commands/modes_command.h"
+#include "commands/manual.h"
 #include "commands/play_command.h"
-#include "commands/predict_command.h"
-#include "commands/record_command.h"
-#include "commands/schema_command.h"
-#include "commands/simulate_command.h"
-#include "commands/trace_commands.h"
+#include "commands/version.h"
 #include "files/bad_input.h"
-#include "sensors/sensor_command.h"
 
 namespace app {
 namespace {
@@ -40,49 +36,84 @@ std::string full_name(const CLI::App& command) {
                                 : command.get_name();
 }
 
-/// The commands that could have followed the last one that was understood.
-std::string what_to_say(const CLI::App& program) {
-    const CLI::App* at = &program;
-    while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
-    std::vector<std::string> names;
-    for (const CLI::App* command : at->get_subcommands(nullptr))
-        if (command->get_name() != "worker" && command->get_name() != "sensor")
-            names.push_back(command->get_name());
-    if (names.empty()) return fmt::format("what `{} --help` tells", full_name(*at));
-    return fmt::format("`{}` and one of {}", full_name(*at), fmt::join(names, ", "));
+/// How many letters must be put in, left out or exchanged to make one word of the other.
+std::size_t distance_between(const std::string& a, const std::string& b) {
+    std::vector<std::size_t> row(b.size() + 1);
+    std::iota(row.begin(), row.end(), 0);
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+        std::size_t diagonal = row[0]++;
+        for (std::size_t k = 1; k <= b.size(); ++k) {
+            const std::size_t exchanged = diagonal + (a[i - 1] == b[k - 1] ? 0 : 1);
+            diagonal = row[k];
+            row[k] = std::min({exchanged, row[k] + 1, row[k - 1] + 1});
+        }
+    }
+    return row.back();
 }
 
-int parse(CLI::App& program, int argc, char** argv, const int& status) {
+std::string nearest(const std::string& word, const std::vector<std::string>& words) {
+    return *std::min_element(words.begin(), words.end(), [&](const std::string& a, const std::string& b) {
+        return distance_between(word, a) < distance_between(word, b);
+    });
+}
+
+/// "found ..., expected ..." for a line that CLI11 did not understand; `at` is the last command that it did.
+std::string explain(const CLI::App& at, const std::string& what) {
+    const std::string name = full_name(at), help = fmt::format("see `{} --help`", name);
+    const std::vector<std::string> rest = at.remaining();
+    const DeclaredCommand declared = declared_commands(at).front();
+    if (!declared.commands.empty() && rest.empty())
+        return fmt::format("found no command, expected {}; usage: `{} COMMAND ...`",
+                           one_of(declared.commands), name);
+    if (!declared.commands.empty())
+        return fmt::format("found `{} {}`, expected {}; the nearest is {}", name, rest.front(),
+                           one_of(declared.commands), nearest(rest.front(), declared.commands));
+    std::vector<std::string> options = {"--help"};
+    for (const DeclaredOption& option : declared.options)
+        if (!option.argument()) options.push_back(option.name);
+    if (!rest.empty() && rest.front().starts_with('-'))
+        return fmt::format("found {}, expected an option of `{}`; the nearest is {}", rest.front(), name,
+                           nearest(rest.front(), options));
+    if (!rest.empty())
+        return fmt::format("found argument {}, expected no more of `{}`; {}", rest.front(), name, help);
+    for (const auto& [words, meaning] : {std::pair(" is required", "found no {}, expected one; {}"),
+                                         {" excludes ", "found {} with {}, expected one of them; {}"},
+                                         {" requires ", "found {} without {}, expected both; {}"}})
+        if (const std::size_t k = what.find(words); k != std::string::npos) {
+            const std::string first = what.substr(0, k), second = what.substr(k + std::string(words).size());
+            return second.empty() ? fmt::format(fmt::runtime(meaning), first, help)
+                                  : fmt::format(fmt::runtime(meaning), first, second, help);
+        }
+    return fmt::format("found bad usage of `{}` ({}), expected what its help tells; {}", name, what, help);
+}
+
+int parse(CLI::App& program, int argc, char** argv) {
     try {
         program.parse(argc, argv);
-    } catch (const CLI::CallForHelp& help) {
-        return program.exit(help);
-    } catch (const CLI::CallForAllHelp& help) {
-        return program.exit(help);
-    } catch (const CLI::CallForVersion& version) {
-        return program.exit(version);
+    } catch (const CLI::Success& help_or_version) {
+        return program.exit(help_or_version);
     } catch (const CLI::ParseError& wrong) {
-        const std::string typed =
-            fmt::format("{} {}", program.get_name(), fmt::join(argv + 1, argv + argc, " "));
-        return complain(fmt::format("error: found bad usage in `{}` ({}), expected {}", typed, wrong.what(),
-                                    what_to_say(program)),
-                        kBadInput);
+        const CLI::App* at = &program;
+        while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
+        return complain("error: " + explain(*at, wrong.what()), kBadInput);
+    } catch (const ExitStatus& ended) {
+        return ended.status;
     }
-    return status;
+    return 0;
 }
 
-}  // namespace
+/// Whoever read standard output has closed it, as `head` does when it has enough.
+bool reader_left() {
+    pollfd out{STDOUT_FILENO, POLLOUT, 0};
+    return std::ferror(stdout) != 0 && ::poll(&out, 1, 0) == 1 && (out.revents & POLLERR) != 0;
+}
 
-int run_commands(CLI::App& program, int argc, char** argv, const int& status) {
-    // A file that may not grow and a reader that went away are errors to report, not reasons to die.
-    std::signal(SIGXFSZ, SIG_IGN);
-    std::signal(SIGPIPE, SIG_IGN);
+int parse_and_report(CLI::App& program, int argc, char** argv) {
     try {
-        const int status_at_end = parse(program, argc, argv, status);
-        if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
-            return complain("error: found standard output that takes no more, expected room for the result",
-                            kFailed);
-        return status_at_end;
+        const int status = parse(program, argc, argv);
+        if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return status;
+        if (reader_left()) return status;
+        return complain("error: cannot write to standard output", kFailed);
     } catch (const BadInput& wrong) {
         return complain(wrong.what(), kBadInput);
     } catch (const tracking::TraceError& wrong) {
@@ -92,16 +123,16 @@ int run_commands(CLI::App& program, int argc, char** argv, const int& status) {
     } catch (const std::bad_alloc&) {
         return complain("error: found too little memory, expected enough for this input", kFailed);
     } catch (const std::exception& wrong) {
-        return complain(wrong.what(), kFailed);
+        return reader_left() ? kFailed : complain(wrong.what(), kFailed);
     }
 }
 
-int run_command_line(int argc, char** argv) {
-    CLI::App program("MusicWorld: tracked drumsticks play a virtual kit, predicted ahead of the lag",
-                     "musicworld");
-    program.set_version_flag("--version", MUSICWORLD_VERSION);
-    program.require_subcommand(1);
-    int status = 0;
+}  // namespace
+
+void add_commands(CLI::App& tree) {
+    tree.set_version_flag(
+        "--version", [] { return version_text(); }, "Print the version, the build and the libraries");
+    Command program(tree);
     add_play_command(program);
     add_predict_command(program);
     add_kit_command(program);
@@ -111,12 +142,29 @@ int run_command_line(int argc, char** argv) {
     add_record_command(program);
     add_modes_command(program);
     add_bench_command(program);
-    add_simulate_command(program, status);
-    add_keys_command(program);
+    add_simulate_command(program);
     add_schema_command(program);
-    add_worker_command(program, status);
-    add_sensor_command(program, status);
-    return run_commands(program, argc, argv, status);
+    add_worker_commands(program);
+    add_manual_commands(program, tree);
+}
+
+int run_commands(CLI::App& program, int argc, char** argv) {
+    // A file that may not grow and a reader that went away are errors to report, not reasons to die at once.
+    std::signal(SIGXFSZ, SIG_IGN);
+    std::signal(SIGPIPE, SIG_IGN);
+    const int status = parse_and_report(program, argc, argv);
+    if (reader_left()) {  // now, with everything in order, end as other tools do
+        std::signal(SIGPIPE, SIG_DFL);
+        std::raise(SIGPIPE);
+    }
+    return status;
+}
+
+int run_command_line(int argc, char** argv) {
+    CLI::App program("MusicWorld: tracked drumsticks play a virtual kit, predicted ahead of the lag",
+                     "musicworld");
+    add_commands(program);
+    return run_commands(program, argc, argv);
 }
 
 }  // namespace app

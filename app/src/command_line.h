@@ -6,11 +6,14 @@ class App;
 
 namespace app {
 
-/// Parses the arguments, which runs the commands of `program`. Prints errors as one line on standard error.
-/// Returns `status` as the command left it, or 1: failed while running; 2: bad usage or bad input.
-[[nodiscard]] int run_commands(CLI::App& program, int argc, char** argv, const int& status);
+/// Adds all commands of musicworld to `program`.
+void add_commands(CLI::App& program);
 
-/// The program `musicworld`. Returns 0: done; 1: failed while running; 2: bad usage or bad input.
+/// Parses the arguments, which runs one of the commands of `program`. Prints errors as one line on standard
+/// error. Returns 0: done; 1: failed while running; 2: bad usage or bad input; or what the command ended with.
+[[nodiscard]] int run_commands(CLI::App& program, int argc, char** argv);
+
+/// The program musicworld.
 [[nodiscard]] int run_command_line(int argc, char** argv);
 
 }  // namespace app

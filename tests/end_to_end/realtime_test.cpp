@@ -149,8 +149,7 @@ TEST(Realtime, WhatCannotBeIsRefusedInOneLine) {
         {"--realtime", "--priority", "high"},
         {"--realtime", "--disturb", "rain:1@2"},
         {"--realtime", "--output-lead", "0.010"},
-        {"--realtime", "--source", "osc:70000"},
-        {"--realtime", "--source", "pigeon"},
+        {"--realtime", "--source", "stdin"},  // with TRACE
         {"--realtime", "--sound-predictor", "exec:cat"},
         {"--realtime", "--solo", "1"},
     };
@@ -161,6 +160,8 @@ TEST(Realtime, WhatCannotBeIsRefusedInOneLine) {
         EXPECT_NE(ended.err.find("expected"), std::string::npos) << ended.err;
         EXPECT_FALSE(fs::exists(folder / "played/summary.json"));
     }
+    for (const std::string source : {"osc:70000", "pigeon"})
+        expect_refused(run({"play", "--realtime", "--source", source, "--out", folder / "played"}), source);
     // No JACK server runs under this name.
     const Ended jack = run(in_time("play", folder / "played", {"--realtime", "--jack", "--no-frames"}),
                            {"JACK_DEFAULT_SERVER=musicworld-none"});

@@ -1,5 +1,3 @@
-#include "commands/bench_command.h"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -9,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "commands/command.h"
+#include "commands/commands.h"
 #include "process/child_process.h"
 
 namespace app {
@@ -30,12 +30,11 @@ void become_bench(std::vector<std::string> arguments) {
 
 }  // namespace
 
-void add_bench_command(CLI::App& program) {
-    CLI::App* command = program.add_subcommand(
-        "bench", "Measure speed beside peers, and speed against error (the program musicworld_bench)");
-    command->prefix_command();
-    command->set_help_flag();
-    command->callback([command] { become_bench(command->remaining()); });
+void add_bench_command(Command& program) {
+    program
+        .command("bench",
+                 "Measure speed beside peers, and speed against error (the program musicworld_bench)")
+        .hands_on(become_bench);
 }
 
 }  // namespace app

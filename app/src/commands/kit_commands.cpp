@@ -1,5 +1,3 @@
-#include "commands/kit_commands.h"
-
 #include <fmt/format.h>
 #include <render/renderer.h>
 
@@ -7,10 +5,12 @@
 #include <memory>
 #include <optional>
 
+#include "commands/command.h"
+#include "commands/commands.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/finished_file.h"
-#include "files/option_values.h"
+#include "files/one_line.h"
 #include "kit/kit.h"
 #include "pictures/kit_stage.h"
 #include "strikes/kit_fit.h"
@@ -62,37 +62,34 @@ void show_kit(const std::string& name) {
     for (const Instrument& instrument : kit.instruments) show_instrument(instrument);
 }
 
-void draw_kit(const std::string& name, const std::string& out, const std::string& size) {
-    const Eigen::Vector2i pixels = parse_size(size, "--size");
-    if (pixels.minCoeff() < 16 || pixels.maxCoeff() > 8192)
-        throw BadInput(fmt::format("error: found --size {}, expected 16x16 to 8192x8192", size));
-    const Kit kit = read_kit(find_kit(name));
+struct DrawOptions {
+    std::string kit, out;
+    Eigen::Vector2i size = {640, 480};  // [pixels]
+};
+
+void draw_kit(const DrawOptions& o) {
+    const Kit kit = read_kit(find_kit(o.kit));
     const KitStage stage(kit, 0, StickGeometry{});
-    render::Renderer renderer(stage.scene(pixels.x(), pixels.y()));
+    render::Renderer renderer(stage.scene(o.size.x(), o.size.y()));
     render::Image image;
     renderer.draw(stage.frame({}, {}), image);
-    write_finished_file(out, render::encode_png(image));
+    write_finished_file(o.out, render::encode_png(image));
 }
 
-struct FitArguments {
+struct FitOptions {
     std::vector<std::string> traces;
-    std::string kind = "drum", radius = "0.006", tip, shaft, out;
+    std::string kind = "drum", out;
+    double radius_m = 0.006;
+    std::optional<Eigen::Vector3d> tip, shaft;
 };
 
 /// The sticks of all traces must be alike, as the kit has one [stick].
-StickGeometry common_geometry(const std::vector<tracking::Trace>& traces, const FitArguments& a) {
+StickGeometry common_geometry(const std::vector<tracking::Trace>& traces, const FitOptions& o) {
     StickDefinition stick;
-    stick.radius_m = parse_number(a.radius, "--radius");
-    if (!(stick.radius_m >= 0.001 && stick.radius_m <= 0.1))
-        throw BadInput(fmt::format("error: found --radius {}, expected 0.001 to 0.1 m", a.radius));
-    std::optional<Eigen::Vector3d> tip, shaft;
-    if (!a.tip.empty()) tip = parse_vector(a.tip, "--tip");
-    if (tip && tip->cwiseAbs().maxCoeff() > 2)
-        throw BadInput(fmt::format("error: found --tip {}, expected coordinates within 2 m", a.tip));
-    if (!a.shaft.empty()) shaft = parse_axis(a.shaft, "--shaft");
-    StickGeometry first = stick_geometry(traces.front(), stick, tip, shaft);
+    stick.radius_m = o.radius_m;
+    const StickGeometry first = stick_geometry(traces.front(), stick, o.tip, o.shaft);
     for (const tracking::Trace& trace : traces) {
-        const StickGeometry other = stick_geometry(trace, stick, tip, shaft);
+        const StickGeometry other = stick_geometry(trace, stick, o.tip, o.shaft);
         if (other.tip != first.tip || other.shaft != first.shaft)
             throw BadInput(
                 fmt::format("{}: error: found a tip or shaft other than that of {}, expected one for all; "
@@ -102,20 +99,20 @@ StickGeometry common_geometry(const std::vector<tracking::Trace>& traces, const 
     return first;
 }
 
-void fit(const FitArguments& a) {
+void fit(const FitOptions& o) {
     std::vector<tracking::Trace> traces;
-    for (const std::string& file : a.traces) traces.push_back(tracking::read_trace(find_trace(file)));
-    const StickGeometry geometry = common_geometry(traces, a);
+    for (const std::string& file : o.traces) traces.push_back(tracking::read_trace(find_trace(file)));
+    const StickGeometry geometry = common_geometry(traces, o);
     const KitFit fitted = fit_kit(traces, geometry);
-    const std::string name = fs::path(a.traces.front()).filename().string();
-    const std::string text = format_fitted_kit(fitted, a.kind, name, geometry, !a.tip.empty());
-    if (a.out.empty()) {
+    const std::string name = fs::path(o.traces.front()).filename().string();
+    const std::string text = format_fitted_kit(fitted, o.kind, name, geometry, o.tip.has_value());
+    if (o.out.empty()) {
         fmt::print("{}", text);
         return;
     }
-    write_finished_file(a.out, text);
+    write_finished_file(o.out, text);
     for (std::size_t i = 0; i < fitted.instruments.size(); ++i)
-        fmt::print("{} {}: {}\n", a.kind, i + 1, describe(fitted.instruments[i]));
+        fmt::print("{} {}: {}\n", o.kind, i + 1, describe(fitted.instruments[i]));
 }
 
 /// A small kit to start from.
@@ -163,71 +160,66 @@ void make_new(const std::string& name, const std::string& out) {
         }))
         throw BadInput(
             "error: found a kit's name with quotes, backslashes or control characters, expected plain text");
-    std::error_code error;
-    if (fs::exists(out, error))
-        throw BadInput(
-            fmt::format("{}: error: found a file of that name, expected none; choose another --out", out));
     write_finished_file(out, fmt::format(kNewKit, name));
 }
 
-void add_fit(CLI::App& kit) {
-    CLI::App* command = kit.add_subcommand("fit", "Place a kit where the sticks of traces strike");
-    auto a = std::make_shared<FitArguments>();
-    command->add_option("TRACE", a->traces, "Traces (CSV)")->required();
-    command->add_option("--kind", a->kind, "Instruments to place")
-        ->check(CLI::IsMember({"drum", "cymbal", "bell"}))
-        ->capture_default_str();
-    command->add_option("--radius", a->radius, "Radius of the tip [m]")->capture_default_str();
-    command->add_option("--tip", a->tip, "Tip in the tracked body's frame, X,Y,Z [m]; the kit then says so");
-    command->add_option("--shaft", a->shaft, "Body axis from hand to tip, e.g. -z (turns the camera)");
-    command->add_option("--out", a->out, "Kit to write; printed if left out");
-    command->callback([a] { fit(*a); });
+void add_fit(Command& kit) {
+    Command command = kit.command("fit", "Place a kit where the sticks of traces strike");
+    auto o = std::make_shared<FitOptions>();
+    command.options("TRACE", o->traces, as::text("TRACE"), "Traces (CSV)").required();
+    command.option("--kind", o->kind, as::choice({"drum", "cymbal", "bell"}), "Instruments to place");
+    command.option("--radius", o->radius_m, as::number(0.001, 0.1, "m"), "Radius of the tip");
+    command.option("--tip", o->tip, as::vector_of_3(as::number(-2, 2, "m")),
+                   "Tip in the tracked body's frame; the kit then says so");
+    command.option("--shaft", o->shaft, as::axis(), "Body axis from hand to tip (turns the camera)");
+    command.option("--out", o->out, as::text("FILE"), "Kit to write; printed if left out");
+    command.runs([o] { fit(*o); });
 }
 
-void add_draw(CLI::App& kit) {
-    CLI::App* command = kit.add_subcommand("draw", "Draw a kit at rest");
-    auto name = std::make_shared<std::string>(), out = std::make_shared<std::string>();
-    auto size = std::make_shared<std::string>("640x480");
-    command->add_option("KIT", *name, "Kit: a file, or the name of a bundled one")->required();
-    command->add_option("--out", *out, "Picture to write (PNG)")->required();
-    command->add_option("--size", *size, "Its size")->capture_default_str();
-    command->callback([name, out, size] { draw_kit(*name, *out, *size); });
+void add_draw(Command& kit) {
+    Command command = kit.command("draw", "Draw a kit at rest");
+    auto o = std::make_shared<DrawOptions>();
+    command.option("KIT", o->kit, as::text("KIT"), "Kit: a file, or the name of a bundled one").required();
+    command.option("--out", o->out, as::text("FILE"), "Picture to write (PNG)").required();
+    command.option("--size", o->size, as::pixels(16, 8192), "Its size");
+    command.runs([o] { draw_kit(*o); });
 }
 
-void add_check(CLI::App& kit) {
-    CLI::App* command = kit.add_subcommand("check", "Check kits; the first fault ends it");
+void add_kit_check(Command& kit) {
+    Command command = kit.command("check", "Check kits; the first fault ends it");
     auto names = std::make_shared<std::vector<std::string>>();
-    command->add_option("KIT", *names, "Kits: files, or names of bundled ones")->required();
-    command->callback([names] {
+    command.options("KIT", *names, as::text("KIT"), "Kits: files, or names of bundled ones").required();
+    command.runs([names] {
         for (const std::string& name : *names) {
             const Kit checked = read_kit(find_kit(name));
-            fmt::print("{}: in order, {} instruments\n", checked.file.string(), checked.instruments.size());
+            fmt::print("{}: in order, {}\n", checked.file.string(),
+                       counted(checked.instruments.size(), "instrument"));
         }
     });
 }
 
-void add_new(CLI::App& kit) {
-    CLI::App* command = kit.add_subcommand("new", "Write a small kit to start from");
+void add_new(Command& kit) {
+    Command command = kit.command("new", "Write a small kit to start from");
     auto name = std::make_shared<std::string>(), out = std::make_shared<std::string>();
-    command->add_option("NAME", *name, "The kit's name")->required();
-    command->add_option("--out", *out, "Kit to write (TOML)")->required();
-    command->callback([name, out] { make_new(*name, *out); });
+    command.option("NAME", *name, as::text("NAME"), "The kit's name").required();
+    command.option("--out", *out, as::text("FILE"), "Kit to write (TOML); replaced if there is one")
+        .required();
+    command.runs([name, out] { make_new(*name, *out); });
 }
 
 }  // namespace
 
-void add_kit_command(CLI::App& program) {
-    CLI::App* kit = program.add_subcommand("kit", "List, show, check, draw, fit or make kits");
-    kit->require_subcommand(1);
-    kit->add_subcommand("list", "List the bundled kits")->callback(list_kits);
-    CLI::App* show = kit->add_subcommand("show", "Show what a kit holds");
+void add_kit_command(Command& program) {
+    Command kit = program.command("kit", "List, show, check, draw, fit or make kits");
+    kit.command("list", "List the bundled kits").runs(list_kits);
+    Command show = kit.command("show", "Show what a kit holds");
     auto name = std::make_shared<std::string>();
-    show->add_option("KIT", *name, "Kit: a file, or the name of a bundled one")->required();
-    show->callback([name] { show_kit(*name); });
-    add_check(*kit);
-    add_draw(*kit);
-    add_fit(*kit);
-    add_new(*kit);
+    show.option("KIT", *name, as::text("KIT"), "Kit: a file, or the name of a bundled one").required();
+    show.runs([name] { show_kit(*name); });
+    add_kit_check(kit);
+    add_draw(kit);
+    add_fit(kit);
+    add_new(kit);
 }
 
 }  // namespace app

@@ -6,8 +6,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "commands/play_arguments.h"
-#include "commands/realtime_arguments.h"
+#include "commands/play_command.h"
 #include "files/output_folder.h"
 #include "latency/latency_comparison.h"
 #include "latency/latency_tables.h"
@@ -16,10 +15,7 @@ namespace app {
 namespace fs = std::filesystem;
 namespace {
 
-/// The options as typed.
-struct Typed {
-    PlayArguments play;
-    RealtimeArguments in_time;
+struct LatencyOptions : RealtimeOptions {
     std::vector<std::string> compare;
     bool json = false;
 };
@@ -47,30 +43,29 @@ private:
     fs::path path_;
 };
 
-void compare(const Typed& typed) {
-    const LatencyComparison comparison = compare_latency(typed.compare[0], typed.compare[1]);
-    if (!typed.play.out.empty()) {
+void compare(const LatencyOptions& o) {
+    const LatencyComparison comparison = compare_latency(o.compare[0], o.compare[1]);
+    if (!o.play.out.empty()) {
         static constexpr std::array<std::string_view, 2> kProducts = {"comparison.json", "report.html"};
-        OutputFolder out(typed.play.out, kProducts);
+        OutputFolder out(o.play.out, kProducts);
         write_file(out.path("comparison.json"), format_json(comparison));
         write_file(out.path("report.html"), format_page(comparison));
         out.finish();
     }
-    fmt::print("{}", typed.json ? format_json(comparison) : format_text(comparison));
+    fmt::print("{}", o.json ? format_json(comparison) : format_text(comparison));
 }
 
-void measure(const Typed& typed, const RunInTime& run) {
+void measure(const LatencyOptions& o, const RunInTime& run) {
     std::unique_ptr<PassingFolder> passing;
-    RealtimeOptions options = realtime_options(play_options(typed.play), typed.in_time);
-    if (typed.play.out.empty()) {
+    RealtimeOptions options = o;
+    if (o.play.out.empty()) {
         passing = std::make_unique<PassingFolder>();
         options.play.out = passing->path();
     }
     const RealtimeOutcome outcome = run(options);
-    fmt::print("{}", typed.json ? format_latency_json(outcome.latency, outcome.play, outcome.realtime)
-                                : format_latency_text(outcome.latency, outcome.realtime));
-    if (!typed.play.out.empty() && !typed.json)
-        fmt::print("Look at {}\n", (options.play.out / "latency.html").string());
+    fmt::print("{}", o.json ? format_latency_json(outcome.latency, outcome.play, outcome.realtime)
+                            : format_latency_text(outcome.latency, outcome.realtime));
+    if (!passing && !o.json) fmt::print("Look at {}\n", (options.play.out / "latency.html").string());
     if (!outcome.failure.empty()) throw std::runtime_error(outcome.failure);
 }
 
@@ -80,27 +75,28 @@ RealtimeOutcome run_and_warn(const RealtimeOptions& options) {
 
 }  // namespace
 
-void add_latency_command(CLI::App& program, const RunInTime& run) {
-    CLI::App* command = program.add_subcommand(
+void add_latency_command(Command& program, const RunInTime& run) {
+    Command command = program.command(
         "latency",
         "Play in real time and measure: each stage's latency, deadlines missed, sound against picture, leads "
         "needed");
-    auto typed = std::make_shared<Typed>();
-    add_play_options(*command, typed->play);
-    add_realtime_options(*command, typed->in_time);
-    command->add_flag("--json", typed->json, "Print one JSON document");
-    command->add_option("--out", typed->play.out,
-                        "Folder for what play writes, latency.json, latency.html and the rows as CSV");
+    auto o = std::make_shared<LatencyOptions>();
+    o->play.out.clear();
+    add_realtime_options(command, *o, add_play_options(command, o->play));
+    command.flag("--no-frames", o->play.frames, "Draw nothing", false);
+    command.flag("--json", o->json, "Print one JSON document");
+    command.option("--out", o->play.out, as::text("DIR"),
+                   "Folder for what play writes, latency.json, latency.html and the rows as CSV");
     command
-        ->add_option("--compare", typed->compare,
-                     "Two such folders of earlier runs: their figures side by side (--out: comparison.json, "
-                     "report.html)")
-        ->expected(2);
-    command->callback([typed, run] {
-        if (typed->compare.empty())
-            measure(*typed, run ? run : run_and_warn);
+        .options("--compare", o->compare, as::text("DIR"),
+                 "Two such folders of earlier runs: their figures side by side (--out: comparison.json, "
+                 "report.html)")
+        .expected(2);
+    command.runs([o, run] {
+        if (o->compare.empty())
+            measure(*o, run ? run : run_and_warn);
         else
-            compare(*typed);
+            compare(*o);
     });
 }
 

@@ -1,7 +1,7 @@
 #pragma once
-#include <CLI/CLI.hpp>
 #include <functional>
 
+#include "commands/command.h"
 #include "realtime/play_realtime.h"
 
 namespace app {
@@ -10,6 +10,6 @@ namespace app {
 using RunInTime = std::function<RealtimeOutcome(const RealtimeOptions&)>;
 
 /// Adds `latency` to the program: play_realtime(), or `run` in its place, and what it measured.
-void add_latency_command(CLI::App& program, const RunInTime& run = {});
+void add_latency_command(Command& program, const RunInTime& run = {});
 
 }  // namespace app

@@ -1,97 +1,169 @@
-#include "commands/modes_command.h"
-
 #include <fmt/format.h>
+#include <sim/modes.h>
 
 #include <array>
-#include <cstdio>
+#include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
-#include <string_view>
 
-#include "commands/mode_report.h"
+#include "commands/command.h"
+#include "commands/commands.h"
 #include "files/bad_input.h"
-#include "files/comma_list.h"
-#include "files/option_values.h"
 #include "files/output_folder.h"
 #include "pictures/mode_pictures.h"
 
 namespace app {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 constexpr int kMostElements = 10, kMostModes = 150, kElementModes = 75, kMostPictures = 75;
 constexpr double kSmallest = 1e-6;  // a size [m]
 
-struct ModesArguments {
-    std::string size, young, poisson, density, shape = "box", exponents, elements = "1", count, out;
+struct ModesOptions {
+    sim::ModesRequest request;
+    Eigen::Vector3d size = Eigen::Vector3d::Zero();  // full extents [m]
+    std::string shape = "box", out;
+    std::optional<Eigen::Vector2d> exponents;
     bool json = false, frames = false;
 };
 
-/// A shape by name; without exponents they must be given.
-struct NamedShape {
-    std::string_view name;
-    double e1, e2;
-};
-constexpr std::array<NamedShape, 4> kShapes = {
-    {{"box", 0.1, 0.1}, {"ellipsoid", 1, 1}, {"cylinder", 0.1, 1}, {"superquadric", 0, 0}}};
-
-const NamedShape& shape_named(const std::string& name) {
-    for (const NamedShape& shape : kShapes)
-        if (shape.name == name) return shape;
-    throw BadInput(fmt::format(
-        "error: found --shape \"{}\", expected box, ellipsoid, cylinder (its axis is y) or superquadric",
-        name));
-}
-
-double number_in(const std::string& text, const std::string& option, double low, double high,
-                 const std::string& expected) {
-    const double value = parse_number(text, option);
-    if (!(value > low && value < high))
-        throw BadInput(fmt::format("error: found {} {}, expected {}", option, text, expected));
-    return value;
-}
-
-void set_exponents(sim::Superquadric& shape, const NamedShape& named, const std::string& exponents) {
-    const bool free = named.name == "superquadric";
-    if (free == exponents.empty())
+/// The exponents of the shapes that have a name; a superquadric's are given.
+Eigen::Vector2d exponents_of(const ModesOptions& o) {
+    const bool free = o.shape == "superquadric";
+    if (free && !o.exponents)
         throw BadInput(
-            free ? std::string("error: found --shape superquadric alone, expected --exponents E1,E2 "
-                               "with it, such as 0.5,1")
-                 : fmt::format("error: found --exponents with --shape {}, expected them with --shape "
-                               "superquadric only; leave one out",
-                               named.name));
-    shape.e1 = named.e1;
-    shape.e2 = named.e2;
-    if (!free) return;
-    const std::vector<std::string> parts = split_at_commas(exponents);
-    if (parts.size() != 2)
-        throw BadInput(fmt::format("error: found --exponents \"{}\", expected two numbers E1,E2", exponents));
-    const std::string expected = "each exponent from 0.1 (edges) by 1 (round) to 1.9 (pinched)";
-    shape.e1 = number_in(parts[0], "--exponents", 0.1 - 1e-12, 1.9 + 1e-12, expected);
-    shape.e2 = number_in(parts[1], "--exponents", 0.1 - 1e-12, 1.9 + 1e-12, expected);
+            "error: found --shape superquadric alone, expected --exponents E1,E2 with it, such as 0.5,1");
+    if (!free && o.exponents)
+        throw BadInput(fmt::format(
+            "error: found --exponents with --shape {}, expected them with --shape superquadric only; "
+            "leave one out",
+            o.shape));
+    if (free) return *o.exponents;
+    return o.shape == "box"         ? Eigen::Vector2d(0.1, 0.1)
+           : o.shape == "ellipsoid" ? Eigen::Vector2d(1, 1)
+                                    : Eigen::Vector2d(0.1, 1);  // a cylinder
 }
 
-sim::ModesRequest request_of(const ModesArguments& a) {
-    sim::ModesRequest request;
-    const NamedShape& shape = shape_named(a.shape);
-    const Eigen::Vector3d size = parse_vector(a.size, "--size");
-    if (!(size.minCoeff() >= kSmallest))
-        throw BadInput(fmt::format("error: found --size {}, expected full extents from {:g} to 1000 m",
-                                   a.size, kSmallest));
-    request.shape.semi_axes = size / 2;
-    set_exponents(request.shape, shape, a.exponents);
-    request.domain = shape.name == "box" ? sim::ModeDomain::box : sim::ModeDomain::superquadric;
-    request.material.young_pa = number_in(a.young, "--young", 0, 1e15, "more than 0 Pa, at most 1e15");
-    request.material.poisson =
-        number_in(a.poisson, "--poisson", -1, 0.5, "more than -1 and less than 0.5; rubber is 0.49");
-    request.material.density_kg_m3 =
-        number_in(a.density, "--density", 0, 1e6, "more than 0 kg/m3, at most 1e6");
-    request.elements = parse_whole(a.elements, "--elements", 1, kMostElements);
-    request.count = a.count.empty() ? kElementModes : parse_whole(a.count, "--count", 1, kMostModes);
+sim::ModesRequest request_of(const ModesOptions& o) {
+    sim::ModesRequest request = o.request;
+    const Eigen::Vector2d exponents = exponents_of(o);
+    request.shape.semi_axes = o.size / 2;
+    request.shape.e1 = exponents[0], request.shape.e2 = exponents[1];
+    request.domain = o.shape == "box" ? sim::ModeDomain::box : sim::ModeDomain::superquadric;
     return request;
 }
 
-void write_products(const ModesArguments& a, const ModeReport& report) {
+/// The free vibration modes of one body, with what the mesh errs.
+struct ModeReport {
+    sim::ModesRequest request;
+    std::string shape;  ///< as asked for: "box", "cylinder" ...
+    sim::FreeVibrationModes modes;
+    Eigen::VectorXd errors;  ///< of the frequencies, relative; NaN: not known
+};
+double frequency_hz(double eigenvalue) {
+    return std::sqrt(std::max(0.0, eigenvalue)) / (2 * M_PI);
+}
+
+int rows(const ModeReport& report) {
+    return 6 + report.modes.basis.count();
+}
+
+std::string percent(double error) {
+    return std::isfinite(error) ? fmt::format("{:.2g} %", 100 * error) : "unknown";
+}
+
+std::string heading(const ModeReport& report) {
+    const sim::ModesRequest& r = report.request;
+    const Eigen::Vector3d size = 2 * r.shape.semi_axes;
+    std::string text = fmt::format("{} {:g} x {:g} x {:g} m", report.shape, size.x(), size.y(), size.z());
+    if (r.domain == sim::ModeDomain::superquadric)
+        text += fmt::format(" (exponents {:g}, {:g})", r.shape.e1, r.shape.e2);
+    return text +
+           fmt::format(", E {:g} Pa, nu {:g}, density {:g} kg/m3, {} x {} x {} elements of 27 nodes\n\n",
+                       r.material.young_pa, r.material.poisson, r.material.density_kg_m3, r.elements,
+                       r.elements, r.elements);
+}
+
+/// "stretching", "bending x", "shear xy", "twisting"; of rigid modes "translation x", "rotation z".
+std::string mode_kind(int parity, bool rigid) {
+    static constexpr std::array<std::string_view, 8> kElastic = {
+        "stretching", "bending x", "bending y", "shear xy", "bending z", "shear xz", "shear yz", "twisting"};
+    static constexpr std::array<std::string_view, 8> kRigid = {
+        "", "translation x", "translation y", "rotation z", "translation z", "rotation y", "rotation x", ""};
+    return std::string((rigid ? kRigid : kElastic).at(static_cast<std::size_t>(parity)));
+}
+
+std::string table_row(const ModeReport& report, int mode) {
+    const int at = 6 + mode;
+    const double eigenvalue = report.modes.eigenvalues[at];
+    return fmt::format("{:>4}  {:>14.6g}  {:>20.10g}  {:<11}  {:>10}\n", mode + 1, frequency_hz(eigenvalue),
+                       eigenvalue, mode_kind(report.modes.parity[static_cast<std::size_t>(at)], false),
+                       percent(report.errors[mode]));
+}
+
+std::string ending(const ModeReport& report) {
+    const sim::GroupCut& cut = report.modes.cut;
+    std::string text = fmt::format(
+        "\nSix rigid modes are left out. error: how far the frequency is above that of an infinitely fine "
+        "mesh, "
+        "estimated with {} elements a side.\n",
+        sim::finer_elements(report.request.elements));
+    if (cut.below != cut.count)
+        text += fmt::format(
+            "{} modes cut a group of equal frequencies, of which any mixture is a mode: whole groups end at "
+            "{} and "
+            "{}.\n",
+            cut.count, cut.below, cut.above);
+    return text;
+}
+
+Json numbers(const Eigen::Ref<const Eigen::VectorXd>& values) {
+    Json list = Json::array();
+    for (const double v : values) list.push_back(std::isfinite(v) ? Json(v) : Json());
+    return list;
+}
+
+/// A table for people.
+std::string format_mode_table(const ModeReport& report) {
+    std::string text =
+        heading(report) + "mode  frequency [Hz]  eigenvalue [rad2/s2]  kind              error\n";
+    for (int i = 0; i < report.modes.basis.count(); ++i) text += table_row(report, i);
+    return text + ending(report);
+}
+
+/// The document of `modes --json`: lists over all modes, the six rigid ones first; an unknown error is null.
+std::string format_mode_json(const ModeReport& report) {
+    const sim::ModesRequest& r = report.request;
+    const int n = rows(report);
+    const Eigen::VectorXd eigenvalues = report.modes.eigenvalues.head(n);
+    Eigen::VectorXd errors = Eigen::VectorXd::Zero(n);
+    errors.tail(n - 6) = report.errors;
+    Json kinds = Json::array();
+    for (int i = 0; i < n; ++i)
+        kinds.push_back(mode_kind(report.modes.parity[static_cast<std::size_t>(i)], i < 6));
+    const sim::GroupCut& cut = report.modes.cut;
+    const Eigen::VectorXd size = 2 * r.shape.semi_axes;
+    Json json = {{"size_m", numbers(size)},
+                 {"shape", report.shape},
+                 {"exponents", r.domain == sim::ModeDomain::box ? Json() : Json{r.shape.e1, r.shape.e2}},
+                 {"young_pa", r.material.young_pa},
+                 {"poisson", r.material.poisson},
+                 {"density_kg_m3", r.material.density_kg_m3},
+                 {"elements_per_side", r.elements},
+                 {"eigenvalues_rad2_s2", numbers(eigenvalues)},
+                 {"frequencies_hz", numbers(eigenvalues.unaryExpr(&frequency_hz))},
+                 {"kinds", kinds},
+                 {"discretisation_error", numbers(errors)},
+                 {"discretisation_error_from_elements", sim::finer_elements(r.elements)},
+                 {"cut", {{"count", cut.count}, {"below", cut.below}, {"above", cut.above}}}};
+    return json.dump(2) + "\n";
+}
+
+void write_products(const ModesOptions& a, const ModeReport& report) {
     OutputFolder folder(a.out, modes_products());
     write_file(folder.path("modes.json"), format_mode_json(report));
     if (a.frames) {
@@ -102,10 +174,12 @@ void write_products(const ModesArguments& a, const ModeReport& report) {
     folder.finish();
 }
 
-void run(const ModesArguments& a) {
+void run(const ModesOptions& a) {
     if (a.frames && a.out.empty())
         throw BadInput("error: found --frames without --out, expected --out DIR for the pictures");
-    const ModeReport report = make_mode_report(request_of(a), a.shape);
+    ModeReport report{request_of(a), a.shape, {}, {}};
+    report.modes = sim::free_vibration_modes(report.request);
+    report.errors = sim::discretisation_errors(report.request, report.modes);
     if (!a.out.empty()) write_products(a, report);
     fmt::print("{}", a.json ? format_mode_json(report) : format_mode_table(report));
     if (a.frames && !a.json) fmt::print("Pictures: {}/modes.png\n", a.out);
@@ -113,25 +187,33 @@ void run(const ModesArguments& a) {
 
 }  // namespace
 
-void add_modes_command(CLI::App& program) {
-    CLI::App* command = program.add_subcommand("modes", "Free vibration modes of a solid body");
-    auto a = std::make_shared<ModesArguments>();
-    command->add_option("--size", a->size, "Full extents X,Y,Z [m]")->required();
-    command->add_option("--young", a->young, "Young's modulus [Pa]")->required();
-    command->add_option("--poisson", a->poisson, "Poisson's ratio, above -1 and below 0.5")->required();
-    command->add_option("--density", a->density, "Density [kg/m3]")->required();
-    command->add_option("--shape", a->shape, "box, ellipsoid, cylinder (its axis is y) or superquadric")
-        ->capture_default_str();
-    command->add_option("--exponents", a->exponents, "E1,E2 of a superquadric, 0.1 to 1.9");
-    command->add_option("--elements", a->elements, "Elements of 27 nodes a side, to 10")
-        ->capture_default_str();
-    command->add_option("--count", a->count, "Lowest modes that are not rigid, to 150; left out: 75");
-    command->add_flag("--json", a->json, "Print one JSON document");
-    command->add_option("--out", a->out, "Folder for modes.json and pictures");
-    command->add_flag(
-        "--frames", a->frames,
-        "Draw the lowest 75 mode shapes: frames/000001.png ..., and modes.png with all of them");
-    command->callback([a] { run(*a); });
+void add_modes_command(Command& program) {
+    Command command = program.command("modes", "Free vibration modes of a solid body");
+    auto o = std::make_shared<ModesOptions>();
+    sim::ModesRequest& request = o->request;
+    request.elements = 1, request.count = kElementModes;
+    command.option("--size", o->size, as::vector_of_3(as::number(kSmallest, 1000, "m")), "Full extents")
+        .required();
+    command.option("--young", request.material.young_pa, as::number_above(0, 1e15, "Pa"), "Young's modulus")
+        .required();
+    command
+        .option("--poisson", request.material.poisson, as::number_between(-1, 0.5),
+                "Poisson's ratio; rubber's is 0.49")
+        .required();
+    command.option("--density", request.material.density_kg_m3, as::number_above(0, 1e6, "kg/m3"), "Density")
+        .required();
+    command.option("--shape", o->shape, as::choice({"box", "ellipsoid", "cylinder", "superquadric"}),
+                   "What it is; a cylinder's axis is y");
+    command.option("--exponents", o->exponents, as::vector_of_2(as::number(0.1, 1.9)),
+                   "Of a superquadric: 0.1 makes edges, 1 is round, 1.9 pinched");
+    command.option("--elements", request.elements, as::whole(1, kMostElements),
+                   "Elements of 27 nodes per side");
+    command.option("--count", request.count, as::whole(1, kMostModes), "Lowest modes that are not rigid");
+    command.flag("--json", o->json, "Print one JSON document");
+    command.option("--out", o->out, as::text("DIR"), "Folder for modes.json and pictures");
+    command.flag("--frames", o->frames,
+                 "Draw the lowest 75 mode shapes: frames/000001.png ..., and modes.png with all of them");
+    command.runs([o] { run(*o); });
 }
 
 }  // namespace app

@@ -2,33 +2,22 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
-#include "commands/play_arguments.h"
-#include "commands/realtime_arguments.h"
+#include "files/assets.h"
 #include "files/bad_input.h"
+#include "files/one_line.h"
 #include "play/play.h"
-#include "realtime/play_realtime.h"
-#include "statistics/statistics.h"
+#include "sticks/predictors.h"
 #include "strikes/strike_score.h"
 
 namespace app {
+namespace fs = std::filesystem;
 namespace {
 
-/// The options as typed.
-struct Typed {
-    PlayArguments play;
-    RealtimeArguments in_time;
-    std::string video;
-    std::int64_t solo = -1;  // none
-    bool realtime = false;
-};
-
-PlayOptions options_of(const Typed& typed) {
-    PlayOptions options = play_options(typed.play);
-    if (typed.solo >= 0) options.solo = static_cast<std::uint64_t>(typed.solo);
-    if (!typed.video.empty()) options.video = typed.video;
-    return options;
+void refuse_together(const std::string& found, const std::string& expected) {
+    throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
 }
 
 void print_places(const PlayOptions& options) {
@@ -38,63 +27,146 @@ void print_places(const PlayOptions& options) {
     fmt::print("\n");
 }
 
-void print_result(const PlayResult& result, const PlayOptions& options) {
+std::string strikes_text(const StrikeScore& s) {
+    return fmt::format("{} of {} sounded, {} false, {} cancelled", s.true_contacts - s.missed,
+                       counted(s.true_contacts, "strike"), s.false_notes, s.cancelled);
+}
+
+void play_offline(const PlayOptions& options) {
+    const PlayResult result = play(options);
     const StrikeScore& s = result.score;
-    const int sounded = s.true_contacts - s.missed;
-    fmt::print(
-        "{} strikes of {} sounded, {} false, {} cancelled; median timing error {}; {:.1f} times real time\n",
-        sounded, s.true_contacts, s.false_notes, s.cancelled,
-        sounded > 0 ? fmt::format("{:.1f} ms", s.timing_median_ms) : "unknown (nothing matched)",
-        (result.t_end_s - result.t0_s) / result.wall_s);
+    fmt::print("{}; median timing error {}; {:.3g} times real time\n", strikes_text(s),
+               s.true_contacts > s.missed ? fmt::format("{:.1f} ms", s.timing_median_ms)
+                                          : "unknown (nothing matched)",
+               (result.t_end_s - result.t0_s) / result.wall_s);
     print_places(options);
 }
 
 void play_in_time(const RealtimeOptions& options) {
     const RealtimeOutcome outcome =
         play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
-    const StrikeScore& s = outcome.play.score;
-    const RealtimeResult& r = outcome.realtime;
     const auto unexplained = std::ranges::count_if(
         outcome.departures, [](const Divergence& d) { return d.cause == "unexplained"; });
-    fmt::print(
-        "{:.1f} s in real time: {} strikes of {} sounded, {} false, {} cancelled; {} of {} frames missed, {} "
-        "of {} notes late\n",
-        r.seconds, s.true_contacts - s.missed, s.true_contacts, s.false_notes, s.cancelled,
-        outcome.latency.frames.missed, outcome.latency.frames.total, outcome.latency.notes.missed,
-        outcome.latency.notes.total);
+    fmt::print("{:.1f} s in real time: {}; {} of {} missed, {} of {} late\n", outcome.realtime.seconds,
+               strikes_text(outcome.play.score), outcome.latency.frames.missed,
+               counted(outcome.latency.frames.total, "frame"), outcome.latency.notes.missed,
+               counted(outcome.latency.notes.total, "note"));
     if (outcome.offline_strikes > 0)
-        fmt::print("{} strikes offline: {} depart from them here, {} unexplained ({})\n",
-                   outcome.offline_strikes, outcome.departures.size(), unexplained,
+        fmt::print("{} offline: {} here, {} unexplained ({})\n", counted(outcome.offline_strikes, "strike"),
+                   counted(outcome.departures.size(), "departure"), unexplained,
                    (options.play.out / "departures.csv").string());
     print_places(options.play);
     if (!outcome.failure.empty()) throw std::runtime_error(outcome.failure);
 }
 
+void check_video(const PlayOptions& o) {
+    if (!o.video) return;
+    const std::string video = fmt::format("--video {}", o.video->string());
+    if (o.width % 2 != 0 || o.height % 2 != 0)
+        refuse_together(fmt::format("--video with --size {}x{}", o.width, o.height), "even sides");
+    std::error_code error;
+    if (fs::is_directory(*o.video, error)) refuse_together(video + ", which is a folder", "a file");
+    const fs::path parent = o.video->parent_path();
+    if (!parent.empty() && !fs::is_directory(parent, error))
+        refuse_together(video + " in a folder that is not there", "an existing folder");
+}
+
 }  // namespace
 
-void add_play_command(CLI::App& program) {
-    CLI::App* play_command = program.add_subcommand("play", "Play a recorded trace into pictures and sound");
-    auto a = std::make_shared<Typed>();
-    a->play.out = "out";
-    add_play_options(*play_command, a->play);
-    play_command->add_option("--out", a->play.out, "Folder for the products")->capture_default_str();
-    play_command->add_option("--solo", a->solo,
-                             "Render the sound of one note alone, by its id in events.csv");
-    play_command->add_option("--video", a->video, "Also make a video (MP4) of frames and sound");
-    CLI::Option* realtime = play_command->add_flag(
-        "--realtime", a->realtime, "Play against the wall clock, sensors in processes of their own");
-    for (CLI::Option* option : add_realtime_options(*play_command, a->in_time)) option->needs(realtime);
-    play_command->callback([a] {
-        const PlayOptions options = options_of(*a);
-        if (a->realtime) {
-            if (!a->in_time.source.empty() && !a->play.trace.empty())
-                throw BadInput(fmt::format("error: found TRACE {} and --source {}, expected one of them",
-                                           a->play.trace, a->in_time.source));
-            play_in_time(realtime_options(options, a->in_time));
-            return;
-        }
-        print_result(play(options), options);
+Option add_play_options(Command& command, PlayOptions& o) {
+    o.trace = "flourish", o.kit = "drums", o.progress = true;
+    const Option trace = command.option("TRACE", o.trace, as::text("TRACE"),
+                                        "Trace (CSV, Beat Saber replay, or the name of a bundled one)");
+    command.option("--kit", o.kit, as::text("KIT"), "Kit: a file, or the name of a bundled one");
+    command.option("--fps", o.fps, as::number(1, 1000, "frames per second"), "Frame rate");
+    command.option<Eigen::Vector2i>(
+        "--size", as::pixels(16, 4096), "Size of the frames",
+        [&o](const Eigen::Vector2i& size) { o.width = size.x(), o.height = size.y(); }, "640x480");
+    const auto predictor = as::text("PREDICTOR", check_specification);
+    const Option both = command.option<std::string>(
+        "--predictor", predictor, "Predictor of pictures and sound",
+        [&o](const std::string& name) { o.picture_predictor = o.sound_predictor = name; }, "auto");
+    command.option("--picture-predictor", o.picture_predictor, predictor, "Predictor of pictures")
+        .excludes(both);
+    command.option("--sound-predictor", o.sound_predictor, predictor, "Predictor of sound").excludes(both);
+    command.option("--render-lead", o.render_lead_s, as::number(0, 1, "s"), "Lead of pictures");
+    command.option("--sound-lead", o.sound_lead_s, as::number(0.001, 1, "s"), "Lead of sound");
+    command.option("--release-margin", o.release_margin_s, as::number(0, 1, "s"),
+                   "A note is fixed this long before its onset, at most the sound lead");
+    command.option("--workers", o.workers, as::whole(0, 64), "Worker processes of the simulation");
+    command.option("--tip", o.tip, as::vector_of_3(as::number(-1000, 1000, "m")),
+                   "Tip in the tracked body's frame");
+    command.option("--shaft", o.shaft, as::axis(), "Body axis from hand to tip");
+    command.flag("--no-cancel", o.cancelling, "Play every scheduled note, also those of feints", false);
+    command.flag("--no-audio", o.audio, "Sound nothing", false);
+    command.checks([&o] {
+        if (o.release_margin_s > o.sound_lead_s)
+            refuse_together(fmt::format("--release-margin {}", o.release_margin_s),
+                            fmt::format("at most the sound lead, {:.4g} s", o.sound_lead_s));
+        o.trace = find_trace(o.trace);
+        o.kit = find_kit(o.kit);
     });
+    return trace;
+}
+
+std::vector<Option> add_realtime_options(Command& command, RealtimeOptions& o, const Option& trace) {
+    const auto midi_out = [&o](const std::string& port) {
+        const bool elsewhere = port.find(':') != std::string::npos;
+        o.midi_port = elsewhere ? "midi_out" : port;
+        if (elsewhere) o.midi_connect = port;
+    };
+    const auto disturb = [&o](const std::string& text) {
+        o.disturbance = parse_disturbance(text);
+        o.disturbed_by = text;
+    };
+    return {command.option("--seconds", o.seconds, as::number(0, 10800, "s"),
+                           "How long; a shorter trace is played again and again; 0: the trace once"),
+            command
+                .option("--source", o.source, as::text("SOURCE"),
+                        "Sensors instead of TRACE: stdin, zmq:ENDPOINT, osc:PORT, trace:FILE")
+                .excludes(trace),
+            command.option("--sticks", o.sticks, as::list_of(as::text("NAME")),
+                           "Names of the sticks of --source"),
+            command.option("--lead", o.lead_auto, as::choice<bool>({{"fixed", false}, {"auto", true}}),
+                           "auto: leads follow the measured delays, never below those asked for"),
+            command.option(
+                "--output-lead", o.output_lead_s, as::number(0.001, 1, "s"),
+                "A block of sound is computed this long before it is due, less than the release margin"),
+            command.option("--priority", o.realtime_priority,
+                           as::choice<bool>({{"auto", true}, {"normal", false}}),
+                           "auto: real-time scheduling where permitted; normal: never"),
+            command.flag("--jack", o.jack_audio, "Also play through a running JACK server"),
+            command.option<std::string>("--midi-out", as::text("PORT"),
+                                        "Send each note to this JACK MIDI port (client:port); a name without "
+                                        "colon is a port of ours, left "
+                                        "open",
+                                        midi_out),
+            command.option<std::string>(
+                "--disturb", as::text("LOAD,..."),
+                "Artificial load: load:N@A-B (threads), renderer:MS@A-B, stall:MS@A (from second A to B)",
+                disturb)};
+}
+
+void add_play_command(Command& program) {
+    Command command = program.command("play", "Play a recorded trace into pictures and sound");
+    struct Options : RealtimeOptions {
+        bool realtime = false;
+    };
+    auto o = std::make_shared<Options>();
+    const Option trace = add_play_options(command, o->play);
+    command.option("--out", o->play.out, as::text("DIR"), "Folder for the products");
+    const Option solo =
+        command.option("--solo", o->play.solo, as::whole(0, std::numeric_limits<std::int64_t>::max()),
+                       "Render the sound of one note alone, by its id in events.csv");
+    const Option no_frames = command.flag("--no-frames", o->play.frames, "Draw nothing", false);
+    command.option("--video", o->play.video, as::text("FILE"), "Also make a video (MP4) of frames and sound")
+        .excludes(no_frames);
+    Option realtime = command.flag("--realtime", o->realtime,
+                                   "Play against the wall clock, sensors in processes of their own");
+    realtime.excludes(solo);
+    for (Option& option : add_realtime_options(command, *o, trace)) option.needs(realtime);
+    command.checks([o] { check_video(o->play); });
+    command.runs([o] { o->realtime ? play_in_time(*o) : play_offline(o->play); });
 }
 
 }  // namespace app

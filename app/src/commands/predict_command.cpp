@@ -1,63 +1,50 @@
-#include "commands/predict_command.h"
-
 #include <fmt/format.h>
 #include <tracking/trace.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
 #include <memory>
-#include <stdexcept>
 #include <string>
 
+#include "commands/command.h"
+#include "commands/commands.h"
+#include "commands/sensor_model_options.h"
 #include "files/assets.h"
-#include "files/bad_input.h"
 #include "files/finished_file.h"
-#include "files/option_values.h"
 #include "sticks/predictors.h"
 #include "traces/predict.h"
-#include "traces/sensor_model_options.h"
+#include "traces/sensor_model.h"
 
 namespace app {
 namespace {
 
-struct PredictArguments {
-    std::string trace, predictor, lead, out;
+struct PredictOptions {
+    std::string trace, predictor, out;
+    double lead_s = 0;
+    tracking::SensorModel sensor;
 };
 
-void print(const std::string& text) {
-    if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
-        throw std::runtime_error(
-            fmt::format("error: found that standard output takes no more ({}), expected room for the table",
-                        std::strerror(errno)));
-}
-
-void predict(const PredictArguments& a, const SensorArguments& sensor) {
-    const double lead_s = parse_number(a.lead, "--lead");
-    if (!(lead_s >= 0 && lead_s <= 1))
-        throw BadInput(fmt::format("error: found --lead {}, expected 0 to 1 s", a.lead));
-    check_specification(a.predictor);
-    const tracking::SensorModel model = sensor_model(sensor);
+void predict(const PredictOptions& o) {
     const std::string table =
-        predict_table(seen_by(tracking::read_trace(find_trace(a.trace)), model), a.predictor, lead_s);
-    if (a.out.empty())
-        print(table);
+        predict_table(seen_by(tracking::read_trace(find_trace(o.trace)), o.sensor), o.predictor, o.lead_s);
+    if (o.out.empty())
+        fmt::print("{}", table);
     else
-        write_finished_file(a.out, table);
+        write_finished_file(o.out, table);
 }
 
 }  // namespace
 
-void add_predict_command(CLI::App& program) {
-    CLI::App* command =
-        program.add_subcommand("predict", "Write down where a predictor expects the tracked points");
-    auto a = std::make_shared<PredictArguments>();
-    command->add_option("TRACE", a->trace, "Trace (CSV)")->required();
-    command->add_option("--predictor", a->predictor, "Predictor; auto: the pictures'")->required();
-    command->add_option("--lead", a->lead, "Time ahead of each sample [s]")->required();
-    command->add_option("--out", a->out, "File to write (CSV); standard output if left out");
-    const std::shared_ptr<SensorArguments> sensor = add_sensor_options(*command);
-    command->callback([a, sensor] { predict(*a, *sensor); });
+void add_predict_command(Command& program) {
+    Command command = program.command("predict", "Write down where a predictor expects the tracked points");
+    auto o = std::make_shared<PredictOptions>();
+    command.option("TRACE", o->trace, as::text("TRACE"), "Trace (CSV)").required();
+    command
+        .option("--predictor", o->predictor, as::text("PREDICTOR", check_specification),
+                "Predictor; auto: the pictures'")
+        .required();
+    command.option("--lead", o->lead_s, as::number(0, 1, "s"), "Time ahead of each sample").required();
+    command.option("--out", o->out, as::text("FILE"), "File to write (CSV); standard output if left out");
+    add_sensor_model_options(command, o->sensor);
+    command.runs([o] { predict(*o); });
 }
 
 }  // namespace app

@@ -14,7 +14,7 @@
 #include "compare/findings.h"
 #include "report/html.h"
 #include "report/report_style.h"
-#include "traces/sensor_model_options.h"
+#include "traces/sensor_model.h"
 
 namespace app {
 namespace {

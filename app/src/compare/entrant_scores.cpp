@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <span>
 
-#include "compare/prediction_cost.h"
 #include "compare/prediction_error.h"
 #include "process/parallel.h"
+#include "statistics/statistics.h"
 #include "sticks/predictors.h"
+#include "sticks/replay.h"
 #include "sticks/stick_tracker.h"
 
 namespace app {
@@ -169,6 +171,32 @@ void advance_strikes(std::vector<std::vector<ComparisonRow>>& parts, const Runs&
             if (row.advance_s) row.hits = runs.hits(place, entrant, lead, *row.advance_s);
         });
     }
+}
+
+constexpr std::size_t kCostPasses = 7, kMostTimedSamples = 4096;
+
+/// Keeps the compiler from removing an unread result.
+void keep(double value) {
+    asm volatile("" : : "g"(value) : "memory");
+}
+
+/// Wall time of a sample: correct() and predict() at every lead, nothing else; the median over several passes
+/// of a fresh predictor over the first samples. The only figure that differs between runs.
+double nanoseconds_per_sample(const std::string& specification, std::span<const tracking::PoseSample> samples,
+                              std::span<const double> leads_s) {
+    const std::span<const tracking::PoseSample> timed =
+        samples.first(std::min(samples.size(), kMostTimedSamples));
+    std::vector<double> costs;
+    for (std::size_t pass = 0; pass < kCostPasses; ++pass) {
+        const auto predictor = make_any_predictor(specification, leads_s);
+        const auto start = std::chrono::steady_clock::now();
+        replay(*predictor, timed, [&](const ReplayedSample& now) {
+            for (const double lead_s : leads_s) keep(predictor->predict(lead_s + now.behind_s).position.x());
+        });
+        const std::chrono::duration<double, std::nano> spent = std::chrono::steady_clock::now() - start;
+        costs.push_back(spent.count() / static_cast<double>(timed.size()));
+    }
+    return median(std::move(costs));
 }
 
 /// A specification that runs at several leads of a pass is measured once.

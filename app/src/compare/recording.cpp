@@ -10,7 +10,7 @@
 #include <iterator>
 
 #include "files/bad_input.h"
-#include "files/comma_list.h"
+#include "files/option_values.h"
 #include "kit/tip_track.h"
 #include "strikes/stroke_lows.h"
 

@@ -1,13 +1,24 @@
 #include "files/assets.h"
 
+#include <fmt/format.h>
+
 #include <cstdlib>
+
+#include "files/bad_input.h"
 
 namespace app {
 namespace fs = std::filesystem;
 
 fs::path assets_folder() {
     const char* chosen = std::getenv("MUSICWORLD_ASSETS");
-    return chosen && *chosen ? fs::path(chosen) : fs::path(MUSICWORLD_ASSETS);
+    if (!chosen || !*chosen) return MUSICWORLD_ASSETS;
+    std::error_code ignored;
+    if (!fs::is_directory(fs::path(chosen) / "kits", ignored))
+        throw BadInput(fmt::format(
+            "{}: error: found no folder kits there, expected the environment variable MUSICWORLD_ASSETS to "
+            "name the folder of kits, scenes and traces; correct it or unset it",
+            chosen));
+    return chosen;
 }
 
 fs::path find_kit(const std::string& name_or_path) {

@@ -5,6 +5,7 @@
 namespace app {
 
 /// The folder of the bundled files; MUSICWORLD_ASSETS in the environment overrides the built-in one.
+/// Throws BadInput where that is no such folder.
 [[nodiscard]] std::filesystem::path assets_folder();
 
 /// A kit by path, or by the name of a bundled one ("drums" is assets/kits/drums.toml).

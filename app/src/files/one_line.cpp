@@ -11,4 +11,11 @@ std::string one_line(std::string_view text, std::size_t longest) {
     return line.size() < text.size() ? line + "..." : line;
 }
 
+std::string counted(std::uint64_t count, std::string_view one) {
+    const std::string number = std::to_string(count) + " ";
+    if (count == 1) return number + std::string(one);
+    if (one.ends_with('y')) return number + std::string(one.substr(0, one.size() - 1)) + "ies";
+    return number + std::string(one) + "s";
+}
+
 }  // namespace app

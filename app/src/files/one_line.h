@@ -1,4 +1,6 @@
 #pragma once
+#include <concepts>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -6,5 +8,11 @@ namespace app {
 
 /// Text of others, fit for a one-line message: control characters become spaces, at most `longest` bytes.
 [[nodiscard]] std::string one_line(std::string_view text, std::size_t longest = 200);
+
+/// "1 strike", "2 strikes", "2 bodies".
+[[nodiscard]] std::string counted(std::uint64_t count, std::string_view one);
+[[nodiscard]] inline std::string counted(std::integral auto count, std::string_view one) {
+    return counted(static_cast<std::uint64_t>(count), one);
+}
 
 }  // namespace app

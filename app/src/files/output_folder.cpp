@@ -114,6 +114,7 @@ OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_v
     try {
         if (std::find(products_.begin(), products_.end(), "frames") != products_.end())
             check_frames(folder_ / "frames");
+        notice_.emplace(staging_);
         make_staging();
     } catch (...) {
         ::close(lock_);
@@ -170,6 +171,7 @@ void OutputFolder::finish() {
     }
     fs::remove(staging_, error);
     check_moved(error, staging_);
+    notice_.reset();
     finished_ = true;
 }
 

@@ -1,9 +1,12 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
+
+#include "files/interruption_notice.h"
 
 namespace app {
 
@@ -55,6 +58,7 @@ private:
     std::vector<std::string_view> products_;
     bool made_folder_ = false, finished_ = false;
     int lock_ = -1;
+    std::optional<InterruptionNotice> notice_;
 };
 
 /// Writes a whole file, replacing an older one. Every write and the close are checked: throws

@@ -44,7 +44,6 @@ void play_through(OfflineRun& run, const PlayOptions& options, PlayResult& resul
 
 PlayResult play(const PlayOptions& options) {
     const WallTimer wall;
-    check_options(options);
     const tracking::Trace trace = read_played_trace(options.trace);
     const Kit kit = read_kit(options.kit);
     const StickGeometry stick = stick_geometry(trace, kit.stick, options.tip, options.shaft);

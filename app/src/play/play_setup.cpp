@@ -15,35 +15,7 @@ namespace {
 
 constexpr double kLongestHours = 3;
 
-void refuse(bool wrong, const std::string& found, const std::string& expected) {
-    if (wrong) throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
-}
-
 }  // namespace
-
-void check_options(const PlayOptions& o) {
-    refuse(!(o.fps >= 1 && o.fps <= 1000), fmt::format("--fps {}", o.fps), "1 to 1000 frames a second");
-    refuse(o.width < 16 || o.height < 16 || o.width > 4096 || o.height > 4096,
-           fmt::format("--size {}x{}", o.width, o.height), "16x16 to 4096x4096");
-    refuse(o.workers < 0 || o.workers > 64, fmt::format("--workers {}", o.workers), "0 to 64");
-    for (const auto& [name, lead] :
-         {std::pair{"--render-lead", o.render_lead_s}, {"--sound-lead", o.sound_lead_s}})
-        refuse(!(lead >= (name == std::string_view("--sound-lead") ? 0.001 : 0) && lead <= 1),
-               fmt::format("{} {}", name, lead), "0 to 1 s (of sound at least 0.001 s)");
-    refuse(!(o.release_margin_s >= 0 && o.release_margin_s <= o.sound_lead_s),
-           fmt::format("--release-margin {}", o.release_margin_s), "0 s to the sound lead");
-    for (const std::string& name : {o.picture_predictor, o.sound_predictor}) check_specification(name);
-    if (!o.video) return;
-    const std::string video = fmt::format("--video {}", o.video->string());
-    refuse(!o.frames, "--video with --no-frames", "one of them");
-    refuse(o.width % 2 != 0 || o.height % 2 != 0, fmt::format("--video with --size {}x{}", o.width, o.height),
-           "even sides");
-    std::error_code error;
-    refuse(fs::is_directory(*o.video, error), video + ", which is a directory", "a file");
-    const fs::path parent = o.video->parent_path();
-    refuse(!parent.empty() && !fs::is_directory(parent, error), video + " in a folder that is not there",
-           "an existing folder");
-}
 
 tracking::Trace read_played_trace(const fs::path& file) {
     tracking::Trace trace = tracking::read_trace(file);

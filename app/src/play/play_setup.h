@@ -20,8 +20,6 @@ namespace app {
 /// Sound goes on this long after the last sample, then until it is silent, at most so long.
 inline constexpr double kSoundTailS = 0.5, kLongestSoundTailS = 10;
 
-/// Throws BadInput for options out of range.
-void check_options(const PlayOptions& options);
 /// Reads a trace that is to be played: at most three hours (a WAV file holds four). Throws BadInput.
 [[nodiscard]] tracking::Trace read_played_trace(const std::filesystem::path& file);
 /// What is known of a run before it begins.

@@ -31,10 +31,10 @@ Part parse_part(const std::string& text) {
     const std::size_t colon = text.find(':'), at = text.find('@');
     if (colon == std::string::npos || at == std::string::npos || at < colon) refuse(text);
     const std::size_t dash = text.find('-', at);
-    Part part{
-        text.substr(0, colon), parse_number(text.substr(colon + 1, at - colon - 1), "--disturb"),
-        parse_number(text.substr(at + 1, dash == std::string::npos ? dash : dash - at - 1), "--disturb"),
-        dash == std::string::npos ? kEver : parse_number(text.substr(dash + 1), "--disturb")};
+    const auto number = [](const std::string& part) { return as::number().parse(part, "--disturb"); };
+    Part part{text.substr(0, colon), number(text.substr(colon + 1, at - colon - 1)),
+              number(text.substr(at + 1, dash == std::string::npos ? dash : dash - at - 1)),
+              dash == std::string::npos ? kEver : number(text.substr(dash + 1))};
     if (!(part.amount > 0 && part.amount <= 1e5 && part.from_s >= 0 && part.to_s > part.from_s)) refuse(text);
     return part;
 }

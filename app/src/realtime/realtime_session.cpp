@@ -25,13 +25,10 @@ void refuse(bool wrong, const std::string& found, const std::string& expected) {
 }
 
 void check(const RealtimeOptions& o) {
-    check_options(o.play);
-    refuse(!(o.seconds >= 0 && o.seconds <= 3 * 3600), fmt::format("--seconds {}", o.seconds),
-           "0 to 10800 s");
     refuse(
-        !(o.output_lead_s >= 0.001 && o.output_lead_s < o.play.release_margin_s),
+        o.output_lead_s >= o.play.release_margin_s,
         fmt::format("--output-lead {} with a release margin of {}", o.output_lead_s, o.play.release_margin_s),
-        "0.001 s to less than the release margin");
+        "less than the release margin");
     refuse(o.play.solo.has_value(), "--solo with --realtime",
            "one of them: play the trace offline to hear one note");
     refuse(!o.play.audio && !o.midi_port.empty(), "--midi-out with --no-audio",

@@ -16,7 +16,7 @@
 
 #include "process/child_process.h"
 #include "process/clock.h"
-#include "sensors/sensor_command.h"
+#include "sensors/sensor_process.h"
 #include "sensors/sensor_memory.h"
 #include "sensors/sensor_watch.h"
 

@@ -1,5 +1,6 @@
 #include "sensors/sensor_process.h"
 
+#include <fmt/format.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/resource.h>
@@ -354,6 +355,28 @@ int run_sensor(const SensorTask& task) {
     const rlimit no_core{0, 0};
     (void)setrlimit(RLIMIT_CORE, &no_core);
     return Sensor(task).run();
+}
+
+std::vector<std::string> sensor_arguments(const SensorTask& task) {
+    std::vector<std::string> words = {"sensor"};
+    const auto add = [&](const char* name, const auto& value) {
+        words.push_back(fmt::format("--{}={}", name, value));  // one word: values may begin with '-'
+    };
+    add("source", task.source.source);
+    for (const std::string& stick : task.source.sticks) add("stick", stick);
+    add("epoch-ns", task.source.epoch_ns);
+    add("period", task.source.period_s);
+    add("stall-at", task.stall_at_s);
+    add("stall", task.stall_s);
+    if (task.source.resume) words.emplace_back("--resume");
+    add("picture", task.predictors.picture);
+    add("sound", task.predictors.sound);
+    if (!task.predictors.confirming.empty()) add("confirming", task.predictors.confirming);
+    for (const int descriptor : task.state_fds) add("state-fd", descriptor);
+    add("wake-fd", task.wake_fd);
+    add("life-fd", task.life_fd);
+    if (!task.realtime) words.emplace_back("--no-realtime");
+    return words;
 }
 
 }  // namespace app

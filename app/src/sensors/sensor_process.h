@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "sensors/sample_source.h"
@@ -22,5 +23,8 @@ struct SensorTask {
 /// reports and watches for the end. Returns the exit status: 0 when the source has ended, the hub is gone or
 /// SIGTERM came; 1 when it failed, which its report says.
 [[nodiscard]] int run_sensor(const SensorTask& task);
+
+/// The words after the program's name with which the command `sensor` gets a task.
+[[nodiscard]] std::vector<std::string> sensor_arguments(const SensorTask& task);
 
 }  // namespace app

@@ -1,8 +1,7 @@
 #pragma once
 #include <sim/distributed_world.h>
 
-#include <CLI/CLI.hpp>
-#include <memory>
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -20,22 +19,9 @@ struct WorkerOptions {
     std::optional<sim::SimulatedProcessors> simulated;  ///< instead of processes
 };
 
-/// The options of `simulate` about workers, as typed.
-struct WorkerArguments {
-    std::string mode = "sync", balance = "on", listen, keys, processors;
-    std::optional<int> bound;
-    int workers = 0, expect = 0;
-};
-
-[[nodiscard]] std::shared_ptr<WorkerArguments> add_worker_options(CLI::App& command);
-
-/// None: in this process. Throws BadInput.
-[[nodiscard]] std::optional<WorkerOptions> worker_options_of(const WorkerArguments& arguments);
-
-/// "simulated[:latency=SECONDS,slowdown=TIMES,cost=measured|modelled]". Throws BadInput.
-[[nodiscard]] sim::SimulatedProcessors parse_processors(const std::string& text);
-
 /// "sync" or "async".
-[[nodiscard]] std::string mode_name(sim::Pace pace);
+[[nodiscard]] inline std::string mode_name(sim::Pace pace) {
+    return pace == sim::Pace::lockstep ? "sync" : "async";
+}
 
 }  // namespace app

@@ -27,17 +27,6 @@ const Words<std::optional<Eigen::Vector3d>> kAxes = {
     {"-y", Eigen::Vector3d(0, -1, 0)}, {"+z", Eigen::Vector3d(0, 0, 1)},  {"-z", Eigen::Vector3d(0, 0, -1)}};
 
 template <class Value>
-Value meaning(const Words<Value>& words, const std::string& word, const std::string& option) {
-    std::string known;
-    for (const auto& [name, value] : words) {
-        if (name == word) return value;
-        known += known.empty() ? "" : ", ";
-        known += name;
-    }
-    throw BadInput(fmt::format("error: found {} \"{}\", expected one of {}", option, word, known));
-}
-
-template <class Value>
 std::string word_for(const Words<Value>& words, Value value) {
     for (const auto& [name, meant] : words)
         if (meant == value) return name;
@@ -134,16 +123,6 @@ tracking::ColumnMap spelt_out(const std::string& text) {
 }
 
 }  // namespace
-
-double metres_per(const std::string& unit, const std::string& option) {
-    return meaning(kMetres, unit, option);
-}
-char separator_called(const std::string& name, const std::string& option) {
-    return meaning(kSeparators, name, option);
-}
-double seconds_per(const std::string& unit, const std::string& option) {
-    return meaning(kSeconds, unit, option);
-}
 
 FormatDescription map_format() {
     return describe_format(kMapFile);

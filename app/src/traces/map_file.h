@@ -27,10 +27,4 @@ namespace app {
 /// Names of the bundled maps.
 [[nodiscard]] std::vector<std::string> map_names();
 
-/// Metres per unit of "m", "cm" or "mm"; the separator called "comma", "semicolon", "tab" or "space"; seconds
-/// per "s", "ms", "us" or "ns". Throw BadInput naming the option.
-[[nodiscard]] double metres_per(const std::string& unit, const std::string& option);
-[[nodiscard]] char separator_called(const std::string& name, const std::string& option);
-[[nodiscard]] double seconds_per(const std::string& unit, const std::string& option);
-
 }  // namespace app

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "files/one_line.h"
 #include "kit/stick_geometry.h"
 #include "kit/tip_track.h"
 #include "statistics/statistics.h"
@@ -85,8 +86,8 @@ std::vector<StickInfo> trace_info(const tracking::Trace& trace) {
 }
 
 std::string format_info(const tracking::Trace& trace, const std::vector<StickInfo>& sticks) {
-    std::string text =
-        fmt::format("{}: {:.3f} s, {} sticks\n", trace.file, trace.t_end_s() - trace.t0_s(), sticks.size());
+    std::string text = fmt::format("{}: {:.6g} s, {}\n", trace.file, trace.t_end_s() - trace.t0_s(),
+                                   counted(sticks.size(), "stick"));
     text += fmt::format("  source       {}\n", trace.source.empty() ? "(not said)" : trace.source);
     text += fmt::format("  nominal rate {}\n",
                         trace.rate_hz > 0 ? fmt::format("{} Hz", trace.rate_hz) : "(not said)");
@@ -94,8 +95,8 @@ std::string format_info(const tracking::Trace& trace, const std::vector<StickInf
                         trace.tip ? point(*trace.tip) + " m" : "(not said; the tracked point)");
     for (const std::string& remark : trace.remarks) text += fmt::format("  remark       {}\n", remark);
     for (const StickInfo& s : sticks) {
-        text +=
-            fmt::format("\n{}: {} samples from {:.6f} to {:.6f} s\n", s.name, s.samples, s.t0_s, s.t_end_s);
+        text += fmt::format("\n{}: {} from {:.9g} to {:.9g} s\n", s.name, counted(s.samples, "sample"),
+                            s.t0_s, s.t_end_s);
         text += fmt::format(
             "  rate         {:.2f} Hz; steps {:.3f}, {:.3f}, {:.3f} ms (shortest, median, longest)\n",
             s.rate_hz, 1e3 * s.dt_min_s, 1e3 * s.dt_median_s, 1e3 * s.dt_max_s);
@@ -107,8 +108,8 @@ std::string format_info(const tracking::Trace& trace, const std::vector<StickInf
         text += fmt::format("  orientation  {}\n", s.orientation ? "yes" : "no, or not throughout");
         if (s.flips > 0)
             text +=
-                fmt::format("  flips        {} steps turn by more than 90 degrees, the first at {:.6f} s\n",
-                            s.flips, s.first_flip_s);
+                fmt::format("  flips        {} by more than 90 degrees in a step, the first at {:.9g} s\n",
+                            counted(s.flips, "turn"), s.first_flip_s);
     }
     return text;
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -75,7 +76,8 @@ TEST(LatencyComparison, RefusesWhatLatencyDidNotWrite) {
 
 /// The program with `latency` alone, over a made-up run; what was asked of it.
 int run_program(std::vector<std::string> arguments, RealtimeOptions* asked = nullptr) {
-    CLI::App program("test");
+    CLI::App tree("test");
+    Command program(tree);
     add_latency_command(program, [asked](const RealtimeOptions& options) {
         if (asked != nullptr) *asked = options;
         EXPECT_FALSE(options.play.out.empty());
@@ -90,7 +92,7 @@ int run_program(std::vector<std::string> arguments, RealtimeOptions* asked = nul
     });
     std::reverse(arguments.begin(), arguments.end());
     try {
-        program.parse(arguments);
+        tree.parse(arguments);
     } catch (const CLI::ParseError& wrong) {
         return wrong.get_exit_code();
     }
@@ -127,6 +129,9 @@ TEST(LatencyCommand, ComparesTwoFolders) {
 
 TEST(LatencyCommand, RefusesValuesThatCannotBe) {
     EXPECT_THROW((void)run_program({"latency", "--seconds", "long"}), BadInput);
+    EXPECT_THROW((void)run_program({"latency", "--seconds", "-1"}), BadInput);
+    EXPECT_THROW((void)run_program({"latency", "--output-lead", "0"}), BadInput);
+    EXPECT_THROW((void)run_program({"latency", "--fps", "0"}), BadInput);
     EXPECT_THROW((void)run_program({"latency", "--lead", "some"}), BadInput);
     EXPECT_NE(run_program({"latency", "--compare", "one"}), 0);
 }

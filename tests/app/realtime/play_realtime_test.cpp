@@ -161,7 +161,6 @@ TEST(PlayRealtime, WhatCannotBeIsRefusedBeforeAnythingStarts) {
         EXPECT_THROW((void)run(options), BadInput);
         EXPECT_FALSE(fs::exists(options.play.out / "summary.json"));
     };
-    refused([](RealtimeOptions& o) { o.seconds = -1; });
     refused([](RealtimeOptions& o) { o.output_lead_s = o.play.release_margin_s; });
     refused([](RealtimeOptions& o) { o.play.solo = 1; });
     refused([](RealtimeOptions& o) { o.play.sound_predictor = "exec:cat"; });

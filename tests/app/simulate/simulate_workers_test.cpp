@@ -51,12 +51,15 @@ const std::string kPile =
     "jitter = 0.05, seed = 3 }\n";
 
 /// Simulated processors whose costs are counted, so that a run is a function of the scene.
-WorkerOptions processors(int count, const std::string& mode) {
-    WorkerArguments typed;
-    typed.workers = count;
-    typed.mode = mode;
-    typed.processors = "simulated:cost=modelled";
-    return worker_options_of(typed).value();
+WorkerOptions processors(int count, sim::Pace pace) {
+    WorkerOptions options;
+    options.count = count;
+    options.pace = pace;
+    options.bound = pace == sim::Pace::bounded ? 4 : 0;
+    options.simulated.emplace();
+    options.simulated->count = count;
+    options.simulated->modelled = true;
+    return options;
 }
 
 SimulateOptions options_for(const WrittenScene& scene, std::uint64_t steps) {
@@ -73,7 +76,7 @@ TEST(SimulateWorkers, LockstepOnThreeProcessorsWritesTheStatesOfOneProcessToTheL
     options.out = folder.path() / "one";
     const SimulateResult one = simulate(options);
     options.out = folder.path() / "three";
-    options.workers = processors(3, "sync");
+    options.workers = processors(3, sim::Pace::lockstep);
     const SimulateResult three = simulate(options);
     EXPECT_EQ(three.state_hash, one.state_hash);
     EXPECT_EQ(text_of(folder.path() / "three/states.csv"), text_of(folder.path() / "one/states.csv"));
@@ -88,7 +91,7 @@ TEST(SimulateWorkers, TimingHasARowAWorkersStepAndEachStepsBodiesAreAllThere) {
     const TemporaryFolder folder;
     SimulateOptions options = options_for(scene, 40);
     options.out = folder.path() / "run";
-    options.workers = processors(3, "sync");
+    options.workers = processors(3, sim::Pace::lockstep);
     options.workers->balance = false;
     (void)simulate(options);
     std::map<double, double> bodies_at;
@@ -105,7 +108,7 @@ TEST(SimulateWorkers, TimingHasARowAWorkersStepAndEachStepsBodiesAreAllThere) {
     EXPECT_NE(text_of(*options.out / "workers.svg").find("worker 2"), std::string::npos);
     const json summary = json::parse(text_of(*options.out / "summary.json"));
     EXPECT_EQ(summary["workers"], 3);
-    EXPECT_EQ(summary["mode"], "sync");
+    EXPECT_EQ(summary["mode"], sim::Pace::lockstep);
     EXPECT_EQ(summary["bodies_lost"], 0);
     EXPECT_GT(summary["bytes_per_body_update"], 0);
     EXPECT_EQ(summary["clock"],
@@ -117,7 +120,7 @@ TEST(SimulateWorkers, AsynchronouslyNoWorkerLeadsByMoreThanTheBoundAndMomentumIs
     const TemporaryFolder folder;
     SimulateOptions options = options_for(scene, 120);
     options.out = folder.path() / "run";
-    options.workers = processors(4, "async");
+    options.workers = processors(4, sim::Pace::bounded);
     const SimulateResult r = simulate(options);
     EXPECT_EQ(r.worker_options.bound, 4);
     int most = 0;
@@ -129,62 +132,6 @@ TEST(SimulateWorkers, AsynchronouslyNoWorkerLeadsByMoreThanTheBoundAndMomentumIs
     EXPECT_GT(r.workers->cross_contacts, 0u);
     ASSERT_TRUE(r.drift);
     EXPECT_LT(r.drift->linear, 1e-3 * r.drift->scale);  // what is promised of asynchronous contacts
-}
-
-TEST(SimulateWorkers, WhatMakesNoSenseTogetherIsRefusedInOneLine) {
-    struct Case {
-        std::function<void(WorkerArguments&)> type;
-        const char* words;
-    };
-    const std::vector<Case> cases = {
-        {[](WorkerArguments& a) { a.workers = -1; }, "--workers -1"},
-        {[](WorkerArguments& a) { a.workers = 257; }, "0 to 256"},
-        {[](WorkerArguments& a) { a.mode = "async"; }, "--mode async"},
-        {[](WorkerArguments& a) { a.bound = 3; }, "--bound 3"},
-        {[](WorkerArguments& a) { a.workers = 2, a.bound = 3; }, "--bound 3 with --mode sync"},
-        {[](WorkerArguments& a) { a.workers = 2, a.mode = "fast"; }, "sync or async"},
-        {[](WorkerArguments& a) { a.workers = 2, a.balance = "maybe"; }, "on or off"},
-        {[](WorkerArguments& a) { a.keys = "k"; }, "--listen ENDPOINT"},
-        {[](WorkerArguments& a) { a.expect = 2; }, "--listen ENDPOINT"},
-        {[](WorkerArguments& a) { a.workers = 3, a.listen = "tcp://127.0.0.1:0", a.expect = 2; },
-         "at least the 3"},
-        {[](WorkerArguments& a) { a.processors = "simulated"; }, "how many of them"},
-        {[](WorkerArguments& a) { a.workers = 2, a.processors = "real"; }, "--processors real"},
-        {[](WorkerArguments& a) { a.workers = 2, a.processors = "simulated:latency=-1"; }, "latency=SECONDS"},
-        {[](WorkerArguments& a) { a.workers = 2, a.processors = "simulated:cost=free"; },
-         "measured|modelled"},
-        {[](WorkerArguments& a) { a.workers = 2, a.processors = "simulated", a.listen = "tcp://*:0"; },
-         "one of them"},
-    };
-    for (const Case& c : cases) {
-        WorkerArguments typed;
-        c.type(typed);
-        try {
-            (void)worker_options_of(typed);
-            ADD_FAILURE() << c.words;
-        } catch (const BadInput& wrong) {
-            const std::string message = wrong.what();
-            EXPECT_NE(message.find(c.words), std::string::npos) << message;
-            EXPECT_EQ(message.find("error: found "), 0u) << message;
-            EXPECT_NE(message.find(", expected "), std::string::npos) << message;
-        }
-    }
-}
-
-TEST(SimulateWorkers, OptionsSayHowManyHowAndOfWhichClock) {
-    WorkerArguments typed;
-    EXPECT_FALSE(worker_options_of(typed));  // in this process
-    typed.listen = "tcp://127.0.0.1:0", typed.expect = 4;
-    EXPECT_EQ(worker_options_of(typed)->count, 0);
-    typed = {};
-    typed.workers = 2, typed.mode = "async", typed.bound = 0;
-    EXPECT_EQ(worker_options_of(typed)->pace, sim::Pace::lockstep);  // nobody may be ahead
-    typed.bound = 16;
-    EXPECT_EQ(worker_options_of(typed)->pace, sim::Pace::bounded);
-    const sim::SimulatedProcessors p = parse_processors("simulated:latency=1/100,slowdown=50,cost=modelled");
-    EXPECT_EQ(p.latency_s, 0.01);
-    EXPECT_EQ(p.slowdown, 50);
-    EXPECT_TRUE(p.modelled);
 }
 
 TEST(WorkerHistory, AMillionStepsOfTwoWorkersStayUnder4000PointsEachEquallyFarApart) {

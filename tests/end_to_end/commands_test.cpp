@@ -1,0 +1,114 @@
+// What holds for every command: how it is named, completed, interrupted, and what stands in its way.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "program.h"
+
+namespace end_to_end {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool contains(const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+}
+
+TEST(Commands, AMisspeltNameIsRefusedWithTheNearest) {
+    const auto refused = [](const std::vector<std::string>& words, const std::string& nearest) {
+        const Ended ended = run(words);
+        expect_refused(ended, words.back());
+        EXPECT_TRUE(contains(ended.err, nearest)) << ended.err;
+    };
+    refused({"plai"}, "the nearest is play");
+    refused({"simulat", "--steps"}, "the nearest is simulate");
+    refused({"kit", "shw"}, "the nearest is show");
+    refused({"play", "--soundlead", "1"}, "the nearest is --sound-lead");
+    refused({"trace", "info"}, "found no TRACE");
+    refused({"compare", "roll", "--kit", "drums", "--plane", "1", "--out", "o"}, "found --plane with --kit");
+    refused({"play", "--seconds", "5"}, "found --seconds without --realtime");
+    refused({"kit", "list", "all"}, "found argument all");
+}
+
+TEST(Commands, VersionTellsBuildAndLibraries) {
+    const Ended ended = run({"--version"});
+    EXPECT_EQ(ended.status, 0);
+    for (const char* part :
+         {"musicworld 0.", "build: GCC ", "x86-64", "libraries: Eigen 3.", "Csound 6.", "CLI11 2."})
+        EXPECT_TRUE(contains(ended.out, part)) << ended.out;
+}
+
+TEST(Commands, AReaderThatHasEnoughEndsThemWithoutAWord) {
+    const Ended ended =
+        run_command({"bash", "-c",
+                     MUSICWORLD_PROGRAM
+                     " predict flourish --predictor hold --lead 0.1 | head -1; echo ${PIPESTATUS[0]}"});
+    EXPECT_EQ(ended.err, "");
+    EXPECT_EQ(ended.out, "t,stick,px,py,pz,qw,qx,qy,qz\n141\n");  // as by SIGPIPE
+}
+
+TEST(Commands, AFullStandardOutputIsAnError) {
+    if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+    const Ended ended = run_command({"bash", "-c", MUSICWORLD_PROGRAM " kit list > /dev/full"});
+    EXPECT_EQ(ended.status, 1);
+    EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 1) << ended.err;
+}
+
+TEST(Commands, AWrongFolderOfAssetsIsNamedWithItsVariable) {
+    for (const std::vector<std::string>& words :
+         {std::vector<std::string>{"kit", "list"}, {"trace", "info", "roll"}, {"play", "roll"}})
+        expect_refused(run(words, {"MUSICWORLD_ASSETS=/nowhere"}), "MUSICWORLD_ASSETS");
+    expect_refused(run({"kit", "list"}, {"MUSICWORLD_ASSETS=/nowhere"}), "/nowhere");
+    EXPECT_EQ(run({"--help"}, {"MUSICWORLD_ASSETS=/nowhere"}).status, 0);
+    EXPECT_EQ(run({"trace", "convert", "--help"}, {"MUSICWORLD_ASSETS=/nowhere"}).status, 0);
+}
+
+TEST(Commands, WhatTheyWroteBeforeIsReplacedAndNothingElse) {
+    const Folder folder;
+    const std::string kit = (folder / "kit.toml").string(), keys = (folder / "keys").string();
+    write(kit, "old");
+    EXPECT_EQ(run({"kit", "new", "fresh", "--out", kit}).status, 0);
+    EXPECT_EQ(run({"kit", "check", kit}).status, 0);
+    ASSERT_EQ(run({"keys", keys}).status, 0);
+    const std::string first = read(folder / "keys/application.key");
+    ASSERT_EQ(run({"keys", keys, "--workers", "a,b"}).status, 0);
+    EXPECT_NE(read(folder / "keys/application.key"), first);
+    EXPECT_TRUE(fs::exists(folder / "keys/b.key"));
+    EXPECT_FALSE(fs::exists(folder / "keys/worker.key"));
+    write(folder / "keys/notes.txt", "mine");
+    expect_refused(run({"keys", keys}), "notes.txt");
+    EXPECT_EQ(read(folder / "keys/notes.txt"), "mine");
+    EXPECT_TRUE(fs::exists(folder / "keys/b.key"));
+    expect_refused(run({"keys", kit}), "a file");
+    EXPECT_FALSE(fs::exists(folder / "keys.partial"));
+}
+
+TEST(Commands, AnInterruptedRunSaysWhatStaysWhere) {
+    for (const auto& [signal, words] :
+         {std::pair(SIGINT, std::vector<std::string>{"simulate", "benchmark25", "--steps", "100000000"}),
+          {SIGTERM, {"play", "flourish", "--size", "4096x4096"}}}) {
+        const Folder folder;
+        std::vector<std::string> all = words;
+        all.insert(all.end(), {"--out", (folder / "out").string()});
+        Started started(all, folder / "");
+        while (!fs::exists(folder / "out/.unfinished/scratch"))
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        kill(started.pid(), signal);
+        const Ended ended = started.wait();
+        EXPECT_EQ(ended.status, 128 + signal);
+        EXPECT_TRUE(contains(ended.err, (folder / "out/.unfinished").string())) << ended.err;
+    }
+}
+
+TEST(Commands, ManualAndCompletionAreThere) {
+    EXPECT_TRUE(run({"manual"}).out.starts_with(".TH MUSICWORLD 1"));
+    EXPECT_TRUE(contains(run({"completion", "bash"}).out, "complete -o default -F _musicworld musicworld"));
+    EXPECT_TRUE(run({"completion", "zsh"}).out.starts_with("#compdef musicworld"));
+    expect_refused(run({"completion", "fish"}), "fish");
+}
+
+}  // namespace
+}  // namespace end_to_end
