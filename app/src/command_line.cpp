@@ -143,8 +143,8 @@ void add_commands(CLI::App& tree) {
     add_modes_command(program);
     add_bench_command(program);
     add_simulate_command(program);
-    add_schema_command(program);
     add_worker_commands(program);
+    add_schema_command(program);
     add_manual_commands(program, tree);
 }
 

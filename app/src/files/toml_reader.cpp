@@ -197,10 +197,7 @@ std::string TomlReader::choice(const Key& key, const toml::node& node) const {
 double TomlReader::number(const Key& key, const toml::node& node) const {
     std::optional<double> value;
     if (node.is_number() && (key.type != KeyType::whole || node.is_integer())) value = node.value<double>();
-    if (key.type == KeyType::fraction && node.is_string()) try {
-            value = parse_number(checked_text(node), std::string(key.name));
-        } catch (const BadInput&) {  // said below, with its place
-        }
+    if (key.type == KeyType::fraction && node.is_string()) value = as::number().read(checked_text(node));
     if (value && *value >= key.range.low && *value <= key.range.high) return *value;
     if (key.type == KeyType::fraction && !node.is_string())
         fail(key.name, fmt::format("{} = {}", key.name, kind_of(node)),
