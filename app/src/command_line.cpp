@@ -22,7 +22,7 @@
 #include "commands/simulate_command.h"
 #include "commands/trace_commands.h"
 #include "files/bad_input.h"
-#include "sensors/sensor_command.h"
+#include "sensors/sensor_process.h"
 
 namespace app {
 namespace {

@@ -8,7 +8,7 @@
 #include "compare/prediction_error.h"
 #include "process/parallel.h"
 #include "sticks/predictors.h"
-#include "sticks/stick_tracker.h"
+#include "sticks/stick.h"
 
 namespace app {
 namespace {

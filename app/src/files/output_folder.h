@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include "files/file_descriptor.h"
+
 namespace app {
 
 /// What `play` writes: summary.json, frames, audio.wav, events.csv, contacts.csv, hits.mid, report.html, and,
@@ -54,11 +56,11 @@ private:
     std::filesystem::path folder_, staging_;
     std::vector<std::string_view> products_;
     bool made_folder_ = false, finished_ = false;
-    int lock_ = -1;
+    FileDescriptor lock_;
 };
 
 /// Writes a whole file, replacing an older one. Every write and the close are checked: throws
-/// std::runtime_error "FILE: error: found REASON (disk full, ...), expected to write N bytes; ...".
+/// std::runtime_error "error: cannot write FILE: REASON; ...".
 void write_file(const std::filesystem::path& file, std::span<const std::uint8_t> bytes);
 void write_file(const std::filesystem::path& file, std::string_view text);
 

@@ -17,8 +17,6 @@
 #include "realtime/divergence.h"
 #include "realtime/realtime_products.h"
 #include "realtime/realtime_session.h"
-#include "sticks/auto_predictor.h"
-#include "sticks/stick_tracker.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -271,8 +269,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
         RealtimeRun run(
             session.kit, session.options, session.stick, session.trace.t0_s(), session.period_samples,
             {*players.simulation, players.stage, *sensors, players.sound.get(), players.frames.get()},
-            session.trace.sticks.size(), !confirming_specification(options.play.sound_predictor).empty(),
-            epoch_ns);
+            session.trace.sticks.size(), epoch_ns);
         play_through(run, session, players, epoch_ns, warn);
         check_samples(session, run, warn);
         collect(outcome, session, run, players, folder, epoch_ns);

@@ -1,9 +1,14 @@
 #pragma once
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "sensors/sample_source.h"
 #include "sticks/stick_filters.h"
+
+namespace CLI {
+class App;
+}
 
 namespace app {
 
@@ -18,8 +23,13 @@ struct SensorTask {
     bool realtime = true;
 };
 
-/// A sensor process: one thread reads the source at its own pace, one filters and publishes, and this one
-/// reports and watches for the end. Returns the exit status: 0 when the source has ended, the hub is gone or
+/// The arguments with which `musicworld` becomes the sensor process of a task.
+[[nodiscard]] std::vector<std::string> sensor_arguments(const SensorTask& task);
+/// `musicworld sensor`, which the program itself starts.
+void add_sensor_command(CLI::App& program, int& status);
+
+/// A sensor process: one thread reads the source at its own pace, one a stick filters and publishes (a slow
+/// external predictor holds up its own stick alone), and this one reports and watches for the end. Returns the exit status: 0 when the source has ended, the hub is gone or
 /// SIGTERM came; 1 when it failed, which its report says.
 [[nodiscard]] int run_sensor(const SensorTask& task);
 
