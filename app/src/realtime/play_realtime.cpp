@@ -17,6 +17,7 @@
 #include "realtime/divergence.h"
 #include "realtime/realtime_products.h"
 #include "realtime/realtime_session.h"
+#include "sticks/predictors.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -275,7 +276,11 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
         collect(outcome, session, run, players, folder, epoch_ns);
     }
     outcome.realtime.clocks = sensors->clocks();
-    if (!session.live) find_departures(outcome, session.trace, session.options.play);
+    // A program of one's own that has failed would fail again.
+    const bool external =
+        is_external(options.play.picture_predictor) || is_external(options.play.sound_predictor);
+    if (!session.live && !(external && !outcome.failure.empty()))
+        find_departures(outcome, session.trace, session.options.play);
     const RunParts parts{session.options.play, session.kit,          session.stick,
                          *players.simulation,  players.frames.get(), wall};
     write_products(outcome.play, parts, folder, [&] { return write_realtime_products(outcome, folder); });
