@@ -7,6 +7,7 @@
 
 #include "play/note_of_strike.h"
 #include "play/play_setup.h"
+#include "sticks/replay.h"
 
 namespace app {
 namespace {
@@ -94,7 +95,7 @@ std::vector<std::uint32_t> OfflineRun::feed(const Tick& tick) {
         const tracking::SampleStatus status =
             filters_[stick].correct(trace_.sticks[stick].samples[index], states_[stick]);
         sticks_[stick].take(states_[stick]);
-        if (status != tracking::SampleStatus::accepted && status != tracking::SampleStatus::reinitialised) {
+        if (!is_taken(status)) {
             ++refused_;
             continue;
         }

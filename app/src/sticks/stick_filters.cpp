@@ -3,6 +3,7 @@
 #include "sticks/auto_predictor.h"
 #include "sticks/external_predictor.h"
 #include "sticks/predictors.h"
+#include "sticks/replay.h"
 #include "sticks/stick.h"
 
 namespace app {
@@ -10,10 +11,6 @@ namespace {
 
 // Frames ask any lead up to the longest; an external predictor answers each 1/60 s.
 constexpr std::size_t kPicturePieces = 9;
-
-bool taken(tracking::SampleStatus status) {
-    return status == tracking::SampleStatus::accepted || status == tracking::SampleStatus::reinitialised;
-}
 
 /// What the predictor expects: its motion; where it has none, its predictions at those leads.
 tracking::PosePath path_of(const tracking::Predictor& predictor, double reach_s, std::size_t pieces) {
@@ -54,7 +51,7 @@ tracking::SampleStatus StickFilters::correct(const tracking::PoseSample& sample,
     require_working(*picture_);
     require_working(*sound_);
     say_paths(state);  // a sample that one filter refuses may count for another
-    if (!taken(status)) {
+    if (!is_taken(status)) {
         ++state.refused;
         return status;
     }
