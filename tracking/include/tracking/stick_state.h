@@ -6,10 +6,13 @@
 
 namespace tracking {
 
-/// What a sensor process knows of one stick after its newest sample. Copied bit by bit through shared memory
-/// (NewestValue). Times: `_s` on the clock of the sample (a trace's own; seconds since the epoch for live
-/// sources), `_ns` on CLOCK_MONOTONIC, which all processes of a machine share.
+/// What the filters of one stick know after its newest sample. Copied bit by bit, also through shared memory
+/// between processes (NewestValue). Times: `_s` on the clock of the sample (a trace's own; seconds since the
+/// epoch for live sources), `_ns` on CLOCK_MONOTONIC, which all processes of a machine share, 0 offline.
 struct StickState {
+    /// To be counted up with each change of this layout: processes that share it check that they agree.
+    static constexpr std::uint64_t kVersion = 2;
+
     std::uint64_t samples =
         0;  ///< accepted since the run began, and those of a trace that were due while its sensor process
             ///< was started again: a larger number is a newer state; 0: none yet
@@ -22,7 +25,9 @@ struct StickState {
     std::int64_t filtered_ns = 0;  ///< when the filters were done, just before publication
     Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< measured, of the tracked body [m]
     Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
-    Motion picture, sound, confirming;  ///< of the three filters (confirming: only where there is one)
+    PosePath picture, sound;     ///< of the filters for pictures and for sound
+    Motion confirming;           ///< of the filter that confirms strikes, where there is one
+    std::uint64_t confirms = 0;  ///< 1: there is one
     /// Time of the newest sample that the filters for pictures and for confirmation took; t_s, unless their
     /// gates refused that one.
     double picture_t_s = 0, confirming_t_s = 0;
