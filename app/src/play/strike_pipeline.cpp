@@ -48,7 +48,7 @@ std::vector<StrikePipeline::StickPaths> StrikePipeline::add_paths(std::span<cons
     for (const std::uint32_t stick : moved) {
         const Stick& known = sticks_[stick];
         StickPaths own{stick, paths.size(), 0, std::nullopt};
-        add(known.predicted_path());
+        for (std::size_t model = 0; model < known.state().models; ++model) add(known.predicted_path(model));
         own.measured = add(known.measured_path());
         if (std::optional<sim::TipPath> confirming = known.confirming_path())
             own.confirming = add(std::move(*confirming));
@@ -121,7 +121,8 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
         expected.push_back(
             {contacts[model],
              std::span(reply.clearance_m).subspan((paths.predicted + model) * bodies, bodies)});
-    scheduler_.sample(paths.stick, s, expected, 0, measured_clearance(paths, reply));
+    scheduler_.sample(paths.stick, s, expected, sticks_[paths.stick].state().model,
+                      measured_clearance(paths, reply));
 }
 
 void StrikePipeline::send_notes() {

@@ -51,8 +51,10 @@ tracking::PointMotion Stick::sounding_tip_at(double T) const {
                               geometry_.tip);
 }
 
-sim::TipPath Stick::predicted_path() const {
-    const auto pose = [this](double lead) { return state_.sound.after(lead); };
+sim::TipPath Stick::predicted_path(std::size_t model) const {
+    const auto pose = [&](double lead) {
+        return state_.models > 1 ? state_.sound_models[model].after(lead) : state_.sound.after(lead);
+    };
     return app::predicted_path(pose, state_.t_s, geometry_, index_, path_leads(sound_lead_s_))
         .value_or(measured_path());
 }

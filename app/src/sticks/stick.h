@@ -59,9 +59,9 @@ public:
     [[nodiscard]] tracking::PosePrediction pose_at(double T) const;
     /// The tip by the sound's filter at T, carried likewise.
     [[nodiscard]] tracking::PointMotion sounding_tip_at(double T) const;
-    /// The path that the sound's filter predicts over [0, sound lead] from its newest sample, and the
-    /// measured tip as a path that stands still.
-    [[nodiscard]] sim::TipPath predicted_path() const;
+    /// The path that a model of the sound's filter predicts over [0, sound lead] from its newest sample, and
+    /// the measured tip as a path that stands still.
+    [[nodiscard]] sim::TipPath predicted_path(std::size_t model) const;
     /// That of the filter which confirms strikes, where there is one.
     [[nodiscard]] std::optional<sim::TipPath> confirming_path() const;
     [[nodiscard]] sim::TipPath measured_path() const;

@@ -1,5 +1,7 @@
 #include "sticks/stick_filters.h"
 
+#include <cassert>
+
 #include "sticks/auto_predictor.h"
 #include "sticks/external_predictor.h"
 #include "sticks/predictors.h"
@@ -68,6 +70,10 @@ void StickFilters::say_paths(tracking::StickState& state) const {
     state.picture_t_s = picture_->time_s();
     state.sound = path_of(*sound_, predictors_.sound_lead_s, kPathPieces);
     state.model = sound_->selected();
+    state.models = sound_->models();
+    assert(state.models <= tracking::StickState::kMostModels);
+    for (std::size_t i = 0; i < state.models && state.models > 1; ++i)
+        state.sound_models[i] = sound_->motion_of_model(i).value_or(state.sound_models[i]);
     if (!confirming_) return;
     state.confirms = 1;
     state.confirming = confirming_->motion().value_or(state.confirming);

@@ -1,4 +1,6 @@
 #pragma once
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "tracking/motion.h"
@@ -11,7 +13,8 @@ namespace tracking {
 /// epoch for live sources), `_ns` on CLOCK_MONOTONIC, which all processes of a machine share, 0 offline.
 struct StickState {
     /// To be counted up with each change of this layout: processes that share it check that they agree.
-    static constexpr std::uint64_t kVersion = 2;
+    static constexpr std::uint64_t kVersion = 3;
+    static constexpr std::size_t kMostModels = 3;
 
     std::uint64_t samples =
         0;  ///< accepted since the run began, and those of a trace that were due while its sensor process
@@ -31,7 +34,10 @@ struct StickState {
     /// Time of the newest sample that the filters for pictures and for confirmation took; t_s, unless their
     /// gates refused that one.
     double picture_t_s = 0, confirming_t_s = 0;
-    std::uint64_t model = 0;  ///< which of its models the sound's filter has selected
+    /// How many models the sound's filter runs in parallel, which it has selected (`sound` is its), and, of
+    /// several, what each of them expects.
+    std::uint64_t models = 1, model = 0;
+    std::array<Motion, kMostModels> sound_models;
 };
 
 /// Numbers and arrays of numbers.
