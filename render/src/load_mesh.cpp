@@ -1,18 +1,24 @@
 #include <algorithm>
 #include <cctype>
+#include <fstream>
+#include <iterator>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include "import_process.h"
 #include "mesh_stream.h"
+#include "obj_reader.h"
 #include "render/mesh.h"
 
 namespace render {
 namespace {
 
 constexpr std::size_t kChildrenAtOnce = 4;
+constexpr std::uintmax_t kMostPlainBytes = 64u << 20;  // what is larger is for the importer
 
-void check_file(const std::filesystem::path& file) {
+/// The extension in lower case. Throws for what cannot be a mesh.
+std::string checked_extension(const std::filesystem::path& file) {
     std::error_code error;
     const std::filesystem::file_status status = std::filesystem::status(file, error);
     if (!std::filesystem::exists(status)) throw std::runtime_error("found no such file, expected a mesh");
@@ -27,6 +33,16 @@ void check_file(const std::filesystem::path& file) {
     if (extension != ".obj" && extension != ".glb" && extension != ".gltf" && extension != ".stl") {
         throw std::runtime_error("found extension '" + extension + "', expected .obj, .glb, .gltf or .stl");
     }
+    return extension;
+}
+
+/// A mesh that is read here, or nothing: it is for the importer.
+std::optional<Mesh> read_here(const std::filesystem::path& file, const std::string& extension) {
+    if (extension != ".obj" || std::filesystem::file_size(file) > kMostPlainBytes) return {};
+    std::ifstream in(file, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+    if (!in.is_open() || in.bad()) return {};
+    return read_plain_obj(file, text);
 }
 
 /// Runs one stage of one file's import and puts the file's name before what went wrong.
@@ -42,20 +58,21 @@ auto naming_file(const std::filesystem::path& file, Stage stage) {
 }  // namespace
 
 std::vector<Mesh> load_meshes(const std::vector<std::filesystem::path>& files) {
-    std::vector<Mesh> meshes;
+    std::vector<Mesh> meshes(files.size());
     for (std::size_t first = 0; first < files.size(); first += kChildrenAtOnce) {
         const std::size_t last = std::min(first + kChildrenAtOnce, files.size());
-        std::vector<std::unique_ptr<ImportProcess>> children;
+        std::vector<std::unique_ptr<ImportProcess>> children(last - first);
         for (std::size_t i = first; i < last; ++i) {
-            children.push_back(naming_file(files[i], [&] {
-                check_file(files[i]);
-                return std::make_unique<ImportProcess>(files[i]);
-            }));
+            const std::string extension = naming_file(files[i], [&] { return checked_extension(files[i]); });
+            if (std::optional<Mesh> mesh = read_here(files[i], extension))
+                meshes[i] = std::move(*mesh);
+            else
+                children[i - first] =
+                    naming_file(files[i], [&] { return std::make_unique<ImportProcess>(files[i]); });
         }
-        for (std::size_t i = first; i < last; ++i) {
-            meshes.push_back(
-                naming_file(files[i], [&] { return decode_mesh_stream(children[i - first]->output()); }));
-        }
+        for (std::size_t i = first; i < last; ++i)
+            if (ImportProcess* child = children[i - first].get())
+                meshes[i] = naming_file(files[i], [&] { return decode_mesh_stream(child->output()); });
     }
     return meshes;
 }

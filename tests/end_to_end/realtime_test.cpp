@@ -112,6 +112,63 @@ TEST(Realtime, AKilledSensorIsStartedAgainAndThePlayGoesOn) {
     EXPECT_EQ(left_memory(), std::vector<std::string>());
 }
 
+const std::string kExample = "exec:python3 '" + bundled("predictors/difference.py").string() + "'";
+
+bool has_python() {
+    return std::system("python3 -c '' 2>/dev/null") == 0;
+}
+
+TEST(Realtime, APredictorOfOnesOwnStrikesAsOfflineButForDelays) {
+    if (!has_python()) GTEST_SKIP() << "needs python3";
+    const Folder folder;
+    const Ended ended =
+        run(in_time("play", folder / "played",
+                    {"--realtime", "--seconds", "2.5", "--no-frames", "--predictor", kExample}));
+    ASSERT_EQ(ended.status, 0) << ended.err;
+    const Json summary = Json::parse(read(folder / "played/summary.json"));
+    EXPECT_GT(summary.at("strikes").at("released"), 0);
+    EXPECT_EQ(summary.at("realtime").at("against_offline").at("unexplained"), 0)
+        << read(folder / "played/departures.csv");
+}
+
+TEST(Realtime, AFaultyPredictorOfOnesOwnEndsItWithOneLineAndStatus1) {
+    const Folder folder;
+    for (const auto& [predictor, message] :
+         {std::pair<std::string, std::string>{"exec:cat", "exec:cat, stick left, first line: error: found"},
+          {"exec:read h; echo position; read l", "answer 1: error: found the child ended with status 0"}}) {
+        const Ended ended =
+            run(in_time("play", folder / "played",
+                        {"--realtime", "--seconds", "60", "--no-frames", "--sound-predictor", predictor}));
+        EXPECT_EQ(ended.status, 1) << predictor << ended.err;
+        EXPECT_NE(ended.err.find(message), std::string::npos) << ended.err;
+    }
+}
+
+TEST(Realtime, AChildThatPredictsEndsWithTheProgramHoweverThatEnds) {
+    for (const int signal : {SIGTERM, SIGINT, SIGKILL}) {
+        const Folder folder;
+        // Each shell and a process that it has started; neither reads its input's end.
+        const std::string child =
+            "exec:read head; set -- $head; shift 3; n=$#; echo position; sleep 1000 & echo $! $$ >> '" +
+            (folder / "pids").string() +
+            "'; while read t x y z rest; do a=; i=0; while [ $i -lt $n ]; do a=\"$a $x $y $z\"; i=$((i+1)); "
+            "done; echo $a; done; sleep 1000";
+        Started started(in_time("play", folder / "played",
+                                {"--realtime", "--seconds", "60", "--no-frames", "--sound-predictor", child}),
+                        folder / "");
+        const auto pids = [&] {
+            std::vector<int> all;
+            std::istringstream text(read(folder / "pids"));
+            for (int pid = 0; text >> pid;) all.push_back(pid);
+            return all;
+        };
+        ASSERT_TRUE(happens([&] { return pids().size() == 4; }));  // two sticks
+        kill(started.pid(), signal);
+        (void)started.wait();
+        for (const int pid : pids()) EXPECT_TRUE(happens([&] { return !alive(pid); })) << "signal " << signal;
+    }
+}
+
 TEST(Realtime, InterruptedItFinishesWhatItHas) {
     const Folder folder;
     Started started(in_time("play", folder / "played", {"--realtime", "--seconds", "60", "--no-frames"}),
@@ -150,7 +207,7 @@ TEST(Realtime, WhatCannotBeIsRefusedInOneLine) {
         {"--realtime", "--disturb", "rain:1@2"},
         {"--realtime", "--output-lead", "0.010"},
         {"--realtime", "--source", "stdin"},  // with TRACE
-        {"--realtime", "--sound-predictor", "exec:cat"},
+        {"--realtime", "--sound-predictor", "exec:"},
         {"--realtime", "--solo", "1"},
     };
     for (const auto& more : cases) {

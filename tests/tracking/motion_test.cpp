@@ -100,6 +100,46 @@ TEST(Motion, OfAPolynomialOfDegreeThreeIsNone) {
     EXPECT_FALSE(predictor->motion());
 }
 
+/// The poses that a polynomial of degree 3 predicts, at leads from 0 to 0.15 s in nine steps.
+SampledMotion sampled_from(const Predictor& predictor) {
+    SampledMotion sampled(0.15, 9);
+    for (std::size_t i = 0; i <= sampled.pieces(); ++i) sampled.set(i, predictor.predict(sampled.lead_s(i)));
+    return sampled;
+}
+
+TEST(SampledMotion, IsItsSamplesToTheBitAndACubicBetweenThem) {
+    const auto predictor = make_predictor("least-squares:degree=3,n=12");
+    RandomStick stick(7, true);
+    for (int i = 0; i < 200; ++i) {
+        (void)predictor->correct(stick.next());
+        const SampledMotion sampled = sampled_from(*predictor);
+        for (std::size_t k = 0; k <= sampled.pieces(); ++k)
+            EXPECT_EQ(difference(sampled.after(sampled.lead_s(k)), predictor->predict(sampled.lead_s(k))), 0);
+        for (const double lead : {0.001, 1.0 / 30, 0.07, 0.149}) {
+            const PosePrediction own = sampled.after(lead), whole = predictor->predict(lead);
+            // A cubic piece is the cubic itself: rounding of numbers below 1e3.
+            EXPECT_LT((own.position - whole.position).norm(), 1e-11);
+            EXPECT_LT((own.velocity - whole.velocity).norm(), 1e-9);
+        }
+    }
+}
+
+/// A turn at 30 rad/s and a push of 50 m/s^2, sampled at three poses: between them the same, beyond at the last
+/// velocities.
+TEST(SampledMotion, TurnsAtAConstantRateAndGoesOnWithTheLastVelocities) {
+    Motion motion;
+    motion.velocity = Vector3d(1, 2, 3);
+    motion.acceleration = Vector3d(0, -50, 0);
+    motion.angular_velocity = Vector3d(10, -20, 20);
+    SampledMotion sampled(0.1, 2);
+    for (std::size_t i = 0; i <= 2; ++i) sampled.set(i, motion.after(sampled.lead_s(i)));
+    for (const double lead : {0.0, 0.02, 0.05, 0.09, 0.1})
+        EXPECT_LT(difference(sampled.after(lead), motion.after(lead)), 1e-12) << lead;
+    const PosePrediction last = motion.after(0.1), beyond = sampled.after(0.13);
+    EXPECT_LT((beyond.position - last.position - 0.03 * last.velocity).norm(), 1e-12);
+    EXPECT_LT((beyond.orientation.coeffs() - motion.after(0.13).orientation.coeffs()).norm(), 1e-12);
+}
+
 /// What one predictor's Motion says differs from another's: the test above would not pass by chance.
 TEST(Motion, DiffersBetweenPredictors) {
     RandomStick stick(7, true);

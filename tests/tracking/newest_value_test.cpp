@@ -152,7 +152,14 @@ TEST(NewestValue, CarriesAStickState) {
     state.samples = 7;
     state.due_ns = -3;
     state.position = Eigen::Vector3d(1, 2, 3);
-    state.picture.orientation = Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5);
+    Motion turned;
+    turned.orientation = Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5);
+    state.picture = turned;
+    SampledMotion sampled(0.1, 1);
+    PosePrediction last;
+    last.position = Eigen::Vector3d(4, 5, 6);
+    sampled.set(1, last);
+    state.sound = sampled;
     state.confirming.law = MotionLaw::decaying_acceleration;
     state.confirming.rate = 3;
     newest->publish(state);
@@ -160,7 +167,10 @@ TEST(NewestValue, CarriesAStickState) {
     EXPECT_EQ(read.samples, 7U);
     EXPECT_EQ(read.due_ns, -3);
     EXPECT_EQ(read.position, state.position);
-    EXPECT_EQ(read.picture.orientation.coeffs(), state.picture.orientation.coeffs());
+    ASSERT_TRUE(read.picture.motion());
+    EXPECT_EQ(read.picture.motion()->orientation.coeffs(), turned.orientation.coeffs());
+    EXPECT_FALSE(read.sound.motion());
+    EXPECT_EQ(read.sound.after(0.1).position, last.position);
     EXPECT_EQ(read.confirming.law, MotionLaw::decaying_acceleration);
     EXPECT_EQ(read.confirming.rate, 3);
 }

@@ -42,7 +42,10 @@ public:
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
     /// That of the selected model.
     [[nodiscard]] std::optional<Motion> motion() const noexcept override {
-        return rotation_[selected_].motion(position_[selected_].now().x);
+        return motion_of_model(selected_);
+    }
+    [[nodiscard]] std::optional<Motion> motion_of_model(std::size_t index) const noexcept override {
+        return rotation_[index].motion(position_[index].now().x);
     }
     [[nodiscard]] std::size_t models() const noexcept override { return kModels; }
     [[nodiscard]] std::size_t selected() const noexcept override { return selected_; }

@@ -50,6 +50,13 @@ PosePrediction DoubleExponential::predict(double lead_s) const noexcept {
     return pose;
 }
 
+std::optional<Motion> DoubleExponential::motion() const noexcept {
+    Motion motion = steady_motion(predict(0));
+    motion.orientation = q1_;  // from there, as predict() turns
+    motion.turn = logarithm(q1_ * q2_.conjugate());
+    return motion;
+}
+
 double OneEuro::share_at_speed(double speed_mps, double dt) const noexcept {
     return share_at_cutoff(options_.least_cutoff_hz + options_.beta_hz_s_per_m * speed_mps, dt);
 }

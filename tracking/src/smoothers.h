@@ -20,7 +20,7 @@ public:
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override;
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
-    [[nodiscard]] std::optional<Motion> motion() const noexcept override { return steady_motion(predict(0)); }
+    [[nodiscard]] std::optional<Motion> motion() const noexcept override;
 
 private:
     SampleClock clock_;

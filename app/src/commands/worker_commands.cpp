@@ -95,6 +95,8 @@ void add_sensor_command(Command& program) {
     command.option("--sound", task->predictors.sound, predictor, "Of sound").required();
     command.option("--confirming", task->predictors.confirming, predictor,
                    "Of contacts, for a second opinion");
+    command.option("--sound-lead", task->predictors.sound_lead_s, as::number(),
+                   "Contacts are looked for so far ahead [s]");
     const auto descriptor = as::whole(0, std::numeric_limits<int>::max());
     command.options("--state-fd", task->state_fds, descriptor, "Shared memory; once a stick").required();
     command.option("--wake-fd", task->wake_fd, descriptor, "eventfd").required();

@@ -8,7 +8,6 @@
 #include "process/parallel.h"
 #include "sticks/auto_predictor.h"
 #include "sticks/predictors.h"
-#include "sticks/stick_tracker.h"
 
 namespace app {
 namespace {

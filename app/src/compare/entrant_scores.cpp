@@ -10,7 +10,7 @@
 #include "statistics/statistics.h"
 #include "sticks/predictors.h"
 #include "sticks/replay.h"
-#include "sticks/stick_tracker.h"
+#include "sticks/stick.h"
 
 namespace app {
 namespace {

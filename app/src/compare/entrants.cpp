@@ -11,7 +11,6 @@
 #include "files/bad_input.h"
 #include "sticks/auto_predictor.h"
 #include "sticks/predictors.h"
-#include "sticks/stick_tracker.h"
 
 namespace app {
 namespace {

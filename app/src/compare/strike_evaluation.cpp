@@ -12,7 +12,7 @@
 #include "statistics/statistics.h"
 #include "sticks/auto_predictor.h"
 #include "sticks/replay.h"
-#include "sticks/stick_outlook.h"
+#include "sticks/stick.h"
 #include "strikes/score_strikes.h"
 #include "strikes/strike_scheduler.h"
 #include "strikes/strike_score.h"

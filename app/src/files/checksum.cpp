@@ -9,29 +9,17 @@
 #include <bit>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <memory>
 #include <stdexcept>
 
 #include "files/bad_input.h"
+#include "files/file_descriptor.h"
 
 namespace app {
 namespace {
 
-struct Descriptor {
-    int number;
-    explicit Descriptor(int opened) : number(opened) {}
-    Descriptor(const Descriptor&) = delete;
-    Descriptor& operator=(const Descriptor&) = delete;
-    ~Descriptor() {
-        if (number >= 0) ::close(number);
-    }
-};
-
-[[noreturn]] void fail_to_read(const std::filesystem::path& file, int error) {
-    throw BadInput(
-        fmt::format("{}: error: found {}, expected a readable file; check the path and its permissions",
-                    file.string(), std::strerror(error)));
+[[noreturn]] void fail_to_read(const std::filesystem::path& file) {
+    throw BadInput("error: " + cannot("read " + file.string()));
 }
 
 void expect(int openssl_status) {
@@ -76,16 +64,16 @@ void probe_libm(BitHash& hash) {
 }  // namespace
 
 std::string sha256_of_file(const std::filesystem::path& file) {
-    const Descriptor input(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
-    if (input.number < 0) fail_to_read(file, errno);
+    const FileDescriptor input(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+    if (!input) fail_to_read(file);
     const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
     if (!context) throw std::bad_alloc();
     expect(EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr));
     std::array<std::uint8_t, 65536> block;
     for (;;) {
-        const ssize_t got = ::read(input.number, block.data(), block.size());
+        const ssize_t got = ::read(input.get(), block.data(), block.size());
         if (got < 0 && errno == EINTR) continue;
-        if (got < 0) fail_to_read(file, errno);
+        if (got < 0) fail_to_read(file);
         if (got == 0) break;
         expect(EVP_DigestUpdate(context.get(), block.data(), static_cast<std::size_t>(got)));
     }

@@ -65,25 +65,19 @@ void check_frames(const fs::path& frames) {
 }
 
 void write_all(const fs::path& file, const void* data, std::size_t size) {
-    const auto fail = [&](int error) {
-        throw std::runtime_error(
-            fmt::format("{}: error: found \"{}\", expected to write {} bytes; free some space "
-                        "or choose another --out",
-                        file.string(), std::strerror(error), size));
+    const auto fail = [&] {
+        throw std::runtime_error("error: " + cannot("write " + file.string()) +
+                                 "; free some space or choose another --out");
     };
-    const int out = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (out < 0) fail(errno);
+    FileDescriptor out(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+    if (!out) fail();
     for (std::size_t done = 0; done < size;) {
-        const ssize_t wrote = ::write(out, static_cast<const char*>(data) + done, size - done);
+        const ssize_t wrote = ::write(out.get(), static_cast<const char*>(data) + done, size - done);
         if (wrote < 0 && errno == EINTR) continue;
-        if (wrote < 0) {
-            const int error = errno;
-            ::close(out);
-            fail(error);
-        }
+        if (wrote < 0) fail();
         done += static_cast<std::size_t>(wrote);
     }
-    if (::close(out) != 0) fail(errno);
+    if (!out.close()) fail();
 }
 
 }  // namespace
@@ -111,23 +105,17 @@ OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_v
     if (fs::exists(folder_, none) && !fs::is_directory(folder_, none)) refuse(folder_, "a file");
     if (error) refuse(folder_, error.message());
     lock();
-    try {
-        if (std::find(products_.begin(), products_.end(), "frames") != products_.end())
-            check_frames(folder_ / "frames");
-        notice_.emplace(staging_);
-        make_staging();
-    } catch (...) {
-        ::close(lock_);
-        throw;
-    }
+    if (std::find(products_.begin(), products_.end(), "frames") != products_.end())
+        check_frames(folder_ / "frames");
+    notice_.emplace(staging_);
+    make_staging();
 }
 
 void OutputFolder::lock() {
-    lock_ = ::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (lock_ < 0) refuse(folder_, std::strerror(errno));
+    lock_ = FileDescriptor(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (!lock_) refuse(folder_, std::strerror(errno));
     // File systems without locks are used without.
-    if (::flock(lock_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
-    ::close(lock_);
+    if (::flock(lock_.get(), LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
     throw BadInput(
         fmt::format("{}: error: found another run writing into it, expected one run a folder; "
                     "wait for it or choose another --out",
@@ -148,7 +136,6 @@ OutputFolder::~OutputFolder() {
         fs::remove_all(staging_, ignored);
         if (made_folder_) fs::remove(folder_, ignored);
     }
-    ::close(lock_);
 }
 
 void OutputFolder::finish() {

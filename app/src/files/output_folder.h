@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "files/file_descriptor.h"
 #include "files/interruption_notice.h"
 
 namespace app {
@@ -57,12 +58,12 @@ private:
     std::filesystem::path folder_, staging_;
     std::vector<std::string_view> products_;
     bool made_folder_ = false, finished_ = false;
-    int lock_ = -1;
+    FileDescriptor lock_;
     std::optional<InterruptionNotice> notice_;
 };
 
 /// Writes a whole file, replacing an older one. Every write and the close are checked: throws
-/// std::runtime_error "FILE: error: found REASON (disk full, ...), expected to write N bytes; ...".
+/// std::runtime_error "error: cannot write FILE: REASON; ...".
 void write_file(const std::filesystem::path& file, std::span<const std::uint8_t> bytes);
 void write_file(const std::filesystem::path& file, std::string_view text);
 

@@ -7,26 +7,27 @@
 
 #include "play/note_of_strike.h"
 #include "play/play_setup.h"
+#include "sticks/replay.h"
 
 namespace app {
 namespace {
 
 constexpr double kSlackS = 1e-9;  // of the causality rules
 
-std::vector<std::unique_ptr<StickTracker>> trackers(const tracking::Trace& trace, const PlayOptions& options,
-                                                    const StickGeometry& stick) {
-    std::vector<std::unique_ptr<StickTracker>> sticks;
-    for (std::uint32_t i = 0; i < trace.sticks.size(); ++i)
-        sticks.push_back(std::make_unique<StickTracker>(i, trace.sticks[i].name, stick,
-                                                        options.picture_predictor, options.sound_predictor,
-                                                        options.sound_lead_s));
-    return sticks;
+std::vector<StickFilters> filters_of(const tracking::Trace& trace, const PlayOptions& options) {
+    const StickPredictors predictors =
+        stick_predictors(options.picture_predictor, options.sound_predictor, options.sound_lead_s);
+    std::vector<StickFilters> filters;
+    for (const tracking::StickTrace& stick : trace.sticks) filters.emplace_back(predictors, stick.name);
+    return filters;
 }
 
-std::vector<const StickOutlook*> outlooks(std::span<const std::unique_ptr<StickTracker>> sticks) {
-    std::vector<const StickOutlook*> result;
-    for (const auto& stick : sticks) result.push_back(stick.get());
-    return result;
+std::vector<Stick> sticks_of(const tracking::Trace& trace, const PlayOptions& options,
+                             const StickGeometry& geometry) {
+    std::vector<Stick> sticks;
+    for (std::uint32_t i = 0; i < trace.sticks.size(); ++i)
+        sticks.emplace_back(i, geometry, options.sound_lead_s);
+    return sticks;
 }
 
 }  // namespace
@@ -42,8 +43,10 @@ OfflineRun::OfflineRun(const tracking::Trace& trace, const Kit& kit, const PlayO
       performance_(performance),
       t0_s_(trace.t0_s()),
       t_end_s_(trace.t_end_s()),
-      sticks_(trackers(trace, options, stick)),
-      pipeline_(kit, strike_rules(options, trace.t0_s()), stick.radius_m, outlooks(sticks_), simulation,
+      filters_(filters_of(trace, options)),
+      states_(trace.sticks.size()),
+      sticks_(sticks_of(trace, options, stick)),
+      pipeline_(kit, strike_rules(options, trace.t0_s()), stick.radius_m, sticks_, simulation,
                 [this](const Strike& strike, bool scheduled) { send(strike, scheduled); }) {}
 
 LoopTimes OfflineRun::times() const {
@@ -89,8 +92,10 @@ std::vector<std::uint32_t> OfflineRun::feed(const Tick& tick) {
     const Stopwatch watch(times_.tracking);
     std::vector<std::uint32_t> moved;
     for (const auto& [stick, index] : tick.samples) {
-        const tracking::SampleStatus status = sticks_[stick]->correct(trace_.sticks[stick].samples[index]);
-        if (status != tracking::SampleStatus::accepted && status != tracking::SampleStatus::reinitialised) {
+        const tracking::SampleStatus status =
+            filters_[stick].correct(trace_.sticks[stick].samples[index], states_[stick]);
+        sticks_[stick].take(states_[stick]);
+        if (!is_taken(status)) {
             ++refused_;
             continue;
         }

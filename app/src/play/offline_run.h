@@ -12,7 +12,7 @@
 #include "pictures/kit_stage.h"
 #include "play/play_options.h"
 #include "play/strike_pipeline.h"
-#include "sticks/stick_tracker.h"
+#include "sticks/stick_filters.h"
 
 namespace app {
 
@@ -52,7 +52,9 @@ private:
     FrameThread* frames_;
     audio::Performance* performance_;
     double t0_s_, t_end_s_;
-    std::vector<std::unique_ptr<StickTracker>> sticks_;
+    std::vector<StickFilters> filters_;  // by stick, as the next two
+    std::vector<tracking::StickState> states_;
+    std::vector<Stick> sticks_;
     StrikePipeline pipeline_;
     std::size_t next_frame_ = 0;
     std::size_t refused_ = 0;

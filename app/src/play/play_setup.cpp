@@ -7,7 +7,6 @@
 #include "files/checksum.h"
 #include "sticks/auto_predictor.h"
 #include "sticks/predictors.h"
-#include "sticks/stick_tracker.h"
 
 namespace app {
 namespace fs = std::filesystem;

@@ -13,12 +13,11 @@ constexpr double kReboundS = 0.05;  // a filter has seen a rebound by then
 }  // namespace
 
 StrikePipeline::StrikePipeline(const Kit& kit, const StrikeRules& rules, double tip_radius_m,
-                               std::vector<const StickOutlook*> sticks, sim::Simulation& simulation,
-                               Notify notify)
+                               const std::vector<Stick>& sticks, sim::Simulation& simulation, Notify notify)
     : kit_(kit),
       cancelling_(rules.cancelling),
       tip_radius_m_(tip_radius_m),
-      sticks_(std::move(sticks)),
+      sticks_(sticks),
       simulation_(simulation),
       notify_(std::move(notify)),
       scheduler_(rules, sticks_.size(), kit.instruments.size()) {}
@@ -47,11 +46,11 @@ std::vector<StrikePipeline::StickPaths> StrikePipeline::add_paths(std::span<cons
     };
     std::vector<StickPaths> all;
     for (const std::uint32_t stick : moved) {
-        const StickOutlook& outlook = *sticks_[stick];
+        const Stick& known = sticks_[stick];
         StickPaths own{stick, paths.size(), 0, std::nullopt};
-        add(outlook.predicted_path());
-        own.measured = add(outlook.measured_path());
-        if (std::optional<sim::TipPath> confirming = outlook.confirming_path())
+        for (std::size_t model = 0; model < known.state().models; ++model) add(known.predicted_path(model));
+        own.measured = add(known.measured_path());
+        if (std::optional<sim::TipPath> confirming = known.confirming_path())
             own.confirming = add(std::move(*confirming));
         all.push_back(own);
     }
@@ -92,7 +91,7 @@ void StrikePipeline::take(double s, std::span<const std::uint32_t> moved) {
 std::vector<double> StrikePipeline::measured_clearance(const StickPaths& paths,
                                                        const sim::StepReply& reply) const {
     const std::size_t bodies = kit_.instruments.size();
-    const Eigen::Vector3d& tip = sticks_[paths.stick]->measured_tip();
+    const Eigen::Vector3d& tip = sticks_[paths.stick].measured_tip();
     std::vector<double> measured(bodies);
     for (std::size_t b = 0; b < bodies; ++b) {
         // The nearer of the surface as it vibrates and at rest: a vibrating head does not arm a stick that lies
@@ -122,7 +121,8 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
         expected.push_back(
             {contacts[model],
              std::span(reply.clearance_m).subspan((paths.predicted + model) * bodies, bodies)});
-    scheduler_.sample(paths.stick, s, expected, 0, measured_clearance(paths, reply));
+    scheduler_.sample(paths.stick, s, expected, sticks_[paths.stick].state().model,
+                      measured_clearance(paths, reply));
 }
 
 void StrikePipeline::send_notes() {
@@ -151,15 +151,15 @@ const Strike* StrikePipeline::struck_by(std::uint32_t stick, double s, double T)
 }
 
 DrawnStick StrikePipeline::drawn(std::uint32_t stick, double s, double T) {
-    const StickOutlook& outlook = *sticks_[stick];
-    DrawnStick result{outlook.pose_at(T), {}, false};
-    result.tip = tracking::point_of(result.pose, outlook.geometry().tip);
+    const Stick& known = sticks_[stick];
+    DrawnStick result{known.pose_at(T), {}, false};
+    result.tip = tracking::point_of(result.pose, known.geometry().tip);
     if (const Strike* strike = struck_by(stick, s, T)) {
         touching_.insert(strike->id);
         const Eigen::Vector3d touch = strike->point_world + tip_radius_m_ * strike->normal_world;
-        if (strike->contact_s > s) result.tip = outlook.sounding_tip_at(T);
-        result.pose = outlook.pose_at(std::max(s, strike->contact_s));
-        result.pose.position += touch - tracking::point_of(result.pose, outlook.geometry().tip).position;
+        if (strike->contact_s > s) result.tip = known.sounding_tip_at(T);
+        result.pose = known.pose_at(std::max(s, strike->contact_s));
+        result.pose.position += touch - tracking::point_of(result.pose, known.geometry().tip).position;
         result.held = true;
         return result;
     }
@@ -169,7 +169,7 @@ DrawnStick StrikePipeline::drawn(std::uint32_t stick, double s, double T) {
         if (strike->stick == stick && strike->outcome != Outcome::cancelled &&
             strike->contact_s > s - kReboundS && strike->contact_s <= s &&
             (result.tip.position - strike->point_world).dot(strike->normal_world) < 0) {
-            result.pose = outlook.pose_at(s);
+            result.pose = known.pose_at(s);
             result.held = true;
         }
     return result;
@@ -178,7 +178,7 @@ DrawnStick StrikePipeline::drawn(std::uint32_t stick, double s, double T) {
 FrameContents StrikePipeline::scene(double s, double T) {
     FrameContents scene;
     for (std::uint32_t i = 0; i < sticks_.size(); ++i)
-        scene.sticks.push_back(sticks_[i]->started() ? std::optional(drawn(i, s, T)) : std::nullopt);
+        scene.sticks.push_back(sticks_[i].started() ? std::optional(drawn(i, s, T)) : std::nullopt);
     sim::StepRequest request;
     request.t_s = s;
     settle_impulses(s, request);

@@ -11,8 +11,7 @@
 
 #include "kit/kit.h"
 #include "process/stopwatch.h"
-#include "sticks/stick_outlook.h"
-#include "sticks/stick_tracker.h"
+#include "sticks/stick.h"
 #include "strikes/drawn_strikes.h"
 #include "strikes/strike_scheduler.h"
 
@@ -46,9 +45,9 @@ public:
     /// A note's change, for the sound: the strike as it stands; `scheduled` false: cancelled.
     using Notify = std::function<void(const Strike& strike, bool scheduled)>;
 
-    /// `simulation` begins anew with the first step.
+    /// `simulation` begins anew with the first step; `sticks` are kept up to date by the caller.
     StrikePipeline(const Kit& kit, const StrikeRules& rules, double tip_radius_m,
-                   std::vector<const StickOutlook*> sticks, sim::Simulation& simulation, Notify notify);
+                   const std::vector<Stick>& sticks, sim::Simulation& simulation, Notify notify);
 
     /// Before the samples at s (StrikeScheduler::advance_to).
     void advance_to(double s, double fixed_s = -std::numeric_limits<double>::infinity());
@@ -87,7 +86,7 @@ private:
     const Kit& kit_;
     bool cancelling_;
     double tip_radius_m_;
-    std::vector<const StickOutlook*> sticks_;
+    const std::vector<Stick>& sticks_;
     sim::Simulation& simulation_;
     Notify notify_;
     StrikeScheduler scheduler_;

@@ -8,11 +8,12 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
+#include <csignal>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 
+#include "files/file_descriptor.h"
 #include "files/one_line.h"
 
 extern char** environ;
@@ -40,7 +41,11 @@ class Attributes {
 public:
     explicit Attributes(bool own_group) {
         posix_spawnattr_init(&attributes_);
-        if (own_group) posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETPGROUP);
+        sigset_t none;
+        sigemptyset(&none);
+        posix_spawnattr_setsigmask(&attributes_, &none);  // whatever this thread has blocked
+        posix_spawnattr_setflags(&attributes_, static_cast<short>(POSIX_SPAWN_SETSIGMASK |
+                                                                  (own_group ? POSIX_SPAWN_SETPGROUP : 0)));
     }
     ~Attributes() { posix_spawnattr_destroy(&attributes_); }
     Attributes(const Attributes&) = delete;
@@ -51,22 +56,11 @@ private:
     posix_spawnattr_t attributes_{};
 };
 
-/// An open file that closes.
-class File {
-public:
-    File(const fs::path& file, int flags) : descriptor_(open(file.c_str(), flags | O_CLOEXEC, 0600)) {
-        if (descriptor_ < 0)
-            throw std::runtime_error(
-                fmt::format("{}: error: found no way to open it ({})", file.string(), std::strerror(errno)));
-    }
-    ~File() { close(descriptor_); }
-    File(const File&) = delete;
-    File& operator=(const File&) = delete;
-    [[nodiscard]] int get() const { return descriptor_; }
-
-private:
-    int descriptor_;
-};
+FileDescriptor open_file(const fs::path& file, int flags) {
+    FileDescriptor opened(open(file.c_str(), flags | O_CLOEXEC, 0600));
+    if (!opened) throw std::runtime_error("error: " + cannot("open " + file.string()));
+    return opened;
+}
 
 std::vector<char*> pointers(const std::vector<std::string>& words) {
     std::vector<char*> result;
@@ -114,9 +108,7 @@ int start_child(const ChildStart& start) {
     pid_t child = 0;
     const int error = posix_spawnp(&child, arguments[0], files.get(), attributes.get(), arguments.data(),
                                    environment.data());
-    if (error != 0)
-        throw std::runtime_error(fmt::format("error: found no way to start {} ({}), expected it installed",
-                                             start.command[0], std::strerror(error)));
+    if (error != 0) throw std::runtime_error("error: " + cannot("start " + start.command[0], error));
     return child;
 }
 
@@ -124,15 +116,14 @@ int wait_for_child(int pid) {
     int status = 0;
     while (waitpid(pid, &status, 0) < 0)
         if (errno != EINTR)
-            throw std::runtime_error(
-                fmt::format("error: lost the process {}: {}", pid, std::strerror(errno)));
+            throw std::runtime_error("error: " + cannot(fmt::format("wait for process {}", pid)));
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
 void run_child(const std::vector<std::string>& command, const fs::path& log,
                const std::vector<std::string>& variables) {
-    const File none("/dev/null", O_RDONLY);
-    const File messages(log, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND);
+    const FileDescriptor none = open_file("/dev/null", O_RDONLY);
+    const FileDescriptor messages = open_file(log, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND);
     const int child = start_child({command, variables, none.get(), messages.get(), messages.get(), false});
     if (const int status = wait_for_child(child); status != 0)
         throw std::runtime_error(fmt::format("error: found {} ended with status {}, expected 0; it said: {}",

@@ -1,5 +1,6 @@
 #include "process/line_child.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/mman.h>
@@ -9,65 +10,75 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <cmath>
 #include <csignal>
-#include <cstring>
 #include <stdexcept>
 
 #include "files/one_line.h"
 #include "process/child_process.h"
+#include "process/clock.h"
 
 namespace app {
 namespace {
 
 double now_s() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+    return to_s(monotonic_ns());
 }
 
-[[noreturn]] void fail_system(const char* what) {
-    throw std::runtime_error(
-        fmt::format("found that {} failed ({}), expected it to work", what, std::strerror(errno)));
+[[noreturn]] void fail_system(const char* action) {
+    throw std::runtime_error(cannot(action));
 }
 
 /// A file without a name, which no other child inherits.
 std::FILE* memory_file() {
     const int descriptor = memfd_create("errors", MFD_CLOEXEC);
-    if (descriptor < 0) fail_system("making a temporary file");
+    if (descriptor < 0) fail_system("make a temporary file");
     std::FILE* file = fdopen(descriptor, "w+");
-    if (!file) fail_system("opening a temporary file");
+    if (!file) fail_system("open a temporary file");
     return file;
+}
+
+/// Lets the system kill a process group when the other end of this pipe closes.
+void kill_at_end(int pipe_end, int group) {
+    if (fcntl(pipe_end, F_SETOWN, -group) != 0 || fcntl(pipe_end, F_SETSIG, SIGKILL) != 0 ||
+        fcntl(pipe_end, F_SETFL, O_ASYNC) != 0)
+        fail_system("tie the child's end to this program's");
 }
 
 }  // namespace
 
 LineChild::LineChild(const std::string& command) : errors_(memory_file()) {
     int ends[2];
-    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) fail_system("making a socket");
-    socket_ = ends[0];
+    if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) fail_system("make a socket");
+    socket_ = FileDescriptor(ends[0]);
+    const FileDescriptor of_child(ends[1]);
+    Pipe life = make_pipe();
+    pid_ = start_child({{"sh", "-c", command},
+                        {},
+                        of_child.get(),
+                        of_child.get(),
+                        fileno(errors_.get()),
+                        true,
+                        {life.out.get()}});
+    life_ = std::move(life.in);
     try {
-        pid_ = start_child({{"sh", "-c", command}, {}, ends[1], ends[1], fileno(errors_.get()), true});
-        keeper_.emplace(pid_);
+        kill_at_end(life.out.get(), pid_);
     } catch (...) {
-        if (pid_ > 0) (void)collect();
-        close(ends[0]);
-        close(ends[1]);
+        (void)collect();
         throw;
     }
-    close(ends[1]);
 }
 
 LineChild::~LineChild() {
-    shutdown(socket_, SHUT_WR);
+    shutdown(socket_.get(), SHUT_WR);
     const double deadline = now_s() + kFarewellS;
     char ignored[4096];
-    pollfd socket{socket_, POLLIN, 0};
+    pollfd socket{socket_.get(), POLLIN, 0};
     for (double left = kFarewellS; pid_ > 0 && left > 0; left = deadline - now_s()) {
         if (poll(&socket, 1, static_cast<int>(std::ceil(left * 1e3))) <= 0) break;
-        if (recv(socket_, ignored, sizeof ignored, 0) <= 0) break;
+        if (recv(socket_.get(), ignored, sizeof ignored, 0) <= 0) break;
     }
     if (pid_ > 0) collect();
-    close(socket_);
 }
 
 std::optional<int> LineChild::collect() {
@@ -83,7 +94,6 @@ std::optional<int> LineChild::collect() {
         usleep(kPauseUs);
     }
     kill(-pid_, SIGKILL);  // the group outlives its leader until that is collected
-    keeper_.reset();
     const int status = wait_for_child(pid_);
     pid_ = -1;
     return by_itself ? std::optional(status) : std::nullopt;
@@ -110,12 +120,12 @@ void LineChild::fail_ended() {
 }
 
 void LineChild::wait_for(short event, double deadline_s, double timeout_s) {
-    pollfd socket{socket_, event, 0};
+    pollfd socket{socket_.get(), event, 0};
     for (;;) {
         const double left_ms = std::ceil(std::max(deadline_s - now_s(), 0.0) * 1e3);
         const int ready = poll(&socket, 1, static_cast<int>(left_ms));
         if (ready > 0) return;
-        if (ready < 0 && errno != EINTR) fail_system("waiting for the child");
+        if (ready < 0 && errno != EINTR) fail_system("wait for the child");
         if (ready == 0)
             throw std::runtime_error(
                 fmt::format("found {} within {} s, expected one line for each line sent; does it flush its "
@@ -128,7 +138,7 @@ void LineChild::send(std::string_view text, double timeout_s) {
     if (pid_ <= 0) throw std::runtime_error("found that the child has ended, expected it to answer");
     const double deadline = now_s() + timeout_s;
     while (!text.empty()) {
-        const ssize_t sent = ::send(socket_, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+        const ssize_t sent = ::send(socket_.get(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
         if (sent >= 0)
             text.remove_prefix(static_cast<std::size_t>(sent));
         else if (errno == EAGAIN)
@@ -149,7 +159,7 @@ std::string_view LineChild::receive(double timeout_s) {
                 fmt::format("found a line of more than {} bytes, expected a short one", kLongestLine));
         wait_for(POLLIN, deadline, timeout_s);
         const std::size_t before = received_.size();
-        const ssize_t got = recv(socket_, chunk_.data(), chunk_.size(), 0);
+        const ssize_t got = recv(socket_.get(), chunk_.data(), chunk_.size(), 0);
         if (got == 0 || (got < 0 && errno != EINTR)) fail_ended();
         received_.append(chunk_.data(), static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
         end = received_.find('\n', before);

@@ -6,14 +6,18 @@
 #include <string>
 #include <string_view>
 
-#include "process/group_keeper.h"
+#include "files/file_descriptor.h"
 
 namespace app {
 
 /// A program run by `sh -c COMMAND` with which lines are exchanged: its standard input and output are one
 /// socket, its standard error is kept for messages. It runs in a process group of its own; the destructor
-/// ends its input, gives it kFarewellS to leave, and kills and collects what is left of it. If the program is
-/// killed, the group is, too (GroupKeeper).
+/// ends its input, gives it kFarewellS to leave, and kills and collects what is left of it.
+///
+/// However this program ends, the system then kills the group (SIGKILL): the child inherits the end of a pipe
+/// whose other end only this program has, and the system signals to the group when that closes (fcntl:
+/// O_ASYNC, F_SETOWN, F_SETSIG). That needs no process or thread that lives on. What it does not reach: a
+/// process that leaves the group, and a group in which nobody keeps the inherited descriptor open.
 ///
 /// All faults are thrown as std::runtime_error "found ..., expected ...; ...", one line.
 class LineChild {
@@ -44,9 +48,9 @@ private:
     [[nodiscard]] std::string last_words() const;
 
     std::unique_ptr<std::FILE, CloseFile> errors_;
-    int socket_ = -1;
+    FileDescriptor life_;  // the group is killed when this closes
+    FileDescriptor socket_;
     int pid_ = -1;
-    std::optional<GroupKeeper> keeper_;  // of its group; ends before the group's leader is collected
     std::array<char, std::size_t{1} << 16> chunk_{};
     std::string received_;
     std::size_t taken_ = 0;  // bytes of it that were handed out

@@ -17,8 +17,7 @@
 #include "realtime/divergence.h"
 #include "realtime/realtime_products.h"
 #include "realtime/realtime_session.h"
-#include "sticks/auto_predictor.h"
-#include "sticks/stick_tracker.h"
+#include "sticks/predictors.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -271,14 +270,17 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options,
         RealtimeRun run(
             session.kit, session.options, session.stick, session.trace.t0_s(), session.period_samples,
             {*players.simulation, players.stage, *sensors, players.sound.get(), players.frames.get()},
-            session.trace.sticks.size(), !confirming_specification(options.play.sound_predictor).empty(),
-            epoch_ns);
+            session.trace.sticks.size(), epoch_ns);
         play_through(run, session, players, epoch_ns, warn);
         check_samples(session, run, warn);
         collect(outcome, session, run, players, folder, epoch_ns);
     }
     outcome.realtime.clocks = sensors->clocks();
-    if (!session.live) find_departures(outcome, session.trace, session.options.play);
+    // A program of one's own that has failed would fail again.
+    const bool external =
+        is_external(options.play.picture_predictor) || is_external(options.play.sound_predictor);
+    if (!session.live && !(external && !outcome.failure.empty()))
+        find_departures(outcome, session.trace, session.options.play);
     const RunParts parts{session.options.play, session.kit,          session.stick,
                          *players.simulation,  players.frames.get(), wall};
     write_products(outcome.play, parts, folder, [&] { return write_realtime_products(outcome, folder); });

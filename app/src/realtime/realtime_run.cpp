@@ -10,7 +10,6 @@
 #include "play/note_of_strike.h"
 #include "play/play_setup.h"
 #include "process/clock.h"
-#include "sensors/row_decoder.h"
 
 namespace app {
 namespace {
@@ -32,7 +31,7 @@ std::vector<double> trial_of(const FrameThread* frames) {
 
 RealtimeRun::RealtimeRun(const Kit& kit, const RealtimeOptions& options, const StickGeometry& stick,
                          double t0_s, std::int64_t period_samples, const RealtimeParts& parts,
-                         std::size_t sticks, bool confirms, std::int64_t epoch_ns)
+                         std::size_t sticks, std::int64_t epoch_ns)
     : kit_(kit),
       options_(options),
       geometry_(stick),
@@ -48,8 +47,7 @@ RealtimeRun::RealtimeRun(const Kit& kit, const RealtimeOptions& options, const S
       sound_lead_(options.play.sound_lead_s, kSamplesExpectedHz,
                   kSoundReserveS + options.play.release_margin_s),
       seen_(sticks) {
-    for (std::uint32_t i = 0; i < sticks; ++i)
-        sticks_.push_back(std::make_unique<StateStick>(i, stick, confirms, options.play.sound_lead_s));
+    for (std::uint32_t i = 0; i < sticks; ++i) sticks_.emplace_back(i, stick, options.play.sound_lead_s);
     for (const QualityLevel& level : quality_levels()) result_.quality_levels.push_back(level.name);
     result_.period_s = static_cast<double>(period_samples) / audio::kSampleRate;
     result_.output_lead_s = options.output_lead_s;
@@ -82,13 +80,9 @@ void RealtimeRun::begin_lap(std::uint64_t lap) {
     }
     lap_ = lap;
     newest_s_ = -std::numeric_limits<double>::infinity();
-    std::vector<const StickOutlook*> outlooks;
-    for (const auto& stick : sticks_) {
-        stick->forget();
-        outlooks.push_back(stick.get());
-    }
+    for (Stick& stick : sticks_) stick.forget();
     pipeline_ = std::make_unique<StrikePipeline>(
-        kit_, strike_rules(options_.play, t0_s_), geometry_.radius_m, std::move(outlooks), parts_.simulation,
+        kit_, strike_rules(options_.play, t0_s_), geometry_.radius_m, sticks_, parts_.simulation,
         [this](const Strike& strike, bool scheduled) { send(strike, scheduled); });
 }
 
@@ -113,14 +107,14 @@ void RealtimeRun::wait(std::int64_t until_ns) {
 
 /// A live stream may say where the tip is (`# tip_m:`), in the lines before its first row.
 void RealtimeRun::learn_geometry() {
-    const std::string head = parts_.sensors.stream_head();
-    if (head == stream_head_) return;
-    stream_head_ = head;
-    RowDecoder decoder(
-        "stream", [](const tracking::TraceRow&) {}, [](const std::string&) {});
-    decoder.message(head);
-    geometry_ = stick_geometry(decoder.keys(), kit_.stick, options_.play.tip, options_.play.shaft);
-    for (const auto& stick : sticks_) stick->set_geometry(geometry_);
+    const StreamHead head = parts_.sensors.stream_head();
+    if (head.text == stream_head_) return;
+    stream_head_ = head.text;
+    tracking::Trace keys;
+    keys.tip = head.tip;
+    keys.shaft = head.shaft;
+    geometry_ = stick_geometry(keys, kit_.stick, options_.play.tip, options_.play.shaft);
+    for (Stick& stick : sticks_) stick.set_geometry(geometry_);
     parts_.stage.set_stick(geometry_);
 }
 
@@ -156,7 +150,7 @@ void RealtimeRun::take_states() {
         std::vector<std::uint32_t> moved;
         const double t_s = fresh[i].state.t_s;
         for (; i < fresh.size() && fresh[i].state.lap == lap_ && fresh[i].state.t_s == t_s; ++i) {
-            sticks_[fresh[i].stick]->take(fresh[i].state);
+            sticks_[fresh[i].stick].take(fresh[i].state);
             moved.push_back(fresh[i].stick);
         }
         std::ranges::sort(moved);
@@ -166,19 +160,19 @@ void RealtimeRun::take_states() {
 
 void RealtimeRun::take(const std::vector<std::uint32_t>& moved, std::int64_t taken_ns,
                        std::int64_t query_ns) {
-    const double s = sticks_[moved.front()]->state().t_s;
+    const double s = sticks_[moved.front()].state().t_s;
     newest_s_ = std::max(newest_s_, s);
     any_sample_ = true;
     const double fixed = fixed_s(lap_);
     pipeline_->advance_to(newest_s_, fixed);
     std::vector<std::uint64_t> skipped;
     for (const std::uint32_t stick : moved) {
-        const tracking::StickState& state = sticks_[stick]->state();
+        const tracking::StickState& state = sticks_[stick].state();
         skipped.push_back(state.samples - samples_seen_[stick] - 1);
         samples_seen_[stick] = state.samples;
         if (state.starts != starts_seen_[stick]) pipeline_->restart(stick);
         starts_seen_[stick] = state.starts;
-        sticks_[stick]->set_sound_lead(sound_lead_s());
+        sticks_[stick].set_sound_lead(sound_lead_s());
         seen_[stick].push_back(
             {s + static_cast<double>(lap_) * result_.period_s, state.position, state.orientation, true});
     }
@@ -198,7 +192,7 @@ void RealtimeRun::take(const std::vector<std::uint32_t>& moved, std::int64_t tak
 
 void RealtimeRun::record_sample(std::uint32_t stick, std::uint64_t skipped, std::int64_t taken_ns,
                                 std::int64_t query_ns) {
-    const tracking::StickState& state = sticks_[stick]->state();
+    const tracking::StickState& state = sticks_[stick].state();
     SampleTiming timing;
     timing.stick = stick;
     timing.lap = lap_;
@@ -215,10 +209,9 @@ void RealtimeRun::record_sample(std::uint32_t stick, std::uint64_t skipped, std:
 double RealtimeRun::next_frame_at_s() const {
     const double begin_s = static_cast<double>(next_frame_) / fps_ - render_lead_s();
     const double begin_lap_s = lap_time_s(to_ns(begin_s), lap_);
-    const bool expected = std::ranges::any_of(sticks_, [&](const auto& stick) {
-        const double due_s = stick->state().t_s + stick->interval_s();
-        return stick->started() && due_s <= begin_lap_s + kJitterS &&
-               due_s > begin_lap_s - stick->interval_s();
+    const bool expected = std::ranges::any_of(sticks_, [&](const Stick& stick) {
+        const double due_s = stick.state().t_s + stick.interval_s();
+        return stick.started() && due_s <= begin_lap_s + kJitterS && due_s > begin_lap_s - stick.interval_s();
     });
     return expected ? begin_s + kGraceS : begin_s;
 }
@@ -257,8 +250,8 @@ void RealtimeRun::ask_for_frame(std::uint64_t index) {
         record_tips(scene, index, T);
         bodies = std::move(scene.bodies);
         double oldest_s = newest_s_;
-        for (const auto& stick : sticks_)
-            if (stick->started()) oldest_s = std::min(oldest_s, stick->state().t_s);
+        for (const Stick& stick : sticks_)
+            if (stick.started()) oldest_s = std::min(oldest_s, stick.state().t_s);
         timing.oldest_sample_age_s = T - oldest_s;
     }
     FrameJob job{index, quality_.level(), epoch_ns_ + timing.shown_ns,

@@ -16,7 +16,7 @@
 #include "realtime/lead_control.h"
 #include "realtime/picture_quality.h"
 #include "sensors/sensor_hub.h"
-#include "sticks/state_stick.h"
+#include "sticks/stick.h"
 
 namespace app {
 
@@ -71,7 +71,7 @@ struct LapStrikes {
 class RealtimeRun {
 public:
     RealtimeRun(const Kit& kit, const RealtimeOptions& options, const StickGeometry& stick, double t0_s,
-                std::int64_t period_samples, const RealtimeParts& parts, std::size_t sticks, bool confirms,
+                std::int64_t period_samples, const RealtimeParts& parts, std::size_t sticks,
                 std::int64_t epoch_ns);
 
     /// Until the time is up, every source has ended, or `stop` says so. `warn` gets one-line messages.
@@ -131,7 +131,7 @@ private:
     std::int64_t period_samples_;
     RealtimeParts parts_;
     std::int64_t epoch_ns_;
-    std::vector<std::unique_ptr<StateStick>> sticks_;
+    std::vector<Stick> sticks_;
     std::unique_ptr<StrikePipeline> pipeline_;
     std::uint64_t lap_ = 0, first_id_ = 0;
     std::string stream_head_;  // of a live source, as far as it was learnt

@@ -9,8 +9,6 @@
 #include "files/bad_input.h"
 #include "play/play_setup.h"
 #include "process/thread_priority.h"
-#include "sticks/auto_predictor.h"
-#include "sticks/stick_tracker.h"
 
 namespace app {
 namespace {
@@ -71,9 +69,8 @@ SensorOptions sensors_of(const RealtimeSession& session, std::int64_t epoch_ns) 
     const RealtimeOptions& o = session.options;
     sensors.source = session.live ? o.source : "trace:" + o.play.trace.string();
     for (const tracking::StickTrace& stick : session.trace.sticks) sensors.sticks.push_back(stick.name);
-    sensors.picture_predictor = picture_specification(o.play.picture_predictor);
-    sensors.sound_predictor = sound_specification(o.play.sound_predictor);
-    sensors.confirming_predictor = confirming_specification(o.play.sound_predictor);
+    sensors.predictors =
+        stick_predictors(o.play.picture_predictor, o.play.sound_predictor, o.play.sound_lead_s);
     sensors.epoch_ns = epoch_ns;
     sensors.period_s = static_cast<double>(session.period_samples) / audio::kSampleRate;
     sensors.stall_at_s = o.disturbance.stall_at_s;

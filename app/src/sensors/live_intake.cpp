@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "files/one_line.h"
-#include "process/child_process.h"
 
 namespace app {
 namespace {

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "files/bad_input.h"
+#include "files/file_descriptor.h"
 #include "files/one_line.h"
-#include "process/child_process.h"
 #include "process/clock.h"
 
 namespace app {
@@ -125,10 +125,8 @@ struct OscSource::Server {
     std::int64_t read_ns = 0;
 
     Server(const std::string& port, const std::vector<std::string>& sticks) : intake(sticks) {
-        server = lo_server_new_with_proto(port.c_str(), LO_UDP, &ignore);
-        if (!server)
-            throw std::runtime_error(fmt::format(
-                "error: found UDP port {} not to be had, expected a free one; choose another", port));
+        server = lo_server_new_with_proto(port.c_str(), LO_UDP, &keep_number);
+        if (!server) throw std::runtime_error("error: " + cannot("open UDP port " + port, error_number));
         lo_server_enable_queue(server, 0, 1);  // a bundle's time is when it was measured, not when it is due
         lo_server_add_method(server, nullptr, nullptr, &take, this);
     }
@@ -136,7 +134,8 @@ struct OscSource::Server {
     Server(const Server&) = delete;
     Server& operator=(const Server&) = delete;
 
-    static void ignore(int, const char*, const char*) {}  // lo_server_dispatch_data() says it, too
+    static thread_local int error_number;  // of the operating system, for liblo's newest error
+    static void keep_number(int number, const char*, const char*) { error_number = number; }
 
     void dispatch(std::vector<char> bytes) {  // liblo turns numbers around in place
         read_ns = monotonic_ns();
@@ -170,6 +169,8 @@ struct OscSource::Server {
         }
     }
 };
+
+thread_local int OscSource::Server::error_number = 0;
 
 void check_osc_port(const std::string& port) {
     unsigned number = 0;

@@ -1,11 +1,14 @@
 #pragma once
 #include <tracking/stick_state.h>
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "sticks/stick_filters.h"
 
 namespace app {
 
@@ -13,8 +16,7 @@ namespace app {
 struct SensorOptions {
     std::string source;               ///< trace:FILE | stdin | zmq:ENDPOINT | osc:PORT
     std::vector<std::string> sticks;  ///< names, by index
-    std::string picture_predictor, sound_predictor,
-        confirming_predictor;   ///< resolved; the last may be empty
+    StickPredictors predictors;
     std::int64_t epoch_ns = 0;  ///< CLOCK_MONOTONIC at which a trace's t0 is due; live times count from it
     double period_s = 0;        ///< a trace begins again this long after it began, > its duration; 0: never
     double stall_at_s = -1, stall_s = 0;  ///< --disturb: a pause of the reader, for tests; < 0: none
@@ -40,6 +42,12 @@ struct ClockReport {
     int jumps = 0;
 };
 
+/// How a live stream began.
+struct StreamHead {
+    std::string text;                           ///< its key lines and header; empty: none so far
+    std::optional<Eigen::Vector3d> tip, shaft;  ///< of the sticks, body frame [m]; none: it does not say
+};
+
 /// Starts and watches the sensor processes (one a stick for traces; one for all sticks where a source
 /// delivers them together), each with a reader thread and a filter thread, and keeps the shared memory that
 /// they publish into. The memory has no name left once it is mapped, so nothing stays in /dev/shm however a
@@ -48,7 +56,7 @@ class SensorHub {
 public:
     /// Returns when the sensors are ready (tens of ms), so the epoch should lie that far ahead. Throws
     /// BadInput for a source, sticks or predictors that cannot be, before anything starts;
-    /// std::runtime_error when a source cannot be opened.
+    /// std::runtime_error when a source cannot be opened or an external predictor does not start.
     explicit SensorHub(const SensorOptions& options);
     ~SensorHub();
     SensorHub(const SensorHub&) = delete;
@@ -65,8 +73,7 @@ public:
     /// Every source has ended, and all that it gave has been published.
     [[nodiscard]] bool ended() const;
     [[nodiscard]] std::vector<ClockReport> clocks() const;  ///< one a process
-    /// The key lines and the header that a live stream began with (units, tip_m, ...); empty: none so far.
-    [[nodiscard]] std::string stream_head() const;
+    [[nodiscard]] StreamHead stream_head() const;
     [[nodiscard]] int restarts() const;
 
 private:

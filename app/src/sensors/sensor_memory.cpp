@@ -10,7 +10,6 @@
 #include <cerrno>
 #include <charconv>
 #include <csignal>
-#include <cstring>
 #include <filesystem>
 #include <stdexcept>
 #include <utility>
@@ -23,9 +22,8 @@ constexpr std::string_view kMemoryPrefix = "musicworld.";
 constexpr int kMostNames = 100;  // several threads may be making memory
 constexpr const char* kFolder = "/dev/shm";
 
-[[noreturn]] void fail_memory(const char* what) {
-    throw std::runtime_error(fmt::format(
-        "error: found that {} shared memory failed ({}), expected it to work", what, std::strerror(errno)));
+[[noreturn]] void fail_memory(const char* action) {
+    throw std::runtime_error("error: " + cannot(action));
 }
 
 /// The process in "musicworld.PID.N"; 0 for another name.
@@ -38,21 +36,18 @@ pid_t maker_of(std::string_view name) {
 }
 
 /// A new descriptor of nameless shared memory.
-int make_memory() {
-    int descriptor = -1;
-    for (int n = 0; descriptor < 0; ++n) {
+FileDescriptor make_memory() {
+    FileDescriptor memory;
+    for (int n = 0; !memory; ++n) {
         const std::string name = fmt::format("/{}{}.{}", kMemoryPrefix, getpid(), n);
-        descriptor = shm_open(name.c_str(), O_CREAT | O_EXCL | O_RDWR, 0600);
-        if (descriptor >= 0)
+        memory = FileDescriptor(shm_open(name.c_str(), O_CREAT | O_EXCL | O_RDWR, 0600));
+        if (memory)
             shm_unlink(name.c_str());
         else if (errno != EEXIST || n == kMostNames)
-            fail_memory("making");
+            fail_memory("make shared memory");
     }
-    if (ftruncate(descriptor, sizeof(SensorMemory)) != 0) {
-        close(descriptor);
-        fail_memory("sizing");
-    }
-    return descriptor;
+    if (ftruncate(memory.get(), sizeof(SensorMemory)) != 0) fail_memory("size shared memory");
+    return memory;
 }
 
 }  // namespace
@@ -64,32 +59,30 @@ void SensorReport::set_text(std::string_view line) {
 
 SharedSensorMemory::SharedSensorMemory() : descriptor_(make_memory()) {
     map();
+    memory_->version = tracking::StickState::kVersion;
 }
 
 SharedSensorMemory::SharedSensorMemory(int descriptor) : descriptor_(descriptor) {
     struct stat found {};
-    if (fstat(descriptor, &found) != 0 || found.st_size < static_cast<off_t>(sizeof(SensorMemory)))
+    const bool large_enough = fstat(descriptor, &found) == 0 && found.st_size == off_t{sizeof(SensorMemory)};
+    if (large_enough) map();
+    if (!large_enough || memory_->version != tracking::StickState::kVersion)
         throw std::runtime_error(
-            "error: found no shared memory, expected to be started by the program itself");
-    map();
+            "error: found no shared memory of this build, expected to be started by the program itself");
 }
 
 void SharedSensorMemory::map() {
     void* memory = mmap(nullptr, sizeof(SensorMemory), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE,
-                        descriptor_, 0);
-    if (memory == MAP_FAILED) {
-        close(descriptor_);
-        fail_memory("mapping");
-    }
+                        descriptor_.get(), 0);
+    if (memory == MAP_FAILED) fail_memory("map shared memory");
     memory_ = static_cast<SensorMemory*>(memory);
 }
 
 SharedSensorMemory::SharedSensorMemory(SharedSensorMemory&& other) noexcept
-    : descriptor_(std::exchange(other.descriptor_, -1)), memory_(std::exchange(other.memory_, nullptr)) {}
+    : descriptor_(std::move(other.descriptor_)), memory_(std::exchange(other.memory_, nullptr)) {}
 
 SharedSensorMemory::~SharedSensorMemory() {
     if (memory_) munmap(memory_, sizeof(SensorMemory));
-    if (descriptor_ >= 0) close(descriptor_);
 }
 
 void sweep_left_memory() noexcept {

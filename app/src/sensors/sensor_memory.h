@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "files/file_descriptor.h"
+
 namespace app {
 
 enum class SensorPhase : std::uint64_t { starting, running, ended, failed };
@@ -31,17 +33,20 @@ struct SensorReport {
     void set_text(std::string_view line);
 };
 
-/// The first lines of a stream, which say how to read the rest: a sensor that is started again in mid-stream
-/// needs them.
-struct StreamHead {
+/// The first lines of a live stream, which say how to read the rest: a sensor that is started again in
+/// mid-stream needs them; and what they say of the sticks.
+struct SharedStreamHead {
     std::array<char, 2048> text{};  ///< ends with 0
+    std::uint64_t has_tip = 0, has_shaft = 0;
+    std::array<double, 3> tip{}, shaft{};  ///< body frame [m]
 };
 
 /// What a sensor process and its hub share of one stick.
 struct SensorMemory {
+    std::uint64_t version = 0;  ///< StickState::kVersion of who made it
     tracking::NewestValue<tracking::StickState> state;
     tracking::NewestValue<SensorReport> report;
-    tracking::NewestValue<StreamHead> head;
+    tracking::NewestValue<SharedStreamHead> head;
 };
 
 /// A SensorMemory in POSIX shared memory, unmapped at the end.
@@ -51,20 +56,20 @@ public:
     /// Throws std::runtime_error.
     SharedSensorMemory();
     /// The memory of a descriptor that this process inherited; takes the descriptor over. Throws
-    /// std::runtime_error.
+    /// std::runtime_error, also for memory of another build.
     explicit SharedSensorMemory(int descriptor);
     ~SharedSensorMemory();
     SharedSensorMemory(SharedSensorMemory&& other) noexcept;
     SharedSensorMemory& operator=(SharedSensorMemory&&) = delete;
 
-    [[nodiscard]] int descriptor() const { return descriptor_; }
+    [[nodiscard]] int descriptor() const { return descriptor_.get(); }
     [[nodiscard]] SensorMemory& operator*() const { return *memory_; }
     [[nodiscard]] SensorMemory* operator->() const { return memory_; }
 
 private:
     void map();
 
-    int descriptor_ = -1;
+    FileDescriptor descriptor_;
     SensorMemory* memory_ = nullptr;
 };
 

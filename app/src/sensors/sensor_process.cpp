@@ -11,15 +11,17 @@
 #include <atomic>
 #include <cmath>
 #include <csignal>
+#include <deque>
+#include <memory>
 #include <mutex>
 #include <thread>
 #include <utility>
 
+#include "files/file_descriptor.h"
 #include "files/one_line.h"
-#include "process/child_process.h"
+#include "process/bounded_queue.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
-#include "sensors/sample_queue.h"
 #include "sensors/sensor_memory.h"
 #include "sensors/source_clock.h"
 
@@ -27,22 +29,10 @@ namespace app {
 namespace {
 
 constexpr std::int64_t kSettlingNs = 250'000'000;
-
+constexpr std::size_t kMostQueued = 256;  // samples of a stick on their way from the reader to its filters
 constexpr int kReportEveryMs = 50;
 constexpr double kSmoothing = 0.1;       // of the interval between samples
 constexpr double kLongestIntervalS = 1;  // longer ones are pauses
-
-class Descriptor {
-public:
-    explicit Descriptor(int descriptor) : descriptor_(descriptor) {}
-    ~Descriptor() { close(descriptor_); }
-    Descriptor(const Descriptor&) = delete;
-    Descriptor& operator=(const Descriptor&) = delete;
-    [[nodiscard]] int get() const { return descriptor_; }
-
-private:
-    int descriptor_;
-};
 
 void add_one(int eventfd) {
     const std::uint64_t one = 1;
@@ -50,12 +40,12 @@ void add_one(int eventfd) {
 }
 
 /// Blocks the signals that end this process, in this thread and those it starts; readable when one came.
-int make_signal_fd() {
+FileDescriptor make_signal_fd() {
     sigset_t ending;
     sigemptyset(&ending);
     for (const int signal : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&ending, signal);
     pthread_sigmask(SIG_BLOCK, &ending, nullptr);
-    return signalfd(-1, &ending, SFD_CLOEXEC | SFD_NONBLOCK);
+    return FileDescriptor(signalfd(-1, &ending, SFD_CLOEXEC | SFD_NONBLOCK));
 }
 
 class Sensor {
@@ -65,11 +55,17 @@ public:
 
 private:
     struct Stick {
+        explicit Stick(int descriptor)
+            : memory(descriptor), state(memory->state.read().value_or(tracking::StickState{})) {}
+
         SharedSensorMemory memory;
-        StickFilters filters, fresh;  // `fresh`: for the next lap
+        BoundedQueue<SourceSample> samples{kMostQueued};
+        // Of the filters' thread:
+        std::unique_ptr<StickFilters> filters;
         tracking::StickState state;
         std::uint64_t lap = 0;
         std::uint64_t missed = 0;  // samples while no process ran, which are still to be counted
+        std::jthread thread;
     };
     /// What the reader knows, for reports.
     struct Reading {
@@ -82,9 +78,9 @@ private:
     };
 
     void read(const std::stop_token& stop);
-    void filter(const std::stop_token& stop);
-    void take(const SourceSample& sample);
-    void pass(SourceSample sample, const std::stop_token& stop);
+    void filter(Stick& stick, const std::stop_token& stop);
+    void take(Stick& stick, const SourceSample& sample);
+    void pass(SourceSample sample);
     /// True for what a live source with a clock of its own sends in the first moments.
     bool settling(const SourceSample& sample);
     void put_on_our_clock(SourceSample& sample);
@@ -94,6 +90,9 @@ private:
     bool stall_if_due(const std::stop_token& stop);
     void report();
     void keep_head();
+    void open();
+    void start();
+    void stop();
     void count_missed();
     [[nodiscard]] SourceOptions source_options() const;
     void fail(const char* what);
@@ -102,9 +101,8 @@ private:
     }
 
     const SensorTask& task_;
-    std::vector<Stick> sticks_;
+    std::deque<Stick> sticks_;
     std::unique_ptr<SampleSource> source_;
-    SampleQueue queue_;
     std::int64_t first_read_ns_ = 0;  // of a live source; the reader's
     SourceClock clock_;               // the reader's
     DelayPercentile delays_;          // of replayed samples; the reader's
@@ -118,38 +116,24 @@ private:
     Reading reading_;
     std::string failure_;
     std::atomic<SensorPhase> phase_ = SensorPhase::starting;
-    Descriptor changed_;  // eventfd: there is something to report
-    std::jthread reader_, filter_;
+    std::atomic<std::size_t> filtering_ = 0;  // sticks that still have samples to come
+    FileDescriptor changed_;                  // eventfd: there is something to report
+    std::jthread reader_;
 };
 
 Sensor::Sensor(const SensorTask& task) : task_(task), changed_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
-    sticks_.reserve(task.state_fds.size());
-    for (const int descriptor : task.state_fds) {
-        sticks_.push_back({SharedSensorMemory(descriptor),
-                           StickFilters(task.predictors),
-                           StickFilters(task.predictors),
-                           {},
-                           0,
-                           0});
-        sticks_.back().state = sticks_.back().memory->state.read().value_or(tracking::StickState{});
-    }
+    for (const int descriptor : task.state_fds) sticks_.emplace_back(descriptor);
     reading_.read.resize(sticks_.size());
     reading_.interval_s.resize(sticks_.size());
     last_s_.resize(sticks_.size());
 }
 
 int Sensor::run() {
-    const Descriptor signals(make_signal_fd());
+    const FileDescriptor signals = make_signal_fd();
     report();
     try {
-        source_ = open_source(source_options());
-        if (source_->sticks().names().size() != sticks_.size())
-            throw std::runtime_error("error: found sticks without shared memory, expected one a stick");
-        count_missed();
-        note_source();
-        phase_ = SensorPhase::running;
-        reader_ = std::jthread([this](const std::stop_token& stop) { read(stop); });
-        filter_ = std::jthread([this](const std::stop_token& stop) { filter(stop); });
+        open();
+        start();
     } catch (const std::exception& wrong) {
         fail(wrong.what());
     }
@@ -161,17 +145,47 @@ int Sensor::run() {
         std::uint64_t ignored = 0;
         (void)!::read(changed_.get(), &ignored, sizeof ignored);
     }
-    reader_ = {};  // stops and joins
-    filter_ = {};
     report();
     add_one(task_.wake_fd);
+    stop();
+    report();
     return phase_ == SensorPhase::failed ? 1 : 0;
+}
+
+/// The source, and the filters, of which external ones are processes.
+void Sensor::open() {
+    source_ = open_source(source_options());
+    const std::vector<std::string>& names = source_->sticks().names();
+    if (names.size() != sticks_.size())
+        throw std::runtime_error("error: found sticks without shared memory, expected some for each stick");
+    for (std::size_t i = 0; i < sticks_.size(); ++i)
+        sticks_[i].filters = std::make_unique<StickFilters>(task_.predictors, names[i]);
+    count_missed();
+    note_source();
+}
+
+void Sensor::start() {
+    phase_ = SensorPhase::running;
+    filtering_ = sticks_.size();
+    for (Stick& stick : sticks_)
+        stick.thread = std::jthread([this, &stick](const std::stop_token& stop) { filter(stick, stop); });
+    reader_ = std::jthread([this](const std::stop_token& stop) { read(stop); });
+}
+
+void Sensor::stop() {
+    reader_.request_stop();
+    for (Stick& stick : sticks_) {
+        stick.thread.request_stop();
+        stick.samples.close();
+    }
+    reader_ = {};  // joins
+    for (Stick& stick : sticks_) stick.thread = {};
 }
 
 SourceOptions Sensor::source_options() const {
     SourceOptions options = task_.source;
     if (options.resume)
-        if (const std::optional<StreamHead> head = sticks_.front().memory->head.read())
+        if (const std::optional<SharedStreamHead> head = sticks_.front().memory->head.read())
             options.stream_head = head->text.data();
     return options;
 }
@@ -190,10 +204,15 @@ void Sensor::count_missed() {
 /// memory before the first sample that they hold for.
 void Sensor::keep_head() {
     const std::string text = source_->stream_head();
-    if (text.empty() || text == head_ || text.size() >= StreamHead{}.text.size()) return;
+    if (text.empty() || text == head_ || text.size() >= SharedStreamHead{}.text.size()) return;
     head_ = text;
-    StreamHead head;
+    const SourceHead said = source_->head();
+    SharedStreamHead head;
     std::copy(text.begin(), text.end(), head.text.begin());
+    head.has_tip = said.tip ? 1 : 0;
+    head.has_shaft = said.shaft ? 1 : 0;
+    if (said.tip) std::copy_n(said.tip->data(), 3, head.tip.begin());
+    if (said.shaft) std::copy_n(said.shaft->data(), 3, head.shaft.begin());
     sticks_.front().memory->head.publish(head);
 }
 
@@ -215,26 +234,27 @@ void Sensor::read(const std::stop_token& stop) {
         while (!stop.stop_requested()) {
             const SourceStatus status = source_->next(sample, monotonic_ns() + kSourcePatienceNs);
             if (stall_if_due(stop)) sample.read_ns = monotonic_ns();
-            if (status == SourceStatus::sample) pass(sample, stop);
+            if (status == SourceStatus::sample) pass(sample);
             if (status != SourceStatus::sample || monotonic_ns() - noted_ns_ > kSourcePatienceNs)
                 note_source();
             if (status == SourceStatus::ended) break;
         }
-        queue_.close();
+        for (Stick& stick : sticks_) stick.samples.close();
     } catch (const std::exception& wrong) {
         fail(wrong.what());
     }
 }
 
-void Sensor::pass(SourceSample sample, const std::stop_token& stop) {
+void Sensor::pass(SourceSample sample) {
     note(sample);
     keep_head();
     if (settling(sample)) return;
     put_on_our_clock(sample);
     if (source_->quiet_until_ns() != 0) note_source();
+    BoundedQueue<SourceSample>& samples = sticks_[sample.stick].samples;
     if (source_->replayed())
-        (void)queue_.push(sample, stop);
-    else if (!queue_.try_push(sample))
+        (void)samples.push(sample);
+    else if (!samples.try_push(sample))
         ++dropped_;
 }
 
@@ -294,24 +314,24 @@ bool Sensor::stall_if_due(const std::stop_token& stop) {
 
 // The filters.
 
-void Sensor::filter(const std::stop_token& stop) {
+void Sensor::filter(Stick& stick, const std::stop_token& stop) {
     (void)set_thread_priority(ThreadRole::sensing, task_.realtime);
     try {
-        while (const std::optional<SourceSample> sample = queue_.pop(stop)) take(*sample);
-        if (!stop.stop_requested() && phase_ == SensorPhase::running) phase_ = SensorPhase::ended;
+        SourceSample sample;
+        while (!stop.stop_requested() && stick.samples.pop(sample)) take(stick, sample);
+        if (!stop.stop_requested() && --filtering_ == 0 && phase_ == SensorPhase::running)
+            phase_ = SensorPhase::ended;
         add_one(changed_.get());
     } catch (const std::exception& wrong) {
         fail(wrong.what());
     }
 }
 
-void Sensor::take(const SourceSample& sample) {
-    Stick& stick = sticks_[sample.stick];
-    const bool anew = sample.lap != stick.lap;
-    if (anew) stick.filters = std::move(stick.fresh);
+void Sensor::take(Stick& stick, const SourceSample& sample) {
+    if (sample.lap != stick.lap) stick.filters->begin_anew();
     stick.lap = sample.lap;
     const std::uint64_t before = stick.state.samples;
-    (void)stick.filters.correct(sample.sample, stick.state);
+    (void)stick.filters->correct(sample.sample, stick.state);
     if (stick.state.samples != before) {
         stick.state.samples += std::exchange(stick.missed, 0);
         stick.state.lap = sample.lap;
@@ -321,7 +341,6 @@ void Sensor::take(const SourceSample& sample) {
     }
     stick.memory->state.publish(stick.state);
     if (stick.state.samples != before) add_one(task_.wake_fd);
-    if (anew) stick.fresh = StickFilters(task_.predictors);
 }
 
 // Reports.
@@ -372,6 +391,7 @@ std::vector<std::string> sensor_arguments(const SensorTask& task) {
     add("picture", task.predictors.picture);
     add("sound", task.predictors.sound);
     if (!task.predictors.confirming.empty()) add("confirming", task.predictors.confirming);
+    add("sound-lead", task.predictors.sound_lead_s);
     for (const int descriptor : task.state_fds) add("state-fd", descriptor);
     add("wake-fd", task.wake_fd);
     add("life-fd", task.life_fd);

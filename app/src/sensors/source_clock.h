@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "sensors/stick_names.h"
+#include "sensors/sample_source.h"
 
 namespace app {
 

@@ -6,7 +6,6 @@
 
 #include "files/bad_input.h"
 #include "process/clock.h"
-#include "sensors/row_decoder.h"
 #include "sensors/stream_source.h"
 
 namespace app {
@@ -80,8 +79,7 @@ SourceStatus ZmqSource::next(SourceSample& sample, std::int64_t deadline_ns) {
             next = connection_->intake.take();
         } catch (const zmq::error_t& wrong) {
             if (wrong.num() != EINTR)
-                throw std::runtime_error(
-                    fmt::format("error: found ZeroMQ failing ({}), expected messages", wrong.what()));
+                throw std::runtime_error(fmt::format("error: cannot receive from ZeroMQ: {}", wrong.what()));
         }
     if (!next) return SourceStatus::waiting;
     sample = *next;

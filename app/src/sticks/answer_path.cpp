@@ -10,17 +10,12 @@
 #include <stdexcept>
 
 #include "files/one_line.h"
-#include "process/child_process.h"
 
 namespace app {
 namespace {
 
 constexpr double kFarthestM = 1e6;
 constexpr double kNormSlack = 0.01;
-
-Eigen::Quaterniond turned(const Eigen::Quaterniond& from, const Eigen::Vector3d& by) {
-    return (tracking::exponential(by) * from).normalized();
-}
 
 /// Rotation vector of the shorter way from one orientation to another, world frame.
 Eigen::Vector3d turn_between(const Eigen::Quaterniond& from, const Eigen::Quaterniond& to) {
@@ -155,22 +150,8 @@ tracking::PosePrediction AnswerPath::at(double lead_s) const noexcept {
     const Node& a = nodes_[i];
     const double past = lead_s - a.lead_s;
     if (!(past > 0)) return a.pose;
-    tracking::PosePrediction pose = a.pose;
-    if (i + 1 == nodes_.size()) {
-        pose.position += past * pose.velocity;
-        pose.orientation = turned(pose.orientation, past * pose.angular_velocity);
-        return pose;
-    }
-    const Node& b = nodes_[i + 1];
-    const double h = b.lead_s - a.lead_s, s = past / h;
-    const double from_b = s * s * (3 - 2 * s), va = s * (1 - s) * (1 - s), vb = s * s * (s - 1);
-    const double slope = 6 * s * (1 - s), wa = (1 - s) * (1 - 3 * s), wb = s * (3 * s - 2);
-    const Eigen::Vector3d step = b.pose.position - a.pose.position;
-    pose.position += from_b * step + h * (va * a.pose.velocity + vb * b.pose.velocity);
-    pose.velocity = slope / h * step + wa * a.pose.velocity + wb * b.pose.velocity;
-    pose.orientation = turned(a.pose.orientation, s * turn_between(a.pose.orientation, b.pose.orientation));
-    pose.angular_velocity = (1 - s) * a.pose.angular_velocity + s * b.pose.angular_velocity;
-    return pose;
+    if (i + 1 == nodes_.size()) return tracking::pose_beyond(a.pose, past);
+    return tracking::pose_between(a.pose, nodes_[i + 1].pose, nodes_[i + 1].lead_s - a.lead_s, past);
 }
 
 std::optional<tracking::PoseCovariance> AnswerPath::covariance_at(double lead_s) const noexcept {

@@ -9,7 +9,6 @@
 #include <stdexcept>
 
 #include "files/one_line.h"
-#include "process/child_process.h"
 
 namespace app {
 namespace {

@@ -43,6 +43,8 @@ public:
         return path_.covariance_at(lead_s);
     }
 
+    /// As before the first sample: times may begin again. The child is told to start anew.
+    void begin_anew() { held_ = tracking::make_predictor("hold"); }
     /// What went wrong; null while all is well.
     [[nodiscard]] const std::exception_ptr& failure() const noexcept { return failure_; }
 

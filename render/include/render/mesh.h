@@ -19,11 +19,12 @@ struct Mesh {
     [[nodiscard]] Eigen::AlignedBox3f bounds() const;
 };
 
-/// Loads OBJ, GLB/glTF or STL through assimp, in a child process with limits on memory, processor time and
-/// waiting time (malformed files crash or hang the importer), and checks the result: finite values, index
-/// ranges, 1 to 500000 triangles. A part's material is the file's material name (OBJ: usemtl, no .mtl
-/// needed); node transforms of glTF are applied. Throws std::runtime_error with one line: FILE: error: found
-/// ..., expected ... Any thread. Costs about 20 ms for a small file, nearly all of it the child's start.
+/// Loads OBJ, GLB/glTF or STL. Plain OBJ, as assets/meshes holds, is read in this process; other files through
+/// assimp in a child process with limits on memory, processor time and waiting time (malformed files crash or
+/// hang that importer). Checked: finite values, index ranges, 1 to 500000 triangles. A part's material is the
+/// file's material name (OBJ: usemtl, no .mtl needed); node transforms of glTF are applied. Throws
+/// std::runtime_error with one line: FILE[:LINE]: error: found ..., expected ... Any thread. Costs about 20 ms
+/// for a small file that needs the child, nearly all of it the child's start.
 [[nodiscard]] Mesh load_mesh(const std::filesystem::path& file);
 
 /// The same for several files, in their order; the children run side by side. The first file that fails

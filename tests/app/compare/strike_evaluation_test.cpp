@@ -11,6 +11,7 @@
 
 #include "sample_recordings.h"
 #include "sticks/auto_predictor.h"
+#include "sticks/stick.h"
 #include "written_kit.h"
 
 namespace app {

@@ -14,7 +14,6 @@
 #include "process/clock.h"
 #include "sensors/live_intake.h"
 #include "sensors/osc_source.h"
-#include "sensors/row_decoder.h"
 #include "sensors/stream_source.h"
 #include "sensors/zmq_source.h"
 #include "tracking/mutation.h"

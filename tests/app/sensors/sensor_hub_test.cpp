@@ -16,6 +16,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <thread>
 #include <zmq.hpp>
 
@@ -23,9 +24,7 @@
 #include "files/bad_input.h"
 #include "free_port.h"
 #include "process/clock.h"
-#include "sticks/auto_predictor.h"
-#include "sticks/predictors.h"
-#include "sticks/stick_tracker.h"
+#include "sticks/stick_filters.h"
 #include "temporary_folder.h"
 
 namespace {
@@ -48,9 +47,7 @@ app::SensorOptions options_for(const std::string& source,
     app::SensorOptions options;
     options.source = source;
     options.sticks = std::move(sticks);
-    options.picture_predictor = app::picture_specification("auto");
-    options.sound_predictor = app::sound_specification("auto");
-    options.confirming_predictor = app::confirming_specification("auto");
+    options.predictors = app::stick_predictors("auto", "auto", 1.0 / 15);
     options.program = MUSICWORLD_PROGRAM;
     options.epoch_ns = app::monotonic_ns() + 300'000'000;
     return options;
@@ -119,6 +116,11 @@ void watch_until(SensorHub& hub, std::size_t sticks, Watched& seen, Enough enoug
 void expect_same(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
     EXPECT_EQ(std::memcmp(a.data(), b.data(), sizeof a), 0) << a.transpose() << " against " << b.transpose();
 }
+void expect_same(const tracking::PosePrediction& a, const tracking::PosePrediction& b) {
+    expect_same(a.position, b.position);
+    expect_same(a.velocity, b.velocity);
+    EXPECT_EQ(a.orientation.coeffs(), b.orientation.coeffs());
+}
 
 TEST(SensorHub, StatesEqualAnOfflineRunToTheBit) {
     const TemporaryFolder folder;
@@ -134,25 +136,30 @@ TEST(SensorHub, StatesEqualAnOfflineRunToTheBit) {
     watch_until(hub, 2, seen, [&] { return laps(0) >= 2 && laps(1) >= 2; });
     for (std::size_t stick = 0; stick < 2; ++stick) {
         // Each state that was seen, against filters of this process that were given the same samples.
-        std::unique_ptr<tracking::Predictor> sound;
+        std::optional<app::StickFilters> filters;
+        tracking::StickState own;
         std::uint64_t lap = 99, count = 0;
         std::size_t next = 0, compared = 0;
         for (const tracking::StickState& state : seen.states[stick]) {
             const auto& samples = trace.sticks[stick].samples;
             if (state.lap != lap) {
-                sound = app::make_any_predictor(options.sound_predictor, {});
+                filters.emplace(options.predictors, "-");
                 lap = state.lap;
                 next = 0;
             }
             while (next < samples.size() && samples[next].t_s <= state.t_s)
-                (void)sound->correct(samples[next++]);
+                (void)filters->correct(samples[next++], own);
             count = state.lap * samples.size() + next;
-            ASSERT_EQ(state.t_s, sound->time_s());
+            ASSERT_EQ(state.t_s, own.t_s);
             EXPECT_EQ(state.samples, count);  // none was refused, none left out
             EXPECT_EQ(state.starts, state.lap + 1);
-            expect_same(state.sound.position, sound->motion()->position);
-            expect_same(state.sound.velocity, sound->motion()->velocity);
-            expect_same(state.sound.acceleration, sound->motion()->acceleration);
+            for (const double lead : {0.0, 0.05}) {
+                expect_same(state.sound.after(lead), own.sound.after(lead));
+                expect_same(state.picture.after(lead), own.picture.after(lead));
+                expect_same(state.confirming.after(lead), own.confirming.after(lead));
+            }
+            EXPECT_EQ(state.picture_t_s, own.picture_t_s);
+            EXPECT_EQ(state.confirming_t_s, own.confirming_t_s);
             EXPECT_EQ(state.due_ns,
                       options.epoch_ns +
                           std::llround((static_cast<double>(lap) * 1.5 + state.t_s - trace.t0_s()) * 1e9));
@@ -322,13 +329,91 @@ TEST(SensorHub, RefusesWhatCannotBe) {
     expect_refused(options_for("tape:x"),
                    "found source \"tape:x\", expected trace:FILE, stdin, zmq:ENDPOINT or osc:PORT");
     app::SensorOptions options = options_for("trace:flourish");
-    options.sound_predictor = "exec:cat";
-    expect_refused(options, "found predictor \"exec:cat\" in real time");
-    options.sound_predictor = "least-squares:degree=3,n=8";
-    expect_refused(options, "found predictor \"least-squares:degree=3,n=8\" in real time");
+    options.predictors.sound = "oracle";
+    expect_refused(options, "found predictor \"oracle\", expected auto, exec:CMD or one of");
+    options.predictors.sound = "exec: ";
+    expect_refused(options, "found predictor \"exec: \" without a command");
     options = options_for("trace:flourish");
     options.period_s = 2;
     expect_refused(options, "found a period of 2 s, expected more than its");
+}
+
+// Predictors of one's own, whose processes the sensor processes start.
+
+/// Answers every sample with its position, each lead alike; `first` is done before.
+std::string holding(const std::string& first = "") {
+    return "exec:read head; set -- $head; name=$3; shift 3; n=$#; k=0; echo position; "
+           "while read t x y z rest; do [ $t = restart ] && continue; k=$((k+1)); " +
+           first + "a=; i=0; while [ $i -lt $n ]; do a=\"$a $x $y $z\"; i=$((i+1)); done; echo $a; done";
+}
+
+TEST(SensorHub, EveryPredictorHasAPathExternalOnesToo) {
+    const TemporaryFolder folder;
+    const fs::path file = folder.write("short.csv", cut_of("flourish", 0, 0.4));
+    for (const std::string& sound : {std::string("least-squares:degree=3,n=8"), holding()}) {
+        app::SensorOptions options = options_for("trace:" + file.string(), {"left"});
+        options.predictors = app::stick_predictors("hold", sound, 0.08);
+        options.period_s = 0.6;
+        SensorHub hub(options);
+        Watched seen;
+        watch_until(hub, 1, seen, [&] { return !seen.states[0].empty() && seen.states[0].back().lap >= 2; });
+        EXPECT_EQ(seen.messages_but_of_silence(), "");
+        for (const tracking::StickState& state : seen.states[0]) {
+            EXPECT_FALSE(state.sound.motion());
+            EXPECT_TRUE(state.picture.motion());
+            EXPECT_EQ(state.starts, state.lap + 1);
+            if (sound.starts_with("exec:")) {
+                EXPECT_EQ(state.sound.after(0.05).position, state.position);  // of this lap, to the bit
+            }
+        }
+        // A lap's first sample is the first again, whatever the lap before has left.
+        app::StickFilters filters(options.predictors, "left");
+        const tracking::Trace trace = tracking::read_trace(file);
+        tracking::StickState own;
+        std::size_t next = 0;
+        for (const tracking::StickState& state : seen.states[0]) {
+            if (state.lap != seen.states[0].back().lap) continue;
+            while (next < trace.sticks[0].samples.size() && trace.sticks[0].samples[next].t_s <= state.t_s)
+                (void)filters.correct(trace.sticks[0].samples[next++], own);
+            expect_same(state.sound.after(0.03), own.sound.after(0.03));
+        }
+    }
+}
+
+TEST(SensorHub, AnExternalPredictorThatDoesNotStartIsSaidInOneLine) {
+    app::SensorOptions options = options_for("trace:flourish");
+    for (const auto& [sound, message] :
+         {std::pair{"exec:exit 5",
+                    "exec:exit 5, stick left, first line: error: found the child ended with status 5"},
+          {"exec:echo hello",
+           "exec:echo hello, stick left, first line: error: found \"hello\", expected \"position"}}) {
+        options.predictors.sound = sound;
+        try {
+            SensorHub hub(options);
+            ADD_FAILURE() << sound;
+        } catch (const std::runtime_error& wrong) {
+            EXPECT_EQ(std::string(wrong.what()).find(message), 0U) << wrong.what();
+        }
+        EXPECT_EQ(children(), std::vector<int>{});
+    }
+}
+
+TEST(SensorHub, ADeadExternalPredictorFailsItsStickAlone) {
+    const TemporaryFolder folder;
+    const fs::path file = folder.write("short.csv", cut_of("roll", 0, 1.0));
+    app::SensorOptions options = options_for("trace:" + file.string());
+    options.predictors = app::stick_predictors("hold", "hold", 0.05);
+    // The left stick's dies of its tenth sample.
+    options.predictors.sound = holding("[ $name = left ] && [ $k = 10 ] && kill -9 $$; ");
+    SensorHub hub(options);
+    Watched seen;
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::failed) == 1 && seen.count(Kind::ended) == 1; });
+    EXPECT_NE(seen.all_messages().find("sensor left: failed: exec:read head"), std::string::npos)
+        << seen.all_messages();
+    EXPECT_EQ(hub.newest(0)->samples, 9u);
+    EXPECT_EQ(hub.newest(1)->samples, 120u);
+    EXPECT_TRUE(hub.ended());
+    EXPECT_EQ(hub.restarts(), 0);
 }
 
 // A live source that serves two sticks from one process.
@@ -439,12 +524,14 @@ TEST(SensorHub, HeadOfAStreamIsThereBeforeItsFirstStateAndOutlivesTheSensor) {
         publisher.send(zmq::buffer(seen.states[0].empty() ? head + row : row));
     };
     watch_until(hub, 1, seen, [&] { return send(), !seen.states[0].empty(); });
-    EXPECT_EQ(hub.stream_head(), head);
+    EXPECT_EQ(hub.stream_head().text, head);
+    EXPECT_EQ(hub.stream_head().tip, Eigen::Vector3d(0, 0, -0.4));
+    EXPECT_FALSE(hub.stream_head().shaft);
     kill(children().front(), SIGKILL);
     watch_until(hub, 1, seen, [&] { return send(), seen.count(Kind::restarted) == 1; });
     const std::size_t before = seen.states[0].size();
     watch_until(hub, 1, seen, [&] { return send(), seen.states[0].size() > before + 10; });
-    EXPECT_EQ(hub.stream_head(), head);
+    EXPECT_EQ(hub.stream_head().text, head);
     EXPECT_EQ(seen.states[0].back().starts, 2u);
     for (const tracking::StickState& state : seen.states[0])
         EXPECT_EQ(state.position, Eigen::Vector3d(1, 1.5, 0));

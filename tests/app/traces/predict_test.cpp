@@ -10,7 +10,6 @@
 #include "files/bad_input.h"
 #include "sticks/auto_predictor.h"
 #include "sticks/prediction_file.h"
-#include "sticks/stick_tracker.h"
 #include "temporary_folder.h"
 
 namespace {

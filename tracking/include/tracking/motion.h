@@ -1,6 +1,9 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <variant>
 
 namespace tracking {
 
@@ -38,5 +41,57 @@ struct Motion {
 
 /// Motion at constant velocities from a pose on.
 [[nodiscard]] Motion steady_motion(const PosePrediction& from) noexcept;
+
+/// The pose `past_s` after a, on the way to b, which is `step_s` > 0 after a: position and velocity on the
+/// cubic Hermite piece, orientation by slerp (at a constant rate, the shorter way), angular velocity linear.
+[[nodiscard]] PosePrediction pose_between(const PosePrediction& a, const PosePrediction& b, double step_s,
+                                          double past_s) noexcept;
+/// The pose `past_s` after a, at a's velocities.
+[[nodiscard]] PosePrediction pose_beyond(const PosePrediction& a, double past_s) noexcept;
+
+/// The poses expected at equal steps of the lead, for estimators whose predictions no Motion can say: at these
+/// leads to the bit what the estimator predicts, between them pose_between(), beyond them pose_beyond(). Plain
+/// numbers.
+class SampledMotion {
+public:
+    static constexpr std::size_t kMostPieces = 9;
+
+    SampledMotion() = default;
+    /// Leads from 0 to `reach_s` in `pieces` equal steps, at most kMostPieces; the poses are still to be set.
+    SampledMotion(double reach_s, std::size_t pieces) noexcept : reach_s_(reach_s), pieces_(pieces) {}
+
+    [[nodiscard]] std::size_t pieces() const noexcept { return pieces_; }
+    /// reach i / pieces [s], for i = 0 to pieces().
+    [[nodiscard]] double lead_s(std::size_t i) const noexcept {
+        return reach_s_ * static_cast<double>(i) / static_cast<double>(pieces_);
+    }
+    void set(std::size_t i, const PosePrediction& pose) noexcept;
+    [[nodiscard]] PosePrediction pose(std::size_t i) const noexcept;
+    [[nodiscard]] PosePrediction after(double lead_s) const noexcept;
+
+private:
+    double reach_s_ = 0;
+    std::uint64_t pieces_ = 1;
+    std::array<std::array<double, 13>, kMostPieces + 1> poses_{};  ///< p, v, q (x y z w), angular velocity
+};
+
+/// What an estimator expects after its newest sample, as a value.
+class PosePath {
+public:
+    PosePath() = default;
+    PosePath(const Motion& motion) : of_(motion) {}         // NOLINT(google-explicit-constructor)
+    PosePath(const SampledMotion& motion) : of_(motion) {}  // NOLINT(google-explicit-constructor)
+
+    /// The pose `lead_s` >= 0 after the newest sample.
+    [[nodiscard]] PosePrediction after(double lead_s) const noexcept {
+        if (const auto* motion = std::get_if<Motion>(&of_)) return motion->after(lead_s);
+        return std::get_if<SampledMotion>(&of_)->after(lead_s);
+    }
+    /// None where the path is one of samples.
+    [[nodiscard]] const Motion* motion() const noexcept { return std::get_if<Motion>(&of_); }
+
+private:
+    std::variant<Motion, SampledMotion> of_;
+};
 
 }  // namespace tracking

@@ -41,6 +41,10 @@ public:
     /// What predict() depends on, as a value: motion()->after(lead_s) is predict(lead_s). None where a Motion
     /// cannot say it: polynomials of degree 3, programs of one's own.
     [[nodiscard]] virtual std::optional<Motion> motion() const noexcept { return std::nullopt; }
+    /// The same of model `index`, of several in parallel.
+    [[nodiscard]] virtual std::optional<Motion> motion_of_model(std::size_t /*index*/) const noexcept {
+        return motion();
+    }
 
     /// Several models in parallel (3.25-3.28): how many, which one predict() speaks for, and what model
     /// `index` alone predicts. An estimator of one model has only itself.

@@ -1,0 +1,28 @@
+#include "files/file_descriptor.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+
+namespace app {
+
+bool FileDescriptor::close() noexcept {
+    const int number = std::exchange(number_, -1);
+    return number < 0 || ::close(number) == 0;
+}
+
+Pipe make_pipe() {
+    int ends[2];
+    if (pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error("error: " + cannot("make a pipe"));
+    return {FileDescriptor(ends[0]), FileDescriptor(ends[1])};
+}
+
+std::string cannot(std::string_view action, int error) {
+    return fmt::format("cannot {}: {}", action, std::strerror(error != 0 ? error : errno));
+}
+
+}  // namespace app

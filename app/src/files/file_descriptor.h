@@ -1,0 +1,39 @@
+#pragma once
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace app {
+
+/// A file descriptor that this object owns and closes; -1: none.
+class FileDescriptor {
+public:
+    explicit FileDescriptor(int number = -1) noexcept : number_(number) {}
+    ~FileDescriptor() { close(); }
+    FileDescriptor(FileDescriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+    FileDescriptor& operator=(FileDescriptor&& other) noexcept {
+        std::swap(number_, other.number_);
+        return *this;
+    }
+
+    [[nodiscard]] int get() const noexcept { return number_; }
+    [[nodiscard]] explicit operator bool() const noexcept { return number_ >= 0; }
+    /// False if the system could not write what was still to be written (errno says why).
+    bool close() noexcept;
+
+private:
+    int number_;
+};
+
+/// The two ends of a pipe, which children inherit only where that is asked for.
+struct Pipe {
+    FileDescriptor out, in;  ///< to read from; to write into
+};
+/// Throws std::runtime_error.
+[[nodiscard]] Pipe make_pipe();
+
+/// "cannot ACTION: REASON" for what the operating system has refused; `error`: its number (errno's, as it is
+/// now, if it is 0).
+[[nodiscard]] std::string cannot(std::string_view action, int error = 0);
+
+}  // namespace app

@@ -1,0 +1,77 @@
+#pragma once
+#include <sim/simulation.h>
+#include <tracking/predictor.h>
+#include <tracking/stick_state.h>
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "kit/stick_geometry.h"
+
+namespace app {
+
+/// 0 to lead in eight equal pieces: the nodes of a predicted path.
+[[nodiscard]] std::vector<double> path_leads(double lead_s);
+/// 0 to lead in equal pieces.
+[[nodiscard]] std::vector<double> leads_up_to(double lead_s, std::size_t pieces);
+
+/// The path of the tip at those leads from a newest sample at `time_s`, of a pose by lead. None if it moves
+/// as no stick can (samples that jump within microseconds): such a path makes no contact.
+[[nodiscard]] std::optional<sim::TipPath> predicted_path(
+    const std::function<tracking::PosePrediction(double)>& pose_after, double time_s,
+    const StickGeometry& geometry, std::uint32_t stick, std::span<const double> leads_s);
+
+/// Pieces of a predicted path, cubic Hermite ones of 8.3 ms: exact for the filters' parabolas; for a stick that
+/// turns at 20 rad/s within 1 um.
+inline constexpr std::size_t kPathPieces = 8;
+/// How far beyond the newest sample a pose is predicted; later it is held [s].
+inline constexpr double kLongestPredictionS = 0.15;
+/// How far ahead the confirming path reaches [s].
+inline constexpr double kConfirmingLeadS = 0.1;
+
+/// One stick after its newest sample, and where it is expected to go: what strikes and pictures ask of the
+/// StickState that its filters published, in this process or another.
+class Stick {
+public:
+    /// `sound_lead_s`: how far ahead predicted_path() reaches.
+    Stick(std::uint32_t index, const StickGeometry& geometry, double sound_lead_s)
+        : index_(index), geometry_(geometry), sound_lead_s_(sound_lead_s) {}
+
+    void take(const tracking::StickState& state);
+    /// As before the first sample.
+    void forget() { state_ = {}; }
+    void set_geometry(const StickGeometry& geometry) { geometry_ = geometry; }
+    void set_sound_lead(double lead_s) { sound_lead_s_ = lead_s; }
+
+    [[nodiscard]] const tracking::StickState& state() const { return state_; }
+    [[nodiscard]] const StickGeometry& geometry() const { return geometry_; }
+    /// False before the first sample.
+    [[nodiscard]] bool started() const { return state_.samples > 0; }
+    /// Between the last two samples seen [s]; 0: not known.
+    [[nodiscard]] double interval_s() const { return interval_s_; }
+    /// Centre of the tip in the newest sample that the sound's filter took [m].
+    [[nodiscard]] const Eigen::Vector3d& measured_tip() const { return measured_tip_; }
+
+    /// Pose for a picture shown at T >= the newest sample's time; a prediction is carried at most 0.15 s
+    /// beyond that, then held.
+    [[nodiscard]] tracking::PosePrediction pose_at(double T) const;
+    /// The tip by the sound's filter at T, carried likewise.
+    [[nodiscard]] tracking::PointMotion sounding_tip_at(double T) const;
+    /// The path that a model of the sound's filter predicts over [0, sound lead] from its newest sample, and
+    /// the measured tip as a path that stands still.
+    [[nodiscard]] sim::TipPath predicted_path(std::size_t model) const;
+    /// That of the filter which confirms strikes, where there is one.
+    [[nodiscard]] std::optional<sim::TipPath> confirming_path() const;
+    [[nodiscard]] sim::TipPath measured_path() const;
+
+private:
+    std::uint32_t index_;
+    StickGeometry geometry_;
+    double sound_lead_s_, interval_s_ = 0;
+    tracking::StickState state_;
+    Eigen::Vector3d measured_tip_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace app

@@ -1,0 +1,137 @@
+// One stick's filters: what they publish is what their predictors predict.
+#include "sticks/stick_filters.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "sticks/predictors.h"
+#include "sticks/stick.h"
+
+namespace {
+
+using Eigen::Vector3d;
+using tracking::PosePrediction;
+using tracking::PoseSample;
+
+constexpr double kSoundLeadS = 1.0 / 15;
+
+/// A stick that waves and turns at 120 Hz, with a gap after sample 50 and one sample that is not newer.
+std::vector<PoseSample> waving() {
+    std::vector<PoseSample> samples;
+    double t = 2;
+    for (int i = 0; i < 100; ++i) {
+        t += i == 50 ? 0.4 : i == 70 ? 0 : 1.0 / 120;
+        PoseSample sample;
+        sample.t_s = t;
+        sample.position = Vector3d(0.1 * std::sin(7 * t), 1 + 0.2 * std::cos(25 * t), 0.3);
+        sample.has_orientation = true;
+        sample.orientation = Eigen::AngleAxisd(std::sin(11 * t), Vector3d(1, 2, 2).normalized());
+        samples.push_back(sample);
+    }
+    return samples;
+}
+
+double difference(const PosePrediction& a, const PosePrediction& b) {
+    return std::max({(a.position - b.position).norm(), (a.velocity - b.velocity).norm(),
+                     (a.orientation.coeffs() - b.orientation.coeffs()).norm()});
+}
+
+class EveryPredictor : public testing::TestWithParam<std::string> {};
+
+/// At the nodes of its path, where contacts are looked for: to the bit, but for estimators that sum in another
+/// order (rounding of numbers below 100).
+TEST_P(EveryPredictor, PublishesThePathThatItPredicts) {
+    const app::StickPredictors predictors = app::stick_predictors("hold", GetParam(), kSoundLeadS);
+    app::StickFilters filters(predictors, "left");
+    const std::vector<double> leads = app::path_leads(kSoundLeadS);
+    const auto own = app::make_any_predictor(predictors.sound, leads, "left");
+    tracking::StickState state;
+    for (const PoseSample& sample : waving()) {
+        const tracking::SampleStatus status = own->correct(sample);
+        EXPECT_EQ(filters.correct(sample, state), status);
+        EXPECT_EQ(state.t_s, own->time_s());
+        EXPECT_EQ(state.model, own->selected());
+        for (const double lead : leads)
+            EXPECT_LE(difference(state.sound.after(lead), own->predict(lead)), 1e-12) << lead;
+    }
+    EXPECT_EQ(state.samples, 99u);
+    EXPECT_EQ(state.refused, 1u);
+    EXPECT_EQ(state.starts, 2u);
+    EXPECT_EQ(state.confirms, 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Specifications, EveryPredictor,
+    testing::Values("hold", "difference", "naive", "least-squares", "least-squares:degree=3,n=8",
+                    "double-exponential", "one-euro", "thesis", "cv:decay=8", "ca", "singer", "bank", "imm",
+                    "exec:read h; set -- $h; shift 3; n=$#; echo position velocity; while read t x y z r; do "
+                    "[ $t = restart ] && continue; a=; i=0; while [ $i -lt $n ]; do "
+                    "a=\"$a $x 0.$i $z 1 $y 0\"; i=$((i+1)); done; echo $a; done"));
+
+TEST(StickFilters, BegunAnewTheyAreAsInTheBeginning) {
+    for (const char* sound : {"auto", "least-squares:degree=3,n=8",
+                              "exec:k=0; read h; set -- $h; shift 3; n=$#; echo position; while read t r; do "
+                              "[ $t = restart ] && k=0 && continue; k=$((k+1)); a=; i=0; "
+                              "while [ $i -lt $n ]; do a=\"$a $k 0 0\"; i=$((i+1)); done; echo $a; done"}) {
+        app::StickFilters filters(app::stick_predictors("thesis", sound, kSoundLeadS), "left");
+        const auto path = [&] {
+            tracking::StickState state;
+            for (int i = 0; i < 20; ++i) (void)filters.correct(waving()[static_cast<std::size_t>(i)], state);
+            return state;
+        };
+        const tracking::StickState first = path();
+        filters.begin_anew();
+        const tracking::StickState second = path();
+        EXPECT_EQ(second.samples, 20u);
+        EXPECT_EQ(second.starts, 1u);
+        EXPECT_EQ(difference(first.sound.after(0.05), second.sound.after(0.05)), 0) << sound;
+        EXPECT_EQ(difference(first.picture.after(0.05), second.picture.after(0.05)), 0) << sound;
+    }
+}
+
+TEST(StickFilters, AFailedExternalPredictorIsThrown) {
+    app::StickFilters filters(
+        app::stick_predictors("exec:read h; echo position; read l; exit 4", "hold", kSoundLeadS), "right");
+    tracking::StickState state;
+    try {
+        (void)filters.correct(waving()[0], state);
+        ADD_FAILURE();
+    } catch (const std::runtime_error& wrong) {
+        EXPECT_NE(std::string(wrong.what()).find("stick right, answer 1: error: found the child ended"),
+                  std::string::npos)
+            << wrong.what();
+    }
+}
+
+/// 0 to 0.15 s for pictures, held beyond; the tip at the shaft's end; a confirming path with `auto` alone.
+TEST(Stick, AsksItsState) {
+    app::StickGeometry geometry;
+    geometry.tip = Vector3d(0, 0, -0.4);
+    app::Stick stick(3, geometry, kSoundLeadS);
+    EXPECT_FALSE(stick.started());
+    app::StickFilters filters(app::stick_predictors("auto", "auto", kSoundLeadS), "left");
+    tracking::StickState state;
+    for (int i = 0; i < 30; ++i) {
+        (void)filters.correct(waving()[static_cast<std::size_t>(i)], state);
+        stick.take(state);
+    }
+    EXPECT_TRUE(stick.started());
+    EXPECT_NEAR(stick.interval_s(), 1.0 / 120, 1e-12);
+    const PoseSample newest = waving()[29];
+    EXPECT_EQ(stick.measured_tip(), newest.position + newest.orientation * geometry.tip);
+    EXPECT_EQ(difference(stick.pose_at(state.t_s + 1), state.picture.after(0.15)), 0);
+    const sim::TipPath path = stick.predicted_path();
+    ASSERT_EQ(path.nodes.size(), 9u);
+    EXPECT_EQ(path.stick, 3u);
+    EXPECT_EQ(path.nodes[8].position,
+              tracking::point_of(state.sound.after(kSoundLeadS), geometry.tip).position);
+    ASSERT_TRUE(stick.confirming_path());
+    EXPECT_EQ(stick.confirming_path()->nodes[8].velocity,
+              tracking::point_of(state.confirming.after(0.1), geometry.tip).velocity);
+    stick.forget();
+    EXPECT_FALSE(stick.started());
+}
+
+}  // namespace
