@@ -4,23 +4,28 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <optional>
+
+#include "simulate/momentum_watch.h"
 
 namespace app {
 namespace {
 
-/// Sums of m v and |m v| and the mean height.
+/// Keeps what is told, the momentum and the mean height.
 class BodiesWatch : public sim::DistributedObserver {
 public:
-    BodiesWatch(MeasuredRun& run, const sim::DistributedSettings& settings, double dt)
-        : run_(run), last_(settings.steps), second_(std::uint64_t(std::lround(1 / dt))) {}
+    BodiesWatch(MeasuredRun& run, const sim::WorldScene& scene, const sim::DistributedSettings& settings)
+        : run_(run),
+          scene_(scene),
+          last_(settings.steps),
+          second_(std::uint64_t(std::lround(1 / scene.world.settings.dt))) {}
 
     void at(std::uint64_t step, const sim::World& world) override {
         if (step > 0) run_.body_steps += std::uint64_t(world.bodies());
-        if (step == 0) start_ = world.momentum();
-        if (step % 10 == 0) look(world);
+        if (step == 0) momentum_.emplace(scene_, world);
+        if (step % 10 == 0 || step == last_) momentum_->look(world);
         if (step == std::min(second_, last_)) keep_centres(world);
         if (step != last_) return;
-        gained_ = world.momentum() - start_;
         for (int body = 0; body < world.bodies(); ++body)
             run_.mean_height += world.state(body).position.y() / world.bodies();
     }
@@ -32,33 +37,27 @@ public:
         run_.trades.push_back({step, bodies, from, to});
     }
     void finish() {
-        const double drift = (gained_ - run_.result.outside_impulse).norm();
-        run_.momentum_drift = scale_ > 0 ? drift / scale_ : drift;
+        const MomentumDrift drift = momentum_->drift(run_.result.outside_impulse).value();
+        run_.momentum_drift = drift.scale > 0 ? drift.linear / drift.scale : drift.linear;
     }
 
 private:
-    void look(const sim::World& world) {
-        double sum = 0;
-        for (int body = 0; body < world.bodies(); ++body)
-            sum += world.rigid_mass(body).mass * world.state(body).velocity.norm();
-        scale_ = std::max(scale_, sum);
-    }
     void keep_centres(const sim::World& world) {
         for (int body = 0; body < world.bodies(); ++body)
             run_.after_a_second.push_back(world.state(body).position);
     }
 
     MeasuredRun& run_;
+    const sim::WorldScene& scene_;
     std::uint64_t last_, second_;
-    Eigen::Vector3d start_ = Eigen::Vector3d::Zero(), gained_ = Eigen::Vector3d::Zero();
-    double scale_ = 0;
+    std::optional<MomentumWatch> momentum_;
 };
 
 template <typename Start>
 MeasuredRun measure(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
                     const Start& start) {
     MeasuredRun run;
-    BodiesWatch watch(run, settings, scene.world.settings.dt);
+    BodiesWatch watch(run, scene, settings);
     run.result = start(watch);
     watch.finish();
     return run;

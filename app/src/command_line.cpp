@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <sim/errors.h>
 #include <tracking/trace.h>
 #include <unistd.h>
 
@@ -118,6 +119,10 @@ int parse_and_report(CLI::App& program, int argc, char** argv) {
         return complain(wrong.what(), kBadInput);
     } catch (const tracking::TraceError& wrong) {
         return complain(wrong.what(), kBadInput);
+    } catch (const sim::InputError& wrong) {
+        return complain(fmt::format("error: {}", wrong.what()), kBadInput);
+    } catch (const sim::WorkerError& wrong) {
+        return complain(fmt::format("error: {}", wrong.what()), kFailed);
     } catch (const std::invalid_argument& wrong) {
         return complain(wrong.what(), kBadInput);
     } catch (const std::bad_alloc&) {

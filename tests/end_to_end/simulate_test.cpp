@@ -141,5 +141,23 @@ TEST(Simulate, TwoWorkerProcessesInLockstepGiveTheFilesOfOneProcess) {
     EXPECT_TRUE(fs::exists(folder / "2" / "timing.csv"));
 }
 
+TEST(Simulate, TheLinesThatItPrintsForWorkersElsewhereMakeThemJoin) {
+    const Folder folder;
+    write(folder / "scene.toml", kScene);
+    ASSERT_EQ(run({"keys", folder / "keys", "--workers", "left,right"}).status, 0);
+    const std::string script =
+        "cd $FOLDER; $PROGRAM simulate scene.toml --steps 5 --listen tcp://127.0.0.1:0 --keys keys --expect "
+        "2 "
+        "--json > out 2> err & "
+        "while [ $(grep -c '^listening: ' err 2> none) -lt 2 ]; do kill -0 $! || exit 1; sleep 0.02; done; "
+        "sed -n 's/^listening: musicworld //p' err > lines; "
+        "while read -r words; do $PROGRAM $words & done < lines; wait";
+    const Ended ended = run_command({"bash", "-c", script}, {"FOLDER=" + (folder / "").string(),
+                                                             std::string("PROGRAM=") + MUSICWORLD_PROGRAM});
+    EXPECT_EQ(ended.status, 0) << ended.err << read(folder / "err");
+    EXPECT_EQ(json::parse(read(folder / "out"))["workers"], 2);
+    EXPECT_NE(read(folder / "lines").find("--key keys/left.key"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace end_to_end

@@ -4,7 +4,7 @@
 
 namespace app {
 
-MomentumWatch::MomentumWatch(const Scene& scene, const sim::World& world) : scene_(scene) {
+MomentumWatch::MomentumWatch(const sim::WorldScene& scene, const sim::World& world) : scene_(scene) {
     closed_ = scene.world.planes.empty() && scene.events.empty();
     for (const sim::PointConstraint& c : scene.world.constraints) closed_ = closed_ && c.body_b >= 0;
     for (int body = 0; closed_ && body < world.bodies(); ++body) {

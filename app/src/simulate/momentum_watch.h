@@ -1,9 +1,7 @@
 #pragma once
-#include <sim/world.h>
+#include <sim/distributed_world.h>
 
 #include <optional>
-
-#include "scene/scene.h"
 
 namespace app {
 
@@ -18,7 +16,7 @@ struct MomentumDrift {
 /// acts, else at the end with what the world counted (World::outside_impulse).
 class MomentumWatch {
 public:
-    MomentumWatch(const Scene& scene, const sim::World& world);
+    MomentumWatch(const sim::WorldScene& scene, const sim::World& world);
     void look(const sim::World& world);  ///< now and then, and at the end
     /// `outside`: the impulse since the start, if it is known. None: unknown.
     [[nodiscard]] std::optional<MomentumDrift> drift(const std::optional<Eigen::Vector3d>& outside) const;
@@ -26,7 +24,7 @@ public:
 private:
     [[nodiscard]] Eigen::Vector3d brought(const sim::World& world) const;
 
-    const Scene& scene_;
+    const sim::WorldScene& scene_;
     bool closed_ = false;  ///< nothing acts from outside but gravity
     Eigen::Vector3d weight_ = Eigen::Vector3d::Zero(), momentum_, angular_momentum_;
     Eigen::Vector3d gained_ = Eigen::Vector3d::Zero();  ///< since the start, but by bodies that came later

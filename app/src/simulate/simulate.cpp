@@ -1,98 +1,163 @@
 #include "simulate/simulate.h"
 
 #include <fmt/format.h>
+#include <sim/errors.h>
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
-#include <memory>
-#include <stdexcept>
+#include <cstdio>
+#include <optional>
 
 #include "files/bad_input.h"
-#include "play/play_setup.h"
 #include "process/clock.h"
 #include "process/progress_bar.h"
+#include "simulate/momentum_watch.h"
 #include "simulate/simulate_record.h"
-#include "simulate/simulate_run.h"
 
 namespace app {
 namespace {
 
-class Run {
+namespace fs = std::filesystem;
+
+std::uint64_t last_step(const SimulateOptions& options, const Scene& scene) {
+    constexpr double kLongestRestS = 600;
+    if (options.steps) return *options.steps;
+    const double seconds = options.seconds.value_or(options.until_rest ? kLongestRestS : scene.seconds);
+    return std::uint64_t(std::llround(std::ceil(seconds / scene.world.settings.dt - 1e-6)));
+}
+
+/// Writes what is told of a run, and keeps what the end needs.
+class RunObserver : public sim::DistributedObserver {
 public:
-    Run(const SimulateOptions& options, const Scene& scene)
-        : options_(options), scene_(scene), world_(scene.world) {
-        result_ = result_at_start(options, scene);
-        result_.energy_start = world_.energy();
-    }
-    SimulateResult run();
+    RunObserver(const SimulateOptions& options, const Scene& scene, SimulateResult& result)
+        : options_(options),
+          scene_(scene),
+          result_(result),
+          record_(options, scene),
+          bar_(options.progress),
+          last_(last_step(options, scene)) {}
+
+    void at(std::uint64_t step, const sim::World& world) override;
+    void ready(std::uint64_t, const sim::World& world) override { record_.take_frames(world); }
+    void worked(const sim::WorkerStep& step) override { record_.take_worker(step); }
+    void note(const std::string& what) override { result_.notes.push_back(what); }
+
+    void finish(const sim::DistributedResult& run);
+    void write(const WallTimer& wall) { record_.finish(result_, wall); }
 
 private:
-    [[nodiscard]] bool at_rest() const { return next_event_ == scene_.events.size() && world_.all_asleep(); }
-    void play_events();
-    double step();
+    void describe(const sim::World& world);
 
     const SimulateOptions& options_;
     const Scene& scene_;
-    sim::World world_;
-    std::size_t next_event_ = 0;
-    SimulateResult result_;
+    SimulateResult& result_;
+    SimulateRecord record_;
+    ProgressBar bar_;
+    std::uint64_t last_;
+    std::optional<MomentumWatch> momentum_;
 };
 
-void Run::play_events() {
-    for (; next_event_ < scene_.events.size() && scene_.events[next_event_].step <= result_.steps;
-         ++next_event_) {
-        const sim::WorldEvent& event = scene_.events[next_event_];
-        for (const int constraint : event.removed)
-            if (world_.constraint_holds(constraint)) world_.remove_constraint(constraint);
-        for (std::size_t k = event.first; k < event.end; ++k) (void)world_.add_body(scene_.later[k]);
-        for (const sim::Slowing& slowing : event.slowing)
-            result_.notes.push_back(
-                fmt::format("at {} s worker {} is to be slower {} times: not done, as there are no workers "
-                            "in one process",
-                            double(event.step) * result_.dt_s, slowing.worker, slowing.factor));
+void RunObserver::at(std::uint64_t step, const sim::World& world) {
+    constexpr std::uint64_t kMomentumEvery =
+        10;  // [steps] the sum over all bodies holds up workers' messages
+    if (step == 0) {
+        record_.start(world);
+        momentum_.emplace(scene_, world);
+        result_.energy_start = world.energy();
+    } else {
+        result_.body_steps += std::uint64_t(world.bodies());
+        record_.take_step(world);
     }
+    // Where rest may end the run any step may be the last.
+    const bool perhaps_last = step == last_ || options_.until_rest;
+    if (perhaps_last || !options_.workers || step % kMomentumEvery == 0) momentum_->look(world);
+    if (perhaps_last) describe(world);
+    bar_.show(last_ > 0 ? double(step) / double(last_) : 1);
 }
 
-double Run::step() {
-    const WallTimer wall;
-    const double cpu = thread_cpu_s();
-    world_.step();
-    const double elapsed = wall.seconds();
-    result_.elapsed_s += elapsed;
-    result_.cpu_s += thread_cpu_s() - cpu;
-    ++result_.steps;
-    result_.body_steps += std::uint64_t(world_.bodies());
-    return elapsed;
+void RunObserver::describe(const sim::World& world) {
+    result_.bodies = world.bodies();
+    result_.rigid = result_.linear = result_.modal = result_.groups_cut = 0;
+    for (int body = 0; body < world.bodies(); ++body) {
+        const sim::FidelityChoice choice = world.fidelity(body);
+        const sim::Fidelity fidelity = choice.fidelity;
+        result_.groups_cut += choice.cut.below < choice.cut.count;
+        (fidelity == sim::Fidelity::rigid    ? result_.rigid
+         : fidelity == sim::Fidelity::linear ? result_.linear
+                                             : result_.modal) += 1;
+    }
+    result_.time_s = world.time_s();
+    result_.energy = world.energy();
+    result_.momentum = world.momentum(), result_.angular_momentum = world.angular_momentum();
+    result_.state_hash = world.state_hash();
 }
 
-SimulateResult Run::run() {
-    const WallTimer wall;
-    SimulateRecord record(options_, scene_);
-    record.start(world_);
-    MomentumWatch drift(scene_, world_);
-    ProgressBar bar(options_.progress);
-    const std::uint64_t last = last_step(options_, scene_);
-    while (result_.steps < last) {
-        play_events();
-        if (options_.until_rest && at_rest()) break;
-        record.take_frames(world_);
-        record.take_time(result_.steps + 1, step());
-        record.take_step(world_);
-        drift.look(world_);
-        bar.show(double(result_.steps) / double(last));
-    }
-    record.take_frames(world_);
-    bar.clear();
-    if (world_.quarantined().empty()) result_.drift = drift.drift(world_.outside_impulse());
-    describe_end(world_, result_);
-    result_.counts = world_.counts();
-    result_.rest_reached = at_rest();
-    for (const sim::QuarantinedBody& q : world_.quarantined())
-        result_.quarantined.emplace_back(world_.definition(q.body).name, q);
-    result_.wall_s = wall.seconds();
-    record.finish(result_, wall);
-    return result_;
+void RunObserver::finish(const sim::DistributedResult& run) {
+    bar_.clear();
+    if (options_.workers) result_.workers = run;
+    result_.steps = run.steps;
+    result_.elapsed_s = run.elapsed_s, result_.cpu_s = run.cpu_s;
+    result_.counts = run.counts;
+    result_.rest_reached = run.rest_reached;
+    for (const sim::QuarantinedBody& q : run.quarantined)
+        result_.quarantined.emplace_back(name_of(scene_, static_cast<std::size_t>(q.body)), q);
+    // What a worker that died had counted of the impulse from outside is lost with it.
+    if (run.lost == 0 && run.quarantined.empty()) result_.drift = momentum_->drift(run.outside_impulse);
+    for (const sim::WorldEvent& event : scene_.events)
+        if (!options_.workers && (event.step < run.steps || run.rest_reached))
+            for (const sim::Slowing& slowing : event.slowing)
+                note(
+                    fmt::format("at {} s worker {} is to be slower {} times: not done, as there are no "
+                                "workers in one process",
+                                double(event.step) * result_.dt_s, slowing.worker, slowing.factor));
+}
+
+sim::DistributedSettings settings_of(const SimulateOptions& options, const Scene& scene) {
+    sim::DistributedSettings settings;
+    settings.steps = last_step(options, scene);
+    settings.until_rest = options.until_rest;
+    settings.all_to_first = scene.workers.all_to_first;
+    settings.market.from_step = scene.workers.balance_from;
+    if (!options.workers) return settings;
+    settings.pace = options.workers->pace;
+    settings.bound = options.workers->bound;
+    settings.market.trade = options.workers->balance;
+    return settings;
+}
+
+/// Tells how workers elsewhere join: a line for each of their keys.
+void print_how_to_join(const std::string& endpoint, const fs::path& keys) {
+    std::vector<std::string> options;
+    if (!keys.empty())
+        for (const fs::directory_entry& entry : fs::directory_iterator(keys))
+            if (entry.path().extension() == ".key" && entry.path().stem() != "application")
+                options.push_back(" --key " + entry.path().string());
+    if (options.empty()) options.emplace_back();
+    std::sort(options.begin(), options.end());
+    for (const std::string& key : options)
+        fmt::print(stderr, "listening: musicworld worker --connect {}{}\n", endpoint, key);
+}
+
+sim::DistributedLaunch launch_of(const WorkerOptions& workers) {
+    sim::DistributedLaunch launch;
+    launch.processes = {fs::read_symlink("/proc/self/exe").string(), {"worker"}, workers.count};
+    launch.listen = workers.listen;
+    launch.expect = workers.expect;
+    launch.keys = workers.keys;
+    if (!workers.listen.empty())
+        launch.listening = [keys = workers.keys](const std::string& endpoint) {
+            print_how_to_join(endpoint, keys);
+        };
+    return launch;
+}
+
+sim::DistributedResult run(const Scene& scene, const SimulateOptions& options,
+                           sim::DistributedObserver& observer) {
+    const sim::DistributedSettings settings = settings_of(options, scene);
+    if (!options.workers) return sim::run_alone(scene, settings, observer);
+    if (options.workers->simulated)
+        return sim::simulate_processors(scene, settings, *options.workers->simulated, observer);
+    return sim::run_distributed(scene, settings, launch_of(*options.workers), observer);
 }
 
 void check(const SimulateOptions& options, const Scene& scene) {
@@ -115,48 +180,26 @@ void check(const SimulateOptions& options, const Scene& scene) {
 
 }  // namespace
 
-SimulateResult result_at_start(const SimulateOptions& options, const Scene& scene) {
+SimulateResult simulate(const SimulateOptions& options) {
+    const Scene scene = read_scene(options.scene, options.dt_s);
+    check(options, scene);
+    const WallTimer wall;
     SimulateResult result;
     result.scene = scene.file, result.name = scene.name;
     result.dt_s = scene.world.settings.dt;
     result.rest_wanted = options.until_rest;
-    return result;
-}
-
-std::uint64_t last_step(const SimulateOptions& options, const Scene& scene) {
-    constexpr double kLongestRestS = 600;
-    if (options.steps) return *options.steps;
-    const double seconds = options.seconds.value_or(options.until_rest ? kLongestRestS : scene.seconds);
-    return std::uint64_t(std::llround(std::ceil(seconds / scene.world.settings.dt - 1e-6)));
-}
-
-void describe_end(const sim::World& world, SimulateResult& result) {
-    result.bodies = world.bodies();
-    for (int body = 0; body < world.bodies(); ++body) {
-        const sim::FidelityChoice choice = world.fidelity(body);
-        const sim::Fidelity fidelity = choice.fidelity;
-        result.groups_cut += choice.cut.below < choice.cut.count;
-        (fidelity == sim::Fidelity::rigid    ? result.rigid
-         : fidelity == sim::Fidelity::linear ? result.linear
-                                             : result.modal) += 1;
-    }
-    result.time_s = world.time_s();
-    result.energy = world.energy();
-    result.momentum = world.momentum(), result.angular_momentum = world.angular_momentum();
-    result.state_hash = world.state_hash();
-}
-
-SimulateResult simulate(const SimulateOptions& options) {
-    const Scene scene = read_scene(options.scene, options.dt_s);
-    check(options, scene);
-    if (options.workers) return simulate_with_workers(options, scene);
-    std::unique_ptr<Run> run;
+    if (options.workers) result.worker_options = *options.workers;
+    RunObserver observer(options, scene, result);
     try {
-        run = std::make_unique<Run>(options, scene);
-    } catch (const std::invalid_argument& wrong) {  // what no single key shows
-        throw BadInput(fmt::format("{}: error: {}", scene.file.string(), wrong.what()));
+        observer.finish(run(scene, options, observer));
+    } catch (const sim::InputError& wrong) {
+        if (!wrong.names_place()) throw;
+        throw BadInput(
+            fmt::format("{}: error: {}", scene.file.string(), wrong.what()));  // no single key shows it
     }
-    return run->run();
+    result.wall_s = wall.seconds();
+    observer.write(wall);
+    return result;
 }
 
 }  // namespace app

@@ -69,13 +69,4 @@ PlotScript workers_plot(const WorkerHistory& history) {
     return {kWidth, kHeight, commands + "unset multiplot\n"};
 }
 
-std::string timing_header() {
-    return "worker,step,seconds,smoothed_s,waited_s,bodies,lead,ghost_age,bytes,cross_contacts\n";
-}
-
-std::string timing_row(const sim::WorkerStep& s) {
-    return fmt::format("{},{},{},{},{},{},{},{},{},{}\n", s.worker, s.step, s.seconds, s.smoothed_s,
-                       s.waited_s, s.bodies, s.lead, s.ghost_age, s.bytes, s.cross_contacts);
-}
-
 }  // namespace app

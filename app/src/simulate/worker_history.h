@@ -33,8 +33,4 @@ private:
 /// A line colour a worker, repeating after the tenth: "rgb '#rrggbb'".
 [[nodiscard]] std::string worker_colour(std::size_t number);
 
-// timing.csv: each step of each worker, in the order in which they were told.
-[[nodiscard]] std::string timing_header();
-[[nodiscard]] std::string timing_row(const sim::WorkerStep& step);
-
 }  // namespace app

@@ -78,6 +78,9 @@ public:
     virtual ~DistributedObserver() = default;
     /// `world`: all bodies at the end of step `step` (0: the start), exact in lockstep, else as published.
     virtual void at(std::uint64_t step, const World& world) { (void)step, (void)world; }
+    /// After at(), perhaps more than once: `world` as the next step begins. Alone the events before that step
+    /// have been applied; among workers they are seen with the step.
+    virtual void ready(std::uint64_t step, const World& world) { (void)step, (void)world; }
     virtual void worked(const WorkerStep& step) { (void)step; }             ///< a worker has published a step
     virtual void moved(std::uint64_t step, int bodies, int from, int to) {  ///< from -1: none
         (void)step, (void)bodies, (void)from, (void)to;
@@ -105,6 +108,12 @@ struct DistributedResult {    ///< of a whole run
     bool rest_reached = false;  ///< until_rest: every body came to rest
 };
 
+/// Runs a scene in this process, without workers: pace, bound and market of `settings` do not count, nor does
+/// who is to be slower. elapsed_s and cpu_s are of the steps alone; each is told as worker 0's. Throws
+/// InputError for a scene that is refused.
+DistributedResult run_alone(const WorldScene& scene, const DistributedSettings& settings,
+                            DistributedObserver& observer);
+
 /// Where workers come from.
 struct DistributedLaunch {
     WorkerLaunch processes;  ///< started here (none without a program), joined through a private folder's ipc
@@ -118,8 +127,8 @@ struct DistributedLaunch {
 };
 
 /// Runs a scene on worker processes over ZeroMQ. Returns when all steps are done. A lost worker's bodies go
-/// on elsewhere; if none is left, in this process. Throws std::invalid_argument for a scene or setting that
-/// is refused, std::runtime_error if no worker joins.
+/// on elsewhere; if none is left, in this process. Throws InputError for a scene or setting that is
+/// refused, WorkerError if workers cannot be started or do not join.
 DistributedResult run_distributed(const WorldScene& scene, const DistributedSettings& settings,
                                   const DistributedLaunch& launch, DistributedObserver& observer);
 
@@ -153,13 +162,14 @@ DistributedResult simulate_processors(const WorldScene& scene, const Distributed
 
 /// Writes CURVE keys into a new folder (0700): application.key (secret, 0600), application.pub, and for each
 /// worker NAME NAME.key (its secret and public keys and the application's public one: all that it needs), and
-/// `allowed`, the public keys and names, a line each. Throws std::invalid_argument for a name or folder that
-/// cannot be (nothing is overwritten), std::runtime_error if it cannot be written.
+/// `allowed`, the public keys and names, a line each. Throws InputError for a name or folder that cannot be
+/// (nothing is overwritten), WorkerError if it cannot be written.
 void make_keys(const std::filesystem::path& folder, const std::vector<std::string>& workers);
 
 /// A worker's process: joins the application at `endpoint`, of a world or of a kit, and serves until the run
 /// ends. SIGTERM or SIGINT: hands its bodies over and leaves. `key`: file made by make_keys, empty: none.
-/// Returns the exit status. Throws std::invalid_argument for an endpoint or key that is refused.
+/// Returns the exit status. Throws InputError for an endpoint or key that is refused, WorkerError
+/// if nobody answers.
 [[nodiscard]] int run_worker(const std::string& endpoint, const std::filesystem::path& key);
 
 }  // namespace sim

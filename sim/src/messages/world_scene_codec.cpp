@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "messages/world_record_codec.h"
+#include "sim/errors.h"
 #include "world/world_check.h"
 
 namespace sim {
@@ -190,7 +191,7 @@ WorldEvent read_event(ByteReader& in) {
 }
 
 [[noreturn]] void refuse(const std::string& what, const std::string& found, const std::string& expected) {
-    throw std::invalid_argument("error: " + what + ": found " + found + ", expected " + expected);
+    throw InputError(what, found, expected);
 }
 
 void check_event(const WorldScene& scene, const WorldEvent& e) {

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
 #include "modes/eigenproblem.h"
 #include "modes/finite_element.h"
 #include "modes/modal_basis.h"
+#include "sim/errors.h"
 #include "sim/modes.h"
 
 namespace sim {
@@ -17,9 +17,7 @@ constexpr int kMostElements = 12, kMostModes = 300, kElementModes = 75;
 constexpr double kEqual = 1e-9;  // relative: eigenvalues of one degenerate group
 
 void expect(bool right, const std::string& what, double found, const std::string& expected) {
-    if (!right)
-        throw std::invalid_argument("error: found " + what + " " + std::to_string(found) + ", expected " +
-                                    expected);
+    if (!right) throw InputError("", what + " " + std::to_string(found), expected);
 }
 
 void check(const ModesRequest& request) {

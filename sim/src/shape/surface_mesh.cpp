@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 #include <string>
 
 #include "shape/generalized_surface.h"
+#include "sim/errors.h"
 
 namespace sim {
 namespace {
@@ -109,8 +109,7 @@ void add_edges_and_corners(SurfaceMesh& mesh, const GeneralizedSurface& surface,
 
 SurfaceMesh surface_mesh(const GeneralizedSuperquadric& shape, int triangles) {
     if (triangles < 48 || triangles > 20000)
-        throw std::invalid_argument("surface_mesh: " + std::to_string(triangles) +
-                                    " triangles, expected 48 to 20000");
+        throw InputError("surface_mesh", std::to_string(triangles) + " triangles", "48 to 20000");
     const int parallels = std::max(4, int(std::lround(std::sqrt(triangles / 3.6))));
     const int meridians = 2 * ((triangles + 4 * parallels - 1) / (4 * parallels));
     const GeneralizedSurface surface(shape);

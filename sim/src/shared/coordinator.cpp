@@ -8,12 +8,17 @@
 namespace sim {
 namespace {
 
-// Records of all bodies before their first step, those to come too.
-std::vector<WorldRecord> first_records(const WorldScene& scene) {
-    World world(scene.world);
-    for (const WorldBody& body : scene.later) world.add_body(body);
+// Records of all bodies before their first step: those of `world`, and of those to come, which it has not yet.
+std::vector<WorldRecord> first_records(const WorldScene& scene, const World& world) {
     std::vector<WorldRecord> records;
     for (int i = 0; i < world.bodies(); ++i) records.push_back(world.record(i));
+    WorldDefinition empty;
+    empty.settings = scene.world.settings;
+    World to_come(empty);
+    for (const WorldBody& body : scene.later) {
+        records.push_back(to_come.record(to_come.add_body(body)));
+        records.back().body = static_cast<int>(records.size()) - 1;
+    }
     return records;
 }
 
@@ -34,7 +39,7 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
       observer_(&observer),
       view_(scene, settings.pace),
       lots_(joined_lots(scene)) {
-    for (WorldRecord& record : first_records(scene)) {
+    for (WorldRecord& record : first_records(scene, view_.world())) {
         const std::uint64_t born = view_.clock().born(static_cast<int>(bodies_.size()));
         bodies_.push_back({kApplication, born, std::move(record), none_, 0});
     }
@@ -112,6 +117,7 @@ void Coordinator::catch_up(std::uint32_t worker) {
 void Coordinator::start() {
     started_ = true;
     observer_->at(0, view_.world());
+    observer_->ready(0, view_.world());
     send(members_, Members{members_});
     if (members_.empty()) {  // all lost before: the next to join gets everything
         std::vector<int> all;
@@ -478,6 +484,7 @@ void Coordinator::advance() {
                 body.record.quarantined && std::exchange(quarantined_[static_cast<std::size_t>(i)], 1) == 0)
                 result_.quarantined.push_back({i, view_.step(), "state"});
         observer_->at(view_.step(), world);
+        observer_->ready(view_.step(), world);
         std::erase_if(kept_, [this](const auto& kept) { return kept.first <= view_.step(); });
     }
 }

@@ -22,9 +22,9 @@ SceneClock::SceneClock(const WorldScene& scene) {
 void SceneClock::apply(World& world, std::uint64_t step) {
     for (; next_ < scene_.events.size() && scene_.events[next_].step <= step; ++next_) {
         const WorldEvent& event = scene_.events[next_];
-        for (const int constraint : event.removed) world.remove_constraint(constraint);
-        for (std::size_t i = event.first; i < event.end; ++i)
-            world.set_own(world.add_body(scene_.later[i]), false);
+        for (const int constraint : event.removed)
+            if (world.constraint_holds(constraint)) world.remove_constraint(constraint);
+        for (std::size_t i = event.first; i < event.end; ++i) (void)world.add_body(scene_.later[i]);
     }
 }
 
@@ -41,6 +41,12 @@ int SceneClock::moving(std::uint64_t step) const {
 Replica::Replica(const WorldScene& scene) : world_(scene.world), clock_(scene) {
     world_.share(Sharing::islands);
     for (int i = 0; i < world_.bodies(); ++i) world_.set_own(i, false);
+}
+
+void Replica::begin_at(std::uint64_t step) {
+    const int before = world_.bodies();
+    clock_.apply(world_, step);
+    for (int i = before; i < world_.bodies(); ++i) world_.set_own(i, false);
 }
 
 Replica::Known& Replica::at(std::uint64_t step) {
@@ -126,7 +132,7 @@ void Replica::undo(const WorldSnapshot& before, std::span<const std::uint8_t> ow
 }
 
 void Replica::jump(const WorldSnapshot& snapshot) {
-    if (snapshot.step > 0) clock_.apply(world_, snapshot.step - 1);
+    if (snapshot.step > 0) begin_at(snapshot.step - 1);
     world_.rewind(snapshot);
     step_ = snapshot.step;
     whole_ = true;

@@ -12,7 +12,7 @@ class SceneClock {
 public:
     explicit SceneClock(const WorldScene& scene);  ///< at the start
 
-    /// Applies the events due before step `step` + 1: removes constraints, adds bodies.
+    /// Applies the events due before step `step` + 1: removes constraints that still hold, adds bodies.
     void apply(World& world, std::uint64_t step);
     [[nodiscard]] bool events_left() const noexcept { return next_ < scene_.events.size(); }
     [[nodiscard]] int bodies() const noexcept { return static_cast<int>(born_.size()); }  ///< with later ones
@@ -51,7 +51,7 @@ public:
     bool advance(bool along);
     /// Applies the events before a step.
     void begin() { begin_at(step_); }
-    void begin_at(std::uint64_t step) { clock_.apply(world_, step); }
+    void begin_at(std::uint64_t step);
     /// After a step of the world: marks the records of own bodies as present.
     void stepped(std::span<const std::uint8_t> own);
     /// Goes back to the snapshot taken before the step that stepped() ended. What was published of that step

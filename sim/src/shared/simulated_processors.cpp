@@ -10,6 +10,7 @@
 #include "shared/coordinator.h"
 #include "shared/shared_world_worker.h"
 #include "sim/distributed_world.h"
+#include "sim/errors.h"
 
 namespace sim {
 namespace {
@@ -258,7 +259,7 @@ DistributedResult Machine::run() {
 
 DistributedResult simulate_processors(const WorldScene& scene, const DistributedSettings& settings,
                                       const SimulatedProcessors& processors, DistributedObserver& observer) {
-    if (processors.count < 1) throw std::invalid_argument("found no processor, expected 1 or more");
+    if (processors.count < 1) throw InputError("", "no processor", "1 or more");
     return Machine(scene, settings, processors, observer).run();
 }
 

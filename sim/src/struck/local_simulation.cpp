@@ -1,5 +1,4 @@
-#include <stdexcept>
-
+#include "sim/errors.h"
 #include "sim/simulation.h"
 #include "struck/request_check.h"
 #include "struck/stepped_body.h"
@@ -19,7 +18,7 @@ public:
     StepReply step(const StepRequest& request) override {
         check_request(request, bodies_.size());
         if (stepped_ && !request.anew && request.t_s < last_t_s_)
-            throw std::invalid_argument("request.t_s is before the last step's");
+            throw InputError("request.t_s is before the last step's");
         for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].step(request, outcomes_[i]);
         stepped_ = true;
         last_t_s_ = request.t_s;

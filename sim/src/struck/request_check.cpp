@@ -2,18 +2,18 @@
 
 #include <cmath>
 #include <sstream>
-#include <stdexcept>
 
+#include "sim/errors.h"
 #include "struck/body_model.h"
 
 namespace sim {
 namespace {
 
 [[noreturn]] void reject(const std::string& where, double found, const char* expected) {
-    std::ostringstream message;
-    message.precision(17);
-    message << where << " = " << found << ", expected " << expected;
-    throw std::invalid_argument(message.str());
+    std::ostringstream number;
+    number.precision(17);
+    number << found;
+    throw InputError(where, number.str(), expected);
 }
 
 // Compares so that NaN fails.

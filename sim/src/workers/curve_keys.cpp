@@ -12,10 +12,10 @@
 #include <map>
 #include <set>
 #include <sstream>
-#include <stdexcept>
 #include <zmq.hpp>
 
 #include "sim/distributed_world.h"
+#include "sim/errors.h"
 
 namespace sim {
 namespace {
@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kKeyLength = 40;
 
 [[noreturn]] void refuse(const std::string& found, const std::string& expected) {
-    throw std::invalid_argument("error: found " + found + ", expected " + expected);
+    throw InputError("", found, expected);
 }
 
 bool is_key(const std::string& text) {
@@ -37,13 +37,14 @@ void write_new(const fs::path& file, const std::string& text, mode_t mode) {
     bool written = descriptor >= 0;
     if (written) written = write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size());
     if (descriptor >= 0) written = close(descriptor) == 0 && written;
-    if (!written)
-        throw std::runtime_error("error: cannot write " + file.string() + ": " + std::strerror(errno));
+    if (!written) throw WorkerError("cannot write " + file.string() + ": " + std::strerror(errno));
 }
 
 std::vector<std::array<std::string, 2>> read_lines(const fs::path& file) {
     std::ifstream in(file);
-    if (!in) refuse("no key file " + file.string() + " that can be read", "one made by `musicworld keys`");
+    if (!in)
+        throw InputError("cannot open key file " + file.string() + ": " + std::strerror(errno) +
+                         "; `musicworld keys` makes one");
     std::vector<std::array<std::string, 2>> lines;
     for (std::string line; std::getline(in, line);) {
         std::istringstream words(line);
@@ -120,7 +121,7 @@ bool is_loopback(const std::string& address) {
 KeyPair make_key_pair() {
     std::array<char, kKeyLength + 1> shown{}, secret{};
     if (zmq_curve_keypair(shown.data(), secret.data()) != 0)
-        throw std::runtime_error("error: cannot make CURVE keys: this ZeroMQ is built without libsodium");
+        throw WorkerError("cannot make CURVE keys: this ZeroMQ is built without libsodium");
     return {shown.data(), secret.data()};
 }
 
@@ -154,8 +155,7 @@ void make_keys(const fs::path& folder, const std::vector<std::string>& workers) 
     if (mkdir(folder.c_str(), 0700) != 0) {
         if (errno == EEXIST)
             refuse(folder.string() + ", which is there already", "a new folder; nothing is overwritten");
-        throw std::invalid_argument("error: cannot make folder " + folder.string() + ": " +
-                                    std::strerror(errno) + "; choose another");
+        throw InputError("cannot make the folder " + folder.string() + ": " + std::strerror(errno));
     }
     try {
         write_keys(folder, workers);

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <csignal>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
 #include "messages/world_scene_codec.h"
 #include "shared/coordinator.h"
 #include "shared/shared_world_worker.h"
+#include "sim/errors.h"
 #include "workers/elapsed.h"
 #include "workers/worker_gate.h"
 #include "workers/worker_process.h"
@@ -127,9 +127,9 @@ private:
             look_after_children();
             pass_on();
             if (seconds_since(start) > launch_.wait_s)
-                throw std::runtime_error("error: " + std::to_string(meeting_.members().size()) + " of " +
-                                         std::to_string(wanted) + " workers joined within " +
-                                         std::to_string(std::lround(launch_.wait_s)) + " s");
+                throw WorkerError(std::to_string(meeting_.members().size()) + " of " +
+                                  std::to_string(wanted) + " workers joined within " +
+                                  std::to_string(std::lround(launch_.wait_s)) + " s");
         }
     }
 
@@ -187,7 +187,7 @@ private:
 
     void note_early_end(const Child& child) {
         if (!child.process.was_killed())
-            throw std::runtime_error("a worker ended before it joined: " + child.process.ending());
+            throw WorkerError("a worker ended before it joined: " + child.process.ending());
         ++ended_early_;
     }
 
@@ -258,8 +258,8 @@ DistributedResult run_distributed(const WorldScene& scene, const DistributedSett
     check_scene(scene);
     check_settings(settings);
     if (launch.processes.count < 0 || launch.processes.count > kMostWorkers)
-        throw std::invalid_argument("error: found " + std::to_string(launch.processes.count) +
-                                    " workers, expected 0 to " + std::to_string(kMostWorkers));
+        throw InputError("", std::to_string(launch.processes.count) + " workers",
+                         "0 to " + std::to_string(kMostWorkers));
     return SharedWorldRun(scene, settings, launch, observer).run();
 }
 

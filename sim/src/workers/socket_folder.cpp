@@ -6,7 +6,8 @@
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
-#include <stdexcept>
+
+#include "sim/errors.h"
 
 namespace sim {
 namespace {
@@ -23,8 +24,8 @@ SocketFolder::SocketFolder() {
     std::string pattern = (wanted && *wanted ? wanted : "/tmp") + name;
     if (pattern.size() + std::strlen(kSocket) > kLongestPath) pattern = "/tmp" + name;
     if (!mkdtemp(pattern.data())) {
-        throw std::runtime_error("cannot make a folder " + pattern +
-                                 " for the workers' socket: " + std::strerror(errno));
+        throw WorkerError("cannot make a folder " + pattern +
+                          " for the workers' socket: " + std::strerror(errno));
     }
     path_ = pattern;
 }

@@ -5,6 +5,7 @@
 #include <thread>
 #include <utility>
 
+#include "sim/errors.h"
 #include "struck/request_check.h"
 
 namespace sim {
@@ -30,8 +31,8 @@ StruckWorkers::StruckWorkers(std::vector<BodyDefinition> bodies, const WorkerLau
       here_(definitions_.size()),
       router_(context_, zmq::socket_type::router) {
     if (launch.count < 0 || launch.count > kStruckMostWorkers) {
-        throw std::invalid_argument(std::to_string(launch.count) + " workers, expected 0 to " +
-                                    std::to_string(kStruckMostWorkers));
+        throw InputError("", std::to_string(launch.count) + " workers",
+                         "0 to " + std::to_string(kStruckMostWorkers));
     }
     for (const BodyDefinition& definition : definitions_) check_body(definition);
     report_.count = launch.count;
@@ -64,10 +65,10 @@ void StruckWorkers::wait_for_hellos() {
                     lose(slot);  // as later: the others take its share
                     continue;
                 }
-                throw std::runtime_error("a worker ended before it joined: " + slot.process.ending());
+                throw WorkerError("a worker ended before it joined: " + slot.process.ending());
             }
         }
-        if (Clock::now() > deadline) throw std::runtime_error("a worker did not join within 20 s");
+        if (Clock::now() > deadline) throw WorkerError("a worker did not join within 20 s");
     }
 }
 
@@ -92,7 +93,7 @@ StruckWorkers::~StruckWorkers() {
 StepReply StruckWorkers::step(const StepRequest& request) {
     check_request(request, definitions_.size());
     if (step_ > 0 && !request.anew && request.t_s < last_t_s_)
-        throw std::invalid_argument("request.t_s is before the last step's");
+        throw InputError("request.t_s is before the last step's");
     receive(0ms);
     request_ = nullptr;
     look_after_workers();

@@ -6,6 +6,7 @@
 
 #include "messages/struck_messages.h"
 #include "sim/distributed_world.h"
+#include "sim/errors.h"
 #include "struck/stepped_body.h"
 #include "workers/heartbeat.h"
 #include "workers/socket_folder.h"
@@ -104,10 +105,10 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
                 status = KitWorker(socket, pulse).serve(frame);
             } catch (const DecodeError& e) {
                 send(socket, encode(Failure{e.what()}));
-                throw std::runtime_error(std::string("bad message: ") + e.what());
+                throw WorkerError(std::string("bad message: ") + e.what());
             }
     } else if (!pulse.application_gone()) {
-        throw std::runtime_error("no answer from " + endpoint + " within 10 s");
+        throw WorkerError("no answer from " + endpoint + " within 10 s");
     }
     if (status != 0 && pulse.application_gone()) remove_left_socket(endpoint);
     return status;

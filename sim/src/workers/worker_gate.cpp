@@ -7,6 +7,7 @@
 #include <cstring>
 #include <utility>
 
+#include "sim/errors.h"
 #include "workers/signal_mask.h"
 
 namespace sim {
@@ -76,8 +77,8 @@ void WorkerGate::bind(const Settings& settings) {
     try {
         router_.bind(listen);
     } catch (const zmq::error_t& e) {
-        throw std::invalid_argument("error: cannot listen at " + settings.listen + ": " + e.what() +
-                                    "; choose a free port of an address of this machine");
+        throw InputError("cannot listen at " + settings.listen + ": " + e.what() +
+                         "; choose a free port of an address of this machine");
     }
     endpoint_ = router_.get(zmq::sockopt::last_endpoint);
 }

@@ -8,9 +8,10 @@
 
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
 #include <utility>
 #include <vector>
+
+#include "sim/errors.h"
 
 namespace sim {
 namespace {
@@ -54,8 +55,7 @@ WorkerProcess::WorkerProcess(const WorkerLaunch& launch, const std::string& endp
     const SpawnSettings settings;
     const int error = posix_spawn(&id_, launch.program.c_str(), &settings.files, &settings.attributes,
                                   arguments.data(), environ);
-    if (error != 0)
-        throw std::runtime_error("cannot start worker " + launch.program + ": " + std::strerror(error));
+    if (error != 0) throw WorkerError("cannot start worker " + launch.program + ": " + std::strerror(error));
 }
 
 WorkerProcess::WorkerProcess(WorkerProcess&& other) noexcept

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "shared/shared_world_worker.h"
+#include "sim/errors.h"
 #include "workers/elapsed.h"
 
 namespace sim {
@@ -91,7 +92,7 @@ private:
     }
     void send(const std::vector<std::uint8_t>& bytes) {
         if (!through_signals([&] { return socket_.send(zmq::buffer(bytes), zmq::send_flags::none); }))
-            throw std::runtime_error("the application takes no more messages");
+            throw WorkerError("the application takes no more messages");
     }
     /// Until something comes, or a signal, or a look at the application is due.
     void wait() {

@@ -2,7 +2,8 @@
 
 #include <cmath>
 #include <sstream>
-#include <stdexcept>
+
+#include "sim/errors.h"
 
 namespace sim {
 namespace {
@@ -11,9 +12,9 @@ constexpr double kFurthest = 1e7, kFastest = 1e6, kStrongest = 1e8;  // m, m/s, 
 
 [[noreturn]] void refuse(const std::string& who, const std::string& what, double found,
                          const std::string& expected) {
-    std::ostringstream text;
-    text << who << ": " << what << ": found " << found << ", expected " << expected;
-    throw std::invalid_argument(text.str());
+    std::ostringstream number;
+    number << found;
+    throw InputError(who + ": " + what, number.str(), expected);
 }
 
 void check_range(const std::string& who, const std::string& what, double value, double low, double high) {
