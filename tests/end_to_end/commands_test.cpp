@@ -19,16 +19,14 @@ bool contains(const std::string& text, const std::string& part) {
 
 TEST(Commands, AMisspeltNameIsRefusedWithTheNearest) {
     const auto refused = [](const std::vector<std::string>& words, const std::string& nearest) {
-        const Ended ended = run(words);
-        expect_refused(ended, words.back());
-        EXPECT_TRUE(contains(ended.err, nearest)) << ended.err;
+        expect_refused(run(words), nearest);
     };
     refused({"plai"}, "the nearest is play");
     refused({"simulat", "--steps"}, "the nearest is simulate");
     refused({"kit", "shw"}, "the nearest is show");
     refused({"play", "--soundlead", "1"}, "the nearest is --sound-lead");
     refused({"trace", "info"}, "found no TRACE");
-    refused({"compare", "roll", "--kit", "drums", "--plane", "1", "--out", "o"}, "found --plane with --kit");
+    refused({"compare", "roll", "--kit", "drums", "--plane", "1", "--out", "o"}, "found --kit with --plane");
     refused({"play", "--seconds", "5"}, "found --seconds without --realtime");
     refused({"kit", "list", "all"}, "found argument all");
 }
@@ -87,6 +85,7 @@ TEST(Commands, WhatTheyWroteBeforeIsReplacedAndNothingElse) {
 }
 
 TEST(Commands, AnInterruptedRunSaysWhatStaysWhere) {
+    (void)::signal(SIGINT, SIG_DFL);  // some shells have it ignored
     for (const auto& [signal, words] :
          {std::pair(SIGINT, std::vector<std::string>{"simulate", "benchmark25", "--steps", "100000000"}),
           {SIGTERM, {"play", "flourish", "--size", "4096x4096"}}}) {

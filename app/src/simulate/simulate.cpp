@@ -167,15 +167,6 @@ void check(const SimulateOptions& options, const Scene& scene) {
             scene.file.string()));
     if ((options.frames || options.video) && !options.out)
         throw BadInput("error: found --frames or --video without --out, expected a folder for the pictures");
-    if (options.frames) {
-        const bool size =
-            options.width >= 16 && options.height >= 16 && options.width <= 8192 && options.height <= 8192;
-        if (!size)
-            throw BadInput(fmt::format("error: found --size {}x{}, expected 16x16 to 8192x8192",
-                                       options.width, options.height));
-    }
-    if (!(options.fps >= 0.1 && options.fps <= 1000))
-        throw BadInput(fmt::format("error: found --fps {}, expected 0.1 to 1000", options.fps));
 }
 
 }  // namespace
