@@ -19,12 +19,10 @@ struct SensorTask {
     bool realtime = true;
 };
 
-/// The arguments with which `musicworld` becomes the sensor process of a task.
-[[nodiscard]] std::vector<std::string> sensor_arguments(const SensorTask& task);
-
-/// A sensor process: one thread reads the source at its own pace, one a stick filters and publishes (a slow
-/// external predictor holds up its own stick alone), and this one reports and watches for the end. Returns the exit status: 0 when the source has ended, the hub is gone or
-/// SIGTERM came; 1 when it failed, which its report says.
+/// A sensor process: one thread reads the source at its own pace, one per stick filters and publishes (a slow
+/// external predictor holds up its own stick alone), and this one reports and watches for the end. Returns the
+/// exit status: 0 when the source has ended, the hub is gone or SIGTERM came; 1 when it failed, which its report
+/// says.
 [[nodiscard]] int run_sensor(const SensorTask& task);
 
 /// The words after the program's name with which the command `sensor` gets a task.
