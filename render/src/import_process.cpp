@@ -16,6 +16,15 @@
 namespace render {
 namespace {
 
+/// Of an installation PREFIX/bin/musicworld: PREFIX/libexec/musicworld/musicworld_mesh_import; else the build's.
+std::string importer() {
+    std::error_code ignored;
+    const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", ignored);
+    const std::filesystem::path installed =
+        program.parent_path().parent_path() / "libexec" / "musicworld" / "musicworld_mesh_import";
+    return std::filesystem::exists(installed, ignored) ? installed.string() : MUSICWORLD_MESH_IMPORT;
+}
+
 constexpr std::chrono::seconds kLongestWait{20};
 constexpr std::size_t kMostBytes = 64u << 20;  // 500000 triangles with vertices of their own: 42 MB
 
@@ -46,7 +55,7 @@ ImportProcess::ImportProcess(const std::filesystem::path& file) {
     }
     pipe_ = ends[0];
     const SpawnActions actions(ends[1]);
-    std::string program = MUSICWORLD_MESH_IMPORT, argument = file.string();
+    std::string program = importer(), argument = file.string();
     char* arguments[] = {program.data(), argument.data(), nullptr};
     const int error = posix_spawn(&child_, program.c_str(), actions.get(), nullptr, arguments, environ);
     close(ends[1]);

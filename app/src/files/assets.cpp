@@ -8,10 +8,21 @@
 
 namespace app {
 namespace fs = std::filesystem;
+namespace {
+
+/// Of an installation PREFIX/bin/musicworld: PREFIX/share/musicworld/assets; else those of the checkout.
+fs::path built_in_assets() {
+    std::error_code ignored;
+    const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
+    fs::path installed = program.parent_path().parent_path() / "share" / "musicworld" / "assets";
+    return fs::is_directory(installed / "kits", ignored) ? installed : fs::path(MUSICWORLD_ASSETS);
+}
+
+}  // namespace
 
 fs::path assets_folder() {
     const char* chosen = std::getenv("MUSICWORLD_ASSETS");
-    if (!chosen || !*chosen) return MUSICWORLD_ASSETS;
+    if (!chosen || !*chosen) return built_in_assets();
     std::error_code ignored;
     if (!fs::is_directory(fs::path(chosen) / "kits", ignored))
         throw BadInput(fmt::format(
