@@ -78,7 +78,7 @@ Option Command::declare(const std::string& name, const Declared& declared, const
         app_->add_option(name, CLI::callback_t{}, about.empty() ? help : fmt::format("{} [{}]", help, about));
     const bool argument = !name.starts_with('-');
     option->type_name(argument ? "" : declared.placeholder);
-    if (declared.several) option->expected(1, CLI::detail::expected_max_vector_size);
+    if (declared.several) option->expected(1, CLI::detail::expected_max_vector_size)->allow_extra_args();
     reads_->push_back([option, read = std::move(read)] {
         if (option->count() > 0) read(option->results());
     });
