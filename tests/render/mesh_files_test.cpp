@@ -65,11 +65,11 @@ std::string error_of(const std::string& name, const std::string& bytes) {
     try {
         (void)render::load_mesh(file);
     } catch (const std::runtime_error& error) {
-        const std::string message = error.what(), name = file.string() + ":";
-        EXPECT_EQ(message.substr(0, name.size()), name);
+        const std::string message = error.what(), place = file.string() + ":";
+        EXPECT_EQ(message.substr(0, place.size()), place);
         const std::string found = " error: found ";  // after the line's number, if the error has a line
         std::size_t start = message.find(found);
-        EXPECT_EQ(message.substr(0, start).find_first_not_of("0123456789:", name.size()), std::string::npos);
+        EXPECT_EQ(message.substr(0, start).find_first_not_of("0123456789:", place.size()), std::string::npos);
         start += found.size();
         EXPECT_NE(message.find(", expected "), std::string::npos) << message;
         EXPECT_EQ(message.find('\n'), std::string::npos) << message;
