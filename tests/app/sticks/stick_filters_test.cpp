@@ -122,7 +122,7 @@ TEST(Stick, AsksItsState) {
     const PoseSample newest = waving()[29];
     EXPECT_EQ(stick.measured_tip(), newest.position + newest.orientation * geometry.tip);
     EXPECT_EQ(difference(stick.pose_at(state.t_s + 1), state.picture.after(0.15)), 0);
-    const sim::TipPath path = stick.predicted_path(stick.selected_model());
+    const sim::TipPath path = stick.predicted_path(0);
     ASSERT_EQ(path.nodes.size(), 9u);
     EXPECT_EQ(path.stick, 3u);
     EXPECT_EQ(path.nodes[8].position,
