@@ -91,14 +91,14 @@ TEST(Commands, AnInterruptedRunSaysWhatStaysWhere) {
           {SIGTERM, {"play", "flourish", "--size", "4096x4096"}}}) {
         const Folder folder;
         std::vector<std::string> all = words;
-        all.insert(all.end(), {"--out", (folder / "out").string()});
+        all.insert(all.end(), {"--out", (folder / "played").string()});
         Started started(all, folder / "");
-        while (!fs::exists(folder / "out/.unfinished/scratch"))
+        for (int i = 0; i < 12000 && !fs::exists(folder / "played/.unfinished/scratch"); ++i)
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
         kill(started.pid(), signal);
         const Ended ended = started.wait();
         EXPECT_EQ(ended.status, 128 + signal);
-        EXPECT_TRUE(contains(ended.err, (folder / "out/.unfinished").string())) << ended.err;
+        EXPECT_TRUE(contains(ended.err, (folder / "played/.unfinished").string())) << ended.err;
     }
 }
 

@@ -73,8 +73,13 @@ Ended run_command(const std::vector<std::string>& words, const std::vector<std::
 void expect_refused(const Ended& ended, const std::string& mentions, int status) {
     EXPECT_EQ(ended.status, status) << ended.err;
     EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 1) << ended.err;
-    for (const std::string& part : {std::string("found"), std::string("expected"), mentions})
-        EXPECT_NE(ended.err.find(part), std::string::npos) << part << " in: " << ended.err;
+    // Bad input: what was found and what was expected; a failure of the system: what could not be done.
+    const bool failure = ended.err.find("error: cannot ") != std::string::npos;
+    const std::vector<std::string> words =
+        failure ? std::vector<std::string>{": "} : std::vector<std::string>{"found", "expected"};
+    for (const std::string& word : words)
+        EXPECT_NE(ended.err.find(word), std::string::npos) << word << " in: " << ended.err;
+    EXPECT_NE(ended.err.find(mentions), std::string::npos) << mentions << " in: " << ended.err;
     // Csound writes a row of dashes to standard output when it runs under the sanitizer.
     EXPECT_EQ(ended.out.find_first_not_of('-'), std::string::npos) << ended.out;
 }

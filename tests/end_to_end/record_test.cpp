@@ -47,7 +47,7 @@ TEST(Record, OfAReplayedTraceGivesTheTraceBack) {
     EXPECT_TRUE(
         source_of(read(folder / "again.csv"))
             .starts_with("# source: recorded; clock of the times: the trace's own, replayed; synthetic: "));
-    EXPECT_NE(recorded.out.find("again.csv: left: 1201 samples in 10.000 s, 120.00 a second, 0 gaps\n"),
+    EXPECT_NE(recorded.out.find("again.csv: left: 1201 samples in 10.000 s, 120.00 per second, 0 gaps\n"),
               std::string::npos)
         << recorded.out;
     EXPECT_FALSE(fs::exists(folder / "again.csv.partial"));
@@ -62,7 +62,7 @@ TEST(Record, KeepsTimesAndDropOutsAndSaysThem) {
     const Ended recorded = run({"record", "--source", "trace:" + (folder / "gap.csv").string(), "--out",
                                 folder / "out.csv", "--speed", "10"});
     ASSERT_EQ(recorded.status, 0) << recorded.err;
-    EXPECT_NE(recorded.out.find("left: 170 samples in 1.990 s, 84.92 a second, 1 gaps, the longest 0.310 s"),
+    EXPECT_NE(recorded.out.find("left: 170 samples in 1.990 s, 84.92 per second, 1 gap, the longest 0.310 s"),
               std::string::npos)
         << recorded.out;
     EXPECT_EQ(read_csv(folder / "gap.csv").size(), 170u);

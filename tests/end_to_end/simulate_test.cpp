@@ -62,7 +62,7 @@ TEST(Simulate, UntilRestEndsWithZeroAtRestAndWithOneWhenTheStepsDoNotSuffice) {
     const Ended rest = run({"simulate", folder / "scene.toml", "--until", "rest"});
     EXPECT_EQ(rest.status, 0) << rest.err;
     const Ended early = run({"simulate", folder / "scene.toml", "--until", "rest", "--steps", "5", "--json"});
-    expect_one_line(early, 1, "1 of 1 bodies awake after 5 steps");
+    expect_one_line(early, 1, "1 of 1 body awake after 5 steps");
     EXPECT_EQ(json::parse(early.out)["at_rest"], false);
 }
 

@@ -3,7 +3,6 @@
 
 #include "kit/kit.h"
 #include "kit/tip_track.h"
-#include "play/play_result.h"
 
 namespace app {
 

@@ -1,7 +1,6 @@
 #pragma once
 #include <vector>
 
-#include "play/play_result.h"
 #include "strikes/strike.h"
 #include "strikes/strike_score.h"
 

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "kit/tip_track.h"
-#include "play/play_result.h"
 
 namespace app {
 

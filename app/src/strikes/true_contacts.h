@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "kit/tip_track.h"
-#include "play/play_result.h"
+#include "strikes/strike.h"
 #include "strikes/strike_score.h"
 
 namespace app {

@@ -199,7 +199,7 @@ TEST(WriteFile, AFullDiskIsARuntimeErrorThatNamesTheFileAndTheReason) {
         FAIL() << "a full disk is no bad input";
     } catch (const std::runtime_error& error) {
         const std::string line = error.what();
-        EXPECT_TRUE(line.starts_with("/dev/full: error: found ")) << line;
+        EXPECT_TRUE(line.starts_with("error: cannot write /dev/full: ")) << line;
         EXPECT_NE(line.find("No space left"), std::string::npos) << line;
     }
 }

@@ -163,7 +163,7 @@ TEST(PlayRealtime, WhatCannotBeIsRefusedBeforeAnythingStarts) {
     };
     refused([](RealtimeOptions& o) { o.output_lead_s = o.play.release_margin_s; });
     refused([](RealtimeOptions& o) { o.play.solo = 1; });
-    refused([](RealtimeOptions& o) { o.play.sound_predictor = "exec:cat"; });
+    refused([](RealtimeOptions& o) { o.play.sound_predictor = "exec:"; });
     refused([](RealtimeOptions& o) { o.source = "carrier-pigeon:1"; });
 }
 

@@ -108,7 +108,7 @@ TEST(SimulateWorkers, TimingHasARowAWorkersStepAndEachStepsBodiesAreAllThere) {
     EXPECT_NE(text_of(*options.out / "workers.svg").find("worker 2"), std::string::npos);
     const json summary = json::parse(text_of(*options.out / "summary.json"));
     EXPECT_EQ(summary["workers"], 3);
-    EXPECT_EQ(summary["mode"], sim::Pace::lockstep);
+    EXPECT_EQ(summary["mode"], "sync");
     EXPECT_EQ(summary["bodies_lost"], 0);
     EXPECT_GT(summary["bytes_per_body_update"], 0);
     EXPECT_EQ(summary["clock"],
