@@ -2,8 +2,6 @@
 
 #include <sim/simulation.h>
 
-#include "kit/surface_entry.h"
-
 namespace app {
 namespace {
 
@@ -23,14 +21,16 @@ StrikeTarget strike_target(const Instrument& instrument, double tip_radius_m, do
                                              : Eigen::Vector3d(across * half.x(), 0, -along * half.z());
     const Eigen::Vector3d outwards_body =
         side ? Eigen::Vector3d(0, 0.4, 1).normalized() : Eigen::Vector3d::UnitY();
-    const Eigen::Vector3d inside = body.world_from_body * inside_body;
-    const Eigen::Vector3d inwards =
-        body.world_from_body.linear() * outwards_body * -(2 * half.norm() + tip_radius_m + 0.1);
-    const auto distance = [&](double share) {
-        return sim::rest_distance(body, inside - (1 - share) * inwards, tip_radius_m).distance;
-    };
-    const Eigen::Vector3d point = inside - (1 - entry_between(0, 1, 0, distance)) * inwards;
-    return {point, sim::rest_distance(body, point, tip_radius_m).normal.normalized()};
+    Eigen::Vector3d inside = body.world_from_body * inside_body;
+    Eigen::Vector3d outside =
+        inside + body.world_from_body.linear() * outwards_body * (2 * half.norm() + tip_radius_m + 0.1);
+    // Halves points, not a parameter as entry_between() does: the bundled traces keep their last digits.
+    constexpr int kHalvings = 60;
+    for (int i = 0; i < kHalvings; ++i) {
+        const Eigen::Vector3d middle = 0.5 * (inside + outside);
+        (sim::rest_distance(body, middle, tip_radius_m).distance > 0 ? outside : inside) = middle;
+    }
+    return {outside, sim::rest_distance(body, outside, tip_radius_m).normal.normalized()};
 }
 
 }  // namespace app
