@@ -156,7 +156,7 @@ TEST(Launchers, SystemdAcceptsTheUnitAndItsCommandLineIsOurs) {
         replaced(replaced(unit.substr(at, unit.find('\n', at) - at), "${ENDPOINT}", "nonsense"),
                  "${CREDENTIALS_DIRECTORY}", folder / "");
     const Ended ended = run_command({"sh", "-c", line});
-    expect_refused(ended);  // the endpoint or the key, not the options
+    expect_refused(ended, "worker.key");  // the endpoint or the key, not the options
     for (const char* usage : {"--help", "an option of"})
         EXPECT_EQ(ended.err.find(usage), std::string::npos) << ended.err;
 }
