@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "report/table.h"
 
@@ -23,6 +25,24 @@ Table table_of(const std::vector<BenchResult>& results) {
 }
 
 }  // namespace
+
+MachineName machine_name() {
+    MachineName name;
+    name.cores = std::thread::hardware_concurrency();
+    name.compiler = "gcc " __VERSION__;
+#ifndef __AVX2__
+    name.avx2 = false;
+#endif
+    std::ifstream info("/proc/cpuinfo");
+    for (std::string line; std::getline(info, line);) {
+        const std::size_t colon = line.find(": ");
+        if (line.rfind("model name", 0) == 0 && colon != std::string::npos) {
+            name.processor = line.substr(colon + 2);
+            break;
+        }
+    }
+    return name;
+}
 
 nlohmann::ordered_json machine_json(const MachineName& machine) {
     return {{"processor", machine.processor},

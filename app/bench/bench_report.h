@@ -4,10 +4,15 @@
 #include <string>
 #include <vector>
 
-#include "bench/machine_speed.h"
-#include "statistics/statistics.h"
-
 namespace app {
+
+/// Processor, cores and compiler.
+struct MachineName {
+    std::string processor, compiler;
+    unsigned cores = 0;
+    bool avx2 = true;  ///< false: built for any x86-64
+};
+[[nodiscard]] MachineName machine_name();
 
 /// One measured figure; beside a peer's, where there is one.
 struct BenchResult {
@@ -20,9 +25,9 @@ struct BenchResult {
 };
 
 struct BenchReport {
-    MachineName machine;
-    std::vector<BenchResult> results;
-    std::vector<std::string> notes;  ///< what was measured and how, lines
+    MachineName machine = machine_name();
+    std::vector<BenchResult> results = {};
+    std::vector<std::string> notes = {};  ///< what was measured and how, lines
 };
 
 /// What every benchmark's JSON says of the machine.

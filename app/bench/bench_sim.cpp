@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "bench/machine_speed.h"
 #include "process/clock.h"
 #include "statistics/statistics.h"
 
@@ -115,7 +116,6 @@ LeastWork least_work(int modes, int samples, int substeps, double contacts_per_b
 BenchReport bench_sim(const SimBenchOptions& options,
                       const std::function<void(const std::string&)>& progress) {
     BenchReport report;
-    report.machine = machine_name();
     const MachineSpeed speed = measure_machine_speed();
     report.results.push_back({"core_peak_single_precision", 1e-9 * speed.flops, "Gflop/s"});
     report.results.push_back({"core_memory_read", 1e-9 * speed.bytes_per_second, "GB/s"});

@@ -4,12 +4,15 @@
 #include <sim/surface_mesh.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <nlohmann/json.hpp>
 
-#include "bench/machine_speed.h"
+#include "bench/bench_report.h"
 #include "process/clock.h"
+#include "report/plot_panel.h"
+#include "report/table.h"
 
 namespace app {
 namespace {
@@ -85,18 +88,19 @@ Run run(const TradeoffSetting& setting, const Probes& probes) {
     made.course.resize(3, probes.columns());
     Eigen::Index column = 0;
     double spent = 0;
-    for (int moment = 0; moment < kMoments; ++moment) {
+    const auto go_to_next_moment = [&](sim::World& in) {
         const double begin = thread_cpu_s();
-        for (int i = 0; i < setting.steps_per_s / kMomentsPerSecond; ++i) world.step();
+        for (int i = 0; i < setting.steps_per_s / kMomentsPerSecond; ++i) in.step();
         spent += thread_cpu_s() - begin;
+    };
+    for (int moment = 0; moment < kMoments; ++moment) {
+        go_to_next_moment(world);
         probes.append(world, made.course, column);
     }
     int runs = 1;
     for (; spent < kLeastMeasured_s; ++runs) {
         sim::World again(definition);
-        const double begin = thread_cpu_s();
-        for (int i = 0; i < kMoments * setting.steps_per_s / kMomentsPerSecond; ++i) again.step();
-        spent += thread_cpu_s() - begin;
+        for (int moment = 0; moment < kMoments; ++moment) go_to_next_moment(again);
     }
     made.ms_per_s = 1e3 * spent / runs / kSeconds;
     return made;
@@ -105,6 +109,49 @@ Run run(const TradeoffSetting& setting, const Probes& probes) {
 double error_of(const Course& course, const Course& truth) {
     const double extent = 2 * soft_body({}).shape.base.semi_axes.maxCoeff();
     return std::sqrt((course - truth).squaredNorm() / static_cast<double>(truth.cols())) / extent;
+}
+
+using Json = nlohmann::ordered_json;
+
+int modes_of(const TradeoffSetting& setting) {
+    if (setting.fidelity == sim::Fidelity::rigid) return 0;
+    return setting.fidelity == sim::Fidelity::linear ? 6 : setting.modes;
+}
+
+Json point_json(const TradeoffPoint& point) {
+    const TradeoffSetting& s = point.setting;
+    return {{"name", name_of(s)},     {"value", point.ms_per_s},  {"unit", "ms a simulated second"},
+            {"peer", nullptr},        {"peer_version", nullptr},  {"ratio", nullptr},
+            {"error", point.error},   {"modes", modes_of(s)},     {"step_s", 1.0 / s.steps_per_s},
+            {"elements", s.elements}, {"triangles", s.triangles}, {"pareto", point.pareto}};
+}
+
+std::vector<TradeoffPoint> front_of(const Tradeoff& tradeoff) {
+    std::vector<TradeoffPoint> front;
+    std::ranges::copy_if(tradeoff.points, std::back_inserter(front), &TradeoffPoint::pareto);
+    std::ranges::sort(front, {}, &TradeoffPoint::ms_per_s);
+    return front;
+}
+
+Table table_of(const std::vector<TradeoffPoint>& points) {
+    Table table = Table::of({"name", "modes:d", "step_s:.5f", "elements:d", "triangles:d", "ms_per_s:.3f",
+                             "error:.3g", "pareto"});
+    for (const TradeoffPoint& p : points)
+        table.add({name_of(p.setting), modes_of(p.setting), 1.0 / p.setting.steps_per_s, p.setting.elements,
+                   p.setting.triangles, p.ms_per_s, p.error, p.pareto});
+    return table;
+}
+
+/// For a terminal.
+std::string lines_of(const std::vector<TradeoffPoint>& points) {
+    return table_of(points).part({"name", "ms_per_s", "error"}).text();
+}
+
+std::string marks(const std::vector<TradeoffPoint>& points) {
+    std::string text;
+    for (const TradeoffPoint& p : points)
+        fmt::format_to(std::back_inserter(text), "{:.5g} {:.5g}\n", p.ms_per_s, 100 * p.error);
+    return text;
 }
 
 }  // namespace
@@ -141,9 +188,7 @@ TradeoffSetting finer_setting() {
 void mark_pareto(std::vector<TradeoffPoint>& points) {
     std::vector<TradeoffPoint*> order;
     for (TradeoffPoint& point : points) order.push_back(&point);
-    std::sort(order.begin(), order.end(), [](const TradeoffPoint* a, const TradeoffPoint* b) {
-        return a->ms_per_s != b->ms_per_s ? a->ms_per_s < b->ms_per_s : a->error < b->error;
-    });
+    std::ranges::sort(order, {}, [](const TradeoffPoint* p) { return std::pair(p->ms_per_s, p->error); });
     double least = std::numeric_limits<double>::infinity();
     for (TradeoffPoint* point : order) {
         point->pareto = point->error < least;
@@ -179,6 +224,74 @@ Tradeoff measure_tradeoff(const std::vector<TradeoffSetting>& settings, const Tr
     made.automatic.ms_per_s = automatic.ms_per_s;
     made.automatic.error = error_of(automatic.course, truth.course);
     return made;
+}
+
+std::string format_csv(const Tradeoff& tradeoff) {
+    return table_of(tradeoff.points).csv();
+}
+
+std::string format_json(const Tradeoff& tradeoff) {
+    Json json;
+    json["machine"] = machine_json(machine_name());
+    json["results"] = Json::array();
+    for (const TradeoffPoint& point : tradeoff.points) json["results"].push_back(point_json(point));
+    json["automatic"] = point_json(tradeoff.automatic);
+    json["automatic"]["requested_error"] = tradeoff.requested_error;
+    json["converged"] = {{"name", name_of(tradeoff.converged)},
+                         {"finer", name_of(tradeoff.finer)},
+                         {"error", tradeoff.converged_error}};
+    return json.dump(2) + "\n";
+}
+
+std::string format_text(const Tradeoff& tradeoff) {
+    std::string text = fmt::format("Pareto front\n{}\nautomatic ({} % asked of the displacement) takes\n{}",
+                                   lines_of(front_of(tradeoff)), 100 * tradeoff.requested_error,
+                                   lines_of({tradeoff.automatic}));
+    text += fmt::format(
+        "\n{} points. Time: processor time for a simulated second of two touching bodies. Error: rms "
+        "distance of their\n"
+        "surface points to {}, of the largest extent;\nthat run is within {:.3f} % of {}.\n",
+        tradeoff.points.size(), name_of(tradeoff.converged), 100 * tradeoff.converged_error,
+        name_of(tradeoff.finer));
+    return text;
+}
+
+std::string plot_commands(const Tradeoff& tradeoff) {
+    PlotPanel panel;
+    const auto add = [&](const std::vector<TradeoffPoint>& points, const char* look, const char* rgb,
+                         const char* title) {
+        panel.add(marks(points), fmt::format("with {} lc rgb '{}' title '{}'", look, rgb, title));
+    };
+    struct Dots {
+        const char *rgb, *title;
+        sim::Fidelity fidelity;
+        int least_modes, most_modes;
+    };
+    for (const auto& [rgb, title, fidelity, least, most] :
+         {Dots{"#8c8c8c", "rigid", sim::Fidelity::rigid, 0, 0},
+          {"#c77c11", "linear", sim::Fidelity::linear, 6, 6},
+          {"#2c7fb8", "5, 11 modes", sim::Fidelity::modal, 1, 11},
+          {"#41ab5d", "14, 23 modes", sim::Fidelity::modal, 12, 23},
+          {"#88419d", "45, 75 modes", sim::Fidelity::modal, 24, 1000}}) {
+        std::vector<TradeoffPoint> some;
+        for (const TradeoffPoint& p : tradeoff.points)
+            if (p.setting.fidelity == fidelity && modes_of(p.setting) >= least && modes_of(p.setting) <= most)
+                some.push_back(p);
+        add(some, "points pt 7 ps 0.45", rgb, title);
+    }
+    add(front_of(tradeoff), "linespoints pt 6 ps 0.8 lw 1.5", "#d7301f", "Pareto front");
+    add({tradeoff.automatic}, "points pt 4 ps 1.6 lw 2", "#000000", "automatic");
+    const auto [fastest, slowest] =
+        std::ranges::minmax_element(tradeoff.points, {}, &TradeoffPoint::ms_per_s);
+    if (fastest != tradeoff.points.end())
+        panel.add(fmt::format("{0:.5g} {2:.5g}\n{1:.5g} {2:.5g}\n", fastest->ms_per_s, slowest->ms_per_s,
+                              100 * tradeoff.converged_error),
+                  "with lines dt 2 lc rgb '#8c8c8c' title 'converged to'");
+    return plot_axes() +
+           "set key outside right top\nset logscale xy\nset xlabel 'processor time for a simulated second "
+           "[ms]'\n"
+           "set ylabel 'rms error [% of the largest extent]'\n" +
+           panel.text();
 }
 
 }  // namespace app

@@ -6,9 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <span>
 #include <thread>
+#include <utility>
 
 #include "bench/measured_run.h"
+#include "report/plot_panel.h"
+#include "report/table.h"
 #include "scene/scene.h"
 
 namespace app {
@@ -44,46 +49,47 @@ double unsteady(int worker, std::uint64_t step) {
     return drawn(std::uint64_t(worker), step) < 0.2 ? 2 : 1;
 }
 
-class Bench {
+class WorkersBenchRun {
 public:
-    Bench(const WorkersBenchOptions& options, const Progress& progress)
-        : options_(options), progress_(progress) {}
+    WorkersBenchRun(const WorkersBenchOptions& options, const Progress& progress)
+        : options_(options),
+          progress_(progress),
+          most_workers_(std::ranges::max(options.workers)),
+          most_bodies_(std::ranges::max(options.bodies)) {}
 
     [[nodiscard]] WorkersBench run();
 
-private:
-    [[nodiscard]] bool wants(const std::string& part) const {
-        return options_.only.empty() || options_.only.contains(part);
-    }
-    void speed_up(int bodies);
+    void speed_ups();
     void stragglers();
     void bounds();
     void migration();
     void processes();
     void throughput();
-    void note_clock();
 
+private:
     struct Way {
         int bound = 0;  ///< 0: lockstep
         bool balance = false;
         Factor factor = {};
     };
+    void speed_up(int bodies);
+    void note_clock();
     MeasuredRun measure(const sim::WorldScene& scene, int workers, const Way& way);
     [[nodiscard]] double ceiling(const sim::WorldScene& scene, int workers);
     void add(const std::string& name, double value, const std::string& unit) {
         bench_.report.results.push_back({name, value, unit});
     }
-    [[nodiscard]] int most_workers() const {
-        return *std::max_element(options_.workers.begin(), options_.workers.end());
-    }
-    [[nodiscard]] int most_bodies() const {
-        return *std::max_element(options_.bodies.begin(), options_.bodies.end());
-    }
 
     const WorkersBenchOptions& options_;
     const Progress& progress_;
+    int most_workers_, most_bodies_;
     WorkersBench bench_;
 };
+
+const std::vector<std::pair<std::string, void (WorkersBenchRun::*)()>> kParts = {
+    {"speedup", &WorkersBenchRun::speed_ups},   {"stragglers", &WorkersBenchRun::stragglers},
+    {"bound", &WorkersBenchRun::bounds},        {"migration", &WorkersBenchRun::migration},
+    {"processes", &WorkersBenchRun::processes}, {"throughput", &WorkersBenchRun::throughput}};
 
 sim::DistributedSettings settings_of(int steps, int bound, bool balance) {
     sim::DistributedSettings settings;
@@ -94,7 +100,7 @@ sim::DistributedSettings settings_of(int steps, int bound, bool balance) {
     return settings;
 }
 
-MeasuredRun Bench::measure(const sim::WorldScene& scene, int workers, const Way& way) {
+MeasuredRun WorkersBenchRun::measure(const sim::WorldScene& scene, int workers, const Way& way) {
     sim::SimulatedProcessors processors = options_.processors;
     processors.count = workers;
     processors.factor = way.factor;
@@ -102,7 +108,7 @@ MeasuredRun Bench::measure(const sim::WorldScene& scene, int workers, const Way&
 }
 
 /// The longest of as many worlds as there are workers, each with its part of the bodies and no others.
-double Bench::ceiling(const sim::WorldScene& scene, int workers) {
+double WorkersBenchRun::ceiling(const sim::WorldScene& scene, int workers) {
     double longest = 0;
     for (int k = 0; k < workers; ++k) {
         sim::WorldScene strip;
@@ -112,7 +118,11 @@ double Bench::ceiling(const sim::WorldScene& scene, int workers) {
     return longest;
 }
 
-void Bench::speed_up(int bodies) {
+void WorkersBenchRun::speed_ups() {
+    for (const int bodies : options_.bodies) speed_up(bodies);
+}
+
+void WorkersBenchRun::speed_up(int bodies) {
     const sim::WorldScene scene = scene_of(bodies);
     SpeedUp speed_up;
     speed_up.bodies = bodies;
@@ -128,22 +138,22 @@ void Bench::speed_up(int bodies) {
             row.ceiling_s = ceiling(scene, workers);
         }
         speed_up.rows.push_back(row);
-        const std::string name = fmt::format("bodies{}_workers{}", bodies, workers);
-        add(name + "_async_elapsed", row.async_s, "s");
-        add(name + "_async_speed_up", speed_up.alone_s / row.async_s, "times one");
-        add(name + "_lockstep_speed_up", speed_up.alone_s / row.lockstep_s, "times one");
-        add(name + "_ceiling_speed_up", speed_up.alone_s / row.ceiling_s, "times one");
-        add(name + "_async_of_ceiling", row.ceiling_s / row.async_s, "share");
-        add(name + "_bytes_per_body_step", row.bytes, "bytes");
+        const std::string name = fmt::format("bodies{}_workers{}_", bodies, workers);
+        add(name + "async_elapsed", row.async_s, "s");
+        add(name + "async_speed_up", speed_up.alone_s / row.async_s, "times one");
+        add(name + "lockstep_speed_up", speed_up.alone_s / row.lockstep_s, "times one");
+        add(name + "ceiling_speed_up", speed_up.alone_s / row.ceiling_s, "times one");
+        add(name + "async_of_ceiling", row.ceiling_s / row.async_s, "share");
+        add(name + "bytes_per_body_step", row.bytes, "bytes");
     }
     bench_.speed_ups.push_back(speed_up);
 }
 
 /// Lockstep solves a pile that crosses workers at each of them; a barrier's cost alone is that of the
 /// asynchronous run's own steps with one (`with_barrier_s`).
-void Bench::stragglers() {
-    const int bodies = most_bodies(), workers = most_workers();
-    const sim::WorldScene scene = scene_of(bodies);
+void WorkersBenchRun::stragglers() {
+    const int workers = most_workers_;
+    const sim::WorldScene scene = scene_of(most_bodies_);
     const Factor permanent = [](int worker, std::uint64_t) { return worker == 0 ? 2.0 : 1.0; };
     const Factor wandering = [workers](int worker, std::uint64_t step) {
         return worker == static_cast<int>(drawn(step / 20, 7) * workers) ? 2.0 : 1.0;
@@ -161,16 +171,15 @@ void Bench::stragglers() {
     };
     const auto [lockstep, barrier] = compare("straggler_permanent_unbalanced", permanent, options_.bound);
     progress_("stragglers: permanent, balanced");
-    const MeasuredRun balanced = measure(scene, workers, {options_.bound, true, permanent}),
-                      balanced_lockstep = measure(scene, workers, {0, true, permanent});
-    add("straggler_permanent_async_balanced_elapsed", balanced.result.elapsed_s, "s");
-    add("straggler_permanent_lockstep_balanced_elapsed", balanced_lockstep.result.elapsed_s, "s");
-    add("straggler_permanent_async_balanced_over_lockstep", lockstep / balanced.result.elapsed_s,
-        "times as fast");
-    add("straggler_permanent_async_balanced_over_barrier", barrier / balanced.result.elapsed_s,
-        "times as fast");
-    add("straggler_permanent_lockstep_balanced_over_lockstep", lockstep / balanced_lockstep.result.elapsed_s,
-        "times as fast");
+    const double balanced = measure(scene, workers, {options_.bound, true, permanent}).result.elapsed_s,
+                 balanced_lockstep = measure(scene, workers, {0, true, permanent}).result.elapsed_s;
+    const std::string async_name = "straggler_permanent_async_balanced_",
+                      lockstep_name = "straggler_permanent_lockstep_balanced_";
+    add(async_name + "elapsed", balanced, "s");
+    add(lockstep_name + "elapsed", balanced_lockstep, "s");
+    add(async_name + "over_lockstep", lockstep / balanced, "times as fast");
+    add(async_name + "over_barrier", barrier / balanced, "times as fast");
+    add(lockstep_name + "over_lockstep", lockstep / balanced_lockstep, "times as fast");
     compare("straggler_unsteady_b4", unsteady, 4);
     compare("straggler_wandering_b16", wandering, 16);
     bench_.report.notes.push_back(
@@ -184,9 +193,9 @@ double apart(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vec
     return a.empty() ? 0 : std::sqrt(sum / static_cast<double>(a.size()));
 }
 
-void Bench::bounds() {
-    const int bodies = most_bodies(), workers = most_workers();
-    const sim::WorldScene scene = scene_of(bodies);
+void WorkersBenchRun::bounds() {
+    const int workers = most_workers_;
+    const sim::WorldScene scene = scene_of(most_bodies_);
     MeasuredRun lockstep;
     for (const int bound : {0, 1, 2, 4, 8, 16, 32}) {
         progress_(fmt::format("bound {}", bound));
@@ -206,7 +215,7 @@ void Bench::bounds() {
     }
 }
 
-void Bench::migration() {
+void WorkersBenchRun::migration() {
     progress_("migration");
     const Scene scene = read_scene(find_scene("migration30"));
     sim::DistributedSettings settings = settings_of(500, options_.bound, true);
@@ -226,9 +235,8 @@ void Bench::migration() {
 }
 
 /// Real processes, as many as there are cores for them beside the application.
-void Bench::processes() {
-    const int bodies = most_bodies();
-    const sim::WorldScene scene = scene_of(bodies);
+void WorkersBenchRun::processes() {
+    const sim::WorldScene scene = scene_of(most_bodies_);
     const int cores = static_cast<int>(std::thread::hardware_concurrency());
     double alone = 0;
     for (const int workers : options_.workers) {
@@ -240,7 +248,7 @@ void Bench::processes() {
             const double elapsed =
                 measure_run(scene, settings_of(options_.steps, bound, true), launch).result.elapsed_s;
             if (alone == 0) alone = elapsed;
-            const std::string name = fmt::format("processes_bodies{}_workers{}_{}", bodies, workers,
+            const std::string name = fmt::format("processes_bodies{}_workers{}_{}", most_bodies_, workers,
                                                  bound > 0 ? "async" : "lockstep");
             add(name + "_elapsed", elapsed, "s");
             add(name + "_speed_up", alone / elapsed, "times one");
@@ -251,7 +259,7 @@ void Bench::processes() {
 }
 
 /// Messages of all bodies, as many as pass in two seconds.
-void Bench::throughput() {
+void WorkersBenchRun::throughput() {
     struct Route {
         const char* name;
         bool keys, through_application;
@@ -261,7 +269,7 @@ void Bench::throughput() {
                                {"plain_through_application", false, true}}) {
         progress_(fmt::format("throughput: {}", route.name));
         sim_bench::ThroughputSettings settings;
-        settings.bodies = most_bodies();
+        settings.bodies = most_bodies_;
         settings.keys = route.keys, settings.through_application = route.through_application;
         const sim_bench::Throughput t = sim_bench::measure_update_throughput(settings);
         const std::string name = fmt::format("tcp_{}", route.name);
@@ -275,10 +283,10 @@ void Bench::throughput() {
     bench_.report.notes.push_back(fmt::format(
         "throughput: quantised states of {} modes over tcp on this machine, {} bodies a message, encoded by "
         "one thread, checked and decoded by another; CURVE encrypts and authenticates.",
-        kModes, most_bodies()));
+        kModes, most_bodies_));
 }
 
-void Bench::note_clock() {
+void WorkersBenchRun::note_clock() {
     const sim::SimulatedProcessors& p = options_.processors;
     bench_.report.notes.push_back(
         fmt::format("Clock: simulated processors; costs {}, {} times slower than here; {:g} s from worker to "
@@ -290,29 +298,100 @@ void Bench::note_clock() {
                     p.latency_s, options_.steps, options_.bound));
 }
 
-WorkersBench Bench::run() {
-    bench_.report.machine = machine_name();
-    if (wants("speedup"))
-        for (const int bodies : options_.bodies) speed_up(bodies);
-    if (wants("stragglers")) stragglers();
-    if (wants("bound")) bounds();
-    if (wants("migration")) migration();
-    if (wants("processes")) processes();
-    if (wants("throughput")) throughput();
+WorkersBench WorkersBenchRun::run() {
+    for (const auto& [name, measure] : kParts)
+        if (options_.only.empty() || options_.only.contains(name)) (this->*measure)();
     note_clock();
     return std::move(bench_);
 }
 
+constexpr int kWidth = 960, kHeight = 380;
+
+/// `of` takes elapsed seconds to what the panel shows.
+template <typename Shown>
+std::string panel(const SpeedUp& s, const Shown& of) {
+    PlotPanel panel;
+    const auto add = [&](const char* colour, const char* title, int dash, const auto& elapsed_s) {
+        std::string points;  // lines "workers value"
+        for (const SpeedUp::Row& row : s.rows)
+            fmt::format_to(std::back_inserter(points), "{} {:.6g}\n", row.workers, of(elapsed_s(row)));
+        panel.add(points, fmt::format("with linespoints pt 7 ps 0.5 lw 1.6 dt {} lc rgb '{}' title '{}'",
+                                      dash, colour, title));
+    };
+    add("#8c8c8c", "ideal", 1, [&](const SpeedUp::Row& row) { return s.alone_s / row.workers; });
+    add("#2b9a48", "ceiling", 3, [](const SpeedUp::Row& row) { return row.ceiling_s; });
+    add("#2468b4", "asynchronous", 1, [](const SpeedUp::Row& row) { return row.async_s; });
+    add("#e03131", "lockstep", 2, [](const SpeedUp::Row& row) { return row.lockstep_s; });
+    return panel.text();
+}
+
+Table table_of(std::span<const SpeedUp> speed_ups) {
+    Table table;
+    for (const SpeedUp& s : speed_ups)
+        for (const SpeedUp::Row& r : s.rows)
+            table.add_figures({{"bodies:d", s.bodies},
+                               {"workers:d", r.workers},
+                               {"ideal_s:.3g", s.alone_s / r.workers},
+                               {"ceiling_s:.3g", r.ceiling_s},
+                               {"async_s:.3g", r.async_s},
+                               {"lockstep_s:.3g", r.lockstep_s},
+                               {"bytes_per_body_step:.0f", r.bytes},
+                               {"async_speed_up:.2f", s.alone_s / r.async_s, false},
+                               {"ceiling_speed_up:.2f", s.alone_s / r.ceiling_s, false},
+                               {"lockstep_speed_up:.2f", s.alone_s / r.lockstep_s, false},
+                               {"async_of_ceiling:.2f", r.ceiling_s / r.async_s, false}});
+    return table;
+}
+
+Table table_of(const std::vector<BoundRow>& rows) {
+    Table table = Table::of({"bound:d", "elapsed_s:.3g", "elapsed_unsteady_s:.3g", "momentum_drift:.2g",
+                             "apart_m:.2g", "height:.4f", "ghost_age:d"});
+    for (const BoundRow& r : rows)
+        table.add(
+            {r.bound, r.elapsed_s, r.elapsed_unsteady_s, r.momentum_drift, r.apart_m, r.height, r.ghost_age});
+    return table;
+}
+
 }  // namespace
 
-const std::vector<std::string>& workers_bench_parts() {
-    static const std::vector<std::string> parts = {"speedup",   "stragglers", "bound",
-                                                   "migration", "processes",  "throughput"};
-    return parts;
+std::vector<std::string> workers_bench_parts() {
+    std::vector<std::string> names;
+    for (const auto& [name, measure] : kParts) names.push_back(name);
+    return names;
 }
 
 WorkersBench bench_workers(const WorkersBenchOptions& options, const Progress& progress) {
-    return Bench(options, progress).run();
+    return WorkersBenchRun(options, progress).run();
+}
+
+PlotScript speed_up_plot(const SpeedUp& s) {
+    std::string commands =
+        plot_axes() + "set multiplot layout 1,2\nset key right top\nset xlabel 'workers'\nset xrange [0:]\n";
+    commands += fmt::format("set yrange [0:]\nset ylabel 'elapsed [s], {} bodies'\n", s.bodies) +
+                panel(s, [](double elapsed) { return elapsed; });
+    commands += "set key left top\nset ylabel 'speed-up [times]'\n" +
+                panel(s, [&](double elapsed) { return s.alone_s / elapsed; });
+    return {kWidth, kHeight, commands + "unset multiplot\n"};
+}
+
+std::string speed_up_csv(const std::vector<SpeedUp>& speed_ups) {
+    return table_of(speed_ups).csv();
+}
+
+std::string bound_csv(const std::vector<BoundRow>& rows) {
+    return table_of(rows).csv();
+}
+
+std::string format_text(const WorkersBench& bench) {
+    std::string text;
+    for (const SpeedUp& s : bench.speed_ups)
+        text += fmt::format("{} bodies: {:.3g} s on one processor\n{}\n", s.bodies, s.alone_s,
+                            table_of(std::span(&s, 1))
+                                .part({"workers", "async_speed_up", "ceiling_speed_up", "lockstep_speed_up",
+                                       "async_of_ceiling", "bytes_per_body_step"})
+                                .text());
+    text += table_of(bench.bounds).text();
+    return (text.empty() ? text : text + '\n') + format_text(bench.report);
 }
 
 }  // namespace app

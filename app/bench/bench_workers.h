@@ -23,7 +23,7 @@ struct WorkersBenchOptions {
 };
 
 /// speedup, stragglers, bound, migration, processes, throughput.
-[[nodiscard]] const std::vector<std::string>& workers_bench_parts();
+[[nodiscard]] std::vector<std::string> workers_bench_parts();
 
 /// Elapsed times of one number of bodies [s], by number of workers.
 struct SpeedUp {

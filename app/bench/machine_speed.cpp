@@ -3,11 +3,8 @@
 #include <immintrin.h>
 
 #include <algorithm>
-#include <array>
-#include <ctime>
-#include <fstream>
+#include <cstring>
 #include <functional>
-#include <thread>
 #include <vector>
 
 #include "process/clock.h"
@@ -17,43 +14,27 @@ namespace {
 
 #ifdef __FMA__
 using Vector = __m256;
-constexpr int kLanes = 8;
-Vector all(float value) {
-    return _mm256_set1_ps(value);
-}
 Vector multiply_add(Vector a, Vector b, Vector c) {
     return _mm256_fmadd_ps(a, b, c);
 }
-Vector load(const float* from) {
-    return _mm256_loadu_ps(from);
-}
 #else
 using Vector = __m128;
-constexpr int kLanes = 4;
-Vector all(float value) {
-    return _mm_set1_ps(value);
-}
 Vector multiply_add(Vector a, Vector b, Vector c) {
-    return _mm_add_ps(_mm_mul_ps(a, b), c);
-}
-Vector load(const float* from) {
-    return _mm_loadu_ps(from);
+    return a * b + c;
 }
 #endif
 
-constexpr int kChains = 12;  // independent, so that no operation waits for the one before it
+constexpr std::size_t kLanes = sizeof(Vector) / sizeof(float);
+constexpr std::size_t kChains = 12;  // independent, so that no operation waits for the one before it
 
 struct Chains {
-    Vector chain[kChains];
+    Vector chain[kChains] = {};
 };
 
 float sum_of(const Chains& chains) {
     float sum = 0;
-    for (const Vector& v : chains.chain) {
-        alignas(32) std::array<float, kLanes> lanes{};
-        std::copy_n(reinterpret_cast<const float*>(&v), kLanes, lanes.begin());
-        for (const float x : lanes) sum += x;
-    }
+    for (const Vector& v : chains.chain)
+        for (std::size_t lane = 0; lane < kLanes; ++lane) sum += v[lane];
     return sum;
 }
 
@@ -71,8 +52,8 @@ double best_rate(double work, const std::function<float()>& run) {
 
 float multiply_adds(int rounds) {
     Chains chains;
-    for (int i = 0; i < kChains; ++i) chains.chain[i] = all(0.1f * static_cast<float>(i));
-    const Vector a = all(0.999f), b = all(0.001f);
+    for (std::size_t i = 0; i < kChains; ++i) chains.chain[i] += 0.1f * static_cast<float>(i);
+    const Vector a = Vector{} + 0.999f, b = Vector{} + 0.001f;
     for (int round = 0; round < rounds; ++round)
         for (Vector& v : chains.chain) v = multiply_add(v, a, b);
     return sum_of(chains);
@@ -80,12 +61,14 @@ float multiply_adds(int rounds) {
 
 float read_all(const std::vector<float>& numbers) {
     Chains chains;
-    for (Vector& v : chains.chain) v = all(0);
-    const Vector one = all(1);
+    const Vector one = Vector{} + 1;
     constexpr std::size_t kStride = kChains * kLanes;
     for (std::size_t i = 0; i + kStride <= numbers.size(); i += kStride)
-        for (std::size_t k = 0; k < kChains; ++k)
-            chains.chain[k] = multiply_add(load(&numbers[i + k * kLanes]), one, chains.chain[k]);
+        for (std::size_t k = 0; k < kChains; ++k) {
+            Vector read;
+            std::memcpy(&read, &numbers[i + k * kLanes], sizeof read);
+            chains.chain[k] = multiply_add(read, one, chains.chain[k]);
+        }
     return sum_of(chains);
 }
 
@@ -95,26 +78,9 @@ MachineSpeed measure_machine_speed() {
     constexpr int kRounds = 2'000'000;
     const std::vector<float> numbers(std::size_t{64} << 20, 1.0f);  // 256 MiB
     return {
-        best_rate(2.0 * kChains * kLanes * kRounds, [] { return multiply_adds(kRounds); }),
+        best_rate(2.0 * static_cast<double>(kChains * kLanes) * kRounds,
+                  [] { return multiply_adds(kRounds); }),
         best_rate(static_cast<double>(numbers.size() * sizeof(float)), [&] { return read_all(numbers); })};
-}
-
-MachineName machine_name() {
-    MachineName name;
-    name.cores = std::thread::hardware_concurrency();
-    name.compiler = "gcc " __VERSION__;
-#ifndef __AVX2__
-    name.avx2 = false;
-#endif
-    std::ifstream info("/proc/cpuinfo");
-    for (std::string line; std::getline(info, line);) {
-        const std::size_t colon = line.find(": ");
-        if (line.rfind("model name", 0) == 0 && colon != std::string::npos) {
-            name.processor = line.substr(colon + 2);
-            break;
-        }
-    }
-    return name;
 }
 
 }  // namespace app

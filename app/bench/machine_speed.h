@@ -1,5 +1,4 @@
 #pragma once
-#include <string>
 
 namespace app {
 
@@ -9,13 +8,5 @@ struct MachineSpeed {
     double bytes_per_second = 0;  ///< read in order from an array that no cache holds
 };
 [[nodiscard]] MachineSpeed measure_machine_speed();
-
-/// Processor, cores and compiler.
-struct MachineName {
-    std::string processor, compiler;
-    unsigned cores = 0;
-    bool avx2 = true;  ///< false: built for any x86-64
-};
-[[nodiscard]] MachineName machine_name();
 
 }  // namespace app

@@ -24,10 +24,11 @@ public:
         if (step > 0) run_.body_steps += std::uint64_t(world.bodies());
         if (step == 0) momentum_.emplace(scene_, world);
         if (step % 10 == 0 || step == last_) momentum_->look(world);
-        if (step == std::min(second_, last_)) keep_centres(world);
-        if (step != last_) return;
-        for (int body = 0; body < world.bodies(); ++body)
-            run_.mean_height += world.state(body).position.y() / world.bodies();
+        for (int body = 0; body < world.bodies(); ++body) {
+            const Eigen::Vector3d centre = world.state(body).position;
+            if (step == std::min(second_, last_)) run_.after_a_second.push_back(centre);
+            if (step == last_) run_.mean_height += centre.y() / world.bodies();
+        }
     }
     void worked(const sim::WorkerStep& step) override {
         run_.steps.push_back(step);
@@ -36,17 +37,12 @@ public:
     void moved(std::uint64_t step, int bodies, int from, int to) override {
         run_.trades.push_back({step, bodies, from, to});
     }
-    void finish() {
-        const MomentumDrift drift = momentum_->drift(run_.result.outside_impulse).value();
-        run_.momentum_drift = drift.scale > 0 ? drift.linear / drift.scale : drift.linear;
+    /// The drift of the momentum; `outside`: the impulse of what is no body.
+    [[nodiscard]] MomentumDrift drift(const std::optional<Eigen::Vector3d>& outside) const {
+        return momentum_->drift(outside).value();
     }
 
 private:
-    void keep_centres(const sim::World& world) {
-        for (int body = 0; body < world.bodies(); ++body)
-            run_.after_a_second.push_back(world.state(body).position);
-    }
-
     MeasuredRun& run_;
     const sim::WorldScene& scene_;
     std::uint64_t last_, second_;
@@ -59,7 +55,8 @@ MeasuredRun measure(const sim::WorldScene& scene, const sim::DistributedSettings
     MeasuredRun run;
     BodiesWatch watch(run, scene, settings);
     run.result = start(watch);
-    watch.finish();
+    const MomentumDrift drift = watch.drift(run.result.outside_impulse);
+    run.momentum_drift = drift.scale > 0 ? drift.linear / drift.scale : drift.linear;
     return run;
 }
 
@@ -122,42 +119,34 @@ sim::WorldDefinition strip_of(const sim::WorldDefinition& world, int number, int
     return strip;
 }
 
-namespace {
-
-double unevenness(const std::map<int, sim::WorkerStep>& now) {
+double unevenness_at(const MeasuredRun& run, std::uint64_t step) {
+    std::map<int, sim::WorkerStep> now;
+    for (const auto& [worker, points] : run.history.workers()) now[worker] = {};
+    for (const sim::WorkerStep& done : run.steps) {
+        now[done.worker] = done;
+        if (std::ranges::all_of(now, [&](const auto& n) { return n.second.step >= step; })) break;
+    }
     double sum = 0, per_body = 0, worst = 0;
-    for (const auto& [worker, step] : now) {
-        sum += step.smoothed_s;
-        if (step.bodies > 0) per_body = std::max(per_body, step.smoothed_s / step.bodies);
+    for (const auto& [worker, last] : now) {
+        sum += last.smoothed_s;
+        if (last.bodies > 0) per_body = std::max(per_body, last.smoothed_s / last.bodies);
     }
     const double average = sum / static_cast<double>(now.size());
-    for (const auto& [worker, step] : now) worst = std::max(worst, std::abs(step.smoothed_s - average));
+    for (const auto& [worker, last] : now) worst = std::max(worst, std::abs(last.smoothed_s - average));
     const double allowed = std::max(0.15 * average, per_body);
     return allowed > 0 ? worst / allowed : 0;
 }
 
-}  // namespace
-
-double unevenness_at(const MeasuredRun& run, std::uint64_t step) {
-    std::map<int, sim::WorkerStep> now;
-    for (const auto& [worker, points] : run.history.workers()) now[worker] = {};
-    for (const sim::WorkerStep& told : run.steps) {
-        now[told.worker] = told;
-        if (std::all_of(now.begin(), now.end(), [&](const auto& n) { return n.second.step >= step; })) break;
-    }
-    return unevenness(now);
-}
-
 int most_trades(const MeasuredRun& run, std::uint64_t from, std::uint64_t to, std::uint64_t window) {
+    const auto in_window = [&](std::uint64_t first) {
+        return std::ranges::count_if(run.trades, [&](const MeasuredRun::Trade& trade) {
+            return trade.step >= first && trade.step < std::min(first + window, to);
+        });
+    };
     int most = 0;
-    for (const MeasuredRun::Trade& first : run.trades) {
-        if (first.step < from || first.step >= to) continue;
-        most =
-            std::max(most, static_cast<int>(std::count_if(
-                               run.trades.begin(), run.trades.end(), [&](const MeasuredRun::Trade& t) {
-                                   return t.step >= first.step && t.step < std::min(first.step + window, to);
-                               })));
-    }
+    for (const MeasuredRun::Trade& first : run.trades)
+        if (first.step >= from && first.step < to)
+            most = std::max(most, static_cast<int>(in_window(first.step)));
     return most;
 }
 

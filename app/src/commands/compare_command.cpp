@@ -5,7 +5,7 @@
 #include "commands/command.h"
 #include "commands/commands.h"
 #include "commands/sensor_model_options.h"
-#include "compare/compare.h"
+#include "compare/comparison.h"
 #include "compare/comparison_report.h"
 #include "compare/comparison_tables.h"
 #include "files/assets.h"

@@ -12,7 +12,6 @@
 #include "kit/drum_score.h"
 #include "kit/kit.h"
 #include "traces/trace_info.h"
-#include "traces/trace_warnings.h"
 
 namespace app {
 namespace {
@@ -51,9 +50,8 @@ void add_info(Command& trace) {
     command.flag("--json", *json, "As one JSON document");
     command.runs([file, json] {
         const tracking::Trace trace_read = tracking::read_trace(find_trace(*file));
-        const std::vector<StickInfo> sticks = trace_info(trace_read);
         if (!*json) warn_of_implausible(trace_read);
-        fmt::print("{}", *json ? format_info_json(trace_read, sticks) : format_info(trace_read, sticks));
+        fmt::print("{}", *json ? format_info_json(trace_read) : format_info(trace_read));
     });
 }
 

@@ -16,7 +16,7 @@
 #include "files/one_line.h"
 #include "traces/map_file.h"
 #include "traces/sensor_model.h"
-#include "traces/trace_warnings.h"
+#include "traces/trace_info.h"
 
 namespace app {
 namespace {

@@ -1,5 +1,5 @@
 #pragma once
-// What is compared and what comes of it: settings and results, without behaviour.
+// What is compared and what comes of it.
 #include <tracking/sensor.h>
 
 #include <functional>
@@ -8,36 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "compare/prediction_error.h"
 #include "compare/strike_evaluation.h"
 #include "statistics/paired_difference.h"
-#include "statistics/statistics.h"
 
 namespace app {
-
-/// Errors of one predictor at one lead. Lengths in mm, as compare.json's keys; of nothing kNoValue.
-struct ErrorScore {
-    std::size_t count = 0;      ///< predictions scored
-    double sum_square_mm2 = 0;  ///< of the tracked point's position error
-    double rms_mm = kNoValue, p95_mm = kNoValue;
-    double free_rms_mm = kNoValue;       ///< truth outside +-50 ms of impacts and of flagged times
-    double unflagged_rms_mm = kNoValue;  ///< sample and truth outside +-50 ms of flagged times
-    double rotation_rms_deg = kNoValue;  ///< without flagged orientations
-    double tip_rms_mm = kNoValue;  ///< position and rotation together, at the tip; where rotations count
-
-    // What the figures are made of, so that scores can be combined.
-    std::size_t free_count = 0, unflagged_count = 0, rotation_count = 0;
-    double free_sum_mm2 = 0, unflagged_sum_mm2 = 0, rotation_sum_deg2 = 0, tip_sum_mm2 = 0;
-    std::vector<double> errors_mm;
-};
-
-/// How honest the stated covariances are; only of predictors that state one.
-struct Calibration {
-    std::size_t count = 0;     ///< predictions with a stated covariance
-    std::size_t singular = 0;  ///< of these, not positive definite: not in the figures
-    double inside_50 = 0,
-           inside_95 = 0;  ///< share of position errors inside the stated 50 and 95 % ellipsoids
-    double negative_log_likelihood = 0;  ///< mean, nats, positions in m
-};
 
 /// A predictor's figures at one lead.
 struct PredictorScore {
@@ -113,7 +88,7 @@ struct MapCell {
 struct ComparisonOptions {
     std::vector<std::string> traces, predictors, tune_traces;
     std::vector<std::pair<std::string, std::string>> predictions;  ///< name, file in `predict`'s format
-    std::vector<std::pair<std::string, std::string>> persons;      ///< text in the path, name
+    PersonNames persons;
     std::vector<double> leads_s;
     tracking::SensorModel sensor;
     StrikeSurface surface;
@@ -136,5 +111,14 @@ struct Comparison {
     std::vector<MapCell> map;
     std::string tuned_on;  ///< one sentence
 };
+
+/// Compares. A pure function of the files and options but for ns_per_sample and `exec:` predictors with a
+/// state of their own. Predictors named bare or with parameters run as they are; of each family that has
+/// parameters to tune, `NAME*` runs those that erred least (RMS, at that lead) on other recordings (the
+/// `--tune` ones, or all others that are compared), and `NAME**` those from the recordings of other persons;
+/// the advance of `auto`'s strikes is learned on the same recordings as `NAME*`. A map tunes on all others
+/// that are compared, `--tune` or not. Throws BadInput (also where nothing can be scored, or two files hold
+/// the same samples), tracking::TraceError.
+[[nodiscard]] Comparison compare(const ComparisonOptions& options);
 
 }  // namespace app

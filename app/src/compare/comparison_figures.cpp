@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "compare/prediction_error.h"
 #include "process/parallel.h"
+#include "sticks/predictors.h"
 #include "sticks/replay.h"
 
 namespace app {
@@ -13,17 +13,10 @@ namespace {
 constexpr double kLongestS = 0.150, kStepS = 0.010;
 constexpr double kWindowS = 3, kZoomS = 0.6;
 
-std::vector<double> curve_leads() {
-    std::vector<double> leads_s;
-    for (int k = 0; k * kStepS < kLongestS + kStepS / 2; ++k) leads_s.push_back(k * kStepS);
-    return leads_s;
-}
-
 /// Of the leads asked for, the one nearest to `lead_s`.
 std::size_t nearest(const std::vector<double>& asked_s, double lead_s) {
-    const auto closer = [&](double a, double b) { return std::abs(a - lead_s) < std::abs(b - lead_s); };
-    return static_cast<std::size_t>(std::min_element(asked_s.begin(), asked_s.end(), closer) -
-                                    asked_s.begin());
+    const auto distance = [&](double asked) { return std::abs(asked - lead_s); };
+    return static_cast<std::size_t>(std::ranges::min_element(asked_s, {}, distance) - asked_s.begin());
 }
 
 LeadCurve curve_of(const Entrant& entrant, std::span<const SensedStick> sticks,
@@ -32,19 +25,17 @@ LeadCurve curve_of(const Entrant& entrant, std::span<const SensedStick> sticks,
     std::vector<SquareSum> sums(leads_s.size());
     for (const SensedStick& stick : sticks) {
         const std::vector<std::string>& used = entrant.used[stick.recording];
-        std::vector<std::string> done;
-        for (const std::string& specification : used) {
-            if (std::find(done.begin(), done.end(), specification) != done.end()) continue;
-            done.push_back(specification);
-            const auto predictor = make_any_predictor(specification, leads_s, stick.name);
+        for (auto specification = used.begin(); specification != used.end(); ++specification) {
+            if (std::find(used.begin(), specification, *specification) != specification) continue;
+            const auto predictor = make_any_predictor(*specification, leads_s, stick.name);
             const std::vector<SquareSum> scored = score_positions(stick, *predictor);
             for (std::size_t lead = 0; lead < leads_s.size(); ++lead)
-                if (used[nearest(asked_s, leads_s[lead])] == specification) sums[lead].add(scored[lead]);
+                if (used[nearest(asked_s, leads_s[lead])] == *specification) sums[lead].add(scored[lead]);
         }
     }
     LeadCurve curve{entrant.name, {}};
     for (std::size_t lead = 0; lead < leads_s.size(); ++lead)
-        if (sums[lead].count > 0) curve.rms_mm.emplace_back(leads_s[lead], sums[lead].rms_mm());
+        if (sums[lead].count > 0) curve.rms_mm.emplace_back(leads_s[lead], sums[lead].rms());
     return curve;
 }
 
@@ -68,7 +59,7 @@ double liveliest(const std::vector<tracking::PoseSample>& samples, double from_s
 FigurePath path_of(const Entrant& entrant, const SensedStick& stick, std::size_t lead,
                    const StickFigure& figure) {
     FigurePath path{entrant.name, entrant.used[stick.recording][lead], stick.leads_s[lead], {}};
-    const auto predictor = make_entrant(entrant, stick, 0, lead);
+    const auto predictor = make_entrant(entrant, stick, lead, stick.leads_s);
     replay(*predictor, stick.samples, [&](const ReplayedSample& now) {
         const double t_s = predictor->time_s() + now.behind_s + path.lead_s;
         if (t_s >= figure.from_s && t_s <= figure.to_s)
@@ -87,7 +78,7 @@ std::vector<std::string> drawn_predictors(const Comparison& comparison) {
         thesis = thesis || summary.predictor == "thesis";
         naive = naive || summary.predictor == "naive";
         if (summary.lead_s == middle_s && !summary.baseline && !summary.external &&
-            (best == nullptr || summary.error.rms_mm < best->error.rms_mm))
+            (best == nullptr || summary.error.position.rms() < best->error.position.rms()))
             best = &summary;
     }
     std::vector<std::string> names;
@@ -101,22 +92,24 @@ std::vector<std::string> drawn_predictors(const Comparison& comparison) {
 
 std::vector<LeadCurve> lead_curves(std::span<const Recording> recordings,
                                    const std::vector<Entrant>& entrants, const ComparisonOptions& options) {
-    const std::vector<SensedStick> sticks = sense_all(recordings, options.sensor, curve_leads());
-    std::vector<const Entrant*> internal;
-    for (const Entrant& entrant : entrants)
-        if (!entrant.external) internal.push_back(&entrant);
-    std::vector<LeadCurve> curves(internal.size());
-    parallel_for(internal.size(), options.threads,
-                 [&](std::size_t i) { curves[i] = curve_of(*internal[i], sticks, options.leads_s); });
+    std::vector<double> leads_s;
+    for (int k = 0; k * kStepS < kLongestS + kStepS / 2; ++k) leads_s.push_back(k * kStepS);
+    const std::vector<SensedStick> sticks = sense_all(recordings, options.sensor, leads_s);
+    std::vector<LeadCurve> curves(entrants.size());
+    parallel_for(entrants.size(), options.threads, [&](std::size_t i) {
+        if (!entrants[i].external) curves[i] = curve_of(entrants[i], sticks, options.leads_s);
+    });
+    std::erase_if(curves, [](const LeadCurve& curve) { return curve.predictor.empty(); });
     return curves;
 }
 
-StickFigure stick_figure(std::span<const Recording> recordings, std::span<const SensedStick> sticks,
-                         const std::vector<Entrant>& entrants, const Comparison& comparison) {
-    const SensedStick& stick = sticks.front();
-    const std::vector<tracking::PoseSample>& recorded = recordings.front().trace.sticks.front().samples;
+StickFigure stick_figure(const Field& field, const std::vector<Entrant>& entrants,
+                         const Comparison& comparison) {
+    const SensedStick& stick = field.sticks.front();
+    const tracking::Trace& trace = field.recordings.front().trace;
+    const std::vector<tracking::PoseSample>& recorded = trace.sticks.front().samples;
     StickFigure figure;
-    figure.trace = recordings.front().file;
+    figure.trace = trace.file;
     figure.stick = stick.name;
     figure.from_s = liveliest(recorded, recorded.front().t_s + kSettlingS, recorded.back().t_s, kWindowS);
     figure.to_s = figure.from_s + kWindowS;
@@ -126,10 +119,9 @@ StickFigure stick_figure(std::span<const Recording> recordings, std::span<const 
         if (sample.t_s >= figure.from_s && sample.t_s <= figure.to_s)
             figure.recorded_m.emplace_back(sample.t_s, sample.position.y());
     for (const std::string& name : drawn_predictors(comparison)) {
-        const auto entrant =
-            std::find_if(entrants.begin(), entrants.end(), [&](const Entrant& e) { return e.name == name; });
+        const Entrant& entrant = *std::ranges::find(entrants, name, &Entrant::name);
         for (std::size_t lead = 0; lead < stick.leads_s.size(); ++lead)
-            figure.paths.push_back(path_of(*entrant, stick, lead, figure));
+            figure.paths.push_back(path_of(entrant, stick, lead, figure));
     }
     return figure;
 }

@@ -1,10 +1,7 @@
 #pragma once
 #include <span>
-#include <string>
-#include <utility>
 #include <vector>
 
-#include "compare/comparison.h"
 #include "compare/entrants.h"
 
 namespace app {
@@ -18,8 +15,7 @@ namespace app {
 /// The data of figures 3-1 to 3-3 of the thesis, redone on the first stick of the first recording: its 3 s
 /// of most motion, and 0.6 s of these. Predicted are naive, thesis and the estimator of least RMS at the
 /// middle lead, as far as they take part.
-[[nodiscard]] StickFigure stick_figure(std::span<const Recording> recordings,
-                                       std::span<const SensedStick> sticks,
-                                       const std::vector<Entrant>& entrants, const Comparison& comparison);
+[[nodiscard]] StickFigure stick_figure(const Field& field, const std::vector<Entrant>& entrants,
+                                       const Comparison& comparison);
 
 }  // namespace app

@@ -1,11 +1,8 @@
 #pragma once
-#include <functional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "compare/comparison.h"
-#include "compare/recording.h"
 
 namespace app {
 
@@ -24,6 +21,6 @@ struct MapAxes {
                                                const ComparisonOptions& options, const MapAxes& axes = {});
 
 /// Of the cells of one sensor and lead, the one of least RMS among estimators.
-[[nodiscard]] std::vector<const MapCell*> best_cells(const std::vector<MapCell>& map);
+[[nodiscard]] std::vector<MapCell> best_cells(const std::vector<MapCell>& map);
 
 }  // namespace app

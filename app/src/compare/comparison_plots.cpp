@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <set>
@@ -26,24 +27,38 @@ std::string text_of(const Points& points, double from, double to, double scale) 
     return text;
 }
 
-PlotScript height_script(const StickFigure& figure, double from_s, double to_s, int width,
-                         const std::vector<std::pair<PlotLine, const FigurePath*>>& paths) {
+/// Recorded and predicted heights within [from_s, to_s]; a path is drawn if `name_of` it is not empty.
+PlotWithLegend heights(const StickFigure& figure, double from_s, double to_s, int width,
+                       const std::function<std::string(const FigurePath&)>& name_of) {
     constexpr double kMmPerM = 1e3;
+    PlotWithLegend plot;
     PlotPanel panel;
+    plot.legend.push_back({"recorded", colours::contact, false});
     panel.add(text_of(figure.recorded_m, from_s, to_s, kMmPerM),
               "with lines lt 1 lw 2.2 lc " + gnuplot_colour(colours::contact));
+    for (const FigurePath& path : figure.paths) {
+        const std::string name = name_of(path);
+        if (name.empty()) continue;
+        plot.legend.push_back(line_of(plot.legend.size() - 1, name));
+        panel.add(text_of(path.height_m, from_s, to_s, kMmPerM), style_of(plot.legend.back(), 1.4));
+    }
     double low = 1e9, high = -1e9;
     for (const auto& [t, y] : figure.recorded_m)
         low = std::min(low, kMmPerM * y), high = std::max(high, kMmPerM * y);
-    for (const auto& [line, path] : paths)
-        panel.add(text_of(path->height_m, from_s, to_s, kMmPerM), style_of(line, 1.4));
     const double room = 0.25 * (high - low) + 1;  // overshoot beyond this leaves the plot
-    std::string commands = plot_axes() + round_tics("x", to_s - from_s, width == kWide ? 12 : 6) +
-                           round_tics("y", high - low + 2 * room, 6);
-    commands +=
-        fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel 'time, s'\nset ylabel 'height, mm'\n",
-                    from_s, to_s, low - room, high + room);
-    return {width, 280, commands + panel.text()};
+    plot.script = {width, 280,
+                   plot_axes() + round_tics("x", to_s - from_s, width == kWide ? 12 : 6) +
+                       round_tics("y", high - low + 2 * room, 6) +
+                       fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel 'time, s'\nset ylabel "
+                                   "'height, mm'\n",
+                                   from_s, to_s, low - room, high + room) +
+                       panel.text()};
+    return plot;
+}
+
+/// The family of a predictor as shown: of cv:q=1e7 and of cv* it is cv.
+std::string shown_family(const std::string& name) {
+    return family_of(name.substr(0, name.find('*')));
 }
 
 /// What a curve plot leaves out: as named, where the family is also there tuned.
@@ -55,10 +70,10 @@ bool superseded(const std::string& name, const std::set<std::string>& tuned) {
 std::size_t family_number(const Comparison& comparison, const std::string& family) {
     std::vector<std::string> families;
     for (const auto& [name, description] : comparison.predictors) {
-        const std::string own = family_of(name.substr(0, name.find('*')));
-        if (std::find(families.begin(), families.end(), own) == families.end()) families.push_back(own);
+        const std::string own = shown_family(name);
+        if (std::ranges::find(families, own) == families.end()) families.push_back(own);
     }
-    return static_cast<std::size_t>(std::find(families.begin(), families.end(), family) - families.begin());
+    return static_cast<std::size_t>(std::ranges::find(families, family) - families.begin());
 }
 
 /// 1, 2 and 5 times the powers of ten within a range.
@@ -73,39 +88,23 @@ std::string logarithmic_tics(double low, double high) {
 }  // namespace
 
 PlotWithLegend height_plot(const StickFigure& figure) {
-    PlotWithLegend plot;
-    plot.legend.push_back({"recorded", colours::contact, false});
-    std::vector<std::pair<PlotLine, const FigurePath*>> paths;
     std::set<std::string> seen;
-    for (const FigurePath& path : figure.paths) {
-        if (!seen.insert(path.predictor).second) continue;  // the first lead alone
-        paths.emplace_back(
-            line_of(paths.size(), fmt::format("{}, {:.0f} ms ahead", path.predictor, 1e3 * path.lead_s)),
-            &path);
-        plot.legend.push_back(paths.back().first);
-    }
-    plot.script = height_script(figure, figure.from_s, figure.to_s, kWide, paths);
-    return plot;
+    return heights(figure, figure.from_s, figure.to_s, kWide, [&](const FigurePath& path) {
+        const bool first = seen.insert(path.predictor).second;  // the first lead alone
+        return first ? fmt::format("{}, {:.0f} ms ahead", path.predictor, 1e3 * path.lead_s) : "";
+    });
 }
 
 PlotWithLegend zoomed_plot(const StickFigure& figure, const std::string& predictor) {
-    PlotWithLegend plot;
-    plot.legend.push_back({"recorded", colours::contact, false});
-    std::vector<std::pair<PlotLine, const FigurePath*>> paths;
-    for (const FigurePath& path : figure.paths) {
-        if (path.predictor != predictor) continue;
-        paths.emplace_back(line_of(paths.size(), fmt::format("{:.0f} ms ahead", 1e3 * path.lead_s)), &path);
-        plot.legend.push_back(paths.back().first);
-    }
-    plot.script = height_script(figure, figure.zoom_from_s, figure.zoom_to_s, kHalf, paths);
-    return plot;
+    return heights(figure, figure.zoom_from_s, figure.zoom_to_s, kHalf, [&](const FigurePath& path) {
+        return path.predictor == predictor ? fmt::format("{:.0f} ms ahead", 1e3 * path.lead_s) : "";
+    });
 }
 
 PlotWithLegend curves_plot(const Comparison& comparison) {
     std::set<std::string> tuned;
     for (const LeadCurve& curve : comparison.curves)
-        if (curve.predictor.ends_with('*'))
-            tuned.insert(curve.predictor.substr(0, curve.predictor.find('*')));
+        if (curve.predictor.ends_with('*')) tuned.insert(shown_family(curve.predictor));
     PlotWithLegend plot;
     PlotPanel panel;
     double highest = 1;
@@ -136,15 +135,13 @@ PlotWithLegend cost_plot(const Comparison& comparison, double lead_s) {
     for (const ComparisonSummary& s : comparison.summaries) {
         if (s.lead_s != lead_s || !(s.ns_per_sample > 0) || s.predictor.ends_with("**")) continue;
         const bool tuned = s.predictor.ends_with('*');
-        const std::size_t n =
-            family_number(comparison, family_of(s.predictor.substr(0, s.predictor.find('*'))));
-        const PlotLine look = line_of(n, s.predictor);
-        panel.add(fmt::format("{:.3f} {:.4f}\n", s.ns_per_sample, s.error.rms_mm),
+        const PlotLine look = line_of(family_number(comparison, shown_family(s.predictor)), s.predictor);
+        panel.add(fmt::format("{:.3f} {:.4f}\n", s.ns_per_sample, s.error.position.rms()),
                   fmt::format("with points pt {} ps 0.8 lw 1.5 lc {}",
                               (look.dashed ? 4 : 6) + (tuned ? 1 : 0), gnuplot_colour(look.colour)));
         if (!tuned) plot.legend.push_back(look);
         fastest = std::min(fastest, s.ns_per_sample), slowest = std::max(slowest, s.ns_per_sample);
-        least = std::min(least, s.error.rms_mm), most = std::max(most, s.error.rms_mm);
+        least = std::min(least, s.error.position.rms()), most = std::max(most, s.error.position.rms());
     }
     const double room = 0.12 * (most - least) + 0.5;
     plot.script = {

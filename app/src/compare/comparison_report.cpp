@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <ranges>
 #include <tuple>
 #include <vector>
 
 #include "compare/comparison_map.h"
 #include "compare/comparison_plots.h"
 #include "compare/comparison_tables.h"
-#include "compare/findings.h"
 #include "report/html.h"
 #include "report/report_style.h"
 #include "traces/sensor_model.h"
@@ -19,22 +19,14 @@
 namespace app {
 namespace {
 
-std::string leads_text(const std::vector<double>& leads_s) {
-    std::string text;
-    for (const double lead_s : leads_s)
-        text += fmt::format("{}{:.1f}", text.empty() ? "" : ", ", 1e3 * lead_s);
-    return text + " ms";
-}
-
 std::string heading(const Comparison& c) {
-    std::string persons;
-    for (const std::string& person : c.persons) persons += (persons.empty() ? "" : ", ") + person;
+    const auto leads_ms = c.options.leads_s | std::views::transform([](double s) { return 1e3 * s; });
     std::string text = "<header><h1>Predictors compared</h1>\n<p>by MusicWorld</p>\n<dl class=facts>\n";
     text += report_fact("recordings", fmt::format("{}", c.options.traces.size()));
-    text += report_fact("persons", fmt::format("{}: {}", c.persons.size(), persons));
+    text += report_fact("persons", fmt::format("{}: {}", c.persons.size(), fmt::join(c.persons, ", ")));
     const std::string sensor = describe(c.options.sensor);
     text += report_fact("sensor", sensor.empty() ? "the recordings as they are" : sensor);
-    text += report_fact("leads", leads_text(c.options.leads_s));
+    text += report_fact("leads", fmt::format("{:.1f} ms", fmt::join(leads_ms, ", ")));
     text += report_fact("tuning", c.tuned_on);
     text += report_fact("strikes on", c.options.surface_text);
     text += "</dl></header>\n<h2>Which predictor wins</h2>\n";
@@ -57,14 +49,11 @@ std::string heading(const Comparison& c) {
 std::vector<const ComparisonSummary*> shown_strikes(const Comparison& comparison) {
     std::vector<const ComparisonSummary*> shown;
     for (const double lead_s : comparison.options.leads_s) {
-        const ComparisonSummary* best = nullptr;
+        const std::vector<const ComparisonSummary*> ranked = ranked_by_f1(comparison, lead_s);
+        if (ranked.empty()) continue;
+        shown.push_back(ranked.front());
         for (const ComparisonSummary& s : comparison.summaries)
-            if (s.lead_s == lead_s && s.hits && s.hits->true_contacts > 0 &&
-                (best == nullptr || s.hits->f1() > best->hits->f1()))
-                best = &s;
-        if (best != nullptr) shown.push_back(best);
-        for (const ComparisonSummary& s : comparison.summaries)
-            if (s.lead_s == lead_s && s.hits && s.hits->matched > 0 && &s != best &&
+            if (s.lead_s == lead_s && s.hits && s.hits->matched > 0 && &s != ranked.front() &&
                 (s.predictor == "auto" || s.predictor == "thesis" || s.predictor == "naive"))
                 shown.push_back(&s);
     }
@@ -82,18 +71,15 @@ Placed declare(PlotGallery& plots, const Comparison& comparison) {
     placed.height = plots.add(height_plot(figure), "Figure 3-1: height as recorded and as predicted");
     std::vector<std::string> names;
     for (const FigurePath& path : figure.paths)
-        if (std::find(names.begin(), names.end(), path.predictor) == names.end())
-            names.push_back(path.predictor);
+        if (std::ranges::find(names, path.predictor) == names.end()) names.push_back(path.predictor);
     for (const std::string& name : names)
         placed.zoomed.push_back(plots.add(
             zoomed_plot(figure, name), fmt::format("Figure {}: {}", name == "naive" ? "3-3" : "3-2", name)));
     placed.curves = plots.add(curves_plot(comparison), "RMS error against lead");
-    const bool timed = std::any_of(comparison.summaries.begin(), comparison.summaries.end(),
-                                   [](const ComparisonSummary& s) { return s.ns_per_sample > 0; });
-    for (std::size_t i = 0; timed && i < comparison.options.leads_s.size(); ++i)
-        placed.costs.push_back(
-            plots.add(cost_plot(comparison, comparison.options.leads_s[i]),
-                      fmt::format("{:.1f} ms ahead", 1e3 * comparison.options.leads_s[i])));
+    if (std::ranges::any_of(comparison.summaries, [](const auto& s) { return s.ns_per_sample > 0; }))
+        for (const double lead_s : comparison.options.leads_s)
+            placed.costs.push_back(
+                plots.add(cost_plot(comparison, lead_s), fmt::format("{:.1f} ms ahead", 1e3 * lead_s)));
     for (const ComparisonSummary* s : shown_strikes(comparison))
         placed.timings.push_back(plots.add(
             timing_plot(*s), fmt::format("{}, {:.1f} ms ahead: {} of {} true strikes matched", s->predictor,
@@ -117,15 +103,6 @@ std::string by_lead(const Comparison& c, Table (*table)(const Comparison&, doubl
 
 using Sensor = std::tuple<double, double, double>;  // rate [Hz], jitter [ms], share lost
 
-/// The best estimators of one lead by sensor and noise [mm].
-std::map<Sensor, std::map<double, const MapCell*>> rows_of(const Comparison& comparison, double lead_s) {
-    std::map<Sensor, std::map<double, const MapCell*>> rows;
-    for (const MapCell* cell : best_cells(comparison.map))
-        if (cell->result.lead_s == lead_s)
-            rows[{cell->rate_hz, cell->jitter_ms, cell->drop_out}][cell->noise_mm] = cell;
-    return rows;
-}
-
 /// The gain in % of the RMS error and its interval.
 std::string cell_of(const PairedResult& result) {
     const PairedDifference& d = result.by_recording;
@@ -138,11 +115,14 @@ std::string cell_of(const PairedResult& result) {
 }
 
 std::string grid(const Comparison& comparison, double lead_s) {
-    const auto rows = rows_of(comparison, lead_s);
+    std::map<Sensor, std::map<double, PairedResult>> rows;  // by noise [mm]
+    for (const MapCell& cell : best_cells(comparison.map))
+        if (cell.result.lead_s == lead_s)
+            rows[{cell.rate_hz, cell.jitter_ms, cell.drop_out}][cell.noise_mm] = cell.result;
     if (rows.empty()) return {};
     std::string text = fmt::format("<p>{}</p>\n<div class=scroll><table class=grid><tr><th>sensor",
                                    html(map_sentence(comparison, lead_s)));
-    for (const auto& [noise_mm, cell] : rows.begin()->second)
+    for (const auto& [noise_mm, result] : rows.begin()->second)
         text += fmt::format("<th>noise {:g} mm", noise_mm);
     text += "</tr>\n";
     for (const auto& [sensor, cells] : rows) {
@@ -150,7 +130,7 @@ std::string grid(const Comparison& comparison, double lead_s) {
         text += fmt::format("<tr><td>{:g} Hz{}{}", rate_hz,
                             jitter_ms > 0 ? fmt::format(", jitter {:g} ms", jitter_ms) : "",
                             lost > 0 ? fmt::format(", {:g} % lost", 100 * lost) : "");
-        for (const auto& [noise_mm, cell] : cells) text += cell_of(cell->result);
+        for (const auto& [noise_mm, result] : cells) text += cell_of(result);
         text += "</tr>\n";
     }
     return text + "</table></div>\n";

@@ -1,9 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "compare/comparison.h"
 #include "compare/entrants.h"
-#include "compare/sensed_stick.h"
 
 namespace app {
 

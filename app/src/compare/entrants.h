@@ -7,8 +7,6 @@
 #include <vector>
 
 #include "compare/comparison.h"
-#include "compare/recording.h"
-#include "compare/sensed_stick.h"
 #include "sticks/prediction_file.h"
 
 namespace app {
@@ -26,24 +24,21 @@ struct Entrant {
     std::string description;  ///< one line
     Tuning tuning = Tuning::none;
     bool baseline = false, external = false;
-    std::string strikes_by;       ///< the specification that is scored on strikes, where it differs (`auto`)
-    std::string confirmed_by;     ///< the one that confirms them (`auto`), else empty
-    bool learns_advance = false;  ///< of the strikes' times, from other recordings (`auto`)
+    /// Of `auto`, else empty: the specification that is scored on strikes, at an advance that is learned from
+    /// other recordings, and the one that confirms them.
+    std::string strikes_by = {}, confirmed_by = {};
     /// Recording x lead: the specification that runs, or the file that answers; empty: does not take part.
-    std::vector<std::vector<std::string>> used;
-    std::map<std::pair<std::size_t, std::size_t>, StickPredictions>
-        replays;  ///< (stick among all, lead): the file's answers
+    std::vector<std::vector<std::string>> used = {};
+    std::map<std::pair<std::size_t, std::size_t>, StickPredictions> replays =
+        {};  ///< (stick among all, lead): the file's answers
 };
 
-/// A fresh predictor for the stick numbered `place` among all, at a lead; `used` of that place is not empty.
+/// A fresh predictor at a lead at which `used` is not empty; `leads_s` will be asked for. `instead`: the
+/// specification that runs unless it is empty or a file answers.
 [[nodiscard]] std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant,
-                                                                const SensedStick& stick, std::size_t place,
-                                                                std::size_t lead);
-/// The same for strikes, whose path is asked at `leads_s`.
-[[nodiscard]] std::unique_ptr<tracking::Predictor> make_striker(const Entrant& entrant,
-                                                                const SensedStick& stick, std::size_t place,
-                                                                std::size_t lead,
-                                                                std::span<const double> leads_s);
+                                                                const SensedStick& stick, std::size_t lead,
+                                                                std::span<const double> leads_s,
+                                                                const std::string& instead = {});
 
 struct EntrantList {
     std::vector<Entrant> entrants;

@@ -2,38 +2,52 @@
 #include <tracking/predictor.h>
 
 #include <optional>
-#include <span>
 #include <vector>
 
-#include "compare/comparison.h"
-#include "compare/sensed_stick.h"
+#include "compare/recording.h"
+#include "statistics/statistics.h"
 
 namespace app {
 
+/// Errors of one predictor at one lead; the RMS of each, in mm or degrees, is a figure of compare.json.
+struct ErrorScore {
+    SquareSum position;   ///< of the tracked point [mm]
+    SquareSum free;       ///< likewise, truth outside +-50 ms of impacts and of flagged times
+    SquareSum unflagged;  ///< likewise, sample and truth outside +-50 ms of flagged times
+    SquareSum rotation;   ///< without flagged orientations [degrees]
+    SquareSum tip;        ///< position and rotation together, at the tip; where rotations count [mm]
+    std::vector<double> errors_mm;  ///< of the tracked point
+
+    [[nodiscard]] double p95_mm() const { return quantile(errors_mm, 0.95); }
+    void add(const tracking::PosePrediction& predicted, const Truth& truth, const Eigen::Vector3d& tip_body);
+    /// Both together, as if one recording followed the other.
+    void add(const ErrorScore& other);
+};
+
+/// How honest the stated covariances are; only of predictors that state one.
+struct Calibration {
+    std::size_t count = 0;     ///< predictions with a stated covariance
+    std::size_t singular = 0;  ///< of these, not positive definite: not in the figures
+    double inside_50 = 0,
+           inside_95 = 0;  ///< share of position errors inside the stated 50 and 95 % ellipsoids
+    double negative_log_likelihood = 0;  ///< mean, nats, positions in m
+};
+/// Both together, as if one recording followed the other.
+void add(std::optional<Calibration>& sum, const std::optional<Calibration>& other);
+
 /// Gathers the errors of predictions at one lead.
-class ErrorGatherer {
+class LeadScore {
 public:
     /// `covariance`: of the position [m^2], as the predictor states it; may be absent.
-    void add(const tracking::PosePrediction& predicted, const Truth& truth, const Eigen::Vector3d& tip,
+    void add(const tracking::PosePrediction& predicted, const Truth& truth, const Eigen::Vector3d& tip_body,
              const std::optional<tracking::PoseCovariance>& covariance);
 
-    [[nodiscard]] ErrorScore error() const;
+    [[nodiscard]] const ErrorScore& error() const { return error_; }
     [[nodiscard]] std::optional<Calibration> calibration() const;
 
 private:
-    void add_covariance(const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance);
-
-    ErrorScore score_;
-    Calibration calibration_;
-};
-
-/// The errors of several scores together, as if one recording followed the other.
-void add(ErrorScore& sum, const ErrorScore& other);
-void add(std::optional<Calibration>& sum, const std::optional<Calibration>& other);
-
-struct LeadScore {
-    ErrorScore error;
-    std::optional<Calibration> calibration;
+    ErrorScore error_;
+    Calibration sums_;
 };
 
 /// Errors of a predictor (fresh, fed here) at every lead of the stick, in one pass over its samples. A
@@ -41,16 +55,7 @@ struct LeadScore {
 [[nodiscard]] std::vector<LeadScore> score_predictor(const SensedStick& stick,
                                                      tracking::Predictor& predictor);
 
-/// A sum of squared position errors [mm^2].
-struct SquareSum {
-    double sum_mm2 = 0;
-    std::size_t count = 0;
-
-    void add(const SquareSum& other) { sum_mm2 += other.sum_mm2, count += other.count; }
-    [[nodiscard]] double rms_mm() const;  ///< 0 of nothing
-};
-
-/// The position errors alone, for tuning and maps: orientation is neither filtered nor scored.
+/// The position errors alone [mm], for tuning and maps: orientation is neither filtered nor scored.
 [[nodiscard]] std::vector<SquareSum> score_positions(const SensedStick& stick,
                                                      tracking::Predictor& predictor);
 

@@ -9,7 +9,7 @@
 
 #include "kit/kit.h"
 #include "kit/stick_geometry.h"
-#include "sticks/auto_predictor.h"
+#include "statistics/statistics.h"
 
 namespace app {
 
@@ -28,18 +28,26 @@ struct HitScore {
     std::vector<double> errors_ms;  ///< committed minus true time, signed, of the matched notes
 
     [[nodiscard]] int false_notes() const { return predicted - matched; }
-    [[nodiscard]] double precision() const;  ///< kNoValue when nothing was predicted
-    [[nodiscard]] double recall() const;     ///< kNoValue when there was nothing to find
-    [[nodiscard]] double f1() const;         ///< 2 matched / (true + predicted); kNoValue when both are 0
+    /// Shares; kNoValue when nothing was predicted, there was nothing to find, or both.
+    [[nodiscard]] double precision() const { return share(matched, predicted); }
+    [[nodiscard]] double recall() const { return share(matched, true_contacts); }
+    [[nodiscard]] double f1() const { return share(2 * matched, true_contacts + predicted); }
     [[nodiscard]] double median_ms() const;  ///< of |error|; kNoValue when nothing matched
     [[nodiscard]] double p95_ms() const;
-    [[nodiscard]] double false_per_min() const;
-    [[nodiscard]] double false_per_min_without_cancel() const;
+    [[nodiscard]] double false_per_min() const { return minutes > 0 ? false_notes() / minutes : 0; }
+    [[nodiscard]] double false_per_min_without_cancel() const {
+        return minutes > 0 ? false_without_cancel / minutes : 0;
+    }
     /// What the strikes cost: 1 for each missed contact and each false note, |error| / 60 ms for the others
     /// (a note at the edge of the 30 ms window is half a miss).
     [[nodiscard]] double loss() const;
     /// Both together, as if one recording followed the other.
     void add(const HitScore& other);
+
+private:
+    [[nodiscard]] static double share(int part, int whole) {
+        return whole > 0 ? static_cast<double>(part) / whole : kNoValue;
+    }
 };
 
 /// The predictors that decide when a stick strikes.
@@ -66,9 +74,7 @@ struct StrikeTiming {
 /// function, but for `exec:` predictors with a state of their own.
 ///
 ///   recorded    the stick as recorded, for the truth
-///
 ///   samples     what the sensor reports, in order of arrival
-///
 ///   predictors  made by the caller for this run; fed from their start
 [[nodiscard]] HitScore evaluate_strikes(const tracking::StickTrace& recorded,
                                         std::span<const tracking::PoseSample> samples,

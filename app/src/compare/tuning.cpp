@@ -88,41 +88,46 @@ std::vector<std::string> tuning_grid(const std::string& family, double noise_mm)
     return all;
 }
 
-std::vector<std::string> candidates_of(const std::vector<std::string>& families, double noise_mm) {
-    std::vector<std::string> all;
-    for (const std::string& family : families)
-        for (const std::string& specification : tuning_grid(family, noise_mm)) all.push_back(specification);
-    return all;
+std::vector<std::string> tunable_families(const std::vector<std::string>& specifications) {
+    std::vector<std::string> families;
+    for (const std::string& specification : specifications) {
+        const std::string family = family_of(specification);
+        if (!tuning_grid(family).empty() && std::ranges::find(families, family) == families.end())
+            families.push_back(family);
+    }
+    return families;
 }
 
-TuningTable::TuningTable(const std::vector<std::string>& specifications, std::span<const SensedStick> sticks,
-                         std::size_t recordings, unsigned threads, const std::function<void(double)>& done)
-    : specifications_(specifications),
+TuningTable::TuningTable(std::vector<std::string> specifications, const std::vector<std::string>& families,
+                         double noise_mm, std::span<const SensedStick> sticks, std::size_t recordings,
+                         unsigned threads)
+    : specifications_(std::move(specifications)),
       recordings_(recordings),
-      leads_(sticks.empty() ? 0 : sticks.front().leads_s.size()),
-      sums_(specifications.size() * recordings * leads_) {
-    const auto work = [&](std::size_t candidate) {
+      leads_(sticks.empty() ? 0 : sticks.front().leads_s.size()) {
+    for (const std::string& family : families)
+        std::ranges::move(tuning_grid(family, noise_mm), std::back_inserter(specifications_));
+    sums_.resize(specifications_.size() * recordings_ * leads_);
+    parallel_for(specifications_.size(), threads, [&](std::size_t candidate) {
         for (const SensedStick& stick : sticks) {
             const auto predictor = make_any_predictor(specifications_[candidate], stick.leads_s);
             const std::vector<SquareSum> scored = score_positions(stick, *predictor);
             for (std::size_t lead = 0; lead < leads_; ++lead)
                 sums_[(candidate * recordings_ + stick.recording) * leads_ + lead].add(scored[lead]);
         }
-    };
-    parallel_for(specifications_.size(), threads, work, done);
+    });
 }
 
-std::size_t TuningTable::best(const std::string& family, std::size_t lead,
-                              const std::vector<bool>& allowed) const {
-    std::size_t best = npos;
+std::optional<std::size_t> TuningTable::best(const std::string& family, std::size_t lead,
+                                             const std::vector<bool>& allowed) const {
+    std::optional<std::size_t> best;
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t candidate = 0; candidate < specifications_.size(); ++candidate) {
         if (family_of(specifications_[candidate]) != family) continue;
         SquareSum pooled;
         for (std::size_t r = 0; r < recordings_; ++r)
             if (allowed[r]) pooled.add(sum(candidate, r, lead));
-        if (pooled.count == 0 || !(pooled.rms_mm() < least)) continue;
-        least = pooled.rms_mm();
+        if (pooled.count == 0 || !(pooled.rms() < least)) continue;
+        least = pooled.rms();
         best = candidate;
     }
     return best;

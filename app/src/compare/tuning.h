@@ -1,11 +1,11 @@
 #pragma once
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "compare/prediction_error.h"
-#include "compare/sensed_stick.h"
 
 namespace app {
 
@@ -19,17 +19,22 @@ namespace app {
 /// parameters.
 [[nodiscard]] std::vector<std::string> tuning_grid(const std::string& family, double noise_mm = 0);
 
+/// The families among specifications that have parameters to tune, each once.
+[[nodiscard]] std::vector<std::string> tunable_families(const std::vector<std::string>& specifications);
+
 /// The position errors of every candidate on every recording at every lead.
 class TuningTable {
 public:
-    /// `sticks` by recording; recordings are numbered 0 ... recordings - 1. Work is shared out to `threads`.
-    TuningTable(const std::vector<std::string>& specifications, std::span<const SensedStick> sticks,
-                std::size_t recordings, unsigned threads, const std::function<void(double)>& done = {});
+    /// Candidates are `specifications` and the grids of `families` behind them. `sticks` by recording;
+    /// recordings are numbered 0 ... recordings - 1. Work is shared out to `threads`.
+    TuningTable(std::vector<std::string> specifications, const std::vector<std::string>& families,
+                double noise_mm, std::span<const SensedStick> sticks, std::size_t recordings,
+                unsigned threads);
 
     /// The candidate of `family` with the least RMS at a lead over the recordings that are `allowed`, pooled
-    /// over samples; of equals the first. npos without candidates or without samples.
-    [[nodiscard]] std::size_t best(const std::string& family, std::size_t lead,
-                                   const std::vector<bool>& allowed) const;
+    /// over samples; of equals the first. None without candidates or without samples.
+    [[nodiscard]] std::optional<std::size_t> best(const std::string& family, std::size_t lead,
+                                                  const std::vector<bool>& allowed) const;
     [[nodiscard]] const std::string& specification(std::size_t candidate) const {
         return specifications_[candidate];
     }
@@ -38,16 +43,10 @@ public:
     }
     [[nodiscard]] std::size_t recordings() const { return recordings_; }
 
-    static constexpr std::size_t npos = static_cast<std::size_t>(-1);
-
 private:
     std::vector<std::string> specifications_;
     std::size_t recordings_, leads_;
     std::vector<SquareSum> sums_;  // candidates x recordings x leads
 };
-
-/// The grids of several families in one list.
-[[nodiscard]] std::vector<std::string> candidates_of(const std::vector<std::string>& families,
-                                                     double noise_mm);
 
 }  // namespace app

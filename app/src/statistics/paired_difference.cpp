@@ -9,31 +9,15 @@
 #include <utility>
 #include <vector>
 
-#include "statistics/statistics.h"
-
 namespace app {
 namespace {
 
 constexpr std::size_t kResamples = 2000;
 
-struct Rms {
-    double a = 0, b = 0;
-};
-
-Rms pooled(const PairedSums& sums) {
-    const double count = std::max(1.0, static_cast<double>(sums.count));
-    return {std::sqrt(sums.sum_a / count), std::sqrt(sums.sum_b / count)};
-}
-
-double ratio_of(const Rms& rms) {
-    if (rms.b > 0) return rms.a / rms.b;
-    return rms.a > 0 ? HUGE_VAL : 1;
-}
-
-void add(PairedSums& sum, const PairedSums& other) {
-    sum.sum_a += other.sum_a;
-    sum.sum_b += other.sum_b;
-    sum.count += other.count;
+double ratio_of(const PairedSums& sums) {
+    const double a = sums.a.rms(), b = sums.b.rms();
+    if (b > 0) return a / b;
+    return a > 0 ? HUGE_VAL : 1;
 }
 
 /// Of 95 %.
@@ -47,21 +31,19 @@ std::pair<double, double> interval(std::vector<double>& values) {
 PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint64_t seed) {
     PairedDifference result;
     PairedSums whole;
-    for (const PairedSums& group : groups) add(whole, group);
-    const Rms rms = pooled(whole);
+    for (const PairedSums& group : groups) whole.add(group);
     result.n = groups.size();
-    result.ratio = ratio_of(rms);
-    result.difference_mm = rms.a - rms.b;
+    result.ratio = ratio_of(whole);
+    result.difference_mm = whole.a.rms() - whole.b.rms();
     if (groups.size() < 2) return result;
     std::mt19937_64 random(seed);
     std::vector<double> ratios, differences;
     for (std::size_t i = 0; i < kResamples; ++i) {
         PairedSums drawn;
         // The remainder favours the first groups by less than 1e-17.
-        for (std::size_t k = 0; k < groups.size(); ++k) add(drawn, groups[random() % groups.size()]);
-        const Rms resampled = pooled(drawn);
-        ratios.push_back(ratio_of(resampled));
-        differences.push_back(resampled.a - resampled.b);
+        for (std::size_t k = 0; k < groups.size(); ++k) drawn.add(groups[random() % groups.size()]);
+        ratios.push_back(ratio_of(drawn));
+        differences.push_back(drawn.a.rms() - drawn.b.rms());
     }
     std::tie(result.low, result.high) = interval(ratios);
     std::tie(result.difference_low_mm, result.difference_high_mm) = interval(differences);

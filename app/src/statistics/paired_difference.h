@@ -3,12 +3,15 @@
 #include <span>
 #include <string>
 
+#include "statistics/statistics.h"
+
 namespace app {
 
 /// Squared errors [mm^2] of two predictors on the same samples of one recording (or person).
 struct PairedSums {
-    double sum_a = 0, sum_b = 0;
-    std::size_t count = 0;  ///< samples
+    SquareSum a, b;
+
+    void add(const PairedSums& other) { a.add(other.a), b.add(other.b); }
 };
 
 /// The ratio RMS of a / RMS of b, pooled over n groups, with the 95 % interval of a bootstrap over the

@@ -3,16 +3,13 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 namespace app {
 namespace {
 
-struct Place {
-    std::size_t below;  ///< index of x_k, from 0
-    double fraction;    ///< h - k
-};
-
-Place place_of(std::size_t count, double p) {
+/// The index of x_k, from 0, and h - k.
+std::pair<std::size_t, double> place_of(std::size_t count, double p) {
     assert(p >= 0 && p <= 1 && "a quantile is of a share from 0 to 1");
     const double at = p * static_cast<double>(count - 1);
     const auto below = static_cast<std::size_t>(at);
@@ -43,6 +40,10 @@ double quantile_in_place(std::span<double> values, double p) noexcept {
 
 double quantile(std::vector<double> values, double p) {
     return quantile_in_place(values, p);
+}
+
+double SquareSum::rms() const {
+    return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
 }
 
 double median(std::vector<double> values) {

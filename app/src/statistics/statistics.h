@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <limits>
 #include <span>
 #include <vector>
@@ -18,6 +19,16 @@ inline constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 [[nodiscard]] double quantile_in_place(std::span<double> values, double p) noexcept;
 /// The same of values that ascend.
 [[nodiscard]] double quantile_of_sorted(std::span<const double> sorted, double p) noexcept;
+
+/// A sum of squares and of how many.
+struct SquareSum {
+    double sum = 0;
+    std::size_t count = 0;
+
+    void add(double square) { sum += square, ++count; }
+    void add(const SquareSum& other) { sum += other.sum, count += other.count; }
+    [[nodiscard]] double rms() const;  ///< 0 of nothing
+};
 
 /// Q(0.5): the middle value, or the mean of the two in the middle.
 [[nodiscard]] double median(std::vector<double> values);

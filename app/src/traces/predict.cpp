@@ -1,13 +1,11 @@
 #include "traces/predict.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <iterator>
 #include <memory>
 #include <tuple>
 #include <vector>
 
+#include "report/table.h"
 #include "sticks/auto_predictor.h"
 #include "sticks/replay.h"
 
@@ -35,22 +33,6 @@ void predict_stick(const tracking::StickTrace& stick, std::size_t index, trackin
     });
 }
 
-std::string format_rows(const tracking::Trace& seen, const std::vector<Row>& rows) {
-    std::string text = "t,stick,px,py,pz,qw,qx,qy,qz\n";
-    auto out = std::back_inserter(text);
-    for (const Row& row : rows) {
-        const Eigen::Vector3d& p = row.predicted.position;
-        const Eigen::Quaterniond& q = row.predicted.orientation;
-        fmt::format_to(out, "{},{},{},{},{},", row.predicted.t_s, seen.sticks[row.stick].name, p.x(), p.y(),
-                       p.z());
-        if (row.predicted.has_orientation)
-            fmt::format_to(out, "{},{},{},{}\n", q.w(), q.x(), q.y(), q.z());
-        else
-            text += ",,,\n";
-    }
-    return text;
-}
-
 }  // namespace
 
 std::string predict_table(const tracking::Trace& seen, const std::string& specification, double lead_s) {
@@ -63,7 +45,17 @@ std::string predict_table(const tracking::Trace& seen, const std::string& specif
     }
     // A stick's times differ. (stable_sort's buffer is not aligned for what holds Eigen's types.)
     std::ranges::sort(rows, {}, [](const Row& row) { return std::tuple(row.sample_t_s, row.stick); });
-    return format_rows(seen, rows);
+    Table table = Table::of({"t", "stick", "px", "py", "pz", "qw", "qx", "qy", "qz"});
+    for (const auto& [sample_t_s, stick, predicted] : rows) {
+        const Eigen::Vector3d& p = predicted.position;
+        const Eigen::Quaterniond& q = predicted.orientation;
+        const auto turn = [oriented = predicted.has_orientation](double part) {
+            return oriented ? Cell(part) : Cell();
+        };
+        table.add({predicted.t_s, seen.sticks[stick].name, p.x(), p.y(), p.z(), turn(q.w()), turn(q.x()),
+                   turn(q.y()), turn(q.z())});
+    }
+    return table.csv();
 }
 
 }  // namespace app

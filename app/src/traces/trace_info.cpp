@@ -5,7 +5,9 @@
 #include <tracking/predictor.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "files/one_line.h"
 #include "kit/stick_geometry.h"
@@ -17,6 +19,24 @@ namespace app {
 namespace {
 
 constexpr double kFlip = 1.5707963267948966;  // rad between two samples
+
+/// What one stick of a trace is like. Times in s on the trace's clock, lengths in m; speeds are the tip's,
+/// between samples.
+struct StickInfo {
+    std::string name;
+    std::size_t samples = 0;
+    double t0_s = 0, t_end_s = 0;
+    double rate_hz = 0;                                  ///< 1 / median dt
+    double dt_min_s = 0, dt_median_s = 0, dt_max_s = 0;  ///< between samples
+    int gaps = 0;                                        ///< dt above tracking::kGapS
+    Eigen::Vector3d low = Eigen::Vector3d::Zero(),
+                    high = Eigen::Vector3d::Zero();  ///< extents of the tip's path
+    double speed_median_mps = 0, speed_p95_mps = 0, speed_max_mps = 0;
+    bool orientation = false;  ///< every sample has one
+    int flips = 0;             ///< turns by more than 90 degrees between samples: faults of a tracker, mostly
+    double first_flip_s = 0;
+    int strokes = 0;  ///< height minima of the tip, prominence 25 mm
+};
 
 StickInfo info_of(const tracking::StickTrace& stick, const TipTrack& track) {
     StickInfo info;
@@ -76,16 +96,22 @@ nlohmann::ordered_json json_of(const StickInfo& s) {
         {"strokes", s.strokes}};
 }
 
-}  // namespace
-
-std::vector<StickInfo> trace_info(const tracking::Trace& trace) {
+std::vector<StickInfo> sticks_of(const tracking::Trace& trace) {
     const std::vector<TipTrack> tracks = tip_tracks(trace, stick_geometry(trace, {}, {}, {}));
     std::vector<StickInfo> sticks;
     for (std::size_t i = 0; i < tracks.size(); ++i) sticks.push_back(info_of(trace.sticks[i], tracks[i]));
     return sticks;
 }
 
-std::string format_info(const tracking::Trace& trace, const std::vector<StickInfo>& sticks) {
+}  // namespace
+
+void warn_of_implausible(const tracking::Trace& trace) {
+    for (const std::string& line : tracking::implausible(trace))
+        fmt::print(stderr, "{}: warning: {}\n", trace.file, line);
+}
+
+std::string format_info(const tracking::Trace& trace) {
+    const std::vector<StickInfo> sticks = sticks_of(trace);
     std::string text = fmt::format("{}: {:.6g} s, {}\n", trace.file, trace.t_end_s() - trace.t0_s(),
                                    counted(sticks.size(), "stick"));
     text += fmt::format("  source       {}\n", trace.source.empty() ? "(not said)" : trace.source);
@@ -114,7 +140,7 @@ std::string format_info(const tracking::Trace& trace, const std::vector<StickInf
     return text;
 }
 
-std::string format_info_json(const tracking::Trace& trace, const std::vector<StickInfo>& sticks) {
+std::string format_info_json(const tracking::Trace& trace) {
     nlohmann::ordered_json json = {
         {"trace", trace.file},  {"source", trace.source},     {"rate_hz", trace.rate_hz},
         {"t0_s", trace.t0_s()}, {"t_end_s", trace.t_end_s()}, {"duration_s", trace.t_end_s() - trace.t0_s()},
@@ -123,7 +149,7 @@ std::string format_info_json(const tracking::Trace& trace, const std::vector<Sti
     json["warnings"] = tracking::implausible(trace);
     if (trace.tip) json["tip_m"] = numbers(*trace.tip);
     if (trace.shaft) json["shaft"] = numbers(*trace.shaft);
-    for (const StickInfo& stick : sticks) json["sticks"].push_back(json_of(stick));
+    for (const StickInfo& stick : sticks_of(trace)) json["sticks"].push_back(json_of(stick));
     return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 

@@ -1,3 +1,5 @@
+#include "compare/comparison.h"
+
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -8,10 +10,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "compare/compare.h"
 #include "compare/comparison_report.h"
 #include "compare/comparison_tables.h"
-#include "compare/findings.h"
 #include "files/bad_input.h"
 #include "sample_recordings.h"
 #include "statistics/statistics.h"
@@ -91,14 +91,14 @@ TEST_F(Comparisons, EveryEstimatorIsPairedWithTheBestBaselineAndTheSentenceNames
         for (const app::ComparisonSummary& summary : comparison.summaries) {
             const bool comparable =
                 summary.baseline && summary.lead_s == paired.lead_s && !summary.predictor.ends_with("*");
-            EXPECT_TRUE(!comparable || paired.baseline_rms_mm <= summary.error.rms_mm * (1 + 1e-12))
+            EXPECT_TRUE(!comparable || paired.baseline_rms_mm <= summary.error.position.rms() * (1 + 1e-12))
                 << summary.predictor;
         }
     }
     EXPECT_EQ(comparison.paired.size(), 2 * 4U);  // cv, thesis, cv*, cv** at two leads
-    const auto least =
-        std::min_element(comparison.summaries.begin(), comparison.summaries.end(),
-                         [](const auto& a, const auto& b) { return a.error.rms_mm < b.error.rms_mm; });
+    const auto least = std::min_element(
+        comparison.summaries.begin(), comparison.summaries.end(),
+        [](const auto& a, const auto& b) { return a.error.position.rms() < b.error.position.rms(); });
     EXPECT_NE(app::winners(comparison)[0].find(least->predictor + " errs least"), std::string::npos);
 }
 
@@ -144,7 +144,7 @@ TEST_F(Comparisons, PredictionsFromAFileOfHoldErrAsHoldDoes) {
                 return row.predictor == name && row.trace == options_.traces[1] && row.lead_s == 0.1;
             });
     };
-    EXPECT_NEAR(row_of("mine").error.rms_mm, row_of("hold").error.rms_mm, 1e-9);
+    EXPECT_NEAR(row_of("mine").error.position.rms(), row_of("hold").error.position.rms(), 1e-9);
     EXPECT_TRUE(row_of("mine").external);
     EXPECT_EQ(std::count_if(comparison.rows.begin(), comparison.rows.end(),
                             [](const app::ComparisonRow& row) { return row.predictor == "mine"; }),

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "compare/sensed_stick.h"
 #include "files/bad_input.h"
 
 namespace {
