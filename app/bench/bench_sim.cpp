@@ -139,13 +139,12 @@ BenchReport bench_sim(const SimBenchOptions& options,
         fmt::format("{} steps of 1/60 s ({} substeps of ours), one thread, processor time, in turns of {} "
                     "steps; nothing sleeps.",
                     options.steps, sim::WorldSettings{}.substeps, kTurn));
-    report.notes.push_back(
-        std::string(options.scene
-                        ? "The scene's bodies and planes, without its constraints."
-                        : "Balls of 0.5 m, 182 vertices, 360 triangles, falling into a box whose floor "
-                          "grows with their number.") +
-        " Bound: the flops that the method cannot do without (app/bench/bench_sim.h) "
-        "at the core's peak, or its bytes from memory.");
+    report.notes.push_back(std::string(options.scene
+                                           ? "The scene's bodies and planes, without its constraints."
+                                           : "Balls of 0.5 m, 182 vertices, 360 triangles, falling into a "
+                                             "box whose floor grows with their number.") +
+                           " Bound: the flops that the method cannot do without (app/bench/bench_sim.h) at "
+                           "the core's peak, or its bytes from memory.");
     if (!sim_bench::bullet_is_there())
         report.notes.push_back("This build has no Bullet: no ratios. Install libbullet-dev and build again.");
     return report;

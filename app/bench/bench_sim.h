@@ -26,11 +26,9 @@ struct SimBenchOptions {
 ///   samples   each of the V samples of a body follows its m modes and the body once a step: V (6 m + 18)
 ///   motion    each of S substeps advances m oscillators and the frame: S (6 m + 100)
 ///   contacts  each point's three rows see each of their bodies' 6 + m coordinates, to and fro, once a
-///   substep:
-///             S 3 2 4 (6 + m), and the implicit function of the sample in it, once a step: 60
+///             substep: S 3 2 4 (6 + m), and the implicit function of the sample in it, once a step: 60
 struct LeastWork {
-    double flops = 0,
-           bytes = 0;  ///< a body and step; bytes: state and positions of samples, read and written once
+    double flops, bytes;  ///< a body and step; bytes: state and positions of samples, read and written once
 };
 [[nodiscard]] LeastWork least_work(int modes, int samples, int substeps, double contacts_per_body);
 

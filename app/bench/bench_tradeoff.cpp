@@ -177,14 +177,6 @@ std::vector<TradeoffSetting> all_tradeoff_settings() {
     return settings;
 }
 
-TradeoffSetting converged_setting() {
-    return {sim::Fidelity::modal, 75, 3840, 3, 2000};
-}
-
-TradeoffSetting finer_setting() {
-    return {sim::Fidelity::modal, 120, 7680, 3, 4000};
-}
-
 void mark_pareto(std::vector<TradeoffPoint>& points) {
     std::vector<TradeoffPoint*> order;
     for (TradeoffPoint& point : points) order.push_back(&point);

@@ -41,8 +41,9 @@ struct Tradeoff {
 /// Modes (rigid, linear, 5 ... 75) by step (1/30 ... 1/1920 s) by elements (1 to 3) by triangles (48 to
 /// 2000).
 [[nodiscard]] std::vector<TradeoffSetting> all_tradeoff_settings();
-[[nodiscard]] TradeoffSetting converged_setting();
-[[nodiscard]] TradeoffSetting finer_setting();
+/// What they are held against, and what shows how far that has converged.
+inline constexpr TradeoffSetting kConverged{sim::Fidelity::modal, 75, 3840, 3, 2000};
+inline constexpr TradeoffSetting kFiner{sim::Fidelity::modal, 120, 7680, 3, 4000};
 
 /// Marks the points that nothing dominates.
 void mark_pareto(std::vector<TradeoffPoint>& points);

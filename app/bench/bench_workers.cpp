@@ -49,6 +49,21 @@ double unsteady(int worker, std::uint64_t step) {
     return drawn(std::uint64_t(worker), step) < 0.2 ? 2 : 1;
 }
 
+sim::DistributedSettings settings_of(int steps, int bound, bool balance) {
+    sim::DistributedSettings settings;
+    settings.pace = bound > 0 ? sim::Pace::bounded : sim::Pace::lockstep;
+    settings.bound = bound;
+    settings.steps = std::uint64_t(steps);
+    settings.market.trade = balance;
+    return settings;
+}
+
+double apart(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b) {
+    double sum = 0;
+    for (std::size_t k = 0; k < a.size(); ++k) sum += (a[k] - b[k]).squaredNorm();
+    return a.empty() ? 0 : std::sqrt(sum / static_cast<double>(a.size()));
+}
+
 class WorkersBenchRun {
 public:
     WorkersBenchRun(const WorkersBenchOptions& options, const Progress& progress)
@@ -57,14 +72,157 @@ public:
           most_workers_(std::ranges::max(options.workers)),
           most_bodies_(std::ranges::max(options.bodies)) {}
 
-    [[nodiscard]] WorkersBench run();
+    void speed_ups() {
+        for (const int bodies : options_.bodies) speed_up(bodies);
+    }
 
-    void speed_ups();
-    void stragglers();
-    void bounds();
-    void migration();
-    void processes();
-    void throughput();
+    /// Lockstep solves a pile that crosses workers at each of them; a barrier's cost alone is that of the
+    /// asynchronous run's own steps with one (`with_barrier_s`).
+    void stragglers() {
+        const int workers = most_workers_;
+        const sim::WorldScene scene = scene_of(most_bodies_);
+        const Factor permanent = [](int worker, std::uint64_t) { return worker == 0 ? 2.0 : 1.0; };
+        const Factor wandering = [workers](int worker, std::uint64_t step) {
+            return worker == static_cast<int>(drawn(step / 20, 7) * workers) ? 2.0 : 1.0;
+        };
+        const auto compare = [&](const std::string& name, const Factor& factor, int bound) {
+            progress_("stragglers: " + name);
+            const MeasuredRun lockstep = measure(scene, workers, {0, false, factor}),
+                              async = measure(scene, workers, {bound, false, factor});
+            add(name + "_lockstep_elapsed", lockstep.result.elapsed_s, "s");
+            add(name + "_async_elapsed", async.result.elapsed_s, "s");
+            add(name + "_async_over_lockstep", lockstep.result.elapsed_s / async.result.elapsed_s,
+                "times as fast");
+            add(name + "_async_over_barrier", async.with_barrier_s() / async.result.elapsed_s,
+                "times as fast");
+            return std::pair{lockstep.result.elapsed_s, async.with_barrier_s()};
+        };
+        const auto [lockstep, barrier] = compare("straggler_permanent_unbalanced", permanent, options_.bound);
+        progress_("stragglers: permanent, balanced");
+        const double balanced = measure(scene, workers, {options_.bound, true, permanent}).result.elapsed_s,
+                     balanced_lockstep = measure(scene, workers, {0, true, permanent}).result.elapsed_s;
+        const std::string async_name = "straggler_permanent_async_balanced_",
+                          lockstep_name = "straggler_permanent_lockstep_balanced_";
+        add(async_name + "elapsed", balanced, "s");
+        add(lockstep_name + "elapsed", balanced_lockstep, "s");
+        add(async_name + "over_lockstep", lockstep / balanced, "times as fast");
+        add(async_name + "over_barrier", barrier / balanced, "times as fast");
+        add(lockstep_name + "over_lockstep", lockstep / balanced_lockstep, "times as fast");
+        compare("straggler_unsteady_b4", unsteady, 4);
+        compare("straggler_wandering_b16", wandering, 16);
+        bench_.report.notes.push_back(
+            "A permanent straggler without balancing gains nothing by asynchrony: once the others are B "
+            "steps "
+            "ahead they wait for it at every step, so all go at its pace. Only less work helps it: "
+            "balancing.");
+    }
+
+    void bounds() {
+        const int workers = most_workers_;
+        const sim::WorldScene scene = scene_of(most_bodies_);
+        MeasuredRun lockstep;
+        for (const int bound : {0, 1, 2, 4, 8, 16, 32}) {
+            progress_(fmt::format("bound {}", bound));
+            MeasuredRun run = measure(scene, workers, {bound, false});
+            if (bound == 0) lockstep = run;
+            const MeasuredRun slow = measure(scene, workers, {bound, false, unsteady});
+            bench_.bounds.push_back({bound, run.result.elapsed_s, slow.result.elapsed_s, run.momentum_drift,
+                                     apart(run.after_a_second, lockstep.after_a_second),
+                                     run.mean_height / lockstep.mean_height, run.result.largest_ghost_age});
+            const BoundRow& row = bench_.bounds.back();
+            const std::string name = fmt::format("bound{}", bound);
+            add(name + "_elapsed", row.elapsed_s, "s");
+            add(name + "_unsteady_elapsed", row.elapsed_unsteady_s, "s");
+            add(name + "_momentum_drift", row.momentum_drift, "of sum |m v|");
+            add(name + "_apart_after_a_second", row.apart_m, "m rms");
+            add(name + "_height_at_end", row.height, "times lockstep's");
+        }
+    }
+
+    void migration() {
+        progress_("migration");
+        const Scene scene = read_scene(find_scene("migration30"));
+        sim::DistributedSettings settings = settings_of(500, options_.bound, true);
+        settings.all_to_first = scene.workers.all_to_first;
+        settings.market.from_step = scene.workers.balance_from;
+        sim::SimulatedProcessors processors = options_.processors;
+        processors.count = 3;
+        const MeasuredRun run = measure_run(scene, settings, processors);
+        const std::uint64_t from = scene.workers.balance_from, load = scene.events.at(0).step;
+        add("migration_unevenness_10_steps_after_start", unevenness_at(run, from + 10), "allowed: 1");
+        add("migration_unevenness_10_steps_after_load", unevenness_at(run, load + 10), "allowed: 1");
+        add("migration_most_trades_in_20_steps_before_load", most_trades(run, from + 10, load, 20), "trades");
+        add("migration_most_trades_in_20_steps_after_load", most_trades(run, load + 10, settings.steps, 20),
+            "trades");
+        add("migration_bodies_traded", double(run.result.migrations), "bodies");
+        bench_.migration = run.history;
+    }
+
+    /// Real processes, as many as there are cores for them beside the application.
+    void processes() {
+        const sim::WorldScene scene = scene_of(most_bodies_);
+        const int cores = static_cast<int>(std::thread::hardware_concurrency());
+        double alone = 0;
+        for (const int workers : options_.workers) {
+            if (workers > std::max(1, cores)) continue;
+            progress_(fmt::format("{} worker processes", workers));
+            sim::DistributedLaunch launch;
+            launch.processes = {options_.program, {"worker"}, workers};
+            for (const int bound : {0, options_.bound}) {
+                const double elapsed =
+                    measure_run(scene, settings_of(options_.steps, bound, true), launch).result.elapsed_s;
+                if (alone == 0) alone = elapsed;
+                const std::string name = fmt::format("processes_bodies{}_workers{}_{}", most_bodies_, workers,
+                                                     bound > 0 ? "async" : "lockstep");
+                add(name + "_elapsed", elapsed, "s");
+                add(name + "_speed_up", alone / elapsed, "times one");
+            }
+        }
+        bench_.report.notes.push_back(
+            fmt::format("processes: real ones by the wall clock, at most {}, this machine's cores.", cores));
+    }
+
+    /// Messages of all bodies, as many as pass in two seconds.
+    void throughput() {
+        struct Route {
+            const char* name;
+            bool keys, through_application;
+        };
+        for (const Route& route : {Route{"curve_one_hop", true, false},
+                                   {"curve_through_application", true, true},
+                                   {"plain_through_application", false, true}}) {
+            progress_(fmt::format("throughput: {}", route.name));
+            sim_bench::ThroughputSettings settings;
+            settings.bodies = most_bodies_;
+            settings.keys = route.keys, settings.through_application = route.through_application;
+            const sim_bench::Throughput t = sim_bench::measure_update_throughput(settings);
+            const std::string name = fmt::format("tcp_{}", route.name);
+            add(name + "_updates", 1e-6 * t.updates_per_s, "million bodies a second");
+            add(name + "_cpu", t.cpu_ns_per_update, "ns a body, all threads");
+            if (!route.keys) continue;
+            add(name + "_bytes_per_update", t.bytes_per_update, "bytes");
+            add(name + "_encode", t.encode_ns, "ns a body");
+            add(name + "_decode", t.decode_ns, "ns a body");
+        }
+        bench_.report.notes.push_back(
+            fmt::format("throughput: quantised states of {} modes over tcp on this machine, {} bodies a "
+                        "message, encoded by "
+                        "one thread, checked and decoded by another; CURVE encrypts and authenticates.",
+                        kModes, most_bodies_));
+    }
+
+    void note_clock() {
+        const sim::SimulatedProcessors& p = options_.processors;
+        bench_.report.notes.push_back(fmt::format(
+            "Clock: simulated processors; costs {}, {} times slower than here; {:g} s from worker to worker; "
+            "events in simulated order in one thread. {} steps, async at most {} ahead. Ceiling: as many "
+            "worlds "
+            "as workers, each with its part of the bodies between walls, no messages.",
+            p.modelled ? "counted, not measured" : "this thread's processor time", p.slowdown, p.latency_s,
+            options_.steps, options_.bound));
+    }
+
+    [[nodiscard]] WorkersBench result() { return std::move(bench_); }
 
 private:
     struct Way {
@@ -72,10 +230,50 @@ private:
         bool balance = false;
         Factor factor = {};
     };
-    void speed_up(int bodies);
-    void note_clock();
-    MeasuredRun measure(const sim::WorldScene& scene, int workers, const Way& way);
-    [[nodiscard]] double ceiling(const sim::WorldScene& scene, int workers);
+    MeasuredRun measure(const sim::WorldScene& scene, int workers, const Way& way) {
+        sim::SimulatedProcessors processors = options_.processors;
+        processors.count = workers;
+        processors.factor = way.factor;
+        return measure_run(scene, settings_of(options_.steps, way.bound, way.balance), processors);
+    }
+
+    /// The longest of as many worlds as there are workers, each with its part of the bodies and no others.
+    double ceiling(const sim::WorldScene& scene, int workers) {
+        double longest = 0;
+        for (int k = 0; k < workers; ++k) {
+            sim::WorldScene strip;
+            strip.world = strip_of(scene.world, k, workers);
+            longest = std::max(longest, measure(strip, 1, {}).result.elapsed_s);
+        }
+        return longest;
+    }
+
+    void speed_up(int bodies) {
+        const sim::WorldScene scene = scene_of(bodies);
+        SpeedUp speed_up;
+        speed_up.bodies = bodies;
+        speed_up.alone_s = measure(scene, 1, {}).result.elapsed_s;
+        for (const int workers : options_.workers) {
+            progress_(fmt::format("speed-up: {} bodies, {} workers", bodies, workers));
+            SpeedUp::Row row{workers, speed_up.alone_s, speed_up.alone_s, speed_up.alone_s, 0};
+            if (workers > 1) {
+                const MeasuredRun async = measure(scene, workers, {options_.bound, true});
+                row.async_s = async.result.elapsed_s;
+                row.bytes = double(async.result.bytes) / double(std::max<std::uint64_t>(1, async.body_steps));
+                row.lockstep_s = measure(scene, workers, {0, true}).result.elapsed_s;
+                row.ceiling_s = ceiling(scene, workers);
+            }
+            speed_up.rows.push_back(row);
+            const std::string name = fmt::format("bodies{}_workers{}_", bodies, workers);
+            add(name + "async_elapsed", row.async_s, "s");
+            add(name + "async_speed_up", speed_up.alone_s / row.async_s, "times one");
+            add(name + "lockstep_speed_up", speed_up.alone_s / row.lockstep_s, "times one");
+            add(name + "ceiling_speed_up", speed_up.alone_s / row.ceiling_s, "times one");
+            add(name + "async_of_ceiling", row.ceiling_s / row.async_s, "share");
+            add(name + "bytes_per_body_step", row.bytes, "bytes");
+        }
+        bench_.speed_ups.push_back(speed_up);
+    }
     void add(const std::string& name, double value, const std::string& unit) {
         bench_.report.results.push_back({name, value, unit});
     }
@@ -90,220 +288,6 @@ const std::vector<std::pair<std::string, void (WorkersBenchRun::*)()>> kParts = 
     {"speedup", &WorkersBenchRun::speed_ups},   {"stragglers", &WorkersBenchRun::stragglers},
     {"bound", &WorkersBenchRun::bounds},        {"migration", &WorkersBenchRun::migration},
     {"processes", &WorkersBenchRun::processes}, {"throughput", &WorkersBenchRun::throughput}};
-
-sim::DistributedSettings settings_of(int steps, int bound, bool balance) {
-    sim::DistributedSettings settings;
-    settings.pace = bound > 0 ? sim::Pace::bounded : sim::Pace::lockstep;
-    settings.bound = bound;
-    settings.steps = std::uint64_t(steps);
-    settings.market.trade = balance;
-    return settings;
-}
-
-MeasuredRun WorkersBenchRun::measure(const sim::WorldScene& scene, int workers, const Way& way) {
-    sim::SimulatedProcessors processors = options_.processors;
-    processors.count = workers;
-    processors.factor = way.factor;
-    return measure_run(scene, settings_of(options_.steps, way.bound, way.balance), processors);
-}
-
-/// The longest of as many worlds as there are workers, each with its part of the bodies and no others.
-double WorkersBenchRun::ceiling(const sim::WorldScene& scene, int workers) {
-    double longest = 0;
-    for (int k = 0; k < workers; ++k) {
-        sim::WorldScene strip;
-        strip.world = strip_of(scene.world, k, workers);
-        longest = std::max(longest, measure(strip, 1, {}).result.elapsed_s);
-    }
-    return longest;
-}
-
-void WorkersBenchRun::speed_ups() {
-    for (const int bodies : options_.bodies) speed_up(bodies);
-}
-
-void WorkersBenchRun::speed_up(int bodies) {
-    const sim::WorldScene scene = scene_of(bodies);
-    SpeedUp speed_up;
-    speed_up.bodies = bodies;
-    speed_up.alone_s = measure(scene, 1, {}).result.elapsed_s;
-    for (const int workers : options_.workers) {
-        progress_(fmt::format("speed-up: {} bodies, {} workers", bodies, workers));
-        SpeedUp::Row row{workers, speed_up.alone_s, speed_up.alone_s, speed_up.alone_s, 0};
-        if (workers > 1) {
-            const MeasuredRun async = measure(scene, workers, {options_.bound, true});
-            row.async_s = async.result.elapsed_s;
-            row.bytes = double(async.result.bytes) / double(std::max<std::uint64_t>(1, async.body_steps));
-            row.lockstep_s = measure(scene, workers, {0, true}).result.elapsed_s;
-            row.ceiling_s = ceiling(scene, workers);
-        }
-        speed_up.rows.push_back(row);
-        const std::string name = fmt::format("bodies{}_workers{}_", bodies, workers);
-        add(name + "async_elapsed", row.async_s, "s");
-        add(name + "async_speed_up", speed_up.alone_s / row.async_s, "times one");
-        add(name + "lockstep_speed_up", speed_up.alone_s / row.lockstep_s, "times one");
-        add(name + "ceiling_speed_up", speed_up.alone_s / row.ceiling_s, "times one");
-        add(name + "async_of_ceiling", row.ceiling_s / row.async_s, "share");
-        add(name + "bytes_per_body_step", row.bytes, "bytes");
-    }
-    bench_.speed_ups.push_back(speed_up);
-}
-
-/// Lockstep solves a pile that crosses workers at each of them; a barrier's cost alone is that of the
-/// asynchronous run's own steps with one (`with_barrier_s`).
-void WorkersBenchRun::stragglers() {
-    const int workers = most_workers_;
-    const sim::WorldScene scene = scene_of(most_bodies_);
-    const Factor permanent = [](int worker, std::uint64_t) { return worker == 0 ? 2.0 : 1.0; };
-    const Factor wandering = [workers](int worker, std::uint64_t step) {
-        return worker == static_cast<int>(drawn(step / 20, 7) * workers) ? 2.0 : 1.0;
-    };
-    const auto compare = [&](const std::string& name, const Factor& factor, int bound) {
-        progress_("stragglers: " + name);
-        const MeasuredRun lockstep = measure(scene, workers, {0, false, factor}),
-                          async = measure(scene, workers, {bound, false, factor});
-        add(name + "_lockstep_elapsed", lockstep.result.elapsed_s, "s");
-        add(name + "_async_elapsed", async.result.elapsed_s, "s");
-        add(name + "_async_over_lockstep", lockstep.result.elapsed_s / async.result.elapsed_s,
-            "times as fast");
-        add(name + "_async_over_barrier", async.with_barrier_s() / async.result.elapsed_s, "times as fast");
-        return std::pair{lockstep.result.elapsed_s, async.with_barrier_s()};
-    };
-    const auto [lockstep, barrier] = compare("straggler_permanent_unbalanced", permanent, options_.bound);
-    progress_("stragglers: permanent, balanced");
-    const double balanced = measure(scene, workers, {options_.bound, true, permanent}).result.elapsed_s,
-                 balanced_lockstep = measure(scene, workers, {0, true, permanent}).result.elapsed_s;
-    const std::string async_name = "straggler_permanent_async_balanced_",
-                      lockstep_name = "straggler_permanent_lockstep_balanced_";
-    add(async_name + "elapsed", balanced, "s");
-    add(lockstep_name + "elapsed", balanced_lockstep, "s");
-    add(async_name + "over_lockstep", lockstep / balanced, "times as fast");
-    add(async_name + "over_barrier", barrier / balanced, "times as fast");
-    add(lockstep_name + "over_lockstep", lockstep / balanced_lockstep, "times as fast");
-    compare("straggler_unsteady_b4", unsteady, 4);
-    compare("straggler_wandering_b16", wandering, 16);
-    bench_.report.notes.push_back(
-        "A permanent straggler without balancing gains nothing by asynchrony: once the others are B steps "
-        "ahead they wait for it at every step, so all go at its pace. Only less work helps it: balancing.");
-}
-
-double apart(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b) {
-    double sum = 0;
-    for (std::size_t k = 0; k < a.size(); ++k) sum += (a[k] - b[k]).squaredNorm();
-    return a.empty() ? 0 : std::sqrt(sum / static_cast<double>(a.size()));
-}
-
-void WorkersBenchRun::bounds() {
-    const int workers = most_workers_;
-    const sim::WorldScene scene = scene_of(most_bodies_);
-    MeasuredRun lockstep;
-    for (const int bound : {0, 1, 2, 4, 8, 16, 32}) {
-        progress_(fmt::format("bound {}", bound));
-        MeasuredRun run = measure(scene, workers, {bound, false});
-        if (bound == 0) lockstep = run;
-        const MeasuredRun slow = measure(scene, workers, {bound, false, unsteady});
-        bench_.bounds.push_back({bound, run.result.elapsed_s, slow.result.elapsed_s, run.momentum_drift,
-                                 apart(run.after_a_second, lockstep.after_a_second),
-                                 run.mean_height / lockstep.mean_height, run.result.largest_ghost_age});
-        const BoundRow& row = bench_.bounds.back();
-        const std::string name = fmt::format("bound{}", bound);
-        add(name + "_elapsed", row.elapsed_s, "s");
-        add(name + "_unsteady_elapsed", row.elapsed_unsteady_s, "s");
-        add(name + "_momentum_drift", row.momentum_drift, "of sum |m v|");
-        add(name + "_apart_after_a_second", row.apart_m, "m rms");
-        add(name + "_height_at_end", row.height, "times lockstep's");
-    }
-}
-
-void WorkersBenchRun::migration() {
-    progress_("migration");
-    const Scene scene = read_scene(find_scene("migration30"));
-    sim::DistributedSettings settings = settings_of(500, options_.bound, true);
-    settings.all_to_first = scene.workers.all_to_first;
-    settings.market.from_step = scene.workers.balance_from;
-    sim::SimulatedProcessors processors = options_.processors;
-    processors.count = 3;
-    const MeasuredRun run = measure_run(scene, settings, processors);
-    const std::uint64_t from = scene.workers.balance_from, load = scene.events.at(0).step;
-    add("migration_unevenness_10_steps_after_start", unevenness_at(run, from + 10), "allowed: 1");
-    add("migration_unevenness_10_steps_after_load", unevenness_at(run, load + 10), "allowed: 1");
-    add("migration_most_trades_in_20_steps_before_load", most_trades(run, from + 10, load, 20), "trades");
-    add("migration_most_trades_in_20_steps_after_load", most_trades(run, load + 10, settings.steps, 20),
-        "trades");
-    add("migration_bodies_traded", double(run.result.migrations), "bodies");
-    bench_.migration = run.history;
-}
-
-/// Real processes, as many as there are cores for them beside the application.
-void WorkersBenchRun::processes() {
-    const sim::WorldScene scene = scene_of(most_bodies_);
-    const int cores = static_cast<int>(std::thread::hardware_concurrency());
-    double alone = 0;
-    for (const int workers : options_.workers) {
-        if (workers > std::max(1, cores)) continue;
-        progress_(fmt::format("{} worker processes", workers));
-        sim::DistributedLaunch launch;
-        launch.processes = {options_.program, {"worker"}, workers};
-        for (const int bound : {0, options_.bound}) {
-            const double elapsed =
-                measure_run(scene, settings_of(options_.steps, bound, true), launch).result.elapsed_s;
-            if (alone == 0) alone = elapsed;
-            const std::string name = fmt::format("processes_bodies{}_workers{}_{}", most_bodies_, workers,
-                                                 bound > 0 ? "async" : "lockstep");
-            add(name + "_elapsed", elapsed, "s");
-            add(name + "_speed_up", alone / elapsed, "times one");
-        }
-    }
-    bench_.report.notes.push_back(
-        fmt::format("processes: real ones by the wall clock, at most {}, this machine's cores.", cores));
-}
-
-/// Messages of all bodies, as many as pass in two seconds.
-void WorkersBenchRun::throughput() {
-    struct Route {
-        const char* name;
-        bool keys, through_application;
-    };
-    for (const Route& route : {Route{"curve_one_hop", true, false},
-                               {"curve_through_application", true, true},
-                               {"plain_through_application", false, true}}) {
-        progress_(fmt::format("throughput: {}", route.name));
-        sim_bench::ThroughputSettings settings;
-        settings.bodies = most_bodies_;
-        settings.keys = route.keys, settings.through_application = route.through_application;
-        const sim_bench::Throughput t = sim_bench::measure_update_throughput(settings);
-        const std::string name = fmt::format("tcp_{}", route.name);
-        add(name + "_updates", 1e-6 * t.updates_per_s, "million bodies a second");
-        add(name + "_cpu", t.cpu_ns_per_update, "ns a body, all threads");
-        if (!route.keys) continue;
-        add(name + "_bytes_per_update", t.bytes_per_update, "bytes");
-        add(name + "_encode", t.encode_ns, "ns a body");
-        add(name + "_decode", t.decode_ns, "ns a body");
-    }
-    bench_.report.notes.push_back(fmt::format(
-        "throughput: quantised states of {} modes over tcp on this machine, {} bodies a message, encoded by "
-        "one thread, checked and decoded by another; CURVE encrypts and authenticates.",
-        kModes, most_bodies_));
-}
-
-void WorkersBenchRun::note_clock() {
-    const sim::SimulatedProcessors& p = options_.processors;
-    bench_.report.notes.push_back(
-        fmt::format("Clock: simulated processors; costs {}, {} times slower than here; {:g} s from worker to "
-                    "worker; events "
-                    "in simulated order in one thread. {} steps, async at most {} ahead. Ceiling: as many "
-                    "worlds as workers, "
-                    "each with its part of the bodies between walls, no messages.",
-                    p.modelled ? "counted, not measured" : "this thread's processor time", p.slowdown,
-                    p.latency_s, options_.steps, options_.bound));
-}
-
-WorkersBench WorkersBenchRun::run() {
-    for (const auto& [name, measure] : kParts)
-        if (options_.only.empty() || options_.only.contains(name)) (this->*measure)();
-    note_clock();
-    return std::move(bench_);
-}
 
 constexpr int kWidth = 960, kHeight = 380;
 
@@ -361,7 +345,11 @@ std::vector<std::string> workers_bench_parts() {
 }
 
 WorkersBench bench_workers(const WorkersBenchOptions& options, const Progress& progress) {
-    return WorkersBenchRun(options, progress).run();
+    WorkersBenchRun run(options, progress);
+    for (const auto& [name, measure] : kParts)
+        if (options.only.empty() || options.only.contains(name)) (run.*measure)();
+    run.note_clock();
+    return run.result();
 }
 
 PlotScript speed_up_plot(const SpeedUp& s) {

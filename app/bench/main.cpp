@@ -81,8 +81,7 @@ Figures bench_the_simulation(const std::string&, const BenchOptions& options) {
 }
 
 Figures bench_the_tradeoff(const std::string&, const BenchOptions&) {
-    const Tradeoff measured =
-        measure_tradeoff(all_tradeoff_settings(), converged_setting(), finer_setting(), say);
+    const Tradeoff measured = measure_tradeoff(all_tradeoff_settings(), kConverged, kFiner, say);
     return {format_text(measured),
             format_json(measured),
             {{"tradeoff.csv", format_csv(measured)}},

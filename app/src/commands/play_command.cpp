@@ -10,7 +10,7 @@
 #include "files/one_line.h"
 #include "play/play.h"
 #include "sticks/predictors.h"
-#include "strikes/strike_score.h"
+#include "strikes/score_strikes.h"
 
 namespace app {
 namespace fs = std::filesystem;

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 
-#include "compare/comparison_figures.h"
 #include "compare/comparison_map.h"
 #include "compare/entrant_scores.h"
 #include "compare/entrants.h"

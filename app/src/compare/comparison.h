@@ -93,7 +93,6 @@ struct ComparisonOptions {
     tracking::SensorModel sensor;
     StrikeSurface surface;
     std::string surface_text;  ///< as given
-    double release_margin_s = 0.010;
     bool tuning = true, cost = true, map = false;
     unsigned threads = 1;
     std::function<void(double)> progress;  ///< share of the work done; may be empty

@@ -5,7 +5,6 @@
 #include <tuple>
 
 #include "compare/entrants.h"
-#include "compare/tuning.h"
 #include "process/parallel.h"
 #include "sticks/auto_predictor.h"
 #include "sticks/predictors.h"

@@ -4,20 +4,190 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <map>
 #include <ranges>
+#include <set>
 #include <tuple>
 #include <vector>
 
 #include "compare/comparison_map.h"
-#include "compare/comparison_plots.h"
 #include "compare/comparison_tables.h"
+#include "compare/entrants.h"
 #include "report/html.h"
+#include "report/plot_gallery.h"
+#include "report/plot_panel.h"
 #include "report/report_style.h"
 #include "traces/sensor_model.h"
 
 namespace app {
 namespace {
+
+constexpr int kWide = 1040, kHalf = 520;
+
+using Points = std::vector<std::pair<double, double>>;
+
+/// Lines "x y" of the points within [from, to].
+std::string text_of(const Points& points, double from, double to, double scale) {
+    std::string text;
+    for (const auto& [x, y] : points)
+        if (x >= from && x <= to) fmt::format_to(std::back_inserter(text), "{:.5f} {:.5f}\n", x, scale * y);
+    return text;
+}
+
+/// Recorded and predicted heights within [from_s, to_s]; a path is drawn if `name_of` it is not empty.
+PlotWithLegend heights(const StickFigure& figure, double from_s, double to_s, int width,
+                       const std::function<std::string(const FigurePath&)>& name_of) {
+    constexpr double kMmPerM = 1e3;
+    PlotWithLegend plot;
+    PlotPanel panel;
+    plot.legend.push_back({"recorded", colours::contact, false});
+    panel.add(text_of(figure.recorded_m, from_s, to_s, kMmPerM),
+              "with lines lt 1 lw 2.2 lc " + gnuplot_colour(colours::contact));
+    for (const FigurePath& path : figure.paths) {
+        const std::string name = name_of(path);
+        if (name.empty()) continue;
+        plot.legend.push_back(line_of(plot.legend.size() - 1, name));
+        panel.add(text_of(path.height_m, from_s, to_s, kMmPerM), style_of(plot.legend.back(), 1.4));
+    }
+    double low = 1e9, high = -1e9;
+    for (const auto& [t, y] : figure.recorded_m)
+        low = std::min(low, kMmPerM * y), high = std::max(high, kMmPerM * y);
+    const double room = 0.25 * (high - low) + 1;  // overshoot beyond this leaves the plot
+    plot.script = {
+        width, 280,
+        plot_axes() + round_tics("x", to_s - from_s, width == kWide ? 12 : 6) +
+            round_tics("y", high - low + 2 * room, 6) +
+            fmt::format(
+                "set xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel 'time, s'\nset ylabel 'height, mm'\n",
+                from_s, to_s, low - room, high + room) +
+            panel.text()};
+    return plot;
+}
+
+/// The family of a predictor as shown: of cv:q=1e7 and of cv* it is cv.
+std::string shown_family(const std::string& name) {
+    return family_of(name.substr(0, name.find('*')));
+}
+
+/// The place of a family among those that take part: its colour in every plot of costs.
+std::size_t family_number(const Comparison& comparison, const std::string& family) {
+    std::vector<std::string> families;
+    for (const auto& [name, description] : comparison.predictors) {
+        const std::string own = shown_family(name);
+        if (std::ranges::find(families, own) == families.end()) families.push_back(own);
+    }
+    return static_cast<std::size_t>(std::ranges::find(families, family) - families.begin());
+}
+
+/// 1, 2 and 5 times the powers of ten within a range.
+std::string logarithmic_tics(double low, double high) {
+    std::string tics;
+    for (double decade = std::pow(10, std::floor(std::log10(low))); decade <= high; decade *= 10)
+        for (const double tic : {1 * decade, 2 * decade, 5 * decade})
+            if (tic >= low && tic <= high) tics += fmt::format("{}{}", tics.empty() ? "" : ",", tic);
+    return "set xtics (" + tics + ")\nset mxtics 1\n";
+}
+
+/// Figure 3-1: recorded height and predictions at the shortest lead, 3 s.
+PlotWithLegend height_plot(const StickFigure& figure) {
+    std::set<std::string> seen;
+    return heights(figure, figure.from_s, figure.to_s, kWide, [&](const FigurePath& path) {
+        const bool first = seen.insert(path.predictor).second;  // the first lead alone
+        return first ? fmt::format("{}, {:.0f} ms ahead", path.predictor, 1e3 * path.lead_s) : "";
+    });
+}
+
+/// Figures 3-2 and 3-3: recorded height and one predictor's at every lead, 0.6 s.
+PlotWithLegend zoomed_plot(const StickFigure& figure, const std::string& predictor) {
+    return heights(figure, figure.zoom_from_s, figure.zoom_to_s, kHalf, [&](const FigurePath& path) {
+        return path.predictor == predictor ? fmt::format("{:.0f} ms ahead", 1e3 * path.lead_s) : "";
+    });
+}
+
+/// RMS over lead, 0 to 150 ms. Of a family the tuned curve alone, where there is one; naive of 1992 stays.
+PlotWithLegend curves_plot(const Comparison& comparison) {
+    std::set<std::string> tuned;
+    for (const LeadCurve& curve : comparison.curves)
+        if (curve.predictor.ends_with('*')) tuned.insert(shown_family(curve.predictor));
+    PlotWithLegend plot;
+    PlotPanel panel;
+    double highest = 1;
+    for (const LeadCurve& curve : comparison.curves) {
+        const std::string& name = curve.predictor;
+        const bool also_tuned = !name.ends_with('*') && tuned.contains(family_of(name));
+        if ((also_tuned && name != "naive") || name.ends_with("**")) continue;
+        plot.legend.push_back(line_of(plot.legend.size(), name));
+        Points points;
+        for (const auto& [lead_s, rms_mm] : curve.rms_mm) points.emplace_back(1e3 * lead_s, rms_mm);
+        panel.add(text_of(points, 0, 150, 1), style_of(plot.legend.back(), 1.6));
+        // What runs away (a quadratic) does not set the scale.
+        if (is_baseline(name) && !curve.rms_mm.empty() && family_of(name) != "least-squares")
+            highest = std::max(highest, curve.rms_mm.back().second);
+    }
+    std::string commands = plot_axes() + round_tics("y", 1.25 * highest, 6);
+    commands += fmt::format(
+        "set xrange [0:150]\nset yrange [0:{}]\nset xtics 10\nset xlabel 'lead, ms'\nset ylabel 'RMS error, "
+        "mm'\n",
+        1.25 * highest);
+    plot.script = {kWide, 360, commands + panel.text()};
+    return plot;
+}
+
+/// Cost of a sample against RMS at a lead: an open point a predictor as named, a filled one as tuned; a
+/// colour a family, and a square where its legend is dashed.
+PlotWithLegend cost_plot(const Comparison& comparison, double lead_s) {
+    PlotWithLegend plot;
+    PlotPanel panel;
+    double fastest = 1e9, slowest = 1, least = 1e9, most = 0;
+    for (const ComparisonSummary& s : comparison.summaries) {
+        if (s.lead_s != lead_s || !(s.ns_per_sample > 0) || s.predictor.ends_with("**")) continue;
+        const bool tuned = s.predictor.ends_with('*');
+        const PlotLine look = line_of(family_number(comparison, shown_family(s.predictor)), s.predictor);
+        panel.add(fmt::format("{:.3f} {:.4f}\n", s.ns_per_sample, s.error.position.rms()),
+                  fmt::format("with points pt {} ps 0.8 lw 1.5 lc {}",
+                              (look.dashed ? 4 : 6) + (tuned ? 1 : 0), gnuplot_colour(look.colour)));
+        if (!tuned) plot.legend.push_back(look);
+        fastest = std::min(fastest, s.ns_per_sample), slowest = std::max(slowest, s.ns_per_sample);
+        least = std::min(least, s.error.position.rms()), most = std::max(most, s.error.position.rms());
+    }
+    const double room = 0.12 * (most - least) + 0.5;
+    plot.script = {kHalf, 320,
+                   plot_axes() + round_tics("y", most - least + 2 * room, 6) +
+                       logarithmic_tics(fastest / 1.5, slowest * 1.5) +
+                       fmt::format("set logscale x\nset xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel "
+                                   "'cost, ns a sample'\nset ylabel 'RMS error, mm'\n",
+                                   fastest / 1.5, slowest * 1.5, std::max(0.0, least - room), most + room) +
+                       panel.text()};
+    return plot;
+}
+
+/// Committed minus true time of the matched strikes of one predictor at a lead.
+PlotWithLegend timing_plot(const ComparisonSummary& summary) {
+    constexpr int kHalfMs = 30;
+    std::map<int, int> bins;
+    if (summary.hits)
+        for (const double error_ms : summary.hits->errors_ms) ++bins[static_cast<int>(std::floor(error_ms))];
+    std::string data;
+    int highest = 1;
+    for (const auto& [bin, count] : bins) {
+        fmt::format_to(std::back_inserter(data), "{} {}\n", bin + 0.5, count);
+        highest = std::max(highest, count);
+    }
+    PlotPanel panel;
+    panel.add(data, "with boxes fs solid 0.75 noborder lc " + gnuplot_colour(colours::released));
+    PlotWithLegend plot;
+    plot.script = {
+        kHalf, 220,
+        plot_axes() +
+            fmt::format(
+                "set xrange [{}:{}]\nset yrange [0:{}]\nset xtics 5\nset ytics {}\nset boxwidth 0.9\n"
+                "set xlabel 'committed - true time, ms (positive: late)'\nset ylabel 'strikes in 1 ms'\n",
+                -kHalfMs, kHalfMs, highest * 1.08, std::max(1.0, round_step(highest, 4))) +
+            panel.text()};
+    return plot;
+}
 
 std::string heading(const Comparison& c) {
     const auto leads_ms = c.options.leads_s | std::views::transform([](double s) { return 1e3 * s; });
@@ -34,14 +204,10 @@ std::string heading(const Comparison& c) {
     text += fmt::format("<p class=note>{}</p>\n", html(selection_caution(c)));
     return text +
            "<p class=note>Samples are taken at uniform times by linear interpolation, with noise; truth "
-           "likewise "
-           "at t + lead from the noiseless recording. The first 0.5 s and gaps are left out. Intervals are "
-           "95 %, by "
-           "bootstrap over recordings or persons; n is their number. NAME* runs the parameters that erred "
-           "least "
-           "on other recordings, NAME** on recordings of other persons. The best baseline is chosen on the "
-           "scored "
-           "recordings themselves, which favours it.</p>\n";
+           "likewise at t + lead from the noiseless recording. The first 0.5 s and gaps are left out. "
+           "Intervals are 95 %, by bootstrap over recordings or persons; n is their number. NAME* runs the "
+           "parameters that erred least on other recordings, NAME** on recordings of other persons. The best "
+           "baseline is chosen on the scored recordings themselves, which favours it.</p>\n";
 }
 
 /// The predictors whose strikes are shown as histograms: of each lead the best F1, then auto, thesis and
@@ -139,14 +305,11 @@ std::string grid(const Comparison& comparison, double lead_s) {
 std::string strike_note(const Comparison& c) {
     return fmt::format(
         "On {}. A strike's time is fixed at the lead; it may be cancelled until {:g} ms before its onset. "
-        "Notes "
-        "and true contacts are matched one to one within 30 ms; errors are those of the matched ones. Not "
-        "cancelling: false strikes a minute if all that was fixed is played. Advance: what contacts are "
-        "taken to "
-        "come earlier than predicted, learned on the recordings that tune (least to most over the "
-        "recordings). "
-        "Tuned parameters are those of the least position error, not of the best strikes.",
-        html(c.options.surface_text), 1e3 * c.options.release_margin_s);
+        "Notes and true contacts are matched one to one within 30 ms; errors are those of the matched ones. "
+        "Not cancelling: false strikes a minute if all that was fixed is played. Advance: what contacts are "
+        "taken to come earlier than predicted, learned on the recordings that tune (least to most over the "
+        "recordings). Tuned parameters are those of the least position error, not of the best strikes.",
+        html(c.options.surface_text), 1e3 * kReleaseMarginS);
 }
 
 std::string map_section(const Comparison& c) {
@@ -157,12 +320,11 @@ std::string map_section(const Comparison& c) {
 }
 
 std::string sections(const Comparison& c, const PlotGallery& plots, const Placed& placed) {
-    std::string text =
-        section("A stick and its predictions",
-                fmt::format("{}, stick {}. Each predicted point stands at the time that it was "
-                            "predicted for.",
-                            html(c.figure.trace), html(c.figure.stick)),
-                plots.element(placed.height) + plots.pair(placed.zoomed));
+    std::string text = section(
+        "A stick and its predictions",
+        fmt::format("{}, stick {}. Each predicted point stands at the time that it was predicted for.",
+                    html(c.figure.trace), html(c.figure.stick)),
+        plots.element(placed.height) + plots.pair(placed.zoomed));
     text += section("Error against lead",
                     "All recordings together. Tuned parameters are those of the nearest lead asked for.",
                     plots.element(placed.curves));
@@ -175,11 +337,11 @@ std::string sections(const Comparison& c, const PlotGallery& plots, const Placed
                     "measurable gain.",
                     by_lead(c, paired_table));
     if (!placed.costs.empty())
-        text += section("Speed against error",
-                        "Update and predictions at all leads, one core; the figure that differs between "
-                        "runs. Open points: "
-                        "as named; filled: tuned. Families whose legend is dashed are squares.",
-                        plots.pair(placed.costs));
+        text +=
+            section("Speed against error",
+                    "Update and predictions at all leads, one core; the figure that differs between runs. "
+                    "Open points: as named; filled: tuned. Families whose legend is dashed are squares.",
+                    plots.pair(placed.costs));
     text += section("Strikes", strike_note(c),
                     by_lead(c, strike_table) + (placed.timings.empty() ? "" : plots.pair(placed.timings)));
     text += section("Calibration",

@@ -162,7 +162,7 @@ Json settings_of(const Comparison& comparison) {
             {"tune", o.tune_traces},
             {"tuned", comparison.tuned_on},
             {"surface", o.surface_text},
-            {"release_margin_s", o.release_margin_s},
+            {"release_margin_s", kReleaseMarginS},
             {"protocol", kProtocol}};
 }
 
@@ -294,8 +294,7 @@ std::string map_sentence(const Comparison& comparison, double lead_s) {
     for (const auto& [count, name] : by_count)
         who += fmt::format("{}{} {}", who.empty() ? "" : ", ", name, -count);
     std::string text = fmt::format(
-        "{:.1f} ms ahead the best estimator gains measurably over the best baseline "
-        "in {} of {} sensors",
+        "{:.1f} ms ahead the best estimator gains measurably over the best baseline in {} of {} sensors",
         1e3 * lead_s, gains.size(), sensors);
     if (!gains.empty()) text += fmt::format(", {:.1f} % in the median of these ({})", median(gains), who);
     return text + ".";
@@ -319,8 +318,8 @@ std::string format_comparison_text(const Comparison& comparison) {
     }
     if (!comparison.map.empty())
         text +=
-            "\nWhere filters pay, each sensor and lead: the best estimator against the best baseline, "
-            "tuned alike\n\n" +
+            "\nWhere filters pay, each sensor and lead: the best estimator against the best baseline, tuned "
+            "alike\n\n" +
             map_table(comparison).text();
     for (const double lead_s : comparison.options.leads_s)
         if (const std::string sentence = map_sentence(comparison, lead_s); !sentence.empty())

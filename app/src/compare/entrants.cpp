@@ -4,16 +4,65 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <set>
+#include <sstream>
 
-#include "compare/tuning.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
+#include "files/one_line.h"
+#include "process/parallel.h"
 #include "sticks/auto_predictor.h"
 #include "sticks/predictors.h"
 
 namespace app {
 namespace {
+
+constexpr double kNoiseMm = 0.25;  // what the filters assume by default
+
+/// What tuning tries of a family: every combination of one of each axis, the last axis fastest. An axis is words
+/// with blanks between; a first one that ends in = stands before each of the others; - is the default.
+struct Grid {
+    const char* family;
+    bool takes_noise;  ///< of the sensor
+    std::vector<const char*> axes;
+};
+
+/// Densities are two values a decade, of Singer's one, from a slow hand to contacts.
+const std::vector<Grid> kGrids = {
+    {"naive", false, {"n= 1 2 3 4 5 6 8 11 16"}},
+    {"least-squares", false, {"degree=1", "n= 2 3 4 5 6 8 12 16"}},
+    {"least-squares", false, {"degree=2", "n= 3 4 5 6 8 12 16 24"}},
+    {"double-exponential", false, {"a= 0.2 0.3 0.4 0.5 0.6 0.7 0.8 0.9 0.95 0.98"}},
+    {"one-euro", false, {"min= 1 2 3 5 10 20 40", "beta= 0 0.01 0.1", "d= 10 30 100 1000"}},
+    {"cv",
+     true,
+     {"q= 1e4 3e4 1e5 3e5 1e6 3e6 1e7 3e7 1e8 3e8 1e9 3e9 1e10 3e10 1e11 3e11 1e12",
+      "- decay=2 decay=4 decay=8 decay=16 decay=32"}},
+    {"ca", true, {"q= 1e5 3e5 1e6 3e6 1e7 3e7 1e8 3e8 1e9 3e9 1e10 3e10 1e11 3e11 1e12 3e12 1e13 3e13 1e14"}},
+    {"singer", true, {"alpha= 3 10 30 100 300", "q= 1e7 1e8 1e9 1e10 1e11 1e12 1e13 1e14"}},
+    {"bank", true, {"cv= 1e7 1e8 1e9", "alpha= 10 30 100", "singer= 1e10 1e11 1e12"}},
+    {"imm",
+     true,
+     {"alpha= 3 10 30 100", "q1=1e8,q2=3e9,q3=1e11 q1=1e9,q2=3e10,q3=1e12 q1=1e10,q2=3e11,q3=1e13"}}};
+
+/// Each specification with each parameter of an axis.
+std::vector<std::string> crossed(const std::vector<std::string>& specifications, const std::string& axis) {
+    std::vector<std::string> all;
+    for (const std::string& specification : specifications) {
+        std::istringstream words(axis);
+        std::string name;
+        for (std::string word; words >> word;) {
+            const char* before = specification.find(':') == std::string::npos ? ":" : ",";
+            if (word.ends_with('='))
+                name = word;
+            else
+                all.push_back(word == "-" ? specification : specification + before + name + word);
+        }
+    }
+    return all;
+}
 
 constexpr const char* kFromFiles = "predictions made elsewhere; their cost is not known";
 constexpr const char* kAuto = "auto";
@@ -36,10 +85,8 @@ Entrant named(const std::string& specification, const Field& scored, const Compa
     entrant.used.assign(
         scored.recordings.size(),
         std::vector<std::string>(options.leads_s.size(), picture_specification(specification)));
-    if (specification == kAuto) {
-        entrant.strikes_by = sound_specification(specification);
-        entrant.confirmed_by = confirming_specification(specification);
-    }
+    entrant.strikes_by = specification == kAuto ? sound_specification(specification) : "";
+    entrant.confirmed_by = confirming_specification(specification);
     return entrant;
 }
 
@@ -68,11 +115,10 @@ Entrant tuned(const std::string& family, Tuning tuning, const TuningTable& table
 
 /// `named`: recordings of --tune, none where the `others` that are compared serve.
 std::string tuned_sentence(std::size_t named, std::size_t others, bool by_person) {
-    const std::size_t count = named > 0 ? named : others;
-    return fmt::format(
-        "tuned by RMS at each lead on {}{} recording{}{}, never on the recording that is scored{}",
-        named > 0 ? "" : "the other ", count, count == 1 ? "" : "s", named > 0 ? " named by --tune" : "",
-        by_person ? "; ** on recordings of other persons only" : "");
+    return fmt::format("tuned by RMS at each lead on {}, never on the recording that is scored{}",
+                       named > 0 ? counted(named, "recording") + " named by --tune"
+                                 : "the other " + counted(others, "recording"),
+                       by_person ? "; ** on recordings of other persons only" : "");
 }
 
 /// Adds the tuned entrants; returns what they were tuned on.
@@ -86,18 +132,16 @@ std::string enter_tuned(std::vector<Entrant>& entrants, const std::vector<std::s
     std::set<std::string> persons;
     for (const Field* players : {&scored, &field})
         for (const Recording& recording : players->recordings) persons.insert(recording.person);
-    bool any = false, by_person = false;
+    const std::size_t untuned = entrants.size();
     for (const Tuning split : {Tuning::other_recordings, Tuning::other_persons})
         for (const std::string& family : families) {
             if (split == Tuning::other_persons && persons.size() < 2) continue;
             Entrant entrant = tuned(family, split, table, scored, field, options.leads_s.size());
-            if (entrant.used.empty()) continue;
-            any = true;
-            by_person = by_person || split == Tuning::other_persons;
-            entrants.push_back(std::move(entrant));
+            if (!entrant.used.empty()) entrants.push_back(std::move(entrant));
         }
-    return any ? tuned_sentence(named.recordings.size(), scored.recordings.size() - 1, by_person)
-               : "nothing is tuned: a recording has no others to be tuned on";
+    if (entrants.size() == untuned) return "nothing is tuned: a recording has no others to be tuned on";
+    return tuned_sentence(named.recordings.size(), scored.recordings.size() - 1,
+                          entrants.back().tuning == Tuning::other_persons);
 }
 
 /// Leads and the file's own: t is written in digits.
@@ -144,10 +188,10 @@ std::size_t find_recording(const PredictionFile& file, const Field& field) {
     }
     if (fitting.size() == 1) return fitting.front();
     if (fitting.empty())
-        throw BadInput(fmt::format(
-            "{}: error: found predictions that fit none of the {} traces, expected a row for every "
-            "sample from the second on of each stick; say NAME=FILE@TRACE to see why",
-            file.rows.file, recordings.size()));
+        throw BadInput(
+            fmt::format("{}: error: found predictions that fit none of the {} traces, expected a row for "
+                        "every sample from the second on of each stick; say NAME=FILE@TRACE to see why",
+                        file.rows.file, recordings.size()));
     throw BadInput(fmt::format(
         "{}: error: found predictions that fit {} and {}, expected to know which; say NAME=FILE@TRACE",
         file.rows.file, recordings[fitting[0]].trace.file, recordings[fitting[1]].trace.file));
@@ -163,10 +207,10 @@ void add_file(Entrant& entrant, const std::string& text, const Field& field,
         entrant.used[recording][lead] = file;
         answer.lead_s = leads_s[lead];
         if (!entrant.replays.emplace(std::pair{number, lead}, std::move(answer)).second)
-            throw BadInput(fmt::format(
-                "{}: error: found predictions of {} {} s ahead a second time, expected one file a trace "
-                "and lead",
-                file, entrant.name, leads_s[lead]));
+            throw BadInput(
+                fmt::format("{}: error: found predictions of {} {} s ahead a second time, expected one file "
+                            "a trace and lead",
+                            file, entrant.name, leads_s[lead]));
     }
 }
 
@@ -187,6 +231,73 @@ Entrant& file_entrant(std::vector<Entrant>& entrants, const std::string& name, c
 }
 
 }  // namespace
+
+std::string family_of(const std::string& specification) {
+    return specification.substr(0, specification.find(':'));
+}
+
+bool is_baseline(const std::string& specification) {
+    const std::string family = family_of(specification);
+    return family == "hold" || family == "naive" || family == "difference" || family == "least-squares";
+}
+
+std::vector<std::string> tuning_grid(const std::string& family, double noise_mm) {
+    std::vector<std::string> all;
+    for (const Grid& grid : kGrids) {
+        if (grid.family != family) continue;
+        std::vector<std::string> specifications = {family};
+        for (const char* axis : grid.axes) specifications = crossed(specifications, axis);
+        if (grid.takes_noise && noise_mm > 0 && noise_mm != kNoiseMm)
+            specifications = crossed(specifications, fmt::format("r={}", noise_mm));
+        std::ranges::move(specifications, std::back_inserter(all));
+    }
+    return all;
+}
+
+std::vector<std::string> tunable_families(const std::vector<std::string>& specifications) {
+    std::vector<std::string> families;
+    for (const std::string& specification : specifications) {
+        const std::string family = family_of(specification);
+        if (!tuning_grid(family).empty() && std::ranges::find(families, family) == families.end())
+            families.push_back(family);
+    }
+    return families;
+}
+
+TuningTable::TuningTable(std::vector<std::string> specifications, const std::vector<std::string>& families,
+                         double noise_mm, std::span<const SensedStick> sticks, std::size_t recordings,
+                         unsigned threads)
+    : specifications_(std::move(specifications)),
+      recordings_(recordings),
+      leads_(sticks.empty() ? 0 : sticks.front().leads_s.size()) {
+    for (const std::string& family : families)
+        std::ranges::move(tuning_grid(family, noise_mm), std::back_inserter(specifications_));
+    sums_.resize(specifications_.size() * recordings_ * leads_);
+    parallel_for(specifications_.size(), threads, [&](std::size_t candidate) {
+        for (const SensedStick& stick : sticks) {
+            const auto predictor = make_any_predictor(specifications_[candidate], stick.leads_s);
+            const std::vector<SquareSum> scored = score_positions(stick, *predictor);
+            for (std::size_t lead = 0; lead < leads_; ++lead)
+                sums_[(candidate * recordings_ + stick.recording) * leads_ + lead].add(scored[lead]);
+        }
+    });
+}
+
+std::optional<std::size_t> TuningTable::best(const std::string& family, std::size_t lead,
+                                             const std::vector<bool>& allowed) const {
+    std::optional<std::size_t> best;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t candidate = 0; candidate < specifications_.size(); ++candidate) {
+        if (family_of(specifications_[candidate]) != family) continue;
+        SquareSum pooled;
+        for (std::size_t r = 0; r < recordings_; ++r)
+            if (allowed[r]) pooled.add(sum(candidate, r, lead));
+        if (pooled.count == 0 || !(pooled.rms() < least)) continue;
+        least = pooled.rms();
+        best = candidate;
+    }
+    return best;
+}
 
 std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const SensedStick& stick,
                                                   std::size_t lead, std::span<const double> leads_s,

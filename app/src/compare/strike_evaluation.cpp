@@ -80,9 +80,9 @@ std::optional<Surface> surface_under(const StrikeSurface& surface, const TipTrac
 }
 
 StrikeRules rules_at(const StrikeTiming& timing, bool cancelling, double t0_s) {
-    const double commit_lead_s = std::max(timing.lead_s, timing.release_margin_s);
+    const double commit_lead_s = std::max(timing.lead_s, kReleaseMarginS);
     return {.t0_s = t0_s,
-            .release_margin_s = timing.release_margin_s,
+            .release_margin_s = kReleaseMarginS,
             .commit_lead_s = commit_lead_s,
             .cancelling = cancelling,
             .sent_lead_s = commit_lead_s};
@@ -159,7 +159,7 @@ void HitScore::add(const HitScore& other) {
 }
 
 std::vector<double> strike_leads(const StrikeTiming& timing) {
-    return path_leads(std::max(timing.lead_s, timing.release_margin_s) + kBeyondLeadS);
+    return path_leads(std::max(timing.lead_s, kReleaseMarginS) + kBeyondLeadS);
 }
 
 HitScore evaluate_strikes(const tracking::StickTrace& recorded, std::span<const tracking::PoseSample> samples,

@@ -56,10 +56,12 @@ struct StrikePredictors {
     tracking::Predictor* confirming = nullptr;  ///< must confirm near contacts (keep_confirmed); may be none
 };
 
+/// A strike is cancelled until this long before its time.
+inline constexpr double kReleaseMarginS = 0.010;
+
 struct StrikeTiming {
-    double lead_s = 1.0 / 15;         ///< a strike's time is fixed this long before
-    double release_margin_s = 0.010;  ///< and cancelled until this long before
-    double advance_s = 0;             ///< predicted contacts are taken to come earlier by this
+    double lead_s = 1.0 / 15;  ///< a strike's time is fixed this long before
+    double advance_s = 0;      ///< predicted contacts are taken to come earlier by this
 };
 
 /// The leads at which evaluate_strikes asks the timing predictor: 0 to a little beyond the strike's lead.

@@ -17,7 +17,7 @@
 #include "report/report_style.h"
 #include "report/table.h"
 #include "statistics/statistics.h"
-#include "strikes/strike_score.h"
+#include "strikes/score_strikes.h"
 
 namespace app {
 namespace fs = std::filesystem;

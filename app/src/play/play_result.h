@@ -7,7 +7,7 @@
 
 #include "kit/tip_track.h"
 #include "strikes/strike.h"
-#include "strikes/strike_score.h"
+#include "strikes/score_strikes.h"
 
 namespace app {
 

@@ -126,8 +126,10 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
 }
 
 void StrikePipeline::send_notes() {
-    for (const NoteChange& change : scheduler_.take_changes())
-        notify_(scheduler_.strikes()[change.id - 1], change.scheduled);
+    for (const std::uint64_t id : scheduler_.take_changes()) {
+        const Strike& strike = scheduler_.strikes()[id - 1];
+        notify_(strike, strike.outcome != Outcome::cancelled);
+    }
 }
 
 void StrikePipeline::finish() {

@@ -2,11 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <random>
-#include <tuple>
-#include <utility>
 #include <vector>
 
 namespace app {
@@ -18,12 +15,6 @@ double ratio_of(const PairedSums& sums) {
     const double a = sums.a.rms(), b = sums.b.rms();
     if (b > 0) return a / b;
     return a > 0 ? HUGE_VAL : 1;
-}
-
-/// Of 95 %.
-std::pair<double, double> interval(std::vector<double>& values) {
-    std::sort(values.begin(), values.end());
-    return {quantile_of_sorted(values, 0.025), quantile_of_sorted(values, 0.975)};
 }
 
 }  // namespace
@@ -45,8 +36,11 @@ PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint
         ratios.push_back(ratio_of(drawn));
         differences.push_back(drawn.a.rms() - drawn.b.rms());
     }
-    std::tie(result.low, result.high) = interval(ratios);
-    std::tie(result.difference_low_mm, result.difference_high_mm) = interval(differences);
+    constexpr double kLow = 0.025, kHigh = 0.975;  // of 95 %
+    result.low = quantile_in_place(ratios, kLow);
+    result.high = quantile_in_place(ratios, kHigh);
+    result.difference_low_mm = quantile_in_place(differences, kLow);
+    result.difference_high_mm = quantile_in_place(differences, kHigh);
     return result;
 }
 

@@ -40,9 +40,13 @@ void DrawnStrikes::start(double T, std::span<const Strike> strikes) {
 std::vector<sim::WeightedImpulse> DrawnStrikes::frame(double T, std::span<const Strike> strikes) {
     const double step = (T - last_s_) / kFadeS;
     last_s_ = T;
+    const auto is_replaced = [&](const Drawn& d) {
+        const Strike& strike = strikes[d.id - 1];
+        return strike.outcome == Outcome::released && !same(d.first, impulse_of(strike));
+    };
     for (Drawn& d : drawn_) {
         const Strike& strike = strikes[d.id - 1];
-        const bool replaced = strike.outcome == Outcome::released && !same(d.first, impulse_of(strike));
+        const bool replaced = is_replaced(d);
         d.first_weight =
             toward(d.first_weight, replaced || strike.outcome == Outcome::cancelled ? 0 : 1, step);
         if (replaced) d.final_weight = toward(d.final_weight, 1, step);
@@ -51,14 +55,11 @@ std::vector<sim::WeightedImpulse> DrawnStrikes::frame(double T, std::span<const 
 
     std::vector<sim::WeightedImpulse> result;
     for (const Drawn& d : drawn_) {
-        const Strike& strike = strikes[d.id - 1];
-        const bool is_folded = folded_.contains(d.id);
-        const sim::Impulse final_impulse = impulse_of(strike);
-        const bool replaced = strike.outcome == Outcome::released && !same(d.first, final_impulse);
+        const bool is_folded = folded_.contains(d.id), replaced = is_replaced(d);
         const double first_excess = d.first_weight - (is_folded && !replaced ? 1 : 0);
         const double final_excess = d.final_weight - (is_folded && replaced ? 1 : 0);
         if (first_excess != 0) result.push_back({d.first, first_excess});
-        if (final_excess != 0) result.push_back({final_impulse, final_excess});
+        if (final_excess != 0) result.push_back({impulse_of(strikes[d.id - 1]), final_excess});
     }
     std::erase_if(drawn_, [&](const Drawn& d) {
         const bool faded = d.first_weight == 0 && strikes[d.id - 1].outcome == Outcome::cancelled;

@@ -2,8 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
+#include <numbers>
 
 #include "files/bad_input.h"
 #include "kit/tip_track.h"
@@ -64,12 +68,11 @@ std::vector<Eigen::Vector2d> find_places(const Lows& lows) {
     std::vector<Mode> modes;
     const std::size_t stride = 1 + (lows.size() - 1) / kSeeds;
     for (std::size_t i = 0; i < lows.size(); i += stride) modes.push_back(climb(plan(lows[i].tip), lows));
-    std::stable_sort(modes.begin(), modes.end(),
-                     [](const Mode& a, const Mode& b) { return a.support > b.support; });
+    std::ranges::stable_sort(modes, std::greater(), &Mode::support);
     std::vector<Eigen::Vector2d> places;
     for (const Mode& mode : modes)
-        if (std::all_of(places.begin(), places.end(),
-                        [&](const Eigen::Vector2d& p) { return (p - mode.place).norm() >= kSeparateM; }))
+        if (std::ranges::all_of(
+                places, [&](const Eigen::Vector2d& p) { return (p - mode.place).norm() >= kSeparateM; }))
             places.push_back(mode.place);
     return places;
 }
@@ -77,10 +80,8 @@ std::vector<Eigen::Vector2d> find_places(const Lows& lows) {
 std::vector<Lows> assign(const Lows& lows, const std::vector<Eigen::Vector2d>& places) {
     std::vector<Lows> clusters(places.size());
     for (const Low& low : lows) {
-        const auto farther = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-            return (a - plan(low.tip)).norm() < (b - plan(low.tip)).norm();
-        };
-        const auto nearest = std::min_element(places.begin(), places.end(), farther);
+        const auto distance = [&](const Eigen::Vector2d& place) { return (place - plan(low.tip)).norm(); };
+        const auto nearest = std::ranges::min_element(places, {}, distance);
         clusters[static_cast<std::size_t>(nearest - places.begin())].push_back(low);
     }
     return clusters;
@@ -174,20 +175,14 @@ void make_room(std::vector<FittedInstrument>& instruments) {
 /// The lows of all sticks, but for those with the tip over the hand: there a stick swings back overhead, it
 /// does not strike.
 Lows find_strokes(std::span<const tracking::Trace> traces, const StickGeometry& geometry) {
-    StickGeometry hand_geometry = geometry;
-    hand_geometry.tip.setZero();
     Lows strokes;
-    for (const tracking::Trace& trace : traces) {
-        const std::vector<TipTrack> tips = tip_tracks(trace, geometry),
-                                    hands = tip_tracks(trace, hand_geometry);
-        for (std::size_t stick = 0; stick < tips.size(); ++stick)
-            for (const Low& low : find_lows(tips[stick])) {
-                const std::vector<double>& times = hands[stick].t_s;
-                const auto at = std::lower_bound(times.begin(), times.end(), low.t_s) - times.begin();
-                if (low.tip.y() <= hands[stick].tip[static_cast<std::size_t>(at)].y() + kOverHandM)
-                    strokes.push_back(low);
+    for (const tracking::Trace& trace : traces)
+        for (const tracking::StickTrace& stick : trace.sticks)
+            for (const Low& low : find_lows(tip_track(stick, geometry))) {
+                const auto hand =
+                    std::ranges::lower_bound(stick.samples, low.t_s, {}, &tracking::PoseSample::t_s);
+                if (low.tip.y() <= hand->position.y() + kOverHandM) strokes.push_back(low);
             }
-    }
     return strokes;
 }
 
@@ -201,11 +196,8 @@ Eigen::Vector3d mean_place(const tracking::StickTrace& stick) {
 Eigen::Vector3d left_to_right(std::span<const tracking::Trace> traces) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (const tracking::Trace& trace : traces) {
-        const auto named = [&](const char* name) {
-            return std::find_if(trace.sticks.begin(), trace.sticks.end(),
-                                [&](const auto& stick) { return stick.name == name; });
-        };
-        const auto left = named("left"), right = named("right");
+        const auto left = std::ranges::find(trace.sticks, "left", &tracking::StickTrace::name),
+                   right = std::ranges::find(trace.sticks, "right", &tracking::StickTrace::name);
         if (left != trace.sticks.end() && right != trace.sticks.end())
             sum += mean_place(*right) - mean_place(*left);
     }
@@ -237,6 +229,72 @@ Eigen::Vector3d direction_to_player(std::span<const tracking::Trace> traces, con
                                          : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
 }
 
+/// What a kind of instrument looks and sounds like in a fitted kit.
+struct Form {
+    std::string kind;
+    double height_m;
+    std::string extra;  // further lines of an instrument
+    double highest_hz, lowest_hz;
+    std::array<int, 6> notes;  // General MIDI percussion; for bells a C major scale
+};
+
+Form form_of(const std::string& kind) {
+    if (kind == "cymbal") return {kind, 0.024, "", 450, 250, {49, 57, 51, 59, 55, 52}};
+    if (kind == "bell")
+        return {kind,   0.03,   "exponents = [0.2, 0.2]\nmesh = \"bar.obj\"\nstand = { drawn = false }\n",
+                1046.5, 523.25, {72, 74, 76, 77, 79, 81}};
+    return {kind, 0.15, "", 220, 80, {50, 48, 47, 45, 43, 41}};
+}
+
+std::string instrument_text(const FittedInstrument& fitted, const Form& form, std::size_t index,
+                            std::size_t count, double tip_radius_m) {
+    const double share = count > 1 ? static_cast<double>(index) / static_cast<double>(count - 1) : 0.5;
+    const double pitch_hz = form.highest_hz * std::pow(form.lowest_hz / form.highest_hz, share);
+    const double diameter = 2 * fitted.radius_m;
+    const Eigen::Vector3d& met = fitted.met;
+    return fmt::format(
+        "\n# {}\n[[instrument]]\nname = \"{} {}\"\nkind = \"{}\"\nsize = [{:.3f}, {:.3f}, {:.3f}]\n"
+        "position = [{:.4f}, {:.4f}, {:.4f}]\nmidi_note = {}\nsound = {{ frequency_hz = {:.1f} }}\n{}",
+        describe(fitted), form.kind, index + 1, form.kind, diameter, form.height_m, diameter, met.x(),
+        met.y() - tip_radius_m - form.height_m / 2, met.z(), form.notes[index % form.notes.size()], pitch_hz,
+        form.extra);
+}
+
+/// Looks from behind the hands and from above at a ball that holds every instrument.
+std::string camera_text(const KitFit& fit) {
+    constexpr double kFieldDeg = 45, kElevation = 0.6, kAroundM = 0.12;
+    Eigen::AlignedBox3d box;
+    for (const FittedInstrument& i : fit.instruments) {
+        const Eigen::Vector3d reach(i.radius_m, kAroundM, i.radius_m);
+        box.extend(Eigen::AlignedBox3d(i.met - reach, i.met + reach));
+    }
+    const Eigen::Vector3d target = box.center();
+    const double distance =
+        std::max(0.7, 0.5 * box.diagonal().norm() / std::sin(kFieldDeg / 2 * std::numbers::pi / 180));
+    const Eigen::Vector3d eye = target + distance * (std::cos(kElevation) * fit.towards_player +
+                                                     std::sin(kElevation) * Eigen::Vector3d::UnitY());
+    return fmt::format(
+        "\n[camera]\neye = [{:.3f}, {:.3f}, {:.3f}]\ntarget = [{:.3f}, {:.3f}, {:.3f}]\nvertical_fov_deg = "
+        "{}\n",
+        eye.x(), eye.y(), eye.z(), target.x(), target.y(), target.z(), kFieldDeg);
+}
+
+std::string room_text(const KitFit& fit) {
+    constexpr double kLegsM = 0.4;
+    double lowest = fit.instruments.front().met.y();
+    for (const FittedInstrument& i : fit.instruments) lowest = std::min(lowest, i.met.y());
+    return lowest - kLegsM > 0 ? "" : fmt::format("\n[room]\nfloor_height = {:.3f}\n", lowest - 2 * kLegsM);
+}
+
+/// A name as it may stand in a comment and in quotes.
+std::string plain(std::string name) {
+    std::replace_if(
+        name.begin(), name.end(),
+        [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == '"' || c == '\\'; },
+        '_');
+    return name;
+}
+
 }  // namespace
 
 KitFit fit_kit(std::span<const tracking::Trace> traces, const StickGeometry& geometry) {
@@ -247,8 +305,7 @@ KitFit fit_kit(std::span<const tracking::Trace> traces, const StickGeometry& geo
                         "strokes to fit a kit to",
                         traces.empty() ? "the trace" : traces.front().file));
     std::vector<Lows> clusters = assign(lows, find_places(lows));
-    std::stable_sort(clusters.begin(), clusters.end(),
-                     [](const Lows& a, const Lows& b) { return a.size() > b.size(); });
+    std::ranges::stable_sort(clusters, std::greater(), [](const Lows& cluster) { return cluster.size(); });
     const std::size_t fewest = std::min(kFewestLows, clusters.front().size());
     std::erase_if(clusters, [&](const Lows& cluster) { return cluster.size() < fewest; });
     if (clusters.size() > kMostInstruments) clusters.resize(kMostInstruments);
@@ -258,13 +315,12 @@ KitFit fit_kit(std::span<const tracking::Trace> traces, const StickGeometry& geo
     fit.instruments = place_instruments(std::move(clusters));
     make_room(fit.instruments);
     const Eigen::Vector3d right = Eigen::Vector3d::UnitY().cross(fit.towards_player);
-    std::stable_sort(fit.instruments.begin(), fit.instruments.end(),
-                     [&](const auto& a, const auto& b) { return a.met.dot(right) < b.met.dot(right); });
+    std::ranges::stable_sort(fit.instruments, {},
+                             [&](const FittedInstrument& i) { return i.met.dot(right); });
     return fit;
 }
 
 std::string describe(const FittedInstrument& instrument) {
-    const Eigen::Vector3d& met = instrument.met;
     const std::string strokes =
         fmt::format("{} of {} strokes go 3 mm deep or more", instrument.entering, instrument.strokes);
     if (instrument.struck)
@@ -275,7 +331,21 @@ std::string describe(const FittedInstrument& instrument) {
     return fmt::format(
         "passed through: {} lows with no head under them; tips meet the instrument at y = {:.3f} m, below "
         "which 80 % of them lie; {}",
-        instrument.lows, met.y(), strokes);
+        instrument.lows, instrument.met.y(), strokes);
+}
+
+std::string format_fitted_kit(const KitFit& fit, const std::string& kind, const std::string& name,
+                              const StickGeometry& geometry, bool write_tip) {
+    const Form form = form_of(kind);
+    std::string text = fmt::format(
+        "# A kit placed where the sticks of {} strike.\n\nname = \"Fitted to {}\"\n\n[stick]\nradius = {}\n",
+        plain(name), plain(name), geometry.radius_m);
+    if (write_tip)
+        text += fmt::format("tip = [{}, {}, {}]\n", geometry.tip.x(), geometry.tip.y(), geometry.tip.z());
+    text += camera_text(fit) + room_text(fit);
+    for (std::size_t i = 0; i < fit.instruments.size(); ++i)
+        text += instrument_text(fit.instruments[i], form, i, fit.instruments.size(), geometry.radius_m);
+    return text;
 }
 
 }  // namespace app

@@ -34,7 +34,6 @@ struct KitFit {
 ///   struck     at least 15 % of a cluster's lows (and three) lie within 50 mm of its lowest, their
 ///              inter-quartile range is at most 30 mm and the median of their turning times at most 20 ms.
 ///              The surface is then 25 mm above contact_height.
-///
 ///   otherwise  the surface is at the 80th percentile of the cluster's lows.
 /// The surface is what the tip's centre meets: the body's head lies the tip's radius below. Deterministic.
 /// O(n) for n samples and at most 1000 m for m lows. Throws BadInput when no stick makes a stroke.

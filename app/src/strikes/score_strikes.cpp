@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <tuple>
-
-#include "statistics/statistics.h"
-#include "strikes/strike_score.h"
+#include <compare>
 
 namespace app {
 namespace {
@@ -15,10 +12,10 @@ namespace {
 constexpr double kTimeSlack_s = 1e-9;
 
 struct Pair {
-    double distance_s = 0, contact_s = 0;
-    std::uint64_t id = 0;
-    std::size_t contact = 0, strike = 0;
-    [[nodiscard]] auto order() const { return std::tie(distance_s, contact_s, id, contact, strike); }
+    double distance_s, contact_s;
+    std::uint64_t id;
+    std::size_t contact, strike;
+    auto operator<=>(const Pair&) const = default;
 };
 
 std::vector<Pair> candidate_pairs(const std::vector<Strike>& strikes,
@@ -28,16 +25,14 @@ std::vector<Pair> candidate_pairs(const std::vector<Strike>& strikes,
     for (std::size_t i = 0; i < strikes.size(); ++i) {
         const Strike& strike = strikes[i];
         if (strike.outcome != Outcome::released) continue;
-        auto contact = std::partition_point(contacts.begin(), contacts.end(), [&](const TrueContact& c) {
-            return c.t_s < strike.onset_s - window_s;
-        });
+        auto contact = std::ranges::lower_bound(contacts, strike.onset_s - window_s, {}, &TrueContact::t_s);
         for (; contact != contacts.end() && contact->t_s <= strike.onset_s + window_s; ++contact) {
             if (contact->stick != strike.stick || contact->instrument != strike.instrument) continue;
             const auto index = static_cast<std::size_t>(contact - contacts.begin());
             pairs.push_back({std::abs(strike.onset_s - contact->t_s), contact->t_s, strike.id, index, i});
         }
     }
-    std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.order() < b.order(); });
+    std::ranges::sort(pairs);
     return pairs;
 }
 
@@ -58,9 +53,7 @@ std::vector<double> match(const std::vector<Strike>& strikes, std::vector<TrueCo
 }  // namespace
 
 StrikeScore score_strikes(const std::vector<Strike>& strikes, std::vector<TrueContact>& contacts) {
-    assert(std::is_sorted(contacts.begin(), contacts.end(),
-                          [](const TrueContact& a, const TrueContact& b) { return a.t_s < b.t_s; }) &&
-           "the true contacts are sorted by time");
+    assert(std::ranges::is_sorted(contacts, {}, &TrueContact::t_s) && "the true contacts are sorted by time");
     const std::vector<double> errors_ms = match(strikes, contacts);
     const int matched = static_cast<int>(errors_ms.size());
     StrikeScore score;

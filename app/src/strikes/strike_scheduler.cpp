@@ -263,12 +263,12 @@ void StrikeScheduler::play(Pair& pair, Strike& pending, double s, std::span<cons
         pending.moves = 0;
         strikes_.push_back(pending);
         pair.strikes.push_back(pending.id);
-        changes_.push_back({pending.id, true});
+        changes_.push_back(pending.id);
         return;
     }
     Strike& known = strike(pending.id);
     const bool moves = known.outcome == Outcome::cancelled || !sounds_the_same(known, pending);
-    if (moves) changes_.push_back({pending.id, true});
+    if (moves) changes_.push_back(pending.id);
     pending.scheduled_at_s = known.scheduled_at_s;
     pending.moves = known.moves + (moves ? 1 : 0);
     known = pending;
@@ -289,7 +289,7 @@ void StrikeScheduler::withdraw(std::uint64_t id, double s) {
     if (strike(id).outcome != Outcome::pending) return;
     strike(id).outcome = Outcome::cancelled;
     strike(id).decided_at_s = s;
-    changes_.push_back({id, false});
+    changes_.push_back(id);
 }
 
 void StrikeScheduler::release_before(double until) {
@@ -320,7 +320,7 @@ void StrikeScheduler::release(Pair& pair, Approach& a, const Strike& pending) {
     pair.struck = {released.onset_s};
 }
 
-std::vector<NoteChange> StrikeScheduler::take_changes() {
+std::vector<std::uint64_t> StrikeScheduler::take_changes() {
     return std::exchange(changes_, {});
 }
 

@@ -29,13 +29,6 @@ struct StrikeRules {
     double sent_lead_s = std::numeric_limits<double>::infinity();
 };
 
-/// A change that the audio has to follow: the note of a strike stands as `strikes()[id - 1]` says, or is
-/// gone.
-struct NoteChange {
-    std::uint64_t id = 0;
-    bool scheduled = true;  ///< added, moved or re-weighted; false: cancelled
-};
-
 /// What one of a predictor's models expects after a sample.
 struct ModelContacts {
     std::span<const sim::Contact> contacts;  ///< of its predicted path, by time
@@ -78,8 +71,9 @@ public:
     void finish();
 
     [[nodiscard]] const std::vector<Strike>& strikes() const { return strikes_; }
-    /// Changes since the last call, in order.
-    [[nodiscard]] std::vector<NoteChange> take_changes();
+    /// Ids of the strikes whose notes have changed since the last call, in order, for the audio to follow: a
+    /// note stands as strikes()[id - 1] says; that of a cancelled strike is gone.
+    [[nodiscard]] std::vector<std::uint64_t> take_changes();
     /// Ids released since the last call, in order.
     [[nodiscard]] std::vector<std::uint64_t> take_released();
 
@@ -164,8 +158,7 @@ private:
     std::vector<Pair> pairs_;  // stick-major
     std::vector<int> samples_since_start_;
     std::vector<Strike> strikes_;
-    std::vector<NoteChange> changes_;
-    std::vector<std::uint64_t> released_;
+    std::vector<std::uint64_t> changes_, released_;
 };
 
 }  // namespace app

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "kit/tip_track.h"
 #include "statistics/statistics.h"
 
 namespace app {
@@ -14,6 +13,7 @@ namespace {
 
 constexpr double kTurnWindowS = 0.009;  // two samples at 250 Hz, one at 90 Hz
 constexpr double kSameLevelM = 0.002;   // noise that does not end a descent
+constexpr double kProminenceM = 0.025;
 
 double slope(const TipTrack& track, std::size_t from, std::size_t to) {
     return (track.tip[to].y() - track.tip[from].y()) / (track.t_s[to] - track.t_s[from]);
@@ -35,21 +35,20 @@ Low low_at(const TipTrack& track, std::size_t at, std::size_t first, std::size_t
 }
 
 /// The lows of the piece [first, last]: falls and rises of at least the prominence alternate.
-void find_in_piece(const TipTrack& track, std::size_t first, std::size_t last, double prominence,
-                   std::vector<Low>& lows) {
+void find_in_piece(const TipTrack& track, std::size_t first, std::size_t last, std::vector<Low>& lows) {
     std::size_t highest = first, lowest = first;
     bool falling = false;
     for (std::size_t i = first; i <= last; ++i) {
         const double y = track.tip[i].y();
         if (falling) {
             if (y < track.tip[lowest].y()) lowest = i;
-            if (y - track.tip[lowest].y() < prominence) continue;
+            if (y - track.tip[lowest].y() < kProminenceM) continue;
             lows.push_back(low_at(track, lowest, first, last));
             falling = false;
             highest = i;
         } else {
             if (y > track.tip[highest].y()) highest = i;
-            if (track.tip[highest].y() - y < prominence) continue;
+            if (track.tip[highest].y() - y < kProminenceM) continue;
             falling = true;
             lowest = i;
         }
@@ -58,24 +57,23 @@ void find_in_piece(const TipTrack& track, std::size_t first, std::size_t last, d
 
 }  // namespace
 
-std::vector<Low> find_lows(const TipTrack& track, double prominence_m) {
+std::vector<Low> find_lows(const TipTrack& track) {
     std::vector<Low> lows;
     std::size_t first = 0;
     for (std::size_t i = 1; i <= track.t_s.size(); ++i) {
         if (i < track.t_s.size() && track.t_s[i] - track.t_s[i - 1] <= tracking::kGapS) continue;
-        find_in_piece(track, first, i - 1, prominence_m, lows);
+        find_in_piece(track, first, i - 1, lows);
         first = i;
     }
     return lows;
 }
 
 double contact_height(std::span<const Low> lows) {
-    double lowest = std::numeric_limits<double>::infinity();
-    for (const Low& low : lows) lowest = std::min(lowest, low.tip.y());
     std::vector<double> heights;
-    for (const Low& low : lows)
-        if (low.tip.y() <= lowest + kNearLowestM) heights.push_back(low.tip.y());
-    return quantile(std::move(heights), 0.5);
+    for (const Low& low : lows) heights.push_back(low.tip.y());
+    const double highest = std::ranges::min(heights) + kNearLowestM;
+    std::erase_if(heights, [&](double height) { return height > highest; });
+    return median(std::move(heights));
 }
 
 }  // namespace app

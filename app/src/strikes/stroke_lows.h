@@ -18,7 +18,7 @@ struct Low {
 };
 
 /// The lows of one tip, by time. Nothing is joined across a gap of more than tracking::kGapS.
-[[nodiscard]] std::vector<Low> find_lows(const TipTrack& track, double prominence_m = 0.025);
+[[nodiscard]] std::vector<Low> find_lows(const TipTrack& track);
 
 inline constexpr double kNearLowestM = 0.05;  ///< lows this close to the lowest belong to one surface
 

@@ -4,15 +4,13 @@
 #include <tracking/predictor.h>
 
 #include <algorithm>
-#include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <set>
 #include <utility>
 
 #include "kit/surface_entry.h"
-#include "kit/tip_track.h"
-#include "strikes/strike_score.h"
 
 namespace app {
 namespace {
@@ -21,36 +19,19 @@ constexpr double kDepthM = 0.003;
 constexpr double kRearmM = 0.003;
 constexpr double kTurnEarlyS = 0.025;
 
-/// What a tip's centre meets: a body at rest, grown by the tip's radius.
-struct RestSurface {
-    static constexpr double kEntryToleranceM = 1e-9;
-    const sim::BodyDefinition& body;
-    double radius_m;
+/// What a tip's centre meets: a body at rest, grown by the tip's radius, or a horizontal plane.
+struct Surface {
+    std::function<sim::SurfacePoint(const Eigen::Vector3d&)> nearest;
+    std::function<bool(const Eigen::Vector3d&)> sounds;
+    double entry_tolerance_m = 0;
 
-    [[nodiscard]] double distance(const Eigen::Vector3d& p) const {
-        return sim::rest_distance(body, p, radius_m).distance;
-    }
-    [[nodiscard]] Eigen::Vector3d normal(const Eigen::Vector3d& p) const {
-        return sim::rest_distance(body, p, radius_m).normal;
-    }
-    [[nodiscard]] bool sounds(const Eigen::Vector3d& p) const { return sim::rest_zone(body, p) >= 0; }
-};
-
-/// Or a horizontal plane.
-struct PlaneSurface {
-    static constexpr double kEntryToleranceM = 0;
-    double height_m;
-
-    [[nodiscard]] double distance(const Eigen::Vector3d& p) const { return p.y() - height_m; }
-    [[nodiscard]] static Eigen::Vector3d normal(const Eigen::Vector3d&) { return Eigen::Vector3d::UnitY(); }
-    [[nodiscard]] static bool sounds(const Eigen::Vector3d&) { return true; }
+    [[nodiscard]] double distance(const Eigen::Vector3d& p) const { return nearest(p).distance; }
 };
 
 /// One recorded tip over one surface, walked along the straight pieces of its path.
-template <class Surface>
 class Crossing {
 public:
-    Crossing(const TipTrack& track, const Surface& surface) : track_(track), surface_(surface) {}
+    Crossing(const TipTrack& track, Surface surface) : track_(track), surface_(std::move(surface)) {}
 
     [[nodiscard]] std::vector<TrueContact> find() {
         start(0);
@@ -78,7 +59,7 @@ private:
         const auto distance = [&](double x) { return surface_.distance(a + way * (x / length)); };
         walk(0, length, surface_.distance(a), 1, distance, [&](const WalkStep& step) {
             if (armed_ && step.enters())
-                enter(to, entry_between(step.from, step.to, Surface::kEntryToleranceM, distance) / length);
+                enter(to, entry_between(step.from, step.to, surface_.entry_tolerance_m, distance) / length);
             if (step.now > 0) entry_.reset();
             if (armed_ && entry_ && step.now <= -kDepthM) {
                 if (surface_.sounds(entry_->point_world)) found_.push_back(*entry_);
@@ -96,7 +77,7 @@ private:
         entry_->t_s = ta + (tb - ta) * share;
         entry_->point_world = track_.tip[to - 1] + (track_.tip[to] - track_.tip[to - 1]) * share;
         // The piece that enters may hold the rebound, too: the last one before it does not.
-        const Eigen::Vector3d normal = surface_.normal(entry_->point_world);
+        const Eigen::Vector3d normal = surface_.nearest(entry_->point_world).normal;
         entry_->speed_mps = inward_speed(to, normal);
         if (to - 1 > first_) entry_->speed_mps = std::max(entry_->speed_mps, inward_speed(to - 1, normal));
     }
@@ -113,17 +94,6 @@ private:
     std::optional<TrueContact> entry_;  // since the tip is inside
     std::vector<TrueContact> found_;
 };
-
-sim::Contact plane_contact(const sim::HermitePiece& piece, double t_s, double depth_m) {
-    sim::Contact contact;
-    contact.t_s = t_s;
-    contact.starts_inside = depth_m >= 0;
-    contact.depth_m = std::max(depth_m, 0.0);
-    contact.speed_mps = -piece.velocity(t_s).y();
-    contact.zone = 0;
-    contact.point_world = piece.position(t_s);
-    return contact;
-}
 
 double nearest_approach_s(const TipTrack& track, const sim::BodyDefinition& body, double radius, double from,
                           double to) {
@@ -143,24 +113,28 @@ std::vector<TrueContact> find_true_contacts(std::span<const TipTrack> tracks,
                                             double tip_radius_m) {
     std::vector<TrueContact> contacts;
     for (std::uint32_t stick = 0; stick < tracks.size(); ++stick) {
-        const TipTrack& track = tracks[stick];
-        if (track.tip.empty()) continue;  // a live stick that sent nothing
+        if (tracks[stick].tip.empty()) continue;  // a live stick that sent nothing
         for (std::uint32_t instrument = 0; instrument < bodies.size(); ++instrument) {
-            for (TrueContact& contact :
-                 Crossing(track, RestSurface{bodies[instrument], tip_radius_m}).find()) {
+            const sim::BodyDefinition& body = bodies[instrument];
+            const Surface surface{
+                [&](const Eigen::Vector3d& p) { return sim::rest_distance(body, p, tip_radius_m); },
+                [&](const Eigen::Vector3d& p) { return sim::rest_zone(body, p) >= 0; }, 1e-9};
+            for (TrueContact& contact : Crossing(tracks[stick], surface).find()) {
                 contact.stick = stick;
                 contact.instrument = instrument;
                 contacts.push_back(contact);
             }
         }
     }
-    std::stable_sort(contacts.begin(), contacts.end(),
-                     [](const TrueContact& a, const TrueContact& b) { return a.t_s < b.t_s; });
+    std::ranges::stable_sort(contacts, {}, &TrueContact::t_s);
     return contacts;
 }
 
 std::vector<TrueContact> find_plane_contacts(const TipTrack& track, double height_m) {
-    return Crossing(track, PlaneSurface{height_m}).find();
+    const auto nearest = [=](const Eigen::Vector3d& p) {
+        return sim::SurfacePoint{p.y() - height_m, Eigen::Vector3d::UnitY()};
+    };
+    return Crossing(track, {nearest, [](const Eigen::Vector3d&) { return true; }}).find();
 }
 
 std::vector<sim::Contact> plane_contacts(const sim::TipPath& path, double height_m) {
@@ -174,17 +148,27 @@ std::vector<sim::Contact> plane_contacts(const sim::TipPath& path, double height
     };
     for (std::size_t i = 0; i + 1 < path.nodes.size(); ++i) {
         const sim::HermitePiece piece(path.nodes[i], path.nodes[i + 1]);
+        const auto add = [&](double t_s) -> sim::Contact& {
+            sim::Contact& contact = contacts.emplace_back();
+            contact.t_s = t_s;
+            contact.speed_mps = -piece.velocity(t_s).y();
+            contact.zone = 0;
+            contact.point_world = piece.position(t_s);
+            return contact;
+        };
         const auto height_at = [&](double t_s) { return piece.position(t_s).y() - height_m; };
-        if (i == 0 && height <= 0) contacts.push_back(plane_contact(piece, piece.t0_s, -height));
-        height = walk(
-            piece.t0_s, piece.t1_s, height, piece.greatest_speed(), height_at, [&](const WalkStep& step) {
-                if (step.enters()) {
-                    const double t_s = entry_between(step.from, step.to, kEntryToleranceS, height_at);
-                    contacts.push_back(plane_contact(piece, t_s, -1));
-                }
-                if (step.leaves()) leave();
-                depth = std::max(depth, -step.now);
-            });
+        if (i == 0 && height <= 0) {
+            sim::Contact& first = add(piece.t0_s);
+            first.starts_inside = true;
+            first.depth_m = -height;
+        }
+        height = walk(piece.t0_s, piece.t1_s, height, piece.greatest_speed(), height_at,
+                      [&](const WalkStep& step) {
+                          if (step.enters())
+                              add(entry_between(step.from, step.to, kEntryToleranceS, height_at));
+                          if (step.leaves()) leave();
+                          depth = std::max(depth, -step.now);
+                      });
     }
     return contacts;
 }

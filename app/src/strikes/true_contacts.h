@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "kit/tip_track.h"
-#include "strikes/strike.h"
-#include "strikes/strike_score.h"
+#include "strikes/score_strikes.h"
 
 namespace app {
 

@@ -47,8 +47,7 @@ void unit_keys(Fields& keys, tracking::ColumnMap& map) {
                  {"ZXY", "ZXY"},
                  {"ZYX", "ZYX"}},
                 "Order of the intrinsic turns, where columns ex, ey, ez hold Euler angles (extrinsic ones: "
-                "write the order "
-                "backwards).");
+                "write the order backwards).");
     keys.choice("angles", map.radians, {{"degrees", false}, {"radians", true}}, "Unit of Euler angles.");
     keys.choice("time_unit", map.seconds_per_unit, kSeconds, "Unit of times.");
     keys.flag("from_zero", map.from_zero, "Times count from the first row's.");
@@ -68,10 +67,9 @@ void unit_keys(Fields& keys, tracking::ColumnMap& map) {
 void map_keys(Fields& keys, tracking::ColumnMap& map) {
     std::string description;
     keys.text("description", description, "One line about it.");
-    keys.text(
-        "signature", map.signature,
-        "Text within a file's first 2000 bytes that tells this kind of file: then the map is found without "
-        "naming it.");
+    keys.text("signature", map.signature,
+              "Text within a file's first 2000 bytes that tells this kind of file: then the map is found "
+              "without naming it.");
     keys.choice("separator", map.separator, kSeparators,
                 "Between columns; space: any run of blanks and tabs.");
     std::string comment = map.comment == '\0' ? "" : std::string(1, map.comment);
@@ -80,10 +78,9 @@ void map_keys(Fields& keys, tracking::ColumnMap& map) {
     map.comment = comment.empty() ? '\0' : comment[0];
     keys.choice("decimal", map.decimal_comma, {{"point", false}, {"comma", true}},
                 "Decimal sign of numbers.");
-    keys.text(
-        "header", map.header,
-        "First cell of the header's last line; empty: the first line that is no comment, or none where all "
-        "columns are numbers.");
+    keys.text("header", map.header,
+              "First cell of the header's last line; empty: the first line that is no comment, or none where "
+              "all columns are numbers.");
     keys.text("header_from", map.header_from,
               "A cell of the header's first line, among its first two; empty: as `header`.");
     unit_keys(keys, map);
@@ -91,20 +88,17 @@ void map_keys(Fields& keys, tracking::ColumnMap& map) {
         "columns", map.columns,
         "The column of each role, or of the roles of each stick: `t` or `frame` (neither: rows are frames), "
         "`stick` (a row a stick), `px py pz`, and one of `qw qx qy qz`, `ex ey ez` (with `euler`), `m00 m01 "
-        ".. "
-        "m22` (rotation matrix, row and column), or nothing. A column is its header's cell (of a header of "
-        "several lines: the cells joined by '/'; '*' stands for anything, {stick} for a stick's name), #N: "
-        "the "
-        "N-th column, or +N: N columns right of the same stick's px. [columns.left] holds the roles of the "
-        "stick left. "
-        "Rotations turn body to world.",
+        ".. m22` (rotation matrix, row and column), or nothing. A column is its header's cell (of a header "
+        "of several lines: the cells joined by '/'; '*' stands for anything, {stick} for a stick's name), "
+        "#N: the N-th column, or +N: N columns right of the same stick's px. [columns.left] holds the roles "
+        "of the stick left. Rotations turn body to world.",
         {.need = Need::given, .example = "{\"t\": \"Time\", \"px\": \"X\", \"py\": \"Y\", \"pz\": \"Z\"}"});
 }
-const TableKind<tracking::ColumnMap> kMapFile = {{"map",
-                                                  "A map file (TOML) for `musicworld trace convert --map`: "
-                                                  "where a table of another program keeps what a trace "
-                                                  "needs, and in which units and axes."},
-                                                 map_keys};
+const TableKind<tracking::ColumnMap> kMapFile = {
+    {"map",
+     "A map file (TOML) for `musicworld trace convert --map`: where a table of another program keeps what a "
+     "trace needs, and in which units and axes."},
+    map_keys};
 
 /// "t=Time,px=X": role by role.
 tracking::ColumnMap spelt_out(const std::string& text) {

@@ -7,7 +7,6 @@
 #include <random>
 
 #include "statistics/statistics.h"
-#include "strikes/strike_score.h"
 
 namespace {
 

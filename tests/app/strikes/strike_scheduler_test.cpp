@@ -88,8 +88,8 @@ Notes play(const Height& height, double duration, double rate = 120, bool cancel
         const Motion m = motion_at(height, s);
         scheduler.advance_to(s);
         take_sample(scheduler, s, contacts_of(m, s), m.y);
-        for (const NoteChange& change : scheduler.take_changes())
-            if (scheduler.strikes()[change.id - 1].onset_s < s + kMarginS - 1e-9) run.causal = false;
+        for (const std::uint64_t id : scheduler.take_changes())
+            if (scheduler.strikes()[id - 1].onset_s < s + kMarginS - 1e-9) run.causal = false;
     }
     scheduler.finish();
     run.strikes = scheduler.strikes();
@@ -413,11 +413,11 @@ public:
         }
         scheduler_.advance_to(s);
         scheduler_.sample(0, s, expected, selected, distance);
-        for (const NoteChange& change : scheduler_.take_changes())
-            if (change.scheduled)
-                sounding_.insert(change.id);
+        for (const std::uint64_t id : scheduler_.take_changes())
+            if (strikes()[id - 1].outcome != Outcome::cancelled)
+                sounding_.insert(id);
             else
-                sounding_.erase(change.id);
+                sounding_.erase(id);
     }
     [[nodiscard]] const std::vector<Strike>& strikes() const { return scheduler_.strikes(); }
     [[nodiscard]] const Strike& first() const { return strikes().at(0); }

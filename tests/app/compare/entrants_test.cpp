@@ -1,11 +1,10 @@
-#include "compare/tuning.h"
+#include "compare/entrants.h"
 
 #include <gtest/gtest.h>
 
 #include <set>
 
 #include "compare/comparison_map.h"
-#include "compare/entrants.h"
 #include "sample_recordings.h"
 
 namespace {
