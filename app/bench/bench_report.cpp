@@ -11,16 +11,11 @@
 namespace app {
 namespace {
 
-Cell text_or_none(const std::string& text) {
-    return text.empty() ? Cell() : Cell(text);
-}
-
 Table table_of(const std::vector<BenchResult>& results) {
     Table table =
         Table::of({"name", "value:.4g", "unit", "peer", "peer_version", "peer_value:.4g", "ratio:.3f"});
     for (const BenchResult& r : results)
-        table.add({r.name, r.value, r.unit, text_or_none(r.peer), text_or_none(r.peer_version), r.peer_value,
-                   r.ratio});
+        table.add({r.name, r.value, r.unit, r.peer, r.peer_version, r.peer_value, r.ratio});
     return table;
 }
 

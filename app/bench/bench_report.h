@@ -19,7 +19,7 @@ struct BenchResult {
     std::string name;
     double value = 0;  ///< ours
     std::string unit;
-    std::string peer = {}, peer_version = {};
+    std::optional<std::string> peer = {}, peer_version = {};
     std::optional<double> peer_value = {};
     std::optional<double> ratio = {};  ///< ours / peer's, median over the rounds: below 1 is faster
 };

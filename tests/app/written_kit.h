@@ -10,6 +10,17 @@
 
 namespace app {
 
+/// A drum with a wide flat head at height 0.
+inline constexpr const char* kFlatDrum = R"(
+name = "Flat"
+[[instrument]]
+name = "table"
+kind = "drum"
+size = [2, 0.2, 2]
+position = [0, -0.1, 0]
+midi_note = 38
+)";
+
 /// A kit's text in a file of its own for as long as the test needs it.
 class WrittenKit {
 public:

@@ -1,7 +1,6 @@
 #include "compare/comparison.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 #include "compare/comparison_map.h"

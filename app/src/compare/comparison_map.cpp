@@ -110,8 +110,7 @@ std::vector<MapCell> map_sensors(std::span<const Recording> recordings, const Co
         const std::vector<SensedStick> sticks = sense_all(recordings, sensors[i], options.leads_s);
         std::vector<std::string> as_named;
         std::ranges::transform(field.as_named, std::back_inserter(as_named), picture_specification);
-        const TuningTable table(as_named, field.families, sensors[i].noise_m / kMm, sticks, recordings.size(),
-                                1);
+        const TuningTable table(as_named, field.families, sensors[i].noise_m / kMm, sticks, 1);
         for (std::size_t lead = 0; lead < options.leads_s.size(); ++lead)
             add_cells(parts[i], runners_of(table, field, lead), sensors[i], options.leads_s[lead]);
     };

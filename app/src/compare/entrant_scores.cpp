@@ -31,6 +31,17 @@ std::vector<std::vector<std::size_t>> passes_of(const Entrant& entrant, std::siz
     return passes;
 }
 
+/// A fresh predictor at a lead at which `used` is not empty; `leads_s` will be asked for. `instead`: the
+/// specification that runs unless it is empty or a file answers.
+std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const SensedStick& stick,
+                                                  std::size_t lead, std::span<const double> leads_s,
+                                                  const std::string& instead = {}) {
+    if (const auto replay = entrant.replays.find({stick.number, lead}); replay != entrant.replays.end())
+        return make_replay(replay->second);
+    return make_any_predictor(instead.empty() ? entrant.used[stick.recording][lead] : instead, leads_s,
+                              stick.name);
+}
+
 HitScore hits_of(const Entrant& entrant, const Field& field, const SensedStick& stick, std::size_t lead,
                  const ComparisonOptions& options, double advance_s) {
     const Recording& recording = field.recordings[stick.recording];
@@ -143,7 +154,7 @@ std::vector<ComparisonRow> rows_of(const Entrant& entrant, const Field& field, c
             row.rate_hz = stick.rate_hz;
             row.noise_mm = 1e3 * options.sensor.noise_m;
             row.external = entrant.external;
-            row.error = scores[lead].error();
+            row.error = scores[lead].error;
             row.calibration = scores[lead].calibration();
             if (losses) row.advance_s = losses->best_s(recording, lead);
             if (options.surface.kind != StrikeSurface::Kind::none)

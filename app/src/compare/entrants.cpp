@@ -127,8 +127,7 @@ std::string enter_tuned(std::vector<Entrant>& entrants, const std::vector<std::s
     const Field& field = named.recordings.empty() ? scored : named;
     if (named.recordings.empty() && scored.recordings.size() < 2)
         return "nothing is tuned: one recording, and no others by --tune";
-    const TuningTable table({}, families, 1e3 * options.sensor.noise_m, field.sticks, field.recordings.size(),
-                            options.threads);
+    const TuningTable table({}, families, 1e3 * options.sensor.noise_m, field.sticks, options.threads);
     std::set<std::string> persons;
     for (const Field* players : {&scored, &field})
         for (const Recording& recording : players->recordings) persons.insert(recording.person);
@@ -265,11 +264,10 @@ std::vector<std::string> tunable_families(const std::vector<std::string>& specif
 }
 
 TuningTable::TuningTable(std::vector<std::string> specifications, const std::vector<std::string>& families,
-                         double noise_mm, std::span<const SensedStick> sticks, std::size_t recordings,
-                         unsigned threads)
+                         double noise_mm, std::span<const SensedStick> sticks, unsigned threads)
     : specifications_(std::move(specifications)),
-      recordings_(recordings),
-      leads_(sticks.empty() ? 0 : sticks.front().leads_s.size()) {
+      recordings_(sticks.back().recording + 1),
+      leads_(sticks.back().leads_s.size()) {
     for (const std::string& family : families)
         std::ranges::move(tuning_grid(family, noise_mm), std::back_inserter(specifications_));
     sums_.resize(specifications_.size() * recordings_ * leads_);
@@ -297,15 +295,6 @@ std::optional<std::size_t> TuningTable::best(const std::string& family, std::siz
         best = candidate;
     }
     return best;
-}
-
-std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const SensedStick& stick,
-                                                  std::size_t lead, std::span<const double> leads_s,
-                                                  const std::string& instead) {
-    if (const auto replay = entrant.replays.find({stick.number, lead}); replay != entrant.replays.end())
-        return make_replay(replay->second);
-    return make_any_predictor(instead.empty() ? entrant.used[stick.recording][lead] : instead, leads_s,
-                              stick.name);
 }
 
 std::vector<std::string> specifications_of(const ComparisonOptions& options) {

@@ -1,7 +1,6 @@
 #pragma once
 #include <functional>
 #include <map>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -29,11 +28,10 @@ namespace app {
 /// The position errors of every candidate on every recording at every lead.
 class TuningTable {
 public:
-    /// Candidates are `specifications` and the grids of `families` behind them. `sticks` by recording;
-    /// recordings are numbered 0 ... recordings - 1. Work is shared out to `threads`.
+    /// Candidates are `specifications` and the grids of `families` behind them. `sticks`: all of the
+    /// recordings, in their order. Work is shared out to `threads`.
     TuningTable(std::vector<std::string> specifications, const std::vector<std::string>& families,
-                double noise_mm, std::span<const SensedStick> sticks, std::size_t recordings,
-                unsigned threads);
+                double noise_mm, std::span<const SensedStick> sticks, unsigned threads);
 
     /// The candidate of `family` with the least RMS at a lead over the recordings that are `allowed`, pooled
     /// over samples; of equals the first. None without candidates or without samples.
@@ -74,13 +72,6 @@ struct Entrant {
     std::map<std::pair<std::size_t, std::size_t>, StickPredictions> replays =
         {};  ///< (stick among all, lead): the file's answers
 };
-
-/// A fresh predictor at a lead at which `used` is not empty; `leads_s` will be asked for. `instead`: the
-/// specification that runs unless it is empty or a file answers.
-[[nodiscard]] std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant,
-                                                                const SensedStick& stick, std::size_t lead,
-                                                                std::span<const double> leads_s,
-                                                                const std::string& instead = {});
 
 struct EntrantList {
     std::vector<Entrant> entrants;

@@ -54,26 +54,26 @@ void ErrorScore::add(const ErrorScore& other) {
 void LeadScore::add(const tracking::PosePrediction& predicted, const Truth& truth,
                     const Eigen::Vector3d& tip_body,
                     const std::optional<tracking::PoseCovariance>& covariance) {
-    error_.add(predicted, truth, tip_body);
+    error.add(predicted, truth, tip_body);
     if (!covariance) return;
-    ++sums_.count;
+    ++sums.count;
     const Eigen::LLT<Eigen::Matrix3d> factor(covariance->position);
     if (factor.info() != Eigen::Success) {
-        ++sums_.singular;
+        ++sums.singular;
         return;
     }
     const Eigen::Vector3d whitened = factor.matrixL().solve(predicted.position - truth.pose.position);
     const double square = whitened.squaredNorm();
     const double log_root = factor.matrixLLT().diagonal().array().log().sum();  // log sqrt(det)
-    sums_.inside_50 += square <= kRadius50;
-    sums_.inside_95 += square <= kRadius95;
-    sums_.negative_log_likelihood += 0.5 * square + log_root + 1.5 * std::log(2 * std::numbers::pi);
+    sums.inside_50 += square <= kRadius50;
+    sums.inside_95 += square <= kRadius95;
+    sums.negative_log_likelihood += 0.5 * square + log_root + 1.5 * std::log(2 * std::numbers::pi);
 }
 
 std::optional<Calibration> LeadScore::calibration() const {
-    const std::size_t stated = sums_.count - sums_.singular;
+    const std::size_t stated = sums.count - sums.singular;
     if (stated == 0) return std::nullopt;
-    Calibration mean = sums_;
+    Calibration mean = sums;
     for (double* sum : {&mean.inside_50, &mean.inside_95, &mean.negative_log_likelihood})
         *sum /= static_cast<double>(stated);
     return mean;

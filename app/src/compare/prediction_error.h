@@ -35,19 +35,15 @@ struct Calibration {
 /// Both together, as if one recording followed the other.
 void add(std::optional<Calibration>& sum, const std::optional<Calibration>& other);
 
-/// Gathers the errors of predictions at one lead.
-class LeadScore {
-public:
+/// The errors of predictions at one lead, as they are made.
+struct LeadScore {
+    ErrorScore error;
+    Calibration sums;  ///< of what calibration() has the means of
+
     /// `covariance`: of the position [m^2], as the predictor states it; may be absent.
     void add(const tracking::PosePrediction& predicted, const Truth& truth, const Eigen::Vector3d& tip_body,
              const std::optional<tracking::PoseCovariance>& covariance);
-
-    [[nodiscard]] const ErrorScore& error() const { return error_; }
     [[nodiscard]] std::optional<Calibration> calibration() const;
-
-private:
-    ErrorScore error_;
-    Calibration sums_;
 };
 
 /// Errors of a predictor (fresh, fed here) at every lead of the stick, in one pass over its samples. A

@@ -140,7 +140,10 @@ void StrikeScheduler::follow_path(Approach& a, double s, std::span<const sim::Co
                 if (apart < best) best = apart, best_p = p, best_c = c;
             }
         if (!std::isfinite(best)) break;
-        update(a.pending[waiting[best_p]], s, *found[best_c].contact);
+        if (Strike& pending = a.pending[waiting[best_p]]; !is_committed(pending, s)) {
+            copy_contact(pending, *found[best_c].contact);
+            place_onset(pending, s);
+        }
         waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(best_p));
         found.erase(found.begin() + static_cast<std::ptrdiff_t>(best_c));
     }
@@ -169,12 +172,6 @@ bool StrikeScheduler::is_committed(const Strike& pending, double s) const {
 bool StrikeScheduler::may_be(const Strike& pending, const Candidate& candidate, double s) const {
     if (!is_committed(pending, s)) return !candidate.late;
     return candidate.happens_s - pending.onset_s <= rules_.late_s;
-}
-
-void StrikeScheduler::update(Strike& pending, double s, const sim::Contact& contact) const {
-    if (is_committed(pending, s)) return;
-    copy_contact(pending, contact);
-    place_onset(pending, s);
 }
 
 Strike StrikeScheduler::new_contact(Approach& a, double s, const sim::Contact& contact) const {

@@ -123,7 +123,6 @@ private:
     [[nodiscard]] std::vector<Candidate> candidates(const Approach& a, double s,
                                                     std::span<const sim::Contact> contacts) const;
     [[nodiscard]] Strike new_contact(Approach& a, double s, const sim::Contact& contact) const;
-    void update(Strike& pending, double s, const sim::Contact& contact) const;
     /// Earliest onset that the sample at s may ask for.
     [[nodiscard]] double earliest_onset(double s) const {
         return std::max(s + rules_.commit_lead_s, fixed_s_);

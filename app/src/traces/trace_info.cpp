@@ -60,8 +60,7 @@ StickInfo info_of(const tracking::StickTrace& stick, const TipTrack& track) {
     info.speed_median_mps = quantile(speed, 0.5);
     info.speed_p95_mps = quantile(speed, 0.95);
     info.speed_max_mps = quantile(speed, 1);
-    info.orientation = std::all_of(stick.samples.begin(), stick.samples.end(),
-                                   [](const tracking::PoseSample& sample) { return sample.has_orientation; });
+    info.orientation = std::ranges::all_of(stick.samples, &tracking::PoseSample::has_orientation);
     for (std::size_t i = 1; i < stick.samples.size(); ++i) {
         if (stick.samples[i].orientation.angularDistance(stick.samples[i - 1].orientation) <= kFlip) continue;
         if (info.flips++ == 0) info.first_flip_s = stick.samples[i].t_s;

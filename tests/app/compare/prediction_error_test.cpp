@@ -21,12 +21,12 @@ std::vector<app::LeadScore> scores_of(const app::Recording& recording, const std
 TEST(PredictionError, HoldOnASineErrsBySqrt2TimesAmplitudeTimesSinOfHalfTheLeadsPhase) {
     // Scored are the samples of [0.5, 10.499], whole periods, with truth up to 10.599.
     const auto scores = scores_of(sample::recording_of(sample::sine, 10.599), "hold", {0.1});
-    EXPECT_EQ(scores[0].error().position.count, 10000U);
+    EXPECT_EQ(scores[0].error.position.count, 10000U);
     // The lead is a whole number of samples, so that interpolation is exact: rounding only.
-    EXPECT_NEAR(scores[0].error().position.rms(), std::sqrt(2.0) * 100 * std::sin(kPi * 0.1), 1e-9);
+    EXPECT_NEAR(scores[0].error.position.rms(), std::sqrt(2.0) * 100 * std::sin(kPi * 0.1), 1e-9);
     // The error is 200 sin(0.1 pi) |cos(...)| with evenly spread phase: 95 % lie below cos(0.025 pi) of it.
     // Neighbouring errors there differ by less than 0.03 mm.
-    EXPECT_NEAR(scores[0].error().p95_mm(), 200 * std::sin(kPi * 0.1) * std::cos(0.025 * kPi), 0.03);
+    EXPECT_NEAR(scores[0].error.p95_mm(), 200 * std::sin(kPi * 0.1) * std::cos(0.025 * kPi), 0.03);
 }
 
 TEST(PredictionError, ConstantVelocityAndTurningArePredictedByDifferenceWithoutError) {
@@ -37,11 +37,11 @@ TEST(PredictionError, ConstantVelocityAndTurningArePredictedByDifferenceWithoutE
         recording.geometry.tip = {0, 0, -0.4};
         for (const app::LeadScore& score :
              scores_of(recording, "difference", {1.0 / 30, 1.0 / 15, 0.1}, sensor)) {
-            EXPECT_GT(score.error().position.count, 150U);
-            EXPECT_LT(score.error().position.rms(),
+            EXPECT_GT(score.error.position.count, 150U);
+            EXPECT_LT(score.error.position.rms(),
                       1e-8);  // rounding of 10 m over steps of 4 ms, times a lead of 0.1 s
-            EXPECT_LT(score.error().rotation.rms(), 1e-8);
-            EXPECT_LT(score.error().tip.rms(), 1e-8);
+            EXPECT_LT(score.error.rotation.rms(), 1e-8);
+            EXPECT_LT(score.error.tip.rms(), 1e-8);
         }
     }
 }
@@ -51,9 +51,9 @@ TEST(PredictionError, HoldOnASteadyTurnErrsByRateTimesLeadAndItsTipByTheChord) {
     for (tracking::PoseSample& sample : recording.trace.sticks[0].samples) sample.position = {0, 1, 0};
     recording.geometry.tip = {0.4, 0, 0};
     const auto scores = scores_of(recording, "hold", {0.1});
-    EXPECT_NEAR(scores[0].error().position.rms(), 0, 1e-12);
-    EXPECT_NEAR(scores[0].error().rotation.rms(), 0.3 * 180 / kPi, 1e-9);
-    EXPECT_NEAR(scores[0].error().tip.rms(), 2 * 400 * std::sin(0.15), 1e-9);
+    EXPECT_NEAR(scores[0].error.position.rms(), 0, 1e-12);
+    EXPECT_NEAR(scores[0].error.rotation.rms(), 0.3 * 180 / kPi, 1e-9);
+    EXPECT_NEAR(scores[0].error.tip.rms(), 2 * 400 * std::sin(0.15), 1e-9);
 }
 
 TEST(PredictionError, NoiseOfASensorIsTheErrorOfHoldOnAStickAtRest) {
@@ -66,7 +66,7 @@ TEST(PredictionError, NoiseOfASensorIsTheErrorOfHoldOnAStickAtRest) {
     };
     const auto scores = scores_of(sample::recording_of(still, 10), "hold", {0.05}, sensor);
     // sqrt 3 mm; the RMS of 9450 x 3 normal numbers has a standard error of 0.42 %: four of these.
-    EXPECT_NEAR(scores[0].error().position.rms(), std::sqrt(3.0), 0.017 * std::sqrt(3.0));
+    EXPECT_NEAR(scores[0].error.position.rms(), std::sqrt(3.0), 0.017 * std::sqrt(3.0));
 }
 
 TEST(PredictionError, TheFirstHalfSecondTheEndAndGapsAreNotScored) {
@@ -76,7 +76,7 @@ TEST(PredictionError, TheFirstHalfSecondTheEndAndGapsAreNotScored) {
     const auto scores = scores_of(recording, "hold", {0.05});
     // Samples 0.50 ... 1.00 and 1.21 ... 2.00; truth 50 ms later lies within the recording for those up to
     // 0.95 (then the gap) and up to 1.95. A rounding of t + lead at either end may cost one.
-    EXPECT_NEAR(static_cast<double>(scores[0].error().position.count), 46 + 75, 2);
+    EXPECT_NEAR(static_cast<double>(scores[0].error.position.count), 46 + 75, 2);
 }
 
 TEST(PredictionError, FreeErrorsLeaveOut50MsAboutImpactsAndFlaggedTimes) {
@@ -84,18 +84,18 @@ TEST(PredictionError, FreeErrorsLeaveOut50MsAboutImpactsAndFlaggedTimes) {
     ASSERT_EQ(recording.marks[0].impacts_s.size(), 20U);  // lows at 0.25, 0.75, ... 9.75 s
     const auto whole = scores_of(recording, "hold", {0.04});
     // 51 of 500 ms about each low: 25 of 125 samples, of truth times in [0.54, 10].
-    const double share = static_cast<double>(whole[0].error().free.count) /
-                         static_cast<double>(whole[0].error().position.count);
+    const double share =
+        static_cast<double>(whole[0].error.free.count) / static_cast<double>(whole[0].error.position.count);
     EXPECT_NEAR(share, 0.8, 0.01);
-    EXPECT_EQ(whole[0].error().unflagged.count, whole[0].error().position.count);
+    EXPECT_EQ(whole[0].error.unflagged.count, whole[0].error.position.count);
     recording.marks[0].flagged_s = {5.5};
     const auto flagged = scores_of(recording, "hold", {0.04});
     // Samples or truths within [5.45, 5.55]: samples of [5.41, 5.55], 35 steps of 4 ms, one more or less at
     // each end by rounding.
-    EXPECT_NEAR(static_cast<double>(flagged[0].error().position.count - flagged[0].error().unflagged.count),
-                35, 2);
-    EXPECT_EQ(flagged[0].error().position.count, whole[0].error().position.count);
-    EXPECT_LT(flagged[0].error().free.count, whole[0].error().free.count);
+    EXPECT_NEAR(static_cast<double>(flagged[0].error.position.count - flagged[0].error.unflagged.count), 35,
+                2);
+    EXPECT_EQ(flagged[0].error.position.count, whole[0].error.position.count);
+    EXPECT_LT(flagged[0].error.free.count, whole[0].error.free.count);
 }
 
 /// Normal numbers that do not depend on the standard library.
@@ -155,13 +155,13 @@ TEST(PredictionError, ScoresAddUpAsIfOneRecordingFollowedTheOther) {
     const app::Recording recording = sample::recording_of(sample::strokes, 4, 250);
     const auto hold = scores_of(recording, "hold", {0.05}), thesis = scores_of(recording, "thesis", {0.05});
     app::ErrorScore sum;
-    sum.add(hold[0].error());
-    sum.add(thesis[0].error());
-    const double a = hold[0].error().position.rms(), b = thesis[0].error().position.rms();
+    sum.add(hold[0].error);
+    sum.add(thesis[0].error);
+    const double a = hold[0].error.position.rms(), b = thesis[0].error.position.rms();
     EXPECT_NEAR(sum.position.rms(), std::sqrt((a * a + b * b) / 2), 1e-9);  // as many of each
     EXPECT_EQ(sum.errors_mm.size(), sum.position.count);
-    EXPECT_GE(sum.p95_mm(), std::min(hold[0].error().p95_mm(), thesis[0].error().p95_mm()));
-    EXPECT_LE(sum.p95_mm(), std::max(hold[0].error().p95_mm(), thesis[0].error().p95_mm()));
+    EXPECT_GE(sum.p95_mm(), std::min(hold[0].error.p95_mm(), thesis[0].error.p95_mm()));
+    EXPECT_LE(sum.p95_mm(), std::max(hold[0].error.p95_mm(), thesis[0].error.p95_mm()));
 }
 
 TEST(PredictionError, PositionsAloneScoreAsTheWholeDoes) {
@@ -175,7 +175,7 @@ TEST(PredictionError, PositionsAloneScoreAsTheWholeDoes) {
         const auto whole = app::score_predictor(stick, *tracking::make_predictor(name));
         const auto positions = app::score_positions(stick, *tracking::make_predictor(name));
         for (std::size_t lead = 0; lead < leads_s.size(); ++lead)
-            EXPECT_DOUBLE_EQ(positions[lead].rms(), whole[lead].error().position.rms()) << name;
+            EXPECT_DOUBLE_EQ(positions[lead].rms(), whole[lead].error.position.rms()) << name;
     }
 }
 

@@ -222,16 +222,6 @@ TEST(StrikeEvaluation, AStrokeIsNotLostBetweenModels) {
     expect_on_time(score_models(0.496, 1), 12, "one note");
 }
 
-constexpr const char* kFlatDrum = R"(
-name = "Flat"
-[[instrument]]
-name = "table"
-kind = "drum"
-size = [2, 0.2, 2]
-position = [0, -0.1, 0]
-midi_note = 38
-)";
-
 TEST(StrikeEvaluation, AWideFlatDrumIsStruckAsAPlaneATipsRadiusAboveIt) {
     const tracking::StickTrace stick = stick_of(bounces({-0.02, -0.03, 0.05, -0.01, 0.03}), 5);
     StrikeSurface drum;

@@ -31,16 +31,6 @@ double rebounding(double t) {
     return t < kTurnS ? kFallMps * (kContactS - t) : -kDepthM + kReboundMps * (t - kTurnS);
 }
 
-constexpr const char* kFlatDrum = R"(
-name = "Flat"
-[[instrument]]
-name = "table"
-kind = "drum"
-size = [2, 0.2, 2]
-position = [0, -0.1, 0]
-midi_note = 38
-)";
-
 TEST(TrueContacts, TheSpeedIsThatOfTheLastPieceBeforeTheContactAlsoIfTheReboundLiesInTheNext) {
     const TipTrack track = track_of(rebounding, -0.1, 0.1, kIntervalS);
     const double across = (track.tip[12].y() - track.tip[13].y()) / kIntervalS;
