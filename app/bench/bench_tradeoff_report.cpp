@@ -7,7 +7,7 @@
 
 #include "bench/bench_report.h"
 #include "bench/bench_tradeoff.h"
-#include "report/plot_panel.h"
+#include "report/plot.h"
 #include "report/table.h"
 
 namespace app {

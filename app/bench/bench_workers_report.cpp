@@ -4,7 +4,7 @@
 #include <iterator>
 
 #include "bench/bench_workers.h"
-#include "report/plot_panel.h"
+#include "report/plot.h"
 #include "report/table.h"
 
 namespace app {

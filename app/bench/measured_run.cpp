@@ -6,7 +6,7 @@
 #include <numeric>
 #include <optional>
 
-#include "simulate/momentum_watch.h"
+#include "simulate/simulate_record.h"
 
 namespace app {
 namespace {
@@ -36,10 +36,7 @@ public:
     void moved(std::uint64_t step, int bodies, int from, int to) override {
         run_.trades.push_back({step, bodies, from, to});
     }
-    void finish() {
-        const MomentumDrift drift = momentum_->drift(run_.result.outside_impulse).value();
-        run_.momentum_drift = drift.scale > 0 ? drift.linear / drift.scale : drift.linear;
-    }
+    void finish() { run_.momentum_drift = momentum_->drift(run_.result.outside_impulse).value().share(); }
 
 private:
     void keep_centres(const sim::World& world) {

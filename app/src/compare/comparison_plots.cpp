@@ -9,7 +9,7 @@
 #include <set>
 
 #include "compare/tuning.h"
-#include "report/plot_panel.h"
+#include "report/plot.h"
 
 namespace app {
 namespace {

@@ -2,7 +2,7 @@
 #include <string>
 
 #include "compare/comparison.h"
-#include "report/plot_gallery.h"
+#include "report/plot.h"
 
 namespace app {
 

@@ -13,7 +13,6 @@
 #include "compare/comparison_tables.h"
 #include "compare/findings.h"
 #include "report/html.h"
-#include "report/report_style.h"
 #include "traces/sensor_model.h"
 
 namespace app {
