@@ -11,7 +11,7 @@
 
 #include "bench/bench_report.h"
 #include "process/clock.h"
-#include "report/plot_panel.h"
+#include "report/plot.h"
 #include "report/table.h"
 
 namespace app {

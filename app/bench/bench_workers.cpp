@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "bench/measured_run.h"
-#include "report/plot_panel.h"
+#include "report/plot.h"
 #include "report/table.h"
 #include "scene/scene.h"
 

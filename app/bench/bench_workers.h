@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bench/bench_report.h"
-#include "simulate/worker_history.h"
+#include "simulate/simulate_record.h"
 
 namespace app {
 

@@ -25,7 +25,7 @@
 #include "files/bad_input.h"
 #include "files/output_folder.h"
 #include "process/child_process.h"
-#include "report/gnuplot.h"
+#include "report/plot.h"
 #include "scene/scene.h"
 
 namespace app {

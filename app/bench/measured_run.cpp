@@ -6,7 +6,7 @@
 #include <numeric>
 #include <optional>
 
-#include "simulate/momentum_watch.h"
+#include "simulate/simulate_record.h"
 
 namespace app {
 namespace {
@@ -55,8 +55,7 @@ MeasuredRun measure(const sim::WorldScene& scene, const sim::DistributedSettings
     MeasuredRun run;
     BodiesWatch watch(run, scene, settings);
     run.result = start(watch);
-    const MomentumDrift drift = watch.drift(run.result.outside_impulse);
-    run.momentum_drift = drift.scale > 0 ? drift.linear / drift.scale : drift.linear;
+    run.momentum_drift = watch.drift(run.result.outside_impulse).share();
     return run;
 }
 

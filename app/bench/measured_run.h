@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "simulate/worker_history.h"
+#include "simulate/simulate_record.h"
 
 namespace app {
 

@@ -12,16 +12,16 @@
 inline app::PlayResult sample_play_result() {
     app::PlayResult r;
     r.trace = "traces/a,b <take> \"1\".csv";
-    r.kit = "kits/drums.toml";
+    r.options.kit = "kits/drums.toml";
     r.kit_name = "drums & bells";
     r.trace_source = "synthetic";
-    r.picture_predictor = "cv";
-    r.sound_predictor = "ca:q=1e9,gate=5";
+    r.options.picture_predictor = "cv";
+    r.options.sound_predictor = "ca:q=1e9,gate=5";
     r.t0_s = 0.1;
     r.t_end_s = 1.1;
-    r.render_lead_s = 1.0 / 30;
-    r.sound_lead_s = 1.0 / 15;
-    r.release_margin_s = 0.01;
+    r.options.render_lead_s = 1.0 / 30;
+    r.options.sound_lead_s = 1.0 / 15;
+    r.options.release_margin_s = 0.01;
     r.frames = 30;
     r.sticks = {"left", "right"};
     r.instruments = {"snare", "tom, \"low\"", "it's <b>crash</b>"};
@@ -67,8 +67,8 @@ inline app::PlayResult sample_play_result() {
     }
     r.wall_s = 0.5;
     r.stages_s = {{"tracking", 0.1}, {"drawing", 0.3}};
-    r.workers = 1;
-    r.inputs = {{r.trace, std::string(64, 'a')}, {r.kit, std::string(64, 'b')}};
+    r.options.workers = 1;
+    r.inputs = {{r.trace, std::string(64, 'a')}, {r.options.kit.string(), std::string(64, 'b')}};
     r.fingerprint = "0123456789abcdef";
     r.versions = {{"csound", "6.18"}};
     return r;

@@ -9,7 +9,7 @@
 #include "commands/play_command.h"
 #include "files/output_folder.h"
 #include "latency/latency_comparison.h"
-#include "latency/latency_tables.h"
+#include "latency/latency_report.h"
 
 namespace app {
 namespace fs = std::filesystem;

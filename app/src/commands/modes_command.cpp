@@ -168,8 +168,8 @@ void write_products(const ModesOptions& a, const ModeReport& report) {
     write_file(folder.path("modes.json"), format_mode_json(report));
     if (a.frames) {
         std::filesystem::create_directory(folder.path("frames"));
-        ModePictures(report.request, report.modes.basis, kMostPictures)
-            .write(folder.path("frames"), folder.path("modes.png"));
+        draw_modes(report.request, report.modes.basis, kMostPictures, folder.path("frames"),
+                   folder.path("modes.png"));
     }
     folder.finish();
 }

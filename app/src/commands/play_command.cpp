@@ -45,15 +45,13 @@ void play_offline(const PlayOptions& options) {
 void play_in_time(const RealtimeOptions& options) {
     const RealtimeOutcome outcome =
         play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
-    const auto unexplained = std::ranges::count_if(
-        outcome.departures, [](const Divergence& d) { return d.cause == "unexplained"; });
     fmt::print("{:.1f} s in real time: {}; {} of {} missed, {} of {} late\n", outcome.realtime.seconds,
                strikes_text(outcome.play.score), outcome.latency.frames.missed,
                counted(outcome.latency.frames.total, "frame"), outcome.latency.notes.missed,
                counted(outcome.latency.notes.total, "note"));
-    if (outcome.offline_strikes > 0)
-        fmt::print("{} offline: {} here, {} unexplained ({})\n", counted(outcome.offline_strikes, "strike"),
-                   counted(outcome.departures.size(), "departure"), unexplained,
+    if (const OfflineComparison& offline = outcome.offline; offline.offline_strikes > 0)
+        fmt::print("{} offline: {} here, {} unexplained ({})\n", counted(offline.offline_strikes, "strike"),
+                   counted(offline.departures.size(), "departure"), offline.unexplained(),
                    (options.play.out / "departures.csv").string());
     print_places(options.play);
     if (!outcome.failure.empty()) throw std::runtime_error(outcome.failure);
@@ -112,30 +110,27 @@ Option add_play_options(Command& command, PlayOptions& o) {
 std::vector<Option> add_realtime_options(Command& command, RealtimeOptions& o, const Option& trace) {
     const auto midi_out = [&o](const std::string& port) {
         const bool elsewhere = port.find(':') != std::string::npos;
-        o.midi_port = elsewhere ? "midi_out" : port;
-        if (elsewhere) o.midi_connect = port;
+        o.sound.midi_port = elsewhere ? "midi_out" : port;
+        if (elsewhere) o.sound.midi_connect = port;
     };
-    const auto disturb = [&o](const std::string& text) {
-        o.disturbance = parse_disturbance(text);
-        o.disturbed_by = text;
-    };
+    const auto disturb = [&o](const std::string& text) { o.disturbance = parse_artificial_load(text); };
     return {command.option("--seconds", o.seconds, as::number(0, 10800, "s"),
                            "How long; a shorter trace is played again and again; 0: the trace once"),
             command
-                .option("--source", o.source, as::text("SOURCE"),
+                .option("--source", o.sensors.source, as::text("SOURCE"),
                         "Sensors instead of TRACE: stdin, zmq:ENDPOINT, osc:PORT, trace:FILE")
                 .excludes(trace),
-            command.option("--sticks", o.sticks, as::list_of(as::text("NAME")),
+            command.option("--sticks", o.sensors.sticks, as::list_of(as::text("NAME")),
                            "Names of the sticks of --source"),
             command.option("--lead", o.lead_auto, as::choice<bool>({{"fixed", false}, {"auto", true}}),
                            "auto: leads follow the measured delays, never below those asked for"),
             command.option(
-                "--output-lead", o.output_lead_s, as::number(0.001, 1, "s"),
+                "--output-lead", o.sound.output_lead_s, as::number(0.001, 1, "s"),
                 "A block of sound is computed this long before it is due, less than the release margin"),
             command.option("--priority", o.realtime_priority,
                            as::choice<bool>({{"auto", true}, {"normal", false}}),
                            "auto: real-time scheduling where permitted; normal: never"),
-            command.flag("--jack", o.jack_audio, "Also play through a running JACK server"),
+            command.flag("--jack", o.sound.jack_audio, "Also play through a running JACK server"),
             command.option<std::string>("--midi-out", as::text("PORT"),
                                         "Send each note to this JACK MIDI port (client:port); a name without "
                                         "colon is a port of ours, left "

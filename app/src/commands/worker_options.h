@@ -2,7 +2,7 @@
 #include <optional>
 
 #include "commands/command.h"
-#include "simulate/worker_options.h"
+#include "simulate/simulate.h"
 
 namespace app {
 

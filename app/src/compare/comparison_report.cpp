@@ -16,9 +16,7 @@
 #include "compare/comparison_tables.h"
 #include "compare/entrants.h"
 #include "report/html.h"
-#include "report/plot_gallery.h"
-#include "report/plot_panel.h"
-#include "report/report_style.h"
+#include "report/plot.h"
 #include "traces/sensor_model.h"
 
 namespace app {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "files/bad_input.h"
-#include "report/report_style.h"
+#include "report/html.h"
 
 namespace app {
 namespace {
@@ -27,6 +27,7 @@ constexpr std::array<const char*, 4> kQuantiles = {"p50_ms", "p95_ms", "p99_ms",
                     file.string(), found));
 }
 
+/// What `latency` wrote, its stages by name.
 Json read_document(const std::filesystem::path& folder) {
     const std::filesystem::path file = folder / "latency.json";
     std::ifstream in(file);
@@ -35,9 +36,14 @@ Json read_document(const std::filesystem::path& folder) {
     if (json.is_discarded()) refuse(file, "a text that is not JSON");
     if (!json.is_object() || !json.contains("stages") || !json["stages"].is_array())
         refuse(file, "no stages");
-    for (const Json& stage : json["stages"])
+    Json stages = Json::object();
+    for (const Json& stage : json["stages"]) {
         if (!stage.is_object() || !stage.contains("name") || !stage["name"].is_string())
             refuse(file, "a stage without a name");
+        const std::string name = stage["name"];
+        if (!stages.contains(name)) stages[name] = stage;
+    }
+    json["stages"] = stages;
     return json;
 }
 
@@ -48,25 +54,9 @@ std::optional<double> number(const Json& json, const std::string& pointer) {
     return json.at(at).get<double>();
 }
 
-const Json* stage_named(const Json& document, const std::string& name) {
-    const Json& stages = document["stages"];
-    const auto stage =
-        std::find_if(stages.begin(), stages.end(), [&](const Json& s) { return s["name"] == name; });
-    return stage == stages.end() ? nullptr : &*stage;
-}
-
 /// A's value, B's, and their ratio.
 std::array<Cell, 3> compared(const std::optional<double>& a, const std::optional<double>& b) {
     return {a, b, a && b && *a != 0 ? std::optional(*b / *a) : std::nullopt};
-}
-
-std::vector<std::string> stage_names(const Json& a, const Json& b) {
-    std::vector<std::string> names;
-    for (const Json* document : {&a, &b})
-        for (const Json& stage : (*document)["stages"])
-            if (std::find(names.begin(), names.end(), stage["name"]) == names.end())
-                names.push_back(stage["name"]);
-    return names;
 }
 
 Table compared_stages(const Json& a, const Json& b) {
@@ -74,12 +64,13 @@ Table compared_stages(const Json& a, const Json& b) {
     for (const std::string key : kQuantiles)
         table.columns.insert(table.columns.end(),
                              {{"a/" + key, ".3f"}, {"b/" + key, ".3f"}, {"ratio/" + key, ".2f"}});
-    for (const std::string& name : stage_names(a, b)) {
-        std::vector<Cell> row = {name};
+    Json all = a["stages"];
+    all.update(b["stages"]);  // adds those that B has alone
+    for (const auto& stage : all.items()) {
+        Cells row = {stage.key()};
         for (const std::string key : kQuantiles) {
             const auto value = [&](const Json& document) {
-                const Json* stage = stage_named(document, name);
-                return stage == nullptr ? std::nullopt : number(*stage, "/" + key);
+                return number(document["stages"].value(stage.key(), Json::object()), "/" + key);
             };
             std::ranges::copy(compared(value(a), value(b)), std::back_inserter(row));
         }
@@ -128,12 +119,11 @@ std::string format_json(const LatencyComparison& c) {
 }
 
 std::string format_page(const LatencyComparison& c) {
-    return report_page(
-        "Latency of two runs",
-        fmt::format("<header><h1>Latency of two runs</h1>\n<dl class=facts>\n{}{}</dl></header>\n"
-                    "<h2>Stages</h2>\n<p class=note>Milliseconds; a ratio below 1: B is faster.</p>\n{}"
-                    "<h2>Figures</h2>\n{}",
-                    report_fact("A", c.a), report_fact("B", c.b), c.stages.html(), c.figures.html()));
+    constexpr const char* kTitle = "Latency of two runs";
+    return report_page(kTitle, report_header(kTitle, "", {{"A", c.a}, {"B", c.b}}) +
+                                   "<h2>Stages</h2>\n<p class=note>Milliseconds; a ratio below 1: B is "
+                                   "faster.</p>\n" +
+                                   c.stages.html() + "<h2>Figures</h2>\n" + c.figures.html());
 }
 
 }  // namespace app

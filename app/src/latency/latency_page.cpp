@@ -1,5 +1,3 @@
-#include "latency/latency_page.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,23 +5,14 @@
 #include <iterator>
 #include <map>
 
-#include "latency/latency_tables.h"
-#include "report/plot_gallery.h"
-#include "report/plot_panel.h"
-#include "report/report_style.h"
+#include "latency/latency_report.h"
+#include "process/clock.h"
+#include "report/plot.h"
 
 namespace app {
 namespace {
 
 constexpr int kWide = 1040, kHalf = 520;
-
-std::string axes(const char* x, const char* y) {
-    return plot_axes() + fmt::format("set xlabel '{}'\nset ylabel '{}'\n", x, y);
-}
-
-std::string range(const char* axis, double low, double high) {
-    return fmt::format("set {}range [{}:{}]\n", axis, low, high);
-}
 
 /// Lines "x y" of the longest values that 1 in 1, 2, 3, ... exceeds, thinned to about 50 a factor of ten.
 std::string longer_shares(const Spread& ms, double least_ms) {
@@ -60,11 +49,6 @@ Histogram histogram(const Spread& ms, double bin_ms, double low_ms, double high_
     return made;
 }
 
-/// A vertical line.
-void add_line(PlotPanel& panel, double x, double height, const PlotLine& look) {
-    panel.add(fmt::format("{} 0\n{} {}\n", x, x, height), style_of(look, 1.4));
-}
-
 /// The shaded place of what drummers call no latency: 10 +- 3 ms after the picture.
 std::string drummers_box(double height) {
     return fmt::format("set object 1 rect from {},0 to {},{} fc {} fs solid 0.18 noborder behind\n",
@@ -78,16 +62,12 @@ const PlotLine kPicture{"against the drawn path", colours::released},
     kItu{"ITU-R BT.1359 detectable (-45, +125 ms)", colours::wrong},
     kDrummers{"drummers: 10 +- 3 ms passes for none", colours::sticks[1]};
 
-std::string boxes(const PlotLine& look) {
-    return "with boxes fs solid 0.75 noborder lc " + gnuplot_colour(look.colour);
+std::string points(const PlotLine& look, double size) {
+    return fmt::format("with points pt 7 ps {} lc {}", size, gnuplot_colour(look.colour));
 }
 
 double pixels_ms_after_due(const FrameTiming& frame) {
     return 1e-6 * static_cast<double>(frame.read_ns - frame.shown_ns);
-}
-
-double seconds(std::int64_t ns) {
-    return 1e-9 * static_cast<double>(ns);
 }
 
 /// Share of the values that are longer, over the value; a line for each stage of that kind. Both axes
@@ -102,13 +82,12 @@ PlotWithLegend stage_plot(const LatencyReport& report, LatencyStage::Kind kind) 
         plot.legend.push_back(line_of(plot.legend.size(), stage.name));
         panel.add(longer_shares(stage.ms, kLeastMs), style_of(plot.legend.back(), 1.6));
         low = std::min(low, std::max(stage.ms.percentile(5), kLeastMs));
-        high = std::max(high, stage.ms.max());
+        high = std::max(high, stage.ms.percentile(100));
         rarest = std::min(rarest, 1 / static_cast<double>(stage.ms.count()));
     }
-    plot.script = {kHalf, 320,
-                   axes("ms", "share that took longer") + "set logscale xy\nset format '%g'\n" +
-                       range("x", std::min(low, high) / 1.5, high * 1.5) + range("y", rarest / 1.5, 1) +
-                       panel.text()};
+    plot.script =
+        plot_of(kHalf, 320, {"ms", std::min(low, high) / 1.5, high * 1.5},
+                {"share that took longer", rarest / 1.5, 1}, panel, "set logscale xy\nset format '%g'\n");
     return plot;
 }
 
@@ -144,52 +123,58 @@ PlotWithLegend leads_plot(const RealtimeResult& realtime) {
         panel.add(data, fmt::format("with steps lt 1 lw 1.6{} lc {}", series.dashed ? " dt '-'" : "",
                                     gnuplot_colour(series.colour)));
     }
-    plot.script = {kWide, 260,
-                   axes("time, s", "ms") + range("x", 0, std::max(realtime.seconds, 1e-3)) +
-                       range("y", 0, highest * 1.1) + round_tics("y", highest * 1.1, 6) + panel.text()};
+    plot.script = plot_of(kWide, 260, {"time, s", 0, std::max(realtime.seconds, 1e-3)},
+                          {"ms", 0, highest * 1.1, 6}, panel);
     return plot;
 }
 
-/// Sound minus picture, with the limits of ITU-R BT.1359 and ATSC and the 10 +- 3 ms of drummers beside it.
-PlotWithLegend sound_picture_plot(const LatencyReport& report) {
-    const double low = std::min(-60.0, std::floor(report.sound_minus_picture_ms.min())),
-                 high = std::max(140.0, std::ceil(report.sound_minus_picture_ms.max()));
-    const Histogram counts = histogram(report.sound_minus_picture_ms, 2, low, high);
-    const double top = 1.08 * counts.highest;
+/// Sound minus picture with the 10 +- 3 ms of drummers; `close`: also against the first frame behind the
+/// surface, else with the limits of ITU-R BT.1359 and ATSC.
+PlotWithLegend sound_picture_plot(const LatencyReport& report, double bin_ms, double low, double high,
+                                  bool close) {
+    const Histogram path = histogram(report.sound_minus_picture_ms, bin_ms, low, high),
+                    frame = histogram(report.sound_minus_frame_ms, bin_ms, low, high);
+    const double top = 1.08 * (close ? std::max(path.highest, frame.highest) : path.highest);
+    PlotWithLegend plot{{}, {kPicture}};
     PlotPanel panel;
-    panel.add(counts.data, boxes(kPicture));
-    for (const double x : {kAtscLimits.early_ms, kAtscLimits.late_ms}) add_line(panel, x, top, kAtsc);
-    for (const double x : {kItuLimits.early_ms, kItuLimits.late_ms}) add_line(panel, x, top, kItu);
-    return {
-        {kHalf, 260,
-         axes("sound - picture, ms (positive: sound late)", "strikes in 2 ms") + drummers_box(top) +
-             range("x", low, high) + range("y", 0, top) + "set xtics 20\nset boxwidth 1.8\n" + panel.text()},
-        {kPicture, kAtsc, kItu, kDrummers}};
+    panel.add(path.data, "with boxes fs solid 0.75 noborder lc " + gnuplot_colour(kPicture.colour));
+    if (close) {
+        panel.add(frame.data, "with histeps lt 1 lw 1.4 lc " + gnuplot_colour(kFrame.colour));
+        plot.legend.push_back(kFrame);
+    } else {
+        for (const auto& [limits, look] : {std::pair{kAtscLimits, kAtsc}, {kItuLimits, kItu}}) {
+            for (const double x : {limits.early_ms, limits.late_ms})
+                panel.add(fmt::format("{} 0\n{} {}\n", x, x, top), style_of(look, 1.4));
+            plot.legend.push_back(look);
+        }
+    }
+    plot.legend.push_back(kDrummers);
+    plot.script = plot_of(
+        kHalf, 260, {"sound - picture, ms (positive: sound late)", low, high},
+        {fmt::format("strikes in {:g} ms", bin_ms), 0, top}, panel,
+        drummers_box(top) + fmt::format("set xtics {}\nset boxwidth {}\n", 10 * bin_ms, 0.9 * bin_ms));
+    return plot;
 }
 
-/// The same close up: 80 ms about the median, 1 ms a bin; and against the first frame behind the surface.
+/// All of them.
+PlotWithLegend sound_picture_plot(const LatencyReport& report) {
+    const Spread& ms = report.sound_minus_picture_ms;
+    return sound_picture_plot(report, 2, std::min(-60.0, std::floor(ms.percentile(0))),
+                              std::max(140.0, std::ceil(ms.percentile(100))), false);
+}
+
+/// Close up: 80 ms about the median.
 PlotWithLegend sound_picture_close_plot(const LatencyReport& report) {
     const Spread& ms = report.sound_minus_picture_ms;
     const double middle = ms.empty() ? 0 : std::round(ms.percentile(50) / 10) * 10;
-    const double low = middle - 40, high = middle + 40;
-    const Histogram path = histogram(report.sound_minus_picture_ms, 1, low, high),
-                    frame = histogram(report.sound_minus_frame_ms, 1, low, high);
-    const double top = 1.08 * std::max(path.highest, frame.highest);
-    PlotPanel panel;
-    panel.add(path.data, boxes(kPicture));
-    panel.add(frame.data, "with histeps lt 1 lw 1.4 lc " + gnuplot_colour(kFrame.colour));
-    return {
-        {kHalf, 260,
-         axes("sound - picture, ms (positive: sound late)", "strikes in 1 ms") + drummers_box(top) +
-             range("x", low, high) + range("y", 0, top) + "set xtics 10\nset boxwidth 0.9\n" + panel.text()},
-        {kPicture, kFrame, kDrummers}};
+    return sound_picture_plot(report, 1, middle - 40, middle + 40, true);
 }
 
 /// When each frame's pixels were there, before (below 0) or after it was due; missed ones marked.
 PlotWithLegend frames_plot(const RealtimeResult& realtime) {
     double low = -5, high = 5, last_s = realtime.seconds;
     for (const FrameTiming& frame : realtime.frames) {
-        last_s = std::max(last_s, seconds(frame.shown_ns));
+        last_s = std::max(last_s, to_s(frame.shown_ns));
         if (frame.read_ns == 0) continue;
         low = std::min(low, pixels_ms_after_due(frame) - 2);
         high = std::max(high, pixels_ms_after_due(frame) + 2);
@@ -197,7 +182,7 @@ PlotWithLegend frames_plot(const RealtimeResult& realtime) {
     const PlotArea area{0, std::max(last_s, 1e-3), low, high, kWide, 240};
     ThinnedMarks in_time(area), late(area), skipped(area);
     for (const FrameTiming& frame : realtime.frames) {
-        const double at_s = seconds(frame.shown_ns);
+        const double at_s = to_s(frame.shown_ns);
         if (!frame.asked_for) continue;
         if (frame.fate == FrameFate::skipped)
             skipped.add(at_s, 0);
@@ -207,14 +192,13 @@ PlotWithLegend frames_plot(const RealtimeResult& realtime) {
     const PlotLine shown{"in time", colours::released}, missed{"late: not shown", colours::wrong},
         never{"skipped: not drawn", colours::missed};
     PlotPanel panel;
-    panel.add(in_time.text(), "with points pt 7 ps 0.25 lc " + gnuplot_colour(shown.colour));
-    panel.add(late.text(), "with points pt 7 ps 0.5 lc " + gnuplot_colour(missed.colour));
-    panel.add(skipped.text(), "with points pt 7 ps 0.5 lc " + gnuplot_colour(never.colour));
+    panel.add(in_time.text(), points(shown, 0.25));
+    panel.add(late.text(), points(missed, 0.5));
+    panel.add(skipped.text(), points(never, 0.5));
     panel.add(fmt::format("0 0\n{} 0\n", area.x_high),
               "with lines lt 1 lw 1 lc " + gnuplot_colour(colours::axis));
-    return {{kWide, 260,
-             axes("due on the screen, s", "pixels there after that, ms") + range("x", 0, area.x_high) +
-                 range("y", low, high) + round_tics("y", high - low, 6) + panel.text()},
+    return {plot_of(kWide, 260, {"due on the screen, s", 0, area.x_high},
+                    {"pixels there after that, ms", low, high, 6}, panel),
             {shown, missed, never}};
 }
 
@@ -233,67 +217,64 @@ PlotWithLegend error_plot(const LatencyReport& report) {
     const PlotLine line{"RMS over 0.5 s, all sticks", colours::sticks[0]};
     PlotPanel panel;
     panel.add(data, style_of(line, 1.6));
-    return {{kWide, 220,
-             axes("time, s", "mm") + range("x", 0, end_s) + range("y", 0, 1.1 * highest) +
-                 round_tics("y", 1.1 * highest, 5) + panel.text()},
-            {line}};
+    return {plot_of(kWide, 220, {"time, s", 0, end_s}, {"mm", 0, 1.1 * highest, 5}, panel), {line}};
+}
+
+std::string trace_name(const PlayResult& play) {
+    return std::filesystem::path(play.trace).filename().string();
 }
 
 std::string heading(const PlayResult& play, const RealtimeResult& r) {
-    const std::string name = std::filesystem::path(play.trace).filename().string();
-    std::string text =
-        fmt::format("<header><h1>Latency of {}</h1>\n<p>on {} in real time, by MusicWorld</p>\n", html(name),
-                    html(play.kit_name));
-    text += "<dl class=facts>\n" + report_fact("source", play.trace) + report_fact("kit", play.kit);
-    text += report_fact("run", fmt::format("{:.1f} s, {} lap{}", r.seconds, r.laps, r.laps == 1 ? "" : "s"));
-    text += report_fact("pictures predicted by", play.picture_predictor);
-    text += report_fact("sounds predicted by", play.sound_predictor);
-    text += report_fact("sound goes to", fmt::format("{}; a block is begun {:.1f} ms before it is due",
-                                                     r.audio_device, 1e3 * r.output_lead_s));
-    for (const auto& [thread, obtained] : r.priorities)
-        text += report_fact("priority of " + thread, obtained);
-    return text + "</dl></header>\n";
+    std::vector<std::pair<std::string, std::string>> facts = {
+        {"source", play.trace},
+        {"kit", play.options.kit.string()},
+        {"run", fmt::format("{:.1f} s, {} lap{}", r.seconds, r.laps, r.laps == 1 ? "" : "s")},
+        {"pictures predicted by", play.options.picture_predictor},
+        {"sounds predicted by", play.options.sound_predictor},
+        {"sound goes to", fmt::format("{}; a block is begun {:.1f} ms before it is due", r.audio_device,
+                                      1e3 * r.output_lead_s)}};
+    for (const auto& [thread, obtained] : r.priorities) facts.emplace_back("priority of " + thread, obtained);
+    return report_header("Latency of " + trace_name(play),
+                         fmt::format("on {} in real time, by MusicWorld", play.kit_name), facts);
 }
 
 std::string signed_ms(const Spread& ms, double percent) {
     return ms.empty() ? "none" : fmt::format("{:+.1f} ms", ms.percentile(percent));
 }
 
-std::string needed(const std::optional<double>& ms) {
-    return ms ? fmt::format("{:.1f} ms", *ms) : "unknown";
-}
-
 std::string figures(const LatencyReport& r) {
-    const auto missed = [](const Deadline& d) { return fmt::format("{} of {}", d.missed, d.total); };
-    const auto tone = [](const Deadline& d) { return d.missed == 0 ? "released" : "wrong"; };
-    std::string text = "<section class=figures>\n";
-    text += report_figure(missed(r.frames), "frames missed", tone(r.frames));
-    text += report_figure(missed(r.notes), "notes late", tone(r.notes));
-    text += report_figure(missed(r.blocks), "blocks late", tone(r.blocks));
-    text += report_figure(missed(r.samples), "samples late", tone(r.samples));
-    text += report_figure(missed(r.skipped), "samples skipped", tone(r.skipped));
-    text += report_figure(missed(r.strokes), "strokes missed", tone(r.strokes));
-    text += report_figure(signed_ms(r.sound_minus_picture_ms, 50), "sound - picture", "axis");
-    text += report_figure(needed(r.render_lead_needed_ms), "lead pictures need", "axis");
-    text += report_figure(needed(r.sound_lead_needed_ms), "lead sound needs", "axis");
+    std::vector<PageFigure> all;
+    const std::pair<const Deadline*, const char*> deadlines[] = {
+        {&r.frames, "frames missed"}, {&r.notes, "notes late"},        {&r.blocks, "blocks late"},
+        {&r.samples, "samples late"}, {&r.skipped, "samples skipped"}, {&r.strokes, "strokes missed"}};
+    for (const auto& [d, name] : deadlines)
+        all.push_back(
+            {fmt::format("{} of {}", d->missed, d->total), name, d->missed == 0 ? "released" : "wrong"});
+    all.push_back({signed_ms(r.sound_minus_picture_ms, 50), "sound - picture", "axis"});
+    all.push_back({milliseconds(r.render_lead_needed_ms), "lead pictures need", "axis"});
+    all.push_back({milliseconds(r.sound_lead_needed_ms), "lead sound needs", "axis"});
     if (r.rms_error_mm)
-        text += report_figure(fmt::format("{:.1f} mm", *r.rms_error_mm), "RMS on the screen", "axis");
-    return text + "</section>\n";
+        all.push_back({fmt::format("{:.1f} mm", *r.rms_error_mm), "RMS on the screen", "axis"});
+    return report_figures(all);
 }
 
 std::string sound_picture_note(const LatencyReport& report) {
+    std::string shares = report.notes.total == 0 ? "There were no notes" : "No note has a picture";
+    if (const std::optional<double> atsc = report.share_within_atsc())
+        shares = fmt::format(
+            "{:.1f} % of all notes lie within ATSC's limit, {:.1f} % of those with a picture within ITU's",
+            100 * *atsc, 100 * report.share_within_itu().value());
     return fmt::format(
         "<p class=note>A note's onset in the output minus the time at which the drawn path of its stick, "
         "a cubic Hermite curve through the tips predicted for the frames shown, comes into the "
         "instrument's surface. Frames that hold a stick at a coming contact count with the prediction of "
         "that contact, which the sound's filter made a render lead before. The screen shows no time "
         "between frames: the first frame that shows the stick at or behind the surface is up to a frame "
-        "later (p5 {}, median {}, p95 {} against that). {:.1f} % of all notes lie within ATSC's limit, "
-        "{:.1f} % of those with a picture within ITU's; of {} notes the drawn stick did not strike "
+        "later (p5 {}, median {}, p95 {} against that). {}; of {} notes the drawn stick did not strike "
         "within {:g} ms.</p>\n",
         signed_ms(report.sound_minus_frame_ms, 5), signed_ms(report.sound_minus_frame_ms, 50),
-        signed_ms(report.sound_minus_frame_ms, 95), 100 * report.share_within_atsc(),
-        100 * report.share_within_itu(), report.notes_without_picture, 1e3 * kPictureWindowS);
+        signed_ms(report.sound_minus_frame_ms, 95), shares, report.notes_without_picture,
+        1e3 * kPictureWindowS);
 }
 
 /// What the sensors and the rule of quality did.
@@ -327,7 +308,7 @@ std::string format_latency_page(const LatencyReport& report, const PlayResult& p
     body += "<h2>Over time</h2>\n" + plots.element(leads) + plots.element(frames) + plots.element(errors);
     if (!realtime.clocks.empty()) body += "<h2>Clocks</h2>\n" + clock_table(realtime).html();
     body += remarks(realtime);
-    return report_page("Latency of " + std::filesystem::path(play.trace).filename().string(), body);
+    return report_page("Latency of " + trace_name(play), body);
 }
 
 }  // namespace app

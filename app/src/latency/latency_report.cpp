@@ -1,70 +1,62 @@
 #include "latency/latency_report.h"
 
-#include <algorithm>
-#include <cmath>
+#include <fmt/format.h>
 
-#include "statistics/statistics.h"
+#include <cmath>
+#include <nlohmann/json.hpp>
 
 namespace app {
 namespace {
 
+using Json = nlohmann::ordered_json;
 using Kind = LatencyStage::Kind;
+
+constexpr const char* kFates[] = {"in time", "late", "skipped"};  // by FrameFate
 
 double ms(std::int64_t ns) {
     return 1e-6 * static_cast<double>(ns);
 }
 
-/// Adds a stage with the value of each item for which value(item) is one.
-template <class Items, class Value>
-void add(LatencyReport& report, Kind kind, const char* name, const char* meaning, const Items& items,
-         const Value& value) {
-    std::vector<double> values;
-    for (const auto& item : items)
-        if (const std::optional<double> one = value(item)) values.push_back(*one);
-    if (!values.empty()) report.stages.push_back({name, meaning, kind, Spread(std::move(values))});
-}
-
-using MaybeMs = std::optional<double>;
-
-void add_sample_stages(LatencyReport& report, const std::vector<SampleTiming>& samples) {
-    const auto stage = [&](const char* name, const char* meaning, auto from, auto to) {
-        add(report, Kind::sound, name, meaning, samples,
-            [&](const SampleTiming& s) { return MaybeMs(ms(s.*to - s.*from)); });
-    };
+/// The stages that something took, with the value of each item but for those of which it is kNoValue.
+std::vector<LatencyStage> stages_of(const RealtimeResult& realtime) {
     using S = SampleTiming;
-    stage("sensor to filter", "sample due to filters done", &S::due_ns, &S::filtered_ns);
-    stage("filter to app", "filters done to the application having it", &S::filtered_ns, &S::taken_ns);
-    add(report, Kind::sound, "query", "of the shared memory", samples,
-        [](const S& s) { return MaybeMs(ms(s.query_ns)); });
-    stage("contact", "the application having it to the simulation's answer", &S::taken_ns, &S::contact_ns);
-    stage("note hand-over", "the simulation's answer to notes with the audio", &S::contact_ns, &S::handed_ns);
-    stage("sample to notes", "sample due to notes with the audio", &S::due_ns, &S::handed_ns);
-}
-
-void add_frame_stages(LatencyReport& report, const std::vector<FrameTiming>& frames) {
     using F = FrameTiming;
-    const auto stage = [&](const char* name, const char* meaning, auto value) {
-        add(report, Kind::picture, name, meaning, frames, [&](const F& f) {
-            return f.fate == FrameFate::skipped || f.read_ns == 0 ? MaybeMs() : value(f);
-        });
+    std::vector<LatencyStage> stages;
+    const auto add = [&](Kind kind, const char* name, const char* meaning, const auto& items, auto value) {
+        std::vector<double> values;
+        for (const auto& item : items)
+            if (const double one = value(item); !std::isnan(one)) values.push_back(one);
+        if (!values.empty()) stages.push_back({name, meaning, kind, Spread(std::move(values))});
     };
-    stage("frame query", "poses and simulation asked", [](const F& f) { return MaybeMs(ms(f.query_ns)); });
-    stage("frame drawn", "drawing", [](const F& f) { return MaybeMs(ms(f.drawn_ns - f.started_ns)); });
-    stage("frame read back", "drawn to pixels there",
-          [](const F& f) { return MaybeMs(ms(f.read_ns - f.drawn_ns)); });
-    stage("frame in all", "query begun to pixels there",
-          [](const F& f) { return MaybeMs(ms(f.read_ns - f.started_ns + f.query_ns)); });
-    stage("frame written", "pixels there to file written",
-          [](const F& f) { return f.written_ns > 0 ? MaybeMs(ms(f.written_ns - f.read_ns)) : MaybeMs(); });
-}
-
-void add_ages(LatencyReport& report, const RealtimeResult& realtime) {
-    add(report, Kind::age, "pose age in frames", "shown minus its oldest stick's sample", realtime.frames,
-        [](const FrameTiming& f) {
-            return f.fate == FrameFate::in_time ? MaybeMs(1e3 * f.oldest_sample_age_s) : MaybeMs();
-        });
-    add(report, Kind::age, "pose age in notes", "onset minus the newest sample that could change it",
-        realtime.notes, [](const NoteTiming& n) { return MaybeMs(1e3 * n.pose_age_s); });
+    const auto sample = [&](const char* name, const char* meaning, auto from, auto to) {
+        add(Kind::sound, name, meaning, realtime.samples, [&](const S& s) { return ms(s.*to - s.*from); });
+    };
+    const auto frame = [&](const char* name, const char* meaning, auto value) {
+        add(Kind::picture, name, meaning, realtime.frames,
+            [&](const F& f) { return f.fate == FrameFate::skipped || f.read_ns == 0 ? kNoValue : value(f); });
+    };
+    sample("sensor to filter", "sample due to filters done", &S::due_ns, &S::filtered_ns);
+    sample("filter to app", "filters done to the application having it", &S::filtered_ns, &S::taken_ns);
+    add(Kind::sound, "query", "of the shared memory", realtime.samples,
+        [](const S& s) { return ms(s.query_ns); });
+    sample("contact", "the application having it to the simulation's answer", &S::taken_ns, &S::contact_ns);
+    sample("note hand-over", "the simulation's answer to notes with the audio", &S::contact_ns,
+           &S::handed_ns);
+    sample("sample to notes", "sample due to notes with the audio", &S::due_ns, &S::handed_ns);
+    add(Kind::sound, "block computed", "planned to done", realtime.blocks,
+        [](const audio::BlockTiming& b) { return ms(b.done_ns - b.planned_ns); });
+    frame("frame query", "poses and simulation asked", [](const F& f) { return ms(f.query_ns); });
+    frame("frame drawn", "drawing", [](const F& f) { return ms(f.drawn_ns - f.started_ns); });
+    frame("frame read back", "drawn to pixels there", [](const F& f) { return ms(f.read_ns - f.drawn_ns); });
+    frame("frame in all", "query begun to pixels there",
+          [](const F& f) { return ms(f.read_ns - f.started_ns + f.query_ns); });
+    frame("frame written", "pixels there to file written",
+          [](const F& f) { return f.written_ns > 0 ? ms(f.written_ns - f.read_ns) : kNoValue; });
+    add(Kind::age, "pose age in frames", "shown minus its oldest stick's sample", realtime.frames,
+        [](const F& f) { return f.fate == FrameFate::in_time ? 1e3 * f.oldest_sample_age_s : kNoValue; });
+    add(Kind::age, "pose age in notes", "onset minus the newest sample that could change it", realtime.notes,
+        [](const NoteTiming& n) { return 1e3 * n.pose_age_s; });
+    return stages;
 }
 
 template <class Items, class Missed>
@@ -108,57 +100,162 @@ void add_sound_and_picture(LatencyReport& report, const PlayResult& play, const 
         touches.push_back(picture.sound_minus_picture_ms());
         if (const auto frame = picture.sound_minus_frame_ms()) frames.push_back(*frame);
     }
-    report.sound_minus_picture_ms = Spread(std::move(touches));
-    report.sound_minus_frame_ms = Spread(std::move(frames));
+    report.sound_minus_picture_ms = Spread(touches);
+    report.sound_minus_frame_ms = Spread(frames);
 }
 
 void add_needed_leads(LatencyReport& report, double output_lead_s) {
-    const LatencyStage *frame = find_stage(report, "frame in all"),
-                       *notes = find_stage(report, "sample to notes"),
-                       *block = find_stage(report, "block computed");
-    if (frame != nullptr) report.render_lead_needed_ms = frame->ms.percentile(99);
-    if (notes != nullptr)
-        report.sound_lead_needed_ms = notes->ms.percentile(99) + 1e3 * output_lead_s +
-                                      (block != nullptr ? block->ms.percentile(99) : 0);
+    const auto p99 = [&](const char* name) -> std::optional<double> {
+        const LatencyStage* stage = find_stage(report, name);
+        return stage == nullptr ? std::nullopt : std::optional(stage->ms.percentile(99));
+    };
+    report.render_lead_needed_ms = p99("frame in all");
+    if (const std::optional<double> notes = p99("sample to notes"))
+        report.sound_lead_needed_ms = *notes + 1e3 * output_lead_s + p99("block computed").value_or(0);
+}
+
+Table sample_table(const PlayResult& play, const RealtimeResult& realtime) {
+    Table table = Table::of({"stick", "lap", "t_s", "due_ns", "read_ns", "filtered_ns", "taken_ns",
+                             "query_ns", "contact_ns", "handed_ns", "skipped", "late_s"});
+    for (const SampleTiming& s : realtime.samples)
+        table.add({play.sticks.at(s.stick), s.lap, s.t_s, s.due_ns, s.read_ns, s.filtered_ns, s.taken_ns,
+                   s.query_ns, s.contact_ns, s.handed_ns, s.skipped, s.late_s});
+    return table;
+}
+
+Table frame_table(const RealtimeResult& realtime) {
+    Table table = Table::of({"index", "fate", "asked_for", "lead_s", "quality", "pose_age_s", "shown_ns",
+                             "query_ns", "started_ns", "drawn_ns", "read_ns", "written_ns"});
+    for (const FrameTiming& f : realtime.frames)
+        table.add({f.index, kFates[static_cast<std::size_t>(f.fate)], f.asked_for, f.lead_s, f.quality,
+                   f.oldest_sample_age_s, f.shown_ns, f.query_ns, f.started_ns, f.drawn_ns, f.read_ns,
+                   f.written_ns});
+    return table;
+}
+
+Table note_table(const LatencyReport& report, const PlayResult& play, const RealtimeResult& realtime) {
+    Table table = Table::of({"id", "stick", "instrument", "lap", "onset_s", "late_s", "pose_age_s",
+                             "planned_sample", "onset_sample", "taken_ns", "midi_sent_ns", "touch_s",
+                             "sound_minus_picture_ms", "sound_minus_frame_ms"});
+    auto picture = report.pictures.begin();
+    for (std::size_t i = 0; i < realtime.notes.size(); ++i) {
+        const NoteTiming& n = realtime.notes[i];
+        const Strike& strike = play.strikes.at(n.strike);
+        Cells row = {strike.id,
+                     play.sticks.at(strike.stick),
+                     play.instruments.at(strike.instrument),
+                     n.lap,
+                     onset_in_lap_s(n, play.t0_s, realtime.period_s),
+                     n.late_s,
+                     n.pose_age_s,
+                     n.played.planned_sample,
+                     n.played.onset_sample,
+                     n.played.taken_ns,
+                     n.played.midi_sent_ns};
+        if (picture != report.pictures.end() && picture->note == i) {
+            row.insert(row.end(), {picture->touch_s, picture->sound_minus_picture_ms(),
+                                   picture->sound_minus_frame_ms()});
+            ++picture;
+        }
+        row.resize(table.columns.size());
+        table.add(std::move(row));
+    }
+    return table;
+}
+
+Table block_table(const RealtimeResult& realtime) {
+    Table table = Table::of({"planned_ns", "started_ns", "done_ns"});
+    for (const audio::BlockTiming& b : realtime.blocks) table.add({b.planned_ns, b.started_ns, b.done_ns});
+    return table;
+}
+
+Table lead_table(const RealtimeResult& realtime) {
+    Table table = Table::of({"at_s", "render_lead_s", "sound_lead_s", "render_delay_s", "sound_delay_s",
+                             "quality", "fps", "why"});
+    for (const LeadStep& l : realtime.leads)
+        table.add({l.at_s, l.render_lead_s, l.sound_lead_s, l.render_delay_s, l.sound_delay_s, l.quality,
+                   l.fps, l.why});
+    return table;
+}
+
+Table error_table(const LatencyReport& report, const PlayResult& play) {
+    Table table = Table::of({"at_s", "stick", "error_mm"});
+    for (const DrawnError& e : report.errors) table.add({e.at_s, play.sticks.at(e.stick), 1e3 * e.error_m});
+    return table;
+}
+
+Json events_of(const RealtimeResult& realtime) {
+    Json events = Json::array();
+    for (const SensorEvent& event : realtime.events)
+        events.push_back({{"at_s", event.at_s}, {"sticks", event.sticks}, {"message", event.message}});
+    return events;
+}
+
+Json frames_of(const LatencyReport& report, const RealtimeResult& realtime) {
+    return {{"total", report.frames.total},       {"missed", report.frames.missed},
+            {"late", report.frames_late},         {"skipped", report.frames_skipped},
+            {"left_out", report.frames_left_out}, {"not_written", realtime.frames_not_written}};
+}
+
+/// RMS errors of the drawn sticks in all and second by second.
+Json errors_of(const LatencyReport& report) {
+    Json windows = Json::array();
+    const double end_s = report.errors.empty() ? -1 : report.errors.back().at_s;
+    for (int second = 0; second <= end_s; ++second)
+        windows.push_back({{"from_s", second}, {"rms", rms_mm(report.errors, second, second + 1)}});
+    return {{"count", report.errors.size()}, {"rms", Cell(report.rms_error_mm).json()}, {"seconds", windows}};
+}
+
+Json run_of(const PlayResult& play, const RealtimeResult& realtime) {
+    Json priorities = Json::object();
+    for (const auto& [thread, obtained] : realtime.priorities) priorities[thread] = obtained;
+    return {{"trace", play.trace},
+            {"kit", play.options.kit.string()},
+            {"picture_predictor", play.options.picture_predictor},
+            {"sound_predictor", play.options.sound_predictor},
+            {"seconds", realtime.seconds},
+            {"period_s", realtime.period_s},
+            {"laps", realtime.laps},
+            {"fps", play.options.fps},
+            {"output_lead_s", realtime.output_lead_s},
+            {"release_margin_s", play.options.release_margin_s},
+            {"disturbed_by", realtime.disturbed_by},
+            {"audio_device", realtime.audio_device},
+            {"priorities", priorities},
+            {"quality_levels", realtime.quality_levels},
+            {"refused_changes", realtime.refused_changes},
+            {"queue_overflows", realtime.queue_overflows},
+            {"device_underruns", realtime.device_underruns}};
 }
 
 }  // namespace
 
-Spread::Spread(std::vector<double> values) : sorted_(std::move(values)) {
-    std::sort(sorted_.begin(), sorted_.end());
+double Spread::share_within(double low, double high) const {
+    if (sorted_.empty()) return 0;
+    const auto inside = std::ranges::upper_bound(sorted_, high) - std::ranges::lower_bound(sorted_, low);
+    return static_cast<double>(inside) / static_cast<double>(sorted_.size());
 }
 
-double Spread::percentile(double percent) const {
-    return quantile_of_sorted(sorted_, percent / 100);
+std::optional<double> LatencyReport::share_within_atsc() const {
+    if (pictures.empty()) return std::nullopt;
+    const auto matched = static_cast<double>(pictures.size());
+    return sound_minus_picture_ms.share_within(kAtscLimits.early_ms, kAtscLimits.late_ms) * matched /
+           (matched + static_cast<double>(notes_without_picture));
 }
 
-double LatencyReport::share_within_atsc() const {
-    const auto matched = static_cast<double>(sound_minus_picture_ms.count());
-    const double all = matched + static_cast<double>(notes_without_picture);
-    return all == 0 ? 0
-                    : sound_minus_picture_ms.share_within(kAtscLimits.early_ms, kAtscLimits.late_ms) *
-                          matched / all;
-}
-
-double LatencyReport::share_within_itu() const {
+std::optional<double> LatencyReport::share_within_itu() const {
+    if (pictures.empty()) return std::nullopt;
     return sound_minus_picture_ms.share_within(kItuLimits.early_ms, kItuLimits.late_ms);
 }
 
-double Spread::share_within(double low, double high) const {
-    if (sorted_.empty()) return 0;
-    const auto inside = std::upper_bound(sorted_.begin(), sorted_.end(), high) -
-                        std::lower_bound(sorted_.begin(), sorted_.end(), low);
-    return static_cast<double>(inside) / static_cast<double>(sorted_.size());
+std::string milliseconds(const std::optional<double>& value) {
+    return value ? fmt::format("{:.1f} ms", *value) : "unknown";
 }
 
 LatencyReport latency_report(const PlayResult& play, const RealtimeResult& realtime, const Kit& kit,
                              double tip_radius_m) {
     LatencyReport report;
-    add_sample_stages(report, realtime.samples);
-    add(report, Kind::sound, "block computed", "planned to done", realtime.blocks,
-        [](const audio::BlockTiming& b) { return MaybeMs(ms(b.done_ns - b.planned_ns)); });
-    add_frame_stages(report, realtime.frames);
-    add_ages(report, realtime);
+    report.stages = stages_of(realtime);
     add_deadlines(report, play, realtime);
     add_sound_and_picture(report, play, realtime, kit, tip_radius_m);
     report.errors = drawn_errors(realtime, play.tracks, play.t0_s);
@@ -168,9 +265,106 @@ LatencyReport latency_report(const PlayResult& play, const RealtimeResult& realt
 }
 
 const LatencyStage* find_stage(const LatencyReport& report, std::string_view name) {
-    const auto stage = std::find_if(report.stages.begin(), report.stages.end(),
-                                    [&](const LatencyStage& s) { return s.name == name; });
+    const auto stage = std::ranges::find(report.stages, name, &LatencyStage::name);
     return stage == report.stages.end() ? nullptr : &*stage;
+}
+
+Table stage_table(const LatencyReport& report) {
+    Table table =
+        Table::of({"name", "meaning", "count:d", "p50_ms:.3f", "p95_ms:.3f", "p99_ms:.3f", "max_ms:.3f"});
+    for (const LatencyStage& s : report.stages)
+        table.add({s.name, s.meaning, s.ms.count(), s.ms.percentile(50), s.ms.percentile(95),
+                   s.ms.percentile(99), s.ms.percentile(100)});
+    return table;
+}
+
+Table deadline_table(const LatencyReport& report) {
+    Table table = Table::of({"name", "meaning", "total:d", "met:d", "missed:d"});
+    for (const Deadline* d : report.deadlines())
+        table.add({d->name, d->meaning, d->total, d->total - d->missed, d->missed});
+    return table;
+}
+
+Table spread_table(const LatencyReport& report) {
+    Table table = Table::of({"sound minus", "p5:+.1f:ms", "median:+.1f:ms", "p95:+.1f:ms", "min:+.1f:ms",
+                             "max:+.1f:ms", "count:d"});
+    const auto add = [&](const char* name, const Spread& ms) {
+        table.add({name, ms.percentile(5), ms.percentile(50), ms.percentile(95), ms.percentile(0),
+                   ms.percentile(100), ms.count()});
+    };
+    add("picture", report.sound_minus_picture_ms);
+    add("first frame", report.sound_minus_frame_ms);
+    return table;
+}
+
+Table clock_table(const RealtimeResult& realtime) {
+    Table table = Table::of({"clock", "offset_s:.6f", "drift_ppm:.1f", "delay_p95_ms:.2f", "jumps:d"});
+    for (const ClockReport& c : realtime.clocks)
+        table.add({c.clock, c.offset_s, c.drift_ppm, c.delay_p95_ms, c.jumps});
+    return table;
+}
+
+std::vector<std::pair<const char*, Table>> latency_rows(const LatencyReport& report, const PlayResult& play,
+                                                        const RealtimeResult& realtime) {
+    return {{"samples.csv", sample_table(play, realtime)},
+            {"frames.csv", frame_table(realtime)},
+            {"notes.csv", note_table(report, play, realtime)},
+            {"blocks.csv", block_table(realtime)},
+            {"leads.csv", lead_table(realtime)},
+            {"errors.csv", error_table(report, play)}};
+}
+
+std::string format_latency_text(const LatencyReport& report, const RealtimeResult& realtime) {
+    std::string text = fmt::format("{:.1f} s, {} lap{}, {}\n\n", realtime.seconds, realtime.laps,
+                                   realtime.laps == 1 ? "" : "s", realtime.audio_device);
+    text += stage_table(report).text() + '\n' + deadline_table(report).text();
+    if (report.frames_left_out > 0)
+        text += fmt::format("left out because the frame rate was lowered: {} more frames\n",
+                            report.frames_left_out);
+    text += fmt::format("\n{}", spread_table(report).text());
+    const auto share = [&](const std::optional<double>& of) {
+        if (of) return fmt::format("{:.1f} %", 100 * *of);
+        return std::string(report.notes.total == 0 ? "no notes" : "no pictures of notes");
+    };
+    text += fmt::format("within ATSC's {:g} to {:+g} ms: {}; ITU-R BT.1359's {:g} to {:+g} ms: {}; ",
+                        kAtscLimits.early_ms, kAtscLimits.late_ms, share(report.share_within_atsc()),
+                        kItuLimits.early_ms, kItuLimits.late_ms, share(report.share_within_itu()));
+    text += fmt::format("notes whose drawn stick does not strike: {}\n", report.notes_without_picture);
+    text += fmt::format("\nleads needed: pictures {}, sound {}\n", milliseconds(report.render_lead_needed_ms),
+                        milliseconds(report.sound_lead_needed_ms));
+    if (report.rms_error_mm)
+        text += fmt::format("drawn sticks, RMS error on the screen: {:.1f} mm\n", *report.rms_error_mm);
+    return text;
+}
+
+std::string format_latency_json(const LatencyReport& report, const PlayResult& play,
+                                const RealtimeResult& realtime) {
+    Json spreads = spread_table(report).json();
+    for (Json& spread : spreads) spread.erase("sound minus");
+    Json& picture = spreads[0];
+    picture["unmatched"] = report.notes_without_picture;
+    picture["share_within_atsc"] = Cell(report.share_within_atsc()).json();
+    picture["share_within_itu"] = Cell(report.share_within_itu()).json();
+    const Json json = {{"run", run_of(play, realtime)},
+                       {"stages", stage_table(report).json()},
+                       {"frames", frames_of(report, realtime)},
+                       {"notes", {{"total", report.notes.total}, {"late", report.notes.missed}}},
+                       {"samples",
+                        {{"taken", report.samples.total},
+                         {"late", report.samples.missed},
+                         {"skipped", report.skipped.missed}}},
+                       {"strokes", {{"total", report.strokes.total}, {"missed", report.strokes.missed}}},
+                       {"deadlines", deadline_table(report).json()},
+                       {"sound_minus_picture_ms", picture},
+                       {"sound_minus_frame_ms", spreads[1]},
+                       {"lead_needed_ms",
+                        {{"render", Cell(report.render_lead_needed_ms).json()},
+                         {"sound", Cell(report.sound_lead_needed_ms).json()}}},
+                       {"drawn_error_mm", errors_of(report)},
+                       {"leads", lead_table(realtime).json()},
+                       {"clocks", clock_table(realtime).json()},
+                       {"events", events_of(realtime)}};
+    return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace app

@@ -1,16 +1,15 @@
 #pragma once
+#include <algorithm>
 #include <array>
-#include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "kit/kit.h"
-#include "latency/drawn_error.h"
-#include "latency/sound_picture.h"
-#include "latency/timings.h"
-#include "play/play_result.h"
+#include "latency/screen_path.h"
+#include "report/table.h"
+#include "statistics/statistics.h"
 
 namespace app {
 
@@ -18,14 +17,14 @@ namespace app {
 class Spread {
 public:
     Spread() = default;
-    explicit Spread(std::vector<double> values);
+    explicit Spread(std::vector<double> values) : sorted_(std::move(values)) { std::ranges::sort(sorted_); }
 
     [[nodiscard]] bool empty() const { return sorted_.empty(); }
     [[nodiscard]] std::size_t count() const { return sorted_.size(); }
     /// The quantile of percent / 100; NaN for no values.
-    [[nodiscard]] double percentile(double percent) const;
-    [[nodiscard]] double min() const { return sorted_.empty() ? 0 : sorted_.front(); }
-    [[nodiscard]] double max() const { return sorted_.empty() ? 0 : sorted_.back(); }
+    [[nodiscard]] double percentile(double percent) const {
+        return quantile_of_sorted(sorted_, percent / 100);
+    }
     /// Share of the values within [low, high].
     [[nodiscard]] double share_within(double low, double high) const;
     [[nodiscard]] const std::vector<double>& sorted() const { return sorted_; }
@@ -60,23 +59,8 @@ inline constexpr double kDrummersLatencyMs = 10, kDrummersJitterMs = 3;
 /// The latency measured in a run in real time.
 struct LatencyReport {
     /// Durations [ms], in the order in which a sample takes them: from sensor to filter, application,
-    /// simulation and sound, then from the query for a frame to its file. A stage that nothing took is left
-    /// out.
-    ///
-    ///   sensor to filter     sample due to all its filters done
-    ///   filter to app        that to the application having it
-    ///   query                of the shared memory
-    ///   contact              the application having it to the simulation's answer
-    ///   note hand-over       that to its notes being with the audio
-    ///   sample to notes      due to notes being with the audio
-    ///   block computed       planned to done
-    ///   frame query          poses and simulation asked
-    ///   frame drawn          drawing begun to ended
-    ///   frame read back      that to pixels being there
-    ///   frame in all         query begun to pixels there
-    ///   frame written        pixels there to the file written
-    ///   pose age in frames   shown minus the oldest stick's sample
-    ///   pose age in notes    onset minus the newest sample that could change it
+    /// simulation and sound, then from the query for a frame to its file; the ages of poses in frames and
+    /// notes. A stage that nothing took is left out.
     std::vector<LatencyStage> stages;
     Deadline samples;  ///< taken; missed: too late to change the sound
     Deadline skipped;  ///< given by the sensors; missed: never seen by the application
@@ -92,10 +76,10 @@ struct LatencyReport {
     std::vector<SoundPicture> pictures;               ///< of the notes that the drawn sticks play, too
     std::size_t notes_without_picture = 0;
     Spread sound_minus_picture_ms, sound_minus_frame_ms;
-    /// Share of the notes within ATSC's limit; one without a picture is not.
-    [[nodiscard]] double share_within_atsc() const;
-    /// Share of those with a picture within ITU-R BT.1359's limits.
-    [[nodiscard]] double share_within_itu() const;
+    /// Share of the notes within ATSC's limits; one without a picture is not. Share of those with a picture
+    /// within ITU-R BT.1359's. None where no note has a picture.
+    [[nodiscard]] std::optional<double> share_within_atsc() const;
+    [[nodiscard]] std::optional<double> share_within_itu() const;
     std::vector<DrawnError> errors;
     std::optional<double> rms_error_mm;  ///< of all of them
     /// p99 of "frame in all": what the render lead must cover so that 99 of 100 frames are in time.
@@ -113,5 +97,40 @@ struct LatencyReport {
 
 /// By name; null if nothing took it.
 [[nodiscard]] const LatencyStage* find_stage(const LatencyReport& report, std::string_view name);
+
+/// "1.2 ms", or "unknown" for none.
+[[nodiscard]] std::string milliseconds(const std::optional<double>& value);
+
+// The figures of a run in real time, each in one table, from which terminal, page and JSON are made.
+
+/// Latency of each stage [ms].
+[[nodiscard]] Table stage_table(const LatencyReport& report);
+/// How often each thing that has to be done by a time was not.
+[[nodiscard]] Table deadline_table(const LatencyReport& report);
+/// Sound minus picture [ms], against the drawn path and against the first frame behind the surface; a row
+/// without values if there are none.
+[[nodiscard]] Table spread_table(const LatencyReport& report);
+/// The clocks of the sensors' sources.
+[[nodiscard]] Table clock_table(const RealtimeResult& realtime);
+
+/// The rows behind the figures, by the files that they are written to: samples.csv, frames.csv, notes.csv,
+/// blocks.csv, leads.csv, errors.csv. Times in ns and `at_s` count from the run's epoch, `t_s` and `onset_s`
+/// are on the lap's clock, onset_s in the output. The last three columns of a note without a picture are
+/// empty.
+[[nodiscard]] std::vector<std::pair<const char*, Table>> latency_rows(const LatencyReport& report,
+                                                                      const PlayResult& play,
+                                                                      const RealtimeResult& realtime);
+
+/// Text of latency.json, and of `latency --json`: stages, frames, notes, sound_minus_picture_ms,
+/// lead_needed_ms, deadlines, errors of the drawn sticks, and what ran where.
+[[nodiscard]] std::string format_latency_json(const LatencyReport& report, const PlayResult& play,
+                                              const RealtimeResult& realtime);
+/// Text of latency's report.html: figures, stages, plots, what ran where. Plots are drawn by gnuplot with
+/// temporary files in `scratch`. In latency_page.cpp.
+[[nodiscard]] std::string format_latency_page(const LatencyReport& report, const PlayResult& play,
+                                              const RealtimeResult& realtime,
+                                              const std::filesystem::path& scratch);
+/// For the terminal.
+[[nodiscard]] std::string format_latency_text(const LatencyReport& report, const RealtimeResult& realtime);
 
 }  // namespace app

@@ -20,10 +20,8 @@ struct SampleTiming {
     std::int64_t query_ns = 0;                              ///< duration of the query of shared memory
     std::int64_t contact_ns = 0;                            ///< the simulation had answered
     std::int64_t handed_ns = 0;                             ///< its changes of notes were with the audio
-    std::uint64_t skipped =
-        0;  ///< samples of this stick between the one before and this, never seen by the application
-    double late_s =
-        0;  ///< the sound was already fixed this far beyond what the sample may change; <= 0: in time
+    std::uint64_t skipped = 0;  ///< samples of this stick just before it that the application never saw
+    double late_s = 0;  ///< the sound was fixed this far beyond what the sample may change; <= 0: in time
 };
 
 enum class FrameFate : std::uint8_t { in_time, late, skipped };
@@ -82,7 +80,7 @@ struct RealtimeResult {
     double seconds = 0;   ///< of the run
     double period_s = 0;  ///< of a looped trace
     std::uint64_t laps = 1;
-    double output_lead_s = 0, release_margin_s = 0;
+    double output_lead_s = 0;
     std::vector<std::string> quality_levels;  ///< what each level draws
     std::vector<SampleTiming> samples;
     std::vector<FrameTiming> frames;

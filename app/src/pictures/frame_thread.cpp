@@ -85,13 +85,13 @@ void FrameThread::draw_all(const std::vector<render::SceneDescription>& scenes,
                            const render::FrameState& rest) {
     const bool refuses = options_.policy == FramePolicy::refuse;
     // The rasteriser's threads, started below, inherit it.
-    if (refuses) priority_ = set_thread_priority(ThreadRole::drawing, options_.realtime_priority);
+    if (refuses) report_.priority = set_thread_priority(ThreadRole::drawing, options_.realtime_priority);
     std::vector<std::unique_ptr<render::Renderer>> renderers;
     for (const render::SceneDescription& scene : scenes) {
         renderers.push_back(std::make_unique<render::Renderer>(scene));
         try_out(*renderers.back(), rest);
     }
-    version_ = renderers.front()->version();
+    report_.version = renderers.front()->version();
     ready_ = true;
     ready_.notify_one();
     FrameJob job;
@@ -109,8 +109,9 @@ void FrameThread::try_out(render::Renderer& renderer, const render::FrameState& 
         renderer.draw(rest, image);
         if (i >= kWarmFrames) times_s.push_back(one.seconds());
     }
-    if (!times_s.empty()) trial_s_.push_back(quantile(times_s, 0.25));  // busy moments of the start aside
-    if (rest_image_.rgb.empty()) rest_image_ = std::move(image);
+    if (!times_s.empty())
+        report_.trial_s.push_back(quantile(times_s, 0.25));  // busy moments of the start aside
+    if (report_.rest_image.rgb.empty()) report_.rest_image = std::move(image);
 }
 
 /// False: the pictures are not wanted any more.
@@ -122,9 +123,9 @@ bool FrameThread::draw_one(render::Renderer& renderer, FrameJob& job) {
     drawn.drawn_ns = monotonic_ns(times.drawn);
     drawn.read_ns = monotonic_ns(times.read);
     drawn.in_time = drawn.read_ns <= job.shown_ns;
-    draw_s_ += to_s(drawn.read_ns - drawn.started_ns);
+    report_.draw_s += to_s(drawn.read_ns - drawn.started_ns);
     if (options_.policy == FramePolicy::wait) return pictures_.push(std::move(picture));
-    if (drawn.in_time && !pictures_.try_push(std::move(picture))) ++not_written_;
+    if (drawn.in_time && !pictures_.try_push(std::move(picture))) ++report_.not_written;
     drawn_ = drawn;
     turn_ = Turn::done;
     return true;
@@ -135,10 +136,10 @@ void FrameThread::write_all() {
         set_thread_priority(ThreadRole::writing, options_.realtime_priority);
     Picture picture;
     while (pictures_.pop(picture)) {
-        const Stopwatch watch(write_s_);
+        const Stopwatch watch(report_.write_s);
         write_file(options_.folder / fmt::format("{:06}.png", picture.index),
                    render::encode_png(enlarged(std::move(picture.image), options_.width, options_.height)));
-        written_.emplace_back(picture.index, monotonic_ns());
+        report_.written.emplace_back(picture.index, monotonic_ns());
     }
 }
 

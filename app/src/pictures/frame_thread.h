@@ -49,6 +49,23 @@ struct FrameThreadOptions {
     bool realtime_priority = false;  ///< of the policy `refuse`: what set_thread_priority() is asked for
 };
 
+/// What the threads have measured and obtained.
+struct FrameReport {
+    std::string version;          ///< of the renderer
+    render::Image rest_image;     ///< what the frame `rest` looks like
+    std::string priority;         ///< what the drawing thread obtained; empty with the policy `wait`
+    std::vector<double> trial_s;  ///< policy `refuse`: lower quartile of drawing times at the start, by level
+    double draw_s = 0, write_s = 0;
+    /// Frames written, in order: index, CLOCK_MONOTONIC when the file was complete [ns].
+    std::vector<std::pair<std::uint64_t, std::int64_t>> written;
+    std::uint64_t not_written = 0;  ///< frames in time for which writing had fallen behind by 8
+};
+
+/// Encodes the frames, and audio.wav if `sound`, of a staging folder beside the video's place, as
+/// FILE.partial. In video.cpp.
+void make_video(const std::filesystem::path& video, double fps, bool sound,
+                const std::filesystem::path& staging);
+
 /// Draws frames on a thread of its own, which owns the renderers, and encodes and writes them as
 /// FOLDER/000000.png on another. push(), take_done() and finish() are for one thread; failures of either
 /// thread are thrown by the next call of these. With the policy `refuse` none of them waits for a lock.
@@ -70,22 +87,8 @@ public:
     /// Lets the frames at hand be drawn and written. Then take_done() has the rest.
     void finish();
 
-    /// With the policy `refuse`: lower quartile of drawing times at the start, by level [s].
-    [[nodiscard]] const std::vector<double>& trial_s() const { return trial_s_; }
-    /// What the drawing thread obtained; empty with the policy `wait`.
-    [[nodiscard]] const std::string& priority() const { return priority_; }
-
-    // After finish():
-    [[nodiscard]] const std::string& version() const { return version_; }
-    [[nodiscard]] const render::Image& rest_image() const { return rest_image_; }
-    [[nodiscard]] double draw_s() const { return draw_s_; }
-    [[nodiscard]] double write_s() const { return write_s_; }
-    /// Frames written, in order: index, CLOCK_MONOTONIC when the file was complete [ns].
-    [[nodiscard]] const std::vector<std::pair<std::uint64_t, std::int64_t>>& written() const {
-        return written_;
-    }
-    /// Frames in time for which writing had fallen behind by 8: not written.
-    [[nodiscard]] std::uint64_t not_written() const { return not_written_; }
+    /// What it has measured; the frames' since finish().
+    [[nodiscard]] const FrameReport& report() const { return report_; }
 
 private:
     struct Picture {
@@ -117,12 +120,7 @@ private:
     std::mutex error_mutex_;
     std::exception_ptr error_;
 
-    std::vector<double> trial_s_;
-    std::string version_, priority_;
-    render::Image rest_image_;
-    std::uint64_t not_written_ = 0;
-    std::vector<std::pair<std::uint64_t, std::int64_t>> written_;
-    double draw_s_ = 0, write_s_ = 0;
+    FrameReport report_;
     std::thread drawing_, writing_;
 };
 

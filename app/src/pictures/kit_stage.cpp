@@ -22,14 +22,6 @@ render::Look chrome() {
     return look;
 }
 
-render::Look hickory() {
-    return wood(0.62f, 0.40f, 0.20f, 0.38f);
-}
-
-render::Look walnut() {
-    return wood(0.26f, 0.13f, 0.06f, 0.4f);
-}
-
 }  // namespace
 
 KitStage::KitStage(const Kit& kit, std::size_t sticks, const StickGeometry& stick)
@@ -47,8 +39,7 @@ void KitStage::add_stand(const Instrument& instrument) {
     const double height = top.y() - kit_.room.floor_height;
     if (height < 0.05) return;
     const double spread = below ? std::max(1.0, 2.2 * body.shape.semi_axes.x() / 0.5) : 1.0;
-    props_.push_back({instrument.name + " stand", assets_folder() / "meshes" / "stand.obj", chrome(),
-                      affine_matrix(Eigen::Vector3d(spread, height, spread).asDiagonal(), top)});
+    add_prop(instrument.name + " stand", "stand.obj", chrome(), {spread, height, spread}, top);
 }
 
 void KitStage::add_string_frame() {
@@ -62,20 +53,25 @@ void KitStage::add_string_frame() {
     const double thickness = 0.03, gap = 0.05;
     const Eigen::Vector3d size(box.sizes().x() + 0.12, thickness, box.sizes().z() + 0.12);
     const Eigen::Vector3d place(box.center().x(), box.min().y() - gap, box.center().z());
-    props_.push_back({"soundboard", assets_folder() / "meshes" / "string_frame.obj", walnut(),
-                      affine_matrix((0.5 * size).asDiagonal(), place)});
+    add_prop("soundboard", "string_frame.obj", wood(0.26f, 0.13f, 0.06f, 0.4f), 0.5 * size, place);
     const double height = std::max(0.05, place.y() - kit_.room.floor_height);
-    props_.push_back({"soundboard stand", assets_folder() / "meshes" / "stand.obj", chrome(),
-                      affine_matrix(Eigen::Vector3d(1.5, height, 1.5).asDiagonal(), place)});
+    add_prop("soundboard stand", "stand.obj", chrome(), {1.5, height, 1.5}, place);
+}
+
+void KitStage::add_prop(const std::string& name, const char* mesh, const render::Look& look,
+                        const Eigen::Vector3d& size, const Eigen::Vector3d& place) {
+    props_.push_back(
+        {{name, assets_folder() / "meshes" / mesh, look}, affine_matrix(size.asDiagonal(), place)});
 }
 
 render::SceneDescription KitStage::scene(int width, int height) const {
     render::SceneDescription scene;
     for (const Instrument& instrument : kit_.instruments)
         scene.objects.push_back({instrument.name, instrument.mesh, instrument.look});
-    for (const Prop& prop : props_) scene.objects.push_back({prop.name, prop.mesh, prop.look});
+    for (const Prop& prop : props_) scene.objects.push_back(prop.object);
     for (std::size_t i = 0; i < sticks_; ++i)
-        scene.objects.push_back({fmt::format("stick {}", i), kit_.stick.mesh, hickory()});
+        scene.objects.push_back(
+            {fmt::format("stick {}", i), kit_.stick.mesh, wood(0.62f, 0.40f, 0.20f, 0.38f)});
     scene.camera = kit_.camera;
     scene.room = kit_.room;
     scene.width = width;
@@ -89,36 +85,29 @@ Eigen::Matrix4f KitStage::stick_matrix(const tracking::PosePrediction& pose) con
     const Eigen::Quaterniond body_from_mesh =
         tracking::rotation_between(-Eigen::Vector3d::UnitZ(), stick_.shaft);
     const double scale = stick_.length_m / kMeshStickLengthM;
-    Eigen::Isometry3d world_from_body = Eigen::Isometry3d::Identity();
-    world_from_body.linear() = pose.orientation.toRotationMatrix();
-    world_from_body.translation() = pose.position;
-    Eigen::Affine3d body_from_stick = Eigen::Affine3d::Identity();
-    body_from_stick.linear() = body_from_mesh.toRotationMatrix() * scale;
-    body_from_stick.translation() = stick_.tip + stick_.shaft * -stick_.length_m;
-    return (world_from_body * body_from_stick).matrix().cast<float>();
+    const Eigen::Matrix3d world_from_body = pose.orientation.toRotationMatrix();
+    const Eigen::Vector3d hand = stick_.tip + stick_.shaft * -stick_.length_m;
+    return affine_matrix(world_from_body * (body_from_mesh.toRotationMatrix() * scale),
+                         world_from_body * hand + pose.position);
 }
 
 render::FrameState KitStage::frame(std::span<const sim::ModalState> bodies,
                                    std::span<const std::optional<tracking::PosePrediction>> sticks) const {
     render::FrameState state;
+    const auto add = [&](const Eigen::Matrix4f& matrix, bool visible) {
+        state.world_from_object.push_back(matrix);
+        state.visible.push_back(visible);
+    };
     for (std::size_t i = 0; i < kit_.instruments.size(); ++i) {
         const sim::BodyDefinition& body = kit_.instruments[i].body;
-        Eigen::Matrix4d size = Eigen::Matrix4d::Identity();
-        size.topLeftCorner<3, 3>() = body.shape.semi_axes.asDiagonal();
-        const Eigen::Matrix4d matrix =
-            sim::body_matrix(body, bodies.empty() ? sim::ModalState{} : bodies[i]) * size;
-        state.world_from_object.push_back(matrix.cast<float>());
-        state.visible.push_back(true);
+        Eigen::Matrix4d matrix = sim::body_matrix(body, bodies.empty() ? sim::ModalState{} : bodies[i]);
+        matrix.leftCols<3>() *= body.shape.semi_axes.asDiagonal();
+        add(matrix.cast<float>(), true);
     }
-    for (const Prop& prop : props_) {
-        state.world_from_object.push_back(prop.matrix);
-        state.visible.push_back(true);
-    }
+    for (const Prop& prop : props_) add(prop.matrix, true);
     for (std::size_t i = 0; i < sticks_; ++i) {
         const bool visible = i < sticks.size() && sticks[i].has_value();
-        state.world_from_object.push_back(visible ? stick_matrix(*sticks[i])
-                                                  : Eigen::Matrix4f(Eigen::Matrix4f::Identity()));
-        state.visible.push_back(visible);
+        add(visible ? stick_matrix(*sticks[i]) : Eigen::Matrix4f(Eigen::Matrix4f::Identity()), visible);
     }
     return state;
 }

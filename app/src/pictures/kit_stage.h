@@ -28,13 +28,14 @@ public:
 
 private:
     struct Prop {  // does not move
-        std::string name;
-        std::filesystem::path mesh;
-        render::Look look;
+        render::SceneObject object;
         Eigen::Matrix4f matrix;
     };
     void add_stand(const Instrument& instrument);
     void add_string_frame();
+    /// `mesh`: a file of the bundled meshes; `size`: factors of its sides.
+    void add_prop(const std::string& name, const char* mesh, const render::Look& look,
+                  const Eigen::Vector3d& size, const Eigen::Vector3d& place);
     [[nodiscard]] Eigen::Matrix4f stick_matrix(const tracking::PosePrediction& pose) const;
 
     Kit kit_;

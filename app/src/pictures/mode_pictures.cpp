@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "files/output_folder.h"
+#include "pictures/stage_parts.h"
 
 namespace app {
 namespace {
@@ -80,19 +81,6 @@ render::Mesh superquadric_mesh(const sim::Superquadric& shape) {
     return mesh;
 }
 
-render::ModeShapes shapes_at(const render::Mesh& mesh, const sim::ModalBasis& basis, int count) {
-    render::ModeShapes shapes;
-    shapes.count = count;
-    for (const render::MeshPart& part : mesh.parts)
-        for (const Eigen::Vector3f& r : part.positions)
-            for (int k = 0; k < count; ++k) {
-                const sim::Displacement u = sim::displacement_at(basis, basis.nodal.col(k), r.cast<double>());
-                shapes.displacement.push_back(u.value.cast<float>());
-                shapes.gradient.push_back(u.gradient.cast<float>());
-            }
-    return shapes;
-}
-
 // The largest displacement of mode `mode` on the surface [kg^-1/2].
 float reach(const render::ModeShapes& shapes, int mode) {
     float largest = 0;
@@ -110,53 +98,59 @@ void paste(const render::Image& picture, int column, int row, render::Image& she
                         static_cast<std::ptrdiff_t>(3) * ((row * kSize + y) * sheet.width + column * kSize));
 }
 
-}  // namespace
+/// The body, its modes, and what fits them into the picture.
+struct ModeSolid {
+    render::Solid solid;
+    double scale;               ///< drawn over real lengths: what is drawn fits the picture
+    double rise;                ///< half the drawn height, with room for the deformation
+    Eigen::VectorXf amplitude;  ///< of each mode [m kg^1/2]
+};
 
-ModePictures::ModePictures(const sim::ModesRequest& request, const sim::ModalBasis& basis, int most) {
+ModeSolid mode_solid(const sim::ModesRequest& request, const sim::ModalBasis& basis, int count) {
     const Eigen::Vector3d& half = request.shape.semi_axes;
     const double deformation = kShare * 2 * std::cbrt(half.prod());
-    solid_.mesh = request.domain == sim::ModeDomain::box ? box_mesh(half) : superquadric_mesh(request.shape);
-    solid_.modes = shapes_at(solid_.mesh, basis, std::min(most, basis.count()));
-    scale_ = kRadius / (half.norm() + deformation);
-    rise_ = scale_ * (half.y() + deformation);
-    amplitude_.resize(solid_.modes.count);
-    for (int k = 0; k < solid_.modes.count; ++k)
-        amplitude_[k] = static_cast<float>(deformation) / reach(solid_.modes, k);
+    const double scale = kRadius / (half.norm() + deformation);
+    ModeSolid drawn{{}, scale, scale * (half.y() + deformation), Eigen::VectorXf(count)};
+    drawn.solid.mesh =
+        request.domain == sim::ModeDomain::box ? box_mesh(half) : superquadric_mesh(request.shape);
+    std::vector<Eigen::Vector3d> vertices;
+    for (const render::MeshPart& part : drawn.solid.mesh.parts)
+        for (const Eigen::Vector3f& r : part.positions) vertices.push_back(r.cast<double>());
+    drawn.solid.modes = shapes_at(vertices, basis, count);
+    for (int k = 0; k < count; ++k)
+        drawn.amplitude[k] = static_cast<float>(deformation) / reach(drawn.solid.modes, k);
+    return drawn;
 }
 
-render::SceneDescription ModePictures::description() const {
+render::SceneDescription description_of(const ModeSolid& drawn) {
     render::SceneDescription scene;
     const render::Appearance light{Eigen::Vector3f(0.75f, 0.72f, 0.62f), 0, 0.5f, 0};
     const render::Appearance dark{Eigen::Vector3f(0.13f, 0.25f, 0.42f), 0, 0.5f, 0};
     scene.objects.push_back({"body", {}, {light, {{"light", light}, {"dark", dark}}}, 0});
-    scene.solids = {solid_};
+    scene.solids = {drawn.solid};
     scene.camera.eye = Eigen::Vector3f(1.5f, 1.25f, 2.1f);
     scene.camera.target = Eigen::Vector3f(0, 0, 0);
     scene.camera.vertical_fov_deg = 36;
-    scene.room.floor_height = static_cast<float>(-rise_ - 0.05);
+    scene.room.floor_height = static_cast<float>(-drawn.rise - 0.05);
     scene.width = scene.height = kSize;
     return scene;
 }
 
-render::FrameState ModePictures::frame(int mode) const {
-    render::FrameState state;
-    Eigen::Matrix4f matrix = Eigen::Matrix4f::Identity();
-    matrix.topLeftCorner<3, 3>() *= static_cast<float>(scale_);
-    state.world_from_object = {matrix};
-    state.visible = {true};
-    state.modal = {amplitude_[mode] * Eigen::VectorXf::Unit(amplitude_.size(), mode)};
-    return state;
-}
+}  // namespace
 
-void ModePictures::write(const std::filesystem::path& folder, const std::filesystem::path& sheet) const {
-    const int count = static_cast<int>(amplitude_.size());
+void draw_modes(const sim::ModesRequest& request, const sim::ModalBasis& basis, int most,
+                const std::filesystem::path& folder, const std::filesystem::path& sheet) {
+    const int count = std::min(most, basis.count());
+    const ModeSolid drawn = mode_solid(request, basis, count);
     const int columns = std::min(count, kColumns), rows = (count + kColumns - 1) / kColumns;
     render::Image all{columns * kSize, rows * kSize, {}};
     all.rgb.resize(static_cast<std::size_t>(3) * all.width * all.height);
-    render::Renderer renderer(description());
+    render::Renderer renderer(description_of(drawn));
     render::Image picture;
     for (int k = 0; k < count; ++k) {
-        renderer.draw(frame(k), picture);
+        const Eigen::Matrix4f matrix =
+            affine_matrix(drawn.scale * Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero());
+        renderer.draw({{matrix}, {true}, {drawn.amplitude[k] * Eigen::VectorXf::Unit(count, k)}}, picture);
         write_file(folder / fmt::format("{:06}.png", k + 1), render::encode_png(picture));
         paste(picture, k % kColumns, k / kColumns, all);
     }

@@ -2,7 +2,7 @@
 
 #include <sim/surface_mesh.h>
 
-#include <algorithm>
+#include <span>
 
 #include "pictures/stage_parts.h"
 
@@ -12,34 +12,20 @@ namespace {
 constexpr int kSceneShadowTexels = 1024;
 constexpr double kKerb = 0.03;  // half height and half thickness, as share of the box's longer side
 
-render::Look kerb_wood() {
-    return wood(0.10f, 0.045f, 0.02f, 0.5f);
+/// The vertices that are drawn: all but the features.
+std::span<const Eigen::Vector3d> drawn_of(const sim::SurfaceMesh& surface) {
+    return std::span(surface.vertices).first(surface.vertices.size() - surface.features);
 }
 
 render::Mesh mesh_of(const sim::SurfaceMesh& surface) {
     render::MeshPart part;
-    const std::size_t drawn = surface.vertices.size() - surface.features;
-    for (std::size_t k = 0; k < drawn; ++k) {
+    for (std::size_t k = 0; k < drawn_of(surface).size(); ++k) {
         part.positions.push_back(surface.vertices[k].cast<float>());
         part.normals.push_back(surface.normals[k].cast<float>());
     }
     for (const auto& triangle : surface.triangles)
         part.indices.insert(part.indices.end(), triangle.begin(), triangle.end());
     return {{part}};
-}
-
-render::ModeShapes shapes_of(const sim::SurfaceMesh& surface, const sim::ModalBasis& basis) {
-    render::ModeShapes modes;
-    modes.count = basis.count();
-    const std::size_t drawn = surface.vertices.size() - surface.features;
-    for (std::size_t v = 0; v < drawn; ++v) {
-        for (int k = 0; k < modes.count; ++k) {
-            const sim::Displacement u = sim::displacement_at(basis, basis.nodal.col(k), surface.vertices[v]);
-            modes.displacement.push_back(u.value.cast<float>());
-            modes.gradient.push_back(u.gradient.cast<float>());
-        }
-    }
-    return modes;
 }
 
 /// I + du/dr of a body whose strain is uniform.
@@ -59,10 +45,8 @@ SceneStage::SceneStage(const Scene& scene, const sim::World& world) : scene_(sce
         const std::size_t kind = scene.looks[body].kind;
         if (kind < solid_of_kind_.size()) continue;
         solid_of_kind_.push_back(static_cast<int>(solids_.size()));
-        if (body < now)
-            add_solid(world, static_cast<int>(body));
-        else
-            add_solid(coming, static_cast<int>(body - now));
+        const bool here = body < now;
+        add_solid(here ? world : coming, static_cast<int>(here ? body : body - now));
     }
     if (scene.box) add_kerbs();
 }
@@ -70,9 +54,9 @@ SceneStage::SceneStage(const Scene& scene, const sim::World& world) : scene_(sce
 void SceneStage::add_solid(const sim::World& world, int body) {
     const sim::WorldBody& definition = world.definition(body);
     const sim::SurfaceMesh surface = sim::surface_mesh(definition.shape, definition.triangles);
-    const bool bends = world.fidelity(body).fidelity == sim::Fidelity::modal && world.basis(body).count() > 0;
-    solids_.push_back(
-        {mesh_of(surface), bends ? shapes_of(surface, world.basis(body)) : render::ModeShapes{}});
+    const sim::ModalBasis& basis = world.basis(body);
+    const bool bends = world.fidelity(body).fidelity == sim::Fidelity::modal;
+    solids_.push_back({mesh_of(surface), shapes_at(drawn_of(surface), basis, bends ? basis.count() : 0)});
 }
 
 void SceneStage::add_kerbs() {
@@ -98,7 +82,7 @@ render::SceneDescription SceneStage::description(int width, int height) const {
     for (const BodyLook& look : scene_.looks)
         description.objects.push_back({"body", {}, {look.appearance, {}}, solid_of_kind_[look.kind]});
     for (std::size_t k = 0; k < kerbs_.size(); ++k)
-        description.objects.push_back({"kerb", {}, kerb_wood(), kerb_solid_});
+        description.objects.push_back({"kerb", {}, wood(0.10f, 0.045f, 0.02f, 0.5f), kerb_solid_});
     description.solids = solids_;
     description.camera = scene_.camera;
     description.camera.eye *= scale, description.camera.target *= scale;

@@ -1,11 +1,13 @@
 #pragma once
 #include <render/scene.h>
+#include <sim/modes.h>
 
 #include <Eigen/Core>
+#include <span>
 
 namespace app {
 
-// What the stages of kits and of scenes share.
+// What the stages of kits and of scenes and the pictures of modes share.
 
 /// Polished wood of a colour (linear RGB).
 [[nodiscard]] inline render::Look wood(float red, float green, float blue, float roughness) {
@@ -19,6 +21,20 @@ namespace app {
     matrix.topLeftCorner<3, 3>() = linear.cast<float>();
     matrix.topRightCorner<3, 1>() = place.cast<float>();
     return matrix;
+}
+
+/// How the first `count` modes move vertices at these places of the body.
+[[nodiscard]] inline render::ModeShapes shapes_at(std::span<const Eigen::Vector3d> vertices,
+                                                  const sim::ModalBasis& basis, int count) {
+    render::ModeShapes shapes;
+    shapes.count = count;
+    for (const Eigen::Vector3d& r : vertices)
+        for (int k = 0; k < count; ++k) {
+            const sim::Displacement u = sim::displacement_at(basis, basis.nodal.col(k), r);
+            shapes.displacement.push_back(u.value.cast<float>());
+            shapes.gradient.push_back(u.gradient.cast<float>());
+        }
+    return shapes;
 }
 
 }  // namespace app

@@ -2,19 +2,163 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <memory>
+#include <optional>
+#include <span>
 
 #include "files/bad_input.h"
-#include "files/output_folder.h"
-#include "kit/tip_track.h"
-#include "play/offline_run.h"
+#include "pictures/kit_stage.h"
 #include "play/play_products.h"
 #include "play/play_setup.h"
+#include "play/strike_pipeline.h"
 #include "process/progress_bar.h"
-#include "process/stopwatch.h"
+#include "sticks/replay.h"
+#include "sticks/stick_filters.h"
 
 namespace app {
 namespace {
+
+constexpr double kSlackS = 1e-9;  // of the causality rules
+constexpr double kEver = std::numeric_limits<double>::infinity();
+
+/// What is played, and what plays it: pictures and sound may be absent.
+struct OfflineParts {
+    const tracking::Trace& trace;
+    const Kit& kit;
+    const PlayOptions& options;
+    const StickGeometry& stick;
+    sim::Simulation& simulation;
+    const KitStage* stage = nullptr;
+    FrameThread* frames = nullptr;
+    audio::Performance* sound = nullptr;
+};
+
+/// The loop of an offline run: every sample of the trace in order of time through filters, contacts and
+/// strikes to notes; every frame as soon as the last sample that it may use has been taken.
+class OfflineRun {
+public:
+    explicit OfflineRun(const OfflineParts& parts);
+
+    void run(ProgressBar& bar);
+
+    [[nodiscard]] const std::vector<Strike>& strikes() const { return pipeline_->strikes(); }
+    [[nodiscard]] std::size_t refused() const { return refused_; }
+    [[nodiscard]] const LoopTimes& times() const { return pipeline_->times(); }
+
+private:
+    struct Sample {
+        std::uint32_t stick;
+        const tracking::PoseSample* pose;
+    };
+    [[nodiscard]] std::vector<Sample> samples_by_time() const;
+    /// Those of one time.
+    void take(std::span<const Sample> samples);
+    [[nodiscard]] std::vector<std::uint32_t> feed(std::span<const Sample> samples);
+    void send(const audio::Note& note, bool scheduled);
+    /// Draws the frames that may use samples up to s but not the next one, at `next`.
+    void draw_frames(double s, double next);
+
+    OfflineParts parts_;
+    double t0_s_, t_end_s_;
+    std::vector<StickFilters> filters_;  // by stick, as the next two
+    std::vector<tracking::StickState> states_;
+    std::vector<Stick> sticks_;
+    std::optional<StrikePipeline> pipeline_;
+    std::size_t next_frame_ = 0;
+    std::size_t refused_ = 0;
+};
+
+OfflineRun::OfflineRun(const OfflineParts& parts)
+    : parts_(parts),
+      t0_s_(parts.trace.t0_s()),
+      t_end_s_(parts.trace.t_end_s()),
+      states_(parts.trace.sticks.size()) {
+    const PlayOptions& o = parts.options;
+    const StickPredictors predictors =
+        stick_predictors(o.picture_predictor, o.sound_predictor, o.sound_lead_s);
+    for (const tracking::StickTrace& stick : parts.trace.sticks) {
+        filters_.emplace_back(predictors, stick.name);
+        sticks_.emplace_back(static_cast<std::uint32_t>(sticks_.size()), parts.stick, o.sound_lead_s);
+    }
+    pipeline_.emplace(parts.kit, o, t0_s_, parts.stick.radius_m, sticks_, parts.simulation,
+                      [this](const audio::Note& note, bool scheduled) { send(note, scheduled); });
+}
+
+std::vector<OfflineRun::Sample> OfflineRun::samples_by_time() const {
+    std::vector<Sample> samples;
+    for (std::uint32_t stick = 0; stick < parts_.trace.sticks.size(); ++stick)
+        for (const tracking::PoseSample& pose : parts_.trace.sticks[stick].samples)
+            samples.push_back({stick, &pose});
+    std::ranges::stable_sort(samples, {}, [](const Sample& sample) { return sample.pose->t_s; });
+    return samples;
+}
+
+void OfflineRun::run(ProgressBar& bar) {
+    const std::vector<Sample> all = samples_by_time();
+    draw_frames(-kEver, all.front().pose->t_s);
+    for (auto first = all.begin(); first != all.end();) {
+        const double s = first->pose->t_s;
+        const auto next =
+            std::find_if(first, all.end(), [&](const Sample& sample) { return sample.pose->t_s > s; });
+        take({first, next});
+        draw_frames(s, next == all.end() ? kEver : next->pose->t_s);
+        bar.show(static_cast<double>(next - all.begin()) / static_cast<double>(all.size()));
+        first = next;
+    }
+    pipeline_->finish();
+    bar.clear();
+}
+
+std::vector<std::uint32_t> OfflineRun::feed(std::span<const Sample> samples) {
+    const Stopwatch watch(pipeline_->times().tracking);
+    std::vector<std::uint32_t> moved;
+    for (const auto& [stick, pose] : samples) {
+        const tracking::SampleStatus status = filters_[stick].correct(*pose, states_[stick]);
+        sticks_[stick].take(states_[stick]);
+        if (!is_taken(status)) {
+            ++refused_;
+            continue;
+        }
+        if (status == tracking::SampleStatus::reinitialised) pipeline_->restart(stick);
+        moved.push_back(stick);
+    }
+    return moved;
+}
+
+void OfflineRun::take(std::span<const Sample> samples) {
+    const double s = samples.front().pose->t_s;
+    pipeline_->advance_to(s);
+    if (parts_.sound) {
+        // Notes before this are fixed; those that this sample may still change lie at or after it.
+        const double fixed = (s + parts_.options.release_margin_s - t0_s_) * audio::kSampleRate;
+        parts_.sound->advance_to(static_cast<std::int64_t>(std::floor(fixed)));
+    }
+    pipeline_->take(s, feed(samples));
+}
+
+void OfflineRun::send(const audio::Note& note, bool scheduled) {
+    if (!parts_.sound || (parts_.options.solo && *parts_.options.solo != note.id)) return;
+    if (scheduled)
+        parts_.sound->schedule(note);
+    else
+        parts_.sound->cancel(note.id);
+}
+
+void OfflineRun::draw_frames(double s, double next) {
+    if (!parts_.frames) return;
+    for (;; ++next_frame_) {
+        const double elapsed = static_cast<double>(next_frame_) / parts_.options.fps;
+        const double T = t0_s_ + elapsed;
+        if (!(elapsed < t_end_s_ - t0_s_) || T - parts_.options.render_lead_s + kSlackS >= next) return;
+        const FrameContents contents = std::isfinite(s) ? pipeline_->scene(s, T) : FrameContents();
+        const Stopwatch watch(pipeline_->times().waiting_for_frames);
+        parts_.frames->push(
+            {.index = next_frame_, .state = parts_.stage->frame(contents.bodies, contents.poses())});
+    }
+}
 
 void check_solo(const PlayOptions& options, const std::vector<Strike>& strikes) {
     if (!options.solo) return;
@@ -26,14 +170,14 @@ void check_solo(const PlayOptions& options, const std::vector<Strike>& strikes) 
 }
 
 /// The loop, from samples to strikes.
-void play_through(OfflineRun& run, const PlayOptions& options, PlayResult& result) {
-    ProgressBar bar(options.progress);
-    run.run([&](double done) { bar.show(done); });
-    bar.clear();
+void play_through(const OfflineParts& parts, PlayResult& result) {
+    OfflineRun run(parts);
+    ProgressBar bar(parts.options.progress);
+    run.run(bar);
     result.strikes = run.strikes();
-    check_solo(options, result.strikes);
+    check_solo(parts.options, result.strikes);
     result.samples_refused = run.refused();
-    const LoopTimes times = run.times();
+    const LoopTimes& times = run.times();
     result.stages_s.insert(result.stages_s.end(), {{"tracking", times.tracking},
                                                    {"simulation", times.simulation},
                                                    {"strikes", times.strikes},
@@ -59,14 +203,22 @@ PlayResult play(const PlayOptions& options) {
     const std::unique_ptr<sim::Simulation> simulation = make_simulation(kit, options.workers);
     result.stages_s.emplace_back("start", wall.seconds());
 
-    OfflineRun run(trace, kit, options, stick, *simulation, stage, frames.get(), sound.get());
-    play_through(run, options, result);
+    play_through({trace, kit, options, stick, *simulation, &stage, frames.get(), sound.get()}, result);
     const double sound_s = seconds_of([&] {
         if (sound) finish_sound(*sound, trace.t_end_s() - trace.t0_s(), result, folder);
     });
     result.stages_s.emplace_back("sound (waiting and writing)", sound_s);
-    write_products(result, {options, kit, stick, *simulation, frames.get(), wall}, folder);
+    write_products(result, {kit, stick, *simulation, frames.get(), wall}, folder);
     return result;
+}
+
+std::vector<Strike> offline_strikes(const tracking::Trace& trace, const Kit& kit, const PlayOptions& options,
+                                    const StickGeometry& stick) {
+    const std::unique_ptr<sim::Simulation> simulation = make_simulation(kit, 0);
+    OfflineRun run({trace, kit, options, stick, *simulation});
+    ProgressBar none(false);
+    run.run(none);
+    return run.strikes();
 }
 
 }  // namespace app

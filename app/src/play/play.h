@@ -1,4 +1,10 @@
 #pragma once
+#include <tracking/trace.h>
+
+#include <vector>
+
+#include "kit/kit.h"
+#include "kit/stick_geometry.h"
 #include "play/play_options.h"
 #include "play/play_result.h"
 
@@ -9,5 +15,9 @@ namespace app {
 /// std::invalid_argument for bad input and std::runtime_error for failures while running; then nothing that
 /// looks finished is left in `out`.
 PlayResult play(const PlayOptions& options);
+
+/// The strikes of the same, by id, without frames and sound and in this process.
+[[nodiscard]] std::vector<Strike> offline_strikes(const tracking::Trace& trace, const Kit& kit,
+                                                  const PlayOptions& options, const StickGeometry& stick);
 
 }  // namespace app

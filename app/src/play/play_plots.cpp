@@ -5,20 +5,27 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <numeric>
+#include <set>
 #include <unordered_map>
 
-#include "kit/tip_track.h"
-#include "report/plot_panel.h"
 #include "statistics/statistics.h"
-#include "strikes/score_strikes.h"
 
 namespace app {
 namespace {
 
+using Kind = Mark::Kind;
+
 constexpr int kWidth = 1040;
+constexpr int kColumns = 980;  // of the timeline's panels
+constexpr int kHeightPanel = 170, kSoundPanel = 56, kFrame = 34;
+constexpr std::size_t kMostRows = 12;
+constexpr double kGap_s = 0.25;  // a line is not drawn across a longer gap in the data
+constexpr double kLeastPeak = 1e-3;
+constexpr const char* kErrorLabel = "onset - true contact, ms (positive: sound late)";
 
 /// The range of the timing plots, [-half_ms, half_ms], and their bins: as wide as the errors ask for.
 struct ErrorScale {
@@ -34,33 +41,23 @@ ErrorScale error_scale(const std::vector<MatchedNote>& notes) {
     return {30, 1, 5};
 }
 
-std::string zero_line() {
-    return fmt::format("set arrow 1 from 0, graph 0 to 0, graph 1 nohead lt 1 lw 1 dt '-' lc {}\n",
+/// A dashed line of the axes' colour, its ends as gnuplot has them.
+std::string dashed_line(int number, const std::string& from, const std::string& to) {
+    return fmt::format("set arrow {} from {} to {} nohead lt 1 lw 1 dt '-' lc {}\n", number, from, to,
                        gnuplot_colour(colours::axis));
 }
 
-/// The strikes of one kind, those with the longest lead first.
-std::vector<const Strike*> strikes_by_lead(const PlayResult& result, Mark wanted) {
-    const std::vector<Mark> kinds = strike_marks(result);
-    std::vector<const Strike*> chosen;
-    for (std::size_t i = 0; i < kinds.size(); ++i)
-        if (kinds[i] == wanted) chosen.push_back(&result.strikes[i]);
-    std::stable_sort(chosen.begin(), chosen.end(), [](const Strike* a, const Strike* b) {
-        return a->onset_s - a->scheduled_at_s > b->onset_s - b->scheduled_at_s;
-    });
-    return chosen;
+std::string zero_line() {
+    return dashed_line(1, "0, graph 0", "0, graph 1");
 }
 
 std::string level_line(int number, double y) {
-    return fmt::format(
-        "set arrow {0} from graph 0, first {1} to graph 1, first {1} nohead lt 1 lw 1 dt '-' lc {2}\n",
-        number, y, gnuplot_colour(colours::axis));
+    return dashed_line(number, fmt::format("graph 0, first {}", y), fmt::format("graph 1, first {}", y));
 }
 
-constexpr int kColumns = 980;  // of the timeline's panels
-constexpr int kHeightPanel = 170, kSoundPanel = 56, kFrame = 34;
-constexpr std::size_t kMostRows = 12;
-constexpr double kGap_s = 0.25;  // a line is not drawn across a longer gap in the data
+std::string strokes(double width, const ReportColour& colour) {
+    return fmt::format("with vectors nohead lw {} lc {}", width, gnuplot_colour(colour));
+}
 
 /// The heights that most of the paths keep to (a glitch of the tracker may not flatten them), and all
 /// contacts.
@@ -81,17 +78,15 @@ std::pair<double, double> height_range(const PlayResult& result) {
 /// The samples of one column of pixels as "x y" lines: all of a few, the first, lowest, highest and last of
 /// many.
 void write_column(std::string& text, const TipTrack& track, std::size_t begin, std::size_t end) {
-    std::vector<std::size_t> kept;
+    std::set<std::size_t> kept;
     if (end - begin <= 4) {
-        for (std::size_t i = begin; i < end; ++i) kept.push_back(i);
+        for (std::size_t i = begin; i < end; ++i) kept.insert(i);
     } else {
-        const auto lower = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) { return a.y() < b.y(); };
         const auto tip = [&](std::size_t i) { return track.tip.begin() + static_cast<std::ptrdiff_t>(i); };
-        const auto [low, high] = std::minmax_element(tip(begin), tip(end), lower);
+        const auto [low, high] =
+            std::ranges::minmax_element(tip(begin), tip(end), {}, [](const auto& at) { return at.y(); });
         kept = {begin, static_cast<std::size_t>(low - track.tip.begin()),
                 static_cast<std::size_t>(high - track.tip.begin()), end - 1};
-        std::sort(kept.begin(), kept.end());
-        kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
     }
     for (const std::size_t i : kept) {
         if (i > 0 && track.t_s[i] - track.t_s[i - 1] > kGap_s) text += '\n';
@@ -120,153 +115,73 @@ std::string height_line(const TipTrack& track, double from_s, double to_s) {
 
 struct MarkStyle {
     const ReportColour& colour;
-    Mark mark;
+    Kind kind;
     int point_type;
     double size;
 };
 
 /// In the order of drawing; gnuplot's point types: 2 cross, 4 frame, 6 ring, 7 disc, 11 triangle pointing
 /// down.
-constexpr MarkStyle kMarkStyles[] = {{colours::cancelled, Mark::cancelled, 2, 0.85},
-                                     {colours::contact, Mark::contact, 6, 0.95},
-                                     {colours::released, Mark::released, 7, 0.55},
-                                     {colours::missed, Mark::missed, 4, 1.0},
-                                     {colours::wrong, Mark::wrong, 11, 0.8}};
+constexpr MarkStyle kMarkStyles[] = {{colours::cancelled, Kind::cancelled, 2, 0.85},
+                                     {colours::contact, Kind::contact, 6, 0.95},
+                                     {colours::released, Kind::released, 7, 0.55},
+                                     {colours::missed, Kind::missed, 4, 1.0},
+                                     {colours::wrong, Kind::wrong, 11, 0.8}};
 
-std::string mark_points(const PlayResult& result, const std::vector<Mark>& kinds, Mark wanted,
-                        const PlotArea& area) {
-    ThinnedMarks points(area);
-    for (const TrueContact& contact : result.contacts) {
-        const bool shown = wanted == Mark::contact || (wanted == Mark::missed && contact.matched_id == 0);
-        if (shown) points.add(contact.t_s, contact.point_world.y());
-    }
-    for (std::size_t i = 0; i < kinds.size(); ++i)
-        if (kinds[i] == wanted) points.add(result.strikes[i].onset_s, result.strikes[i].point_world.y());
-    return points.text();
-}
-
-std::string height_panel(const PlayResult& result, const std::vector<Mark>& kinds, const PlotArea& area) {
+std::string height_panel(const PlayResult& result, const std::vector<Mark>& marks, const PlotArea& area) {
     PlotPanel panel;
     for (std::size_t i = 0; i < result.tracks.size(); ++i)
         panel.add(height_line(result.tracks[i], area.x_low, area.x_high),
                   "with lines lw 1.4 lc " + gnuplot_colour(stick_colour(i)));
-    for (const MarkStyle& style : kMarkStyles)
-        panel.add(mark_points(result, kinds, style.mark, area),
-                  fmt::format("with points lw 1.6 pt {} ps {} lc {}", style.point_type, style.size,
-                              gnuplot_colour(style.colour)));
-    return fmt::format("set yrange [{}:{}]\n{}set ylabel 'tip height, m' offset 1\n", area.y_low, area.y_high,
-                       round_tics("y", area.y_high - area.y_low, 4)) +
-           panel.text();
-}
-
-std::string sound_panel(const PlayResult& result, const std::vector<Mark>& kinds, const PlotArea& area,
-                        double peak) {
-    PlotPanel panel;
-    panel.add(sound_envelope(result.audio, result.t0_s, area.x_low, area.x_high, kColumns),
-              "with filledcurves fs solid 1 noborder lc " + gnuplot_colour(colours::wave));
-    const PlotArea strip = {area.x_low, area.x_high, -peak, peak, kColumns, 1};
-    for (const auto& [kind, colour] :
-         {std::pair{Mark::released, colours::released}, {Mark::wrong, colours::wrong}}) {
-        ThinnedMarks onsets(strip);
-        for (std::size_t i = 0; i < kinds.size(); ++i)
-            if (kinds[i] == kind)
-                onsets.add(result.strikes[i].onset_s, -peak, fmt::format("0 {:.4f}", 2 * peak));
-        panel.add(onsets.text(), "with vectors nohead lw 0.8 lc " + gnuplot_colour(colour));
+    for (const MarkStyle& style : kMarkStyles) {
+        ThinnedMarks points(area);
+        for (const Mark& mark : marks)
+            if (mark.kind == style.kind) points.add(mark.t_s, mark.height_m);
+        panel.add(points.text(), fmt::format("with points lw 1.6 pt {} ps {} lc {}", style.point_type,
+                                             style.size, gnuplot_colour(style.colour)));
     }
-    return fmt::format("set yrange [{}:{}]\nset ytics ({} 0)\nset ylabel 'sound' offset 1\n", -peak, peak,
-                       gnuplot_string("0")) +
+    return fmt::format("set yrange [{}:{}]\n", area.y_low, area.y_high) +
+           round_tics("y", area.y_high - area.y_low, 4) + "set ylabel 'tip height, m' offset 1\n" +
            panel.text();
 }
 
-PlotScript row_plot(const PlayResult& result, const std::vector<Mark>& kinds, const PlotArea& area,
+/// The envelope of the sound, and the onsets of the notes heard and false as strokes that rise from `foot`.
+PlotPanel sound_panel(const PlayResult& result, const std::vector<Mark>& marks, const PlotArea& area,
+                      double foot, double rise, double width) {
+    PlotPanel panel;
+    panel.add(sound_envelope(result.audio, result.t0_s, area.x_low, area.x_high, area.width),
+              "with filledcurves fs solid 1 noborder lc " + gnuplot_colour(colours::wave));
+    for (const auto& [kind, colour] :
+         {std::pair{Kind::released, colours::released}, {Kind::wrong, colours::wrong}}) {
+        ThinnedMarks onsets(area);
+        for (const Mark& mark : marks)
+            if (mark.kind == kind) onsets.add(mark.t_s, foot, fmt::format("0 {:.4f}", rise));
+        panel.add(onsets.text(), strokes(width, colour));
+    }
+    return panel;
+}
+
+PlotScript row_plot(const PlayResult& result, const std::vector<Mark>& marks, const PlotArea& area,
                     double peak) {
     const bool sound = !result.audio.empty();
     const int height = kHeightPanel + kFrame + (sound ? kSoundPanel : 0);
-    const auto margins = [&](int top, int bottom) {
-        return fmt::format("set tmargin at screen {}\nset bmargin at screen {}\n",
-                           1 - static_cast<double>(top) / height, 1 - static_cast<double>(bottom) / height);
-    };
-    std::string commands = plot_axes();
-    commands += fmt::format("set xrange [{}:{}]\n", area.x_low, area.x_high);
-    commands += "set multiplot\nset lmargin at screen 0.058\nset rmargin at screen 0.984\n";
     const std::string time_axis = round_tics("x", area.x_high - area.x_low, 8);
-    commands += margins(8, kHeightPanel) + time_axis;
-    if (sound) {
-        commands += "set format x ''\n" + height_panel(result, kinds, area);
-        commands += margins(kHeightPanel + 6, kHeightPanel + kSoundPanel) + time_axis + "set format y '%g'\n";
-        commands += sound_panel(result, kinds, area, peak);
-    } else {
-        commands += height_panel(result, kinds, area);
-    }
+    std::string commands = plot_axes() + fmt::format("set xrange [{}:{}]\n", area.x_low, area.x_high) +
+                           "set multiplot\nset lmargin at screen 0.058\nset rmargin at screen 0.984\n" +
+                           plot_margins(8, kHeightPanel, height) + time_axis;
+    if (sound) commands += "set format x ''\n";
+    commands += height_panel(result, marks, area);
+    if (sound)
+        commands += plot_margins(kHeightPanel + 6, kHeightPanel + kSoundPanel, height) + time_axis +
+                    "set format y '%g'\n" + fmt::format("set yrange [{}:{}]\n", -peak, peak) +
+                    "set ytics ('0' 0)\nset ylabel 'sound' offset 1\n" +
+                    sound_panel(result, marks, {area.x_low, area.x_high, -peak, peak, kColumns, 1}, -peak,
+                                2 * peak, 0.8)
+                        .text();
     return {kWidth, height, commands + "unset multiplot\n"};
 }
 
-}  // namespace
-
-std::vector<Mark> strike_marks(const PlayResult& result) {
-    std::unordered_map<std::uint64_t, bool> matched;
-    for (const TrueContact& contact : result.contacts) matched[contact.matched_id] = true;
-    std::vector<Mark> marks;
-    for (const Strike& strike : result.strikes) {
-        const Mark heard = matched.count(strike.id) > 0 ? Mark::released : Mark::wrong;
-        marks.push_back(strike.outcome == Outcome::released ? heard : Mark::cancelled);
-    }
-    return marks;
-}
-
-std::vector<MatchedNote> matched_notes(const PlayResult& result) {
-    std::unordered_map<std::uint64_t, const Strike*> by_id;
-    for (const Strike& strike : result.strikes) by_id.emplace(strike.id, &strike);
-    std::vector<MatchedNote> notes;
-    for (const TrueContact& contact : result.contacts)
-        if (const auto strike = by_id.find(contact.matched_id); strike != by_id.end())
-            notes.push_back(
-                {(strike->second->onset_s - contact.t_s) * 1e3, contact.stick, contact.instrument});
-    return notes;
-}
-
-Timeline timeline_of(const PlayResult& result) {
-    const double duration_s = std::max(result.t_end_s - result.t0_s, 1e-3);
-    Timeline timeline;
-    timeline.row_s = std::min(timeline.row_s, duration_s);
-    const auto rows = static_cast<std::size_t>(std::ceil(duration_s / timeline.row_s - 1e-9));
-    std::vector<int> errors(rows);
-    const auto count = [&](double t_s) {
-        const double row = std::floor((t_s - result.t0_s) / timeline.row_s);
-        ++errors[std::min(static_cast<std::size_t>(std::max(row, 0.0)), rows - 1)];
-    };
-    const std::vector<Mark> marks = strike_marks(result);
-    for (std::size_t i = 0; i < marks.size(); ++i)
-        if (marks[i] == Mark::wrong) count(result.strikes[i].onset_s);
-    for (const TrueContact& contact : result.contacts)
-        if (contact.matched_id == 0) count(contact.t_s);
-    std::vector<std::size_t> shown(rows);
-    std::iota(shown.begin(), shown.end(), 0);
-    timeline.whole = rows <= kMostRows;
-    if (!timeline.whole) {
-        std::stable_sort(shown.begin(), shown.end(), [&](auto a, auto b) { return errors[a] > errors[b]; });
-        shown.resize(kMostRows);
-        std::sort(shown.begin(), shown.end());
-    }
-    for (const std::size_t row : shown)
-        timeline.starts_s.push_back(result.t0_s + static_cast<double>(row) * timeline.row_s);
-    return timeline;
-}
-
-std::vector<PlotScript> timeline_plots(const PlayResult& result, const Timeline& timeline) {
-    const auto [low, high] = height_range(result);
-    const std::vector<Mark> kinds = strike_marks(result);
-    double peak = 1e-3;
-    for (const float sample : result.audio) peak = std::max(peak, std::abs(static_cast<double>(sample)));
-    std::vector<PlotScript> scripts;
-    for (const double from_s : timeline.starts_s)
-        scripts.push_back(row_plot(
-            result, kinds, {from_s, from_s + timeline.row_s, low, high, kColumns, kHeightPanel}, peak));
-    return scripts;
-}
-
-PlotScript timing_plot(const PlayResult& result) {
-    const std::vector<MatchedNote> notes = matched_notes(result);
+PlotScript timing_plot(const std::vector<MatchedNote>& notes) {
     const ErrorScale scale = error_scale(notes);
     std::map<int, int> bins;
     for (const MatchedNote& note : notes) ++bins[static_cast<int>(std::floor(note.error_ms / scale.bin_ms))];
@@ -278,17 +193,14 @@ PlotScript timing_plot(const PlayResult& result) {
     }
     PlotPanel panel;
     panel.add(data, "with boxes fs solid 0.75 noborder lc " + gnuplot_colour(colours::released));
-    std::string commands = plot_axes() + zero_line();
-    commands += fmt::format(
-        "set xrange [{}:{}]\nset yrange [0:{}]\nset ytics {}\nset xtics {}\nset boxwidth {}\n"
-        "set xlabel 'onset - true contact, ms (positive: sound late)'\nset ylabel 'notes in {} ms'\n",
-        -scale.half_ms, scale.half_ms, highest * 1.08, std::max(1.0, round_step(highest, 5)), scale.tic_ms,
-        0.9 * scale.bin_ms, scale.bin_ms);
-    return {kWidth / 2, 260, commands + panel.text()};
+    return plot_of(
+        kWidth / 2, 260, {kErrorLabel, -scale.half_ms, scale.half_ms},
+        {fmt::format("notes in {} ms", scale.bin_ms), 0, highest * 1.08}, panel,
+        zero_line() + fmt::format("set ytics {}\nset xtics {}\nset boxwidth {}\n",
+                                  std::max(1.0, round_step(highest, 5)), scale.tic_ms, 0.9 * scale.bin_ms));
 }
 
-PlotScript timing_by_instrument_plot(const PlayResult& result) {
-    const std::vector<MatchedNote> notes = matched_notes(result);
+PlotScript timing_by_instrument_plot(const PlayResult& result, const std::vector<MatchedNote>& notes) {
     std::map<std::uint32_t, int> lines;  // instrument -> line, those with notes only
     for (const MatchedNote& note : notes) lines.emplace(note.instrument, 0);
     std::string tics;
@@ -311,59 +223,59 @@ PlotScript timing_by_instrument_plot(const PlayResult& result) {
             if (note.stick == stick) marks.add(note.error_ms, lines[note.instrument] - lift);
         panel.add(marks.text(), "with points pt 7 ps 0.5 lc " + gnuplot_colour(stick_colour(stick)));
     }
-    std::string commands = plot_axes() + zero_line();
-    commands += fmt::format(
-        "set xrange [{}:{}]\nset yrange [-0.6:{}]\nset xtics {}\nset ytics ({})\n"
-        "set xlabel 'onset - true contact, ms (positive: sound late)'\n",
-        area.x_low, area.x_high, area.y_high, scale.tic_ms, tics);
-    return {kWidth / 2, height, commands + panel.text()};
+    return plot_of(kWidth / 2, height, {kErrorLabel, area.x_low, area.x_high}, {"", area.y_low, area.y_high},
+                   panel, zero_line() + fmt::format("set xtics {}\nset ytics ({})\n", scale.tic_ms, tics));
 }
 
-PlotScript lead_plot(const PlayResult& result) {
-    const double first_ms = -1e3 * result.sound_lead_s, release_ms = -1e3 * result.release_margin_s;
+PlotScript lead_plot(const PlayResult& result, const std::vector<Mark>& marks) {
+    const double first_ms = -1e3 * result.options.sound_lead_s,
+                 release_ms = -1e3 * result.options.release_margin_s;
     double low = std::min({first_ms * 1.1, release_ms * 1.1, -1.0});
     for (const Strike& strike : result.strikes)
         low = std::min(low, (strike.scheduled_at_s - strike.onset_s) * 1.05e3);
     const double count = static_cast<double>(result.strikes.size());
     const PlotArea area = {0.5, std::max(count, 1.0) + 0.5, low, 0, kWidth, 260};
+    std::vector<Mark> by_lead = marks;
+    std::erase_if(by_lead, [](const Mark& mark) { return mark.strike == nullptr; });
+    std::ranges::stable_sort(by_lead, std::greater(), [](const Mark& mark) {
+        return mark.strike->onset_s - mark.strike->scheduled_at_s;
+    });
     int place = 0;
     PlotPanel panel;
-    for (const auto& [kind, colour] : {std::pair{Mark::released, colours::released},
-                                       {Mark::wrong, colours::wrong},
-                                       {Mark::cancelled, colours::cancelled}}) {
+    for (const auto& [kind, colour] : {std::pair{Kind::released, colours::released},
+                                       {Kind::wrong, colours::wrong},
+                                       {Kind::cancelled, colours::cancelled}}) {
         ThinnedMarks held(area), first(area), decided(area);
-        for (const Strike* strike : strikes_by_lead(result, kind)) {
-            const double from = (strike->scheduled_at_s - strike->onset_s) * 1e3;
-            const double to = (strike->decided_at_s - strike->onset_s) * 1e3;
+        for (const Mark& mark : by_lead) {
+            if (mark.kind != kind) continue;
+            const double from = (mark.strike->scheduled_at_s - mark.t_s) * 1e3;
+            const double to = (mark.strike->decided_at_s - mark.t_s) * 1e3;
             held.add(++place, from, fmt::format("0 {:.4f}", to - from));
             first.add(place, from);
             decided.add(place, to);
         }
         const std::string paint = gnuplot_colour(colour);
-        panel.add(held.text(), "with vectors nohead lw 1 lc " + paint);
+        panel.add(held.text(), strokes(1, colour));
         panel.add(first.text(), "with points pt 6 ps 0.45 lc " + paint);
         panel.add(decided.text(),
-                  fmt::format("with points pt {} ps 0.5 lc {}", kind == Mark::cancelled ? 2 : 7, paint));
+                  fmt::format("with points pt {} ps 0.5 lc {}", kind == Kind::cancelled ? 2 : 7, paint));
     }
-    std::string commands = plot_axes() + level_line(1, first_ms) + level_line(2, release_ms);
-    commands += fmt::format(
-        "set xrange [{}:{}]\nset yrange [{}:0]\nset xtics {}\nset xlabel 'notes: by outcome, then by lead'\n"
-        "set ylabel 'ms before the sound'\n",
-        area.x_low, area.x_high, low, std::max(1.0, round_step(count + 1, 12)));
-    return {kWidth, 260, commands + panel.text()};
+    return plot_of(kWidth, 260, {"notes: by outcome, then by lead", area.x_low, area.x_high},
+                   {"ms before the sound", low, 0}, panel,
+                   level_line(1, first_ms) + level_line(2, release_ms) +
+                       fmt::format("set xtics {}\n", std::max(1.0, round_step(count + 1, 12))));
 }
 
-PlotScript overview_plot(const PlayResult& result, const Timeline& timeline) {
+PlotScript overview_plot(const PlayResult& result, const std::vector<Mark>& marks, const Timeline& timeline) {
+    constexpr std::tuple<std::size_t, Kind, const ReportColour&> kKinds[] = {
+        {2, Kind::missed, colours::missed},
+        {1, Kind::wrong, colours::wrong},
+        {0, Kind::released, colours::released}};
     const double bin_s = round_step(result.t_end_s - result.t0_s, 120);
     std::map<std::int64_t, std::array<int, 3>> bins;  // heard, false, missed
-    const auto count = [&](double t_s, std::size_t kind) {
-        ++bins[static_cast<std::int64_t>(std::floor(t_s / bin_s))][kind];
-    };
-    const std::vector<Mark> kinds = strike_marks(result);
-    for (std::size_t i = 0; i < kinds.size(); ++i)
-        if (kinds[i] != Mark::cancelled) count(result.strikes[i].onset_s, kinds[i] == Mark::wrong ? 1 : 0);
-    for (const TrueContact& contact : result.contacts)
-        if (contact.matched_id == 0) count(contact.t_s, 2);
+    for (const auto& [number, kind, colour] : kKinds)
+        for (const Mark& mark : marks)
+            if (mark.kind == kind) ++bins[static_cast<std::int64_t>(std::floor(mark.t_s / bin_s))][number];
     std::array<std::string, 3> stacks;  // each up to and with its kind
     int highest = 1;
     for (const auto& [bin, counts] : bins) {
@@ -379,42 +291,101 @@ PlotScript overview_plot(const PlayResult& result, const Timeline& timeline) {
     for (const double from_s : timeline.starts_s)
         fmt::format_to(std::back_inserter(shown), "{} {} {} 0\n", from_s, -0.07 * highest, timeline.row_s);
     PlotPanel panel;
-    for (const auto& [kind, colour] :
-         {std::pair{2U, colours::missed}, {1U, colours::wrong}, {0U, colours::released}})
-        panel.add(stacks[kind], "with boxes fs solid 1 noborder lc " + gnuplot_colour(colour));
-    panel.add(shown, "with vectors nohead lw 6 lc " + gnuplot_colour(colours::axis));
-    std::string commands = plot_axes() + round_tics("x", result.t_end_s - result.t0_s, 12);
-    commands += fmt::format(
-        "set xrange [{}:{}]\nset yrange [{}:{}]\nset ytics {}\nset boxwidth {}\nset xlabel 'time, s'\n"
-        "set ylabel 'in {:g} s'\n",
-        result.t0_s, result.t_end_s, -0.12 * highest, 1.05 * highest, std::max(1.0, round_step(highest, 4)),
-        0.85 * bin_s, bin_s);
-    return {kWidth, 190, commands + panel.text()};
+    for (const auto& [number, kind, colour] : kKinds)
+        panel.add(stacks[number], "with boxes fs solid 1 noborder lc " + gnuplot_colour(colour));
+    panel.add(shown, strokes(6, colours::axis));
+    return plot_of(
+        kWidth, 190, {"time, s", result.t0_s, result.t_end_s, 12},
+        {fmt::format("in {:g} s", bin_s), -0.12 * highest, 1.05 * highest}, panel,
+        fmt::format("set ytics {}\nset boxwidth {}\n", std::max(1.0, round_step(highest, 4)), 0.85 * bin_s));
 }
 
-PlotScript sound_plot(const PlayResult& result) {
-    const std::size_t frames = result.audio.size() / 2;
-    const double length_s = static_cast<double>(frames) / 48000;
+PlotScript sound_plot(const PlayResult& result, const std::vector<Mark>& marks, double peak) {
+    const double length_s = static_cast<double>(result.audio.size() / 2) / 48000;
     const PlotArea area = {result.t0_s, result.t0_s + length_s, -1, 1, kWidth, 1};
-    const auto [low, high] = std::minmax_element(result.audio.begin(), result.audio.end());
-    const double peak = std::max({-static_cast<double>(*low), static_cast<double>(*high), 1e-3});
-    PlotPanel panel;
-    panel.add(sound_envelope(result.audio, result.t0_s, area.x_low, area.x_high, kWidth),
-              "with filledcurves fs solid 1 noborder lc " + gnuplot_colour(colours::wave));
-    const std::vector<Mark> kinds = strike_marks(result);
-    for (const auto& [kind, colour] :
-         {std::pair{Mark::released, colours::released}, {Mark::wrong, colours::wrong}}) {
-        ThinnedMarks onsets(area);
-        for (std::size_t i = 0; i < kinds.size() && kinds.size() < kWidth; ++i)  // more would be one bar
-            if (kinds[i] == kind)
-                onsets.add(result.strikes[i].onset_s, -1.16 * peak, fmt::format("0 {:.4f}", 0.1 * peak));
-        panel.add(onsets.text(), "with vectors nohead lw 1.3 lc " + gnuplot_colour(colour));
+    const bool few = result.strikes.size() < kWidth;  // more would be one bar
+    const PlotPanel panel =
+        sound_panel(result, few ? marks : std::vector<Mark>(), area, -1.16 * peak, 0.1 * peak, 1.3);
+    return plot_of(kWidth, 200, {"time, s", area.x_low, area.x_high, 12}, {"sample", -1.2 * peak, 1.1 * peak},
+                   panel, round_tics("y", 2 * peak, 4));
+}
+
+}  // namespace
+
+std::vector<Mark> marks_of(const PlayResult& result) {
+    std::set<std::uint64_t> matched;
+    std::vector<Mark> marks;
+    for (const TrueContact& c : result.contacts) {
+        matched.insert(c.matched_id);
+        marks.push_back({Kind::contact, c.t_s, c.point_world.y(), c.instrument});
+        if (c.matched_id == 0) marks.push_back({Kind::missed, c.t_s, c.point_world.y(), c.instrument});
     }
-    std::string commands = plot_axes() + round_tics("x", length_s, 12) + round_tics("y", 2 * peak, 4);
-    commands +=
-        fmt::format("set xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel 'time, s'\nset ylabel 'sample'\n",
-                    area.x_low, area.x_high, -1.2 * peak, 1.1 * peak);
-    return {kWidth, 200, commands + panel.text()};
+    for (const Strike& s : result.strikes) {
+        const Kind heard = matched.contains(s.id) ? Kind::released : Kind::wrong;
+        marks.push_back({s.outcome == Outcome::released ? heard : Kind::cancelled, s.onset_s,
+                         s.point_world.y(), s.instrument, &s});
+    }
+    return marks;
+}
+
+std::vector<MatchedNote> matched_notes(const PlayResult& result) {
+    std::unordered_map<std::uint64_t, const Strike*> by_id;
+    for (const Strike& strike : result.strikes) by_id.emplace(strike.id, &strike);
+    std::vector<MatchedNote> notes;
+    for (const TrueContact& contact : result.contacts)
+        if (const auto strike = by_id.find(contact.matched_id); strike != by_id.end())
+            notes.push_back(
+                {(strike->second->onset_s - contact.t_s) * 1e3, contact.stick, contact.instrument});
+    return notes;
+}
+
+Timeline timeline_of(const PlayResult& result) {
+    const double duration_s = std::max(result.t_end_s - result.t0_s, 1e-3);
+    Timeline timeline;
+    timeline.row_s = std::min(timeline.row_s, duration_s);
+    const auto rows = static_cast<std::size_t>(std::ceil(duration_s / timeline.row_s - 1e-9));
+    std::vector<int> errors(rows);
+    for (const Mark& mark : marks_of(result)) {
+        if (mark.kind != Kind::wrong && mark.kind != Kind::missed) continue;
+        const double row = std::floor((mark.t_s - result.t0_s) / timeline.row_s);
+        ++errors[std::min(static_cast<std::size_t>(std::max(row, 0.0)), rows - 1)];
+    }
+    std::vector<std::size_t> shown(rows);
+    std::iota(shown.begin(), shown.end(), 0);
+    timeline.whole = rows <= kMostRows;
+    if (!timeline.whole) {
+        std::stable_sort(shown.begin(), shown.end(), [&](auto a, auto b) { return errors[a] > errors[b]; });
+        shown.resize(kMostRows);
+        std::sort(shown.begin(), shown.end());
+    }
+    for (const std::size_t row : shown)
+        timeline.starts_s.push_back(result.t0_s + static_cast<double>(row) * timeline.row_s);
+    return timeline;
+}
+
+PlayPlots add_play_plots(PlotGallery& gallery, const PlayResult& result) {
+    const std::vector<Mark> marks = marks_of(result);
+    const std::vector<MatchedNote> notes = matched_notes(result);
+    const auto [low, high] = height_range(result);
+    double peak = kLeastPeak;
+    for (const float sample : result.audio) peak = std::max(peak, std::abs(static_cast<double>(sample)));
+    PlayPlots plots;
+    plots.timeline = timeline_of(result);
+    for (const double from_s : plots.timeline.starts_s)
+        plots.rows.push_back(gallery.add(
+            {row_plot(result, marks,
+                      {from_s, from_s + plots.timeline.row_s, low, high, kColumns, kHeightPanel}, peak)},
+            fmt::format("timeline from {:g} s on", from_s)));
+    plots.timing = gallery.add({timing_plot(notes)}, "histogram of onset minus true contact");
+    plots.instruments =
+        gallery.add({timing_by_instrument_plot(result, notes)}, "onset minus true contact by instrument");
+    plots.leads = gallery.add({lead_plot(result, marks)}, "first prediction and decision of each note");
+    if (!result.audio.empty())
+        plots.sound = gallery.add({sound_plot(result, marks, peak)}, "envelope of the sound");
+    if (!plots.timeline.whole)
+        plots.overview = gallery.add({overview_plot(result, marks, plots.timeline)},
+                                     "notes heard, false and missed over time");
+    return plots;
 }
 
 }  // namespace app

@@ -1,18 +1,24 @@
 #pragma once
 #include <cstdint>
-#include <string>
+#include <optional>
 #include <vector>
 
 #include "play/play_result.h"
-#include "report/gnuplot.h"
+#include "report/plot.h"
 
 namespace app {
 
 /// What became of a strike or a contact: one mark of the report's plots.
-enum class Mark { contact, released, wrong, missed, cancelled };
-/// A released strike is `wrong` when no contact is matched to it, a contact `missed` when no strike is.
-/// Strike marks by index into strikes.
-[[nodiscard]] std::vector<Mark> strike_marks(const PlayResult& result);
+struct Mark {
+    /// A released strike is `wrong` when no contact is matched to it, a contact `missed` when no strike is.
+    enum class Kind { contact, missed, released, wrong, cancelled };
+    Kind kind;
+    double t_s = 0, height_m = 0;  ///< of the contact, or of the onset and the struck point
+    std::uint32_t instrument = 0;
+    const Strike* strike = nullptr;  ///< of the result; null for contacts
+};
+/// Contacts (a missed one twice, also as a contact), then strikes, in their order.
+[[nodiscard]] std::vector<Mark> marks_of(const PlayResult& result);
 
 /// A note and the contact that it belongs to.
 struct MatchedNote {
@@ -32,22 +38,22 @@ struct Timeline {
 };
 [[nodiscard]] Timeline timeline_of(const PlayResult& result);
 
-// Scripts of the report's plots. Times on the trace's clock. Of many marks within a pixel one is kept, so
-// that the size is bounded for any length.
-
-/// Tip heights of all sticks with the marks, under it the envelope of the sound with the onsets: a script for
-/// each row.
-[[nodiscard]] std::vector<PlotScript> timeline_plots(const PlayResult& result, const Timeline& timeline);
-/// Notes heard, false and missed over the whole recording, with the rows of the timeline marked.
-[[nodiscard]] PlotScript overview_plot(const PlayResult& result, const Timeline& timeline);
-/// The envelope of the whole sound, tail included, with the onsets. The result must hold audio.
-[[nodiscard]] PlotScript sound_plot(const PlayResult& result);
-/// Histogram of onset - true contact [ms]: +-30 ms in bins of 1 ms; +-10 or +-5 ms in finer ones where all
-/// errors are smaller.
-[[nodiscard]] PlotScript timing_plot(const PlayResult& result);
-/// The same with a point for each note and a line for each instrument.
-[[nodiscard]] PlotScript timing_by_instrument_plot(const PlayResult& result);
-/// For each note, first prediction and decision relative to its onset [ms]; notes by outcome, then by lead.
-[[nodiscard]] PlotScript lead_plot(const PlayResult& result);
+/// The plots of a run by their numbers in a gallery. Times on the trace's clock. Of many marks within a pixel
+/// one is kept, so that the size is bounded for any length.
+struct PlayPlots {
+    Timeline timeline;
+    /// Tip heights of all sticks with the marks, under it the envelope of the sound with the onsets: one for
+    /// each row.
+    std::vector<std::size_t> rows;
+    /// Histogram of onset - true contact [ms]: +-30 ms in bins of 1 ms; +-10 or +-5 ms in finer ones where all
+    /// errors are smaller. And the same with a point for each note and a line for each instrument.
+    std::size_t timing, instruments;
+    /// For each note, first prediction and decision relative to its onset [ms]; notes by outcome, then by
+    /// lead.
+    std::size_t leads;
+    std::optional<std::size_t> sound;  ///< the whole sound, tail included, with the onsets, if there is any
+    std::optional<std::size_t> overview;  ///< notes heard, false and missed, unless the timeline shows all
+};
+[[nodiscard]] PlayPlots add_play_plots(PlotGallery& gallery, const PlayResult& result);
 
 }  // namespace app

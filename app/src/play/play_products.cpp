@@ -9,9 +9,6 @@
 #include <vector>
 
 #include "files/checksum.h"
-#include "pictures/video.h"
-#include "play/note_of_strike.h"
-#include "play/play_report.h"
 #include "report/table.h"
 #include "strikes/score_strikes.h"
 #include "strikes/true_contacts.h"
@@ -28,7 +25,7 @@ void score(PlayResult& result, const Kit& kit, const StickGeometry& stick) {
     result.contacts = find_true_contacts(result.tracks, bodies, stick.radius_m);
     result.score = score_strikes(result.strikes, result.contacts);
     count_turns(result.score, result.strikes, result.contacts, result.tracks, bodies, stick.radius_m,
-                result.release_margin_s);
+                result.options.release_margin_s);
 }
 
 /// The released notes, by onset.
@@ -57,7 +54,7 @@ std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& f
     }
     std::vector<fs::path> files;
     for (const Strike* strike : shown) {
-        const auto at = static_cast<long>(std::ceil((strike->onset_s - result.t0_s) * result.fps));
+        const auto at = static_cast<long>(std::ceil((strike->onset_s - result.t0_s) * result.options.fps));
         for (const long k : {at - 2, at, at + 2})
             if (k >= 0 && k < static_cast<long>(result.frames))
                 files.push_back(folder / fmt::format("{:06}.png", k));
@@ -68,32 +65,15 @@ std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& f
 /// Waits for the last frames; their measurements, and what the report shows of them.
 void take_frames(PlayResult& result, FrameThread& frames, const fs::path& folder) {
     const double waited_s = seconds_of([&] { frames.finish(); });
-    if (result.frames == 0) result.frames = frames.written().size();
-    result.stages_s.emplace_back("drawing (own thread)", frames.draw_s());
-    result.stages_s.emplace_back("writing frames (own thread)", frames.write_s());
+    if (result.frames == 0) result.frames = frames.report().written.size();
+    result.stages_s.emplace_back("drawing (own thread)", frames.report().draw_s);
+    result.stages_s.emplace_back("writing frames (own thread)", frames.report().write_s);
     result.stages_s.emplace_back("frames (waiting at the end)", waited_s);
-    result.versions.emplace_back("renderer", frames.version());
+    result.versions.emplace_back("renderer", frames.report().version);
     result.report_frames = frames_to_show(result, folder);
 }
 
 using Json = nlohmann::ordered_json;
-
-Json strikes_json(const StrikeScore& score) {
-    return {{"true", score.true_contacts},
-            {"released", score.released},
-            {"cancelled", score.cancelled},
-            {"moved", score.moved},
-            {"false", score.false_notes},
-            {"missed", score.missed},
-            {"false_turned_early", score.false_turned_early},
-            {"false_turned_late", score.false_turned_late}};
-}
-
-Json timing_json(const StrikeScore& score) {
-    const bool any_matched = score.released > score.false_notes;
-    return {{"median", any_matched ? Json(score.timing_median_ms) : Json()},
-            {"p95", any_matched ? Json(score.timing_p95_ms) : Json()}};
-}
 
 template <typename Value>
 Json object_json(const std::vector<std::pair<std::string, Value>>& pairs) {
@@ -102,30 +82,18 @@ Json object_json(const std::vector<std::pair<std::string, Value>>& pairs) {
     return out;
 }
 
-Json inputs_json(const std::vector<InputFile>& files) {
-    Json out = Json::array();
-    for (const InputFile& input : files) out.push_back({{"file", input.file}, {"sha256", input.sha256}});
-    return out;
-}
-
 std::string_view outcome_word(const Strike& strike) {
-    switch (strike.outcome) {
-        case Outcome::released:
-            return "released";
-        case Outcome::cancelled:
-            return "cancelled";
-        case Outcome::pending:
-            break;
-    }
-    throw std::logic_error(
-        fmt::format("strike {} of a finished run is neither released nor cancelled", strike.id));
+    if (strike.outcome == Outcome::pending)
+        throw std::logic_error(
+            fmt::format("strike {} of a finished run is neither released nor cancelled", strike.id));
+    return strike.outcome == Outcome::released ? "released" : "cancelled";
 }
 
 }  // namespace
 
 void write_products(PlayResult& result, const RunParts& parts, OutputFolder& folder,
                     const std::function<std::string()>& realtime_part) {
-    const PlayOptions& options = parts.options;
+    const PlayOptions& options = result.options;
     const auto stage = [&](const char* name, const auto& work) {
         result.stages_s.emplace_back(name, seconds_of(work));
     };
@@ -133,7 +101,7 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     stage("scoring", [&] { score(result, parts.kit, parts.stick); });
     if (parts.frames) take_frames(result, *parts.frames, folder.path("frames"));
     result.fingerprint =
-        fingerprint(parts.frames ? parts.frames->rest_image().rgb : std::vector<std::uint8_t>{});
+        fingerprint(parts.frames ? parts.frames->report().rest_image.rgb : std::vector<std::uint8_t>{});
     const sim::WorkerReport workers = parts.simulation.report();
     result.workers_lost = workers.lost;
     result.bodies_reowned = workers.bodies_reowned;
@@ -151,32 +119,48 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
 }
 
 std::string format_summary(const PlayResult& r, const std::string& realtime_json) {
+    const PlayOptions& o = r.options;
+    const StrikeScore& s = r.score;
     const double duration_s = r.t_end_s - r.t0_s;
+    const bool any_matched = s.released > s.false_notes;
+    Json inputs = Json::array();
+    for (const InputFile& input : r.inputs)
+        inputs.push_back({{"file", input.file}, {"sha256", input.sha256}});
     Json summary = {
         {"trace", r.trace},
-        {"kit", r.kit},
+        {"kit", o.kit.string()},
         {"duration_s", duration_s},
         {"frames", r.frames},
-        {"picture_predictor", r.picture_predictor},
-        {"sound_predictor", r.sound_predictor},
-        {"render_lead_s", r.render_lead_s},
-        {"sound_lead_s", r.sound_lead_s},
-        {"release_margin_s", r.release_margin_s},
-        {"strikes", strikes_json(r.score)},
-        {"timing_ms", timing_json(r.score)},
+        {"picture_predictor", o.picture_predictor},
+        {"sound_predictor", o.sound_predictor},
+        {"render_lead_s", o.render_lead_s},
+        {"sound_lead_s", o.sound_lead_s},
+        {"release_margin_s", o.release_margin_s},
+        {"strikes",
+         {{"true", s.true_contacts},
+          {"released", s.released},
+          {"cancelled", s.cancelled},
+          {"moved", s.moved},
+          {"false", s.false_notes},
+          {"missed", s.missed},
+          {"false_turned_early", s.false_turned_early},
+          {"false_turned_late", s.false_turned_late}}},
+        {"timing_ms",
+         {{"median", any_matched ? Json(s.timing_median_ms) : Json()},
+          {"p95", any_matched ? Json(s.timing_p95_ms) : Json()}}},
         {"realtime_factor", r.wall_s > 0 ? Json(duration_s / r.wall_s) : Json()},
         {"stages_s", object_json(r.stages_s)},
-        {"workers", {{"count", r.workers}, {"lost", r.workers_lost}, {"bodies_reowned", r.bodies_reowned}}},
-        {"inputs", inputs_json(r.inputs)},
+        {"workers", {{"count", o.workers}, {"lost", r.workers_lost}, {"bodies_reowned", r.bodies_reowned}}},
+        {"inputs", inputs},
         {"fingerprint", r.fingerprint},
         {"versions", object_json(r.versions)},
         {"kit_name", r.kit_name},
         {"trace_source", r.trace_source},
         {"t0_s", r.t0_s},
         {"t_end_s", r.t_end_s},
-        {"fps", r.fps},
-        {"size", {{"width", r.width}, {"height", r.height}}},
-        {"cancelling", r.cancelling},
+        {"fps", o.fps},
+        {"size", {{"width", o.width}, {"height", o.height}}},
+        {"cancelling", o.cancelling},
         {"sticks", r.sticks},
         {"samples_refused", r.samples_refused},
         {"clipped_samples", r.clipped_samples},
@@ -192,8 +176,8 @@ std::string format_events(const PlayResult& result) {
                              "scheduled_at_s", "outcome", "moves", "decided_at_s", "model"});
     // Of several models in parallel, the number of the one that the note's time comes from.
     const auto model = [&](const Strike& s) {
-        return result.sound_models > 1 ? fmt::format("{}#{}", result.sound_predictor, s.model)
-                                       : result.sound_predictor;
+        return result.sound_models > 1 ? fmt::format("{}#{}", result.options.sound_predictor, s.model)
+                                       : result.options.sound_predictor;
     };
     for (const Strike& s : result.strikes)
         table.add({s.id, result.sticks.at(s.stick), result.instruments.at(s.instrument), s.onset_s,

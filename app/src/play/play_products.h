@@ -6,21 +6,15 @@
 #include <functional>
 #include <string>
 
-#include "files/output_folder.h"
-#include "kit/kit.h"
 #include "kit/stick_geometry.h"
-#include "pictures/frame_thread.h"
-#include "play/play_options.h"
 #include "play/play_result.h"
 #include "play/play_setup.h"
-#include "process/clock.h"
 #include "process/stopwatch.h"
 
 namespace app {
 
 /// What a run's products are made from, beside its result.
 struct RunParts {
-    const PlayOptions& options;
     const Kit& kit;
     const StickGeometry& stick;
     const sim::Simulation& simulation;
@@ -67,5 +61,13 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
 ///   t,stick,instrument,speed_mps,px,py,pz,matched_id
 /// px,py,pz the centre of the tip [m]; matched_id the note that sounded it, 0 for a missed one.
 [[nodiscard]] std::string format_contacts(const PlayResult& result);
+
+/// Text of report.html: what was played, key figures, pictures, plots and tables on one page that needs
+/// nothing beside it: no script, no font, no address; pictures and plots lie within. Light and dark follow
+/// the reader's system. All names are escaped. The frames of `report_frames` are read from disk, plots are
+/// drawn by gnuplot with temporary files in `scratch` (an existing folder). A pure function of the result
+/// without its times and workers, of the frames and of gnuplot's version. Throws std::runtime_error without
+/// gnuplot or without a frame. In play_report.cpp.
+[[nodiscard]] std::string format_report(const PlayResult& result, const std::filesystem::path& scratch);
 
 }  // namespace app

@@ -1,5 +1,3 @@
-#include "play/play_report.h"
-
 #include <fmt/format.h>
 #include <openssl/evp.h>
 
@@ -8,13 +6,12 @@
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "play/play_plots.h"
+#include "play/play_products.h"
 #include "report/html.h"
-#include "report/report_style.h"
 #include "report/table.h"
 #include "statistics/statistics.h"
 #include "strikes/score_strikes.h"
@@ -52,10 +49,8 @@ std::string nearest_note(const PlayResult& result, double shown_s) {
 
 /// Frames are named by their number: frame k is shown at t0 + k / fps.
 std::string frame_caption(const PlayResult& result, const fs::path& file) {
-    std::string number = file.stem().string();
-    if (number.empty() || number.size() > 12 || number.find_first_not_of("0123456789") != std::string::npos)
-        return number;
-    const double shown_s = result.t0_s + static_cast<double>(std::stoll(number)) / result.fps;
+    const double shown_s =
+        result.t0_s + static_cast<double>(std::stoll(file.stem().string())) / result.options.fps;
     const std::string note = nearest_note(result, shown_s);
     return fmt::format("{:.3f} s{}{}", shown_s, note.empty() ? "" : ": ", note);
 }
@@ -69,63 +64,30 @@ std::string frames_section(const PlayResult& result) {
             std::back_inserter(text),
             "<figure><img width={} height={} alt=\"frame shown at {}\" src=\"data:image/png;base64,{}\">"
             "<figcaption>{}</figcaption></figure>\n",
-            result.width, result.height, caption, base64_of_file(file), caption);
+            result.options.width, result.options.height, caption, base64_of_file(file), caption);
     }
     return text + "</div>\n";
 }
 
-std::string legend_entry(std::string_view shape, std::string_view name) {
-    return fmt::format("<li><svg viewBox=\"0 0 22 12\" aria-hidden=\"true\">{}</svg>{}</li>\n", shape,
-                       html(name));
-}
-
 std::string legend(const PlayResult& result) {
-    std::string text = "<ul class=legend>\n";
+    std::vector<std::pair<std::string, std::string>> entries;
     for (std::size_t i = 0; i < result.tracks.size(); ++i)
-        text += legend_entry(fmt::format("<path d=\"M1,6h20\" stroke=\"var(--{})\" stroke-width=\"2.5\"/>",
-                                         stick_colour(i).name),
-                             "tip of " + result.tracks[i].stick);
-    text += legend_entry(
-        R"svg(<circle cx="11" cy="6" r="4.2" fill="none" stroke="var(--contact)" stroke-width="1.5"/>)svg",
-        "true contact");
-    text +=
-        legend_entry(R"svg(<circle cx="11" cy="6" r="3.4" fill="var(--released)"/>)svg", "note at its onset");
-    text += legend_entry(R"svg(<path d="M11,11l-5,-9h10z" fill="var(--wrong)"/>)svg", "false note");
-    text += legend_entry(
-        R"svg(<path d="M7,2h8v8h-8z" fill="none" stroke="var(--missed)" stroke-width="1.5"/>)svg",
-        "missed contact");
-    text +=
-        legend_entry(R"svg(<path d="M7,2l8,8M15,2l-8,8" stroke="var(--cancelled)" stroke-width="1.5"/>)svg",
-                     "cancelled note");
-    return text + "</ul>\n";
+        entries.emplace_back(line_shape(stick_colour(i)), "tip of " + result.tracks[i].stick);
+    entries.insert(
+        entries.end(),
+        {{R"svg(<circle cx="11" cy="6" r="4.2" fill="none" stroke="var(--contact)" stroke-width="1.5"/>)svg",
+          "true contact"},
+         {R"svg(<circle cx="11" cy="6" r="3.4" fill="var(--released)"/>)svg", "note at its onset"},
+         {R"svg(<path d="M11,11l-5,-9h10z" fill="var(--wrong)"/>)svg", "false note"},
+         {R"svg(<path d="M7,2h8v8h-8z" fill="none" stroke="var(--missed)" stroke-width="1.5"/>)svg",
+          "missed contact"},
+         {R"svg(<path d="M7,2l8,8M15,2l-8,8" stroke="var(--cancelled)" stroke-width="1.5"/>)svg",
+          "cancelled note"}});
+    return report_legend(entries);
 }
 
 std::string percent(int part, int whole) {
     return whole > 0 ? fmt::format("{:.1f} %", 100.0 * part / whole) : "none";
-}
-
-struct InstrumentRow {
-    int contacts = 0, released = 0, cancelled = 0, wrong = 0, missed = 0;
-    std::vector<double> errors_ms;
-};
-
-std::vector<InstrumentRow> count_by_instrument(const PlayResult& result) {
-    std::vector<InstrumentRow> rows(result.instruments.size());
-    const std::vector<Mark> marks = strike_marks(result);
-    for (std::size_t i = 0; i < marks.size(); ++i) {
-        InstrumentRow& row = rows.at(result.strikes[i].instrument);
-        row.cancelled += marks[i] == Mark::cancelled;
-        row.released += marks[i] != Mark::cancelled;
-        row.wrong += marks[i] == Mark::wrong;
-    }
-    for (const TrueContact& contact : result.contacts) {
-        InstrumentRow& row = rows.at(contact.instrument);
-        ++row.contacts;
-        row.missed += contact.matched_id == 0;
-    }
-    for (const MatchedNote& note : matched_notes(result))
-        rows.at(note.instrument).errors_ms.push_back(note.error_ms);
-    return rows;
 }
 
 /// Rounded to tenths, without a negative zero.
@@ -134,46 +96,35 @@ double tenths(double value) {
 }
 
 std::string heading(const PlayResult& r) {
-    std::string text =
-        fmt::format("<header><h1>{}</h1>\n<p>played on {} by MusicWorld</p>\n<dl class=facts>\n",
-                    html(std::filesystem::path(r.trace).filename().string()), html(r.kit_name));
-    text += report_fact("trace", r.trace);
-    if (!r.trace_source.empty()) text += report_fact("recorded from", r.trace_source);
-    text += report_fact("kit", r.kit);
-    text += report_fact(
-        "duration", fmt::format("{:.3f} s ({:.3f} s to {:.3f} s)", r.t_end_s - r.t0_s, r.t0_s, r.t_end_s));
-    text += report_fact("pictures predicted by",
-                        fmt::format("{}, {:.1f} ms ahead", r.picture_predictor, r.render_lead_s * 1e3));
-    text += report_fact("sounds predicted by",
-                        fmt::format("{}, up to {:.1f} ms ahead", r.sound_predictor, r.sound_lead_s * 1e3));
-    text +=
-        report_fact("sounds are fixed", fmt::format("{:.1f} ms before their onset; cancelling is {}",
-                                                    r.release_margin_s * 1e3, r.cancelling ? "on" : "off"));
-    text += report_fact("frames",
-                        fmt::format("{} of {} x {}, {:g} per second", r.frames, r.width, r.height, r.fps));
-    return text + "</dl></header>\n";
+    const PlayOptions& o = r.options;
+    return report_header(
+        fs::path(r.trace).filename().string(), fmt::format("played on {} by MusicWorld", r.kit_name),
+        {{"trace", r.trace},
+         {"recorded from", r.trace_source},
+         {"kit", o.kit.string()},
+         {"duration", fmt::format("{:.3f} s ({:.3f} s to {:.3f} s)", r.t_end_s - r.t0_s, r.t0_s, r.t_end_s)},
+         {"pictures predicted by",
+          fmt::format("{}, {:.1f} ms ahead", o.picture_predictor, o.render_lead_s * 1e3)},
+         {"sounds predicted by",
+          fmt::format("{}, up to {:.1f} ms ahead", o.sound_predictor, o.sound_lead_s * 1e3)},
+         {"sounds are fixed", fmt::format("{:.1f} ms before their onset; cancelling is {}",
+                                          o.release_margin_s * 1e3, o.cancelling ? "on" : "off")},
+         {"frames", fmt::format("{} of {} x {}, {:g} per second", r.frames, o.width, o.height, o.fps)}});
 }
 
 std::string figures(const PlayResult& r) {
     const StrikeScore& s = r.score;
-    const bool matched = s.released > s.false_notes;
     const auto ms = [&](double value) {
-        return matched ? fmt::format("{:.1f} ms", value) : std::string("none");
+        return s.released > s.false_notes ? fmt::format("{:.1f} ms", value) : std::string("none");
     };
-    const auto count = [](int value) { return fmt::format("{}", value); };
-    const std::tuple<std::string, const char*, const char*> cards[] = {
-        {count(s.true_contacts), "true contacts", "contact"},
-        {count(s.released), "released", "released"},
-        {count(s.cancelled), "cancelled", "cancelled"},
-        {count(s.moved), "moved", "axis"},
-        {count(s.false_notes), "false", "wrong"},
-        {count(s.missed), "missed", "missed"},
-        {ms(s.timing_median_ms), "median error", "axis"},
-        {ms(s.timing_p95_ms), "95 % error", "axis"}};
-    std::string text = "<section class=figures>\n";
-    for (const auto& [value, name, tone] : cards) text += report_figure(value, name, tone);
-    text += "</section>\n";
-    return text +
+    return report_figures({{std::to_string(s.true_contacts), "true contacts", "contact"},
+                           {std::to_string(s.released), "released", "released"},
+                           {std::to_string(s.cancelled), "cancelled", "cancelled"},
+                           {std::to_string(s.moved), "moved", "axis"},
+                           {std::to_string(s.false_notes), "false", "wrong"},
+                           {std::to_string(s.missed), "missed", "missed"},
+                           {ms(s.timing_median_ms), "median error", "axis"},
+                           {ms(s.timing_p95_ms), "95 % error", "axis"}}) +
            fmt::format(
                "<p class=note>Heard: {} of the true contacts. False: {} of the notes, {} after a stroke that "
                "turned back at least 25 ms before the release point, {} later. The error is |onset - true "
@@ -185,19 +136,25 @@ std::string figures(const PlayResult& r) {
 
 /// A row for each instrument that was struck or meant to be.
 std::string instruments_section(const PlayResult& result) {
-    const std::vector<InstrumentRow> rows = count_by_instrument(result);
+    using Counts = std::array<int, 5>;  // by Mark::Kind
+    std::vector<Counts> counts(result.instruments.size(), Counts{});
+    std::vector<std::vector<double>> errors_ms(result.instruments.size());
+    for (const Mark& mark : marks_of(result))
+        ++counts.at(mark.instrument).at(static_cast<std::size_t>(mark.kind));
+    for (const MatchedNote& note : matched_notes(result))
+        errors_ms.at(note.instrument).push_back(note.error_ms);
     Table table = Table::of({"instrument", "true:d", "released:d", "cancelled:d", "false:d", "missed:d",
                              "median |ms|:.1f", "median ms:+.1f"});
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-        const InstrumentRow& row = rows[i];
-        if (row.contacts + row.released + row.cancelled == 0) continue;
-        std::vector<double> sizes_ms = row.errors_ms;
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+        const auto [contacts, missed, matched, wrong, cancelled] = counts[i];
+        if (contacts + matched + wrong + cancelled == 0) continue;
+        std::vector<double> sizes_ms = errors_ms[i];
         for (double& size : sizes_ms) size = std::abs(size);
-        table.add({result.instruments[i], row.contacts, row.released, row.cancelled, row.wrong, row.missed,
-                   median(sizes_ms), tenths(median(row.errors_ms))});
+        table.add({result.instruments[i], contacts, matched + wrong, cancelled, wrong, missed,
+                   median(sizes_ms), tenths(median(errors_ms[i]))});
     }
     std::string text = "<h2>By instrument</h2>\n" + table.html();
-    if (const std::size_t silent = rows.size() - table.rows.size(); silent > 0)
+    if (const std::size_t silent = counts.size() - table.rows.size(); silent > 0)
         text += fmt::format("<p class=note>{} more of the kit were not struck.</p>\n", silent);
     return text;
 }
@@ -213,50 +170,21 @@ std::string provenance(const PlayResult& r) {
            inputs.html() + "<h2>Versions</h2>\n" + versions.html();
 }
 
-/// The plots as elements of the page; `sound` and `overview` are empty where there is nothing to show.
-struct DrawnPlots {
-    std::vector<std::string> rows;
-    std::string timing, instruments, leads, sound, overview, symbols;
-};
-
-DrawnPlots draw_plots(const PlayResult& result, const Timeline& timeline, const fs::path& scratch) {
-    DrawnPlots plots;
-    plots.rows.resize(timeline.starts_s.size());
-    std::vector<PlotScript> scripts = timeline_plots(result, timeline);
-    std::vector<std::pair<std::string*, std::string>> places;  // of each script: where it goes, what it shows
-    for (std::size_t row = 0; row < plots.rows.size(); ++row)
-        places.emplace_back(&plots.rows[row], fmt::format("timeline from {:g} s on", timeline.starts_s[row]));
-    const auto add = [&](std::string& place, PlotScript script, const char* label) {
-        scripts.push_back(std::move(script));
-        places.emplace_back(&place, label);
-    };
-    add(plots.timing, timing_plot(result), "histogram of onset minus true contact");
-    add(plots.instruments, timing_by_instrument_plot(result), "onset minus true contact by instrument");
-    add(plots.leads, lead_plot(result), "first prediction and decision of each note");
-    if (!result.audio.empty()) add(plots.sound, sound_plot(result), "envelope of the sound");
-    if (!timeline.whole)
-        add(plots.overview, overview_plot(result, timeline), "notes heard, false and missed over time");
-    const std::vector<std::string> drawn = draw_svg(scripts, scratch);
-    for (std::size_t i = 0; i < drawn.size(); ++i) *places[i].first = inline_svg(drawn[i], places[i].second);
-    plots.symbols = svg_symbols(drawn.front());
-    return plots;
-}
-
-std::string timeline_section(const PlayResult& result, const Timeline& timeline, const DrawnPlots& plots) {
+std::string timeline_section(const PlayResult& result, const PlotGallery& gallery, const PlayPlots& plots) {
     std::string text = "<h2>Timeline</h2>\n";
-    if (!timeline.whole)
+    if (plots.overview)
         text += fmt::format(
             "<p class=note>The whole recording: notes heard (green), false (red) and missed (purple) in "
             "each stretch. Enlarged below are the {} rows of {:g} s with the most false and missed ones, "
-            "marked under the axis.</p>\n<div class=plot>\n{}</div>\n",
-            plots.rows.size(), timeline.row_s, plots.overview);
-    text += fmt::format(
-        "<p class=note>Height of the tips as recorded over the trace's clock, {:g} s per row. A note stands "
-        "at its onset, at the point where it was predicted to strike.{}</p>\n{}<div class=plot>\n",
-        timeline.row_s, result.audio.empty() ? "" : " Under it the sound; vertical lines are onsets.",
-        legend(result));
-    for (const std::string& row : plots.rows) text += row;
-    return text + "</div>\n";
+            "marked under the axis.</p>\n{}\n",
+            plots.rows.size(), plots.timeline.row_s, gallery.framed({*plots.overview}));
+    return text + fmt::format(
+                      "<p class=note>Height of the tips as recorded over the trace's clock, {:g} s per row. "
+                      "A note stands "
+                      "at its onset, at the point where it was predicted to strike.{}</p>\n{}{}\n",
+                      plots.timeline.row_s,
+                      result.audio.empty() ? "" : " Under it the sound; vertical lines are onsets.",
+                      legend(result), gallery.framed(plots.rows));
 }
 
 std::string sound_section(const PlayResult& result, const std::string& plot) {
@@ -265,25 +193,27 @@ std::string sound_section(const PlayResult& result, const std::string& plot) {
     const std::string level = peak > 0 ? fmt::format("Peak {:.1f} dBFS", 20 * std::log10(peak)) : "Silence";
     return fmt::format(
         "<h2>Sound</h2>\n<p class=note>The whole file, both channels together: lowest and highest sample "
-        "of each column; ticks below are onsets. {}, {} samples clipped.</p>\n<div class=plot>\n{}</div>\n",
+        "of each column; ticks below are onsets. {}, {} samples clipped.</p>\n{}\n",
         level, result.clipped_samples, plot);
 }
 
 std::string plot_sections(const PlayResult& result, const fs::path& scratch) {
-    const Timeline timeline = timeline_of(result);
-    const DrawnPlots plots = draw_plots(result, timeline, scratch);
-    std::string text = plots.symbols + timeline_section(result, timeline, plots);
-    text +=
-        "<h2>Timing</h2>\n<p class=note>How far each note lies from the contact that it belongs to.</p>\n";
-    text += fmt::format("<div class=pair><div class=plot>\n{}</div><div class=plot>\n{}</div></div>\n",
-                        plots.timing, plots.instruments);
+    PlotGallery gallery;
+    const PlayPlots plots = add_play_plots(gallery, result);
+    gallery.draw(scratch);
+    std::string text = gallery.symbols() + timeline_section(result, gallery, plots);
+    text += fmt::format(
+        "<h2>Timing</h2>\n<p class=note>How far each note lies from the contact that it belongs to.</p>\n"
+        "<div class=pair>{}{}</div>\n",
+        gallery.framed({plots.timing}), gallery.framed({plots.instruments}));
     text += instruments_section(result);
     text += fmt::format(
         "<h2>When notes were decided</h2>\n<p class=note>From its first prediction (ring) to its release "
         "(disc) or cancellation (cross); 0 is the onset. Dashed: the sound lead of {:.1f} ms and the "
-        "release margin of {:.1f} ms.</p>\n<div class=plot>\n{}</div>\n",
-        result.sound_lead_s * 1e3, result.release_margin_s * 1e3, plots.leads);
-    if (!result.audio.empty()) text += sound_section(result, plots.sound);
+        "release margin of {:.1f} ms.</p>\n{}\n",
+        result.options.sound_lead_s * 1e3, result.options.release_margin_s * 1e3,
+        gallery.framed({plots.leads}));
+    if (plots.sound) text += sound_section(result, gallery.framed({*plots.sound}));
     return text;
 }
 

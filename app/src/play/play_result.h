@@ -1,11 +1,11 @@
 #pragma once
-#include <Eigen/Core>
 #include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "kit/tip_track.h"
+#include "play/play_options.h"
 #include "strikes/strike.h"
 #include "strikes/score_strikes.h"
 
@@ -17,13 +17,10 @@ struct InputFile {
 
 /// Everything that `play` found out, for the summary, the tables and the report.
 struct PlayResult {
-    std::string trace, kit, kit_name, trace_source;
-    std::string picture_predictor, sound_predictor;
+    PlayOptions options;  ///< as asked for, the predictors as specifications
+    std::string trace, kit_name, trace_source;
     std::size_t sound_models = 1;  ///< that the sound's predictor runs in parallel
     double t0_s = 0, t_end_s = 0;
-    double fps = 30, render_lead_s = 0, sound_lead_s = 0, release_margin_s = 0;
-    bool cancelling = true;
-    int width = 640, height = 480;
     std::size_t frames = 0;                ///< drawn
     std::vector<std::string> sticks;       ///< names, by index
     std::vector<std::string> instruments;  ///< names, by index
@@ -36,12 +33,11 @@ struct PlayResult {
     std::size_t clipped_samples = 0;
     double wall_s = 0;
     std::vector<std::pair<std::string, double>> stages_s;  ///< name, seconds
-    int workers = 0, workers_lost = 0, bodies_reowned = 0;
+    int workers_lost = 0, bodies_reowned = 0;
     std::vector<InputFile> inputs;
     std::string fingerprint;
     std::vector<std::pair<std::string, std::string>> versions;
-    std::vector<std::filesystem::path>
-        report_frames;  ///< a few frames (PNG files on disk) that the report shows
+    std::vector<std::filesystem::path> report_frames;  ///< a few PNG files on disk that the report shows
 };
 
 }  // namespace app

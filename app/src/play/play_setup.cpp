@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/checksum.h"
@@ -13,6 +16,17 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kLongestHours = 3;
+
+/// 0 at the centre of the struck zone, 1 at its edge: along a string, else by the radius about the body's
+/// axis.
+double place_of(const Strike& strike, const Instrument& instrument) {
+    const Eigen::Vector3d unit = strike.point_body.cwiseQuotient(instrument.body.shape.semi_axes);
+    if (instrument.kind == "string") return std::clamp(std::abs(unit.x()), 0.0, 1.0);
+    const sim::Zone& zone = instrument.body.zones[static_cast<std::size_t>(strike.zone)];
+    const double outer = std::min(1.0, zone.max_radius);
+    const double radius = std::hypot(unit.x(), unit.z());
+    return std::clamp((radius - zone.min_radius) / std::max(1e-6, outer - zone.min_radius), 0.0, 1.0);
+}
 
 }  // namespace
 
@@ -26,14 +40,6 @@ tracking::Trace read_played_trace(const fs::path& file) {
     return trace;
 }
 
-StrikeRules strike_rules(const PlayOptions& options, double t0_s) {
-    StrikeRules rules;
-    rules.t0_s = t0_s;
-    rules.release_margin_s = rules.commit_lead_s = options.release_margin_s;
-    rules.cancelling = options.cancelling;
-    return rules;
-}
-
 std::vector<sim::BodyDefinition> bodies_of(const Kit& kit) {
     std::vector<sim::BodyDefinition> bodies;
     for (const Instrument& instrument : kit.instruments) bodies.push_back(instrument.body);
@@ -44,6 +50,20 @@ std::vector<audio::Voice> voices_of(const Kit& kit) {
     std::vector<audio::Voice> voices;
     for (const Instrument& instrument : kit.instruments) voices.push_back(instrument.voice);
     return voices;
+}
+
+audio::Note note_of(const Strike& strike, const Instrument& instrument) {
+    audio::Note note;
+    note.id = strike.id;
+    note.voice = strike.instrument;
+    note.onset_sample = strike.onset_sample;
+    note.speed_mps = 5 * std::pow(strike.speed_mps / 5, instrument.velocity_gamma);
+    note.place = place_of(strike, instrument);
+    note.zone = strike.zone;
+    note.midi_note = instrument.zones[static_cast<std::size_t>(strike.zone)].midi_note;
+    note.midi_velocity =
+        static_cast<int>(std::clamp(std::round(127 * std::pow(strike.speed_mps / 8, 0.7)), 1.0, 127.0));
+    return note;
 }
 
 fs::path orchestra_file() {
@@ -70,24 +90,16 @@ std::unique_ptr<FrameThread> start_frames(const PlayOptions& options,
 PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
                     bool trace_is_file) {
     PlayResult result;
+    result.options = options;
+    result.options.picture_predictor = picture_specification(options.picture_predictor);
+    result.options.sound_predictor = sound_specification(options.sound_predictor);
+    if (const std::string& sound = result.options.sound_predictor; !is_external(sound))
+        result.sound_models = tracking::make_predictor(sound)->models();
     result.trace = trace.file;
-    result.kit = options.kit.string();
     result.kit_name = kit.name;
     result.trace_source = trace.source;
-    result.picture_predictor = picture_specification(options.picture_predictor);
-    result.sound_predictor = sound_specification(options.sound_predictor);
-    if (!is_external(result.sound_predictor))
-        result.sound_models = tracking::make_predictor(result.sound_predictor)->models();
     result.t0_s = trace.t0_s();
     result.t_end_s = trace.t_end_s();
-    result.fps = options.fps;
-    result.render_lead_s = options.render_lead_s;
-    result.sound_lead_s = options.sound_lead_s;
-    result.release_margin_s = options.release_margin_s;
-    result.cancelling = options.cancelling;
-    result.width = options.width;
-    result.height = options.height;
-    result.workers = options.workers;
     for (const tracking::StickTrace& stick : trace.sticks) result.sticks.push_back(stick.name);
     for (const Instrument& instrument : kit.instruments) result.instruments.push_back(instrument.name);
     if (trace_is_file) result.inputs.push_back({options.trace.string(), sha256_of_file(options.trace)});

@@ -3,7 +3,6 @@
 #include <sim/simulation.h>
 #include <tracking/trace.h>
 
-#include <chrono>
 #include <memory>
 #include <vector>
 
@@ -13,7 +12,7 @@
 #include "pictures/frame_thread.h"
 #include "play/play_options.h"
 #include "play/play_result.h"
-#include "strikes/strike_scheduler.h"
+#include "strikes/strike.h"
 
 namespace app {
 
@@ -26,11 +25,11 @@ inline constexpr double kSoundTailS = 0.5, kLongestSoundTailS = 10;
 [[nodiscard]] PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
                                   bool trace_is_file = true);
 
-/// The rules of a strike's life that the options ask for.
-[[nodiscard]] StrikeRules strike_rules(const PlayOptions& options, double t0_s);
-
 [[nodiscard]] std::vector<sim::BodyDefinition> bodies_of(const Kit& kit);
 [[nodiscard]] std::vector<audio::Voice> voices_of(const Kit& kit);
+/// The note that sounds a strike: speed through the instrument's velocity curve, place within the struck
+/// zone, MIDI note and velocity. MIDI velocity = 127 (v / 8 m/s)^0.7, held to 1..127.
+[[nodiscard]] audio::Note note_of(const Strike& strike, const Instrument& instrument);
 [[nodiscard]] std::filesystem::path orchestra_file();
 [[nodiscard]] std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers);
 /// The thread that draws into the run's folder `frames`; null with --no-frames. `scenes`: one for each level

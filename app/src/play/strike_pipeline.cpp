@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "play/play_setup.h"
 #include "sticks/auto_predictor.h"
 
 namespace app {
@@ -12,15 +13,19 @@ constexpr double kReboundS = 0.05;  // a filter has seen a rebound by then
 
 }  // namespace
 
-StrikePipeline::StrikePipeline(const Kit& kit, const StrikeRules& rules, double tip_radius_m,
+StrikePipeline::StrikePipeline(const Kit& kit, const PlayOptions& options, double t0_s, double tip_radius_m,
                                const std::vector<Stick>& sticks, sim::Simulation& simulation, Notify notify)
     : kit_(kit),
-      cancelling_(rules.cancelling),
+      cancelling_(options.cancelling),
       tip_radius_m_(tip_radius_m),
       sticks_(sticks),
       simulation_(simulation),
       notify_(std::move(notify)),
-      scheduler_(rules, sticks_.size(), kit.instruments.size()) {}
+      scheduler_({.t0_s = t0_s,
+                  .release_margin_s = options.release_margin_s,
+                  .commit_lead_s = options.release_margin_s,
+                  .cancelling = options.cancelling},
+                 sticks_.size(), kit.instruments.size()) {}
 
 void StrikePipeline::advance_to(double s, double fixed_s) {
     scheduler_.advance_to(s, fixed_s);
@@ -128,7 +133,7 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
 void StrikePipeline::send_notes() {
     for (const std::uint64_t id : scheduler_.take_changes()) {
         const Strike& strike = scheduler_.strikes()[id - 1];
-        notify_(strike, strike.outcome != Outcome::cancelled);
+        notify_(note_of(strike, kit_.instruments[strike.instrument]), strike.outcome != Outcome::cancelled);
     }
 }
 
@@ -137,17 +142,23 @@ void StrikePipeline::finish() {
     send_notes();
 }
 
+/// The strikes of a stick that are not cancelled and were predicted within the last second, newest first.
+std::vector<const Strike*> StrikePipeline::recent(std::uint32_t stick, double s) const {
+    std::vector<const Strike*> found;
+    const std::vector<Strike>& all = scheduler_.strikes();
+    for (auto strike = all.rbegin(); strike != all.rend() && strike->scheduled_at_s > s - 1; ++strike)
+        if (strike->stick == stick && strike->outcome != Outcome::cancelled) found.push_back(&*strike);
+    return found;
+}
+
 /// The strike that the frame at T has to show the stick at: one whose contact lies between s and T, or one
 /// that no frame has shown yet. Its rebound is unknown, so the stick stays on the surface.
-const Strike* StrikePipeline::struck_by(std::uint32_t stick, double s, double T) {
-    const std::vector<Strike>& all = scheduler_.strikes();
+const Strike* StrikePipeline::struck_by(std::uint32_t stick, double s, double T) const {
     const Strike* earliest = nullptr;
-    for (auto strike = all.rbegin(); strike != all.rend() && strike->scheduled_at_s > s - 1; ++strike) {
-        if (strike->stick != stick || strike->outcome == Outcome::cancelled || strike->contact_s > T)
-            continue;
-        if (strike->contact_s <= s && (strike->contact_s <= s - kReboundS || touching_.contains(strike->id)))
-            continue;
-        if (!earliest || strike->contact_s < earliest->contact_s) earliest = &*strike;
+    for (const Strike* strike : recent(stick, s)) {
+        const bool shown = strike->contact_s <= s - kReboundS || touching_.contains(strike->id);
+        if (strike->contact_s > T || (strike->contact_s <= s && shown)) continue;
+        if (!earliest || strike->contact_s < earliest->contact_s) earliest = strike;
     }
     return earliest;
 }
@@ -166,10 +177,8 @@ DrawnStick StrikePipeline::drawn(std::uint32_t stick, double s, double T) {
         return result;
     }
     // One that has just struck and whose filter has not yet seen the rebound is drawn as it was at s.
-    const std::vector<Strike>& all = scheduler_.strikes();
-    for (auto strike = all.rbegin(); strike != all.rend() && strike->scheduled_at_s > s - 1; ++strike)
-        if (strike->stick == stick && strike->outcome != Outcome::cancelled &&
-            strike->contact_s > s - kReboundS && strike->contact_s <= s &&
+    for (const Strike* strike : recent(stick, s))
+        if (strike->contact_s > s - kReboundS && strike->contact_s <= s &&
             (result.tip.position - strike->point_world).dot(strike->normal_world) < 0) {
             result.pose = known.pose_at(s);
             result.held = true;

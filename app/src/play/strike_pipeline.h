@@ -1,4 +1,5 @@
 #pragma once
+#include <audio/performance.h>
 #include <sim/simulation.h>
 
 #include <functional>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "kit/kit.h"
+#include "play/play_options.h"
 #include "process/stopwatch.h"
 #include "sticks/stick.h"
 #include "strikes/drawn_strikes.h"
@@ -35,18 +37,26 @@ struct DrawnStick {
 struct FrameContents {
     std::vector<std::optional<DrawnStick>> sticks;  ///< none before its first sample
     std::vector<sim::ModalState> bodies;            ///< empty: at rest
+
+    [[nodiscard]] std::vector<std::optional<tracking::PosePrediction>> poses() const {
+        std::vector<std::optional<tracking::PosePrediction>> all;
+        for (const auto& stick : sticks) all.push_back(stick ? std::optional(stick->pose) : std::nullopt);
+        return all;
+    }
 };
 
-/// From what is known of the sticks to strikes, notes and pictures, on a clock that somebody else keeps:
+/// From what is known of the sticks to strikes, notes and pictures, on the clock of the caller:
 /// contacts of predicted paths (sim), their life as strikes (StrikeScheduler), the bodies' response, and what
 /// a frame shows of both. Begins with all bodies at rest. Offline and in real time the same.
 class StrikePipeline {
 public:
-    /// A note's change, for the sound: the strike as it stands; `scheduled` false: cancelled.
-    using Notify = std::function<void(const Strike& strike, bool scheduled)>;
+    /// A note's change, for the sound: the note as it stands, its id that of the strike; `scheduled` false:
+    /// cancelled.
+    using Notify = std::function<void(const audio::Note& note, bool scheduled)>;
 
-    /// `simulation` begins anew with the first step; `sticks` are kept up to date by the caller.
-    StrikePipeline(const Kit& kit, const StrikeRules& rules, double tip_radius_m,
+    /// The strikes follow the margin and the cancelling of the options; t0_s is audio sample 0. `simulation`
+    /// begins anew with the first step; `sticks` are kept up to date by the caller.
+    StrikePipeline(const Kit& kit, const PlayOptions& options, double t0_s, double tip_radius_m,
                    const std::vector<Stick>& sticks, sim::Simulation& simulation, Notify notify);
 
     /// Before the samples at s (StrikeScheduler::advance_to).
@@ -61,12 +71,14 @@ public:
     [[nodiscard]] FrameContents scene(double s, double T);
 
     [[nodiscard]] const std::vector<Strike>& strikes() const { return scheduler_.strikes(); }
+    /// The caller adds the times of its own part.
+    [[nodiscard]] LoopTimes& times() { return times_; }
     [[nodiscard]] const LoopTimes& times() const { return times_; }
 
 private:
     [[nodiscard]] sim::StepReply step(sim::StepRequest& request);
     /// Where the paths of a stick stand in a request; each path's `stick` is its own place there, so that its
-    /// contacts are told apart.
+    /// contacts can be assigned to it.
     struct StickPaths {
         std::uint32_t stick;
         std::size_t predicted;                  ///< the first of the models' paths, which follow each other
@@ -80,7 +92,8 @@ private:
                                                          const sim::StepReply& reply) const;
     void send_notes();
     void settle_impulses(double s, sim::StepRequest& request);
-    [[nodiscard]] const Strike* struck_by(std::uint32_t stick, double s, double T);
+    [[nodiscard]] std::vector<const Strike*> recent(std::uint32_t stick, double s) const;
+    [[nodiscard]] const Strike* struck_by(std::uint32_t stick, double s, double T) const;
     [[nodiscard]] DrawnStick drawn(std::uint32_t stick, double s, double T);
 
     const Kit& kit_;

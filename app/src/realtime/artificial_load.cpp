@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 #include "files/bad_input.h"
 #include "files/option_values.h"
@@ -22,54 +24,44 @@ constexpr int kMostThreads = 256;
                     part));
 }
 
-struct Part {
-    std::string kind;
-    double amount, from_s, to_s;
-};
+ArtificialLoad::Part& part_named(ArtificialLoad& load, const std::string& kind, const std::string& text) {
+    if (kind == "load") return load.load;
+    if (kind == "renderer") return load.renderer;
+    if (kind == "stall") return load.stall;
+    refuse(text);
+}
 
-Part parse_part(const std::string& text) {
+void read_part(ArtificialLoad& load, const std::string& text) {
     const std::size_t colon = text.find(':'), at = text.find('@');
     if (colon == std::string::npos || at == std::string::npos || at < colon) refuse(text);
-    const std::size_t dash = text.find('-', at);
-    const auto number = [](const std::string& part) { return as::number().parse(part, "--disturb"); };
-    Part part{text.substr(0, colon), number(text.substr(colon + 1, at - colon - 1)),
-              number(text.substr(at + 1, dash == std::string::npos ? dash : dash - at - 1)),
-              dash == std::string::npos ? kEver : number(text.substr(dash + 1))};
+    const std::size_t dash = std::min(text.find('-', at), text.size());
+    const auto number = [&](std::size_t begin, std::size_t end) {
+        return as::number().parse(text.substr(begin, end - begin), "--disturb");
+    };
+    const ArtificialLoad::Part part{number(colon + 1, at), number(at + 1, dash),
+                                    dash == text.size() ? kEver : number(dash + 1, text.size())};
     if (!(part.amount > 0 && part.amount <= 1e5 && part.from_s >= 0 && part.to_s > part.from_s)) refuse(text);
-    return part;
+    part_named(load, text.substr(0, colon), text) = part;
+    if (load.load.amount > kMostThreads) refuse(text);
 }
 
 }  // namespace
 
-ArtificialLoad parse_disturbance(const std::string& text) {
-    ArtificialLoad d;
-    for (std::size_t begin = 0; begin < text.size();) {
-        const std::size_t end = std::min(text.find(',', begin), text.size());
-        const std::string piece = text.substr(begin, end - begin);
-        const Part part = parse_part(piece);
-        if (part.kind == "load" && part.amount <= kMostThreads) {
-            d.load_threads = static_cast<int>(part.amount);
-            d.load_from_s = part.from_s, d.load_to_s = part.to_s;
-        } else if (part.kind == "renderer") {
-            d.slower_s = part.amount / 1e3, d.slower_from_s = part.from_s, d.slower_to_s = part.to_s;
-        } else if (part.kind == "stall") {
-            d.stall_s = part.amount / 1e3, d.stall_at_s = part.from_s;
-        } else {
-            refuse(piece);
-        }
-        begin = end + 1;
-    }
-    return d;
+ArtificialLoad parse_artificial_load(const std::string& text) {
+    ArtificialLoad load{.load = {}, .renderer = {}, .stall = {}, .text = text};
+    std::istringstream parts(text);
+    for (std::string part; std::getline(parts, part, ',');) read_part(load, part);
+    return load;
 }
 
-BusyThreads::BusyThreads(const ArtificialLoad& d, std::int64_t epoch_ns) {
-    for (int i = 0; i < d.load_threads; ++i)
-        threads_.emplace_back([this, d, epoch_ns] {
+BusyThreads::BusyThreads(const ArtificialLoad& load, std::int64_t epoch_ns) {
+    for (int i = 0; i < static_cast<int>(load.load.amount); ++i)
+        threads_.emplace_back([this, part = load.load, epoch_ns] {
             volatile double sink = 1;
             while (!end_) {
-                const double now_s = static_cast<double>(monotonic_ns() - epoch_ns) / 1e9;
-                if (now_s >= d.load_to_s) return;
-                if (now_s < d.load_from_s)
+                const double now_s = to_s(monotonic_ns() - epoch_ns);
+                if (now_s >= part.to_s) return;
+                if (now_s < part.from_s)
                     std::this_thread::sleep_for(std::chrono::milliseconds(5));
                 else
                     for (int k = 0; k < 10000; ++k) sink = std::sqrt(sink + k);

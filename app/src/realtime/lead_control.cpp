@@ -22,15 +22,11 @@ LeadControl::LeadControl(double least_s, double rate_hz, double reserve_s)
       lead_s_(least_s) {}
 
 double LeadControl::measured(double delay_s) {
-    if (recent_.size() < window_)
-        recent_.push_back(delay_s);
-    else
-        recent_[next_ % window_] = delay_s;
-    ++next_;
-    delay_s_ = quantile(recent_, kFollowed);
-    std::vector<double> newest;
-    for (std::size_t i = 0; i < std::min(kNewest, recent_.size()); ++i)
-        newest.push_back(recent_[(next_ - 1 - i) % window_]);
+    recent_.push_back(delay_s);
+    if (recent_.size() > window_) recent_.pop_front();
+    delay_s_ = quantile({recent_.begin(), recent_.end()}, kFollowed);
+    const auto count = static_cast<std::ptrdiff_t>(std::min(kNewest, recent_.size()));
+    const std::vector<double> newest(recent_.end() - count, recent_.end());
     // One late frame among many is no reason: only the percentile or a delay that stays.
     const double wanted = std::clamp(std::max(delay_s_, median(newest)) + reserve_s_, least_s_,
                                      std::max(least_s_, kLongestLeadS));

@@ -1,5 +1,6 @@
 #pragma once
-#include <vector>
+#include <cstddef>
+#include <deque>
 
 namespace app {
 
@@ -15,10 +16,7 @@ public:
     /// A measured delay [s]; the lead from now on.
     double measured(double delay_s);
     /// What is measured has changed: earlier delays do not count any more.
-    void forget() {
-        recent_.clear();
-        next_ = 0;
-    }
+    void forget() { recent_.clear(); }
     [[nodiscard]] double lead_s() const { return lead_s_; }
     /// The percentile that it follows [s].
     [[nodiscard]] double delay_s() const { return delay_s_; }
@@ -26,8 +24,7 @@ public:
 private:
     double least_s_, reserve_s_;
     std::size_t window_;
-    std::vector<double> recent_;  // a ring
-    std::size_t next_ = 0;
+    std::deque<double> recent_;  // delays of the window
     double lead_s_, delay_s_ = 0;
 };
 

@@ -4,101 +4,82 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 
-#include "files/output_folder.h"
-#include "kit/tip_track.h"
+#include "latency/latency_report.h"
+#include "play/play.h"
 #include "play/play_products.h"
 #include "play/play_setup.h"
-#include "process/clock.h"
-#include "process/progress_bar.h"
-#include "process/stop_signals.h"
-#include "process/thread_priority.h"
-#include "realtime/divergence.h"
-#include "realtime/realtime_products.h"
-#include "realtime/realtime_session.h"
+#include "realtime/realtime_run.h"
 #include "sticks/predictors.h"
 
 namespace app {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kStartS = 0.7;  // from starting the sensors to the epoch, at first
-constexpr double kAheadS = 0.1;  // the epoch lies at least that far ahead when all is ready
-constexpr int kStarts = 3;
+using Json = nlohmann::ordered_json;
 
-/// Sensors have to know the epoch when they are started; where starting takes until then, they are started
-/// once more with more time (of a live source, whose first samples then count from before the epoch, that
-/// does no harm).
-std::unique_ptr<SensorHub> start_sensors(const RealtimeSession& session, std::int64_t& epoch_ns) {
-    double ahead_s = session.live ? 2 * kStartS : kStartS;
-    for (int i = 1;; ++i, ahead_s *= 4) {
-        epoch_ns = monotonic_ns() + to_ns(ahead_s);
-        auto hub = std::make_unique<SensorHub>(sensors_of(session, epoch_ns));
-        if (session.live || monotonic_ns() < epoch_ns - to_ns(kAheadS)) return hub;
-        if (i == kStarts)
-            throw std::runtime_error(fmt::format(
-                "error: found sensors that took more than {:.1f} s to start, expected a machine less busy",
-                ahead_s));
-    }
+constexpr const char* kEventKinds[] = {"silent",       "back",      "restarted", "ended",
+                                       "clock jumped", "malformed", "failed"};  // by SensorEvent::Kind
+
+constexpr double kSameSpeed = 1e-6;  // relative: far below a step of MIDI or 24 bits
+constexpr double kNextToS = 0.03;    // as notes are matched with contacts
+constexpr double kEarlierS = 2;      // a delay acts on what follows: arming, bodies that still move
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+/// Age of the newest sample that a note could use: the onset of its strike, on the lap's clock, less the
+/// sample's time.
+double pose_age_s(const std::vector<SampleTiming>& samples, const NoteTiming& note, const Strike& strike) {
+    double newest_s = strike.scheduled_at_s;
+    auto sample = std::ranges::upper_bound(samples, note.played.taken_ns, {}, &SampleTiming::handed_ns);
+    while (sample != samples.begin() && (--sample)->lap == note.lap)
+        if (sample->stick == strike.stick) {
+            newest_s = std::max(newest_s, sample->t_s);
+            break;
+        }
+    return strike.onset_s - newest_s;
 }
 
-/// The strikes of all laps, on their laps' clocks and on the run's. The sound decides which of them were played,
-/// and when.
-void collect_strikes(RealtimeOutcome& outcome, std::vector<LapStrikes>& laps, std::int64_t period_samples,
-                     bool sound) {
-    std::map<std::uint64_t, const audio::PlayedNote*> played;
-    for (const NoteTiming& note : outcome.realtime.notes) played[note.played.id] = &note.played;
-    const double period_s = outcome.realtime.period_s;
-    for (LapStrikes& lap : laps)
+/// The strikes of all laps on the run's clock; returns them on their laps' clocks. The sound decides which of
+/// them were played, and when.
+std::vector<LapStrikes> collect_strikes(RealtimeOutcome& outcome, std::vector<LapStrikes> laps,
+                                        const RealtimeSession& session) {
+    std::map<std::uint64_t, NoteTiming*> notes;
+    for (NoteTiming& note : outcome.realtime.notes) notes[note.played.id] = &note;
+    const auto place = [&](Strike& strike, std::int64_t sample) {
+        strike.onset_sample = sample;
+        strike.onset_s = outcome.play.t0_s + static_cast<double>(sample) / audio::kSampleRate;
+    };
+    for (LapStrikes& lap : laps) {
+        const std::int64_t shift = static_cast<std::int64_t>(lap.lap) * session.period_samples;
+        const double shift_s = static_cast<double>(lap.lap) * session.period_s();
         for (Strike& strike : lap.strikes) {
             strike.id += lap.first_id;
-            const auto note = played.find(strike.id);
-            if (sound) strike.outcome = note == played.end() ? Outcome::cancelled : Outcome::released;
-            if (note != played.end()) {
-                strike.onset_sample =
-                    note->second->onset_sample - static_cast<std::int64_t>(lap.lap) * period_samples;
-                strike.onset_s =
-                    outcome.play.t0_s + static_cast<double>(strike.onset_sample) / audio::kSampleRate;
+            const auto found = notes.find(strike.id);
+            if (session.sound) strike.outcome = found == notes.end() ? Outcome::cancelled : Outcome::released;
+            if (found != notes.end()) {
+                NoteTiming& note = *found->second;
+                place(strike, note.played.onset_sample - shift);
+                note.strike = outcome.play.strikes.size();
+                note.lap = lap.lap;
+                note.pose_age_s = pose_age_s(outcome.realtime.samples, note, strike);
             }
-            outcome.lap_strikes.push_back(strike);
-            const double shift_s = static_cast<double>(lap.lap) * period_s;
-            strike.onset_sample += static_cast<std::int64_t>(lap.lap) * period_samples;
-            strike.onset_s =
-                outcome.play.t0_s + static_cast<double>(strike.onset_sample) / audio::kSampleRate;
-            for (double* t : {&strike.contact_s, &strike.scheduled_at_s, &strike.decided_at_s}) *t += shift_s;
-            outcome.play.strikes.push_back(strike);
+            Strike& shifted = outcome.play.strikes.emplace_back(strike);
+            place(shifted, strike.onset_sample + shift);
+            for (double* t : {&shifted.contact_s, &shifted.scheduled_at_s, &shifted.decided_at_s})
+                *t += shift_s;
         }
-    for (NoteTiming& note : outcome.realtime.notes) {
-        note.strike = static_cast<std::size_t>(note.played.id - 1);
-        const auto lap = std::ranges::find_if(laps, [&](const LapStrikes& l) {
-            return note.played.id > l.first_id && note.played.id <= l.first_id + l.strikes.size();
-        });
-        note.lap = lap == laps.end() ? 0 : lap->lap;
     }
-}
-
-/// Age of the newest sample that a note could use: its onset less the sample's time.
-void age_notes(RealtimeOutcome& outcome) {
-    const std::vector<SampleTiming>& samples = outcome.realtime.samples;  // by time of their hand-over
-    for (NoteTiming& note : outcome.realtime.notes) {
-        const Strike& strike = outcome.lap_strikes[note.strike];
-        double newest_s = strike.scheduled_at_s;
-        auto sample = std::ranges::upper_bound(samples, note.played.taken_ns, {}, &SampleTiming::handed_ns);
-        while (sample != samples.begin() && (--sample)->lap == note.lap)
-            if (sample->stick == strike.stick) {
-                newest_s = std::max(newest_s, sample->t_s);
-                break;
-            }
-        note.pose_age_s = strike.onset_s - newest_s;
-    }
+    return laps;
 }
 
 /// The recorded paths on the run's clock: the trace lap by lap, or what a live source gave.
 std::vector<TipTrack> tracks_of(const RealtimeSession& session, const RealtimeRun& run) {
     tracking::Trace trace = session.trace;
     const double t0_s = trace.t0_s(), end_s = t0_s + run.end_s();
-    const double period_s = static_cast<double>(session.period_samples) / audio::kSampleRate;
+    const double period_s = session.period_s();
     for (std::size_t i = 0; i < trace.sticks.size(); ++i) {
         std::vector<tracking::PoseSample> samples;
         if (session.live) {
@@ -132,70 +113,23 @@ void fill_gaps(const fs::path& folder, std::size_t frames, const render::Image& 
     }
 }
 
-/// Everything that plays, made before the run's clock starts.
-struct Players {
-    Players(const RealtimeSession& session, const OutputFolder& folder)
-        : stage(session.kit, session.trace.sticks.size(), session.stick) {
-        const RealtimeOptions& options = session.options;
-        // Worker processes and ZeroMQ's threads inherit it.
-        simulation_priority = set_thread_priority(ThreadRole::simulation, options.realtime_priority);
-        simulation = make_simulation(session.kit, options.play.workers);
-        leave_thread_priority();
-        if (options.play.audio) sound = make_live_sound(session, sound_priority);
-        frames = start_frames(options.play, scenes_of(stage, options.play.width, options.play.height),
-                              stage.frame({}, {}), folder, FramePolicy::refuse, options.realtime_priority);
-    }
-    Players(const Players&) = delete;
-    Players& operator=(const Players&) = delete;
-
-    KitStage stage;
-    std::string simulation_priority, sound_priority, control_priority;
-    std::unique_ptr<sim::Simulation> simulation;
-    std::unique_ptr<audio::LivePerformance> sound;  ///< absent with --no-audio
-    std::unique_ptr<FrameThread> frames;            ///< absent with --no-frames
-};
-
-std::vector<std::pair<std::string, std::string>> priorities_of(const Players& players, int workers) {
-    std::vector<std::pair<std::string, std::string>> all = {
-        {"control", players.control_priority},
-        {"simulation", workers > 0 ? players.simulation_priority : players.control_priority}};
-    if (players.sound) all.emplace_back("sound", players.sound_priority);
-    if (players.frames) all.emplace_back("drawing", players.frames->priority());
-    return all;
-}
-
-/// The loop, from samples to notes and frames.
-void play_through(RealtimeRun& run, const RealtimeSession& session, Players& players, std::int64_t epoch_ns,
-                  const std::function<void(const std::string&)>& warn) {
-    const RealtimeOptions& options = session.options;
-    if (players.sound) players.sound->start(epoch_ns);
-    const BusyThreads load(options.disturbance, epoch_ns);
-    players.control_priority = set_thread_priority(ThreadRole::control, options.realtime_priority);
-    ProgressBar bar(options.play.progress);
-    const StopSignals signals;
-    run.run(
-        session.seconds, [] { return StopSignals::stopped(); }, warn, [&](double done) { bar.show(done); });
-    bar.clear();
-    leave_thread_priority();
-    if (run.end_s() <= 0) throw std::runtime_error("error: interrupted before anything was played");
-}
-
-std::string failure_of(const RealtimeResult& realtime) {
+std::string failure_of(const std::vector<SensorEvent>& events) {
     std::string failure;
-    for (const SensorEvent& event : realtime.events)
+    for (const SensorEvent& event : events)
         if (event.kind == SensorEvent::Kind::failed) failure = event.message;
     return failure;
 }
 
-/// Warns of each stick without a sample. A live run without any sample has nothing to show: that is an error.
-void check_samples(const RealtimeSession& session, RealtimeRun& run,
-                   const std::function<void(const std::string&)>& warn) {
+/// Warns of each stick without a sample. A run that was interrupted before it began, or a live run without any
+/// sample, has nothing to show: that is an error.
+void check_samples(const RealtimeSession& session, const RealtimeRun& run, const Warn& warn) {
+    if (run.end_s() <= 0) throw std::runtime_error("error: interrupted before anything was played");
     const auto silent = [](const auto& samples) { return samples.empty(); };
     if (session.live && std::ranges::all_of(run.seen(), silent)) {
-        const std::string failure = failure_of(run.result());
+        const std::string failure = failure_of(run.events());
         throw std::runtime_error(
             failure.empty() ? fmt::format("error: no sample came from {} in {:.1f} s; nothing was written",
-                                          session.options.source, run.end_s())
+                                          session.options.sensors.source, run.end_s())
                             : failure);
     }
     for (std::size_t i = 0; i < session.trace.sticks.size(); ++i)
@@ -203,87 +137,204 @@ void check_samples(const RealtimeSession& session, RealtimeRun& run,
             warn(fmt::format("stick {}: no sample in {:.1f} s", session.trace.sticks[i].name, run.end_s()));
 }
 
-void take_sound(audio::LivePerformance& sound, RealtimeOutcome& outcome, const OutputFolder& folder,
-                std::int64_t epoch_ns) {
-    RealtimeResult& result = outcome.realtime;
-    finish_sound(sound, result.seconds, outcome.play, folder);
-    for (const audio::PlayedNote& played : sound.take_played()) {
-        NoteTiming note;
-        note.played = played;
-        note.late_s = static_cast<double>(played.onset_sample - played.planned_sample) / audio::kSampleRate;
-        result.notes.push_back(note);
+/// A filter that was started again comes near to one that was not, but never to the last bit.
+bool same_speed(const Strike& a, const Strike& b) {
+    return std::abs(a.speed_mps - b.speed_mps) <= kSameSpeed * b.speed_mps;
+}
+
+/// The strike of the same stick and instrument next to an offline one.
+std::vector<const Strike*>::iterator nearest(std::vector<const Strike*>& strikes, const Strike& offline) {
+    auto best = strikes.end();
+    double least = kNextToS;
+    for (auto other = strikes.begin(); other != strikes.end(); ++other) {
+        if ((*other)->stick != offline.stick || (*other)->instrument != offline.instrument) continue;
+        const double apart = std::abs((*other)->onset_s - offline.onset_s);
+        if (apart <= least) least = apart, best = other;
     }
-    for (NoteTiming& note : result.notes) {
-        note.played.taken_ns -= epoch_ns;
-        if (note.played.midi_sent_ns != 0) note.played.midi_sent_ns -= epoch_ns;
+    return best;
+}
+
+/// Finds the cause of a divergence of `strike` in a lap; what was played until `end_s` of its clock was fixed.
+void explain(Divergence& divergence, const Strike& strike, const RealtimeResult& realtime, double end_s) {
+    const double from_s = strike.scheduled_at_s - kEarlierS, to_s = strike.onset_s;
+    std::map<std::uint32_t, double> before_s;  // the sample before, by stick
+    for (const SampleTiming& sample : realtime.samples) {
+        if (sample.lap != divergence.lap) continue;
+        // What was skipped lies before the sample that came instead.
+        const auto [before, first] = before_s.try_emplace(sample.stick, sample.t_s);
+        const double begin_s = sample.skipped > 0 ? before->second : sample.t_s;
+        before->second = sample.t_s;
+        if (sample.t_s < from_s || begin_s > to_s || (sample.late_s <= 0 && sample.skipped == 0)) continue;
+        // How late the sample was with the sound, whatever else held it up.
+        const double delay_s = static_cast<double>(sample.handed_ns - sample.due_ns) / 1e9;
+        if (delay_s <= divergence.delay_s) continue;
+        divergence.delay_s = delay_s;
+        divergence.cause = sample.skipped > 0 ? "samples skipped" : "sample late";
     }
-    for (audio::BlockTiming block : sound.blocks()) {
-        block.planned_ns -= epoch_ns, block.started_ns -= epoch_ns, block.done_ns -= epoch_ns;
-        result.blocks.push_back(block);
+    if (divergence.delay_s == 0 && strike.onset_s > end_s) divergence.cause = "the run ended";
+}
+
+/// Plays the session's trace offline (no frames, no sound, in this process): each strike of each lap, on the
+/// lap's clock, against the offline strike of the same stick and instrument next to it (30 ms). Equal: the same
+/// outcome, the same onset to the sample and the same speed (within a millionth). A difference is explained by
+/// the greatest delay met by samples of any stick (the bodies are common to all) between two seconds before the
+/// strike was first predicted and its decision: samples that came later than they could still change the sound
+/// (late_s > 0), or were never seen; or by the end of the run within its lap.
+OfflineComparison compare_with_offline(const std::vector<LapStrikes>& laps, const RealtimeResult& realtime,
+                                       const RealtimeSession& session) {
+    const std::vector<Strike> offline =
+        offline_strikes(session.trace, session.kit, session.options.play, session.stick);
+    OfflineComparison result;
+    for (std::uint64_t lap = 0; lap < realtime.laps; ++lap) {
+        const double end_s =
+            session.trace.t0_s() + realtime.seconds - static_cast<double>(lap) * realtime.period_s;
+        const auto add = [&](const Strike& strike, const char* what, double offline_s, double here_s) {
+            result.departures.push_back(
+                {lap, strike.stick, strike.instrument, what, offline_s, here_s, 0, "unexplained"});
+            explain(result.departures.back(), strike, realtime,
+                    end_s - session.options.play.release_margin_s);
+        };
+        std::vector<const Strike*> own;  // played here, and not matched yet
+        for (const LapStrikes& those : laps)
+            for (const Strike& strike : those.strikes)
+                if (those.lap == lap && strike.outcome == Outcome::released) own.push_back(&strike);
+        for (const Strike& strike : offline) {
+            // What lies beyond the run's end could not be.
+            if (strike.outcome != Outcome::released || strike.scheduled_at_s > end_s) continue;
+            ++result.offline_strikes;
+            const auto match = nearest(own, strike);
+            if (match == own.end()) {
+                add(strike, "not sounded", strike.onset_s, kNone);
+                continue;
+            }
+            const Strike& here = **match;
+            own.erase(match);
+            if (here.onset_sample != strike.onset_sample)
+                add(strike, "another onset", strike.onset_s, here.onset_s);
+            else if (!same_speed(here, strike))
+                add(strike, "another speed", strike.onset_s, here.onset_s);
+        }
+        for (const Strike* strike : own) add(*strike, "sounded only here", kNone, strike->onset_s);
     }
-    result.audio_device = sound.device();
-    result.refused_changes = sound.refused_changes();
-    result.queue_overflows = sound.queue_overflows();
-    result.device_underruns = sound.device_underruns();
-    result.device_corrections = sound.device_corrections();
-    result.midi_late = sound.late_strokes();
-    result.midi_lost = sound.lost_strokes();
+    return result;
 }
 
 /// What the finished run gave, on the run's clock.
-void collect(RealtimeOutcome& outcome, RealtimeSession& session, RealtimeRun& run, Players& players,
-             const OutputFolder& folder, std::int64_t epoch_ns) {
-    if (players.frames) run.finish_frames();
-    outcome.realtime = std::move(run.result());
-    outcome.realtime.disturbed_by = session.options.disturbed_by;
-    outcome.realtime.priorities = priorities_of(players, session.options.play.workers);
-    outcome.failure = failure_of(outcome.realtime);
-    if (players.sound) take_sound(*players.sound, outcome, folder, epoch_ns);
-    outcome.stick = session.stick = run.geometry();
+void collect(RealtimeOutcome& outcome, const RealtimeSession& session, RealtimeRun& run,
+             const OutputFolder& folder) {
     PlayResult& result = outcome.play;
+    if (session.sound) finish_sound(*session.sound, run.end_s(), result, folder);
+    outcome.realtime = run.finish();
+    outcome.failure = failure_of(outcome.realtime.events);
     result.samples_refused = run.refused();
     result.frames = outcome.realtime.frames.size();
     result.t_end_s = result.t0_s + run.end_s();
     result.tracks = tracks_of(session, run);
-    collect_strikes(outcome, run.laps(), session.period_samples, players.sound != nullptr);
-    age_notes(outcome);
-    if (players.frames) fill_gaps(folder.path("frames"), result.frames, players.frames->rest_image());
+    const std::vector<LapStrikes> laps = collect_strikes(outcome, run.laps(), session);
+    if (session.frames) fill_gaps(folder.path("frames"), result.frames, session.frames->report().rest_image);
+    const PlayOptions& o = session.options.play;
+    // A program of one's own that has failed would fail again.
+    const bool external = is_external(o.picture_predictor) || is_external(o.sound_predictor);
+    if (!session.live && !(external && !outcome.failure.empty()))
+        outcome.offline = compare_with_offline(laps, outcome.realtime, session);
+}
+
+Json quality_json(const RealtimeResult& r) {
+    Json changes = Json::array();
+    for (const LeadStep& step : r.leads)
+        if (!step.why.empty())
+            changes.push_back({{"at_s", step.at_s}, {"level", step.quality}, {"why", step.why}});
+    return {{"levels", r.quality_levels},
+            {"first", r.leads.empty() ? Json() : Json(r.leads.front().quality)},
+            {"last", r.leads.empty() ? Json() : Json(r.leads.back().quality)},
+            {"changes", changes}};
+}
+
+/// The object `realtime` of summary.json.
+Json summary_of(const RealtimeOutcome& o) {
+    const RealtimeResult& r = o.realtime;
+    const LatencyReport& l = o.latency;
+    Json priorities = Json::object(), events = Json::array();
+    for (const auto& [thread, obtained] : r.priorities) priorities[thread] = obtained;
+    for (const SensorEvent& event : r.events)
+        events.push_back({{"at_s", event.at_s},
+                          {"kind", kEventKinds[static_cast<std::size_t>(event.kind)]},
+                          {"message", event.message}});
+    return {{"seconds", r.seconds},
+            {"laps", r.laps},
+            {"period_s", r.period_s},
+            {"output_lead_s", r.output_lead_s},
+            {"frames",
+             {{"total", l.frames.total},
+              {"missed", l.frames.missed},
+              {"late", l.frames_late},
+              {"skipped", l.frames_skipped},
+              {"left_out_by_rate", l.frames_left_out},
+              {"not_written", r.frames_not_written}}},
+            {"notes",
+             {{"total", l.notes.total},
+              {"late", l.notes.missed},
+              {"changes_refused", r.refused_changes},
+              {"queue_overflows", r.queue_overflows}}},
+            {"against_offline",
+             {{"offline_strikes", o.offline.offline_strikes},
+              {"departures", o.offline.departures.size()},
+              {"unexplained", o.offline.unexplained()}}},
+            {"quality", quality_json(r)},
+            {"sensors", {{"clocks", clock_table(r).json()}, {"events", events}}},
+            {"priorities", priorities},
+            {"disturbed_by", r.disturbed_by},
+            {"audio_device", r.audio_device},
+            {"device_underruns", r.device_underruns},
+            {"device_corrections", r.device_corrections},
+            {"midi_late", r.midi_late},
+            {"midi_lost", r.midi_lost}};
+}
+
+Table departure_table(const RealtimeOutcome& o) {
+    Table table =
+        Table::of({"lap", "stick", "instrument", "what", "offline_onset_s", "onset_s", "cause", "delay_ms"});
+    for (const Divergence& d : o.offline.departures)
+        table.add({d.lap, o.play.sticks[d.stick], o.play.instruments[d.instrument], d.what, d.offline_onset_s,
+                   d.onset_s, d.cause, fmt::format("{:.3f}", 1e3 * d.delay_s)});
+    return table;
+}
+
+/// Measures the latency of a run whose strikes are scored and writes what a run in real time has beside the
+/// products of play().
+void write_measurements(RealtimeOutcome& o, const RealtimeSession& session, const OutputFolder& folder) {
+    o.latency = latency_report(o.play, o.realtime, session.kit, session.stick.radius_m);
+    write_file(folder.path("departures.csv"), departure_table(o).csv());
+    for (const auto& [name, table] : latency_rows(o.latency, o.play, o.realtime))
+        write_file(folder.path(name), table.csv());
+    write_file(folder.path("latency.json"), format_latency_json(o.latency, o.play, o.realtime));
+    write_file(folder.path("latency.html"),
+               format_latency_page(o.latency, o.play, o.realtime, folder.scratch()));
 }
 
 }  // namespace
 
-RealtimeOutcome play_realtime(const RealtimeOptions& options,
-                              const std::function<void(const std::string&)>& warn) {
+RealtimeOutcome play_realtime(const RealtimeOptions& options, const Warn& warn) {
     const WallTimer wall;
-    RealtimeSession session = open_session(options);
+    std::optional<OutputFolder> folder;  // outlives the threads that write into it
+    RealtimeSession session(options);
     RealtimeOutcome outcome;
     outcome.play = describe(session.options.play, session.trace, session.kit, !session.live);
-    outcome.kit = session.kit;
-    outcome.stick = session.stick;
-    OutputFolder folder(options.play.out);
-    Players players(session, folder);
-    if (players.sound && !players.sound->midi_problem().empty()) warn(players.sound->midi_problem());
-    std::int64_t epoch_ns = 0;
-    const std::unique_ptr<SensorHub> sensors = start_sensors(session, epoch_ns);
+    folder.emplace(options.play.out);
+    session.start(*folder, warn);
     outcome.play.stages_s.emplace_back("start", wall.seconds());
     {
-        RealtimeRun run(
-            session.kit, session.options, session.stick, session.trace.t0_s(), session.period_samples,
-            {*players.simulation, players.stage, *sensors, players.sound.get(), players.frames.get()},
-            session.trace.sticks.size(), epoch_ns);
-        play_through(run, session, players, epoch_ns, warn);
+        RealtimeRun run(session);
+        run.run(warn);
         check_samples(session, run, warn);
-        collect(outcome, session, run, players, folder, epoch_ns);
+        collect(outcome, session, run, *folder);
     }
-    outcome.realtime.clocks = sensors->clocks();
-    // A program of one's own that has failed would fail again.
-    const bool external =
-        is_external(options.play.picture_predictor) || is_external(options.play.sound_predictor);
-    if (!session.live && !(external && !outcome.failure.empty()))
-        find_departures(outcome, session.trace, session.options.play);
-    const RunParts parts{session.options.play, session.kit,          session.stick,
-                         *players.simulation,  players.frames.get(), wall};
-    write_products(outcome.play, parts, folder, [&] { return write_realtime_products(outcome, folder); });
+    write_products(outcome.play,
+                   {session.kit, session.stick, *session.simulation, session.frames.get(), wall}, *folder,
+                   [&] {
+                       write_measurements(outcome, session, *folder);
+                       return summary_of(outcome).dump(2, ' ', false, Json::error_handler_t::replace);
+                   });
     return outcome;
 }
 

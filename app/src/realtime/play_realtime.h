@@ -1,10 +1,11 @@
 #pragma once
-#include <functional>
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include "latency/latency_report.h"
 #include "play/play_result.h"
-#include "realtime/realtime_run.h"
+#include "realtime/realtime_session.h"
 
 namespace app {
 
@@ -18,27 +19,32 @@ struct Divergence {
     std::string cause;  ///< "sample late", "samples skipped", "the run ended", "unexplained"
 };
 
+/// The run beside the offline run of the same trace.
+struct OfflineComparison {
+    std::size_t offline_strikes = 0;  ///< released ones of the offline run over the same laps
+    std::vector<Divergence> departures;
+
+    [[nodiscard]] std::size_t unexplained() const {
+        return static_cast<std::size_t>(std::ranges::count(departures, "unexplained", &Divergence::cause));
+    }
+};
+
 /// The results of a run in real time.
 struct RealtimeOutcome {
-    PlayResult
-        play;  ///< strikes, contacts and tracks over all laps, on the run's clock (t0 + time since the epoch)
+    PlayResult play;  ///< over all laps, on the run's clock (t0 + time since the epoch)
     RealtimeResult realtime;
-    std::vector<Strike> lap_strikes;  ///< those of `play`, on their laps' clocks
-    Kit kit;
-    StickGeometry stick;
-    std::vector<Divergence> departures;  ///< traces only
+    OfflineComparison offline;  ///< traces only
     LatencyReport latency;
     std::string failure;  ///< a sensor that could not go on: the products hold what was played until then;
                           ///< empty: none
-    std::size_t offline_strikes = 0;  ///< released ones of the offline run over the same laps
 };
 
 /// Plays in real time: sensor processes, contacts, strikes, sound and frames against the wall clock, into the
 /// folder `out` as play() does (frames in time only; what stayed on the screen instead of a dropped one is
-/// linked in its place), with the measurements of latency beside (latency.json and its tables). Then plays
-/// the trace offline, without frames and sound, and finds where and why the two differ. `warn` gets one line
-/// for each problem on the way. Throws as play() does, and std::runtime_error for a live run without a sample.
-RealtimeOutcome play_realtime(const RealtimeOptions& options,
-                              const std::function<void(const std::string&)>& warn);
+/// linked in its place), with the measurements of latency beside: departures.csv, latency.json, latency.html,
+/// samples.csv, frames.csv, notes.csv, blocks.csv, leads.csv, errors.csv and summary.json's object `realtime`.
+/// Then plays the trace offline, without frames and sound, and finds where and why the two differ. Throws as
+/// play() does, and std::runtime_error for a live run without a sample.
+RealtimeOutcome play_realtime(const RealtimeOptions& options, const Warn& warn);
 
 }  // namespace app

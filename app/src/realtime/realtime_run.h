@@ -1,56 +1,17 @@
 #pragma once
-#include <audio/live_performance.h>
-#include <sim/simulation.h>
-
-#include <functional>
 #include <memory>
 #include <vector>
 
-#include "kit/kit.h"
 #include "latency/timings.h"
-#include "pictures/frame_thread.h"
-#include "pictures/kit_stage.h"
-#include "play/play_options.h"
 #include "play/strike_pipeline.h"
-#include "realtime/artificial_load.h"
+#include "process/clock.h"
 #include "realtime/lead_control.h"
 #include "realtime/picture_quality.h"
-#include "sensors/sensor_hub.h"
-#include "sticks/stick.h"
+#include "realtime/realtime_session.h"
 
 namespace app {
 
-/// What a run in real time was asked for, beyond PlayOptions.
-struct RealtimeOptions {
-    PlayOptions play;
-    std::vector<std::string> sticks = {"left", "right"};  ///< names, of live sources
-    std::string source;                                   ///< of the sensors; empty: the trace, replayed
-    double seconds = 0;            ///< how long; 0: the trace once; live sources: until they end
-    bool lead_auto = false;        ///< both leads follow the measured delays, never below those asked for
-    double output_lead_s = 0.004;  ///< a block of sound is computed this long before it is due
-    bool realtime_priority = true;
-    std::string program;  ///< that has the command `sensor`; empty: this one
-    bool jack_audio = false;
-    std::string midi_port, midi_connect;
-    ArtificialLoad disturbance;
-    std::string disturbed_by;  ///< the same as typed, for the products
-};
-
-/// True if the sticks are live: there is no trace.
-[[nodiscard]] inline bool is_live(const RealtimeOptions& options) {
-    return !options.source.empty() && !options.source.starts_with("trace:");
-}
-
-/// The parts of a run that others make.
-struct RealtimeParts {
-    sim::Simulation& simulation;
-    KitStage& stage;
-    SensorHub& sensors;
-    audio::LivePerformance* sound = nullptr;  ///< may be absent
-    FrameThread* frames = nullptr;            ///< may be absent
-};
-
-/// A strike of a run in real time, on its lap's clock.
+/// The strikes of a lap, on its clock.
 struct LapStrikes {
     std::uint64_t lap = 0;
     std::vector<Strike> strikes;
@@ -70,39 +31,32 @@ struct LapStrikes {
 /// (SampleTiming::late_s).
 class RealtimeRun {
 public:
-    RealtimeRun(const Kit& kit, const RealtimeOptions& options, const StickGeometry& stick, double t0_s,
-                std::int64_t period_samples, const RealtimeParts& parts, std::size_t sticks,
-                std::int64_t epoch_ns);
+    /// The session's parts have been started.
+    explicit RealtimeRun(RealtimeSession& session);
 
-    /// Until the time is up, every source has ended, or `stop` says so. `warn` gets one-line messages.
-    void run(double seconds, const std::function<bool()>& stop,
-             const std::function<void(const std::string&)>& warn,
-             const std::function<void(double)>& progress);
+    /// Until the time is up, every source has ended, or SIGINT or SIGTERM came.
+    void run(const Warn& warn);
+    /// Waits until the frames at hand are drawn and written, and completes the measurements; after the sound
+    /// was finished.
+    [[nodiscard]] RealtimeResult finish();
 
-    /// Waits until the frames at hand are drawn and written, and completes their timings.
-    void finish_frames();
-
-    [[nodiscard]] RealtimeResult& result() { return result_; }
-    [[nodiscard]] std::vector<LapStrikes>& laps() { return laps_; }
+    [[nodiscard]] const std::vector<SensorEvent>& events() const { return result_.events; }
+    [[nodiscard]] const std::vector<LapStrikes>& laps() const { return laps_; }
     /// Measured poses as the loop saw them, by stick, on the run's clock: the trace of a live source.
     [[nodiscard]] const std::vector<std::vector<tracking::PoseSample>>& seen() const { return seen_; }
     [[nodiscard]] double end_s() const { return end_s_; }
     [[nodiscard]] std::uint64_t refused() const;
-    /// Of the sticks, also as a live source gave it.
-    [[nodiscard]] const StickGeometry& geometry() const { return geometry_; }
 
 private:
-    [[nodiscard]] std::int64_t now_ns() const;
-    [[nodiscard]] double lap_time_s(std::int64_t run_ns, std::uint64_t lap) const;
-    [[nodiscard]] double fixed_s(std::uint64_t lap) const;
+    [[nodiscard]] std::int64_t now_ns() const { return monotonic_ns() - session_.epoch_ns; }
+    [[nodiscard]] double lap_time_s(std::int64_t run_ns) const;
+    [[nodiscard]] double fixed_s() const;
     void wait(std::int64_t until_ns);
     void take_states();
     void learn_geometry();
     void take(const std::vector<std::uint32_t>& moved, std::int64_t taken_ns, std::int64_t query_ns);
     void begin_lap(std::uint64_t lap);
-    void send(const Strike& strike, bool scheduled);
-    void record_sample(std::uint32_t stick, std::uint64_t skipped, std::int64_t taken_ns,
-                       std::int64_t query_ns);
+    void send(audio::Note note, bool scheduled);
     /// When the next frame is to be begun: a render lead before it is shown, or up to 1 ms later while a
     /// sample of before then is on its way.
     [[nodiscard]] double next_frame_at_s() const;
@@ -112,6 +66,7 @@ private:
     void skipped(double shown_s);
     void record_tips(const FrameContents& scene, std::uint64_t index, double T);
     void take_frames();
+    [[nodiscard]] FrameTiming& frame_of(std::uint64_t index);
     FrameTiming& settle(const DrawnFrame& drawn);
     void take_notes();
     void follow_delays();
@@ -121,22 +76,17 @@ private:
     [[nodiscard]] double sound_lead_s() const {
         return options_.lead_auto ? sound_lead_.lead_s() : options_.play.sound_lead_s;
     }
-    [[nodiscard]] LeadStep step_now() const;
-    void note_step(const std::string& why);
+    void record_step(const std::string& why = {});
+    void change_quality(const std::optional<std::string>& why);
 
-    const Kit& kit_;
+    RealtimeSession& session_;
     const RealtimeOptions& options_;
-    StickGeometry geometry_;
     double t0_s_;
-    std::int64_t period_samples_;
-    RealtimeParts parts_;
-    std::int64_t epoch_ns_;
     std::vector<Stick> sticks_;
     std::unique_ptr<StrikePipeline> pipeline_;
     std::uint64_t lap_ = 0, first_id_ = 0;
     std::string stream_head_;  // of a live source, as far as it was learnt
     double newest_s_ = 0;      // of the samples taken, on the lap's clock
-    bool any_sample_ = false;
     std::vector<std::uint64_t> samples_seen_, starts_seen_;
 
     double fps_;

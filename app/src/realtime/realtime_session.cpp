@@ -8,7 +8,9 @@
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "play/play_setup.h"
+#include "process/clock.h"
 #include "process/thread_priority.h"
+#include "realtime/picture_quality.h"
 
 namespace app {
 namespace {
@@ -16,70 +18,36 @@ namespace {
 constexpr std::string_view kTracePrefix = "trace:";
 constexpr double kBetweenLapsS = 0.25;  // more than tracking::kGapS and any note's way beyond the last sample
 constexpr double kLongestLiveS = 600;   // 23 MB of sound a minute are kept
+constexpr double kLiveSpareS = 60;      // of a live source's only lap, beyond the run
 constexpr double kSpareSoundS = 1;
+constexpr double kStartS = 0.7;  // from starting the sensors to the epoch, at first
+constexpr double kAheadS = 0.1;  // the epoch lies at least that far ahead when all is ready
+constexpr int kStarts = 3;
 
 void refuse(bool wrong, const std::string& found, const std::string& expected) {
     if (wrong) throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
 }
 
 void check(const RealtimeOptions& o) {
-    refuse(
-        o.output_lead_s >= o.play.release_margin_s,
-        fmt::format("--output-lead {} with a release margin of {}", o.output_lead_s, o.play.release_margin_s),
-        "less than the release margin");
+    refuse(o.sound.output_lead_s >= o.play.release_margin_s,
+           fmt::format("--output-lead {} with a release margin of {}", o.sound.output_lead_s,
+                       o.play.release_margin_s),
+           "less than the release margin");
     refuse(o.play.solo.has_value(), "--solo with --realtime",
            "one of them: play the trace offline to hear one note");
-    refuse(!o.play.audio && !o.midi_port.empty(), "--midi-out with --no-audio",
+    refuse(!o.play.audio && !o.sound.midi_port.empty(), "--midi-out with --no-audio",
            "sound, whose clock times MIDI");
 }
 
 /// A trace that stands for the sticks of a live source, which has no samples yet.
-tracking::Trace live_trace(const RealtimeOptions& options) {
+tracking::Trace live_trace(const SensorOptions& sensors) {
     tracking::Trace trace;
-    trace.file = trace.source = options.source;
-    for (const std::string& name : options.sticks) trace.sticks.push_back({name, {{}, {}}});
+    trace.file = trace.source = sensors.source;
+    for (const std::string& name : sensors.sticks) trace.sticks.push_back({name, {{}, {}}});
     return trace;
 }
 
-}  // namespace
-
-RealtimeSession open_session(const RealtimeOptions& options) {
-    check(options);
-    RealtimeSession session{options, {}, {}, {}, is_live(options), options.seconds, 0};
-    if (options.source.starts_with(kTracePrefix))
-        session.options.play.trace = find_trace(options.source.substr(kTracePrefix.size()));
-    session.trace = session.live ? live_trace(options) : read_played_trace(session.options.play.trace);
-    session.kit = read_kit(options.play.kit);
-    session.stick = stick_geometry(session.trace, session.kit.stick, options.play.tip, options.play.shaft);
-    const double once_s = session.trace.t_end_s() - session.trace.t0_s();
-    if (session.live) {
-        if (session.seconds == 0) session.seconds = kLongestLiveS;
-        session.period_samples =
-            static_cast<std::int64_t>(std::ceil((session.seconds + 60) * audio::kSampleRate));
-        return session;
-    }
-    if (session.seconds == 0) session.seconds = once_s;
-    session.period_samples =
-        static_cast<std::int64_t>(std::ceil((once_s + kBetweenLapsS) * audio::kSampleRate));
-    return session;
-}
-
-SensorOptions sensors_of(const RealtimeSession& session, std::int64_t epoch_ns) {
-    SensorOptions sensors;
-    const RealtimeOptions& o = session.options;
-    sensors.source = session.live ? o.source : "trace:" + o.play.trace.string();
-    for (const tracking::StickTrace& stick : session.trace.sticks) sensors.sticks.push_back(stick.name);
-    sensors.predictors =
-        stick_predictors(o.play.picture_predictor, o.play.sound_predictor, o.play.sound_lead_s);
-    sensors.epoch_ns = epoch_ns;
-    sensors.period_s = static_cast<double>(session.period_samples) / audio::kSampleRate;
-    sensors.stall_at_s = o.disturbance.stall_at_s;
-    sensors.stall_s = o.disturbance.stall_s;
-    sensors.realtime = o.realtime_priority;
-    sensors.program = o.program;
-    return sensors;
-}
-
+/// The stage for each level of picture quality that is drawn differently.
 std::vector<render::SceneDescription> scenes_of(const KitStage& stage, int width, int height) {
     std::vector<render::SceneDescription> scenes;
     for (const QualityLevel& level : quality_levels()) {
@@ -94,19 +62,81 @@ std::vector<render::SceneDescription> scenes_of(const KitStage& stage, int width
     return scenes;
 }
 
-std::unique_ptr<audio::LivePerformance> make_live_sound(const RealtimeSession& session,
-                                                        std::string& priority) {
-    const RealtimeOptions& o = session.options;
-    audio::LiveOptions live;
-    live.output_lead_s = o.output_lead_s;
-    live.longest_s = session.seconds + kSpareSoundS;
-    live.jack_audio = o.jack_audio;
-    live.midi_port = o.midi_port;
-    live.midi_connect = o.midi_connect;
-    live.on_thread_start = [&priority, realtime = o.realtime_priority] {
-        priority = set_thread_priority(ThreadRole::sound, realtime);
+}  // namespace
+
+RealtimeSession::RealtimeSession(const RealtimeOptions& asked) : options(asked), seconds(asked.seconds) {
+    check(asked);
+    const bool replayed = asked.sensors.source.starts_with(kTracePrefix);
+    if (replayed) options.play.trace = find_trace(asked.sensors.source.substr(kTracePrefix.size()));
+    live = !asked.sensors.source.empty() && !replayed;
+    trace = live ? live_trace(asked.sensors) : read_played_trace(options.play.trace);
+    kit = read_kit(asked.play.kit);
+    stick = stick_geometry(trace, kit.stick, asked.play.tip, asked.play.shaft);
+    const double once_s = trace.t_end_s() - trace.t0_s();
+    if (seconds == 0) seconds = live ? kLongestLiveS : once_s;
+    const double period_s = live ? seconds + kLiveSpareS : once_s + kBetweenLapsS;
+    period_samples = static_cast<std::int64_t>(std::ceil(period_s * audio::kSampleRate));
+}
+
+void RealtimeSession::start(const OutputFolder& folder, const Warn& warn) {
+    const PlayOptions& o = options.play;
+    stage.emplace(kit, trace.sticks.size(), stick);
+    // Worker processes and ZeroMQ's threads inherit it.
+    simulation_priority = set_thread_priority(ThreadRole::simulation, options.realtime_priority);
+    simulation = make_simulation(kit, o.workers);
+    leave_thread_priority();
+    if (o.audio) start_sound();
+    frames = start_frames(o, scenes_of(*stage, o.width, o.height), stage->frame({}, {}), folder,
+                          FramePolicy::refuse, options.realtime_priority);
+    if (sound && !sound->midi_problem().empty()) warn(sound->midi_problem());
+    start_sensors();
+}
+
+void RealtimeSession::start_sound() {
+    audio::LiveOptions o = options.sound;
+    o.longest_s = seconds + kSpareSoundS;
+    o.on_thread_start = [this] {
+        sound_priority = set_thread_priority(ThreadRole::sound, options.realtime_priority);
     };
-    return std::make_unique<audio::LivePerformance>(orchestra_file(), voices_of(session.kit), live);
+    sound = std::make_unique<audio::LivePerformance>(orchestra_file(), voices_of(kit), o);
+}
+
+/// Sensors have to know the epoch when they are started; where starting takes until then, they are started
+/// once more with more time (of a live source, whose first samples then count from before the epoch, that
+/// does no harm).
+void RealtimeSession::start_sensors() {
+    SensorOptions o = options.sensors;
+    if (!live) o.source = "trace:" + options.play.trace.string();
+    o.sticks.clear();
+    for (const tracking::StickTrace& each : trace.sticks) o.sticks.push_back(each.name);
+    o.predictors = stick_predictors(options.play.picture_predictor, options.play.sound_predictor,
+                                    options.play.sound_lead_s);
+    o.period_s = period_s();
+    o.realtime = options.realtime_priority;
+    if (const ArtificialLoad::Part& stall = options.disturbance.stall; stall.amount > 0) {
+        o.stall_at_s = stall.from_s;
+        o.stall_s = stall.amount / 1e3;
+    }
+    double ahead_s = live ? 2 * kStartS : kStartS;
+    for (int i = 1;; ++i, ahead_s *= 4) {
+        o.epoch_ns = epoch_ns = monotonic_ns() + to_ns(ahead_s);
+        sensors.reset();
+        sensors = std::make_unique<SensorHub>(o);
+        if (live || monotonic_ns() < epoch_ns - to_ns(kAheadS)) return;
+        if (i == kStarts)
+            throw std::runtime_error(fmt::format(
+                "error: found sensors that took more than {:.1f} s to start, expected a machine less busy",
+                ahead_s));
+    }
+}
+
+std::vector<std::pair<std::string, std::string>> RealtimeSession::priorities() const {
+    std::vector<std::pair<std::string, std::string>> all = {
+        {"control", control_priority},
+        {"simulation", options.play.workers > 0 ? simulation_priority : control_priority}};
+    if (sound) all.emplace_back("sound", sound_priority);
+    if (frames) all.emplace_back("drawing", frames->report().priority);
+    return all;
 }
 
 }  // namespace app

@@ -1,35 +1,72 @@
 #pragma once
 #include <audio/live_performance.h>
-#include <render/scene.h>
+#include <sim/simulation.h>
+#include <tracking/trace.h>
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "realtime/realtime_run.h"
+#include "files/output_folder.h"
+#include "kit/kit.h"
+#include "kit/stick_geometry.h"
+#include "pictures/frame_thread.h"
+#include "pictures/kit_stage.h"
+#include "play/play_options.h"
+#include "realtime/artificial_load.h"
+#include "sensors/sensor_hub.h"
 
 namespace app {
 
-/// What a run in real time plays, and for how long: everything before its parts are started.
-struct RealtimeSession {
-    RealtimeOptions options;
-    tracking::Trace trace;  ///< of a live source only the sticks' names
-    Kit kit;
-    StickGeometry stick;
-    bool live = false;
-    double seconds = 0;
-    std::int64_t period_samples = 0;  ///< of a lap; a live source has one, longer than the run
+/// What a run in real time was asked for, beyond PlayOptions.
+struct RealtimeOptions {
+    PlayOptions play;
+    /// No source: the trace, replayed. `sticks`: of live sources.
+    SensorOptions sensors{.source = {}, .sticks = {"left", "right"}, .predictors = {}, .program = {}};
+    audio::LiveOptions sound;
+    double seconds = 0;      ///< how long; 0: the trace once; live sources: until they end
+    bool lead_auto = false;  ///< both leads follow the measured delays, never below those asked for
+    bool realtime_priority = true;
+    ArtificialLoad disturbance;
 };
 
-/// Reads trace and kit. Throws BadInput for options that cannot be.
-[[nodiscard]] RealtimeSession open_session(const RealtimeOptions& options);
+/// Gets one line for each problem on the way.
+using Warn = std::function<void(const std::string&)>;
 
-/// The options of the sensor processes.
-[[nodiscard]] SensorOptions sensors_of(const RealtimeSession& session, std::int64_t epoch_ns);
-/// The stage for each level of picture quality that is drawn differently.
-[[nodiscard]] std::vector<render::SceneDescription> scenes_of(const KitStage& stage, int width, int height);
-/// Sets `priority` to what the audio thread obtained; `priority` must outlive the performance.
-[[nodiscard]] std::unique_ptr<audio::LivePerformance> make_live_sound(const RealtimeSession& session,
-                                                                      std::string& priority);
+/// What a run in real time plays, for how long, and everything that plays it.
+struct RealtimeSession {
+    /// Reads trace and kit. Throws BadInput for options that cannot be.
+    explicit RealtimeSession(const RealtimeOptions& asked);
+    /// Makes everything that plays; frames go into `folder`. The session must stay where it is from then on.
+    void start(const OutputFolder& folder, const Warn& warn);
+    /// Of a lap.
+    [[nodiscard]] double period_s() const { return static_cast<double>(period_samples) / audio::kSampleRate; }
+    /// Threads and what they obtained.
+    [[nodiscard]] std::vector<std::pair<std::string, std::string>> priorities() const;
+
+    RealtimeOptions options;
+    bool live = false;      ///< there is no trace
+    tracking::Trace trace;  ///< of a live source only the sticks' names
+    Kit kit;
+    StickGeometry stick;  ///< also as a live source gives it
+    double seconds = 0;
+    std::int64_t period_samples = 0;  ///< of a lap; a live source has one, longer than the run
+
+    // Since start():
+    std::int64_t epoch_ns = 0;  ///< CLOCK_MONOTONIC, when the run's clock is 0
+    std::optional<KitStage> stage;
+    std::unique_ptr<sim::Simulation> simulation;
+    std::unique_ptr<audio::LivePerformance> sound;  ///< absent with --no-audio
+    std::unique_ptr<FrameThread> frames;            ///< absent with --no-frames
+    std::unique_ptr<SensorHub> sensors;
+    std::string simulation_priority, sound_priority, control_priority;
+
+private:
+    void start_sound();
+    void start_sensors();
+};
 
 }  // namespace app

@@ -2,139 +2,128 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
-#include <vector>
+#include <algorithm>
 
 namespace app {
 namespace {
 
-struct Rgb {
-    unsigned red, green, blue;
-};
+constexpr const char* kRules = R"css(
+*{box-sizing:border-box}
+body{margin:0;background:var(--page);color:var(--ink);font:15px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,sans-serif}
+main{max-width:1120px;margin:0 auto;padding:28px 24px 56px}
+header p{margin:2px 0;color:var(--axis)}
+h1{font-size:26px;line-height:1.25;margin:0 0 4px;overflow-wrap:anywhere}
+h2{font-size:18px;margin:40px 0 6px}
+h3{font-size:15px;margin:0 0 4px}
+p.note{color:var(--axis);margin:0 0 10px;max-width:95ch}
+.scroll+p.note,table+p.note{margin-top:8px}
+.facts{display:grid;grid-template-columns:repeat(auto-fit,minmax(230px,1fr));gap:8px 28px;margin:18px 0 0}
+.facts div{border-top:1px solid var(--grid);padding-top:5px;overflow-wrap:anywhere}
+.facts dt{color:var(--axis);font-size:12.5px}
+.facts dd{margin:0}
+.figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(106px,1fr));gap:9px;margin:24px 0 8px}
+.figures div{background:var(--card);border:1px solid var(--grid);border-top:3px solid var(--tone,var(--axis));border-radius:6px;padding:8px 11px}
+.figures b{display:block;white-space:nowrap;font-size:20px;line-height:1.2;font-weight:650;font-variant-numeric:tabular-nums}
+.figures span{color:var(--axis);font-size:12.5px}
+.frames{display:grid;grid-template-columns:repeat(auto-fill,minmax(300px,1fr));gap:12px}
+figure{margin:0}
+.frames img{width:100%;height:auto;display:block;border-radius:6px;border:1px solid var(--grid)}
+figcaption{color:var(--axis);font-size:12.5px;padding-top:3px}
+.plot{background:var(--card);border:1px solid var(--grid);border-radius:6px;padding:8px 10px 4px}
+.plot svg{display:block;width:100%;height:auto}
+.pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(420px,1fr));gap:12px}
+.legend{display:flex;flex-wrap:wrap;gap:4px 18px;margin:0 0 8px;padding:0;list-style:none;font-size:13px}
+.legend svg{width:22px;height:12px;vertical-align:-1px;margin-right:5px}
+.scroll{overflow-x:auto}
+table{border-collapse:collapse;font-variant-numeric:tabular-nums}
+th,td{padding:4px 14px 4px 0;text-align:left;border-bottom:1px solid var(--grid);vertical-align:top;overflow-wrap:anywhere}
+th{color:var(--axis);font-weight:500;font-size:13px}
+td.n,th.n{text-align:right}
+.wide td,.wide th,.grid td{overflow-wrap:normal}
+.scroll+h3{margin-top:20px}
+.wide td,.grid td{white-space:nowrap}
+.wide td.text{white-space:normal}
+.grid{font-size:12px}
+.grid td,.grid th{padding:2px 10px 2px 0}
+.scroll+p{margin-top:20px}
+.grid td.gain b{color:var(--released)}
+.grid td.none{color:var(--axis)}
+details summary{cursor:pointer;margin:12px 0 6px}
+.pair,.plot+.pair{margin-top:12px}
+code{font:12.5px/1.5 ui-monospace,SFMono-Regular,Menlo,Consolas,monospace;overflow-wrap:anywhere}
+@media(max-width:520px){.pair{grid-template-columns:1fr}main{padding:20px 14px}}
+@media print{body{font-size:12px}.plot,figure,tr{break-inside:avoid}}
+)css";
 
-Rgb parts(std::uint32_t rgb) {
-    return {(rgb >> 16) & 255U, (rgb >> 8) & 255U, rgb & 255U};
-}
-
-void replace_all(std::string& text, std::string_view from, std::string_view to) {
-    std::string replaced;
-    std::size_t done = 0;
-    for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, done)) {
-        replaced.append(text, done, at - done).append(to);
-        done = at + from.size();
-    }
-    if (done > 0) text = replaced.append(text, done);
-}
-
-/// From the first `from` to the next `to` after it, both included.
-std::string_view span_of(std::string_view text, std::string_view from, std::string_view to) {
-    const std::size_t begin = text.find(from);
-    const std::size_t end = begin == std::string_view::npos ? begin : text.find(to, begin + from.size());
-    if (end == std::string_view::npos)
-        throw std::runtime_error(
-            fmt::format("error: found a plot without {}, expected one of gnuplot 5", from));
-    return text.substr(begin, end + to.size() - begin);
-}
-
-/// gnuplot writes its colours as attributes: what it drew in one of ours follows the page, black is the
-/// page's text.
-void follow_page(std::string& svg) {
-    const auto follow = [&](const ReportColour& colour) {
-        const Rgb rgb = parts(colour.light);
-        const std::string variable = fmt::format("var(--{})", colour.name);
-        replace_all(svg, fmt::format("rgb({:3}, {:3}, {:3})", rgb.red, rgb.green, rgb.blue),
-                    variable);                                                                   // lines
-        replace_all(svg, fmt::format("rgb({},{},{})", rgb.red, rgb.green, rgb.blue), variable);  // text
-    };
-    for (const ReportColour& colour : colours::marks) follow(colour);
-    for (const ReportColour& colour : colours::sticks) follow(colour);
-    replace_all(svg, "\"black\"", "\"currentColor\"");
-    replace_all(svg, "'black'", "'currentColor'");
-}
-
-/// Lines without the groups that hold nothing (gnuplot writes four of them a tick), titles and ids.
-std::string without_ballast(std::string_view svg) {
-    std::vector<std::string_view> lines;
-    for (std::size_t at = 0; at < svg.size();) {
-        const std::size_t end = std::min(svg.find('\n', at), svg.size());
-        const std::string_view line = svg.substr(at, end - at);
-        at = end + 1;
-        if (line == "</g>" && !lines.empty() && lines.back().starts_with("<g fill=\"none\"") &&
-            lines.back().ends_with(">")) {
-            lines.pop_back();
-        } else if (!line.empty()) {
-            lines.push_back(line);
-        }
-    }
-    std::string out;
-    for (const std::string_view line : lines) {
-        const bool named =
-            line.starts_with("\t<g id=\"gnuplot_plot_") || line.starts_with("<g id=\"gnuplot_canvas\"");
-        out += named ? "<g>" : line;
-        out += '\n';
-    }
-    return out;
+/// CSS declarations of all colours, "--grid:#e4e8ee;...", for a light or a dark page.
+std::string css_colours(bool dark) {
+    std::string css;
+    for (const ReportColour& colour : colours::all)
+        css += fmt::format("--{}:#{:06x};", colour.name, dark ? colour.dark : colour.light);
+    return css;
 }
 
 }  // namespace
 
-const ReportColour& stick_colour(std::size_t stick) {
-    return colours::sticks[stick % colours::sticks.size()];
-}
-
-std::string gnuplot_colour(const ReportColour& colour) {
-    return fmt::format("rgb '#{:06x}'", colour.light);
-}
-
-std::string css_colours(bool dark) {
-    std::string css;
-    const auto declare = [&](const ReportColour& colour) {
-        css += fmt::format("--{}:#{:06x};", colour.name, dark ? colour.dark : colour.light);
-    };
-    for (const ReportColour& colour : colours::marks) declare(colour);
-    for (const ReportColour& colour : colours::sticks) declare(colour);
-    return css;
-}
-
-std::string inline_svg(std::string_view svg, std::string_view label) {
-    const std::string_view view_box = span_of(svg, "viewBox=\"", "\"");
-    std::string drawn = without_ballast(span_of(svg, "</defs>", "</svg>").substr(7));
-    follow_page(drawn);
-    // The definitions, left out, stood inside the canvas's group.
-    return fmt::format("<svg role=\"img\" aria-label=\"{}\" {}>\n<g>\n{}", html(label), view_box, drawn);
-}
-
-std::string svg_symbols(std::string_view svg) {
-    const std::string_view definitions = span_of(svg, "<defs>", "</defs>");
-    return fmt::format(
-        "<svg width=\"0\" height=\"0\" style=\"position:absolute\" aria-hidden=\"true\">{}</svg>\n",
-        definitions);
-}
-
 std::string html(std::string_view text) {
+    constexpr std::pair<char, const char*> kEscapes[] = {
+        {'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}};
     std::string out;
     for (const char c : text) {
-        switch (c) {
-            case '&':
-                out += "&amp;";
-                break;
-            case '<':
-                out += "&lt;";
-                break;
-            case '>':
-                out += "&gt;";
-                break;
-            case '"':
-                out += "&quot;";
-                break;
-            case '\'':
-                out += "&#39;";
-                break;
-            default:
-                out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
-        }
+        const auto* escape = std::ranges::find(kEscapes, c, &std::pair<char, const char*>::first);
+        if (escape != std::end(kEscapes))
+            out += escape->second;
+        else
+            out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
     }
     return out;
+}
+
+std::string report_page(std::string_view title, std::string_view body) {
+    return fmt::format(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n"
+        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+        "<title>{}: MusicWorld</title>\n<style>"
+        ":root{{color-scheme:light dark;--page:#f6f8fa;--card:#ffffff;--ink:#1b2027;{}}}\n"
+        "@media screen and (prefers-color-scheme:dark)"
+        "{{:root{{--page:#12161b;--card:#1a2027;--ink:#e3e8ee;{}}}}}{}"
+        "</style></head>\n<body><main>\n{}</main></body></html>\n",
+        html(title), css_colours(false), css_colours(true), kRules, body);
+}
+
+std::string report_fact(std::string_view name, std::string_view value) {
+    return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", html(name), html(value));
+}
+
+std::string report_header(std::string_view title, std::string_view subtitle,
+                          const std::vector<std::pair<std::string, std::string>>& facts) {
+    std::string text = fmt::format("<header><h1>{}</h1>\n", html(title));
+    if (!subtitle.empty()) text += fmt::format("<p>{}</p>\n", html(subtitle));
+    text += "<dl class=facts>\n";
+    for (const auto& [name, value] : facts)
+        if (!value.empty()) text += report_fact(name, value);
+    return text + "</dl></header>\n";
+}
+
+std::string report_figures(const std::vector<PageFigure>& figures) {
+    std::string text = "<section class=figures>\n";
+    for (const auto& [value, name, tone] : figures)
+        text += fmt::format("<div style=\"--tone:var(--{})\"><b>{}</b><span>{}</span></div>\n", tone,
+                            html(value), html(name));
+    return text + "</section>\n";
+}
+
+std::string report_legend(const std::vector<std::pair<std::string, std::string>>& entries) {
+    std::string text = "<ul class=legend>\n";
+    for (const auto& [shape, name] : entries)
+        text += fmt::format("<li><svg viewBox=\"0 0 22 12\" aria-hidden=\"true\">{}</svg>{}</li>\n", shape,
+                            html(name));
+    return text + "</ul>\n";
+}
+
+std::string line_shape(const ReportColour& colour, bool dashed) {
+    return fmt::format("<path d=\"M1,6h20\" stroke=\"var(--{})\" stroke-width=\"2.5\"{}/>", colour.name,
+                       dashed ? " stroke-dasharray=\"5 3\"" : "");
 }
 
 }  // namespace app

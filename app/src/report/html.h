@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace app {
 
@@ -23,27 +25,33 @@ inline constexpr std::array<ReportColour, 4> sticks{{{"stick-1", 0x2468b4, 0x68a
                                                      {"stick-2", 0xc07a12, 0xf0b04e},
                                                      {"stick-3", 0x6b46c1, 0xb197fc},
                                                      {"stick-4", 0x0f8a8a, 0x3fd0d0}}};
-inline constexpr std::array<ReportColour, 8> marks{grid,   axis,      released, wrong,
-                                                   missed, cancelled, contact,  wave};
+inline constexpr ReportColour all[] = {grid,    axis, released,  wrong,     missed,    cancelled,
+                                       contact, wave, sticks[0], sticks[1], sticks[2], sticks[3]};
 }  // namespace colours
-
-[[nodiscard]] const ReportColour& stick_colour(std::size_t stick);
-
-/// "rgb '#rrggbb'", for gnuplot.
-[[nodiscard]] std::string gnuplot_colour(const ReportColour& colour);
-
-/// CSS declarations of all colours, "--grid:#e4e8ee;...", for a light or a dark page.
-[[nodiscard]] std::string css_colours(bool dark);
-
-/// A plot of gnuplot as an element of an HTML page: no XML head, no titles that would pop up, no ids, colours
-/// by CSS variables, scaled to the width of its place. Its point shapes are those of svg_symbols(), once a
-/// page. `label` says what it shows, for readers who do not see it.
-[[nodiscard]] std::string inline_svg(std::string_view svg, std::string_view label);
-
-/// The definitions of gnuplot's point shapes, taken from any plot, as an invisible element.
-[[nodiscard]] std::string svg_symbols(std::string_view svg);
 
 /// Text for HTML: & < > " ' escaped, control characters replaced.
 [[nodiscard]] std::string html(std::string_view text);
+
+/// A page that needs nothing beside it; it follows the reader's choice of light or dark, and prints on white.
+/// `title` is text, `body` HTML.
+[[nodiscard]] std::string report_page(std::string_view title, std::string_view body);
+
+/// An entry of a list of class `facts`.
+[[nodiscard]] std::string report_fact(std::string_view name, std::string_view value);
+/// What a page is about, and the facts that are not empty: name and value.
+[[nodiscard]] std::string report_header(std::string_view title, std::string_view subtitle,
+                                        const std::vector<std::pair<std::string, std::string>>& facts);
+
+/// A figure of a page, in a colour of the report.
+struct PageFigure {
+    std::string value;
+    std::string_view name, tone;
+};
+[[nodiscard]] std::string report_figures(const std::vector<PageFigure>& figures);
+
+/// A legend: shapes (SVG, 22 x 12 units) and what they stand for.
+[[nodiscard]] std::string report_legend(const std::vector<std::pair<std::string, std::string>>& entries);
+/// A line as a shape.
+[[nodiscard]] std::string line_shape(const ReportColour& colour, bool dashed = false);
 
 }  // namespace app

@@ -114,13 +114,13 @@ Table Table::of(std::initializer_list<std::string_view> columns) {
     return table;
 }
 
-void Table::add(std::vector<Cell> row) {
+void Table::add(Cells row) {
     assert(row.size() == columns.size() && "a row has a cell for every column");
     rows.push_back(std::move(row));
 }
 
 void Table::add_figures(const std::vector<Figure>& row) {
-    std::vector<Cell> cells;
+    Cells cells;
     for (const Figure& figure : row) {
         if (rows.empty()) {
             columns.push_back(column_of(figure.column));
@@ -142,7 +142,7 @@ Table Table::part(std::initializer_list<std::string_view> names) const {
         part.columns.push_back(*column);
     }
     for (const auto& row : rows) {
-        std::vector<Cell> cells;
+        Cells cells;
         for (const std::size_t at : chosen) cells.push_back(row[at]);
         if (std::any_of(cells.begin() + 1, cells.end(), [](const Cell& cell) { return !cell.none(); }))
             part.add(std::move(cells));
@@ -166,7 +166,7 @@ std::string Table::text() const {
 }
 
 std::string Table::csv() const {
-    std::vector<Cell> line;
+    Cells line;
     const auto add_line = [&](std::string& text, const auto& cell_of) {
         line.clear();
         for (std::size_t i = 0; i < columns.size(); ++i)

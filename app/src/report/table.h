@@ -57,15 +57,17 @@ struct Figure {
     bool in_csv = true;
 };
 
+using Cells = std::vector<Cell>;
+
 /// Columns and rows, rendered in four ways.
 struct Table {
     std::vector<Column> columns = {};
-    std::vector<std::vector<Cell>> rows = {};  ///< of as many cells as there are columns
+    std::vector<Cells> rows = {};  ///< of as many cells as there are columns
 
     /// Columns as a Figure has them.
     [[nodiscard]] static Table of(std::initializer_list<std::string_view> columns);
 
-    void add(std::vector<Cell> row);
+    void add(Cells row);
     /// A row of cells with their columns; those of the first row are the table's.
     void add_figures(const std::vector<Figure>& row);
 
@@ -76,7 +78,7 @@ struct Table {
     [[nodiscard]] std::string text() const;
     /// Header and rows (RFC 4180, but lines end with \n).
     [[nodiscard]] std::string csv() const;
-    /// For a page with report_style(), a dash for none; empty without rows.
+    /// For a page with report_page(), a dash for none; empty without rows.
     [[nodiscard]] std::string html() const;
     /// An array with an object per row. An object within that holds no value is null.
     [[nodiscard]] nlohmann::ordered_json json() const;

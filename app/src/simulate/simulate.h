@@ -1,5 +1,5 @@
 #pragma once
-#include <sim/world.h>
+#include <sim/distributed_world.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -7,10 +7,24 @@
 #include <string>
 #include <vector>
 
-#include "simulate/momentum_watch.h"
-#include "simulate/worker_options.h"
-
 namespace app {
+
+/// How a scene is shared out to workers.
+struct WorkerOptions {
+    int count = 0;  ///< processes started here, or simulated processors
+    sim::Pace pace = sim::Pace::lockstep;
+    int bound = 0;  ///< [steps]
+    bool balance = true;
+    std::string listen;  ///< endpoint; empty: in a private folder
+    std::filesystem::path keys;
+    int expect = 0;                                     ///< workers before the first step
+    std::optional<sim::SimulatedProcessors> simulated;  ///< instead of processes
+};
+
+/// "sync" or "async".
+[[nodiscard]] inline std::string mode_name(sim::Pace pace) {
+    return pace == sim::Pace::lockstep ? "sync" : "async";
+}
 
 struct SimulateOptions {
     std::filesystem::path scene;
@@ -23,6 +37,16 @@ struct SimulateOptions {
     int width = 640, height = 480;
     bool progress = false;
     std::optional<WorkerOptions> workers;  ///< none: all in this process
+};
+
+/// Momentum that came from nowhere.
+struct MomentumDrift {
+    double linear = 0;              ///< largest seen; at the end where more than gravity acted [kg m/s]
+    std::optional<double> angular;  ///< largest seen [kg m^2/s]; known where nothing at all acted
+    double scale = 0;               ///< largest sum of |m v| over the bodies [kg m/s]
+
+    /// Share of the momenta that went around.
+    [[nodiscard]] double share() const { return scale > 0 ? linear / scale : linear; }
 };
 
 struct SimulateResult {

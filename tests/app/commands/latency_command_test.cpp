@@ -82,12 +82,12 @@ int run_program(std::vector<std::string> arguments, RealtimeOptions* asked = nul
         if (asked != nullptr) *asked = options;
         EXPECT_FALSE(options.play.out.empty());
         RealtimeOutcome run;
-        run.kit = sample::one_drum();
+        const Kit kit = sample::one_drum();
         run.play.sticks = {"left"};
         run.play.instruments = {"snare"};
-        sample::draw(run.realtime, sample::falling(0.493, sample::touch_height(run.kit), 2), 0.4, 0.6);
+        sample::draw(run.realtime, sample::falling(0.493, sample::touch_height(kit), 2), 0.4, 0.6);
         sample::sound(run.play, run.realtime, {0.5});
-        run.latency = latency_report(run.play, run.realtime, run.kit, sample::kTipRadius);
+        run.latency = latency_report(run.play, run.realtime, kit, sample::kTipRadius);
         return run;
     });
     std::reverse(arguments.begin(), arguments.end());

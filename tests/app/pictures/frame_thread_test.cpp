@@ -35,10 +35,10 @@ TEST(FrameThread, OfflineEveryFrameIsDrawnAndWritten) {
     FrameThread frames({empty_room(64)}, {}, into(folder, FramePolicy::wait));
     for (std::uint64_t k = 0; k < 40; ++k) EXPECT_TRUE(frames.push({.index = k, .state = {}}));
     frames.finish();
-    ASSERT_EQ(frames.written().size(), 40U);
-    EXPECT_EQ(frames.not_written(), 0U);
-    EXPECT_EQ(picture(folder.path() / "000039.png").rgb, frames.rest_image().rgb);
-    EXPECT_FALSE(frames.version().empty());
+    ASSERT_EQ(frames.report().written.size(), 40U);
+    EXPECT_EQ(frames.report().not_written, 0U);
+    EXPECT_EQ(picture(folder.path() / "000039.png").rgb, frames.report().rest_image.rgb);
+    EXPECT_FALSE(frames.report().version.empty());
     EXPECT_TRUE(frames.take_done().empty());
 }
 
@@ -46,8 +46,8 @@ TEST(FrameThread, OfflineEveryFrameIsDrawnAndWritten) {
 TEST(FrameThread, InRealTimeABusyThreadRefusesAndALateFrameIsDropped) {
     const TemporaryFolder folder;
     FrameThread frames({empty_room(64), empty_room(16)}, {}, into(folder, FramePolicy::refuse));
-    EXPECT_EQ(frames.trial_s().size(), 2U);
-    EXPECT_FALSE(frames.priority().empty());
+    EXPECT_EQ(frames.report().trial_s.size(), 2U);
+    EXPECT_FALSE(frames.report().priority.empty());
     EXPECT_TRUE(frames.push({.index = 0, .slower_s = 0.2, .state = {}}));
     EXPECT_FALSE(frames.push({.index = 1, .state = {}}));
     std::vector<DrawnFrame> done;
@@ -63,7 +63,7 @@ TEST(FrameThread, InRealTimeABusyThreadRefusesAndALateFrameIsDropped) {
     done = frames.take_done();
     ASSERT_EQ(done.size(), 1U);
     EXPECT_EQ(done[0].index, 3U);
-    EXPECT_EQ(frames.written().size(), 2U);
+    EXPECT_EQ(frames.report().written.size(), 2U);
     EXPECT_FALSE(fs::exists(folder.path() / "000002.png"));
     EXPECT_EQ(picture(folder.path() / "000003.png").width, 64) << "a smaller picture is enlarged";
 }

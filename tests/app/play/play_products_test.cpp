@@ -167,7 +167,7 @@ TEST(EventsTable, HasItsColumnsAndARowAStrikeThatReadsBackToTheSameValues) {
         EXPECT_EQ(row[9], s.outcome == app::Outcome::released ? "released" : "cancelled");
         EXPECT_EQ(row[10], std::to_string(s.moves));
         expect_same_bits(row[11], s.decided_at_s);
-        EXPECT_EQ(row[12], result.sound_predictor);
+        EXPECT_EQ(row[12], result.options.sound_predictor);
     }
 }
 

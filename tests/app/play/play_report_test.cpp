@@ -1,5 +1,3 @@
-#include "play/play_report.h"
-
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -9,9 +7,8 @@
 #include "files/output_folder.h"
 #include "kit/tip_track.h"
 #include "play/play_plots.h"
-#include "report/gnuplot.h"
-#include "report/html.h"
-#include "report/plot_panel.h"
+#include "play/play_products.h"
+#include "report/plot.h"
 #include "sample_play_result.h"
 
 namespace {
@@ -104,7 +101,7 @@ TEST(Report, DoesNotDependOnTimesAndWorkers) {
     app::PlayResult other = sample_play_result();
     other.wall_s = 123;
     other.stages_s = {{"drawing", 45}};
-    other.workers = 3, other.workers_lost = 1, other.bodies_reowned = 4;
+    other.options.workers = 3, other.workers_lost = 1, other.bodies_reowned = 4;
     EXPECT_EQ(report_of(other), report_of(sample_play_result()));
 }
 
@@ -114,8 +111,9 @@ TEST(Report, NamesAreTextWhateverTheyHold) {
     app::PlayResult result = sample_play_result();
     const std::string hostile =
         "'; system('touch " + touched + "'); `touch " + touched + "`\nset output <script>alert(1)</script>";
-    result.trace = result.kit = result.kit_name = result.trace_source = result.picture_predictor = hostile;
-    result.sound_predictor = result.fingerprint = hostile;
+    result.trace = result.kit_name = result.trace_source = result.options.picture_predictor = hostile;
+    result.options.sound_predictor = result.fingerprint = hostile;
+    result.options.kit = hostile;
     for (std::string& name : result.instruments) name = hostile;
     for (std::string& name : result.sticks) name = hostile;
     for (app::TipTrack& track : result.tracks) track.stick = hostile;

@@ -15,7 +15,6 @@
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "kit/kit.h"
-#include "play/note_of_strike.h"
 #include "play/play_setup.h"
 #include "temporary_folder.h"
 
@@ -43,7 +42,7 @@ RealtimeOptions options_of(const TemporaryFolder& folder, const fs::path& trace,
     options.play.workers = 0;
     options.play.width = 160, options.play.height = 120;
     options.seconds = seconds;
-    options.program = MUSICWORLD_PROGRAM;
+    options.sensors.program = MUSICWORLD_PROGRAM;
     return options;
 }
 
@@ -55,10 +54,11 @@ RealtimeOutcome run(const RealtimeOptions& options, std::vector<std::string>* wa
 
 /// The sound of the notes that were played, rendered offline.
 std::vector<float> offline_sound(const RealtimeOutcome& outcome) {
-    audio::Performance performance(orchestra_file(), voices_of(outcome.kit));
+    const Kit kit = read_kit(outcome.play.options.kit);
+    audio::Performance performance(orchestra_file(), voices_of(kit));
     for (const Strike& strike : outcome.play.strikes)
         if (strike.outcome == Outcome::released)
-            performance.schedule(note_of(strike, outcome.kit.instruments[strike.instrument]));
+            performance.schedule(note_of(strike, kit.instruments[strike.instrument]));
     const double length = (outcome.realtime.seconds + kSoundTailS) * audio::kSampleRate;
     return performance.finish(static_cast<std::int64_t>(std::ceil(length)),
                               static_cast<std::int64_t>(kLongestSoundTailS * audio::kSampleRate));
@@ -79,8 +79,8 @@ TEST(PlayRealtime, ALoopedTraceSoundsAsPlannedToTheSampleAndDepartsFromOfflineOn
         EXPECT_EQ(strike.outcome, Outcome::released);
         EXPECT_EQ(strike.onset_sample, note.played.onset_sample);
     }
-    EXPECT_GT(outcome.offline_strikes, 0U);
-    for (const Divergence& departure : outcome.departures) {
+    EXPECT_GT(outcome.offline.offline_strikes, 0U);
+    for (const Divergence& departure : outcome.offline.departures) {
         EXPECT_NE(departure.cause, "unexplained") << departure.what << " " << departure.offline_onset_s;
         if (departure.cause != "the run ended") {
             EXPECT_GT(departure.delay_s, 0.0033);
@@ -114,7 +114,7 @@ TEST(PlayRealtime, FramesAreInTimeOrDroppedAndTheFolderHasOneForEach) {
 TEST(PlayRealtime, StalledAndEndedSensorsAreSaidAndTheRunGoesOn) {
     const TemporaryFolder folder;
     RealtimeOptions options = options_of(folder, cut_flourish(folder, 1.6), 2.5);
-    options.disturbance = parse_disturbance("stall:150@0.7");
+    options.disturbance = parse_artificial_load("stall:150@0.7");
     std::vector<std::string> warnings;
     const RealtimeOutcome outcome = run(options, &warnings);
     const auto said = [&](const char* words) {
@@ -124,7 +124,7 @@ TEST(PlayRealtime, StalledAndEndedSensorsAreSaidAndTheRunGoesOn) {
     EXPECT_TRUE(said("silent for"));
     EXPECT_TRUE(said("back after"));
     EXPECT_GT(outcome.realtime.samples.back().due_ns, 2'000'000'000);
-    for (const Divergence& departure : outcome.departures)
+    for (const Divergence& departure : outcome.offline.departures)
         EXPECT_NE(departure.cause, "unexplained") << departure.lap << " " << departure.what << " "
                                                   << departure.offline_onset_s << " " << departure.onset_s;
 }
@@ -132,7 +132,7 @@ TEST(PlayRealtime, StalledAndEndedSensorsAreSaidAndTheRunGoesOn) {
 TEST(PlayRealtime, ALiveRunWithoutASampleFailsAndLeavesNothing) {
     const TemporaryFolder folder;
     RealtimeOptions options = options_of(folder, find_trace("flourish"), 1);
-    options.source = "zmq:ipc://" + (folder.path() / "nobody").string();
+    options.sensors.source = "zmq:ipc://" + (folder.path() / "nobody").string();
     try {
         (void)run(options);
         ADD_FAILURE() << "a run that has nothing to show counts as one";
@@ -148,7 +148,7 @@ TEST(PlayRealtime, ALiveRunWithoutASampleFailsAndLeavesNothing) {
 TEST(PlayRealtime, ATraceMayBeGivenAsTheSource) {
     const TemporaryFolder folder;
     RealtimeOptions options = options_of(folder, find_trace("flourish"), 1);
-    options.source = "trace:" + cut_flourish(folder, 1).string();
+    options.sensors.source = "trace:" + cut_flourish(folder, 1).string();
     EXPECT_EQ(run(options).play.trace, (folder.path() / "cut.csv").string());
 }
 
@@ -161,10 +161,10 @@ TEST(PlayRealtime, WhatCannotBeIsRefusedBeforeAnythingStarts) {
         EXPECT_THROW((void)run(options), BadInput);
         EXPECT_FALSE(fs::exists(options.play.out / "summary.json"));
     };
-    refused([](RealtimeOptions& o) { o.output_lead_s = o.play.release_margin_s; });
+    refused([](RealtimeOptions& o) { o.sound.output_lead_s = o.play.release_margin_s; });
     refused([](RealtimeOptions& o) { o.play.solo = 1; });
     refused([](RealtimeOptions& o) { o.play.sound_predictor = "exec:"; });
-    refused([](RealtimeOptions& o) { o.source = "carrier-pigeon:1"; });
+    refused([](RealtimeOptions& o) { o.sensors.source = "carrier-pigeon:1"; });
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "simulate/simulate.h"
-#include "simulate/worker_history.h"
+#include "simulate/simulate_record.h"
 #include "temporary_folder.h"
 #include "written_scene.h"
 

@@ -1,0 +1,270 @@
+#include "report/plot.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include "files/output_folder.h"
+#include "process/child_process.h"
+
+namespace app {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::array<ReportColour, 9> kLineColours = {
+    colours::sticks[0], colours::sticks[1], colours::sticks[2], colours::sticks[3], colours::released,
+    colours::wrong,     colours::missed,    colours::wave,      colours::cancelled};
+
+std::string read_text(const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+/// In the locale C, so that numbers have points, and without the user's start-up files.
+void run_gnuplot(const fs::path& script, const fs::path& messages) {
+    try {
+        run_child({"gnuplot", "--default-settings", script.string()}, messages, {"LC_ALL=C"});
+    } catch (const std::runtime_error& failed) {
+        throw std::runtime_error(
+            fmt::format("{}; the report's plots need gnuplot (package gnuplot-nox)", failed.what()));
+    }
+}
+
+void replace_all(std::string& text, std::string_view from, std::string_view to) {
+    std::string replaced;
+    std::size_t done = 0;
+    for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, done)) {
+        replaced.append(text, done, at - done).append(to);
+        done = at + from.size();
+    }
+    if (done > 0) text = replaced.append(text, done);
+}
+
+/// From the first `from` to the next `to` after it, both included.
+std::string_view span_of(std::string_view text, std::string_view from, std::string_view to) {
+    const std::size_t begin = text.find(from);
+    const std::size_t end = begin == std::string_view::npos ? begin : text.find(to, begin + from.size());
+    if (end == std::string_view::npos)
+        throw std::runtime_error(
+            fmt::format("error: found a plot without {}, expected one of gnuplot 5", from));
+    return text.substr(begin, end + to.size() - begin);
+}
+
+/// gnuplot writes its colours as attributes: what it drew in one of ours follows the page, black is the
+/// page's text.
+void follow_page(std::string& svg) {
+    for (const ReportColour& colour : colours::all) {
+        const std::uint32_t rgb = colour.light, red = rgb >> 16, green = rgb >> 8 & 255, blue = rgb & 255;
+        const std::string variable = fmt::format("var(--{})", colour.name);
+        replace_all(svg, fmt::format("rgb({:3}, {:3}, {:3})", red, green, blue), variable);  // lines
+        replace_all(svg, fmt::format("rgb({},{},{})", red, green, blue), variable);          // text
+    }
+    replace_all(svg, "\"black\"", "\"currentColor\"");
+    replace_all(svg, "'black'", "'currentColor'");
+}
+
+/// Lines without the groups that hold nothing (gnuplot writes four of them a tick), titles and ids.
+std::string without_ballast(std::string_view svg) {
+    std::vector<std::string_view> lines;
+    for (std::size_t at = 0; at < svg.size();) {
+        const std::size_t end = std::min(svg.find('\n', at), svg.size());
+        const std::string_view line = svg.substr(at, end - at);
+        at = end + 1;
+        if (line == "</g>" && !lines.empty() && lines.back().starts_with("<g fill=\"none\"") &&
+            lines.back().ends_with(">")) {
+            lines.pop_back();
+        } else if (!line.empty()) {
+            lines.push_back(line);
+        }
+    }
+    std::string out;
+    for (const std::string_view line : lines) {
+        const bool named =
+            line.starts_with("\t<g id=\"gnuplot_plot_") || line.starts_with("<g id=\"gnuplot_canvas\"");
+        out += named ? "<g>" : line;
+        out += '\n';
+    }
+    return out;
+}
+
+}  // namespace
+
+std::vector<std::string> draw_svg(const std::vector<PlotScript>& scripts, const fs::path& scratch) {
+    const auto svg_file = [&](std::size_t index) { return scratch / fmt::format("plot{:03}.svg", index); };
+    std::string commands;
+    for (std::size_t i = 0; i < scripts.size(); ++i)
+        commands += fmt::format(
+            "reset\nset terminal svg size {},{} noenhanced font 'sans-serif,12'\nset output {}\n{}\n"
+            "set output\n",
+            scripts[i].width, scripts[i].height, gnuplot_string(svg_file(i).string()), scripts[i].commands);
+    const fs::path script = scratch / "plots.gp";
+    write_file(script, commands);
+    run_gnuplot(script, scratch / "plots.log");
+    std::vector<std::string> pictures;
+    for (std::size_t i = 0; i < scripts.size(); ++i) {
+        pictures.push_back(read_text(svg_file(i)));
+        if (pictures.back().find("</svg>") == std::string::npos)
+            throw std::runtime_error(
+                fmt::format("{}: error: found an unfinished plot, expected a whole one; is the "
+                            "disk full?",
+                            svg_file(i).string()));
+    }
+    return pictures;
+}
+
+std::string gnuplot_string(std::string_view text) {
+    std::string quoted = "'";
+    for (const char c : text) {
+        if (c == '\'') quoted += '\'';
+        quoted += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
+    }
+    return quoted + "'";
+}
+
+std::string gnuplot_colour(const ReportColour& colour) {
+    return fmt::format("rgb '#{:06x}'", colour.light);
+}
+
+const ReportColour& stick_colour(std::size_t stick) {
+    return colours::sticks[stick % colours::sticks.size()];
+}
+
+void PlotPanel::add(std::string data, std::string_view style) {
+    if (data.empty()) return;
+    fmt::format_to(std::back_inserter(clauses_), "{}'-' {}", clauses_.empty() ? "" : ", ", style);
+    data_ += std::move(data) + "e\n";
+}
+
+std::string PlotPanel::text() const {
+    return clauses_.empty() ? "plot NaN\n" : "plot " + clauses_ + "\n" + data_;
+}
+
+std::string plot_axes() {
+    return fmt::format(
+        "unset key\nset border 3 lt 1 lw 1 lc {0}\nset tics nomirror out scale 0.6 textcolor {0}\n"
+        "set grid lt 1 lw 0.6 lc {1}\n",
+        gnuplot_colour(colours::axis), gnuplot_colour(colours::grid));
+}
+
+double round_step(double span, int count) {
+    const double rough = span / count, power = std::pow(10.0, std::floor(std::log10(rough)));
+    for (const double factor : {1.0, 2.0, 5.0})
+        if (factor * power >= rough * (1 - 1e-9)) return factor * power;
+    return 10 * power;
+}
+
+PlotScript plot_of(int width, int height, const PlotAxis& x, const PlotAxis& y, const PlotPanel& panel,
+                   std::string_view more) {
+    std::string commands = plot_axes();
+    for (const auto& [name, axis] : {std::pair{"x", &x}, {"y", &y}}) {
+        if (!axis->label.empty()) commands += fmt::format("set {}label '{}'\n", name, axis->label);
+        commands += fmt::format("set {}range [{}:{}]\n", name, axis->low, axis->high);
+        if (axis->tics > 0) commands += round_tics(name, axis->high - axis->low, axis->tics);
+    }
+    return {width, height, commands.append(more) + panel.text()};
+}
+
+std::string plot_margins(int top, int bottom, int height) {
+    return fmt::format("set tmargin at screen {}\nset bmargin at screen {}\n",
+                       1 - static_cast<double>(top) / height, 1 - static_cast<double>(bottom) / height);
+}
+
+std::string round_tics(std::string_view axis, double span, int count) {
+    const double step = round_step(span, count);
+    const int decimals = std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9)));
+    return fmt::format("set {0}tics {1}\nset format {0} '%.{2}f'\n", axis, step, decimals);
+}
+
+void ThinnedMarks::add(double x, double y, std::string_view rest) {
+    const auto pixel = [](double value, double low, double high, int size) {
+        return static_cast<int>(std::floor(std::clamp((value - low) / (high - low), -1.0, 2.0) * size));
+    };
+    if (!(x >= area_.x_low && x <= area_.x_high)) return;
+    const std::pair<int, int> place = {pixel(x, area_.x_low, area_.x_high, area_.width),
+                                       pixel(y, area_.y_low, area_.y_high, area_.height)};
+    if (taken_.insert(place).second)
+        fmt::format_to(std::back_inserter(text_), "{:.4f} {:.4f} {}\n", x, y, rest);
+}
+
+std::string sound_envelope(std::span<const float> stereo, double t0_s, double from_s, double to_s,
+                           int columns) {
+    constexpr double kRate = 48000;
+    const std::size_t frames = stereo.size() / 2;
+    const double count = static_cast<double>(frames), column_s = (to_s - from_s) / columns;
+    const auto sample_at = [&](double t_s) {
+        return static_cast<std::size_t>(std::clamp(std::round((t_s - t0_s) * kRate), 0.0, count)) * 2;
+    };
+    std::string text;
+    for (int i = 0; i < columns; ++i) {
+        const std::size_t begin = sample_at(from_s + i * column_s),
+                          end = sample_at(from_s + (i + 1) * column_s);
+        if (begin == end) continue;
+        const auto [low, high] = std::minmax_element(stereo.begin() + static_cast<std::ptrdiff_t>(begin),
+                                                     stereo.begin() + static_cast<std::ptrdiff_t>(end));
+        fmt::format_to(std::back_inserter(text), "{:.4f} {:.4f} {:.4f}\n", from_s + (i + 0.5) * column_s,
+                       *low, *high);
+    }
+    return text;
+}
+
+PlotLine line_of(std::size_t n, const std::string& name) {
+    return {name, kLineColours[n % kLineColours.size()], n / kLineColours.size() % 2 == 1};
+}
+
+std::string style_of(const PlotLine& line, double width) {
+    return fmt::format("with lines lt 1 lw {}{} lc {}", width, line.dashed ? " dt '-'" : "",
+                       gnuplot_colour(line.colour));
+}
+
+std::size_t PlotGallery::add(PlotWithLegend plot, std::string label) {
+    plots_.push_back(std::move(plot));
+    labels_.push_back(std::move(label));
+    return plots_.size() - 1;
+}
+
+void PlotGallery::draw(const fs::path& scratch) {
+    std::vector<PlotScript> scripts;
+    for (const PlotWithLegend& plot : plots_) scripts.push_back(plot.script);
+    drawn_ = draw_svg(scripts, scratch);
+}
+
+std::string PlotGallery::symbols() const {
+    return fmt::format(
+        "<svg width=\"0\" height=\"0\" style=\"position:absolute\" aria-hidden=\"true\">{}</svg>\n",
+        span_of(drawn_.front(), "<defs>", "</defs>"));
+}
+
+std::string PlotGallery::svg(std::size_t number) const {
+    const std::string_view whole = drawn_[number];
+    std::string drawn = without_ballast(span_of(whole, "</defs>", "</svg>").substr(7));
+    follow_page(drawn);
+    // The definitions, left out, stood inside the canvas's group.
+    return fmt::format("<svg role=\"img\" aria-label=\"{}\" {}>\n<g>\n{}", html(labels_[number]),
+                       span_of(whole, "viewBox=\"", "\""), drawn);
+}
+
+std::string PlotGallery::framed(const std::vector<std::size_t>& numbers) const {
+    std::string text = "<div class=plot>\n";
+    for (const std::size_t number : numbers) text += svg(number);
+    return text + "</div>";
+}
+
+std::string PlotGallery::element(std::size_t number) const {
+    std::vector<std::pair<std::string, std::string>> legend;
+    for (const PlotLine& line : plots_[number].legend)
+        legend.emplace_back(line_shape(line.colour, line.dashed), line.name);
+    return fmt::format("<div><h3>{}</h3>\n{}{}</div>\n", html(labels_[number]),
+                       legend.empty() ? "" : report_legend(legend), framed({number}));
+}
+
+std::string PlotGallery::pair(const std::vector<std::size_t>& numbers) const {
+    std::string text = "<div class=pair>";
+    for (const std::size_t number : numbers) text += element(number);
+    return text + "</div>\n";
+}
+
+}  // namespace app

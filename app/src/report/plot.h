@@ -1,0 +1,129 @@
+#pragma once
+#include <filesystem>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "report/html.h"
+
+namespace app {
+
+/// The commands of one picture, data inline.
+struct PlotScript {
+    int width = 640, height = 240;  ///< SVG units
+    std::string commands;
+};
+
+/// Draws every script with one gnuplot process in the C locale and without the user's start-up files; returns
+/// an SVG document per script. Files lie in `scratch`, an existing folder. Throws std::runtime_error when
+/// gnuplot is missing or fails.
+[[nodiscard]] std::vector<std::string> draw_svg(const std::vector<PlotScript>& scripts,
+                                                const std::filesystem::path& scratch);
+
+/// A name as a gnuplot string: quoted so that nothing in it is a command; control characters become spaces.
+[[nodiscard]] std::string gnuplot_string(std::string_view text);
+/// "rgb '#rrggbb'", for gnuplot.
+[[nodiscard]] std::string gnuplot_colour(const ReportColour& colour);
+[[nodiscard]] const ReportColour& stick_colour(std::size_t stick);
+
+/// One panel of a gnuplot script: series with their data inline, drawn in the order they were added.
+class PlotPanel {
+public:
+    /// `data`: lines of numbers; empty data is left out. `style`: e.g. "with lines lc rgb '#ff0000'".
+    void add(std::string data, std::string_view style);
+    /// The plot command; axes without data where nothing was added.
+    [[nodiscard]] std::string text() const;
+
+private:
+    std::string clauses_, data_;
+};
+
+/// Axes and grid as all plots have them, no key.
+[[nodiscard]] std::string plot_axes();
+/// An axis: what is along it, its range, and about how many round tics it has; 0: gnuplot's own.
+struct PlotAxis {
+    std::string label;
+    double low, high;
+    int tics = 0;
+};
+/// A plot of one panel. `more`: further commands.
+[[nodiscard]] PlotScript plot_of(int width, int height, const PlotAxis& x, const PlotAxis& y,
+                                 const PlotPanel& panel, std::string_view more = {});
+/// Margins of a panel of a plot of `height`, from the top of the plot to the panel's top and bottom.
+[[nodiscard]] std::string plot_margins(int top, int bottom, int height);
+
+/// Tics every `step`, a round number of which about `count` fit into `span`, with as many decimals as they
+/// need.
+[[nodiscard]] std::string round_tics(std::string_view axis, double span, int count);
+[[nodiscard]] double round_step(double span, int count);
+
+/// The range that a panel shows and its size in SVG units.
+struct PlotArea {
+    double x_low = 0, x_high = 1, y_low = 0, y_high = 1;
+    int width = 1, height = 1;
+};
+
+/// Marks of one kind, as lines of numbers: those outside of the range in x and those within a pixel of an
+/// earlier one are left out, so that the number of marks is bounded however long the recording.
+class ThinnedMarks {
+public:
+    explicit ThinnedMarks(const PlotArea& area) : area_(area) {}
+    /// A mark at (x, y), written as the line "x y `rest`".
+    void add(double x, double y, std::string_view rest = {});
+    [[nodiscard]] const std::string& text() const { return text_; }
+
+private:
+    PlotArea area_;
+    std::set<std::pair<int, int>> taken_;
+    std::string text_;
+};
+
+/// Lowest and highest sample of the columns of a stretch of interleaved stereo sound, as lines "x low high";
+/// x runs over [from_s, to_s] with the sound's first sample at t0_s. Columns outside of the sound are left
+/// out.
+[[nodiscard]] std::string sound_envelope(std::span<const float> stereo, double t0_s, double from_s,
+                                         double to_s, int columns);
+
+/// A line of a plot, for its legend.
+struct PlotLine {
+    std::string name;
+    ReportColour colour;
+    bool dashed = false;
+};
+
+/// The n-th line's look: nine colours, then the same ones dashed.
+[[nodiscard]] PlotLine line_of(std::size_t n, const std::string& name);
+/// As gnuplot's "with lines ...".
+[[nodiscard]] std::string style_of(const PlotLine& line, double width);
+
+struct PlotWithLegend {
+    PlotScript script;
+    std::vector<PlotLine> legend = {};
+};
+
+/// The plots of a page: declared in the order of the page, drawn at once, placed by number. In the page they
+/// have no XML head, no titles that would pop up and no ids; their colours are CSS variables, their width is
+/// that of their place, and a label says what they show for readers who do not see it.
+class PlotGallery {
+public:
+    std::size_t add(PlotWithLegend plot, std::string label);
+    void draw(const std::filesystem::path& scratch);
+    /// gnuplot's point shapes, which all plots refer to, as an invisible element; once a page.
+    [[nodiscard]] std::string symbols() const;
+    /// The plots of these numbers in a frame.
+    [[nodiscard]] std::string framed(const std::vector<std::size_t>& numbers) const;
+    /// The plot in a frame with its label and legend above it.
+    [[nodiscard]] std::string element(std::size_t number) const;
+    [[nodiscard]] std::string pair(const std::vector<std::size_t>& numbers) const;
+
+private:
+    [[nodiscard]] std::string svg(std::size_t number) const;
+
+    std::vector<PlotWithLegend> plots_;
+    std::vector<std::string> labels_, drawn_;
+};
+
+}  // namespace app
