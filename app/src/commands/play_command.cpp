@@ -43,8 +43,7 @@ void play_offline(const PlayOptions& options) {
 }
 
 void play_in_time(const RealtimeOptions& options) {
-    const RealtimeOutcome outcome =
-        play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
+    const RealtimeOutcome outcome = play_realtime_and_warn(options);
     const auto unexplained = std::ranges::count_if(
         outcome.departures, [](const Divergence& d) { return d.cause == "unexplained"; });
     fmt::print("{:.1f} s in real time: {}; {} of {} missed, {} of {} late\n", outcome.realtime.seconds,
@@ -73,9 +72,13 @@ void check_video(const PlayOptions& o) {
 
 }  // namespace
 
-Option add_play_options(Command& command, PlayOptions& o) {
+RealtimeOutcome play_realtime_and_warn(const RealtimeOptions& options) {
+    return play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
+}
+
+CLI::Option* add_play_options(Command& command, PlayOptions& o) {
     o.trace = "flourish", o.kit = "drums", o.progress = true;
-    const Option trace = command.option("TRACE", o.trace, as::text("TRACE"),
+    CLI::Option* trace = command.option("TRACE", o.trace, as::text("TRACE"),
                                         "Trace (CSV, Beat Saber replay, or the name of a bundled one)");
     command.option("--kit", o.kit, as::text("KIT"), "Kit: a file, or the name of a bundled one");
     command.option("--fps", o.fps, as::number(1, 1000, "frames per second"), "Frame rate");
@@ -83,12 +86,12 @@ Option add_play_options(Command& command, PlayOptions& o) {
         "--size", as::pixels(16, 4096), "Size of the frames",
         [&o](const Eigen::Vector2i& size) { o.width = size.x(), o.height = size.y(); }, "640x480");
     const auto predictor = as::text("PREDICTOR", check_specification);
-    const Option both = command.option<std::string>(
+    CLI::Option* both = command.option<std::string>(
         "--predictor", predictor, "Predictor of pictures and sound",
         [&o](const std::string& name) { o.picture_predictor = o.sound_predictor = name; }, "auto");
     command.option("--picture-predictor", o.picture_predictor, predictor, "Predictor of pictures")
-        .excludes(both);
-    command.option("--sound-predictor", o.sound_predictor, predictor, "Predictor of sound").excludes(both);
+        ->excludes(both);
+    command.option("--sound-predictor", o.sound_predictor, predictor, "Predictor of sound")->excludes(both);
     command.option("--render-lead", o.render_lead_s, as::number(0, 1, "s"), "Lead of pictures");
     command.option("--sound-lead", o.sound_lead_s, as::number(0.001, 1, "s"), "Lead of sound");
     command.option("--release-margin", o.release_margin_s, as::number(0, 1, "s"),
@@ -109,7 +112,7 @@ Option add_play_options(Command& command, PlayOptions& o) {
     return trace;
 }
 
-std::vector<Option> add_realtime_options(Command& command, RealtimeOptions& o, const Option& trace) {
+std::vector<CLI::Option*> add_realtime_options(Command& command, RealtimeOptions& o, CLI::Option* trace) {
     const auto midi_out = [&o](const std::string& port) {
         const bool elsewhere = port.find(':') != std::string::npos;
         o.midi_port = elsewhere ? "midi_out" : port;
@@ -124,7 +127,7 @@ std::vector<Option> add_realtime_options(Command& command, RealtimeOptions& o, c
             command
                 .option("--source", o.source, as::text("SOURCE"),
                         "Sensors instead of TRACE: stdin, zmq:ENDPOINT, osc:PORT, trace:FILE")
-                .excludes(trace),
+                ->excludes(trace),
             command.option("--sticks", o.sticks, as::list_of(as::text("NAME")),
                            "Names of the sticks of --source"),
             command.option("--lead", o.lead_auto, as::choice<bool>({{"fixed", false}, {"auto", true}}),
@@ -153,18 +156,18 @@ void add_play_command(Command& program) {
         bool realtime = false;
     };
     auto o = std::make_shared<Options>();
-    const Option trace = add_play_options(command, o->play);
+    CLI::Option* trace = add_play_options(command, o->play);
     command.option("--out", o->play.out, as::text("DIR"), "Folder for the products");
-    const Option solo =
+    CLI::Option* solo =
         command.option("--solo", o->play.solo, as::whole(0, std::numeric_limits<std::int64_t>::max()),
                        "Render the sound of one note alone, by its id in events.csv");
-    const Option no_frames = command.flag("--no-frames", o->play.frames, "Draw nothing", false);
+    CLI::Option* no_frames = command.flag("--no-frames", o->play.frames, "Draw nothing", false);
     command.option("--video", o->play.video, as::text("FILE"), "Also make a video (MP4) of frames and sound")
-        .excludes(no_frames);
-    Option realtime = command.flag("--realtime", o->realtime,
-                                   "Play against the wall clock, sensors in processes of their own");
-    realtime.excludes(solo);
-    for (Option& option : add_realtime_options(command, *o, trace)) option.needs(realtime);
+        ->excludes(no_frames);
+    CLI::Option* realtime = command.flag("--realtime", o->realtime,
+                                         "Play against the wall clock, sensors in processes of their own");
+    realtime->excludes(solo);
+    for (CLI::Option* option : add_realtime_options(command, *o, trace)) option->needs(realtime);
     command.checks([o] { check_video(o->play); });
     command.runs([o] { o->realtime ? play_in_time(*o) : play_offline(o->play); });
 }

@@ -59,7 +59,7 @@ std::optional<sim::SimulatedProcessors> read_processors(const std::string& text)
     if (text.substr(0, colon) != "simulated") return std::nullopt;
     sim::SimulatedProcessors processors;
     if (colon == std::string::npos) return processors;
-    for (const std::string& part : split_at_commas(text.substr(colon + 1))) {
+    for (const std::string& part : split(text.substr(colon + 1))) {
         const auto pair = as::named("NAME=VALUE").read(part);
         if (!pair) return std::nullopt;
         const auto& [name, value] = *pair;

@@ -5,7 +5,7 @@
 
 #include "compare/prediction_error.h"
 #include "process/parallel.h"
-#include "sticks/replay.h"
+#include "sticks/predictors.h"
 
 namespace app {
 namespace {

@@ -6,7 +6,6 @@
 #include "compare/prediction_error.h"
 #include "compare/tuning.h"
 #include "process/parallel.h"
-#include "sticks/auto_predictor.h"
 #include "sticks/predictors.h"
 
 namespace app {

@@ -9,7 +9,6 @@
 #include "compare/tuning.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "sticks/auto_predictor.h"
 #include "sticks/predictors.h"
 
 namespace app {

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "statistics/statistics.h"
-#include "sticks/replay.h"
+#include "sticks/predictors.h"
 
 namespace app {
 namespace {

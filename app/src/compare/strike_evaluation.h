@@ -9,7 +9,8 @@
 
 #include "kit/kit.h"
 #include "kit/stick_geometry.h"
-#include "sticks/auto_predictor.h"
+#include "sticks/predictors.h"
+#include "sticks/stick.h"
 
 namespace app {
 

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "kit/tip_track.h"
+#include "process/clock.h"
 
 namespace app {
 namespace {
@@ -35,7 +36,7 @@ std::vector<DrawnError> drawn_errors(const RealtimeResult& realtime, std::span<c
         for (; tip != realtime.tips.end() && tip->frame <= frame.index; ++tip)
             if (tip->shown && tip->stick < screen.size()) screen[tip->stick] = &*tip;
         if (!frame.asked_for) continue;
-        const double at_s = 1e-9 * static_cast<double>(frame.shown_ns);
+        const double at_s = to_s(frame.shown_ns);
         const std::uint64_t lap = lap_at(at_s, realtime.period_s);
         for (std::uint32_t stick = 0; stick < screen.size(); ++stick) {
             if (screen[stick] == nullptr || screen[stick]->lap != lap) continue;

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "latency/latency_tables.h"
+#include "process/clock.h"
 #include "report/plot_gallery.h"
 #include "report/plot_panel.h"
 #include "report/report_style.h"
@@ -84,10 +85,6 @@ std::string boxes(const PlotLine& look) {
 
 double pixels_ms_after_due(const FrameTiming& frame) {
     return 1e-6 * static_cast<double>(frame.read_ns - frame.shown_ns);
-}
-
-double seconds(std::int64_t ns) {
-    return 1e-9 * static_cast<double>(ns);
 }
 
 /// Share of the values that are longer, over the value; a line for each stage of that kind. Both axes
@@ -189,7 +186,7 @@ PlotWithLegend sound_picture_close_plot(const LatencyReport& report) {
 PlotWithLegend frames_plot(const RealtimeResult& realtime) {
     double low = -5, high = 5, last_s = realtime.seconds;
     for (const FrameTiming& frame : realtime.frames) {
-        last_s = std::max(last_s, seconds(frame.shown_ns));
+        last_s = std::max(last_s, to_s(frame.shown_ns));
         if (frame.read_ns == 0) continue;
         low = std::min(low, pixels_ms_after_due(frame) - 2);
         high = std::max(high, pixels_ms_after_due(frame) + 2);
@@ -197,7 +194,7 @@ PlotWithLegend frames_plot(const RealtimeResult& realtime) {
     const PlotArea area{0, std::max(last_s, 1e-3), low, high, kWide, 240};
     ThinnedMarks in_time(area), late(area), skipped(area);
     for (const FrameTiming& frame : realtime.frames) {
-        const double at_s = seconds(frame.shown_ns);
+        const double at_s = to_s(frame.shown_ns);
         if (!frame.asked_for) continue;
         if (frame.fate == FrameFate::skipped)
             skipped.add(at_s, 0);

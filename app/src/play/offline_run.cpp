@@ -7,7 +7,7 @@
 
 #include "play/note_of_strike.h"
 #include "play/play_setup.h"
-#include "sticks/replay.h"
+#include "sticks/predictors.h"
 
 namespace app {
 namespace {

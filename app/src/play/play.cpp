@@ -11,7 +11,7 @@
 #include "play/play_products.h"
 #include "play/play_setup.h"
 #include "process/progress_bar.h"
-#include "process/stopwatch.h"
+#include "process/clock.h"
 
 namespace app {
 namespace {

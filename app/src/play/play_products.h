@@ -14,7 +14,6 @@
 #include "play/play_result.h"
 #include "play/play_setup.h"
 #include "process/clock.h"
-#include "process/stopwatch.h"
 
 namespace app {
 

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <iterator>
 
-#include "sticks/auto_predictor.h"
+#include "sticks/predictors.h"
+#include "sticks/stick.h"
 
 namespace app {
 namespace {

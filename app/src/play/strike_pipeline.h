@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "kit/kit.h"
-#include "process/stopwatch.h"
+#include "process/clock.h"
 #include "sticks/stick.h"
 #include "strikes/drawn_strikes.h"
 #include "strikes/strike_scheduler.h"

@@ -67,7 +67,7 @@ BusyThreads::BusyThreads(const ArtificialLoad& d, std::int64_t epoch_ns) {
         threads_.emplace_back([this, d, epoch_ns] {
             volatile double sink = 1;
             while (!end_) {
-                const double now_s = static_cast<double>(monotonic_ns() - epoch_ns) / 1e9;
+                const double now_s = to_s(monotonic_ns() - epoch_ns);
                 if (now_s >= d.load_to_s) return;
                 if (now_s < d.load_from_s)
                     std::this_thread::sleep_for(std::chrono::milliseconds(5));

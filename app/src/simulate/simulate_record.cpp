@@ -182,7 +182,7 @@ void GrowingTable::finish() {
 
 SimulateRecord::SimulateRecord(const SimulateOptions& options, const Scene& scene)
     : options_(options), scene_(scene) {
-    if (options.out) folder_ = std::make_unique<OutputFolder>(*options.out, simulate_products());
+    if (options.out) folder_ = std::make_unique<OutputFolder>(*options.out, kSimulateProducts);
 }
 
 void SimulateRecord::start(const sim::World& world) {

@@ -8,8 +8,7 @@
 #include <tuple>
 #include <vector>
 
-#include "sticks/auto_predictor.h"
-#include "sticks/replay.h"
+#include "sticks/predictors.h"
 
 namespace app {
 namespace {

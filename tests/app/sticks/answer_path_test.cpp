@@ -1,4 +1,4 @@
-#include "sticks/answer_path.h"
+#include "sticks/external_predictor.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "files/bad_input.h"
-#include "sticks/auto_predictor.h"
+#include "sticks/predictors.h"
 #include "sticks/prediction_file.h"
 #include "temporary_folder.h"
 
