@@ -158,8 +158,7 @@ void make_new(const std::string& name, const std::string& out) {
     if (name.find_first_of("\"\\") != std::string::npos || std::any_of(name.begin(), name.end(), [](char c) {
             return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
         }))
-        throw BadInput(
-            "error: found a kit's name with quotes, backslashes or control characters, expected plain text");
+        refuse_options("a kit's name with quotes, backslashes or control characters", "plain text");
     write_finished_file(out, fmt::format(kNewKit, name));
 }
 

@@ -11,7 +11,6 @@
 
 #include "commands/command.h"
 #include "commands/commands.h"
-#include "files/bad_input.h"
 #include "files/output_folder.h"
 #include "pictures/mode_pictures.h"
 
@@ -35,13 +34,10 @@ struct ModesOptions {
 Eigen::Vector2d exponents_of(const ModesOptions& o) {
     const bool free = o.shape == "superquadric";
     if (free && !o.exponents)
-        throw BadInput(
-            "error: found --shape superquadric alone, expected --exponents E1,E2 with it, such as 0.5,1");
+        refuse_options("--shape superquadric alone", "--exponents E1,E2 with it, such as 0.5,1");
     if (!free && o.exponents)
-        throw BadInput(fmt::format(
-            "error: found --exponents with --shape {}, expected them with --shape superquadric only; "
-            "leave one out",
-            o.shape));
+        refuse_options("--exponents with --shape " + o.shape,
+                       "them with --shape superquadric only; leave one out");
     if (free) return *o.exponents;
     return o.shape == "box"         ? Eigen::Vector2d(0.1, 0.1)
            : o.shape == "ellipsoid" ? Eigen::Vector2d(1, 1)
@@ -161,8 +157,7 @@ void write_products(const ModesOptions& a, const ModeReport& report) {
 }
 
 void run(const ModesOptions& a) {
-    if (a.frames && a.out.empty())
-        throw BadInput("error: found --frames without --out, expected --out DIR for the pictures");
+    if (a.frames && a.out.empty()) refuse_options("--frames without --out", "--out DIR for the pictures");
     ModeReport report{request_of(a), a.shape, {}, {}};
     report.modes = sim::free_vibration_modes(report.request);
     report.errors = sim::discretisation_errors(report.request, report.modes);

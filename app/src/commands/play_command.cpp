@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "files/assets.h"
-#include "files/bad_input.h"
 #include "files/one_line.h"
 #include "play/play.h"
 #include "sticks/predictors.h"
@@ -15,10 +14,6 @@
 namespace app {
 namespace fs = std::filesystem;
 namespace {
-
-void refuse_together(const std::string& found, const std::string& expected) {
-    throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
-}
 
 void print_places(const PlayOptions& options) {
     fmt::print("Look at {}", (options.out / "report.html").string());
@@ -62,12 +57,12 @@ void check_video(const PlayOptions& o) {
     if (!o.video) return;
     const std::string video = fmt::format("--video {}", o.video->string());
     if (o.width % 2 != 0 || o.height % 2 != 0)
-        refuse_together(fmt::format("--video with --size {}x{}", o.width, o.height), "even sides");
+        refuse_options(fmt::format("--video with --size {}x{}", o.width, o.height), "even sides");
     std::error_code error;
-    if (fs::is_directory(*o.video, error)) refuse_together(video + ", which is a folder", "a file");
+    if (fs::is_directory(*o.video, error)) refuse_options(video + ", which is a folder", "a file");
     const fs::path parent = o.video->parent_path();
     if (!parent.empty() && !fs::is_directory(parent, error))
-        refuse_together(video + " in a folder that is not there", "an existing folder");
+        refuse_options(video + " in a folder that is not there", "an existing folder");
 }
 
 }  // namespace
@@ -104,8 +99,8 @@ CLI::Option* add_play_options(Command& command, PlayOptions& o) {
     command.flag("--no-audio", o.audio, "Sound nothing", false);
     command.checks([&o] {
         if (o.release_margin_s > o.sound_lead_s)
-            refuse_together(fmt::format("--release-margin {}", o.release_margin_s),
-                            fmt::format("at most the sound lead, {:.4g} s", o.sound_lead_s));
+            refuse_options(fmt::format("--release-margin {}", o.release_margin_s),
+                           fmt::format("at most the sound lead, {:.4g} s", o.sound_lead_s));
         o.trace = find_trace(o.trace);
         o.kit = find_kit(o.kit);
     });

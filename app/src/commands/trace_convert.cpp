@@ -87,8 +87,8 @@ std::vector<std::string> stick_names(const ConvertOptions& o) {
     if (names.empty() && o.in.size() == 2) names = {"left", "right"};
     if (names.empty() && o.in.size() == 1) names = {"stick"};
     if (names.size() == o.in.size()) return names;
-    throw BadInput(fmt::format("error: found {} files and {} names in --sticks, expected a name per file",
-                               o.in.size(), names.size()));
+    refuse_options(fmt::format("{} files and {} names in --sticks", o.in.size(), names.size()),
+                   "a name per file");
 }
 
 void refuse_table_options(const ConvertOptions& o) {
@@ -168,7 +168,8 @@ void add_table_options(Command& command, ConvertOptions& o) {
     tables.option("--sticks", o.sticks, as::list_of(as::text("NAME")),
                   "Names for the files' sticks; two files: left,right");
     tables.flag("--from-zero", o.from_zero, "Times count from the first row");
-    o.of_tables = command->get_options([](const CLI::Option* option) { return option->get_group() == kHeading; });
+    o.of_tables =
+        command->get_options([](const CLI::Option* option) { return option->get_group() == kHeading; });
 }
 
 }  // namespace

@@ -77,9 +77,12 @@ ValueFormat<Vector> vector_of(const std::string& placeholder, const ValueFormat<
 
 }  // namespace
 
+void refuse_options(const std::string& found, const std::string& expected) {
+    throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
+}
+
 void refuse_value(const std::string& name, const std::string& text, const std::string& expected) {
-    throw BadInput(
-        fmt::format("error: found {} {}, expected {}", name, text.empty() ? "\"\"" : text, expected));
+    refuse_options(name + " " + (text.empty() ? "\"\"" : text), expected);
 }
 
 std::vector<std::string> split(const std::string& text, char separator) {

@@ -11,6 +11,8 @@
 
 namespace app {
 
+/// Throws BadInput "error: found FOUND, expected EXPECTED".
+[[noreturn]] void refuse_options(const std::string& found, const std::string& expected);
 /// Throws BadInput "error: found NAME TEXT, expected EXPECTED".
 [[noreturn]] void refuse_value(const std::string& name, const std::string& text, const std::string& expected);
 

@@ -1,6 +1,5 @@
 #include "sensors/sensor_hub.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/eventfd.h>
 #include <sys/wait.h>
@@ -8,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <csignal>
 #include <deque>
 #include <filesystem>
@@ -115,21 +113,20 @@ struct SensorHub::Implementation {
 
     void wait_until_ready() {
         const std::int64_t until = monotonic_ns() + to_ns(ready_within_s());
-        for (HubSensor& sensor : sensors)
-            while (report_of(sensor).phase == SensorPhase::starting) {
-                sleep_until_ns(monotonic_ns() + kLookEveryNs);
-                collect(sensor);
-                if (report_of(sensor).phase != SensorPhase::starting) break;
+        for (HubSensor& sensor : sensors) {
+            SensorReport report;
+            while ((report = report_of(sensor)).phase == SensorPhase::starting) {
                 if (sensor.pid < 0)
                     fail_start(
                         fmt::format("error: found that a sensor {}, expected it to run", how(sensor.status)));
                 if (monotonic_ns() > until)
                     fail_start(fmt::format("error: found a sensor not ready after {} s, expected it to run",
                                            ready_within_s()));
+                sleep_until_ns(monotonic_ns() + kLookEveryNs);
+                collect(sensor);
             }
-        for (const HubSensor& sensor : sensors)
-            if (const SensorReport report = report_of(sensor); report.phase == SensorPhase::failed)
-                fail_start(report.text.data());
+            if (report.phase == SensorPhase::failed) fail_start(report.text.data());
+        }
     }
     [[noreturn]] void fail_start(const std::string& message) {
         end_all();
