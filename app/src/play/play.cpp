@@ -10,8 +10,8 @@
 #include "play/offline_run.h"
 #include "play/play_products.h"
 #include "play/play_setup.h"
-#include "process/progress_bar.h"
 #include "process/clock.h"
+#include "process/progress_bar.h"
 
 namespace app {
 namespace {

@@ -1,11 +1,11 @@
-#include "sticks/external_predictor.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 #include <random>
 #include <stdexcept>
+
+#include "sticks/external_predictor.h"
 
 namespace {
 
