@@ -188,7 +188,7 @@ void add_bench_options(Command& program) {
     std::vector<std::string> names;
     for (const Bench& bench : kBenches) names.push_back(bench.name);
     names.emplace_back("all");
-    program.option("NAME", o->name, as::choice(names), "What is measured: " + one_of(names)).required();
+    program.required("NAME", o->name, as::choice(names), "What is measured: " + one_of(names));
     using Counts = std::vector<std::int64_t>;
     const auto counts = as::list_of(as::whole(1, 100000));
     program.option<Counts>(

@@ -18,13 +18,17 @@
 #include "commands/latency_command.h"
 #include "commands/manual.h"
 #include "commands/play_command.h"
-#include "commands/version.h"
 #include "files/bad_input.h"
 
 namespace app {
 namespace {
 
 constexpr int kFailed = 1, kBadInput = 2;
+#ifdef MUSICWORLD_BASELINE
+constexpr const char* kLevel = "x86-64";
+#else
+constexpr const char* kLevel = "x86-64-v3";
+#endif
 
 int complain(std::string message, int status) {
     std::replace(message.begin(), message.end(), '\n', ' ');
@@ -136,7 +140,12 @@ int parse_and_report(CLI::App& program, int argc, char** argv) {
 
 void add_commands(CLI::App& tree) {
     tree.set_version_flag(
-        "--version", [] { return version_text(); }, "Print the version, the build and the libraries");
+        "--version",
+        [] {
+            return fmt::format("musicworld {}\nbuild: GCC {}, {}, {}\nlibraries: {}", MUSICWORLD_VERSION,
+                               __VERSION__, MUSICWORLD_BUILD_TYPE, kLevel, MUSICWORLD_LIBRARIES);
+        },
+        "Print the version, the build and the libraries");
     Command program(tree);
     add_play_command(program);
     add_predict_command(program);
@@ -163,13 +172,6 @@ int run_commands(CLI::App& program, int argc, char** argv) {
         std::raise(SIGPIPE);
     }
     return status;
-}
-
-int run_command_line(int argc, char** argv) {
-    CLI::App program("MusicWorld: tracked drumsticks play a virtual kit, predicted ahead of the lag",
-                     "musicworld");
-    add_commands(program);
-    return run_commands(program, argc, argv);
 }
 
 }  // namespace app

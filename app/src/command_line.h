@@ -13,7 +13,4 @@ void add_commands(CLI::App& program);
 /// error. Returns 0: done; 1: failed while running; 2: bad usage or bad input; or what the command ended with.
 [[nodiscard]] int run_commands(CLI::App& program, int argc, char** argv);
 
-/// The program musicworld.
-[[nodiscard]] int run_command_line(int argc, char** argv);
-
 }  // namespace app

@@ -31,10 +31,11 @@ void become_bench(std::vector<std::string> arguments) {
 }  // namespace
 
 void add_bench_command(Command& program) {
-    program
-        .command("bench",
-                 "Measure speed beside peers, and speed against error (the program musicworld_bench)")
-        .hands_on(become_bench);
+    const Command command = program.command(
+        "bench", "Measure speed beside peers, and speed against error (the program musicworld_bench)");
+    command->prefix_command();  // that gets all the words that follow, also --help
+    command->set_help_flag();
+    command->callback([command] { become_bench(command->remaining()); });
 }
 
 }  // namespace app

@@ -1,4 +1,5 @@
 #pragma once
+#include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -9,33 +10,9 @@
 
 #include "files/option_values.h"
 
-namespace CLI {
-class App;
-class Option;
-}  // namespace CLI
-
 namespace app {
 
-/// An option of a command, for what concerns other options. Valid as long as its program.
-class Option {
-public:
-    explicit Option(CLI::Option* option) : option_(option) {}
-    Option& required();
-    /// Takes so many words.
-    Option& expected(int words);
-    /// Refused together with `other`, and without it.
-    Option& excludes(const Option& other);
-    Option& needs(const Option& other);
-    /// Under a heading of its own in the help; an empty one hides the option.
-    Option& group(const std::string& heading);
-    [[nodiscard]] bool given() const;
-    [[nodiscard]] std::string name() const;
-
-private:
-    CLI::Option* option_;
-};
-
-/// What a command ends with in place of 0, where it has told the reason itself.
+/// What a command ends with in place of 0, where it has printed the reason itself.
 struct ExitStatus {
     int status;
 };
@@ -50,22 +27,22 @@ public:
     /// The program itself, or one of its commands.
     explicit Command(CLI::App& app);
 
+    /// The same command; what is declared through it stands under a heading of its own in the help.
+    [[nodiscard]] Command under(const std::string& heading) const;
     /// A command below this one, of which one is then required.
     [[nodiscard]] Command command(const std::string& name, const std::string& help);
-    /// Not listed in the help: what the program starts itself.
-    Command& hidden();
+    /// CLI11's own: group("") hides a command from the help.
+    [[nodiscard]] CLI::App* operator->() const { return app_; }
 
     /// What it does once its options are read.
     void runs(std::function<void()> run);
-    /// Has no options, not even --help: `run` gets all the words that follow.
-    void hands_on(std::function<void(std::vector<std::string>)> run);
     /// Is called after the options declared so far are read: for what they cannot be together. Throws BadInput.
     void checks(std::function<void()> check);
 
     /// An option `--name` or an argument `NAME` of one word; `take` gets its value.
     template <class Value>
-    Option option(const std::string& name, const ValueFormat<Value>& format, const std::string& help,
-                  std::function<void(Value)> take, const std::string& otherwise = "") {
+    CLI::Option* option(const std::string& name, const ValueFormat<Value>& format, const std::string& help,
+                        std::function<void(Value)> take, const std::string& otherwise = "") {
         return declare(name, {format.placeholder, format.range, otherwise, false}, help,
                        [name, format, take = std::move(take)](const std::vector<std::string>& words) {
                            take(format.parse(words.front(), name));
@@ -73,16 +50,21 @@ public:
     }
     /// The same into a variable, or an std::optional, of a type that the value converts to.
     template <class Value, class Target>
-    Option option(const std::string& name, Target& target, const ValueFormat<Value>& format,
-                  const std::string& help) {
+    CLI::Option* option(const std::string& name, Target& target, const ValueFormat<Value>& format,
+                        const std::string& help) {
         return option<Value>(
-            name, format, help, [&target](Value value) { assign(target, std::move(value)); },
+            name, format, help, [&target](Value value) { target = static_cast<Target>(std::move(value)); },
             shown(target, format));
+    }
+    template <class Value, class Target>
+    CLI::Option* required(const std::string& name, Target& target, const ValueFormat<Value>& format,
+                          const std::string& help) {
+        return option(name, target, format, help)->required();
     }
     /// One word or more, each a value.
     template <class Value, class Target>
-    Option options(const std::string& name, std::vector<Target>& targets, const ValueFormat<Value>& format,
-                   const std::string& help) {
+    CLI::Option* options(const std::string& name, std::vector<Target>& targets,
+                         const ValueFormat<Value>& format, const std::string& help) {
         return declare(name, {format.placeholder, format.range, "", true}, help,
                        [name, format, &targets](const std::vector<std::string>& words) {
                            targets.clear();
@@ -91,7 +73,7 @@ public:
                        });
     }
     /// A switch that sets `target` to `value`.
-    Option flag(const std::string& name, bool& target, const std::string& help, bool value = true);
+    CLI::Option* flag(const std::string& name, bool& target, const std::string& help, bool value = true);
 
 private:
     struct Declared {
@@ -99,16 +81,9 @@ private:
         bool several;
     };
     using Read = std::function<void(const std::vector<std::string>&)>;
-    Option declare(const std::string& name, const Declared& declared, const std::string& help, Read read);
+    CLI::Option* declare(const std::string& name, const Declared& declared, const std::string& help,
+                         Read read);
 
-    template <class Target, class Value>
-    static void assign(std::optional<Target>& target, Value value) {
-        target = static_cast<Target>(std::move(value));
-    }
-    template <class Target, class Value>
-    static void assign(Target& target, Value value) {
-        target = static_cast<Target>(std::move(value));
-    }
     template <class Target, class Value>
     static std::string shown(const std::optional<Target>& target, const ValueFormat<Value>& format) {
         return target ? shown(*target, format) : "";
@@ -122,6 +97,7 @@ private:
     }
 
     CLI::App* app_;
+    std::string heading_ = "Options";
     std::shared_ptr<std::vector<std::function<void()>>> reads_;  // in the order of declaration
 };
 

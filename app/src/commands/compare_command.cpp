@@ -64,7 +64,7 @@ void run(CompareOptions options) {
     options.traces = found_traces(options.traces);
     options.tune_traces = found_traces(options.tune_traces);
     options.threads = worthwhile_threads();
-    OutputFolder out(options.out, compare_products());
+    OutputFolder out(options.out, kCompareProducts);
     ProgressBar bar(true);
     options.progress = [&bar](double share) { bar.show(share); };
     const Comparison comparison = compare(options);
@@ -86,12 +86,12 @@ void add_compare_command(Command& program) {
     o->leads_s = {1.0 / 30, 1.0 / 15, 1.0 / 10};
     o->surface_text = "none";
     const auto trace = as::text("TRACE");
-    command.options("TRACE", o->traces, trace, "Traces (CSV), or names of bundled ones").required();
+    command.options("TRACE", o->traces, trace, "Traces (CSV), or names of bundled ones")->required();
     command.option<std::string>(
         "--predictors", as::text("PREDICTOR,..."), "Predictors, separated by commas",
         [o](const std::string& list) { o->predictors = split_specifications(list); }, "all");
     command.option("--leads", o->leads_s, as::list_of(as::number(0, 1, "s")), "Leads");
-    const Option kit = command.option<std::string>(
+    CLI::Option* kit = command.option<std::string>(
         "--kit", as::text("KIT"), "Score strikes on the instruments of a kit: its name or file",
         [o](const std::string& name) {
             o->surface = {StrikeSurface::Kind::kit, 0, read_kit(find_kit(name))};
@@ -106,7 +106,7 @@ void add_compare_command(Command& program) {
                 o->surface = read_plane(text);
                 o->surface_text = "plane " + text;
             })
-        .excludes(kit);
+        ->excludes(kit);
     command.options("--tune", o->tune_traces, trace,
                     "Tune, and learn the advance of auto's strikes, on these traces (without the one scored) "
                     "instead of on the others compared; --map does not use them");
@@ -117,8 +117,7 @@ void add_compare_command(Command& program) {
     command.flag("--no-tuning", o->tuning, "Run the predictors as named only", false);
     command.flag("--no-cost", o->cost, "Measure no cost: the results are then the same on every run", false);
     command.flag("--map", o->map, "Also map 30 to 240 Hz x noise x jitter x drop-outs (minutes)");
-    command.option("--out", o->out, as::text("DIR"), "Folder for compare.json, compare.csv, report.html")
-        .required();
+    command.required("--out", o->out, as::text("DIR"), "Folder for compare.json, compare.csv, report.html");
     add_sensor_model_options(command, o->sensor);
     command.runs([o] { run(*o); });
 }

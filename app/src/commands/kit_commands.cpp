@@ -9,8 +9,8 @@
 #include "commands/commands.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/finished_file.h"
 #include "files/one_line.h"
+#include "files/output_folder.h"
 #include "kit/kit.h"
 #include "pictures/kit_stage.h"
 #include "strikes/kit_fit.h"
@@ -158,15 +158,14 @@ void make_new(const std::string& name, const std::string& out) {
     if (name.find_first_of("\"\\") != std::string::npos || std::any_of(name.begin(), name.end(), [](char c) {
             return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
         }))
-        throw BadInput(
-            "error: found a kit's name with quotes, backslashes or control characters, expected plain text");
+        refuse_options("a kit's name with quotes, backslashes or control characters", "plain text");
     write_finished_file(out, fmt::format(kNewKit, name));
 }
 
 void add_fit(Command& kit) {
     Command command = kit.command("fit", "Place a kit where the sticks of traces strike");
     auto o = std::make_shared<FitOptions>();
-    command.options("TRACE", o->traces, as::text("TRACE"), "Traces (CSV)").required();
+    command.options("TRACE", o->traces, as::text("TRACE"), "Traces (CSV)")->required();
     command.option("--kind", o->kind, as::choice({"drum", "cymbal", "bell"}), "Instruments to place");
     command.option("--radius", o->radius_m, as::number(0.001, 0.1, "m"), "Radius of the tip");
     command.option("--tip", o->tip, as::vector_of_3(as::number(-2, 2, "m")),
@@ -179,8 +178,8 @@ void add_fit(Command& kit) {
 void add_draw(Command& kit) {
     Command command = kit.command("draw", "Draw a kit at rest");
     auto o = std::make_shared<DrawOptions>();
-    command.option("KIT", o->kit, as::text("KIT"), "Kit: a file, or the name of a bundled one").required();
-    command.option("--out", o->out, as::text("FILE"), "Picture to write (PNG)").required();
+    command.required("KIT", o->kit, as::text("KIT"), "Kit: a file, or the name of a bundled one");
+    command.required("--out", o->out, as::text("FILE"), "Picture to write (PNG)");
     command.option("--size", o->size, as::pixels(16, 8192), "Its size");
     command.runs([o] { draw_kit(*o); });
 }
@@ -188,7 +187,7 @@ void add_draw(Command& kit) {
 void add_kit_check(Command& kit) {
     Command command = kit.command("check", "Check kits; the first fault ends it");
     auto names = std::make_shared<std::vector<std::string>>();
-    command.options("KIT", *names, as::text("KIT"), "Kits: files, or names of bundled ones").required();
+    command.options("KIT", *names, as::text("KIT"), "Kits: files, or names of bundled ones")->required();
     command.runs([names] {
         for (const std::string& name : *names) {
             const Kit checked = read_kit(find_kit(name));
@@ -201,9 +200,8 @@ void add_kit_check(Command& kit) {
 void add_new(Command& kit) {
     Command command = kit.command("new", "Write a small kit to start from");
     auto name = std::make_shared<std::string>(), out = std::make_shared<std::string>();
-    command.option("NAME", *name, as::text("NAME"), "The kit's name").required();
-    command.option("--out", *out, as::text("FILE"), "Kit to write (TOML); replaced if there is one")
-        .required();
+    command.required("NAME", *name, as::text("NAME"), "The kit's name");
+    command.required("--out", *out, as::text("FILE"), "Kit to write (TOML); replaced if there is one");
     command.runs([name, out] { make_new(*name, *out); });
 }
 
@@ -214,7 +212,7 @@ void add_kit_command(Command& program) {
     kit.command("list", "List the bundled kits").runs(list_kits);
     Command show = kit.command("show", "Show what a kit holds");
     auto name = std::make_shared<std::string>();
-    show.option("KIT", *name, as::text("KIT"), "Kit: a file, or the name of a bundled one").required();
+    show.required("KIT", *name, as::text("KIT"), "Kit: a file, or the name of a bundled one");
     show.runs([name] { show_kit(*name); });
     add_kit_check(kit);
     add_draw(kit);

@@ -20,28 +20,15 @@ struct LatencyOptions : RealtimeOptions {
     bool json = false;
 };
 
-/// A folder for the products of a run that nobody asked for; gone at the end.
-class PassingFolder {
-public:
-    PassingFolder() {
-        std::string name = (fs::temp_directory_path() / "musicworld_latency_XXXXXX").string();
-        if (::mkdtemp(name.data()) == nullptr)
-            throw std::runtime_error(fmt::format(
-                "{}: error: found no way to make a folder there, expected one for the run; use --out DIR",
-                fs::temp_directory_path().string()));
-        path_ = name;
-    }
-    ~PassingFolder() {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-    PassingFolder(const PassingFolder&) = delete;
-    PassingFolder& operator=(const PassingFolder&) = delete;
-    [[nodiscard]] const fs::path& path() const { return path_; }
-
-private:
-    fs::path path_;
-};
+/// A new folder among the temporary ones.
+fs::path make_folder() {
+    std::string name = (fs::temp_directory_path() / "musicworld_latency_XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr)
+        throw std::runtime_error(fmt::format(
+            "{}: error: found no way to make a folder there, expected one for the run; use --out DIR",
+            fs::temp_directory_path().string()));
+    return name;
+}
 
 void compare(const LatencyOptions& o) {
     const LatencyComparison comparison = compare_latency(o.compare[0], o.compare[1]);
@@ -56,21 +43,19 @@ void compare(const LatencyOptions& o) {
 }
 
 void measure(const LatencyOptions& o, const RunInTime& run) {
-    std::unique_ptr<PassingFolder> passing;
+    const bool kept = !o.play.out.empty();
     RealtimeOptions options = o;
-    if (o.play.out.empty()) {
-        passing = std::make_unique<PassingFolder>();
-        options.play.out = passing->path();
-    }
+    if (!kept) options.play.out = make_folder();
+    const auto remove = [kept](const fs::path* folder) {
+        std::error_code ignored;
+        if (!kept) fs::remove_all(*folder, ignored);
+    };
+    const std::unique_ptr<const fs::path, decltype(remove)> at_end(&options.play.out, remove);
     const RealtimeOutcome outcome = run(options);
     fmt::print("{}", o.json ? format_latency_json(outcome.latency, outcome.play, outcome.realtime)
                             : format_latency_text(outcome.latency, outcome.realtime));
-    if (!passing && !o.json) fmt::print("Look at {}\n", (options.play.out / "latency.html").string());
+    if (kept && !o.json) fmt::print("Look at {}\n", (options.play.out / "latency.html").string());
     if (!outcome.failure.empty()) throw std::runtime_error(outcome.failure);
-}
-
-RealtimeOutcome run_and_warn(const RealtimeOptions& options) {
-    return play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
 }
 
 }  // namespace
@@ -91,10 +76,10 @@ void add_latency_command(Command& program, const RunInTime& run) {
         .options("--compare", o->compare, as::text("DIR"),
                  "Two such folders of earlier runs: their figures side by side (--out: comparison.json, "
                  "report.html)")
-        .expected(2);
+        ->expected(2);
     command.runs([o, run] {
         if (o->compare.empty())
-            measure(*o, run ? run : run_and_warn);
+            measure(*o, run);
         else
             compare(*o);
     });

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 
 #include "commands/command.h"
@@ -11,20 +10,17 @@ namespace app {
 namespace {
 
 void collect(const CLI::App& app, const std::string& words, std::vector<DeclaredCommand>& found) {
-    DeclaredCommand command{words, app.get_description(), {}, {}};
+    const std::size_t at = found.size();
+    found.push_back({words, app.get_description(), {}, {}});
     for (const CLI::Option* o : app.get_options())
         if (!o->get_group().empty() && o != app.get_help_ptr())
-            command.options.push_back({o->get_name(), o->get_type_name(), o->get_description(),
-                                       o->get_required(), o->get_expected_max() > 1});
-    std::vector<const CLI::App*> below;
+            found[at].options.push_back({o->get_name(), o->get_type_name(), o->get_description(),
+                                         o->get_required(), o->get_expected_max() > 1});
     for (const CLI::App* sub :
          app.get_subcommands([](const CLI::App* s) { return !s->get_group().empty(); })) {
-        below.push_back(sub);
-        command.commands.push_back(sub->get_name());
+        found[at].commands.push_back(sub->get_name());
+        collect(*sub, found[at].words_of(sub->get_name()), found);
     }
-    found.push_back(std::move(command));
-    for (const CLI::App* sub : below)
-        collect(*sub, words.empty() ? sub->get_name() : words + " " + sub->get_name(), found);
 }
 
 /// Text of the roff language: no character of it is an order.
@@ -90,21 +86,15 @@ std::string path_cases(const std::vector<DeclaredCommand>& commands) {
     for (const DeclaredCommand& command : commands)
         for (const std::string& below : command.commands)
             text += fmt::format("            {}) at={} ;;\n", shell_quoted(command.words + ":" + below),
-                                shell_quoted(command.words.empty() ? below : command.words + " " + below));
+                                shell_quoted(command.words_of(below)));
     return text;
 }
 
 }  // namespace
 
 std::vector<std::string> DeclaredOption::choices() const {
-    std::vector<std::string> words;
-    if (placeholder.find('|') == std::string::npos) return words;
-    for (std::size_t begin = 0; begin <= placeholder.size();) {
-        const std::size_t bar = std::min(placeholder.find('|', begin), placeholder.size());
-        words.push_back(placeholder.substr(begin, bar - begin));
-        begin = bar + 1;
-    }
-    return words;
+    if (placeholder.find('|') == std::string::npos) return {};
+    return split(placeholder, '|');
 }
 
 std::vector<DeclaredCommand> declared_commands(const CLI::App& program) {
@@ -179,8 +169,7 @@ _musicworld() {{
         text += fmt::format("        {}) entries=(\n", shell_quoted(command.words));
         for (const DeclaredCommand& below : commands)
             for (const std::string& name : command.commands)
-                if (below.words == (command.words.empty() ? name : command.words + " " + name))
-                    text += entry(name, below.help);
+                if (below.words == command.words_of(name)) text += entry(name, below.help);
         for (const DeclaredOption& option : command.options)
             if (!option.argument()) text += entry(option.name, option.help);
         text += entry("--help", "Print the help") + "        ) ;;\n";
@@ -189,13 +178,13 @@ _musicworld() {{
 }
 
 void add_manual_commands(Command& program, const CLI::App& tree) {
-    program.command("manual", "Print the manual page").hidden().runs([&tree] {
-        fmt::print("{}", format_manual(declared_commands(tree)));
-    });
-    Command completion = program.command("completion", "Print the completion of a shell").hidden();
+    Command manual = program.command("manual", "Print the manual page");
+    manual->group("");
+    manual.runs([&tree] { fmt::print("{}", format_manual(declared_commands(tree))); });
+    Command completion = program.command("completion", "Print the completion of a shell");
+    completion->group("");
     auto bash = std::make_shared<bool>(true);
-    completion.option("SHELL", *bash, as::choice<bool>({{"bash", true}, {"zsh", false}}), "bash or zsh")
-        .required();
+    completion.required("SHELL", *bash, as::choice<bool>({{"bash", true}, {"zsh", false}}), "bash or zsh");
     completion.runs([bash, &tree] {
         const std::vector<DeclaredCommand> commands = declared_commands(tree);
         fmt::print("{}", *bash ? format_bash_completion(commands) : format_zsh_completion(commands));

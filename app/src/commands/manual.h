@@ -27,6 +27,11 @@ struct DeclaredCommand {
     std::string words, help;
     std::vector<std::string> commands;  ///< below it
     std::vector<DeclaredOption> options;
+
+    /// Of a command below.
+    [[nodiscard]] std::string words_of(const std::string& name) const {
+        return words.empty() ? name : words + " " + name;
+    }
 };
 
 /// The program's commands, itself first, but those that are hidden.

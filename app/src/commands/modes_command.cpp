@@ -11,7 +11,6 @@
 
 #include "commands/command.h"
 #include "commands/commands.h"
-#include "files/bad_input.h"
 #include "files/output_folder.h"
 #include "pictures/mode_pictures.h"
 
@@ -35,13 +34,10 @@ struct ModesOptions {
 Eigen::Vector2d exponents_of(const ModesOptions& o) {
     const bool free = o.shape == "superquadric";
     if (free && !o.exponents)
-        throw BadInput(
-            "error: found --shape superquadric alone, expected --exponents E1,E2 with it, such as 0.5,1");
+        refuse_options("--shape superquadric alone", "--exponents E1,E2 with it, such as 0.5,1");
     if (!free && o.exponents)
-        throw BadInput(fmt::format(
-            "error: found --exponents with --shape {}, expected them with --shape superquadric only; "
-            "leave one out",
-            o.shape));
+        refuse_options("--exponents with --shape " + o.shape,
+                       "them with --shape superquadric only; leave one out");
     if (free) return *o.exponents;
     return o.shape == "box"         ? Eigen::Vector2d(0.1, 0.1)
            : o.shape == "ellipsoid" ? Eigen::Vector2d(1, 1)
@@ -68,14 +64,6 @@ double frequency_hz(double eigenvalue) {
     return std::sqrt(std::max(0.0, eigenvalue)) / (2 * M_PI);
 }
 
-int rows(const ModeReport& report) {
-    return 6 + report.modes.basis.count();
-}
-
-std::string percent(double error) {
-    return std::isfinite(error) ? fmt::format("{:.2g} %", 100 * error) : "unknown";
-}
-
 std::string heading(const ModeReport& report) {
     const sim::ModesRequest& r = report.request;
     const Eigen::Vector3d size = 2 * r.shape.semi_axes;
@@ -97,14 +85,6 @@ std::string mode_kind(int parity, bool rigid) {
     return std::string((rigid ? kRigid : kElastic).at(static_cast<std::size_t>(parity)));
 }
 
-std::string table_row(const ModeReport& report, int mode) {
-    const int at = 6 + mode;
-    const double eigenvalue = report.modes.eigenvalues[at];
-    return fmt::format("{:>4}  {:>14.6g}  {:>20.10g}  {:<11}  {:>10}\n", mode + 1, frequency_hz(eigenvalue),
-                       eigenvalue, mode_kind(report.modes.parity[static_cast<std::size_t>(at)], false),
-                       percent(report.errors[mode]));
-}
-
 std::string ending(const ModeReport& report) {
     const sim::GroupCut& cut = report.modes.cut;
     std::string text = fmt::format(
@@ -121,33 +101,35 @@ std::string ending(const ModeReport& report) {
     return text;
 }
 
-Json numbers(const Eigen::Ref<const Eigen::VectorXd>& values) {
-    Json list = Json::array();
-    for (const double v : values) list.push_back(std::isfinite(v) ? Json(v) : Json());
-    return list;
+/// What is not known is null.
+Json numbers(const Eigen::VectorXd& values) {
+    return std::vector<double>(values.begin(), values.end());
 }
 
 /// A table for people.
 std::string format_mode_table(const ModeReport& report) {
     std::string text =
         heading(report) + "mode  frequency [Hz]  eigenvalue [rad2/s2]  kind              error\n";
-    for (int i = 0; i < report.modes.basis.count(); ++i) text += table_row(report, i);
+    for (int i = 0; i < report.modes.basis.count(); ++i) {
+        const double eigenvalue = report.modes.eigenvalues[6 + i], error = report.errors[i];
+        text += fmt::format("{:>4}  {:>14.6g}  {:>20.10g}  {:<11}  {:>10}\n", i + 1, frequency_hz(eigenvalue),
+                            eigenvalue, mode_kind(report.modes.parity[std::size_t(6 + i)], false),
+                            std::isfinite(error) ? fmt::format("{:.2g} %", 100 * error) : "unknown");
+    }
     return text + ending(report);
 }
 
 /// The document of `modes --json`: lists over all modes, the six rigid ones first; an unknown error is null.
 std::string format_mode_json(const ModeReport& report) {
     const sim::ModesRequest& r = report.request;
-    const int n = rows(report);
+    const int n = 6 + report.modes.basis.count();
     const Eigen::VectorXd eigenvalues = report.modes.eigenvalues.head(n);
     Eigen::VectorXd errors = Eigen::VectorXd::Zero(n);
     errors.tail(n - 6) = report.errors;
     Json kinds = Json::array();
-    for (int i = 0; i < n; ++i)
-        kinds.push_back(mode_kind(report.modes.parity[static_cast<std::size_t>(i)], i < 6));
+    for (int i = 0; i < n; ++i) kinds.push_back(mode_kind(report.modes.parity[std::size_t(i)], i < 6));
     const sim::GroupCut& cut = report.modes.cut;
-    const Eigen::VectorXd size = 2 * r.shape.semi_axes;
-    Json json = {{"size_m", numbers(size)},
+    Json json = {{"size_m", numbers(2 * r.shape.semi_axes)},
                  {"shape", report.shape},
                  {"exponents", r.domain == sim::ModeDomain::box ? Json() : Json{r.shape.e1, r.shape.e2}},
                  {"young_pa", r.material.young_pa},
@@ -164,7 +146,7 @@ std::string format_mode_json(const ModeReport& report) {
 }
 
 void write_products(const ModesOptions& a, const ModeReport& report) {
-    OutputFolder folder(a.out, modes_products());
+    OutputFolder folder(a.out, kModesProducts);
     write_file(folder.path("modes.json"), format_mode_json(report));
     if (a.frames) {
         std::filesystem::create_directory(folder.path("frames"));
@@ -175,8 +157,7 @@ void write_products(const ModesOptions& a, const ModeReport& report) {
 }
 
 void run(const ModesOptions& a) {
-    if (a.frames && a.out.empty())
-        throw BadInput("error: found --frames without --out, expected --out DIR for the pictures");
+    if (a.frames && a.out.empty()) refuse_options("--frames without --out", "--out DIR for the pictures");
     ModeReport report{request_of(a), a.shape, {}, {}};
     report.modes = sim::free_vibration_modes(report.request);
     report.errors = sim::discretisation_errors(report.request, report.modes);
@@ -192,16 +173,13 @@ void add_modes_command(Command& program) {
     auto o = std::make_shared<ModesOptions>();
     sim::ModesRequest& request = o->request;
     request.elements = 1, request.count = kElementModes;
-    command.option("--size", o->size, as::vector_of_3(as::number(kSmallest, 1000, "m")), "Full extents")
-        .required();
-    command.option("--young", request.material.young_pa, as::number_above(0, 1e15, "Pa"), "Young's modulus")
-        .required();
-    command
-        .option("--poisson", request.material.poisson, as::number_between(-1, 0.5),
-                "Poisson's ratio; rubber's is 0.49")
-        .required();
-    command.option("--density", request.material.density_kg_m3, as::number_above(0, 1e6, "kg/m3"), "Density")
-        .required();
+    command.required("--size", o->size, as::vector_of_3(as::number(kSmallest, 1000, "m")), "Full extents");
+    command.required("--young", request.material.young_pa, as::number_above(0, 1e15, "Pa"),
+                     "Young's modulus");
+    command.required("--poisson", request.material.poisson, as::number_between(-1, 0.5),
+                     "Poisson's ratio; rubber's is 0.49");
+    command.required("--density", request.material.density_kg_m3, as::number_above(0, 1e6, "kg/m3"),
+                     "Density");
     command.option("--shape", o->shape, as::choice({"box", "ellipsoid", "cylinder", "superquadric"}),
                    "What it is; a cylinder's axis is y");
     command.option("--exponents", o->exponents, as::vector_of_2(as::number(0.1, 1.9)),

@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "files/assets.h"
-#include "files/bad_input.h"
 #include "files/one_line.h"
 #include "play/play.h"
 #include "sticks/predictors.h"
@@ -15,10 +14,6 @@
 namespace app {
 namespace fs = std::filesystem;
 namespace {
-
-void refuse_together(const std::string& found, const std::string& expected) {
-    throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
-}
 
 void print_places(const PlayOptions& options) {
     fmt::print("Look at {}", (options.out / "report.html").string());
@@ -43,8 +38,7 @@ void play_offline(const PlayOptions& options) {
 }
 
 void play_in_time(const RealtimeOptions& options) {
-    const RealtimeOutcome outcome =
-        play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
+    const RealtimeOutcome outcome = play_realtime_and_warn(options);
     fmt::print("{:.1f} s in real time: {}; {} of {} missed, {} of {} late\n", outcome.realtime.seconds,
                strikes_text(outcome.play.score), outcome.latency.frames.missed,
                counted(outcome.latency.frames.total, "frame"), outcome.latency.notes.missed,
@@ -61,19 +55,23 @@ void check_video(const PlayOptions& o) {
     if (!o.video) return;
     const std::string video = fmt::format("--video {}", o.video->string());
     if (o.width % 2 != 0 || o.height % 2 != 0)
-        refuse_together(fmt::format("--video with --size {}x{}", o.width, o.height), "even sides");
+        refuse_options(fmt::format("--video with --size {}x{}", o.width, o.height), "even sides");
     std::error_code error;
-    if (fs::is_directory(*o.video, error)) refuse_together(video + ", which is a folder", "a file");
+    if (fs::is_directory(*o.video, error)) refuse_options(video + ", which is a folder", "a file");
     const fs::path parent = o.video->parent_path();
     if (!parent.empty() && !fs::is_directory(parent, error))
-        refuse_together(video + " in a folder that is not there", "an existing folder");
+        refuse_options(video + " in a folder that is not there", "an existing folder");
 }
 
 }  // namespace
 
-Option add_play_options(Command& command, PlayOptions& o) {
+RealtimeOutcome play_realtime_and_warn(const RealtimeOptions& options) {
+    return play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
+}
+
+CLI::Option* add_play_options(Command& command, PlayOptions& o) {
     o.trace = "flourish", o.kit = "drums", o.progress = true;
-    const Option trace = command.option("TRACE", o.trace, as::text("TRACE"),
+    CLI::Option* trace = command.option("TRACE", o.trace, as::text("TRACE"),
                                         "Trace (CSV, Beat Saber replay, or the name of a bundled one)");
     command.option("--kit", o.kit, as::text("KIT"), "Kit: a file, or the name of a bundled one");
     command.option("--fps", o.fps, as::number(1, 1000, "frames per second"), "Frame rate");
@@ -81,12 +79,12 @@ Option add_play_options(Command& command, PlayOptions& o) {
         "--size", as::pixels(16, 4096), "Size of the frames",
         [&o](const Eigen::Vector2i& size) { o.width = size.x(), o.height = size.y(); }, "640x480");
     const auto predictor = as::text("PREDICTOR", check_specification);
-    const Option both = command.option<std::string>(
+    CLI::Option* both = command.option<std::string>(
         "--predictor", predictor, "Predictor of pictures and sound",
         [&o](const std::string& name) { o.picture_predictor = o.sound_predictor = name; }, "auto");
     command.option("--picture-predictor", o.picture_predictor, predictor, "Predictor of pictures")
-        .excludes(both);
-    command.option("--sound-predictor", o.sound_predictor, predictor, "Predictor of sound").excludes(both);
+        ->excludes(both);
+    command.option("--sound-predictor", o.sound_predictor, predictor, "Predictor of sound")->excludes(both);
     command.option("--render-lead", o.render_lead_s, as::number(0, 1, "s"), "Lead of pictures");
     command.option("--sound-lead", o.sound_lead_s, as::number(0.001, 1, "s"), "Lead of sound");
     command.option("--release-margin", o.release_margin_s, as::number(0, 1, "s"),
@@ -99,15 +97,15 @@ Option add_play_options(Command& command, PlayOptions& o) {
     command.flag("--no-audio", o.audio, "Sound nothing", false);
     command.checks([&o] {
         if (o.release_margin_s > o.sound_lead_s)
-            refuse_together(fmt::format("--release-margin {}", o.release_margin_s),
-                            fmt::format("at most the sound lead, {:.4g} s", o.sound_lead_s));
+            refuse_options(fmt::format("--release-margin {}", o.release_margin_s),
+                           fmt::format("at most the sound lead, {:.4g} s", o.sound_lead_s));
         o.trace = find_trace(o.trace);
         o.kit = find_kit(o.kit);
     });
     return trace;
 }
 
-std::vector<Option> add_realtime_options(Command& command, RealtimeOptions& o, const Option& trace) {
+std::vector<CLI::Option*> add_realtime_options(Command& command, RealtimeOptions& o, CLI::Option* trace) {
     const auto midi_out = [&o](const std::string& port) {
         const bool elsewhere = port.find(':') != std::string::npos;
         o.sound.midi_port = elsewhere ? "midi_out" : port;
@@ -119,7 +117,7 @@ std::vector<Option> add_realtime_options(Command& command, RealtimeOptions& o, c
             command
                 .option("--source", o.sensors.source, as::text("SOURCE"),
                         "Sensors instead of TRACE: stdin, zmq:ENDPOINT, osc:PORT, trace:FILE")
-                .excludes(trace),
+                ->excludes(trace),
             command.option("--sticks", o.sensors.sticks, as::list_of(as::text("NAME")),
                            "Names of the sticks of --source"),
             command.option("--lead", o.lead_auto, as::choice<bool>({{"fixed", false}, {"auto", true}}),
@@ -148,18 +146,18 @@ void add_play_command(Command& program) {
         bool realtime = false;
     };
     auto o = std::make_shared<Options>();
-    const Option trace = add_play_options(command, o->play);
+    CLI::Option* trace = add_play_options(command, o->play);
     command.option("--out", o->play.out, as::text("DIR"), "Folder for the products");
-    const Option solo =
+    CLI::Option* solo =
         command.option("--solo", o->play.solo, as::whole(0, std::numeric_limits<std::int64_t>::max()),
                        "Render the sound of one note alone, by its id in events.csv");
-    const Option no_frames = command.flag("--no-frames", o->play.frames, "Draw nothing", false);
+    CLI::Option* no_frames = command.flag("--no-frames", o->play.frames, "Draw nothing", false);
     command.option("--video", o->play.video, as::text("FILE"), "Also make a video (MP4) of frames and sound")
-        .excludes(no_frames);
-    Option realtime = command.flag("--realtime", o->realtime,
-                                   "Play against the wall clock, sensors in processes of their own");
-    realtime.excludes(solo);
-    for (Option& option : add_realtime_options(command, *o, trace)) option.needs(realtime);
+        ->excludes(no_frames);
+    CLI::Option* realtime = command.flag("--realtime", o->realtime,
+                                         "Play against the wall clock, sensors in processes of their own");
+    realtime->excludes(solo);
+    for (CLI::Option* option : add_realtime_options(command, *o, trace)) option->needs(realtime);
     command.checks([o] { check_video(o->play); });
     command.runs([o] { o->realtime ? play_in_time(*o) : play_offline(o->play); });
 }

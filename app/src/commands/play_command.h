@@ -8,8 +8,12 @@ namespace app {
 void add_play_command(Command& program);
 
 /// Options of a run that `play` and `latency` share: all but the folder to write into. Returns TRACE.
-Option add_play_options(Command& command, PlayOptions& options);
+CLI::Option* add_play_options(Command& command, PlayOptions& options);
 /// Those of a run in real time. `trace` is what --source replaces.
-std::vector<Option> add_realtime_options(Command& command, RealtimeOptions& options, const Option& trace);
+std::vector<CLI::Option*> add_realtime_options(Command& command, RealtimeOptions& options,
+                                               CLI::Option* trace);
+
+/// Plays in real time into the folder of the options, warnings on standard error.
+RealtimeOutcome play_realtime_and_warn(const RealtimeOptions& options);
 
 }  // namespace app

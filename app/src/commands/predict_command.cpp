@@ -8,7 +8,7 @@
 #include "commands/commands.h"
 #include "commands/sensor_model_options.h"
 #include "files/assets.h"
-#include "files/finished_file.h"
+#include "files/output_folder.h"
 #include "sticks/predictors.h"
 #include "traces/predict.h"
 #include "traces/sensor_model.h"
@@ -36,12 +36,10 @@ void predict(const PredictOptions& o) {
 void add_predict_command(Command& program) {
     Command command = program.command("predict", "Write down where a predictor expects the tracked points");
     auto o = std::make_shared<PredictOptions>();
-    command.option("TRACE", o->trace, as::text("TRACE"), "Trace (CSV)").required();
-    command
-        .option("--predictor", o->predictor, as::text("PREDICTOR", check_specification),
-                "Predictor; auto: the pictures'")
-        .required();
-    command.option("--lead", o->lead_s, as::number(0, 1, "s"), "Time ahead of each sample").required();
+    command.required("TRACE", o->trace, as::text("TRACE"), "Trace (CSV)");
+    command.required("--predictor", o->predictor, as::text("PREDICTOR", check_specification),
+                     "Predictor; auto: the pictures'");
+    command.required("--lead", o->lead_s, as::number(0, 1, "s"), "Time ahead of each sample");
     command.option("--out", o->out, as::text("FILE"), "File to write (CSV); standard output if left out");
     add_sensor_model_options(command, o->sensor);
     command.runs([o] { predict(*o); });

@@ -40,18 +40,15 @@ void print(const RecordResult& result, const std::string& out) {
 void add_record_command(Command& program) {
     Command command = program.command("record", "Write what a source of samples gives to a trace");
     auto o = std::make_shared<RecordOptions>();
-    command
-        .option("--source", o->source.source, as::text("SOURCE"),
-                "trace:FILE, stdin, zmq:ENDPOINT or osc:PORT")
-        .required();
-    command.option("--out", o->out, as::text("FILE"), "Trace to write (CSV); replaced if there is one")
-        .required();
+    command.required("--source", o->source.source, as::text("SOURCE"),
+                     "trace:FILE, stdin, zmq:ENDPOINT or osc:PORT");
+    command.required("--out", o->out, as::text("FILE"), "Trace to write (CSV); replaced if there is one");
     command.option("--seconds", o->seconds, as::number(0, as::kAny, "s"),
                    "From the first sample on; 0: until the source ends, Ctrl-C or SIGTERM");
     command.option("--sticks", o->source.sticks, as::list_of(as::text("NAME")),
                    "Names; default: all that come");
     command.option("--speed", o->source.speed, as::number_above(0, as::kAny), "Of a replay, for tests")
-        .group("");
+        ->group("");
     command.runs([o] {
         o->source.epoch_ns = monotonic_ns() + kHeadStartNs;
         print(record(*o), o->out.string());

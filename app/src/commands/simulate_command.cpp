@@ -69,14 +69,13 @@ void add_simulate_command(Command& program) {
     };
     auto o = std::make_shared<Options>();
     o->progress = true;
-    command.option("SCENE", o->scene, as::text("SCENE"), "Scene: a file, or the name of a bundled one")
-        .required();
-    const Option steps = command.option("--steps", o->steps, as::whole(0, 1'000'000'000),
+    command.required("SCENE", o->scene, as::text("SCENE"), "Scene: a file, or the name of a bundled one");
+    CLI::Option* steps = command.option("--steps", o->steps, as::whole(0, 1'000'000'000),
                                         "Steps to do; default: as long as the scene says");
     command
         .option("--seconds", o->seconds, as::number_above(0, 360000, "s"),
                 "Instead of --steps, of the scene's time")
-        .excludes(steps);
+        ->excludes(steps);
     command.option("--dt", o->dt_s, as::number(1e-6, 0.1, "s"),
                    "Length of a step, such as 1/60; default: the scene's");
     command.option("--until", o->until_rest, as::choice<bool>({{"rest", true}}),

@@ -7,8 +7,8 @@
 #include "commands/command.h"
 #include "commands/commands.h"
 #include "files/assets.h"
-#include "files/finished_file.h"
 #include "files/one_line.h"
+#include "files/output_folder.h"
 #include "kit/drum_score.h"
 #include "kit/kit.h"
 #include "traces/trace_info.h"
@@ -24,15 +24,14 @@ struct SynthOptions {
 void add_synth(Command& trace) {
     Command command = trace.command("synth", "Make a synthetic trace of a score, played on a kit");
     auto o = std::make_shared<SynthOptions>();
-    command.option("NAME", o->score, as::choice(score_names()), "Score: " + one_of(score_names())).required();
+    command.required("NAME", o->score, as::choice(score_names()), "Score: " + one_of(score_names()));
     command.option("--kit", o->kit, as::text("KIT"), "Kit: a file, or the name of a bundled one");
     command.option("--seed", o->sensor.seed, as::whole(0, std::numeric_limits<std::int64_t>::max()),
                    "Seed of the sensor's noise");
     command.option("--rate", o->sensor.rate_hz, as::number(10, 2000, "Hz"), "Samples per second");
     command.option("--noise", o->sensor.noise_mm, as::number(0, 50, "mm"),
                    "Standard deviation of position noise");
-    command.option("--out", o->out, as::text("FILE"), "Trace to write (CSV); replaced if there is one")
-        .required();
+    command.required("--out", o->out, as::text("FILE"), "Trace to write (CSV); replaced if there is one");
     command.runs([o] {
         const Kit kit = read_kit(find_kit(o->kit));
         write_finished_file(o->out, tracking::format_trace(synthesise_score(o->score, kit, o->sensor)));
@@ -43,10 +42,8 @@ void add_info(Command& trace) {
     Command command = trace.command("info", "Tell what a trace holds");
     auto file = std::make_shared<std::string>();
     auto json = std::make_shared<bool>(false);
-    command
-        .option("TRACE", *file, as::text("TRACE"),
-                "Trace (CSV, Beat Saber replay, or the name of a bundled one)")
-        .required();
+    command.required("TRACE", *file, as::text("TRACE"),
+                     "Trace (CSV, Beat Saber replay, or the name of a bundled one)");
     command.flag("--json", *json, "As one JSON document");
     command.runs([file, json] {
         const tracking::Trace trace_read = tracking::read_trace(find_trace(*file));
@@ -61,7 +58,7 @@ void add_trace_check(Command& trace) {
     command
         .options("TRACE", *files, as::text("TRACE"),
                  "Traces (CSV, Beat Saber replays, or names of bundled ones)")
-        .required();
+        ->required();
     command.runs([files] {
         for (const std::string& file : *files) {
             const tracking::Trace checked = tracking::read_trace(find_trace(file));

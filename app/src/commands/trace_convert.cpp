@@ -12,8 +12,8 @@
 #include "commands/sensor_model_options.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/finished_file.h"
 #include "files/one_line.h"
+#include "files/output_folder.h"
 #include "traces/map_file.h"
 #include "traces/sensor_model.h"
 #include "traces/trace_info.h"
@@ -31,7 +31,7 @@ struct ConvertOptions {
     std::optional<Eigen::Vector3d> tip, shaft;
     bool from_zero = false;
     tracking::SensorModel sensor;
-    std::vector<Option> of_tables;  ///< that only a table of another program has a use for
+    std::vector<CLI::Option*> of_tables;  ///< that only a table of another program has a use for
 };
 
 bool is_native(std::string_view text) {
@@ -87,17 +87,17 @@ std::vector<std::string> stick_names(const ConvertOptions& o) {
     if (names.empty() && o.in.size() == 2) names = {"left", "right"};
     if (names.empty() && o.in.size() == 1) names = {"stick"};
     if (names.size() == o.in.size()) return names;
-    throw BadInput(fmt::format("error: found {} files and {} names in --sticks, expected a name per file",
-                               o.in.size(), names.size()));
+    refuse_options(fmt::format("{} files and {} names in --sticks", o.in.size(), names.size()),
+                   "a name per file");
 }
 
 void refuse_table_options(const ConvertOptions& o) {
-    for (const Option& option : o.of_tables)
-        if (option.given())
+    for (const CLI::Option* option : o.of_tables)
+        if (option->count() > 0)
             throw BadInput(
                 fmt::format("{}: error: found {} with a trace that says this itself, expected a table "
                             "of another program; drop the option or say --map",
-                            o.in.front(), option.name()));
+                            o.in.front(), option->get_name()));
 }
 
 tracking::Trace read_inputs(const ConvertOptions& o) {
@@ -146,30 +146,30 @@ std::string bundled_maps() {
 }
 
 void add_table_options(Command& command, ConvertOptions& o) {
-    const auto add = [&](const char* name, auto& value, const auto& format, const std::string& help) {
-        o.of_tables.push_back(command.option(name, value, format, help).group("Tables of other programs"));
-    };
-    command
-        .option("--map", o.map, as::text("MAP"),
-                "Columns: \"t=Time,px=X,..\", a TOML file, or one of " + bundled_maps())
-        .group("Tables of other programs");
-    add("--save-map", o.save_map, as::text("FILE"), "Write the map, with these options, to a TOML file");
-    add("--units", o.metres_per_unit, as::choice<double>({{"m", 1}, {"cm", 0.01}, {"mm", 0.001}}),
-        "Of positions");
-    add("--up", o.z_up, as::choice<bool>({{"y", false}, {"z", true}}), "Axis that points up");
-    add("--euler", o.euler, as::text("ORDER"), "Order of the intrinsic turns ex, ey, ez, such as XYZ");
-    add("--rate", o.rate_hz, as::number_above(0, 1e5, "Hz"),
-        "Rows per second, where there is no column of times");
-    add("--separator", o.separator,
-        as::choice<char>({{"comma", ','}, {"semicolon", ';'}, {"tab", '\t'}, {"space", ' '}}),
-        "Between the cells");
-    add("--time-unit", o.seconds_per_unit,
-        as::choice<double>({{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}}), "Of times");
-    add("--header", o.header, as::text("CELL"), "First cell of the header's last line");
-    add("--sticks", o.sticks, as::list_of(as::text("NAME")),
-        "Names for the files' sticks; two files: left,right");
-    o.of_tables.push_back(command.flag("--from-zero", o.from_zero, "Times count from the first row")
-                              .group("Tables of other programs"));
+    constexpr const char* kHeading = "Tables of other programs";
+    Command tables = command.under(kHeading);
+    tables.option("--map", o.map, as::text("MAP"),
+                  "Columns: \"t=Time,px=X,..\", a TOML file, or one of " + bundled_maps());
+    tables.option("--save-map", o.save_map, as::text("FILE"),
+                  "Write the map, with these options, to a TOML file");
+    tables.option("--units", o.metres_per_unit, as::choice<double>({{"m", 1}, {"cm", 0.01}, {"mm", 0.001}}),
+                  "Of positions");
+    tables.option("--up", o.z_up, as::choice<bool>({{"y", false}, {"z", true}}), "Axis that points up");
+    tables.option("--euler", o.euler, as::text("ORDER"),
+                  "Order of the intrinsic turns ex, ey, ez, such as XYZ");
+    tables.option("--rate", o.rate_hz, as::number_above(0, 1e5, "Hz"),
+                  "Rows per second, where there is no column of times");
+    tables.option("--separator", o.separator,
+                  as::choice<char>({{"comma", ','}, {"semicolon", ';'}, {"tab", '\t'}, {"space", ' '}}),
+                  "Between the cells");
+    tables.option("--time-unit", o.seconds_per_unit,
+                  as::choice<double>({{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}}), "Of times");
+    tables.option("--header", o.header, as::text("CELL"), "First cell of the header's last line");
+    tables.option("--sticks", o.sticks, as::list_of(as::text("NAME")),
+                  "Names for the files' sticks; two files: left,right");
+    tables.flag("--from-zero", o.from_zero, "Times count from the first row");
+    o.of_tables =
+        command->get_options([](const CLI::Option* option) { return option->get_group() == kHeading; });
 }
 
 }  // namespace
@@ -181,9 +181,8 @@ void add_convert_command(Command& trace) {
     command
         .options("IN", o->in, as::text("IN"),
                  "Traces (CSV), Beat Saber replays (*.bsor), exports of other programs")
-        .required();
-    command.option("--out", o->out, as::text("FILE"), "Trace to write (CSV); replaced if there is one")
-        .required();
+        ->required();
+    command.required("--out", o->out, as::text("FILE"), "Trace to write (CSV); replaced if there is one");
     command.option("--tip", o->tip, as::vector_of_3(as::number(-1000, 1000, "m")),
                    "Tip in the tracked body's frame");
     command.option("--shaft", o->shaft, as::axis(), "Body axis from hand to tip");

@@ -51,8 +51,7 @@ void add_keys_command(Command& program) {
         std::vector<std::string> workers = {"worker"};
     };
     auto o = std::make_shared<Options>();
-    command.option("FOLDER", o->folder, as::text("FOLDER"), "Folder for the keys; keys in it are replaced")
-        .required();
+    command.required("FOLDER", o->folder, as::text("FOLDER"), "Folder for the keys; keys in it are replaced");
     command.option("--workers", o->workers, as::list_of(as::text("NAME")),
                    "Names of workers: each gets NAME.key");
     command.runs([o] { make_keys(o->folder, o->workers); });
@@ -64,44 +63,33 @@ void add_worker_command(Command& program) {
         std::string endpoint, key;
     };
     auto o = std::make_shared<Options>();
-    command
-        .option("--connect", o->endpoint, as::text("ENDPOINT"),
-                "ZeroMQ endpoint of the application: tcp://ADDRESS:PORT")
-        .required();
+    command.required("--connect", o->endpoint, as::text("ENDPOINT"),
+                     "ZeroMQ endpoint of the application: tcp://ADDRESS:PORT");
     command.option("--key", o->key, as::text("FILE"), "This worker's key, made by `musicworld keys`");
     command.runs([o] { throw ExitStatus{sim::run_worker(o->endpoint, o->key)}; });
 }
 
 void add_sensor_command(Command& program) {
     Command command =
-        program.command("sensor", "Read and filter a stick's samples (started by the program itself)")
-            .hidden();
+        program.command("sensor", "Read and filter a stick's samples (started by the program itself)");
+    command->group("");
     auto task = std::make_shared<SensorTask>();
-    SourceOptions& source = task->source;
-    command
-        .option("--source", source.source, as::text("SOURCE"), "trace:FILE, stdin, zmq:ENDPOINT or osc:PORT")
-        .required();
-    command.options("--stick", source.sticks, as::text("NAME"), "Name; once a stick").required();
-    constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
-    command.option("--epoch-ns", source.epoch_ns, as::whole(0, kMost, "ns"),
-                   "CLOCK_MONOTONIC at which the run begins");
-    command.option("--period", source.period_s, as::number(),
-                   "A trace begins again that long after it began [s]; 0: never");
-    command.flag("--resume", source.resume, "Go on at the current time");
-    command.option("--stall-at", task->stall_at_s, as::number(), "Pause the reader then [s since the epoch]");
-    command.option("--stall", task->stall_s, as::number(), "for that long [s]");
-    const auto predictor = as::text("PREDICTOR");
-    command.option("--picture", task->predictors.picture, predictor, "Of pictures").required();
-    command.option("--sound", task->predictors.sound, predictor, "Of sound").required();
-    command.option("--confirming", task->predictors.confirming, predictor,
-                   "Of contacts, for a second opinion");
-    command.option("--sound-lead", task->predictors.sound_lead_s, as::number(),
-                   "Contacts are looked for so far ahead [s]");
-    const auto descriptor = as::whole(0, std::numeric_limits<int>::max());
-    command.options("--state-fd", task->state_fds, descriptor, "Shared memory; once a stick").required();
-    command.option("--wake-fd", task->wake_fd, descriptor, "eventfd").required();
-    command.option("--life-fd", task->life_fd, descriptor, "Pipe that ends with the application").required();
-    command.flag("--no-realtime", task->realtime, "Without real-time scheduling", false);
+    for_each_sensor_option(*task, [&](const char* name, auto& value, const char* help) {
+        using Value = std::decay_t<decltype(value)>;
+        const auto whole = as::whole(0, std::numeric_limits<std::int64_t>::max());
+        if constexpr (std::is_same_v<Value, std::vector<std::string>>)
+            command.options(name, value, as::text("TEXT"), help)->required();
+        else if constexpr (std::is_same_v<Value, std::vector<int>>)
+            command.options(name, value, whole, help)->required();
+        else if constexpr (std::is_same_v<Value, std::string>)
+            command.option(name, value, as::text("TEXT"), help);
+        else if constexpr (std::is_same_v<Value, bool>)
+            command.option(name, value, as::choice<bool>({{"false", false}, {"true", true}}), help);
+        else if constexpr (std::is_floating_point_v<Value>)
+            command.option(name, value, as::number(), help);
+        else
+            command.option(name, value, whole, help);
+    });
     command.runs([task] { throw ExitStatus{run_sensor(*task)}; });
 }
 

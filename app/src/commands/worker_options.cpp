@@ -4,8 +4,6 @@
 
 #include <memory>
 
-#include "files/bad_input.h"
-
 namespace app {
 namespace {
 
@@ -18,29 +16,25 @@ struct TypedWorkers {
     std::optional<int> bound;
 };
 
-void refuse_workers(const std::string& found, const std::string& expected) {
-    throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
-}
-
 /// What makes no sense without workers, or without an endpoint that others reach.
 void check_together(const TypedWorkers& typed) {
     const WorkerOptions& o = typed.options;
     const bool alone = o.count == 0 && o.listen.empty();
     const int bound = typed.bound.value_or(0);
     if (alone && o.simulated)
-        refuse_workers("--processors without --workers", "how many of them, such as --workers 10");
+        refuse_options("--processors without --workers", "how many of them, such as --workers 10");
     if (alone && (typed.async || bound != 0))
-        refuse_workers(typed.async ? "--mode async" : fmt::format("--bound {}", bound),
+        refuse_options(typed.async ? "--mode async" : fmt::format("--bound {}", bound),
                        "--workers N with it: without workers a scene runs in this process");
     if (!typed.async && bound != 0)
-        refuse_workers(fmt::format("--bound {} with --mode sync", bound), "--mode async, or no --bound");
+        refuse_options(fmt::format("--bound {} with --mode sync", bound), "--mode async, or no --bound");
     if (o.simulated && !o.listen.empty())
-        refuse_workers("--listen with --processors", "one of them: simulated processors are in this process");
+        refuse_options("--listen with --processors", "one of them: simulated processors are in this process");
     if (o.listen.empty() && (!o.keys.empty() || o.expect > 0))
-        refuse_workers(!o.keys.empty() ? "--keys" : "--expect",
+        refuse_options(!o.keys.empty() ? "--keys" : "--expect",
                        "--listen ENDPOINT with it, where workers of other hosts come in");
     if (o.expect > 0 && o.expect < o.count)
-        refuse_workers(fmt::format("--expect {}", o.expect),
+        refuse_options(fmt::format("--expect {}", o.expect),
                        fmt::format("at least the {} --workers that are started here", o.count));
 }
 
@@ -59,7 +53,7 @@ std::optional<sim::SimulatedProcessors> read_processors(const std::string& text)
     if (text.substr(0, colon) != "simulated") return std::nullopt;
     sim::SimulatedProcessors processors;
     if (colon == std::string::npos) return processors;
-    for (const std::string& part : split_at_commas(text.substr(colon + 1))) {
+    for (const std::string& part : split(text.substr(colon + 1))) {
         const auto pair = as::named("NAME=VALUE").read(part);
         if (!pair) return std::nullopt;
         const auto& [name, value] = *pair;

@@ -6,7 +6,6 @@
 
 #include "compare/entrants.h"
 #include "process/parallel.h"
-#include "sticks/auto_predictor.h"
 #include "sticks/predictors.h"
 
 namespace app {

@@ -9,7 +9,6 @@
 
 #include "process/parallel.h"
 #include "sticks/predictors.h"
-#include "sticks/replay.h"
 #include "sticks/stick.h"
 
 namespace app {

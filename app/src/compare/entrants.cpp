@@ -13,7 +13,6 @@
 #include "files/bad_input.h"
 #include "files/one_line.h"
 #include "process/parallel.h"
-#include "sticks/auto_predictor.h"
 #include "sticks/predictors.h"
 
 namespace app {

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "sticks/replay.h"
+#include "statistics/statistics.h"
+#include "sticks/predictors.h"
 
 namespace app {
 namespace {

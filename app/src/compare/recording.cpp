@@ -37,7 +37,7 @@ void add_marks(Recording& recording, const fs::path& file, const std::string& he
                 fmt::format("{}:1:1: error: found \"{}\", expected the columns {}; mend it or move it away",
                             file.string(), line.substr(0, 60), header));
         if (number == 1 || line.empty()) continue;
-        const std::vector<std::string> fields = split_at_commas(line);
+        const std::vector<std::string> fields = split(line);
         double t_s = 0;
         const char* end = fields[0].data() + fields[0].size();
         const auto [stop, failed] = std::from_chars(fields[0].data(), end, t_s);

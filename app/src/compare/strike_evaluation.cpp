@@ -11,8 +11,7 @@
 
 #include "kit/tip_track.h"
 #include "statistics/statistics.h"
-#include "sticks/auto_predictor.h"
-#include "sticks/replay.h"
+#include "sticks/predictors.h"
 #include "sticks/stick.h"
 #include "strikes/score_strikes.h"
 #include "strikes/strike_scheduler.h"

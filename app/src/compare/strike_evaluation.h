@@ -10,6 +10,8 @@
 #include "kit/kit.h"
 #include "kit/stick_geometry.h"
 #include "statistics/statistics.h"
+#include "sticks/predictors.h"
+#include "sticks/stick.h"
 
 namespace app {
 

@@ -32,18 +32,18 @@ fs::path assets_folder() {
     return chosen;
 }
 
-fs::path find_kit(const std::string& name_or_path) {
-    fs::path bundled = assets_folder() / "kits" / (name_or_path + ".toml");
-    if (name_or_path.find('/') == std::string::npos && fs::is_regular_file(bundled)) return bundled;
-    return name_or_path;
+fs::path find_bundled(const std::string& name_or_path, const std::string& folder,
+                      const std::string& extension) {
+    std::error_code ignored;
+    fs::path bundled = assets_folder() / folder / (name_or_path + extension);
+    const bool name = name_or_path.find('/') == std::string::npos;
+    return name && fs::is_regular_file(bundled, ignored) ? bundled : fs::path(name_or_path);
 }
 
 fs::path find_trace(const std::string& name_or_path) {
-    fs::path bundled = assets_folder() / "traces" / (name_or_path + ".csv");
-    const bool name = name_or_path.find('/') == std::string::npos;
     std::error_code ignored;
-    if (name && !fs::exists(name_or_path, ignored) && fs::is_regular_file(bundled, ignored)) return bundled;
-    return name_or_path;
+    if (fs::exists(name_or_path, ignored)) return name_or_path;
+    return find_bundled(name_or_path, "traces", ".csv");
 }
 
 }  // namespace app

@@ -8,10 +8,15 @@ namespace app {
 /// Throws BadInput where that is no such folder.
 [[nodiscard]] std::filesystem::path assets_folder();
 
+/// A file by path, or by the name of a bundled one: NAME + extension in a folder of the assets.
+[[nodiscard]] std::filesystem::path find_bundled(const std::string& name_or_path, const std::string& folder,
+                                                 const std::string& extension = ".toml");
 /// A kit by path, or by the name of a bundled one ("drums" is assets/kits/drums.toml).
-[[nodiscard]] std::filesystem::path find_kit(const std::string& name_or_path);
-
-/// A trace by path, or by the name of a bundled one ("flourish" is assets/traces/flourish.csv).
+[[nodiscard]] inline std::filesystem::path find_kit(const std::string& name_or_path) {
+    return find_bundled(name_or_path, "kits");
+}
+/// A trace by path, or, where there is no such file, by the name of a bundled one ("flourish" is
+/// assets/traces/flourish.csv).
 [[nodiscard]] std::filesystem::path find_trace(const std::string& name_or_path);
 
 }  // namespace app

@@ -2,57 +2,30 @@
 
 #include <fmt/format.h>
 
+#include <array>
+
 namespace app {
 
-void Fields::text(std::string_view key, std::string& value, std::string_view meaning, Note note) {
-    KeyValue read_value = value;
-    if (read({key, KeyType::text, meaning, note}, read_value)) value = std::get<std::string>(read_value);
-}
-
-void Fields::text(std::string_view key, std::optional<std::string>& value, std::string_view meaning,
-                  Note note) {
-    KeyValue read_value;
-    if (read({key, KeyType::text, meaning, note}, read_value)) value = std::get<std::string>(read_value);
-}
-
-void Fields::texts(std::string_view key, Texts& value, std::string_view meaning, Note note) {
-    KeyValue read_value = value;
-    if (read({key, KeyType::texts, meaning, note}, read_value)) value = std::get<Texts>(read_value);
-}
-
-void Fields::text_or_texts(std::string_view key, Texts& value, std::string_view meaning, Note note) {
-    KeyValue read_value = value;
-    if (read({key, KeyType::text_or_texts, meaning, note}, read_value)) value = std::get<Texts>(read_value);
-}
-
-void Fields::columns(std::string_view key, std::map<std::string, std::string>& value,
-                     std::string_view meaning, Note note) {
-    KeyValue read_value = value;
-    if (read({key, KeyType::columns, meaning, note}, read_value))
-        value = std::get<std::map<std::string, std::string>>(read_value);
-}
-
-void Fields::flag(std::string_view key, bool& value, std::string_view meaning, Note note) {
-    KeyValue read_value = value;
-    if (read({key, KeyType::flag, meaning, note}, read_value)) value = std::get<bool>(read_value);
-}
-
-bool Fields::numbers(const Key& key, Eigen::VectorXd& values, bool with_default) {
-    KeyValue read_value;
-    if (with_default) read_value = std::vector<double>(values.begin(), values.end());
-    if (!read(key, read_value)) return false;
-    const auto& given = std::get<std::vector<double>>(read_value);
-    for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = given[std::size_t(i)];
-    return true;
-}
-
-bool Fields::one_of(const Key& key, std::size_t& chosen) {
-    KeyValue read_value;
-    if (chosen < key.words.size()) read_value = std::string(key.words[chosen]);
-    if (!read(key, read_value)) return false;
-    const auto& word = std::get<std::string>(read_value);
-    for (chosen = 0; key.words[chosen] != word;) ++chosen;
-    return true;
+const KeyTypeText& text_of(KeyType type) {
+    static constexpr KeyTypeText kText = {"a text in quotes", "text", "{2}"};
+    static constexpr std::array<KeyTypeText, 9> kTexts = {{
+        kText,
+        kText,  // a choice lists its words
+        {"true or false", "true or false", R"("type": "boolean")"},
+        {"a number from {0} to {1}", "number", R"("type": "number", "minimum": {0}, "maximum": {1})"},
+        {"a number from {0} to {1} or a fraction such as \"1/60\"", "number, or fraction in quotes",
+         R"("anyOf": [{{"type": "number", "minimum": {0}, "maximum": {1}}}, )"
+         R"({{"type": "string", "pattern": "^[0-9.eE+-]+(/[0-9.eE+-]+)?$"}}])"},
+        {"a whole number from {0} to {1}", "whole number",
+         R"("type": "integer", "minimum": {0}, "maximum": {1})"},
+        {"an array of texts", "array of texts", R"("type": "array", "items": {{{2}}})"},
+        {"an array of texts", "text, or array of texts",
+         R"("anyOf": [{{{2}}}, {{"type": "array", "items": {{{2}}}}}])"},
+        {"a table", "texts by name",
+         R"("type": "object", "additionalProperties": {{"anyOf": [{{"type": "string"}}, )"
+         R"({{"type": "object", "additionalProperties": {{"type": "string"}}}}]}})"},
+    }};
+    return kTexts[static_cast<std::size_t>(type)];
 }
 
 void Fields::require_direction(const Eigen::Vector3d& value, std::string_view key) const {

@@ -1,6 +1,6 @@
 #pragma once
 #include <Eigen/Core>
-#include <cstddef>
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <optional>
@@ -51,6 +51,13 @@ struct Word {
 };
 
 enum class KeyType { text, choice, flag, number, fraction, whole, texts, text_or_texts, columns };
+
+/// What a value of a type is called in a message, in the reference page and, as formats of fmt, in a JSON Schema:
+/// {0} and {1} are the limits of numbers, {2} is the schema of a text.
+struct KeyTypeText {
+    const char *expected, *page, *schema;
+};
+[[nodiscard]] const KeyTypeText& text_of(KeyType type);
 
 /// One key as it is declared.
 struct Key {
@@ -109,43 +116,49 @@ public:
     using Parameters = std::vector<std::pair<std::string, double>>;
     virtual ~Fields() = default;
 
-    void text(std::string_view key, std::string& value, std::string_view meaning, Note note = {});
-    void text(std::string_view key, std::optional<std::string>& value, std::string_view meaning,
-              Note note = {});
-    void texts(std::string_view key, Texts& value, std::string_view meaning, Note note = {});
+    // Values may be std::optional: empty, unless the file has the key.
+
+    void text(std::string_view key, auto& value, std::string_view meaning, Note note = {}) {
+        one({key, KeyType::text, meaning, note}, value);
+    }
+    void texts(std::string_view key, Texts& value, std::string_view meaning, Note note = {}) {
+        one({key, KeyType::texts, meaning, note}, value);
+    }
     /// A text, or an array of them.
-    void text_or_texts(std::string_view key, Texts& value, std::string_view meaning, Note note = {});
+    void text_or_texts(std::string_view key, Texts& value, std::string_view meaning, Note note = {}) {
+        one({key, KeyType::text_or_texts, meaning, note}, value);
+    }
     /// Texts by name, or by stick and name as STICK.NAME.
     void columns(std::string_view key, std::map<std::string, std::string>& value, std::string_view meaning,
-                 Note note = {});
-    void flag(std::string_view key, bool& value, std::string_view meaning, Note note = {});
+                 Note note = {}) {
+        one({key, KeyType::columns, meaning, note}, value);
+    }
+    void flag(std::string_view key, bool& value, std::string_view meaning, Note note = {}) {
+        one({key, KeyType::flag, meaning, note}, value);
+    }
 
-    template <class Number>  // also a std::optional: empty, unless the file has the key
-    void number(std::string_view key, Number& value, Range range, std::string_view meaning, Note note = {}) {
+    void number(std::string_view key, auto& value, Range range, std::string_view meaning, Note note = {}) {
         one_number({key, KeyType::number, meaning, note, range}, value);
     }
     /// A number, or a text with a fraction: "1/60".
-    template <class Number>
-    void fraction(std::string_view key, Number& value, Range range, std::string_view meaning,
-                  Note note = {}) {
+    void fraction(std::string_view key, auto& value, Range range, std::string_view meaning, Note note = {}) {
         one_number({key, KeyType::fraction, meaning, note, range}, value);
     }
-    template <class Number>
-    void integer(std::string_view key, Number& value, Range range, std::string_view meaning, Note note = {}) {
+    void integer(std::string_view key, auto& value, Range range, std::string_view meaning, Note note = {}) {
         one_number({key, KeyType::whole, meaning, note, range}, value);
     }
     template <class Vector>
     void vector(std::string_view key, Vector& value, Range range, std::string_view meaning, Note note = {}) {
-        Eigen::VectorXd wide = value.template cast<double>();
-        if (numbers({key, KeyType::number, meaning, note, range, int(wide.size())}, wide, true))
-            value = wide.cast<typename Vector::Scalar>();
+        std::vector<double> wide(value.begin(), value.end());
+        one({key, KeyType::number, meaning, note, range, int(value.size())}, wide);
+        std::copy(wide.begin(), wide.end(), value.begin());
     }
     template <class Vector>
     void vector(std::string_view key, std::optional<Vector>& value, Range range, std::string_view meaning,
                 Note note = {}) {
-        Eigen::VectorXd wide(int(Vector::SizeAtCompileTime));
-        if (numbers({key, KeyType::number, meaning, note, range, int(wide.size())}, wide, false))
-            value = wide.cast<typename Vector::Scalar>();
+        std::optional<std::vector<double>> wide;
+        one({key, KeyType::number, meaning, note, range, int(Vector::SizeAtCompileTime)}, wide);
+        if (wide) std::copy(wide->begin(), wide->end(), value.emplace().begin());
     }
     /// One of the words.
     template <class Value>
@@ -153,12 +166,14 @@ public:
                 const std::vector<Word<std::type_identity_t<Value>>>& words, std::string_view meaning,
                 Note note = {}) {
         Key declared{key, KeyType::choice, meaning, note};
-        std::size_t chosen = words.size();
-        for (std::size_t i = 0; i < words.size(); ++i) {
-            declared.words.push_back(words[i].name);
-            if (words[i].value == value && chosen == words.size()) chosen = i;
+        KeyValue word;
+        for (const auto& known : words) {
+            declared.words.emplace_back(known.name);
+            if (known.value == value && word.index() == 0) word = std::string(known.name);
         }
-        if (one_of(declared, chosen)) value = words[chosen].value;
+        if (!read(declared, word)) return;
+        for (const auto& known : words)
+            if (std::get<std::string>(word) == known.name) value = known.value;
     }
     /// Numbers under names of their own, besides the keys declared so far: those of `known`, which a reader
     /// must have.
@@ -167,34 +182,32 @@ public:
 
     // Tables. `take` is called with what was read and its place for complaints, never by a describer.
 
-    template <class T, class Take>
-    void table(std::string_view key, T& value, const TableKind<T>& kind, const Take& take) {
+    template <class T>
+    using Take = std::type_identity_t<std::function<void(Fields& at, T&)>>;
+
+    template <class T>
+    void table(
+        std::string_view key, T& value, const TableKind<T>& kind, const Take<T>& take = [](Fields&, T&) {}) {
         enter({key, TableForm::merged, &kind},
               {[&](Fields& inner, const std::string&) { kind.keys(inner, value); },
-               [&](Fields& at, const std::string&) { take(at, value); }});
+               [&](Fields& at) { take(at, value); }});
     }
     template <class T>
-    void table(std::string_view key, T& value, const TableKind<T>& kind) {
-        table(key, value, kind, [](Fields&, T&) {});
-    }
-    template <class T, class Take>
-    void table(std::string_view key, std::optional<T>& value, const TableKind<T>& kind, const Take& take) {
+    void table(
+        std::string_view key, std::optional<T>& value, const TableKind<T>& kind,
+        const Take<T>& take = [](Fields&, T&) {}) {
         enter({key, TableForm::optional, &kind},
               {[&](Fields& inner, const std::string&) { kind.keys(inner, value.emplace()); },
-               [&](Fields& at, const std::string&) { take(at, *value); }});
-    }
-    template <class T>
-    void table(std::string_view key, std::optional<T>& value, const TableKind<T>& kind) {
-        table(key, value, kind, [](Fields&, T&) {});
+               [&](Fields& at) { take(at, *value); }});
     }
     /// An array of tables; each begins as a copy of `first` and is taken in turn.
-    template <class T, class Take>
+    template <class T>
     void tables(std::string_view key, const T& first, const TableKind<T>& kind, std::string_view meaning,
-                const Take& take) {
+                const Take<T>& take) {
         std::optional<T> value;
         enter({key, TableForm::array, &kind, meaning},
               {[&](Fields& inner, const std::string&) { kind.keys(inner, value.emplace(first)); },
-               [&](Fields& at, const std::string&) { take(at, *value); }});
+               [&](Fields& at) { take(at, *value); }});
     }
     template <class T>
     void named_tables(std::string_view key, std::map<std::string, T>& values, const TableKind<T>& kind,
@@ -220,25 +233,35 @@ public:
 
 protected:
     struct Visit {
-        std::function<void(Fields&, const std::string&name)> keys, take;
+        std::function<void(Fields&, const std::string& name)> keys;
+        std::function<void(Fields&)> take;
     };
     /// `value` holds the default; true: the file has the key, and `value` is what it says.
     virtual bool read(const Key& key, KeyValue& value) = 0;
     virtual void enter(const TableKey& key, const Visit& visit) = 0;
 
 private:
-    [[nodiscard]] bool numbers(const Key& key, Eigen::VectorXd& values, bool with_default);
-    [[nodiscard]] bool one_of(const Key& key, std::size_t& chosen);
-
+    template <class Value>
+    void one(const Key& key, Value& value) {
+        KeyValue read_value = value;
+        if (read(key, read_value)) value = std::get<Value>(std::move(read_value));
+    }
+    template <class Value>
+    void one(const Key& key, std::optional<Value>& value) {
+        KeyValue read_value;
+        if (read(key, read_value)) value = std::get<Value>(std::move(read_value));
+    }
     template <class Number>
     void one_number(const Key& key, Number& value) {
-        Eigen::VectorXd wide = Eigen::VectorXd::Constant(1, static_cast<double>(value));
-        if (numbers(key, wide, true)) value = static_cast<Number>(wide[0]);
+        std::vector<double> wide = {static_cast<double>(value)};
+        one(key, wide);
+        value = static_cast<Number>(wide.front());
     }
     template <class Number>
     void one_number(const Key& key, std::optional<Number>& value) {
-        Eigen::VectorXd wide(1);
-        if (numbers(key, wide, false)) value = static_cast<Number>(wide[0]);
+        std::optional<std::vector<double>> wide;
+        one(key, wide);
+        if (wide) value = static_cast<Number>(wide->front());
     }
 };
 

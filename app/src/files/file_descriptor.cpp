@@ -10,6 +10,16 @@
 
 namespace app {
 
+bool FileDescriptor::write(std::string_view bytes) const noexcept {
+    while (!bytes.empty()) {
+        const ssize_t wrote = ::write(number_, bytes.data(), bytes.size());
+        if (wrote > 0) bytes.remove_prefix(static_cast<std::size_t>(wrote));
+        if (wrote == 0) errno = ENOSPC;
+        if (wrote == 0 || (wrote < 0 && errno != EINTR)) return false;
+    }
+    return true;
+}
+
 bool FileDescriptor::close() noexcept {
     const int number = std::exchange(number_, -1);
     return number < 0 || ::close(number) == 0;

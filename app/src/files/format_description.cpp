@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 namespace app {
 namespace {
@@ -91,41 +90,19 @@ bool is_required(const DescribedTable& table, const DescribedKey& key) {
 
 // JSON Schema
 
-std::string number_schema(const Range& range, const char* type = "number") {
-    return fmt::format("\"type\": \"{}\", \"minimum\": {}, \"maximum\": {}", type, range.low, range.high);
+std::string range_schema(KeyType type, const Range& range, const std::string& text = {}) {
+    return fmt::format(fmt::runtime(text_of(type).schema), range.low, range.high, text);
 }
 
 std::string type_schema(const Key& key) {
-    static constexpr const char* kText =
-        "\"type\": \"string\", \"pattern\": \"^[^\\\\u0000-\\\\u001f\\\\u007f]*$\"";
-    static constexpr const char* kFraction =
-        "\"type\": \"string\", \"pattern\": \"^[0-9.eE+-]+(/[0-9.eE+-]+)?$\"";
     if (key.size > 0)
         return fmt::format("\"type\": \"array\", \"items\": {{{}}}, \"minItems\": {}, \"maxItems\": {}",
-                           number_schema(key.range), key.size, key.size);
-    switch (key.type) {
-        case KeyType::choice:
-            return "\"type\": \"string\", \"enum\": " + json_list(key.words, json_text);
-        case KeyType::flag:
-            return "\"type\": \"boolean\"";
-        case KeyType::number:
-            return number_schema(key.range);
-        case KeyType::whole:
-            return number_schema(key.range, "integer");
-        case KeyType::fraction:
-            return fmt::format("\"anyOf\": [{{{}}}, {{{}}}]", number_schema(key.range), kFraction);
-        case KeyType::texts:
-            return fmt::format("\"type\": \"array\", \"items\": {{{}}}", kText);
-        case KeyType::text_or_texts:
-            return fmt::format("\"anyOf\": [{{{0}}}, {{\"type\": \"array\", \"items\": {{{0}}}}}]", kText);
-        case KeyType::columns:
-            return fmt::format(
-                "\"type\": \"object\", \"additionalProperties\": {{\"anyOf\": [{{{0}}}, "
-                "{{\"type\": \"object\", \"additionalProperties\": {{{0}}}}}]}}",
-                "\"type\": \"string\"");
-        default:
-            return key.note.need == Need::here ? fmt::format("{}, \"minLength\": 1", kText) : kText;
-    }
+                           range_schema(KeyType::number, key.range), key.size, key.size);
+    if (key.type == KeyType::choice)
+        return "\"type\": \"string\", \"enum\": " + json_list(key.words, json_text);
+    return range_schema(key.type, key.range,
+                        std::string(R"("type": "string", "pattern": "^[^\\u0000-\\u001f\\u007f]*$")") +
+                            (key.note.need == Need::here ? ", \"minLength\": 1" : ""));
 }
 
 std::string reference_to(const std::string& table) {
@@ -170,7 +147,7 @@ std::string table_schema(const DescribedTable& table, const std::string& margin)
                               table.parameters.empty()
                                   ? "false"
                                   : fmt::format("{{\"description\": {}, {}}}", json_text(table.parameters),
-                                                number_schema(table.parameter_range)));
+                                                range_schema(KeyType::number, table.parameter_range)));
 }
 
 // Reference page
@@ -184,27 +161,9 @@ std::string type_text(const DescribedKey& described) {
         return fmt::format("{0} [{1}](#{1})", form, described.table);
     }
     if (key.size > 0) return fmt::format("{} numbers", key.size);
-    switch (key.type) {
-        case KeyType::choice:
-            return fmt::format("`{}`", fmt::join(key.words, "`, `"))
-                .substr(key.words.front().empty() ? 4 : 0);
-        case KeyType::flag:
-            return "true or false";
-        case KeyType::number:
-            return "number";
-        case KeyType::whole:
-            return "whole number";
-        case KeyType::fraction:
-            return "number, or fraction in quotes";
-        case KeyType::texts:
-            return "array of texts";
-        case KeyType::text_or_texts:
-            return "text, or array of texts";
-        case KeyType::columns:
-            return "texts by name";
-        default:
-            return "text";
-    }
+    if (key.type == KeyType::choice)
+        return fmt::format("`{}`", fmt::join(key.words, "`, `")).substr(key.words.front().empty() ? 4 : 0);
+    return text_of(key.type).page;
 }
 
 std::string default_text(const DescribedTable& table, const DescribedKey& described) {

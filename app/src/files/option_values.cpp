@@ -62,7 +62,7 @@ ValueFormat<double> number_where(const std::string& range, const std::string& un
 template <class Vector>
 ValueFormat<Vector> vector_of(const std::string& placeholder, const ValueFormat<double>& one) {
     const auto read = [one](const std::string& text) -> std::optional<Vector> {
-        const std::vector<std::string> parts = split_at_commas(text);
+        const std::vector<std::string> parts = split(text);
         Vector result;
         if (static_cast<Eigen::Index>(parts.size()) != result.size()) return std::nullopt;
         for (Eigen::Index i = 0; i < result.size(); ++i) {
@@ -77,17 +77,20 @@ ValueFormat<Vector> vector_of(const std::string& placeholder, const ValueFormat<
 
 }  // namespace
 
-void refuse_value(const std::string& name, const std::string& text, const std::string& expected) {
-    throw BadInput(
-        fmt::format("error: found {} {}, expected {}", name, text.empty() ? "\"\"" : text, expected));
+void refuse_options(const std::string& found, const std::string& expected) {
+    throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
 }
 
-std::vector<std::string> split_at_commas(const std::string& text) {
+void refuse_value(const std::string& name, const std::string& text, const std::string& expected) {
+    refuse_options(name + " " + (text.empty() ? "\"\"" : text), expected);
+}
+
+std::vector<std::string> split(const std::string& text, char separator) {
     std::vector<std::string> parts;
     for (std::size_t begin = 0; begin <= text.size();) {
-        const std::size_t comma = std::min(text.find(',', begin), text.size());
-        parts.push_back(text.substr(begin, comma - begin));
-        begin = comma + 1;
+        const std::size_t end = std::min(text.find(separator, begin), text.size());
+        parts.push_back(text.substr(begin, end - begin));
+        begin = end + 1;
     }
     return parts;
 }

@@ -11,6 +11,8 @@
 
 namespace app {
 
+/// Throws BadInput "error: found FOUND, expected EXPECTED".
+[[noreturn]] void refuse_options(const std::string& found, const std::string& expected);
 /// Throws BadInput "error: found NAME TEXT, expected EXPECTED".
 [[noreturn]] void refuse_value(const std::string& name, const std::string& text, const std::string& expected);
 
@@ -31,8 +33,8 @@ struct ValueFormat {
     }
 };
 
-/// The parts between the commas, one more than there are commas.
-[[nodiscard]] std::vector<std::string> split_at_commas(const std::string& text);
+/// The parts between the separators, one more than there are separators.
+[[nodiscard]] std::vector<std::string> split(const std::string& text, char separator = ',');
 
 /// "a, b, c or d".
 [[nodiscard]] std::string one_of(const std::vector<std::string>& words);
@@ -108,7 +110,7 @@ template <class Value>
                                            {}};
     format.read = [one](const std::string& text) -> std::optional<std::vector<Value>> {
         std::vector<Value> values;
-        for (const std::string& part : split_at_commas(text)) {
+        for (const std::string& part : split(text)) {
             const std::optional<Value> value = part.empty() ? std::nullopt : one.read(part);
             if (!value || std::find(values.begin(), values.end(), *value) != values.end())
                 return std::nullopt;

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <climits>
+#include <csignal>
 #include <cstring>
 #include <stdexcept>
 #include <string>
@@ -20,16 +22,19 @@ namespace app {
 namespace fs = std::filesystem;
 namespace {
 
-/// The first leads: it goes first, so that a folder whose products are being exchanged does not look
-/// finished.
-constexpr std::array<std::string_view, 16> kPlayProducts = {
-    "summary.json", "frames",       "audio.wav",    "events.csv",     "contacts.csv", "hits.mid",
-    "report.html",  "latency.json", "latency.html", "departures.csv", "samples.csv",  "frames.csv",
-    "notes.csv",    "blocks.csv",   "leads.csv",    "errors.csv"};
-constexpr std::array<std::string_view, 3> kModesProducts = {"modes.json", "modes.png", "frames"};
-constexpr std::array<std::string_view, 7> kSimulateProducts = {
-    "summary.json", "frames", "states.csv", "energy.csv", "times.csv", "timing.csv", "workers.svg"};
-constexpr std::array<std::string_view, 3> kCompareProducts = {"compare.json", "compare.csv", "report.html"};
+// Of InterruptionNotice, whose handler can neither be given anything nor allocate.
+std::array<char, PATH_MAX + 200> notice;
+volatile std::sig_atomic_t notice_size = 0;
+
+void print_notice_and_end(int signal) {
+    (void)!write(STDERR_FILENO, notice.data(), static_cast<std::size_t>(notice_size));
+    (void)raise(signal);  // SA_RESETHAND: now it ends the program
+}
+
+bool is_handled_by(int signal, void (*handler)(int)) {
+    struct sigaction now {};
+    return sigaction(signal, nullptr, &now) == 0 && now.sa_handler == handler;
+}
 
 [[noreturn]] void refuse(const fs::path& path, const std::string& found) {
     throw BadInput(fmt::format("{}: error: found {}, expected a folder to write into; choose another --out",
@@ -64,38 +69,38 @@ void check_frames(const fs::path& frames) {
     if (error) refuse(frames, error.message());
 }
 
-void write_all(const fs::path& file, const void* data, std::size_t size) {
-    const auto fail = [&] {
-        throw std::runtime_error("error: " + cannot("write " + file.string()) +
-                                 "; free some space or choose another --out");
-    };
-    FileDescriptor out(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-    if (!out) fail();
-    for (std::size_t done = 0; done < size;) {
-        const ssize_t wrote = ::write(out.get(), static_cast<const char*>(data) + done, size - done);
-        if (wrote < 0 && errno == EINTR) continue;
-        if (wrote < 0) fail();
-        done += static_cast<std::size_t>(wrote);
-    }
-    if (!out.close()) fail();
+std::string_view text_of(std::span<const std::uint8_t> bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 }  // namespace
 
-std::span<const std::string_view> play_products() {
-    return kPlayProducts;
-}
-
-std::span<const std::string_view> compare_products() {
-    return kCompareProducts;
-}
-
-std::span<const std::string_view> modes_products() {
-    return kModesProducts;
-}
-std::span<const std::string_view> simulate_products() {
-    return kSimulateProducts;
-}
+/// While this lives, a SIGINT or SIGTERM that ends the program at once first says on standard error what stays
+/// in the folder of an unfinished run. Where signals are handled or ignored already it does nothing. One at a
+/// time.
+class OutputFolder::InterruptionNotice {
+public:
+    explicit InterruptionNotice(const fs::path& unfinished) {
+        const std::string text =
+            fmt::format("{}interrupted: what was done so far stays in {}, which the next run there removes\n",
+                        isatty(STDERR_FILENO) != 0 ? "\n" : "", unfinished.string());
+        const std::size_t size = std::min(text.size(), notice.size());
+        std::copy_n(text.begin(), size, notice.begin());
+        notice_size = static_cast<std::sig_atomic_t>(size);
+        struct sigaction action {};
+        action.sa_handler = print_notice_and_end;
+        action.sa_flags = static_cast<int>(SA_RESETHAND);
+        for (const int signal : {SIGINT, SIGTERM})
+            if (is_handled_by(signal, SIG_DFL)) sigaction(signal, &action, nullptr);
+    }
+    ~InterruptionNotice() {
+        notice_size = 0;
+        for (const int signal : {SIGINT, SIGTERM})
+            if (is_handled_by(signal, print_notice_and_end)) std::signal(signal, SIG_DFL);
+    }
+    InterruptionNotice(const InterruptionNotice&) = delete;
+    InterruptionNotice& operator=(const InterruptionNotice&) = delete;
+};
 
 OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_view> products)
     : folder_(folder), staging_(folder / ".unfinished"), products_(products.begin(), products.end()) {
@@ -104,26 +109,17 @@ OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_v
     std::error_code none;  // a path that cannot even be looked at has failed above
     if (fs::exists(folder_, none) && !fs::is_directory(folder_, none)) refuse(folder_, "a file");
     if (error) refuse(folder_, error.message());
-    lock();
-    if (std::find(products_.begin(), products_.end(), "frames") != products_.end())
-        check_frames(folder_ / "frames");
-    notice_.emplace(staging_);
-    make_staging();
-}
-
-void OutputFolder::lock() {
     lock_ = FileDescriptor(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (!lock_) refuse(folder_, std::strerror(errno));
     // File systems without locks are used without.
-    if (::flock(lock_.get(), LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
-    throw BadInput(
-        fmt::format("{}: error: found another run writing into it, expected one run a folder; "
-                    "wait for it or choose another --out",
-                    folder_.string()));
-}
-
-void OutputFolder::make_staging() {
-    std::error_code error;
+    if (::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        throw BadInput(
+            fmt::format("{}: error: found another run writing into it, expected one run a folder; "
+                        "wait for it or choose another --out",
+                        folder_.string()));
+    if (std::find(products_.begin(), products_.end(), "frames") != products_.end())
+        check_frames(folder_ / "frames");
+    notice_ = std::make_unique<InterruptionNotice>(staging_);
     fs::remove_all(staging_, error);
     if (!error) fs::create_directory(staging_, error);
     if (!error) fs::create_directory(scratch(), error);
@@ -131,7 +127,7 @@ void OutputFolder::make_staging() {
 }
 
 OutputFolder::~OutputFolder() {
-    std::error_code ignored;  // a destructor has nobody to tell
+    std::error_code ignored;  // a destructor cannot report it
     if (!finished_) {
         fs::remove_all(staging_, ignored);
         if (made_folder_) fs::remove(folder_, ignored);
@@ -162,12 +158,44 @@ void OutputFolder::finish() {
     finished_ = true;
 }
 
-void write_file(const fs::path& file, std::span<const std::uint8_t> bytes) {
-    write_all(file, bytes.data(), bytes.size());
+void write_file(const fs::path& file, std::string_view text) {
+    FileDescriptor out(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+    if (!out || !out.write(text) || !out.close())
+        throw std::runtime_error("error: " + cannot("write " + file.string()) +
+                                 "; free some space or choose another --out");
 }
 
-void write_file(const fs::path& file, std::string_view text) {
-    write_all(file, text.data(), text.size());
+void write_file(const fs::path& file, std::span<const std::uint8_t> bytes) {
+    write_file(file, text_of(bytes));
+}
+
+fs::path partial_name(const fs::path& file) {
+    const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+    std::error_code error;
+    if (!file.has_filename() || fs::is_directory(file, error))
+        throw BadInput(
+            fmt::format("{}: error: found a folder, expected the name of a file to write", file.string()));
+    if (!fs::is_directory(folder, error))
+        throw BadInput(
+            fmt::format("{}: error: found no such folder, expected one to write {} into; make it first",
+                        folder.string(), file.filename().string()));
+    return file.string() + ".partial";
+}
+
+void write_finished_file(const fs::path& file, std::string_view text) {
+    const fs::path partial = partial_name(file);
+    try {
+        write_file(partial, text);
+        fs::rename(partial, file);
+    } catch (const std::runtime_error&) {  // filesystem_error is one
+        std::error_code ignored;
+        fs::remove(partial, ignored);
+        throw;
+    }
+}
+
+void write_finished_file(const fs::path& file, std::span<const std::uint8_t> bytes) {
+    write_finished_file(file, text_of(bytes));
 }
 
 }  // namespace app

@@ -1,28 +1,30 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
+#include <memory>
 #include <span>
 #include <string_view>
 #include <vector>
 
 #include "files/file_descriptor.h"
-#include "files/interruption_notice.h"
 
 namespace app {
 
-/// What `play` writes: summary.json, frames, audio.wav, events.csv, contacts.csv, hits.mid, report.html, and,
-/// in real time, the measurements (latency.json, latency.html, departures.csv and tables). The first of a
-/// list leads: a folder that has it is a finished run.
-[[nodiscard]] std::span<const std::string_view> play_products();
-/// What `compare` writes: compare.json, compare.csv, report.html.
-[[nodiscard]] std::span<const std::string_view> compare_products();
-/// What `simulate` writes: summary.json, frames, states.csv, energy.csv, and times.csv or, with workers,
-/// timing.csv and workers.svg.
-[[nodiscard]] std::span<const std::string_view> simulate_products();
+// What commands write. The first of a list leads: a folder that has it is a finished run; it is removed first,
+// so that a folder whose products are being exchanged does not look finished.
 
-/// What `modes` writes: modes.json, modes.png, frames.
-[[nodiscard]] std::span<const std::string_view> modes_products();
+/// `play`; in real time also the measurements, from latency.json on.
+inline constexpr std::array<std::string_view, 16> kPlayProducts = {
+    "summary.json", "frames",       "audio.wav",    "events.csv",     "contacts.csv", "hits.mid",
+    "report.html",  "latency.json", "latency.html", "departures.csv", "samples.csv",  "frames.csv",
+    "notes.csv",    "blocks.csv",   "leads.csv",    "errors.csv"};
+/// `simulate`: times.csv or, with workers, timing.csv and workers.svg.
+inline constexpr std::array<std::string_view, 7> kSimulateProducts = {
+    "summary.json", "frames", "states.csv", "energy.csv", "times.csv", "timing.csv", "workers.svg"};
+inline constexpr std::array<std::string_view, 3> kCompareProducts = {"compare.json", "compare.csv",
+                                                                     "report.html"};
+inline constexpr std::array<std::string_view, 3> kModesProducts = {"modes.json", "modes.png", "frames"};
 
 /// The folder that a run writes its products into, all of them or none. They are staged in its hidden
 /// subfolder `.unfinished`; finish() moves them into place by rename, the leading product last, so that
@@ -34,7 +36,7 @@ public:
     /// Throws BadInput when that cannot be: a file is in the way, no permission, another run is writing
     /// there, or `frames` holds files that no run wrote and finish() would delete.
     explicit OutputFolder(const std::filesystem::path& folder,
-                          std::span<const std::string_view> products = play_products());
+                          std::span<const std::string_view> products = kPlayProducts);
     /// Without finish(): removes what was staged, and the folder if this run made it and nothing else is in
     /// it.
     ~OutputFolder();
@@ -52,19 +54,27 @@ public:
     void finish();
 
 private:
-    void lock();
-    void make_staging();
+    class InterruptionNotice;
 
     std::filesystem::path folder_, staging_;
     std::vector<std::string_view> products_;
     bool made_folder_ = false, finished_ = false;
     FileDescriptor lock_;
-    std::optional<InterruptionNotice> notice_;
+    std::unique_ptr<InterruptionNotice> notice_;
 };
 
 /// Writes a whole file, replacing an older one. Every write and the close are checked: throws
 /// std::runtime_error "error: cannot write FILE: REASON; ...".
 void write_file(const std::filesystem::path& file, std::span<const std::uint8_t> bytes);
 void write_file(const std::filesystem::path& file, std::string_view text);
+
+/// FILE.partial, for what becomes FILE by renaming it. Throws BadInput when FILE cannot be made there (no such
+/// folder, a folder of that name).
+[[nodiscard]] std::filesystem::path partial_name(const std::filesystem::path& file);
+
+/// Writes FILE.partial, then renames it: FILE is never seen half-written, and an older one stays until the
+/// new one is complete. Throws as partial_name(), std::runtime_error when writing fails.
+void write_finished_file(const std::filesystem::path& file, std::span<const std::uint8_t> bytes);
+void write_finished_file(const std::filesystem::path& file, std::string_view text);
 
 }  // namespace app

@@ -1,6 +1,7 @@
 #include "kit/drum_score.h"
 
 #include <fmt/format.h>
+#include <sim/simulation.h>
 
 #include <algorithm>
 #include <array>
@@ -8,10 +9,44 @@
 #include <string_view>
 
 #include "files/bad_input.h"
-#include "kit/strike_target.h"
 
 namespace app {
 namespace {
+
+/// An upright bell is struck on its side; a bar lies flat and is struck from above.
+bool struck_on_side(const Instrument& instrument) {
+    const Eigen::Vector3d& half = instrument.body.shape.semi_axes;
+    return instrument.kind == "bell" && half.y() > 0.5 * half.x();
+}
+
+/// A point of an instrument's surface at rest, grown by the tip's radius, and the outward unit normal there.
+/// World frame [m].
+struct StrikeTarget {
+    Eigen::Vector3d point, normal;
+};
+
+/// Where a player strikes: from above, upright bells from the player's side (body +z, a little above).
+/// `across` and `along` shift the place from the middle of that side, as shares (below 1) of the half extents
+/// to the body's right (x) and away from its front (-z, for bells up).
+StrikeTarget strike_target(const Instrument& instrument, double tip_radius_m, double across, double along) {
+    const sim::BodyDefinition& body = instrument.body;
+    const Eigen::Vector3d& half = body.shape.semi_axes;
+    const bool side = struck_on_side(instrument);
+    const Eigen::Vector3d inside_body = side ? Eigen::Vector3d(across * half.x(), along * half.y(), 0)
+                                             : Eigen::Vector3d(across * half.x(), 0, -along * half.z());
+    const Eigen::Vector3d outwards_body =
+        side ? Eigen::Vector3d(0, 0.4, 1).normalized() : Eigen::Vector3d::UnitY();
+    Eigen::Vector3d inside = body.world_from_body * inside_body;
+    Eigen::Vector3d outside =
+        inside + body.world_from_body.linear() * outwards_body * (2 * half.norm() + tip_radius_m + 0.1);
+    // Halves points, not a parameter as entry_between() does: the bundled traces keep their last digits.
+    constexpr int kHalvings = 60;
+    for (int i = 0; i < kHalvings; ++i) {
+        const Eigen::Vector3d middle = 0.5 * (inside + outside);
+        (sim::rest_distance(body, middle, tip_radius_m).distance > 0 ? outside : inside) = middle;
+    }
+    return {outside, sim::rest_distance(body, outside, tip_radius_m).normal.normalized()};
+}
 
 /// The parts that scores are written for: the bundled drums.
 enum Part { snare, hi_hat, tom_1, tom_2, floor_tom, bass_drum, crash, ride };
@@ -29,19 +64,7 @@ public:
     Writer(const Kit& kit, double looseness_s) : kit_(kit), looseness_s_(looseness_s) {}
 
     /// A hit `at` seconds. Each hand has its own place on an instrument, a hand's width from the other's.
-    void hit(double at, Hand hand, Part part, double speed) { add(at, hand, part, speed); }
-
-    /// A feint that would have struck at `speed`, and turns `height` metres above the surface `at` seconds.
-    void feint(double at, Hand hand, Part part, double speed, double height) {
-        tracking::Stroke& stroke = add(at, hand, part, speed);
-        stroke.kind = tracking::StrokeKind::feint;
-        stroke.turn_height_m = height;
-    }
-
-    [[nodiscard]] DrumScore finish(double duration_s) { return {std::move(strokes_), duration_s}; }
-
-private:
-    tracking::Stroke& add(double at, Hand hand, Part part, double speed) {
+    tracking::Stroke& hit(double at, Hand hand, Part part, double speed) {
         const Instrument& instrument = instrument_of(part);
         const bool disc = instrument.kind == "cymbal";
         const double across = (hand == left ? -1 : 1) * (disc ? 0.3 : 0.28);
@@ -57,6 +80,16 @@ private:
         return strokes_.back();
     }
 
+    /// A feint that would have struck at `speed`, and turns `height` metres above the surface `at` seconds.
+    void feint(double at, Hand hand, Part part, double speed, double height) {
+        tracking::Stroke& stroke = hit(at, hand, part, speed);
+        stroke.kind = tracking::StrokeKind::feint;
+        stroke.turn_height_m = height;
+    }
+
+    [[nodiscard]] DrumScore finish(double duration_s) { return {std::move(strokes_), duration_s}; }
+
+private:
     /// In [-1, 1], the same for every run.
     double next_deviation() {
         count_ += 7;
@@ -185,9 +218,9 @@ const std::vector<std::string>& score_names() {
 }
 
 DrumScore make_score(const std::string& name, const Kit& kit) {
-    if (name == "flourish") return flourish(kit);
-    if (name == "feints") return feints(kit);
-    if (name == "roll") return roll(kit);
+    constexpr std::array<DrumScore (*)(const Kit&), 3> kScores = {flourish, feints, roll};
+    const auto at = std::ranges::find(score_names(), name) - score_names().begin();
+    if (at < std::ssize(kScores)) return kScores[static_cast<std::size_t>(at)](kit);
     throw BadInput(
         fmt::format("error: found score \"{}\", expected one of {}", name, fmt::join(score_names(), ", ")));
 }

@@ -1,5 +1,6 @@
 #include "kit/kit.h"
 
+#include <audio/orchestra.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,19 +8,15 @@
 
 #include "files/assets.h"
 #include "files/bad_input.h"
+#include "files/format_description.h"
 #include "files/toml_reader.h"
-#include "kit/kit_keys.h"
+#include "scene/look_keys.h"
 
 namespace app {
 namespace fs = std::filesystem;
 namespace {
 
-/// The files of a kit, the kit itself first, then its includes in order, the assets' defaults last.
-struct KitFiles {
-    std::vector<TomlFile> documents;
-    std::vector<fs::path> files;
-    std::vector<KitHeader> headers;
-};
+// The keys of a kit file. `mesh` is a name until it is looked for.
 
 bool is_file(const fs::path& path) {
     std::error_code error;  // a name that is no path (too long) is no file
@@ -36,8 +33,288 @@ fs::path find_file(const Fields& at, const char* key, const fs::path& name, cons
     return found ? beside : other;
 }
 
-void load(KitFiles& kit, const fs::path& file) {
-    if (std::find(kit.files.begin(), kit.files.end(), file) != kit.files.end()) return;
+// Tables within an instrument
+
+const TableKind<sim::Material> kMaterial = {
+    {"material", "What the body is made of: gives its mass and the ratios of its visible modes."},
+    material_keys};
+
+void visual_keys(Fields& keys, sim::VisualModes& visual) {
+    keys.number("frequency_hz", visual.frequency_hz, {0.5, 50, "Hz"},
+                "Frequency of the lowest visible mode.");
+    keys.number("displacement", visual.displacement, {0, 0.2},
+                "Displacement of the struck point by a stroke of 5 m/s, as a share of the largest extent.");
+    keys.number("decay_s", visual.decay_s, {0.05, 30, "s"}, "Time in which the visible modes fall by 60 dB.");
+}
+const TableKind<sim::VisualModes> kVisual = {
+    {"visual", "The modes that are seen, softer than what is heard."}, visual_keys};
+
+void stand_keys(Fields& keys, Instrument& instrument) {
+    sim::Stand& stand = instrument.body.stand;
+    keys.choice("kind", stand.hinged, {{"fixed", false}, {"hinge", true}}, "fixed, or on a damped hinge.");
+    keys.vector("pivot", stand.pivot_body, {-10, 10, "m"}, "Point of the hinge's axis in the body's frame.",
+                {.otherwise = "the middle of the top", .example = "[0, 0.07, 0]"});
+    keys.vector("axis", stand.axis_body, {-1e3, 1e3},
+                "Direction of the hinge's axis in the body's frame; any length but 0.");
+    keys.require_direction(stand.axis_body, "axis");
+    stand.axis_body.normalize();
+    keys.number("frequency_hz", stand.frequency_hz, {0.05, 50, "Hz"}, "Frequency at which the body swings.");
+    keys.number("damping_ratio", stand.damping_ratio, {0, 10}, "Damping ratio of the swing: 1 is critical.");
+    keys.flag("drawn", instrument.drawn_stand, "Whether a stand is drawn down to the floor.");
+}
+const TableKind<Instrument> kStand = {{"stand", "How the body is held."}, stand_keys};
+
+struct ZoneDraft {
+    sim::Zone zone;
+    std::optional<int> midi_note;
+};
+void zone_keys(Fields& keys, ZoneDraft& written) {
+    Eigen::Vector2d radius(0, 1.01), height(0.5, 2);
+    keys.text("name", written.zone.name, "Name of the zone.", {.need = Need::given, .example = "\"head\""});
+    keys.vector("radius", radius, {0, 100},
+                "Inner and outer limit of sqrt((x/a)^2 + (z/c)^2); 0 is the axis.");
+    keys.vector("height", height, {-100, 100}, "Lower and upper limit of y/b: -1 underside, 1 top.");
+    keys.require(radius[0] < radius[1], "radius", "a zone without radius",
+                 "[inner, outer], inner below outer");
+    keys.require(height[0] < height[1], "height", "a zone without height", "[low, high], low below high");
+    keys.integer("midi_note", written.midi_note, {0, 127}, "MIDI note.",
+                 {.otherwise = "the instrument's", .example = "38"});
+    written.zone.min_radius = radius[0], written.zone.max_radius = radius[1];
+    written.zone.min_height = height[0], written.zone.max_height = height[1];
+}
+const TableKind<ZoneDraft> kZone = {
+    {"zone", "A part of the surface, in shares of the half extents (a, b, c)."}, zone_keys};
+
+void appearance_keys(Fields& keys, render::Appearance& look) {
+    keys.vector("color", look.color, {0, 1}, "Linear RGB.");
+    surface_keys(keys, look);
+}
+const TableKind<render::Appearance> kAppearance = {{"appearance", "How a surface looks."}, appearance_keys};
+
+void look_keys(Fields& keys, render::Look& look) {
+    for (const char* part : {"shell", "head", "hoop", "lug", "bronze", "metal", "string", "wood"}) {
+        std::optional<render::Appearance> appearance;
+        keys.table(part, appearance, kAppearance);
+        if (appearance) look.parts.emplace_back(part, *appearance);
+    }
+    keys.table("body", look.body, kAppearance);
+}
+const TableKind<render::Look> kLook = {
+    {"look", "Looks of the mesh's materials by name; `body` is the look of all others."}, look_keys};
+
+/// The parameters of a sound, which must be one of the orchestra's.
+std::vector<ParameterRange> parameters_of(const std::string& sound, Fields& keys,
+                                          const std::vector<audio::Instrument>& orchestra) {
+    const auto found = std::ranges::find(orchestra, sound, &audio::Instrument::name);
+    std::vector<std::string> known;
+    for (const audio::Instrument& instrument : orchestra) known.push_back(instrument.name);
+    keys.require(found != orchestra.end(), "instrument", fmt::format("instrument = \"{}\"", sound),
+                 fmt::format("one of {}", fmt::join(known, ", ")));
+    std::vector<ParameterRange> parameters;
+    if (found == orchestra.end()) return parameters;  // nothing is read, only described
+    for (const audio::Parameter& p : found->parameters) parameters.push_back({p.name, p.minimum, p.maximum});
+    return parameters;
+}
+
+/// An instrument as it is written: `mesh` is a name (empty: KIND.obj).
+struct InstrumentDraft {
+    Instrument instrument;
+    const std::vector<audio::Instrument>* orchestra = nullptr;  ///< the sounds that there are
+};
+
+void sound_keys(Fields& keys, InstrumentDraft& written) {
+    audio::Voice& voice = written.instrument.voice;
+    keys.text("instrument", voice.instrument, "Name of the instrument in the orchestra.",
+              {.otherwise = "the kind", .example = "\"drum\""});
+    keys.number("gain_db", voice.gain_db, {-60, 20, "dB"}, "Gain.");
+    keys.number("pan", voice.pan, {0, 1}, "0 left ... 1 right, constant power.",
+                {.otherwise = "from the position's x", .example = "0.5"});
+    static const std::vector<audio::Instrument> kNone;
+    keys.parameters(
+        voice.parameters,
+        parameters_of(voice.instrument, keys, written.orchestra ? *written.orchestra : kNone), {-1e9, 1e9},
+        "A parameter of the orchestra's instrument. The header of assets/orchestra/musicworld.orc lists "
+        "them with their ranges.");
+}
+const TableKind<InstrumentDraft> kSound = {{"sound", "The orchestra's instrument and its parameters."},
+                                           sound_keys};
+
+// [[instrument]]
+
+void body_keys(Fields& keys, InstrumentDraft& written) {
+    Instrument& instrument = written.instrument;
+    sim::BodyDefinition& body = instrument.body;
+    std::string shape = "superquadric";
+    keys.choice("shape", shape, {{"superquadric", "superquadric"}}, "Surface that is struck.");
+    Eigen::Vector3d size(0, 0, 0), position(0, 0, 0);
+    Eigen::Vector2d exponents(1, 1);
+    keys.vector(
+        "size", size, {0.001, 10, "m"},
+        "Full extents along the body's x, y, z. y is the axis of a drum, bell or cymbal; x the direction of "
+        "a string.",
+        {.need = Need::given, .example = "[0.36, 0.14, 0.36]"});
+    keys.vector(
+        "exponents", exponents, {0.1, 1.9},
+        "Exponents e1 (profile along y) and e2 (section across y) of the superquadric "
+        "((|x/a|^(2/e2) + |z/c|^(2/e2))^(e2/e1)) + |y/b|^(2/e1) = 1: [0.1, 1] a drum, [1, 1] an ellipsoid, "
+        "[0.2, 0.2] a bar.");
+    keys.vector("position", position, {-kRoomM, kRoomM, "m"},
+                "Centre of the body, world: y up, the player at the origin looks along -z.",
+                {.need = Need::given, .example = "[0, 0.7, -0.45]"});
+    body.shape.semi_axes = 0.5 * size;
+    body.shape.e1 = exponents[0], body.shape.e2 = exponents[1];
+    body.world_from_body.translation() = position;
+    Eigen::Quaterniond orientation;
+    orientation_keys(keys, orientation);
+    body.world_from_body.linear() = orientation.toRotationMatrix();
+    keys.table("material", body.material, kMaterial);
+    keys.table("visual", body.visual, kVisual);
+    keys.choice("modes", body.visual.enabled, {{"rigid", false}, {"linear", true}},
+                "How deformable: rigid, or the six linear modes (scale and shear) of the body.");
+    body.stand.pivot_body = {0, body.shape.semi_axes.y(), 0};
+    keys.table("stand", instrument, kStand);
+    keys.number("restitution", body.restitution, {0, 1},
+                "Share of its speed that a stick keeps when it rebounds.");
+}
+
+void zones_keys(Fields& keys, Instrument& instrument) {
+    int note = 38;
+    keys.integer(
+        "midi_note", note, {0, 127},
+        "MIDI note of zones that name none (General MIDI percussion: 38 snare, 42 closed hi-hat, 49 crash, "
+        "51 ride ...).");
+    keys.tables(
+        "zones", ZoneDraft(), kZone,
+        "Parts of the surface that sound, in the body's coordinates at rest; where none holds the struck "
+        "point the body is silent. Without zones all of the surface sounds, as one zone `body`. The first "
+        "zone is zone 0 of the orchestra's instrument, the next zone 1.",
+        [&](Fields&, const ZoneDraft& zone) {
+            instrument.body.zones.push_back(zone.zone);
+            instrument.zones.push_back({zone.zone.name, zone.midi_note.value_or(note)});
+        });
+    if (!instrument.zones.empty()) return;
+    instrument.body.zones.push_back({"body", 0, 100, -100, 100});
+    instrument.zones.push_back({"body", note});
+}
+
+void instrument_keys(Fields& keys, InstrumentDraft& written) {
+    Instrument& instrument = written.instrument;
+    keys.text("name", instrument.name, "Name, different from all others.",
+              {.need = Need::here, .example = "\"snare\""});
+    keys.choice("kind", instrument.kind,
+                {{"drum", "drum"}, {"bell", "bell"}, {"string", "string"}, {"cymbal", "cymbal"}},
+                "What it is; chooses the defaults.", {.need = Need::here, .example = "\"drum\""});
+    body_keys(keys, written);
+    zones_keys(keys, instrument);
+    std::string mesh = instrument.kind + ".obj";
+    keys.text("mesh", mesh,
+              "Mesh (OBJ, GLB, glTF or STL) that is drawn, a file beside the kit or a bundled one; it is "
+              "scaled by the "
+              "half extents, so it should fill [-1, 1] in x, y, z.",
+              {.otherwise = "KIND.obj", .example = "\"drum.obj\""});
+    instrument.mesh = mesh;
+    keys.table("look", instrument.look, kLook);
+    audio::Voice& voice = instrument.voice;
+    voice.name = instrument.name;
+    voice.instrument = instrument.kind;
+    voice.pan = std::clamp(0.5 + 0.5 * instrument.body.world_from_body.translation().x(), 0.08, 0.92);
+    keys.table("sound", written, kSound);
+    keys.text("choke_group", voice.choke_group,
+              "Instruments of one group silence each other (an open and a closed hi-hat); empty: none.");
+    keys.number("velocity_curve", instrument.velocity_gamma, {0.2, 5},
+                "Exponent g of loudness: a stroke of v m/s sounds like one of 5 (v / 5)^g m/s.");
+}
+const TableKind<InstrumentDraft> kInstrument = {
+    {"instrument", "One playable thing.", Below::defaults_of_kind}, instrument_keys};
+
+// The file
+
+/// What each file of a kit says for itself.
+struct KitHeader {
+    std::string name, description;
+    std::vector<std::string> include;
+};
+void header_keys(Fields& keys, KitHeader& header) {
+    keys.text("name", header.name, "Name of the kit.", {.otherwise = "the file's", .example = "\"Drums\""});
+    keys.text("description", header.description, "One line about it.");
+    keys.texts("include", header.include,
+               "Further kit files, relative to this one or among the bundled kits. Their instruments join "
+               "this kit's.",
+               {.example = "[\"bells.toml\"]"});
+}
+
+/// A kit as its files say it.
+struct KitDraft {
+    Kit kit;
+    std::vector<audio::Instrument> orchestra;
+    std::set<std::string> names;  ///< of its instruments
+};
+
+void stick_keys(Fields& keys, StickDefinition& stick) {
+    keys.number("length", stick.length_m, {0.05, 2, "m"}, "Length of the drawn stick, hand to tip.");
+    keys.vector("tip", stick.tip, {-2, 2, "m"}, "Centre of the tip in the tracked body's frame.",
+                {.otherwise = "the trace's", .example = "[0, 0, -0.4]"});
+    keys.vector("shaft", stick.shaft, {-1e3, 1e3},
+                "Direction from hand to tip in the tracked body's frame, any length but 0.",
+                {.otherwise = "the trace's", .example = "[0, 0, -1]"});
+    if (stick.shaft) {
+        keys.require_direction(*stick.shaft, "shaft");
+        stick.shaft->normalize();
+    }
+    keys.number("radius", stick.radius_m, {0.001, 0.1, "m"}, "Radius of the tip.");
+    keys.number("mass", stick.mass_kg, {0.001, 5, "kg"}, "Effective mass of the stick in a stroke.");
+    std::string mesh = stick.mesh.empty() ? "stick.obj" : stick.mesh.string();
+    keys.text("mesh", mesh,
+              "Mesh of the stick: 0.40 m along -z from the hand at the origin; a file beside the kit or a "
+              "bundled one.");
+    stick.mesh = mesh;
+}
+const TableKind<StickDefinition> kStick = {{"stick", "The sticks."}, stick_keys};
+
+const TableKind<render::Room> kRoom = {{"room", "The room."}, room_keys};
+
+void defaults_keys(Fields& keys, KitDraft&) {
+    for (const char* kind : {"drum", "bell", "string", "cymbal"}) keys.partial_table(kind, kInstrument);
+}
+const TableKind<KitDraft> kDefaults = {
+    {"defaults", "What instruments of a kind have unless they say otherwise."}, defaults_keys};
+
+void kit_keys(Fields& keys, KitDraft& written) {
+    KitHeader header;
+    header_keys(keys, header);
+    Kit& kit = written.kit;
+    keys.table("stick", kit.stick, kStick, [&](Fields& at, StickDefinition& stick) {
+        stick.mesh = find_file(at, "mesh", stick.mesh, kit.file, "meshes");
+    });
+    keys.table("camera", kit.camera, kCamera);
+    keys.table("room", kit.room, kRoom);
+    keys.table("defaults", written, kDefaults);
+    keys.tables(
+        "instrument", InstrumentDraft{{}, &written.orchestra}, kInstrument,
+        "The playable things, 1 to 64 with all included files.", [&](Fields& at, InstrumentDraft& read) {
+            Instrument& instrument = read.instrument;
+            instrument.body.name = instrument.name;
+            instrument.body.stick_mass_kg = kit.stick.mass_kg;
+            instrument.mesh = find_file(at, "mesh", instrument.mesh, kit.file, "meshes");
+            at.require(written.names.insert(instrument.name).second, "",
+                       fmt::format("a second instrument \"{}\"", instrument.name), "a name of its own");
+            kit.instruments.push_back(instrument);
+        });
+}
+
+const TableKind<KitDraft> kKitFile = {{"kit",
+                                       "A kit file (TOML). Lengths in m, times in s, y up, right-handed. "
+                                       "Values come from the kit, then the files that "
+                                       "it includes in their order, then defaults.toml of the bundled kits; "
+                                       "of an instrument: from itself, then "
+                                       "[defaults.KIND] of the same files. Tables are merged key by key."},
+                                      kit_keys};
+
+// Reading
+
+/// Adds a file of a kit: the kit itself first, then its includes in order, the assets' defaults last.
+void load(Kit& kit, std::vector<TomlFile>& documents, const fs::path& file) {
+    if (std::ranges::find(kit.files, file) != kit.files.end()) return;
     if (kit.files.size() > 32)
         throw BadInput(
             fmt::format("{}: error: found more than 32 included files, expected fewer", file.string()));
@@ -51,49 +328,29 @@ void load(KitFiles& kit, const fs::path& file) {
             includes.push_back(find_file(keys, "include", name, file, "kits"));
     };
     read_toml(alone, "the kit", read_header, false);
-    kit.documents.push_back(std::move(alone.front()));
+    if (kit.files.empty()) kit.name = header.name, kit.description = header.description;
     kit.files.push_back(file);
-    kit.headers.push_back(header);
-    for (const fs::path& include : includes) load(kit, include);
-}
-
-void check_count(const Kit& kit) {
-    const std::string file = kit.file.string();
-    if (kit.instruments.empty())
-        throw BadInput(fmt::format("{}:1:1: error: found no [[instrument]], expected at least one", file));
-    if (kit.instruments.size() > 64)
-        throw BadInput(fmt::format("{}:1:1: error: found {} instruments, expected at most 64", file,
-                                   kit.instruments.size()));
+    documents.push_back(std::move(alone.front()));
+    for (const fs::path& include : includes) load(kit, documents, include);
 }
 
 }  // namespace
 
 Kit read_kit(const fs::path& file) {
-    KitFiles files;
-    load(files, file);
-    load(files, assets_folder() / "kits" / "defaults.toml");
-
     KitDraft written;
-    written.orchestra = audio::read_instruments(assets_folder() / "orchestra" / "musicworld.orc");
-    written.take_stick = [&](Fields& at, StickDefinition& stick) {
-        stick.mesh = find_file(at, "mesh", stick.mesh, file, "meshes");
-    };
     Kit& kit = written.kit;
-    std::set<std::string> names;
-    written.take_instrument = [&](Fields& at, Instrument& instrument) {
-        instrument.body.name = instrument.name;
-        instrument.body.stick_mass_kg = kit.stick.mass_kg;
-        instrument.mesh = find_file(at, "mesh", instrument.mesh, file, "meshes");
-        at.require(names.insert(instrument.name).second, "",
-                   fmt::format("a second instrument \"{}\"", instrument.name), "a name of its own");
-        kit.instruments.push_back(instrument);
-    };
     kit.file = file;
-    kit.files = files.files;
-    read_toml(files.documents, "the kit", [&](Fields& keys) { kKitFile.keys(keys, written); });
-    kit.name = files.headers.front().name;
-    kit.description = files.headers.front().description;
-    check_count(kit);
+    std::vector<TomlFile> documents;
+    load(kit, documents, file);
+    load(kit, documents, assets_folder() / "kits" / "defaults.toml");
+    written.orchestra = audio::read_instruments(assets_folder() / "orchestra" / "musicworld.orc");
+    read_toml(documents, "the kit", [&](Fields& keys) { kKitFile.keys(keys, written); });
+    if (kit.instruments.empty())
+        throw BadInput(
+            fmt::format("{}:1:1: error: found no [[instrument]], expected at least one", file.string()));
+    if (kit.instruments.size() > 64)
+        throw BadInput(fmt::format("{}:1:1: error: found {} instruments, expected at most 64", file.string(),
+                                   kit.instruments.size()));
     return kit;
 }
 
@@ -101,9 +358,9 @@ FormatDescription kit_format() {
     KitDraft written;
     std::vector<TomlFile> defaults;
     defaults.emplace_back(assets_folder() / "kits" / "defaults.toml", TomlKind{"the kits' defaults", ""});
-    written.take_stick = [](Fields&, StickDefinition&) {};
-    written.take_instrument = [](Fields&, Instrument&) {};
+    written.kit.file = assets_folder() / "kits" / "defaults.toml";
     read_toml(defaults, "the kits' defaults", [&](Fields& keys) { kKitFile.keys(keys, written); });
+    written.kit.stick.mesh = written.kit.stick.mesh.filename();
     return describe_format(kKitFile, written);
 }
 

@@ -11,6 +11,8 @@
 
 namespace app {
 
+struct FormatDescription;
+
 /// What a zone of an instrument sends to MIDI.
 struct ZoneSound {
     std::string name;
@@ -55,5 +57,9 @@ struct Kit {
 /// relative to the kit or to the assets. Throws BadInput with FILE:LINE:COLUMN for whatever is unknown,
 /// missing or out of range.
 [[nodiscard]] Kit read_kit(const std::filesystem::path& file);
+
+/// Keys, ranges and defaults of kit files. The defaults of [stick], [camera] and [room] are those of the bundled
+/// defaults.toml.
+[[nodiscard]] FormatDescription kit_format();
 
 }  // namespace app

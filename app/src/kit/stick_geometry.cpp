@@ -10,16 +10,9 @@ StickGeometry stick_geometry(const tracking::Trace& trace, const StickDefinition
     StickGeometry geometry;
     geometry.radius_m = stick.radius_m;
     geometry.length_m = stick.length_m;
-    for (const auto& tip : {tip_option, stick.tip, trace.tip})
-        if (tip) {
-            geometry.tip = *tip;
-            break;
-        }
-    for (const auto& shaft : {shaft_option, stick.shaft, trace.shaft})
-        if (shaft) {
-            geometry.shaft = shaft->normalized();
-            break;
-        }
+    geometry.tip = tip_option.value_or(stick.tip.value_or(trace.tip.value_or(geometry.tip)));
+    geometry.shaft =
+        shaft_option.value_or(stick.shaft.value_or(trace.shaft.value_or(geometry.shaft))).normalized();
     return geometry;
 }
 

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "process/clock.h"
+#include "statistics/statistics.h"
+
 namespace app {
 namespace {
 
@@ -78,7 +81,7 @@ void add_deadlines(LatencyReport& report, const PlayResult& play, const Realtime
     report.strokes = {"strokes", "sounded, by a note within 30 ms",
                       static_cast<std::size_t>(play.score.true_contacts),
                       static_cast<std::size_t>(play.score.missed)};
-    const auto output_lead_ns = std::llround(1e9 * realtime.output_lead_s);
+    const auto output_lead_ns = to_ns(realtime.output_lead_s);
     report.blocks =
         deadline("blocks", "of sound, done before they are due", realtime.blocks,
                  [&](const audio::BlockTiming& b) { return b.done_ns - b.planned_ns > output_lead_ns; });

@@ -7,7 +7,6 @@
 
 #include "files/output_folder.h"
 #include "process/clock.h"
-#include "process/stopwatch.h"
 #include "process/thread_priority.h"
 #include "statistics/statistics.h"
 

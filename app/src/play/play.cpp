@@ -14,8 +14,9 @@
 #include "play/play_products.h"
 #include "play/play_setup.h"
 #include "play/strike_pipeline.h"
+#include "process/clock.h"
 #include "process/progress_bar.h"
-#include "sticks/replay.h"
+#include "sticks/predictors.h"
 #include "sticks/stick_filters.h"
 
 namespace app {

@@ -9,7 +9,7 @@
 #include "kit/stick_geometry.h"
 #include "play/play_result.h"
 #include "play/play_setup.h"
-#include "process/stopwatch.h"
+#include "process/clock.h"
 
 namespace app {
 

@@ -8,7 +8,6 @@
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/checksum.h"
-#include "sticks/auto_predictor.h"
 #include "sticks/predictors.h"
 
 namespace app {

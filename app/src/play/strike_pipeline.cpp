@@ -4,7 +4,8 @@
 #include <iterator>
 
 #include "play/play_setup.h"
-#include "sticks/auto_predictor.h"
+#include "sticks/predictors.h"
+#include "sticks/stick.h"
 
 namespace app {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "kit/kit.h"
 #include "play/play_options.h"
-#include "process/stopwatch.h"
+#include "process/clock.h"
 #include "sticks/stick.h"
 #include "strikes/drawn_strikes.h"
 #include "strikes/strike_scheduler.h"

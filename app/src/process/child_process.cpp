@@ -22,38 +22,29 @@ namespace app {
 namespace fs = std::filesystem;
 namespace {
 
-class FileActions {
-public:
-    FileActions() { posix_spawn_file_actions_init(&actions_); }
-    ~FileActions() { posix_spawn_file_actions_destroy(&actions_); }
-    FileActions(const FileActions&) = delete;
-    FileActions& operator=(const FileActions&) = delete;
-    void become(int descriptor, int of_child) {
-        if (descriptor >= 0) posix_spawn_file_actions_adddup2(&actions_, descriptor, of_child);
-    }
-    [[nodiscard]] const posix_spawn_file_actions_t* get() const { return &actions_; }
+/// What posix_spawn does in the child before it becomes the program.
+struct Preparation {
+    posix_spawn_file_actions_t files{};
+    posix_spawnattr_t attributes{};
 
-private:
-    posix_spawn_file_actions_t actions_{};
-};
-
-class Attributes {
-public:
-    explicit Attributes(bool own_group) {
-        posix_spawnattr_init(&attributes_);
+    explicit Preparation(bool own_group) {
+        posix_spawn_file_actions_init(&files);
+        posix_spawnattr_init(&attributes);
         sigset_t none;
         sigemptyset(&none);
-        posix_spawnattr_setsigmask(&attributes_, &none);  // whatever this thread has blocked
-        posix_spawnattr_setflags(&attributes_, static_cast<short>(POSIX_SPAWN_SETSIGMASK |
-                                                                  (own_group ? POSIX_SPAWN_SETPGROUP : 0)));
+        posix_spawnattr_setsigmask(&attributes, &none);  // whatever this thread has blocked
+        posix_spawnattr_setflags(&attributes, static_cast<short>(POSIX_SPAWN_SETSIGMASK |
+                                                                 (own_group ? POSIX_SPAWN_SETPGROUP : 0)));
     }
-    ~Attributes() { posix_spawnattr_destroy(&attributes_); }
-    Attributes(const Attributes&) = delete;
-    Attributes& operator=(const Attributes&) = delete;
-    [[nodiscard]] const posix_spawnattr_t* get() const { return &attributes_; }
-
-private:
-    posix_spawnattr_t attributes_{};
+    ~Preparation() {
+        posix_spawnattr_destroy(&attributes);
+        posix_spawn_file_actions_destroy(&files);
+    }
+    Preparation(const Preparation&) = delete;
+    Preparation& operator=(const Preparation&) = delete;
+    void become(int descriptor, int of_child) {
+        if (descriptor >= 0) posix_spawn_file_actions_adddup2(&files, descriptor, of_child);
+    }
 };
 
 FileDescriptor open_file(const fs::path& file, int flags) {
@@ -83,11 +74,6 @@ std::vector<std::string> environment_with(const std::vector<std::string>& variab
     return all;
 }
 
-std::string read_text(const fs::path& file) {
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
 }  // namespace
 
 fs::path program_beside(const std::string& name) {
@@ -95,19 +81,18 @@ fs::path program_beside(const std::string& name) {
 }
 
 int start_child(const ChildStart& start) {
-    FileActions files;
-    files.become(start.in, STDIN_FILENO);
-    files.become(start.out, STDOUT_FILENO);
-    files.become(start.err, STDERR_FILENO);
+    Preparation child_side(start.own_group);
+    child_side.become(start.in, STDIN_FILENO);
+    child_side.become(start.out, STDOUT_FILENO);
+    child_side.become(start.err, STDERR_FILENO);
     for (const int descriptor : start.inherited)
-        files.become(descriptor, descriptor);  // onto itself: open across exec in the child alone
-    const Attributes attributes(start.own_group);
+        child_side.become(descriptor, descriptor);  // onto itself: open across exec in the child alone
     const std::vector<char*> arguments = pointers(start.command);
     const std::vector<std::string> variables = environment_with(start.variables);
     const std::vector<char*> environment = pointers(variables);
     pid_t child = 0;
-    const int error = posix_spawnp(&child, arguments[0], files.get(), attributes.get(), arguments.data(),
-                                   environment.data());
+    const int error = posix_spawnp(&child, arguments[0], &child_side.files, &child_side.attributes,
+                                   arguments.data(), environment.data());
     if (error != 0) throw std::runtime_error("error: " + cannot("start " + start.command[0], error));
     return child;
 }
@@ -125,9 +110,12 @@ void run_child(const std::vector<std::string>& command, const fs::path& log,
     const FileDescriptor none = open_file("/dev/null", O_RDONLY);
     const FileDescriptor messages = open_file(log, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND);
     const int child = start_child({command, variables, none.get(), messages.get(), messages.get(), false});
-    if (const int status = wait_for_child(child); status != 0)
-        throw std::runtime_error(fmt::format("error: found {} ended with status {}, expected 0; it said: {}",
-                                             command[0], status, one_line(read_text(log), 400)));
+    const int status = wait_for_child(child);
+    if (status == 0) return;
+    std::ifstream said(log, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(said), std::istreambuf_iterator<char>()};
+    throw std::runtime_error(fmt::format("error: found {} ended with status {}, expected 0; it said: {}",
+                                         command[0], status, one_line(text, 400)));
 }
 
 }  // namespace app

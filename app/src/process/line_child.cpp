@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <csignal>
 #include <stdexcept>
 
@@ -20,10 +19,6 @@
 
 namespace app {
 namespace {
-
-double now_s() {
-    return to_s(monotonic_ns());
-}
 
 [[noreturn]] void fail_system(const char* action) {
     throw std::runtime_error(cannot(action));
@@ -36,13 +31,6 @@ std::FILE* memory_file() {
     std::FILE* file = fdopen(descriptor, "w+");
     if (!file) fail_system("open a temporary file");
     return file;
-}
-
-/// Lets the system kill a process group when the other end of this pipe closes.
-void kill_at_end(int pipe_end, int group) {
-    if (fcntl(pipe_end, F_SETOWN, -group) != 0 || fcntl(pipe_end, F_SETSIG, SIGKILL) != 0 ||
-        fcntl(pipe_end, F_SETFL, O_ASYNC) != 0)
-        fail_system("tie the child's end to this program's");
 }
 
 }  // namespace
@@ -61,22 +49,21 @@ LineChild::LineChild(const std::string& command) : errors_(memory_file()) {
                         true,
                         {life.out.get()}});
     life_ = std::move(life.in);
-    try {
-        kill_at_end(life.out.get(), pid_);
-    } catch (...) {
-        (void)collect();
-        throw;
-    }
+    // Lets the system kill the process group when the other end of this pipe closes.
+    const int end = life.out.get();
+    if (fcntl(end, F_SETOWN, -pid_) == 0 && fcntl(end, F_SETSIG, SIGKILL) == 0 &&
+        fcntl(end, F_SETFL, O_ASYNC) == 0)
+        return;
+    const std::string why = cannot("tie the child's end to this program's");
+    (void)collect();
+    throw std::runtime_error(why);
 }
 
 LineChild::~LineChild() {
     shutdown(socket_.get(), SHUT_WR);
-    const double deadline = now_s() + kFarewellS;
-    char ignored[4096];
-    pollfd socket{socket_.get(), POLLIN, 0};
-    for (double left = kFarewellS; pid_ > 0 && left > 0; left = deadline - now_s()) {
-        if (poll(&socket, 1, static_cast<int>(std::ceil(left * 1e3))) <= 0) break;
-        if (recv(socket_.get(), ignored, sizeof ignored, 0) <= 0) break;
+    const std::int64_t deadline_ns = monotonic_ns() + to_ns(kFarewellS);
+    while (pid_ > 0 && readable_until(socket_.get(), deadline_ns) &&
+           recv(socket_.get(), chunk_.data(), chunk_.size(), 0) > 0) {
     }
     if (pid_ > 0) collect();
 }
@@ -119,11 +106,10 @@ void LineChild::fail_ended() {
                     words.empty() ? "" : fmt::format(" saying \"{}\"", words)));
 }
 
-void LineChild::wait_for(short event, double deadline_s, double timeout_s) {
+void LineChild::wait_for(short event, std::int64_t deadline_ns, double timeout_s) {
     pollfd socket{socket_.get(), event, 0};
     for (;;) {
-        const double left_ms = std::ceil(std::max(deadline_s - now_s(), 0.0) * 1e3);
-        const int ready = poll(&socket, 1, static_cast<int>(left_ms));
+        const int ready = poll(&socket, 1, milliseconds_until(deadline_ns));
         if (ready > 0) return;
         if (ready < 0 && errno != EINTR) fail_system("wait for the child");
         if (ready == 0)
@@ -136,20 +122,20 @@ void LineChild::wait_for(short event, double deadline_s, double timeout_s) {
 
 void LineChild::send(std::string_view text, double timeout_s) {
     if (pid_ <= 0) throw std::runtime_error("found that the child has ended, expected it to answer");
-    const double deadline = now_s() + timeout_s;
+    const std::int64_t deadline_ns = monotonic_ns() + to_ns(timeout_s);
     while (!text.empty()) {
         const ssize_t sent = ::send(socket_.get(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
         if (sent >= 0)
             text.remove_prefix(static_cast<std::size_t>(sent));
         else if (errno == EAGAIN)
-            wait_for(POLLOUT, deadline, timeout_s);
+            wait_for(POLLOUT, deadline_ns, timeout_s);
         else if (errno != EINTR)
-            fail_ended();
+            return;  // it has ended: receive() says how, and what it had sent before
     }
 }
 
 std::string_view LineChild::receive(double timeout_s) {
-    const double deadline = now_s() + timeout_s;
+    const std::int64_t deadline_ns = monotonic_ns() + to_ns(timeout_s);
     received_.erase(0, taken_);
     taken_ = 0;
     std::size_t end = received_.find('\n');
@@ -157,7 +143,7 @@ std::string_view LineChild::receive(double timeout_s) {
         if (received_.size() > kLongestLine)
             throw std::runtime_error(
                 fmt::format("found a line of more than {} bytes, expected a short one", kLongestLine));
-        wait_for(POLLIN, deadline, timeout_s);
+        wait_for(POLLIN, deadline_ns, timeout_s);
         const std::size_t before = received_.size();
         const ssize_t got = recv(socket_.get(), chunk_.data(), chunk_.size(), 0);
         if (got == 0 || (got < 0 && errno != EINTR)) fail_ended();

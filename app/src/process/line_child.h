@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -17,7 +18,7 @@ namespace app {
 /// However this program ends, the system then kills the group (SIGKILL): the child inherits the end of a pipe
 /// whose other end only this program has, and the system signals to the group when that closes (fcntl:
 /// O_ASYNC, F_SETOWN, F_SETSIG). That needs no process or thread that lives on. What it does not reach: a
-/// process that leaves the group, and a group in which nobody keeps the inherited descriptor open.
+/// process that leaves the group, and a group in which no process keeps the inherited descriptor open.
 ///
 /// All faults are thrown as std::runtime_error "found ..., expected ...; ...", one line.
 class LineChild {
@@ -40,8 +41,8 @@ private:
     struct CloseFile {
         void operator()(std::FILE* file) const { (void)std::fclose(file); }
     };
-    /// Waits until the socket can be read (or written); throws if that takes longer than until `deadline_s`.
-    void wait_for(short event, double deadline_s, double timeout_s);
+    /// Waits until the socket can be read (or written); throws if that takes longer than until `deadline_ns`.
+    void wait_for(short event, std::int64_t deadline_ns, double timeout_s);
     [[noreturn]] void fail_ended();
     /// Kills what is left of the child and collects it; returns how it ended by itself (as wait_for_child()).
     std::optional<int> collect();

@@ -6,35 +6,17 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <array>
+
 namespace app {
 namespace {
 
-/// SCHED_FIFO priority; 0: not of real time.
-int fifo_of(ThreadRole role) {
-    switch (role) {
-        case ThreadRole::sound:
-            return 70;
-        case ThreadRole::sensing:
-            return 60;
-        case ThreadRole::control:
-            return 50;
-        default:
-            return 0;
-    }
-}
-
-int nice_of(ThreadRole role) {
-    switch (role) {
-        case ThreadRole::simulation:
-            return -8;
-        case ThreadRole::drawing:
-            return 0;
-        case ThreadRole::writing:
-            return 10;
-        default:
-            return 0;
-    }
-}
+struct Scheduling {
+    int fifo;  // priority of SCHED_FIFO; 0: not of real time
+    int nice;
+};
+/// By ThreadRole.
+constexpr std::array<Scheduling, 6> kScheduling = {{{70, 0}, {60, 0}, {50, 0}, {0, -8}, {0, 0}, {0, 10}}};
 
 bool schedule(int policy, int priority) {
     sched_param parameter{};
@@ -61,10 +43,10 @@ std::string set_thread_priority(ThreadRole role, bool realtime) {
     nice_before = getpriority(PRIO_PROCESS, 0);
     if (realtime && realtime_permitted()) {
         // Without SCHED_RESET_ON_FORK Csound's or a driver's own threads would inherit it.
-        const int fifo = fifo_of(role);
+        const auto [fifo, nice] = kScheduling[static_cast<std::size_t>(role)];
         if (fifo > 0 && schedule(SCHED_FIFO | SCHED_RESET_ON_FORK, fifo))
             return fmt::format("SCHED_FIFO {}", fifo);
-        return fifo == 0 && set_nice(nice_of(role)) ? fmt::format("nice {}", nice_of(role)) : "as it was";
+        return fifo == 0 && set_nice(nice) ? fmt::format("nice {}", nice) : "as it was";
     }
     const bool behind = role == ThreadRole::drawing || role == ThreadRole::writing;
     return behind && schedule(SCHED_IDLE, 0) ? "SCHED_IDLE" : "as it was";

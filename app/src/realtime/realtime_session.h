@@ -25,7 +25,7 @@ namespace app {
 struct RealtimeOptions {
     PlayOptions play;
     /// No source: the trace, replayed. `sticks`: of live sources.
-    SensorOptions sensors{.source = {}, .sticks = {"left", "right"}, .predictors = {}, .program = {}};
+    SensorOptions sensors{{.source = {}, .sticks = {"left", "right"}}, {}, -1, 0, true, {}};
     audio::LiveOptions sound;
     double seconds = 0;      ///< how long; 0: the trace once; live sources: until they end
     bool lead_auto = false;  ///< both leads follow the measured delays, never below those asked for

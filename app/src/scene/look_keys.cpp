@@ -50,4 +50,10 @@ void room_keys(Fields& keys, render::Room& room) {
     keys.number("floor_height", room.floor_height, {-kRoomM, kRoomM, "m"}, "World y of the drawn floor.");
 }
 
+void material_keys(Fields& keys, sim::Material& material) {
+    keys.number("young_pa", material.young_pa, {1e2, 1e13, "Pa"}, "Young's modulus.");
+    keys.number("poisson", material.poisson, {-0.9, 0.495}, "Poisson's ratio.");
+    keys.number("density_kg_m3", material.density_kg_m3, {1, 1e5, "kg/m^3"}, "Density.");
+}
+
 }  // namespace app

@@ -1,5 +1,6 @@
 #pragma once
 #include <render/scene.h>
+#include <sim/modal_body.h>
 
 #include <Eigen/Geometry>
 
@@ -17,6 +18,8 @@ void orientation_keys(Fields& keys, Eigen::Quaterniond& orientation);
 void surface_keys(Fields& keys, render::Appearance& look);
 /// Keys floor_color, wall_color and floor_height.
 void room_keys(Fields& keys, render::Room& room);
+/// Keys young_pa, poisson and density_kg_m3.
+void material_keys(Fields& keys, sim::Material& material);
 extern const TableKind<render::Camera> kCamera;
 
 }  // namespace app

@@ -9,6 +9,8 @@
 
 namespace app {
 
+struct FormatDescription;
+
 inline constexpr double kFarM = 1000;  ///< everything of a scene lies within this of the origin
 
 /// How a body is drawn. Bodies of one kind (copies of one table) have the same shape, material and modes.
@@ -45,6 +47,9 @@ struct Scene : sim::WorldScene {
 /// Reads a scene (TOML, see assets/README.md). `dt_s` stands in for the file's. Throws BadInput with
 /// FILE:LINE:COLUMN for whatever is unknown, missing or out of range.
 [[nodiscard]] Scene read_scene(const std::filesystem::path& file, std::optional<double> dt_s = {});
+
+/// Keys, ranges and defaults of scene files.
+[[nodiscard]] FormatDescription scene_format();
 
 /// A scene by path, or by the name of a bundled one ("human" is assets/scenes/human.toml).
 [[nodiscard]] std::filesystem::path find_scene(const std::string& name_or_path);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <lo/lo.h>
 #include <lo/lo_lowlevel.h>
-#include <poll.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -28,12 +27,6 @@ constexpr double kLatest = 1e11;    // s
 constexpr double kNormTolerance = 0.01;
 constexpr double kFractionsPerS = 4294967296.0;  // of a time tag
 
-struct OscPose {
-    std::string_view stick;
-    tracking::PoseSample sample;
-    bool has_time = false;
-};
-
 /// An argument's value. OSC aligns to 4 bytes, less than the union lo_arg wants.
 template <class T>
 T value_of(const lo_arg* argument) {
@@ -44,10 +37,6 @@ T value_of(const lo_arg* argument) {
 
 double seconds_of(const lo_timetag& tag) {
     return tag.sec + tag.frac / kFractionsPerS;
-}
-
-bool is_immediate(const lo_timetag& tag) {
-    return tag.sec == 0 && tag.frac <= 1;
 }
 
 [[noreturn]] void refuse(std::string_view path, const std::string& found, const std::string& expected) {
@@ -93,9 +82,10 @@ std::optional<double> time_of(std::string_view path, std::string_view types, lo_
            "the first of 4 or 8 to be a time: a double or a time tag");
 }
 
-OscPose decode(std::string_view path, std::string_view types, lo_arg** arguments, const lo_timetag& bundle) {
-    OscPose pose;
-    pose.stick = stick_of(path);
+/// Adds what a message says to the source; `bundle`: the time tag that it came with.
+void decode(std::string_view path, std::string_view types, lo_arg** arguments, const lo_timetag& bundle,
+            OscSource& source) {
+    const std::string_view stick = stick_of(path);
     if (types.size() != 3 && types.size() != 4 && types.size() != 7 && types.size() != 8)
         refuse(path, fmt::format("{} arguments", types.size()),
                "3 (px py pz) or 7 (.. qw qx qy qz), and perhaps a time before them");
@@ -103,74 +93,37 @@ OscPose decode(std::string_view path, std::string_view types, lo_arg** arguments
     if (time) {
         types.remove_prefix(1);
         ++arguments;
-    } else if (!is_immediate(bundle)) {
+    } else if (bundle.sec != 0 || bundle.frac > 1) {  // not "at once"
         time = seconds_of(bundle);
     }
-    pose.has_time = time.has_value();
-    pose.sample.t_s = time.value_or(0);
+    tracking::PoseSample sample;
+    sample.t_s = time.value_or(0);
     for (int axis = 0; axis < 3; ++axis)
-        pose.sample.position[axis] =
+        sample.position[axis] =
             number_of(path, types[static_cast<std::size_t>(axis)], arguments[axis], kFarthest);
-    pose.sample.has_orientation = types.size() == 7;
-    if (pose.sample.has_orientation)
-        pose.sample.orientation = orientation_of(path, types.substr(3), arguments + 3);
-    return pose;
+    sample.has_orientation = types.size() == 7;
+    if (sample.has_orientation) sample.orientation = orientation_of(path, types.substr(3), arguments + 3);
+    source.put(stick, sample, time.has_value());
+}
+
+int take(const char* path, const char* types, lo_arg** arguments, int count, lo_message message,
+         void* source) {
+    auto& own = *static_cast<OscSource*>(source);
+    try {
+        decode(path, {types, static_cast<std::size_t>(count)}, arguments, lo_message_get_timestamp(message),
+               own);
+    } catch (const std::invalid_argument& wrong) {
+        own.malformed(wrong.what());
+    }
+    return 0;
+}
+
+thread_local int error_number = 0;  // of the operating system, for liblo's newest error
+void keep_number(int number, const char*, const char*) {
+    error_number = number;
 }
 
 }  // namespace
-
-struct OscSource::Server {
-    LiveIntake intake;
-    lo_server server = nullptr;
-    std::int64_t read_ns = 0;
-
-    Server(const std::string& port, const std::vector<std::string>& sticks) : intake(sticks) {
-        server = lo_server_new_with_proto(port.c_str(), LO_UDP, &keep_number);
-        if (!server) throw std::runtime_error("error: " + cannot("open UDP port " + port, error_number));
-        lo_server_enable_queue(server, 0, 1);  // a bundle's time is when it was measured, not when it is due
-        lo_server_add_method(server, nullptr, nullptr, &take, this);
-    }
-    ~Server() { lo_server_free(server); }
-    Server(const Server&) = delete;
-    Server& operator=(const Server&) = delete;
-
-    static thread_local int error_number;  // of the operating system, for liblo's newest error
-    static void keep_number(int number, const char*, const char*) { error_number = number; }
-
-    void dispatch(std::vector<char> bytes) {  // liblo turns numbers around in place
-        read_ns = monotonic_ns();
-        if (lo_server_dispatch_data(server, bytes.data(), bytes.size()) < 0)
-            intake.malformed(
-                "osc: error: found a datagram that is none of OSC, expected a message or a bundle");
-    }
-    /// Takes one datagram if there is one.
-    void receive(std::int64_t deadline_ns) {
-        const std::int64_t left = std::max<std::int64_t>(0, deadline_ns - monotonic_ns());
-        pollfd watched{lo_server_get_socket_fd(server), POLLIN, 0};
-        if (poll(&watched, 1, static_cast<int>((left + 999'999) / 1'000'000)) <= 0) return;
-        std::vector<char> bytes(kLargestDatagram);
-        const ssize_t size = recv(watched.fd, bytes.data(), bytes.size(), MSG_DONTWAIT);
-        if (size <= 0) return;
-        bytes.resize(static_cast<std::size_t>(size));
-        dispatch(std::move(bytes));
-    }
-    static int take(const char* path, const char* types, lo_arg** arguments, int count, lo_message message,
-                    void* own) {
-        static_cast<Server*>(own)->take(path, {types, static_cast<std::size_t>(count)}, arguments,
-                                        lo_message_get_timestamp(message));
-        return 0;
-    }
-    void take(std::string_view path, std::string_view types, lo_arg** arguments, const lo_timetag& bundle) {
-        try {
-            const OscPose pose = decode(path, types, arguments, bundle);
-            intake.put(pose.stick, pose.sample, pose.has_time, read_ns);
-        } catch (const std::invalid_argument& wrong) {
-            intake.malformed(wrong.what());
-        }
-    }
-};
-
-thread_local int OscSource::Server::error_number = 0;
 
 void check_osc_port(const std::string& port) {
     unsigned number = 0;
@@ -180,40 +133,31 @@ void check_osc_port(const std::string& port) {
             fmt::format("error: found source \"osc:{}\", expected a UDP port such as osc:9000", port));
 }
 
-OscSource::OscSource(const std::string& port, const SourceOptions& options) {
+OscSource::OscSource(const std::string& port, const SourceOptions& options) : LiveSource(options.sticks) {
     check_osc_port(port);
-    server_ = std::make_unique<Server>(port, options.sticks);
+    server_ = lo_server_new_with_proto(port.c_str(), LO_UDP, &keep_number);
+    if (!server_) throw std::runtime_error("error: " + cannot("open UDP port " + port, error_number));
+    lo_server_enable_queue(server_, 0, 1);  // a bundle's time is when it was measured, not when it is due
+    lo_server_add_method(server_, nullptr, nullptr, &take, this);
 }
 
-OscSource::~OscSource() = default;
-
-SourceStatus OscSource::next(SourceSample& sample, std::int64_t deadline_ns) {
-    std::optional<SourceSample> next = server_->intake.take();
-    if (!next) {
-        server_->receive(deadline_ns);
-        next = server_->intake.take();
-    }
-    if (!next) return SourceStatus::waiting;
-    sample = *next;
-    return SourceStatus::sample;
+OscSource::~OscSource() {
+    lo_server_free(server_);
 }
 
-void OscSource::datagram(std::span<const char> bytes) {
-    server_->dispatch({bytes.begin(), bytes.end()});
+void OscSource::receive(std::int64_t deadline_ns) {
+    const int socket = lo_server_get_socket_fd(server_);
+    if (!readable_until(socket, deadline_ns)) return;
+    std::vector<char> bytes(kLargestDatagram);
+    const ssize_t size = recv(socket, bytes.data(), bytes.size(), MSG_DONTWAIT);
+    if (size > 0) datagram({bytes.data(), static_cast<std::size_t>(size)});
 }
 
-const StickNames& OscSource::sticks() const {
-    return server_->intake.sticks();
-}
-
-SourceHead OscSource::head() const {
-    SourceHead head;
-    head.base_s = server_->intake.base_s();
-    return head;
-}
-
-SourceFaults OscSource::faults() const {
-    return server_->intake.faults();
+void OscSource::datagram(std::span<const char> datagram) {
+    read_ns_ = monotonic_ns();
+    std::vector<char> bytes(datagram.begin(), datagram.end());  // liblo turns numbers around in place
+    if (lo_server_dispatch_data(server_, bytes.data(), bytes.size()) < 0)
+        malformed("osc: error: found a datagram that is none of OSC, expected a message or a bundle");
 }
 
 }  // namespace app

@@ -1,9 +1,8 @@
 #pragma once
 #include <cstddef>
-#include <memory>
 #include <span>
 
-#include "sensors/live_intake.h"
+#include "sensors/live_source.h"
 
 namespace app {
 
@@ -14,23 +13,20 @@ namespace app {
 ///               before them, if the source has a clock: its time as a double [s] or as a time tag
 ///
 /// Without a time argument the time tag of the bundle counts, if it has one; else the time of arrival.
-class OscSource final : public SampleSource {
+class OscSource final : public LiveSource {
 public:
     /// Throws BadInput for what is no port, std::runtime_error for one that is taken.
     OscSource(const std::string& port, const SourceOptions& options);
     ~OscSource() override;
 
-    [[nodiscard]] SourceStatus next(SourceSample& sample, std::int64_t deadline_ns) override;
-    [[nodiscard]] const StickNames& sticks() const override;
-    [[nodiscard]] SourceHead head() const override;
-    [[nodiscard]] SourceFaults faults() const override;
-
     /// Takes the bytes of a datagram as if they had arrived.
     void datagram(std::span<const char> bytes);
 
+protected:
+    void receive(std::int64_t deadline_ns) override;
+
 private:
-    struct Server;
-    std::unique_ptr<Server> server_;
+    void* server_;  // lo_server
 };
 
 /// Throws BadInput for what is no port.

@@ -1,26 +1,48 @@
 #include "sensors/record.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <tracking/trace_rows.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
+#include <cerrno>
+#include <cstring>
 #include <stdexcept>
 
-#include "files/recording_file.h"
+#include "files/bad_input.h"
+#include "files/output_folder.h"
 #include "process/clock.h"
 #include "process/stop_signals.h"
 
 namespace app {
+namespace fs = std::filesystem;
 namespace {
 
 constexpr std::int64_t kFlushEveryNs = 200'000'000;
 constexpr double kGapIntervals = 2.5, kLeastGapS = 0.02;
 constexpr double kIntervalSmoothing = 0.1;
 
+/// Writes a native trace that grows: OUT.partial until finish() renames it. What has been flushed is a trace, up
+/// to its last complete line: a stick's first row waits for its second one, without which no trace may have it.
 class Recorder {
 public:
-    explicit Recorder(const RecordOptions& options)
-        : options_(options), file_(options.out), source_(open_source(options.source)) {}
+    explicit Recorder(const RecordOptions& options) : options_(options), partial_(partial_name(options.out)) {
+        file_ = FileDescriptor(open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+        if (!file_)
+            throw BadInput(
+                fmt::format("{}: error: found no way to write it ({}), expected a file that may be written",
+                            partial_.string(), std::strerror(errno)));
+        try {
+            source_ = open_source(options.source);
+        } catch (...) {
+            remove_if_empty();
+            throw;
+        }
+    }
+    ~Recorder() { remove_if_empty(); }
+    Recorder(const Recorder&) = delete;
+    Recorder& operator=(const Recorder&) = delete;
 
     RecordResult run() {
         const StopSignals signals;
@@ -36,19 +58,40 @@ public:
     }
 
 private:
-    struct Stick {
-        RecordedStick told;
+    struct Stick : RecordedStick {
         double interval_s = 0;  // between samples, smoothed
     };
+    struct Row {
+        std::size_t stick;
+        std::string text;
+    };
+
+    /// Any other OUT.partial stays, unless it was finished.
+    void remove_if_empty() const {
+        std::error_code ignored;
+        if (!wrote_) fs::remove(partial_, ignored);
+    }
 
     [[nodiscard]] bool over(std::int64_t ns) const {
-        return options_.seconds > 0 && first_ns_ != 0 &&
-               static_cast<double>(ns - first_ns_) * 1e-9 >= options_.seconds;
+        return options_.seconds > 0 && first_ns_ != 0 && to_s(ns - first_ns_) >= options_.seconds;
     }
 
     void flush() {
-        file_.flush();
         flushed_ns_ = monotonic_ns();
+        std::string text;
+        std::erase_if(rows_, [&](const Row& row) {
+            if (sticks_[row.stick].samples < 2) return false;
+            text += row.text;
+            return true;
+        });
+        if (text.empty()) return;
+        if (!wrote_) text.insert(0, head_);
+        wrote_ = true;
+        if (!file_.write(text))
+            throw std::runtime_error(fmt::format(
+                "{}: error: found no way to write on ({}), expected room; what was recorded until then "
+                "is kept there",
+                partial_.string(), std::strerror(errno)));
     }
 
     void take(const SourceSample& given) {
@@ -57,13 +100,14 @@ private:
         sample.t_s = time_of(given);
         if (given.stick >= sticks_.size()) sticks_.resize(given.stick + 1);
         Stick& stick = sticks_[given.stick];
-        stick.told.name = source_->sticks().names()[given.stick];
-        if (stick.told.samples > 0 && !(sample.t_s > stick.told.last_s)) {
+        stick.name = source_->sticks().names()[given.stick];
+        if (stick.samples > 0 && !(sample.t_s > stick.last_s)) {
             ++result_.late;
             return;
         }
         note(stick, sample.t_s);
-        file_.add(given.stick, stick.told.name, sample);
+        rows_.push_back({given.stick, {}});
+        tracking::append_trace_row(rows_.back().text, stick.name, sample, oriented_);
     }
 
     void begin(const SourceSample& first) {
@@ -72,8 +116,7 @@ private:
                         : first.has_time    ? "the source's"
                                             : "arrival";
         if (source_->replayed())
-            result_.estimate.offset_s =
-                static_cast<double>(first.due_ns - options_.source.epoch_ns) * 1e-9 - first.sample.t_s;
+            result_.estimate.offset_s = to_s(first.due_ns - options_.source.epoch_ns) - first.sample.t_s;
         const SourceHead head = source_->head();
         tracking::Trace keys;
         keys.rate_hz = head.rate_hz;
@@ -82,14 +125,15 @@ private:
         keys.source = fmt::format("recorded; clock of the times: {}{}", result_.clock,
                                   head.base_s == 0 ? "" : fmt::format(" minus {:.0f} s", head.base_s));
         if (!head.origin.empty()) keys.source += "; " + head.origin;
-        file_.begin(keys, head.oriented);
+        oriented_ = head.oriented;
+        head_ = tracking::format_trace_head(keys, oriented_);
     }
 
     /// The time that the recording says: the source's, unchanged but for jumps of its clock.
     double time_of(const SourceSample& given) {
-        const double arrival_s = static_cast<double>(given.read_ns - first_ns_) * 1e-9;
+        const double arrival_s = to_s(given.read_ns - first_ns_);
         if (source_->replayed()) {
-            delays_.add(static_cast<double>(given.read_ns - given.due_ns) * 1e-9);
+            delays_.add(to_s(given.read_ns - given.due_ns));
             return given.sample.t_s;
         }
         if (!given.has_time) return arrival_s;
@@ -98,16 +142,15 @@ private:
     }
 
     static void note(Stick& stick, double t_s) {
-        RecordedStick& told = stick.told;
-        const double interval_s = t_s - told.last_s;
-        told.last_s = t_s;
-        if (told.samples++ == 0) {
-            told.first_s = t_s;
+        const double interval_s = t_s - stick.last_s;
+        stick.last_s = t_s;
+        if (stick.samples++ == 0) {
+            stick.first_s = t_s;
         } else if (stick.interval_s == 0) {
             stick.interval_s = interval_s;
         } else if (interval_s > std::max(kGapIntervals * stick.interval_s, kLeastGapS)) {
-            ++told.gaps;
-            told.longest_gap_s = std::max(told.longest_gap_s, interval_s);
+            ++stick.gaps;
+            stick.longest_gap_s = std::max(stick.longest_gap_s, interval_s);
         } else {
             stick.interval_s += kIntervalSmoothing * (interval_s - stick.interval_s);
         }
@@ -115,8 +158,8 @@ private:
 
     RecordResult finish() {
         for (const Stick& stick : sticks_) {
-            if (stick.told.samples == 1) result_.alone.push_back(stick.told.name);
-            if (stick.told.samples >= 2) result_.sticks.push_back(stick.told);
+            if (stick.samples == 1) result_.alone.push_back(stick.name);
+            if (stick.samples >= 2) result_.sticks.push_back(stick);
         }
         result_.faults = source_->faults();
         const ClockEstimate estimate = clock_.estimate();
@@ -128,12 +171,21 @@ private:
             throw std::runtime_error(fmt::format(
                 "error: found no stick with two samples from {}, expected some{}", options_.source.source,
                 result_.faults.first.empty() ? "" : "; " + result_.faults.first));
-        file_.finish();
+        flush();
+        if (fsync(file_.get()) != 0 && errno != EINVAL && errno != EROFS)
+            throw std::runtime_error(
+                fmt::format("{}: error: found that saving it failed ({}), expected room on the disk",
+                            partial_.string(), std::strerror(errno)));
+        fs::rename(partial_, options_.out);
         return std::move(result_);
     }
 
     const RecordOptions& options_;
-    RecordingFile file_;
+    fs::path partial_;
+    FileDescriptor file_;
+    bool wrote_ = false, oriented_ = true;
+    std::string head_;
+    std::vector<Row> rows_;  // not yet written
     std::unique_ptr<SampleSource> source_;
     SourceClock clock_;
     DelayPercentile delays_;

@@ -7,19 +7,13 @@
 
 #include "files/bad_input.h"
 #include "sensors/osc_source.h"
-#include "sensors/stream_source.h"
+#include "sensors/row_sources.h"
 #include "sensors/trace_source.h"
-#include "sensors/zmq_source.h"
 
 namespace app {
 namespace {
 
 constexpr std::string_view kTrace = "trace:", kStream = "stdin", kZmq = "zmq:", kOsc = "osc:";
-
-[[noreturn]] void refuse(const std::string& source) {
-    throw BadInput(fmt::format(
-        "error: found source \"{}\", expected trace:FILE, stdin, zmq:ENDPOINT or osc:PORT", source));
-}
 
 bool is_word(std::string_view name) {
     return !name.empty() && name.size() <= StickNames::kLongestName &&
@@ -55,10 +49,11 @@ std::unique_ptr<SampleSource> open_source(const SourceOptions& options) {
     const std::string& source = options.source;
     if (source.starts_with(kTrace))
         return std::make_unique<TraceSource>(source.substr(kTrace.size()), options);
-    if (source == kStream) return std::make_unique<StreamSource>(STDIN_FILENO, options);
-    if (source.starts_with(kZmq)) return std::make_unique<ZmqSource>(source.substr(kZmq.size()), options);
+    if (source == kStream) return make_stream_source(STDIN_FILENO, options);
+    if (source.starts_with(kZmq)) return make_zmq_source(source.substr(kZmq.size()), options);
     if (source.starts_with(kOsc)) return std::make_unique<OscSource>(source.substr(kOsc.size()), options);
-    refuse(source);
+    throw BadInput(fmt::format(
+        "error: found source \"{}\", expected trace:FILE, stdin, zmq:ENDPOINT or osc:PORT", source));
 }
 
 }  // namespace app

@@ -48,7 +48,7 @@ struct SourceFaults {
 
 /// What a source says of all its samples.
 struct SourceHead {
-    double rate_hz = 0;  ///< 0: it does not say
+    double rate_hz = 0;  ///< 0: not known
     std::optional<Eigen::Vector3d> tip, shaft;
     bool oriented = true;  ///< its samples may have orientations
     std::string origin;    ///< a trace's `source` key
@@ -103,7 +103,7 @@ void check_source(const SourceOptions& options);
 /// Opens it. Throws as check_source(); std::runtime_error when it cannot be opened now.
 [[nodiscard]] std::unique_ptr<SampleSource> open_source(const SourceOptions& options);
 
-/// The longest time that next() may be asked to wait, so that whoever asks can be stopped [ns].
+/// The longest time that next() may be asked to wait, so that the caller can be stopped [ns].
 inline constexpr std::int64_t kSourcePatienceNs = 50'000'000;
 
 }  // namespace app

@@ -1,24 +1,21 @@
 #include "sensors/sensor_hub.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/eventfd.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cmath>
+#include <array>
 #include <csignal>
 #include <deque>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 
-#include "files/file_descriptor.h"
 #include "process/child_process.h"
 #include "process/clock.h"
 #include "sensors/sensor_memory.h"
-#include "sensors/sensor_process.h"
 #include "sticks/external_predictor.h"
 #include "sticks/predictors.h"
 
@@ -34,16 +31,6 @@ constexpr std::int64_t kLeastSilenceNs = 100'000'000;
 constexpr std::int64_t kFirstSampleWithinNs = 2'000'000'000;  // a player may take the sticks up later
 constexpr double kSilentIntervals = 3;
 
-/// A pipe and an eventfd that the sensors inherit. The pipe ends with this process, however that ends.
-struct Links {
-    FileDescriptor wake = FileDescriptor(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-    Pipe life = make_pipe();
-
-    Links() {
-        if (!wake) throw std::runtime_error("error: " + cannot("make an eventfd"));
-    }
-};
-
 struct HubSensor {
     SensorTask task;
     std::vector<std::size_t> sticks;  ///< indices of the run
@@ -53,131 +40,14 @@ struct HubSensor {
     std::deque<std::int64_t> restarts_ns{};
 };
 
-/// What there is to tell the user of sensors, once each: told from one look at their memory to the next.
-class SensorWatch {
-public:
-    SensorWatch(std::vector<std::string> sticks, std::int64_t epoch_ns);
-
-    /// Silence and its end: no state for 100 ms or 3 intervals between samples, whichever is longer.
-    void stick(std::size_t stick, const std::optional<tracking::StickState>& state,
-               const SensorReport& report, std::vector<SensorEvent>& events);
-    /// Jumps of the source's clock, malformed messages.
-    void source(const std::vector<std::size_t>& sticks, const SensorReport& report,
-                std::vector<SensorEvent>& events);
-
-    [[nodiscard]] SensorEvent ended(const std::vector<std::size_t>& sticks, const SensorReport& report) const;
-    [[nodiscard]] SensorEvent failed(const std::vector<std::size_t>& sticks, const std::string& why) const;
-    [[nodiscard]] SensorEvent restarted(const std::vector<std::size_t>& sticks, const std::string& how,
-                                        std::size_t count, std::size_t most);
-
-private:
-    struct Stick {
-        std::uint64_t samples = 0;
-        std::int64_t heard_ns = 0;         ///< when the newest sample was read, or should have begun to come
-        std::int64_t silent_since_ns = 0;  ///< 0: not silent
-        std::uint64_t pid = 0;             ///< that the counts of the process below are of
-        std::uint64_t jumps = 0, malformed = 0;
-    };
-    [[nodiscard]] SensorEvent event(SensorEvent::Kind kind, const std::vector<std::size_t>& sticks,
-                                    const std::string& text) const;
-    void silence(std::size_t stick, const std::optional<tracking::StickState>& state, std::int64_t now_ns,
-                 std::vector<SensorEvent>& events);
-
-    std::vector<std::string> names_;
-    std::int64_t epoch_ns_;
-    std::vector<Stick> sticks_;
+/// What was last seen of a stick, so that each change is reported once.
+struct SeenStick {
+    std::uint64_t samples = 0;
+    std::int64_t heard_ns = 0;         ///< when the newest sample was read, or should have begun to come
+    std::int64_t silent_since_ns = 0;  ///< 0: not silent
+    std::uint64_t pid = 0;             ///< that the counts of the process below are of
+    std::uint64_t jumps = 0, malformed = 0;
 };
-
-SensorWatch::SensorWatch(std::vector<std::string> sticks, std::int64_t epoch_ns)
-    : names_(std::move(sticks)), epoch_ns_(epoch_ns), sticks_(names_.size()) {}
-
-SensorEvent SensorWatch::event(SensorEvent::Kind kind, const std::vector<std::size_t>& sticks,
-                               const std::string& text) const {
-    SensorEvent event{kind, to_s(monotonic_ns() - epoch_ns_), {}, {}};
-    for (const std::size_t stick : sticks) event.sticks.push_back(names_[stick]);
-    event.message = fmt::format("sensor {}: {}", fmt::join(event.sticks, ", "), text);
-    return event;
-}
-
-void SensorWatch::stick(std::size_t index, const std::optional<tracking::StickState>& state,
-                        const SensorReport& report, std::vector<SensorEvent>& events) {
-    Stick& stick = sticks_[index];
-    const std::int64_t now = monotonic_ns();
-    if (report.phase != SensorPhase::running) return;
-    if (report.pid != stick.pid) stick.heard_ns = now;  // it has just begun
-    stick.pid = report.pid;
-    stick.heard_ns = std::max({stick.heard_ns, report.quiet_until_ns, epoch_ns_});
-    const std::uint64_t samples = state ? state->samples : 0;
-    if (samples != stick.samples) {
-        if (stick.silent_since_ns != 0)
-            events.push_back(
-                event(SensorEvent::Kind::back, {index},
-                      fmt::format("back after {:.2f} s", to_s(state->read_ns - stick.silent_since_ns))));
-        stick.silent_since_ns = 0;
-        stick.samples = samples;
-        stick.heard_ns = std::max(stick.heard_ns, state->read_ns);
-    }
-    const auto intervals_ns = std::llround(kSilentIntervals * report.interval_s * 1e9);
-    const std::int64_t patience =
-        samples == 0 ? kFirstSampleWithinNs : std::max<std::int64_t>(kLeastSilenceNs, intervals_ns);
-    if (stick.silent_since_ns == 0 && now - stick.heard_ns > patience) silence(index, state, now, events);
-}
-
-void SensorWatch::silence(std::size_t index, const std::optional<tracking::StickState>& state,
-                          std::int64_t now_ns, std::vector<SensorEvent>& events) {
-    Stick& stick = sticks_[index];
-    stick.silent_since_ns = stick.heard_ns;
-    const double lasts_s = to_s(now_ns - stick.heard_ns);
-    events.push_back(event(SensorEvent::Kind::silent, {index},
-                           state ? fmt::format("silent for {:.2f} s (last sample at {:.2f} s)", lasts_s,
-                                               to_s(state->read_ns - epoch_ns_))
-                                 : fmt::format("silent for {:.2f} s (no sample yet)", lasts_s)));
-}
-
-void SensorWatch::source(const std::vector<std::size_t>& sticks, const SensorReport& report,
-                         std::vector<SensorEvent>& events) {
-    Stick& first = sticks_[sticks.front()];
-    if (report.jumps > first.jumps)
-        events.push_back(event(
-            SensorEvent::Kind::clock_jumped, sticks,
-            fmt::format("the source's clock jumped by {:+.3f} s ({} so far); its offset is estimated anew",
-                        report.last_jump_s, report.jumps)));
-    if (report.malformed > 0 && first.malformed == 0)
-        events.push_back(event(SensorEvent::Kind::malformed, sticks,
-                               fmt::format("left out what it could not read: {}", report.text.data())));
-    first.jumps = report.jumps;
-    first.malformed = std::max(first.malformed, report.malformed);
-}
-
-SensorEvent SensorWatch::ended(const std::vector<std::size_t>& sticks, const SensorReport& report) const {
-    return event(SensorEvent::Kind::ended, sticks,
-                 fmt::format("the source has ended{}",
-                             sticks.size() == 1 ? fmt::format(" after {} samples", report.read) : ""));
-}
-
-SensorEvent SensorWatch::failed(const std::vector<std::size_t>& sticks, const std::string& why) const {
-    return event(SensorEvent::Kind::failed, sticks, "failed: " + why);
-}
-
-SensorEvent SensorWatch::restarted(const std::vector<std::size_t>& sticks, const std::string& how,
-                                   std::size_t count, std::size_t most) {
-    sticks_[sticks.front()].jumps = 0;
-    return event(
-        SensorEvent::Kind::restarted, sticks,
-        fmt::format("its process {}; started again ({} of at most {} times in 10 s)", how, count, most));
-}
-
-ClockReport clock_report(const SensorReport& report) {
-    ClockReport clock;
-    clock.clock = report.clock == SampleClock::replayed ? "the trace's own, replayed"
-                  : report.clock == SampleClock::source ? "the source's"
-                                                        : "arrival";
-    clock.offset_s = report.offset_s;
-    clock.drift_ppm = report.drift_ppm;
-    clock.delay_p95_ms = report.delay_p95_ms;
-    clock.jumps = static_cast<int>(report.jumps);
-    return clock;
-}
 
 std::string how(int status) {
     return WIFSIGNALED(status) ? fmt::format("was killed by signal {}", WTERMSIG(status))
@@ -188,18 +58,29 @@ std::string how(int status) {
 
 struct SensorHub::Implementation {
     SensorOptions options;
-    Links links;
-    std::vector<SharedSensorMemory> memory;  // one a stick
+    // A pipe and an eventfd that the sensors inherit. The pipe ends with this process, however that ends.
+    FileDescriptor wake = FileDescriptor(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+    Pipe life = make_pipe();
+    std::vector<SharedSensorMemory> memory;  // one for each stick, as the next
+    std::vector<SeenStick> seen;
     std::vector<HubSensor> sensors;
-    SensorWatch watch;
+    std::vector<SensorEvent> events;  // since the last watch()
     int restarts = 0;
 
     explicit Implementation(const SensorOptions& given)
-        : options(given), watch(given.sticks, given.epoch_ns) {
+        : options(given), memory(given.sticks.size()), seen(given.sticks.size()) {
+        if (!wake) throw std::runtime_error("error: " + cannot("make an eventfd"));
         if (options.program.empty())
             options.program = std::filesystem::read_symlink("/proc/self/exe").string();
-        for (std::size_t i = 0; i < options.sticks.size(); ++i) memory.emplace_back();
-        make_tasks();
+        for (std::size_t i = 0; i < memory.size(); ++i) {
+            if (i == 0 || !serves_all_sticks(options.source)) {
+                sensors.push_back({{options, {}, wake.get(), life.out.get()}, {}});
+                sensors.back().task.sticks.clear();
+            }
+            sensors.back().sticks.push_back(i);
+            sensors.back().task.sticks.push_back(options.sticks[i]);
+            sensors.back().task.state_fds.push_back(memory[i].descriptor());
+        }
         for (HubSensor& sensor : sensors) start(sensor);
         wait_until_ready();
     }
@@ -207,39 +88,14 @@ struct SensorHub::Implementation {
     Implementation(const Implementation&) = delete;
     Implementation& operator=(const Implementation&) = delete;
 
-    void make_tasks() {
-        if (serves_all_sticks(options.source)) {
-            std::vector<std::size_t> all;
-            for (std::size_t i = 0; i < options.sticks.size(); ++i) all.push_back(i);
-            sensors.push_back({task_for(all), all});
-        } else {
-            for (std::size_t i = 0; i < options.sticks.size(); ++i) sensors.push_back({task_for({i}), {i}});
-        }
-    }
-    [[nodiscard]] SensorTask task_for(const std::vector<std::size_t>& sticks) const {
-        SensorTask task;
-        task.source = {options.source, {}, options.epoch_ns, options.period_s, 1, false};
-        for (const std::size_t stick : sticks) {
-            task.source.sticks.push_back(options.sticks[stick]);
-            task.state_fds.push_back(memory[stick].descriptor());
-        }
-        task.predictors = options.predictors;
-        task.wake_fd = links.wake.get();
-        task.life_fd = links.life.out.get();
-        task.stall_at_s = options.stall_at_s;
-        task.stall_s = options.stall_s;
-        task.realtime = options.realtime;
-        return task;
-    }
-
-    void start(HubSensor& sensor) {
+    void start(HubSensor& sensor) const {
         for (const std::size_t stick : sensor.sticks) memory[stick]->report.publish({});
         ChildStart child;
         child.command = sensor_arguments(sensor.task);
         child.command.insert(child.command.begin(), options.program);
         child.own_group = options.source != "stdin";  // a terminal lets only the foreground group read
         child.inherited = sensor.task.state_fds;
-        child.inherited.insert(child.inherited.end(), {links.wake.get(), links.life.out.get()});
+        child.inherited.insert(child.inherited.end(), {wake.get(), life.out.get()});
         sensor.pid = start_child(child);
     }
 
@@ -257,21 +113,20 @@ struct SensorHub::Implementation {
 
     void wait_until_ready() {
         const std::int64_t until = monotonic_ns() + to_ns(ready_within_s());
-        for (HubSensor& sensor : sensors)
-            while (report_of(sensor).phase == SensorPhase::starting) {
-                sleep_until_ns(monotonic_ns() + kLookEveryNs);
-                collect(sensor);
-                if (report_of(sensor).phase != SensorPhase::starting) break;
+        for (HubSensor& sensor : sensors) {
+            SensorReport report;
+            while ((report = report_of(sensor)).phase == SensorPhase::starting) {
                 if (sensor.pid < 0)
                     fail_start(
                         fmt::format("error: found that a sensor {}, expected it to run", how(sensor.status)));
                 if (monotonic_ns() > until)
                     fail_start(fmt::format("error: found a sensor not ready after {} s, expected it to run",
                                            ready_within_s()));
+                sleep_until_ns(monotonic_ns() + kLookEveryNs);
+                collect(sensor);
             }
-        for (const HubSensor& sensor : sensors)
-            if (const SensorReport report = report_of(sensor); report.phase == SensorPhase::failed)
-                fail_start(report.text.data());
+            if (report.phase == SensorPhase::failed) fail_start(report.text.data());
+        }
     }
     [[noreturn]] void fail_start(const std::string& message) {
         end_all();
@@ -283,47 +138,106 @@ struct SensorHub::Implementation {
         if (sensor.pid > 0 && waitpid(sensor.pid, &sensor.status, WNOHANG) == sensor.pid) sensor.pid = -1;
     }
 
-    void look_after(HubSensor& sensor, std::vector<SensorEvent>& events) {
+    void add(SensorEvent::Kind kind, const std::vector<std::size_t>& sticks, const std::string& text) {
+        SensorEvent event{kind, to_s(monotonic_ns() - options.epoch_ns), {}, {}};
+        for (const std::size_t stick : sticks) event.sticks.push_back(options.sticks[stick]);
+        event.message = fmt::format("sensor {}: {}", fmt::join(event.sticks, ", "), text);
+        events.push_back(std::move(event));
+    }
+    void fail(const HubSensor& sensor, const std::string& why) {
+        add(SensorEvent::Kind::failed, sensor.sticks, "failed: " + why);
+    }
+
+    /// Silence and its end: no state for 100 ms or 3 intervals between samples, whichever is longer.
+    void watch_stick(std::size_t index) {
+        const SensorReport report = memory[index]->report.read().value_or(SensorReport{});
+        if (report.phase != SensorPhase::running) return;
+        SeenStick& stick = seen[index];
+        const std::optional<tracking::StickState> state = memory[index]->state.read();
+        const std::int64_t now = monotonic_ns();
+        if (report.pid != stick.pid) stick.heard_ns = now;  // it has just begun
+        stick.pid = report.pid;
+        stick.heard_ns = std::max({stick.heard_ns, report.quiet_until_ns, options.epoch_ns});
+        const std::uint64_t samples = state ? state->samples : 0;
+        if (samples != stick.samples) {
+            if (stick.silent_since_ns != 0)
+                add(SensorEvent::Kind::back, {index},
+                    fmt::format("back after {:.2f} s", to_s(state->read_ns - stick.silent_since_ns)));
+            stick.silent_since_ns = 0;
+            stick.samples = samples;
+            stick.heard_ns = std::max(stick.heard_ns, state->read_ns);
+        }
+        const std::int64_t patience =
+            samples == 0 ? kFirstSampleWithinNs
+                         : std::max(kLeastSilenceNs, to_ns(kSilentIntervals * report.interval_s));
+        if (stick.silent_since_ns != 0 || now - stick.heard_ns <= patience) return;
+        stick.silent_since_ns = stick.heard_ns;
+        add(SensorEvent::Kind::silent, {index},
+            fmt::format("silent for {:.2f} s ({})", to_s(now - stick.heard_ns),
+                        state
+                            ? fmt::format("last sample at {:.2f} s", to_s(state->read_ns - options.epoch_ns))
+                            : "no sample yet"));
+    }
+
+    /// Jumps of the source's clock, malformed messages.
+    void watch_source(const HubSensor& sensor) {
+        const SensorReport report = report_of(sensor);
+        SeenStick& first = seen[sensor.sticks.front()];
+        if (report.estimate.jumps > first.jumps)
+            add(SensorEvent::Kind::clock_jumped, sensor.sticks,
+                fmt::format(
+                    "the source's clock jumped by {:+.3f} s ({} so far); its offset is estimated anew",
+                    report.estimate.last_jump_s, report.estimate.jumps));
+        if (report.malformed > 0 && first.malformed == 0)
+            add(SensorEvent::Kind::malformed, sensor.sticks,
+                fmt::format("left out what it could not read: {}", report.text.data()));
+        first.jumps = report.estimate.jumps;
+        first.malformed = std::max(first.malformed, report.malformed);
+    }
+
+    void look_after(HubSensor& sensor) {
         if (sensor.over) return;
         collect(sensor);
         if (sensor.pid > 0) return;
         const SensorReport report = report_of(sensor);
         sensor.over = true;
         if (report.phase == SensorPhase::ended)
-            events.push_back(watch.ended(sensor.sticks, report));
+            add(SensorEvent::Kind::ended, sensor.sticks,
+                fmt::format("the source has ended{}",
+                            sensor.sticks.size() == 1 ? fmt::format(" after {} samples", report.read) : ""));
         else if (report.phase == SensorPhase::failed)
-            events.push_back(watch.failed(sensor.sticks, report.text.data()));
+            fail(sensor, report.text.data());
         else
-            restart(sensor, events);
+            restart(sensor);
     }
 
-    void restart(HubSensor& sensor, std::vector<SensorEvent>& events) {
+    void restart(HubSensor& sensor) {
         const std::int64_t now = monotonic_ns();
         std::deque<std::int64_t>& recent = sensor.restarts_ns;
         while (!recent.empty() && now - recent.front() > kRestartWindowNs) recent.pop_front();
         if (recent.size() == kMostRestarts) {
-            events.push_back(
-                watch.failed(sensor.sticks,
-                             fmt::format("its process {} after {} restarts in 10 s; it is not started again",
-                                         how(sensor.status), kMostRestarts)));
+            fail(sensor, fmt::format("its process {} after {} restarts in 10 s; it is not started again",
+                                     how(sensor.status), kMostRestarts));
             return;
         }
         recent.push_back(now);
         ++restarts;
-        sensor.task.source.resume = true;
+        sensor.task.resume = true;
         sensor.task.stall_at_s = -1;
         try {
             start(sensor);
             sensor.over = false;
-            events.push_back(
-                watch.restarted(sensor.sticks, how(sensor.status), recent.size(), kMostRestarts));
+            seen[sensor.sticks.front()].jumps = 0;
+            add(SensorEvent::Kind::restarted, sensor.sticks,
+                fmt::format("its process {}; started again ({} of at most {} times in 10 s)",
+                            how(sensor.status), recent.size(), kMostRestarts));
         } catch (const std::runtime_error& wrong) {
-            events.push_back(watch.failed(sensor.sticks, wrong.what()));
+            fail(sensor, wrong.what());
         }
     }
 
     void end_all() {
-        links.life.in.close();
+        life.in.close();
         const std::int64_t until = monotonic_ns() + kFarewellNs;
         for (HubSensor& sensor : sensors) {
             for (collect(sensor); sensor.pid > 0 && monotonic_ns() < until; collect(sensor))
@@ -339,20 +253,19 @@ struct SensorHub::Implementation {
 SensorHub::SensorHub(const SensorOptions& options) {
     for (const std::string& name : {options.predictors.picture, options.predictors.sound})
         check_specification(name);
-    check_source({options.source, options.sticks, options.epoch_ns, options.period_s, 1, false});
-    sweep_left_memory();
+    check_source(options);
     implementation_ = std::make_unique<Implementation>(options);
 }
 
 SensorHub::~SensorHub() = default;
 
 int SensorHub::wake_fd() const {
-    return implementation_->links.wake.get();
+    return implementation_->wake.get();
 }
 
 void SensorHub::clear_wake() {
     std::uint64_t count = 0;
-    (void)!read(implementation_->links.wake.get(), &count, sizeof count);
+    (void)!read(implementation_->wake.get(), &count, sizeof count);
 }
 
 std::optional<tracking::StickState> SensorHub::newest(std::size_t stick) const noexcept {
@@ -361,18 +274,15 @@ std::optional<tracking::StickState> SensorHub::newest(std::size_t stick) const n
 
 std::vector<SensorEvent> SensorHub::watch() {
     Implementation& own = *implementation_;
-    std::vector<SensorEvent> events;
     for (HubSensor& sensor : own.sensors) {
         const bool was_over = sensor.over;
-        own.look_after(sensor, events);
+        own.look_after(sensor);
         if (was_over) continue;
-        own.watch.source(sensor.sticks, own.report_of(sensor), events);
+        own.watch_source(sensor);
         if (sensor.over) continue;
-        for (const std::size_t stick : sensor.sticks)
-            own.watch.stick(stick, own.memory[stick]->state.read(),
-                            own.memory[stick]->report.read().value_or(SensorReport{}), events);
+        for (const std::size_t stick : sensor.sticks) own.watch_stick(stick);
     }
-    return events;
+    return std::exchange(own.events, {});
 }
 
 bool SensorHub::ended() const {
@@ -383,18 +293,20 @@ bool SensorHub::ended() const {
 }
 
 std::vector<ClockReport> SensorHub::clocks() const {
+    constexpr std::array<const char*, 3> kClocks = {"the trace's own, replayed", "the source's", "arrival"};
     std::vector<ClockReport> clocks;
-    for (const HubSensor& sensor : implementation_->sensors)
-        clocks.push_back(clock_report(implementation_->report_of(sensor)));
+    for (const HubSensor& sensor : implementation_->sensors) {
+        const SensorReport report = implementation_->report_of(sensor);
+        const ClockEstimate& estimate = report.estimate;
+        clocks.push_back({kClocks[static_cast<std::size_t>(report.clock)], estimate.offset_s,
+                          estimate.drift_ppm, estimate.delay_p95_s * 1e3, static_cast<int>(estimate.jumps)});
+    }
     return clocks;
 }
 
 StreamHead SensorHub::stream_head() const {
     const SharedStreamHead shared = implementation_->memory.front()->head.read().value_or(SharedStreamHead{});
-    StreamHead head{shared.text.data(), {}, {}};
-    if (shared.has_tip != 0) head.tip = Eigen::Map<const Eigen::Vector3d>(shared.tip.data());
-    if (shared.has_shaft != 0) head.shaft = Eigen::Map<const Eigen::Vector3d>(shared.shaft.data());
-    return head;
+    return {shared.text.data(), shared.tip, shared.shaft};
 }
 
 int SensorHub::restarts() const {

@@ -8,21 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "sticks/stick_filters.h"
+#include "sensors/sensor_process.h"
 
 namespace app {
-
-/// What the sensor processes of a run are told.
-struct SensorOptions {
-    std::string source;               ///< trace:FILE | stdin | zmq:ENDPOINT | osc:PORT
-    std::vector<std::string> sticks;  ///< names, by index
-    StickPredictors predictors;
-    std::int64_t epoch_ns = 0;  ///< CLOCK_MONOTONIC at which a trace's t0 is due; live times count from it
-    double period_s = 0;        ///< a trace begins again this long after it began, > its duration; 0: never
-    double stall_at_s = -1, stall_s = 0;  ///< --disturb: a pause of the reader, for tests; < 0: none
-    bool realtime = true;                 ///< real-time scheduling where that is permitted
-    std::string program;                  ///< that has the command `sensor`; empty: this one
-};
 
 /// What happened to a sensor that the user should know.
 struct SensorEvent {
@@ -45,13 +33,12 @@ struct ClockReport {
 /// How a live stream began.
 struct StreamHead {
     std::string text;                           ///< its key lines and header; empty: none so far
-    std::optional<Eigen::Vector3d> tip, shaft;  ///< of the sticks, body frame [m]; none: it does not say
+    std::optional<Eigen::Vector3d> tip, shaft;  ///< of the sticks, body frame [m]; none: not known
 };
 
-/// Starts and watches the sensor processes (one a stick for traces; one for all sticks where a source
+/// Starts and watches the sensor processes (one per stick of a trace; one for all sticks where a source
 /// delivers them together), each with a reader thread and a filter thread, and keeps the shared memory that
-/// they publish into. The memory has no name left once it is mapped, so nothing stays in /dev/shm however a
-/// process ends. A process that dies is started again, at most 5 times in 10 s. One thread.
+/// they publish into. The memory has no name, so nothing stays in /dev/shm however a process ends. A process that dies is started again, at most 5 times in 10 s. One thread.
 class SensorHub {
 public:
     /// Returns when the sensors are ready (tens of ms), so the epoch should lie that far ahead. Throws
@@ -72,7 +59,7 @@ public:
     [[nodiscard]] std::vector<SensorEvent> watch();
     /// Every source has ended, and all that it gave has been published.
     [[nodiscard]] bool ended() const;
-    [[nodiscard]] std::vector<ClockReport> clocks() const;  ///< one a process
+    [[nodiscard]] std::vector<ClockReport> clocks() const;  ///< one per process
     [[nodiscard]] StreamHead stream_head() const;
     [[nodiscard]] int restarts() const;
 

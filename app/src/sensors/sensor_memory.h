@@ -4,10 +4,12 @@
 
 #include <array>
 #include <cstdint>
-#include <string>
+#include <memory>
+#include <optional>
 #include <string_view>
 
 #include "files/file_descriptor.h"
+#include "sensors/source_clock.h"
 
 namespace app {
 
@@ -23,11 +25,9 @@ struct SensorReport {
     std::int64_t quiet_until_ns = 0;  ///< no sample is expected before
     double interval_s = 0;            ///< between the stick's samples, smoothed; 0: not known
     std::uint64_t read = 0;           ///< samples of the stick that the reader got
-    std::uint64_t malformed = 0, foreign = 0, lost = 0;
+    std::uint64_t malformed = 0;      ///< messages or rows
     SampleClock clock = SampleClock::replayed;
-    double offset_s = 0, drift_ppm = 0, delay_p95_ms = 0;
-    std::uint64_t jumps = 0;
-    double last_jump_s = 0;
+    ClockEstimate estimate;
     std::array<char, 256> text{};  ///< why it failed, or what the first malformed message was; ends with 0
 
     void set_text(std::string_view line);
@@ -36,10 +36,17 @@ struct SensorReport {
 /// The first lines of a live stream, which say how to read the rest: a sensor that is started again in
 /// mid-stream needs them; and what they say of the sticks.
 struct SharedStreamHead {
-    std::array<char, 2048> text{};  ///< ends with 0
-    std::uint64_t has_tip = 0, has_shaft = 0;
-    std::array<double, 3> tip{}, shaft{};  ///< body frame [m]
+    std::array<char, 2048> text{};              ///< ends with 0
+    std::optional<Eigen::Vector3d> tip, shaft;  ///< body frame [m]
 };
+
+}  // namespace app
+
+/// Numbers and arrays of numbers.
+template <>
+inline constexpr bool tracking::kCopiesAsBytes<app::SharedStreamHead> = true;
+
+namespace app {
 
 /// What a sensor process and its hub share of one stick.
 struct SensorMemory {
@@ -49,31 +56,28 @@ struct SensorMemory {
     tracking::NewestValue<SharedStreamHead> head;
 };
 
-/// A SensorMemory in POSIX shared memory, unmapped at the end.
+/// A SensorMemory in memory that processes share by its descriptor, unmapped at the end. It has no name, so
+/// nothing stays in /dev/shm however a process ends.
 class SharedSensorMemory {
 public:
-    /// New memory of zeros, for this user alone. It has a name (musicworld.PID.N) only until it is mapped.
-    /// Throws std::runtime_error.
+    /// New memory of zeros. Throws std::runtime_error.
     SharedSensorMemory();
     /// The memory of a descriptor that this process inherited; takes the descriptor over. Throws
     /// std::runtime_error, also for memory of another build.
     explicit SharedSensorMemory(int descriptor);
-    ~SharedSensorMemory();
-    SharedSensorMemory(SharedSensorMemory&& other) noexcept;
-    SharedSensorMemory& operator=(SharedSensorMemory&&) = delete;
 
     [[nodiscard]] int descriptor() const { return descriptor_.get(); }
     [[nodiscard]] SensorMemory& operator*() const { return *memory_; }
-    [[nodiscard]] SensorMemory* operator->() const { return memory_; }
+    [[nodiscard]] SensorMemory* operator->() const { return memory_.get(); }
 
 private:
+    struct Unmap {
+        void operator()(SensorMemory* memory) const;
+    };
     void map();
 
     FileDescriptor descriptor_;
-    SensorMemory* memory_ = nullptr;
+    std::unique_ptr<SensorMemory, Unmap> memory_;
 };
-
-/// Removes shared memory that programs of this user left when they were killed between naming and mapping it.
-void sweep_left_memory() noexcept;
 
 }  // namespace app

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <csignal>
 #include <deque>
 #include <memory>
@@ -50,8 +49,33 @@ FileDescriptor make_signal_fd() {
 
 class Sensor {
 public:
-    explicit Sensor(const SensorTask& task);
-    int run();
+    explicit Sensor(const SensorTask& task) : task_(task), changed_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+        for (const int descriptor : task.state_fds) sticks_.emplace_back(descriptor);
+        report_.pid = static_cast<std::uint64_t>(getpid());
+    }
+    int run() {
+        const FileDescriptor signals = make_signal_fd();
+        report();
+        try {
+            open();
+            start();
+        } catch (const std::exception& wrong) {
+            fail(wrong.what());
+        }
+        pollfd watched[] = {{changed_.get(), POLLIN, 0}, {task_.life_fd, 0, 0}, {signals.get(), POLLIN, 0}};
+        while (phase_ == SensorPhase::running) {
+            report();
+            (void)poll(watched, std::size(watched), kReportEveryMs);
+            if (watched[1].revents != 0 || watched[2].revents != 0) break;
+            std::uint64_t ignored = 0;
+            (void)!::read(changed_.get(), &ignored, sizeof ignored);
+        }
+        report();
+        add_one(task_.wake_fd);
+        stop();
+        report();
+        return phase_ == SensorPhase::failed ? 1 : 0;
+    }
 
 private:
     struct Stick {
@@ -66,39 +90,197 @@ private:
         std::uint64_t lap = 0;
         std::uint64_t missed = 0;  // samples while no process ran, which are still to be counted
         std::jthread thread;
-    };
-    /// What the reader knows, for reports.
-    struct Reading {
-        SampleClock clock = SampleClock::replayed;
-        ClockEstimate estimate;
-        std::int64_t quiet_until_ns = 0;
-        SourceFaults faults;
-        std::vector<std::uint64_t> read;
-        std::vector<double> interval_s;
+        // Of the reader, for reports:
+        double last_s = 0;  // when the newest sample was read
+        std::uint64_t read = 0;
+        double interval_s = 0;
     };
 
-    void read(const std::stop_token& stop);
-    void filter(Stick& stick, const std::stop_token& stop);
-    void take(Stick& stick, const SourceSample& sample);
-    void pass(SourceSample sample);
-    /// True for what a live source with a clock of its own sends in the first moments.
-    bool settling(const SourceSample& sample);
-    void put_on_our_clock(SourceSample& sample);
-    void note(const SourceSample& sample);
-    void note_source();
-    /// True if the reader was held up just now.
-    bool stall_if_due(const std::stop_token& stop);
-    void report();
-    void keep_head();
-    void open();
-    void start();
-    void stop();
-    void count_missed();
-    [[nodiscard]] SourceOptions source_options() const;
-    void fail(const char* what);
-    [[nodiscard]] double since_epoch_s(std::int64_t ns) const {
-        return static_cast<double>(ns - task_.source.epoch_ns) * 1e-9;
+    // The reader.
+
+    void read(const std::stop_token& stop) {
+        (void)set_thread_priority(ThreadRole::sensing, task_.realtime);
+        try {
+            SourceSample sample;
+            while (!stop.stop_requested()) {
+                const SourceStatus status = source_->next(sample, monotonic_ns() + kSourcePatienceNs);
+                if (stall_if_due(stop)) sample.read_ns = monotonic_ns();
+                if (status == SourceStatus::sample) pass(sample);
+                if (status != SourceStatus::sample || monotonic_ns() - noted_ns_ > kSourcePatienceNs)
+                    note_source();
+                if (status == SourceStatus::ended) break;
+            }
+            for (Stick& stick : sticks_) stick.samples.close();
+        } catch (const std::exception& wrong) {
+            fail(wrong.what());
+        }
     }
+    void pass(SourceSample sample) {
+        note(sample);
+        keep_head();
+        if (settling(sample)) return;
+        put_on_our_clock(sample);
+        if (source_->quiet_until_ns() != 0) note_source();
+        BoundedQueue<SourceSample>& samples = sticks_[sample.stick].samples;
+        if (source_->replayed())
+            (void)samples.push(sample);
+        else
+            (void)samples.try_push(sample);
+    }
+    /// True for what a live source with a clock of its own sends in the first moments. What had piled up before this process was ready arrives all at once and says nothing of the clocks'
+    /// offset; it would be played late, too.
+    bool settling(const SourceSample& sample) {
+        if (source_->replayed() || !sample.has_time) return false;
+        if (first_read_ns_ == 0) first_read_ns_ = sample.read_ns;
+        return sample.read_ns - first_read_ns_ < kSettlingNs;
+    }
+    void put_on_our_clock(SourceSample& sample) {
+        const double arrival_s = since_epoch_s(sample.read_ns);
+        if (source_->replayed()) {
+            delays_.add(to_s(sample.read_ns - sample.due_ns));
+            replay_offset_s_ = since_epoch_s(sample.due_ns) - sample.sample.t_s -
+                               static_cast<double>(sample.lap) * task_.period_s;
+            return;
+        }
+        sample.sample.t_s =
+            sample.has_time ? clock_.map(sample.stick, sample.sample.t_s, arrival_s) : arrival_s;
+        sample.due_ns = task_.epoch_ns + to_ns(sample.sample.t_s);
+        const std::lock_guard lock(mutex_);
+        report_.clock = sample.has_time ? SampleClock::source : SampleClock::arrival;
+    }
+    void note(const SourceSample& sample) {
+        Stick& stick = sticks_[sample.stick];
+        const double now_s = since_epoch_s(sample.read_ns);
+        const double interval_s = now_s - std::exchange(stick.last_s, now_s);
+        const std::lock_guard lock(mutex_);
+        if (stick.read++ == 0 || !(interval_s < kLongestIntervalS)) return;
+        stick.interval_s += (stick.interval_s == 0 ? 1 : kSmoothing) * (interval_s - stick.interval_s);
+    }
+    void note_source() {
+        ClockEstimate estimate = clock_.estimate();
+        if (source_->replayed()) estimate = {replay_offset_s_, 0, delays_.p95(), 0, 0};
+        noted_ns_ = monotonic_ns();
+        keep_head();
+        const SourceFaults faults = source_->faults();
+        const std::lock_guard lock(mutex_);
+        report_.malformed = faults.malformed;
+        report_.set_text(one_line(faults.first, 240));
+        report_.estimate = estimate;
+        const std::int64_t quiet_until_ns = source_->quiet_until_ns();
+        if (std::exchange(report_.quiet_until_ns, quiet_until_ns) != quiet_until_ns) add_one(changed_.get());
+    }
+    /// True if the reader was held up just now.
+    bool stall_if_due(const std::stop_token& stop) {
+        if (stalled_ || task_.stall_at_s < 0 || since_epoch_s(monotonic_ns()) < task_.stall_at_s)
+            return false;
+        const std::int64_t until = monotonic_ns() + to_ns(task_.stall_s);
+        while (monotonic_ns() < until && !stop.stop_requested())
+            sleep_until_ns(std::min(until, monotonic_ns() + kSourcePatienceNs));
+        stalled_ = true;
+        return true;
+    }
+
+    // The filters.
+
+    void filter(Stick& stick, const std::stop_token& stop) {
+        (void)set_thread_priority(ThreadRole::sensing, task_.realtime);
+        try {
+            SourceSample sample;
+            while (!stop.stop_requested() && stick.samples.pop(sample)) take(stick, sample);
+            if (!stop.stop_requested() && --filtering_ == 0 && phase_ == SensorPhase::running)
+                phase_ = SensorPhase::ended;
+            add_one(changed_.get());
+        } catch (const std::exception& wrong) {
+            fail(wrong.what());
+        }
+    }
+    void take(Stick& stick, const SourceSample& sample) {
+        if (sample.lap != stick.lap) stick.filters->begin_anew();
+        stick.lap = sample.lap;
+        const std::uint64_t before = stick.state.samples;
+        (void)stick.filters->correct(sample.sample, stick.state);
+        if (stick.state.samples != before) {
+            stick.state.samples += std::exchange(stick.missed, 0);
+            stick.state.lap = sample.lap;
+            stick.state.due_ns = sample.due_ns;
+            stick.state.read_ns = sample.read_ns;
+            stick.state.filtered_ns = monotonic_ns();
+        }
+        stick.memory->state.publish(stick.state);
+        if (stick.state.samples != before) add_one(task_.wake_fd);
+    }
+
+    // Start, end, reports.
+
+    void report() {
+        const std::lock_guard lock(mutex_);
+        for (Stick& stick : sticks_) {
+            SensorReport report = report_;
+            report.phase = phase_;
+            report.interval_s = stick.interval_s;
+            report.read = stick.read;
+            if (!failure_.empty()) report.set_text(failure_);
+            stick.memory->report.publish(report);
+        }
+    }
+    /// The stream's key lines and header, for the hub and for the process that follows this one: in the shared
+    /// memory before the first sample that they hold for.
+    void keep_head() {
+        const std::string text = source_->stream_head();
+        if (text.empty() || text == head_ || text.size() >= SharedStreamHead{}.text.size()) return;
+        head_ = text;
+        const SourceHead said = source_->head();
+        SharedStreamHead head;
+        std::copy(text.begin(), text.end(), head.text.begin());
+        head.tip = said.tip;
+        head.shaft = said.shaft;
+        sticks_.front().memory->head.publish(head);
+    }
+    /// The source, and the filters, of which external ones are processes.
+    void open() {
+        SourceOptions options = task_;
+        if (options.resume)
+            if (const std::optional<SharedStreamHead> head = sticks_.front().memory->head.read())
+                options.stream_head = head->text.data();
+        source_ = open_source(options);
+        const std::vector<std::string>& names = source_->sticks().names();
+        if (names.size() != sticks_.size())
+            throw std::runtime_error(
+                "error: found sticks without shared memory, expected some for each stick");
+        for (std::size_t i = 0; i < sticks_.size(); ++i) {
+            sticks_[i].filters = std::make_unique<StickFilters>(task_.predictors, names[i]);
+            // What a replay passed over after the newest state of the process before this one.
+            const tracking::StickState& state = sticks_[i].state;
+            const auto newest_s = state.samples > 0 ? std::optional(state.t_s) : std::nullopt;
+            if (options.resume) sticks_[i].missed = source_->passed_over(i, state.lap, newest_s);
+        }
+        note_source();
+    }
+    void start() {
+        phase_ = SensorPhase::running;
+        filtering_ = sticks_.size();
+        for (Stick& stick : sticks_)
+            stick.thread = std::jthread([this, &stick](const std::stop_token& stop) { filter(stick, stop); });
+        reader_ = std::jthread([this](const std::stop_token& stop) { read(stop); });
+    }
+    void stop() {
+        reader_.request_stop();
+        for (Stick& stick : sticks_) {
+            stick.thread.request_stop();
+            stick.samples.close();
+        }
+        reader_ = {};  // joins
+        for (Stick& stick : sticks_) stick.thread = {};
+    }
+    void fail(const char* what) {
+        {
+            const std::lock_guard lock(mutex_);
+            if (failure_.empty()) failure_ = one_line(what, 240);
+        }
+        phase_ = SensorPhase::failed;
+        add_one(changed_.get());
+    }
+    [[nodiscard]] double since_epoch_s(std::int64_t ns) const { return to_s(ns - task_.epoch_ns); }
 
     const SensorTask& task_;
     std::deque<Stick> sticks_;
@@ -106,267 +288,18 @@ private:
     std::int64_t first_read_ns_ = 0;  // of a live source; the reader's
     SourceClock clock_;               // the reader's
     DelayPercentile delays_;          // of replayed samples; the reader's
-    std::vector<double> last_s_;      // times of the sticks' newest samples; the reader's
-    double replay_offset_s_ = 0;      // the reader's, as the next four
+    double replay_offset_s_ = 0;      // the reader's, as the next three
     std::string head_;
     std::int64_t noted_ns_ = 0;
-    std::uint64_t dropped_ = 0;
     bool stalled_ = false;
-    std::mutex mutex_;  // of what follows
-    Reading reading_;
+    std::mutex mutex_;     // of what follows, and of the sticks' figures for reports
+    SensorReport report_;  // what all sticks have in common
     std::string failure_;
     std::atomic<SensorPhase> phase_ = SensorPhase::starting;
     std::atomic<std::size_t> filtering_ = 0;  // sticks that still have samples to come
     FileDescriptor changed_;                  // eventfd: there is something to report
     std::jthread reader_;
 };
-
-Sensor::Sensor(const SensorTask& task) : task_(task), changed_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
-    for (const int descriptor : task.state_fds) sticks_.emplace_back(descriptor);
-    reading_.read.resize(sticks_.size());
-    reading_.interval_s.resize(sticks_.size());
-    last_s_.resize(sticks_.size());
-}
-
-int Sensor::run() {
-    const FileDescriptor signals = make_signal_fd();
-    report();
-    try {
-        open();
-        start();
-    } catch (const std::exception& wrong) {
-        fail(wrong.what());
-    }
-    pollfd watched[] = {{changed_.get(), POLLIN, 0}, {task_.life_fd, 0, 0}, {signals.get(), POLLIN, 0}};
-    while (phase_ == SensorPhase::running) {
-        report();
-        (void)poll(watched, std::size(watched), kReportEveryMs);
-        if (watched[1].revents != 0 || watched[2].revents != 0) break;
-        std::uint64_t ignored = 0;
-        (void)!::read(changed_.get(), &ignored, sizeof ignored);
-    }
-    report();
-    add_one(task_.wake_fd);
-    stop();
-    report();
-    return phase_ == SensorPhase::failed ? 1 : 0;
-}
-
-/// The source, and the filters, of which external ones are processes.
-void Sensor::open() {
-    source_ = open_source(source_options());
-    const std::vector<std::string>& names = source_->sticks().names();
-    if (names.size() != sticks_.size())
-        throw std::runtime_error("error: found sticks without shared memory, expected some for each stick");
-    for (std::size_t i = 0; i < sticks_.size(); ++i)
-        sticks_[i].filters = std::make_unique<StickFilters>(task_.predictors, names[i]);
-    count_missed();
-    note_source();
-}
-
-void Sensor::start() {
-    phase_ = SensorPhase::running;
-    filtering_ = sticks_.size();
-    for (Stick& stick : sticks_)
-        stick.thread = std::jthread([this, &stick](const std::stop_token& stop) { filter(stick, stop); });
-    reader_ = std::jthread([this](const std::stop_token& stop) { read(stop); });
-}
-
-void Sensor::stop() {
-    reader_.request_stop();
-    for (Stick& stick : sticks_) {
-        stick.thread.request_stop();
-        stick.samples.close();
-    }
-    reader_ = {};  // joins
-    for (Stick& stick : sticks_) stick.thread = {};
-}
-
-SourceOptions Sensor::source_options() const {
-    SourceOptions options = task_.source;
-    if (options.resume)
-        if (const std::optional<SharedStreamHead> head = sticks_.front().memory->head.read())
-            options.stream_head = head->text.data();
-    return options;
-}
-
-/// What a replay passed over after the newest state of the process before this one.
-void Sensor::count_missed() {
-    if (!task_.source.resume) return;
-    for (std::size_t i = 0; i < sticks_.size(); ++i) {
-        const tracking::StickState& state = sticks_[i].state;
-        const bool any = state.samples > 0;
-        sticks_[i].missed = source_->passed_over(i, state.lap, any ? std::optional(state.t_s) : std::nullopt);
-    }
-}
-
-/// The stream's key lines and header, for the hub and for the process that follows this one: in the shared
-/// memory before the first sample that they hold for.
-void Sensor::keep_head() {
-    const std::string text = source_->stream_head();
-    if (text.empty() || text == head_ || text.size() >= SharedStreamHead{}.text.size()) return;
-    head_ = text;
-    const SourceHead said = source_->head();
-    SharedStreamHead head;
-    std::copy(text.begin(), text.end(), head.text.begin());
-    head.has_tip = said.tip ? 1 : 0;
-    head.has_shaft = said.shaft ? 1 : 0;
-    if (said.tip) std::copy_n(said.tip->data(), 3, head.tip.begin());
-    if (said.shaft) std::copy_n(said.shaft->data(), 3, head.shaft.begin());
-    sticks_.front().memory->head.publish(head);
-}
-
-void Sensor::fail(const char* what) {
-    {
-        const std::lock_guard lock(mutex_);
-        if (failure_.empty()) failure_ = one_line(what, 240);
-    }
-    phase_ = SensorPhase::failed;
-    add_one(changed_.get());
-}
-
-// The reader.
-
-void Sensor::read(const std::stop_token& stop) {
-    (void)set_thread_priority(ThreadRole::sensing, task_.realtime);
-    try {
-        SourceSample sample;
-        while (!stop.stop_requested()) {
-            const SourceStatus status = source_->next(sample, monotonic_ns() + kSourcePatienceNs);
-            if (stall_if_due(stop)) sample.read_ns = monotonic_ns();
-            if (status == SourceStatus::sample) pass(sample);
-            if (status != SourceStatus::sample || monotonic_ns() - noted_ns_ > kSourcePatienceNs)
-                note_source();
-            if (status == SourceStatus::ended) break;
-        }
-        for (Stick& stick : sticks_) stick.samples.close();
-    } catch (const std::exception& wrong) {
-        fail(wrong.what());
-    }
-}
-
-void Sensor::pass(SourceSample sample) {
-    note(sample);
-    keep_head();
-    if (settling(sample)) return;
-    put_on_our_clock(sample);
-    if (source_->quiet_until_ns() != 0) note_source();
-    BoundedQueue<SourceSample>& samples = sticks_[sample.stick].samples;
-    if (source_->replayed())
-        (void)samples.push(sample);
-    else if (!samples.try_push(sample))
-        ++dropped_;
-}
-
-/// What had piled up before this process was ready arrives all at once and says nothing of the clocks'
-/// offset; it would be played late, too. So the first moments are let go.
-bool Sensor::settling(const SourceSample& sample) {
-    if (source_->replayed() || !sample.has_time) return false;
-    if (first_read_ns_ == 0) first_read_ns_ = sample.read_ns;
-    return sample.read_ns - first_read_ns_ < kSettlingNs;
-}
-
-void Sensor::put_on_our_clock(SourceSample& sample) {
-    const double arrival_s = since_epoch_s(sample.read_ns);
-    if (source_->replayed()) {
-        delays_.add(static_cast<double>(sample.read_ns - sample.due_ns) * 1e-9);
-        replay_offset_s_ = since_epoch_s(sample.due_ns) - sample.sample.t_s -
-                           static_cast<double>(sample.lap) * task_.source.period_s;
-        return;
-    }
-    sample.sample.t_s = sample.has_time ? clock_.map(sample.stick, sample.sample.t_s, arrival_s) : arrival_s;
-    sample.due_ns = task_.source.epoch_ns + std::llround(sample.sample.t_s * 1e9);
-    const std::lock_guard lock(mutex_);
-    reading_.clock = sample.has_time ? SampleClock::source : SampleClock::arrival;
-}
-
-void Sensor::note(const SourceSample& sample) {
-    const double interval_s = since_epoch_s(sample.read_ns) - last_s_[sample.stick];
-    last_s_[sample.stick] = since_epoch_s(sample.read_ns);
-    const std::lock_guard lock(mutex_);
-    if (reading_.read[sample.stick]++ == 0 || !(interval_s < kLongestIntervalS)) return;
-    double& smoothed = reading_.interval_s[sample.stick];
-    smoothed += (smoothed == 0 ? 1 : kSmoothing) * (interval_s - smoothed);
-}
-
-void Sensor::note_source() {
-    ClockEstimate estimate = clock_.estimate();
-    if (source_->replayed()) estimate = {replay_offset_s_, 0, delays_.p95(), 0, 0};
-    noted_ns_ = monotonic_ns();
-    keep_head();
-    const std::lock_guard lock(mutex_);
-    const std::int64_t quiet_before_ns = reading_.quiet_until_ns;
-    reading_.faults = source_->faults();
-    reading_.faults.lost += dropped_;
-    reading_.estimate = estimate;
-    reading_.quiet_until_ns = source_->quiet_until_ns();
-    if (reading_.quiet_until_ns != quiet_before_ns) add_one(changed_.get());
-}
-
-bool Sensor::stall_if_due(const std::stop_token& stop) {
-    if (stalled_ || task_.stall_at_s < 0 || since_epoch_s(monotonic_ns()) < task_.stall_at_s) return false;
-    const std::int64_t until = monotonic_ns() + std::llround(task_.stall_s * 1e9);
-    while (monotonic_ns() < until && !stop.stop_requested())
-        sleep_until_ns(std::min(until, monotonic_ns() + kSourcePatienceNs));
-    stalled_ = true;
-    return true;
-}
-
-// The filters.
-
-void Sensor::filter(Stick& stick, const std::stop_token& stop) {
-    (void)set_thread_priority(ThreadRole::sensing, task_.realtime);
-    try {
-        SourceSample sample;
-        while (!stop.stop_requested() && stick.samples.pop(sample)) take(stick, sample);
-        if (!stop.stop_requested() && --filtering_ == 0 && phase_ == SensorPhase::running)
-            phase_ = SensorPhase::ended;
-        add_one(changed_.get());
-    } catch (const std::exception& wrong) {
-        fail(wrong.what());
-    }
-}
-
-void Sensor::take(Stick& stick, const SourceSample& sample) {
-    if (sample.lap != stick.lap) stick.filters->begin_anew();
-    stick.lap = sample.lap;
-    const std::uint64_t before = stick.state.samples;
-    (void)stick.filters->correct(sample.sample, stick.state);
-    if (stick.state.samples != before) {
-        stick.state.samples += std::exchange(stick.missed, 0);
-        stick.state.lap = sample.lap;
-        stick.state.due_ns = sample.due_ns;
-        stick.state.read_ns = sample.read_ns;
-        stick.state.filtered_ns = monotonic_ns();
-    }
-    stick.memory->state.publish(stick.state);
-    if (stick.state.samples != before) add_one(task_.wake_fd);
-}
-
-// Reports.
-
-void Sensor::report() {
-    const std::lock_guard lock(mutex_);
-    for (std::size_t i = 0; i < sticks_.size(); ++i) {
-        SensorReport report;
-        report.pid = static_cast<std::uint64_t>(getpid());
-        report.phase = phase_;
-        report.quiet_until_ns = reading_.quiet_until_ns;
-        report.interval_s = reading_.interval_s[i];
-        report.read = reading_.read[i];
-        report.malformed = reading_.faults.malformed;
-        report.foreign = reading_.faults.foreign;
-        report.lost = reading_.faults.lost;
-        report.clock = reading_.clock;
-        report.offset_s = reading_.estimate.offset_s;
-        report.drift_ppm = reading_.estimate.drift_ppm;
-        report.delay_p95_ms = reading_.estimate.delay_p95_s * 1e3;
-        report.jumps = reading_.estimate.jumps;
-        report.last_jump_s = reading_.estimate.last_jump_s;
-        report.set_text(failure_.empty() ? one_line(reading_.faults.first, 240) : failure_);
-        sticks_[i].memory->report.publish(report);
-    }
-}
 
 }  // namespace
 
@@ -379,23 +312,18 @@ int run_sensor(const SensorTask& task) {
 std::vector<std::string> sensor_arguments(const SensorTask& task) {
     std::vector<std::string> words = {"sensor"};
     const auto add = [&](const char* name, const auto& value) {
-        words.push_back(fmt::format("--{}={}", name, value));  // one word: values may begin with '-'
+        const std::string text = fmt::format("{}", value);
+        if (!text.empty()) words.push_back(fmt::format("{}={}", name, text));  // one word: it may be negative
     };
-    add("source", task.source.source);
-    for (const std::string& stick : task.source.sticks) add("stick", stick);
-    add("epoch-ns", task.source.epoch_ns);
-    add("period", task.source.period_s);
-    add("stall-at", task.stall_at_s);
-    add("stall", task.stall_s);
-    if (task.source.resume) words.emplace_back("--resume");
-    add("picture", task.predictors.picture);
-    add("sound", task.predictors.sound);
-    if (!task.predictors.confirming.empty()) add("confirming", task.predictors.confirming);
-    add("sound-lead", task.predictors.sound_lead_s);
-    for (const int descriptor : task.state_fds) add("state-fd", descriptor);
-    add("wake-fd", task.wake_fd);
-    add("life-fd", task.life_fd);
-    if (!task.realtime) words.emplace_back("--no-realtime");
+    const auto add_each = [&]<class Value>(const char* name, const std::vector<Value>& values) {
+        for (const Value& value : values) add(name, value);
+    };
+    for_each_sensor_option(task, [&](const char* name, const auto& value, const char*) {
+        if constexpr (requires { add_each(name, value); })
+            add_each(name, value);
+        else
+            add(name, value);
+    });
     return words;
 }
 

@@ -14,28 +14,24 @@
 namespace app {
 namespace {
 
-const tracking::StickTrace& stick_called(const tracking::Trace& trace, const std::string& name) {
-    const auto found = std::find_if(trace.sticks.begin(), trace.sticks.end(),
-                                    [&](const tracking::StickTrace& stick) { return stick.name == name; });
-    if (found != trace.sticks.end()) return *found;
-    std::vector<std::string> names;
-    for (const tracking::StickTrace& stick : trace.sticks) names.push_back(stick.name);
-    throw BadInput(fmt::format("{}: error: found no stick \"{}\", expected one of {}", trace.file, name,
-                               fmt::join(names, ", ")));
-}
-
-std::vector<std::string> wanted_sticks(const tracking::Trace& trace, const SourceOptions& options) {
-    if (!options.sticks.empty()) return options.sticks;
+std::vector<std::string> names_of(const tracking::Trace& trace) {
     std::vector<std::string> names;
     for (const tracking::StickTrace& stick : trace.sticks) names.push_back(stick.name);
     return names;
+}
+
+const tracking::StickTrace& stick_called(const tracking::Trace& trace, const std::string& name) {
+    const auto found = std::ranges::find(trace.sticks, name, &tracking::StickTrace::name);
+    if (found != trace.sticks.end()) return *found;
+    throw BadInput(fmt::format("{}: error: found no stick \"{}\", expected one of {}", trace.file, name,
+                               fmt::join(names_of(trace), ", ")));
 }
 
 }  // namespace
 
 TraceSource::TraceSource(const std::string& file, const SourceOptions& options) : options_(options) {
     const tracking::Trace trace = tracking::read_trace(find_trace(file));
-    const std::vector<std::string> wanted = wanted_sticks(trace, options);
+    const std::vector<std::string> wanted = options.sticks.empty() ? names_of(trace) : options.sticks;
     names_ = StickNames(wanted);
     t0_s_ = trace.t0_s();
     head_ = {trace.rate_hz, trace.tip, trace.shaft, false, trace.source, 0};
@@ -54,7 +50,7 @@ TraceSource::TraceSource(const std::string& file, const SourceOptions& options) 
 
 std::int64_t TraceSource::due_ns(const Row& row) const {
     const double since_epoch_s = static_cast<double>(lap_) * options_.period_s + (row.sample.t_s - t0_s_);
-    return options_.epoch_ns + std::llround(since_epoch_s / options_.speed * 1e9);
+    return options_.epoch_ns + to_ns(since_epoch_s / options_.speed);
 }
 
 void TraceSource::pass_on() {
@@ -67,7 +63,7 @@ void TraceSource::pass_on() {
 
 void TraceSource::skip_until(std::int64_t now_ns) {
     if (options_.period_s > 0) {  // not lap by lap through the night
-        const double since_epoch_s = static_cast<double>(now_ns - options_.epoch_ns) * 1e-9 * options_.speed;
+        const double since_epoch_s = to_s(now_ns - options_.epoch_ns) * options_.speed;
         lap_ = static_cast<std::uint64_t>(std::max(0.0, std::floor(since_epoch_s / options_.period_s)));
     }
     while (next_ < rows_.size() && due_ns(rows_[next_]) < now_ns) pass_on();

@@ -244,7 +244,7 @@ SimulateRecord::SimulateRecord(const SimulateOptions& options, const Scene& scen
     result_.dt_s = scene.world.settings.dt;
     result_.rest_wanted = options.until_rest;
     if (options.workers) result_.worker_options = *options.workers;
-    if (options.out) folder_ = std::make_unique<OutputFolder>(*options.out, simulate_products());
+    if (options.out) folder_ = std::make_unique<OutputFolder>(*options.out, kSimulateProducts);
 }
 
 void SimulateRecord::start(const sim::World& world) {

@@ -1,11 +1,14 @@
 #include "sticks/external_predictor.h"
 
 #include <fmt/format.h>
+#include <tracking/rotation.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <iterator>
+#include <sstream>
 #include <stdexcept>
 
 #include "files/one_line.h"
@@ -14,6 +17,29 @@ namespace app {
 namespace {
 
 constexpr int kProtocol = 1;
+constexpr double kFarthestM = 1e6;
+constexpr double kNormSlack = 0.01;
+
+/// Rates at the nodes from the slopes between them: of the parabola through three neighbours.
+Eigen::Vector3d rate_at(std::size_t i, const std::vector<double>& steps,
+                        const std::vector<Eigen::Vector3d>& slopes) {
+    const std::size_t last = slopes.size();  // of the nodes
+    if (last == 0) return Eigen::Vector3d::Zero();
+    if (last == 1) return slopes[0];
+    const std::size_t k = std::clamp<std::size_t>(i, 1, last - 1);  // the middle one of the three
+    const double before = steps[k - 1], after = steps[k];
+    const Eigen::Vector3d bend = (slopes[k] - slopes[k - 1]) / (before + after);  // half the acceleration
+    if (i < k) return slopes[0] - before * bend;
+    if (i > k) return slopes[k] + after * bend;
+    return slopes[k - 1] + before * bend;
+}
+
+bool positive(const Eigen::Matrix3d& m) {
+    constexpr double kRounding = 1e-12;  // of the largest entry
+    const Eigen::Vector3d values =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m, Eigen::EigenvaluesOnly).eigenvalues();
+    return values.minCoeff() >= -kRounding * m.cwiseAbs().maxCoeff();
+}
 
 std::vector<double> ascending(std::span<const double> leads_s) {
     std::vector<double> leads(leads_s.begin(), leads_s.end());
@@ -46,6 +72,113 @@ void parse_numbers(std::string_view line, std::size_t count, std::vector<double>
 }
 
 }  // namespace
+
+AnswerForm parse_answer_form(std::string_view line) {
+    std::istringstream text{std::string(line)};
+    const std::vector<std::string> words(std::istream_iterator<std::string>(text), {});
+    AnswerForm form;
+    std::vector<std::string> in_order = {"position"};
+    for (const auto& [name, given] : {std::pair("velocity", &form.velocity),
+                                      {"orientation", &form.orientation},
+                                      {"covariance", &form.covariance}})
+        if ((*given = std::ranges::find(words, name) != words.end())) in_order.emplace_back(name);
+    if (words != in_order)
+        throw std::runtime_error(fmt::format(
+            "found \"{}\", expected \"position [velocity] [orientation] [covariance]\"", one_line(line, 60)));
+    return form;
+}
+
+AnswerPath::AnswerPath(std::span<const double> leads_s, const AnswerForm& form)
+    : form_(form), sample_nodes_(leads_s.front() > 0 ? 1 : 0) {
+    nodes_.resize(leads_s.size() + sample_nodes_);
+    for (std::size_t i = 0; i < leads_s.size(); ++i) nodes_[i + sample_nodes_].lead_s = leads_s[i];
+    next_ = nodes_;
+}
+
+AnswerPath::Node AnswerPath::parse(std::size_t index, std::span<const double> numbers,
+                                   const tracking::PosePrediction& sample) const {
+    const auto refuse = [&](const std::string& found, const std::string& expected) {
+        throw std::runtime_error(
+            fmt::format("found {} at lead {} s, expected {}", found, nodes_[index].lead_s, expected));
+    };
+    const double* n = numbers.data() + (index - sample_nodes_) * form_.numbers();
+    const auto three = [&n] {
+        n += 3;
+        return Eigen::Vector3d(n[-3], n[-2], n[-1]);
+    };
+    Node node{nodes_[index].lead_s, sample, Eigen::Matrix3d::Zero()};
+    node.pose.position = three();
+    if (!(node.pose.position.norm() <= kFarthestM))
+        refuse(fmt::format("a position {} m away", node.pose.position.norm()), "metres, within 1000000");
+    if (form_.velocity) node.pose.velocity = three();
+    if (form_.orientation) {
+        node.pose.orientation = Eigen::Quaterniond(n[0], n[1], n[2], n[3]);
+        const double norm = node.pose.orientation.norm();
+        if (!(std::abs(norm - 1) <= kNormSlack))
+            refuse(fmt::format("a quaternion of norm {}", norm), "w x y z of norm 1");
+        node.pose.orientation.normalize();
+        n += 4;
+    }
+    if (form_.covariance) {
+        node.covariance << n[0], n[1], n[2], n[1], n[3], n[4], n[2], n[4], n[5];
+        if (!positive(node.covariance))
+            refuse("a covariance with a negative variance", "xx xy xz yy yz zz of a covariance [m^2]");
+    }
+    return node;
+}
+
+void AnswerPath::take(const tracking::PosePrediction& sample, std::span<const double> numbers) {
+    for (std::size_t i = sample_nodes_; i < next_.size(); ++i) next_[i] = parse(i, numbers, sample);
+    if (sample_nodes_ > 0) next_[0] = {0, sample, next_[1].covariance};
+    differentiate();
+    nodes_.swap(next_);
+    answered_ = true;
+}
+
+void AnswerPath::differentiate() {
+    std::vector<double> steps;
+    std::vector<Eigen::Vector3d> slopes, turns;
+    for (std::size_t i = 1; i < next_.size(); ++i) {
+        const Node &a = next_[i - 1], &b = next_[i];
+        steps.push_back(b.lead_s - a.lead_s);
+        slopes.emplace_back((b.pose.position - a.pose.position) / steps.back());
+        // The rotation vector of the shorter way, world frame.
+        turns.emplace_back(tracking::logarithm(b.pose.orientation * a.pose.orientation.conjugate()) /
+                           steps.back());
+    }
+    for (std::size_t i = 0; i < next_.size(); ++i) {
+        const bool stated = form_.velocity && i >= sample_nodes_;
+        if (!stated) next_[i].pose.velocity = rate_at(i, steps, slopes);
+        next_[i].pose.angular_velocity = rate_at(i, steps, turns);
+    }
+}
+
+std::size_t AnswerPath::node_before(double lead_s) const noexcept {
+    const auto after = std::ranges::upper_bound(nodes_, lead_s, {}, &Node::lead_s);
+    return static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - nodes_.begin() - 1, 0));
+}
+
+tracking::PosePrediction AnswerPath::at(double lead_s) const noexcept {
+    const std::size_t i = node_before(lead_s);
+    const Node& a = nodes_[i];
+    const double past = lead_s - a.lead_s;
+    if (!(past > 0)) return a.pose;
+    if (i + 1 == nodes_.size()) return tracking::pose_beyond(a.pose, past);
+    return tracking::pose_between(a.pose, nodes_[i + 1].pose, nodes_[i + 1].lead_s - a.lead_s, past);
+}
+
+std::optional<tracking::PoseCovariance> AnswerPath::covariance_at(double lead_s) const noexcept {
+    if (!form_.covariance || !answered_) return std::nullopt;
+    const std::size_t i = node_before(lead_s);
+    const Node& a = nodes_[i];
+    tracking::PoseCovariance result;
+    result.position = a.covariance;
+    if (i + 1 < nodes_.size() && lead_s > a.lead_s) {
+        const double s = (lead_s - a.lead_s) / (nodes_[i + 1].lead_s - a.lead_s);
+        result.position += s * (nodes_[i + 1].covariance - a.covariance);
+    }
+    return result;
+}
 
 ExternalPredictor::ExternalPredictor(const std::string& command, std::span<const double> leads_s,
                                      const std::string& stick, ExternalPatience patience)

@@ -1,41 +1,21 @@
 #include "sticks/prediction_file.h"
 
 #include <fmt/format.h>
+#include <tracking/import.h>
 #include <tracking/rotation.h>
+#include <tracking/trace_rows.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <limits>
+#include <sstream>
 
 #include "files/bad_input.h"
+#include "sticks/predictors.h"
 
 namespace app {
 namespace fs = std::filesystem;
 namespace {
-
-/// Where the rows of each stick lie in a text that parse_trace has found in order.
-std::vector<std::vector<std::size_t>> lines_of(const tracking::Trace& trace, std::string_view text) {
-    std::vector<std::vector<std::size_t>> lines(trace.sticks.size());
-    bool after_header = false;
-    for (std::size_t number = 1; !text.empty(); ++number) {
-        const std::string_view line = text.substr(0, text.find('\n'));
-        text.remove_prefix(std::min(line.size() + 1, text.size()));
-        if (line.starts_with('#') || line.find(',') == std::string_view::npos) continue;
-        if (!after_header) {
-            after_header = true;
-            continue;
-        }
-        std::string_view name = line.substr(line.find(',') + 1);
-        name = name.substr(0, name.find(','));
-        name.remove_prefix(std::min(name.find_first_not_of(" \t"), name.size()));
-        name = name.substr(0, name.find_last_not_of(" \t") + 1);
-        for (std::size_t s = 0; s < trace.sticks.size(); ++s)
-            if (trace.sticks[s].name == name) lines[s].push_back(number);
-    }
-    return lines;
-}
 
 /// 1e-9 s, and what writing t as a double can cost.
 double lead_tolerance_s(double t_s) {
@@ -59,8 +39,7 @@ public:
 
     [[nodiscard]] tracking::SampleStatus correct(const tracking::PoseSample& sample) noexcept override {
         const tracking::SampleStatus status = held_->correct(sample);
-        if (status == tracking::SampleStatus::accepted || status == tracking::SampleStatus::reinitialised)
-            ++taken_;
+        if (is_taken(status)) ++taken_;
         return status;
     }
     [[nodiscard]] tracking::PosePrediction predict(double lead_s) const noexcept override {
@@ -93,24 +72,31 @@ private:
 
 PredictionFile read_prediction_file(const fs::path& file) {
     PredictionFile result;
-    result.rows = tracking::read_trace(file);  // refuses what cannot be read
-    std::ifstream in(file, std::ios::binary);
-    const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-    result.lines = lines_of(result.rows, text);
-    for (std::size_t s = 0; s < result.lines.size(); ++s)
-        if (result.lines[s].size() != result.rows.sticks[s].samples.size())
-            throw BadInput(
-                fmt::format("{}: error: found a recording in another format, expected rows as `musicworld "
-                            "predict` writes",
-                            file.string()));
+    const std::string text = tracking::read_bytes(file.string());
+    result.rows = tracking::parse_trace(text, file.string());  // refuses what cannot be read
+    result.lines.resize(result.rows.sticks.size());
+    tracking::TraceRows rows(file.string(), tracking::RowOrder::strict);
+    std::istringstream lines(text.substr(text.starts_with("\xEF\xBB\xBF") ? 3 : 0));
+    std::string line;
+    try {
+        for (std::size_t number = 1; std::getline(lines, line); ++number) {
+            line.erase(line.find_last_not_of(" \t\r") + 1);
+            if (line.empty()) continue;
+            if (const auto row = rows.take(line)) result.lines[row->stick].push_back(number);
+        }
+    } catch (const tracking::TraceError&) {  // a recording that is no table
+        throw BadInput(
+            fmt::format("{}: error: found a recording in another format, expected rows as `musicworld "
+                        "predict` writes",
+                        file.string()));
+    }
     return result;
 }
 
 StickPredictions match_predictions(const PredictionFile& file, const std::string& stick,
                                    std::span<const tracking::PoseSample> samples) {
     const std::vector<tracking::StickTrace>& sticks = file.rows.sticks;
-    const auto found = std::find_if(sticks.begin(), sticks.end(),
-                                    [&](const tracking::StickTrace& s) { return s.name == stick; });
+    const auto found = std::ranges::find(sticks, stick, &tracking::StickTrace::name);
     if (found == sticks.end())
         throw BadInput(
             fmt::format("{}: error: found no predictions of stick {}, expected a row for every "

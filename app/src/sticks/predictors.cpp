@@ -13,6 +13,14 @@ namespace {
 
 constexpr std::string_view kExternal = "exec:";
 
+// What `auto` stands for, as measured on recorded mallets and sabers (README, figures). Pictures want the
+// least mean error: a velocity that fades with the lead errs 5 to 25 % less than one that lasts, on every
+// recording. Strikes want a path that bends: constant acceleration times them best, and the constant
+// velocity, which does not overshoot after a rebound, confirms them.
+constexpr const char* kAutoPicture = "cv:q=1e7,decay=8,r=0.5,gate=5";
+constexpr const char* kAutoSound = "ca:q=7e8,gate=5";
+constexpr const char* kAutoConfirming = "cv:q=1e8,gate=5";
+
 std::string command_of(const std::string& specification) {
     std::string command = specification.substr(kExternal.size());
     if (command.find_first_not_of(" \t") == std::string::npos)
@@ -51,6 +59,18 @@ std::string unescaped(std::string part) {
 }
 
 }  // namespace
+
+std::string confirming_specification(const std::string& specification) {
+    return specification == "auto" ? kAutoConfirming : "";
+}
+
+std::string picture_specification(const std::string& specification) {
+    return specification == "auto" ? kAutoPicture : specification;
+}
+
+std::string sound_specification(const std::string& specification) {
+    return specification == "auto" ? kAutoSound : specification;
+}
 
 bool is_external(const std::string& specification) {
     return specification.starts_with(kExternal);

@@ -1,6 +1,7 @@
 #pragma once
 #include <tracking/predictor.h>
 
+#include <algorithm>
 #include <memory>
 #include <span>
 #include <string>
@@ -17,6 +18,13 @@ namespace app {
                                                                       std::span<const double> leads_s,
                                                                       const std::string& stick = "-");
 
+/// A predictor's specification with `auto` resolved: what measurements chose for pictures and for sound.
+[[nodiscard]] std::string picture_specification(const std::string& specification);
+[[nodiscard]] std::string sound_specification(const std::string& specification);
+/// The filter that confirms the strikes of a sound predictor's specification; empty for none. With `auto`,
+/// contacts less than 50 ms ahead must be confirmed by a second filter (keep_confirmed in sticks/stick.h).
+[[nodiscard]] std::string confirming_specification(const std::string& sound_specification);
+
 /// Throws BadInput if make_any_predictor would; starts no child.
 void check_specification(const std::string& specification);
 
@@ -31,5 +39,33 @@ void require_working(const tracking::Predictor& predictor);
 /// `exec:` takes the rest of its part up to the next comma that is not escaped as `\,`. Throws BadInput for
 /// empty parts.
 [[nodiscard]] std::vector<std::string> split_specifications(const std::string& list);
+
+/// Whether a sample became part of an estimator's state.
+[[nodiscard]] inline bool is_taken(tracking::SampleStatus status) {
+    return status == tracking::SampleStatus::accepted || status == tracking::SampleStatus::reinitialised;
+}
+
+/// A sample as a predictor has just answered it.
+struct ReplayedSample {
+    std::size_t index;  ///< among the samples
+    const tracking::PoseSample& sample;
+    tracking::SampleStatus status;
+    /// How far the predictor's state lies behind this sample [s]; 0 if the predictor took it. What is expected
+    /// `lead_s` after the sample is predict(lead_s + behind_s), also where the sample was refused.
+    double behind_s;
+};
+
+/// Feeds samples to a predictor in order of arrival and calls visit(ReplayedSample) after each. Throws
+/// std::runtime_error if an external predictor has failed on the way.
+template <class Visit>
+void replay(tracking::Predictor& predictor, std::span<const tracking::PoseSample> samples,
+            const Visit& visit) {
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        const tracking::SampleStatus status = predictor.correct(samples[i]);
+        const double behind_s = is_taken(status) ? 0 : std::max(0.0, samples[i].t_s - predictor.time_s());
+        visit(ReplayedSample{i, samples[i], status, behind_s});
+    }
+    require_working(predictor);
+}
 
 }  // namespace app

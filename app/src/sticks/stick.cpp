@@ -5,6 +5,8 @@
 namespace app {
 namespace {
 
+constexpr double kNearS = 0.05;   // a contact nearer than this must be confirmed
+constexpr double kLaterS = 0.05;  // constant velocity meets the surface later than a stroke that accelerates
 constexpr double kStandstillS = 1e-6;
 constexpr double kImpossibleSpeed_mps = 1e4, kImpossibleDistanceM = 1e4;
 
@@ -34,6 +36,15 @@ std::optional<sim::TipPath> predicted_path(const std::function<tracking::PosePre
             return std::nullopt;
     }
     return path;
+}
+
+void keep_confirmed(std::vector<sim::Contact>& contacts, std::span<const sim::Contact> confirming, double s) {
+    std::erase_if(contacts, [&](const sim::Contact& contact) {
+        if (contact.t_s - s > kNearS) return false;
+        return std::none_of(confirming.begin(), confirming.end(), [&](const sim::Contact& other) {
+            return other.body == contact.body && other.t_s <= contact.t_s + kLaterS;
+        });
+    });
 }
 
 void Stick::take(const tracking::StickState& state) {

@@ -23,6 +23,11 @@ namespace app {
     const std::function<tracking::PosePrediction(double)>& pose_after, double time_s,
     const StickGeometry& geometry, std::uint32_t stick, std::span<const double> leads_s);
 
+/// Removes those of `contacts`, predicted at s, that are less than 50 ms ahead and not confirmed: a contact is
+/// confirmed by one of `confirming`, the contacts of the second filter's path, with the same body at most 50 ms
+/// later.
+void keep_confirmed(std::vector<sim::Contact>& contacts, std::span<const sim::Contact> confirming, double s);
+
 /// Pieces of a predicted path, cubic Hermite ones of 8.3 ms: exact for the filters' parabolas; for a stick that
 /// turns at 20 rad/s within 1 um.
 inline constexpr std::size_t kPathPieces = 8;

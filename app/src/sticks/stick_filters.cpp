@@ -2,10 +2,8 @@
 
 #include <cassert>
 
-#include "sticks/auto_predictor.h"
 #include "sticks/external_predictor.h"
 #include "sticks/predictors.h"
-#include "sticks/replay.h"
 #include "sticks/stick.h"
 
 namespace app {

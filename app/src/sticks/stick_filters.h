@@ -10,7 +10,7 @@ namespace app {
 /// What a stick's poses are predicted by.
 struct StickPredictors {
     std::string picture, sound;
-    std::string confirming;          ///< confirms the strikes that `sound` predicts; empty: nobody does
+    std::string confirming;          ///< confirms the strikes that `sound` predicts; empty: none
     double sound_lead_s = 1.0 / 15;  ///< how far ahead contacts are looked for
 };
 
@@ -22,7 +22,7 @@ struct StickPredictors {
 /// One thread at a time.
 class StickFilters {
 public:
-    /// `stick` is the name that external predictors are told. Throws BadInput for predictors that do not
+    /// `stick` is the name that external predictors get. Throws BadInput for predictors that do not
     /// exist, std::runtime_error for an external one that does not start.
     StickFilters(const StickPredictors& predictors, const std::string& stick);
 

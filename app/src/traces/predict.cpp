@@ -6,8 +6,7 @@
 #include <vector>
 
 #include "report/table.h"
-#include "sticks/auto_predictor.h"
-#include "sticks/replay.h"
+#include "sticks/predictors.h"
 
 namespace app {
 namespace {

@@ -4,8 +4,9 @@
 #include <fstream>
 #include <sstream>
 
-#include "kit/kit_keys.h"
-#include "scene/scene_keys.h"
+#include "files/format_description.h"
+#include "kit/kit.h"
+#include "scene/scene.h"
 #include "traces/map_file.h"
 
 namespace app {

@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "sample_recordings.h"
-#include "sticks/auto_predictor.h"
+#include "sticks/predictors.h"
 #include "sticks/stick.h"
 #include "written_kit.h"
 

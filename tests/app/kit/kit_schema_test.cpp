@@ -2,7 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "files/bad_input.h"
-#include "kit/kit_keys.h"
+#include "files/format_description.h"
+#include "kit/kit.h"
 #include "schema_walk.h"
 #include "written_kit.h"
 

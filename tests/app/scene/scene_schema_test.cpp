@@ -1,7 +1,8 @@
 // The JSON Schema of the scene format and the reader know the same keys, types and ranges.
 #include <gtest/gtest.h>
 
-#include "scene/scene_keys.h"
+#include "files/format_description.h"
+#include "scene/scene.h"
 #include "schema_walk.h"
 #include "written_scene.h"
 

@@ -12,15 +12,13 @@
 #include "files/bad_input.h"
 #include "free_port.h"
 #include "process/clock.h"
-#include "sensors/live_intake.h"
 #include "sensors/osc_source.h"
-#include "sensors/stream_source.h"
-#include "sensors/zmq_source.h"
+#include "sensors/row_sources.h"
 #include "tracking/mutation.h"
 
 namespace {
 
-using app::LiveIntake;
+using app::LiveSource;
 using app::OscSource;
 using app::RowDecoder;
 using app::SourceSample;
@@ -135,29 +133,36 @@ TEST(RowDecoder, MutatedMessagesGiveSoundSamplesOrOneLine) {
     EXPECT_GT(refused, 1000u);
 }
 
-TEST(LiveIntake, IsBoundedAndCounts) {
-    LiveIntake intake({"left"});
+/// A source into which the test puts the samples.
+struct Intake : LiveSource {
+    using LiveSource::LiveSource;
+    void receive(std::int64_t) override {}
+};
+
+TEST(LiveSource, IsBoundedAndCounts) {
+    Intake intake(std::vector<std::string>{"left"});
     tracking::PoseSample sample;
-    for (std::size_t i = 0; i < LiveIntake::kLongest + 10; ++i) intake.put("left", sample, true, 1);
-    intake.put("middle", sample, true, 1);
+    for (std::size_t i = 0; i < LiveSource::kLongest + 10; ++i) intake.put("left", sample, true);
+    intake.put("middle", sample, true);
     EXPECT_EQ(intake.faults().lost, 10u);
     EXPECT_EQ(intake.faults().foreign, 1u);
-    LiveIntake open({});
-    for (int i = 0; i < 20; ++i) open.put("stick" + std::to_string(i), sample, true, 1);
+    Intake open(std::vector<std::string>{});
+    for (int i = 0; i < 20; ++i) open.put("stick" + std::to_string(i), sample, true);
     EXPECT_EQ(open.sticks().names().size(), 16u);
     EXPECT_EQ(open.faults().foreign, 4u);
 }
 
-TEST(LiveIntake, TimesFromLongAgoKeepTheirNanoseconds) {
-    LiveIntake intake({});
+TEST(LiveSource, TimesFromLongAgoKeepTheirNanoseconds) {
+    Intake intake(std::vector<std::string>{});
     tracking::PoseSample sample;
     sample.t_s = 1732203547.25;
-    intake.put("left", sample, true, 1);
+    intake.put("left", sample, true);
     sample.t_s = 1732203548.5;
-    intake.put("left", sample, true, 1);
-    EXPECT_EQ(intake.take()->sample.t_s, 0.25);
-    EXPECT_EQ(intake.take()->sample.t_s, 1.5);
-    EXPECT_EQ(intake.base_s(), 1732203547.0);
+    intake.put("left", sample, true);
+    const std::vector<SourceSample> samples = take(intake, 2);
+    EXPECT_EQ(samples.at(0).sample.t_s, 0.25);
+    EXPECT_EQ(samples.at(1).sample.t_s, 1.5);
+    EXPECT_EQ(intake.head().base_s, 1732203547.0);
 }
 
 TEST(StreamSource, ReadsToTheEndAndIsTakenUpInTheMiddle) {
@@ -166,14 +171,14 @@ TEST(StreamSource, ReadsToTheEndAndIsTakenUpInTheMiddle) {
     const std::string text = "# units: mm\n# rate_hz: 60\nt,stick,px,py,pz\n0,left,1000,0,0\n1,left,2000,0,0";
     ASSERT_EQ(write(ends[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
     close(ends[1]);
-    app::StreamSource source(ends[0], {});
-    const std::vector<SourceSample> samples = take(source);
+    const auto source = app::make_stream_source(ends[0], {});
+    const std::vector<SourceSample> samples = take(*source);
     close(ends[0]);
     ASSERT_EQ(samples.size(), 2u);
     EXPECT_EQ(samples[1].sample.position, Vector3d(2, 0, 0));
-    EXPECT_EQ(source.head().rate_hz, 60);
-    EXPECT_FALSE(source.head().oriented);
-    EXPECT_EQ(source.stream_head(), "# units: mm\n# rate_hz: 60\nt,stick,px,py,pz\n");
+    EXPECT_EQ(source->head().rate_hz, 60);
+    EXPECT_FALSE(source->head().oriented);
+    EXPECT_EQ(source->stream_head(), "# units: mm\n# rate_hz: 60\nt,stick,px,py,pz\n");
 
     ASSERT_EQ(pipe(ends), 0);
     const std::string rest = "5,left,5000,0,0\n3,left,3000,0,0\n";  // the first line began before
@@ -181,9 +186,9 @@ TEST(StreamSource, ReadsToTheEndAndIsTakenUpInTheMiddle) {
     close(ends[1]);
     app::SourceOptions resumed;
     resumed.resume = true;
-    resumed.stream_head = source.stream_head();
-    app::StreamSource second(ends[0], resumed);
-    const std::vector<SourceSample> more = take(second);
+    resumed.stream_head = source->stream_head();
+    const auto second = app::make_stream_source(ends[0], resumed);
+    const std::vector<SourceSample> more = take(*second);
     close(ends[0]);
     ASSERT_EQ(more.size(), 1u);
     EXPECT_EQ(more[0].sample.position, Vector3d(3, 0, 0));
@@ -194,22 +199,22 @@ TEST(ZmqSource, TakesTheLastPartOfEachMessage) {
     zmq::socket_t publisher(context, zmq::socket_type::pub);
     publisher.set(zmq::sockopt::linger, 0);
     publisher.bind("tcp://127.0.0.1:*");
-    app::ZmqSource source(publisher.get(zmq::sockopt::last_endpoint), {});
+    const auto source = app::make_zmq_source(publisher.get(zmq::sockopt::last_endpoint), {});
     std::vector<SourceSample> samples;
     // Until the subscription has reached the publisher its messages are lost.
     for (int i = 0; i < 1000 && samples.size() < 3; ++i) {
         publisher.send(zmq::str_buffer("topic"), zmq::send_flags::sndmore);
         publisher.send(zmq::str_buffer("1,left,0.5,1,0,1,0,0,0\n1,right,0,1,0\nrubbish\n"));
         SourceSample sample;
-        while (source.next(sample, app::monotonic_ns() + 10'000'000) == SourceStatus::sample)
+        while (source->next(sample, app::monotonic_ns() + 10'000'000) == SourceStatus::sample)
             samples.push_back(sample);
     }
     ASSERT_GE(samples.size(), 2u);
-    EXPECT_EQ(source.sticks().names(), (std::vector<std::string>{"left", "right"}));
+    EXPECT_EQ(source->sticks().names(), (std::vector<std::string>{"left", "right"}));
     EXPECT_EQ(samples[0].sample.position, Vector3d(0.5, 1, 0));
-    EXPECT_GE(source.faults().malformed, 1u);
-    EXPECT_THROW(app::ZmqSource("http://x", {}), app::BadInput);
-    EXPECT_THROW(app::ZmqSource("tcp://", {}), app::BadInput);
+    EXPECT_GE(source->faults().malformed, 1u);
+    EXPECT_THROW((void)app::make_zmq_source("http://x", {}), app::BadInput);
+    EXPECT_THROW((void)app::make_zmq_source("tcp://", {}), app::BadInput);
 }
 
 TEST(ZmqSource, IsTakenUpWithTheHeadThatWasSentOnce) {
@@ -224,23 +229,23 @@ TEST(ZmqSource, IsTakenUpWithTheHeadThatWasSentOnce) {
     app::SourceOptions resumed;
     resumed.resume = true;
     {
-        app::ZmqSource first(endpoint, {});
+        const auto first = app::make_zmq_source(endpoint, {});
         ASSERT_TRUE(publisher.recv(subscription));
-        EXPECT_EQ(first.stream_head(), "");
+        EXPECT_EQ(first->stream_head(), "");
         publisher.send(zmq::buffer(head + "1,left,1000,0,0\n"));
-        ASSERT_EQ(take(first, 1).size(), 1u);
-        EXPECT_EQ(first.stream_head(), head);
-        resumed.stream_head = first.stream_head();
+        ASSERT_EQ(take(*first, 1).size(), 1u);
+        EXPECT_EQ(first->stream_head(), head);
+        resumed.stream_head = first->stream_head();
     }
     ASSERT_TRUE(publisher.recv(subscription));  // that it is gone
-    app::ZmqSource second(endpoint, resumed);
+    const auto second = app::make_zmq_source(endpoint, resumed);
     ASSERT_TRUE(publisher.recv(subscription));
     publisher.send(zmq::str_buffer("2,left,2000,0,0\n"));
-    const std::vector<SourceSample> samples = take(second, 1);
+    const std::vector<SourceSample> samples = take(*second, 1);
     ASSERT_EQ(samples.size(), 1u);
     EXPECT_EQ(samples[0].sample.position, Vector3d(2, 0, 0));
-    EXPECT_EQ(second.stream_head(), head);
-    EXPECT_EQ(second.faults().malformed, 0u);
+    EXPECT_EQ(second->stream_head(), head);
+    EXPECT_EQ(second->faults().malformed, 0u);
 }
 
 // OSC.

@@ -1,11 +1,11 @@
-#include "sticks/answer_path.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 #include <random>
 #include <stdexcept>
+
+#include "sticks/external_predictor.h"
 
 namespace {
 

@@ -8,8 +8,8 @@
 #include <stdexcept>
 
 #include "files/bad_input.h"
-#include "sticks/auto_predictor.h"
 #include "sticks/prediction_file.h"
+#include "sticks/predictors.h"
 #include "temporary_folder.h"
 
 namespace {

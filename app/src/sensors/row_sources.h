@@ -2,10 +2,11 @@
 #include <tracking/trace_rows.h>
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 
-#include "sensors/live_intake.h"
+#include "sensors/live_source.h"
 
 namespace app {
 
@@ -42,7 +43,6 @@ public:
 
 private:
     void grow(std::string_view bytes);
-    void line(std::string_view text);
     void take_line(std::string_view text);
 
     std::string name_;
@@ -54,30 +54,26 @@ private:
     bool skipping_ = false;
 };
 
-/// Native rows from a descriptor (standard input), as they come; it ends with the stream. The units, axes,
-/// tip and shaft of its key lines are honoured.
-class StreamSource final : public SampleSource {
+/// A live source of native rows. The units, axes, tip and shaft of their key lines are honoured.
+class RowSource : public LiveSource {
 public:
-    StreamSource(int descriptor, const SourceOptions& options);
-
-    [[nodiscard]] SourceStatus next(SourceSample& sample, std::int64_t deadline_ns) override;
-    [[nodiscard]] const StickNames& sticks() const override { return intake_.sticks(); }
     [[nodiscard]] SourceHead head() const override;
-    [[nodiscard]] SourceFaults faults() const override { return intake_.faults(); }
     [[nodiscard]] std::string stream_head() const override { return rows_.head(); }
 
-private:
-    /// Reads what is there; waits until then.
-    void read_on(std::int64_t deadline_ns);
+protected:
+    RowSource(const std::string& name, const SourceOptions& options);
 
-    int descriptor_;
-    LiveIntake intake_;
     RowDecoder rows_;
-    std::int64_t read_ns_ = 0;
-    bool ended_ = false;
 };
 
-/// How the rows' keys describe a live source.
-[[nodiscard]] SourceHead head_of(const RowDecoder& rows, const LiveIntake& intake);
+/// Rows from a descriptor (standard input), as they come; it ends with the stream.
+[[nodiscard]] std::unique_ptr<SampleSource> make_stream_source(int descriptor, const SourceOptions& options);
+
+/// Rows from a ZeroMQ publisher: a SUB socket that connects and subscribes to everything. The last part of
+/// each message is one row or several, with or without a head (RowDecoder); messages of more than 64 KiB are
+/// refused by the socket. It never ends; a publisher that comes later or again is found. Throws BadInput for
+/// what is no endpoint.
+[[nodiscard]] std::unique_ptr<SampleSource> make_zmq_source(const std::string& endpoint,
+                                                            const SourceOptions& options);
 
 }  // namespace app
