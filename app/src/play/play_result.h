@@ -6,8 +6,8 @@
 
 #include "kit/tip_track.h"
 #include "play/play_options.h"
-#include "strikes/strike.h"
 #include "strikes/score_strikes.h"
+#include "strikes/strike.h"
 
 namespace app {
 
