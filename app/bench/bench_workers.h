@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bench/bench_report.h"
-#include "simulate/simulate_record.h"
+#include "simulate/run_measures.h"
 
 namespace app {
 

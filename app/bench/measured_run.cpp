@@ -6,7 +6,7 @@
 #include <numeric>
 #include <optional>
 
-#include "simulate/simulate_record.h"
+#include "simulate/run_measures.h"
 
 namespace app {
 namespace {

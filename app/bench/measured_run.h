@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "simulate/simulate_record.h"
+#include "simulate/run_measures.h"
 
 namespace app {
 

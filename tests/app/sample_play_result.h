@@ -2,8 +2,8 @@
 #include <cmath>
 #include <string>
 
-#include "kit/tip_track.h"
-#include "play/play_result.h"
+#include "kit/kit.h"
+#include "play/play.h"
 #include "temporary_folder.h"
 
 /// A small finished run for the tests of its outputs: two sticks, three instruments, four strikes (one false,

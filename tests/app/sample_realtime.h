@@ -5,9 +5,8 @@
 #include <functional>
 
 #include "kit/kit.h"
-#include "kit/stick_geometry.h"
 #include "latency/timings.h"
-#include "play/play_result.h"
+#include "play/play.h"
 
 /// Made-up runs in real time whose figures are known in closed form.
 namespace sample {

@@ -6,7 +6,6 @@
 #include "commands/commands.h"
 #include "commands/sensor_model_options.h"
 #include "compare/comparison.h"
-#include "compare/comparison_report.h"
 #include "compare/comparison_tables.h"
 #include "files/assets.h"
 #include "files/bad_input.h"

@@ -9,7 +9,7 @@
 #include "files/one_line.h"
 #include "play/play.h"
 #include "sticks/predictors.h"
-#include "strikes/score_strikes.h"
+#include "strikes/true_contacts.h"
 
 namespace app {
 namespace fs = std::filesystem;

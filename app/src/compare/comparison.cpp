@@ -1,15 +1,110 @@
 #include "compare/comparison.h"
 
 #include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <iterator>
 #include <map>
+#include <memory>
+#include <span>
+#include <tuple>
 
-#include "compare/comparison_map.h"
-#include "compare/entrant_scores.h"
 #include "compare/entrants.h"
 #include "files/bad_input.h"
+#include "process/parallel.h"
+#include "sticks/predictors.h"
+#include "sticks/stick.h"
 
 namespace app {
 namespace {
+
+constexpr double kMm = 1e-3, kMs = 1e-3;
+
+std::vector<tracking::SensorModel> sensors_of(const MapAxes& axes, const ComparisonOptions& options) {
+    std::vector<tracking::SensorModel> sensors;
+    for (const double rate_hz : axes.rates_hz)
+        for (const double noise_mm : axes.noises_mm)
+            for (const double jitter_ms : axes.jitters_ms)
+                for (const double drop_out : axes.drop_outs) {
+                    tracking::SensorModel sensor = options.sensor;
+                    sensor.rate_hz = rate_hz;
+                    sensor.noise_m = kMm * noise_mm;
+                    sensor.jitter_s = kMs * jitter_ms;
+                    sensor.drop_out = drop_out;
+                    sensors.push_back(sensor);
+                }
+    return sensors;
+}
+
+/// One thing that runs: a family tuned on other recordings, or a specification as named.
+struct Runner {
+    std::string name;
+    bool baseline = false;
+    std::vector<SquareSum> by_recording = {};
+    SquareSum pooled = {};
+
+    void add(const SquareSum& recording) { by_recording.push_back(recording), pooled.add(recording); }
+};
+
+/// What a map compares: families that are tuned, and the other specifications as named.
+struct MapField {
+    std::vector<std::string> families, as_named;
+};
+
+MapField field_of(const ComparisonOptions& options, bool tunable) {
+    MapField field;
+    field.as_named = specifications_of(options);
+    std::erase_if(field.as_named, is_external);
+    if (!tunable) return field;
+    field.families = tunable_families(field.as_named);
+    std::erase_if(field.as_named, [](const std::string& specification) {
+        return !tuning_grid(family_of(specification)).empty();
+    });
+    return field;
+}
+
+std::vector<Runner> runners_of(const TuningTable& table, const MapField& field, std::size_t lead) {
+    std::vector<Runner> runners;
+    for (std::size_t i = 0; i < field.as_named.size(); ++i) {  // first in the table
+        Runner& runner = runners.emplace_back(Runner{field.as_named[i], is_baseline(field.as_named[i])});
+        for (std::size_t r = 0; r < table.recordings(); ++r) runner.add(table.sum(i, r, lead));
+    }
+    for (const std::string& family : field.families) {
+        Runner& runner = runners.emplace_back(Runner{family + "*", is_baseline(family)});
+        for (std::size_t r = 0; r < table.recordings(); ++r) {
+            std::vector<bool> allowed(table.recordings(), true);
+            allowed[r] = false;
+            const std::optional<std::size_t> best = table.best(family, lead, allowed);
+            runner.add(best ? table.sum(*best, r, lead) : SquareSum{});
+        }
+    }
+    return runners;
+}
+
+void add_cells(std::vector<MapCell>& cells, const std::vector<Runner>& runners,
+               const tracking::SensorModel& sensor, double lead_s) {
+    const Runner* baseline = nullptr;
+    for (const Runner& runner : runners)
+        if (runner.baseline && (baseline == nullptr || runner.pooled.rms() < baseline->pooled.rms()))
+            baseline = &runner;
+    for (const Runner& runner : runners) {
+        if (runner.baseline || baseline == nullptr) continue;
+        MapCell cell{sensor.rate_hz, sensor.noise_m / kMm, sensor.jitter_s / kMs, sensor.drop_out, {}};
+        std::vector<PairedSums> pairs;
+        for (std::size_t r = 0; r < runner.by_recording.size(); ++r)
+            if (runner.by_recording[r].count > 0)
+                pairs.push_back({runner.by_recording[r], baseline->by_recording[r]});
+        cell.result = {runner.name,
+                       baseline->name,
+                       lead_s,
+                       runner.pooled.rms(),
+                       baseline->pooled.rms(),
+                       paired_difference(pairs, sensor.seed),
+                       {}};
+        cells.push_back(std::move(cell));
+    }
+}
 
 Field read_scored(const ComparisonOptions& options) {
     Field field = read_field(options.traces, options.persons, options.sensor, options.leads_s);
@@ -22,6 +117,312 @@ Field read_scored(const ComparisonOptions& options) {
             "gaps, and leads beyond the end do not count), expected some; give longer recordings, shorter "
             "leads or a faster sensor");
     return field;
+}
+
+/// The leads that one predictor serves in one pass: those for which the same specification runs.
+std::vector<std::vector<std::size_t>> passes_of(const Entrant& entrant, std::size_t recording) {
+    const std::vector<std::string>& used = entrant.used[recording];
+    std::vector<std::vector<std::size_t>> passes;
+    for (std::size_t lead = 0; lead < used.size(); ++lead) {
+        if (used[lead].empty()) continue;
+        const auto same =
+            std::ranges::find_if(passes, [&](const auto& pass) { return used[pass.front()] == used[lead]; });
+        if (same == passes.end() || !entrant.replays.empty())
+            passes.push_back({lead});
+        else
+            same->push_back(lead);
+    }
+    return passes;
+}
+
+/// A fresh predictor at a lead at which `used` is not empty; `leads_s` will be asked for. `instead`: the
+/// specification that runs unless it is empty or a file answers.
+std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const SensedStick& stick,
+                                                  std::size_t lead, std::span<const double> leads_s,
+                                                  const std::string& instead = {}) {
+    if (const auto replay = entrant.replays.find({stick.number, lead}); replay != entrant.replays.end())
+        return make_replay(replay->second);
+    return make_any_predictor(instead.empty() ? entrant.used[stick.recording][lead] : instead, leads_s,
+                              stick.name);
+}
+
+HitScore hits_of(const Entrant& entrant, const Field& field, const SensedStick& stick, std::size_t lead,
+                 const ComparisonOptions& options, double advance_s) {
+    const Recording& recording = field.recordings[stick.recording];
+    const StrikeTiming when{stick.leads_s[lead], advance_s};
+    const auto timing = make_entrant(entrant, stick, lead, strike_leads(when), entrant.strikes_by);
+    std::unique_ptr<tracking::Predictor> confirming;
+    if (!entrant.confirmed_by.empty())
+        confirming = make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), stick.name);
+    return evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples, {*timing, confirming.get()},
+                            recording.geometry, options.surface, when);
+}
+
+/// Advances that learning tries: -8 to 14 ms.
+constexpr std::size_t kAdvances = 23;
+constexpr double advance_s(std::size_t k) {
+    return 1e-3 * (static_cast<double>(k) - 8);
+}
+
+/// The advance whose loss, averaged with those up to 2 ms off, is least: single notes that match or just miss
+/// decide nothing. None if that saves less than 5 % against none.
+std::size_t least_smoothed(std::span<const double, kAdvances> loss) {
+    constexpr std::size_t kReach = 2, kUnchanged = 8;
+    constexpr double kWorthwhile = 0.95;
+    static_assert(advance_s(kUnchanged) == 0);
+    const auto smoothed = [&](std::size_t k) {
+        double sum = 0;
+        for (std::size_t near = k - kReach; near <= k + kReach; ++near) sum += loss[near];
+        return sum;
+    };
+    std::size_t best = kUnchanged;
+    for (std::size_t k = kReach; k + kReach < kAdvances; ++k)
+        if (smoothed(k) < smoothed(best)) best = k;
+    return smoothed(best) < kWorthwhile * smoothed(kUnchanged) ? best : kUnchanged;
+}
+
+/// Learns by how much the contacts of an entrant come earlier: by what costs least (HitScore::loss) at a lead.
+class AdvanceLosses {
+public:
+    /// Of `auto`, the one entrant that learns; it runs the same on every recording.
+    AdvanceLosses(const Field& field, const Entrant& entrant, const ComparisonOptions& options)
+        : field_(field), leads_(options.leads_s.size()), losses_(field.sticks.size() * leads_) {
+        parallel_for(losses_.size(), options.threads, [&](std::size_t i) {
+            for (std::size_t k = 0; k < kAdvances; ++k)
+                losses_[i][k] =
+                    hits_of(entrant, field, field.sticks[i / leads_], i % leads_, options, advance_s(k))
+                        .loss();
+        });
+    }
+
+    /// On the recordings but `scored`; none where there are no others.
+    [[nodiscard]] std::optional<double> best_s(const Recording& scored, std::size_t lead) const {
+        std::array<double, kAdvances> loss{};
+        bool any = false;
+        for (const SensedStick& stick : field_.sticks) {
+            if (same_samples(field_.recordings[stick.recording], scored)) continue;
+            any = true;
+            for (std::size_t k = 0; k < kAdvances; ++k) loss[k] += losses_[stick.number * leads_ + lead][k];
+        }
+        return any ? std::optional(advance_s(least_smoothed(loss))) : std::nullopt;
+    }
+
+private:
+    const Field& field_;
+    std::size_t leads_;
+    std::vector<std::array<double, kAdvances>> losses_;  // by stick and lead
+};
+
+constexpr std::size_t kCostPasses = 7, kMostTimedSamples = 4096;
+
+/// Keeps the compiler from removing an unread result.
+void keep(double value) {
+    asm volatile("" : : "g"(value) : "memory");
+}
+
+/// Wall time of a sample: correct() and predict() at every lead, nothing else; the median over several passes
+/// of a fresh predictor over the first samples. The only figure that differs between runs.
+double nanoseconds_per_sample(const std::string& specification, const SensedStick& stick) {
+    const std::span timed = std::span(stick.samples).first(std::min(stick.samples.size(), kMostTimedSamples));
+    std::vector<double> costs;
+    for (std::size_t pass = 0; pass < kCostPasses; ++pass) {
+        const auto predictor = make_any_predictor(specification, stick.leads_s);
+        const auto start = std::chrono::steady_clock::now();
+        for (const tracking::PoseSample& sample : timed) {
+            const double behind_s = feed(*predictor, sample);
+            for (const double lead_s : stick.leads_s)
+                keep(predictor->predict(lead_s + behind_s).position.x());
+        }
+        const std::chrono::duration<double, std::nano> spent = std::chrono::steady_clock::now() - start;
+        costs.push_back(spent.count() / static_cast<double>(timed.size()));
+    }
+    return median(std::move(costs));
+}
+
+/// The rows of one entrant on one stick, a lead each; those without predictions have no `used`. `losses`: of
+/// an entrant that learns an advance.
+std::vector<ComparisonRow> rows_of(const Entrant& entrant, const Field& field, const SensedStick& stick,
+                                   const AdvanceLosses* losses, const ComparisonOptions& options) {
+    const Recording& recording = field.recordings[stick.recording];
+    std::vector<ComparisonRow> rows(stick.leads_s.size());
+    for (const std::vector<std::size_t>& pass : passes_of(entrant, stick.recording)) {
+        const auto predictor = make_entrant(entrant, stick, pass.front(), stick.leads_s);
+        const std::vector<LeadScore> scores = score_predictor(stick, *predictor);
+        for (const std::size_t lead : pass) {
+            ComparisonRow& row = rows[lead];
+            row.trace = recording.trace.file;
+            row.person = recording.person;
+            row.stick = stick.name;
+            row.predictor = entrant.name;
+            row.used = entrant.used[stick.recording][lead];
+            row.lead_s = stick.leads_s[lead];
+            row.rate_hz = stick.rate_hz;
+            row.noise_mm = 1e3 * options.sensor.noise_m;
+            row.external = entrant.external;
+            row.error = scores[lead].error;
+            row.calibration = scores[lead].calibration();
+            if (losses) row.advance_s = losses->best_s(recording, lead);
+            if (options.surface.kind != StrikeSurface::Kind::none)
+                row.hits = hits_of(entrant, field, stick, lead, options, row.advance_s.value_or(0));
+        }
+    }
+    return rows;
+}
+
+constexpr double kLongestS = 0.150, kStepS = 0.010;
+constexpr double kWindowS = 3, kZoomS = 0.6;
+
+/// Of the leads asked for, the one nearest to `lead_s`.
+std::size_t nearest(const std::vector<double>& asked_s, double lead_s) {
+    const auto distance = [&](double asked) { return std::abs(asked - lead_s); };
+    return static_cast<std::size_t>(std::ranges::min_element(asked_s, {}, distance) - asked_s.begin());
+}
+
+LeadCurve curve_of(const Entrant& entrant, std::span<const SensedStick> sticks,
+                   const std::vector<double>& asked_s) {
+    const std::vector<double>& leads_s = sticks.front().leads_s;
+    std::vector<SquareSum> sums(leads_s.size());
+    for (const SensedStick& stick : sticks) {
+        for (const std::vector<std::size_t>& pass : passes_of(entrant, stick.recording)) {
+            const auto predictor = make_entrant(entrant, stick, pass.front(), leads_s);
+            const std::vector<SquareSum> scored = score_positions(stick, *predictor);
+            for (std::size_t lead = 0; lead < leads_s.size(); ++lead)
+                if (std::ranges::count(pass, nearest(asked_s, leads_s[lead])) > 0)
+                    sums[lead].add(scored[lead]);
+        }
+    }
+    LeadCurve curve{entrant.name, {}};
+    for (std::size_t lead = 0; lead < leads_s.size(); ++lead)
+        if (sums[lead].count > 0) curve.rms_mm.emplace_back(leads_s[lead], sums[lead].rms());
+    return curve;
+}
+
+/// Start of the `length_s` in [from_s, to_s] in which the recorded point rises and falls most.
+double liveliest(const std::vector<tracking::PoseSample>& samples, double from_s, double to_s,
+                 double length_s) {
+    double best = -1, start_s = from_s, sum = 0;
+    std::size_t first = 0;
+    while (first + 1 < samples.size() && samples[first].t_s < from_s) ++first;
+    const auto way = [&](std::size_t i) {
+        return std::abs(samples[i].position.y() - samples[i - 1].position.y());
+    };
+    for (std::size_t i = first + 1; i < samples.size() && samples[i].t_s <= to_s; ++i) {
+        sum += way(i);
+        while (samples[i].t_s - samples[first].t_s > length_s) sum -= way(++first);
+        if (sum > best) best = sum, start_s = samples[first].t_s;
+    }
+    return start_s;
+}
+
+FigurePath path_of(const Entrant& entrant, const SensedStick& stick, std::size_t lead,
+                   const StickFigure& figure) {
+    FigurePath path{entrant.name, entrant.used[stick.recording][lead], stick.leads_s[lead], {}};
+    const auto predictor = make_entrant(entrant, stick, lead, stick.leads_s);
+    for (const tracking::PoseSample& sample : stick.samples) {
+        const double behind_s = feed(*predictor, sample), t_s = predictor->time_s() + behind_s + path.lead_s;
+        if (t_s >= figure.from_s && t_s <= figure.to_s)
+            path.height_m.emplace_back(t_s, predictor->predict(path.lead_s + behind_s).position.y());
+    }
+    return path;
+}
+
+/// Names of the predictors whose paths are drawn.
+std::vector<std::string> drawn_predictors(const Comparison& comparison) {
+    const std::vector<double>& leads_s = comparison.options.leads_s;
+    const double middle_s = leads_s[leads_s.size() / 2];
+    const ComparisonSummary* best = nullptr;
+    bool thesis = false, naive = false;
+    for (const ComparisonSummary& summary : comparison.summaries) {
+        thesis = thesis || summary.predictor == "thesis";
+        naive = naive || summary.predictor == "naive";
+        if (summary.lead_s == middle_s && !summary.baseline && !summary.external &&
+            (best == nullptr || summary.error.position.rms() < best->error.position.rms()))
+            best = &summary;
+    }
+    std::vector<std::string> names;
+    if (thesis) names.emplace_back("thesis");
+    if (best != nullptr && best->predictor != "thesis") names.push_back(best->predictor);
+    if (naive) names.emplace_back("naive");
+    return names;
+}
+
+/// Runs every entrant over every stick of the field at every lead: errors and calibration; strikes, if there
+/// is a surface, those of an entrant that learns an advance with the one that it learned (on `tuning`, of
+/// --tune, or, if that is empty, on all others of the field; never on the one that is scored); cost, if asked
+/// for. By stick, entrant, lead, but where an entrant does not take part. The rows do not depend on
+/// `options.threads`.
+std::vector<ComparisonRow> score_entrants(const Field& field, const Field& tuning,
+                                          const std::vector<Entrant>& entrants,
+                                          const ComparisonOptions& options) {
+    const Field& others = tuning.recordings.empty() ? field : tuning;
+    const auto learner =
+        std::ranges::find_if(entrants, [](const Entrant& e) { return !e.strikes_by.empty(); });
+    std::optional<AdvanceLosses> losses;
+    if (learner != entrants.end() && options.tuning && options.surface.kind != StrikeSurface::Kind::none &&
+        (!tuning.recordings.empty() || field.recordings.size() > 1))
+        losses.emplace(others, *learner, options);
+    std::vector<std::vector<ComparisonRow>> parts(field.sticks.size() * entrants.size());
+    const auto score = [&](std::size_t i) {
+        const auto entrant = entrants.begin() + static_cast<std::ptrdiff_t>(i % entrants.size());
+        parts[i] = rows_of(*entrant, field, field.sticks[i / entrants.size()],
+                           entrant == learner && losses ? &*losses : nullptr, options);
+    };
+    parallel_for(parts.size(), options.threads, score, options.progress);
+    std::vector<ComparisonRow> rows;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+        std::erase_if(parts[i], [](const ComparisonRow& row) { return row.used.empty(); });
+        for (ComparisonRow& row : parts[i]) {
+            if (!options.cost || row.external) continue;
+            // A specification that runs at several leads is measured once.
+            const auto same = std::ranges::find(parts[i], row.used, &ComparisonRow::used);
+            row.ns_per_sample = &*same != &row
+                                    ? same->ns_per_sample
+                                    : nanoseconds_per_sample(row.used, field.sticks[i / entrants.size()]);
+        }
+        std::ranges::move(parts[i], std::back_inserter(rows));
+    }
+    return rows;
+}
+
+/// RMS over leads of 0 to 150 ms of every entrant whose cost is not external, over all recordings; a tuned
+/// one runs, at each lead, the parameters chosen for the nearest lead asked for.
+std::vector<LeadCurve> lead_curves(std::span<const Recording> recordings,
+                                   const std::vector<Entrant>& entrants, const ComparisonOptions& options) {
+    std::vector<double> leads_s;
+    for (int k = 0; k * kStepS < kLongestS + kStepS / 2; ++k) leads_s.push_back(k * kStepS);
+    const std::vector<SensedStick> sticks = sense_all(recordings, options.sensor, leads_s);
+    std::vector<LeadCurve> curves(entrants.size());
+    parallel_for(entrants.size(), options.threads, [&](std::size_t i) {
+        if (!entrants[i].external) curves[i] = curve_of(entrants[i], sticks, options.leads_s);
+    });
+    std::erase_if(curves, [](const LeadCurve& curve) { return curve.predictor.empty(); });
+    return curves;
+}
+
+/// The data of figures 3-1 to 3-3 of the thesis, redone on the first stick of the first recording: its 3 s
+/// of most motion, and 0.6 s of these. Predicted are naive, thesis and the estimator of least RMS at the
+/// middle lead, as far as they take part.
+StickFigure stick_figure(const Field& field, const std::vector<Entrant>& entrants,
+                         const Comparison& comparison) {
+    const SensedStick& stick = field.sticks.front();
+    const tracking::Trace& trace = field.recordings.front().trace;
+    const std::vector<tracking::PoseSample>& recorded = trace.sticks.front().samples;
+    StickFigure figure;
+    figure.trace = trace.file;
+    figure.stick = stick.name;
+    figure.from_s = liveliest(recorded, recorded.front().t_s + kSettlingS, recorded.back().t_s, kWindowS);
+    figure.to_s = figure.from_s + kWindowS;
+    figure.zoom_from_s = liveliest(recorded, figure.from_s, figure.to_s, kZoomS);
+    figure.zoom_to_s = figure.zoom_from_s + kZoomS;
+    for (const tracking::PoseSample& sample : recorded)
+        if (sample.t_s >= figure.from_s && sample.t_s <= figure.to_s)
+            figure.recorded_m.emplace_back(sample.t_s, sample.position.y());
+    for (const std::string& name : drawn_predictors(comparison)) {
+        const Entrant& entrant = *std::ranges::find(entrants, name, &Entrant::name);
+        for (std::size_t lead = 0; lead < stick.leads_s.size(); ++lead)
+            figure.paths.push_back(path_of(entrant, stick, lead, figure));
+    }
+    return figure;
 }
 
 ComparisonSummary summary_of(const Entrant& entrant, double lead_s, const std::vector<ComparisonRow>& rows) {
@@ -104,6 +505,39 @@ std::vector<PairedResult> pair_with_baselines(const Comparison& comparison,
 }
 
 }  // namespace
+
+std::vector<MapCell> map_sensors(std::span<const Recording> recordings, const ComparisonOptions& options,
+                                 const MapAxes& axes) {
+    const MapField field = field_of(options, options.tuning && recordings.size() >= 2);
+    const std::vector<tracking::SensorModel> sensors = sensors_of(axes, options);
+    std::vector<std::vector<MapCell>> parts(sensors.size());
+    const auto work = [&](std::size_t i) {
+        const std::vector<SensedStick> sticks = sense_all(recordings, sensors[i], options.leads_s);
+        std::vector<std::string> as_named;
+        std::ranges::transform(field.as_named, std::back_inserter(as_named), picture_specification);
+        const TuningTable table(as_named, field.families, sensors[i].noise_m / kMm, sticks, 1);
+        for (std::size_t lead = 0; lead < options.leads_s.size(); ++lead)
+            add_cells(parts[i], runners_of(table, field, lead), sensors[i], options.leads_s[lead]);
+    };
+    parallel_for(sensors.size(), options.threads, work, options.progress);
+    std::vector<MapCell> map;
+    for (std::vector<MapCell>& part : parts) std::ranges::move(part, std::back_inserter(map));
+    return map;
+}
+
+std::vector<MapCell> best_cells(const std::vector<MapCell>& map) {
+    const auto place_of = [](const MapCell& cell) {
+        return std::tuple(cell.rate_hz, cell.noise_mm, cell.jitter_ms, cell.drop_out, cell.result.lead_s);
+    };
+    std::vector<MapCell> best;
+    for (const MapCell& cell : map) {
+        if (best.empty() || place_of(best.back()) != place_of(cell))
+            best.push_back(cell);
+        else if (cell.result.rms_mm < best.back().result.rms_mm)
+            best.back() = cell;
+    }
+    return best;
+}
 
 Comparison compare(const ComparisonOptions& options) {
     Comparison comparison;

@@ -1,4 +1,3 @@
-#include "compare/comparison_report.h"
 
 #include <fmt/format.h>
 
@@ -12,7 +11,7 @@
 #include <tuple>
 #include <vector>
 
-#include "compare/comparison_map.h"
+#include "compare/comparison.h"
 #include "compare/comparison_tables.h"
 #include "compare/entrants.h"
 #include "report/html.h"
@@ -23,6 +22,7 @@ namespace app {
 namespace {
 
 constexpr int kWide = 1040, kHalf = 520;
+constexpr const char* kTitle = "Predictors compared";
 
 using Points = std::vector<std::pair<double, double>>;
 
@@ -35,33 +35,25 @@ std::string text_of(const Points& points, double from, double to, double scale) 
 }
 
 /// Recorded and predicted heights within [from_s, to_s]; a path is drawn if `name_of` it is not empty.
-PlotWithLegend heights(const StickFigure& figure, double from_s, double to_s, int width,
-                       const std::function<std::string(const FigurePath&)>& name_of) {
+PlotScript heights(const StickFigure& figure, double from_s, double to_s, int width,
+                   const std::function<std::string(const FigurePath&)>& name_of) {
     constexpr double kMmPerM = 1e3;
-    PlotWithLegend plot;
+    std::vector<PlotLine> legend = {{"recorded", colours::contact}};
     PlotPanel panel;
-    plot.legend.push_back({"recorded", colours::contact, false});
     panel.add(text_of(figure.recorded_m, from_s, to_s, kMmPerM),
               "with lines lt 1 lw 2.2 lc " + gnuplot_colour(colours::contact));
     for (const FigurePath& path : figure.paths) {
         const std::string name = name_of(path);
         if (name.empty()) continue;
-        plot.legend.push_back(line_of(plot.legend.size() - 1, name));
-        panel.add(text_of(path.height_m, from_s, to_s, kMmPerM), style_of(plot.legend.back(), 1.4));
+        legend.push_back(line_of(legend.size() - 1, name));
+        panel.add(text_of(path.height_m, from_s, to_s, kMmPerM), style_of(legend.back(), 1.4));
     }
     double low = 1e9, high = -1e9;
     for (const auto& [t, y] : figure.recorded_m)
         low = std::min(low, kMmPerM * y), high = std::max(high, kMmPerM * y);
     const double room = 0.25 * (high - low) + 1;  // overshoot beyond this leaves the plot
-    plot.script = {
-        width, 280,
-        plot_axes() + round_tics("x", to_s - from_s, width == kWide ? 12 : 6) +
-            round_tics("y", high - low + 2 * room, 6) +
-            fmt::format(
-                "set xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel 'time, s'\nset ylabel 'height, mm'\n",
-                from_s, to_s, low - room, high + room) +
-            panel.text()};
-    return plot;
+    return plot_of(width, 280, {"time, s", from_s, to_s, width == kWide ? 12 : 6},
+                   {"height, mm", low - room, high + room, 6}, panel, {}, legend);
 }
 
 /// The family of a predictor as shown: of cv:q=1e7 and of cv* it is cv.
@@ -89,7 +81,7 @@ std::string logarithmic_tics(double low, double high) {
 }
 
 /// Figure 3-1: recorded height and predictions at the shortest lead, 3 s.
-PlotWithLegend height_plot(const StickFigure& figure) {
+PlotScript height_plot(const StickFigure& figure) {
     std::set<std::string> seen;
     return heights(figure, figure.from_s, figure.to_s, kWide, [&](const FigurePath& path) {
         const bool first = seen.insert(path.predictor).second;  // the first lead alone
@@ -98,45 +90,40 @@ PlotWithLegend height_plot(const StickFigure& figure) {
 }
 
 /// Figures 3-2 and 3-3: recorded height and one predictor's at every lead, 0.6 s.
-PlotWithLegend zoomed_plot(const StickFigure& figure, const std::string& predictor) {
+PlotScript zoomed_plot(const StickFigure& figure, const std::string& predictor) {
     return heights(figure, figure.zoom_from_s, figure.zoom_to_s, kHalf, [&](const FigurePath& path) {
         return path.predictor == predictor ? fmt::format("{:.0f} ms ahead", 1e3 * path.lead_s) : "";
     });
 }
 
 /// RMS over lead, 0 to 150 ms. Of a family the tuned curve alone, where there is one; naive of 1992 stays.
-PlotWithLegend curves_plot(const Comparison& comparison) {
+PlotScript curves_plot(const Comparison& comparison) {
     std::set<std::string> tuned;
     for (const LeadCurve& curve : comparison.curves)
         if (curve.predictor.ends_with('*')) tuned.insert(shown_family(curve.predictor));
-    PlotWithLegend plot;
+    std::vector<PlotLine> legend;
     PlotPanel panel;
     double highest = 1;
     for (const LeadCurve& curve : comparison.curves) {
         const std::string& name = curve.predictor;
         const bool also_tuned = !name.ends_with('*') && tuned.contains(family_of(name));
         if ((also_tuned && name != "naive") || name.ends_with("**")) continue;
-        plot.legend.push_back(line_of(plot.legend.size(), name));
+        legend.push_back(line_of(legend.size(), name));
         Points points;
         for (const auto& [lead_s, rms_mm] : curve.rms_mm) points.emplace_back(1e3 * lead_s, rms_mm);
-        panel.add(text_of(points, 0, 150, 1), style_of(plot.legend.back(), 1.6));
+        panel.add(text_of(points, 0, 150, 1), style_of(legend.back(), 1.6));
         // What runs away (a quadratic) does not set the scale.
         if (is_baseline(name) && !curve.rms_mm.empty() && family_of(name) != "least-squares")
             highest = std::max(highest, curve.rms_mm.back().second);
     }
-    std::string commands = plot_axes() + round_tics("y", 1.25 * highest, 6);
-    commands += fmt::format(
-        "set xrange [0:150]\nset yrange [0:{}]\nset xtics 10\nset xlabel 'lead, ms'\nset ylabel 'RMS error, "
-        "mm'\n",
-        1.25 * highest);
-    plot.script = {kWide, 360, commands + panel.text()};
-    return plot;
+    return plot_of(kWide, 360, {"lead, ms", 0, 150}, {"RMS error, mm", 0, 1.25 * highest, 6}, panel,
+                   "set xtics 10\n", legend);
 }
 
 /// Cost of a sample against RMS at a lead: an open point a predictor as named, a filled one as tuned; a
 /// colour a family, and a square where its legend is dashed.
-PlotWithLegend cost_plot(const Comparison& comparison, double lead_s) {
-    PlotWithLegend plot;
+PlotScript cost_plot(const Comparison& comparison, double lead_s) {
+    std::vector<PlotLine> legend;
     PlotPanel panel;
     double fastest = 1e9, slowest = 1, least = 1e9, most = 0;
     for (const ComparisonSummary& s : comparison.summaries) {
@@ -146,58 +133,42 @@ PlotWithLegend cost_plot(const Comparison& comparison, double lead_s) {
         panel.add(fmt::format("{:.3f} {:.4f}\n", s.ns_per_sample, s.error.position.rms()),
                   fmt::format("with points pt {} ps 0.8 lw 1.5 lc {}",
                               (look.dashed ? 4 : 6) + (tuned ? 1 : 0), gnuplot_colour(look.colour)));
-        if (!tuned) plot.legend.push_back(look);
+        if (!tuned) legend.push_back(look);
         fastest = std::min(fastest, s.ns_per_sample), slowest = std::max(slowest, s.ns_per_sample);
         least = std::min(least, s.error.position.rms()), most = std::max(most, s.error.position.rms());
     }
     const double room = 0.12 * (most - least) + 0.5;
-    plot.script = {kHalf, 320,
-                   plot_axes() + round_tics("y", most - least + 2 * room, 6) +
-                       logarithmic_tics(fastest / 1.5, slowest * 1.5) +
-                       fmt::format("set logscale x\nset xrange [{}:{}]\nset yrange [{}:{}]\nset xlabel "
-                                   "'cost, ns a sample'\nset ylabel 'RMS error, mm'\n",
-                                   fastest / 1.5, slowest * 1.5, std::max(0.0, least - room), most + room) +
-                       panel.text()};
-    return plot;
+    return plot_of(kHalf, 320, {"cost, ns a sample", fastest / 1.5, slowest * 1.5},
+                   {"RMS error, mm", std::max(0.0, least - room), most + room}, panel,
+                   "set logscale x\n" + logarithmic_tics(fastest / 1.5, slowest * 1.5) +
+                       round_tics("y", most - least + 2 * room, 6),
+                   legend);
 }
 
 /// Committed minus true time of the matched strikes of one predictor at a lead.
-PlotWithLegend timing_plot(const ComparisonSummary& summary) {
+PlotScript timing_plot(const ComparisonSummary& summary) {
     constexpr int kHalfMs = 30;
-    std::map<int, int> bins;
-    if (summary.hits)
-        for (const double error_ms : summary.hits->errors_ms) ++bins[static_cast<int>(std::floor(error_ms))];
-    std::string data;
-    int highest = 1;
-    for (const auto& [bin, count] : bins) {
-        fmt::format_to(std::back_inserter(data), "{} {}\n", bin + 0.5, count);
-        highest = std::max(highest, count);
-    }
+    const auto [data, highest] = histogram(summary.hits->errors_ms, 1);
     PlotPanel panel;
-    panel.add(data, "with boxes fs solid 0.75 noborder lc " + gnuplot_colour(colours::released));
-    PlotWithLegend plot;
-    plot.script = {
-        kHalf, 220,
-        plot_axes() +
-            fmt::format(
-                "set xrange [{}:{}]\nset yrange [0:{}]\nset xtics 5\nset ytics {}\nset boxwidth 0.9\n"
-                "set xlabel 'committed - true time, ms (positive: late)'\nset ylabel 'strikes in 1 ms'\n",
-                -kHalfMs, kHalfMs, highest * 1.08, std::max(1.0, round_step(highest, 4))) +
-            panel.text()};
-    return plot;
+    panel.add(data, boxes_of(colours::released));
+    return plot_of(
+        kHalf, 220, {"committed - true time, ms (positive: late)", -kHalfMs, kHalfMs},
+        {"strikes in 1 ms", 0, highest * 1.08}, panel,
+        fmt::format("set xtics 5\nset ytics {}\nset boxwidth 0.9\n", std::max(1.0, round_step(highest, 4))));
 }
 
 std::string heading(const Comparison& c) {
     const auto leads_ms = c.options.leads_s | std::views::transform([](double s) { return 1e3 * s; });
-    std::string text = "<header><h1>Predictors compared</h1>\n<p>by MusicWorld</p>\n<dl class=facts>\n";
-    text += report_fact("recordings", fmt::format("{}", c.options.traces.size()));
-    text += report_fact("persons", fmt::format("{}: {}", c.persons.size(), fmt::join(c.persons, ", ")));
     const std::string sensor = describe(c.options.sensor);
-    text += report_fact("sensor", sensor.empty() ? "the recordings as they are" : sensor);
-    text += report_fact("leads", fmt::format("{:.1f} ms", fmt::join(leads_ms, ", ")));
-    text += report_fact("tuning", c.tuned_on);
-    text += report_fact("strikes on", c.options.surface_text);
-    text += "</dl></header>\n<h2>Which predictor wins</h2>\n";
+    std::string text =
+        report_header(kTitle, "by MusicWorld",
+                      {{"recordings", fmt::format("{}", c.options.traces.size())},
+                       {"persons", fmt::format("{}: {}", c.persons.size(), fmt::join(c.persons, ", "))},
+                       {"sensor", sensor.empty() ? "the recordings as they are" : sensor},
+                       {"leads", fmt::format("{:.1f} ms", fmt::join(leads_ms, ", "))},
+                       {"tuning", c.tuned_on},
+                       {"strikes on", c.options.surface_text}});
+    text += "<h2>Which predictor wins</h2>\n";
     for (const std::string& sentence : winners(c)) text += fmt::format("<p>{}</p>\n", html(sentence));
     text += fmt::format("<p class=note>{}</p>\n", html(selection_caution(c)));
     return text +
@@ -368,8 +339,7 @@ std::string format_comparison_report(const Comparison& comparison, const std::fi
     PlotGallery plots;
     const Placed placed = declare(plots, comparison);
     plots.draw(scratch);
-    return report_page("Predictors compared",
-                       heading(comparison) + plots.symbols() + sections(comparison, plots, placed));
+    return report_page(kTitle, heading(comparison) + plots.symbols() + sections(comparison, plots, placed));
 }
 
 }  // namespace app

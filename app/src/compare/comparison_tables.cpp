@@ -9,7 +9,7 @@
 #include <ranges>
 #include <set>
 
-#include "compare/comparison_map.h"
+#include "compare/comparison.h"
 #include "files/one_line.h"
 
 namespace app {

@@ -12,7 +12,7 @@
 
 #include "files/bad_input.h"
 #include "files/option_values.h"
-#include "kit/tip_track.h"
+#include "kit/kit.h"
 #include "statistics/statistics.h"
 #include "strikes/stroke_lows.h"
 #include "traces/sensor_model.h"

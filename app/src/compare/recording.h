@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "kit/stick_geometry.h"
+#include "kit/kit.h"
 
 namespace app {
 

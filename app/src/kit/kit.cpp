@@ -354,6 +354,12 @@ Kit read_kit(const fs::path& file) {
     return kit;
 }
 
+std::vector<sim::BodyDefinition> bodies_of(const Kit& kit) {
+    std::vector<sim::BodyDefinition> bodies;
+    for (const Instrument& instrument : kit.instruments) bodies.push_back(instrument.body);
+    return bodies;
+}
+
 FormatDescription kit_format() {
     KitDraft written;
     std::vector<TomlFile> defaults;
@@ -362,6 +368,35 @@ FormatDescription kit_format() {
     read_toml(defaults, "the kits' defaults", [&](Fields& keys) { kKitFile.keys(keys, written); });
     written.kit.stick.mesh = written.kit.stick.mesh.filename();
     return describe_format(kKitFile, written);
+}
+
+StickGeometry stick_geometry(const tracking::Trace& trace, const StickDefinition& stick,
+                             const std::optional<Eigen::Vector3d>& tip_option,
+                             const std::optional<Eigen::Vector3d>& shaft_option) {
+    StickGeometry geometry;
+    geometry.radius_m = stick.radius_m;
+    geometry.length_m = stick.length_m;
+    geometry.tip = tip_option.value_or(stick.tip.value_or(trace.tip.value_or(geometry.tip)));
+    geometry.shaft =
+        shaft_option.value_or(stick.shaft.value_or(trace.shaft.value_or(geometry.shaft))).normalized();
+    return geometry;
+}
+
+TipTrack tip_track(const tracking::StickTrace& stick, const StickGeometry& geometry) {
+    TipTrack track{stick.name, {}, {}};
+    track.t_s.reserve(stick.samples.size());
+    track.tip.reserve(stick.samples.size());
+    for (const tracking::PoseSample& sample : stick.samples) {
+        track.t_s.push_back(sample.t_s);
+        track.tip.push_back(sample.position + sample.orientation * geometry.tip);
+    }
+    return track;
+}
+
+std::vector<TipTrack> tip_tracks(const tracking::Trace& trace, const StickGeometry& geometry) {
+    std::vector<TipTrack> tracks;
+    for (const tracking::StickTrace& stick : trace.sticks) tracks.push_back(tip_track(stick, geometry));
+    return tracks;
 }
 
 }  // namespace app

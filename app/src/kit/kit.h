@@ -2,6 +2,7 @@
 #include <audio/performance.h>
 #include <render/scene.h>
 #include <sim/modal_body.h>
+#include <tracking/trace.h>
 
 #include <Eigen/Geometry>
 #include <filesystem>
@@ -58,8 +59,35 @@ struct Kit {
 /// missing or out of range.
 [[nodiscard]] Kit read_kit(const std::filesystem::path& file);
 
+/// What the instruments are for the simulation, in their order.
+[[nodiscard]] std::vector<sim::BodyDefinition> bodies_of(const Kit& kit);
+
 /// Keys, ranges and defaults of kit files. The defaults of [stick], [camera] and [room] are those of the bundled
 /// defaults.toml.
 [[nodiscard]] FormatDescription kit_format();
+
+/// Where the tip and the shaft lie in the tracked body's frame: an option overrides the kit, the kit the
+/// trace.
+struct StickGeometry {
+    Eigen::Vector3d tip = Eigen::Vector3d::Zero();      ///< centre of the tip [m]
+    Eigen::Vector3d shaft = -Eigen::Vector3d::UnitZ();  ///< unit, hand to tip
+    double radius_m = 0.006;
+    double length_m = 0.40;
+};
+
+[[nodiscard]] StickGeometry stick_geometry(const tracking::Trace& trace, const StickDefinition& stick,
+                                           const std::optional<Eigen::Vector3d>& tip_option,
+                                           const std::optional<Eigen::Vector3d>& shaft_option);
+
+/// The measured path of one stick's tip.
+struct TipTrack {
+    std::string stick;
+    std::vector<double> t_s;
+    std::vector<Eigen::Vector3d> tip;  ///< [m], world
+};
+[[nodiscard]] TipTrack tip_track(const tracking::StickTrace& stick, const StickGeometry& geometry);
+
+/// Those of all sticks.
+[[nodiscard]] std::vector<TipTrack> tip_tracks(const tracking::Trace& trace, const StickGeometry& geometry);
 
 }  // namespace app

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <map>
+#include <utility>
 
 #include "latency/latency_report.h"
 #include "process/clock.h"
@@ -29,24 +29,10 @@ std::string longer_shares(const Spread& ms, double least_ms) {
     return text;
 }
 
-/// Counts in bins of a width, as boxes.
-struct Histogram {
-    std::string data;
-    int highest = 1;
-};
-Histogram histogram(const Spread& ms, double bin_ms, double low_ms, double high_ms) {
-    std::map<int, int> bins;
-    for (const double value : ms.sorted())
-        if (value >= low_ms && value <= high_ms) ++bins[static_cast<int>(std::floor(value / bin_ms))];
-    Histogram made;
-    if (bins.empty()) return made;
-    for (int bin = bins.begin()->first - 1; bin <= bins.rbegin()->first + 1; ++bin) {
-        const auto found = bins.find(bin);
-        const int count = found == bins.end() ? 0 : found->second;
-        fmt::format_to(std::back_inserter(made.data), "{} {}\n", (bin + 0.5) * bin_ms, count);
-        made.highest = std::max(made.highest, count);
-    }
-    return made;
+/// Of the values within a range.
+Histogram histogram_within(const Spread& ms, double bin_ms, double low_ms, double high_ms) {
+    const auto low = std::ranges::lower_bound(ms.sorted(), low_ms);
+    return histogram({low, std::ranges::upper_bound(low, ms.sorted().end(), high_ms)}, bin_ms);
 }
 
 /// The shaded place of what drummers call no latency: 10 +- 3 ms after the picture.
@@ -72,45 +58,39 @@ double pixels_ms_after_due(const FrameTiming& frame) {
 
 /// Share of the values that are longer, over the value; a line for each stage of that kind. Both axes
 /// logarithmic, so that a straight look shows 1 in 2, in 20, in 100 and the rare ones.
-PlotWithLegend stage_plot(const LatencyReport& report, LatencyStage::Kind kind) {
+PlotScript stage_plot(const LatencyReport& report, LatencyStage::Kind kind) {
     constexpr double kLeastMs = 1e-5;
-    PlotWithLegend plot;
+    std::vector<PlotLine> legend;
     PlotPanel panel;
     double low = 1e9, high = 1e-3, rarest = 0.1;
     for (const LatencyStage& stage : report.stages) {
         if (stage.kind != kind) continue;
-        plot.legend.push_back(line_of(plot.legend.size(), stage.name));
-        panel.add(longer_shares(stage.ms, kLeastMs), style_of(plot.legend.back(), 1.6));
+        legend.push_back(line_of(legend.size(), stage.name));
+        panel.add(longer_shares(stage.ms, kLeastMs), style_of(legend.back(), 1.6));
         low = std::min(low, std::max(stage.ms.percentile(5), kLeastMs));
         high = std::max(high, stage.ms.percentile(100));
         rarest = std::min(rarest, 1 / static_cast<double>(stage.ms.count()));
     }
-    plot.script =
-        plot_of(kHalf, 320, {"ms", std::min(low, high) / 1.5, high * 1.5},
-                {"share that took longer", rarest / 1.5, 1}, panel, "set logscale xy\nset format '%g'\n");
-    return plot;
+    return plot_of(kHalf, 320, {"ms", std::min(low, high) / 1.5, high * 1.5},
+                   {"share that took longer", rarest / 1.5, 1}, panel, "set logscale xy\nset format '%g'\n",
+                   legend);
 }
 
 /// Leads in force and the delays that they follow over the run.
-PlotWithLegend leads_plot(const RealtimeResult& realtime) {
-    struct Series {
-        const char* name;
-        double LeadStep::*value;
-        ReportColour colour;
-        bool dashed;
-    };
-    constexpr Series kSeries[] = {{"lead of pictures", &LeadStep::render_lead_s, colours::sticks[0], false},
-                                  {"their delay", &LeadStep::render_delay_s, colours::sticks[0], true},
-                                  {"lead of sound", &LeadStep::sound_lead_s, colours::sticks[1], false},
-                                  {"its delay", &LeadStep::sound_delay_s, colours::sticks[1], true}};
-    PlotWithLegend plot;
+PlotScript leads_plot(const RealtimeResult& realtime) {
+    const std::pair<PlotLine, double LeadStep::*> series[] = {
+        {{"lead of pictures", colours::sticks[0]}, &LeadStep::render_lead_s},
+        {{"their delay", colours::sticks[0], true}, &LeadStep::render_delay_s},
+        {{"lead of sound", colours::sticks[1]}, &LeadStep::sound_lead_s},
+        {{"its delay", colours::sticks[1], true}, &LeadStep::sound_delay_s}};
+    std::vector<PlotLine> legend;
     PlotPanel panel;
     double highest = 10;
-    for (const Series& series : kSeries) {
-        const auto ms = [&](const LeadStep& step) { return 1e3 * step.*series.value; };
+    for (const auto& [line, value] : series) {
+        const auto ms = [value = value](const LeadStep& step) { return 1e3 * step.*value; };
         // Delays are measured where leads follow them.
-        if (std::all_of(realtime.leads.begin(), realtime.leads.end(),
-                        [&](const LeadStep& step) { return ms(step) == 0; }))
+        if (std::ranges::all_of(
+                realtime.leads, [](double delay) { return delay == 0; }, ms))
             continue;
         std::string data;
         for (const LeadStep& step : realtime.leads) {
@@ -119,59 +99,44 @@ PlotWithLegend leads_plot(const RealtimeResult& realtime) {
         }
         fmt::format_to(std::back_inserter(data), "{:.3f} {:.4f}\n",
                        std::max(realtime.seconds, realtime.leads.back().at_s), ms(realtime.leads.back()));
-        plot.legend.push_back({series.name, series.colour, series.dashed});
-        panel.add(data, fmt::format("with steps lt 1 lw 1.6{} lc {}", series.dashed ? " dt '-'" : "",
-                                    gnuplot_colour(series.colour)));
+        legend.push_back(line);
+        panel.add(data, fmt::format("with steps lt 1 lw 1.6{} lc {}", line.dashed ? " dt '-'" : "",
+                                    gnuplot_colour(line.colour)));
     }
-    plot.script = plot_of(kWide, 260, {"time, s", 0, std::max(realtime.seconds, 1e-3)},
-                          {"ms", 0, highest * 1.1, 6}, panel);
-    return plot;
+    return plot_of(kWide, 260, {"time, s", 0, std::max(realtime.seconds, 1e-3)}, {"ms", 0, highest * 1.1, 6},
+                   panel, {}, legend);
 }
 
 /// Sound minus picture with the 10 +- 3 ms of drummers; `close`: also against the first frame behind the
 /// surface, else with the limits of ITU-R BT.1359 and ATSC.
-PlotWithLegend sound_picture_plot(const LatencyReport& report, double bin_ms, double low, double high,
-                                  bool close) {
-    const Histogram path = histogram(report.sound_minus_picture_ms, bin_ms, low, high),
-                    frame = histogram(report.sound_minus_frame_ms, bin_ms, low, high);
+PlotScript sound_picture_plot(const LatencyReport& report, double bin_ms, double low, double high,
+                              bool close) {
+    const Histogram path = histogram_within(report.sound_minus_picture_ms, bin_ms, low, high),
+                    frame = histogram_within(report.sound_minus_frame_ms, bin_ms, low, high);
     const double top = 1.08 * (close ? std::max(path.highest, frame.highest) : path.highest);
-    PlotWithLegend plot{{}, {kPicture}};
+    std::vector<PlotLine> legend = {kPicture};
     PlotPanel panel;
-    panel.add(path.data, "with boxes fs solid 0.75 noborder lc " + gnuplot_colour(kPicture.colour));
+    panel.add(path.data, boxes_of(kPicture.colour));
     if (close) {
         panel.add(frame.data, "with histeps lt 1 lw 1.4 lc " + gnuplot_colour(kFrame.colour));
-        plot.legend.push_back(kFrame);
+        legend.push_back(kFrame);
     } else {
         for (const auto& [limits, look] : {std::pair{kAtscLimits, kAtsc}, {kItuLimits, kItu}}) {
             for (const double x : {limits.early_ms, limits.late_ms})
                 panel.add(fmt::format("{} 0\n{} {}\n", x, x, top), style_of(look, 1.4));
-            plot.legend.push_back(look);
+            legend.push_back(look);
         }
     }
-    plot.legend.push_back(kDrummers);
-    plot.script = plot_of(
+    legend.push_back(kDrummers);
+    return plot_of(
         kHalf, 260, {"sound - picture, ms (positive: sound late)", low, high},
         {fmt::format("strikes in {:g} ms", bin_ms), 0, top}, panel,
-        drummers_box(top) + fmt::format("set xtics {}\nset boxwidth {}\n", 10 * bin_ms, 0.9 * bin_ms));
-    return plot;
-}
-
-/// All of them.
-PlotWithLegend sound_picture_plot(const LatencyReport& report) {
-    const Spread& ms = report.sound_minus_picture_ms;
-    return sound_picture_plot(report, 2, std::min(-60.0, std::floor(ms.percentile(0))),
-                              std::max(140.0, std::ceil(ms.percentile(100))), false);
-}
-
-/// Close up: 80 ms about the median.
-PlotWithLegend sound_picture_close_plot(const LatencyReport& report) {
-    const Spread& ms = report.sound_minus_picture_ms;
-    const double middle = ms.empty() ? 0 : std::round(ms.percentile(50) / 10) * 10;
-    return sound_picture_plot(report, 1, middle - 40, middle + 40, true);
+        drummers_box(top) + fmt::format("set xtics {}\nset boxwidth {}\n", 10 * bin_ms, 0.9 * bin_ms),
+        legend);
 }
 
 /// When each frame's pixels were there, before (below 0) or after it was due; missed ones marked.
-PlotWithLegend frames_plot(const RealtimeResult& realtime) {
+PlotScript frames_plot(const RealtimeResult& realtime) {
     double low = -5, high = 5, last_s = realtime.seconds;
     for (const FrameTiming& frame : realtime.frames) {
         last_s = std::max(last_s, to_s(frame.shown_ns));
@@ -197,13 +162,12 @@ PlotWithLegend frames_plot(const RealtimeResult& realtime) {
     panel.add(skipped.text(), points(never, 0.5));
     panel.add(fmt::format("0 0\n{} 0\n", area.x_high),
               "with lines lt 1 lw 1 lc " + gnuplot_colour(colours::axis));
-    return {plot_of(kWide, 260, {"due on the screen, s", 0, area.x_high},
-                    {"pixels there after that, ms", low, high, 6}, panel),
-            {shown, missed, never}};
+    return plot_of(kWide, 260, {"due on the screen, s", 0, area.x_high},
+                   {"pixels there after that, ms", low, high, 6}, panel, {}, {shown, missed, never});
 }
 
 /// RMS error of the drawn sticks, a point for each half second.
-PlotWithLegend error_plot(const LatencyReport& report) {
+PlotScript error_plot(const LatencyReport& report) {
     constexpr double kWindowS = 0.5;
     std::string data;
     double highest = 1;
@@ -217,7 +181,7 @@ PlotWithLegend error_plot(const LatencyReport& report) {
     const PlotLine line{"RMS over 0.5 s, all sticks", colours::sticks[0]};
     PlotPanel panel;
     panel.add(data, style_of(line, 1.6));
-    return {plot_of(kWide, 220, {"time, s", 0, end_s}, {"mm", 0, 1.1 * highest, 5}, panel), {line}};
+    return plot_of(kWide, 220, {"time, s", 0, end_s}, {"mm", 0, 1.1 * highest, 5}, panel, {}, {line});
 }
 
 std::string trace_name(const PlayResult& play) {
@@ -290,12 +254,18 @@ std::string remarks(const RealtimeResult& realtime) {
 
 std::string format_latency_page(const LatencyReport& report, const PlayResult& play,
                                 const RealtimeResult& realtime, const std::filesystem::path& scratch) {
+    const Spread& ms = report.sound_minus_picture_ms;
+    const double low = std::min(-60.0, std::floor(ms.percentile(0))),
+                 high = std::max(140.0, std::ceil(ms.percentile(100)));
+    const double middle = ms.empty() ? 0 : std::round(ms.percentile(50) / 10) * 10;
     PlotGallery plots;
     const std::size_t sound =
                           plots.add(stage_plot(report, LatencyStage::Kind::sound), "From sensor to sound"),
                       picture = plots.add(stage_plot(report, LatencyStage::Kind::picture), "Pictures"),
-                      apart = plots.add(sound_picture_plot(report), "Sound minus picture"),
-                      close = plots.add(sound_picture_close_plot(report), "The same close up"),
+                      apart =
+                          plots.add(sound_picture_plot(report, 2, low, high, false), "Sound minus picture"),
+                      close = plots.add(sound_picture_plot(report, 1, middle - 40, middle + 40, true),
+                                        "The same close up"),
                       leads = plots.add(leads_plot(realtime), "Leads and delays"),
                       frames = plots.add(frames_plot(realtime), "Frames"),
                       errors = plots.add(error_plot(report), "Error of the drawn sticks");

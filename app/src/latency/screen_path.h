@@ -5,9 +5,8 @@
 #include <vector>
 
 #include "kit/kit.h"
-#include "kit/tip_track.h"
 #include "latency/timings.h"
-#include "play/play_result.h"
+#include "play/play.h"
 
 namespace app {
 

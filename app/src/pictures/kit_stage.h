@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "kit/kit.h"
-#include "kit/stick_geometry.h"
 
 namespace app {
 

@@ -17,7 +17,7 @@
 #include "process/clock.h"
 #include "process/progress_bar.h"
 #include "sticks/predictors.h"
-#include "sticks/stick_filters.h"
+#include "sticks/stick.h"
 
 namespace app {
 namespace {
@@ -41,9 +41,37 @@ struct OfflineParts {
 /// strikes to notes; every frame as soon as the last sample that it may use has been taken.
 class OfflineRun {
 public:
-    explicit OfflineRun(const OfflineParts& parts);
+    explicit OfflineRun(const OfflineParts& parts)
+        : parts_(parts),
+          t0_s_(parts.trace.t0_s()),
+          t_end_s_(parts.trace.t_end_s()),
+          states_(parts.trace.sticks.size()) {
+        const PlayOptions& o = parts.options;
+        const StickPredictors predictors =
+            stick_predictors(o.picture_predictor, o.sound_predictor, o.sound_lead_s);
+        for (const tracking::StickTrace& stick : parts.trace.sticks) {
+            filters_.emplace_back(predictors, stick.name);
+            sticks_.emplace_back(static_cast<std::uint32_t>(sticks_.size()), parts.stick, o.sound_lead_s);
+        }
+        pipeline_.emplace(parts.kit, o, t0_s_, parts.stick.radius_m, sticks_, parts.simulation,
+                          [this](const audio::Note& note, bool scheduled) { send(note, scheduled); });
+    }
 
-    void run(ProgressBar& bar);
+    void run(ProgressBar& bar) {
+        const std::vector<Sample> all = samples_by_time();
+        draw_frames(-kEver, all.front().pose->t_s);
+        for (auto first = all.begin(); first != all.end();) {
+            const double s = first->pose->t_s;
+            const auto next =
+                std::find_if(first, all.end(), [&](const Sample& sample) { return sample.pose->t_s > s; });
+            take({first, next});
+            draw_frames(s, next == all.end() ? kEver : next->pose->t_s);
+            bar.show(static_cast<double>(next - all.begin()) / static_cast<double>(all.size()));
+            first = next;
+        }
+        pipeline_->finish();
+        bar.clear();
+    }
 
     [[nodiscard]] const std::vector<Strike>& strikes() const { return pipeline_->strikes(); }
     [[nodiscard]] std::size_t refused() const { return refused_; }
@@ -54,13 +82,64 @@ private:
         std::uint32_t stick;
         const tracking::PoseSample* pose;
     };
-    [[nodiscard]] std::vector<Sample> samples_by_time() const;
+    [[nodiscard]] std::vector<Sample> samples_by_time() const {
+        std::vector<Sample> samples;
+        for (std::uint32_t stick = 0; stick < parts_.trace.sticks.size(); ++stick)
+            for (const tracking::PoseSample& pose : parts_.trace.sticks[stick].samples)
+                samples.push_back({stick, &pose});
+        std::ranges::stable_sort(samples, {}, [](const Sample& sample) { return sample.pose->t_s; });
+        return samples;
+    }
+
     /// Those of one time.
-    void take(std::span<const Sample> samples);
-    [[nodiscard]] std::vector<std::uint32_t> feed(std::span<const Sample> samples);
-    void send(const audio::Note& note, bool scheduled);
+    void take(std::span<const Sample> samples) {
+        const double s = samples.front().pose->t_s;
+        pipeline_->advance_to(s);
+        if (parts_.sound) {
+            // Notes before this are fixed; those that this sample may still change lie at or after it.
+            const double fixed = (s + parts_.options.release_margin_s - t0_s_) * audio::kSampleRate;
+            parts_.sound->advance_to(static_cast<std::int64_t>(std::floor(fixed)));
+        }
+        pipeline_->take(s, feed(samples));
+    }
+
+    std::vector<std::uint32_t> feed(std::span<const Sample> samples) {
+        const Stopwatch watch(pipeline_->times().tracking);
+        std::vector<std::uint32_t> moved;
+        for (const auto& [stick, pose] : samples) {
+            const tracking::SampleStatus status = filters_[stick].correct(*pose, states_[stick]);
+            sticks_[stick].take(states_[stick]);
+            if (!is_taken(status)) {
+                ++refused_;
+                continue;
+            }
+            if (status == tracking::SampleStatus::reinitialised) pipeline_->restart(stick);
+            moved.push_back(stick);
+        }
+        return moved;
+    }
+
+    void send(const audio::Note& note, bool scheduled) {
+        if (!parts_.sound || (parts_.options.solo && *parts_.options.solo != note.id)) return;
+        if (scheduled)
+            parts_.sound->schedule(note);
+        else
+            parts_.sound->cancel(note.id);
+    }
+
     /// Draws the frames that may use samples up to s but not the next one, at `next`.
-    void draw_frames(double s, double next);
+    void draw_frames(double s, double next) {
+        if (!parts_.frames) return;
+        for (;; ++next_frame_) {
+            const double elapsed = static_cast<double>(next_frame_) / parts_.options.fps;
+            const double T = t0_s_ + elapsed;
+            if (!(elapsed < t_end_s_ - t0_s_) || T - parts_.options.render_lead_s + kSlackS >= next) return;
+            const FrameContents contents = std::isfinite(s) ? pipeline_->scene(s, T) : FrameContents();
+            const Stopwatch watch(pipeline_->times().waiting_for_frames);
+            parts_.frames->push(
+                {.index = next_frame_, .state = parts_.stage->frame(contents.bodies, contents.poses())});
+        }
+    }
 
     OfflineParts parts_;
     double t0_s_, t_end_s_;
@@ -71,95 +150,6 @@ private:
     std::size_t next_frame_ = 0;
     std::size_t refused_ = 0;
 };
-
-OfflineRun::OfflineRun(const OfflineParts& parts)
-    : parts_(parts),
-      t0_s_(parts.trace.t0_s()),
-      t_end_s_(parts.trace.t_end_s()),
-      states_(parts.trace.sticks.size()) {
-    const PlayOptions& o = parts.options;
-    const StickPredictors predictors =
-        stick_predictors(o.picture_predictor, o.sound_predictor, o.sound_lead_s);
-    for (const tracking::StickTrace& stick : parts.trace.sticks) {
-        filters_.emplace_back(predictors, stick.name);
-        sticks_.emplace_back(static_cast<std::uint32_t>(sticks_.size()), parts.stick, o.sound_lead_s);
-    }
-    pipeline_.emplace(parts.kit, o, t0_s_, parts.stick.radius_m, sticks_, parts.simulation,
-                      [this](const audio::Note& note, bool scheduled) { send(note, scheduled); });
-}
-
-std::vector<OfflineRun::Sample> OfflineRun::samples_by_time() const {
-    std::vector<Sample> samples;
-    for (std::uint32_t stick = 0; stick < parts_.trace.sticks.size(); ++stick)
-        for (const tracking::PoseSample& pose : parts_.trace.sticks[stick].samples)
-            samples.push_back({stick, &pose});
-    std::ranges::stable_sort(samples, {}, [](const Sample& sample) { return sample.pose->t_s; });
-    return samples;
-}
-
-void OfflineRun::run(ProgressBar& bar) {
-    const std::vector<Sample> all = samples_by_time();
-    draw_frames(-kEver, all.front().pose->t_s);
-    for (auto first = all.begin(); first != all.end();) {
-        const double s = first->pose->t_s;
-        const auto next =
-            std::find_if(first, all.end(), [&](const Sample& sample) { return sample.pose->t_s > s; });
-        take({first, next});
-        draw_frames(s, next == all.end() ? kEver : next->pose->t_s);
-        bar.show(static_cast<double>(next - all.begin()) / static_cast<double>(all.size()));
-        first = next;
-    }
-    pipeline_->finish();
-    bar.clear();
-}
-
-std::vector<std::uint32_t> OfflineRun::feed(std::span<const Sample> samples) {
-    const Stopwatch watch(pipeline_->times().tracking);
-    std::vector<std::uint32_t> moved;
-    for (const auto& [stick, pose] : samples) {
-        const tracking::SampleStatus status = filters_[stick].correct(*pose, states_[stick]);
-        sticks_[stick].take(states_[stick]);
-        if (!is_taken(status)) {
-            ++refused_;
-            continue;
-        }
-        if (status == tracking::SampleStatus::reinitialised) pipeline_->restart(stick);
-        moved.push_back(stick);
-    }
-    return moved;
-}
-
-void OfflineRun::take(std::span<const Sample> samples) {
-    const double s = samples.front().pose->t_s;
-    pipeline_->advance_to(s);
-    if (parts_.sound) {
-        // Notes before this are fixed; those that this sample may still change lie at or after it.
-        const double fixed = (s + parts_.options.release_margin_s - t0_s_) * audio::kSampleRate;
-        parts_.sound->advance_to(static_cast<std::int64_t>(std::floor(fixed)));
-    }
-    pipeline_->take(s, feed(samples));
-}
-
-void OfflineRun::send(const audio::Note& note, bool scheduled) {
-    if (!parts_.sound || (parts_.options.solo && *parts_.options.solo != note.id)) return;
-    if (scheduled)
-        parts_.sound->schedule(note);
-    else
-        parts_.sound->cancel(note.id);
-}
-
-void OfflineRun::draw_frames(double s, double next) {
-    if (!parts_.frames) return;
-    for (;; ++next_frame_) {
-        const double elapsed = static_cast<double>(next_frame_) / parts_.options.fps;
-        const double T = t0_s_ + elapsed;
-        if (!(elapsed < t_end_s_ - t0_s_) || T - parts_.options.render_lead_s + kSlackS >= next) return;
-        const FrameContents contents = std::isfinite(s) ? pipeline_->scene(s, T) : FrameContents();
-        const Stopwatch watch(pipeline_->times().waiting_for_frames);
-        parts_.frames->push(
-            {.index = next_frame_, .state = parts_.stage->frame(contents.bodies, contents.poses())});
-    }
-}
 
 void check_solo(const PlayOptions& options, const std::vector<Strike>& strikes) {
     if (!options.solo) return;

@@ -1,14 +1,65 @@
 #pragma once
 #include <tracking/trace.h>
 
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "kit/kit.h"
-#include "kit/stick_geometry.h"
-#include "play/play_options.h"
-#include "play/play_result.h"
+#include "strikes/strike.h"
+#include "strikes/true_contacts.h"
 
 namespace app {
+
+/// What `musicworld play` was asked for.
+struct PlayOptions {
+    std::filesystem::path trace;
+    std::filesystem::path kit;
+    std::filesystem::path out = "out";
+    double fps = 30;
+    int width = 640, height = 480;
+    std::string picture_predictor = "auto", sound_predictor = "auto";
+    double render_lead_s = 1.0 / 30, sound_lead_s = 1.0 / 15, release_margin_s = 0.010;
+    int workers = 1;
+    bool cancelling = true, frames = true, audio = true;
+    std::optional<std::uint64_t> solo;  ///< render the sound of this strike alone
+    std::optional<Eigen::Vector3d> tip, shaft;
+    std::optional<std::filesystem::path> video;  ///< also an MP4, by ffmpeg
+    bool progress = false;                       ///< draw a progress bar on standard error
+};
+
+struct InputFile {
+    std::string file, sha256;
+};
+
+/// Everything that `play` found out, for the summary, the tables and the report.
+struct PlayResult {
+    PlayOptions options;  ///< as asked for, the predictors as specifications
+    std::string trace, kit_name, trace_source;
+    std::size_t sound_models = 1;  ///< that the sound's predictor runs in parallel
+    double t0_s = 0, t_end_s = 0;
+    std::size_t frames = 0;                ///< drawn
+    std::vector<std::string> sticks;       ///< names, by index
+    std::vector<std::string> instruments;  ///< names, by index
+    std::vector<Strike> strikes;           ///< by id
+    std::vector<TrueContact> contacts;     ///< by time
+    StrikeScore score;
+    std::vector<TipTrack> tracks;
+    std::vector<float> audio;         ///< interleaved stereo, 48 kHz; empty with --no-audio
+    std::size_t samples_refused = 0;  ///< reports that the filters ignored
+    std::size_t clipped_samples = 0;
+    double wall_s = 0;
+    std::vector<std::pair<std::string, double>> stages_s;  ///< name, seconds
+    int workers_lost = 0, bodies_reowned = 0;
+    std::vector<InputFile> inputs;
+    std::string fingerprint;
+    std::vector<std::pair<std::string, std::string>> versions;
+    std::vector<std::filesystem::path> report_frames;  ///< a few PNG files on disk that the report shows
+};
 
 /// Plays a recorded trace offline on a virtual clock into the folder `out`: frames/, audio.wav, events.csv,
 /// contacts.csv, hits.mid, summary.json and report.html. Throws BadInput, tracking::TraceError or

@@ -183,16 +183,11 @@ PlotScript row_plot(const PlayResult& result, const std::vector<Mark>& marks, co
 
 PlotScript timing_plot(const std::vector<MatchedNote>& notes) {
     const ErrorScale scale = error_scale(notes);
-    std::map<int, int> bins;
-    for (const MatchedNote& note : notes) ++bins[static_cast<int>(std::floor(note.error_ms / scale.bin_ms))];
-    std::string data;
-    int highest = 1;
-    for (const auto& [bin, count] : bins) {
-        fmt::format_to(std::back_inserter(data), "{} {}\n", (bin + 0.5) * scale.bin_ms, count);
-        highest = std::max(highest, count);
-    }
+    std::vector<double> errors_ms;
+    for (const MatchedNote& note : notes) errors_ms.push_back(note.error_ms);
+    const auto [data, highest] = histogram(errors_ms, scale.bin_ms);
     PlotPanel panel;
-    panel.add(data, "with boxes fs solid 0.75 noborder lc " + gnuplot_colour(colours::released));
+    panel.add(data, boxes_of(colours::released));
     return plot_of(
         kWidth / 2, 260, {kErrorLabel, -scale.half_ms, scale.half_ms},
         {fmt::format("notes in {} ms", scale.bin_ms), 0, highest * 1.08}, panel,
@@ -373,17 +368,17 @@ PlayPlots add_play_plots(PlotGallery& gallery, const PlayResult& result) {
     plots.timeline = timeline_of(result);
     for (const double from_s : plots.timeline.starts_s)
         plots.rows.push_back(gallery.add(
-            {row_plot(result, marks,
-                      {from_s, from_s + plots.timeline.row_s, low, high, kColumns, kHeightPanel}, peak)},
+            row_plot(result, marks,
+                     {from_s, from_s + plots.timeline.row_s, low, high, kColumns, kHeightPanel}, peak),
             fmt::format("timeline from {:g} s on", from_s)));
-    plots.timing = gallery.add({timing_plot(notes)}, "histogram of onset minus true contact");
+    plots.timing = gallery.add(timing_plot(notes), "histogram of onset minus true contact");
     plots.instruments =
-        gallery.add({timing_by_instrument_plot(result, notes)}, "onset minus true contact by instrument");
-    plots.leads = gallery.add({lead_plot(result, marks)}, "first prediction and decision of each note");
+        gallery.add(timing_by_instrument_plot(result, notes), "onset minus true contact by instrument");
+    plots.leads = gallery.add(lead_plot(result, marks), "first prediction and decision of each note");
     if (!result.audio.empty())
-        plots.sound = gallery.add({sound_plot(result, marks, peak)}, "envelope of the sound");
+        plots.sound = gallery.add(sound_plot(result, marks, peak), "envelope of the sound");
     if (!plots.timeline.whole)
-        plots.overview = gallery.add({overview_plot(result, marks, plots.timeline)},
+        plots.overview = gallery.add(overview_plot(result, marks, plots.timeline),
                                      "notes heard, false and missed over time");
     return plots;
 }

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "play/play_result.h"
+#include "play/play.h"
 #include "report/plot.h"
 
 namespace app {

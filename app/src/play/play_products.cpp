@@ -10,7 +10,6 @@
 
 #include "files/checksum.h"
 #include "report/table.h"
-#include "strikes/score_strikes.h"
 #include "strikes/true_contacts.h"
 
 namespace app {

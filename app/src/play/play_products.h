@@ -6,8 +6,8 @@
 #include <functional>
 #include <string>
 
-#include "kit/stick_geometry.h"
-#include "play/play_result.h"
+#include "kit/kit.h"
+#include "play/play.h"
 #include "play/play_setup.h"
 #include "process/clock.h"
 

@@ -14,7 +14,7 @@
 #include "report/html.h"
 #include "report/table.h"
 #include "statistics/statistics.h"
-#include "strikes/score_strikes.h"
+#include "strikes/true_contacts.h"
 
 namespace app {
 namespace fs = std::filesystem;

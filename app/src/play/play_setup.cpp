@@ -39,12 +39,6 @@ tracking::Trace read_played_trace(const fs::path& file) {
     return trace;
 }
 
-std::vector<sim::BodyDefinition> bodies_of(const Kit& kit) {
-    std::vector<sim::BodyDefinition> bodies;
-    for (const Instrument& instrument : kit.instruments) bodies.push_back(instrument.body);
-    return bodies;
-}
-
 std::vector<audio::Voice> voices_of(const Kit& kit) {
     std::vector<audio::Voice> voices;
     for (const Instrument& instrument : kit.instruments) voices.push_back(instrument.voice);

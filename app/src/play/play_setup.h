@@ -8,10 +8,8 @@
 
 #include "files/output_folder.h"
 #include "kit/kit.h"
-#include "kit/stick_geometry.h"
 #include "pictures/frame_thread.h"
-#include "play/play_options.h"
-#include "play/play_result.h"
+#include "play/play.h"
 #include "strikes/strike.h"
 
 namespace app {
@@ -25,7 +23,6 @@ inline constexpr double kSoundTailS = 0.5, kLongestSoundTailS = 10;
 [[nodiscard]] PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
                                   bool trace_is_file = true);
 
-[[nodiscard]] std::vector<sim::BodyDefinition> bodies_of(const Kit& kit);
 [[nodiscard]] std::vector<audio::Voice> voices_of(const Kit& kit);
 /// The note that sounds a strike: speed through the instrument's velocity curve, place within the struck
 /// zone, MIDI note and velocity. MIDI velocity = 127 (v / 8 m/s)^0.7, held to 1..127.

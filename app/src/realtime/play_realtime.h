@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "latency/latency_report.h"
-#include "play/play_result.h"
+#include "play/play.h"
 #include "realtime/realtime_session.h"
 
 namespace app {

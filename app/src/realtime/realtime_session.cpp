@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "files/assets.h"
-#include "files/bad_input.h"
+#include "files/option_values.h"
 #include "play/play_setup.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
@@ -24,19 +24,15 @@ constexpr double kStartS = 0.7;  // from starting the sensors to the epoch, at f
 constexpr double kAheadS = 0.1;  // the epoch lies at least that far ahead when all is ready
 constexpr int kStarts = 3;
 
-void refuse(bool wrong, const std::string& found, const std::string& expected) {
-    if (wrong) throw BadInput(fmt::format("error: found {}, expected {}", found, expected));
-}
-
 void check(const RealtimeOptions& o) {
-    refuse(o.sound.output_lead_s >= o.play.release_margin_s,
-           fmt::format("--output-lead {} with a release margin of {}", o.sound.output_lead_s,
-                       o.play.release_margin_s),
-           "less than the release margin");
-    refuse(o.play.solo.has_value(), "--solo with --realtime",
-           "one of them: play the trace offline to hear one note");
-    refuse(!o.play.audio && !o.sound.midi_port.empty(), "--midi-out with --no-audio",
-           "sound, whose clock times MIDI");
+    if (o.sound.output_lead_s >= o.play.release_margin_s)
+        refuse_options(fmt::format("--output-lead {} with a release margin of {}", o.sound.output_lead_s,
+                                   o.play.release_margin_s),
+                       "less than the release margin");
+    if (o.play.solo)
+        refuse_options("--solo with --realtime", "one of them: play the trace offline to hear one note");
+    if (!o.play.audio && !o.sound.midi_port.empty())
+        refuse_options("--midi-out with --no-audio", "sound, whose clock times MIDI");
 }
 
 /// A trace that stands for the sticks of a live source, which has no samples yet.

@@ -12,10 +12,9 @@
 
 #include "files/output_folder.h"
 #include "kit/kit.h"
-#include "kit/stick_geometry.h"
 #include "pictures/frame_thread.h"
 #include "pictures/kit_stage.h"
-#include "play/play_options.h"
+#include "play/play.h"
 #include "realtime/artificial_load.h"
 #include "sensors/sensor_hub.h"
 

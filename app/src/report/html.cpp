@@ -91,17 +91,14 @@ std::string report_page(std::string_view title, std::string_view body) {
         html(title), css_colours(false), css_colours(true), kRules, body);
 }
 
-std::string report_fact(std::string_view name, std::string_view value) {
-    return fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", html(name), html(value));
-}
-
 std::string report_header(std::string_view title, std::string_view subtitle,
                           const std::vector<std::pair<std::string, std::string>>& facts) {
     std::string text = fmt::format("<header><h1>{}</h1>\n", html(title));
     if (!subtitle.empty()) text += fmt::format("<p>{}</p>\n", html(subtitle));
     text += "<dl class=facts>\n";
     for (const auto& [name, value] : facts)
-        if (!value.empty()) text += report_fact(name, value);
+        if (!value.empty())
+            text += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>\n", html(name), html(value));
     return text + "</dl></header>\n";
 }
 

@@ -36,8 +36,6 @@ inline constexpr ReportColour all[] = {grid,    axis, released,  wrong,     miss
 /// `title` is text, `body` HTML.
 [[nodiscard]] std::string report_page(std::string_view title, std::string_view body);
 
-/// An entry of a list of class `facts`.
-[[nodiscard]] std::string report_fact(std::string_view name, std::string_view value);
 /// What a page is about, and the facts that are not empty: name and value.
 [[nodiscard]] std::string report_header(std::string_view title, std::string_view subtitle,
                                         const std::vector<std::pair<std::string, std::string>>& facts);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <stdexcept>
 
 #include "files/output_folder.h"
@@ -158,14 +159,31 @@ double round_step(double span, int count) {
 }
 
 PlotScript plot_of(int width, int height, const PlotAxis& x, const PlotAxis& y, const PlotPanel& panel,
-                   std::string_view more) {
+                   std::string_view more, std::vector<PlotLine> legend) {
     std::string commands = plot_axes();
     for (const auto& [name, axis] : {std::pair{"x", &x}, {"y", &y}}) {
         if (!axis->label.empty()) commands += fmt::format("set {}label '{}'\n", name, axis->label);
         commands += fmt::format("set {}range [{}:{}]\n", name, axis->low, axis->high);
         if (axis->tics > 0) commands += round_tics(name, axis->high - axis->low, axis->tics);
     }
-    return {width, height, commands.append(more) + panel.text()};
+    return {width, height, commands.append(more) + panel.text(), std::move(legend)};
+}
+
+Histogram histogram(std::span<const double> values, double bin) {
+    std::map<int, int> bins;
+    for (const double value : values) ++bins[static_cast<int>(std::floor(value / bin))];
+    Histogram made;
+    if (bins.empty()) return made;
+    for (int at = bins.begin()->first - 1, last = bins.rbegin()->first + 1; at <= last; ++at) {
+        const int count = bins[at];
+        fmt::format_to(std::back_inserter(made.data), "{} {}\n", (at + 0.5) * bin, count);
+        made.highest = std::max(made.highest, count);
+    }
+    return made;
+}
+
+std::string boxes_of(const ReportColour& colour) {
+    return "with boxes fs solid 0.75 noborder lc " + gnuplot_colour(colour);
 }
 
 std::string plot_margins(int top, int bottom, int height) {
@@ -220,16 +238,14 @@ std::string style_of(const PlotLine& line, double width) {
                        gnuplot_colour(line.colour));
 }
 
-std::size_t PlotGallery::add(PlotWithLegend plot, std::string label) {
+std::size_t PlotGallery::add(PlotScript plot, std::string label) {
     plots_.push_back(std::move(plot));
     labels_.push_back(std::move(label));
     return plots_.size() - 1;
 }
 
 void PlotGallery::draw(const fs::path& scratch) {
-    std::vector<PlotScript> scripts;
-    for (const PlotWithLegend& plot : plots_) scripts.push_back(plot.script);
-    drawn_ = draw_svg(scripts, scratch);
+    drawn_ = draw_svg(plots_, scratch);
 }
 
 std::string PlotGallery::symbols() const {

@@ -11,10 +11,18 @@
 
 namespace app {
 
+/// A line of a plot, for its legend.
+struct PlotLine {
+    std::string name;
+    ReportColour colour;
+    bool dashed = false;
+};
+
 /// The commands of one picture, data inline.
 struct PlotScript {
     int width = 640, height = 240;  ///< SVG units
     std::string commands;
+    std::vector<PlotLine> legend = {};
 };
 
 /// Draws every script with one gnuplot process in the C locale and without the user's start-up files; returns
@@ -51,7 +59,16 @@ struct PlotAxis {
 };
 /// A plot of one panel. `more`: further commands.
 [[nodiscard]] PlotScript plot_of(int width, int height, const PlotAxis& x, const PlotAxis& y,
-                                 const PlotPanel& panel, std::string_view more = {});
+                                 const PlotPanel& panel, std::string_view more = {},
+                                 std::vector<PlotLine> legend = {});
+/// Counts of values in bins of a width, as lines "middle count" for boxes; an empty bin at either end.
+struct Histogram {
+    std::string data;
+    int highest = 1;
+};
+[[nodiscard]] Histogram histogram(std::span<const double> values, double bin);
+/// gnuplot's "with boxes ..." of a histogram.
+[[nodiscard]] std::string boxes_of(const ReportColour& colour);
 /// Margins of a panel of a plot of `height`, from the top of the plot to the panel's top and bottom.
 [[nodiscard]] std::string plot_margins(int top, int bottom, int height);
 
@@ -87,29 +104,17 @@ private:
 [[nodiscard]] std::string sound_envelope(std::span<const float> stereo, double t0_s, double from_s,
                                          double to_s, int columns);
 
-/// A line of a plot, for its legend.
-struct PlotLine {
-    std::string name;
-    ReportColour colour;
-    bool dashed = false;
-};
-
 /// The n-th line's look: nine colours, then the same ones dashed.
 [[nodiscard]] PlotLine line_of(std::size_t n, const std::string& name);
 /// As gnuplot's "with lines ...".
 [[nodiscard]] std::string style_of(const PlotLine& line, double width);
-
-struct PlotWithLegend {
-    PlotScript script;
-    std::vector<PlotLine> legend = {};
-};
 
 /// The plots of a page: declared in the order of the page, drawn at once, placed by number. In the page they
 /// have no XML head, no titles that would pop up and no ids; their colours are CSS variables, their width is
 /// that of their place, and a label says what they show for readers who do not see it.
 class PlotGallery {
 public:
-    std::size_t add(PlotWithLegend plot, std::string label);
+    std::size_t add(PlotScript plot, std::string label);
     void draw(const std::filesystem::path& scratch);
     /// gnuplot's point shapes, which all plots refer to, as an invisible element; once a page.
     [[nodiscard]] std::string symbols() const;
@@ -122,7 +127,7 @@ public:
 private:
     [[nodiscard]] std::string svg(std::size_t number) const;
 
-    std::vector<PlotWithLegend> plots_;
+    std::vector<PlotScript> plots_;
     std::vector<std::string> labels_, drawn_;
 };
 

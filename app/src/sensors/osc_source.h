@@ -2,7 +2,7 @@
 #include <cstddef>
 #include <span>
 
-#include "sensors/live_source.h"
+#include "sensors/sample_source.h"
 
 namespace app {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "sensors/live_source.h"
+#include "sensors/sample_source.h"
 
 namespace app {
 

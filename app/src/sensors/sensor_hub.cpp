@@ -15,7 +15,7 @@
 
 #include "process/child_process.h"
 #include "process/clock.h"
-#include "sensors/sensor_memory.h"
+#include "sensors/sensor_process.h"
 #include "sticks/external_predictor.h"
 #include "sticks/predictors.h"
 

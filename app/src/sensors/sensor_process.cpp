@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/signalfd.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,6 +15,7 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 
@@ -21,11 +24,14 @@
 #include "process/bounded_queue.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
-#include "sensors/sensor_memory.h"
 #include "sensors/source_clock.h"
 
 namespace app {
 namespace {
+
+[[noreturn]] void fail_memory(const char* action) {
+    throw std::runtime_error("error: " + cannot(action));
+}
 
 constexpr std::int64_t kSettlingNs = 250'000'000;
 constexpr std::size_t kMostQueued = 256;  // samples of a stick on their way from the reader to its filters
@@ -302,6 +308,38 @@ private:
 };
 
 }  // namespace
+
+void SensorReport::set_text(std::string_view line) {
+    text.fill(0);
+    std::copy_n(line.data(), std::min(line.size(), text.size() - 1), text.data());
+}
+
+SharedSensorMemory::SharedSensorMemory() : descriptor_(memfd_create("musicworld", MFD_CLOEXEC)) {
+    if (!descriptor_) fail_memory("make shared memory");
+    if (ftruncate(descriptor_.get(), sizeof(SensorMemory)) != 0) fail_memory("size shared memory");
+    map();
+    memory_->version = tracking::StickState::kVersion;
+}
+
+SharedSensorMemory::SharedSensorMemory(int descriptor) : descriptor_(descriptor) {
+    struct stat found {};
+    const bool large_enough = fstat(descriptor, &found) == 0 && found.st_size == off_t{sizeof(SensorMemory)};
+    if (large_enough) map();
+    if (!large_enough || memory_->version != tracking::StickState::kVersion)
+        throw std::runtime_error(
+            "error: found no shared memory of this build, expected to be started by the program itself");
+}
+
+void SharedSensorMemory::map() {
+    void* memory = mmap(nullptr, sizeof(SensorMemory), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE,
+                        descriptor_.get(), 0);
+    if (memory == MAP_FAILED) fail_memory("map shared memory");
+    memory_.reset(static_cast<SensorMemory*>(memory));
+}
+
+void SharedSensorMemory::Unmap::operator()(SensorMemory* memory) const {
+    munmap(memory, sizeof(SensorMemory));
+}
 
 int run_sensor(const SensorTask& task) {
     const rlimit no_core{0, 0};

@@ -4,17 +4,237 @@
 #include <sim/errors.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "files/bad_input.h"
+#include "files/output_folder.h"
+#include "pictures/frame_thread.h"
+#include "pictures/scene_stage.h"
 #include "process/clock.h"
-#include "simulate/simulate_record.h"
+#include "process/progress_bar.h"
+#include "report/table.h"
+#include "scene/scene.h"
+#include "simulate/run_measures.h"
+#include "statistics/statistics.h"
 
 namespace app {
 namespace {
 
 namespace fs = std::filesystem;
+
+// The header of each table. states.csv: a body per row at each frame's time; `modes`: its modal coordinates,
+// separated by blanks. energy.csv: the world before the first step and after each. times.csv: what each step
+// took. timing.csv: each step of each worker, in the order in which they ended.
+constexpr const char* kStates = "frame,t_s,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,lx,ly,lz,modes\n";
+constexpr const char* kEnergy =
+    "step,t_s,kinetic_j,potential_j,elastic_j,springs_j,px,py,pz,lx,ly,lz,contacts,pairs,islands,asleep\n";
+constexpr const char* kTimes = "step,elapsed_s\n";
+constexpr const char* kTiming =
+    "worker,step,seconds,smoothed_s,waited_s,bodies,lead,ghost_age,bytes,cross_contacts\n";
+
+const std::string& name_of(const Scene& scene, int body) {
+    const auto b = static_cast<std::size_t>(body), now = scene.world.bodies.size();
+    return b < now ? scene.world.bodies[b].name : scene.later[b - now].name;
+}
+
+std::string state_row(const Scene& scene, const sim::World& world, int body, std::size_t frame) {
+    const sim::WorldBodyState s = world.state(body);
+    const Eigen::Vector3d &p = s.position, &v = s.velocity, &l = s.angular_momentum;
+    const Eigen::Quaterniond& q = s.orientation;
+    return csv_line({frame, world.time_s(), name_of(scene, body), p.x(), p.y(), p.z(), q.w(), q.x(), q.y(),
+                     q.z(), v.x(), v.y(), v.z(), l.x(), l.y(), l.z(),
+                     fmt::format("{}", fmt::join(s.q.begin(), s.q.end(), " "))});
+}
+
+/// `stepped`: in this process, so that the world knows its contacts; else their cells are empty.
+std::string energy_row(const sim::World& world, bool stepped) {
+    const sim::World::Energy e = world.energy();
+    const Eigen::Vector3d p = world.momentum(), l = world.angular_momentum();
+    const sim::WorldCounts& n = world.counts();
+    const auto found = [&](const auto& count) { return stepped ? Cell(count) : Cell(); };
+    return csv_line({n.steps, world.time_s(), e.kinetic, e.potential, e.elastic, e.springs, p.x(), p.y(),
+                     p.z(), l.x(), l.y(), l.z(), found(n.contacts), found(n.pairs), found(n.islands),
+                     found(n.asleep)});
+}
+
+/// A CSV file that grows while a simulation runs. Throws std::runtime_error when it cannot be written.
+class GrowingTable {
+public:
+    GrowingTable(const fs::path& file, const std::string& header)
+        : file_(file), out_(file, std::ios::binary) {
+        add(header);
+    }
+    void add(const std::string& rows) {
+        out_ << rows;
+        check();
+    }
+    void finish() {
+        out_.close();
+        check();
+    }
+
+private:
+    void check() const {
+        if (!out_)
+            throw std::runtime_error(fmt::format(
+                "{}: error: found \"{}\", expected to write the simulation's results; free some space "
+                "or choose another --out",
+                file_.string(), std::strerror(errno)));
+    }
+
+    fs::path file_;
+    std::ofstream out_;
+};
+
+/// Observes a run: keeps what its result says, and writes tables and pictures while it goes on. Without a
+/// folder it writes nothing.
+class SimulateRecord : public sim::DistributedObserver {
+public:
+    /// `last`: the step that ends the run at the latest.
+    SimulateRecord(const SimulateOptions& options, const Scene& scene, std::uint64_t last)
+        : options_(options), scene_(scene), last_(last), bar_(options.progress) {
+        result_.scene = scene.file, result_.name = scene.name;
+        result_.dt_s = scene.world.settings.dt;
+        result_.rest_wanted = options.until_rest;
+        if (options.workers) result_.worker_options = *options.workers;
+        if (options.out) folder_ = std::make_unique<OutputFolder>(*options.out, kSimulateProducts);
+    }
+
+    void at(std::uint64_t step, const sim::World& world) override {
+        constexpr std::uint64_t kMomentumEvery =
+            10;  // [steps] the sum over all bodies holds up workers' messages
+        if (step == 0)
+            start(world);
+        else
+            result_.body_steps += std::uint64_t(world.bodies());
+        if (energy_) energy_->add(energy_row(world, !options_.workers));
+        // Where rest may end the run any step may be the last.
+        const bool perhaps_last = step == last_ || options_.until_rest;
+        if (perhaps_last || !options_.workers || step % kMomentumEvery == 0) momentum_->look(world);
+        if (perhaps_last) describe(world);
+        bar_.show(last_ > 0 ? double(step) / double(last_) : 1);
+    }
+
+    /// Takes frames: the first state that is not before a frame's time.
+    void ready(std::uint64_t, const sim::World& world) override {
+        if (!folder_) return;
+        for (; double(next_frame_) / options_.fps <= world.time_s() + 1e-9; ++next_frame_) {
+            for (int body = 0; body < world.bodies(); ++body)
+                states_->add(state_row(scene_, world, body, next_frame_));
+            if (frames_) frames_->push({.index = next_frame_, .state = stage_->frame(world)});
+        }
+    }
+
+    void worked(const sim::WorkerStep& s) override {
+        if (!steps_) return;
+        steps_->add(options_.workers ? csv_line({s.worker, s.step, s.seconds, s.smoothed_s, s.waited_s,
+                                                 s.bodies, s.lead, s.ghost_age, s.bytes, s.cross_contacts})
+                                     : csv_line({s.step, s.seconds}));
+        if (options_.workers) history_.add(s);
+    }
+
+    void note(const std::string& what) override { result_.notes.push_back(what); }
+
+    /// After the last step; `wall`: since the scene was read.
+    [[nodiscard]] SimulateResult finish(const sim::DistributedResult& run, const WallTimer& wall) {
+        bar_.clear();
+        take_result(run);
+        result_.wall_s = wall.seconds();
+        if (folder_) write_products(wall);
+        return std::move(result_);
+    }
+
+private:
+    void start(const sim::World& world) {
+        momentum_.emplace(scene_, world);
+        result_.energy_start = world.energy();
+        if (!folder_) return;
+        const auto table = [&](const char* name, const char* header) {
+            return std::make_unique<GrowingTable>(folder_->path(name), header);
+        };
+        states_ = table("states.csv", kStates);
+        energy_ = table("energy.csv", kEnergy);
+        steps_ = options_.workers ? table("timing.csv", kTiming) : table("times.csv", kTimes);
+        if (!options_.frames) return;
+        fs::create_directory(folder_->path("frames"));
+        stage_ = std::make_unique<SceneStage>(scene_, world);
+        const FrameThreadOptions where{options_.width, options_.height, folder_->path("frames")};
+        frames_ = std::make_unique<FrameThread>(
+            std::vector{stage_->description(options_.width, options_.height)}, stage_->frame(world), where);
+    }
+
+    void describe(const sim::World& world) {
+        result_.bodies = world.bodies();
+        result_.rigid = result_.linear = result_.modal = result_.groups_cut = 0;
+        for (int body = 0; body < world.bodies(); ++body) {
+            const sim::FidelityChoice choice = world.fidelity(body);
+            const sim::Fidelity fidelity = choice.fidelity;
+            result_.groups_cut += choice.cut.below < choice.cut.count;
+            (fidelity == sim::Fidelity::rigid    ? result_.rigid
+             : fidelity == sim::Fidelity::linear ? result_.linear
+                                                 : result_.modal) += 1;
+        }
+        result_.time_s = world.time_s();
+        result_.energy = world.energy();
+        result_.momentum = world.momentum(), result_.angular_momentum = world.angular_momentum();
+        result_.state_hash = world.state_hash();
+    }
+
+    void take_result(const sim::DistributedResult& run) {
+        if (options_.workers) result_.workers = run;
+        result_.steps = run.steps;
+        result_.elapsed_s = run.elapsed_s, result_.cpu_s = run.cpu_s;
+        result_.counts = run.counts;
+        result_.rest_reached = run.rest_reached;
+        for (const sim::QuarantinedBody& q : run.quarantined)
+            result_.quarantined.emplace_back(name_of(scene_, static_cast<std::size_t>(q.body)), q);
+        // What a worker that died had counted of the impulse from outside is lost with it.
+        if (run.lost == 0 && run.quarantined.empty()) result_.drift = momentum_->drift(run.outside_impulse);
+        for (const sim::WorldEvent& event : scene_.events)
+            if (!options_.workers && (event.step < run.steps || run.rest_reached))
+                for (const sim::Slowing& slowing : event.slowing)
+                    note(
+                        fmt::format("at {} s worker {} is to be slower {} times: not done, as there are no "
+                                    "workers in one process",
+                                    double(event.step) * result_.dt_s, slowing.worker, slowing.factor));
+    }
+
+    void write_products(const WallTimer& wall) {
+        for (GrowingTable* table : {states_.get(), energy_.get(), steps_.get()}) table->finish();
+        if (frames_) frames_->finish();
+        if (options_.workers) {
+            fs::create_directories(folder_->scratch());
+            write_file(folder_->path("workers.svg"),
+                       draw_svg({workers_plot(history_)}, folder_->scratch()).front());
+        }
+        result_.frames = frames_ ? frames_->report().written.size() : 0;
+        if (options_.video) make_video(*options_.video, options_.fps, false, folder_->path("."));
+        result_.wall_s = wall.seconds();
+        write_file(folder_->path("summary.json"), format_simulate(result_));
+        folder_->finish();
+        if (options_.video) fs::rename(options_.video->string() + ".partial", *options_.video);
+    }
+
+    const SimulateOptions& options_;
+    const Scene& scene_;
+    std::uint64_t last_;
+    SimulateResult result_;
+    ProgressBar bar_;
+    std::optional<MomentumWatch> momentum_;
+    std::unique_ptr<OutputFolder> folder_;
+    std::unique_ptr<GrowingTable> states_, energy_, steps_;
+    std::unique_ptr<SceneStage> stage_;
+    std::unique_ptr<FrameThread> frames_;
+    WorkerHistory history_;
+    std::size_t next_frame_ = 0;
+};
 
 std::uint64_t last_step(const SimulateOptions& options, const Scene& scene) {
     constexpr double kLongestRestS = 600;
@@ -79,6 +299,75 @@ void check(const SimulateOptions& options, const Scene& scene) {
         throw BadInput("error: found --frames or --video without --out, expected a folder for the pictures");
 }
 
+using Json = nlohmann::ordered_json;
+
+Json json_of(const Eigen::Vector3d& v) {
+    return {v.x(), v.y(), v.z()};
+}
+
+/// What is left out of the first part of the summary.
+Json details_of(const SimulateResult& r) {
+    Json quarantined = Json::array();
+    for (const auto& [name, q] : r.quarantined)
+        quarantined.push_back({{"body", name}, {"step", q.step}, {"what", q.what}});
+    const sim::World::Energy& e = r.energy;
+    const sim::WorldCounts& n = r.counts;
+    const MomentumDrift drift = r.drift.value_or(MomentumDrift{kNoValue, {}, 0});
+    Json details = {
+        {"name", r.name},
+        {"time_s", r.time_s},
+        {"fidelity",
+         {{"rigid", r.rigid}, {"linear", r.linear}, {"modal", r.modal}, {"groups_cut", r.groups_cut}}},
+        {"energy_start_j", r.energy_start.total()},
+        {"energy_parts_j",
+         {{"kinetic", e.kinetic},
+          {"potential", e.potential},
+          {"elastic", e.elastic},
+          {"springs", e.springs}}},
+        {"momentum_kg_m_s", json_of(r.momentum)},
+        {"angular_momentum_kg_m2_s", json_of(r.angular_momentum)},
+        {"momentum_drift_kg_m_s", Cell(drift.linear).json()},
+        {"angular_momentum_drift_kg_m2_s", Cell(drift.angular).json()},
+        {"counts",
+         {{"contacts", n.contacts},
+          {"pairs", n.pairs},
+          {"islands", n.islands},
+          {"asleep", n.asleep},
+          {"inverse_fallbacks", n.inverse_fallbacks},
+          {"deformations_limited", n.deformations_limited},
+          {"constraints_broken", n.constraints_broken}}},
+        {"quarantined", quarantined},
+        {"at_rest", r.rest_reached},
+        {"frames", r.frames},
+        {"notes", r.notes},
+        {"wall_s", r.wall_s},
+        {"versions", {{"musicworld", MUSICWORLD_VERSION}}}};
+    if (r.workers) details["counts"] = Json();  // workers do not send theirs
+    return details;
+}
+
+/// Which clock elapsed_s is of.
+std::string clock_of(const WorkerOptions& options) {
+    if (!options.simulated) return "wall";
+    return fmt::format("simulated processors, {} costs, {} times slower, {} s from worker to worker",
+                       options.simulated->modelled ? "modelled" : "measured", options.simulated->slowdown,
+                       options.simulated->latency_s);
+}
+
+Json workers_of(const SimulateResult& r) {
+    const sim::DistributedResult& w = *r.workers;
+    return {{"clock", clock_of(r.worker_options)},
+            {"balance", r.worker_options.balance},
+            {"workers_lost", w.lost},
+            {"workers_left", w.left},
+            {"bodies_reowned", w.bodies_reowned},
+            {"trades", w.trades},
+            {"bytes_per_body_step", r.body_steps > 0 ? Json(double(w.bytes) / double(r.body_steps)) : Json()},
+            {"largest_lead", w.largest_lead},
+            {"largest_ghost_age", w.largest_ghost_age},
+            {"refused_messages", w.refused_messages}};
+}
+
 }  // namespace
 
 SimulateResult simulate(const SimulateOptions& options) {
@@ -96,6 +385,32 @@ SimulateResult simulate(const SimulateOptions& options) {
             fmt::format("{}: error: {}", scene.file.string(), wrong.what()));  // no single key shows it
     }
     return record.finish(done, wall);
+}
+
+std::string format_simulate(const SimulateResult& r) {
+    const sim::DistributedResult workers = r.workers.value_or(sim::DistributedResult{});
+    Json json = {
+        {"scene", r.scene.string()},
+        {"bodies", r.bodies},
+        {"steps", r.steps},
+        {"dt_s", r.dt_s},
+        {"workers", workers.workers},
+        {"mode", mode_name(r.worker_options.pace)},
+        {"bound", r.worker_options.bound},
+        {"elapsed_s", r.elapsed_s},
+        {"cpu_s", r.cpu_s},
+        {"ns_per_body_step", r.body_steps > 0 ? Json(1e9 * r.elapsed_s / double(r.body_steps)) : Json()},
+        {"bytes_per_body_update",
+         workers.records > 0 ? double(workers.bytes_states) / double(workers.records) : 0.0},
+        {"cross_worker_contacts", workers.cross_contacts},
+        {"migrations", workers.migrations},
+        {"bodies_lost", r.quarantined.size()},
+        {"state_hash", fmt::format("{:016x}", r.state_hash)},
+        {"momentum_drift", r.drift ? Json(r.drift->share()) : Json()},
+        {"energy_j", r.energy.total()}};
+    json.update(details_of(r));
+    if (r.workers) json.update(workers_of(r));
+    return json.dump(2) + "\n";
 }
 
 }  // namespace app

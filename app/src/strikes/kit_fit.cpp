@@ -10,7 +10,7 @@
 #include <numbers>
 
 #include "files/bad_input.h"
-#include "kit/tip_track.h"
+#include "kit/kit.h"
 #include "statistics/statistics.h"
 #include "strikes/stroke_lows.h"
 

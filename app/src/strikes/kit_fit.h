@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "kit/stick_geometry.h"
+#include "kit/kit.h"
 
 namespace app {
 

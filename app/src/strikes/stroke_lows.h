@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "kit/tip_track.h"
+#include "kit/kit.h"
 
 namespace app {
 

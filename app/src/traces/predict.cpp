@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "report/table.h"
@@ -22,14 +23,16 @@ void predict_stick(const tracking::StickTrace& stick, std::size_t index, trackin
                    double lead_s, std::vector<Row>& rows) {
     bool oriented = false;
     double newest_s = 0;
-    replay(predictor, stick.samples, [&](const ReplayedSample& now) {
-        oriented = oriented || now.sample.has_orientation;
-        if (now.index > 0 && !(now.sample.t_s > newest_s)) return;
-        newest_s = now.sample.t_s;
-        if (now.index == 0) return;
-        const tracking::PosePrediction pose = predictor.predict(lead_s + now.behind_s);
+    bool first = true;
+    for (const tracking::PoseSample& sample : stick.samples) {
+        const double behind_s = feed(predictor, sample);
+        oriented = oriented || sample.has_orientation;
+        if (!first && !(sample.t_s > newest_s)) continue;
+        newest_s = sample.t_s;
+        if (std::exchange(first, false)) continue;
+        const tracking::PosePrediction pose = predictor.predict(lead_s + behind_s);
         rows.push_back({newest_s, index, {newest_s + lead_s, pose.position, pose.orientation, oriented}});
-    });
+    }
 }
 
 }  // namespace

@@ -10,8 +10,7 @@
 #include <vector>
 
 #include "files/one_line.h"
-#include "kit/stick_geometry.h"
-#include "kit/tip_track.h"
+#include "kit/kit.h"
 #include "statistics/statistics.h"
 #include "strikes/stroke_lows.h"
 

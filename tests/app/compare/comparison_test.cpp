@@ -10,7 +10,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "compare/comparison_report.h"
 #include "compare/comparison_tables.h"
 #include "files/bad_input.h"
 #include "sample_recordings.h"

@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "compare/comparison_map.h"
+#include "compare/comparison.h"
 #include "sample_recordings.h"
 
 namespace {

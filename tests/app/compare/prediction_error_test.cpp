@@ -1,4 +1,4 @@
-#include "compare/prediction_error.h"
+#include "compare/predictor_scores.h"
 
 #include <gtest/gtest.h>
 

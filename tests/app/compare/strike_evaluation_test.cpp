@@ -1,5 +1,5 @@
 // Strikes of predictors on paths whose contacts are known in closed form.
-#include "compare/strike_evaluation.h"
+#include "compare/predictor_scores.h"
 
 #include <gtest/gtest.h>
 #include <tracking/sensor.h>

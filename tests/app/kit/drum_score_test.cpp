@@ -12,8 +12,7 @@
 
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "kit/stick_geometry.h"
-#include "kit/tip_track.h"
+#include "kit/kit.h"
 #include "strikes/true_contacts.h"
 
 namespace app {
@@ -21,12 +20,6 @@ namespace {
 
 Kit drums() {
     return read_kit(find_kit("drums"));
-}
-
-std::vector<sim::BodyDefinition> bodies_of(const Kit& kit) {
-    std::vector<sim::BodyDefinition> bodies;
-    for (const Instrument& instrument : kit.instruments) bodies.push_back(instrument.body);
-    return bodies;
 }
 
 std::string contents(const std::filesystem::path& file) {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "kit/tip_track.h"
+#include "kit/kit.h"
 #include "sample_realtime.h"
 
 namespace app {

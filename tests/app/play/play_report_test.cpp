@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "files/output_folder.h"
-#include "kit/tip_track.h"
+#include "kit/kit.h"
 #include "play/play_plots.h"
 #include "play/play_products.h"
 #include "report/plot.h"

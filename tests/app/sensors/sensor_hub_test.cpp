@@ -24,7 +24,7 @@
 #include "files/bad_input.h"
 #include "free_port.h"
 #include "process/clock.h"
-#include "sticks/stick_filters.h"
+#include "sticks/stick.h"
 #include "temporary_folder.h"
 
 namespace {

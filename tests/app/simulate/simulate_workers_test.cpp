@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "simulate/simulate.h"
-#include "simulate/simulate_record.h"
+#include "simulate/run_measures.h"
 #include "temporary_folder.h"
 #include "written_scene.h"
 

@@ -1,4 +1,4 @@
-#include "statistics/paired_difference.h"
+#include "statistics/statistics.h"
 
 #include <gtest/gtest.h>
 

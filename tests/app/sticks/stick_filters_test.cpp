@@ -1,5 +1,4 @@
 // One stick's filters: what they publish is what their predictors predict.
-#include "sticks/stick_filters.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "kit/drum_score.h"
-#include "kit/tip_track.h"
+#include "kit/kit.h"
 #include "strikes/stroke_lows.h"
 #include "strikes/true_contacts.h"
 #include "written_kit.h"

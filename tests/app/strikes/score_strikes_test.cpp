@@ -1,4 +1,4 @@
-#include "strikes/score_strikes.h"
+#include "strikes/true_contacts.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // What pictures add to the bodies' exact states, strike by strike.
-#include "strikes/drawn_strikes.h"
+#include "play/strike_pipeline.h"
 
 #include <gtest/gtest.h>
 

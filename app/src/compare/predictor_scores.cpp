@@ -1,25 +1,31 @@
-#include "compare/strike_evaluation.h"
+#include "compare/predictor_scores.h"
 
 #include <sim/simulation.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <optional>
 
-#include "kit/tip_track.h"
+#include "kit/kit.h"
 #include "statistics/statistics.h"
 #include "sticks/predictors.h"
 #include "sticks/stick.h"
-#include "strikes/score_strikes.h"
 #include "strikes/strike_scheduler.h"
 #include "strikes/stroke_lows.h"
 #include "strikes/true_contacts.h"
 
 namespace app {
 namespace {
+
+constexpr double kMm2 = 1e6, kDegrees = 180 / std::numbers::pi;
+/// Squared radii of the 50 and 95 % regions of a normal error in three dimensions (chi-square, 3 degrees of
+/// freedom).
+constexpr double kRadius50 = 2.3659738843753377, kRadius95 = 7.814727903251179;
 
 // Contacts are looked for this far beyond the lead at which they are committed: more than a sample's period,
 // so that each is seen, and re-timed, before.
@@ -40,8 +46,7 @@ Surface plane_at(double height_m) {
 }
 
 Surface surface_of(const Kit& kit, double tip_radius_m) {
-    std::vector<sim::BodyDefinition> bodies;
-    for (const Instrument& instrument : kit.instruments) bodies.push_back(instrument.body);
+    const std::vector<sim::BodyDefinition> bodies = bodies_of(kit);
     const auto sweep = [simulation = std::shared_ptr(sim::make_local_simulation(bodies)),
                         last_s = -std::numeric_limits<double>::infinity()](const sim::TipPath& path) mutable {
         sim::StepRequest request;
@@ -134,6 +139,99 @@ Expected expected_of(const tracking::Predictor& predictor, std::size_t model, co
 
 }  // namespace
 
+void ErrorScore::add(const tracking::PosePrediction& predicted, const Truth& truth,
+                     const Eigen::Vector3d& tip_body) {
+    const Eigen::Vector3d error = predicted.position - truth.pose.position;
+    const double square_mm2 = kMm2 * error.squaredNorm();
+    position.add(square_mm2);
+    errors_mm.push_back(std::sqrt(square_mm2));
+    if (truth.free) free.add(square_mm2);
+    if (truth.unflagged) unflagged.add(square_mm2);
+    if (!truth.rotation_trusted) return;
+    const double angle = kDegrees * predicted.orientation.angularDistance(truth.pose.orientation);
+    const Eigen::Vector3d tip_error =
+        error + predicted.orientation * tip_body - truth.pose.orientation * tip_body;
+    rotation.add(angle * angle);
+    tip.add(kMm2 * tip_error.squaredNorm());
+}
+
+void ErrorScore::add(const ErrorScore& other) {
+    for (SquareSum ErrorScore::*sum : {&ErrorScore::position, &ErrorScore::free, &ErrorScore::unflagged,
+                                       &ErrorScore::rotation, &ErrorScore::tip})
+        (this->*sum).add(other.*sum);
+    errors_mm.insert(errors_mm.end(), other.errors_mm.begin(), other.errors_mm.end());
+}
+
+void LeadScore::add(const tracking::PosePrediction& predicted, const Truth& truth,
+                    const Eigen::Vector3d& tip_body,
+                    const std::optional<tracking::PoseCovariance>& covariance) {
+    error.add(predicted, truth, tip_body);
+    if (!covariance) return;
+    ++sums.count;
+    const Eigen::LLT<Eigen::Matrix3d> factor(covariance->position);
+    if (factor.info() != Eigen::Success) {
+        ++sums.singular;
+        return;
+    }
+    const Eigen::Vector3d whitened = factor.matrixL().solve(predicted.position - truth.pose.position);
+    const double square = whitened.squaredNorm();
+    const double log_root = factor.matrixLLT().diagonal().array().log().sum();  // log sqrt(det)
+    sums.inside_50 += square <= kRadius50;
+    sums.inside_95 += square <= kRadius95;
+    sums.negative_log_likelihood += 0.5 * square + log_root + 1.5 * std::log(2 * std::numbers::pi);
+}
+
+std::optional<Calibration> LeadScore::calibration() const {
+    const std::size_t stated = sums.count - sums.singular;
+    if (stated == 0) return std::nullopt;
+    Calibration mean = sums;
+    for (double* sum : {&mean.inside_50, &mean.inside_95, &mean.negative_log_likelihood})
+        *sum /= static_cast<double>(stated);
+    return mean;
+}
+
+void add(std::optional<Calibration>& sum, const std::optional<Calibration>& other) {
+    if (!other) return;
+    if (!sum) {
+        sum = other;
+        return;
+    }
+    const double a = static_cast<double>(sum->count - sum->singular);
+    const double b = static_cast<double>(other->count - other->singular);
+    for (double Calibration::*mean :
+         {&Calibration::inside_50, &Calibration::inside_95, &Calibration::negative_log_likelihood})
+        *sum.*mean = (a * (*sum.*mean) + b * (*other.*mean)) / (a + b);
+    sum->count += other->count;
+    sum->singular += other->singular;
+}
+
+std::vector<LeadScore> score_predictor(const SensedStick& stick, tracking::Predictor& predictor) {
+    std::vector<LeadScore> scores(stick.leads_s.size());
+    for (std::size_t i = 0; i < stick.samples.size(); ++i) {
+        const double behind_s = feed(predictor, stick.samples[i]);
+        for (std::size_t lead = 0; lead < scores.size(); ++lead)
+            if (const std::optional<Truth>& truth = stick.truth(i, lead)) {
+                const double ahead_s = stick.leads_s[lead] + behind_s;
+                scores[lead].add(predictor.predict(ahead_s), *truth, stick.tip,
+                                 predictor.covariance(ahead_s));
+            }
+    }
+    return scores;
+}
+
+std::vector<SquareSum> score_positions(const SensedStick& stick, tracking::Predictor& predictor) {
+    std::vector<SquareSum> sums(stick.leads_s.size());
+    for (std::size_t i = 0; i < stick.samples.size(); ++i) {
+        const double behind_s = feed(predictor, {stick.samples[i].t_s, stick.samples[i].position});
+        for (std::size_t lead = 0; lead < sums.size(); ++lead)
+            if (const std::optional<Truth>& truth = stick.truth(i, lead))
+                sums[lead].add(
+                    kMm2 * (predictor.predict(stick.leads_s[lead] + behind_s).position - truth->pose.position)
+                               .squaredNorm());
+    }
+    return sums;
+}
+
 double HitScore::median_ms() const {
     return median(absolute(errors_ms));
 }
@@ -173,9 +271,13 @@ HitScore evaluate_strikes(const tracking::StickTrace& recorded, std::span<const 
     tracking::Predictor* const other = predictors.confirming;
     StrikeScheduler played(rules_at(timing, true, track.t_s.front()), 1, surface->parts);
     StrikeScheduler uncancelled(rules_at(timing, false, track.t_s.front()), 1, surface->parts);
-    replay(predictors.timing, samples, [&](const ReplayedSample& now) {
-        if (other) (void)other->correct(now.sample);
-        if (!is_taken(now.status)) return;
+    for (const tracking::PoseSample& sample : samples) {
+        const tracking::SampleStatus status = predictors.timing.correct(sample);
+        if (other) (void)other->correct(sample);
+        if (!is_taken(status)) {
+            require_working(predictor);
+            continue;
+        }
         std::vector<Expected> all;
         for (std::size_t model = 0; model < predictor.models(); ++model)
             all.push_back(expected_of(predictor, model, *surface, geometry, timing));
@@ -188,14 +290,14 @@ HitScore evaluate_strikes(const tracking::StickTrace& recorded, std::span<const 
                 keep_confirmed(expected.contacts, confirming, predictor.time_s());
         }
         const std::vector<double> measured =
-            surface->clearances(now.sample.position + now.sample.orientation * geometry.tip);
+            surface->clearances(sample.position + sample.orientation * geometry.tip);
         for (const auto& [strikes, expected] : {std::pair(&played, &confirmed), {&uncancelled, &all}}) {
-            strikes->advance_to(now.sample.t_s);
-            if (now.status == tracking::SampleStatus::reinitialised) strikes->restart(0);
+            strikes->advance_to(sample.t_s);
+            if (status == tracking::SampleStatus::reinitialised) strikes->restart(0);
             const std::vector<ModelContacts> views(expected->begin(), expected->end());
-            strikes->sample(0, now.sample.t_s, views, predictor.selected(), measured);
+            strikes->sample(0, sample.t_s, views, predictor.selected(), measured);
         }
-    });
+    }
     std::vector<TrueContact> contacts = surface->true_contacts(track);
     played.finish();
     uncancelled.finish();
