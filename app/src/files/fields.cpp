@@ -25,6 +25,7 @@ const KeyTypeText& text_of(KeyType type) {
          R"("type": "object", "additionalProperties": {{"anyOf": [{{"type": "string"}}, )"
          R"({{"type": "object", "additionalProperties": {{"type": "string"}}}}]}})"},
     }};
+    static_assert(kTexts.size() == static_cast<std::size_t>(KeyType::columns) + 1);
     return kTexts[static_cast<std::size_t>(type)];
 }
 

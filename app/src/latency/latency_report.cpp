@@ -15,6 +15,7 @@ using Json = nlohmann::ordered_json;
 using Kind = LatencyStage::Kind;
 
 constexpr const char* kFates[] = {"in time", "late", "skipped"};  // by FrameFate
+static_assert(std::size(kFates) == static_cast<std::size_t>(FrameFate::skipped) + 1);
 
 double ms(std::int64_t ns) {
     return 1e-6 * static_cast<double>(ns);

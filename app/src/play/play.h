@@ -67,7 +67,7 @@ struct PlayResult {
 /// looks finished is left in `out`.
 PlayResult play(const PlayOptions& options);
 
-/// The strikes of the same, by id, without frames and sound and in this process.
+/// The strikes of play(), by id, without frames and sound and in this process.
 [[nodiscard]] std::vector<Strike> offline_strikes(const tracking::Trace& trace, const Kit& kit,
                                                   const PlayOptions& options, const StickGeometry& stick);
 

@@ -17,6 +17,7 @@ struct Scheduling {
 };
 /// By ThreadRole.
 constexpr std::array<Scheduling, 6> kScheduling = {{{70, 0}, {60, 0}, {50, 0}, {0, -8}, {0, 0}, {0, 10}}};
+static_assert(kScheduling.size() == static_cast<std::size_t>(ThreadRole::writing) + 1);
 
 bool schedule(int policy, int priority) {
     sched_param parameter{};

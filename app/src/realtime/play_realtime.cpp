@@ -23,6 +23,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kEventKinds[] = {"silent",       "back",      "restarted", "ended",
                                        "clock jumped", "malformed", "failed"};  // by SensorEvent::Kind
+static_assert(std::size(kEventKinds) == static_cast<std::size_t>(SensorEvent::Kind::failed) + 1);
 
 constexpr double kSameSpeed = 1e-6;  // relative: far below a step of MIDI or 24 bits
 constexpr double kNextToS = 0.03;    // as notes are matched with contacts

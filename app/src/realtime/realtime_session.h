@@ -39,7 +39,9 @@ using Warn = std::function<void(const std::string&)>;
 struct RealtimeSession {
     /// Reads trace and kit. Throws BadInput for options that cannot be.
     explicit RealtimeSession(const RealtimeOptions& asked);
-    /// Makes everything that plays; frames go into `folder`. The session must stay where it is from then on.
+    RealtimeSession(const RealtimeSession&) = delete;
+    RealtimeSession& operator=(const RealtimeSession&) = delete;
+    /// Makes everything that plays; frames go into `folder`.
     void start(const OutputFolder& folder, const Warn& warn);
     /// Of a lap.
     [[nodiscard]] double period_s() const { return static_cast<double>(period_samples) / audio::kSampleRate; }

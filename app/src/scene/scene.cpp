@@ -181,8 +181,7 @@ public:
         events_.push_back(std::move(timed));
     }
     void take_added(const Fields& at, const BodyDraft& body) { coming_ = named(at, body); }
-    /// Once everything was taken.
-    /// Bodies that come are numbered in the order in which they come.
+    /// After all tables were read. Bodies that come are numbered in the order in which they come.
     void add_events() {
         std::stable_sort(events_.begin(), events_.end(), [](const TimedEvent& a, const TimedEvent& b) {
             return a.event.step < b.event.step;

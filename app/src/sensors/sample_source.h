@@ -62,6 +62,9 @@ enum class SourceStatus { sample, waiting, ended };
 /// Where samples come from, at their own pace. One thread.
 class SampleSource {
 public:
+    SampleSource() = default;
+    SampleSource(const SampleSource&) = delete;
+    SampleSource& operator=(const SampleSource&) = delete;
     virtual ~SampleSource() = default;
     /// The next sample, waiting for it until `deadline_ns` (CLOCK_MONOTONIC) at the longest. Throws
     /// tracking::TraceError or std::runtime_error, one line, when the source cannot go on.
@@ -90,8 +93,8 @@ struct SourceOptions {
     std::string source;               ///< trace:FILE | stdin | zmq:ENDPOINT | osc:PORT
     std::vector<std::string> sticks;  ///< by index; empty: all, as they come
     std::int64_t epoch_ns = 0;        ///< CLOCK_MONOTONIC at which a trace's t0 is due
-    double period_s = 0;              ///< a trace begins again this long after it began; 0: never
-    double speed = 1;                 ///< of a replay
+    double period_s = 0;  ///< a trace begins again this long after it began, > its duration; 0: never
+    double speed = 1;     ///< of a replay
     bool resume = false;  ///< begin at the current time: samples of a trace that are due have been seen
     std::string stream_head = {};  ///< with `resume`: what stream_head() was
 };

@@ -294,6 +294,7 @@ bool SensorHub::ended() const {
 
 std::vector<ClockReport> SensorHub::clocks() const {
     constexpr std::array<const char*, 3> kClocks = {"the trace's own, replayed", "the source's", "arrival"};
+    static_assert(kClocks.size() == static_cast<std::size_t>(SampleClock::arrival) + 1);
     std::vector<ClockReport> clocks;
     for (const HubSensor& sensor : implementation_->sensors) {
         const SensorReport report = implementation_->report_of(sensor);

@@ -37,8 +37,9 @@ struct StreamHead {
 };
 
 /// Starts and watches the sensor processes (one per stick of a trace; one for all sticks where a source
-/// delivers them together), each with a reader thread and a filter thread, and keeps the shared memory that
-/// they publish into. The memory has no name, so nothing stays in /dev/shm however a process ends. A process that dies is started again, at most 5 times in 10 s. One thread.
+/// delivers them together), each with a reader thread and a filter thread per stick, and keeps the shared memory that
+/// they publish into. The memory has no name, so nothing stays in /dev/shm however a process ends. A process
+/// that dies is started again, at most 5 times in 10 s. One thread.
 class SensorHub {
 public:
     /// Returns when the sensors are ready (tens of ms), so the epoch should lie that far ahead. Throws

@@ -133,8 +133,9 @@ private:
         else
             (void)samples.try_push(sample);
     }
-    /// True for what a live source with a clock of its own sends in the first moments. What had piled up before this process was ready arrives all at once and says nothing of the clocks'
-    /// offset; it would be played late, too.
+    /// True for what a live source with a clock of its own sends in the first moments. What had piled up before
+    /// this process was ready arrives all at once and says nothing of the clocks' offset; it would be played
+    /// late, too. So the first moments are left out.
     bool settling(const SourceSample& sample) {
         if (source_->replayed() || !sample.has_time) return false;
         if (first_read_ns_ == 0) first_read_ns_ = sample.read_ns;

@@ -22,7 +22,7 @@ enum class SensorPhase : std::uint64_t { starting, running, ended, failed };
 /// Whose clock the times of samples are.
 enum class SampleClock : std::uint64_t { replayed, source, arrival };
 
-/// How a sensor process is, for its hub. One a stick; what concerns the process is the same in all.
+/// How a sensor process is, for its hub. One for each stick; what concerns the process is the same in all.
 struct SensorReport {
     std::uint64_t pid = 0;
     SensorPhase phase = SensorPhase::starting;
@@ -46,7 +46,7 @@ struct SharedStreamHead {
 
 }  // namespace app
 
-/// Numbers and arrays of numbers.
+/// Numbers and arrays of numbers; std::optional of one is a flag beside it, and both sides are the same program.
 template <>
 inline constexpr bool tracking::kCopiesAsBytes<app::SharedStreamHead> = true;
 

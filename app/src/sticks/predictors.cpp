@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::string_view kExternal = "exec:";
 
-// What `auto` stands for, as measured on recorded mallets and sabers (README, figures). Pictures want the
+// What `auto` stands for, as measured on recorded mallets and sabers (docs/results.md). Pictures want the
 // least mean error: a velocity that fades with the lead errs 5 to 25 % less than one that lasts, on every
 // recording. Strikes want a path that bends: constant acceleration times them best, and the constant
 // velocity, which does not overshoot after a rebound, confirms them.
