@@ -1,6 +1,4 @@
 // Strikes of predictors on paths whose contacts are known in closed form.
-#include "compare/predictor_scores.h"
-
 #include <gtest/gtest.h>
 #include <tracking/sensor.h>
 
@@ -9,6 +7,7 @@
 #include <functional>
 #include <optional>
 
+#include "compare/predictor_scores.h"
 #include "sample_recordings.h"
 #include "sticks/predictors.h"
 #include "sticks/stick.h"

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "simulate/simulate.h"
 #include "simulate/run_measures.h"
+#include "simulate/simulate.h"
 #include "temporary_folder.h"
 #include "written_scene.h"
 

@@ -1,11 +1,11 @@
-#include "statistics/statistics.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 #include <span>
 #include <vector>
+
+#include "statistics/statistics.h"
 
 namespace {
 

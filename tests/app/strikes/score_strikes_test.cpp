@@ -1,5 +1,3 @@
-#include "strikes/true_contacts.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 #include <random>
 
 #include "statistics/statistics.h"
+#include "strikes/true_contacts.h"
 
 namespace {
 
