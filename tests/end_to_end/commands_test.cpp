@@ -68,7 +68,14 @@ TEST(Commands, WhatTheyWroteBeforeIsReplacedAndNothingElse) {
     const Folder folder;
     const std::string kit = (folder / "kit.toml").string(), keys = (folder / "keys").string();
     write(kit, "old");
-    EXPECT_EQ(run({"kit", "new", "fresh", "--out", kit}).status, 0);
+    for (const std::vector<std::string>& again : {std::vector<std::string>{"kit", "new", "again"},
+                                                  {"kit", "fit", "flourish"},
+                                                  {"record", "--source", "trace:roll"}}) {
+        std::vector<std::string> words = again;
+        words.insert(words.end(), {"--out", kit});
+        expect_refused(run(words), "none yet; name another, or say --replace");
+    }
+    EXPECT_EQ(run({"kit", "new", "fresh", "--out", kit, "--replace"}).status, 0);
     EXPECT_EQ(run({"kit", "check", kit}).status, 0);
     ASSERT_EQ(run({"keys", keys}).status, 0);
     const std::string first = read(folder / "keys/application.key");

@@ -1,5 +1,6 @@
 #pragma once
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -71,6 +72,19 @@ public:
                            for (const std::string& word : words)
                                targets.push_back(Target(format.parse(word, name)));
                        });
+    }
+    /// The option --out, a file that must not be there yet, and --replace, which lifts that.
+    template <class Target>
+    CLI::Option* new_file(Target& file, const std::string& help) {
+        CLI::Option* out = option("--out", file, as::text("FILE"), help);
+        const auto replace = std::make_shared<bool>(false);
+        flag("--replace", *replace, "Replace the file of --out, if there is one");
+        checks([&file, replace] {
+            if (!*replace && std::filesystem::is_regular_file(file))
+                refuse_options("the file " + std::string(file) + " of --out",
+                               "none yet; name another, or say --replace");
+        });
+        return out;
     }
     /// A switch that sets `target` to `value`.
     CLI::Option* flag(const std::string& name, bool& target, const std::string& help, bool value = true);

@@ -20,13 +20,8 @@ namespace fs = std::filesystem;
 namespace {
 
 void list_kits() {
-    std::vector<fs::path> files;
-    for (const fs::directory_entry& entry : fs::directory_iterator(assets_folder() / "kits"))
-        if (entry.path().extension() == ".toml" && entry.path().stem() != "defaults")
-            files.push_back(entry.path());
-    std::sort(files.begin(), files.end());
-    for (const fs::path& file : files)
-        fmt::print("{:<10} {}\n", file.stem().string(), read_kit(file).description);
+    for (const std::string& name : bundled_names("kits"))
+        fmt::print("{:<10} {}\n", name, read_kit(find_kit(name)).description);
 }
 
 std::string zones_text(const Instrument& instrument) {
@@ -68,6 +63,8 @@ struct DrawOptions {
 };
 
 void draw_kit(const DrawOptions& o) {
+    if (fs::path(o.out).extension() != ".png")
+        refuse_options("--out " + o.out, "a file whose name ends in .png");
     const Kit kit = read_kit(find_kit(o.kit));
     const KitStage stage(kit, 0, StickGeometry{});
     render::Renderer renderer(stage.scene(o.size.x(), o.size.y()));
@@ -171,7 +168,7 @@ void add_fit(Command& kit) {
     command.option("--tip", o->tip, as::vector_of_3(as::number(-2, 2, "m")),
                    "Tip in the tracked body's frame; the kit then says so");
     command.option("--shaft", o->shaft, as::axis(), "Body axis from hand to tip (turns the camera)");
-    command.option("--out", o->out, as::text("FILE"), "Kit to write; printed if left out");
+    command.new_file(o->out, "Kit to write; printed if left out");
     command.runs([o] { fit(*o); });
 }
 
@@ -201,7 +198,7 @@ void add_new(Command& kit) {
     Command command = kit.command("new", "Write a small kit to start from");
     auto name = std::make_shared<std::string>(), out = std::make_shared<std::string>();
     command.required("NAME", *name, as::text("NAME"), "The kit's name");
-    command.required("--out", *out, as::text("FILE"), "Kit to write (TOML); replaced if there is one");
+    command.new_file(*out, "Kit to write (TOML)")->required();
     command.runs([name, out] { make_new(*name, *out); });
 }
 

@@ -42,7 +42,7 @@ void add_record_command(Command& program) {
     auto o = std::make_shared<RecordOptions>();
     command.required("--source", o->source.source, as::text("SOURCE"),
                      "trace:FILE, stdin, zmq:ENDPOINT or osc:PORT");
-    command.required("--out", o->out, as::text("FILE"), "Trace to write (CSV); replaced if there is one");
+    command.new_file(o->out, "Trace to write (CSV)")->required();
     command.option("--seconds", o->seconds, as::number(0, as::kAny, "s"),
                    "From the first sample on; 0: until the source ends, Ctrl-C or SIGTERM");
     command.option("--sticks", o->source.sticks, as::list_of(as::text("NAME")),
