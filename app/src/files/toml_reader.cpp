@@ -117,6 +117,7 @@ protected:
     }
     void enter(const TableKey& key, const Visit& visit) override {
         known_.emplace_back(key.name);
+        if (missing_) return;
         if (key.form == TableForm::array) {
             for (const toml::table* entry : entries(key)) visit_table({entry}, key, {}, visit);
             return;
