@@ -11,7 +11,6 @@
 #include <csignal>
 #include <cstdio>
 #include <new>
-#include <numeric>
 
 #include "commands/command.h"
 #include "commands/commands.h"
@@ -19,6 +18,7 @@
 #include "commands/manual.h"
 #include "commands/play_command.h"
 #include "files/bad_input.h"
+#include "files/one_line.h"
 
 namespace app {
 namespace {
@@ -39,27 +39,6 @@ int complain(std::string message, int status) {
 std::string full_name(const CLI::App& command) {
     return command.get_parent() ? full_name(*command.get_parent()) + " " + command.get_name()
                                 : command.get_name();
-}
-
-/// How many letters must be put in, left out or exchanged to make one word of the other.
-std::size_t distance_between(const std::string& a, const std::string& b) {
-    std::vector<std::size_t> row(b.size() + 1);
-    std::iota(row.begin(), row.end(), 0);
-    for (std::size_t i = 1; i <= a.size(); ++i) {
-        std::size_t diagonal = row[0]++;
-        for (std::size_t k = 1; k <= b.size(); ++k) {
-            const std::size_t exchanged = diagonal + (a[i - 1] == b[k - 1] ? 0 : 1);
-            diagonal = row[k];
-            row[k] = std::min({exchanged, row[k] + 1, row[k - 1] + 1});
-        }
-    }
-    return row.back();
-}
-
-std::string nearest(const std::string& word, const std::vector<std::string>& words) {
-    return *std::min_element(words.begin(), words.end(), [&](const std::string& a, const std::string& b) {
-        return distance_between(word, a) < distance_between(word, b);
-    });
 }
 
 /// "found ..., expected ..." for a line that CLI11 did not understand; `at` is the last command that it did.

@@ -142,7 +142,7 @@ TEST(Record, BadInputIsOneLine) {
     refused({"--source", "tape:x"}, "found source \"tape:x\", expected trace:FILE, stdin");
     refused({"--source", "osc:lots"}, "found source \"osc:lots\", expected a UDP port such as osc:9000");
     refused({"--source", "zmq:nowhere"}, "found source \"zmq:nowhere\", expected an endpoint such as");
-    refused({"--source", "trace:" + (folder / "none.csv").string()}, "none.csv:1:1: error: found");
+    refused({"--source", "trace:" + (folder / "none.csv").string()}, "none.csv: error: found no such file");
     refused({"--source", "trace:flourish", "--sticks", "foot"},
             "found no stick \"foot\", expected one of left, right");
     refused({"--source", "trace:flourish", "--seconds", "-1"}, "found --seconds -1");

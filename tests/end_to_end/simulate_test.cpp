@@ -94,8 +94,8 @@ TEST(Simulate, WrongScenesAreRefusedWithTheirPlaceAndNothingIsWritten) {
         expect_one_line(run({"simulate", folder / "scene.toml", "--out", folder / "out"}), 2, words);
         EXPECT_FALSE(fs::exists(folder / "out"));
     }
-    expect_one_line(run({"simulate", folder / "none.toml"}), 2, "no readable file");
-    expect_one_line(run({"simulate", folder / "."}), 2, "a directory");
+    expect_one_line(run({"simulate", folder / "none.toml"}), 2, "no such file");
+    expect_one_line(run({"simulate", folder / "."}), 2, "no readable file");
 }
 
 TEST(Simulate, WrongOptionsAreRefusedInOneLine) {

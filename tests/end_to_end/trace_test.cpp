@@ -56,7 +56,8 @@ TEST(TraceConvert, ATableBecomesATraceAndItsSavedMapDoesTheSame) {
     const Folder folder;
     write(folder / "in.txt", table());
     std::vector<std::string> options = kMapped;
-    options.insert(options.end(), {"--save-map", (folder / "map.toml").string()});
+    options.insert(options.end(),
+                   {"--save-map", (folder / "map.toml").string(), "--tip", "0,0,-0.35", "--shaft", "-x"});
     const Ended ended = run(convert({(folder / "in.txt").string()}, folder / "a.csv", options));
     ASSERT_EQ(ended.status, 0) << ended.err;
     EXPECT_EQ(ended.err, "");

@@ -111,6 +111,7 @@ void ModelBank::select(const PoseSample& sample) noexcept {
     const double period = clock_.time_s() - past(0).t_s;
     if (elapsed < lead_s_ - period / 2) return;
     const Lanes measured = to_lanes(sample.position);
+    // (3.28): the model whose prediction of a lead ago was nearest, or (3.27): most likely.
     double least = penalty(0, past(age), elapsed, measured);
     selected_ = 0;
     for (std::size_t i = 1; i < kModels; ++i) {

@@ -103,9 +103,10 @@ void judge_gravity(const Trace& trace, std::vector<std::string>& lines) {
         mean += all[static_cast<std::size_t>(i)].stableNormalized() / static_cast<double>(count);
     if (mean.norm() < kOneSided || mean.y() >= 0.5 * mean.norm()) return;
     const Vector3d side = mean.normalized();
-    lines.push_back("the tips are stopped from the side (" + number(side.x()) + ", " + number(side.y()) +
-                    ", " + number(side.z()) + "), mean of the strongest " + std::to_string(count) +
-                    " accelerations, not from below: is the axis that points up right?");
+    lines.push_back(
+        "the tips are stopped from the side (" + number(side.x()) + ", " + number(side.y()) + ", " +
+        number(side.z()) + "), mean of the strongest " + std::to_string(count) +
+        " accelerations, not from below: is the axis that points up right, or the tip not given?");
 }
 
 /// Another way in which the same components may have been meant.

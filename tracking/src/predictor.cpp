@@ -149,18 +149,18 @@ struct Entry {
     std::unique_ptr<Predictor> (*make)(Specification&);
 };
 
-constexpr std::array<Entry, 12> kPredictors = {{{"hold", make_hold},
-                                                {"naive", make_naive},
-                                                {"difference", make_difference},
-                                                {"least-squares", make_least_squares},
-                                                {"double-exponential", make_double_exponential},
-                                                {"one-euro", make_one_euro},
-                                                {"thesis", make_thesis},
-                                                {"cv", make_cv},
-                                                {"ca", make_ca},
-                                                {"singer", make_singer},
-                                                {"bank", make_bank},
-                                                {"imm", make_imm}}};
+constexpr auto kPredictors = std::to_array<Entry>({{"hold", make_hold},
+                                                   {"naive", make_naive},
+                                                   {"difference", make_difference},
+                                                   {"least-squares", make_least_squares},
+                                                   {"double-exponential", make_double_exponential},
+                                                   {"one-euro", make_one_euro},
+                                                   {"thesis", make_thesis},
+                                                   {"cv", make_cv},
+                                                   {"ca", make_ca},
+                                                   {"singer", make_singer},
+                                                   {"bank", make_bank},
+                                                   {"imm", make_imm}});
 
 }  // namespace
 

@@ -79,7 +79,9 @@ struct TraceRows::Reading {
         while (offset != std::string_view::npos && count < columns_)
             fields_[count++] = line.next_field(offset);
         if (count == columns_ && offset == std::string_view::npos) return;
-        const std::string expected = std::to_string(columns_) + " fields, as in the header";
+        const std::string expected =
+            std::to_string(columns_) +
+            (assumed ? " fields: t,stick,px,py,pz,qw,qx,qy,qz" : " fields, as in the header");
         if (count == columns_)
             line.fail(offset - 1, "more than " + std::to_string(columns_) + " fields", expected,
                       "delete what is too much");
@@ -236,7 +238,7 @@ struct TraceRows::Reading {
     std::string name;
     RowOrder order;
     std::size_t lines = 0;
-    bool headed = false;
+    bool headed = false, assumed = false;
     TraceKeys keys;
     Trace trace;  // what the keys say
     Orientation orientation_ = Orientation::absent;
@@ -257,6 +259,11 @@ TraceRows& TraceRows::operator=(TraceRows&& other) noexcept = default;
 
 std::optional<TraceRow> TraceRows::take(std::string_view line) {
     return reading_->take(Line(reading_->name, ++reading_->lines, line));
+}
+
+void TraceRows::assume_header() {
+    (void)reading_->take(Line(reading_->name, 0, "t,stick,px,py,pz,qw,qx,qy,qz"));
+    reading_->assumed = true;
 }
 
 bool TraceRows::headed() const noexcept {

@@ -20,13 +20,8 @@ namespace fs = std::filesystem;
 namespace {
 
 void list_kits() {
-    std::vector<fs::path> files;
-    for (const fs::directory_entry& entry : fs::directory_iterator(assets_folder() / "kits"))
-        if (entry.path().extension() == ".toml" && entry.path().stem() != "defaults")
-            files.push_back(entry.path());
-    std::sort(files.begin(), files.end());
-    for (const fs::path& file : files)
-        fmt::print("{:<10} {}\n", file.stem().string(), read_kit(file).description);
+    for (const std::string& name : bundled_names("kits"))
+        fmt::print("{:<10} {}\n", name, read_kit(find_kit(name)).description);
 }
 
 std::string zones_text(const Instrument& instrument) {
@@ -68,6 +63,8 @@ struct DrawOptions {
 };
 
 void draw_kit(const DrawOptions& o) {
+    if (fs::path(o.out).extension() != ".png")
+        refuse_options("--out " + o.out, "a file whose name ends in .png");
     const Kit kit = read_kit(find_kit(o.kit));
     const KitStage stage(kit, 0, StickGeometry{});
     render::Renderer renderer(stage.scene(o.size.x(), o.size.y()));

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "commands/play_command.h"
+#include "files/one_line.h"
 #include "files/output_folder.h"
 #include "latency/latency_comparison.h"
 #include "latency/latency_report.h"
@@ -17,7 +18,7 @@ namespace {
 
 struct LatencyOptions : RealtimeOptions {
     std::vector<std::string> compare;
-    bool json = false;
+    bool json = false, realtime = false;
 };
 
 /// A new folder among the temporary ones.
@@ -72,11 +73,15 @@ void add_latency_command(Command& program, const RunInTime& run) {
     command.flag("--json", o->json, "Print one JSON document");
     command.option("--out", o->play.out, as::text("DIR"),
                    "Folder for what play writes, latency.json, latency.html and the rows as CSV");
-    command
-        .options("--compare", o->compare, as::text("DIR"),
-                 "Two such folders of earlier runs: their figures side by side (--out: comparison.json, "
-                 "report.html)")
-        ->expected(2);
+    command.options(
+        "--compare", o->compare, as::text("DIR"),
+        "Two such folders of earlier runs: their figures side by side (--out: comparison.json, report.html)");
+    command.flag("--realtime", o->realtime, "Always so")->group("");
+    command.checks([o] {
+        if (o->realtime) refuse_options("--realtime", "none: latency always plays in real time");
+        if (const std::size_t folders = o->compare.size(); folders != 0 && folders != 2)
+            refuse_options(counted(folders, "folder") + " after --compare", "two");
+    });
     command.runs([o, run] {
         if (o->compare.empty())
             measure(*o, run);

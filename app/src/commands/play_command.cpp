@@ -2,17 +2,19 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <memory>
 
 #include "files/assets.h"
 #include "files/one_line.h"
+#include "files/output_folder.h"
+#include "kit/kit.h"
 #include "play/play.h"
 #include "sticks/predictors.h"
 #include "strikes/true_contacts.h"
 
 namespace app {
-namespace fs = std::filesystem;
 namespace {
 
 void print_places(const PlayOptions& options) {
@@ -27,6 +29,22 @@ std::string strikes_text(const StrikeScore& s) {
                        counted(s.true_contacts, "strike"), s.false_notes, s.cancelled);
 }
 
+/// Says where tips and instruments were if none met.
+void print_if_apart(const PlayResult& result) {
+    if (result.score.true_contacts + result.score.released > 0 || result.tracks.empty()) return;
+    Eigen::AlignedBox3d tips, instruments;
+    for (const TipTrack& track : result.tracks)
+        for (const Eigen::Vector3d& tip : track.tip) tips.extend(tip);
+    for (const Instrument& instrument : read_kit(result.options.kit).instruments)
+        instruments.extend(instrument.body.world_from_body.translation());
+    fmt::print(
+        "no stick met an instrument: the tips moved within ({:.2f}) to ({:.2f}) m, the instruments lie "
+        "within "
+        "({:.2f}) to ({:.2f}) m; check --tip, or place a kit with `kit fit {}`\n",
+        fmt::join(tips.min(), ", "), fmt::join(tips.max(), ", "), fmt::join(instruments.min(), ", "),
+        fmt::join(instruments.max(), ", "), result.trace);
+}
+
 void play_offline(const PlayOptions& options) {
     const PlayResult result = play(options);
     const StrikeScore& s = result.score;
@@ -34,6 +52,7 @@ void play_offline(const PlayOptions& options) {
                s.true_contacts > s.missed ? fmt::format("{:.1f} ms", s.timing_median_ms)
                                           : "unknown (nothing matched)",
                (result.t_end_s - result.t0_s) / result.wall_s);
+    print_if_apart(result);
     print_places(options);
 }
 
@@ -43,6 +62,7 @@ void play_in_time(const RealtimeOptions& options) {
                strikes_text(outcome.play.score), outcome.latency.frames.missed,
                counted(outcome.latency.frames.total, "frame"), outcome.latency.notes.missed,
                counted(outcome.latency.notes.total, "note"));
+    print_if_apart(outcome.play);
     if (const OfflineComparison& offline = outcome.offline; offline.offline_strikes > 0)
         fmt::print("{} offline: {} here, {} unexplained ({})\n", counted(offline.offline_strikes, "strike"),
                    counted(offline.departures.size(), "departure"), offline.unexplained(),
@@ -53,14 +73,9 @@ void play_in_time(const RealtimeOptions& options) {
 
 void check_video(const PlayOptions& o) {
     if (!o.video) return;
-    const std::string video = fmt::format("--video {}", o.video->string());
     if (o.width % 2 != 0 || o.height % 2 != 0)
         refuse_options(fmt::format("--video with --size {}x{}", o.width, o.height), "even sides");
-    std::error_code error;
-    if (fs::is_directory(*o.video, error)) refuse_options(video + ", which is a folder", "a file");
-    const fs::path parent = o.video->parent_path();
-    if (!parent.empty() && !fs::is_directory(parent, error))
-        refuse_options(video + " in a folder that is not there", "an existing folder");
+    (void)partial_name(*o.video);
 }
 
 }  // namespace

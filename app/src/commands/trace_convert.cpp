@@ -60,6 +60,8 @@ std::optional<tracking::ColumnMap> map_of(const ConvertOptions& o, const std::st
     map->seconds_per_unit = o.seconds_per_unit.value_or(map->seconds_per_unit);
     map->header = o.header.value_or(map->header);
     if (o.from_zero) map->from_zero = true;
+    if (o.tip) map->tip = o.tip;
+    if (o.shaft) map->shaft = o.shaft;
     map->check();
     return map;
 }
@@ -136,20 +138,11 @@ void convert(const ConvertOptions& o) {
                    stick.samples.back().t_s);
 }
 
-/// For the help, which is there even where the assets are not.
-std::string bundled_maps() {
-    try {
-        return fmt::format("{}", fmt::join(map_names(), ", "));
-    } catch (const BadInput&) {
-        return "the bundled ones";
-    }
-}
-
 void add_table_options(Command& command, ConvertOptions& o) {
     constexpr const char* kHeading = "Tables of other programs";
     Command tables = command.under(kHeading);
     tables.option("--map", o.map, as::text("MAP"),
-                  "Columns: \"t=Time,px=X,..\", a TOML file, or one of " + bundled_maps());
+                  "Columns: \"t=Time,px=X,..\", a TOML file, or a bundled map such as optitrack");
     tables.option("--save-map", o.save_map, as::text("FILE"),
                   "Write the map, with these options, to a TOML file");
     tables.option("--units", o.metres_per_unit, as::choice<double>({{"m", 1}, {"cm", 0.01}, {"mm", 0.001}}),

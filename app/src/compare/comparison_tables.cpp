@@ -174,9 +174,10 @@ std::string strike_winner(const Comparison& comparison, double lead_s) {
     const HitScore& best = *ranked[0]->hits;
     std::string text = fmt::format(
         ". Of {} true strikes {} commits best that far ahead: F1 {:.3f}, median error {:.1f} ms, {:.2f} "
-        "false a minute; then {} ({:.3f})",
+        "false a minute; {} {} ({:.3f})",
         best.true_contacts, ranked[0]->predictor, best.f1(), best.median_ms(), best.false_per_min(),
-        ranked[1]->predictor, ranked[1]->hits->f1());
+        ranked[1]->hits->f1() == best.f1() ? "as good:" : "then", ranked[1]->predictor,
+        ranked[1]->hits->f1());
     const auto baseline = std::ranges::find(ranked, true, &ComparisonSummary::baseline);
     if (baseline - ranked.begin() >= 2 && baseline != ranked.end())
         text += fmt::format("; the best baseline is {} ({:.3f})", (*baseline)->predictor,
@@ -241,19 +242,21 @@ std::vector<const ComparisonSummary*> ranked_by_f1(const Comparison& comparison,
     for (const ComparisonSummary& summary : comparison.summaries)
         if (summary.lead_s == lead_s && summary.hits && summary.hits->true_contacts > 0)
             ranked.push_back(&summary);
-    std::ranges::stable_sort(ranked, std::greater(),
-                             [](const ComparisonSummary* summary) { return summary->hits->f1(); });
+    std::ranges::stable_sort(ranked, std::greater(), [](const ComparisonSummary* summary) {
+        return std::pair(summary->hits->f1(), summary->baseline);  // a tie is no win over a baseline
+    });
     return ranked;
 }
 
 std::vector<std::string> winners(const Comparison& comparison) {
     std::vector<std::string> sentences;
     for (const double lead_s : comparison.options.leads_s) {
+        const auto rank = [](const ComparisonSummary& summary) {
+            return std::pair(summary.error.position.rms(), !summary.baseline);  // a tie is no win
+        };
         const ComparisonSummary* best = nullptr;
         for (const ComparisonSummary& summary : comparison.summaries)
-            if (summary.lead_s == lead_s &&
-                (best == nullptr || summary.error.position.rms() < best->error.position.rms()))
-                best = &summary;
+            if (summary.lead_s == lead_s && (best == nullptr || rank(summary) < rank(*best))) best = &summary;
         if (best == nullptr) continue;
         std::string text = fmt::format("{:.1f} ms ahead {} errs least, {:.1f} mm RMS", 1e3 * lead_s,
                                        best->predictor, best->error.position.rms());

@@ -150,8 +150,8 @@ std::size_t lead_of(const StickPredictions& predictions, const std::string& file
     for (std::size_t lead = 0; lead < leads_s.size(); ++lead)
         if (std::abs(leads_s[lead] - predictions.lead_s) < kSameLeadS) return lead;
     throw BadInput(fmt::format(
-        "{}: error: found predictions {} s ahead, expected one of the leads {}; name it in --leads", file,
-        predictions.lead_s, fmt::join(leads_s, ", ")));
+        "{}: error: found predictions {:.4g} s ahead, expected one of the leads {:.4g}; name it in --leads",
+        file, predictions.lead_s, fmt::join(leads_s, ", ")));
 }
 
 /// The sticks of one recording as a file answers them, by their numbers. Throws BadInput where it does not fit.
@@ -168,7 +168,9 @@ std::map<std::size_t, StickPredictions> answers_of(const PredictionFile& file, c
 std::pair<std::string, std::optional<std::size_t>> split_file(const std::string& text, const Field& field) {
     const std::size_t at = text.rfind('@');
     for (std::size_t r = 0; at != std::string::npos && r < field.recordings.size(); ++r)
-        if (field.recordings[r].trace.file == find_trace(text.substr(at + 1))) return {text.substr(0, at), r};
+        if (const std::string& file = field.recordings[r].trace.file, named = text.substr(at + 1);
+            file == named || file == assets_folder() / "traces" / (named + ".csv"))
+            return {text.substr(0, at), r};
     return {text, std::nullopt};
 }
 

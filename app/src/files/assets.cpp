@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "files/bad_input.h"
+#include "files/one_line.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -32,12 +34,29 @@ fs::path assets_folder() {
     return chosen;
 }
 
+std::vector<std::string> bundled_names(const std::string& folder, const std::string& extension) {
+    std::vector<std::string> names;
+    std::error_code ignored;
+    for (const fs::directory_entry& entry : fs::directory_iterator(assets_folder() / folder, ignored))
+        if (entry.path().extension() == extension && entry.path().stem() != "defaults")
+            names.push_back(entry.path().stem().string());
+    std::ranges::sort(names);
+    return names;
+}
+
 fs::path find_bundled(const std::string& name_or_path, const std::string& folder,
                       const std::string& extension) {
-    std::error_code ignored;
+    std::error_code error;
     fs::path bundled = assets_folder() / folder / (name_or_path + extension);
     const bool name = name_or_path.find('/') == std::string::npos;
-    return name && fs::is_regular_file(bundled, ignored) ? bundled : fs::path(name_or_path);
+    if (name && fs::is_regular_file(bundled, error)) return bundled;
+    const std::vector<std::string> names = bundled_names(folder, extension);
+    if (fs::status(name_or_path, error).type() == fs::file_type::not_found && !names.empty())
+        throw BadInput(fmt::format(
+            "{}: error: found no such file, expected a {}; the bundled ones are {}; the nearest is {}",
+            name_or_path, folder.substr(0, folder.size() - 1), fmt::join(names, ", "),
+            nearest(fs::path(name_or_path).stem().string(), names)));
+    return name_or_path;
 }
 
 fs::path find_trace(const std::string& name_or_path) {

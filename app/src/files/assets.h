@@ -1,6 +1,7 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace app {
 
@@ -8,7 +9,11 @@ namespace app {
 /// Throws BadInput where that is no such folder.
 [[nodiscard]] std::filesystem::path assets_folder();
 
-/// A file by path, or by the name of a bundled one: NAME + extension in a folder of the assets.
+/// The NAMEs of the files NAME + extension in a folder of the assets.
+[[nodiscard]] std::vector<std::string> bundled_names(const std::string& folder,
+                                                     const std::string& extension = ".toml");
+/// A file by path, or by the name of a bundled one: NAME + extension in a folder of the assets. Throws BadInput
+/// with the nearest name if there is neither.
 [[nodiscard]] std::filesystem::path find_bundled(const std::string& name_or_path, const std::string& folder,
                                                  const std::string& extension = ".toml");
 /// A kit by path, or by the name of a bundled one ("drums" is assets/kits/drums.toml).

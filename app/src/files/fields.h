@@ -83,6 +83,7 @@ struct TableText {
     const char* name;
     const char* meaning;
     Below below = Below::nothing;
+    const char* example = "";  ///< of a short one
 };
 /// A kind of table with the function that declares its keys.
 template <class T>

@@ -1,6 +1,27 @@
 #include "files/one_line.h"
 
+#include <algorithm>
+#include <numeric>
+
 namespace app {
+namespace {
+
+/// How many letters must be put in, left out or exchanged to make one word of the other.
+std::size_t distance_between(const std::string& a, const std::string& b) {
+    std::vector<std::size_t> row(b.size() + 1);
+    std::iota(row.begin(), row.end(), 0);
+    for (std::size_t i = 1; i <= a.size(); ++i) {
+        std::size_t diagonal = row[0]++;
+        for (std::size_t k = 1; k <= b.size(); ++k) {
+            const std::size_t exchanged = diagonal + (a[i - 1] == b[k - 1] ? 0 : 1);
+            diagonal = row[k];
+            row[k] = std::min({exchanged, row[k] + 1, row[k - 1] + 1});
+        }
+    }
+    return row.back();
+}
+
+}  // namespace
 
 std::string one_line(std::string_view text, std::size_t longest) {
     std::string line(text.substr(0, longest));
@@ -16,6 +37,13 @@ std::string counted(std::uint64_t count, std::string_view one) {
     if (count == 1) return number + std::string(one);
     if (one.ends_with('y')) return number + std::string(one.substr(0, one.size() - 1)) + "ies";
     return number + std::string(one) + "s";
+}
+
+std::string nearest(const std::string& word, const std::vector<std::string>& words) {
+    if (words.empty()) return "none";
+    return *std::min_element(words.begin(), words.end(), [&](const std::string& a, const std::string& b) {
+        return distance_between(word, a) < distance_between(word, b);
+    });
 }
 
 }  // namespace app

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace app {
 
@@ -14,5 +15,8 @@ namespace app {
 [[nodiscard]] inline std::string counted(std::integral auto count, std::string_view one) {
     return counted(static_cast<std::uint64_t>(count), one);
 }
+
+/// The one of the words that takes the fewest letters to become `word`.
+[[nodiscard]] std::string nearest(const std::string& word, const std::vector<std::string>& words);
 
 }  // namespace app

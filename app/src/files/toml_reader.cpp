@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "files/bad_input.h"
+#include "files/one_line.h"
 #include "files/option_values.h"
 
 namespace app {
@@ -40,16 +41,15 @@ std::string kind_of(const toml::node& node) {
     return "a date or time";
 }
 
-[[noreturn]] void fail_at(const toml::source_region& place, const std::string& found,
-                          const std::string& expected) {
-    throw BadInput(fmt::format("{}:{}:{}: error: found {}, expected {}", place.path ? *place.path : "a file",
-                               place.begin.line, place.begin.column, found, expected));
+BadInput fault_at(const toml::source_region& place, const std::string& found, const std::string& expected) {
+    return BadInput(fmt::format("{}:{}:{}: error: found {}, expected {}", place.path ? *place.path : "a file",
+                                place.begin.line, place.begin.column, found, expected));
 }
 
 std::string checked_text(const toml::node& node) {
     const std::string& value = node.as_string()->get();
     if (std::any_of(value.begin(), value.end(), is_control))
-        fail_at(node.source(), kind_of(node), "a text without line breaks and control characters");
+        throw fault_at(node.source(), kind_of(node), "a text without line breaks and control characters");
     return value;
 }
 
@@ -80,19 +80,21 @@ public:
     }
     void require(bool holds, std::string_view key, const std::string& found,
                  const std::string& expected) const override {
-        if (!holds) fail(key, found, expected);
+        if (!holds && !missing_) throw fault(key, found, expected);
     }
-    /// Refuses keys that were not declared.
-    void done() const {
+    /// Refuses keys that were not declared, if it has `all`, then what is missing: it may be misspelt.
+    void done(bool all = true) const {
         const auto among = [](const std::vector<std::string>& keys, std::string_view key) {
             return std::ranges::find(keys, key) != keys.end();
         };
-        for (const toml::table* layer : layers_)
+        for (const toml::table* layer : all ? layers_ : Layers())
             for (const auto& [key, node] : *layer)
                 if (!among(known_, key.str()) || (layer != layers_.front() && among(own_, key.str())))
-                    fail_at(key.source(),
-                            fmt::format("unknown key \"{}\" in {}", printable(key.str()), where_),
-                            fmt::format("only {}", fmt::join(known_, ", ")));
+                    throw fault_at(key.source(),
+                                   fmt::format("unknown key \"{}\" in {}", printable(key.str()), where_),
+                                   fmt::format("only {}; the nearest is {}", fmt::join(known_, ", "),
+                                               nearest(std::string(key.str()), known_)));
+        if (missing_) throw BadInput(*missing_);
     }
 
 protected:
@@ -102,23 +104,25 @@ protected:
         if (own) own_.emplace_back(key.name);
         const toml::node* node = own ? layers_.front()->get(key.name) : get(key.name);
         if (!node && key.note.need == Need::no) return false;
-        if (!node)
-            fail("", fmt::format("no key \"{}\" in {}", key.name, where_),
-                 key.type == KeyType::text || key.type == KeyType::choice
-                     ? fmt::format("{} = \"text\"", key.name)
-                     : expected_of(key));
+        if (!node && !missing_)
+            missing_ = fault("", fmt::format("no key \"{}\" in {}", key.name, where_),
+                             key.type == KeyType::text || key.type == KeyType::choice
+                                 ? fmt::format("{} = \"text\"", key.name)
+                                 : expected_of(key));
+        if (!node) return false;
         value = value_of(key, *node);
         if (own && std::get<std::string>(value).empty())
-            fail(key.name, fmt::format("{} = \"\"", key.name), fmt::format("a {}", key.name));
+            throw fault(key.name, fmt::format("{} = \"\"", key.name), fmt::format("a {}", key.name));
         return true;
     }
     void enter(const TableKey& key, const Visit& visit) override {
         known_.emplace_back(key.name);
+        if (missing_) return;
         if (key.form == TableForm::array) {
             for (const toml::table* entry : entries(key)) visit_table({entry}, key, {}, visit);
             return;
         }
-        const Layers inner = merged(key.name);
+        const Layers inner = merged(key.name, key.table->example);
         if (key.form == TableForm::merged || (key.form == TableForm::optional && !inner.empty()))
             visit_table(inner, key, {}, visit);
         if (key.form != TableForm::named) return;
@@ -135,15 +139,15 @@ private:
             if (const toml::node* node = layer->get(key)) return node;
         return nullptr;
     }
-    [[noreturn]] void fail(std::string_view key, const std::string& found,
-                           const std::string& expected) const {
+    [[nodiscard]] BadInput fault(std::string_view key, const std::string& found,
+                                 const std::string& expected) const {
         const toml::node* node = key.empty() ? nullptr : get(key);
         if (!node && !layers_.empty()) node = layers_.front();
-        fail_at(node ? node->source() : toml::source_region{},
-                key.empty() ? found : fmt::format("{} in {}", found, where_), expected);
+        return fault_at(node ? node->source() : toml::source_region{},
+                        key.empty() ? found : fmt::format("{} in {}", found, where_), expected);
     }
     [[noreturn]] void refuse(const Key& key, const toml::node& node) const {
-        fail(key.name, fmt::format("{} = {}", key.name, kind_of(node)), expected_of(key));
+        throw fault(key.name, fmt::format("{} = {}", key.name, kind_of(node)), expected_of(key));
     }
 
     [[nodiscard]] KeyValue value_of(const Key& key, const toml::node& node) const {
@@ -170,8 +174,8 @@ private:
     /// One of the words, if they are given.
     [[nodiscard]] std::string checked_word(const Key& key, const std::string& word) const {
         if (!key.words.empty() && std::ranges::find(key.words, word) == key.words.end())
-            fail(key.name, fmt::format("{} = \"{}\"", key.name, printable(word)),
-                 fmt::format("one of {}", fmt::join(key.words, ", ")));
+            throw fault(key.name, fmt::format("{} = \"{}\"", key.name, printable(word)),
+                        fmt::format("one of {}", fmt::join(key.words, ", ")));
         return word;
     }
     [[nodiscard]] const toml::array& array_of(const Key& key, const toml::node& node) const {
@@ -185,21 +189,23 @@ private:
         if (key.type == KeyType::fraction && node.is_string()) value = as::number().read(checked_text(node));
         if (value && *value >= key.range.low && *value <= key.range.high) return *value;
         if (key.type == KeyType::fraction && !node.is_string())
-            fail(key.name, fmt::format("{} = {}", key.name, kind_of(node)),
-                 range_text(key.range.low, key.range.high));
+            throw fault(key.name, fmt::format("{} = {}", key.name, kind_of(node)),
+                        range_text(key.range.low, key.range.high));
         refuse(key, node);
     }
     [[nodiscard]] std::vector<double> numbers(const Key& key, const toml::node& node) const {
         const toml::array& array = array_of(key, node);
         if (array.size() != static_cast<std::size_t>(key.size))
-            fail(key.name, fmt::format("{} with {} entries", key.name, array.size()), expected_of(key));
+            throw fault(key.name, fmt::format("{} with {} entries", key.name, array.size()),
+                        expected_of(key));
         std::vector<double> values;
         for (const toml::node& entry : array) {
             const std::optional<double> value = entry.is_number() ? entry.value<double>() : std::nullopt;
             if (!value || !(*value >= key.range.low && *value <= key.range.high))
-                fail_at(entry.source(),
-                        fmt::format("{}[{}] = {} in {}", key.name, values.size(), kind_of(entry), where_),
-                        expected_of(key));
+                throw fault_at(
+                    entry.source(),
+                    fmt::format("{}[{}] = {} in {}", key.name, values.size(), kind_of(entry), where_),
+                    expected_of(key));
             values.push_back(*value);
         }
         return values;
@@ -209,7 +215,8 @@ private:
         Texts result;
         for (const toml::node& entry : array_of(key, node)) {
             if (!entry.is_string())
-                fail_at(entry.source(), fmt::format("{} in {}", kind_of(entry), where_), "a text in quotes");
+                throw fault_at(entry.source(), fmt::format("{} in {}", kind_of(entry), where_),
+                               "a text in quotes");
             result.push_back(checked_text(entry));
         }
         return result;
@@ -224,23 +231,25 @@ private:
             else if (node.is_string())
                 columns[role] = node.as_string()->get();
             else
-                fail_at(node.source(), fmt::format("no text for column \"{}\"", printable(role)),
-                        "a column's name in quotes, #N or +N");
+                throw fault_at(node.source(), fmt::format("no text for column \"{}\"", printable(role)),
+                               "a column's name in quotes, #N or +N");
         }
         return columns;
     }
 
-    [[nodiscard]] const toml::table* table_in(const toml::node& node, const std::string& at) const {
+    [[nodiscard]] const toml::table* table_in(const toml::node& node, const std::string& at,
+                                              std::string_view such_as = {}) const {
         if (!node.is_table())
-            fail_at(node.source(), fmt::format("{}{} in {}", at, kind_of(node), where_), "a table");
+            throw fault_at(node.source(), fmt::format("{}{} in {}", at, kind_of(node), where_),
+                           fmt::format("a table{}{}", such_as.empty() ? "" : " such as ", such_as));
         return node.as_table();
     }
     /// The tables at a key, through all layers.
-    [[nodiscard]] Layers merged(std::string_view key) const {
+    [[nodiscard]] Layers merged(std::string_view key, std::string_view such_as = {}) const {
         Layers inner;
         for (const toml::table* layer : layers_)
             if (const toml::node* at = layer->get(key)) {
-                inner.push_back(table_in(*at, fmt::format("{} = ", key)));
+                inner.push_back(table_in(*at, fmt::format("{} = ", key), such_as));
             }
         return inner;
     }
@@ -252,8 +261,8 @@ private:
             if (!node) continue;
             const toml::array* array = node->as_array();
             if (!array)
-                fail_at(node->source(), fmt::format("{} = {} in {}", key.name, kind_of(*node), where_),
-                        "an array of tables");
+                throw fault_at(node->source(), fmt::format("{} = {} in {}", key.name, kind_of(*node), where_),
+                               "an array of tables");
             for (const toml::node& entry : *array) result.push_back(table_in(entry, ""));
             if (key.table->below == Below::nothing) break;
         }
@@ -284,6 +293,7 @@ private:
     Layers layers_;
     std::string where_;
     const Layers& root_;
+    std::optional<BadInput> missing_;
     std::vector<std::string> known_, own_;
 };
 
@@ -301,15 +311,12 @@ toml::table parsed(const std::string& file, const auto& parse) {
 
 }  // namespace
 
-TomlFile::TomlFile(const fs::path& file, const TomlKind& kind) {
+TomlFile::TomlFile(const char* kind, const fs::path& file) {
     std::error_code error;
-    if (fs::is_directory(file, error))
-        throw BadInput(
-            fmt::format("{}: error: found a directory, expected {} (a TOML file)", file.string(), kind.name));
     std::ifstream in(file);
-    if (!in.good())
-        throw BadInput(fmt::format("{}: error: found no readable file, expected {} (TOML); {}", file.string(),
-                                   kind.name, kind.help));
+    if (!in.good() || fs::is_directory(file, error))
+        throw BadInput(
+            fmt::format("{}: error: found no readable file, expected {} (TOML)", file.string(), kind));
     const auto parse = [&] { return toml::parse(in, file.string()); };
     document_ = std::make_unique<Document>(parsed(file.string(), parse));
 }
@@ -327,7 +334,7 @@ void read_toml(const std::vector<TomlFile>& layers, const std::string& where,
     for (const TomlFile& layer : layers) roots.push_back(&layer.document_->root);
     TomlReader reader(roots, where, roots);
     keys(reader);
-    if (all) reader.done();
+    reader.done(all);
 }
 
 }  // namespace app

@@ -9,17 +9,11 @@
 
 namespace app {
 
-/// What a file should be, for messages.
-struct TomlKind {
-    std::string name;  ///< "a kit"
-    std::string help;  ///< what to do when there is no such file
-};
-
 /// A TOML document in memory, with the places of its keys.
 class TomlFile {
 public:
-    /// Throws BadInput: no file, a folder, a syntax error (with its place).
-    TomlFile(const std::filesystem::path& file, const TomlKind& kind);
+    /// `kind` is what it should be, "a kit". Throws BadInput: no file, a folder, a syntax error (with its place).
+    TomlFile(const char* kind, const std::filesystem::path& file);
     /// `name` stands for the file in messages.
     TomlFile(std::string_view text, const std::string& name);
     TomlFile(TomlFile&&) noexcept;

@@ -136,8 +136,9 @@ void sound_keys(Fields& keys, InstrumentDraft& written) {
         "A parameter of the orchestra's instrument. The header of assets/orchestra/musicworld.orc lists "
         "them with their ranges.");
 }
-const TableKind<InstrumentDraft> kSound = {{"sound", "The orchestra's instrument and its parameters."},
-                                           sound_keys};
+const TableKind<InstrumentDraft> kSound = {
+    {"sound", "The orchestra's instrument and its parameters.", Below::nothing, "{ instrument = \"NAME\" }"},
+    sound_keys};
 
 // [[instrument]]
 
@@ -319,7 +320,7 @@ void load(Kit& kit, std::vector<TomlFile>& documents, const fs::path& file) {
         throw BadInput(
             fmt::format("{}: error: found more than 32 included files, expected fewer", file.string()));
     std::vector<TomlFile> alone;
-    alone.emplace_back(file, TomlKind{"a kit", "`musicworld kit list` names the bundled ones"});
+    alone.emplace_back("a kit", file);
     KitHeader header{file.stem().string(), {}, {}};
     std::vector<fs::path> includes;
     const auto read_header = [&](Fields& keys) {
@@ -363,7 +364,7 @@ std::vector<sim::BodyDefinition> bodies_of(const Kit& kit) {
 FormatDescription kit_format() {
     KitDraft written;
     std::vector<TomlFile> defaults;
-    defaults.emplace_back(assets_folder() / "kits" / "defaults.toml", TomlKind{"the kits' defaults", ""});
+    defaults.emplace_back("the kits' defaults", assets_folder() / "kits" / "defaults.toml");
     written.kit.file = assets_folder() / "kits" / "defaults.toml";
     read_toml(defaults, "the kits' defaults", [&](Fields& keys) { kKitFile.keys(keys, written); });
     written.kit.stick.mesh = written.kit.stick.mesh.filename();

@@ -224,10 +224,10 @@ std::string figures(const LatencyReport& r) {
 
 std::string sound_picture_note(const LatencyReport& report) {
     std::string shares = report.notes.total == 0 ? "There were no notes" : "No note has a picture";
-    if (const std::optional<double> atsc = report.share_within_atsc())
+    if (const std::optional<double> atsc = report.share_within(kAtscLimits))
         shares = fmt::format(
-            "{:.1f} % of all notes lie within ATSC's limit, {:.1f} % of those with a picture within ITU's",
-            100 * *atsc, 100 * report.share_within_itu().value());
+            "{:.1f} % of the notes with a picture lie within ATSC's limits, {:.1f} % within ITU's",
+            100 * *atsc, 100 * report.share_within(kItuLimits).value());
     return fmt::format(
         "<p class=note>A note's onset in the output minus the time at which the drawn path of its stick, "
         "a cubic Hermite curve through the tips predicted for the frames shown, comes into the "

@@ -240,16 +240,9 @@ double Spread::share_within(double low, double high) const {
     return static_cast<double>(inside) / static_cast<double>(sorted_.size());
 }
 
-std::optional<double> LatencyReport::share_within_atsc() const {
+std::optional<double> LatencyReport::share_within(const AvLimits& limits) const {
     if (pictures.empty()) return std::nullopt;
-    const auto matched = static_cast<double>(pictures.size());
-    return sound_minus_picture_ms.share_within(kAtscLimits.early_ms, kAtscLimits.late_ms) * matched /
-           (matched + static_cast<double>(notes_without_picture));
-}
-
-std::optional<double> LatencyReport::share_within_itu() const {
-    if (pictures.empty()) return std::nullopt;
-    return sound_minus_picture_ms.share_within(kItuLimits.early_ms, kItuLimits.late_ms);
+    return sound_minus_picture_ms.share_within(limits.early_ms, limits.late_ms);
 }
 
 std::string milliseconds(const std::optional<double>& value) {
@@ -326,13 +319,13 @@ std::string format_latency_text(const LatencyReport& report, const RealtimeResul
         text += fmt::format("left out because the frame rate was lowered: {} more frames\n",
                             report.frames_left_out);
     text += fmt::format("\n{}", spread_table(report).text());
-    const auto share = [&](const std::optional<double>& of) {
-        if (of) return fmt::format("{:.1f} %", 100 * *of);
-        return std::string(report.notes.total == 0 ? "no notes" : "no pictures of notes");
-    };
-    text += fmt::format("within ATSC's {:g} to {:+g} ms: {}; ITU-R BT.1359's {:g} to {:+g} ms: {}; ",
-                        kAtscLimits.early_ms, kAtscLimits.late_ms, share(report.share_within_atsc()),
-                        kItuLimits.early_ms, kItuLimits.late_ms, share(report.share_within_itu()));
+    if (const auto atsc = report.share_within(kAtscLimits), itu = report.share_within(kItuLimits);
+        atsc && itu)
+        text += fmt::format(
+            "of the notes with a picture, within ATSC's {:g} to {:+g} ms: {:.1f} %, within ITU-R BT.1359's "
+            "{:g} to {:+g} ms: {:.1f} %\n",
+            kAtscLimits.early_ms, kAtscLimits.late_ms, 100 * *atsc, kItuLimits.early_ms, kItuLimits.late_ms,
+            100 * *itu);
     text += fmt::format("notes whose drawn stick does not strike: {}\n", report.notes_without_picture);
     text += fmt::format("\nleads needed: pictures {}, sound {}\n", milliseconds(report.render_lead_needed_ms),
                         milliseconds(report.sound_lead_needed_ms));
@@ -347,8 +340,8 @@ std::string format_latency_json(const LatencyReport& report, const PlayResult& p
     for (Json& spread : spreads) spread.erase("sound minus");
     Json& picture = spreads[0];
     picture["unmatched"] = report.notes_without_picture;
-    picture["share_within_atsc"] = Cell(report.share_within_atsc()).json();
-    picture["share_within_itu"] = Cell(report.share_within_itu()).json();
+    picture["share_within_atsc"] = Cell(report.share_within(kAtscLimits)).json();
+    picture["share_within_itu"] = Cell(report.share_within(kItuLimits)).json();
     const Json json = {{"run", run_of(play, realtime)},
                        {"stages", stage_table(report).json()},
                        {"frames", frames_of(report, realtime)},

@@ -76,10 +76,8 @@ struct LatencyReport {
     std::vector<SoundPicture> pictures;               ///< of the notes that the drawn sticks play, too
     std::size_t notes_without_picture = 0;
     Spread sound_minus_picture_ms, sound_minus_frame_ms;
-    /// Share of the notes within ATSC's limits; one without a picture is not. Share of those with a picture
-    /// within ITU-R BT.1359's. None where no note has a picture.
-    [[nodiscard]] std::optional<double> share_within_atsc() const;
-    [[nodiscard]] std::optional<double> share_within_itu() const;
+    /// Share of the notes with a picture; none where there are none.
+    [[nodiscard]] std::optional<double> share_within(const AvLimits& limits) const;
     std::vector<DrawnError> errors;
     std::optional<double> rms_error_mm;  ///< of all of them
     /// p99 of "frame in all": what the render lead must cover so that 99 of 100 frames are in time.

@@ -568,8 +568,7 @@ Scene read_scene(const fs::path& file, std::optional<double> dt_s) {
     reader.scene.name = file.stem().string();
     reader.dt_s = dt_s;
     std::vector<TomlFile> layers;
-    layers.emplace_back(file,
-                        TomlKind{"a scene", "the bundled ones are human, lattice, spiked, benchmark25 ..."});
+    layers.emplace_back("a scene", file);
     read_toml(layers, "the scene", [&](Fields& keys) { kSceneFile.keys(keys, reader); });
     reader.add_events();
     if (reader.scene.world.bodies.empty())

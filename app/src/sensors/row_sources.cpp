@@ -17,7 +17,6 @@ namespace app {
 namespace {
 
 constexpr std::size_t kLongestHead = 2000;
-constexpr const char* kDefaultHeader = "t,stick,px,py,pz,qw,qx,qy,qz";
 
 class StreamSource final : public RowSource {
 public:
@@ -149,7 +148,7 @@ void RowDecoder::take_line(std::string_view text) {
         if (head_.size() + text.size() < kLongestHead) head_.append(text).append("\n");
         return;
     }
-    if (!rows_.headed() && !given_head_) (void)rows_.take(kDefaultHeader);
+    if (!rows_.headed() && !given_head_) rows_.assume_header();
     const bool short_row = !given_head_ && std::count(text.begin(), text.end(), ',') == 4;
     if (const auto row = rows_.take(short_row ? std::string(text) + ",,,," : std::string(text))) take_(*row);
 }

@@ -3,11 +3,8 @@
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
-#include <algorithm>
-#include <fstream>
 #include <sstream>
 
-#include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/toml_reader.h"
 
@@ -125,8 +122,7 @@ FormatDescription map_format() {
 tracking::ColumnMap read_map(const fs::path& file) {
     tracking::ColumnMap map;
     std::vector<TomlFile> layers;
-    layers.emplace_back(file, TomlKind{"a map: NAME=COLUMN,.., or a file",
-                                       fmt::format("the bundled ones are {}", fmt::join(map_names(), ", "))});
+    layers.emplace_back("a map", file);
     read_toml(layers, "the map", [&](Fields& keys) { map_keys(keys, map); });
     try {
         map.check();
@@ -173,15 +169,6 @@ std::string format_map(const tracking::ColumnMap& map) {
     return out.str();
 }
 
-std::vector<std::string> map_names() {
-    std::vector<std::string> names;
-    std::error_code ignored;
-    for (const fs::directory_entry& entry : fs::directory_iterator(assets_folder() / "maps", ignored))
-        if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
-    std::sort(names.begin(), names.end());
-    return names;
-}
-
 std::optional<tracking::ColumnMap> map_for(std::string_view text) {
     constexpr std::size_t kBeginning = 2000;
     for (const std::string& name : map_names()) {
@@ -194,11 +181,7 @@ std::optional<tracking::ColumnMap> map_for(std::string_view text) {
 }
 
 tracking::ColumnMap find_map(const std::string& map) {
-    if (map.find('=') != std::string::npos) return spelt_out(map);
-    const fs::path bundled = assets_folder() / "maps" / (map + ".toml");
-    std::error_code ignored;
-    if (map.find('/') == std::string::npos && fs::is_regular_file(bundled, ignored)) return read_map(bundled);
-    return read_map(map);
+    return map.find('=') != std::string::npos ? spelt_out(map) : read_map(find_bundled(map, "maps"));
 }
 
 }  // namespace app

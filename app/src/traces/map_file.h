@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "files/assets.h"
 #include "files/format_description.h"
 
 namespace app {
@@ -25,6 +26,8 @@ namespace app {
 /// The bundled map for a file that begins so; none if it has none of their signatures.
 [[nodiscard]] std::optional<tracking::ColumnMap> map_for(std::string_view text);
 /// Names of the bundled maps.
-[[nodiscard]] std::vector<std::string> map_names();
+[[nodiscard]] inline std::vector<std::string> map_names() {
+    return bundled_names("maps");
+}
 
 }  // namespace app

@@ -133,7 +133,7 @@ TEST(LatencyCommand, RefusesValuesThatCannotBe) {
     EXPECT_THROW((void)run_program({"latency", "--output-lead", "0"}), BadInput);
     EXPECT_THROW((void)run_program({"latency", "--fps", "0"}), BadInput);
     EXPECT_THROW((void)run_program({"latency", "--lead", "some"}), BadInput);
-    EXPECT_NE(run_program({"latency", "--compare", "one"}), 0);
+    EXPECT_THROW((void)run_program({"latency", "--compare", "one"}), BadInput);
 }
 
 }  // namespace

@@ -34,6 +34,8 @@ public:
 
     /// Takes the next line, without its end; a row if it was one. Before the header blank lines are skipped.
     [[nodiscard]] std::optional<TraceRow> take(std::string_view line);
+    /// As if the header t,stick,px,py,pz,qw,qx,qy,qz had been read, without counting a line.
+    void assume_header();
     /// The header has been read: rows follow.
     [[nodiscard]] bool headed() const noexcept;
     /// Rows have columns of an orientation.
