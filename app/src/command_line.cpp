@@ -50,14 +50,14 @@ std::string explain(const CLI::App& at, const std::string& what) {
         return fmt::format("found no command, expected {}; usage: `{} COMMAND ...`",
                            one_of(declared.commands), name);
     if (!declared.commands.empty())
-        return fmt::format("found `{} {}`, expected {}; the nearest is {}", name, rest.front(),
-                           one_of(declared.commands), nearest(rest.front(), declared.commands));
+        return fmt::format("found `{} {}`, expected {}{}", name, rest.front(), one_of(declared.commands),
+                           nearest_hint(rest.front(), declared.commands));
     std::vector<std::string> options = {"--help"};
     for (const DeclaredOption& option : declared.options)
         if (!option.argument()) options.push_back(option.name);
     if (!rest.empty() && rest.front().starts_with('-'))
-        return fmt::format("found {}, expected an option of `{}`; the nearest is {}", rest.front(), name,
-                           nearest(rest.front(), options));
+        return fmt::format("found {}, expected an option of `{}`{}", rest.front(), name,
+                           nearest_hint(rest.front(), options));
     if (!rest.empty())
         return fmt::format("found argument {}, expected no more of `{}`; {}", rest.front(), name, help);
     for (const auto& [words, meaning] : {std::pair(" is required", "found no {}, expected one; {}"),

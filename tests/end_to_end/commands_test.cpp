@@ -29,6 +29,9 @@ TEST(Commands, AMisspeltNameIsRefusedWithTheNearest) {
     refused({"compare", "roll", "--kit", "drums", "--plane", "1", "--out", "o"}, "found --kit with --plane");
     refused({"play", "--seconds", "5"}, "found --seconds without --realtime");
     refused({"kit", "list", "all"}, "found argument all");
+    const Ended far = run({"xylophone"});
+    expect_refused(far, "found `musicworld xylophone`");
+    EXPECT_FALSE(contains(far.err, "nearest"));
 }
 
 TEST(Commands, VersionTellsBuildAndLibraries) {

@@ -52,10 +52,9 @@ fs::path find_bundled(const std::string& name_or_path, const std::string& folder
     if (name && fs::is_regular_file(bundled, error)) return bundled;
     const std::vector<std::string> names = bundled_names(folder, extension);
     if (fs::status(name_or_path, error).type() == fs::file_type::not_found && !names.empty())
-        throw BadInput(fmt::format(
-            "{}: error: found no such file, expected a {}; the bundled ones are {}; the nearest is {}",
-            name_or_path, folder.substr(0, folder.size() - 1), fmt::join(names, ", "),
-            nearest(fs::path(name_or_path).stem().string(), names)));
+        throw BadInput(fmt::format("{}: error: found no such file, expected a {}; the bundled ones are {}{}",
+                                   name_or_path, folder.substr(0, folder.size() - 1), fmt::join(names, ", "),
+                                   nearest_hint(fs::path(name_or_path).stem().string(), names)));
     return name_or_path;
 }
 

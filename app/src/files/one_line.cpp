@@ -39,11 +39,11 @@ std::string counted(std::uint64_t count, std::string_view one) {
     return number + std::string(one) + "s";
 }
 
-std::string nearest(const std::string& word, const std::vector<std::string>& words) {
-    if (words.empty()) return "none";
-    return *std::min_element(words.begin(), words.end(), [&](const std::string& a, const std::string& b) {
-        return distance_between(word, a) < distance_between(word, b);
-    });
+std::string nearest_hint(const std::string& word, const std::vector<std::string>& words) {
+    const auto distance = [&word](const std::string& other) { return distance_between(word, other); };
+    const auto nearest = std::ranges::min_element(words, {}, distance);
+    const bool near = nearest != words.end() && distance(*nearest) <= 1 + word.size() / 3;
+    return near ? "; the nearest is " + *nearest : "";
 }
 
 }  // namespace app

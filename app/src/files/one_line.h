@@ -16,7 +16,8 @@ namespace app {
     return counted(static_cast<std::uint64_t>(count), one);
 }
 
-/// The one of the words that takes the fewest letters to become `word`.
-[[nodiscard]] std::string nearest(const std::string& word, const std::vector<std::string>& words);
+/// "; the nearest is W", W the one of the words that takes the fewest letters put in, left out or exchanged to
+/// become `word`; empty if that is more than a third of its letters and one.
+[[nodiscard]] std::string nearest_hint(const std::string& word, const std::vector<std::string>& words);
 
 }  // namespace app

@@ -92,8 +92,8 @@ public:
                 if (!among(known_, key.str()) || (layer != layers_.front() && among(own_, key.str())))
                     throw fault_at(key.source(),
                                    fmt::format("unknown key \"{}\" in {}", printable(key.str()), where_),
-                                   fmt::format("only {}; the nearest is {}", fmt::join(known_, ", "),
-                                               nearest(std::string(key.str()), known_)));
+                                   fmt::format("only {}{}", fmt::join(known_, ", "),
+                                               nearest_hint(std::string(key.str()), known_)));
         if (missing_) throw BadInput(*missing_);
     }
 

@@ -101,6 +101,17 @@ TEST_F(Comparisons, EveryEstimatorIsPairedWithTheBestBaselineAndTheSentenceNames
     EXPECT_NE(app::winners(comparison)[0].find(least->predictor + " errs least"), std::string::npos);
 }
 
+TEST_F(Comparisons, ATieWithABaselineIsNotCalledAWin) {
+    app::Comparison comparison = app::compare(options_);
+    const double lead_s = comparison.summaries.front().lead_s;
+    for (app::ComparisonSummary& summary : comparison.summaries)
+        if (summary.lead_s == lead_s) summary.error.position = {1, 1}, summary.hits.reset();
+    std::swap(comparison.summaries.front(),
+              *std::ranges::find(comparison.summaries, false, &app::ComparisonSummary::baseline));
+    ASSERT_FALSE(comparison.summaries.front().baseline);  // else the first of equals would be one anyway
+    EXPECT_NE(app::winners(comparison)[0].find("a baseline, no filter does better"), std::string::npos);
+}
+
 TEST_F(Comparisons, ResultsDoNotDependOnThreadsOrRuns) {
     const std::string one = app::format_comparison_json(app::compare(options_));
     options_.threads = 3;
