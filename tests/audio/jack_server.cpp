@@ -117,6 +117,13 @@ Listener::Listener() : client_(open_client("listener")) {
     in_r_ = jack_port_register(client_, "in_r", JACK_DEFAULT_AUDIO_TYPE, JackPortIsInput, 0);
     midi_ = jack_port_register(client_, "midi", JACK_DEFAULT_MIDI_TYPE, JackPortIsInput, 0);
     jack_set_process_callback(client_, &Listener::process, this);
+    jack_set_xrun_callback(
+        client_,
+        [](void* self) {
+            ++static_cast<Listener*>(self)->xruns_;
+            return 0;
+        },
+        this);
     jack_activate(client_);
 }
 

@@ -73,6 +73,9 @@ public:
     [[nodiscard]] const std::vector<float>& right() const { return right_; }
     [[nodiscard]] const std::vector<Cycle>& cycles() const { return cycles_; }
     [[nodiscard]] const std::vector<Received>& received() const { return received_; }
+    /// Cycles that the server told it did not finish. What was sent in one may be lost, or come twice: a client that JACK did
+    /// not wait for leaves its old buffer to the receiver.
+    [[nodiscard]] int xruns() const { return xruns_.load(); }
 
 private:
     static int process(jack_nframes_t frames, void* self);
@@ -83,6 +86,7 @@ private:
     std::vector<float> left_, right_;
     std::vector<Cycle> cycles_;
     std::vector<Received> received_;
+    std::atomic<int> xruns_ = 0;
 };
 
 }  // namespace jack_server
