@@ -141,6 +141,68 @@ TEST(Simulate, TwoWorkerProcessesInLockstepGiveTheFilesOfOneProcess) {
     EXPECT_TRUE(fs::exists(folder / "2" / "timing.csv"));
 }
 
+/// A body that rises at 10^4 m/s^2, so that it is out of the world's range, 1e7 m, after 44.72 s; one that hits
+/// the floor too hard for its stiffness; and one that hangs on a hook that its weight breaks.
+const std::string kMishaps =
+    "[settings]\ndt = 0.1\nseconds = 48\ngravity = [0, -1000, 0]\n[[plane]]\n"
+    "[defaults]\nfidelity = \"rigid\"\ngravity_scale = 0.01\n"
+    "[material.soft]\nyoung_pa = 1e4\ndensity_kg_m3 = 1000\n"
+    "[[body]]\nname = \"far\"\nradius = 0.5\nposition = [0, 5, 9]\ngravity_scale = -10\n"
+    "[[body]]\nname = \"soft\"\nradius = 0.5\nmaterial = \"soft\"\nfidelity = \"modal\"\n"
+    "position = [0, 0.6, 0]\nvelocity = [0, -20, 0]\n"
+    "[[body]]\nname = \"heavy\"\nradius = 0.5\nposition = [5, 20, 0]\n"
+    "[[constraint]]\nname = \"hook\"\nbody = \"heavy\"\npoint = [0, 0.5, 0]\nbreaking_force = 10\n";
+
+const char* const kMishapLines[] = {
+    "1 body taken out (beyond the world's range or not finite): far (position); first at step 448\n",
+    "1 constraint broken (above the breaking force): hook; first at step ",
+    "1 body held at the limit of deformation: soft; first at step "};
+
+const std::string kTakenOut = "error: found 1 body taken out, expected none";
+
+TEST(Simulate, WhatIsTakenOutBreaksOrIsHeldAtItsLimitIsSaidAndABodyTakenOutEndsWithOne) {
+    const Folder folder;
+    write(folder / "scene.toml", kMishaps);
+    const Ended ended = run({"simulate", folder / "scene.toml", "--out", folder / "out"});
+    expect_one_line(ended, 1, kTakenOut);
+    const json summary = json::parse(read(folder / "out" / "summary.json"));
+    for (const char* line : kMishapLines) {
+        EXPECT_NE(ended.out.find(line), std::string::npos) << line << ": " << ended.out;
+        EXPECT_NE(summary["notes"].dump().find(std::string(line, 40)), std::string::npos) << summary["notes"];
+    }
+    EXPECT_EQ(summary["notes"].size(), 3u);
+    EXPECT_EQ(summary["quarantined"], json::parse(R"([{"body": "far", "step": 448, "what": "position"}])"));
+    EXPECT_EQ(summary["constraints_broken"][0]["constraint"], "hook");
+    EXPECT_EQ(summary["held_at_limit"][0]["body"], "soft");
+
+    const Ended allowed = run({"simulate", folder / "scene.toml", "--allow-quarantine", "--json"});
+    EXPECT_EQ(allowed.status, 0);
+    EXPECT_EQ(allowed.err, "");
+    EXPECT_EQ(json::parse(allowed.out)["notes"], summary["notes"]);
+}
+
+TEST(Simulate, WorkersSayTheSameOfTheirBodies) {
+    const Folder folder;
+    write(folder / "scene.toml", kMishaps);
+    const Ended alone = run({"simulate", folder / "scene.toml", "--json"});
+    const json expected = json::parse(alone.out);
+    for (const std::vector<std::string>& mode :
+         {std::vector<std::string>{"--mode", "sync"}, {"--mode", "async", "--bound", "2"}}) {
+        std::vector<std::string> arguments = {"simulate", folder / "scene.toml", "--workers", "2"};
+        arguments.insert(arguments.end(), mode.begin(), mode.end());
+        const Ended words = run(arguments);
+        expect_one_line(words, 1, kTakenOut);
+        for (const char* line : kMishapLines)
+            EXPECT_NE(words.out.find(line), std::string::npos) << line << ": " << words.out;
+        arguments.insert(arguments.end(), {"--json", "--allow-quarantine"});
+        const Ended ended = run(arguments);
+        EXPECT_EQ(ended.status, 0) << ended.err;
+        const json r = json::parse(ended.out);
+        for (const char* key : {"quarantined", "constraints_broken", "held_at_limit", "bodies_lost"})
+            EXPECT_EQ(r[key], expected[key]) << key;
+    }
+}
+
 TEST(Simulate, TheLinesThatItPrintsForWorkersElsewhereMakeThemJoin) {
     const Folder folder;
     write(folder / "scene.toml", kScene);

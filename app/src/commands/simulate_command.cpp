@@ -35,14 +35,11 @@ void print(const SimulateResult& r, const SimulateOptions& options) {
     if (!r.workers) fmt::print("{} asleep; ", r.counts.asleep);
     fmt::print("state {:016x}\n", r.state_hash);
     if (r.workers) print_workers(r);
-    if (r.counts.constraints_broken > 0)
-        fmt::print("{} broke\n", counted(r.counts.constraints_broken, "constraint"));
-    for (const auto& [name, q] : r.quarantined)
-        fmt::print("body {} was taken out at step {}: {}\n", name, q.step, q.what);
+    for (const std::string& line : r.mishaps.lines()) fmt::print("{}\n", line);
     if (options.out && r.frames > 0) fmt::print("See {}\n", (*options.out / "frames").string());
 }
 
-void simulate_and_print(const SimulateOptions& options, bool json) {
+void simulate_and_print(const SimulateOptions& options, bool json, bool allow_quarantine) {
     const SimulateResult result = simulate(options);
     for (const std::string& note : result.workers ? std::vector<std::string>{} : result.notes)
         fmt::print(stderr, "{}: note: {}\n", result.scene.string(), note);
@@ -50,6 +47,11 @@ void simulate_and_print(const SimulateOptions& options, bool json) {
         fmt::print("{}", format_simulate(result));
     else
         print(result, options);
+    if (const auto taken_out = result.mishaps.quarantined.size(); taken_out > 0 && !allow_quarantine)
+        throw std::runtime_error(fmt::format(
+            "{}: error: found {} taken out, expected none; shorten the step (--dt), soften what drives them, "
+            "or take it as it is (--allow-quarantine)",
+            result.scene.string(), counted(taken_out, "body")));
     if (!options.until_rest || result.rest_reached) return;
     const std::string awake = result.workers ? "bodies"
                                              : fmt::format("{} of {}", result.bodies - result.counts.asleep,
@@ -65,7 +67,7 @@ void simulate_and_print(const SimulateOptions& options, bool json) {
 void add_simulate_command(Command& program) {
     Command command = program.command("simulate", "Let the bodies of a scene fall, touch and bend");
     struct Options : SimulateOptions {
-        bool json = false;
+        bool json = false, allow_quarantine = false;
     };
     auto o = std::make_shared<Options>();
     o->progress = true;
@@ -90,11 +92,14 @@ void add_simulate_command(Command& program) {
         [o = o.get()](const Eigen::Vector2i& size) { o->width = size.x(), o->height = size.y(); }, "640x480");
     command.option("--video", o->video, as::text("FILE"), "Also make a video (MP4) of the frames");
     add_worker_options(command, o->workers);
+    command.flag(
+        "--allow-quarantine", o->allow_quarantine,
+        "Exit status 0 also if bodies left the world's range or became not finite and were taken out");
     command.flag("--json", o->json, "Print one JSON document instead of words");
     command.runs([o] {
         o->scene = find_scene(o->scene);
         o->frames = o->frames || o->video.has_value();
-        simulate_and_print(*o, o->json);
+        simulate_and_print(*o, o->json, o->allow_quarantine);
     });
 }
 

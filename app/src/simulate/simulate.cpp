@@ -194,7 +194,12 @@ private:
         result_.counts = run.counts;
         result_.rest_reached = run.rest_reached;
         for (const sim::QuarantinedBody& q : run.quarantined)
-            result_.quarantined.emplace_back(name_of(scene_, static_cast<std::size_t>(q.body)), q);
+            result_.mishaps.quarantined.push_back({name_of(scene_, q.body), q.step, q.what});
+        for (const sim::FirstStep& c : run.broken)
+            result_.mishaps.broken.push_back(
+                {scene_.world.constraints.at(std::size_t(c.number)).name, c.step});
+        for (const sim::FirstStep& b : run.limited)
+            result_.mishaps.limited.push_back({name_of(scene_, b.number), b.step});
         // What a worker that died had counted of the impulse from outside is lost with it.
         if (run.lost == 0 && run.quarantined.empty()) result_.drift = momentum_->drift(run.outside_impulse);
         for (const sim::WorldEvent& event : scene_.events)
@@ -305,11 +310,19 @@ Json json_of(const Eigen::Vector3d& v) {
     return {v.x(), v.y(), v.z()};
 }
 
+Json json_of(const std::vector<Mishap>& mishaps, const char* of) {
+    Json all = Json::array();
+    for (const Mishap& m : mishaps) all.push_back({{of, m.name}, {"step", m.step}});
+    return all;
+}
+
 /// What is left out of the first part of the summary.
 Json details_of(const SimulateResult& r) {
+    std::vector<std::string> notes = r.notes;
+    for (std::string& line : r.mishaps.lines()) notes.push_back(std::move(line));
     Json quarantined = Json::array();
-    for (const auto& [name, q] : r.quarantined)
-        quarantined.push_back({{"body", name}, {"step", q.step}, {"what", q.what}});
+    for (const Mishap& m : r.mishaps.quarantined)
+        quarantined.push_back({{"body", m.name}, {"step", m.step}, {"what", m.what}});
     const sim::World::Energy& e = r.energy;
     const sim::WorldCounts& n = r.counts;
     const MomentumDrift drift = r.drift.value_or(MomentumDrift{kNoValue, {}, 0});
@@ -337,9 +350,11 @@ Json details_of(const SimulateResult& r) {
           {"deformations_limited", n.deformations_limited},
           {"constraints_broken", n.constraints_broken}}},
         {"quarantined", quarantined},
+        {"constraints_broken", json_of(r.mishaps.broken, "constraint")},
+        {"held_at_limit", json_of(r.mishaps.limited, "body")},
         {"at_rest", r.rest_reached},
         {"frames", r.frames},
-        {"notes", r.notes},
+        {"notes", notes},
         {"wall_s", r.wall_s},
         {"versions", {{"musicworld", MUSICWORLD_VERSION}}}};
     if (r.workers) details["counts"] = Json();  // workers do not send theirs
@@ -404,7 +419,7 @@ std::string format_simulate(const SimulateResult& r) {
          workers.records > 0 ? double(workers.bytes_states) / double(workers.records) : 0.0},
         {"cross_worker_contacts", workers.cross_contacts},
         {"migrations", workers.migrations},
-        {"bodies_lost", r.quarantined.size()},
+        {"bodies_lost", r.mishaps.quarantined.size()},
         {"state_hash", fmt::format("{:016x}", r.state_hash)},
         {"momentum_drift", r.drift ? Json(r.drift->share()) : Json()},
         {"energy_j", r.energy.total()}};

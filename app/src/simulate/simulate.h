@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "simulate/mishaps.h"
+
 namespace app {
 
 /// How a scene is shared out to workers.
@@ -63,10 +65,10 @@ struct SimulateResult {
     Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
     std::uint64_t state_hash = 0;
     sim::WorldCounts counts;
-    std::vector<std::pair<std::string, sim::QuarantinedBody>> quarantined;
+    Mishaps mishaps;
     bool rest_wanted = false, rest_reached = false;
     std::size_t frames = 0;
-    std::vector<std::string> notes;  ///< what was asked for and had no effect
+    std::vector<std::string> notes;  ///< what was asked for and had no effect; what workers said
     double wall_s = 0;               ///< with reading, drawing and writing
     std::optional<sim::DistributedResult> workers;
     WorkerOptions worker_options;

@@ -104,8 +104,9 @@ struct DistributedResult {    ///< of a whole run
     int largest_lead = 0, largest_ghost_age = 0;  ///< [steps]
     Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< see World::outside_impulse
     WorldCounts counts;                                         ///< summed over workers
-    std::vector<QuarantinedBody> quarantined;
-    bool rest_reached = false;  ///< until_rest: every body came to rest
+    std::vector<QuarantinedBody> quarantined;                   ///< in order of steps; so are the next two
+    std::vector<FirstStep> limited, broken;                     ///< see World::limited and World::broken
+    bool rest_reached = false;                                  ///< until_rest: every body came to rest
 };
 
 /// Runs a scene in this process, without workers: pace, bound and market of `settings` do not count, nor does

@@ -178,6 +178,12 @@ struct QuarantinedBody {  ///< taken out of the world
     std::string what;    ///< which value was not finite
 };
 
+/// When something first happened to a body or a constraint.
+struct FirstStep {
+    int number;          ///< of the body or constraint
+    std::uint64_t step;  ///< that it happened in, counted from 1
+};
+
 /// Totals since the start, but where said otherwise.
 struct WorldCounts {
     std::uint64_t steps = 0;              ///< done
@@ -234,6 +240,10 @@ public:
     [[nodiscard]] Eigen::Vector3d angular_momentum() const;    ///< about the origin [kg m^2/s]
     [[nodiscard]] const WorldCounts& counts() const noexcept;  ///< so far
     [[nodiscard]] const std::vector<QuarantinedBody>& quarantined() const noexcept;  ///< in order of steps
+    /// Own bodies whose deformation was held at its limit, and constraints that broke by their breaking force
+    /// where they were solved; in order of steps, each once. rewind takes back what it undoes.
+    [[nodiscard]] const std::vector<FirstStep>& limited() const noexcept;
+    [[nodiscard]] const std::vector<FirstStep>& broken() const noexcept;
     /// All impulse that came from planes, fixed bodies, places, gravity, drag and user forces onto own bodies
     /// since the start [kg m/s].
     [[nodiscard]] Eigen::Vector3d outside_impulse() const;

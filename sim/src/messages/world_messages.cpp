@@ -14,7 +14,8 @@ namespace {
 constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'W'};
 constexpr std::uint16_t kUpdateType = 12;
 constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kChecksumBytes = 4, kAppliedBytes = 12;
-constexpr std::uint32_t kLongestText = 4096;
+constexpr std::size_t kMishapBytes = 17;  // at least
+constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64;
 
 // What several messages hold.
 
@@ -22,6 +23,22 @@ void write(ByteWriter& out, const StepReport& r) {
     for (const float x : {r.seconds, r.smoothed_s, r.waited_s}) out.number(x);
     for (const std::uint32_t n : {r.lead, r.ghost_age, r.cross_contacts, r.own}) out.number(n);
     out.matrix(r.outside_impulse);
+    out.count(r.mishaps.size());
+    for (const Mishap& m : r.mishaps) {
+        out.number(static_cast<std::uint8_t>(m.kind));
+        out.number(m.number);
+        out.number(m.step);
+        out.text(m.what.substr(0, kLongestReason));
+    }
+}
+
+Mishap read_mishap(ByteReader& in) {
+    const auto kind = in.number<std::uint8_t>();
+    if (kind > static_cast<std::uint8_t>(Mishap::Kind::broken))
+        throw DecodeError("a mishap of kind " + std::to_string(kind) + ", expected at most 2");
+    Mishap m{static_cast<Mishap::Kind>(kind), in.number<std::uint32_t>(), in.number<std::uint64_t>(), {}};
+    m.what = in.text(kLongestReason);
+    return m;
 }
 
 StepReport read_report(ByteReader& in) {
@@ -34,6 +51,8 @@ StepReport read_report(ByteReader& in) {
         *n = in.number<std::uint32_t>();
     in.matrix(r.outside_impulse);
     if (!r.outside_impulse.allFinite()) throw DecodeError("a report that is not finite");
+    r.mishaps.resize(in.count(kMishapBytes));
+    for (Mishap& m : r.mishaps) m = read_mishap(in);
     return r;
 }
 

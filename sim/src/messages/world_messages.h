@@ -43,8 +43,8 @@ namespace sim {
 //   14 answer     worker  u32 to, u32 number, flag accepted
 //   15 handover   worker  u32 to, u32 number, list of record, list of applied
 //
-//   report      52 bytes: f32 seconds, smoothed, waited; u32 lead, ghost age, cross contacts, own;
-//               v3 outside impulse
+//   report      56 bytes and its mishaps: f32 seconds, smoothed, waited; u32 lead, ghost age, cross contacts,
+//               own; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
 //   applied     12 bytes: u32 worker, u64 step
 //   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8 broken),
 //               u16 still steps, i32 sleep group, v3 position, f64 orientation w x y z, v3 velocity,
@@ -76,12 +76,20 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kWorldProtocol = 1;  ///< version
+constexpr std::uint16_t kWorldProtocol = 2;  ///< version
 
 struct WorldHeader {
     std::uint32_t worker = kApplication;
     std::uint32_t epoch = 0;
     std::uint64_t step = 0;  ///< the sender's: number of steps it has done
+};
+
+/// What happened to an own body or constraint for the first time.
+struct Mishap {
+    enum class Kind : std::uint8_t { quarantined, limited, broken } kind = Kind::quarantined;
+    std::uint32_t number = 0;  ///< of the body; of the constraint that broke
+    std::uint64_t step = 0;
+    std::string what;  ///< quarantined: which value
 };
 
 /// A worker's report of its last step, in every state and update message.
@@ -90,6 +98,7 @@ struct StepReport {
     std::uint32_t lead = 0, ghost_age = 0, cross_contacts = 0;
     std::uint32_t own = 0;
     Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< since this worker's start
+    std::vector<Mishap> mishaps;                                ///< of the step
 };
 
 // Worker to application.

@@ -43,7 +43,6 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
         const std::uint64_t born = view_.clock().born(static_cast<int>(bodies_.size()));
         bodies_.push_back({kApplication, born, std::move(record), none_, 0});
     }
-    quarantined_.assign(bodies_.size(), 0);
 }
 
 void Coordinator::send(std::vector<std::uint32_t> to, const WorldMessage& message) {
@@ -305,6 +304,12 @@ bool Coordinator::fits(std::uint32_t worker, const std::vector<WorldRecord>& rec
     });
 }
 
+bool Coordinator::fits(const std::vector<Mishap>& mishaps) const {
+    return std::all_of(mishaps.begin(), mishaps.end(), [this](const Mishap& m) {
+        return m.number < (m.kind == Mishap::Kind::broken ? scene_.world.constraints.size() : bodies_.size());
+    });
+}
+
 bool Coordinator::owns_constraint(std::uint32_t worker, int constraint) const {
     if (constraint < 0 || constraint >= static_cast<int>(scene_.world.constraints.size())) return false;
     const PointConstraint& c = scene_.world.constraints[static_cast<std::size_t>(constraint)];
@@ -339,7 +344,7 @@ void Coordinator::publish(Body& body, WorldRecord&& record, std::uint64_t step,
 void Coordinator::take_state(const WorldHeader& header, std::span<const std::uint8_t> bytes,
                              StateMessage&& message) {
     if (settings_.pace != Pace::lockstep || header.step == 0 || header.step > view_.step() + 1 ||
-        !fits(header.worker, message.bodies))
+        !fits(header.worker, message.bodies) || !fits(message.report.mishaps))
         return expel(header.worker, "found states that are not its to publish");
     if (!own_contacts(header.worker, message))
         return expel(header.worker, "found contacts that are not its to publish");
@@ -366,8 +371,8 @@ void Coordinator::take_update(const WorldHeader& header, std::span<const std::ui
     const bool constraints = std::all_of(message.broken.begin(), message.broken.end(), [&](std::uint32_t c) {
         return owns_constraint(header.worker, static_cast<int>(c));
     });
-    if (settings_.pace != Pace::bounded || !own || !pushes || !constraints || header.step < sender.step ||
-        (header.step == sender.step && header.step != settings_.steps))
+    if (settings_.pace != Pace::bounded || !own || !pushes || !constraints || !fits(message.report.mishaps) ||
+        header.step < sender.step || (header.step == sender.step && header.step != settings_.steps))
         return expel(header.worker, "found states that are not its to publish");
     sender.settled = settled;
     for (const std::uint32_t constraint : message.broken)
@@ -467,6 +472,13 @@ void Coordinator::report(const WorldHeader& header, const StepReport& report, st
     result_.largest_lead = std::max(result_.largest_lead, step.lead);
     result_.largest_ghost_age = std::max(result_.largest_ghost_age, step.ghost_age);
     outside_[header.worker] = report.outside_impulse;
+    for (const Mishap& m : report.mishaps) {
+        const int number = static_cast<int>(m.number);
+        if (m.kind == Mishap::Kind::quarantined)
+            quarantined_.try_emplace(number, QuarantinedBody{number, m.step, m.what});
+        else
+            (m.kind == Mishap::Kind::limited ? limited_ : broken_).try_emplace(number, m.step);
+    }
     observer_->worked(step);
 }
 
@@ -479,10 +491,6 @@ void Coordinator::advance() {
         if (settings_.pace == Pace::bounded) release();
         if (!view_.advance()) return;
         const World& world = view_.world();
-        for (int i = 0; i < world.bodies(); ++i)
-            if (Body& body = bodies_[static_cast<std::size_t>(i)];
-                body.record.quarantined && std::exchange(quarantined_[static_cast<std::size_t>(i)], 1) == 0)
-                result_.quarantined.push_back({i, view_.step(), "state"});
         observer_->at(view_.step(), world);
         observer_->ready(view_.step(), world);
         std::erase_if(kept_, [this](const auto& kept) { return kept.first <= view_.step(); });
@@ -502,8 +510,23 @@ void Coordinator::end(bool rest) {
     result_.steps = view_.step();
     result_.rest_reached = rest;
     result_.counts = view_.world().counts();
+    name_mishaps();
     for (const auto& [worker, impulse] : outside_) result_.outside_impulse += impulse;
     send(members_, EndOfRun{});
+}
+
+// Those of the steps that all have done, in order of steps.
+void Coordinator::name_mishaps() {
+    const auto in_order = [&](const auto& a, const auto& b) { return a.step < b.step; };
+    for (const auto& [body, q] : quarantined_)
+        if (q.step <= result_.steps) result_.quarantined.push_back(q);
+    std::stable_sort(result_.quarantined.begin(), result_.quarantined.end(), in_order);
+    for (const auto& [told, named] :
+         {std::pair(&limited_, &result_.limited), std::pair(&broken_, &result_.broken)}) {
+        for (const auto& [number, step] : *told)
+            if (step <= result_.steps) named->push_back({number, step});
+        std::stable_sort(named->begin(), named->end(), in_order);
+    }
 }
 
 }  // namespace sim

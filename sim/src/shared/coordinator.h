@@ -82,6 +82,7 @@ private:
     [[nodiscard]] bool owns(std::uint32_t worker, std::uint32_t body) const;
     [[nodiscard]] bool fits(std::uint32_t body, Eigen::Index modes) const;
     [[nodiscard]] bool fits(std::uint32_t worker, const std::vector<WorldRecord>& records) const;
+    [[nodiscard]] bool fits(const std::vector<Mishap>& mishaps) const;
     [[nodiscard]] bool owns_constraint(std::uint32_t worker, int constraint) const;
     [[nodiscard]] bool own_contacts(std::uint32_t worker, const StateMessage& message) const;
     void publish(Body& body, WorldRecord&& record, std::uint64_t step,
@@ -97,6 +98,7 @@ private:
     void advance();
     void release();
     void end(bool rest);
+    void name_mishaps();
 
     void send(std::vector<std::uint32_t> to, const WorldMessage& message);
 
@@ -114,7 +116,9 @@ private:
     std::vector<Outgoing> queue_;
     /// State and update messages of steps that the view has not reached, for workers that join later.
     std::deque<std::pair<std::uint64_t, std::shared_ptr<const std::vector<std::uint8_t>>>> kept_;
-    std::vector<std::uint8_t> quarantined_;
+    /// Mishaps as workers told them first, by body or constraint.
+    std::map<int, QuarantinedBody> quarantined_;
+    std::map<int, std::uint64_t> limited_, broken_;
     std::vector<std::pair<std::uint32_t, std::vector<int>>>
         orphans_;  // by the lost worker that owned them; if none was left
     std::map<std::uint32_t, Eigen::Vector3d> outside_;  // of each worker since its start

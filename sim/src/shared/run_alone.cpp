@@ -45,6 +45,7 @@ DistributedResult run_alone(const WorldScene& scene, const DistributedSettings& 
     result.outside_impulse = world.outside_impulse();
     result.counts = world.counts();
     result.quarantined = world.quarantined();
+    result.limited = world.limited(), result.broken = world.broken();
     return result;
 }
 

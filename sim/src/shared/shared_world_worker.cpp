@@ -4,6 +4,22 @@
 #include <utility>
 
 namespace sim {
+namespace {
+
+std::vector<Mishap> mishaps_of(const World& world, std::uint64_t step) {
+    std::vector<Mishap> mishaps;
+    for (const QuarantinedBody& q : world.quarantined())
+        if (q.step == step)
+            mishaps.push_back({Mishap::Kind::quarantined, static_cast<std::uint32_t>(q.body), step, q.what});
+    for (const auto& [kind, told] : {std::pair(Mishap::Kind::limited, &world.limited()),
+                                     std::pair(Mishap::Kind::broken, &world.broken())})
+        for (const FirstStep& first : *told)
+            if (first.step == step)
+                mishaps.push_back({kind, static_cast<std::uint32_t>(first.number), step, {}});
+    return mishaps;
+}
+
+}  // namespace
 
 SharedWorldWorker::SharedWorldWorker(const SceneMessage& scene)
     : self_(scene.worker),
@@ -139,6 +155,7 @@ void SharedWorldWorker::publish(double seconds, double waited_s) {
     report.cross_contacts = static_cast<std::uint32_t>(world.cross_contacts());
     report.own = static_cast<std::uint32_t>(exchange_->own_bodies());
     report.outside_impulse = world.outside_impulse();
+    report.mishaps = mishaps_of(world, exchange_->steps_done());
     published_ = exchange_->steps_done();
     queue_.push_back(exchange_->publish(epoch_, report));
 }

@@ -70,7 +70,7 @@ bool limit_deformation(MovingBody& body) {
     const double outwards = q.dot(rate);
     if (outwards > 0) rate -= outwards / q.squaredNorm() * q;
     q *= kGradientLimit / largest;
-    body.at_limit = true;
+    body.at_limit = body.limited_now = true;
     return true;
 }
 

@@ -14,9 +14,11 @@ struct MovingBody {
     PosedBody posed;
     FreeRotation substep_rotation{Eigen::Vector3d::Ones(), 0}, step_rotation{Eigen::Vector3d::Ones(), 0};
     bool at_limit = false;  ///< its deformation was held in the last substep: contacts find its modes stiff
-    int still_steps = 0;    ///< since it was faster than the sleep speed, at most kMostStillSteps
-    int sleep_group = -1;   ///< first body of those that fell asleep together
-    bool pushed = false;    ///< forces act in the next step: the user's, or of bodies elsewhere
+    bool limited_now = false;        ///< in any substep of the step that is being done
+    std::uint64_t limited_step = 0;  ///< first step in which it was; 0: never
+    int still_steps = 0;             ///< since it was faster than the sleep speed, at most kMostStillSteps
+    int sleep_group = -1;            ///< first body of those that fell asleep together
+    bool pushed = false;             ///< forces act in the next step: the user's, or of bodies elsewhere
     Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();  ///< world axes
     Eigen::VectorXd modal_force;                                                        ///< [N kg^-1/2]
 

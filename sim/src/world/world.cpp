@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <numeric>
+#include <utility>
 
 #include "world/world_check.h"
 #include "world/world_implementation.h"
@@ -243,6 +244,24 @@ void World::Implementation::solve_islands() {
     counts.constraints_broken = solver->constraints_broken();
 }
 
+void World::Implementation::tell_broken(std::uint64_t broken_before) {
+    if (counts.constraints_broken == broken_before) return;
+    for (std::size_t c = 0; c < constraints.size(); ++c)
+        if (held_before[c] != 0 && !constraints[c].holds)
+            broken.push_back({static_cast<int>(c), counts.steps});
+}
+
+void World::Implementation::tell_limited(std::uint64_t limited_before) {
+    if (counts.deformations_limited == limited_before) return;
+    for (const int i : here) {
+        MovingBody& body = bodies[static_cast<std::size_t>(i)];
+        const bool now = std::exchange(body.limited_now, false);
+        if (!now || !body.own || body.limited_step != 0) continue;
+        body.limited_step = counts.steps;
+        limited.push_back({i, counts.steps});
+    }
+}
+
 int World::Implementation::still_steps_to_sleep() const {
     return static_cast<int>(std::ceil(kStillTime / settings.dt - 1e-9));
 }
@@ -325,7 +344,13 @@ void World::Implementation::step() {
     }
     contacts.find(settings, planes, joined, bodies, here, sharing == Sharing::pairs);
     find_islands();
+    held_before.resize(constraints.size());
+    for (std::size_t c = 0; c < constraints.size(); ++c) held_before[c] = constraints[c].holds;
+    const auto [limited_before, broken_before] =
+        std::pair(counts.deformations_limited, counts.constraints_broken);
     solve_islands();
+    tell_broken(broken_before);
+    tell_limited(limited_before);
     put_to_sleep();
     count_work();
     quarantine_results();
@@ -507,6 +532,14 @@ const WorldCounts& World::counts() const noexcept {
 
 const std::vector<QuarantinedBody>& World::quarantined() const noexcept {
     return implementation_->quarantined;
+}
+
+const std::vector<FirstStep>& World::limited() const noexcept {
+    return implementation_->limited;
+}
+
+const std::vector<FirstStep>& World::broken() const noexcept {
+    return implementation_->broken;
 }
 
 std::uint64_t World::state_hash() const {

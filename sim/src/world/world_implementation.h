@@ -23,6 +23,8 @@ struct World::Implementation {
     std::size_t islands_used = 0;
     WorldCounts counts;
     std::vector<QuarantinedBody> quarantined;
+    std::vector<FirstStep> limited, broken;
+    std::vector<std::uint8_t> held_before;  // constraints, when the last step began
     std::uint64_t free_limited = 0;
     Eigen::Vector3d outside = Eigen::Vector3d::Zero();         // impulse, see World::outside_impulse
     Eigen::Vector3d outside_before = Eigen::Vector3d::Zero();  // when the last step began
@@ -62,13 +64,15 @@ struct World::Implementation {
     void gather_pairs();             // own bodies and the ghosts that were placed
     void forget_foreign_contacts();  ///< at the end of a step
     void stop_at_planes(MovingBody& body, const Eigen::Vector3d& before) const;
-    void dismiss_ghosts();                           ///< at the end of a step
-    void find_islands();                             ///< of contacts and constraints
-    void solve_islands();                            ///< in order of ids
-    void put_to_sleep();                             ///< islands that are still
-    void count_work();                               ///< see World::work
-    void step();                                     ///< see World::step
-    [[nodiscard]] int still_steps_to_sleep() const;  ///< half a second
+    void dismiss_ghosts();                            ///< at the end of a step
+    void find_islands();                              ///< of contacts and constraints
+    void solve_islands();                             ///< in order of ids
+    void tell_broken(std::uint64_t broken_before);    ///< constraints, of the step
+    void tell_limited(std::uint64_t limited_before);  ///< bodies, of the step
+    void put_to_sleep();                              ///< islands that are still
+    void count_work();                                ///< see World::work
+    void step();                                      ///< see World::step
+    [[nodiscard]] int still_steps_to_sleep() const;   ///< half a second
 };
 
 }  // namespace sim

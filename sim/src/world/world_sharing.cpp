@@ -246,7 +246,12 @@ void World::rewind(const WorldSnapshot& snapshot) {
     for (const WorldRecord& record : snapshot.bodies) restore(record);
     w.contacts.manifolds().clear();
     restore_contacts(snapshot.contacts, snapshot.springs);
-    std::erase_if(w.quarantined, [&](const QuarantinedBody& q) { return q.step > snapshot.step; });
+    const auto undone = [&](const auto& told) { return told.step > snapshot.step; };
+    std::erase_if(w.quarantined, undone);
+    std::erase_if(w.broken, undone);
+    for (const FirstStep& first : w.limited)
+        if (undone(first)) w.bodies[static_cast<std::size_t>(first.number)].limited_step = 0;
+    std::erase_if(w.limited, undone);
 }
 
 void World::set_step(std::uint64_t step) {
@@ -373,7 +378,9 @@ void World::extrapolate(int body, WorldBodyState& state, const StepImpulse* held
     const Eigen::Vector3d before = b.state.position;
     move_freely(b, implementation_->settings);
     implementation_->stop_at_planes(b, before);
+    const bool limited = b.limited_now;
     (void)limit_deformation(b);
+    b.limited_now = limited;  // a guess of what its owner finds
     b.pushed = pushed;
     std::swap(b.state, state);
 }

@@ -205,7 +205,7 @@ TEST(Simulate, TheFigureAndTheLatticeRestBeforeAndAfterTheirConstraintsAreDelete
         EXPECT_GT(second.steps, c.before);
         EXPECT_EQ(second.counts.asleep, c.bodies);
         EXPECT_LT(second.energy.potential, first.energy.potential) << "it has come down";
-        EXPECT_EQ(second.quarantined.size(), 0u);
+        EXPECT_EQ(second.mishaps.quarantined.size(), 0u);
     }
 }
 

@@ -86,7 +86,11 @@ sim::WorldScene scene() {
 }
 
 sim::StepReport report() {
-    return {0.001f, 0.002f, 0.0003f, 3, 2, 17, 25, {1, -2, 3}};
+    using enum sim::Mishap::Kind;
+    return {
+        0.001f, 0.002f,     0.0003f,
+        3,      2,          17,
+        25,     {1, -2, 3}, {{quarantined, 2, 77, "velocity"}, {limited, 1, 77, {}}, {broken, 0, 76, {}}}};
 }
 
 std::vector<sim::WorldMessage> samples() {

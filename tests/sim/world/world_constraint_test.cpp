@@ -80,6 +80,11 @@ TEST(WorldConstraint, BreaksAboveItsForceAndHoldsBelow) {
         run(world, 300);
         EXPECT_EQ(world.constraint_holds(0), share > 1);
         EXPECT_EQ(world.counts().constraints_broken, share > 1 ? 0u : 1u);
+        ASSERT_EQ(world.broken().size(), share > 1 ? 0u : 1u);
+        if (share < 1) {
+            EXPECT_EQ(world.broken()[0].number, 0);
+            EXPECT_LT(world.broken()[0].step, 60u) << "as its load came, in the first second";
+        }
         EXPECT_EQ(world.state(0).position.y() > -1, share > 1);
     }
 }

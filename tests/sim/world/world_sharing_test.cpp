@@ -142,6 +142,13 @@ TEST(WorldSharing, ARewoundWorldThatOwnsMoreRepeatsTheStepToTheBit) {
         ASSERT_EQ(other.state_hash(), alone.state_hash()) << step;
     }
     EXPECT_EQ(other.counts().steps, alone.counts().steps);
+    const auto after = [](const std::vector<FirstStep>& all) {
+        std::vector<std::pair<int, std::uint64_t>> late;
+        for (const FirstStep& first : all)
+            if (first.step > 150) late.emplace_back(first.number, first.step);
+        return late;
+    };
+    EXPECT_EQ(after(other.broken()), after(alone.broken())) << "what was undone is told once";
 }
 
 }  // namespace
