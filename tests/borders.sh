@@ -22,6 +22,7 @@ GL/|assimp/|spng|isa-l/:render
 csound|sndfile|smf:audio
 Spectra/:sim
 zmq:sim|app
+mujoco/|bt[A-Z]|Bullet:sim
 CLI/|toml\+\+/|nlohmann/|lo/:app
 LIST
 # The folders of a library, from the ground up: each includes those before it in the list alone, so there is no circle.

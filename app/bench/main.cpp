@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -15,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/bench_hard.h"
 #include "bench/bench_report.h"
 #include "bench/bench_sim.h"
 #include "bench/bench_tradeoff.h"
@@ -38,6 +40,7 @@ struct BenchOptions {
     std::string name, out;
     SimBenchOptions sim;
     WorkersBenchOptions workers;
+    HardBenchOptions hard;
     bool json = false;
 };
 
@@ -46,6 +49,8 @@ struct Figures {
     std::string text, json;
     std::map<std::string, std::string> tables = {};
     std::map<std::string, PlotScript> plots = {};
+    /// A page with plots of its own, by file name; drawn in an existing folder.
+    std::map<std::string, std::function<std::string(const fs::path& scratch)>> pages = {};
 };
 
 struct Bench {
@@ -86,6 +91,15 @@ Figures bench_the_tradeoff(const std::string&, const BenchOptions&) {
             format_json(measured),
             {{"tradeoff.csv", format_csv(measured)}},
             {{"tradeoff.svg", {900, 560, plot_commands(measured)}}}};
+}
+
+Figures bench_the_hard_scenes(const std::string&, const BenchOptions& options) {
+    const HardBench measured = bench_hard(options.hard, say);
+    return {format_text(measured),
+            format_json(measured),
+            {{"hard.csv", format_csv(measured)}},
+            {{"hard.svg", hard_plot(measured)}},
+            {{"hard.html", [measured](const fs::path& scratch) { return format_page(measured, scratch); }}}};
 }
 
 Figures bench_the_workers(const std::string&, const BenchOptions& options) {
@@ -139,6 +153,7 @@ Figures run_bench_program(const std::string& bench, const BenchOptions&) {
 const std::vector<Bench> kBenches = {
     {"tracking", {"bench.json"}, run_bench_program},
     {"sim", {"bench.json"}, bench_the_simulation},
+    {"hard", {"bench.json", "hard.csv", "hard.svg", "hard.html"}, bench_the_hard_scenes},
     {"workers", {"bench.json", "speed_up", "speed_up.csv", "bound.csv", "migration.svg"}, bench_the_workers},
     {"render", {"bench.json"}, run_bench_program},
     {"audio", {"bench.json"}, run_bench_program},
@@ -155,6 +170,10 @@ Figures run_bench(const Bench& bench, const BenchOptions& options, const std::st
     for (const auto& [name, plot] : figures.plots) {
         fs::create_directories(folder->path(name).parent_path());
         write_file(folder->path(name), draw_svg({plot}, folder->scratch()).front());
+    }
+    for (const auto& [name, page] : figures.pages) {
+        fs::create_directories(folder->scratch());
+        write_file(folder->path(name), page(folder->scratch()));
     }
     folder->finish();
     return figures;
@@ -213,6 +232,11 @@ void add_bench_options(Command& program) {
             o->workers.only = {parts.begin(), parts.end()};
         },
         "all");
+    std::vector<std::string> scenes;
+    for (const HardScene& scene : hard_scenes()) scenes.push_back(scene.name);
+    program.option("--scenes", o->hard.scenes, as::list_of(as::choice(scenes)), "hard: some scenes");
+    program.option("--halvings", o->hard.halvings, as::whole(0, 10),
+                   "hard: of the step, at most, for peers to be as near as we are");
     program.option("--rounds", o->sim.rounds, as::whole(0, 1000),
                    "sim: how often each; 0: five, three for 100, one for more");
     program.option<std::string>("--scene", as::text("SCENE"),

@@ -28,6 +28,20 @@ TEST(Bench, BecomesTheProgramBesideItWithTheSameArguments) {
     EXPECT_NE(run({"bench", "--help"}).out.find("--rounds"), std::string::npos);
 }
 
+TEST(Bench, HardScenesWriteTheirFiguresTablePageAndPlot) {
+    const Folder folder;
+    const Ended ended =
+        run({"bench", "hard", "--scenes", "ghost", "--halvings", "0", "--json", "--out", folder / "out"});
+    ASSERT_EQ(ended.status, 0) << ended.err;
+    EXPECT_EQ(json::parse(ended.out)["results"][0]["name"], "hard_ghost");
+    EXPECT_EQ(read(folder / "out" / "bench.json"), ended.out);
+    EXPECT_NE(read(folder / "out" / "hard.csv").find("scene,engine,version,settings,step_s"),
+              std::string::npos);
+    EXPECT_NE(read(folder / "out" / "hard.svg").find("ghost"), std::string::npos);
+    EXPECT_NE(read(folder / "out" / "hard.html").find("<table"), std::string::npos);
+    expect_refused(run({"bench", "hard", "--scenes", "nothing"}), "--scenes");
+}
+
 TEST(Bench, WithoutItSaysHowToBuildIt) {
     const Folder folder;
     fs::copy_file(MUSICWORLD_PROGRAM, folder / "musicworld");

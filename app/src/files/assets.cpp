@@ -48,7 +48,9 @@ fs::path find_bundled(const std::string& name_or_path, const std::string& folder
                       const std::string& extension) {
     std::error_code error;
     fs::path bundled = assets_folder() / folder / (name_or_path + extension);
-    const bool name = name_or_path.find('/') == std::string::npos;
+    // "hard/table" is of a folder within, unless there is such a file here.
+    const bool name = name_or_path.find('/') == std::string::npos ||
+                      (fs::path(name_or_path).is_relative() && !fs::exists(name_or_path, error));
     if (name && fs::is_regular_file(bundled, error)) return bundled;
     const std::vector<std::string> names = bundled_names(folder, extension);
     if (fs::status(name_or_path, error).type() == fs::file_type::not_found && !names.empty())
