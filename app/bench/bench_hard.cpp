@@ -219,9 +219,10 @@ HardBench bench_hard(const HardBenchOptions& options,
         "where they belong, or were faster than all the energy could make them.",
         fmt::format(
             "At equal error: the cheapest run that is right and errs no more than ours at the scene's step "
-            "(or {:g}), the step halved up to {} times; where ours is not right at that step, the cheapest "
-            "right runs. Processor time of the steps alone, one thread.",
-            kLeastError, options.halvings),
+            "(or {:g}), the step halved up to {} times, but not after a run of {:g} s; where ours is not "
+            "right at "
+            "that step, the cheapest right runs. Processor time of the steps alone, one thread.",
+            kLeastError, options.halvings, options.longest_s),
         "Peers have rigid bodies, also for a body with modes, and joints without a spring."};
     for (const sim_bench::PeerLibrary& peer : sim_bench::rigid_peers())
         bench.notes.push_back(fmt::format("{} {}: {}.", peer.name, peer.version, peer.settings));

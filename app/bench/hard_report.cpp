@@ -131,9 +131,14 @@ std::vector<std::string> engines_of(const HardBench& bench) {
     return names;
 }
 
+/// Axes that need no data.
+constexpr const char* kAnyX = "set xrange [0.01:100]\n";
+constexpr const char* kAnyY = "set yrange [0.01:100]\n";
+
 /// Error against processor time, a line for each entrant in its engine's colour.
 PlotScript precision_plot(const HardComparison& scene, const std::vector<std::string>& engines) {
     PlotPanel panel;
+    bool any = false;
     std::vector<PlotLine> legend;
     for (std::size_t e = 0; e < engines.size(); ++e) {
         legend.push_back({engines[e], engine_colour(e)});
@@ -152,7 +157,7 @@ PlotScript precision_plot(const HardComparison& scene, const std::vector<std::st
             plot_axes() +
                 "set logscale xy\nset format '%g'\nset xlabel 'processor time for a simulated second "
                 "[ms]'\nset ylabel 'error [%]'\n" +
-                panel.text(),
+                (any ? std::string() : std::string(kAnyX) + kAnyY) + panel.text(),
             legend};
 }
 
@@ -183,7 +188,7 @@ PlotScript hard_plot(const HardBench& bench) {
     const std::vector<std::string> engines = engines_of(bench);
     std::string tics;
     PlotPanel panel;
-    std::vector<PlotLine> legend;
+    bool any = false;
     for (std::size_t e = 0; e < engines.size(); ++e) {
         std::string data;
         for (std::size_t s = 0; s < bench.scenes.size(); ++s) {
@@ -195,7 +200,7 @@ PlotScript hard_plot(const HardBench& bench) {
                 fmt::format_to(std::back_inserter(data), "{} {:.5g}\n", double(s) + 0.14 * (double(e) - 1),
                                run->ms_per_s);
         }
-        legend.push_back({engines[e], engine_colour(e)});
+        any = any || !data.empty();
         panel.add(data, fmt::format("with points pt 7 ps 0.9 lc {} title {}",
                                     gnuplot_colour(engine_colour(e)), gnuplot_string(engines[e])));
     }
@@ -205,8 +210,7 @@ PlotScript hard_plot(const HardBench& bench) {
                             "set xrange [-0.6:{}]\nset xtics rotate by -30 ({})\n"
                             "set ylabel 'processor time at equal error [ms/s]'\n",
                             double(bench.scenes.size()) - 0.4, tics) +
-                panel.text(),
-            legend};
+                (any ? "" : kAnyY) + panel.text()};
 }
 
 std::string format_page(const HardBench& bench, const std::filesystem::path& scratch) {

@@ -7,7 +7,9 @@
 namespace sim_bench {
 namespace {
 
-constexpr double kPlaneHalfExtent = 50, kPlaneThickness = 1;  // m, of the slab behind a plane
+/// Half extents of the slab that stands for a plane, in those of the scene: single precision knows a small body
+/// on it the better the smaller it is.
+constexpr double kSlab = 20, kSlabThickness = 2;
 
 constexpr const char* kManyIterations = "50 iterations, full warm start";  // what stacks need
 
@@ -34,7 +36,11 @@ public:
             world_.getSolverInfo().m_numIterations = 50;
             world_.getSolverInfo().m_warmstartingFactor = 1;
         }
-        for (const sim::WorldBody& body : definition.bodies) add(body);
+        for (const sim::WorldBody& body : definition.bodies) {
+            add(body);
+            extent_ = std::max(
+                extent_, body.world_from_body.translation().norm() + body.shape.base.semi_axes.maxCoeff());
+        }
         for (const sim::WorldPlane& plane : definition.planes) add(plane);
         for (const sim::PointConstraint& constraint : definition.constraints) add(constraint);
     }
@@ -104,12 +110,13 @@ private:
     }
 
     void add(const sim::WorldPlane& plane) {
-        shapes_.push_back(std::make_unique<btBoxShape>(
-            btVector3(btScalar(kPlaneHalfExtent), btScalar(kPlaneThickness), btScalar(kPlaneHalfExtent))));
+        const double thickness = kSlabThickness * extent_;
+        shapes_.push_back(
+            std::make_unique<btBoxShape>(to_bullet(extent_ * Eigen::Vector3d(kSlab, kSlabThickness, kSlab))));
         Eigen::Isometry3d at = Eigen::Isometry3d::Identity();
         at.linear() =
             Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), plane.normal).toRotationMatrix();
-        at.translation() = (plane.offset - kPlaneThickness) * plane.normal;
+        at.translation() = (plane.offset - thickness) * plane.normal;
         btRigidBody::btRigidBodyConstructionInfo info(0, nullptr, shapes_.back().get());
         info.m_startWorldTransform = to_bullet(at);
         info.m_friction = static_cast<btScalar>(plane.friction);
@@ -128,6 +135,7 @@ private:
     }
 
     PeerSettings settings_;
+    double extent_ = 0;   ///< of the bodies about the origin [m]
     std::size_t moving_;  ///< bodies of the definition; planes come after them
     btDefaultCollisionConfiguration configuration_;
     btCollisionDispatcher dispatcher_{&configuration_};

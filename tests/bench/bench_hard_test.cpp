@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "app/temporary_folder.h"
 #include "files/assets.h"
 #include "scene/scene.h"
 
@@ -187,6 +188,16 @@ TEST(HardComparison, TheBestOfAPeerIsItsCheapestRunThatIsRightAndErrsNoMoreThanO
     EXPECT_EQ(json["results"][1]["name"], "hard_a scene_vs_theirs");
     EXPECT_TRUE(json["results"][1]["ratio"].is_null()) << "ours is not right";
     EXPECT_EQ(json["runs"].size(), 5u);
+}
+
+TEST(HardComparison, WhereNothingIsRightThereIsAPageAndAPlotAllTheSame) {
+    app::HardComparison c;
+    c.scene = {"a scene", Right::rests, 0.1};
+    c.entrants = {{{run_of("ours", std::numeric_limits<double>::infinity(), 1, false)}}};
+    const TemporaryFolder scratch;
+    EXPECT_NE(app::draw_svg({app::hard_plot({{c}, {}})}, scratch.path()).front().find("a scene"),
+              std::string::npos);
+    EXPECT_NE(app::format_page({{c}, {}}, scratch.path()).find("<table"), std::string::npos);
 }
 
 TEST(BenchHard, TwoShortScenesRunBesideThePeersThatAreThere) {
