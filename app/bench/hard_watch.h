@@ -30,7 +30,8 @@ struct HardScene {
 
 /// What a run did. Lengths are shares of the size: the largest extent of the smallest body that moves. Energies
 /// are shares of what there is: the kinetic energy of the start, and what a fall of every body by its reach
-/// frees (its distance from the place that it hangs from, else its height above the lowest plane).
+/// frees (its distance from the first place that anything hangs from, else its height above the lowest plane,
+/// at least its extent).
 struct HardFigures {
     int through = 0;  ///< bodies whose centre crossed the inner half of another one, or went beneath a plane
     int quarantined = 0;  ///< taken out or no longer finite; of a library that began anew: all

@@ -239,12 +239,15 @@ bool add_mujoco(std::vector<PeerLibrary>& peers) {
         {"MuJoCo",
          mj_versionString(),
          false,
-         {"Euler", "implicit", "RK4"},
-         "Newton's solver, pyramidal cones (its default; with elliptic ones stacks fall), contacts as stiff "
+         {"Euler", "RK4"},
+         "Newton's solver, pyramidal cones (its default; with elliptic ones stacks fall at 1/60 s), contacts "
+         "as stiff "
          "as it "
-         "allows (solref 2 dt, solimp 0.99 0.999 0.001), integrators Euler (semi-implicit), implicit in "
-         "velocity, RK4; joints are a tree of ball joints in reduced coordinates; "
-         "hulls with multiccd; no sleeping and no continuous detection in this version",
+         "allows (solref 2 dt, solimp 0.99 0.999 0.001), integrators Euler (semi-implicit) and RK4 (the "
+         "implicit "
+         "one did not converge with ball joints); joints are a tree of ball joints in reduced coordinates; "
+         "hulls "
+         "with multiccd; this version has neither sleeping nor continuous detection; double precision",
          [](const sim::WorldDefinition& world, const PeerSettings& settings) -> std::unique_ptr<RigidPeer> {
              return std::make_unique<MujocoRigid>(world, settings);
          }});
