@@ -6,7 +6,7 @@
 #include "commands/command.h"
 #include "commands/commands.h"
 #include "commands/worker_options.h"
-#include "files/one_line.h"
+#include "files/bad_input.h"
 #include "scene/scene.h"
 #include "simulate/simulate.h"
 

@@ -10,7 +10,7 @@
 #include <set>
 
 #include "compare/comparison.h"
-#include "files/one_line.h"
+#include "files/bad_input.h"
 
 namespace app {
 namespace {

@@ -11,7 +11,6 @@
 
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/one_line.h"
 #include "process/parallel.h"
 #include "sticks/predictors.h"
 

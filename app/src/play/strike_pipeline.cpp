@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "play/play_setup.h"
+#include "play/play_run.h"
 #include "sticks/predictors.h"
 #include "sticks/stick.h"
 

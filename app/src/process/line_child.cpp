@@ -13,7 +13,7 @@
 #include <csignal>
 #include <stdexcept>
 
-#include "files/one_line.h"
+#include "files/bad_input.h"
 #include "process/child_process.h"
 #include "process/clock.h"
 

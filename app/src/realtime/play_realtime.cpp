@@ -10,8 +10,7 @@
 
 #include "latency/latency_report.h"
 #include "play/play.h"
-#include "play/play_products.h"
-#include "play/play_setup.h"
+#include "play/play_run.h"
 #include "realtime/realtime_run.h"
 #include "sticks/predictors.h"
 

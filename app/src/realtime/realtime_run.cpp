@@ -93,9 +93,9 @@ void RealtimeRun::wait(std::int64_t until_ns) {
 
 /// A live stream may say where the tip is (`# tip_m:`), in the lines before its first row.
 void RealtimeRun::learn_geometry() {
-    const StreamHead head = session_.sensors->stream_head();
-    if (head.text == stream_head_) return;
-    stream_head_ = head.text;
+    const SharedStreamHead head = session_.sensors->stream_head();
+    if (head.text.data() == stream_head_) return;
+    stream_head_ = head.text.data();
     tracking::Trace keys;
     keys.tip = head.tip;
     keys.shaft = head.shaft;

@@ -14,7 +14,7 @@
 #include "files/bad_input.h"
 #include "files/format_description.h"
 #include "files/toml_reader.h"
-#include "scene/look_keys.h"
+#include "scene/shared_keys.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -567,9 +567,7 @@ Scene read_scene(const fs::path& file, std::optional<double> dt_s) {
     reader.scene.file = file;
     reader.scene.name = file.stem().string();
     reader.dt_s = dt_s;
-    std::vector<TomlFile> layers;
-    layers.emplace_back("a scene", file);
-    read_toml(layers, "the scene", [&](Fields& keys) { kSceneFile.keys(keys, reader); });
+    read_toml({TomlFile("a scene", file)}, "the scene", [&](Fields& keys) { kSceneFile.keys(keys, reader); });
     reader.add_events();
     if (reader.scene.world.bodies.empty())
         throw BadInput(fmt::format("{}:1:1: error: found no [[body]], expected at least one", file.string()));

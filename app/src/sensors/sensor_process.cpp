@@ -19,8 +19,8 @@
 #include <thread>
 #include <utility>
 
+#include "files/bad_input.h"
 #include "files/file_descriptor.h"
-#include "files/one_line.h"
 #include "process/bounded_queue.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
@@ -153,7 +153,7 @@ private:
             sample.has_time ? clock_.map(sample.stick, sample.sample.t_s, arrival_s) : arrival_s;
         sample.due_ns = task_.epoch_ns + to_ns(sample.sample.t_s);
         const std::lock_guard lock(mutex_);
-        report_.clock = sample.has_time ? SampleClock::source : SampleClock::arrival;
+        report_.clock.clock = sample.has_time ? SampleClock::source : SampleClock::arrival;
     }
     void note(const SourceSample& sample) {
         Stick& stick = sticks_[sample.stick];
@@ -172,7 +172,7 @@ private:
         const std::lock_guard lock(mutex_);
         report_.malformed = faults.malformed;
         report_.set_text(one_line(faults.first, 240));
-        report_.estimate = estimate;
+        report_.clock.estimate = estimate;
         const std::int64_t quiet_until_ns = source_->quiet_until_ns();
         if (std::exchange(report_.quiet_until_ns, quiet_until_ns) != quiet_until_ns) add_one(changed_.get());
     }

@@ -11,7 +11,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "files/one_line.h"
+#include "files/bad_input.h"
 
 namespace app {
 namespace {
@@ -92,7 +92,6 @@ AnswerPath::AnswerPath(std::span<const double> leads_s, const AnswerForm& form)
     : form_(form), sample_nodes_(leads_s.front() > 0 ? 1 : 0) {
     nodes_.resize(leads_s.size() + sample_nodes_);
     for (std::size_t i = 0; i < leads_s.size(); ++i) nodes_[i + sample_nodes_].lead_s = leads_s[i];
-    next_ = nodes_;
 }
 
 AnswerPath::Node AnswerPath::parse(std::size_t index, std::span<const double> numbers,
@@ -128,28 +127,29 @@ AnswerPath::Node AnswerPath::parse(std::size_t index, std::span<const double> nu
 }
 
 void AnswerPath::take(const tracking::PosePrediction& sample, std::span<const double> numbers) {
-    for (std::size_t i = sample_nodes_; i < next_.size(); ++i) next_[i] = parse(i, numbers, sample);
-    if (sample_nodes_ > 0) next_[0] = {0, sample, next_[1].covariance};
-    differentiate();
-    nodes_.swap(next_);
+    std::vector<Node> next(nodes_.size());
+    for (std::size_t i = sample_nodes_; i < next.size(); ++i) next[i] = parse(i, numbers, sample);
+    if (sample_nodes_ > 0) next[0] = {0, sample, next[1].covariance};
+    differentiate(next);
+    nodes_ = std::move(next);
     answered_ = true;
 }
 
-void AnswerPath::differentiate() {
+void AnswerPath::differentiate(std::vector<Node>& nodes) const {
     std::vector<double> steps;
     std::vector<Eigen::Vector3d> slopes, turns;
-    for (std::size_t i = 1; i < next_.size(); ++i) {
-        const Node &a = next_[i - 1], &b = next_[i];
+    for (std::size_t i = 1; i < nodes.size(); ++i) {
+        const Node &a = nodes[i - 1], &b = nodes[i];
         steps.push_back(b.lead_s - a.lead_s);
         slopes.emplace_back((b.pose.position - a.pose.position) / steps.back());
         // The rotation vector of the shorter way, world frame.
         turns.emplace_back(tracking::logarithm(b.pose.orientation * a.pose.orientation.conjugate()) /
                            steps.back());
     }
-    for (std::size_t i = 0; i < next_.size(); ++i) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
         const bool stated = form_.velocity && i >= sample_nodes_;
-        if (!stated) next_[i].pose.velocity = rate_at(i, steps, slopes);
-        next_[i].pose.angular_velocity = rate_at(i, steps, turns);
+        if (!stated) nodes[i].pose.velocity = rate_at(i, steps, slopes);
+        nodes[i].pose.angular_velocity = rate_at(i, steps, turns);
     }
 }
 
@@ -201,10 +201,9 @@ ExternalPredictor::ExternalPredictor(const std::string& command, std::span<const
 tracking::SampleStatus ExternalPredictor::correct(const tracking::PoseSample& sample) noexcept {
     if (failure_) return tracking::SampleStatus::not_finite;
     const tracking::SampleStatus status = held_->correct(sample);
-    const bool fresh = status == tracking::SampleStatus::reinitialised;
-    if (status != tracking::SampleStatus::accepted && !fresh) return status;
+    if (!is_taken(status)) return status;
     try {
-        exchange(sample, fresh && answers_ > 0);
+        exchange(sample, status == tracking::SampleStatus::reinitialised && answers_ > 0);
     } catch (...) {
         failure_ = std::current_exception();
         return tracking::SampleStatus::not_finite;

@@ -58,14 +58,14 @@ private:
     };
     [[nodiscard]] Node parse(std::size_t index, std::span<const double> numbers,
                              const tracking::PosePrediction& sample) const;
-    void differentiate();
+    void differentiate(std::vector<Node>& nodes) const;
     /// The node at or before a lead.
     [[nodiscard]] std::size_t node_before(double lead_s) const noexcept;
 
     AnswerForm form_;
     std::size_t sample_nodes_ = 0;  // 1 if the sample stands for lead 0
     bool answered_ = false;
-    std::vector<Node> nodes_, next_;
+    std::vector<Node> nodes_;
 };
 
 /// How long an external predictor is waited for.
@@ -100,8 +100,9 @@ public:
 
     /// As before the first sample: times may begin again. The child gets `restart`.
     void begin_anew() { held_ = tracking::make_predictor("hold"); }
-    /// What went wrong; null while all is well.
-    [[nodiscard]] const std::exception_ptr& failure() const noexcept { return failure_; }
+    void require_working() const override {
+        if (failure_) std::rethrow_exception(failure_);
+    }
 
 private:
     /// Sends a sample, after `restart` if the child is to start anew, and takes the answer.

@@ -1,4 +1,6 @@
 // Decoders and sources of live samples, within this process.
+#include "sensors/live_sources.h"
+
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <lo/lo.h>
@@ -12,8 +14,6 @@
 #include "files/bad_input.h"
 #include "free_port.h"
 #include "process/clock.h"
-#include "sensors/osc_source.h"
-#include "sensors/row_sources.h"
 #include "tracking/mutation.h"
 
 namespace {

@@ -1,4 +1,4 @@
-#include "files/one_line.h"
+#include "files/bad_input.h"
 
 #include <algorithm>
 #include <numeric>
