@@ -17,7 +17,6 @@
 #include "report/plot.h"
 #include "report/table.h"
 #include "scene/scene.h"
-#include "simulate/run_measures.h"
 
 namespace app {
 namespace {

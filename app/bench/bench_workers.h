@@ -2,7 +2,6 @@
 #include <sim/distributed_world.h>
 
 #include <functional>
-#include <map>
 #include <string>
 #include <vector>
 

@@ -112,9 +112,7 @@ void fit(const FitOptions& o) {
 }
 
 void make_new(const std::string& name, const std::string& out) {
-    if (name.find_first_of("\"\\") != std::string::npos || std::any_of(name.begin(), name.end(), [](char c) {
-            return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-        }))
+    if (name.find_first_of("\"\\") != std::string::npos || std::ranges::any_of(name, is_control))
         refuse_options("a kit's name with quotes, backslashes or control characters", "plain text");
     constexpr std::string_view kName = "NAME";
     std::string kit = read_file(assets_folder() / "templates" / "kit.toml");

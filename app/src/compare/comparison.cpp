@@ -7,7 +7,6 @@
 #include <iterator>
 #include <map>
 #include <memory>
-#include <span>
 #include <tuple>
 
 #include "compare/entrants.h"

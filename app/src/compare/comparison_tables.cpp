@@ -9,7 +9,6 @@
 #include <ranges>
 #include <set>
 
-#include "compare/comparison.h"
 #include "files/bad_input.h"
 
 namespace app {

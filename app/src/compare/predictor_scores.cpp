@@ -9,12 +9,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
-#include <optional>
 
-#include "kit/kit.h"
-#include "statistics/statistics.h"
-#include "sticks/predictors.h"
-#include "sticks/stick.h"
 #include "strikes/strike_scheduler.h"
 #include "strikes/stroke_lows.h"
 #include "strikes/true_contacts.h"

@@ -12,7 +12,6 @@
 
 #include "files/bad_input.h"
 #include "files/option_values.h"
-#include "kit/kit.h"
 #include "statistics/statistics.h"
 #include "strikes/stroke_lows.h"
 

@@ -15,6 +15,10 @@ public:
     using std::runtime_error::runtime_error;
 };
 
+/// Whether a character may stand in no one-line message.
+[[nodiscard]] inline bool is_control(char c) {
+    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+}
 /// Text of others, fit for a one-line message: control characters become spaces, at most `longest` bytes.
 [[nodiscard]] std::string one_line(std::string_view text, std::size_t longest = 200);
 

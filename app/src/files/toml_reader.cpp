@@ -18,10 +18,6 @@ struct TomlFile::Document {
 
 namespace {
 
-bool is_control(char c) {
-    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-}
-
 /// A file's text for a one-line message: control characters as '?', long ones cut.
 std::string printable(std::string_view text) {
     constexpr std::size_t kLongest = 60;

@@ -5,14 +5,12 @@
 #include <sim/modal_body.h>
 #include <tracking/predictor.h>
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 
 #include "kit/surface_entry.h"
 #include "process/clock.h"
-#include "statistics/statistics.h"
 
 namespace app {
 namespace {

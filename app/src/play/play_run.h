@@ -18,6 +18,8 @@
 
 namespace app {
 
+// How a run begins and ends, offline and in real time: its parts, its sound, its products.
+
 /// Sound goes on this long after the last sample, then until it is silent, at most so long.
 inline constexpr double kSoundTailS = 0.5, kLongestSoundTailS = 10;
 

@@ -5,7 +5,6 @@
 
 #include "play/play_run.h"
 #include "sticks/predictors.h"
-#include "sticks/stick.h"
 
 namespace app {
 namespace {

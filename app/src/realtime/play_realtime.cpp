@@ -2,14 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "latency/latency_report.h"
-#include "play/play.h"
 #include "play/play_run.h"
 #include "realtime/realtime_run.h"
 #include "sticks/predictors.h"

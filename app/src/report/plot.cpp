@@ -8,6 +8,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "files/bad_input.h"
 #include "files/output_folder.h"
 #include "process/child_process.h"
 
@@ -120,7 +121,7 @@ std::string gnuplot_string(std::string_view text) {
     std::string quoted = "'";
     for (const char c : text) {
         if (c == '\'') quoted += '\'';
-        quoted += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
+        quoted += is_control(c) ? ' ' : c;
     }
     return quoted + "'";
 }

@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -312,8 +311,7 @@ RowSource::RowSource(const std::string& name, const SourceOptions& options)
 }
 
 SourceHead RowSource::head() const {
-    const tracking::Trace& keys = rows_.keys();
-    return {keys.rate_hz, keys.tip, keys.shaft, rows_.oriented(), keys.source, LiveSource::head().base_s};
+    return {rows_.keys(), rows_.oriented(), LiveSource::head().base_s};
 }
 
 std::unique_ptr<SampleSource> make_stream_source(int descriptor, const SourceOptions& options) {

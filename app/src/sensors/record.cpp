@@ -118,16 +118,13 @@ private:
         if (source_->replayed())
             result_.clock.estimate.offset_s =
                 to_s(first.due_ns - options_.source.epoch_ns) - first.sample.t_s;
-        const SourceHead head = source_->head();
-        tracking::Trace keys;
-        keys.rate_hz = head.rate_hz;
-        keys.tip = head.tip;
-        keys.shaft = head.shaft;
-        keys.source = fmt::format("recorded; clock of the times: {}{}", name_of(result_.clock.clock),
-                                  head.base_s == 0 ? "" : fmt::format(" minus {:.0f} s", head.base_s));
-        if (!head.origin.empty()) keys.source += "; " + head.origin;
+        SourceHead head = source_->head();
+        const std::string origin = std::exchange(head.keys.source, {});
+        head.keys.source = fmt::format("recorded; clock of the times: {}{}", name_of(result_.clock.clock),
+                                       head.base_s == 0 ? "" : fmt::format(" minus {:.0f} s", head.base_s));
+        if (!origin.empty()) head.keys.source += "; " + origin;
         oriented_ = head.oriented;
-        head_ = tracking::format_trace_head(keys, oriented_);
+        head_ = tracking::format_trace_head(head.keys, oriented_);
     }
 
     /// The time that the recording says: the source's, unchanged but for jumps of its clock.

@@ -50,7 +50,8 @@ public:
         const std::vector<std::string> wanted = options.sticks.empty() ? names_of(trace) : options.sticks;
         names_ = StickNames(wanted);
         t0_s_ = trace.t0_s();
-        head_ = {trace.rate_hz, trace.tip, trace.shaft, false, trace.source, 0};
+        head_ = {trace, false, 0};
+        head_.keys.sticks.clear();
         for (std::size_t i = 0; i < wanted.size(); ++i)
             for (const tracking::PoseSample& sample : stick_called(trace, wanted[i]).samples) {
                 rows_.push_back({i, sample});

@@ -48,10 +48,8 @@ struct SourceFaults {
 
 /// What a source says of all its samples.
 struct SourceHead {
-    double rate_hz = 0;  ///< 0: not known
-    std::optional<Eigen::Vector3d> tip, shaft;
+    tracking::Trace keys;  ///< its rate, tip, shaft and source, as far as they are known
     bool oriented = true;  ///< its samples may have orientations
-    std::string origin;    ///< a trace's `source` key
     double base_s = 0;     ///< was taken from all its times, which count from long ago
 };
 

@@ -13,18 +13,15 @@
 #include <atomic>
 #include <csignal>
 #include <deque>
-#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
 #include <utility>
 
 #include "files/bad_input.h"
-#include "files/file_descriptor.h"
 #include "process/bounded_queue.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
-#include "sensors/source_clock.h"
 
 namespace app {
 namespace {
@@ -239,8 +236,8 @@ private:
         const SourceHead said = source_->head();
         SharedStreamHead head;
         std::copy(text.begin(), text.end(), head.text.begin());
-        head.tip = said.tip;
-        head.shaft = said.shaft;
+        head.tip = said.keys.tip;
+        head.shaft = said.keys.shaft;
         sticks_.front().memory->head.publish(head);
     }
     /// The source, and the filters, of which external ones are processes.

@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "process/line_child.h"
-
 namespace app {
+
+class LineChild;
 
 /// What an external predictor answers for each lead, in this order, as its first line announced.
 struct AnswerForm {
@@ -88,6 +88,7 @@ public:
     /// Starts `sh -c COMMAND` and waits for its first line. Throws std::runtime_error, one line.
     ExternalPredictor(const std::string& command, std::span<const double> leads_s, const std::string& stick,
                       ExternalPatience patience = {});
+    ~ExternalPredictor() override;
 
     [[nodiscard]] tracking::SampleStatus correct(const tracking::PoseSample& sample) noexcept override;
     [[nodiscard]] tracking::PosePrediction predict(double lead_s) const noexcept override {
@@ -112,7 +113,7 @@ private:
     std::vector<double> leads_s_;                // ascending, each once
     std::unique_ptr<tracking::Predictor> held_;  // `hold`: judges samples, keeps the newest pose
     ExternalPatience patience_;
-    std::optional<LineChild> child_;
+    std::unique_ptr<LineChild> child_;
     AnswerForm form_;
     AnswerPath path_;
     std::vector<double> numbers_;  // of one answer

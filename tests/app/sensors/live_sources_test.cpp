@@ -178,7 +178,7 @@ TEST(StreamSource, ReadsToTheEndAndIsTakenUpInTheMiddle) {
     close(ends[0]);
     ASSERT_EQ(samples.size(), 2u);
     EXPECT_EQ(samples[1].sample.position, Vector3d(2, 0, 0));
-    EXPECT_EQ(source->head().rate_hz, 60);
+    EXPECT_EQ(source->head().keys.rate_hz, 60);
     EXPECT_FALSE(source->head().oriented);
     EXPECT_EQ(source->stream_head(), "# units: mm\n# rate_hz: 60\nt,stick,px,py,pz\n");
 
