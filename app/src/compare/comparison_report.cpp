@@ -6,7 +6,6 @@
 #include <functional>
 #include <iterator>
 #include <map>
-#include <ranges>
 #include <set>
 #include <tuple>
 #include <vector>
@@ -74,9 +73,11 @@ std::size_t family_number(const Comparison& comparison, const std::string& famil
 /// 1, 2 and 5 times the powers of ten within a range.
 std::string logarithmic_tics(double low, double high) {
     std::string tics;
-    for (double decade = std::pow(10, std::floor(std::log10(low))); decade <= high; decade *= 10)
-        for (const double tic : {1 * decade, 2 * decade, 5 * decade})
-            if (tic >= low && tic <= high) tics += fmt::format("{}{}", tics.empty() ? "" : ",", tic);
+    for (int exponent = static_cast<int>(std::floor(std::log10(low))); std::pow(10, exponent) <= high;
+         ++exponent)
+        for (const int digit : {1, 2, 5})
+            if (const double tic = digit * std::pow(10, exponent); tic >= low && tic <= high)
+                tics += fmt::format("{}{}", tics.empty() ? "" : ",", tic);
     return "set xtics (" + tics + ")\nset mxtics 1\n";
 }
 
@@ -158,7 +159,8 @@ PlotScript timing_plot(const ComparisonSummary& summary) {
 }
 
 std::string heading(const Comparison& c) {
-    const auto leads_ms = c.options.leads_s | std::views::transform([](double s) { return 1e3 * s; });
+    std::vector<double> leads_ms;
+    for (const double lead_s : c.options.leads_s) leads_ms.push_back(1e3 * lead_s);
     const std::string sensor = describe(c.options.sensor);
     std::string text =
         report_header(kTitle, "by MusicWorld",

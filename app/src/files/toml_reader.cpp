@@ -313,11 +313,13 @@ TomlFile::TomlFile(const char* kind, const fs::path& file) {
         throw BadInput(
             fmt::format("{}: error: found no readable file, expected {} (TOML)", file.string(), kind));
     const auto parse = [&] { return toml::parse(in, file.string()); };
-    document_ = std::make_shared<const Document>(parsed(file.string(), parse));
+    document_ = std::make_shared<const Document>(Document{parsed(file.string(), parse)});
 }
 
 TomlFile::TomlFile(std::string_view text, const std::string& name)
-    : document_(std::make_shared<const Document>(parsed(name, [&] { return toml::parse(text, name); }))) {}
+    : document_(
+          std::make_shared<const Document>(Document{parsed(name, [&] { return toml::parse(text, name); })})) {
+}
 
 void read_toml(const std::vector<TomlFile>& layers, const std::string& where,
                const std::function<void(Fields&)>& keys, bool all) {

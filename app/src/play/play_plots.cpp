@@ -296,7 +296,8 @@ PlotScript overview_plot(const PlayResult& result, const std::vector<Mark>& mark
 }
 
 PlotScript sound_plot(const PlayResult& result, const std::vector<Mark>& marks, double peak) {
-    const double length_s = static_cast<double>(result.audio.size() / 2) / 48000;
+    const std::size_t frames = result.audio.size() / 2;
+    const double length_s = static_cast<double>(frames) / 48000;
     const PlotArea area = {result.t0_s, result.t0_s + length_s, -1, 1, kWidth, 1};
     const bool few = result.strikes.size() < kWidth;  // more would be one bar
     const PlotPanel panel =

@@ -8,7 +8,6 @@
 #include <map>
 #include <numbers>
 #include <random>
-#include <ranges>
 
 #include "files/assets.h"
 #include "files/bad_input.h"
@@ -84,7 +83,8 @@ const std::array<Eigen::Vector3f, 8> kPalette = {Eigen::Vector3f(0.55f, 0.05f, 0
 SceneMaterial material_of(const BodyDraft& draft, const SceneMaterials& materials, const Fields& at) {
     if (!draft.material) return {};
     const auto found = materials.find(*draft.material);
-    const std::string known = fmt::format("{}", fmt::join(std::views::keys(materials), ", "));
+    std::string known;
+    for (const auto& [name, material] : materials) known += (known.empty() ? "" : ", ") + name;
     at.require(found != materials.end(), "material", fmt::format("material = \"{}\"", *draft.material),
                known.empty() ? "a table [material.NAME] of that name"
                              : fmt::format("one of {} or a table [material.{}]", known, *draft.material));
