@@ -1,20 +1,13 @@
 #pragma once
-#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include "bench/bench_report.h"
 #include "bench/hard_watch.h"
-#include "report/plot.h"
+#include "commands/bench_options.h"
 
 namespace app {
-
-struct HardBenchOptions {
-    std::vector<std::string> scenes;  ///< by name; none: all
-    int halvings = 4;                 ///< of the scene's step, at most
-    double longest_s = 20;            ///< of processor time: after a longer run the step is not halved again
-};
 
 /// One scene by one engine, in one setting, at one step.
 struct HardRun {
@@ -64,15 +57,9 @@ inline constexpr double kLeastError = 1e-4;
 [[nodiscard]] HardBench bench_hard(const HardBenchOptions& options,
                                    const std::function<void(const std::string&)>& progress);
 
-/// Machine, results (ours beside each peer's best at equal error), runs, notes.
-[[nodiscard]] std::string format_json(const HardBench& bench);
-/// A row of each entrant at the scene's step.
-[[nodiscard]] std::string format_text(const HardBench& bench);
-/// A row of each run.
-[[nodiscard]] std::string format_csv(const HardBench& bench);
-/// Processor time at equal error, by scene.
-[[nodiscard]] PlotScript hard_plot(const HardBench& bench);
-/// Table and plots in one page, the plots drawn in `scratch`, an existing folder.
-[[nodiscard]] std::string format_page(const HardBench& bench, const std::filesystem::path& scratch);
+/// Text: a row of each entrant at the scene's step. JSON: machine, results (ours beside each peer's best at equal
+/// error), runs, notes. Table: a row of each run. Plot: processor time at equal error, by scene. Page: tables
+/// and plots.
+[[nodiscard]] Figures figures_of(const HardBench& bench);
 
 }  // namespace app

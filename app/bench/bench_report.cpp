@@ -46,19 +46,15 @@ nlohmann::ordered_json machine_json(const MachineName& machine) {
             {"avx2", machine.avx2}};
 }
 
-std::string format_json(const BenchReport& report) {
-    const nlohmann::ordered_json json = {{"machine", machine_json(report.machine)},
-                                         {"results", table_of(report.results).json()},
-                                         {"notes", report.notes}};
-    return json.dump(2) + "\n";
-}
-
-std::string format_text(const BenchReport& report) {
-    std::string text = fmt::format(
-        "{}, {} cores, {}{}\n\n{}\n", report.machine.processor, report.machine.cores, report.machine.compiler,
-        report.machine.avx2 ? "" : ", without AVX2", table_of(report.results).text());
+Figures figures_of(const BenchReport& report) {
+    const Table table = table_of(report.results);
+    const nlohmann::ordered_json json = {
+        {"machine", machine_json(report.machine)}, {"results", table.json()}, {"notes", report.notes}};
+    std::string text =
+        fmt::format("{}, {} cores, {}{}\n\n{}\n", report.machine.processor, report.machine.cores,
+                    report.machine.compiler, report.machine.avx2 ? "" : ", without AVX2", table.text());
     for (const std::string& note : report.notes) text += note + '\n';
-    return text;
+    return {text, json.dump(2) + "\n"};
 }
 
 }  // namespace app

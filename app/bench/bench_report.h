@@ -1,8 +1,11 @@
 #pragma once
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "report/plot.h"
 
 namespace app {
 
@@ -30,12 +33,24 @@ struct BenchReport {
     std::vector<std::string> notes = {};  ///< what was measured and how, lines
 };
 
+/// A page whose plots are still to be drawn, see PlotGallery.
+struct BenchPage {
+    std::string text;
+    PlotGallery plots;
+};
+
+/// A benchmark's figures as text and as one JSON document, and what else goes into its folder, by file name.
+struct Figures {
+    std::string text, json;
+    std::map<std::string, std::string> tables = {};
+    std::map<std::string, PlotScript> plots = {};
+    std::map<std::string, BenchPage> pages = {};
+};
+
 /// What every benchmark's JSON says of the machine.
 [[nodiscard]] nlohmann::ordered_json machine_json(const MachineName& machine);
 
-/// One JSON document: machine, results, notes.
-[[nodiscard]] std::string format_json(const BenchReport& report);
-/// The same as lines of a table.
-[[nodiscard]] std::string format_text(const BenchReport& report);
+/// Machine, results and notes.
+[[nodiscard]] Figures figures_of(const BenchReport& report);
 
 }  // namespace app

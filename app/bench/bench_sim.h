@@ -1,26 +1,10 @@
 #pragma once
-#include <sim/world.h>
-
 #include <functional>
-#include <optional>
-#include <vector>
 
 #include "bench/bench_report.h"
+#include "commands/bench_options.h"
 
 namespace app {
-
-struct SimBenchOptions {
-    std::vector<int> bodies = {25, 100, 400, 1600};
-    int modes = 12;
-    int rounds = 0;  ///< of all steps; 0: five for 25 bodies, three for 100, one for more
-    int steps = 500;
-    /// Bodies of one kind in a box of planes instead of the piles.
-    struct Scene {
-        std::string name;
-        sim::WorldDefinition world;
-    };
-    std::optional<Scene> scene = std::nullopt;
-};
 
 /// The least work of a step: what the method cannot do without, whoever programs it.
 ///   samples   each of the V samples of a body follows its m modes and the body once a step: V (6 m + 18)

@@ -9,9 +9,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "bench/bench_report.h"
 #include "process/clock.h"
-#include "report/plot.h"
 #include "report/table.h"
 
 namespace app {
@@ -154,6 +152,70 @@ std::string marks(const std::vector<TradeoffPoint>& points) {
     return text;
 }
 
+std::string json_of(const Tradeoff& tradeoff) {
+    Json json;
+    json["machine"] = machine_json(machine_name());
+    json["results"] = Json::array();
+    for (const TradeoffPoint& point : tradeoff.points) json["results"].push_back(point_json(point));
+    json["automatic"] = point_json(tradeoff.automatic);
+    json["automatic"]["requested_error"] = tradeoff.requested_error;
+    json["converged"] = {{"name", name_of(tradeoff.converged)},
+                         {"finer", name_of(tradeoff.finer)},
+                         {"error", tradeoff.converged_error}};
+    return json.dump(2) + "\n";
+}
+
+std::string text_of(const Tradeoff& tradeoff) {
+    std::string text = fmt::format("Pareto front\n{}\nautomatic ({} % asked of the displacement) takes\n{}",
+                                   lines_of(front_of(tradeoff)), 100 * tradeoff.requested_error,
+                                   lines_of({tradeoff.automatic}));
+    text += fmt::format(
+        "\n{} points. Time: processor time for a simulated second of two touching bodies. Error: rms "
+        "distance of their\n"
+        "surface points to {}, of the largest extent;\nthat run is within {:.3f} % of {}.\n",
+        tradeoff.points.size(), name_of(tradeoff.converged), 100 * tradeoff.converged_error,
+        name_of(tradeoff.finer));
+    return text;
+}
+
+std::string plot_commands(const Tradeoff& tradeoff) {
+    PlotPanel panel;
+    const auto add = [&](const std::vector<TradeoffPoint>& points, const char* look, const char* rgb,
+                         const char* title) {
+        panel.add(marks(points), fmt::format("with {} lc rgb '{}' title '{}'", look, rgb, title));
+    };
+    struct Dots {
+        const char *rgb, *title;
+        sim::Fidelity fidelity;
+        int least_modes, most_modes;
+    };
+    for (const auto& [rgb, title, fidelity, least, most] :
+         {Dots{"#8c8c8c", "rigid", sim::Fidelity::rigid, 0, 0},
+          {"#c77c11", "linear", sim::Fidelity::linear, 6, 6},
+          {"#2c7fb8", "5, 11 modes", sim::Fidelity::modal, 1, 11},
+          {"#41ab5d", "14, 23 modes", sim::Fidelity::modal, 12, 23},
+          {"#88419d", "45, 75 modes", sim::Fidelity::modal, 24, 1000}}) {
+        std::vector<TradeoffPoint> some;
+        for (const TradeoffPoint& p : tradeoff.points)
+            if (p.setting.fidelity == fidelity && modes_of(p.setting) >= least && modes_of(p.setting) <= most)
+                some.push_back(p);
+        add(some, "points pt 7 ps 0.45", rgb, title);
+    }
+    add(front_of(tradeoff), "linespoints pt 6 ps 0.8 lw 1.5", "#d7301f", "Pareto front");
+    add({tradeoff.automatic}, "points pt 4 ps 1.6 lw 2", "#000000", "automatic");
+    const auto [fastest, slowest] =
+        std::ranges::minmax_element(tradeoff.points, {}, &TradeoffPoint::ms_per_s);
+    if (fastest != tradeoff.points.end())
+        panel.add(fmt::format("{0:.5g} {2:.5g}\n{1:.5g} {2:.5g}\n", fastest->ms_per_s, slowest->ms_per_s,
+                              100 * tradeoff.converged_error),
+                  "with lines dt 2 lc rgb '#8c8c8c' title 'converged to'");
+    return plot_axes() +
+           "set key outside right top\nset logscale xy\nset xlabel 'processor time for a simulated second "
+           "[ms]'\n"
+           "set ylabel 'rms error [% of the largest extent]'\n" +
+           panel.text();
+}
+
 }  // namespace
 
 std::string name_of(const TradeoffSetting& s) {
@@ -218,72 +280,11 @@ Tradeoff measure_tradeoff(const std::vector<TradeoffSetting>& settings, const Tr
     return made;
 }
 
-std::string format_csv(const Tradeoff& tradeoff) {
-    return table_of(tradeoff.points).csv();
-}
-
-std::string format_json(const Tradeoff& tradeoff) {
-    Json json;
-    json["machine"] = machine_json(machine_name());
-    json["results"] = Json::array();
-    for (const TradeoffPoint& point : tradeoff.points) json["results"].push_back(point_json(point));
-    json["automatic"] = point_json(tradeoff.automatic);
-    json["automatic"]["requested_error"] = tradeoff.requested_error;
-    json["converged"] = {{"name", name_of(tradeoff.converged)},
-                         {"finer", name_of(tradeoff.finer)},
-                         {"error", tradeoff.converged_error}};
-    return json.dump(2) + "\n";
-}
-
-std::string format_text(const Tradeoff& tradeoff) {
-    std::string text = fmt::format("Pareto front\n{}\nautomatic ({} % asked of the displacement) takes\n{}",
-                                   lines_of(front_of(tradeoff)), 100 * tradeoff.requested_error,
-                                   lines_of({tradeoff.automatic}));
-    text += fmt::format(
-        "\n{} points. Time: processor time for a simulated second of two touching bodies. Error: rms "
-        "distance of their\n"
-        "surface points to {}, of the largest extent;\nthat run is within {:.3f} % of {}.\n",
-        tradeoff.points.size(), name_of(tradeoff.converged), 100 * tradeoff.converged_error,
-        name_of(tradeoff.finer));
-    return text;
-}
-
-std::string plot_commands(const Tradeoff& tradeoff) {
-    PlotPanel panel;
-    const auto add = [&](const std::vector<TradeoffPoint>& points, const char* look, const char* rgb,
-                         const char* title) {
-        panel.add(marks(points), fmt::format("with {} lc rgb '{}' title '{}'", look, rgb, title));
-    };
-    struct Dots {
-        const char *rgb, *title;
-        sim::Fidelity fidelity;
-        int least_modes, most_modes;
-    };
-    for (const auto& [rgb, title, fidelity, least, most] :
-         {Dots{"#8c8c8c", "rigid", sim::Fidelity::rigid, 0, 0},
-          {"#c77c11", "linear", sim::Fidelity::linear, 6, 6},
-          {"#2c7fb8", "5, 11 modes", sim::Fidelity::modal, 1, 11},
-          {"#41ab5d", "14, 23 modes", sim::Fidelity::modal, 12, 23},
-          {"#88419d", "45, 75 modes", sim::Fidelity::modal, 24, 1000}}) {
-        std::vector<TradeoffPoint> some;
-        for (const TradeoffPoint& p : tradeoff.points)
-            if (p.setting.fidelity == fidelity && modes_of(p.setting) >= least && modes_of(p.setting) <= most)
-                some.push_back(p);
-        add(some, "points pt 7 ps 0.45", rgb, title);
-    }
-    add(front_of(tradeoff), "linespoints pt 6 ps 0.8 lw 1.5", "#d7301f", "Pareto front");
-    add({tradeoff.automatic}, "points pt 4 ps 1.6 lw 2", "#000000", "automatic");
-    const auto [fastest, slowest] =
-        std::ranges::minmax_element(tradeoff.points, {}, &TradeoffPoint::ms_per_s);
-    if (fastest != tradeoff.points.end())
-        panel.add(fmt::format("{0:.5g} {2:.5g}\n{1:.5g} {2:.5g}\n", fastest->ms_per_s, slowest->ms_per_s,
-                              100 * tradeoff.converged_error),
-                  "with lines dt 2 lc rgb '#8c8c8c' title 'converged to'");
-    return plot_axes() +
-           "set key outside right top\nset logscale xy\nset xlabel 'processor time for a simulated second "
-           "[ms]'\n"
-           "set ylabel 'rms error [% of the largest extent]'\n" +
-           panel.text();
+Figures figures_of(const Tradeoff& tradeoff) {
+    return {text_of(tradeoff),
+            json_of(tradeoff),
+            {{"tradeoff.csv", table_of(tradeoff.points).csv()}},
+            {{"tradeoff.svg", {900, 560, plot_commands(tradeoff)}}}};
 }
 
 }  // namespace app

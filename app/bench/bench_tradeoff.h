@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "bench/bench_report.h"
+
 namespace app {
 
 /// One way to compute the scene.
@@ -48,12 +50,8 @@ inline constexpr TradeoffSetting kFiner{sim::Fidelity::modal, 120, 7680, 3, 4000
 /// Marks the points that nothing dominates.
 void mark_pareto(std::vector<TradeoffPoint>& points);
 
-/// Rows of all points: name,modes,step_s,elements,triangles,ms_per_s,error,pareto.
-[[nodiscard]] std::string format_csv(const Tradeoff& tradeoff);
-[[nodiscard]] std::string format_json(const Tradeoff& tradeoff);
-/// The front, the automatic point and how converged the reference is.
-[[nodiscard]] std::string format_text(const Tradeoff& tradeoff);
-/// Commands of a plot of error against time.
-[[nodiscard]] std::string plot_commands(const Tradeoff& tradeoff);
+/// The front, the automatic point and how converged the reference is; tradeoff.csv, rows of all points:
+/// name,modes,step_s,elements,triangles,ms_per_s,error,pareto; tradeoff.svg, error against time.
+[[nodiscard]] Figures figures_of(const Tradeoff& tradeoff);
 
 }  // namespace app

@@ -7,17 +7,67 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
+#include <numeric>
+#include <optional>
 #include <span>
 #include <thread>
 #include <utility>
 
-#include "bench/measured_run.h"
 #include "report/plot.h"
 #include "report/table.h"
 #include "scene/scene.h"
 
 namespace app {
 namespace {
+
+/// Keeps what is told, the momentum and the mean height.
+class BodiesWatch : public sim::DistributedObserver {
+public:
+    BodiesWatch(MeasuredRun& run, const sim::WorldScene& scene, const sim::DistributedSettings& settings)
+        : run_(run),
+          scene_(scene),
+          last_(settings.steps),
+          second_(std::uint64_t(std::lround(1 / scene.world.settings.dt))) {}
+
+    void at(std::uint64_t step, const sim::World& world) override {
+        if (step > 0) run_.body_steps += std::uint64_t(world.bodies());
+        if (step == 0) momentum_.emplace(scene_, world);
+        if (step % 10 == 0 || step == last_) momentum_->look(world);
+        for (int body = 0; body < world.bodies(); ++body) {
+            const Eigen::Vector3d centre = world.state(body).position;
+            if (step == std::min(second_, last_)) run_.after_a_second.push_back(centre);
+            if (step == last_) run_.mean_height += centre.y() / world.bodies();
+        }
+    }
+    void worked(const sim::WorkerStep& step) override {
+        run_.steps.push_back(step);
+        run_.history.add(step);
+    }
+    void moved(std::uint64_t step, int bodies, int from, int to) override {
+        run_.trades.push_back({step, bodies, from, to});
+    }
+    /// The drift of the momentum; `outside`: the impulse of what is no body.
+    [[nodiscard]] MomentumDrift drift(const std::optional<Eigen::Vector3d>& outside) const {
+        return momentum_->drift(outside).value();
+    }
+
+private:
+    MeasuredRun& run_;
+    const sim::WorldScene& scene_;
+    std::uint64_t last_, second_;
+    std::optional<MomentumWatch> momentum_;
+};
+
+template <typename Start>
+MeasuredRun measure(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
+                    const Start& start) {
+    MeasuredRun run;
+    BodiesWatch watch(run, scene, settings);
+    run.result = start(watch);
+    run.momentum_drift = watch.drift(run.result.outside_impulse).share();
+    return run;
+}
 
 using Progress = std::function<void(const std::string&)>;
 using Factor = std::function<double(int, std::uint64_t)>;
@@ -309,6 +359,16 @@ std::string panel(const SpeedUp& s, const Shown& of) {
     return panel.text();
 }
 
+PlotScript speed_up_plot(const SpeedUp& s) {
+    std::string commands =
+        plot_axes() + "set multiplot layout 1,2\nset key right top\nset xlabel 'workers'\nset xrange [0:]\n";
+    commands += fmt::format("set yrange [0:]\nset ylabel 'elapsed [s], {} bodies'\n", s.bodies) +
+                panel(s, [](double elapsed) { return elapsed; });
+    commands += "set key left top\nset ylabel 'speed-up [times]'\n" +
+                panel(s, [&](double elapsed) { return s.alone_s / elapsed; });
+    return {kWidth, kHeight, commands + "unset multiplot\n"};
+}
+
 Table table_of(std::span<const SpeedUp> speed_ups) {
     Table table;
     for (const SpeedUp& s : speed_ups)
@@ -338,10 +398,92 @@ Table table_of(const std::vector<BoundRow>& rows) {
 
 }  // namespace
 
-std::vector<std::string> workers_bench_parts() {
-    std::vector<std::string> names;
-    for (const auto& [name, measure] : kParts) names.push_back(name);
-    return names;
+double MeasuredRun::with_barrier_s() const {
+    std::map<std::uint64_t, double> longest;
+    for (const sim::WorkerStep& s : steps) longest[s.step] = std::max(longest[s.step], s.seconds);
+    return std::accumulate(longest.begin(), longest.end(), 0.0,
+                           [](double sum, const auto& step) { return sum + step.second; });
+}
+
+MeasuredRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
+                        const sim::SimulatedProcessors& processors) {
+    return measure(scene, settings, [&](sim::DistributedObserver& observer) {
+        return sim::simulate_processors(scene, settings, processors, observer);
+    });
+}
+
+MeasuredRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
+                        const sim::DistributedLaunch& launch) {
+    return measure(scene, settings, [&](sim::DistributedObserver& observer) {
+        return sim::run_distributed(scene, settings, launch, observer);
+    });
+}
+
+sim::WorldDefinition strip_of(const sim::WorldDefinition& world, int number, int of) {
+    std::vector<std::size_t> order(world.bodies.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    const auto x = [&](std::size_t body) { return world.bodies[body].world_from_body.translation().x(); };
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return x(a) != x(b) ? x(a) < x(b) : a < b; });
+    const auto border = [&](int k) { return order.size() * std::size_t(k) / std::size_t(of); };
+    const std::size_t first = border(number), end = border(number + 1);
+
+    sim::WorldDefinition strip;
+    strip.settings = world.settings;
+    strip.planes = world.planes;
+    std::map<int, int> number_of;
+    for (std::size_t k = first; k < end; ++k) {
+        number_of[static_cast<int>(order[k])] = static_cast<int>(strip.bodies.size());
+        strip.bodies.push_back(world.bodies[order[k]]);
+    }
+    // Half-way to the neighbour, but not through the strip's own bodies.
+    const auto wall = [&](std::size_t at, double side) {
+        double offset = side * 0.5 * (x(order[at - 1]) + x(order[at]));
+        for (const sim::WorldBody& body : strip.bodies)
+            offset = std::min(
+                offset, side * body.world_from_body.translation().x() - body.shape.base.semi_axes.maxCoeff());
+        strip.planes.push_back({side * Eigen::Vector3d::UnitX(), offset});
+    };
+    if (number > 0) wall(first, 1);
+    if (number + 1 < of) wall(end, -1);
+    for (sim::PointConstraint c : world.constraints) {
+        if (!number_of.contains(c.body_a) || (c.body_b >= 0 && !number_of.contains(c.body_b))) continue;
+        c.body_a = number_of[c.body_a];
+        if (c.body_b >= 0) c.body_b = number_of[c.body_b];
+        strip.constraints.push_back(c);
+    }
+    return strip;
+}
+
+double unevenness_at(const MeasuredRun& run, std::uint64_t step) {
+    std::map<int, sim::WorkerStep> now;
+    for (const auto& [worker, points] : run.history.workers()) now[worker] = {};
+    for (const sim::WorkerStep& done : run.steps) {
+        now[done.worker] = done;
+        if (std::ranges::all_of(now, [&](const auto& n) { return n.second.step >= step; })) break;
+    }
+    double sum = 0, per_body = 0, worst = 0;
+    for (const auto& [worker, last] : now) {
+        sum += last.smoothed_s;
+        if (last.bodies > 0) per_body = std::max(per_body, last.smoothed_s / last.bodies);
+    }
+    const double average = sum / static_cast<double>(now.size());
+    for (const auto& [worker, last] : now) worst = std::max(worst, std::abs(last.smoothed_s - average));
+    const double allowed = std::max(0.15 * average, per_body);
+    return allowed > 0 ? worst / allowed : 0;
+}
+
+int most_trades(const MeasuredRun& run, std::uint64_t from, std::uint64_t to, std::uint64_t window) {
+    const auto in_window = [&](std::uint64_t first) {
+        return std::ranges::count_if(run.trades, [&](const MeasuredRun::Trade& trade) {
+            return trade.step >= first && trade.step < std::min(first + window, to);
+        });
+    };
+    int most = 0;
+    for (const MeasuredRun::Trade& first : run.trades)
+        if (first.step >= from && first.step < to)
+            most = std::max(most, static_cast<int>(in_window(first.step)));
+    return most;
 }
 
 WorkersBench bench_workers(const WorkersBenchOptions& options, const Progress& progress) {
@@ -352,34 +494,23 @@ WorkersBench bench_workers(const WorkersBenchOptions& options, const Progress& p
     return run.result();
 }
 
-PlotScript speed_up_plot(const SpeedUp& s) {
-    std::string commands =
-        plot_axes() + "set multiplot layout 1,2\nset key right top\nset xlabel 'workers'\nset xrange [0:]\n";
-    commands += fmt::format("set yrange [0:]\nset ylabel 'elapsed [s], {} bodies'\n", s.bodies) +
-                panel(s, [](double elapsed) { return elapsed; });
-    commands += "set key left top\nset ylabel 'speed-up [times]'\n" +
-                panel(s, [&](double elapsed) { return s.alone_s / elapsed; });
-    return {kWidth, kHeight, commands + "unset multiplot\n"};
-}
-
-std::string speed_up_csv(const std::vector<SpeedUp>& speed_ups) {
-    return table_of(speed_ups).csv();
-}
-
-std::string bound_csv(const std::vector<BoundRow>& rows) {
-    return table_of(rows).csv();
-}
-
-std::string format_text(const WorkersBench& bench) {
+Figures figures_of(const WorkersBench& bench) {
+    Figures figures = figures_of(bench.report);
     std::string text;
-    for (const SpeedUp& s : bench.speed_ups)
+    for (const SpeedUp& s : bench.speed_ups) {
         text += fmt::format("{} bodies: {:.3g} s on one processor\n{}\n", s.bodies, s.alone_s,
                             table_of(std::span(&s, 1))
                                 .part({"workers", "async_speed_up", "ceiling_speed_up", "lockstep_speed_up",
                                        "async_of_ceiling", "bytes_per_body_step"})
                                 .text());
+        figures.plots[fmt::format("speed_up/bodies{}.svg", s.bodies)] = speed_up_plot(s);
+    }
+    if (!bench.speed_ups.empty()) figures.tables["speed_up.csv"] = table_of(bench.speed_ups).csv();
+    if (!bench.bounds.empty()) figures.tables["bound.csv"] = table_of(bench.bounds).csv();
+    if (!bench.migration.workers().empty()) figures.plots["migration.svg"] = workers_plot(bench.migration);
     text += table_of(bench.bounds).text();
-    return (text.empty() ? text : text + '\n') + format_text(bench.report);
+    figures.text.insert(0, text.empty() ? text : text + '\n');
+    return figures;
 }
 
 }  // namespace app

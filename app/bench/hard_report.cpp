@@ -149,6 +149,7 @@ PlotScript precision_plot(const HardComparison& scene, const std::vector<std::st
                 if (std::isfinite(run.figures.error))
                     fmt::format_to(std::back_inserter(data), "{:.5g} {:.5g}\n", run.ms_per_s,
                                    100 * std::max(run.figures.error, kLeastError));
+            any = any || !data.empty();
             panel.add(data,
                       "with linespoints lt 1 lw 1.4 pt 7 ps 0.4 lc " + gnuplot_colour(engine_colour(e)));
         }
@@ -161,9 +162,7 @@ PlotScript precision_plot(const HardComparison& scene, const std::vector<std::st
             legend};
 }
 
-}  // namespace
-
-std::string format_json(const HardBench& bench) {
+std::string json_of(const HardBench& bench) {
     const HardJson json = {{"machine", machine_json(machine_name())},
                            {"results", results_of(bench).json()},
                            {"runs", runs_of(bench).json()},
@@ -171,11 +170,7 @@ std::string format_json(const HardBench& bench) {
     return json.dump(2) + "\n";
 }
 
-std::string format_csv(const HardBench& bench) {
-    return runs_of(bench).csv();
-}
-
-std::string format_text(const HardBench& bench) {
+std::string text_of(const HardBench& bench) {
     std::string text;
     for (const HardComparison& scene : bench.scenes)
         text += fmt::format("{}, {:g} s, step {}\n{}\n", scene.scene.name, scene.seconds,
@@ -213,24 +208,31 @@ PlotScript hard_plot(const HardBench& bench) {
                 (any ? "" : kAnyY) + panel.text()};
 }
 
-std::string format_page(const HardBench& bench, const std::filesystem::path& scratch) {
+BenchPage page_of(const HardBench& bench) {
     constexpr const char* kTitle = "Hard scenes";
     const MachineName machine = machine_name();
-    PlotGallery plots;
-    const std::size_t all = plots.add(hard_plot(bench), "Processor time at equal error");
-    std::vector<std::size_t> each;
-    for (const HardComparison& scene : bench.scenes)
-        each.push_back(plots.add(precision_plot(scene, engines_of(bench)), scene.scene.name));
-    plots.draw(scratch);
+    BenchPage page;
     std::string body =
         report_header(kTitle, "Ours beside Bullet and MuJoCo: what breaks, by how much, and at what cost",
                       {{"processor", machine.processor}, {"compiler", machine.compiler}}) +
-        plots.symbols() + plots.element(all);
-    for (std::size_t s = 0; s < bench.scenes.size(); ++s)
-        body += fmt::format("<section>\n{}{}</section>\n", plots.element(each[s]),
-                            entrants_of(bench.scenes[s]).html());
+        PlotGallery::symbols() + page.plots.element(hard_plot(bench), "Processor time at equal error");
+    for (const HardComparison& scene : bench.scenes)
+        body += fmt::format("<section>\n{}{}</section>\n",
+                            page.plots.element(precision_plot(scene, engines_of(bench)), scene.scene.name),
+                            entrants_of(scene).html());
     for (const std::string& note : bench.notes) body += fmt::format("<p>{}</p>\n", html(note));
-    return report_page(kTitle, body);
+    page.text = report_page(kTitle, body);
+    return page;
+}
+
+}  // namespace
+
+Figures figures_of(const HardBench& bench) {
+    return {text_of(bench),
+            json_of(bench),
+            {{"hard.csv", runs_of(bench).csv()}},
+            {{"hard.svg", hard_plot(bench)}},
+            {{"hard.html", page_of(bench)}}};
 }
 
 }  // namespace app

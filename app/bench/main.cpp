@@ -7,8 +7,6 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
-#include <functional>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -22,8 +20,8 @@
 #include "bench/bench_tradeoff.h"
 #include "bench/bench_workers.h"
 #include "command_line.h"
+#include "commands/bench_options.h"
 #include "commands/command.h"
-#include "commands/worker_options.h"
 #include "files/bad_input.h"
 #include "files/output_folder.h"
 #include "process/child_process.h"
@@ -35,23 +33,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-struct BenchOptions {
-    std::string name, out;
-    SimBenchOptions sim;
-    WorkersBenchOptions workers;
-    HardBenchOptions hard;
-    bool json = false;
-};
-
-/// A benchmark's figures as text and as one JSON document, and what else goes into its folder, by file name.
-struct Figures {
-    std::string text, json;
-    std::map<std::string, std::string> tables = {};
-    std::map<std::string, PlotScript> plots = {};
-    /// A page with plots of its own, by file name; drawn in an existing folder.
-    std::map<std::string, std::function<std::string(const fs::path& scratch)>> pages = {};
-};
 
 struct Bench {
     std::string name;
@@ -81,37 +62,19 @@ SimBenchOptions::Scene balls_of(const std::string& name) {
 }
 
 Figures bench_the_simulation(const std::string&, const BenchOptions& options) {
-    const BenchReport report = bench_sim(options.sim, say);
-    return {format_text(report), format_json(report)};
+    return figures_of(bench_sim(options.sim, say));
 }
 
 Figures bench_the_tradeoff(const std::string&, const BenchOptions&) {
-    const Tradeoff measured = measure_tradeoff(all_tradeoff_settings(), kConverged, kFiner, say);
-    return {format_text(measured),
-            format_json(measured),
-            {{"tradeoff.csv", format_csv(measured)}},
-            {{"tradeoff.svg", {900, 560, plot_commands(measured)}}}};
+    return figures_of(measure_tradeoff(all_tradeoff_settings(), kConverged, kFiner, say));
 }
 
 Figures bench_the_hard_scenes(const std::string&, const BenchOptions& options) {
-    const HardBench measured = bench_hard(options.hard, say);
-    return {format_text(measured),
-            format_json(measured),
-            {{"hard.csv", format_csv(measured)}},
-            {{"hard.svg", hard_plot(measured)}},
-            {{"hard.html", [measured](const fs::path& scratch) { return format_page(measured, scratch); }}}};
+    return figures_of(bench_hard(options.hard, say));
 }
 
 Figures bench_the_workers(const std::string&, const BenchOptions& options) {
-    const WorkersBench measured = bench_workers(options.workers, say);
-    Figures figures{format_text(measured), format_json(measured.report)};
-    if (!measured.speed_ups.empty()) figures.tables["speed_up.csv"] = speed_up_csv(measured.speed_ups);
-    for (const SpeedUp& s : measured.speed_ups)
-        figures.plots[fmt::format("speed_up/bodies{}.svg", s.bodies)] = speed_up_plot(s);
-    if (!measured.bounds.empty()) figures.tables["bound.csv"] = bound_csv(measured.bounds);
-    if (!measured.migration.workers().empty())
-        figures.plots["migration.svg"] = workers_plot(measured.migration);
-    return figures;
+    return figures_of(bench_workers(options.workers, say));
 }
 
 /// What a program writes to its standard output, to its end.
@@ -147,7 +110,7 @@ Figures run_bench_program(const std::string& bench, const BenchOptions&) {
             fmt::format("error: a benchmark's output is not understood: {}", wrong.what()));
     }
     report.notes.push_back(name + ": processor time.");
-    return {format_text(report), format_json(report)};
+    return figures_of(report);
 }
 
 const std::vector<Bench> kBenches = {
@@ -173,7 +136,7 @@ Figures run_bench(const Bench& bench, const BenchOptions& options, const std::st
     }
     for (const auto& [name, page] : figures.pages) {
         fs::create_directories(folder->scratch());
-        write_file(folder->path(name), page(folder->scratch()));
+        write_file(folder->path(name), page.plots.drawn(page.text, folder->scratch()));
     }
     folder->finish();
     return figures;
@@ -201,56 +164,12 @@ Figures bench_all(const BenchOptions& o) {
     return all;
 }
 
-void add_bench_options(Command& program) {
-    auto o = std::make_shared<BenchOptions>();
-    o->workers.program = program_beside("musicworld").string();
-    std::vector<std::string> names;
-    for (const Bench& bench : kBenches) names.push_back(bench.name);
-    names.emplace_back("all");
-    program.required("NAME", o->name, as::choice(names), "What is measured: " + one_of(names));
-    using Counts = std::vector<std::int64_t>;
-    const auto counts = as::list_of(as::whole(1, 100000));
-    program.option<Counts>(
-        "--bodies", counts, "sim, workers: how many, in turn",
-        [o](const Counts& bodies) {
-            o->sim.bodies.assign(bodies.begin(), bodies.end());
-            o->workers.bodies = o->sim.bodies;
-        },
-        "25,100,400,1600 of sim, 25,400 of workers");
-    program.option<Counts>(
-        "--workers", counts, "workers: how many, in turn",
-        [o](const Counts& workers) { o->workers.workers.assign(workers.begin(), workers.end()); },
-        "1,2,3,5,10");
-    program.option("--steps", o->workers.steps, as::whole(1, 1000000), "workers: of each run");
-    program.option("--bound", o->workers.bound, as::whole(1, 64, "steps"),
-                   "workers: how far one may be ahead");
-    program.option("--processors", o->workers.processors, as::processors(),
-                   "workers: simulated[:latency=S,slowdown=X,cost=measured|modelled]");
-    program.option<std::vector<std::string>>(
-        "--only", as::list_of(as::choice(workers_bench_parts())), "workers: some parts",
-        [o](const std::vector<std::string>& parts) {
-            o->workers.only = {parts.begin(), parts.end()};
-        },
-        "all");
-    std::vector<std::string> scenes;
-    for (const HardScene& scene : hard_scenes()) scenes.push_back(scene.name);
-    program.option("--scenes", o->hard.scenes, as::list_of(as::choice(scenes)), "hard: some scenes");
-    program.option("--halvings", o->hard.halvings, as::whole(0, 10),
-                   "hard: of the step, at most, for peers to be as near as we are");
-    program.option("--rounds", o->sim.rounds, as::whole(0, 1000),
-                   "sim: how often each; 0: five, three for 100, one for more");
-    program.option<std::string>("--scene", as::text("SCENE"),
-                                "sim: balls of a scene, e.g. benchmark25, instead of the piles",
-                                [o](const std::string& name) { o->sim.scene = balls_of(name); });
-    program.flag("--json", o->json, "Print one JSON document");
-    program.option("--out", o->out, as::text("DIR"),
-                   "Folder for bench.json and plots; of tradeoff for tradeoff.svg, .csv and .json; of all a "
-                   "folder for each");
-    program.runs([o] {
-        const auto bench = std::ranges::find(kBenches, o->name, &Bench::name);
-        const Figures figures = bench == kBenches.end() ? bench_all(*o) : run_bench(*bench, *o, o->out);
-        fmt::print("{}", o->json ? figures.json : figures.text);
-    });
+void run_benches(BenchOptions& o) {
+    o.workers.program = program_beside("musicworld").string();
+    if (!o.scene.empty()) o.sim.scene = balls_of(o.scene);
+    const auto bench = std::ranges::find(kBenches, o.name, &Bench::name);
+    const Figures figures = bench == kBenches.end() ? bench_all(o) : run_bench(*bench, o, o.out);
+    fmt::print("{}", o.json ? figures.json : figures.text);
 }
 
 }  // namespace
@@ -259,6 +178,8 @@ void add_bench_options(Command& program) {
 int main(int argc, char** argv) {
     CLI::App program("Measure speed beside peers, and speed against error", "musicworld bench");
     app::Command command(program);
-    app::add_bench_options(command);
+    app::BenchOptions options;
+    app::add_bench_options(command, options);
+    command.runs([&] { app::run_benches(options); });
     return app::run_commands(program, argc, argv);
 }

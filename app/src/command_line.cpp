@@ -14,11 +14,9 @@
 
 #include "commands/command.h"
 #include "commands/commands.h"
-#include "commands/latency_command.h"
 #include "commands/manual.h"
 #include "commands/play_command.h"
 #include "files/bad_input.h"
-#include "files/one_line.h"
 
 namespace app {
 namespace {

@@ -125,16 +125,18 @@ TEST(HardWatch, BodiesThatAreNotFiniteAreLostAndThoseTooFastAreThrown) {
 }
 
 TEST(HardScenes, EachHasAFileWhoseHeadSaysWhatIsRightAndEachFileIsOne) {
-    std::set<std::string> named;
+    std::vector<std::string> listed;
     for (const HardScene& scene : app::hard_scenes()) {
-        named.insert(scene.name);
+        listed.push_back(scene.name);
         std::ifstream file(app::find_bundled("hard/" + scene.name, "scenes"));
         std::string head, line;
         while (std::getline(file, line) && line.starts_with("#")) head += line;
         EXPECT_NE(head.find("# Right: "), std::string::npos) << scene.name;
     }
     const std::vector<std::string> files = app::bundled_names("scenes/hard");
-    EXPECT_EQ(named, std::set<std::string>(files.begin(), files.end()));
+    EXPECT_EQ(listed, app::kHardSceneNames);
+    EXPECT_EQ(std::set<std::string>(listed.begin(), listed.end()),
+              std::set<std::string>(files.begin(), files.end()));
 }
 
 TEST(HardScenes, PeersBeginWhereTheSceneDoes) {
@@ -181,7 +183,7 @@ TEST(HardComparison, TheBestOfAPeerIsItsCheapestRunThatIsRightAndErrsNoMoreThanO
     c.entrants[0].runs[0].figures.right = false;  // then what is right will do
     EXPECT_EQ(c.best_of("theirs")->ms_per_s, 2);
     EXPECT_EQ(c.best_of("ours"), nullptr);
-    const Json json = Json::parse(app::format_json({{c}, {}}));
+    const Json json = Json::parse(app::figures_of(app::HardBench{{c}, {}}).json);
     for (const Json& result : json["results"])
         for (const char* key : {"name", "value", "unit", "peer", "peer_version", "ratio"})
             EXPECT_TRUE(result.contains(key)) << key;
@@ -195,9 +197,13 @@ TEST(HardComparison, WhereNothingIsRightThereIsAPageAndAPlotAllTheSame) {
     c.scene = {"a scene", Right::rests, 0.1};
     c.entrants = {{{run_of("ours", std::numeric_limits<double>::infinity(), 1, false)}}};
     const TemporaryFolder scratch;
-    EXPECT_NE(app::draw_svg({app::hard_plot({{c}, {}})}, scratch.path()).front().find("a scene"),
+    const app::Figures figures = app::figures_of(app::HardBench{{c}, {}});
+    EXPECT_NE(app::draw_svg({figures.plots.at("hard.svg")}, scratch.path()).front().find("a scene"),
               std::string::npos);
-    EXPECT_NE(app::format_page({{c}, {}}, scratch.path()).find("<table"), std::string::npos);
+    const app::BenchPage& page = figures.pages.at("hard.html");
+    const std::string drawn = page.plots.drawn(page.text, scratch.path());
+    EXPECT_NE(drawn.find("<table"), std::string::npos);
+    EXPECT_NE(drawn.find("<svg"), std::string::npos);
 }
 
 TEST(BenchHard, TwoShortScenesRunBesideThePeersThatAreThere) {
@@ -217,10 +223,11 @@ TEST(BenchHard, TwoShortScenesRunBesideThePeersThatAreThere) {
                 EXPECT_TRUE(!missed || run.figures.right) << run.engine << ' ' << run.figures.error;
             }
     EXPECT_EQ(engines.size(), 1 + sim_bench::rigid_peers().size());
-    const std::string text = app::format_text(bench), csv = app::format_csv(bench);
-    for (const std::string& engine : engines) EXPECT_NE(text.find(engine), std::string::npos);
+    const app::Figures figures = app::figures_of(bench);
+    const std::string& csv = figures.tables.at("hard.csv");
+    for (const std::string& engine : engines) EXPECT_NE(figures.text.find(engine), std::string::npos);
     EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')),
-              1 + Json::parse(app::format_json(bench))["runs"].size());
+              1 + Json::parse(figures.json)["runs"].size());
 }
 
 }  // namespace

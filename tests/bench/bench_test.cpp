@@ -21,14 +21,14 @@ TEST(Bench, JsonHasTheContractsKeysAndNullWhereThereIsNoPeer) {
     report.results = {
         {"ours_alone", 1.5, "ms a step"},
         {"bodies25_modal12_vs_bullet_rigid", 2, "ms a step", "btRigidBody", "Bullet 3.24", 4.0, 0.5}};
-    const Json json = Json::parse(app::format_json(report));
+    const Json json = Json::parse(app::figures_of(report).json);
     EXPECT_EQ(json["machine"]["cores"], 2);
     ASSERT_EQ(json["results"].size(), 2u);
     for (const char* key : {"name", "value", "unit", "peer", "peer_version", "ratio"})
         for (const Json& result : json["results"]) EXPECT_TRUE(result.contains(key)) << key;
     EXPECT_TRUE(json["results"][0]["ratio"].is_null());
     EXPECT_EQ(json["results"][1]["ratio"], 0.5);
-    const std::string text = app::format_text(report);
+    const std::string text = app::figures_of(report).text;
     for (const char* cell : {"btRigidBody", "Bullet 3.24", "  0.500\n"})
         EXPECT_NE(text.find(cell), std::string::npos) << cell;
 }
@@ -92,10 +92,11 @@ TEST(Bench, TheConvergedRunHasNoErrorAgainstItselfAndARigidBodyHasSome) {
     EXPECT_GT(made.points[0].error, 0.005);
     EXPECT_LT(made.points[0].error, 0.5);
     EXPECT_GT(made.automatic.ms_per_s, 0);
-    const Json json = Json::parse(app::format_json(made));
+    const app::Figures figures = app::figures_of(made);
+    const Json json = Json::parse(figures.json);
     EXPECT_EQ(json["results"].size(), 2u);
     EXPECT_EQ(json["results"][0]["modes"], 0);
-    const std::string csv = app::format_csv(made);
+    const std::string& csv = figures.tables.at("tradeoff.csv");
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
 }
 

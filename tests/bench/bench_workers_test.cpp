@@ -6,7 +6,6 @@
 #include <map>
 #include <set>
 
-#include "bench/measured_run.h"
 #include "scene/scene.h"
 
 namespace app {
@@ -80,7 +79,7 @@ TEST(BenchWorkers, TwentyFiveBallsOnTwoProcessorsGiveEveryFigureOfEveryPart) {
     EXPECT_EQ(figures.at("bound0_apart_after_a_second"), 0);
     EXPECT_EQ(bench.bounds.size(), 7u);
     EXPECT_EQ(bench.migration.workers().size(), 3u);
-    const std::string csv = speed_up_csv(bench.speed_ups);
+    const std::string csv = figures_of(bench).tables.at("speed_up.csv");
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
 }
 

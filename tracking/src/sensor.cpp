@@ -225,4 +225,12 @@ std::vector<PoseSample> sense(const StickTrace& stick, const SensorModel& sensor
     return Sensing(stick, sensor, stick_index).all();
 }
 
+std::vector<PoseSample> sense(const Trace& trace, std::size_t index, const SensorModel& sensor) {
+    try {
+        return sense(trace.sticks[index], sensor, index);
+    } catch (const std::invalid_argument& wrong) {
+        throw TraceError(trace.file + ": error: " + wrong.what());
+    }
+}
+
 }  // namespace tracking

@@ -9,7 +9,6 @@
 #include "commands/commands.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/one_line.h"
 #include "files/output_folder.h"
 #include "kit/kit.h"
 #include "pictures/kit_stage.h"
@@ -112,51 +111,12 @@ void fit(const FitOptions& o) {
         fmt::print("{} {}: {}\n", o.kind, i + 1, describe(fitted.instruments[i]));
 }
 
-/// A small kit to start from.
-constexpr std::string_view kNewKit =
-    R"(# A MusicWorld kit. Units: m, s, Hz; y is up, the player at the origin looks along -z.
-# Every key is listed by `musicworld schema kit`; what is not said here comes from defaults.toml among the bundled kits.
-
-name = "{}"
-description = "a drum, a cymbal and a bell"
-
-[camera]
-eye = [0.0, 1.6, 0.5]
-target = [0.0, 0.8, -0.5]
-
-[[instrument]]
-name = "drum"
-kind = "drum"                      # drum, cymbal, bell or string
-size = [0.36, 0.16, 0.36]          # full extents along the body's x, y, z; y is the axis of a drum
-position = [-0.15, 0.68, -0.45]    # of its middle: the head is half a height above
-tilt_deg = [6, 0, 0]               # about x, y, z: 6 degrees towards the player
-midi_note = 38
-sound = {{ frequency_hz = 190, decay_s = 0.5, snare = 0.5 }}   # parameters of the orchestra's instrument
-
-[[instrument]]
-name = "cymbal"
-kind = "cymbal"
-size = [0.44, 0.024, 0.44]
-position = [0.35, 0.95, -0.60]
-tilt_deg = [10, 0, 4]
-midi_note = 51
-sound = {{ frequency_hz = 300, decay_s = 3 }}
-
-[[instrument]]
-name = "bell"
-kind = "bell"
-size = [0.16, 0.18, 0.16]
-position = [-0.5, 0.95, -0.6]
-midi_note = 72
-sound = {{ frequency_hz = 523.25 }}
-)";
-
 void make_new(const std::string& name, const std::string& out) {
-    if (name.find_first_of("\"\\") != std::string::npos || std::any_of(name.begin(), name.end(), [](char c) {
-            return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-        }))
+    if (name.find_first_of("\"\\") != std::string::npos || std::ranges::any_of(name, is_control))
         refuse_options("a kit's name with quotes, backslashes or control characters", "plain text");
-    write_finished_file(out, fmt::format(kNewKit, name));
+    constexpr std::string_view kName = "NAME";
+    std::string kit = read_file(assets_folder() / "templates" / "kit.toml");
+    write_finished_file(out, kit.replace(kit.find(kName), kName.size(), name));
 }
 
 void add_fit(Command& kit) {

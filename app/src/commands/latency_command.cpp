@@ -1,5 +1,3 @@
-#include "commands/latency_command.h"
-
 #include <fmt/format.h>
 
 #include <array>
@@ -7,7 +5,7 @@
 #include <memory>
 
 #include "commands/play_command.h"
-#include "files/one_line.h"
+#include "files/bad_input.h"
 #include "files/output_folder.h"
 #include "latency/latency_comparison.h"
 #include "latency/latency_report.h"

@@ -113,7 +113,7 @@ std::string format_mode_table(const ModeReport& report) {
     for (int i = 0; i < report.modes.basis.count(); ++i) {
         const double eigenvalue = report.modes.eigenvalues[6 + i], error = report.errors[i];
         text += fmt::format("{:>4}  {:>14.6g}  {:>20.10g}  {:<11}  {:>10}\n", i + 1, frequency_hz(eigenvalue),
-                            eigenvalue, mode_kind(report.modes.parity[std::size_t(6 + i)], false),
+                            eigenvalue, mode_kind(report.modes.parity[6 + std::size_t(i)], false),
                             std::isfinite(error) ? fmt::format("{:.2g} %", 100 * error) : "unknown");
     }
     return text + ending(report);

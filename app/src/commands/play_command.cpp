@@ -3,11 +3,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <memory>
 
 #include "files/assets.h"
-#include "files/one_line.h"
+#include "files/bad_input.h"
 #include "files/output_folder.h"
 #include "kit/kit.h"
 #include "play/play.h"

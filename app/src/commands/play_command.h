@@ -1,4 +1,6 @@
 #pragma once
+#include <functional>
+
 #include "commands/command.h"
 #include "realtime/play_realtime.h"
 
@@ -15,5 +17,11 @@ std::vector<CLI::Option*> add_realtime_options(Command& command, RealtimeOptions
 
 /// Plays in real time into the folder of the options, warnings on standard error.
 RealtimeOutcome play_realtime_and_warn(const RealtimeOptions& options);
+
+/// Plays in real time into the folder of the options.
+using RunInTime = std::function<RealtimeOutcome(const RealtimeOptions&)>;
+
+/// Adds `latency` to the program: `run`, and what it measured.
+void add_latency_command(Command& program, const RunInTime& run = play_realtime_and_warn);
 
 }  // namespace app

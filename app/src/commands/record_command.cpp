@@ -4,7 +4,7 @@
 
 #include "commands/command.h"
 #include "commands/commands.h"
-#include "files/one_line.h"
+#include "files/bad_input.h"
 #include "process/clock.h"
 #include "sensors/record.h"
 
@@ -21,9 +21,10 @@ void print(const RecordResult& result, const std::string& out) {
                    counted(stick.gaps, "gap"),
                    stick.gaps == 0 ? "" : fmt::format(", the longest {:.3f} s", stick.longest_gap_s));
     for (const std::string& name : result.alone) fmt::print("{}: {}: one sample, left out\n", out, name);
+    const ClockEstimate& clock = result.clock.estimate;
     fmt::print("{}: times: {}; offset {:.6f} s, drift {:.1f} ppm, delay p95 {:.2f} ms, {}\n", out,
-               result.clock, result.estimate.offset_s, result.estimate.drift_ppm,
-               result.estimate.delay_p95_s * 1e3, counted(result.estimate.jumps, "jump"));
+               name_of(result.clock.clock), clock.offset_s, clock.drift_ppm, clock.delay_p95_s * 1e3,
+               counted(clock.jumps, "jump"));
     if (result.late > 0)
         fmt::print("{}: {} late or repeated, left out\n", out, counted(result.late, "sample"));
     if (result.faults.foreign > 0)

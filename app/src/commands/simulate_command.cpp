@@ -6,7 +6,7 @@
 #include "commands/command.h"
 #include "commands/commands.h"
 #include "commands/worker_options.h"
-#include "files/one_line.h"
+#include "files/bad_input.h"
 #include "scene/scene.h"
 #include "simulate/simulate.h"
 
@@ -14,16 +14,15 @@ namespace app {
 namespace {
 
 void print_workers(const SimulateResult& r) {
-    const sim::DistributedResult& w = *r.workers;
-    const WorkerOptions& o = r.worker_options;
+    const WorkerOptions& o = *r.worker_options;
     fmt::print("{}, {}, {}: {:.1f} bytes per body and step, {} between workers, {} traded\n",
-               counted(w.workers, o.simulated ? "simulated processor" : "worker"), mode_name(o.pace),
+               counted(r.workers, o.simulated ? "simulated processor" : "worker"), mode_name(o.pace),
                o.pace == sim::Pace::bounded ? fmt::format("bound {}", o.bound) : "lockstep",
-               r.body_steps > 0 ? double(w.bytes) / double(r.body_steps) : 0.0,
-               counted(w.cross_contacts, "contact"), counted(w.migrations, "body"));
-    if (w.lost + w.left > 0)
-        fmt::print("{} lost, {} left; {} went to others\n", counted(w.lost, "worker"), w.left,
-                   counted(w.bodies_reowned, "body"));
+               r.body_steps > 0 ? double(r.bytes) / double(r.body_steps) : 0.0,
+               counted(r.cross_contacts, "contact"), counted(r.migrations, "body"));
+    if (r.lost + r.left > 0)
+        fmt::print("{} lost, {} left; {} went to others\n", counted(r.lost, "worker"), r.left,
+                   counted(r.bodies_reowned, "body"));
 }
 
 void print(const SimulateResult& r, const SimulateOptions& options) {
@@ -32,16 +31,16 @@ void print(const SimulateResult& r, const SimulateOptions& options) {
         r.name, counted(r.bodies, "body"), r.rigid, r.linear, r.modal, counted(r.steps, "step"), r.dt_s,
         r.elapsed_s, r.body_steps > 0 ? 1e6 * r.elapsed_s / double(r.body_steps) : 0.0);
     fmt::print("energy {:.6g} J at first, {:.6g} J at last; ", r.energy_start.total(), r.energy.total());
-    if (!r.workers) fmt::print("{} asleep; ", r.counts.asleep);
+    if (!r.worker_options) fmt::print("{} asleep; ", r.counts.asleep);
     fmt::print("state {:016x}\n", r.state_hash);
-    if (r.workers) print_workers(r);
+    if (r.worker_options) print_workers(r);
     for (const std::string& line : r.mishaps.lines()) fmt::print("{}\n", line);
     if (options.out && r.frames > 0) fmt::print("See {}\n", (*options.out / "frames").string());
 }
 
 void simulate_and_print(const SimulateOptions& options, bool json, bool allow_quarantine) {
     const SimulateResult result = simulate(options);
-    for (const std::string& note : result.workers ? std::vector<std::string>{} : result.notes)
+    for (const std::string& note : result.worker_options ? std::vector<std::string>{} : result.notes)
         fmt::print(stderr, "{}: note: {}\n", result.scene.string(), note);
     if (json)
         fmt::print("{}", format_simulate(result));
@@ -53,9 +52,10 @@ void simulate_and_print(const SimulateOptions& options, bool json, bool allow_qu
             "or take it as it is (--allow-quarantine)",
             result.scene.string(), counted(taken_out, "body")));
     if (!options.until_rest || result.rest_reached) return;
-    const std::string awake = result.workers ? "bodies"
-                                             : fmt::format("{} of {}", result.bodies - result.counts.asleep,
-                                                           counted(result.bodies, "body"));
+    const std::string awake =
+        result.worker_options
+            ? "bodies"
+            : fmt::format("{} of {}", result.bodies - result.counts.asleep, counted(result.bodies, "body"));
     throw std::runtime_error(fmt::format(
         "{}: error: found {} awake after {} (or events to come), expected rest; allow more --steps, or "
         "damp what swings and spins (damping_alpha)",

@@ -7,7 +7,7 @@
 #include "commands/command.h"
 #include "commands/commands.h"
 #include "files/assets.h"
-#include "files/one_line.h"
+#include "files/bad_input.h"
 #include "files/output_folder.h"
 #include "kit/drum_score.h"
 #include "kit/kit.h"

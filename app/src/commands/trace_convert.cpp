@@ -12,7 +12,6 @@
 #include "commands/sensor_model_options.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/one_line.h"
 #include "files/output_folder.h"
 #include "traces/map_file.h"
 #include "traces/sensor_model.h"

@@ -7,7 +7,6 @@
 #include <iterator>
 #include <map>
 #include <memory>
-#include <span>
 #include <tuple>
 
 #include "compare/entrants.h"
@@ -154,7 +153,7 @@ HitScore hits_of(const Entrant& entrant, const Field& field, const SensedStick& 
     std::unique_ptr<tracking::Predictor> confirming;
     if (!entrant.confirmed_by.empty())
         confirming = make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), stick.name);
-    return evaluate_strikes(recording.trace.sticks[stick.stick], stick.samples, {*timing, confirming.get()},
+    return evaluate_strikes(recording.tracks[stick.stick], stick.samples, {*timing, confirming.get()},
                             recording.geometry, options.surface, when);
 }
 
@@ -229,7 +228,7 @@ double nanoseconds_per_sample(const std::string& specification, const SensedStic
         const auto predictor = make_any_predictor(specification, stick.leads_s);
         const auto start = std::chrono::steady_clock::now();
         for (const tracking::PoseSample& sample : timed) {
-            const double behind_s = feed(*predictor, sample);
+            const double behind_s = tracking::feed(*predictor, sample);
             for (const double lead_s : stick.leads_s)
                 keep(predictor->predict(lead_s + behind_s).position.x());
         }
@@ -319,7 +318,8 @@ FigurePath path_of(const Entrant& entrant, const SensedStick& stick, std::size_t
     FigurePath path{entrant.name, entrant.used[stick.recording][lead], stick.leads_s[lead], {}};
     const auto predictor = make_entrant(entrant, stick, lead, stick.leads_s);
     for (const tracking::PoseSample& sample : stick.samples) {
-        const double behind_s = feed(*predictor, sample), t_s = predictor->time_s() + behind_s + path.lead_s;
+        const double behind_s = tracking::feed(*predictor, sample),
+                     t_s = predictor->time_s() + behind_s + path.lead_s;
         if (t_s >= figure.from_s && t_s <= figure.to_s)
             path.height_m.emplace_back(t_s, predictor->predict(path.lead_s + behind_s).position.y());
     }

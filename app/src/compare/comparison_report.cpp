@@ -6,7 +6,6 @@
 #include <functional>
 #include <iterator>
 #include <map>
-#include <ranges>
 #include <set>
 #include <tuple>
 #include <vector>
@@ -74,9 +73,11 @@ std::size_t family_number(const Comparison& comparison, const std::string& famil
 /// 1, 2 and 5 times the powers of ten within a range.
 std::string logarithmic_tics(double low, double high) {
     std::string tics;
-    for (double decade = std::pow(10, std::floor(std::log10(low))); decade <= high; decade *= 10)
-        for (const double tic : {1 * decade, 2 * decade, 5 * decade})
-            if (tic >= low && tic <= high) tics += fmt::format("{}{}", tics.empty() ? "" : ",", tic);
+    for (int exponent = static_cast<int>(std::floor(std::log10(low))); std::pow(10, exponent) <= high;
+         ++exponent)
+        for (const int digit : {1, 2, 5})
+            if (const double tic = digit * std::pow(10, exponent); tic >= low && tic <= high)
+                tics += fmt::format("{}{}", tics.empty() ? "" : ",", tic);
     return "set xtics (" + tics + ")\nset mxtics 1\n";
 }
 
@@ -158,7 +159,8 @@ PlotScript timing_plot(const ComparisonSummary& summary) {
 }
 
 std::string heading(const Comparison& c) {
-    const auto leads_ms = c.options.leads_s | std::views::transform([](double s) { return 1e3 * s; });
+    std::vector<double> leads_ms;
+    for (const double lead_s : c.options.leads_s) leads_ms.push_back(1e3 * lead_s);
     const std::string sensor = describe(c.options.sensor);
     std::string text =
         report_header(kTitle, "by MusicWorld",
@@ -193,33 +195,6 @@ std::vector<const ComparisonSummary*> shown_strikes(const Comparison& comparison
                 shown.push_back(&s);
     }
     return shown;
-}
-
-struct Placed {
-    std::size_t height = 0, curves = 0;
-    std::vector<std::size_t> zoomed, costs, timings;
-};
-
-Placed declare(PlotGallery& plots, const Comparison& comparison) {
-    Placed placed;
-    const StickFigure& figure = comparison.figure;
-    placed.height = plots.add(height_plot(figure), "Figure 3-1: height as recorded and as predicted");
-    std::vector<std::string> names;
-    for (const FigurePath& path : figure.paths)
-        if (std::ranges::find(names, path.predictor) == names.end()) names.push_back(path.predictor);
-    for (const std::string& name : names)
-        placed.zoomed.push_back(plots.add(
-            zoomed_plot(figure, name), fmt::format("Figure {}: {}", name == "naive" ? "3-3" : "3-2", name)));
-    placed.curves = plots.add(curves_plot(comparison), "RMS error against lead");
-    if (std::ranges::any_of(comparison.summaries, [](const auto& s) { return s.ns_per_sample > 0; }))
-        for (const double lead_s : comparison.options.leads_s)
-            placed.costs.push_back(
-                plots.add(cost_plot(comparison, lead_s), fmt::format("{:.1f} ms ahead", 1e3 * lead_s)));
-    for (const ComparisonSummary* s : shown_strikes(comparison))
-        placed.timings.push_back(plots.add(
-            timing_plot(*s), fmt::format("{}, {:.1f} ms ahead: {} of {} true strikes matched", s->predictor,
-                                         1e3 * s->lead_s, s->hits->matched, s->hits->true_contacts)));
-    return placed;
 }
 
 std::string section(std::string_view title, std::string_view note, const std::string& content) {
@@ -288,15 +263,23 @@ std::string map_section(const Comparison& c) {
            "</details>\n";
 }
 
-std::string sections(const Comparison& c, const PlotGallery& plots, const Placed& placed) {
+std::string sections(const Comparison& c, PlotGallery& plots) {
+    std::vector<std::string> names;
+    for (const FigurePath& path : c.figure.paths)
+        if (std::ranges::find(names, path.predictor) == names.end()) names.push_back(path.predictor);
+    std::string zoomed;
+    for (const std::string& name : names)
+        zoomed += plots.element(zoomed_plot(c.figure, name),
+                                fmt::format("Figure {}: {}", name == "naive" ? "3-3" : "3-2", name));
     std::string text = section(
         "A stick and its predictions",
         fmt::format("{}, stick {}. Each predicted point stands at the time that it was predicted for.",
                     html(c.figure.trace), html(c.figure.stick)),
-        plots.element(placed.height) + plots.pair(placed.zoomed));
+        plots.element(height_plot(c.figure), "Figure 3-1: height as recorded and as predicted") +
+            plots.pair(zoomed));
     text += section("Error against lead",
                     "All recordings together. Tuned parameters are those of the nearest lead asked for.",
-                    plots.element(placed.curves));
+                    plots.element(curves_plot(c), "RMS error against lead"));
     text += section("Errors",
                     "Of the tracked point but where tip is said; free of impacts: truth not within 50 ms of "
                     "impacts or flagged times.",
@@ -305,14 +288,23 @@ std::string sections(const Comparison& c, const PlotGallery& plots, const Placed
                     "Ratio of the RMS errors, below 1 is better; where the interval includes 1 there is no "
                     "measurable gain.",
                     by_lead(c, paired_table));
-    if (!placed.costs.empty())
+    if (std::ranges::any_of(c.summaries, [](const auto& s) { return s.ns_per_sample > 0; })) {
+        std::string costs;
+        for (const double lead_s : c.options.leads_s)
+            costs += plots.element(cost_plot(c, lead_s), fmt::format("{:.1f} ms ahead", 1e3 * lead_s));
         text +=
             section("Speed against error",
                     "Update and predictions at all leads, one core; the figure that differs between runs. "
                     "Open points: as named; filled: tuned. Families whose legend is dashed are squares.",
-                    plots.pair(placed.costs));
+                    plots.pair(costs));
+    }
+    std::string timings;
+    for (const ComparisonSummary* s : shown_strikes(c))
+        timings += plots.element(
+            timing_plot(*s), fmt::format("{}, {:.1f} ms ahead: {} of {} true strikes matched", s->predictor,
+                                         1e3 * s->lead_s, s->hits->matched, s->hits->true_contacts));
     text += section("Strikes", strike_note(c),
-                    by_lead(c, strike_table) + (placed.timings.empty() ? "" : plots.pair(placed.timings)));
+                    by_lead(c, strike_table) + (timings.empty() ? "" : plots.pair(timings)));
     text += section("Calibration",
                     "Share of position errors inside the regions that a predictor states, and the mean "
                     "negative log likelihood (nats, metres).",
@@ -337,9 +329,8 @@ std::string map_grids(const Comparison& comparison) {
 
 std::string format_comparison_report(const Comparison& comparison, const std::filesystem::path& scratch) {
     PlotGallery plots;
-    const Placed placed = declare(plots, comparison);
-    plots.draw(scratch);
-    return report_page(kTitle, heading(comparison) + plots.symbols() + sections(comparison, plots, placed));
+    const std::string body = heading(comparison) + plots.symbols() + sections(comparison, plots);
+    return report_page(kTitle, plots.drawn(body, scratch));
 }
 
 }  // namespace app

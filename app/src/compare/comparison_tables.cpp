@@ -6,11 +6,9 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <ranges>
 #include <set>
 
-#include "compare/comparison.h"
-#include "files/one_line.h"
+#include "files/bad_input.h"
 
 namespace app {
 namespace {
@@ -114,18 +112,20 @@ Figures figures_of(const MapCell& cell) {
 }
 
 /// A row for each result.
-template <class Results>
-Table table_of(Results&& results) {
+template <class Result>
+Table table_of(const std::vector<Result>& results) {
     Table table;
-    for (const auto& result : results) table.add_figures(figures_of(result));
+    for (const Result& result : results) table.add_figures(figures_of(result));
     return table;
 }
 
 /// Those at a lead.
 template <class Result>
 Table table_at(const std::vector<Result>& results, double lead_s) {
-    const auto at_lead = [&](const Result& result) { return result.lead_s == lead_s; };
-    return table_of(results | std::views::filter(at_lead));
+    Table table;
+    for (const Result& result : results)
+        if (result.lead_s == lead_s) table.add_figures(figures_of(result));
+    return table;
 }
 
 Json summary_json(const Comparison& comparison) {

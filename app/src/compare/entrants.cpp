@@ -11,7 +11,6 @@
 
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/one_line.h"
 #include "process/parallel.h"
 #include "sticks/predictors.h"
 
@@ -57,7 +56,8 @@ std::vector<std::string> crossed(const std::vector<std::string>& specifications,
             if (word.ends_with('='))
                 name = word;
             else
-                all.push_back(word == "-" ? specification : specification + before + name + word);
+                all.push_back(word == "-" ? specification
+                                          : fmt::format("{}{}{}{}", specification, before, name, word));
         }
     }
     return all;

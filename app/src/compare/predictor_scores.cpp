@@ -9,12 +9,7 @@
 #include <limits>
 #include <memory>
 #include <numbers>
-#include <optional>
 
-#include "kit/kit.h"
-#include "statistics/statistics.h"
-#include "sticks/predictors.h"
-#include "sticks/stick.h"
 #include "strikes/strike_scheduler.h"
 #include "strikes/stroke_lows.h"
 #include "strikes/true_contacts.h"
@@ -208,7 +203,7 @@ void add(std::optional<Calibration>& sum, const std::optional<Calibration>& othe
 std::vector<LeadScore> score_predictor(const SensedStick& stick, tracking::Predictor& predictor) {
     std::vector<LeadScore> scores(stick.leads_s.size());
     for (std::size_t i = 0; i < stick.samples.size(); ++i) {
-        const double behind_s = feed(predictor, stick.samples[i]);
+        const double behind_s = tracking::feed(predictor, stick.samples[i]);
         for (std::size_t lead = 0; lead < scores.size(); ++lead)
             if (const std::optional<Truth>& truth = stick.truth(i, lead)) {
                 const double ahead_s = stick.leads_s[lead] + behind_s;
@@ -222,7 +217,7 @@ std::vector<LeadScore> score_predictor(const SensedStick& stick, tracking::Predi
 std::vector<SquareSum> score_positions(const SensedStick& stick, tracking::Predictor& predictor) {
     std::vector<SquareSum> sums(stick.leads_s.size());
     for (std::size_t i = 0; i < stick.samples.size(); ++i) {
-        const double behind_s = feed(predictor, {stick.samples[i].t_s, stick.samples[i].position});
+        const double behind_s = tracking::feed(predictor, {stick.samples[i].t_s, stick.samples[i].position});
         for (std::size_t lead = 0; lead < sums.size(); ++lead)
             if (const std::optional<Truth>& truth = stick.truth(i, lead))
                 sums[lead].add(
@@ -259,23 +254,22 @@ std::vector<double> strike_leads(const StrikeTiming& timing) {
     return path_leads(std::max(timing.lead_s, kReleaseMarginS) + kBeyondLeadS);
 }
 
-HitScore evaluate_strikes(const tracking::StickTrace& recorded, std::span<const tracking::PoseSample> samples,
+HitScore evaluate_strikes(const TipTrack& recorded, std::span<const tracking::PoseSample> samples,
                           const StrikePredictors& predictors, const StickGeometry& geometry,
                           const StrikeSurface& where, const StrikeTiming& timing) {
-    const TipTrack track = tip_track(recorded, geometry);
     HitScore hits;
-    hits.minutes = (track.t_s.back() - track.t_s.front()) / 60;
-    const std::optional<Surface> surface = surface_under(where, track, geometry.radius_m);
+    hits.minutes = (recorded.t_s.back() - recorded.t_s.front()) / 60;
+    const std::optional<Surface> surface = surface_under(where, recorded, geometry.radius_m);
     if (!surface) return hits;
     const tracking::Predictor& predictor = predictors.timing;
     tracking::Predictor* const other = predictors.confirming;
-    StrikeScheduler played(rules_at(timing, true, track.t_s.front()), 1, surface->parts);
-    StrikeScheduler uncancelled(rules_at(timing, false, track.t_s.front()), 1, surface->parts);
+    StrikeScheduler played(rules_at(timing, true, recorded.t_s.front()), 1, surface->parts);
+    StrikeScheduler uncancelled(rules_at(timing, false, recorded.t_s.front()), 1, surface->parts);
     for (const tracking::PoseSample& sample : samples) {
         const tracking::SampleStatus status = predictors.timing.correct(sample);
         if (other) (void)other->correct(sample);
         if (!is_taken(status)) {
-            require_working(predictor);
+            predictor.require_working();
             continue;
         }
         std::vector<Expected> all;
@@ -298,7 +292,7 @@ HitScore evaluate_strikes(const tracking::StickTrace& recorded, std::span<const 
             strikes->sample(0, sample.t_s, views, predictor.selected(), measured);
         }
     }
-    std::vector<TrueContact> contacts = surface->true_contacts(track);
+    std::vector<TrueContact> contacts = surface->true_contacts(recorded);
     played.finish();
     uncancelled.finish();
     const int without_cancel = score_of(uncancelled.strikes(), contacts).false_notes();

@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "compare/recording.h"
@@ -124,10 +123,10 @@ struct StrikeTiming {
 /// played. The true contacts are those of the recorded path, straight between samples, 3 mm deep. A pure
 /// function, but for `exec:` predictors with a state of their own.
 ///
-///   recorded    the stick as recorded, for the truth
+///   recorded    the tip's path as recorded, for the truth
 ///   samples     what the sensor reports, in order of arrival
 ///   predictors  made by the caller for this run; fed from their start
-[[nodiscard]] HitScore evaluate_strikes(const tracking::StickTrace& recorded,
+[[nodiscard]] HitScore evaluate_strikes(const TipTrack& recorded,
                                         std::span<const tracking::PoseSample> samples,
                                         const StrikePredictors& predictors, const StickGeometry& geometry,
                                         const StrikeSurface& surface, const StrikeTiming& timing);

@@ -12,10 +12,8 @@
 
 #include "files/bad_input.h"
 #include "files/option_values.h"
-#include "kit/kit.h"
 #include "statistics/statistics.h"
 #include "strikes/stroke_lows.h"
-#include "traces/sensor_model.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -103,9 +101,10 @@ std::optional<Truth> truth_at(const Recording& recording, std::size_t stick, dou
 }  // namespace
 
 Recording recording_of(tracking::Trace trace, std::string person) {
-    Recording recording{std::move(trace), std::move(person), {}, {}};
+    Recording recording{std::move(trace), std::move(person), {}, {}, {}};
     recording.geometry = stick_geometry(recording.trace, {}, {}, {});
-    for (const TipTrack& track : tip_tracks(recording.trace, recording.geometry)) {
+    recording.tracks = tip_tracks(recording.trace, recording.geometry);
+    for (const TipTrack& track : recording.tracks) {
         MarkedTimes& marks = recording.marks.emplace_back();
         for (const Low& low : find_lows(track)) marks.impacts_s.push_back(low.t_s);
     }
@@ -151,7 +150,7 @@ SensedStick sense_stick(const Recording& recording, std::size_t stick, const tra
     sensed.stick = stick;
     sensed.name = recorded.name;
     sensed.tip = recording.geometry.tip;
-    sensed.samples = seen_samples(recording.trace, stick, sensor);
+    sensed.samples = tracking::sense(recording.trace, stick, sensor);
     sensed.rate_hz = sensor.rate_hz > 0 ? sensor.rate_hz : median_rate(recorded.samples);
     sensed.leads_s.assign(leads_s.begin(), leads_s.end());
     sensed.truths.reserve(sensed.samples.size() * leads_s.size());

@@ -28,8 +28,9 @@ struct MarkedTimes {
 struct Recording {
     tracking::Trace trace;
     std::string person;
-    StickGeometry geometry;          ///< the trace's own tip and shaft
-    std::vector<MarkedTimes> marks;  ///< a stick each
+    StickGeometry geometry;        ///< the trace's own tip and shaft
+    std::vector<TipTrack> tracks;  ///< of its tip, a stick each, as the next
+    std::vector<MarkedTimes> marks;
 };
 
 /// (TEXT, NAME) pairs: the first TEXT that a path contains names its person.
@@ -78,7 +79,7 @@ struct SensedStick {
 inline constexpr double kSettlingS = 0.5;
 
 /// The samples are those that `musicworld predict` sees of the same file with the same sensor.
-/// Throws BadInput for more samples than can be.
+/// Throws tracking::TraceError for more samples than can be.
 [[nodiscard]] SensedStick sense_stick(const Recording& recording, std::size_t stick,
                                       const tracking::SensorModel& sensor, std::span<const double> leads_s);
 

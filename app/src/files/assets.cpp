@@ -6,7 +6,6 @@
 #include <cstdlib>
 
 #include "files/bad_input.h"
-#include "files/one_line.h"
 
 namespace app {
 namespace fs = std::filesystem;

@@ -6,11 +6,8 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstdio>
-#include <memory>
 #include <stdexcept>
 
-#include "files/bad_input.h"
 #include "files/file_descriptor.h"
 
 namespace app {
@@ -41,12 +38,7 @@ void probe_libm(std::uint64_t& hash) {
 }  // namespace
 
 std::string sha256_of_file(const std::filesystem::path& file) {
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> in(std::fopen(file.c_str(), "rbe"), &std::fclose);
-    std::string text;
-    std::array<char, 65536> block;
-    while (const std::size_t got = in ? std::fread(block.data(), 1, block.size(), in.get()) : 0)
-        text.append(block.data(), got);
-    if (!in || std::ferror(in.get()) != 0) throw BadInput("error: " + cannot("read " + file.string()));
+    const std::string text = read_file(file);
     std::array<std::uint8_t, 32> digest{};
     if (EVP_Digest(text.data(), text.size(), digest.data(), nullptr, EVP_sha256(), nullptr) != 1)
         throw std::runtime_error("error: found libcrypto without SHA-256, expected OpenSSL 3");

@@ -4,9 +4,14 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
+#include <memory>
 #include <stdexcept>
+
+#include "files/bad_input.h"
 
 namespace app {
 
@@ -29,6 +34,16 @@ Pipe make_pipe() {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error("error: " + cannot("make a pipe"));
     return {FileDescriptor(ends[0]), FileDescriptor(ends[1])};
+}
+
+std::string read_file(const std::filesystem::path& file) {
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> in(std::fopen(file.c_str(), "rbe"), &std::fclose);
+    std::string text;
+    std::array<char, 65536> block;
+    while (const std::size_t got = in ? std::fread(block.data(), 1, block.size(), in.get()) : 0)
+        text.append(block.data(), got);
+    if (!in || std::ferror(in.get()) != 0) throw BadInput("error: " + cannot("read " + file.string()));
+    return text;
 }
 
 std::string cannot(std::string_view action, int error) {

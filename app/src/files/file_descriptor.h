@@ -1,4 +1,5 @@
 #pragma once
+#include <filesystem>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -33,6 +34,9 @@ struct Pipe {
 };
 /// Throws std::runtime_error.
 [[nodiscard]] Pipe make_pipe();
+
+/// A file's bytes. Throws BadInput "error: cannot read FILE: REASON".
+[[nodiscard]] std::string read_file(const std::filesystem::path& file);
 
 /// "cannot ACTION: REASON" for what the operating system has refused; `error`: its number (errno's, as it is
 /// now, if it is 0).

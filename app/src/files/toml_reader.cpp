@@ -7,7 +7,6 @@
 #include <fstream>
 
 #include "files/bad_input.h"
-#include "files/one_line.h"
 #include "files/option_values.h"
 
 namespace app {
@@ -18,10 +17,6 @@ struct TomlFile::Document {
 };
 
 namespace {
-
-bool is_control(char c) {
-    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
-}
 
 /// A file's text for a one-line message: control characters as '?', long ones cut.
 std::string printable(std::string_view text) {
@@ -318,15 +313,13 @@ TomlFile::TomlFile(const char* kind, const fs::path& file) {
         throw BadInput(
             fmt::format("{}: error: found no readable file, expected {} (TOML)", file.string(), kind));
     const auto parse = [&] { return toml::parse(in, file.string()); };
-    document_ = std::make_unique<Document>(parsed(file.string(), parse));
+    document_ = std::make_shared<const Document>(Document{parsed(file.string(), parse)});
 }
 
 TomlFile::TomlFile(std::string_view text, const std::string& name)
-    : document_(std::make_unique<Document>(parsed(name, [&] { return toml::parse(text, name); }))) {}
-
-TomlFile::TomlFile(TomlFile&&) noexcept = default;
-TomlFile& TomlFile::operator=(TomlFile&&) noexcept = default;
-TomlFile::~TomlFile() = default;
+    : document_(
+          std::make_shared<const Document>(Document{parsed(name, [&] { return toml::parse(text, name); })})) {
+}
 
 void read_toml(const std::vector<TomlFile>& layers, const std::string& where,
                const std::function<void(Fields&)>& keys, bool all) {

@@ -16,15 +16,12 @@ public:
     TomlFile(const char* kind, const std::filesystem::path& file);
     /// `name` stands for the file in messages.
     TomlFile(std::string_view text, const std::string& name);
-    TomlFile(TomlFile&&) noexcept;
-    TomlFile& operator=(TomlFile&&) noexcept;
-    ~TomlFile();
 
 private:
     friend void read_toml(const std::vector<TomlFile>& layers, const std::string& where,
                           const std::function<void(Fields&)>& keys, bool all);
     struct Document;
-    std::unique_ptr<Document> document_;
+    std::shared_ptr<const Document> document_;  // of this and its copies
 };
 
 /// Runs a declaration of keys on a stack of files: the first that has a key gives its value, tables are merged

@@ -10,7 +10,7 @@
 #include "files/bad_input.h"
 #include "files/format_description.h"
 #include "files/toml_reader.h"
-#include "scene/look_keys.h"
+#include "scene/shared_keys.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -319,8 +319,7 @@ void load(Kit& kit, std::vector<TomlFile>& documents, const fs::path& file) {
     if (kit.files.size() > 32)
         throw BadInput(
             fmt::format("{}: error: found more than 32 included files, expected fewer", file.string()));
-    std::vector<TomlFile> alone;
-    alone.emplace_back("a kit", file);
+    const TomlFile document("a kit", file);
     KitHeader header{file.stem().string(), {}, {}};
     std::vector<fs::path> includes;
     const auto read_header = [&](Fields& keys) {
@@ -328,10 +327,10 @@ void load(Kit& kit, std::vector<TomlFile>& documents, const fs::path& file) {
         for (const std::string& name : header.include)
             includes.push_back(find_file(keys, "include", name, file, "kits"));
     };
-    read_toml(alone, "the kit", read_header, false);
+    read_toml({document}, "the kit", read_header, false);
     if (kit.files.empty()) kit.name = header.name, kit.description = header.description;
     kit.files.push_back(file);
-    documents.push_back(std::move(alone.front()));
+    documents.push_back(document);
     for (const fs::path& include : includes) load(kit, documents, include);
 }
 
@@ -363,10 +362,9 @@ std::vector<sim::BodyDefinition> bodies_of(const Kit& kit) {
 
 FormatDescription kit_format() {
     KitDraft written;
-    std::vector<TomlFile> defaults;
-    defaults.emplace_back("the kits' defaults", assets_folder() / "kits" / "defaults.toml");
     written.kit.file = assets_folder() / "kits" / "defaults.toml";
-    read_toml(defaults, "the kits' defaults", [&](Fields& keys) { kKitFile.keys(keys, written); });
+    read_toml({TomlFile("the kits' defaults", written.kit.file)}, "the kits' defaults",
+              [&](Fields& keys) { kKitFile.keys(keys, written); });
     written.kit.stick.mesh = written.kit.stick.mesh.filename();
     return describe_format(kKitFile, written);
 }

@@ -8,7 +8,6 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <vector>
 
 #include "files/bad_input.h"
 #include "report/html.h"

@@ -259,26 +259,23 @@ std::string format_latency_page(const LatencyReport& report, const PlayResult& p
                  high = std::max(140.0, std::ceil(ms.percentile(100)));
     const double middle = ms.empty() ? 0 : std::round(ms.percentile(50) / 10) * 10;
     PlotGallery plots;
-    const std::size_t sound =
-                          plots.add(stage_plot(report, LatencyStage::Kind::sound), "From sensor to sound"),
-                      picture = plots.add(stage_plot(report, LatencyStage::Kind::picture), "Pictures"),
-                      apart =
-                          plots.add(sound_picture_plot(report, 2, low, high, false), "Sound minus picture"),
-                      close = plots.add(sound_picture_plot(report, 1, middle - 40, middle + 40, true),
-                                        "The same close up"),
-                      leads = plots.add(leads_plot(realtime), "Leads and delays"),
-                      frames = plots.add(frames_plot(realtime), "Frames"),
-                      errors = plots.add(error_plot(report), "Error of the drawn sticks");
-    plots.draw(scratch);
     std::string body = heading(play, realtime) + figures(report) + plots.symbols();
+    const std::string stages =
+        plots.element(stage_plot(report, LatencyStage::Kind::sound), "From sensor to sound") +
+        plots.element(stage_plot(report, LatencyStage::Kind::picture), "Pictures");
     body += "<h2>Stages</h2>\n<p class=note>Milliseconds.</p>\n" + stage_table(report).html() +
-            plots.pair({sound, picture});
+            plots.pair(stages);
     body += "<h2>Deadlines</h2>\n" + deadline_table(report).html();
-    body += "<h2>Sound and picture</h2>\n" + sound_picture_note(report) + plots.pair({apart, close});
-    body += "<h2>Over time</h2>\n" + plots.element(leads) + plots.element(frames) + plots.element(errors);
+    const std::string apart =
+        plots.element(sound_picture_plot(report, 2, low, high, false), "Sound minus picture") +
+        plots.element(sound_picture_plot(report, 1, middle - 40, middle + 40, true), "The same close up");
+    body += "<h2>Sound and picture</h2>\n" + sound_picture_note(report) + plots.pair(apart);
+    body += "<h2>Over time</h2>\n" + plots.element(leads_plot(realtime), "Leads and delays") +
+            plots.element(frames_plot(realtime), "Frames") +
+            plots.element(error_plot(report), "Error of the drawn sticks");
     if (!realtime.clocks.empty()) body += "<h2>Clocks</h2>\n" + clock_table(realtime).html();
     body += remarks(realtime);
-    return report_page("Latency of " + trace_name(play), body);
+    return report_page("Latency of " + trace_name(play), plots.drawn(std::move(body), scratch));
 }
 
 }  // namespace app

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <string>
-#include <vector>
 
 #include "files/output_folder.h"
 #include "process/child_process.h"

@@ -4,8 +4,6 @@
 #include <sim/simulation.h>
 #include <tracking/rotation.h>
 
-#include <cmath>
-
 #include "files/assets.h"
 #include "pictures/stage_parts.h"
 

@@ -6,13 +6,11 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <optional>
 #include <span>
 
 #include "files/bad_input.h"
 #include "pictures/kit_stage.h"
-#include "play/play_products.h"
-#include "play/play_setup.h"
+#include "play/play_run.h"
 #include "play/strike_pipeline.h"
 #include "process/clock.h"
 #include "process/progress_bar.h"

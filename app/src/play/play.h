@@ -32,10 +32,6 @@ struct PlayOptions {
     bool progress = false;                       ///< draw a progress bar on standard error
 };
 
-struct InputFile {
-    std::string file, sha256;
-};
-
 /// Everything that `play` found out, for the summary, the tables and the report.
 struct PlayResult {
     PlayOptions options;  ///< as asked for, the predictors as specifications
@@ -55,7 +51,7 @@ struct PlayResult {
     double wall_s = 0;
     std::vector<std::pair<std::string, double>> stages_s;  ///< name, seconds
     int workers_lost = 0, bodies_reowned = 0;
-    std::vector<InputFile> inputs;
+    std::vector<std::pair<std::string, std::string>> inputs;  ///< file, SHA-256
     std::string fingerprint;
     std::vector<std::pair<std::string, std::string>> versions;
     std::vector<std::filesystem::path> report_frames;  ///< a few PNG files on disk that the report shows

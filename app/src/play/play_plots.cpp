@@ -296,7 +296,8 @@ PlotScript overview_plot(const PlayResult& result, const std::vector<Mark>& mark
 }
 
 PlotScript sound_plot(const PlayResult& result, const std::vector<Mark>& marks, double peak) {
-    const double length_s = static_cast<double>(result.audio.size() / 2) / 48000;
+    const std::size_t frames = result.audio.size() / 2;
+    const double length_s = static_cast<double>(frames) / 48000;
     const PlotArea area = {result.t0_s, result.t0_s + length_s, -1, 1, kWidth, 1};
     const bool few = result.strikes.size() < kWidth;  // more would be one bar
     const PlotPanel panel =
@@ -366,20 +367,23 @@ PlayPlots add_play_plots(PlotGallery& gallery, const PlayResult& result) {
     for (const float sample : result.audio) peak = std::max(peak, std::abs(static_cast<double>(sample)));
     PlayPlots plots;
     plots.timeline = timeline_of(result);
+    const auto framed = [&](PlotScript plot, const char* label) {
+        return gallery.framed(gallery.add(std::move(plot), label));
+    };
     for (const double from_s : plots.timeline.starts_s)
-        plots.rows.push_back(gallery.add(
+        plots.rows += gallery.add(
             row_plot(result, marks,
                      {from_s, from_s + plots.timeline.row_s, low, high, kColumns, kHeightPanel}, peak),
-            fmt::format("timeline from {:g} s on", from_s)));
-    plots.timing = gallery.add(timing_plot(notes), "histogram of onset minus true contact");
+            fmt::format("timeline from {:g} s on", from_s));
+    plots.rows = gallery.framed(plots.rows);
+    plots.timing = framed(timing_plot(notes), "histogram of onset minus true contact");
     plots.instruments =
-        gallery.add(timing_by_instrument_plot(result, notes), "onset minus true contact by instrument");
-    plots.leads = gallery.add(lead_plot(result, marks), "first prediction and decision of each note");
-    if (!result.audio.empty())
-        plots.sound = gallery.add(sound_plot(result, marks, peak), "envelope of the sound");
+        framed(timing_by_instrument_plot(result, notes), "onset minus true contact by instrument");
+    plots.leads = framed(lead_plot(result, marks), "first prediction and decision of each note");
+    if (!result.audio.empty()) plots.sound = framed(sound_plot(result, marks, peak), "envelope of the sound");
     if (!plots.timeline.whole)
-        plots.overview = gallery.add(overview_plot(result, marks, plots.timeline),
-                                     "notes heard, false and missed over time");
+        plots.overview =
+            framed(overview_plot(result, marks, plots.timeline), "notes heard, false and missed over time");
     return plots;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 #include <cstdint>
-#include <optional>
+#include <string>
 #include <vector>
 
 #include "play/play.h"
@@ -38,21 +38,21 @@ struct Timeline {
 };
 [[nodiscard]] Timeline timeline_of(const PlayResult& result);
 
-/// The plots of a run by their numbers in a gallery. Times on the trace's clock. Of many marks within a pixel
-/// one is kept, so that the size is bounded for any length.
+/// The plots of a run, in frames. Times on the trace's clock. Of many marks within a pixel one is kept, so that
+/// the size is bounded for any length.
 struct PlayPlots {
     Timeline timeline;
     /// Tip heights of all sticks with the marks, under it the envelope of the sound with the onsets: one for
     /// each row.
-    std::vector<std::size_t> rows;
+    std::string rows;
     /// Histogram of onset - true contact [ms]: +-30 ms in bins of 1 ms; +-10 or +-5 ms in finer ones where all
     /// errors are smaller. And the same with a point for each note and a line for each instrument.
-    std::size_t timing, instruments;
+    std::string timing, instruments;
     /// For each note, first prediction and decision relative to its onset [ms]; notes by outcome, then by
     /// lead.
-    std::size_t leads;
-    std::optional<std::size_t> sound;  ///< the whole sound, tail included, with the onsets, if there is any
-    std::optional<std::size_t> overview;  ///< notes heard, false and missed, unless the timeline shows all
+    std::string leads;
+    std::string sound;     ///< the whole sound, tail included, with the onsets; empty without sound
+    std::string overview;  ///< notes heard, false and missed; empty where the timeline shows all
 };
 [[nodiscard]] PlayPlots add_play_plots(PlotGallery& gallery, const PlayResult& result);
 

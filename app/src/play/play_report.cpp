@@ -3,14 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <iterator>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "play/play_plots.h"
-#include "play/play_products.h"
+#include "play/play_run.h"
 #include "report/html.h"
 #include "report/table.h"
 #include "statistics/statistics.h"
@@ -21,11 +19,7 @@ namespace fs = std::filesystem;
 namespace {
 
 std::string base64_of_file(const fs::path& file) {
-    std::ifstream in(file, std::ios::binary);
-    const std::string bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-    if (!in.is_open() || in.bad() || bytes.empty())
-        throw std::runtime_error(
-            fmt::format("{}: error: found no readable frame, expected a PNG for the report", file.string()));
+    const std::string bytes = read_file(file);
     std::string text((bytes.size() + 2) / 3 * 4 + 1, '\0');  // the encoder ends with a zero
     const int length =
         EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
@@ -162,7 +156,7 @@ std::string instruments_section(const PlayResult& result) {
 /// Inputs and versions.
 std::string provenance(const PlayResult& r) {
     Table inputs = Table::of({"file", "SHA-256"}), versions = Table::of({"part", "version"});
-    for (const InputFile& input : r.inputs) inputs.add({input.file, input.sha256});
+    for (const auto& [file, sha256] : r.inputs) inputs.add({file, sha256});
     for (const auto& [name, version] : r.versions) versions.add({name, version});
     versions.add({"fingerprint of this machine and build", r.fingerprint});
     return "<p class=note>Times and workers, which differ between runs, are in summary.json.</p>\n"
@@ -170,21 +164,21 @@ std::string provenance(const PlayResult& r) {
            inputs.html() + "<h2>Versions</h2>\n" + versions.html();
 }
 
-std::string timeline_section(const PlayResult& result, const PlotGallery& gallery, const PlayPlots& plots) {
+std::string timeline_section(const PlayResult& result, const PlayPlots& plots) {
     std::string text = "<h2>Timeline</h2>\n";
-    if (plots.overview)
+    if (!plots.overview.empty())
         text += fmt::format(
             "<p class=note>The whole recording: notes heard (green), false (red) and missed (purple) in "
             "each stretch. Enlarged below are the {} rows of {:g} s with the most false and missed ones, "
             "marked under the axis.</p>\n{}\n",
-            plots.rows.size(), plots.timeline.row_s, gallery.framed({*plots.overview}));
+            plots.timeline.starts_s.size(), plots.timeline.row_s, plots.overview);
     return text + fmt::format(
                       "<p class=note>Height of the tips as recorded over the trace's clock, {:g} s per row. "
                       "A note stands "
                       "at its onset, at the point where it was predicted to strike.{}</p>\n{}{}\n",
                       plots.timeline.row_s,
                       result.audio.empty() ? "" : " Under it the sound; vertical lines are onsets.",
-                      legend(result), gallery.framed(plots.rows));
+                      legend(result), plots.rows);
 }
 
 std::string sound_section(const PlayResult& result, const std::string& plot) {
@@ -200,21 +194,19 @@ std::string sound_section(const PlayResult& result, const std::string& plot) {
 std::string plot_sections(const PlayResult& result, const fs::path& scratch) {
     PlotGallery gallery;
     const PlayPlots plots = add_play_plots(gallery, result);
-    gallery.draw(scratch);
-    std::string text = gallery.symbols() + timeline_section(result, gallery, plots);
+    std::string text = gallery.symbols() + timeline_section(result, plots);
     text += fmt::format(
         "<h2>Timing</h2>\n<p class=note>How far each note lies from the contact that it belongs to.</p>\n"
         "<div class=pair>{}{}</div>\n",
-        gallery.framed({plots.timing}), gallery.framed({plots.instruments}));
+        plots.timing, plots.instruments);
     text += instruments_section(result);
     text += fmt::format(
         "<h2>When notes were decided</h2>\n<p class=note>From its first prediction (ring) to its release "
         "(disc) or cancellation (cross); 0 is the onset. Dashed: the sound lead of {:.1f} ms and the "
         "release margin of {:.1f} ms.</p>\n{}\n",
-        result.options.sound_lead_s * 1e3, result.options.release_margin_s * 1e3,
-        gallery.framed({plots.leads}));
-    if (plots.sound) text += sound_section(result, gallery.framed({*plots.sound}));
-    return text;
+        result.options.sound_lead_s * 1e3, result.options.release_margin_s * 1e3, plots.leads);
+    if (!plots.sound.empty()) text += sound_section(result, plots.sound);
+    return gallery.drawn(std::move(text), scratch);
 }
 
 }  // namespace

@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <iterator>
 
-#include "play/play_setup.h"
+#include "play/play_run.h"
 #include "sticks/predictors.h"
-#include "sticks/stick.h"
 
 namespace app {
 namespace {

@@ -9,12 +9,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
+#include "files/bad_input.h"
 #include "files/file_descriptor.h"
-#include "files/one_line.h"
 
 extern char** environ;
 
@@ -112,10 +110,8 @@ void run_child(const std::vector<std::string>& command, const fs::path& log,
     const int child = start_child({command, variables, none.get(), messages.get(), messages.get(), false});
     const int status = wait_for_child(child);
     if (status == 0) return;
-    std::ifstream said(log, std::ios::binary);
-    const std::string text{std::istreambuf_iterator<char>(said), std::istreambuf_iterator<char>()};
     throw std::runtime_error(fmt::format("error: found {} ended with status {}, expected 0; it said: {}",
-                                         command[0], status, one_line(text, 400)));
+                                         command[0], status, one_line(read_file(log), 400)));
 }
 
 }  // namespace app

@@ -2,16 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "latency/latency_report.h"
-#include "play/play.h"
-#include "play/play_products.h"
-#include "play/play_setup.h"
+#include "play/play_run.h"
 #include "realtime/realtime_run.h"
 #include "sticks/predictors.h"
 

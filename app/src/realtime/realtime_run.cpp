@@ -93,9 +93,9 @@ void RealtimeRun::wait(std::int64_t until_ns) {
 
 /// A live stream may say where the tip is (`# tip_m:`), in the lines before its first row.
 void RealtimeRun::learn_geometry() {
-    const StreamHead head = session_.sensors->stream_head();
-    if (head.text == stream_head_) return;
-    stream_head_ = head.text;
+    const SharedStreamHead head = session_.sensors->stream_head();
+    if (head.text.data() == stream_head_) return;
+    stream_head_ = head.text.data();
     tracking::Trace keys;
     keys.tip = head.tip;
     keys.shaft = head.shaft;
@@ -263,8 +263,8 @@ FrameTiming& RealtimeRun::settle(const DrawnFrame& drawn) {
     frame.started_ns = drawn.started_ns - session_.epoch_ns;
     frame.drawn_ns = drawn.drawn_ns - session_.epoch_ns;
     frame.read_ns = drawn.read_ns - session_.epoch_ns;
-    for (DrawnTip& tip : std::ranges::equal_range(result_.tips, drawn.index, {}, &DrawnTip::frame))
-        tip.shown = drawn.in_time;
+    auto tip = std::ranges::lower_bound(result_.tips, drawn.index, {}, &DrawnTip::frame);
+    for (; tip != result_.tips.end() && tip->frame == drawn.index; ++tip) tip->shown = drawn.in_time;
     return frame;
 }
 

@@ -7,7 +7,7 @@
 
 #include "files/assets.h"
 #include "files/option_values.h"
-#include "play/play_setup.h"
+#include "play/play_run.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
 #include "realtime/picture_quality.h"

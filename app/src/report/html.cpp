@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "files/bad_input.h"
+
 namespace app {
 namespace {
 
@@ -74,7 +76,7 @@ std::string html(std::string_view text) {
         if (escape != std::end(kEscapes))
             out += escape->second;
         else
-            out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
+            out += is_control(c) ? ' ' : c;
     }
     return out;
 }

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <stdexcept>
 
+#include "files/bad_input.h"
 #include "files/output_folder.h"
 #include "process/child_process.h"
 
@@ -19,11 +19,6 @@ namespace {
 constexpr std::array<ReportColour, 9> kLineColours = {
     colours::sticks[0], colours::sticks[1], colours::sticks[2], colours::sticks[3], colours::released,
     colours::wrong,     colours::missed,    colours::wave,      colours::cancelled};
-
-std::string read_text(const fs::path& file) {
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
 
 /// In the locale C, so that numbers have points, and without the user's start-up files.
 void run_gnuplot(const fs::path& script, const fs::path& messages) {
@@ -53,6 +48,11 @@ std::string_view span_of(std::string_view text, std::string_view from, std::stri
         throw std::runtime_error(
             fmt::format("error: found a plot without {}, expected one of gnuplot 5", from));
     return text.substr(begin, end + to.size() - begin);
+}
+
+/// What stands for a plot in a page's text.
+std::string mark_of(std::size_t number) {
+    return fmt::format("<!--plot {}-->", number);
 }
 
 /// gnuplot writes its colours as attributes: what it drew in one of ours follows the page, black is the
@@ -107,7 +107,7 @@ std::vector<std::string> draw_svg(const std::vector<PlotScript>& scripts, const 
     run_gnuplot(script, scratch / "plots.log");
     std::vector<std::string> pictures;
     for (std::size_t i = 0; i < scripts.size(); ++i) {
-        pictures.push_back(read_text(svg_file(i)));
+        pictures.push_back(read_file(svg_file(i)));
         if (pictures.back().find("</svg>") == std::string::npos)
             throw std::runtime_error(
                 fmt::format("{}: error: found an unfinished plot, expected a whole one; is the "
@@ -121,7 +121,7 @@ std::string gnuplot_string(std::string_view text) {
     std::string quoted = "'";
     for (const char c : text) {
         if (c == '\'') quoted += '\'';
-        quoted += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
+        quoted += is_control(c) ? ' ' : c;
     }
     return quoted + "'";
 }
@@ -238,49 +238,37 @@ std::string style_of(const PlotLine& line, double width) {
                        gnuplot_colour(line.colour));
 }
 
-std::size_t PlotGallery::add(PlotScript plot, std::string label) {
+std::string PlotGallery::add(PlotScript plot, std::string label) {
     plots_.push_back(std::move(plot));
     labels_.push_back(std::move(label));
-    return plots_.size() - 1;
+    return mark_of(plots_.size() - 1);
 }
 
-void PlotGallery::draw(const fs::path& scratch) {
-    drawn_ = draw_svg(plots_, scratch);
+std::string PlotGallery::element(PlotScript plot, const std::string& label) {
+    std::vector<std::pair<std::string, std::string>> legend;
+    for (const PlotLine& line : plot.legend)
+        legend.emplace_back(line_shape(line.colour, line.dashed), line.name);
+    return fmt::format("<div><h3>{}</h3>\n{}{}</div>\n", html(label),
+                       legend.empty() ? "" : report_legend(legend), framed(add(std::move(plot), label)));
 }
 
-std::string PlotGallery::symbols() const {
-    return fmt::format(
-        "<svg width=\"0\" height=\"0\" style=\"position:absolute\" aria-hidden=\"true\">{}</svg>\n",
-        span_of(drawn_.front(), "<defs>", "</defs>"));
-}
-
-std::string PlotGallery::svg(std::size_t number) const {
-    const std::string_view whole = drawn_[number];
-    std::string drawn = without_ballast(span_of(whole, "</defs>", "</svg>").substr(7));
-    follow_page(drawn);
+std::string PlotGallery::in_page(std::size_t number, std::string_view drawn) const {
+    std::string svg = without_ballast(span_of(drawn, "</defs>", "</svg>").substr(7));
+    follow_page(svg);
     // The definitions, left out, stood inside the canvas's group.
     return fmt::format("<svg role=\"img\" aria-label=\"{}\" {}>\n<g>\n{}", html(labels_[number]),
-                       span_of(whole, "viewBox=\"", "\""), drawn);
+                       span_of(drawn, "viewBox=\"", "\""), svg);
 }
 
-std::string PlotGallery::framed(const std::vector<std::size_t>& numbers) const {
-    std::string text = "<div class=plot>\n";
-    for (const std::size_t number : numbers) text += svg(number);
-    return text + "</div>";
-}
-
-std::string PlotGallery::element(std::size_t number) const {
-    std::vector<std::pair<std::string, std::string>> legend;
-    for (const PlotLine& line : plots_[number].legend)
-        legend.emplace_back(line_shape(line.colour, line.dashed), line.name);
-    return fmt::format("<div><h3>{}</h3>\n{}{}</div>\n", html(labels_[number]),
-                       legend.empty() ? "" : report_legend(legend), framed({number}));
-}
-
-std::string PlotGallery::pair(const std::vector<std::size_t>& numbers) const {
-    std::string text = "<div class=pair>";
-    for (const std::size_t number : numbers) text += element(number);
-    return text + "</div>\n";
+std::string PlotGallery::drawn(std::string page, const fs::path& scratch) const {
+    const std::vector<std::string> drawn = draw_svg(plots_, scratch);
+    for (std::size_t i = 0; i < drawn.size(); ++i) replace_all(page, mark_of(i), in_page(i, drawn[i]));
+    replace_all(
+        page, symbols(),
+        fmt::format(
+            "<svg width=\"0\" height=\"0\" style=\"position:absolute\" aria-hidden=\"true\">{}</svg>\n",
+            span_of(drawn.front(), "<defs>", "</defs>")));
+    return page;
 }
 
 }  // namespace app

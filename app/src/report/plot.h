@@ -109,26 +109,31 @@ private:
 /// As gnuplot's "with lines ...".
 [[nodiscard]] std::string style_of(const PlotLine& line, double width);
 
-/// The plots of a page: declared in the order of the page, drawn at once, placed by number. In the page they
-/// have no XML head, no titles that would pop up and no ids; their colours are CSS variables, their width is
-/// that of their place, and a label says what they show for readers who do not see it.
+/// The plots of a page. Each stands as a mark in the page's text until drawn() draws all of them at once. In the
+/// page they have no XML head, no titles that would pop up and no ids; their colours are CSS variables, their
+/// width is that of their place, and a label says what they show for readers who do not see it.
 class PlotGallery {
 public:
-    std::size_t add(PlotScript plot, std::string label);
-    void draw(const std::filesystem::path& scratch);
+    /// The plot alone: one or several stand in a frame.
+    [[nodiscard]] std::string add(PlotScript plot, std::string label);
+    [[nodiscard]] static std::string framed(const std::string& plots) {
+        return "<div class=plot>\n" + plots + "</div>";
+    }
+    /// The plot in a frame with its label and legend above it; and several of these side by side.
+    [[nodiscard]] std::string element(PlotScript plot, const std::string& label);
+    [[nodiscard]] static std::string pair(const std::string& elements) {
+        return "<div class=pair>" + elements + "</div>\n";
+    }
     /// gnuplot's point shapes, which all plots refer to, as an invisible element; once a page.
-    [[nodiscard]] std::string symbols() const;
-    /// The plots of these numbers in a frame.
-    [[nodiscard]] std::string framed(const std::vector<std::size_t>& numbers) const;
-    /// The plot in a frame with its label and legend above it.
-    [[nodiscard]] std::string element(std::size_t number) const;
-    [[nodiscard]] std::string pair(const std::vector<std::size_t>& numbers) const;
+    [[nodiscard]] static std::string symbols() { return "<!--symbols-->"; }
+    /// The page with its plots in their places. Throws as draw_svg() does.
+    [[nodiscard]] std::string drawn(std::string page, const std::filesystem::path& scratch) const;
 
 private:
-    [[nodiscard]] std::string svg(std::size_t number) const;
+    [[nodiscard]] std::string in_page(std::size_t number, std::string_view drawn) const;
 
     std::vector<PlotScript> plots_;
-    std::vector<std::string> labels_, drawn_;
+    std::vector<std::string> labels_;
 };
 
 }  // namespace app

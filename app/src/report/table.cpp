@@ -17,6 +17,8 @@ template <class... Functions>
 struct Visitor : Functions... {
     using Functions::operator()...;
 };
+template <class... Functions>
+Visitor(Functions...) -> Visitor<Functions...>;
 
 /// Without the objects that JSON puts it into.
 std::string last_part(const std::string& name) {

@@ -8,13 +8,12 @@
 #include <map>
 #include <numbers>
 #include <random>
-#include <ranges>
 
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/format_description.h"
 #include "files/toml_reader.h"
-#include "scene/look_keys.h"
+#include "scene/shared_keys.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -84,7 +83,8 @@ const std::array<Eigen::Vector3f, 8> kPalette = {Eigen::Vector3f(0.55f, 0.05f, 0
 SceneMaterial material_of(const BodyDraft& draft, const SceneMaterials& materials, const Fields& at) {
     if (!draft.material) return {};
     const auto found = materials.find(*draft.material);
-    const std::string known = fmt::format("{}", fmt::join(std::views::keys(materials), ", "));
+    std::string known;
+    for (const auto& [name, material] : materials) known += (known.empty() ? "" : ", ") + name;
     at.require(found != materials.end(), "material", fmt::format("material = \"{}\"", *draft.material),
                known.empty() ? "a table [material.NAME] of that name"
                              : fmt::format("one of {} or a table [material.{}]", known, *draft.material));
@@ -567,9 +567,7 @@ Scene read_scene(const fs::path& file, std::optional<double> dt_s) {
     reader.scene.file = file;
     reader.scene.name = file.stem().string();
     reader.dt_s = dt_s;
-    std::vector<TomlFile> layers;
-    layers.emplace_back("a scene", file);
-    read_toml(layers, "the scene", [&](Fields& keys) { kSceneFile.keys(keys, reader); });
+    read_toml({TomlFile("a scene", file)}, "the scene", [&](Fields& keys) { kSceneFile.keys(keys, reader); });
     reader.add_events();
     if (reader.scene.world.bodies.empty())
         throw BadInput(fmt::format("{}:1:1: error: found no [[body]], expected at least one", file.string()));

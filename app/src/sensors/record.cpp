@@ -112,21 +112,19 @@ private:
 
     void begin(const SourceSample& first) {
         first_ns_ = first.read_ns;
-        result_.clock = source_->replayed() ? "the trace's own, replayed"
-                        : first.has_time    ? "the source's"
-                                            : "arrival";
+        result_.clock.clock = source_->replayed() ? SampleClock::replayed
+                              : first.has_time    ? SampleClock::source
+                                                  : SampleClock::arrival;
         if (source_->replayed())
-            result_.estimate.offset_s = to_s(first.due_ns - options_.source.epoch_ns) - first.sample.t_s;
-        const SourceHead head = source_->head();
-        tracking::Trace keys;
-        keys.rate_hz = head.rate_hz;
-        keys.tip = head.tip;
-        keys.shaft = head.shaft;
-        keys.source = fmt::format("recorded; clock of the times: {}{}", result_.clock,
-                                  head.base_s == 0 ? "" : fmt::format(" minus {:.0f} s", head.base_s));
-        if (!head.origin.empty()) keys.source += "; " + head.origin;
+            result_.clock.estimate.offset_s =
+                to_s(first.due_ns - options_.source.epoch_ns) - first.sample.t_s;
+        SourceHead head = source_->head();
+        const std::string origin = std::exchange(head.keys.source, {});
+        head.keys.source = fmt::format("recorded; clock of the times: {}{}", name_of(result_.clock.clock),
+                                       head.base_s == 0 ? "" : fmt::format(" minus {:.0f} s", head.base_s));
+        if (!origin.empty()) head.keys.source += "; " + origin;
         oriented_ = head.oriented;
-        head_ = tracking::format_trace_head(keys, oriented_);
+        head_ = tracking::format_trace_head(head.keys, oriented_);
     }
 
     /// The time that the recording says: the source's, unchanged but for jumps of its clock.
@@ -162,11 +160,10 @@ private:
             if (stick.samples >= 2) result_.sticks.push_back(stick);
         }
         result_.faults = source_->faults();
-        const ClockEstimate estimate = clock_.estimate();
         if (source_->replayed())
-            result_.estimate.delay_p95_s = delays_.p95();
-        else if (result_.clock == "the source's")
-            result_.estimate = estimate;
+            result_.clock.estimate.delay_p95_s = delays_.p95();
+        else if (result_.clock.clock == SampleClock::source)
+            result_.clock.estimate = clock_.estimate();
         if (result_.sticks.empty())
             throw std::runtime_error(fmt::format(
                 "error: found no stick with two samples from {}, expected some{}", options_.source.source,

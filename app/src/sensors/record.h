@@ -29,8 +29,7 @@ struct RecordResult {
     std::vector<std::string> alone;     ///< sticks with one sample, left out
     std::uint64_t late = 0;             ///< samples not newer than the one before, left out
     SourceFaults faults;
-    std::string clock;  ///< as ClockReport::clock
-    ClockEstimate estimate;
+    ClockReport clock;
 };
 
 /// Writes what a source gives to a native trace, with the times that the source gave (from the whole second

@@ -1,9 +1,6 @@
 #pragma once
-#include <tracking/stick_state.h>
-
-#include <Eigen/Core>
 #include <cstdint>
-#include <memory>
+#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,21 +18,6 @@ struct SensorEvent {
     std::string message;  ///< one line, complete
 };
 
-/// How the clock of a source's sample times relates to ours.
-struct ClockReport {
-    std::string clock;        ///< "the trace's own, replayed" | "the source's" | "arrival"
-    double offset_s = 0;      ///< ours (since the epoch) minus the source's
-    double drift_ppm = 0;     ///< of the source's clock against ours
-    double delay_p95_ms = 0;  ///< of arrival beyond the least delay seen
-    int jumps = 0;
-};
-
-/// How a live stream began.
-struct StreamHead {
-    std::string text;                           ///< its key lines and header; empty: none so far
-    std::optional<Eigen::Vector3d> tip, shaft;  ///< of the sticks, body frame [m]; none: not known
-};
-
 /// Starts and watches the sensor processes (one per stick of a trace; one for all sticks where a source
 /// delivers them together), each with a reader thread and a filter thread per stick, and keeps the shared memory that
 /// they publish into. The memory has no name, so nothing stays in /dev/shm however a process ends. A process
@@ -51,22 +33,63 @@ public:
     SensorHub& operator=(const SensorHub&) = delete;
 
     /// Readable (poll) when a state was published since the last clear_wake().
-    [[nodiscard]] int wake_fd() const;
+    [[nodiscard]] int wake_fd() const { return wake_.get(); }
     void clear_wake();
     /// The stick's newest state; bounded time, never blocks, no system call.
-    [[nodiscard]] std::optional<tracking::StickState> newest(std::size_t stick) const noexcept;
+    [[nodiscard]] std::optional<tracking::StickState> newest(std::size_t stick) const noexcept {
+        return memory_[stick]->state.read();
+    }
     /// Looks after the processes (call it some times a second): restarts dead ones; what happened since the
     /// last call.
     [[nodiscard]] std::vector<SensorEvent> watch();
     /// Every source has ended, and all that it gave has been published.
     [[nodiscard]] bool ended() const;
     [[nodiscard]] std::vector<ClockReport> clocks() const;  ///< one per process
-    [[nodiscard]] StreamHead stream_head() const;
-    [[nodiscard]] int restarts() const;
+    /// How a live stream began.
+    [[nodiscard]] SharedStreamHead stream_head() const {
+        return memory_.front()->head.read().value_or(SharedStreamHead{});
+    }
+    [[nodiscard]] int restarts() const { return restarts_; }
 
 private:
-    struct Implementation;
-    std::unique_ptr<Implementation> implementation_;
+    struct Sensor {
+        SensorTask task;
+        std::vector<std::size_t> sticks;  ///< indices of the run
+        int pid = -1;                     ///< -1: not running
+        int status = 0;                   ///< of waitpid, once it has ended
+        bool over = false;                ///< and will not be started again
+        std::deque<std::int64_t> restarts_ns{};
+    };
+    /// What was last seen of a stick, so that each change is reported once.
+    struct SeenStick {
+        std::uint64_t samples = 0;
+        std::int64_t heard_ns = 0;         ///< when the newest sample was read, or should have begun to come
+        std::int64_t silent_since_ns = 0;  ///< 0: not silent
+        std::uint64_t pid = 0;             ///< that the counts of the process below are of
+        std::uint64_t jumps = 0, malformed = 0;
+    };
+
+    void start(Sensor& sensor) const;
+    [[nodiscard]] SensorReport report_of(const Sensor& sensor) const;
+    void wait_until_ready();
+    [[noreturn]] void fail_start(const std::string& message);
+    void add(SensorEvent::Kind kind, const std::vector<std::size_t>& sticks, const std::string& text);
+    void fail(const Sensor& sensor, const std::string& why);
+    void watch_stick(std::size_t index);
+    void watch_source(const Sensor& sensor);
+    void look_after(Sensor& sensor);
+    void restart(Sensor& sensor);
+    void end_all();
+
+    SensorOptions options_;
+    // An eventfd and a pipe that the sensors inherit. The pipe ends with this process, however that ends.
+    FileDescriptor wake_;
+    Pipe life_ = make_pipe();
+    std::vector<SharedSensorMemory> memory_;  // one for each stick, as the next
+    std::vector<SeenStick> seen_;
+    std::vector<Sensor> sensors_;
+    std::vector<SensorEvent> events_;  // since the last watch()
+    int restarts_ = 0;
 };
 
 }  // namespace app

@@ -13,18 +13,15 @@
 #include <atomic>
 #include <csignal>
 #include <deque>
-#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
 #include <utility>
 
-#include "files/file_descriptor.h"
-#include "files/one_line.h"
+#include "files/bad_input.h"
 #include "process/bounded_queue.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
-#include "sensors/source_clock.h"
 
 namespace app {
 namespace {
@@ -153,7 +150,7 @@ private:
             sample.has_time ? clock_.map(sample.stick, sample.sample.t_s, arrival_s) : arrival_s;
         sample.due_ns = task_.epoch_ns + to_ns(sample.sample.t_s);
         const std::lock_guard lock(mutex_);
-        report_.clock = sample.has_time ? SampleClock::source : SampleClock::arrival;
+        report_.clock.clock = sample.has_time ? SampleClock::source : SampleClock::arrival;
     }
     void note(const SourceSample& sample) {
         Stick& stick = sticks_[sample.stick];
@@ -172,7 +169,7 @@ private:
         const std::lock_guard lock(mutex_);
         report_.malformed = faults.malformed;
         report_.set_text(one_line(faults.first, 240));
-        report_.estimate = estimate;
+        report_.clock.estimate = estimate;
         const std::int64_t quiet_until_ns = source_->quiet_until_ns();
         if (std::exchange(report_.quiet_until_ns, quiet_until_ns) != quiet_until_ns) add_one(changed_.get());
     }
@@ -239,8 +236,8 @@ private:
         const SourceHead said = source_->head();
         SharedStreamHead head;
         std::copy(text.begin(), text.end(), head.text.begin());
-        head.tip = said.tip;
-        head.shaft = said.shaft;
+        head.tip = said.keys.tip;
+        head.shaft = said.keys.shaft;
         sticks_.front().memory->head.publish(head);
     }
     /// The source, and the filters, of which external ones are processes.

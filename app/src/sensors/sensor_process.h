@@ -19,9 +19,6 @@ namespace app {
 
 enum class SensorPhase : std::uint64_t { starting, running, ended, failed };
 
-/// Whose clock the times of samples are.
-enum class SampleClock : std::uint64_t { replayed, source, arrival };
-
 /// How a sensor process is, for its hub. One for each stick; what concerns the process is the same in all.
 struct SensorReport {
     std::uint64_t pid = 0;
@@ -30,8 +27,7 @@ struct SensorReport {
     double interval_s = 0;            ///< between the stick's samples, smoothed; 0: not known
     std::uint64_t read = 0;           ///< samples of the stick that the reader got
     std::uint64_t malformed = 0;      ///< messages or rows
-    SampleClock clock = SampleClock::replayed;
-    ClockEstimate estimate;
+    ClockReport clock;
     std::array<char, 256> text{};  ///< why it failed, or what the first malformed message was; ends with 0
 
     void set_text(std::string_view line);

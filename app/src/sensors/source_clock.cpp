@@ -17,6 +17,13 @@ constexpr double kLeastStepS = 1e-6;
 
 }  // namespace
 
+const char* name_of(SampleClock clock) {
+    static constexpr std::array<const char*, 3> kNames = {"the trace's own, replayed", "the source's",
+                                                          "arrival"};
+    static_assert(kNames.size() == static_cast<std::size_t>(SampleClock::arrival) + 1);
+    return kNames[static_cast<std::size_t>(clock)];
+}
+
 double DelayPercentile::p95() const noexcept {
     std::array<double, 1024> values = values_;
     return quantile_in_place(std::span(values).first(std::min(count_, values.size())), 0.95);

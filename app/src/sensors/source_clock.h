@@ -29,6 +29,17 @@ struct ClockEstimate {
     double last_jump_s = 0;  ///< by which the source's clock jumped, > 0: forwards
 };
 
+/// Whose clock the times of samples are.
+enum class SampleClock : std::uint64_t { replayed, source, arrival };
+/// "the trace's own, replayed", "the source's" or "arrival".
+[[nodiscard]] const char* name_of(SampleClock clock);
+
+/// How that clock relates to ours, which counts from the epoch.
+struct ClockReport {
+    SampleClock clock = SampleClock::replayed;
+    ClockEstimate estimate = {};
+};
+
 /// Puts the times of a source's samples on our clock.
 ///
 /// Of each sample the arrival minus its own time is the clocks' offset and the delay on the way, which is

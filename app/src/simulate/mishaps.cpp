@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "files/one_line.h"
+#include "files/bad_input.h"
 
 namespace app {
 namespace {

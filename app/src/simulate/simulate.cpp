@@ -103,7 +103,7 @@ public:
         result_.scene = scene.file, result_.name = scene.name;
         result_.dt_s = scene.world.settings.dt;
         result_.rest_wanted = options.until_rest;
-        if (options.workers) result_.worker_options = *options.workers;
+        result_.worker_options = options.workers;
         if (options.out) folder_ = std::make_unique<OutputFolder>(*options.out, kSimulateProducts);
     }
 
@@ -188,11 +188,7 @@ private:
     }
 
     void take_result(const sim::DistributedResult& run) {
-        if (options_.workers) result_.workers = run;
-        result_.steps = run.steps;
-        result_.elapsed_s = run.elapsed_s, result_.cpu_s = run.cpu_s;
-        result_.counts = run.counts;
-        result_.rest_reached = run.rest_reached;
+        static_cast<sim::DistributedResult&>(result_) = run;
         for (const sim::QuarantinedBody& q : run.quarantined)
             result_.mishaps.quarantined.push_back({name_of(scene_, q.body), q.step, q.what});
         for (const sim::FirstStep& c : run.broken)
@@ -357,7 +353,7 @@ Json details_of(const SimulateResult& r) {
         {"notes", notes},
         {"wall_s", r.wall_s},
         {"versions", {{"musicworld", MUSICWORLD_VERSION}}}};
-    if (r.workers) details["counts"] = Json();  // workers do not send theirs
+    if (r.worker_options) details["counts"] = Json();  // workers do not send theirs
     return details;
 }
 
@@ -370,17 +366,16 @@ std::string clock_of(const WorkerOptions& options) {
 }
 
 Json workers_of(const SimulateResult& r) {
-    const sim::DistributedResult& w = *r.workers;
-    return {{"clock", clock_of(r.worker_options)},
-            {"balance", r.worker_options.balance},
-            {"workers_lost", w.lost},
-            {"workers_left", w.left},
-            {"bodies_reowned", w.bodies_reowned},
-            {"trades", w.trades},
-            {"bytes_per_body_step", r.body_steps > 0 ? Json(double(w.bytes) / double(r.body_steps)) : Json()},
-            {"largest_lead", w.largest_lead},
-            {"largest_ghost_age", w.largest_ghost_age},
-            {"refused_messages", w.refused_messages}};
+    return {{"clock", clock_of(*r.worker_options)},
+            {"balance", r.worker_options->balance},
+            {"workers_lost", r.lost},
+            {"workers_left", r.left},
+            {"bodies_reowned", r.bodies_reowned},
+            {"trades", r.trades},
+            {"bytes_per_body_step", r.body_steps > 0 ? Json(double(r.bytes) / double(r.body_steps)) : Json()},
+            {"largest_lead", r.largest_lead},
+            {"largest_ghost_age", r.largest_ghost_age},
+            {"refused_messages", r.refused_messages}};
 }
 
 }  // namespace
@@ -403,28 +398,27 @@ SimulateResult simulate(const SimulateOptions& options) {
 }
 
 std::string format_simulate(const SimulateResult& r) {
-    const sim::DistributedResult workers = r.workers.value_or(sim::DistributedResult{});
+    const WorkerOptions options = r.worker_options.value_or(WorkerOptions{});
     Json json = {
         {"scene", r.scene.string()},
         {"bodies", r.bodies},
         {"steps", r.steps},
         {"dt_s", r.dt_s},
-        {"workers", workers.workers},
-        {"mode", mode_name(r.worker_options.pace)},
-        {"bound", r.worker_options.bound},
+        {"workers", r.workers},
+        {"mode", mode_name(options.pace)},
+        {"bound", options.bound},
         {"elapsed_s", r.elapsed_s},
         {"cpu_s", r.cpu_s},
         {"ns_per_body_step", r.body_steps > 0 ? Json(1e9 * r.elapsed_s / double(r.body_steps)) : Json()},
-        {"bytes_per_body_update",
-         workers.records > 0 ? double(workers.bytes_states) / double(workers.records) : 0.0},
-        {"cross_worker_contacts", workers.cross_contacts},
-        {"migrations", workers.migrations},
+        {"bytes_per_body_update", r.records > 0 ? double(r.bytes_states) / double(r.records) : 0.0},
+        {"cross_worker_contacts", r.cross_contacts},
+        {"migrations", r.migrations},
         {"bodies_lost", r.mishaps.quarantined.size()},
         {"state_hash", fmt::format("{:016x}", r.state_hash)},
         {"momentum_drift", r.drift ? Json(r.drift->share()) : Json()},
         {"energy_j", r.energy.total()}};
     json.update(details_of(r));
-    if (r.workers) json.update(workers_of(r));
+    if (r.worker_options) json.update(workers_of(r));
     return json.dump(2) + "\n";
 }
 

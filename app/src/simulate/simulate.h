@@ -51,27 +51,25 @@ struct MomentumDrift {
     [[nodiscard]] double share() const { return scale > 0 ? linear / scale : linear; }
 };
 
-struct SimulateResult {
+/// What the run gave; its counts are the world's where there are no workers.
+struct SimulateResult : sim::DistributedResult {
     std::filesystem::path scene;
     std::string name;
     int bodies = 0;
     int rigid = 0, linear = 0, modal = 0;  ///< bodies by what is computed of them
     int groups_cut = 0;  ///< modal bodies whose count of modes cuts a group of equal frequencies
-    std::uint64_t steps = 0, body_steps = 0;
+    std::uint64_t body_steps = 0;
     double dt_s = 0, time_s = 0;
-    double elapsed_s = 0, cpu_s = 0;  ///< of the steps alone
     std::optional<MomentumDrift> drift;
     sim::World::Energy energy_start{}, energy{};
     Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
     std::uint64_t state_hash = 0;
-    sim::WorldCounts counts;
-    Mishaps mishaps;
-    bool rest_wanted = false, rest_reached = false;
+    Mishaps mishaps;  ///< quarantined, broken and limited with their names
+    bool rest_wanted = false;
     std::size_t frames = 0;
-    std::vector<std::string> notes;  ///< what was asked for and had no effect; what workers said
-    double wall_s = 0;               ///< with reading, drawing and writing
-    std::optional<sim::DistributedResult> workers;
-    WorkerOptions worker_options;
+    std::vector<std::string> notes;               ///< what was asked for and had no effect; what workers said
+    double wall_s = 0;                            ///< with reading, drawing and writing
+    std::optional<WorkerOptions> worker_options;  ///< none: in this process
 };
 
 /// Runs a scene, in this process or shared out to workers. Throws BadInput, or std::runtime_error while

@@ -1,20 +1,47 @@
 #include "sticks/external_predictor.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
 #include <tracking/rotation.h>
+#include <unistd.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
 #include <iterator>
 #include <sstream>
 #include <stdexcept>
 
-#include "files/one_line.h"
+#include "files/bad_input.h"
+#include "files/file_descriptor.h"
+#include "process/child_process.h"
+#include "process/clock.h"
 
 namespace app {
 namespace {
+
+[[noreturn]] void fail_system(const char* action) {
+    throw std::runtime_error(cannot(action));
+}
+
+/// A file without a name, which no other child inherits.
+std::FILE* memory_file() {
+    const int descriptor = memfd_create("errors", MFD_CLOEXEC);
+    if (descriptor < 0) fail_system("make a temporary file");
+    std::FILE* file = fdopen(descriptor, "w+");
+    if (!file) fail_system("open a temporary file");
+    return file;
+}
 
 constexpr int kProtocol = 1;
 constexpr double kFarthestM = 1e6;
@@ -73,6 +100,159 @@ void parse_numbers(std::string_view line, std::size_t count, std::vector<double>
 
 }  // namespace
 
+/// A program run by `sh -c COMMAND` with which lines are exchanged: its standard input and output are one
+/// socket, its standard error is kept for messages. It runs in a process group of its own; the destructor
+/// ends its input, gives it kFarewellS to leave, and kills and collects what is left of it.
+///
+/// However this program ends, the system then kills the group (SIGKILL): the child inherits the end of a pipe
+/// whose other end only this program has, and the system signals to the group when that closes (fcntl:
+/// O_ASYNC, F_SETOWN, F_SETSIG). That needs no process or thread that lives on. What it does not reach: a
+/// process that leaves the group, and a group in which no process keeps the inherited descriptor open.
+///
+/// All faults are thrown as std::runtime_error "found ..., expected ...; ...", one line.
+class LineChild {
+public:
+    explicit LineChild(const std::string& command) : errors_(memory_file()) {
+        int ends[2];
+        if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) fail_system("make a socket");
+        socket_ = FileDescriptor(ends[0]);
+        const FileDescriptor of_child(ends[1]);
+        Pipe life = make_pipe();
+        pid_ = start_child({{"sh", "-c", command},
+                            {},
+                            of_child.get(),
+                            of_child.get(),
+                            fileno(errors_.get()),
+                            true,
+                            {life.out.get()}});
+        life_ = std::move(life.in);
+        // Lets the system kill the process group when the other end of this pipe closes.
+        const int end = life.out.get();
+        if (fcntl(end, F_SETOWN, -pid_) == 0 && fcntl(end, F_SETSIG, SIGKILL) == 0 &&
+            fcntl(end, F_SETFL, O_ASYNC) == 0)
+            return;
+        const std::string why = cannot("tie the child's end to this program's");
+        (void)collect();
+        throw std::runtime_error(why);
+    }
+    ~LineChild() {
+        shutdown(socket_.get(), SHUT_WR);
+        const std::int64_t deadline_ns = monotonic_ns() + to_ns(kFarewellS);
+        while (pid_ > 0 && readable_until(socket_.get(), deadline_ns) &&
+               recv(socket_.get(), chunk_.data(), chunk_.size(), 0) > 0) {
+        }
+        if (pid_ > 0) collect();
+    }
+    LineChild(const LineChild&) = delete;
+    LineChild& operator=(const LineChild&) = delete;
+
+    /// Sends a line (text with its line end), waiting at most `timeout_s` for the child to make room.
+    void send(std::string_view text, double timeout_s) {
+        if (pid_ <= 0) throw std::runtime_error("found that the child has ended, expected it to answer");
+        const std::int64_t deadline_ns = monotonic_ns() + to_ns(timeout_s);
+        while (!text.empty()) {
+            const ssize_t sent = ::send(socket_.get(), text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+            if (sent >= 0)
+                text.remove_prefix(static_cast<std::size_t>(sent));
+            else if (errno == EAGAIN)
+                wait_for(POLLOUT, deadline_ns, timeout_s);
+            else if (errno != EINTR)
+                return;  // it has ended: receive() says how, and what it had sent before
+        }
+    }
+    /// The next line, without its end, valid until the next call. Waits at most `timeout_s`; a second line
+    /// that follows it at once is a fault.
+    [[nodiscard]] std::string_view receive(double timeout_s) {
+        const std::int64_t deadline_ns = monotonic_ns() + to_ns(timeout_s);
+        received_.erase(0, taken_);
+        taken_ = 0;
+        std::size_t end = received_.find('\n');
+        while (end == std::string::npos) {
+            if (received_.size() > kLongestLine)
+                throw std::runtime_error(
+                    fmt::format("found a line of more than {} bytes, expected a short one", kLongestLine));
+            wait_for(POLLIN, deadline_ns, timeout_s);
+            const std::size_t before = received_.size();
+            const ssize_t got = recv(socket_.get(), chunk_.data(), chunk_.size(), 0);
+            if (got == 0 || (got < 0 && errno != EINTR)) fail_ended();
+            received_.append(chunk_.data(), static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
+            end = received_.find('\n', before);
+        }
+        taken_ = end + 1;
+        if (taken_ < received_.size()) {
+            const std::string second = received_.substr(taken_, received_.find('\n', taken_) - taken_);
+            throw std::runtime_error(fmt::format(
+                "found a second line, \"{}\", expected one line for each line sent", one_line(second, 60)));
+        }
+        return std::string_view(received_).substr(0, end);
+    }
+
+private:
+    static constexpr double kFarewellS = 1;
+    static constexpr std::size_t kLongestLine = std::size_t{1} << 20;
+    struct CloseFile {
+        void operator()(std::FILE* file) const { (void)std::fclose(file); }
+    };
+    /// Waits until the socket can be read (or written); throws if that takes longer than until `deadline_ns`.
+    void wait_for(short event, std::int64_t deadline_ns, double timeout_s) const {
+        pollfd socket{socket_.get(), event, 0};
+        for (;;) {
+            const int ready = poll(&socket, 1, milliseconds_until(deadline_ns));
+            if (ready > 0) return;
+            if (ready < 0 && errno != EINTR) fail_system("wait for the child");
+            if (ready == 0)
+                throw std::runtime_error(fmt::format(
+                    "found {} within {} s, expected one line for each line sent; does it flush its "
+                    "output?",
+                    event == POLLIN ? "no whole line" : "that the child does not read", timeout_s));
+        }
+    }
+    [[noreturn]] void fail_ended() {
+        const std::optional<int> status = collect();
+        const std::string words = last_words();
+        throw std::runtime_error(fmt::format(
+            "found the child {}{}, expected it to answer",
+            status ? fmt::format("ended with status {}", *status) : std::string("closed its output"),
+            words.empty() ? "" : fmt::format(" saying \"{}\"", words)));
+    }
+    /// Kills what is left of the child and collects it; returns how it ended by itself (as wait_for_child()).
+    std::optional<int> collect() {
+        // A moment to end by itself, so that its status is its own.
+        constexpr int kTries = 20;
+        constexpr useconds_t kPauseUs = 5000;
+        siginfo_t ended{};
+        bool by_itself = false;
+        for (int i = 0; i < kTries; ++i) {
+            (void)waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOHANG | WNOWAIT);
+            by_itself = ended.si_pid == pid_;
+            if (by_itself) break;
+            usleep(kPauseUs);
+        }
+        kill(-pid_, SIGKILL);  // the group outlives its leader until that is collected
+        const int status = wait_for_child(pid_);
+        pid_ = -1;
+        return by_itself ? std::optional(status) : std::nullopt;
+    }
+    [[nodiscard]] std::string last_words() const {
+        constexpr long kTail = 4096;
+        std::FILE* file = errors_.get();
+        if (std::fseek(file, 0, SEEK_END) != 0) return {};
+        (void)std::fseek(file, -std::min(std::ftell(file), kTail), SEEK_END);
+        std::string text(kTail, '\0');
+        text.resize(std::fread(text.data(), 1, text.size(), file));
+        text.erase(std::min(text.find_last_not_of(" \t\r\n") + 1, text.size()));
+        return one_line(text.substr(text.rfind('\n') + 1));
+    }
+
+    std::unique_ptr<std::FILE, CloseFile> errors_;
+    FileDescriptor life_;  // the group is killed when this closes
+    FileDescriptor socket_;
+    int pid_ = -1;
+    std::array<char, std::size_t{1} << 16> chunk_{};
+    std::string received_;
+    std::size_t taken_ = 0;  // bytes of it that were handed out
+};
+
 AnswerForm parse_answer_form(std::string_view line) {
     std::istringstream text{std::string(line)};
     const std::vector<std::string> words(std::istream_iterator<std::string>(text), {});
@@ -92,7 +272,6 @@ AnswerPath::AnswerPath(std::span<const double> leads_s, const AnswerForm& form)
     : form_(form), sample_nodes_(leads_s.front() > 0 ? 1 : 0) {
     nodes_.resize(leads_s.size() + sample_nodes_);
     for (std::size_t i = 0; i < leads_s.size(); ++i) nodes_[i + sample_nodes_].lead_s = leads_s[i];
-    next_ = nodes_;
 }
 
 AnswerPath::Node AnswerPath::parse(std::size_t index, std::span<const double> numbers,
@@ -128,28 +307,29 @@ AnswerPath::Node AnswerPath::parse(std::size_t index, std::span<const double> nu
 }
 
 void AnswerPath::take(const tracking::PosePrediction& sample, std::span<const double> numbers) {
-    for (std::size_t i = sample_nodes_; i < next_.size(); ++i) next_[i] = parse(i, numbers, sample);
-    if (sample_nodes_ > 0) next_[0] = {0, sample, next_[1].covariance};
-    differentiate();
-    nodes_.swap(next_);
+    std::vector<Node> next(nodes_.size());
+    for (std::size_t i = sample_nodes_; i < next.size(); ++i) next[i] = parse(i, numbers, sample);
+    if (sample_nodes_ > 0) next[0] = {0, sample, next[1].covariance};
+    differentiate(next);
+    nodes_ = std::move(next);
     answered_ = true;
 }
 
-void AnswerPath::differentiate() {
+void AnswerPath::differentiate(std::vector<Node>& nodes) const {
     std::vector<double> steps;
     std::vector<Eigen::Vector3d> slopes, turns;
-    for (std::size_t i = 1; i < next_.size(); ++i) {
-        const Node &a = next_[i - 1], &b = next_[i];
+    for (std::size_t i = 1; i < nodes.size(); ++i) {
+        const Node &a = nodes[i - 1], &b = nodes[i];
         steps.push_back(b.lead_s - a.lead_s);
         slopes.emplace_back((b.pose.position - a.pose.position) / steps.back());
         // The rotation vector of the shorter way, world frame.
         turns.emplace_back(tracking::logarithm(b.pose.orientation * a.pose.orientation.conjugate()) /
                            steps.back());
     }
-    for (std::size_t i = 0; i < next_.size(); ++i) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
         const bool stated = form_.velocity && i >= sample_nodes_;
-        if (!stated) next_[i].pose.velocity = rate_at(i, steps, slopes);
-        next_[i].pose.angular_velocity = rate_at(i, steps, turns);
+        if (!stated) nodes[i].pose.velocity = rate_at(i, steps, slopes);
+        nodes[i].pose.angular_velocity = rate_at(i, steps, turns);
     }
 }
 
@@ -187,7 +367,7 @@ ExternalPredictor::ExternalPredictor(const std::string& command, std::span<const
       held_(tracking::make_predictor("hold")),
       patience_(patience) {
     try {
-        child_.emplace(command);
+        child_ = std::make_unique<LineChild>(command);
         fmt::format_to(std::back_inserter(line_), "musicworld {} {}", kProtocol, stick);
         for (const double lead : leads_s_) fmt::format_to(std::back_inserter(line_), " {}", lead);
         line_ += '\n';
@@ -198,13 +378,14 @@ ExternalPredictor::ExternalPredictor(const std::string& command, std::span<const
     }
 }
 
+ExternalPredictor::~ExternalPredictor() = default;
+
 tracking::SampleStatus ExternalPredictor::correct(const tracking::PoseSample& sample) noexcept {
     if (failure_) return tracking::SampleStatus::not_finite;
     const tracking::SampleStatus status = held_->correct(sample);
-    const bool fresh = status == tracking::SampleStatus::reinitialised;
-    if (status != tracking::SampleStatus::accepted && !fresh) return status;
+    if (!is_taken(status)) return status;
     try {
-        exchange(sample, fresh && answers_ > 0);
+        exchange(sample, status == tracking::SampleStatus::reinitialised && answers_ > 0);
     } catch (...) {
         failure_ = std::current_exception();
         return tracking::SampleStatus::not_finite;

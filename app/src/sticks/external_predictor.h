@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "process/line_child.h"
-
 namespace app {
+
+class LineChild;
 
 /// What an external predictor answers for each lead, in this order, as its first line announced.
 struct AnswerForm {
@@ -58,14 +58,14 @@ private:
     };
     [[nodiscard]] Node parse(std::size_t index, std::span<const double> numbers,
                              const tracking::PosePrediction& sample) const;
-    void differentiate();
+    void differentiate(std::vector<Node>& nodes) const;
     /// The node at or before a lead.
     [[nodiscard]] std::size_t node_before(double lead_s) const noexcept;
 
     AnswerForm form_;
     std::size_t sample_nodes_ = 0;  // 1 if the sample stands for lead 0
     bool answered_ = false;
-    std::vector<Node> nodes_, next_;
+    std::vector<Node> nodes_;
 };
 
 /// How long an external predictor is waited for.
@@ -88,6 +88,7 @@ public:
     /// Starts `sh -c COMMAND` and waits for its first line. Throws std::runtime_error, one line.
     ExternalPredictor(const std::string& command, std::span<const double> leads_s, const std::string& stick,
                       ExternalPatience patience = {});
+    ~ExternalPredictor() override;
 
     [[nodiscard]] tracking::SampleStatus correct(const tracking::PoseSample& sample) noexcept override;
     [[nodiscard]] tracking::PosePrediction predict(double lead_s) const noexcept override {
@@ -100,8 +101,9 @@ public:
 
     /// As before the first sample: times may begin again. The child gets `restart`.
     void begin_anew() { held_ = tracking::make_predictor("hold"); }
-    /// What went wrong; null while all is well.
-    [[nodiscard]] const std::exception_ptr& failure() const noexcept { return failure_; }
+    void require_working() const override {
+        if (failure_) std::rethrow_exception(failure_);
+    }
 
 private:
     /// Sends a sample, after `restart` if the child is to start anew, and takes the answer.
@@ -111,7 +113,7 @@ private:
     std::vector<double> leads_s_;                // ascending, each once
     std::unique_ptr<tracking::Predictor> held_;  // `hold`: judges samples, keeps the newest pose
     ExternalPatience patience_;
-    std::optional<LineChild> child_;
+    std::unique_ptr<LineChild> child_;
     AnswerForm form_;
     AnswerPath path_;
     std::vector<double> numbers_;  // of one answer

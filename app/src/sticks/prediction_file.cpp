@@ -11,7 +11,6 @@
 #include <sstream>
 
 #include "files/bad_input.h"
-#include "sticks/predictors.h"
 
 namespace app {
 namespace fs = std::filesystem;

@@ -90,12 +90,6 @@ void check_specification(const std::string& specification) {
         (void)make_internal(specification);
 }
 
-void require_working(const tracking::Predictor& predictor) {
-    if (const auto* external = dynamic_cast<const ExternalPredictor*>(&predictor);
-        external && external->failure())
-        std::rethrow_exception(external->failure());
-}
-
 std::vector<std::string> split_specifications(const std::string& list) {
     std::vector<std::string> parts;
     for (std::size_t begin = 0; begin <= list.size();) {

@@ -127,8 +127,8 @@ tracking::SampleStatus StickFilters::correct(const tracking::PoseSample& sample,
     (void)picture_->correct(sample);
     if (confirming_) (void)confirming_->correct(sample);
     const tracking::SampleStatus status = sound_->correct(sample);
-    require_working(*picture_);
-    require_working(*sound_);
+    picture_->require_working();
+    sound_->require_working();
     say_paths(state);  // a sample that one filter refuses may count for another
     if (!is_taken(status)) {
         ++state.refused;

@@ -10,7 +10,6 @@
 #include <numbers>
 
 #include "files/bad_input.h"
-#include "kit/kit.h"
 #include "statistics/statistics.h"
 #include "strikes/stroke_lows.h"
 
@@ -288,10 +287,8 @@ std::string room_text(const KitFit& fit) {
 
 /// A name as it may stand in a comment and in quotes.
 std::string plain(std::string name) {
-    std::replace_if(
-        name.begin(), name.end(),
-        [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f || c == '"' || c == '\\'; },
-        '_');
+    for (char& c : name)
+        if (is_control(c) || c == '"' || c == '\\') c = '_';
     return name;
 }
 

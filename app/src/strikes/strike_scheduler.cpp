@@ -2,7 +2,6 @@
 
 #include <audio/performance.h>
 
-#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <numeric>

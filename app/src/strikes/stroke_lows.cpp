@@ -3,7 +3,6 @@
 #include <tracking/predictor.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "statistics/statistics.h"

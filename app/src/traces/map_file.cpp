@@ -121,9 +121,7 @@ FormatDescription map_format() {
 
 tracking::ColumnMap read_map(const fs::path& file) {
     tracking::ColumnMap map;
-    std::vector<TomlFile> layers;
-    layers.emplace_back("a map", file);
-    read_toml(layers, "the map", [&](Fields& keys) { map_keys(keys, map); });
+    read_toml({TomlFile("a map", file)}, "the map", [&](Fields& keys) { map_keys(keys, map); });
     try {
         map.check();
     } catch (const std::invalid_argument& wrong) {

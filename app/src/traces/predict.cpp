@@ -25,7 +25,7 @@ void predict_stick(const tracking::StickTrace& stick, std::size_t index, trackin
     double newest_s = 0;
     bool first = true;
     for (const tracking::PoseSample& sample : stick.samples) {
-        const double behind_s = feed(predictor, sample);
+        const double behind_s = tracking::feed(predictor, sample);
         oriented = oriented || sample.has_orientation;
         if (!first && !(sample.t_s > newest_s)) continue;
         newest_s = sample.t_s;

@@ -24,21 +24,12 @@ std::string describe(const tracking::SensorModel& sensor) {
     return text.empty() ? text : fmt::format("simulated sensor ({}; seed {})", text, sensor.seed);
 }
 
-std::vector<tracking::PoseSample> seen_samples(const tracking::Trace& trace, std::size_t stick,
-                                               const tracking::SensorModel& sensor) {
-    try {
-        return tracking::sense(trace.sticks[stick], sensor, stick);
-    } catch (const std::invalid_argument& error) {
-        throw BadInput(fmt::format("{}: error: {}", trace.file, error.what()));
-    }
-}
-
 tracking::Trace seen_by(const tracking::Trace& trace, const tracking::SensorModel& sensor) {
     tracking::Trace seen = trace;
     if (sensor.rate_hz > 0) seen.rate_hz = sensor.rate_hz;
     for (std::size_t i = 0; i < seen.sticks.size(); ++i) {
         tracking::StickTrace& stick = seen.sticks[i];
-        stick.samples = seen_samples(trace, i, sensor);
+        stick.samples = tracking::sense(trace, i, sensor);
         if (stick.samples.size() < 2)
             throw BadInput(
                 fmt::format("{}: error: found {} samples of stick '{}' after the simulated sensor, expected "

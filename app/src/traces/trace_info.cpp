@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "files/one_line.h"
+#include "files/bad_input.h"
 #include "kit/kit.h"
 #include "statistics/statistics.h"
 #include "strikes/stroke_lows.h"

@@ -1,11 +1,10 @@
-#include "commands/latency_command.h"
-
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "commands/play_command.h"
 #include "files/bad_input.h"
 #include "latency/latency_comparison.h"
 #include "sample_realtime.h"

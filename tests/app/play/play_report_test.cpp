@@ -7,7 +7,7 @@
 #include "files/output_folder.h"
 #include "kit/kit.h"
 #include "play/play_plots.h"
-#include "play/play_products.h"
+#include "play/play_run.h"
 #include "report/plot.h"
 #include "sample_play_result.h"
 

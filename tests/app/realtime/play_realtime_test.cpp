@@ -15,7 +15,7 @@
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "kit/kit.h"
-#include "play/play_setup.h"
+#include "play/play_run.h"
 #include "temporary_folder.h"
 
 namespace app {

@@ -1,4 +1,6 @@
 // Decoders and sources of live samples, within this process.
+#include "sensors/live_sources.h"
+
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <lo/lo.h>
@@ -12,8 +14,6 @@
 #include "files/bad_input.h"
 #include "free_port.h"
 #include "process/clock.h"
-#include "sensors/osc_source.h"
-#include "sensors/row_sources.h"
 #include "tracking/mutation.h"
 
 namespace {
@@ -178,7 +178,7 @@ TEST(StreamSource, ReadsToTheEndAndIsTakenUpInTheMiddle) {
     close(ends[0]);
     ASSERT_EQ(samples.size(), 2u);
     EXPECT_EQ(samples[1].sample.position, Vector3d(2, 0, 0));
-    EXPECT_EQ(source->head().rate_hz, 60);
+    EXPECT_EQ(source->head().keys.rate_hz, 60);
     EXPECT_FALSE(source->head().oriented);
     EXPECT_EQ(source->stream_head(), "# units: mm\n# rate_hz: 60\nt,stick,px,py,pz\n");
 

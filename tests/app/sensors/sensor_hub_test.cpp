@@ -176,7 +176,7 @@ TEST(SensorHub, StatesEqualAnOfflineRunToTheBit) {
         return e.kind == Kind::silent && std::fmod(e.at_s, 1.5) > 1;
     });
     EXPECT_LE(in_pauses, 1) << seen.all_messages();
-    for (const app::ClockReport& clock : hub.clocks()) EXPECT_EQ(clock.clock, "the trace's own, replayed");
+    for (const app::ClockReport& clock : hub.clocks()) EXPECT_EQ(clock.clock, app::SampleClock::replayed);
 }
 
 TEST(SensorHub, EndsWithItsSourceAndLeavesNothing) {
@@ -464,7 +464,7 @@ TEST(SensorHub, LiveSticksShareAProcessAndSurviveWhatHappensToIt) {
     seen.states.resize(2);
     watch_until(hub, 2, seen, grown_by(100));
     EXPECT_EQ(seen.messages_but_of_silence(), "");
-    EXPECT_EQ(hub.clocks().at(0).clock, "the source's");
+    EXPECT_EQ(hub.clocks().at(0).clock, app::SampleClock::source);
 
     sender.turn_clock_by(-7);
     watch_until(hub, 2, seen, [&] { return seen.count(Kind::clock_jumped) == 1; });
@@ -516,14 +516,14 @@ TEST(SensorHub, HeadOfAStreamIsThereBeforeItsFirstStateAndOutlivesTheSensor) {
         publisher.send(zmq::buffer(seen.states[0].empty() ? head + row : row));
     };
     watch_until(hub, 1, seen, [&] { return send(), !seen.states[0].empty(); });
-    EXPECT_EQ(hub.stream_head().text, head);
+    EXPECT_EQ(hub.stream_head().text.data(), head);
     EXPECT_EQ(hub.stream_head().tip, Eigen::Vector3d(0, 0, -0.4));
     EXPECT_FALSE(hub.stream_head().shaft);
     kill(children().front(), SIGKILL);
     watch_until(hub, 1, seen, [&] { return send(), seen.count(Kind::restarted) == 1; });
     const std::size_t before = seen.states[0].size();
     watch_until(hub, 1, seen, [&] { return send(), seen.states[0].size() > before + 10; });
-    EXPECT_EQ(hub.stream_head().text, head);
+    EXPECT_EQ(hub.stream_head().text.data(), head);
     EXPECT_EQ(seen.states[0].back().starts, 2u);
     for (const tracking::StickState& state : seen.states[0])
         EXPECT_EQ(state.position, Eigen::Vector3d(1, 1.5, 0));

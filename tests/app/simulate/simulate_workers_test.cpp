@@ -122,14 +122,14 @@ TEST(SimulateWorkers, AsynchronouslyNoWorkerLeadsByMoreThanTheBoundAndMomentumIs
     options.out = folder.path() / "run";
     options.workers = processors(4, sim::Pace::bounded);
     const SimulateResult r = simulate(options);
-    EXPECT_EQ(r.worker_options.bound, 4);
+    EXPECT_EQ(r.worker_options->bound, 4);
     int most = 0;
     for (const auto& row : table_of(*options.out / "timing.csv")) {
         EXPECT_LE(row.at("lead"), 4);
         EXPECT_LE(row.at("ghost_age"), 4);
         most = std::max(most, int(row.at("lead")));
     }
-    EXPECT_GT(r.workers->cross_contacts, 0u);
+    EXPECT_GT(r.cross_contacts, 0u);
     ASSERT_TRUE(r.drift);
     EXPECT_LT(r.drift->linear, 1e-3 * r.drift->scale);  // what is promised of asynchronous contacts
 }

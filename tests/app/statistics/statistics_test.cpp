@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <random>
+#include <span>
 #include <vector>
 
 namespace {
@@ -67,6 +69,85 @@ TEST(Quantile, OfSortedAndInPlaceAreTheSame) {
 TEST(Median, IsTheMiddleOrTheMeanOfTheTwoMiddleValues) {
     EXPECT_EQ(median({3, 1, 2}), 2);
     EXPECT_EQ(median({4, 1, 2, 3}), 2.5);
+}
+
+using app::PairedDifference;
+using app::PairedSums;
+
+PairedSums sums(double of_a, double of_b, std::size_t count) {
+    return {{of_a, count}, {of_b, count}};
+}
+
+TEST(PairedDifference, APredictorAgainstItselfGainsNothing) {
+    const std::vector<PairedSums> groups = {sums(10, 10, 5), sums(40, 40, 8), sums(3, 3, 2)};
+    const PairedDifference d = app::paired_difference(groups, 1);
+    EXPECT_EQ(d.ratio, 1);
+    EXPECT_EQ(d.low, 1);
+    EXPECT_EQ(d.high, 1);
+    EXPECT_EQ(d.difference_mm, 0);
+    EXPECT_TRUE(app::verdict(d).starts_with("no measurable gain")) << app::verdict(d);
+}
+
+TEST(PairedDifference, TenPercentInEveryRecordingIsAGainHoweverTheRecordingsDiffer) {
+    std::vector<PairedSums> groups;
+    for (const double level : {1.0, 100.0, 7.0, 3000.0}) groups.push_back(sums(0.81 * level, level, 10));
+    const PairedDifference d = app::paired_difference(groups, 1);
+    EXPECT_NEAR(d.ratio, 0.9, 1e-12);  // rounding
+    EXPECT_NEAR(d.low, 0.9, 1e-12);
+    EXPECT_NEAR(d.high, 0.9, 1e-12);
+    EXPECT_TRUE(d.gain());
+    EXPECT_EQ(app::verdict(d), "10.0 % better (0.900 to 0.900, n = 4)");
+}
+
+TEST(PairedDifference, ABaselineWithoutErrorIsWordedNotDividedBy) {
+    const std::vector<PairedSums> groups = {sums(10, 0, 5), sums(40, 0, 8)};
+    for (const std::size_t count : {1, 2}) {
+        const PairedDifference d = app::paired_difference(std::span(groups).first(count), 1);
+        EXPECT_EQ(app::verdict(d), "the baseline errs nothing, so there is no ratio");
+        EXPECT_GT(d.difference_mm, 0);
+    }
+}
+
+TEST(PairedDifference, BetterOnHalfAndWorseOnHalfIsNoMeasurableGain) {
+    std::vector<PairedSums> groups;
+    for (int i = 0; i < 12; ++i) groups.push_back(sums(i % 2 == 0 ? 0.7 : 1.25, 1, 10));
+    const PairedDifference d = app::paired_difference(groups, 1);
+    EXPECT_LT(d.low, 1);
+    EXPECT_GT(d.high, 1);
+    EXPECT_LT(d.difference_low_mm, 0);
+    EXPECT_GT(d.difference_high_mm, 0);
+    EXPECT_FALSE(d.gain());
+    EXPECT_FALSE(d.loss());
+    EXPECT_TRUE(app::verdict(d).starts_with("no measurable gain"));
+}
+
+TEST(PairedDifference, OneRecordingHasNoInterval) {
+    const std::vector<PairedSums> one = {sums(1, 4, 10)};
+    const PairedDifference d = app::paired_difference(one, 1);
+    EXPECT_EQ(d.ratio, 0.5);
+    EXPECT_FALSE(d.has_interval());
+    EXPECT_FALSE(d.gain());
+    EXPECT_NE(app::verdict(d).find("no interval"), std::string::npos);
+}
+
+TEST(PairedDifference, TheIntervalOf400GroupsIsTheNormalOne) {
+    std::vector<PairedSums> groups;
+    std::mt19937_64 random(3);
+    for (int i = 0; i < 400; ++i)
+        groups.push_back(sums(0.5 + static_cast<double>(random() >> 11) / 9007199254740992.0, 1, 1));
+    const PairedDifference d = app::paired_difference(groups, 1);
+    // ratio^2 is the mean of numbers even in [0.5, 1.5], standard error 0.2887/20; halved by the root. The
+    // bootstrap's own quantiles of 2000 draws and the sample's deviation vary by 5 % each: three of these.
+    const double half_width = 1.96 * 0.2887 / 20 / 2;
+    EXPECT_NEAR((d.high - d.low) / 2, half_width, 0.2 * half_width);
+    EXPECT_NEAR(d.ratio, 1, 3.5 * 0.2887 / 20 / 2);
+}
+
+TEST(PairedDifference, TheSameSeedDrawsTheSameInterval) {
+    const std::vector<PairedSums> groups = {sums(1, 2, 3), sums(5, 4, 3), sums(2, 2, 3), sums(9, 10, 3)};
+    const PairedDifference a = app::paired_difference(groups, 5), b = app::paired_difference(groups, 5);
+    EXPECT_EQ(a.low, b.low);
+    EXPECT_EQ(a.high, b.high);
 }
 
 }  // namespace

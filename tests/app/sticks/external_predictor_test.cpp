@@ -84,7 +84,7 @@ TEST(ExternalPredictor, TheExampleIsDifference) {
     const auto external = app::make_any_predictor(kExample, kLeads, "left");
     for (const PoseSample& sample : waving(200)) {
         EXPECT_EQ(external->correct(sample), own->correct(sample));
-        app::require_working(*external);
+        external->require_working();
         EXPECT_EQ(external->time_s(), own->time_s());
         for (const double lead : {0.0, 0.01, 1.0 / 30, 0.05, 1.0 / 15}) {
             const tracking::PosePrediction a = external->predict(lead), b = own->predict(lead);
@@ -113,7 +113,7 @@ TEST(ExternalPredictor, SendsTheHeaderThenWhatTheClockLetsThroughAndRestartAfter
         EXPECT_EQ(predictor.correct(sample_at(0.15, {NAN, 0, 0})), SampleStatus::not_finite);
         EXPECT_EQ(predictor.correct(sample_at(0.2)), SampleStatus::accepted);
         EXPECT_EQ(predictor.correct(sample_at(0.5)), SampleStatus::reinitialised);
-        EXPECT_FALSE(predictor.failure());
+        EXPECT_NO_THROW(predictor.require_working());
         EXPECT_EQ(predictor.predict(0.5).position, Vector3d(1, 2, 3));
         EXPECT_FALSE(predictor.covariance(0.5).has_value());
     }
@@ -139,7 +139,7 @@ struct Fault {
 
 std::string failure_of(const app::ExternalPredictor& predictor) {
     try {
-        app::require_working(predictor);
+        predictor.require_working();
     } catch (const std::runtime_error& error) {
         return error.what();
     }
@@ -181,7 +181,8 @@ TEST(ExternalPredictor, EveryFaultIsALocatedErrorAndTheChildIsCollected) {
             patience.answer_s = std::string(fault.message).find("0.5 s") != std::string::npos ? 0.5 : 10;
             ExternalPredictor predictor(fault.command, std::vector<double>{0.05}, "r", patience);
             double t = 0;
-            for (; t < 0.1 && !predictor.failure(); t += 0.01) (void)predictor.correct(sample_at(t));
+            for (; t < 0.1 && failure_of(predictor) == "no failure"; t += 0.01)
+                (void)predictor.correct(sample_at(t));
             const std::string message = failure_of(predictor);
             EXPECT_EQ(message.find("exec:" + fault.command + ", stick r, answer "), 0U) << message;
             EXPECT_NE(message.find(": error: found "), std::string::npos) << message;

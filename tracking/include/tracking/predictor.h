@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,6 +22,10 @@ struct PoseCovariance {
 /// What became of a sample. `outlier`: only with a gate (`gate=`); the sample was ignored, but the
 /// third in a row is taken as real and answers `reinitialised`.
 enum class SampleStatus { accepted, not_newer, not_finite, reinitialised, outlier };
+/// Whether a sample became part of an estimator's state.
+[[nodiscard]] inline bool is_taken(SampleStatus status) {
+    return status == SampleStatus::accepted || status == SampleStatus::reinitialised;
+}
 
 /// A causal estimator of one stick's pose. One thread at a time; correct() and predict() allocate nothing.
 class Predictor {
@@ -53,7 +58,20 @@ public:
     [[nodiscard]] virtual PosePrediction predict_model(std::size_t /*index*/, double lead_s) const noexcept {
         return predict(lead_s);
     }
+
+    /// Throws what made an estimator give up that runs in another process: correct() and predict() cannot
+    /// throw. To be called before a run's results are used.
+    virtual void require_working() const {}
 };
+
+/// Feeds a sample to a predictor and returns how far the predictor's state then lies behind it [s]; 0 if the
+/// predictor took it. What is expected `lead_s` after the sample is predict(lead_s + that), also where the
+/// sample was refused. Throws as require_working() does.
+[[nodiscard]] inline double feed(Predictor& predictor, const PoseSample& sample) {
+    if (is_taken(predictor.correct(sample))) return 0;
+    predictor.require_working();
+    return std::max(0.0, sample.t_s - predictor.time_s());
+}
 
 /// Longest pause between samples that an estimator bridges; after a longer one it starts anew.
 inline constexpr double kGapS = 0.1;

@@ -41,5 +41,7 @@ struct SensorModel {
 /// distributions). `stick_index` gives each stick its own noise.
 [[nodiscard]] std::vector<PoseSample> sense(const StickTrace& stick, const SensorModel& sensor,
                                             std::size_t stick_index = 0);
+/// The same of a trace's stick `index`; what cannot be sensed is a TraceError that names the trace's file.
+[[nodiscard]] std::vector<PoseSample> sense(const Trace& trace, std::size_t index, const SensorModel& sensor);
 
 }  // namespace tracking

@@ -1,4 +1,4 @@
-#include "scene/look_keys.h"
+#include "scene/shared_keys.h"
 
 #include <fmt/format.h>
 

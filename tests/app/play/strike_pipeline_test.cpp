@@ -1,9 +1,9 @@
 // What pictures add to the bodies' exact states, strike by strike.
+#include "play/strike_pipeline.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
-
-#include "play/strike_pipeline.h"
 
 namespace app {
 namespace {

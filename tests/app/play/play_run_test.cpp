@@ -1,4 +1,4 @@
-#include "play/play_products.h"
+#include "play/play_run.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,6 @@
-// One stick's filters: what they publish is what their predictors predict.
+// One stick's filters: what they publish is what their predictors predict; contacts that are confirmed.
+
+#include "sticks/stick.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +8,6 @@
 #include <cstring>
 
 #include "sticks/predictors.h"
-#include "sticks/stick.h"
 
 namespace {
 
@@ -131,6 +132,40 @@ TEST(Stick, AsksItsState) {
               tracking::point_of(state.confirming.after(0.1), geometry.tip).velocity);
     stick.forget();
     EXPECT_FALSE(stick.started());
+}
+
+sim::Contact contact_at(double t_s, std::uint32_t body = 0) {
+    sim::Contact contact;
+    contact.t_s = t_s;
+    contact.body = body;
+    return contact;
+}
+
+bool is_kept(const sim::Contact& contact, const std::vector<sim::Contact>& confirming) {
+    std::vector<sim::Contact> contacts = {contact};
+    app::keep_confirmed(contacts, confirming, 1.0);
+    return !contacts.empty();
+}
+
+TEST(KeepConfirmed, ContactsFartherThan50MsNeedNoConfirmation) {
+    EXPECT_TRUE(is_kept(contact_at(1.051), {}));
+    EXPECT_FALSE(is_kept(contact_at(1.049), {}));
+}
+
+TEST(KeepConfirmed, NearOnesNeedTheSameBodyAtMost50MsLater) {
+    EXPECT_TRUE(is_kept(contact_at(1.02, 2), {contact_at(1.069, 2)}));
+    EXPECT_FALSE(is_kept(contact_at(1.02, 2), {contact_at(1.071, 2)}));
+    EXPECT_FALSE(is_kept(contact_at(1.02, 2), {contact_at(1.02, 1)}));
+    EXPECT_TRUE(is_kept(contact_at(1.02, 2), {contact_at(1.0, 1), contact_at(1.001, 2)}));
+}
+
+TEST(KeepConfirmed, EachContactIsJudgedByItself) {
+    std::vector<sim::Contact> contacts = {contact_at(1.01, 0), contact_at(1.02, 1), contact_at(1.06, 2)};
+    const std::vector<sim::Contact> confirming = {contact_at(1.03, 1)};
+    app::keep_confirmed(contacts, confirming, 1.0);
+    ASSERT_EQ(contacts.size(), 2U);
+    EXPECT_EQ(contacts[0].body, 1U);
+    EXPECT_EQ(contacts[1].body, 2U);
 }
 
 }  // namespace

@@ -43,7 +43,7 @@ StrikeSurface plane(double height_m) {
 HitScore score(const tracking::StickTrace& stick, const std::string& specification,
                const StrikeTiming& timing = {}, const StrikeSurface& surface = plane(0)) {
     const auto predictor = tracking::make_predictor(specification);
-    return evaluate_strikes(stick, stick.samples, {*predictor, nullptr}, {}, surface, timing);
+    return evaluate_strikes(tip_track(stick, {}), stick.samples, {*predictor, nullptr}, {}, surface, timing);
 }
 
 /// Falls at `speed` towards 0 at contact_s, turns back at turn_s.
@@ -145,7 +145,7 @@ TEST(StrikeEvaluation, WhatIsDecidedDoesNotDependOnLaterSamples) {
         for (const tracking::PoseSample& sample : stick.samples)
             if (sample.t_s <= until_s) samples.push_back(sample);
         const auto predictor = tracking::make_predictor(specification);
-        return evaluate_strikes(stick, samples, {*predictor, nullptr}, {}, plane(0.04), {});
+        return evaluate_strikes(tip_track(stick, {}), samples, {*predictor, nullptr}, {}, plane(0.04), {});
     };
     for (const char* specification : {"cv", "bank"}) {
         const HitScore whole = run(specification, 1e9);
@@ -200,7 +200,7 @@ HitScore score_models(double first_until_s, std::size_t before = 0) {
     const Height height = fall(2, 0.5);
     const tracking::StickTrace stick = stick_of(height, 0.7);
     TwoModels models(height, first_until_s, before);
-    return evaluate_strikes(stick, stick.samples, {models, nullptr}, {}, plane(0), {});
+    return evaluate_strikes(tip_track(stick, {}), stick.samples, {models, nullptr}, {}, plane(0), {});
 }
 
 TEST(StrikeEvaluation, OfSeveralModelsThePendingContactOfTheSelectedOneIsPlayed) {
@@ -247,7 +247,8 @@ TEST(StrikeEvaluation, AStrikeIsPlayedOnlyIfTheConfirmingFilterConfirmsIt) {
     const auto with = [&](const char* confirming) {
         const auto timing = tracking::make_predictor("difference"),
                    other = tracking::make_predictor(confirming);
-        return evaluate_strikes(stick, stick.samples, {*timing, other.get()}, {}, plane(0), {});
+        return evaluate_strikes(tip_track(stick, {}), stick.samples, {*timing, other.get()}, {}, plane(0),
+                                {});
     };
     expect_on_time(with("cv"), 0, "cv meets the plane too");
     const HitScore unconfirmed = with("hold");  // stands still, until it is inside
@@ -292,40 +293,6 @@ TEST(HitScore, SumsAreOfCountsAndTimes) {
     EXPECT_DOUBLE_EQ(sum.false_per_min(), 2.0 / 3);
     EXPECT_DOUBLE_EQ(sum.false_per_min_without_cancel(), 5.0 / 3);
     EXPECT_DOUBLE_EQ(sum.loss(), loss);
-}
-
-sim::Contact contact_at(double t_s, std::uint32_t body = 0) {
-    sim::Contact contact;
-    contact.t_s = t_s;
-    contact.body = body;
-    return contact;
-}
-
-bool is_kept(const sim::Contact& contact, const std::vector<sim::Contact>& confirming) {
-    std::vector<sim::Contact> contacts = {contact};
-    keep_confirmed(contacts, confirming, 1.0);
-    return !contacts.empty();
-}
-
-TEST(KeepConfirmed, ContactsFartherThan50MsNeedNoConfirmation) {
-    EXPECT_TRUE(is_kept(contact_at(1.051), {}));
-    EXPECT_FALSE(is_kept(contact_at(1.049), {}));
-}
-
-TEST(KeepConfirmed, NearOnesNeedTheSameBodyAtMost50MsLater) {
-    EXPECT_TRUE(is_kept(contact_at(1.02, 2), {contact_at(1.069, 2)}));
-    EXPECT_FALSE(is_kept(contact_at(1.02, 2), {contact_at(1.071, 2)}));
-    EXPECT_FALSE(is_kept(contact_at(1.02, 2), {contact_at(1.02, 1)}));
-    EXPECT_TRUE(is_kept(contact_at(1.02, 2), {contact_at(1.0, 1), contact_at(1.001, 2)}));
-}
-
-TEST(KeepConfirmed, EachContactIsJudgedByItself) {
-    std::vector<sim::Contact> contacts = {contact_at(1.01, 0), contact_at(1.02, 1), contact_at(1.06, 2)};
-    const std::vector<sim::Contact> confirming = {contact_at(1.03, 1)};
-    keep_confirmed(contacts, confirming, 1.0);
-    ASSERT_EQ(contacts.size(), 2U);
-    EXPECT_EQ(contacts[0].body, 1U);
-    EXPECT_EQ(contacts[1].body, 2U);
 }
 
 }  // namespace

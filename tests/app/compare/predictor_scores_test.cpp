@@ -1,9 +1,10 @@
+#include "compare/predictor_scores.h"
+
 #include <gtest/gtest.h>
 
 #include <array>
 #include <random>
 
-#include "compare/predictor_scores.h"
 #include "sample_recordings.h"
 
 namespace {

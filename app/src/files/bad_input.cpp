@@ -1,4 +1,4 @@
-#include "files/one_line.h"
+#include "files/bad_input.h"
 
 #include <algorithm>
 #include <numeric>
@@ -28,7 +28,7 @@ std::string one_line(std::string_view text, std::size_t longest) {
     if (line.size() < text.size())  // no part of a character at the end
         while (!line.empty() && (static_cast<unsigned char>(line.back()) & 0x80) != 0) line.pop_back();
     for (char& c : line)
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+        if (is_control(c)) c = ' ';
     return line.size() < text.size() ? line + "..." : line;
 }
 

@@ -1,8 +1,7 @@
-#include "latency/screen_path.h"
-
 #include <gtest/gtest.h>
 
 #include "kit/kit.h"
+#include "latency/latency_report.h"
 #include "sample_realtime.h"
 
 namespace app {

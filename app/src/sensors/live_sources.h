@@ -1,14 +1,53 @@
 #pragma once
 #include <tracking/trace_rows.h>
 
+#include <array>
+#include <cstddef>
+#include <deque>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 
 #include "sensors/sample_source.h"
 
 namespace app {
+
+/// What live sources share: samples that have been decoded wait to be taken, at most kLongest (newer ones are
+/// lost); the names of their sticks; what was wrong. Times that count from long ago (1970, 1900) are counted
+/// from the whole second of the first one, so that doubles keep them to the nanosecond.
+class LiveSource : public SampleSource {
+public:
+    static constexpr std::size_t kLongest = 4096;
+
+    /// Empty `sticks`: as they come.
+    explicit LiveSource(const std::vector<std::string>& sticks);
+
+    [[nodiscard]] SourceStatus next(SourceSample& sample, std::int64_t deadline_ns) final;
+    [[nodiscard]] const StickNames& sticks() const final { return names_; }
+    [[nodiscard]] SourceFaults faults() const final { return faults_; }
+    [[nodiscard]] SourceHead head() const override;
+
+    /// Adds a sample; one without orientation gets the stick's newest one.
+    void put(std::string_view stick, tracking::PoseSample sample, bool has_time);
+    /// `what`: one line, whatever bytes were sent.
+    void malformed(const std::string& what);
+
+protected:
+    /// Adds what has come by `deadline_ns`, waiting for it at most until then.
+    virtual void receive(std::int64_t deadline_ns) = 0;
+
+    std::int64_t read_ns_ = 0;  // CLOCK_MONOTONIC at which the newest bytes were here
+    bool ended_ = false;        // nothing more will come
+
+private:
+    StickNames names_;
+    std::array<Eigen::Quaterniond, StickNames::kMostSticks> orientations_;
+    std::deque<SourceSample> samples_;
+    SourceFaults faults_;
+    std::optional<double> base_s_;
+};
 
 /// Rows of the native format as they come: `# key: value` lines and a header may stand before them, and
 /// again later (they hold until the next ones); without any, rows are t,stick,px,py,pz[,qw,qx,qy,qz] in m, y
@@ -75,5 +114,31 @@ protected:
 /// what is no endpoint.
 [[nodiscard]] std::unique_ptr<SampleSource> make_zmq_source(const std::string& endpoint,
                                                             const SourceOptions& options);
+
+/// Poses from Open Sound Control messages over UDP (liblo).
+///
+///   address     /musicworld/stick/NAME or /NAME
+///   arguments   px py pz, or px py pz qw qx qy qz: floats or doubles, metres, y up, body to world
+///               before them, if the source has a clock: its time as a double [s] or as a time tag
+///
+/// Without a time argument the time tag of the bundle counts, if it has one; else the time of arrival.
+class OscSource final : public LiveSource {
+public:
+    /// Throws BadInput for what is no port, std::runtime_error for one that is taken.
+    OscSource(const std::string& port, const SourceOptions& options);
+    ~OscSource() override;
+
+    /// Takes the bytes of a datagram as if they had arrived.
+    void datagram(std::span<const char> bytes);
+
+protected:
+    void receive(std::int64_t deadline_ns) override;
+
+private:
+    void* server_;  // lo_server
+};
+
+/// Throws BadInput for what is no port.
+void check_osc_port(const std::string& port);
 
 }  // namespace app
