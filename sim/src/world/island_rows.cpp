@@ -11,6 +11,7 @@ namespace sim {
 namespace {
 
 constexpr double kPushHz = 30, kPushDamping = 10;
+constexpr double kFrameTurn = 0.05;  // [rad]
 
 /// Two unit vectors square to n and to each other.
 void set_tangents(const Eigen::Vector3f& n, Eigen::Vector3f (&t)[2]) {
@@ -62,7 +63,7 @@ void IslandSolver::begin(const Island& island) {
     }
     jacobians_.resize(floats);
     jacobians_used_ = 0;
-    contacts_.clear(), springs_.clear();
+    contacts_.clear(), springs_.clear(), impacts_.clear();
     any_told_ = false;
     first_crossed_ = crossed_.size();
     contacts_.reserve(triples);
@@ -203,35 +204,72 @@ void IslandSolver::finish_rows(Rows& rows) {
 }
 
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
-    alignas(32) float scratch[2][3 * kMostModes];
+    auto moving = [this](int id) { return id < kFirstPlane ? local(id) : -1; };
     ContactRows c{};
-    const Place a = place(manifold.a, point.arm_a, point.sample_a, point.rest, scratch[0]);
-    const Place b = place(manifold.b, point.arm_b, point.sample_b, point.rest, scratch[1]);
-    set_tangents(point.normal, c.tangent);
-    Eigen::Matrix3f directions;
-    directions << point.normal.transpose(), c.tangent[0].transpose(), c.tangent[1].transpose();
-    c.side[0] = reserve_rows(a.body);
-    write_rows(a, directions, 1, c.side[0]);
-    c.side[1] = reserve_rows(b.body);
-    write_rows(b, directions, -1, c.side[1]);
-    finish_rows(c);
+    c.manifold = &manifold;
     c.point = &point;
+    c.side[0] = reserve_rows(moving(manifold.a));
+    c.side[1] = reserve_rows(moving(manifold.b));
+    set_tangents(point.normal, c.tangent);
+    write_contact(c);
     c.separation = c.now = point.separation;
+    c.begins = point.begins;
     c.friction = manifold.friction;
     // Only what comes together rebounds, not what rests and rings.
     c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
     c.emerging = manifold.emerging;
-    c.inverse_normal = 1 / c.k[0][0];
-    c.slide_mass = 2 / (c.k[1][1] + c.k[2][2]);
-    const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
-    c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
-    c.inverse_tangent[2] = c.k[1][1] / det;
     c.pair = note_pair(manifold);
     c.told = note_told(c, true) || c.pair >= 0;
     c.impulse[0] = point.normal_impulse;
     c.impulse[1] = point.friction_impulse.dot(c.tangent[0]);
     c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
+    if (c.begins > 0) impacts_.push_back(contacts_.size());
     contacts_.push_back(c);
+}
+
+// A contact's rows in its bodies' frames.
+void IslandSolver::write_contact(ContactRows& c) {
+    alignas(32) float scratch[2][3 * kMostModes];
+    const Manifold& manifold = *c.manifold;
+    const ManifoldPoint& point = *c.point;
+    const Place a = place(manifold.a, point.arm_a, point.sample_a, point.rest_a, scratch[0]);
+    const Place b = place(manifold.b, point.arm_b, point.sample_b, point.rest_b, scratch[1]);
+    Eigen::Matrix3f directions;
+    directions << point.normal.transpose(), c.tangent[0].transpose(), c.tangent[1].transpose();
+    write_rows(a, directions, 1, c.side[0]);
+    write_rows(b, directions, -1, c.side[1]);
+    finish_rows(c);
+    c.inverse_normal = 1 / c.k[0][0];
+    c.slide_mass = 2 / (c.k[1][1] + c.k[2][2]);
+    const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
+    c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
+    c.inverse_tangent[2] = c.k[1][1] / det;
+}
+
+// Frames follow bodies that turned, with what is written in them: rows, and the way so far.
+void IslandSolver::turn_frames() {
+    turned_.assign(rows_of_.size(), false);
+    bool any = false;
+    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
+        BodyRows& rows = rows_of_[i];
+        const Eigen::Vector3d& root = rows.body->kind->root_inertia;
+        if (root.maxCoeff() - root.minCoeff() < 1e-6 * root.maxCoeff()) continue;  // alike in all frames
+        const Eigen::Matrix3d now = rows.body->state.orientation.toRotationMatrix();
+        if ((now - rows.frame).squaredNorm() < 2 * kFrameTurn * kFrameTurn) continue;
+        any = turned_[i] = true;
+        float* moved = moved_.data() + rows.offset + 3;
+        const Eigen::Vector3d way =
+            rows.frame * Eigen::Vector3d(moved[0], moved[1], moved[2]).cwiseQuotient(root);
+        rows.frame = now;
+        rows.body_from_world = now.transpose().cast<float>();
+        const Eigen::Vector3d again = (now.transpose() * way).cwiseProduct(root);
+        for (int k = 0; k < 3; ++k) moved[k] = static_cast<float>(again[k]);
+    }
+    auto has_turned = [this](const Side& side) {
+        return side.body >= 0 && turned_[static_cast<std::size_t>(side.body)];
+    };
+    for (ContactRows& c : contacts_)
+        if (any && (has_turned(c.side[0]) || has_turned(c.side[1]))) write_contact(c);
 }
 
 void IslandSolver::add_spring(HeldConstraint& constraint) {

@@ -10,7 +10,8 @@ namespace {
 
 using ModeArray = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostModes, 1>;  // on the stack
 
-constexpr float kPushSpeed = 3;           // [m/s]
+constexpr float kPushSpeed = 3;  // [m/s]
+constexpr int kImpactSweeps = 30;
 constexpr float kBounceThreshold = 0.1f;  // [m/s]
 
 void clear(StepImpulse& impulse) {
@@ -29,6 +30,8 @@ void IslandSolver::solve(const Island& island) {
     begin(island);
     for (int i = 0; i < settings_->substeps; ++i) {
         remaining_ = h_ * (settings_->substeps - 1 - i);
+        until_ = static_cast<float>(h_ * (i + 1));
+        leg_ = static_cast<std::size_t>(i);
         substep(i == 0, i + 1 == settings_->substeps);
     }
     if (any_told_) settle_given();
@@ -37,6 +40,7 @@ void IslandSolver::solve(const Island& island) {
 }
 
 void IslandSolver::substep(bool first, bool last) {
+    if (!first && !contacts_.empty()) turn_frames();
     load_velocities();
     for (SpringRows& spring : springs_) refresh(spring);
     warm_start(first);
@@ -124,6 +128,8 @@ void IslandSolver::push_out() {
 void IslandSolver::sweep(Push push) {
     for (SpringRows& spring : springs_) solve_spring(spring);
     for (ContactRows& contact : contacts_) solve_contact(contact, push);
+    for (int i = 0; i < (impacts_.empty() ? 0 : kImpactSweeps); ++i)
+        for (const std::size_t c : impacts_) solve_contact(contacts_[c], push);
 }
 
 // What the rows see of the velocities.
@@ -153,12 +159,15 @@ void IslandSolver::solve_spring(SpringRows& s) {
 }
 
 void IslandSolver::solve_contact(ContactRows& c, Push push) {
+    if (c.begins > until_) return;
     float v[3];
     speeds(c, v);
     // Selected, not branched: which case it is cannot be foretold.
     const bool soft = c.now <= 0 && (push == Push::all || (push == Push::soft && !c.emerging));
     const float bias = c.now > 0 ? c.now * inverse_h_ : soft ? std::max(push_rate_ * c.now, -kPushSpeed) : 0;
-    const float mass_share = soft ? mass_share_ : 1, impulse_share = soft ? impulse_share_ : 0;
+    // An impact is stopped at once: what yields for a substep lets it far in.
+    const bool yields = soft && c.begins == 0;
+    const float mass_share = yields ? mass_share_ : 1, impulse_share = yields ? impulse_share_ : 0;
     const float normal = std::max(
         c.impulse[0] - mass_share * c.inverse_normal * (v[0] + bias) - impulse_share * c.impulse[0], 0.f);
     float p[3] = {normal - c.impulse[0], 0, 0};
@@ -229,14 +238,26 @@ void IslandSolver::move() {
         const float h = static_cast<float>(h_);
         for (int i = 0; i < rows.width; ++i) moved[i] += h * y[i];
         WorldBodyState& s = body.state;
-        const double root_mass = kind.root_mass;
-        s.position += h_ / root_mass * Eigen::Vector3d(y[0], y[1], y[2]);
+        const Eigen::Vector3d velocity = Eigen::Vector3d(y[0], y[1], y[2]) / kind.root_mass;
+        if (paths_) {
+            const auto id = static_cast<std::size_t>(&body - bodies_->data());
+            (*paths_)[id].legs.resize(static_cast<std::size_t>(settings_->substeps));
+            (*paths_)[id].legs[leg_] = {s.position, s.orientation, velocity, Eigen::Vector3d::Zero()};
+        }
+        s.position += h_ * velocity;
         Eigen::Vector3d change;
         for (int i = 0; i < 3; ++i) change[i] = kind.root_inertia[i] * (y[3 + i] - start[3 + i]);
         Eigen::Vector3d momentum = s.angular_momentum + rows.frame * change;
         if (body.pushed) momentum += h_ * body.torque;
+        if (paths_)
+            (*paths_)[static_cast<std::size_t>(&body - bodies_->data())].legs[leg_].spin =
+                spin_of(body, s.orientation, momentum);
         s.orientation = body.substep_rotation.advance(s.orientation, momentum);
     }
+}
+
+void IslandSolver::forget_crossed(int body) {
+    std::erase_if(crossed_, [body](const CrossImpulse& c) { return c.own == body || c.ghost == body; });
 }
 
 // Half-way between where the contact would be if it moved with either centre.

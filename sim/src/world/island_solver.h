@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "shape/lanes.h"
+#include "world/body_path.h"
 #include "world/manifold.h"
-#include "world/moving_body.h"
 
 namespace sim {
 
@@ -35,10 +35,16 @@ struct Island {
 /// Rows. One Jacobian row a direction (normal, two tangents) and body, scaled by the square root of the
 /// inverse mass: D = J M^-1/2, floats in whole lanes, (n, R^T(r x n) / sqrt(I), sqrt(w) phi(r)^T R^T n). So
 /// the same row takes velocities out and puts impulses in. The three rows of a point are read together, with
-/// K = D D^T between them; friction is a 2 x 2 block limited to the cone. Separations move along with the
+/// K = D D^T between them; friction is a 2 x 2 block limited to the cone. A contact that begins later in the
+/// step (ManifoldPoint::begins) is passed over until then. Separations move along with the
 /// rows: s = s0 + D . integral of y. Contacts are frozen over the step but for velocities and separations;
 /// the rows of springs follow the bodies every substep, as does the frame of angular rows where there is no
 /// contact.
+///
+/// Impacts: a fast body crosses its own size within a substep, so what a sweep leaves over of its speed takes
+/// it through a wall. Contacts that begin later are swept kImpactSweeps times more, and do not yield. Frames
+/// of bodies with unequal moments of inertia follow them where they turn by more than kFrameTurn, with their
+/// rows.
 ///
 /// Deterministic: sweeps go over springs, then contacts, in the order of ids (see in_turns). No allocation
 /// once the buffers have grown.
@@ -49,6 +55,8 @@ public:
         : settings_(&settings), bodies_(&bodies), manifolds_(&manifolds), constraints_(&constraints) {}
 
     void solve(const Island& island);  ///< over one step
+    /// Where solve writes the paths of its bodies, one a body of the world; must stay. nullptr: nowhere.
+    void record(std::vector<BodyPath>* paths) noexcept { paths_ = paths; }
     /// What planes, fixed bodies, places, gravity and drag gave own bodies since the last call [N s].
     [[nodiscard]] Eigen::Vector3d take_outside_impulse() noexcept {
         return std::exchange(outside_, Eigen::Vector3d::Zero());
@@ -59,6 +67,8 @@ public:
         crossed_.clear();
         told_crossed_ = told;
     }
+    /// Forgets the crossed impulses of a body whose island is solved once more.
+    void forget_crossed(int body);
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
     [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }  ///< since the start
 
@@ -85,9 +95,10 @@ private:
         bool told = false;  ///< a watched body is among them
     };
     struct ContactRows : Rows {
+        Manifold* manifold;
         ManifoldPoint* point;
         Eigen::Vector3f tangent[2];
-        float separation, now, friction, restitution, approach;
+        float separation, now, begins, friction, restitution, approach;
         float taken, slide_mass, inverse_normal,
             inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
         float impulse[3], kept[3], at_move[3], largest;
@@ -123,6 +134,8 @@ private:
     void flush_window();
     const std::vector<Turn>& in_turns(const Island& island);
     void add_contact(Manifold& manifold, ManifoldPoint& point);
+    void write_contact(ContactRows& contact);
+    void turn_frames();
     void add_spring(HeldConstraint& constraint);
     /// An end of a spring, now.
     struct End {
@@ -169,6 +182,8 @@ private:
     std::vector<MovingBody>* bodies_;
     std::vector<Manifold>* manifolds_;
     std::vector<HeldConstraint>* constraints_;
+    std::vector<BodyPath>* paths_ = nullptr;
+    std::size_t leg_ = 0;  // of the paths: number of the substep
 
     std::vector<BodyRows> rows_of_;  // per island body
     std::vector<int> local_;         // world body -> island body or -1
@@ -176,6 +191,8 @@ private:
     std::vector<int> next_turn_;  // per island body
     std::vector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
+    std::vector<std::size_t> impacts_;  // contacts that begin later than the step
+    std::vector<bool> turned_;          // per island body: its frame was
     LaneArray y_, kept_, start_, moved_, jacobians_;
     std::size_t jacobians_used_ = 0;
     double h_ = 0;
@@ -186,6 +203,7 @@ private:
     std::vector<CrossImpulse> crossed_;  // of all islands since forget_crossed
     std::size_t first_crossed_ = 0;      // of this island
     double remaining_ = 0;               // of the step after this substep [s]
+    float until_ = 0;                    // since the step's start, end of this substep [s]
 };
 
 }  // namespace sim

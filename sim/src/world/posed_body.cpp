@@ -111,13 +111,6 @@ std::pair<int, float> PosedBody::furthest_sample(const Eigen::Vector3f& directio
     return best;
 }
 
-Eigen::Vector3f PosedBody::furthest_rest_point(const Eigen::Vector3f& direction) const noexcept {
-    // max d . D r with |r / a| = 1:  r = a^2 D^T d / |a D^T d|.
-    const Eigen::Vector3f axes = kind->definition.shape.base.semi_axes.cast<float>();
-    const Eigen::Vector3f pulled = axes.cwiseProduct(deformation.transpose() * direction);
-    return axes.cwiseProduct(pulled) / pulled.norm();
-}
-
 Eigen::Vector3d PosedBody::deformed(const Eigen::Vector3d& rest) const noexcept {
     if (kind->modes == 0) return rest;
     if (kind->linear()) return deformation.cast<double>() * rest;

@@ -30,9 +30,6 @@ struct PosedBody {
     }
     /// The sample furthest along `direction` (unit, body frame), and how far that is [m].
     [[nodiscard]] std::pair<int, float> furthest_sample(const Eigen::Vector3f& direction) const noexcept;
-    /// Of an ellipsoid: the rest point that is furthest along `direction` (body frame) as deformed, exactly
-    /// for rigid and linear bodies; modal ones are taken as undeformed.
-    [[nodiscard]] Eigen::Vector3f furthest_rest_point(const Eigen::Vector3f& direction) const noexcept;
     /// Deformed place of a rest point, body frame.
     [[nodiscard]] Eigen::Vector3d deformed(const Eigen::Vector3d& rest) const noexcept;
 

@@ -214,35 +214,6 @@ void World::Implementation::find_islands() {
     }
 }
 
-void World::Implementation::solve_islands() {
-    int awake = 0;
-    for (std::size_t i = 0; i < islands_used; ++i) {
-        const Island& island = islands[i];
-        if (!is_own(island)) continue;
-        ++awake;
-        if (island.manifolds.empty() && island.constraints.empty()) {
-            MovingBody& body = bodies[static_cast<std::size_t>(island.bodies.front())];
-            const Eigen::Vector3d before = body.state.velocity;
-            move_freely(body, settings);
-            if (limit_deformation(body)) ++free_limited;
-            if (body.own) outside += body.kind->mass.mass * (body.state.velocity - before);
-            if (body.pushed && sharing == Sharing::pairs) outside -= settings.dt * body.force;
-        } else {
-            solver->solve(island);
-            if (sharing == Sharing::pairs) continue;
-            for (const int id : island.bodies)
-                if (const MovingBody& body = bodies[static_cast<std::size_t>(id)]; body.pushed && body.own)
-                    outside += settings.dt * body.force;
-        }
-    }
-    counts.islands = awake;
-    outside += solver->take_outside_impulse();
-    if (!outside.allFinite()) outside = outside_before;  // of a body that is broken
-    counts.deformations_limited = free_limited + solver->deformations_limited();
-    if (counts.constraints_broken != solver->constraints_broken()) set_joined();
-    counts.constraints_broken = solver->constraints_broken();
-}
-
 int World::Implementation::still_steps_to_sleep() const {
     return static_cast<int>(std::ceil(kStillTime / settings.dt - 1e-9));
 }
@@ -323,7 +294,7 @@ void World::Implementation::step() {
         if (body.moves() && (!body.asleep || body.unposed)) pose(body);
         body.was_given = false;
     }
-    contacts.find(settings, planes, joined, bodies, here, sharing == Sharing::pairs);
+    contacts.find(contact_scene());
     find_islands();
     solve_islands();
     put_to_sleep();
@@ -343,6 +314,7 @@ World::World(const WorldDefinition& definition) : implementation_(std::make_uniq
     w.settings = definition.settings;
     w.planes = definition.planes;
     w.solver = std::make_unique<IslandSolver>(w.settings, w.bodies, w.contacts.manifolds(), w.constraints);
+    w.solver->record(&w.contacts.paths());
     for (const WorldBody& body : definition.bodies) w.add(body);
     for (const PointConstraint& constraint : definition.constraints) add_constraint(constraint);
 }

@@ -1,0 +1,169 @@
+#include <algorithm>
+#include <tuple>
+
+#include "world/world_implementation.h"
+
+// Solves a step's islands, and those again in which bodies meet what nobody foresaw.
+
+namespace sim {
+namespace {
+
+constexpr int kRounds = 12;  // then what still meets is held apart
+
+}  // namespace
+
+ContactScene World::Implementation::contact_scene() {
+    return {settings, planes, joined, bodies, here, sharing == Sharing::pairs};
+}
+
+// islands: others' bodies, too, as own ones may meet them unforeseen.
+bool World::Implementation::is_solved(const Island& island) const {
+    return is_own(island) || sharing == Sharing::islands;
+}
+
+void World::Implementation::start_solving() {
+    started.resize(bodies.size());
+    limited_before.resize(bodies.size());
+    outcomes.resize(bodies.size());
+    solved.assign(bodies.size(), false);
+    again.assign(bodies.size(), false);
+    for (std::size_t i = 0; i < islands_used; ++i) {
+        if (!is_solved(islands[i])) continue;
+        for (const int id : islands[i].bodies) {
+            const auto at = static_cast<std::size_t>(id);
+            started[at] = bodies[at].state;
+            limited_before[at] = bodies[at].at_limit;
+        }
+    }
+    springs_before.clear();
+    for (const HeldConstraint& c : constraints) springs_before.emplace_back(c.impulse, c.holds);
+}
+
+void World::Implementation::move_alone(int id) {
+    MovingBody& body = bodies[static_cast<std::size_t>(id)];
+    Outcome& outcome = outcomes[static_cast<std::size_t>(id)];
+    const Eigen::Vector3d before = body.state.velocity;
+    move_freely(body, settings);
+    if (limit_deformation(body)) ++outcome.limited;
+    if (body.own) outcome.outside += body.kind->mass.mass * (body.state.velocity - before);
+    if (body.pushed && sharing == Sharing::pairs) outcome.outside -= settings.dt * body.force;
+}
+
+void World::Implementation::solve_island(const Island& island) {
+    Outcome& outcome = outcomes[static_cast<std::size_t>(island.bodies.front())];
+    outcome = {};
+    if (island.manifolds.empty() && island.constraints.empty()) return move_alone(island.bodies.front());
+    const std::uint64_t limited = solver->deformations_limited(), broken = solver->constraints_broken();
+    solver->solve(island);
+    outcome.limited = solver->deformations_limited() - limited;
+    outcome.broken = solver->constraints_broken() - broken;
+    outcome.outside = solver->take_outside_impulse();
+    for (const int id : island.bodies) {
+        const MovingBody& body = bodies[static_cast<std::size_t>(id)];
+        solved[static_cast<std::size_t>(id)] = true;
+        if (sharing != Sharing::pairs && body.pushed && body.own) outcome.outside += settings.dt * body.force;
+    }
+}
+
+void World::Implementation::solve_again() {
+    find_islands();
+    for (std::size_t i = 0; i < islands_used; ++i) {
+        const Island& island = islands[i];
+        const bool any = std::any_of(island.bodies.begin(), island.bodies.end(),
+                                     [this](int id) { return again[static_cast<std::size_t>(id)]; });
+        if (!any || !is_solved(island)) continue;
+        for (const int id : island.bodies) {
+            MovingBody& body = bodies[static_cast<std::size_t>(id)];
+            body.state = started[static_cast<std::size_t>(id)];
+            body.at_limit = limited_before[static_cast<std::size_t>(id)];
+            body.was_given = false;
+            solver->forget_crossed(id);
+        }
+        for (const int m : island.manifolds)
+            contacts.rewarm(contacts.manifolds()[static_cast<std::size_t>(m)]);
+        for (const int c : island.constraints)
+            std::tie(constraints[static_cast<std::size_t>(c)].impulse,
+                     constraints[static_cast<std::size_t>(c)].holds) =
+                springs_before[static_cast<std::size_t>(c)];
+        solve_island(island);
+    }
+    ++counts.solved_again;
+}
+
+// The last resort: the island stops where the bodies meet, and these go on together.
+void World::Implementation::hold_apart(const WorldContacts::Meeting& meeting) {
+    auto at = [this](int id) -> MovingBody& { return bodies[static_cast<std::size_t>(id)]; };
+    const double substep = settings.dt / settings.substeps;
+    double mass = 0;
+    Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
+    bool free = true;
+    for (const int id : {meeting.a, meeting.b}) {
+        if (!at(id).moves()) {
+            free = false;
+            continue;
+        }
+        mass += at(id).kind->mass.mass, momentum += at(id).kind->mass.mass * at(id).state.velocity;
+        const Island& island = islands[static_cast<std::size_t>(place[static_cast<std::size_t>(root(id))])];
+        for (const int other : island.bodies) {
+            const BodyPath::Pose pose =
+                contacts.paths()[static_cast<std::size_t>(other)].at(meeting.time, substep);
+            at(other).state.position = pose.position, at(other).state.orientation = pose.orientation;
+        }
+    }
+    const Eigen::Vector3d together =
+        free ? Eigen::Vector3d(momentum / mass) : Eigen::Vector3d(Eigen::Vector3d::Zero());
+    for (const int id : {meeting.a, meeting.b}) {
+        if (!at(id).moves()) continue;
+        const Island& island = islands[static_cast<std::size_t>(place[static_cast<std::size_t>(root(id))])];
+        if (at(id).own)
+            outcomes[static_cast<std::size_t>(island.bodies.front())].outside +=
+                at(id).kind->mass.mass * (together - at(id).state.velocity);
+        at(id).state.velocity = together;
+    }
+    ++counts.held_apart;
+}
+
+void World::Implementation::sum_outcomes() {
+    bool broken = false;
+    for (std::size_t i = 0; i < islands_used; ++i) {
+        if (!is_solved(islands[i])) continue;
+        const Outcome& outcome = outcomes[static_cast<std::size_t>(islands[i].bodies.front())];
+        broken = broken || outcome.broken > 0;
+        if (!is_own(islands[i])) continue;
+        outside += outcome.outside;
+        counts.deformations_limited += outcome.limited;
+        counts.constraints_broken += outcome.broken;
+    }
+    if (broken) set_joined();
+    if (!outside.allFinite()) outside = outside_before;  // of a body that is broken
+}
+
+void World::Implementation::solve_islands() {
+    start_solving();
+    int awake = 0;
+    for (std::size_t i = 0; i < islands_used; ++i) {
+        if (!is_solved(islands[i])) continue;
+        awake += is_own(islands[i]);
+        solve_island(islands[i]);
+    }
+    for (int round = 0; round <= kRounds; ++round) {
+        const auto& meetings = contacts.unforeseen(contact_scene(), solved);
+        if (meetings.empty()) break;
+        if (round == kRounds) {
+            last = meetings;
+            // The first last: an island stops where it meets first.
+            std::sort(last.begin(), last.end(), [](const auto& a, const auto& b) { return a.time > b.time; });
+            for (const WorldContacts::Meeting& meeting : last) hold_apart(meeting);
+            break;
+        }
+        again.assign(bodies.size(), false);
+        for (const WorldContacts::Meeting& meeting : meetings)
+            again[static_cast<std::size_t>(meeting.a)] = again[static_cast<std::size_t>(meeting.b)] = true;
+        solve_again();
+    }
+    counts.islands = awake;
+    counts.impacts = contacts.impacts();
+    sum_outcomes();
+}
+
+}  // namespace sim
