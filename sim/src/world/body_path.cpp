@@ -46,6 +46,10 @@ double BodyPath::turn(double substep) const {
     return sum;
 }
 
+void set_spins(const MovingBody& body, BodyPath& path) {
+    for (BodyPath::Leg& leg : path.legs) leg.spin = spin_of(body, leg.orientation, leg.momentum);
+}
+
 void follow_freely(const MovingBody& body, const WorldSettings& settings, BodyPath& path) {
     path.legs.resize(static_cast<std::size_t>(settings.substeps));
     const bool still = !body.moves() || body.asleep;
@@ -56,7 +60,7 @@ void follow_freely(const MovingBody& body, const WorldSettings& settings, BodyPa
     if (body.pushed) acceleration += body.force / body.kind->mass.mass;
     Eigen::Quaterniond orientation = body.state.orientation;
     for (BodyPath::Leg& leg : path.legs) {
-        leg = {position, orientation, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+        leg = {.position = position, .orientation = orientation};
         if (still) continue;
         velocity += h * acceleration;
         if (body.pushed) momentum += h * body.torque;

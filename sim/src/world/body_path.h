@@ -11,7 +11,8 @@ struct BodyPath {
         Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< at the leg's start
         Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
         Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< [m/s]
-        Eigen::Vector3d spin = Eigen::Vector3d::Zero();      ///< world axes [rad/s]
+        Eigen::Vector3d spin = Eigen::Vector3d::Zero();      ///< world axes [rad/s]; see set_spins
+        Eigen::Vector3d momentum = Eigen::Vector3d::Zero();  ///< angular, world axes [kg m^2/s]
     };
     std::vector<Leg> legs;  ///< one a substep
 
@@ -32,6 +33,9 @@ struct BodyPath {
 /// A body's angular velocity, world axes [rad/s].
 [[nodiscard]] Eigen::Vector3d spin_of(const MovingBody& body, const Eigen::Quaterniond& orientation,
                                       const Eigen::Vector3d& momentum);
+
+/// Spins of a path that has orientations and momenta: the solver writes those of all bodies, few are asked for.
+void set_spins(const MovingBody& body, BodyPath& path);
 
 /// The path of a body that nothing touches; of one that is fixed or sleeps: that it stays. Allocates only
 /// while `path` grows.

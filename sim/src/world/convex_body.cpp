@@ -8,7 +8,6 @@
 namespace sim {
 namespace {
 
-constexpr int kModalSteps = 2;
 constexpr double kBent = 0.01;  // of the smallest semi-axis
 
 double smallest_axis(const BodyKind& kind) {
@@ -30,6 +29,11 @@ double turn_reach_of(const BodyKind& kind) noexcept {
     return std::sqrt(std::max(0.0, outer * outer - inner * inner));
 }
 
+double smallest_radius(const BodyKind& kind) noexcept {
+    const Eigen::Vector3d& axes = kind.definition.shape.base.semi_axes;
+    return axes.minCoeff() * axes.minCoeff() / axes.maxCoeff();
+}
+
 bool is_bent(const PosedBody& posed) noexcept {
     return posed.kind->modes > 0 && !posed.kind->linear() &&
            posed.sample_reach > static_cast<float>(kBent * smallest_axis(*posed.kind));
@@ -39,7 +43,10 @@ bool is_round(const PosedBody& posed) noexcept {
     return posed.kind->ellipsoid && !is_bent(posed);
 }
 
-ConvexBody::ConvexBody(const PosedBody& posed, double scale) noexcept : posed_(&posed), scale_(scale) {
+ConvexBody::ConvexBody(const PosedBody& posed, double scale) noexcept
+    : posed_(&posed),
+      scale_(scale),
+      hull_(posed.kind->modes > 0 && !posed.kind->linear() && !is_round(posed)) {
     const BodyKind& kind = *posed.kind;
     const double bent = static_cast<double>(posed.sample_reach);
     if (kind.ellipsoid) {
@@ -47,12 +54,10 @@ ConvexBody::ConvexBody(const PosedBody& posed, double scale) noexcept : posed_(&
         // A strain e takes at most (1 - e)^2 / (1 + e) from a radius of curvature; modes bend besides.
         const double strain = (kind.linear() ? 1.0 : 4.0) * bent / axes.minCoeff();
         const double left = std::max(0.0, 1 - strain);
-        shrunk_ = is_bent(posed)
-                      ? 0
-                      : axes.minCoeff() * axes.minCoeff() / axes.maxCoeff() * left * left / (1 + strain);
+        shrunk_ = is_bent(posed) ? 0 : smallest_radius(kind) * left * left / (1 + strain);
         margin_ = shrunk_;
     }
-    margin_ += kind.surface.reach();
+    if (!hull_) margin_ += kind.surface.reach();  // samples lie on the bumps
     margin_ *= scale;
     const double reach = turn_reach_of(kind);
     // A deformed ball is no ball: sqrt((R + u)^2 - (r - u)^2).
@@ -69,35 +74,33 @@ ConvexBody::Point ConvexBody::support(const Eigen::Vector3d& direction) const no
         point.rest = kind.surface.base().support(d.transpose() * direction);
         point.place = d * point.rest;
     } else {
-        point = modal_support(direction);
+        point = hull_ ? sample_support(direction) : round_support(direction);
     }
     point.place = scale_ * (point.place - shrunk_ * direction);
     return point;
 }
 
-ConvexBody::Point ConvexBody::modal_support(const Eigen::Vector3d& direction) const noexcept {
+// Of a body that modes bend so little that r + u(r) is furthest where F^T d points, to second order.
+ConvexBody::Point ConvexBody::round_support(const Eigen::Vector3d& direction) const noexcept {
     const BodyKind& kind = *posed_->kind;
-    const double bricks = kind.bricks;
-    Point best{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-    double furthest = -1e300;
-    Eigen::Vector3d pulled = direction;
-    for (int step = 0; step < kModalSteps; ++step) {
-        const Eigen::Vector3d rest = kind.surface.base().support(pulled);
-        const BodyKind::Local local = kind.locate(rest.cast<float>());
-        const PolynomialValue<float> p = evaluate_polynomial<float>(
-            posed_->polynomial.data() + 81 * local.brick, local.xi.x(), local.xi.y(), local.xi.z());
-        const Eigen::Vector3d place = rest + Eigen::Vector3d(p.u[0], p.u[1], p.u[2]);
-        const double far = place.dot(direction);
-        if (far > furthest) furthest = far, best = {place, rest};
-        const Eigen::Vector3d before = pulled;
-        for (int j = 0; j < 3; ++j) {
-            double sum = 0;
-            for (int i = 0; i < 3; ++i) sum += static_cast<double>(p.gradient[i][j]) * direction[i];
-            pulled[j] = direction[j] + bricks / kind.basis.half_extents[j] * sum;
-        }
-        if ((pulled - before).squaredNorm() < 1e-8) break;
-    }
-    return best;
+    const Eigen::Vector3d near = kind.surface.base().support(direction);
+    const BodyKind::Local local = kind.locate(near.cast<float>());
+    const PolynomialValue<float> p = evaluate_polynomial<float>(posed_->polynomial.data() + 81 * local.brick,
+                                                                local.xi.x(), local.xi.y(), local.xi.z());
+    Eigen::Matrix3d bend;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            bend(i, j) = static_cast<double>(p.gradient[i][j]) * kind.bricks / kind.basis.half_extents[j];
+    const Eigen::Vector3d rest = kind.surface.base().support(direction + bend.transpose() * direction);
+    return {rest + Eigen::Vector3d(p.u[0], p.u[1], p.u[2]) + bend * (rest - near), rest};
+}
+
+// Of the hull of the samples.
+ConvexBody::Point ConvexBody::sample_support(const Eigen::Vector3d& direction) const noexcept {
+    const int at = posed_->furthest_sample(direction.cast<float>()).first;
+    const float* rest = posed_->kind->rest.data() + at;
+    const int stride = posed_->kind->batches * kLanes;
+    return {posed_->sample(at).cast<double>(), Eigen::Vector3d(rest[0], rest[stride], rest[2 * stride])};
 }
 
 }  // namespace sim

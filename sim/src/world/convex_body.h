@@ -8,7 +8,8 @@ namespace sim {
 /// The core's furthest point along d, D the deformation, F = I + du/dr:
 ///   rigid   s(d)                                s: of the superquadric, in closed form (Gauge::support)
 ///   linear  D s(D^T d)                          exact: the map is affine
-///   modal   r + u(r),  r <- s(F(r)^T d)         a few steps; the best of them. Of a dented body: the hull
+///   modal   r + u(r),  r = s(F(s(d))^T d)       ellipsoids that are hardly bent; u to first order from s(d)
+///           the furthest of the samples         others: the hull of the samples
 /// Of an ellipsoid a ball as large as its smallest radius of curvature, a_min^2 / a_max, is taken out of the
 /// core, so that two that overlap by less than their margins still have a distance and a normal. A body with
 /// bumps is its base, grown by the highest: bounds it from outside.
@@ -32,10 +33,13 @@ public:
     [[nodiscard]] double turn_reach() const noexcept { return turn_reach_; }
 
 private:
-    [[nodiscard]] Point modal_support(const Eigen::Vector3d& direction) const noexcept;
+    [[nodiscard]] Point round_support(const Eigen::Vector3d& direction) const noexcept;
+    [[nodiscard]] Point sample_support(const Eigen::Vector3d& direction) const noexcept;
 
     const PosedBody* posed_;
-    double scale_, shrunk_ = 0, margin_ = 0, turn_reach_ = 0;
+    double scale_;
+    bool hull_;  // of samples
+    double shrunk_ = 0, margin_ = 0, turn_reach_ = 0;
 };
 
 /// Whether contacts of this body are where its surface is nearest, one point, rather than samples: ellipsoids
@@ -45,6 +49,9 @@ private:
 
 /// Whether modes bend a body by more than 1 % of its smallest semi-axis.
 [[nodiscard]] bool is_bent(const PosedBody& posed) noexcept;
+
+/// Smallest radius of curvature of an ellipsoid at rest [m].
+[[nodiscard]] double smallest_radius(const BodyKind& kind) noexcept;
 
 /// sqrt(R^2 - r^2), R and r radii of balls about the centre that hold the rest shape and that it holds [m].
 [[nodiscard]] double turn_reach_of(const BodyKind& kind) noexcept;

@@ -145,16 +145,14 @@ ConvexDistance distance_between(const PlacedConvex& a, const PlacedConvex& b, do
         normal = v / distance;
         const Vertex w = furthest(a, b, between, normal);
         const double lower = normal.dot(w.w);
-        if (lower > result.gap) result.gap = lower, result.normal = normal, result.apart = true;
+        if (lower > result.gap) result.gap = lower, result.normal = normal;
         if (stuck || distance - lower <= std::max(tolerance, share * (lower - margin)) ||
             k + 1 == kMostSupports)
             break;
         simplex.vertex[static_cast<std::size_t>(simplex.count++)] = w;
     }
-    if (!result.apart || !(result.gap > 0)) {
-        result.apart = false;
-        return result;
-    }
+    if (!(result.gap > 0)) return result;
+    result.apart = true;
     result.gap -= margin;
     result.arm_a = simplex.mean(&Vertex::a) - a.body->margin() * result.normal;
     result.arm_b = simplex.mean(&Vertex::b) + b.body->margin() * result.normal;

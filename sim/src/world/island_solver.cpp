@@ -242,7 +242,8 @@ void IslandSolver::move() {
         if (paths_) {
             const auto id = static_cast<std::size_t>(&body - bodies_->data());
             (*paths_)[id].legs.resize(static_cast<std::size_t>(settings_->substeps));
-            (*paths_)[id].legs[leg_] = {s.position, s.orientation, velocity, Eigen::Vector3d::Zero()};
+            (*paths_)[id].legs[leg_] = {
+                .position = s.position, .orientation = s.orientation, .velocity = velocity};
         }
         s.position += h_ * velocity;
         Eigen::Vector3d change;
@@ -250,8 +251,7 @@ void IslandSolver::move() {
         Eigen::Vector3d momentum = s.angular_momentum + rows.frame * change;
         if (body.pushed) momentum += h_ * body.torque;
         if (paths_)
-            (*paths_)[static_cast<std::size_t>(&body - bodies_->data())].legs[leg_].spin =
-                spin_of(body, s.orientation, momentum);
+            (*paths_)[static_cast<std::size_t>(&body - bodies_->data())].legs[leg_].momentum = momentum;
         s.orientation = body.substep_rotation.advance(s.orientation, momentum);
     }
 }

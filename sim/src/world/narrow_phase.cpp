@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "shape/closest_point.h"
 
@@ -18,6 +19,7 @@ constexpr std::uint32_t kParting = 0x7ffffffe;  // feature of the one contact of
 constexpr std::uint32_t kFoot = 0x7fffffff;     // feature of a body's lowest point over a plane
 constexpr float kManifoldTolerance = 0.02f;
 constexpr double kExact = 1e-5;           // of the size: tolerance of distances
+constexpr double kOnSurface = 1e-3;       // of the way from the centre
 constexpr std::uint32_t kOfB = 1u << 31;  // feature: a sample of b
 
 bool is_sample(std::uint32_t feature) {
@@ -37,10 +39,13 @@ void finish(const Manifold* before, float size, Manifold& manifold) {
     if (before) take_impulses(*before, manifold.impulse_reach, manifold);
 }
 
-// The contact's distance to the surface itself, where that to first order is not right: outside.
+// The contact's distance to the surface itself, where that to first order, a lower bound, is not right:
+// outside, where the foot of the normal is not on the surface.
 void measure_exactly(const PosedBody& implicit, SampleContact& contact) {
     const BodyKind& kind = *implicit.kind;
     if (contact.separation <= 0 || kind.ellipsoid || kind.surface.has_bumps()) return;
+    const Eigen::Vector3d foot = (contact.rest - contact.separation * contact.normal).cast<double>();
+    if (std::abs(kind.surface.base().value(foot) - 1) < kOnSurface) return;
     Deformation deformation;
     if (kind.linear()) {
         deformation.matrix = implicit.deformation.cast<double>();
@@ -83,20 +88,28 @@ double smallest_half(const PosedBody& body) noexcept {
 
 void NarrowPhase::pair(const PosedBody& a, const PosedBody& b, const PairSearch& search, Manifold& manifold) {
     const float size = static_cast<float>(std::min(smallest_half(a), smallest_half(b)));
-    const Eigen::Vector3f between = (a.position - b.position).cast<float>();
+    between_ = (a.position - b.position).cast<float>();
     const bool smooth = !a.kind->surface.has_bumps() && !b.kind->surface.has_bumps();
     candidates_.clear();
-    if (smooth && (is_round(a) || is_round(b)) && nearest(a, b, search.margin))
-        return fill(size, between, search.before, manifold);
+    sources_.clear();
+    const float tolerance = kManifoldTolerance * size;
+    if (smooth && (is_round(a) || is_round(b)) && nearest(a, b, search.margin)) {
+        choose(tolerance, search.before);
+        return fill(size, search.before, manifold);
+    }
     const float lowest = find_samples(a, b, search.margin);
+    turn_a_ = a.rotation.cast<float>(), turn_b_ = b.rotation.cast<float>();
     if (lowest < 0 && (!search.before || search.before->emerging || search.may_part) &&
         (is_buried(a, b) || is_buried(b, a)))
-        return part(a, b, between, search.before, manifold);
+        return part(a, b, between_, search.before, manifold);
     const bool edges = lowest > 0 && !(a.kind->ellipsoid && b.kind->ellipsoid);
     if (smooth && (search.nearest || edges)) (void)nearest(a, b, search.margin);
     const float first = candidates_.empty() ? lowest : std::min(lowest, candidates_.front().separation);
-    add_samples(a, b, PointChooser::reach(first, kManifoldTolerance * size));
-    fill(size, between, search.before, manifold);
+    sources_.assign(candidates_.size(), -1);
+    add_samples(a, b, std::min(search.margin, PointChooser::reach(first, tolerance)));
+    do choose(tolerance, search.before);
+    while (lowest <= 0 && measure_chosen(a, b, tolerance));
+    fill(size, search.before, manifold);
 }
 
 // Adds the nearest points if they are within the margin; whether the distance could be told at all.
@@ -116,13 +129,17 @@ bool NarrowPhase::nearest(const PosedBody& a, const PosedBody& b, float margin) 
     return true;
 }
 
-// Samples of either body in the other, or near it; returns the lowest separation.
+// Samples of either body in the other, or near it; returns the lowest separation. Where none is inside, their
+// distances are exact.
 float NarrowPhase::find_samples(const PosedBody& a, const PosedBody& b, float margin) {
     found_.clear();
     finder_.find(a, b, margin, found_);
     of_a_ = found_.size();
     finder_.find(b, a, margin, found_);
     float lowest = 1e30f;
+    for (const SampleContact& contact : found_) lowest = std::min(lowest, contact.separation);
+    if (lowest <= 0) return lowest;
+    lowest = 1e30f;
     for (std::size_t i = 0; i < found_.size(); ++i) {
         measure_exactly(i < of_a_ ? b : a, found_[i]);
         if (found_[i].separation < margin) lowest = std::min(lowest, found_[i].separation);
@@ -131,25 +148,43 @@ float NarrowPhase::find_samples(const PosedBody& a, const PosedBody& b, float ma
 }
 
 void NarrowPhase::add_samples(const PosedBody& a, const PosedBody& b, float out) {
-    const Eigen::Vector3f between = (a.position - b.position).cast<float>();
-    for (const bool b_sampled : {false, true}) {
-        const PosedBody &sampled = b_sampled ? b : a, &implicit = b_sampled ? a : b;
-        const Eigen::Matrix3f turn = implicit.rotation.cast<float>(),
-                              turn_sampled = sampled.rotation.cast<float>();
-        for (std::size_t i = b_sampled ? of_a_ : 0; i < (b_sampled ? found_.size() : of_a_); ++i) {
-            const SampleContact& contact = found_[i];
-            if (contact.separation > out) continue;
-            ContactCandidate& point = candidates_.emplace_back();
-            const Eigen::Vector3f normal = turn * contact.normal;
-            const Eigen::Vector3f arm =
-                turn_sampled * sampled.sample(contact.sample) - 0.5f * contact.separation * normal;
-            point.feature = static_cast<std::uint32_t>(contact.sample) | (b_sampled ? kOfB : 0u);
-            point.separation = contact.separation;
-            point.rest_a = point.rest_b = contact.rest;
-            point.normal = b_sampled ? Eigen::Vector3f(-normal) : normal;
-            point.arm_a = b_sampled ? Eigen::Vector3f(arm - between) : arm;
-        }
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+        if (found_[i].separation > out) continue;
+        candidates_.push_back(candidate_of(a, b, i));
+        sources_.push_back(static_cast<int>(i));
     }
+}
+
+ContactCandidate NarrowPhase::candidate_of(const PosedBody& a, const PosedBody& b, std::size_t found) const {
+    const SampleContact& contact = found_[found];
+    const bool b_sampled = found >= of_a_;
+    const Eigen::Vector3f normal = (b_sampled ? turn_a_ : turn_b_) * contact.normal;
+    const Eigen::Vector3f place =
+        b_sampled ? turn_b_ * b.sample(contact.sample) : turn_a_ * a.sample(contact.sample);
+    const Eigen::Vector3f arm = place - 0.5f * contact.separation * normal;
+    ContactCandidate point;
+    point.feature = static_cast<std::uint32_t>(contact.sample) | (b_sampled ? kOfB : 0u);
+    point.separation = contact.separation;
+    point.rest_a = point.rest_b = contact.rest;
+    point.normal = b_sampled ? Eigen::Vector3f(-normal) : normal;
+    point.arm_a = b_sampled ? Eigen::Vector3f(arm - between_) : arm;
+    return point;
+}
+
+// Makes what was chosen exact; whether something is further out than was thought.
+bool NarrowPhase::measure_chosen(const PosedBody& a, const PosedBody& b, float tolerance) {
+    bool moved = false;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(count_); ++k) {
+        const auto at = static_cast<std::size_t>(chosen_[k]);
+        if (sources_[at] < 0) continue;
+        const auto found = static_cast<std::size_t>(std::exchange(sources_[at], -1));
+        const float before = found_[found].separation;
+        measure_exactly(found < of_a_ ? b : a, found_[found]);
+        if (found_[found].separation == before) continue;
+        candidates_[at] = candidate_of(a, b, found);
+        moved = moved || found_[found].separation > before + 0.1f * tolerance;
+    }
+    return moved;
 }
 
 void NarrowPhase::plane(const PosedBody& a, const Eigen::Vector3d& plane_normal, float height, float margin,
@@ -164,12 +199,20 @@ void NarrowPhase::plane(const PosedBody& a, const Eigen::Vector3d& plane_normal,
     candidates_.clear();
     float lowest = margin;
     if (a.kind->ellipsoid) {
-        const ConvexBody body(a);
-        const ConvexBody::Point point = body.support(down);
+        // Of bent bodies one more sample, where they would touch at rest.
+        ConvexBody::Point point;
+        if (is_bent(a)) {
+            point.rest = a.kind->surface.base().support(down);
+            point.place = a.deformed(point.rest);
+        } else {
+            const ConvexBody body(a);
+            point = body.support(down);
+            point.place += body.margin() * down;
+        }
         ContactCandidate foot;
         foot.feature = kFoot;
         foot.rest_a = foot.rest_b = point.rest.cast<float>();
-        const Eigen::Vector3f place = turn * (point.place + body.margin() * down).cast<float>();
+        const Eigen::Vector3f place = turn * point.place.cast<float>();
         foot.separation = normal.dot(place) + height;
         foot.normal = normal;
         foot.arm_a = place - 0.5f * foot.separation * normal;
@@ -191,18 +234,15 @@ void NarrowPhase::plane(const PosedBody& a, const Eigen::Vector3d& plane_normal,
             point.rest_a.setZero(), point.rest_b.setZero();
         }
     }
-    fill(size, Eigen::Vector3f::Zero(), before, manifold);
+    choose(tolerance, before);
+    fill(size, before, manifold);
 }
 
-// The manifold's points out of the candidates, with the impulses of the step before. between: from b's centre
-// to a's.
-void NarrowPhase::fill(float size, const Eigen::Vector3f& between, const Manifold* before,
-                       Manifold& manifold) {
-    if (candidates_.empty()) return;
-    std::array<int, kManifoldPoints> chosen;
-    manifold.count = chooser_.choose(candidates_, kManifoldTolerance * size, before, chosen);
-    for (std::size_t i = 0; i < static_cast<std::size_t>(manifold.count); ++i) {
-        const ContactCandidate& from = candidates_[static_cast<std::size_t>(chosen[i])];
+// The manifold's points out of the chosen candidates, with the impulses of the step before.
+void NarrowPhase::fill(float size, const Manifold* before, Manifold& manifold) {
+    manifold.count = count_;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+        const ContactCandidate& from = candidates_[static_cast<std::size_t>(chosen_[i])];
         ManifoldPoint& point = manifold.points[i];
         point.feature = from.feature;
         point.separation = from.separation;
@@ -211,13 +251,18 @@ void NarrowPhase::fill(float size, const Eigen::Vector3f& between, const Manifol
         if (manifold.b >= kFirstPlane) {
             point.arm_b.setZero();
         } else {
-            point.arm_b = from.arm_a + between;
+            point.arm_b = from.arm_a + between_;
         }
         point.rest_a = from.rest_a, point.rest_b = from.rest_b;
         const int sample = static_cast<int>(from.feature & ~kOfB);
         if (is_sample(from.feature)) (from.feature & kOfB ? point.sample_b : point.sample_a) = sample;
     }
     finish(before, size, manifold);
+}
+
+// Up to four of the candidates.
+void NarrowPhase::choose(float tolerance, const Manifold* before) {
+    count_ = chooser_.choose(candidates_, tolerance, before, chosen_);
 }
 
 }  // namespace sim

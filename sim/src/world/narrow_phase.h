@@ -32,13 +32,22 @@ private:
     [[nodiscard]] bool nearest(const PosedBody& a, const PosedBody& b, float margin);
     float find_samples(const PosedBody& a, const PosedBody& b, float margin);
     void add_samples(const PosedBody& a, const PosedBody& b, float out);
-    void fill(float size, const Eigen::Vector3f& between, const Manifold* before, Manifold& manifold);
+    [[nodiscard]] ContactCandidate candidate_of(const PosedBody& a, const PosedBody& b,
+                                                std::size_t found) const;
+    void choose(float tolerance, const Manifold* before);
+    bool measure_chosen(const PosedBody& a, const PosedBody& b, float tolerance);
+    void fill(float size, const Manifold* before, Manifold& manifold);
 
+    Eigen::Matrix3f turn_a_, turn_b_;  // of the pair
+    Eigen::Vector3f between_;          // from b's centre to a's
     SampleFinder finder_;
     std::vector<SampleContact> found_;
     std::size_t of_a_ = 0;  // samples of a among found_, the first
     std::vector<ContactCandidate> candidates_;
+    std::vector<int> sources_;  // of candidates: of which of found_, if its distance is not exact yet, or -1
     PointChooser chooser_;
+    std::array<int, kManifoldPoints> chosen_{};
+    int count_ = 0;  // of chosen_
 };
 
 /// Smallest semi-axis [m].

@@ -6,6 +6,8 @@
 namespace sim {
 namespace {
 
+constexpr double kNormalTurn = 0.004;  // [rad]; a rebound turns by twice that
+
 double smallest_half(const MovingBody& body) {
     return sim::smallest_half(body.posed);
 }
@@ -17,11 +19,12 @@ Eigen::Vector3d pull_on(const MovingBody& body, const WorldSettings& settings) {
     return pull;
 }
 
-// How far a body's surface turns in a step; a ball's does not.
-double turn_in_step(const ContactScene& scene, const MovingBody& body) {
-    if (!body.moves() || body.asleep) return 0;
-    return scene.settings.dt * body.state.angular_momentum.norm() / body.kind->mass.inertia.minCoeff() *
-           turn_reach_of(*body.kind);
+// Speed of a body's surface by its modes, at most.
+double ringing_speed(const MovingBody& body) {
+    double speed = 0;
+    for (int k = 0; k < body.kind->modes; ++k)
+        speed += std::abs(body.state.q_dot[k]) * body.kind->shape_bound[k];
+    return speed;
 }
 
 bool carries(const Manifold& manifold) {
@@ -30,29 +33,39 @@ bool carries(const Manifold& manifold) {
                        [](const ManifoldPoint& p) { return p.normal_impulse > 0; });
 }
 
-// Whether a contact that does not touch yet would stop the free motion.
-bool closes(const Manifold& manifold, const MovingBody& a, const MovingBody& b, const Eigen::Vector3d& moved,
-            double dt) {
+// The least separation of a contact's points when free motion ends, as its half-spaces tell [m].
+double separation_after(const Manifold& manifold, const MovingBody& a, const MovingBody& b,
+                        const Eigen::Vector3d& moved, double dt) {
+    double least = 1e300;
     const Eigen::Vector3d spin_a = spin_of(a, a.state.orientation, a.state.angular_momentum),
                           spin_b = spin_of(b, b.state.orientation, b.state.angular_momentum);
     for (int i = 0; i < manifold.count; ++i) {
         const ManifoldPoint& p = manifold.points[static_cast<std::size_t>(i)];
         const Eigen::Vector3d turned =
             spin_a.cross(p.arm_a.cast<double>()) - spin_b.cross(p.arm_b.cast<double>());
-        if (static_cast<double>(p.separation) + p.normal.cast<double>().dot(moved + dt * turned) < 0)
-            return true;
+        least = std::min(
+            least, static_cast<double>(p.separation) + p.normal.cast<double>().dot(moved + dt * turned));
     }
-    return false;
+    return least;
+}
+
+// Whether the normal of a contact of two ellipsoids stands still until they touch; bent ones touch with several
+// samples, whose normals differ by more.
+bool keeps_normal(const Manifold& manifold, const MovingBody& a, const MovingBody& b,
+                  const Eigen::Vector3d& moved, double turned) {
+    if (!a.kind->ellipsoid || !b.kind->ellipsoid) return false;
+    const Eigen::Vector3d n = manifold.points[0].normal.cast<double>();
+    const double aside = (moved - n.dot(moved) * n).norm() + turned;
+    const double most = is_round(a.posed) && is_round(b.posed) ? kNormalTurn : 4 * kNormalTurn;
+    return aside < most * (smallest_radius(*a.kind) + smallest_radius(*b.kind));
 }
 
 }  // namespace
 
-double surface_speed(const MovingBody& body) noexcept {
-    double speed =
-        body.state.angular_momentum.norm() / body.kind->mass.inertia.minCoeff() * turn_reach_of(*body.kind);
-    for (int k = 0; k < body.kind->modes; ++k)
-        speed += std::abs(body.state.q_dot[k]) * body.kind->shape_bound[k];
-    return speed;
+double turning_speed(const MovingBody& body) noexcept {
+    if (!body.moves() || body.asleep) return 0;
+    return body.state.angular_momentum.norm() / body.kind->mass.inertia.minCoeff() *
+           turn_reach_of(*body.kind);
 }
 
 double contact_reach(const MovingBody& body, const WorldSettings& settings) {
@@ -88,7 +101,8 @@ void WorldContacts::set_reach(const ContactScene& scene, int id) {
     if (!body.moves() || body.asleep) return;
     const double dt = scene.settings.dt;
     reach.moved = dt * (body.state.velocity + dt * pull_on(body, scene.settings));
-    reach.turned = dt * surface_speed(body);
+    reach.turned = dt * turning_speed(body);
+    reach.rung = dt * ringing_speed(body);
 }
 
 bool WorldContacts::find_once(const ContactScene& scene) {
@@ -97,16 +111,15 @@ bool WorldContacts::find_once(const ContactScene& scene) {
     watched_.assign(scene.bodies.size(), false);
     pairs_ = 0;
     next_before_ = 0;
-    woke_ = any_fast_ = false;
+    woke_ = false;
     auto& boxes = broad_.boxes();
     boxes.clear();
     for (const int id : scene.here) {
         const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
         set_reach(scene, id);
         const Reach& reach = reach_[static_cast<std::size_t>(id)];
-        any_fast_ = any_fast_ || reach.moved.norm() + reach.turned > kSlow * smallest_half(body);
         const Eigen::Vector3d half =
-            body.posed.half_aabb.array() + reach.turned + kSlop * smallest_half(body);
+            body.posed.half_aabb.array() + reach.turned + reach.rung + kSlop * smallest_half(body);
         const Eigen::Vector3d &from = body.posed.position, to = from + reach.moved;
         boxes.push_back(
             {from.cwiseMin(to) - half, from.cwiseMax(to) + half, id, body.moves() && !body.asleep});
@@ -149,8 +162,7 @@ bool WorldContacts::pass_by(const ContactScene& scene, int i, int j) const {
     const double length = moved.squaredNorm(), dt = scene.settings.dt;
     const double at = length > 0 ? std::clamp(-apart.dot(moved) / length, 0.0, 1.0) : 0;
     const Eigen::Vector3d bend = pull_on(a, scene.settings) - pull_on(b, scene.settings);
-    const double bulge = (a.kind->modes > 0 ? ra.turned : 0) + (b.kind->modes > 0 ? rb.turned : 0);
-    const double reach = static_cast<double>(a.posed.radius + b.posed.radius) + bulge +
+    const double reach = static_cast<double>(a.posed.radius + b.posed.radius) + ra.rung + rb.rung +
                          kSlop * std::min(smallest_half(a), smallest_half(b)) + dt * dt / 8 * bend.norm();
     return (apart + at * moved).squaredNorm() > reach * reach;
 }
@@ -167,17 +179,19 @@ void WorldContacts::meet_pair(const ContactScene& scene, int i, int j) {
     const Manifold* before = last(static_cast<std::uint64_t>(i) << 32 | static_cast<std::uint32_t>(j));
     if (motion > kSlow * size) return meet_fast(scene, i, j, before);
     const std::size_t count = manifolds_.size();
-    meet_near(scene, i, j, kSlop * size + motion, before);
+    meet_near(scene, i, j, kSlop * size + motion + ra.rung + rb.rung, before);
     if (manifolds_.size() == count) return;
-    // What does not touch yet, but would be stopped: where and whether it meets, the paths tell better.
-    const Manifold& manifold = manifolds_.back();
-    if (static_cast<double>(manifold.points[0].separation) > kTouching * size &&
-        closes(manifold, a, b, moved, scene.settings.dt)) {
-        const Impact impact = foresee(scene, i, j);
-        const bool nearest = is_round(a.posed) || is_round(b.posed);
-        if (!impact.meets || (nearest && !impact.at_once)) manifolds_.pop_back();
-        if (!impact.meets) return;
-        if (nearest && !impact.at_once) meetings_.push_back({i, j, impact.time, false});
+    if (static_cast<double>(manifolds_.back().points[0].separation) > kTouching * size) {
+        const double after = separation_after(manifolds_.back(), a, b, moved, scene.settings.dt);
+        if (after > kSlop * size + ra.rung + rb.rung) return manifolds_.pop_back();
+        // What would be stopped: where and whether it meets, the paths tell better.
+        if (after < 0 && !keeps_normal(manifolds_.back(), a, b, moved, ra.turned + rb.turned)) {
+            const Impact impact = foresee(scene, i, j);
+            const bool nearest = is_round(a.posed) || is_round(b.posed);
+            if (!impact.meets || (nearest && !impact.at_once)) manifolds_.pop_back();
+            if (!impact.meets) return;
+            if (nearest && !impact.at_once) meetings_.push_back({i, j, impact.time, false});
+        }
     }
     wake(scene, i, j);
 }
@@ -220,7 +234,8 @@ void WorldContacts::meet_fast(const ContactScene& scene, int i, int j, const Man
     }
     wake(scene, i, j);
     // Turning on, other places of them may meet.
-    if (turn_in_step(scene, a) + turn_in_step(scene, b) > kSlow * size)
+    if (reach_[static_cast<std::size_t>(i)].turned + reach_[static_cast<std::size_t>(j)].turned >
+        kSlow * size)
         watched_[static_cast<std::size_t>(i)] = watched_[static_cast<std::size_t>(j)] = true;
 }
 
@@ -239,8 +254,8 @@ void WorldContacts::meet_planes(const ContactScene& scene, int i) {
     for (std::size_t p = 0; p < scene.planes.size(); ++p) {
         const WorldPlane& plane = scene.planes[p];
         const double height = plane.normal.dot(body.posed.position) - plane.offset;
-        const double margin =
-            kSlop * smallest_half(body) + reach.turned + std::max(0.0, -plane.normal.dot(reach.moved));
+        const double margin = kSlop * smallest_half(body) + reach.turned + reach.rung +
+                              std::max(0.0, -plane.normal.dot(reach.moved));
         if (height > plane.normal.cwiseAbs().dot(body.posed.half_aabb) + margin) continue;
         ++pairs_;
         Manifold& manifold = manifolds_.emplace_back();

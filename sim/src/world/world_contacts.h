@@ -20,8 +20,8 @@ struct ContactScene {
 /// Finds the contacts of a step: broad phase over the bounds that free motion sweeps, narrow phase,
 /// manifolds, impulses of the step before; wakes sleepers that are touched.
 ///
-/// A pair is slow if its surfaces move against each other by at most kSlow of the smaller half extent within
-/// the step. Its contacts are found where it is, as half-spaces that stand still over the step: with a motion
+/// A pair is slow if its surfaces move against each other, ringing apart, by at most kSlow of the smaller half
+/// extent within the step. Its contacts are found where it is, as half-spaces that stand still over the step: with a motion
 /// d a pair of balls that a half-space stops would have missed each other by less than d^2 / (2 (r_a + r_b)),
 /// so by less than half a per cent of r. Edges are sharper, and normals of balls turn by up to d / (r_a +
 /// r_b): where such a contact is not touched yet and would stop the free motion, the pair is treated as a
@@ -52,7 +52,6 @@ public:
     [[nodiscard]] const std::vector<Manifold>& manifolds() const noexcept { return manifolds_; }
     [[nodiscard]] int pairs() const noexcept { return pairs_; }  ///< tested in the last step
     [[nodiscard]] std::uint64_t fallbacks() const noexcept { return narrow_.fallbacks(); }
-    [[nodiscard]] bool any_fast() const noexcept { return any_fast_; }  ///< bodies in the last step
     [[nodiscard]] std::uint64_t impacts() const noexcept {
         return impacts_;
     }  ///< of fast pairs, since the start
@@ -61,7 +60,8 @@ private:
     /// How far a body's free motion takes it in the step.
     struct Reach {
         Eigen::Vector3d moved = Eigen::Vector3d::Zero();  // the centre [m]
-        double turned = 0;                                // its surface about the centre, modes included [m]
+        double turned = 0;                                // its surface about the centre [m]
+        double rung = 0;                                  // its surface, by modes [m]
     };
     void set_reach(const ContactScene& scene, int id);
     bool find_once(const ContactScene& scene);
@@ -96,12 +96,12 @@ private:
     std::vector<Meeting> meetings_;
     PosedBody at_[2];  // where an impact is
     int pairs_ = 0;
-    bool woke_ = false, any_fast_ = false;
+    bool woke_ = false;
     std::uint64_t impacts_ = 0;
 };
 
-/// Speed of a body's surface about its centre, at most, by spin and modes [m/s].
-[[nodiscard]] double surface_speed(const MovingBody& body) noexcept;
+/// Speed at which a body's surface moves along its normals by spin, at most [m/s]. A ball's does not.
+[[nodiscard]] double turning_speed(const MovingBody& body) noexcept;
 /// How far a body's contacts may begin beyond its surface in the next step [m].
 [[nodiscard]] double contact_reach(const MovingBody& body, const WorldSettings& settings);
 

@@ -148,7 +148,7 @@ bool WorldContacts::left_path(const ContactScene& scene, int i) const {
     const double least = kSlow * smallest_half(body.posed);
     const Eigen::Vector3d aside = body.state.position - body.posed.position - reach.moved;
     if (aside.squaredNorm() > least * least) return true;
-    return scene.settings.dt * surface_speed(body) > reach.turned + least;
+    return scene.settings.dt * turning_speed(body) > reach.turned + least;
 }
 
 // Bodies that left their free paths, against all that their paths come near.
@@ -168,7 +168,11 @@ const std::vector<WorldContacts::Meeting>& WorldContacts::unforeseen(const Conta
         const auto at = static_cast<std::size_t>(id);
         const MovingBody& body = scene.bodies[at];
         const bool left = solved[at] && left_path(scene, id);
-        if (!solved[at]) follow(scene, id);
+        if (!solved[at]) {
+            follow(scene, id);
+        } else {
+            set_spins(body, paths_[at]);
+        }
         Eigen::Vector3d low = body.posed.position, high = low;
         for (const BodyPath::Leg& leg : paths_[at].legs) {
             const Eigen::Vector3d end = leg.position + substep * leg.velocity;
