@@ -2,7 +2,16 @@
 
 #include <algorithm>
 
+#include "world/free_rotation.h"
+
 namespace sim {
+namespace {
+
+// Free rotation is split into parts of about so much.
+constexpr double kPart = 0.5;  // [rad]
+constexpr int kMostParts = 16;
+
+}  // namespace
 
 Eigen::Vector3d spin_of(const MovingBody& body, const Eigen::Quaterniond& orientation,
                         const Eigen::Vector3d& momentum) {
@@ -10,40 +19,30 @@ Eigen::Vector3d spin_of(const MovingBody& body, const Eigen::Quaterniond& orient
     return r * (r.transpose() * momentum).cwiseQuotient(body.kind->mass.inertia);
 }
 
-BodyPath::Pose BodyPath::at(double time, double substep) const {
-    const auto last = static_cast<double>(legs.size() - 1);
-    const double place = std::clamp(time / substep, 0.0, last);
-    const Leg& leg = legs[static_cast<std::size_t>(place)];
-    const double gone = time - substep * static_cast<double>(static_cast<std::size_t>(place));
-    const double rate = leg.spin.norm(), angle = rate * gone;
-    Pose pose{leg.position + gone * leg.velocity, leg.orientation};
-    if (angle > 0)
-        pose.orientation =
-            (Eigen::Quaterniond(Eigen::AngleAxisd(angle, leg.spin / rate)) * leg.orientation).normalized();
-    return pose;
+Eigen::Quaterniond turned_freely(const Eigen::Quaterniond& orientation, const Eigen::Vector3d& momentum,
+                                 const Eigen::Vector3d& inertia, double time) {
+    const double most = momentum.norm() / inertia.minCoeff() * time;
+    if (!(most > 0)) return orientation;
+    const int parts = std::clamp(static_cast<int>(most / kPart), 1, kMostParts);
+    const FreeRotation part(inertia, time / parts);
+    Eigen::Quaterniond turned = orientation;
+    for (int i = 0; i < parts; ++i) turned = part.advance(turned, momentum);
+    return turned;
 }
 
-BodyPath::Way BodyPath::until(double time, double substep) const {
+BodyPath::Pose BodyPath::at(double time) const {
+    const Leg& leg = leg_at(time);
+    const double gone = time - leg.start;
+    return {leg.position + gone * leg.velocity, turned_freely(leg.orientation, leg.momentum, inertia, gone)};
+}
+
+BodyPath::Way BodyPath::until(double time) const {
     Way way{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
-    double start = 0;
-    for (const Leg& leg : legs) {
-        const double span = std::clamp(time - start, 0.0, substep);
-        way.moved += span * leg.velocity, way.turned += span * leg.spin;
-        start += substep;
+    for (std::size_t i = 0; i < legs.size() && legs[i].start < time; ++i) {
+        const double span = std::min(time, end_of(i)) - legs[i].start;
+        way.moved += span * legs[i].velocity, way.turned += span * legs[i].spin;
     }
     return way;
-}
-
-double BodyPath::length(double substep) const {
-    double sum = 0;
-    for (const Leg& leg : legs) sum += substep * leg.velocity.norm();
-    return sum;
-}
-
-double BodyPath::turn(double substep) const {
-    double sum = 0;
-    for (const Leg& leg : legs) sum += substep * leg.spin.norm();
-    return sum;
 }
 
 void set_spins(const MovingBody& body, BodyPath& path) {
@@ -52,6 +51,9 @@ void set_spins(const MovingBody& body, BodyPath& path) {
 
 void follow_freely(const MovingBody& body, const WorldSettings& settings, BodyPath& path) {
     path.legs.resize(static_cast<std::size_t>(settings.substeps));
+    path.end = settings.dt;
+    path.inertia = body.kind->mass.inertia;
+    double start = 0;
     const bool still = !body.moves() || body.asleep;
     const double h = settings.dt / settings.substeps;
     Eigen::Vector3d position = body.state.position, velocity = body.state.velocity,
@@ -60,11 +62,12 @@ void follow_freely(const MovingBody& body, const WorldSettings& settings, BodyPa
     if (body.pushed) acceleration += body.force / body.kind->mass.mass;
     Eigen::Quaterniond orientation = body.state.orientation;
     for (BodyPath::Leg& leg : path.legs) {
-        leg = {.position = position, .orientation = orientation};
+        leg = {.start = start, .position = position, .orientation = orientation};
+        start += h;
         if (still) continue;
         velocity += h * acceleration;
         if (body.pushed) momentum += h * body.torque;
-        leg.velocity = velocity;
+        leg.velocity = velocity, leg.momentum = momentum;
         leg.spin = spin_of(body, orientation, momentum);
         position += h * velocity;
         orientation = body.substep_rotation.advance(orientation, momentum);

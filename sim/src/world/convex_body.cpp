@@ -43,13 +43,15 @@ bool is_round(const PosedBody& posed) noexcept {
     return posed.kind->ellipsoid && !is_bent(posed);
 }
 
-ConvexBody::ConvexBody(const PosedBody& posed, double scale) noexcept
+ConvexBody::ConvexBody(const PosedBody& posed, double inside) noexcept
     : posed_(&posed),
-      scale_(scale),
+      scale_(1 - inside * smallest_axis(*posed.kind) *
+                     posed.kind->definition.shape.base.semi_axes.cwiseInverse().array()),
+      inside_(inside > 0),
       hull_(posed.kind->modes > 0 && !posed.kind->linear() && !is_round(posed)) {
     const BodyKind& kind = *posed.kind;
     const double bent = static_cast<double>(posed.sample_reach);
-    if (kind.ellipsoid) {
+    if (kind.ellipsoid && !inside_) {
         const Eigen::Vector3d& axes = kind.definition.shape.base.semi_axes;
         // A strain e takes at most (1 - e)^2 / (1 + e) from a radius of curvature; modes bend besides.
         const double strain = (kind.linear() ? 1.0 : 4.0) * bent / axes.minCoeff();
@@ -58,13 +60,24 @@ ConvexBody::ConvexBody(const PosedBody& posed, double scale) noexcept
         margin_ = shrunk_;
     }
     if (!hull_) margin_ += kind.surface.reach();  // samples lie on the bumps
-    margin_ *= scale;
     const double reach = turn_reach_of(kind);
     // A deformed ball is no ball: sqrt((R + u)^2 - (r - u)^2).
     turn_reach_ = bent > 0 ? std::sqrt(reach * reach + 4 * kind.surface.bounding_radius() * bent) : reach;
 }
 
 ConvexBody::Point ConvexBody::support(const Eigen::Vector3d& direction) const noexcept {
+    if (inside_) {
+        const Eigen::Vector3d pulled = scale_ * direction.array();
+        Point point = outer_support(pulled / pulled.norm());
+        point.place = scale_ * point.place.array();
+        return point;
+    }
+    Point point = outer_support(direction);
+    point.place -= shrunk_ * direction;
+    return point;
+}
+
+ConvexBody::Point ConvexBody::outer_support(const Eigen::Vector3d& direction) const noexcept {
     const BodyKind& kind = *posed_->kind;
     Point point;
     if (kind.modes == 0) {
@@ -76,7 +89,6 @@ ConvexBody::Point ConvexBody::support(const Eigen::Vector3d& direction) const no
     } else {
         point = hull_ ? sample_support(direction) : round_support(direction);
     }
-    point.place = scale_ * (point.place - shrunk_ * direction);
     return point;
 }
 

@@ -16,8 +16,9 @@ namespace sim {
 /// Borrows the posed body. Pure, no allocation.
 class ConvexBody {
 public:
-    /// scale: of the body about its centre, for tests whether two are deep inside each other.
-    explicit ConvexBody(const PosedBody& posed, double scale = 1) noexcept;
+    /// inside: a share of the smallest semi-axis by which the body is made smaller along every axis, for tests
+    /// how deep two are in each other.
+    explicit ConvexBody(const PosedBody& posed, double inside = 0) noexcept;
 
     struct Point {
         Eigen::Vector3d place;  ///< as deformed, body frame [m]
@@ -27,18 +28,19 @@ public:
     [[nodiscard]] Point support(const Eigen::Vector3d& direction) const noexcept;
     [[nodiscard]] double margin() const noexcept { return margin_; }  ///< [m]
     /// Of a ball about the centre that holds it [m].
-    [[nodiscard]] double radius() const noexcept { return scale_ * static_cast<double>(posed_->radius); }
+    [[nodiscard]] double radius() const noexcept { return static_cast<double>(posed_->radius); }
     /// How far out of the line of its normal a surface point may be: a turn by dw moves the support plane of
     /// any direction by at most |dw| times this [m]. 0 for a rigid ball.
     [[nodiscard]] double turn_reach() const noexcept { return turn_reach_; }
 
 private:
+    [[nodiscard]] Point outer_support(const Eigen::Vector3d& direction) const noexcept;
     [[nodiscard]] Point round_support(const Eigen::Vector3d& direction) const noexcept;
     [[nodiscard]] Point sample_support(const Eigen::Vector3d& direction) const noexcept;
 
     const PosedBody* posed_;
-    double scale_;
-    bool hull_;  // of samples
+    Eigen::Array3d scale_;  // of the axes
+    bool inside_, hull_;    // made smaller; of samples
     double shrunk_ = 0, margin_ = 0, turn_reach_ = 0;
 };
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "world/island_solver.h"
 #include "world/row_kernels.h"
@@ -10,8 +11,8 @@
 namespace sim {
 namespace {
 
+constexpr double kMoving = 0.05;  // of the smallest half extent, in a step
 constexpr double kPushHz = 30, kPushDamping = 10;
-constexpr double kFrameTurn = 0.05;  // [rad]
 
 /// Two unit vectors square to n and to each other.
 void set_tangents(const Eigen::Vector3f& n, Eigen::Vector3f (&t)[2]) {
@@ -38,8 +39,21 @@ void IslandSolver::begin(const Island& island) {
     for (const int id : island.bodies) {
         MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
         local_[static_cast<std::size_t>(id)] = static_cast<int>(rows_of_.size());
-        rows_of_.push_back({&body, offset, body.kind->width, body.state.position, body.posed.rotation,
-                            body.posed.rotation.transpose().cast<float>()});
+        BodyRows& rows = rows_of_.emplace_back();
+        rows.body = &body, rows.offset = offset, rows.width = body.kind->width;
+        rows.place = body.state.position, rows.frame = body.posed.rotation;
+        rows.body_from_world = body.posed.rotation.transpose().cast<float>();
+        const double speed = body.state.velocity.norm() + body.state.angular_momentum.norm() /
+                                                              body.kind->mass.inertia.minCoeff() *
+                                                              body.kind->surface.bounding_radius();
+        rows.moving = speed * settings_->dt > kMoving * body.kind->definition.shape.base.semi_axes.minCoeff();
+        if (paths_) {
+            BodyPath& path = (*paths_)[static_cast<std::size_t>(id)];
+            path.legs.clear();
+            path.legs.reserve(2 * static_cast<std::size_t>(settings_->substeps));
+            path.end = settings_->dt;
+            path.inertia = body.kind->mass.inertia;
+        }
         offset += static_cast<std::uint32_t>(body.kind->width);
     }
     y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
@@ -70,6 +84,11 @@ void IslandSolver::begin(const Island& island) {
     for (const Turn& turn : in_turns(island))
         add_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
     for (const int c : island.constraints) add_spring((*constraints_)[static_cast<std::size_t>(c)]);
+    // A pair's points together.
+    std::sort(impacts_.begin(), impacts_.end(), [this](std::size_t i, std::size_t j) {
+        const ContactRows &a = contacts_[i], &b = contacts_[j];
+        return std::tuple(a.point->begins, a.manifold, i) < std::tuple(b.point->begins, b.manifold, j);
+    });
 }
 
 const std::vector<IslandSolver::Turn>& IslandSolver::in_turns(const Island& island) {
@@ -213,17 +232,23 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     set_tangents(point.normal, c.tangent);
     write_contact(c);
     c.separation = c.now = point.separation;
-    c.begins = point.begins;
     c.friction = manifold.friction;
     // Only what comes together rebounds, not what rests and rings.
     c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
     c.emerging = manifold.emerging;
+    c.firm = point.begins >= 0;
+    for (const Side& side : c.side)
+        c.moving = c.moving || (side.body >= 0 && rows_of_[static_cast<std::size_t>(side.body)].moving);
     c.pair = note_pair(manifold);
     c.told = note_told(c, true) || c.pair >= 0;
     c.impulse[0] = point.normal_impulse;
     c.impulse[1] = point.friction_impulse.dot(c.tangent[0]);
     c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
-    if (c.begins > 0) impacts_.push_back(contacts_.size());
+    if (point.begins >= 0) {
+        impacts_.push_back(contacts_.size());
+        c.begins =
+            std::clamp(static_cast<int>(static_cast<double>(point.begins) / h_), 0, settings_->substeps - 1);
+    }
     contacts_.push_back(c);
 }
 
@@ -244,32 +269,6 @@ void IslandSolver::write_contact(ContactRows& c) {
     const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
     c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
     c.inverse_tangent[2] = c.k[1][1] / det;
-}
-
-// Frames follow bodies that turned, with what is written in them: rows, and the way so far.
-void IslandSolver::turn_frames() {
-    turned_.assign(rows_of_.size(), false);
-    bool any = false;
-    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
-        BodyRows& rows = rows_of_[i];
-        const Eigen::Vector3d& root = rows.body->kind->root_inertia;
-        if (root.maxCoeff() - root.minCoeff() < 1e-6 * root.maxCoeff()) continue;  // alike in all frames
-        const Eigen::Matrix3d now = rows.body->state.orientation.toRotationMatrix();
-        if ((now - rows.frame).squaredNorm() < 2 * kFrameTurn * kFrameTurn) continue;
-        any = turned_[i] = true;
-        float* moved = moved_.data() + rows.offset + 3;
-        const Eigen::Vector3d way =
-            rows.frame * Eigen::Vector3d(moved[0], moved[1], moved[2]).cwiseQuotient(root);
-        rows.frame = now;
-        rows.body_from_world = now.transpose().cast<float>();
-        const Eigen::Vector3d again = (now.transpose() * way).cwiseProduct(root);
-        for (int k = 0; k < 3; ++k) moved[k] = static_cast<float>(again[k]);
-    }
-    auto has_turned = [this](const Side& side) {
-        return side.body >= 0 && turned_[static_cast<std::size_t>(side.body)];
-    };
-    for (ContactRows& c : contacts_)
-        if (any && (has_turned(c.side[0]) || has_turned(c.side[1]))) write_contact(c);
 }
 
 void IslandSolver::add_spring(HeldConstraint& constraint) {

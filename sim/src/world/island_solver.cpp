@@ -11,8 +11,6 @@ namespace {
 using ModeArray = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostModes, 1>;  // on the stack
 
 constexpr float kPushSpeed = 3;  // [m/s]
-constexpr int kImpactSweeps = 30;
-constexpr float kBounceThreshold = 0.1f;  // [m/s]
 
 void clear(StepImpulse& impulse) {
     impulse.linear.setZero(), impulse.angular.setZero(), impulse.displacement.setZero();
@@ -30,8 +28,7 @@ void IslandSolver::solve(const Island& island) {
     begin(island);
     for (int i = 0; i < settings_->substeps; ++i) {
         remaining_ = h_ * (settings_->substeps - 1 - i);
-        until_ = static_cast<float>(h_ * (i + 1));
-        leg_ = static_cast<std::size_t>(i);
+        substep_ = i;
         substep(i == 0, i + 1 == settings_->substeps);
     }
     if (any_told_) settle_given();
@@ -42,6 +39,7 @@ void IslandSolver::solve(const Island& island) {
 void IslandSolver::substep(bool first, bool last) {
     if (!first && !contacts_.empty()) turn_frames();
     load_velocities();
+    if (!impacts_.empty()) strike();
     for (SpringRows& spring : springs_) refresh(spring);
     warm_start(first);
     sweep(Push::soft);
@@ -57,7 +55,7 @@ void IslandSolver::load_velocities() {
         const MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
         const WorldBodyState& s = body.state;
-        rows.place = s.position;
+        rows.place = s.position, rows.time = 0;
         if (contacts_.empty()) {
             rows.frame = s.orientation.toRotationMatrix();
             rows.body_from_world = rows.frame.transpose().cast<float>();
@@ -97,7 +95,7 @@ void IslandSolver::warm_start(bool first) {
             if (side.body < 0) continue;
             const float* d = jacobians_.data() + side.rows;
             if (c.restitution > 0 && c.largest == 0) speed += dot(d, start_.data() + side.y, side.width);
-            if (!first) moved += dot(d, moved_.data() + side.y, side.width);
+            if (!first || !impacts_.empty()) moved += dot(d, moved_.data() + side.y, side.width);
         }
         if (c.largest == 0) c.approach = speed;
         c.now = c.separation + moved;
@@ -127,9 +125,8 @@ void IslandSolver::push_out() {
 
 void IslandSolver::sweep(Push push) {
     for (SpringRows& spring : springs_) solve_spring(spring);
-    for (ContactRows& contact : contacts_) solve_contact(contact, push);
-    for (int i = 0; i < (impacts_.empty() ? 0 : kImpactSweeps); ++i)
-        for (const std::size_t c : impacts_) solve_contact(contacts_[c], push);
+    for (ContactRows& contact : contacts_)
+        if (contact.begins < substep_ && !contact.over) solve_contact(contact, push);
 }
 
 // What the rows see of the velocities.
@@ -159,14 +156,17 @@ void IslandSolver::solve_spring(SpringRows& s) {
 }
 
 void IslandSolver::solve_contact(ContactRows& c, Push push) {
-    if (c.begins > until_) return;
     float v[3];
     speeds(c, v);
     // Selected, not branched: which case it is cannot be foretold.
-    const bool soft = c.now <= 0 && (push == Push::all || (push == Push::soft && !c.emerging));
-    const float bias = c.now > 0 ? c.now * inverse_h_ : soft ? std::max(push_rate_ * c.now, -kPushSpeed) : 0;
-    // An impact is stopped at once: what yields for a substep lets it far in.
-    const bool yields = soft && c.begins == 0;
+    const bool hit = hits(c),
+               soft = !hit && c.now <= 0 && (push == Push::all || (push == Push::soft && !c.emerging));
+    const float bias = hit         ? c.bias
+                       : c.now > 0 ? c.now * inverse_h_
+                       : soft      ? std::max(push_rate_ * c.now, -kPushSpeed)
+                                   : 0;
+    // What an impact left is stopped at once: what yields for a substep lets it far in.
+    const bool yields = soft && !c.firm;
     const float mass_share = yields ? mass_share_ : 1, impulse_share = yields ? impulse_share_ : 0;
     const float normal = std::max(
         c.impulse[0] - mass_share * c.inverse_normal * (v[0] + bias) - impulse_share * c.impulse[0], 0.f);
@@ -191,68 +191,67 @@ void IslandSolver::solve_contact(ContactRows& c, Push push) {
 // Energy that a contact's normal impulse takes out in this substep, where it may have to give some back: held
 // over the substep, it does p (v0 + v1) / 2 on the rigid part and p G on the modes.
 void IslandSolver::note_work() {
-    for (ContactRows& c : contacts_) {
-        if (c.restitution == 0 || c.largest == 0) continue;
-        float mean = 0;
-        for (const Side& side : c.side) {
-            if (side.body < 0) continue;
-            const float* d = jacobians_.data() + side.rows;
-            const float *before = start_.data() + side.y, *after = y_.data() + side.y;
-            mean += (dot(d, before, 8) + dot(d, after, 8)) / 2;
-            if (side.width > 8) mean += dot(d + 8, after + 8, side.width - 8);
-        }
-        c.taken -= c.impulse[0] * mean;
+    for (ContactRows& c : contacts_) note_work(c);
+}
+
+void IslandSolver::note_work(ContactRows& c) {
+    if (c.restitution == 0 || c.largest == 0) return;
+    float mean = 0;
+    for (const Side& side : c.side) {
+        if (side.body < 0) continue;
+        const float* d = jacobians_.data() + side.rows;
+        const float *before = start_.data() + side.y, *after = y_.data() + side.y;
+        mean += (dot(d, before, 8) + dot(d, after, 8)) / 2;
+        if (side.width > 8) mean += dot(d + 8, after + 8, side.width - 8);
     }
+    c.taken -= c.impulse[0] * mean;
 }
 
 // A rebound to e times the approach, by an impulse p whose work p v + p^2 (K_rigid / 2 + K_modes) is at most
 // e^2 of the energy that the contact has taken. For rigid bodies both say the same.
 void IslandSolver::restitute() {
-    for (ContactRows& c : contacts_) {
-        if (c.restitution == 0 || c.largest == 0 || c.approach > -kBounceThreshold) continue;
-        float v[3];
-        speeds(c, v);
-        float rigid = 0;
-        for (const Side& side : c.side)
-            if (side.body >= 0) rigid += dot(jacobians_.data() + side.rows, jacobians_.data() + side.rows, 8);
-        // The modes yield to p under the impulse of this substep, too.
-        const float modes = c.k[0][0] - rigid, firm = rigid / 2 + modes, slope = v[0] + modes * c.impulse[0];
-        const float budget = c.restitution * c.restitution * std::max(c.taken, 0.f);
-        const float most = (std::sqrt(slope * slope + 4 * firm * budget) - slope) / (2 * firm);
-        const float wanted = -c.inverse_normal * (v[0] + c.restitution * c.approach);
-        const float p[3] = {std::clamp(wanted, 0.f, std::max(most, 0.f)), 0, 0};
-        c.impulse[0] += p[0];
-        push_by(c, p);
-    }
+    for (ContactRows& c : contacts_) restitute(c);
+}
+
+void IslandSolver::restitute(ContactRows& c) {
+    if (c.restitution == 0 || c.largest == 0 || c.approach > -kBounceThreshold) return;
+    float v[3];
+    speeds(c, v);
+    float rigid = 0;
+    for (const Side& side : c.side)
+        if (side.body >= 0) rigid += dot(jacobians_.data() + side.rows, jacobians_.data() + side.rows, 8);
+    // The modes yield to p under the impulse of this substep, too.
+    const float modes = c.k[0][0] - rigid, firm = rigid / 2 + modes, slope = v[0] + modes * c.impulse[0];
+    const float budget = c.restitution * c.restitution * std::max(c.taken, 0.f);
+    const float most = (std::sqrt(slope * slope + 4 * firm * budget) - slope) / (2 * firm);
+    const float wanted = -c.inverse_normal * (v[0] + c.restitution * c.approach);
+    const float p[3] = {std::clamp(wanted, 0.f, std::max(most, 0.f)), 0, 0};
+    c.impulse[0] += p[0];
+    push_by(c, p);
 }
 
 void IslandSolver::move() {
-    if (any_told_)
-        for (ContactRows& c : contacts_) std::copy_n(c.impulse, 3, c.at_move);
-    for (const BodyRows& rows : rows_of_) {
+    for (ContactRows& c : contacts_) std::copy_n(c.impulse, 3, c.at_move);
+    const float h = static_cast<float>(h_);
+    for (BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
         const float* y = y_.data() + rows.offset;
         const float* start = start_.data() + rows.offset;
         float* moved = moved_.data() + rows.offset;
-        const float h = static_cast<float>(h_);
-        for (int i = 0; i < rows.width; ++i) moved[i] += h * y[i];
+        const double left = h_ - rows.time;
+        const float rigid = static_cast<float>(left);
+        for (int i = 0; i < rows.width; ++i) moved[i] += (i < 8 ? rigid : h) * y[i];
         WorldBodyState& s = body.state;
         const Eigen::Vector3d velocity = Eigen::Vector3d(y[0], y[1], y[2]) / kind.root_mass;
-        if (paths_) {
-            const auto id = static_cast<std::size_t>(&body - bodies_->data());
-            (*paths_)[id].legs.resize(static_cast<std::size_t>(settings_->substeps));
-            (*paths_)[id].legs[leg_] = {
-                .position = s.position, .orientation = s.orientation, .velocity = velocity};
-        }
-        s.position += h_ * velocity;
         Eigen::Vector3d change;
         for (int i = 0; i < 3; ++i) change[i] = kind.root_inertia[i] * (y[3 + i] - start[3 + i]);
         Eigen::Vector3d momentum = s.angular_momentum + rows.frame * change;
         if (body.pushed) momentum += h_ * body.torque;
-        if (paths_)
-            (*paths_)[static_cast<std::size_t>(&body - bodies_->data())].legs[leg_].momentum = momentum;
-        s.orientation = body.substep_rotation.advance(s.orientation, momentum);
+        if (paths_) write_leg(rows, velocity, momentum);
+        s.position = rows.place + left * velocity;
+        s.orientation = rows.time > 0 ? turned_freely(s.orientation, momentum, kind.mass.inertia, left)
+                                      : body.substep_rotation.advance(s.orientation, momentum);
     }
 }
 
@@ -294,7 +293,7 @@ void IslandSolver::tell_side(const Rows& rows, int which, const Eigen::Vector3d&
     const Side& side = rows.side[which];
     const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
     const double sign = which == 0 ? 1 : -1;
-    const Eigen::Vector3d arm = point - at.place, moved = h_ * at_move + remaining_ * impulse;
+    const Eigen::Vector3d arm = point - at.place, moved = (h_ - at.time) * at_move + remaining_ * impulse;
     given.linear += sign * impulse;
     given.angular += sign * arm.cross(impulse);
     given.displacement += sign * moved;
@@ -366,12 +365,16 @@ void IslandSolver::settle_given() {
 void IslandSolver::finish() {
     ring_on();
     for (const ContactRows& c : contacts_) {
+        if (c.impulse[0] == 0 && c.at_move[0] == 0) continue;
         auto world = [&c](const float(&p)[3]) -> Eigen::Vector3d {
             return (p[0] * c.point->normal + p[1] * c.tangent[0] + p[2] * c.tangent[1]).cast<double>();
         };
-        if (c.told && (c.impulse[0] != 0 || c.at_move[0] != 0))
-            tell(c, c.pair, world(c.impulse), world(c.at_move), c.impulse, place_now(c));
-        if (c.impulse[0] != 0) apply(c, world(c.impulse), place_now(c));
+        if (c.told) tell(c, c.pair, world(c.impulse), world(c.at_move), c.impulse, place_now(c));
+        if (c.moving) {
+            apply_moving(c);
+        } else {
+            apply(c, world(c.impulse), place_now(c));
+        }
     }
     for (const SpringRows& s : springs_) {
         const Eigen::Vector3d p(s.impulse[0], s.impulse[1], s.impulse[2]);

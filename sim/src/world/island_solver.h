@@ -35,16 +35,20 @@ struct Island {
 /// Rows. One Jacobian row a direction (normal, two tangents) and body, scaled by the square root of the
 /// inverse mass: D = J M^-1/2, floats in whole lanes, (n, R^T(r x n) / sqrt(I), sqrt(w) phi(r)^T R^T n). So
 /// the same row takes velocities out and puts impulses in. The three rows of a point are read together, with
-/// K = D D^T between them; friction is a 2 x 2 block limited to the cone. A contact that begins later in the
-/// step (ManifoldPoint::begins) is passed over until then. Separations move along with the
+/// K = D D^T between them; friction is a 2 x 2 block limited to the cone. Separations move along with the
 /// rows: s = s0 + D . integral of y. Contacts are frozen over the step but for velocities and separations;
 /// the rows of springs follow the bodies every substep, as does the frame of angular rows where there is no
 /// contact.
 ///
-/// Impacts: a fast body crosses its own size within a substep, so what a sweep leaves over of its speed takes
-/// it through a wall. Contacts that begin later are swept kImpactSweeps times more, and do not yield. Frames
-/// of bodies with unequal moments of inertia follow them where they turn by more than kFrameTurn, with their
-/// rows.
+/// Impacts (ManifoldPoint::begins) come first in a substep, in the order of their times t: the bodies go there
+/// with the velocities that they have, their frames are those of that time, the impulses of one pair's points
+/// are found by kImpactSweeps sweeps and act at one place of space, and the bodies go on from there. So
+/// angular momentum is kept to rounding and a body may hit several times within a substep. A rebound of rigid
+/// bodies is part of the same solve. Other contacts then see the velocities that impacts left. Afterwards an
+/// impact is a contact, unless its bodies turn on too fast for one that stands still.
+///
+/// Frames of bodies with unequal moments of inertia follow them where they turn by more than kFrameTurn, with
+/// their rows.
 ///
 /// Deterministic: sweeps go over springs, then contacts, in the order of ids (see in_turns). No allocation
 /// once the buffers have grown.
@@ -77,7 +81,9 @@ private:
         MovingBody* body;
         std::uint32_t offset;  // of y, start, moved
         int width;
-        Eigen::Vector3d place;  // of the centre, at the start of the substep
+        Eigen::Vector3d place;  // of the centre, at the start of the substep or the last impact in it
+        double time = 0;        // of that, since the substep's start [s]
+        bool moving = false;    // by more than kMoving in the step
         Eigen::Matrix3d frame;  // body to world, in which angular rows are written
         Eigen::Matrix3f body_from_world;
     };
@@ -98,12 +104,16 @@ private:
         Manifold* manifold;
         ManifoldPoint* point;
         Eigen::Vector3f tangent[2];
-        float separation, now, begins, friction, restitution, approach;
+        float separation, now, friction, restitution, approach;
+        int begins = -1;    // of an impact: number of the substep
+        bool over = false;  // an impact that is no contact afterwards
+        float bias = 0;     // of an impact: speed along the normal that it leaves, negative [m/s]
         float taken, slide_mass, inverse_normal,
             inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
         float impulse[3], kept[3], at_move[3], largest;
-        bool emerging;
-        int pair = -1;  // of crossed_
+        bool emerging, firm;  // firm: an impact, which does not yield
+        bool moving;          // a body of it does, see apply_moving
+        int pair = -1;        // of crossed_
     };
     struct SpringRows : Rows {
         HeldConstraint* constraint;
@@ -135,7 +145,24 @@ private:
     const std::vector<Turn>& in_turns(const Island& island);
     void add_contact(Manifold& manifold, ManifoldPoint& point);
     void write_contact(ContactRows& contact);
+    // Impacts, island_impacts.cpp.
+    [[nodiscard]] bool hits(const ContactRows& contact) const noexcept { return contact.begins == substep_; }
+    void strike();
+    void strike(std::size_t first, std::size_t last);
+    enum class Strike { rough, smooth, soft };
+    bool sweep_impact(std::size_t first, std::size_t last, Strike how);
+    void go_to(BodyRows& rows, double time);
     void turn_frames();
+    void turn_frame(BodyRows& rows, const Eigen::Matrix3d& frame);
+    void aim(ContactRows& contact) const;
+    void rebound(ContactRows& contact);
+    [[nodiscard]] bool goes_far(const ContactRows& contact) const;
+    void end_impact(ContactRows& contact);
+    void apply_moving(const ContactRows& contact);
+    void write_leg(const BodyRows& rows, const Eigen::Vector3d& velocity, const Eigen::Vector3d& momentum);
+    [[nodiscard]] bool is_rigid(const ContactRows& contact) const noexcept {
+        return contact.side[0].width <= 8 && contact.side[1].width <= 8;
+    }
     void add_spring(HeldConstraint& constraint);
     /// An end of a spring, now.
     struct End {
@@ -163,7 +190,9 @@ private:
     void solve_spring(SpringRows& spring);
     void solve_contact(ContactRows& contact, Push push);
     void note_work();
+    void note_work(ContactRows& contact);
     void restitute();
+    void restitute(ContactRows& contact);
     void move();
     [[nodiscard]] Eigen::Vector3d place_now(const ContactRows& contact) const;
     void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
@@ -178,12 +207,14 @@ private:
     void settle(const BodyRows& rows, StepImpulse& given) const;
     int note_pair(const Manifold& manifold);
 
+    static constexpr float kBounceThreshold = 0.1f;  // slower approaches do not rebound [m/s]
+
     const WorldSettings* settings_;
     std::vector<MovingBody>* bodies_;
     std::vector<Manifold>* manifolds_;
     std::vector<HeldConstraint>* constraints_;
     std::vector<BodyPath>* paths_ = nullptr;
-    std::size_t leg_ = 0;  // of the paths: number of the substep
+    int substep_ = 0;
 
     std::vector<BodyRows> rows_of_;  // per island body
     std::vector<int> local_;         // world body -> island body or -1
@@ -191,7 +222,7 @@ private:
     std::vector<int> next_turn_;  // per island body
     std::vector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
-    std::vector<std::size_t> impacts_;  // contacts that begin later than the step
+    std::vector<std::size_t> impacts_;  // contacts, by time
     std::vector<bool> turned_;          // per island body: its frame was
     LaneArray y_, kept_, start_, moved_, jacobians_;
     std::size_t jacobians_used_ = 0;
@@ -203,7 +234,6 @@ private:
     std::vector<CrossImpulse> crossed_;  // of all islands since forget_crossed
     std::size_t first_crossed_ = 0;      // of this island
     double remaining_ = 0;               // of the step after this substep [s]
-    float until_ = 0;                    // since the step's start, end of this substep [s]
 };
 
 }  // namespace sim

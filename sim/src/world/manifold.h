@@ -15,7 +15,8 @@ struct ManifoldPoint {
     Eigen::Vector3f arm_a, arm_b;      ///< from the centres to the contact, half-way through the overlap [m]
     int sample_a = -1, sample_b = -1;  ///< which of the samples, or -1: see rest
     Eigen::Vector3f rest_a, rest_b;    ///< places in the rest shapes, of a body whose sample is -1
-    float begins = 0;                  ///< since the step's start: not felt in substeps that end before [s]
+    float begins = -1;                 ///< of an impact: its time since the step's start [s]; else -1
+    float gap = 0;                     ///< of an impact, then [m]
     float normal_impulse = 0;          ///< of the last substep, to start the next from [N s]
     Eigen::Vector3f friction_impulse = Eigen::Vector3f::Zero();
 };

@@ -1,7 +1,5 @@
 #include "world/time_of_impact.h"
 
-#include <algorithm>
-
 namespace sim {
 namespace {
 
@@ -21,15 +19,13 @@ struct Gap {
 }  // namespace
 
 Impact time_of_impact(const ConvexBody& a, const BodyPath& path_a, const ConvexBody& b,
-                      const BodyPath& path_b, double substep, double tolerance) noexcept {
+                      const BodyPath& path_b, double tolerance) noexcept {
     Impact impact;
-    const std::size_t legs = path_a.legs.size();
-    std::size_t leg = 0;
     double time = 0;
     const double radii = a.radius() + b.radius();
     Gap gap;
     while (impact.distances < kMostDistances) {
-        const BodyPath::Pose at_a = path_a.at(time, substep), at_b = path_b.at(time, substep);
+        const BodyPath::Pose at_a = path_a.at(time), at_b = path_b.at(time);
         const Eigen::Vector3d between = at_a.position - at_b.position;
         const double length = between.norm();
         if (length - radii > 0.1 * radii) {  // the balls that hold them are far apart
@@ -45,20 +41,16 @@ Impact time_of_impact(const ConvexBody& a, const BodyPath& path_a, const ConvexB
         }
         ++impact.distances;
         double left = gap.width - 0.5 * tolerance;
-        for (; leg < legs; ++leg) {
-            const BodyPath::Leg &of_a = path_a.legs[leg], &of_b = path_b.legs[leg];
+        bool used_up = false;
+        along(path_a, path_b, time, [&](const BodyPath::Leg& of_a, const BodyPath::Leg& of_b, double span) {
             const double closing = -gap.normal.dot(of_a.velocity - of_b.velocity) +
-                                   of_a.spin.cross(gap.normal).norm() * gap.turn_a +
-                                   of_b.spin.cross(gap.normal).norm() * gap.turn_b;
-            const double end = substep * static_cast<double>(leg + 1), span = end - time;
-            if (closing * span > left) {
-                time += left / closing;
-                break;
-            }
+                                   of_a.spin.norm() * gap.turn_a + of_b.spin.norm() * gap.turn_b;
+            used_up = closing * span > left;
+            time += used_up ? left / closing : span;
             left -= closing * span;
-            time = end;
-        }
-        if (leg == legs) return impact;
+            return !used_up;
+        });
+        if (!used_up) return impact;
     }
     impact.meets = true;
     impact.time = time;

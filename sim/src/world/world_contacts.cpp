@@ -6,7 +6,9 @@
 namespace sim {
 namespace {
 
-constexpr double kNormalTurn = 0.004;  // [rad]; a rebound turns by twice that
+// How far the normal of a pair may turn until it touches; a rebound turns by twice that. Bent bodies touch with
+// several samples, whose normals differ by more.
+constexpr double kNormalTurn = 0.004, kBentNormalTurn = 0.05;  // [rad]
 
 double smallest_half(const MovingBody& body) {
     return sim::smallest_half(body.posed);
@@ -49,14 +51,13 @@ double separation_after(const Manifold& manifold, const MovingBody& a, const Mov
     return least;
 }
 
-// Whether the normal of a contact of two ellipsoids stands still until they touch; bent ones touch with several
-// samples, whose normals differ by more.
+// Whether the normal of a contact of two ellipsoids stands still until they touch.
 bool keeps_normal(const Manifold& manifold, const MovingBody& a, const MovingBody& b,
                   const Eigen::Vector3d& moved, double turned) {
     if (!a.kind->ellipsoid || !b.kind->ellipsoid) return false;
     const Eigen::Vector3d n = manifold.points[0].normal.cast<double>();
     const double aside = (moved - n.dot(moved) * n).norm() + turned;
-    const double most = is_round(a.posed) && is_round(b.posed) ? kNormalTurn : 4 * kNormalTurn;
+    const double most = is_round(a.posed) && is_round(b.posed) ? kNormalTurn : kBentNormalTurn;
     return aside < most * (smallest_radius(*a.kind) + smallest_radius(*b.kind));
 }
 
@@ -225,12 +226,8 @@ void WorldContacts::meet_fast(const ContactScene& scene, int i, int j, const Man
     if (!touches) {
         const Impact impact = foresee(scene, i, j);
         if (!impact.meets) return;
-        if (!impact.at_once) {
-            meetings_.push_back({i, j, impact.time, false});
-            return wake(scene, i, j);
-        }
-        meet_near(scene, i, j, margin, before);
-        if (manifolds_.size() == count) return;
+        meetings_.push_back({i, j, impact.time, false});
+        return wake(scene, i, j);
     }
     wake(scene, i, j);
     // Turning on, other places of them may meet.

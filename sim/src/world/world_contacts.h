@@ -21,17 +21,18 @@ struct ContactScene {
 /// manifolds, impulses of the step before; wakes sleepers that are touched.
 ///
 /// A pair is slow if its surfaces move against each other, ringing apart, by at most kSlow of the smaller half
-/// extent within the step. Its contacts are found where it is, as half-spaces that stand still over the step: with a motion
-/// d a pair of balls that a half-space stops would have missed each other by less than d^2 / (2 (r_a + r_b)),
-/// so by less than half a per cent of r. Edges are sharper, and normals of balls turn by up to d / (r_a +
-/// r_b): where such a contact is not touched yet and would stop the free motion, the pair is treated as a
-/// fast one.
+/// extent within the step. Its contacts are found where it is, as half-spaces that stand still over the step:
+/// with a motion d a pair of balls that a half-space stops would have missed each other by less than
+/// d^2 / (2 (r_a + r_b)), so by less than half a per cent of r. Edges are sharper, and normals of balls turn by
+/// up to d / (r_a + r_b): where such a contact is not touched yet, would stop the free motion, and may turn, the
+/// pair is treated as a fast one.
 ///
-/// A fast pair that does not touch has its time of impact on the paths of free motion (time_of_impact.h):
-/// none, no contact; else its contact is found where the bodies are then, begins at that time, and is as far
-/// away now as its rows close until then. Of a body's impacts those later than a substep after its first are
-/// left to unforeseen(), which runs after the islands have been solved: it follows the paths really taken of
-/// bodies that left the foreseen ones, or touch and turn, and adds the contacts that they lead to.
+/// A fast pair that carries no load has its time of impact on the paths of free motion (time_of_impact.h):
+/// none, no contact; else its contact is found where the bodies are then, as one that begins at that time
+/// (IslandSolver: impacts). Of a body's impacts those later than a substep after its first are left to
+/// unforeseen(), which runs after the islands have been solved: it follows the paths really taken of bodies
+/// that left the foreseen ones, or touch and turn, and adds the contacts that they lead to. A pair that touches
+/// already meets again where it is kInside deep in each other, a little deeper every time.
 class WorldContacts {
 public:
     void find(const ContactScene& scene);
@@ -41,9 +42,15 @@ public:
     struct Meeting {
         int a, b;
         double time;    ///< since the step's start [s]
-        bool touching;  ///< had a contact already, and still went on inside by a tenth of the size
+        bool touching;  ///< had a contact already, and still went on inside
     };
     const std::vector<Meeting>& unforeseen(const ContactScene& scene, const std::vector<bool>& solved);
+    /// Of several impacts of a pair within the step only the last is one of its past in the next.
+    void keep_last();
+    /// The pair's manifold in this step, if it has one; the first of several.
+    [[nodiscard]] const Manifold* find_now(int a, int b) {
+        return find_now(static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b));
+    }
     /// Impulses of the last step again, for a manifold whose island is solved once more.
     void rewarm(Manifold& manifold) const;
     std::vector<BodyPath>& paths() noexcept { return paths_; }  ///< of each body; set by solver and find
@@ -75,6 +82,7 @@ private:
     const Manifold* last(std::uint64_t key);
     [[nodiscard]] const Manifold* find_last(std::uint64_t key) const;
     [[nodiscard]] Manifold* find_now(std::uint64_t key);
+    [[nodiscard]] int impacts_of(int i, int j) const;  // of a pair in this step
 
     // Fast pairs, world_impacts.cpp.
     [[nodiscard]] Impact foresee(const ContactScene& scene, int i, int j);

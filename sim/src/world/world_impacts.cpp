@@ -8,26 +8,28 @@
 namespace sim {
 namespace {
 
-// Bodies shrunk to this that meet are deep inside each other; what is bent may be pressed in.
-constexpr double kInside = 0.9, kInsideBent = 0.5;
+// A pair that touches already meets once more where it is this deep inside each other, shares of the smallest
+// semi-axes; bent bodies may be pressed in. With every impact within the step a little deeper.
+constexpr double kInside = 0.1, kInsideBent = 0.5, kDeeper = 0.05, kDeepest = 0.9;
 
 double size_of(const MovingBody& a, const MovingBody& b) {
     return std::min(smallest_half(a.posed), smallest_half(b.posed));
 }
 
 // Whether surfaces moved against each other by more than `least` [m] on their paths.
-bool is_far(const BodyPath& pa, const BodyPath& pb, double substep, double least, const MovingBody& a,
-            const MovingBody& b) {
+bool is_far(const BodyPath& pa, const BodyPath& pb, double least, const MovingBody& a, const MovingBody& b) {
     double sum = 0;
-    for (std::size_t leg = 0; leg < pa.legs.size(); ++leg)
-        sum += substep * ((pa.legs[leg].velocity - pb.legs[leg].velocity).norm() +
-                          pa.legs[leg].spin.norm() * turn_reach_of(*a.kind) +
-                          pb.legs[leg].spin.norm() * turn_reach_of(*b.kind));
+    along(pa, pb, 0, [&](const BodyPath::Leg& of_a, const BodyPath::Leg& of_b, double span) {
+        sum += span * ((of_a.velocity - of_b.velocity).norm() + of_a.spin.norm() * turn_reach_of(*a.kind) +
+                       of_b.spin.norm() * turn_reach_of(*b.kind));
+        return sum <= least;
+    });
     return sum > least;
 }
 
+// A pair's impacts in their order.
 bool by_key(const Manifold& a, const Manifold& b) {
-    return a.key() < b.key();
+    return a.key() != b.key() ? a.key() < b.key() : a.points[0].begins < b.points[0].begins;
 }
 
 }  // namespace
@@ -44,10 +46,17 @@ Manifold* WorldContacts::find_now(std::uint64_t key) {
     return at != manifolds_.end() && at->key() == key ? &*at : nullptr;
 }
 
+int WorldContacts::impacts_of(int i, int j) const {
+    const auto count = std::count_if(manifolds_.begin(), manifolds_.end(), [&](const Manifold& m) {
+        return m.a == i && m.b == j && m.points[0].begins >= 0;
+    });
+    return static_cast<int>(count);
+}
+
 void WorldContacts::rewarm(Manifold& manifold) const {
     for (ManifoldPoint& point : manifold.points) point.normal_impulse = 0, point.friction_impulse.setZero();
-    if (const Manifold* before = find_last(manifold.key()))
-        take_impulses(*before, manifold.impulse_reach, manifold);
+    const Manifold* before = find_last(manifold.key());
+    if (before && manifold.points[0].begins < 0) take_impulses(*before, manifold.impulse_reach, manifold);
 }
 
 void WorldContacts::follow(const ContactScene& scene, int i) {
@@ -62,8 +71,7 @@ Impact WorldContacts::foresee(const ContactScene& scene, int i, int j) {
     const MovingBody &a = scene.bodies[static_cast<std::size_t>(i)],
                      &b = scene.bodies[static_cast<std::size_t>(j)];
     return time_of_impact(ConvexBody(a.posed), paths_[static_cast<std::size_t>(i)], ConvexBody(b.posed),
-                          paths_[static_cast<std::size_t>(j)], scene.settings.dt / scene.settings.substeps,
-                          kTouching * size_of(a, b));
+                          paths_[static_cast<std::size_t>(j)], kTouching * size_of(a, b));
 }
 
 // Of a moving body's impacts, those within a substep of its first: the first may keep it from the others.
@@ -85,18 +93,16 @@ void WorldContacts::accept_impacts(const ContactScene& scene) {
 }
 
 // The contact of a pair where its paths bring it at a time. Its separation now is what its rows, which stand
-// still over the step, close until then. A pair that has a manifold gets the points besides, in place of
-// those that carry nothing. false: it has none there.
+// still over the step, close until then. false: it has none there.
 bool WorldContacts::add_impact(const ContactScene& scene, const Meeting& meeting) {
-    const double substep = scene.settings.dt / scene.settings.substeps;
     const int ids[2] = {meeting.a, meeting.b};
     BodyPath::Way way[2];
     for (std::size_t side = 0; side < 2; ++side) {
         const auto id = static_cast<std::size_t>(ids[side]);
-        const BodyPath::Pose pose = paths_[id].at(meeting.time, substep);
+        const BodyPath::Pose pose = paths_[id].at(meeting.time);
         at_[side].kind = scene.bodies[id].kind;
         at_[side].set(pose.position, pose.orientation, scene.bodies[id].state.q);
-        way[side] = paths_[id].until(meeting.time, substep);
+        way[side] = paths_[id].until(meeting.time);
     }
     const MovingBody &a = scene.bodies[static_cast<std::size_t>(meeting.a)],
                      &b = scene.bodies[static_cast<std::size_t>(meeting.b)];
@@ -111,7 +117,9 @@ bool WorldContacts::add_impact(const ContactScene& scene, const Meeting& meeting
         const double closed =
             n.dot(way[0].moved - way[1].moved + way[0].turned.cross(p.arm_a.cast<double>()) -
                   way[1].turned.cross(p.arm_b.cast<double>()));
-        p.separation = static_cast<float>(std::max(static_cast<double>(p.separation), 0.0) - closed);
+        const double gap = std::max(static_cast<double>(p.separation), 0.0);
+        p.gap = gap > 2 * kTouching * size_of(a, b) ? static_cast<float>(gap) : 0;
+        p.separation = static_cast<float>(gap - closed);
         p.begins = static_cast<float>(meeting.time);
         p.normal_impulse = 0, p.friction_impulse.setZero();
     }
@@ -119,25 +127,18 @@ bool WorldContacts::add_impact(const ContactScene& scene, const Meeting& meeting
     manifold.friction = std::sqrt(a.friction * b.friction);
     manifold.restitution = std::max(a.restitution, b.restitution);
     ++impacts_;
-    Manifold* now = meeting.touching ? find_now(manifold.key()) : nullptr;
-    if (!now) {
-        manifolds_.push_back(manifold);
-        return true;
-    }
-    for (std::size_t i = 0; i < static_cast<std::size_t>(manifold.count); ++i) {
-        if (now->count < kManifoldPoints) {
-            now->points[static_cast<std::size_t>(now->count++)] = manifold.points[i];
-            continue;
-        }
-        // In place of one that carries nothing, the nearest of them.
-        auto cost = [&](const ManifoldPoint& p) {
-            return p.normal_impulse > 0 ? 1e30f : (p.arm_a - manifold.points[i].arm_a).squaredNorm();
-        };
-        *std::min_element(now->points.begin(), now->points.end(),
-                          [&](const ManifoldPoint& p, const ManifoldPoint& q) { return cost(p) < cost(q); }) =
-            manifold.points[i];
-    }
+    manifolds_.push_back(manifold);
     return true;
+}
+
+void WorldContacts::keep_last() {
+    const auto again = [](const Manifold& a, const Manifold& b) { return a.key() == b.key(); };
+    auto kept = manifolds_.begin();
+    for (auto next = manifolds_.begin(); next != manifolds_.end(); ++next) {
+        if (kept != manifolds_.begin() && again(*std::prev(kept), *next)) --kept;
+        *kept++ = *next;
+    }
+    manifolds_.erase(kept, manifolds_.end());
 }
 
 // Whether the solved motion differs from the free one by more than slow pairs may move.
@@ -174,9 +175,10 @@ const std::vector<WorldContacts::Meeting>& WorldContacts::unforeseen(const Conta
             set_spins(body, paths_[at]);
         }
         Eigen::Vector3d low = body.posed.position, high = low;
-        for (const BodyPath::Leg& leg : paths_[at].legs) {
-            const Eigen::Vector3d end = leg.position + substep * leg.velocity;
-            low = low.cwiseMin(end), high = high.cwiseMax(end);
+        for (std::size_t i = 0; i < paths_[at].legs.size(); ++i) {
+            const BodyPath::Leg& leg = paths_[at].legs[i];
+            const Eigen::Vector3d end = leg.position + (paths_[at].end_of(i) - leg.start) * leg.velocity;
+            low = low.cwiseMin(leg.position).cwiseMin(end), high = high.cwiseMax(leg.position).cwiseMax(end);
         }
         const double radius = static_cast<double>(body.posed.radius);
         boxes.push_back({low.array() - radius, high.array() + radius, id, left});
@@ -206,13 +208,14 @@ void WorldContacts::meet_unforeseen(const ContactScene& scene, int i, int j) {
                      &b = scene.bodies[static_cast<std::size_t>(j)];
     if (!a.moves() && !b.moves()) return;
     const BodyPath &pa = paths_[static_cast<std::size_t>(i)], &pb = paths_[static_cast<std::size_t>(j)];
-    const double size = size_of(a, b), substep = scene.settings.dt / scene.settings.substeps;
+    const double size = size_of(a, b);
     const Manifold* now = find_now(static_cast<std::uint64_t>(i) << 32 | static_cast<std::uint32_t>(j));
-    if (now && !is_far(pa, pb, substep, kSlow * size, a, b)) return;
+    if (now && !is_far(pa, pb, kSlow * size, a, b)) return;
     const bool bent = is_bent(a.posed) || is_bent(b.posed);
-    const double scale = !now ? 1 : bent ? kInsideBent : kInside;
-    const ConvexBody of_a(a.posed, scale), of_b(b.posed, scale);
-    const Impact impact = time_of_impact(of_a, pa, of_b, pb, substep, kTouching * size);
+    const double inside =
+        now ? std::min((bent ? kInsideBent : kInside) + kDeeper * impacts_of(i, j), kDeepest) : 0;
+    const ConvexBody of_a(a.posed, inside), of_b(b.posed, inside);
+    const Impact impact = time_of_impact(of_a, pa, of_b, pb, kTouching * size);
     if (!impact.meets || (impact.at_once && now)) return;
     meetings_.push_back({i, j, impact.time, now != nullptr});
 }

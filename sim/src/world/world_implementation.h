@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "sim/world.h"
+#include "world/island_solver.h"
 #include "world/world_contacts.h"
 
 namespace sim {
@@ -41,10 +42,10 @@ struct World::Implementation {
 
     // Sharing.
     Sharing sharing = Sharing::alone;
-    BroadPhase neighbours;                 // loose boxes, to find what may reach own islands
-    std::vector<double> reaches, fastest;  // islands: of each body, of each set
-    std::vector<int> owned;                // pairs: own and fixed bodies, ascending
-    std::vector<int> placed;               // pairs: ghosts of the next step
+    BroadPhase neighbours;                        // loose boxes, to find what may reach own islands
+    std::vector<double> reaches, quick, fastest;  // islands: of each body, each fast one, each set
+    std::vector<int> owned;                       // pairs: own and fixed bodies, ascending
+    std::vector<int> placed;                      // pairs: ghosts of the next step
     int cross_contacts = 0;
     struct LooseBall {
         Eigen::Vector3d center;

@@ -8,7 +8,35 @@
 namespace sim {
 namespace {
 
-constexpr int kRounds = 12;  // then what still meets is held apart
+constexpr int kRounds = 24;  // then what still meets is held apart
+
+// The impulse on a, and the opposite on b, half-way between the places that their arms reach, after which they
+// do not approach each other at the point. Applied, and returned.
+Eigen::Vector3d stop_approach(MovingBody& a, MovingBody& b, const ManifoldPoint& point) {
+    const Eigen::Vector3d n = point.normal.cast<double>();
+    const bool both = a.moves() && b.moves();
+    const Eigen::Vector3d on_a = a.state.position + point.arm_a.cast<double>(),
+                          on_b = b.state.position + point.arm_b.cast<double>(),
+                          place = both        ? Eigen::Vector3d((on_a + on_b) / 2)
+                                  : a.moves() ? on_a
+                                              : on_b;
+    double speed = 0, mobility = 0;
+    for (const MovingBody* body : {&a, &b}) {
+        if (!body->moves()) continue;
+        const Eigen::Vector3d arm = place - body->state.position, lever = arm.cross(n);
+        const Eigen::Vector3d spin = spin_of(*body, body->state.orientation, body->state.angular_momentum);
+        speed += (body == &a ? 1 : -1) * n.dot(body->state.velocity + spin.cross(arm));
+        mobility += 1 / body->kind->mass.mass + lever.dot(spin_of(*body, body->state.orientation, lever));
+    }
+    const Eigen::Vector3d impulse = std::max(0.0, -speed) / mobility * n;
+    for (MovingBody* body : {&a, &b}) {
+        if (!body->moves()) continue;
+        const Eigen::Vector3d p = body == &a ? impulse : Eigen::Vector3d(-impulse);
+        body->state.velocity += p / body->kind->mass.mass;
+        body->state.angular_momentum += (place - body->state.position).cross(p);
+    }
+    return impulse;
+}
 
 }  // namespace
 
@@ -90,35 +118,36 @@ void World::Implementation::solve_again() {
     ++counts.solved_again;
 }
 
-// The last resort: the island stops where the bodies meet, and these go on together.
+// The last resort: the island stops where the bodies meet, as it moves then, and these stop approaching each
+// other.
 void World::Implementation::hold_apart(const WorldContacts::Meeting& meeting) {
     auto at = [this](int id) -> MovingBody& { return bodies[static_cast<std::size_t>(id)]; };
-    const double substep = settings.dt / settings.substeps;
-    double mass = 0;
-    Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
-    bool free = true;
-    for (const int id : {meeting.a, meeting.b}) {
-        if (!at(id).moves()) {
-            free = false;
-            continue;
-        }
-        mass += at(id).kind->mass.mass, momentum += at(id).kind->mass.mass * at(id).state.velocity;
-        const Island& island = islands[static_cast<std::size_t>(place[static_cast<std::size_t>(root(id))])];
-        for (const int other : island.bodies) {
-            const BodyPath::Pose pose =
-                contacts.paths()[static_cast<std::size_t>(other)].at(meeting.time, substep);
-            at(other).state.position = pose.position, at(other).state.orientation = pose.orientation;
-        }
-    }
-    const Eigen::Vector3d together =
-        free ? Eigen::Vector3d(momentum / mass) : Eigen::Vector3d(Eigen::Vector3d::Zero());
+    auto island_of = [this](int id) -> const Island& {
+        return islands[static_cast<std::size_t>(place[static_cast<std::size_t>(root(id))])];
+    };
     for (const int id : {meeting.a, meeting.b}) {
         if (!at(id).moves()) continue;
-        const Island& island = islands[static_cast<std::size_t>(place[static_cast<std::size_t>(root(id))])];
-        if (at(id).own)
-            outcomes[static_cast<std::size_t>(island.bodies.front())].outside +=
-                at(id).kind->mass.mass * (together - at(id).state.velocity);
-        at(id).state.velocity = together;
+        for (const int other : island_of(id).bodies) {
+            MovingBody& body = at(other);
+            const BodyPath& path = contacts.paths()[static_cast<std::size_t>(other)];
+            const BodyPath::Pose pose = path.at(meeting.time);
+            const BodyPath::Leg& leg = path.leg_at(meeting.time);
+            if (body.own)
+                outcomes[static_cast<std::size_t>(island_of(id).bodies.front())].outside +=
+                    body.kind->mass.mass * (leg.velocity - body.state.velocity);
+            body.state.position = pose.position, body.state.orientation = pose.orientation;
+            body.state.velocity = leg.velocity, body.state.angular_momentum = leg.momentum;
+        }
+    }
+    const Manifold* manifold = contacts.find_now(meeting.a, meeting.b);
+    if (manifold) {
+        const Eigen::Vector3d kick = stop_approach(at(meeting.a), at(meeting.b), manifold->points[0]);
+        for (const int id : {meeting.a, meeting.b}) {
+            const int other = id == meeting.a ? meeting.b : meeting.a;
+            if (at(id).moves() && at(id).own && !at(other).moves())
+                outcomes[static_cast<std::size_t>(island_of(id).bodies.front())].outside +=
+                    id == meeting.a ? kick : Eigen::Vector3d(-kick);
+        }
     }
     ++counts.held_apart;
 }
@@ -161,6 +190,7 @@ void World::Implementation::solve_islands() {
             again[static_cast<std::size_t>(meeting.a)] = again[static_cast<std::size_t>(meeting.b)] = true;
         solve_again();
     }
+    contacts.keep_last();
     counts.islands = awake;
     counts.impacts = contacts.impacts();
     sum_outcomes();

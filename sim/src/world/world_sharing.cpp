@@ -105,7 +105,7 @@ void World::Implementation::join_neighbours(const std::vector<double>& reach) {
 // Bodies that may be in an island with an own body: joined by overlapping loose boxes, constraints, or having
 // fallen asleep together. A superset of the islands is enough: what is left out can neither touch nor wake an
 // own body in this step. What a fast body hits may fly off at up to twice its speed, and hit others in the
-// same step: sets with a fast body reach that far.
+// same step: sets with a fast body reach that far, and so do those that they reach.
 void World::Implementation::gather_islands() {
     start_union();
     reaches.resize(bodies.size());
@@ -120,18 +120,24 @@ void World::Implementation::gather_islands() {
             bodies[static_cast<std::size_t>(b)].moves())
             join(a, b);
     }
+    quick.assign(bodies.size(), 0);
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+        if (bodies[i].moves() && reaches[i] > (kSlow + kSlop) * smallest_half(bodies[i].posed))
+            quick[i] = reaches[i];
     join_neighbours(reaches);
-    fastest.assign(bodies.size(), 0);
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-        double& most = fastest[static_cast<std::size_t>(root(static_cast<int>(i)))];
-        if (reaches[i] > (kSlow + kSlop) * smallest_half(bodies[i].posed)) most = std::max(most, reaches[i]);
+    for (bool any = true; any;) {
+        any = false;
+        fastest.assign(bodies.size(), 0);
+        for (std::size_t i = 0; i < bodies.size(); ++i) {
+            double& most = fastest[static_cast<std::size_t>(root(static_cast<int>(i)))];
+            most = std::max(most, quick[i]);
+        }
+        for (std::size_t i = 0; i < bodies.size(); ++i) {
+            const double most = 2 * fastest[static_cast<std::size_t>(root(static_cast<int>(i)))];
+            if (most > reaches[i] && bodies[i].moves()) any = true, reaches[i] = most;
+        }
+        if (any) join_neighbours(reaches);
     }
-    bool any = false;
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-        const double most = 2 * fastest[static_cast<std::size_t>(root(static_cast<int>(i)))];
-        if (most > reaches[i] && bodies[i].moves()) any = true, reaches[i] = most;
-    }
-    if (any) join_neighbours(reaches);
     place.assign(bodies.size(), 0);
     for (std::size_t i = 0; i < bodies.size(); ++i)
         if (bodies[i].own && bodies[i].moves())
