@@ -90,7 +90,7 @@ struct BulletWorld::Implementation {
 
 void BulletWorld::Implementation::make_world(const sim::WorldSettings& settings) {
     dt = static_cast<btScalar>(settings.dt);
-    if (kind == BulletKind::rigid) {
+    if (kind != BulletKind::reduced) {
         world = std::make_unique<btDiscreteDynamicsWorld>(&dispatcher, &broadphase, &rigid_constraints,
                                                           &configuration);
     } else {
@@ -141,14 +141,20 @@ void BulletWorld::Implementation::add_box(const sim::WorldDefinition& definition
 }
 
 void BulletWorld::Implementation::add_rigid(const sim::WorldDefinition& definition, const BallMesh& mesh) {
-    auto hull = std::make_unique<btConvexHullShape>();
-    for (std::size_t i = 1; i < mesh.nodes.size(); ++i) hull->addPoint(to_bullet(mesh.nodes[i]), false);
-    hull->recalcLocalAabb();
     const sim::WorldBody& like = definition.bodies.front();
+    std::unique_ptr<btConvexShape> shape;
+    if (kind == BulletKind::spheres) {
+        shape = std::make_unique<btSphereShape>(static_cast<btScalar>(like.shape.base.semi_axes.x()));
+    } else {
+        auto hull = std::make_unique<btConvexHullShape>();
+        for (std::size_t i = 1; i < mesh.nodes.size(); ++i) hull->addPoint(to_bullet(mesh.nodes[i]), false);
+        hull->recalcLocalAabb();
+        shape = std::move(hull);
+    }
     const double mass = sim::rigid_mass(like.shape.base, like.material).mass;
     for (const sim::WorldBody& body : definition.bodies)
-        add_body(static_cast<btScalar>(mass), *hull, body.world_from_body.translation(), body);
-    shapes.push_back(std::move(hull));
+        add_body(static_cast<btScalar>(mass), *shape, body.world_from_body.translation(), body);
+    shapes.push_back(std::move(shape));
 }
 
 std::unique_ptr<btReducedDeformableBody> BulletWorld::Implementation::reduced_ball(const BallMesh& mesh) {
@@ -219,7 +225,7 @@ BulletWorld::BulletWorld(const sim::WorldDefinition& world, BulletKind kind)
     implementation_->make_world(world.settings);
     implementation_->add_box(world);
     const BallMesh mesh = ball_mesh(world.bodies.front());
-    if (kind == BulletKind::rigid) implementation_->add_rigid(world, mesh);
+    if (kind != BulletKind::reduced) implementation_->add_rigid(world, mesh);
     if (kind == BulletKind::reduced) implementation_->add_reduced(world, mesh);
 }
 
@@ -234,7 +240,7 @@ void BulletWorld::step() {
 Eigen::Vector3d BulletWorld::position(int body) const {
     constexpr int kSlabs = 5;
     const btVector3 p =
-        implementation_->kind == BulletKind::rigid
+        implementation_->kind != BulletKind::reduced
             ? implementation_->rigid[static_cast<std::size_t>(kSlabs + body)]->getCenterOfMassPosition()
             : implementation_->reduced[static_cast<std::size_t>(body)]->getRigidTransform().getOrigin();
     return {p.x(), p.y(), p.z()};

@@ -9,7 +9,8 @@ namespace sim_bench {
 /// The same balls in the Bullet library, as it is installed (single precision). One thread, 1/60 s per step,
 /// ten solver iterations (its default), nothing is put to sleep. The box is made of btBoxShapes.
 enum class BulletKind {
-    rigid,   ///< btRigidBody with the btConvexHullShape of the 182 vertices
+    rigid,    ///< btRigidBody with the btConvexHullShape of the 182 vertices
+    spheres,  ///< btRigidBody with a btSphereShape
     reduced  ///< btReducedDeformableBody, 183 nodes, 360 tetrahedra, our own modes at the nodes. These bodies
              ///< collide with the box, not with each other.
 };

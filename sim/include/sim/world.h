@@ -194,6 +194,9 @@ struct WorldCounts {
     std::uint64_t inverse_fallbacks = 0;  ///< inverse mappings without convergence
     std::uint64_t deformations_limited = 0;  ///< bodies held at the limit of deformation, per substep
     std::uint64_t constraints_broken = 0;    ///< by their breaking force
+    std::uint64_t impacts = 0;               ///< of fast bodies, found by their time of impact
+    std::uint64_t solved_again = 0;  ///< rounds in which islands were solved once more: bodies met unforeseen
+    std::uint64_t held_apart = 0;    ///< bodies held where they met, as those rounds did not suffice
 };
 
 /// Many modal bodies that fall, touch, deform and hang together (thesis 2.2, 2.3.1, 2.6). See world.cpp and

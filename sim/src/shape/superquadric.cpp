@@ -128,6 +128,26 @@ Eigen::Vector3d Gauge::onto_surface(const Eigen::Vector3d& r) const noexcept {
     return r / n;
 }
 
+// N(r) = 1 and d parallel to grad N(r): with u = |d| times the semi-axes and q = p / (p - 1), the share
+// u_i^q / sum u^q of a coordinate in the dual norm is |r_i / a_i|^p, its share in N.
+Eigen::Vector3d Gauge::support(const Eigen::Vector3d& direction) const noexcept {
+    if (p1_ == 2 && p2_ == 2) {
+        const Eigen::Vector3d pulled = semi_axes_.cwiseProduct(direction);
+        const double length = pulled.norm();
+        return length > 0 ? Eigen::Vector3d(semi_axes_.cwiseProduct(pulled) / length)
+                          : Eigen::Vector3d(0, semi_axes_.y(), 0);
+    }
+    const Eigen::Vector3d u = direction.cwiseAbs().cwiseProduct(semi_axes_);
+    const PairNorm flat = pair_norm(u.x(), u.z(), p2_ / (p2_ - 1));
+    const PairNorm whole = pair_norm(flat.value, u.y(), p1_ / (p1_ - 1));
+    const double rho = std::pow(whole.first, 1 / p1_);
+    const Eigen::Vector3d r(rho * std::pow(flat.first, 1 / p2_), std::pow(whole.second, 1 / p1_),
+                            rho * std::pow(flat.second, 1 / p2_));
+    Eigen::Vector3d point;
+    for (int i = 0; i < 3; ++i) point[i] = std::copysign(r[i] * semi_axes_[i], direction[i]);
+    return point;
+}
+
 Eigen::Vector3d Gauge::near_outside(const Eigen::Vector3d& r) const noexcept {
     if (e1_ >= 0.6) return onto_surface(r);
     const Eigen::Vector3d u = r.cwiseAbs().cwiseQuotient(semi_axes_);

@@ -199,7 +199,6 @@ BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
                   {},
                   {},
                   {},
-                  {},
                   Eigen::Vector3d::Zero()};
     kind.modes = kind.basis.count();
     kind.choice.modes = kind.modes;
@@ -207,18 +206,22 @@ BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
     kind.root_mass = std::sqrt(kind.mass.mass);
     kind.root_inertia = kind.mass.inertia.cwiseSqrt();
     kind.step_drag = std::exp(-body.damping_alpha * settings.dt);
-    kind.substep_drag = std::exp(-body.damping_alpha * settings.dt / settings.substeps);
     kind.mode_width = whole_lanes(kind.modes);
     kind.width = 8 + kind.mode_width;
-    kind.root_compliance.resize(kind.mode_width);
     kind.ellipsoid = body.shape.base.e1 == 1 && body.shape.base.e2 == 1 && body.shape.bumps.empty();
     kind.sigma =
         body.damping_alpha / 2 +
         kind.basis.omega.array() * (body.damping_ratio + body.damping_beta / 2 * kind.basis.omega.array());
-    kind.substep = HeldSteps(kind.basis.omega, kind.sigma, settings.dt / settings.substeps);
     kind.whole = HeldSteps(kind.basis.omega, kind.sigma, settings.dt);
-    for (int k = 0; k < kind.modes; ++k)
-        kind.root_compliance.data()[k] = static_cast<float>(kind.substep.root_compliance[k]);
+    double tau = settings.dt / settings.substeps;
+    for (BodyKind::Substep& substep : kind.substeps) {
+        substep.held = HeldSteps(kind.basis.omega, kind.sigma, tau);
+        substep.drag = std::exp(-body.damping_alpha * tau);
+        substep.root_compliance.resize(static_cast<std::size_t>(kind.mode_width));
+        for (int k = 0; k < kind.modes; ++k)
+            substep.root_compliance.data()[k] = static_cast<float>(substep.held.root_compliance[k]);
+        tau /= 2;
+    }
     set_samples(kind);
     if (kind.modes > 0) {
         set_polynomials(kind);

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <vector>
 
 #include "modes/oscillator.h"
@@ -27,8 +28,9 @@ struct HeldSteps {
     HeldSteps(const Eigen::VectorXd& omega, const Eigen::VectorXd& sigma, double tau);
 };
 
-constexpr int kProbes = 56;      // 53 in whole lanes, the rest copies
-constexpr int kMostModes = 128;  // of a body, whole lanes (world_check: 120)
+constexpr int kProbes = 56;         // 53 in whole lanes, the rest copies
+constexpr int kSubstepLevels = 10;  // a substep may be halved so often, less one
+constexpr int kMostModes = 128;     // of a body, whole lanes (world_check: 120)
 
 /// What bodies of one shape, material, fidelity and sampling share; computed once.
 struct BodyKind {
@@ -37,12 +39,12 @@ struct BodyKind {
     GeneralizedSurface surface;
     RigidMass mass;
     ModalBasis basis;
-    Eigen::VectorXd sigma;                   ///< decay rates [1/s]
-    Eigen::VectorXd gradient_bound;          ///< largest |d phi_k / dr| (Frobenius) over the probes
-    HeldSteps substep, whole;                ///< for a substep, for a step
-    Eigen::Vector3d half_box;                ///< of the rest surface, bumps included [m]
-    double substep_drag = 1, step_drag = 1;  ///< e^(-alpha tau): what damping_alpha leaves of rigid motion
-    double root_mass = 0;                    ///< sqrt(m)
+    Eigen::VectorXd sigma;           ///< decay rates [1/s]
+    Eigen::VectorXd gradient_bound;  ///< largest |d phi_k / dr| (Frobenius) over the probes
+    HeldSteps whole;                 ///< for a step
+    Eigen::Vector3d half_box;        ///< of the rest surface, bumps included [m]
+    double step_drag = 1;            ///< e^(-alpha dt): what damping_alpha leaves of rigid motion
+    double root_mass = 0;            ///< sqrt(m)
     Eigen::Vector3d root_inertia = Eigen::Vector3d::Zero();  ///< sqrt(I)
     Eigen::VectorXd shape_bound = {};                        ///< largest |phi_k| over the samples [kg^-1/2]
     int modes = 0, width = 8;      ///< width: floats of a Jacobian's row, 8 + mode_width
@@ -55,7 +57,13 @@ struct BodyKind {
     float sample_radius = 0;                               ///< [m]
     LaneArray shapes = {};                                 ///< phi at samples: [mode][axis][8 batches]
     LaneArray sample_shapes = {};                          ///< phi at samples: [sample][axis][mode_width]
-    LaneArray root_compliance = {};                        ///< of a substep: [mode_width]
+    /// What depends on the length of a substep; entry n: 1/2^n of the shortest that is usual.
+    struct Substep {
+        HeldSteps held = {};
+        double drag = 1;                 ///< as step_drag
+        LaneArray root_compliance = {};  ///< [mode_width]
+    };
+    std::array<Substep, kSubstepLevels> substeps = {};
     /// d phi / dr at 53 points of the body, the probes: centre, and the surface in 26 directions and half-way
     /// to it: [mode][3 i + j][kProbes].
     LaneArray gradients = {};

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <tuple>
 
 #include "world/island_solver.h"
 #include "world/row_kernels.h"
@@ -10,6 +12,7 @@
 namespace sim {
 namespace {
 
+constexpr double kMoving = 0.05;  // of the smallest half extent, in a step
 constexpr double kPushHz = 30, kPushDamping = 10;
 
 /// Two unit vectors square to n and to each other.
@@ -23,7 +26,8 @@ void set_tangents(const Eigen::Vector3f& n, Eigen::Vector3f (&t)[2]) {
 }  // namespace
 
 void IslandSolver::begin(const Island& island) {
-    h_ = settings_->dt / settings_->substeps;
+    h_ = last_h_ = settings_->dt / settings_->substeps;
+    level_ = 0;
     inverse_h_ = static_cast<float>(1 / h_);
     const double omega = 2 * std::numbers::pi * std::min(kPushHz, 0.25 / h_);
     const double a1 = 2 * kPushDamping + h_ * omega, a2 = h_ * omega * a1;
@@ -37,8 +41,22 @@ void IslandSolver::begin(const Island& island) {
     for (const int id : island.bodies) {
         MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
         local_[static_cast<std::size_t>(id)] = static_cast<int>(rows_of_.size());
-        rows_of_.push_back({&body, offset, body.kind->width, body.state.position, body.posed.rotation,
-                            body.posed.rotation.transpose().cast<float>()});
+        BodyRows& rows = rows_of_.emplace_back();
+        rows.body = &body, rows.offset = offset, rows.width = body.kind->width;
+        rows.place = body.state.position, rows.frame = body.posed.rotation;
+        rows.body_from_world = body.posed.rotation.transpose().cast<float>();
+        rows.rotation = body.substep_rotation;
+        const double speed = body.state.velocity.norm() + body.state.angular_momentum.norm() /
+                                                              body.kind->mass.inertia.minCoeff() *
+                                                              body.kind->surface.bounding_radius();
+        rows.moving = speed * settings_->dt > kMoving * body.kind->definition.shape.base.semi_axes.minCoeff();
+        if (paths_) {
+            BodyPath& path = (*paths_)[static_cast<std::size_t>(id)];
+            path.legs.clear();
+            path.legs.reserve(2 * static_cast<std::size_t>(settings_->substeps));
+            path.end = settings_->dt;
+            path.inertia = body.kind->mass.inertia;
+        }
         offset += static_cast<std::uint32_t>(body.kind->width);
     }
     y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
@@ -62,13 +80,21 @@ void IslandSolver::begin(const Island& island) {
     }
     jacobians_.resize(floats);
     jacobians_used_ = 0;
-    contacts_.clear(), springs_.clear();
-    any_told_ = false;
+    contacts_.clear(), springs_.clear(), impacts_.clear();
+    any_told_ = direct_ = springs_direct_ = false;
     first_crossed_ = crossed_.size();
     contacts_.reserve(triples);
     for (const Turn& turn : in_turns(island))
         add_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
     for (const int c : island.constraints) add_spring((*constraints_)[static_cast<std::size_t>(c)]);
+    // A pair's points together.
+    std::sort(impacts_.begin(), impacts_.end(), [this](std::size_t i, std::size_t j) {
+        const ContactRows &a = contacts_[i], &b = contacts_[j];
+        return std::tuple(a.point->begins, a.manifold, i) < std::tuple(b.point->begins, b.manifold, j);
+    });
+    if (springs_.empty()) return;
+    if (begin_direct(kMostWithSprings * static_cast<double>(rows_of_.size()))) return;
+    begin_direct(std::numeric_limits<double>::infinity(), false);
 }
 
 const std::vector<IslandSolver::Turn>& IslandSolver::in_turns(const Island& island) {
@@ -149,8 +175,9 @@ void IslandSolver::write_rows(const Place& place, const Eigen::Matrix3f& directi
         }
         const Eigen::Vector3f own = body_from_world * world;
         const int width = kind.mode_width;
+        const float* root_compliance = of_substep(kind).root_compliance.data();
         for (int k = 0; k < width; k += kLanes)
-            store_lanes(out + 8 + k, load_lanes(kind.root_compliance.data() + k) *
+            store_lanes(out + 8 + k, load_lanes(root_compliance + k) *
                                          (own.x() * load_lanes(place.shapes + k) +
                                           own.y() * load_lanes(place.shapes + width + k) +
                                           own.z() * load_lanes(place.shapes + 2 * width + k)));
@@ -203,47 +230,69 @@ void IslandSolver::finish_rows(Rows& rows) {
 }
 
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
-    alignas(32) float scratch[2][3 * kMostModes];
+    auto moving = [this](int id) { return id < kFirstPlane ? local(id) : -1; };
     ContactRows c{};
-    const Place a = place(manifold.a, point.arm_a, point.sample_a, point.rest, scratch[0]);
-    const Place b = place(manifold.b, point.arm_b, point.sample_b, point.rest, scratch[1]);
-    set_tangents(point.normal, c.tangent);
-    Eigen::Matrix3f directions;
-    directions << point.normal.transpose(), c.tangent[0].transpose(), c.tangent[1].transpose();
-    c.side[0] = reserve_rows(a.body);
-    write_rows(a, directions, 1, c.side[0]);
-    c.side[1] = reserve_rows(b.body);
-    write_rows(b, directions, -1, c.side[1]);
-    finish_rows(c);
+    c.manifold = &manifold;
     c.point = &point;
+    c.side[0] = reserve_rows(moving(manifold.a));
+    c.side[1] = reserve_rows(moving(manifold.b));
+    set_tangents(point.normal, c.tangent);
+    write_contact(c);
     c.separation = c.now = point.separation;
     c.friction = manifold.friction;
     // Only what comes together rebounds, not what rests and rings.
     c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
     c.emerging = manifold.emerging;
-    c.inverse_normal = 1 / c.k[0][0];
-    c.slide_mass = 2 / (c.k[1][1] + c.k[2][2]);
-    const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
-    c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
-    c.inverse_tangent[2] = c.k[1][1] / det;
+    c.firm = point.begins >= 0;
+    for (const Side& side : c.side)
+        c.moving = c.moving || (side.body >= 0 && rows_of_[static_cast<std::size_t>(side.body)].moving);
     c.pair = note_pair(manifold);
     c.told = note_told(c, true) || c.pair >= 0;
     c.impulse[0] = point.normal_impulse;
     c.impulse[1] = point.friction_impulse.dot(c.tangent[0]);
     c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
+    if (point.begins >= 0) {
+        impacts_.push_back(contacts_.size());
+        c.begins =
+            std::clamp(static_cast<int>(static_cast<double>(point.begins) / h_), 0, settings_->substeps - 1);
+    }
     contacts_.push_back(c);
+}
+
+// The rows of a contact, in the bodies' frames as they are now. Directly, at the one point at which its impulses act.
+void IslandSolver::write_contact(ContactRows& c) {
+    alignas(32) float scratch[2][3 * kMostModes];
+    const ManifoldPoint& point = *c.point;
+    Eigen::Vector3f arms[2] = {point.arm_a, point.arm_b};
+    if (direct_ && c.side[0].body >= 0 && c.side[1].body >= 0) {
+        const Eigen::Vector3d at = place_now(c);
+        for (int side = 0; side < 2; ++side)
+            arms[side] = (at - rows_of_[static_cast<std::size_t>(c.side[side].body)].place).cast<float>();
+    }
+    const Place a = place(c.manifold->a, arms[0], point.sample_a, point.rest_a, scratch[0]);
+    const Place b = place(c.manifold->b, arms[1], point.sample_b, point.rest_b, scratch[1]);
+    Eigen::Matrix3f directions;
+    directions << point.normal.transpose(), c.tangent[0].transpose(), c.tangent[1].transpose();
+    write_rows(a, directions, 1, c.side[0]);
+    write_rows(b, directions, -1, c.side[1]);
+    finish_rows(c);
+    c.inverse_normal = 1 / c.k[0][0];
+    c.slide_mass = 2 / (c.k[1][1] + c.k[2][2]);
+    const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
+    c.inverse_tangent[0] = c.k[2][2] / det, c.inverse_tangent[1] = -c.k[1][2] / det,
+    c.inverse_tangent[2] = c.k[1][1] / det;
 }
 
 void IslandSolver::add_spring(HeldConstraint& constraint) {
     const PointConstraint& held = constraint.definition;
     SpringRows s{};
-    s.place.setZero();
+    s.impulse = constraint.impulse.cast<double>() / 2;  // each half, at rest
+    s.place.setZero(), s.moved.setZero(), s.offset.setZero(), s.after.setZero(), s.gap.setZero();
     auto local_of = [this](int body) { return body >= 0 ? local(body) : -1; };
     s.side[0] = reserve_rows(local_of(held.body_a));
     s.side[1] = reserve_rows(local_of(held.body_b));
     s.constraint = &constraint;
     s.told = note_told(s, false);
-    for (int i = 0; i < 3; ++i) s.impulse[i] = constraint.impulse[i];
     springs_.push_back(s);
 }
 
@@ -263,7 +312,7 @@ IslandSolver::End IslandSolver::end_of(int body, const Eigen::Vector3d& rest, fl
 }
 
 // Springs act over large turns, so their arms and rows follow the bodies every substep.
-void IslandSolver::refresh(SpringRows& s) {
+void IslandSolver::write_spring(SpringRows& s) {
     const PointConstraint& held = s.constraint->definition;
     alignas(32) float scratch[2][3 * kMostModes];
     const End a = end_of(held.body_a, held.point_a, scratch[0]);
@@ -273,19 +322,7 @@ void IslandSolver::refresh(SpringRows& s) {
     write_rows(b.place, axes, -1, s.side[1]);
     finish_rows(s);
     s.place = (a.point + b.point) / 2;
-    const double mass = 3.0 / (s.k[0][0] + s.k[1][1] + s.k[2][2]), k = held.stiffness;
-    const double damping = 2 * held.damping_ratio * std::sqrt(k * mass), firm = damping + h_ * k;
-    s.gamma = static_cast<float>(1 / (h_ * firm));
-    s.pull = static_cast<float>(k / firm);
-    Eigen::Matrix3d soft;
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) soft(i, j) = s.k[i][j] + (i == j ? s.gamma : 0);
-    const Eigen::Matrix3d inverse = soft.inverse();
-    const Eigen::Vector3d error = a.point - b.point;
-    for (int i = 0; i < 3; ++i) {
-        s.error[i] = static_cast<float>(error[i]);
-        for (int j = 0; j < 3; ++j) s.inverse[i][j] = static_cast<float>(inverse(i, j));
-    }
+    s.gap = a.point - b.point;
 }
 
 }  // namespace sim

@@ -10,8 +10,8 @@ namespace {
 
 using ModeArray = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostModes, 1>;  // on the stack
 
-constexpr float kPushSpeed = 3;           // [m/s]
-constexpr float kBounceThreshold = 0.1f;  // [m/s]
+// Speeds by which swept contacts may miss: at rest, of the smallest body's size a second, and as a share of the fastest body's.
+constexpr double kMissedAtRest = 1e-3, kMissedShare = 0.03;
 
 void clear(StepImpulse& impulse) {
     impulse.linear.setZero(), impulse.angular.setZero(), impulse.displacement.setZero();
@@ -27,25 +27,107 @@ float root(float x) {
 
 void IslandSolver::solve(const Island& island) {
     begin(island);
-    for (int i = 0; i < settings_->substeps; ++i) {
-        remaining_ = h_ * (settings_->substeps - 1 - i);
-        substep(i == 0, i + 1 == settings_->substeps);
+    before_.resize(bodies_->size());
+    double fastest = 0, size = 1;
+    for (const int id : island.bodies) {
+        const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        Before& before = before_[static_cast<std::size_t>(id)];
+        before.state = body.state, before.at_limit = body.at_limit;
+        fastest = std::max(fastest, body.state.velocity.squaredNorm());
+        size = std::min(size, 2 * body.kind->half_box.minCoeff());
+    }
+    const Eigen::Vector3d outside = outside_;
+    const std::uint64_t limited = limited_;
+    advance();
+    const double enough = kMissedAtRest * size + kMissedShare * std::sqrt(fastest);
+    const double most = kMostWithContacts * static_cast<double>(rows_of_.size());
+    if (!direct_ && impacts_.empty() && residual() > enough && begin_direct(most)) {
+        for (const int id : island.bodies) {
+            MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+            const Before& before = before_[static_cast<std::size_t>(id)];
+            body.state = before.state, body.at_limit = before.at_limit, body.limited_now = false;
+            body.was_given = false;
+        }
+        outside_ = outside, limited_ = limited;
+        crossed_.resize(first_crossed_);
+        begin(island);
+        begin_direct(most);
+        advance();
     }
     if (any_told_) settle_given();
     keep_impulses();
     for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
 }
 
+void IslandSolver::advance() {
+    for (int i = 0; i < settings_->substeps; ++i) {
+        remaining_ = h_ * (settings_->substeps - 1 - i);
+        substep_ = i;
+        const bool first = i == 0, last = i + 1 == settings_->substeps;
+        if (!direct_) {
+            substep(first, last);
+            continue;
+        }
+        begin_legs();
+        direct_substep(0, first, last);
+        end_legs();
+    }
+}
+
+// By how much speeds miss what contacts demand, at most [m/s]: the change of the impulses that would satisfy a
+// contact alone, as a speed.
+double IslandSolver::residual() const {
+    float worst = 0;
+    for (const ContactRows& c : contacts_) {
+        float v[3];
+        speeds(c, v);
+        if (c.restitution > 0 && c.largest > 0) continue;
+        const float bias = c.now > 0 ? c.now * inverse_h_ : 0;
+        const float normal = std::max(c.impulse[0] - c.inverse_normal * (v[0] + bias), 0.f);
+        float t[2] = {c.impulse[1] - c.slide_mass * v[1], c.impulse[2] - c.slide_mass * v[2]};
+        const float along = std::hypot(t[0], t[1]), most = c.friction * c.impulse[0];
+        if (along > most) t[0] *= most / along, t[1] *= most / along;
+        worst = std::max({worst, std::abs(normal - c.impulse[0]) * c.k[0][0],
+                          std::hypot(t[0] - c.impulse[1], t[1] - c.impulse[2]) / c.slide_mass});
+    }
+    return worst;
+}
+
 void IslandSolver::substep(bool first, bool last) {
+    if (!first && !contacts_.empty()) turn_frames();
     load_velocities();
-    for (SpringRows& spring : springs_) refresh(spring);
+    if (!impacts_.empty()) strike();
+    for (SpringRows& s : springs_) write_spring(s), s.moved.setZero(), s.after.setZero();
     warm_start(first);
+    solve_springs(true);
     sweep(Push::soft);
+    solve_springs(true);
     push_out();
-    sweep(Push::none), sweep(Push::none);
+    apply_springs(true);
+    for (int i = 0; i < 2; ++i) {
+        solve_springs(false);
+        sweep(Push::none);
+    }
+    solve_springs(false);
     note_work();
     if (last) restitute();
+    apply_springs(false);
     finish();
+}
+
+// What solve_springs found, and the springs' rows where the bodies are now.
+void IslandSolver::apply_springs(bool positions) {
+    for (SpringRows& s : springs_) {
+        s.impulse = positions ? s.moved : s.after;
+        const Eigen::Vector3d at_move = positions ? s.impulse : Eigen::Vector3d::Zero();
+        const Eigen::Vector3f p = s.impulse.cast<float>();
+        if (s.told) tell(s, -1, s.impulse, at_move, {p[0], p[1], p[2]}, s.place);
+        apply(s, s.impulse, s.place);
+    }
+    for (BodyRows& rows : rows_of_)
+        if (!springs_.empty()) rows.place = rows.body->state.position;
+    if (positions)
+        for (SpringRows& s : springs_) write_spring(s);
 }
 
 void IslandSolver::load_velocities() {
@@ -53,7 +135,7 @@ void IslandSolver::load_velocities() {
         const MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
         const WorldBodyState& s = body.state;
-        rows.place = s.position;
+        rows.place = s.position, rows.time = 0;
         if (contacts_.empty()) {
             rows.frame = s.orientation.toRotationMatrix();
             rows.body_from_world = rows.frame.transpose().cast<float>();
@@ -75,7 +157,7 @@ void IslandSolver::load_velocities() {
             y[3 + i] = static_cast<float>(kind.root_inertia[i] * spin[i]);
         }
         y[6] = y[7] = 0;
-        const HeldSteps& step = kind.substep;
+        const HeldSteps& step = of_substep(kind).held;
         Eigen::Map<Eigen::ArrayXf> mean(y + 8, kind.modes);
         mean = ((step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array()) / step.root_compliance)
                    .cast<float>();
@@ -93,13 +175,12 @@ void IslandSolver::warm_start(bool first) {
             if (side.body < 0) continue;
             const float* d = jacobians_.data() + side.rows;
             if (c.restitution > 0 && c.largest == 0) speed += dot(d, start_.data() + side.y, side.width);
-            if (!first) moved += dot(d, moved_.data() + side.y, side.width);
+            if (!first || !impacts_.empty()) moved += dot(d, moved_.data() + side.y, side.width);
         }
         if (c.largest == 0) c.approach = speed;
         c.now = c.separation + moved;
         if (c.impulse[0] != 0) push_by(c, c.impulse);
     }
-    for (SpringRows& s : springs_) push_by(s, s.impulse);
 }
 
 // Positions move with velocities that also push emerging bodies out; the velocities themselves never see it.
@@ -114,16 +195,16 @@ void IslandSolver::push_out() {
         for (auto& row : rows) std::copy_n(row.kept, 3, row.impulse);
     };
     std::copy_n(y_.data(), y_.size(), kept_.data());
-    save(contacts_), save(springs_);
+    save(contacts_);
     sweep(Push::all);
     move();
     std::copy_n(kept_.data(), y_.size(), y_.data());
-    restore(contacts_), restore(springs_);
+    restore(contacts_);
 }
 
 void IslandSolver::sweep(Push push) {
-    for (SpringRows& spring : springs_) solve_spring(spring);
-    for (ContactRows& contact : contacts_) solve_contact(contact, push);
+    for (ContactRows& contact : contacts_)
+        if (contact.begins < substep_ && !contact.over) solve_contact(contact, push);
 }
 
 // What the rows see of the velocities.
@@ -140,25 +221,19 @@ inline void IslandSolver::push_by(const Rows& rows, const float (&impulse)[3]) {
             add_rows_to(jacobians_.data() + side.rows, impulse, side.width, y_.data() + side.y);
 }
 
-void IslandSolver::solve_spring(SpringRows& s) {
-    float v[3];
-    speeds(s, v);
-    for (int i = 0; i < 3; ++i) v[i] += s.pull * s.error[i] + s.gamma * s.impulse[i];
-    float p[3];
-    for (int i = 0; i < 3; ++i) {
-        p[i] = -(s.inverse[i][0] * v[0] + s.inverse[i][1] * v[1] + s.inverse[i][2] * v[2]);
-        s.impulse[i] += p[i];
-    }
-    push_by(s, p);
-}
-
 void IslandSolver::solve_contact(ContactRows& c, Push push) {
     float v[3];
     speeds(c, v);
     // Selected, not branched: which case it is cannot be foretold.
-    const bool soft = c.now <= 0 && (push == Push::all || (push == Push::soft && !c.emerging));
-    const float bias = c.now > 0 ? c.now * inverse_h_ : soft ? std::max(push_rate_ * c.now, -kPushSpeed) : 0;
-    const float mass_share = soft ? mass_share_ : 1, impulse_share = soft ? impulse_share_ : 0;
+    const bool hit = hits(c),
+               soft = !hit && c.now <= 0 && (push == Push::all || (push == Push::soft && !c.emerging));
+    const float bias = hit         ? c.bias
+                       : c.now > 0 ? c.now * inverse_h_
+                       : soft      ? std::max(push_rate_ * c.now, -kPushSpeed)
+                                   : 0;
+    // What an impact left is stopped at once: what yields for a substep lets it far in.
+    const bool yields = soft && !c.firm;
+    const float mass_share = yields ? mass_share_ : 1, impulse_share = yields ? impulse_share_ : 0;
     const float normal = std::max(
         c.impulse[0] - mass_share * c.inverse_normal * (v[0] + bias) - impulse_share * c.impulse[0], 0.f);
     float p[3] = {normal - c.impulse[0], 0, 0};
@@ -182,61 +257,72 @@ void IslandSolver::solve_contact(ContactRows& c, Push push) {
 // Energy that a contact's normal impulse takes out in this substep, where it may have to give some back: held
 // over the substep, it does p (v0 + v1) / 2 on the rigid part and p G on the modes.
 void IslandSolver::note_work() {
-    for (ContactRows& c : contacts_) {
-        if (c.restitution == 0 || c.largest == 0) continue;
-        float mean = 0;
-        for (const Side& side : c.side) {
-            if (side.body < 0) continue;
-            const float* d = jacobians_.data() + side.rows;
-            const float *before = start_.data() + side.y, *after = y_.data() + side.y;
-            mean += (dot(d, before, 8) + dot(d, after, 8)) / 2;
-            if (side.width > 8) mean += dot(d + 8, after + 8, side.width - 8);
-        }
-        c.taken -= c.impulse[0] * mean;
+    for (ContactRows& c : contacts_) note_work(c);
+}
+
+void IslandSolver::note_work(ContactRows& c) {
+    if (c.restitution == 0 || c.largest == 0) return;
+    float mean = 0;
+    for (const Side& side : c.side) {
+        if (side.body < 0) continue;
+        const float* d = jacobians_.data() + side.rows;
+        const float *before = start_.data() + side.y, *after = y_.data() + side.y;
+        mean += (dot(d, before, 8) + dot(d, after, 8)) / 2;
+        if (side.width > 8) mean += dot(d + 8, after + 8, side.width - 8);
     }
+    c.taken -= c.impulse[0] * mean;
 }
 
 // A rebound to e times the approach, by an impulse p whose work p v + p^2 (K_rigid / 2 + K_modes) is at most
 // e^2 of the energy that the contact has taken. For rigid bodies both say the same.
 void IslandSolver::restitute() {
-    for (ContactRows& c : contacts_) {
-        if (c.restitution == 0 || c.largest == 0 || c.approach > -kBounceThreshold) continue;
-        float v[3];
-        speeds(c, v);
-        float rigid = 0;
-        for (const Side& side : c.side)
-            if (side.body >= 0) rigid += dot(jacobians_.data() + side.rows, jacobians_.data() + side.rows, 8);
-        // The modes yield to p under the impulse of this substep, too.
-        const float modes = c.k[0][0] - rigid, firm = rigid / 2 + modes, slope = v[0] + modes * c.impulse[0];
-        const float budget = c.restitution * c.restitution * std::max(c.taken, 0.f);
-        const float most = (std::sqrt(slope * slope + 4 * firm * budget) - slope) / (2 * firm);
-        const float wanted = -c.inverse_normal * (v[0] + c.restitution * c.approach);
-        const float p[3] = {std::clamp(wanted, 0.f, std::max(most, 0.f)), 0, 0};
-        c.impulse[0] += p[0];
-        push_by(c, p);
-    }
+    for (ContactRows& c : contacts_) restitute(c);
+}
+
+void IslandSolver::restitute(ContactRows& c) {
+    if (c.restitution == 0 || c.largest == 0 || c.approach > -kBounceThreshold) return;
+    float v[3];
+    speeds(c, v);
+    float rigid = 0;
+    for (const Side& side : c.side)
+        if (side.body >= 0) rigid += dot(jacobians_.data() + side.rows, jacobians_.data() + side.rows, 8);
+    // The modes yield to p under the impulse of this substep, too.
+    const float modes = c.k[0][0] - rigid, firm = rigid / 2 + modes, slope = v[0] + modes * c.impulse[0];
+    const float budget = c.restitution * c.restitution * std::max(c.taken, 0.f);
+    const float most = (std::sqrt(slope * slope + 4 * firm * budget) - slope) / (2 * firm);
+    const float wanted = -c.inverse_normal * (v[0] + c.restitution * c.approach);
+    const float p[3] = {std::clamp(wanted, 0.f, std::max(most, 0.f)), 0, 0};
+    c.impulse[0] += p[0];
+    push_by(c, p);
 }
 
 void IslandSolver::move() {
-    if (any_told_)
-        for (ContactRows& c : contacts_) std::copy_n(c.impulse, 3, c.at_move);
-    for (const BodyRows& rows : rows_of_) {
+    for (ContactRows& c : contacts_) std::copy_n(c.impulse, 3, c.at_move);
+    const float h = static_cast<float>(h_);
+    for (BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
         const float* y = y_.data() + rows.offset;
         const float* start = start_.data() + rows.offset;
         float* moved = moved_.data() + rows.offset;
-        const float h = static_cast<float>(h_);
-        for (int i = 0; i < rows.width; ++i) moved[i] += h * y[i];
+        const double left = h_ - rows.time;
+        const float rigid = static_cast<float>(left);
+        for (int i = 0; i < rows.width; ++i) moved[i] += (i < 8 ? rigid : h) * y[i];
         WorldBodyState& s = body.state;
-        const double root_mass = kind.root_mass;
-        s.position += h_ / root_mass * Eigen::Vector3d(y[0], y[1], y[2]);
+        const Eigen::Vector3d velocity = Eigen::Vector3d(y[0], y[1], y[2]) / kind.root_mass;
         Eigen::Vector3d change;
         for (int i = 0; i < 3; ++i) change[i] = kind.root_inertia[i] * (y[3 + i] - start[3 + i]);
         Eigen::Vector3d momentum = s.angular_momentum + rows.frame * change;
         if (body.pushed) momentum += h_ * body.torque;
-        s.orientation = body.substep_rotation.advance(s.orientation, momentum);
+        if (paths_) write_leg(rows, velocity, momentum);
+        s.position = rows.place + left * velocity;
+        s.orientation = rows.time > 0 ? turned_freely(s.orientation, momentum, kind.mass.inertia, left)
+                                      : body.substep_rotation.advance(s.orientation, momentum);
     }
+}
+
+void IslandSolver::forget_crossed(int body) {
+    std::erase_if(crossed_, [body](const CrossImpulse& c) { return c.own == body || c.ghost == body; });
 }
 
 // Half-way between where the contact would be if it moved with either centre.
@@ -273,13 +359,13 @@ void IslandSolver::tell_side(const Rows& rows, int which, const Eigen::Vector3d&
     const Side& side = rows.side[which];
     const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
     const double sign = which == 0 ? 1 : -1;
-    const Eigen::Vector3d arm = point - at.place, moved = h_ * at_move + remaining_ * impulse;
+    const Eigen::Vector3d arm = point - at.place, moved = (h_ - at.time) * at_move + remaining_ * impulse;
     given.linear += sign * impulse;
     given.angular += sign * arm.cross(impulse);
     given.displacement += sign * moved;
     given.turn += sign * arm.cross(moved);
     const float* d = jacobians_.data() + side.rows + 8;
-    const HeldSteps& step = at.body->kind->substep;
+    const HeldSteps& step = of_substep(*at.body->kind).held;
     for (int k = 0; k < at.body->kind->modes; ++k) {
         const double held = static_cast<double>(along[0] * d[k] + along[1] * d[side.width + k] +
                                                 along[2] * d[2 * side.width + k]) /
@@ -294,7 +380,7 @@ void IslandSolver::tell_side(const Rows& rows, int which, const Eigen::Vector3d&
 // What earlier substeps did to the modes of ghosts rings on.
 void IslandSolver::ring_on() {
     auto ring = [this](int body, StepImpulse& given) {
-        const HeldSteps& step = (*bodies_)[static_cast<std::size_t>(body)].kind->substep;
+        const HeldSteps& step = of_substep(*(*bodies_)[static_cast<std::size_t>(body)].kind).held;
         for (int k = 0; k < given.modal_q.size(); ++k) {
             const double z = given.modal_q[k], rate = given.modal_rate[k];
             given.modal_q[k] = z + h_ * (step.mean_z[k] * z + step.mean_rate[k] * rate);
@@ -342,45 +428,55 @@ void IslandSolver::settle_given() {
     }
 }
 
-void IslandSolver::finish() {
+// The contacts' impulses.
+void IslandSolver::apply_contacts() {
     ring_on();
     for (const ContactRows& c : contacts_) {
+        if (c.impulse[0] == 0 && c.at_move[0] == 0) continue;
         auto world = [&c](const float(&p)[3]) -> Eigen::Vector3d {
             return (p[0] * c.point->normal + p[1] * c.tangent[0] + p[2] * c.tangent[1]).cast<double>();
         };
-        if (c.told && (c.impulse[0] != 0 || c.at_move[0] != 0))
-            tell(c, c.pair, world(c.impulse), world(c.at_move), c.impulse, place_now(c));
-        if (c.impulse[0] != 0) apply(c, world(c.impulse), place_now(c));
+        if (c.told) tell(c, c.pair, world(c.impulse), world(c.at_move), c.impulse, place_now(c));
+        if (c.moving) {
+            apply_moving(c);
+        } else {
+            apply(c, world(c.impulse), place_now(c));
+        }
     }
-    for (const SpringRows& s : springs_) {
-        const Eigen::Vector3d p(s.impulse[0], s.impulse[1], s.impulse[2]);
-        if (s.told) tell(s, -1, p, p, s.impulse, s.place);
-        apply(s, p, s.place);
-    }
+}
+
+void IslandSolver::finish() {
+    apply_contacts();
     for (const BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
-        const float* y = y_.data() + rows.offset;
-        const float* start = start_.data() + rows.offset;
         WorldBodyState& s = body.state;
         const Eigen::Vector3d entered = s.velocity;
         s.velocity += h_ * body.gravity_scale * settings_->gravity;
-        s.velocity *= kind.substep_drag, s.angular_momentum *= kind.substep_drag;
+        s.velocity *= of_substep(kind).drag, s.angular_momentum *= of_substep(kind).drag;
         if (body.own) outside_ += kind.mass.mass * (s.velocity - entered);
         if (body.pushed) {
             s.velocity += h_ / kind.mass.mass * body.force;
             s.angular_momentum += h_ * body.torque;
         }
-        const HeldSteps& step = kind.substep;
-        const Eigen::Map<const Eigen::ArrayXf> now(y + 8, kind.modes), before(start + 8, kind.modes);
-        ModeArray held = (now.cast<double>() - before.cast<double>()) / step.root_compliance;
-        if (body.pushed) held += h_ * body.modal_force.array();
-        const ModeArray mean =
-            step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array() + step.compliance * held;
-        s.q_dot.array() = step.c * s.q.array() + step.d * s.q_dot.array() + step.rate * held;
-        s.q.array() += h_ * mean;
-        if (limit_deformation(body)) ++limited_;
+        step_modes(rows);
     }
+}
+
+// The modes under what the rows gave them, held over the substep.
+void IslandSolver::step_modes(const BodyRows& rows) {
+    MovingBody& body = *rows.body;
+    const HeldSteps& step = of_substep(*body.kind).held;
+    WorldBodyState& s = body.state;
+    const Eigen::Map<const Eigen::ArrayXf> now(y_.data() + rows.offset + 8, body.kind->modes),
+        before(start_.data() + rows.offset + 8, body.kind->modes);
+    ModeArray held = (now.cast<double>() - before.cast<double>()) / step.root_compliance;
+    if (body.pushed) held += h_ * body.modal_force.array();
+    const ModeArray mean =
+        step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array() + step.compliance * held;
+    s.q_dot.array() = step.c * s.q.array() + step.d * s.q_dot.array() + step.rate * held;
+    s.q.array() += h_ * mean;
+    if (limit_deformation(body)) ++limited_;
 }
 
 void IslandSolver::keep_impulses() {
@@ -389,7 +485,7 @@ void IslandSolver::keep_impulses() {
         c.point->friction_impulse = c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1];
     }
     for (const SpringRows& s : springs_) {
-        for (int i = 0; i < 3; ++i) s.constraint->impulse[i] = s.impulse[i];
+        s.constraint->impulse = (s.moved + s.impulse).cast<float>();
         const double force = s.constraint->impulse.norm() / h_;
         if (!(force > s.constraint->definition.breaking_force)) continue;
         s.constraint->holds = false;

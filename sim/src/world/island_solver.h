@@ -1,12 +1,19 @@
 #pragma once
 #include <array>
+#include <numbers>
 #include <vector>
 
 #include "shape/lanes.h"
+#include "world/block_cholesky.h"
+#include "world/body_path.h"
 #include "world/manifold.h"
-#include "world/moving_body.h"
 
 namespace sim {
+
+/// Multiply-adds of a factorisation per body up to which an island is solved directly: one of contacts alone, which sweeps
+/// solve, too, and one with springs.
+constexpr double kMostWithContacts = 500, kMostWithSprings = 1e4;
+constexpr float kPushSpeed = 3;  ///< at which bodies inside each other are moved apart [m/s]
 
 /// Bodies joined by contacts or constraints in one step, in order of ids.
 struct Island {
@@ -40,6 +47,31 @@ struct Island {
 /// the rows of springs follow the bodies every substep, as does the frame of angular rows where there is no
 /// contact.
 ///
+/// Impacts (ManifoldPoint::begins) come first in a substep, in the order of their times t: the bodies go there
+/// with the velocities that they have, their frames are those of that time, the impulses of one pair's points
+/// are found by kImpactSweeps sweeps and act at one place of space, and the bodies go on from there. So
+/// angular momentum is kept to rounding and a body may hit several times within a substep. A rebound of rigid
+/// bodies is part of the same solve. Other contacts then see the velocities that impacts left. Afterwards an
+/// impact is a contact, unless its bodies turn on too fast for one that stands still.
+///
+/// Frames of bodies with unequal moments of inertia follow them where they turn by more than kFrameTurn, with
+/// their rows.
+///
+/// Directly (direct_solution.cpp) go islands with springs, and islands whose contacts a step's sweeps leave far
+/// from solved (kMissedAtRest, kMissedShare), where a factorisation is cheap enough; such a step is taken anew.
+/// A substep then has two halves, as RATTLE (Andersen 1983) for rigid springs:
+///   half of gravity; impulses P by which springs' ends meet where the bodies *will be*, and contacts close
+///   their gaps; move; the other half; impulses V by which what holds has no speed between its ends
+/// which is of second order and bounds the energy of joints at any stiffness. P is found by Newton's method on
+/// the poses at the end with the rows of the start; each of its steps, and V, minimise
+///   1/2 |y - y_free|^2 + sum over rows of what they hold (a convex problem; Castro et al. 2022)
+/// with H = 1 + sum of D^T D / gamma, factorised as BlockCholesky: O(bodies) for chains, stacks and trees.
+/// Overlaps yield by a share of their bodies' compliance, less under heavy loads; V and friction have no
+/// compliance: they are held to the round before's impulses (proximal point method). Modes see all of a
+/// substep's impulse in its first half. A substep is halved, and again, where an arm of a spring turns further
+/// than kMostTurn, Newton's method does not converge, or weight moves a body by more than kMostFall of its size.
+/// Where a factorisation is too dear, springs alone are solved directly, between sweeps over the contacts.
+///
 /// Deterministic: sweeps go over springs, then contacts, in the order of ids (see in_turns). No allocation
 /// once the buffers have grown.
 class IslandSolver {
@@ -49,6 +81,8 @@ public:
         : settings_(&settings), bodies_(&bodies), manifolds_(&manifolds), constraints_(&constraints) {}
 
     void solve(const Island& island);  ///< over one step
+    /// Where solve writes the paths of its bodies, one a body of the world; must stay. nullptr: nowhere.
+    void record(std::vector<BodyPath>* paths) noexcept { paths_ = paths; }
     /// What planes, fixed bodies, places, gravity and drag gave own bodies since the last call [N s].
     [[nodiscard]] Eigen::Vector3d take_outside_impulse() noexcept {
         return std::exchange(outside_, Eigen::Vector3d::Zero());
@@ -59,6 +93,8 @@ public:
         crossed_.clear();
         told_crossed_ = told;
     }
+    /// Forgets the crossed impulses of a body whose island is solved once more.
+    void forget_crossed(int body);
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
     [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }  ///< since the start
 
@@ -67,9 +103,13 @@ private:
         MovingBody* body;
         std::uint32_t offset;  // of y, start, moved
         int width;
-        Eigen::Vector3d place;  // of the centre, at the start of the substep
+        Eigen::Vector3d place;  // of the centre, at the start of the substep or the last impact in it
+        double time = 0;        // of that, since the substep's start [s]
+        bool moving = false;    // by more than kMoving in the step
         Eigen::Matrix3d frame;  // body to world, in which angular rows are written
         Eigen::Matrix3f body_from_world;
+        std::uint32_t at;                                   // of wide_y_
+        FreeRotation rotation{Eigen::Vector3d::Ones(), 0};  // over the substep, direct solutions
     };
     /// One body's part of a row triple.
     struct Side {
@@ -81,26 +121,45 @@ private:
     /// A row triple and the bodies it joins.
     struct Rows {
         Side side[2];
+        std::uint32_t wide[2] = {0, 0};  // where the sides' rows begin in wide_rows_
         float k[3][3];
         bool told = false;  ///< a watched body is among them
     };
     struct ContactRows : Rows {
         ManifoldPoint* point;
+        const Manifold* manifold;
         Eigen::Vector3f tangent[2];
         float separation, now, friction, restitution, approach;
+        int begins = -1;    // of an impact: number of the substep
+        bool over = false;  // an impact that is no contact afterwards
+        float bias = 0;     // of an impact: speed along the normal that it leaves, negative [m/s]
         float taken, slide_mass, inverse_normal,
             inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
         float impulse[3], kept[3], at_move[3], largest;
-        bool emerging;
-        int pair = -1;  // of crossed_
+        bool emerging, firm;  // firm: an impact, which does not yield
+        bool moving;          // a body of it does, see apply_moving
+        int pair = -1;        // of crossed_
     };
     struct SpringRows : Rows {
         HeldConstraint* constraint;
-        Eigen::Vector3d place;  // where the impulse acts in this substep, world
-        float error[3];
-        float inverse[3][3];  // of K + gamma
-        float gamma, pull;    // pull: bias speed per error [1/s]
-        float impulse[3], kept[3];
+        Eigen::Vector3d place;   // where the impulse acts, world
+        Eigen::Vector3d offset;  // of the ends, over h, less what the rows see of the velocities [m/s]
+        double gamma;            // [1/kg]: a unit of impulse lets the ends move by so much
+        bool resolved;           // whether the substep follows its motion
+        double lag;              // of their gap, what counts of the one before the substep
+        Eigen::Vector3d gap;     // between the ends [m]
+        Eigen::Vector3d impulse, moved;  // of the velocities' solution, of the positions' [N s]
+        Eigen::Vector3d after;           // of velocities, where contacts are swept over
+    };
+    /// A contact in a direct solution.
+    struct DirectContact {
+        double normal_gamma, tangent_gamma;  // [1/kg]
+        bool active;                         // begins before the substep ends
+        bool soft;                           // along the normal: not held to the impulse before
+        double bias;                         // speed along the normal that is wanted, less its sign [m/s]
+        double bound;                        // of the friction impulse [N s]
+        Eigen::Vector3d before;              // of `impulse`, what `start` has seen
+        Eigen::Vector3d impulse;
     };
     /// A place on a body that rows act on.
     struct Place {
@@ -123,6 +182,25 @@ private:
     void flush_window();
     const std::vector<Turn>& in_turns(const Island& island);
     void add_contact(Manifold& manifold, ManifoldPoint& point);
+    void write_contact(ContactRows& contact);
+    // Impacts, island_impacts.cpp.
+    [[nodiscard]] bool hits(const ContactRows& contact) const noexcept { return contact.begins == substep_; }
+    void strike();
+    void strike(std::size_t first, std::size_t last);
+    enum class Strike { rough, smooth, soft };
+    bool sweep_impact(std::size_t first, std::size_t last, Strike how);
+    void go_to(BodyRows& rows, double time);
+    void turn_frames();
+    void turn_frame(BodyRows& rows, const Eigen::Matrix3d& frame);
+    void aim(ContactRows& contact) const;
+    void rebound(ContactRows& contact);
+    [[nodiscard]] bool goes_far(const ContactRows& contact) const;
+    void end_impact(ContactRows& contact);
+    void apply_moving(const ContactRows& contact);
+    void write_leg(const BodyRows& rows, const Eigen::Vector3d& velocity, const Eigen::Vector3d& momentum);
+    [[nodiscard]] bool is_rigid(const ContactRows& contact) const noexcept {
+        return contact.side[0].width <= 8 && contact.side[1].width <= 8;
+    }
     void add_spring(HeldConstraint& constraint);
     /// An end of a spring, now.
     struct End {
@@ -130,16 +208,57 @@ private:
         Place place;
     };
     [[nodiscard]] End end_of(int body, const Eigen::Vector3d& rest, float* shapes) const;
-    void refresh(SpringRows& spring);
+    void write_spring(SpringRows& spring);
+
+    // Directly; direct_solution.cpp.
+    bool begin_direct(double most, bool with_contacts = true);
+    void solve_springs(bool positions);
+    void set_firmness(SpringRows& spring, bool positions) const;
+    [[nodiscard]] bool turns_little() const;
+    [[nodiscard]] bool falls_little() const;
+    [[nodiscard]] double residual() const;
+    void direct_substep(int level, bool first, bool last);
+    bool try_substep(bool first, bool last);
+    void begin_legs();
+    void end_legs();
+    void follow(bool positions);
+    void kick();
+    void load_wide(bool positions);
+    void widen(Rows& rows, bool positions);
+    [[nodiscard]] double mode_scale(bool positions) const noexcept {
+        return direct_ && positions ? std::numbers::sqrt2 : 1;
+    }
+    void find_ends();
+    [[nodiscard]] Eigen::Vector3d gap_at_end(const SpringRows& spring) const;
+    bool solve_positions();
+    void settle_contacts();
+    void begin_contact(std::size_t i, const Eigen::Vector3d& seen_so_far, const Eigen::Vector3d& guess,
+                       double bias, bool positions);
+    [[nodiscard]] double size_of(const Rows& rows) const;
+    void solve_velocities();
+    void minimise(bool springs_only);
+    [[nodiscard]] Eigen::Vector3d seen(const Rows& rows, const AlignedDoubles& y) const;
+    void give(const Rows& rows, const Eigen::Vector3d& impulse, AlignedDoubles& y) const;
+    [[nodiscard]] Eigen::Vector3d impulse_of(const DirectContact& contact,
+                                             const Eigen::Vector3d& speed) const;
+    void gradient();
+    void assemble();
+    void move_directly();
+    void finish_directly(bool last);
     [[nodiscard]] Place place(int body, const Eigen::Vector3f& arm, int sample, const Eigen::Vector3f& rest,
                               float* scratch);
     [[nodiscard]] Side reserve_rows(int body);
     void write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign, const Side& side);
     void finish_rows(Rows& rows);
     bool note_told(const Rows& rows, bool contact);  // notes it in any_told_, too
+    [[nodiscard]] const BodyKind::Substep& of_substep(const BodyKind& kind) const noexcept {
+        return kind.substeps[static_cast<std::size_t>(level_)];
+    }
     [[nodiscard]] int local(int body) const noexcept { return local_[static_cast<std::size_t>(body)]; }
 
+    void advance();
     void substep(bool first, bool last);
+    void apply_springs(bool positions);
     void load_velocities();
     void warm_start(bool first);
     enum class Push { none, soft, all };
@@ -147,10 +266,11 @@ private:
     void push_out();
     void speeds(const Rows& rows, float (&v)[3]) const;
     void push_by(const Rows& rows, const float (&impulse)[3]);
-    void solve_spring(SpringRows& spring);
     void solve_contact(ContactRows& contact, Push push);
     void note_work();
+    void note_work(ContactRows& contact);
     void restitute();
+    void restitute(ContactRows& contact);
     void move();
     [[nodiscard]] Eigen::Vector3d place_now(const ContactRows& contact) const;
     void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
@@ -158,17 +278,24 @@ private:
               const float (&along)[3], const Eigen::Vector3d& point);
     void tell_side(const Rows& rows, int side, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
                    const float (&along)[3], const Eigen::Vector3d& point, StepImpulse& given) const;
+    void apply_contacts();
+    [[nodiscard]] Eigen::Vector3d in_world(const ContactRows& contact, const Eigen::Vector3d& impulse) const;
     void finish();
+    void step_modes(const BodyRows& rows);
     void keep_impulses();
     void ring_on();
     void settle_given();
     void settle(const BodyRows& rows, StepImpulse& given) const;
     int note_pair(const Manifold& manifold);
 
+    static constexpr float kBounceThreshold = 0.1f;  // slower approaches do not rebound [m/s]
+
     const WorldSettings* settings_;
     std::vector<MovingBody>* bodies_;
     std::vector<Manifold>* manifolds_;
     std::vector<HeldConstraint>* constraints_;
+    std::vector<BodyPath>* paths_ = nullptr;
+    int substep_ = 0;
 
     std::vector<BodyRows> rows_of_;  // per island body
     std::vector<int> local_;         // world body -> island body or -1
@@ -176,9 +303,13 @@ private:
     std::vector<int> next_turn_;  // per island body
     std::vector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
+    std::vector<std::size_t> impacts_;  // contacts, by time
+    std::vector<bool> turned_;          // per island body: its frame was
     LaneArray y_, kept_, start_, moved_, jacobians_;
     std::size_t jacobians_used_ = 0;
-    double h_ = 0;
+    double h_ = 0;       // of the substep
+    double last_h_ = 0;  // of the substep before [s]
+    int level_ = 0;      // how often it was halved
     float inverse_h_ = 0, push_rate_ = 0, mass_share_ = 1, impulse_share_ = 0;
     std::uint64_t limited_ = 0, broken_ = 0;
     Eigen::Vector3d outside_ = Eigen::Vector3d::Zero();
@@ -186,6 +317,24 @@ private:
     std::vector<CrossImpulse> crossed_;  // of all islands since forget_crossed
     std::size_t first_crossed_ = 0;      // of this island
     double remaining_ = 0;               // of the step after this substep [s]
+
+    // Of direct solutions, in double precision: body by body velocity, spin, modes, without lanes' padding.
+    bool direct_ = false;          // contacts, too
+    bool springs_direct_ = false;  // springs alone, between sweeps over the contacts
+    struct Before {
+        WorldBodyState state;
+        bool at_limit;
+    };
+    std::vector<Before> before_;  // per world body, the last island's when the step began
+    BlockCholesky factor_;
+    std::vector<int> sizes_;
+    std::vector<DirectContact> direct_contacts_;
+    AlignedDoubles wide_rows_, wide_y_, wide_start_, wide_free_, wide_held_, gradient_, step_;
+    struct End0 {
+        Eigen::Vector3d position;
+        Eigen::Quaterniond orientation;
+    };
+    std::vector<End0> ends_;  // of the bodies, at the end of the substep
 };
 
 }  // namespace sim

@@ -14,7 +14,9 @@ struct ManifoldPoint {
     Eigen::Vector3f normal;
     Eigen::Vector3f arm_a, arm_b;      ///< from the centres to the contact, half-way through the overlap [m]
     int sample_a = -1, sample_b = -1;  ///< which of the samples, or -1: see rest
-    Eigen::Vector3f rest;              ///< place in the implicit body's rest shape
+    Eigen::Vector3f rest_a, rest_b;    ///< places in the rest shapes, of a body whose sample is -1
+    float begins = -1;                 ///< of an impact: its time since the step's start [s]; else -1
+    float gap = 0;                     ///< of an impact, then [m]
     float normal_impulse = 0;          ///< of the last substep, to start the next from [N s]
     Eigen::Vector3f friction_impulse = Eigen::Vector3f::Zero();
 };
@@ -27,7 +29,8 @@ struct Manifold {
     int count = 0;
     std::array<ManifoldPoint, kManifoldPoints> points;
     float friction = 0, restitution = 0;
-    bool emerging = false;                              ///< began deep inside each other, and still overlap
+    bool emerging = false;    ///< began deep inside each other, and still overlap
+    float impulse_reach = 0;  ///< how far from a point its last impulse may have been, see take_impulses [m]
     [[nodiscard]] std::uint64_t key() const noexcept {  ///< orders pairs by (a, b)
         return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);
     }
@@ -38,9 +41,9 @@ constexpr int kFirstPlane = 1 << 30;
 struct ContactCandidate {
     std::uint32_t feature;
     float separation;
-    Eigen::Vector3f normal;  ///< from b towards a
-    Eigen::Vector3f arm_a;   ///< from a's centre [m]
-    Eigen::Vector3f rest;    ///< place in the implicit body's rest shape
+    Eigen::Vector3f normal;          ///< from b towards a
+    Eigen::Vector3f arm_a;           ///< from a's centre [m]
+    Eigen::Vector3f rest_a, rest_b;  ///< places in the rest shapes
 };
 
 /// Chooses up to four of a pair's candidates: the deepest (first of equals), the one furthest from it, the

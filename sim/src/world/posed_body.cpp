@@ -27,7 +27,12 @@ void PosedBody::set(const Eigen::Vector3d& at, const Eigen::Quaterniond& orienta
     half_box = kind->half_box.cast<float>();
     radius = static_cast<float>(kind->surface.bounding_radius());
     sample_reach = 0;
-    if (kind->modes > 0) kind->linear() ? deform_linear(q) : deform_modal(q);
+    if (kind->linear()) {
+        deform_linear(q);
+    } else {  // may have been another, linear body before
+        deformation.setIdentity(), deformation_inverse.setIdentity();
+        if (kind->modes > 0) deform_modal(q);
+    }
     half_aabb = (rotation.cwiseAbs() * half_box.cast<double>()).cwiseMin(radius);
 }
 
@@ -103,19 +108,23 @@ void PosedBody::bend_polynomial(const float* q) {
 }
 
 std::pair<int, float> PosedBody::furthest_sample(const Eigen::Vector3f& direction) const noexcept {
-    std::pair<int, float> best{0, -1e30f};
-    for (int i = 0; i < kind->samples; ++i) {
-        const float reach = direction.dot(sample(i));
-        if (reach > best.second) best = {i, reach};
+    const float* x = sample_data();
+    const int stride = kind->batches * kLanes;
+    const Lanes d[3] = {lanes_of(direction[0]), lanes_of(direction[1]), lanes_of(direction[2])};
+    Lanes top = lanes_of(-1e30f);
+    LaneMask place{}, at = {0, 1, 2, 3, 4, 5, 6, 7};
+    for (int i = 0; i < stride; i += kLanes, at += kLanes) {
+        const Lanes reach = d[0] * load_lanes(x + i) + d[1] * load_lanes(x + stride + i) +
+                            d[2] * load_lanes(x + 2 * stride + i);
+        const LaneMask more = reach > top;
+        top = more ? reach : top;
+        place = more ? at : place;
     }
+    std::pair<int, float> best{place[0], top[0]};
+    for (int lane = 1; lane < kLanes; ++lane)
+        if (top[lane] > best.second || (top[lane] == best.second && place[lane] < best.first))
+            best = {place[lane], top[lane]};
     return best;
-}
-
-Eigen::Vector3f PosedBody::furthest_rest_point(const Eigen::Vector3f& direction) const noexcept {
-    // max d . D r with |r / a| = 1:  r = a^2 D^T d / |a D^T d|.
-    const Eigen::Vector3f axes = kind->definition.shape.base.semi_axes.cast<float>();
-    const Eigen::Vector3f pulled = axes.cwiseProduct(deformation.transpose() * direction);
-    return axes.cwiseProduct(pulled) / pulled.norm();
 }
 
 Eigen::Vector3d PosedBody::deformed(const Eigen::Vector3d& rest) const noexcept {

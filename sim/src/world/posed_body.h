@@ -15,7 +15,7 @@ struct PosedBody {
     LaneArray polynomial;  ///< displacement: [brick][27][3], whole lanes in all; modal bodies only
     Eigen::Matrix3f deformation = Eigen::Matrix3f::Identity();  ///< D of (2.12), linear bodies
     Eigen::Matrix3f deformation_inverse = Eigen::Matrix3f::Identity();
-    Eigen::Vector3f half_box;                             ///< of the deformed body, its own axes [m]
+    Eigen::Vector3f half_box = Eigen::Vector3f::Zero();                             ///< of the deformed body, its own axes [m]
     float radius = 0;                                     ///< [m]
     float sample_reach = 0;                               ///< how far samples are from their rest places [m]
     Eigen::Vector3d half_aabb = Eigen::Vector3d::Zero();  ///< world axes [m]
@@ -30,9 +30,6 @@ struct PosedBody {
     }
     /// The sample furthest along `direction` (unit, body frame), and how far that is [m].
     [[nodiscard]] std::pair<int, float> furthest_sample(const Eigen::Vector3f& direction) const noexcept;
-    /// Of an ellipsoid: the rest point that is furthest along `direction` (body frame) as deformed, exactly
-    /// for rigid and linear bodies; modal ones are taken as undeformed.
-    [[nodiscard]] Eigen::Vector3f furthest_rest_point(const Eigen::Vector3f& direction) const noexcept;
     /// Deformed place of a rest point, body frame.
     [[nodiscard]] Eigen::Vector3d deformed(const Eigen::Vector3d& rest) const noexcept;
 

@@ -215,35 +215,6 @@ void World::Implementation::find_islands() {
     }
 }
 
-void World::Implementation::solve_islands() {
-    int awake = 0;
-    for (std::size_t i = 0; i < islands_used; ++i) {
-        const Island& island = islands[i];
-        if (!is_own(island)) continue;
-        ++awake;
-        if (island.manifolds.empty() && island.constraints.empty()) {
-            MovingBody& body = bodies[static_cast<std::size_t>(island.bodies.front())];
-            const Eigen::Vector3d before = body.state.velocity;
-            move_freely(body, settings);
-            if (limit_deformation(body)) ++free_limited;
-            if (body.own) outside += body.kind->mass.mass * (body.state.velocity - before);
-            if (body.pushed && sharing == Sharing::pairs) outside -= settings.dt * body.force;
-        } else {
-            solver->solve(island);
-            if (sharing == Sharing::pairs) continue;
-            for (const int id : island.bodies)
-                if (const MovingBody& body = bodies[static_cast<std::size_t>(id)]; body.pushed && body.own)
-                    outside += settings.dt * body.force;
-        }
-    }
-    counts.islands = awake;
-    outside += solver->take_outside_impulse();
-    if (!outside.allFinite()) outside = outside_before;  // of a body that is broken
-    counts.deformations_limited = free_limited + solver->deformations_limited();
-    if (counts.constraints_broken != solver->constraints_broken()) set_joined();
-    counts.constraints_broken = solver->constraints_broken();
-}
-
 void World::Implementation::tell_broken(std::uint64_t broken_before) {
     if (counts.constraints_broken == broken_before) return;
     for (std::size_t c = 0; c < constraints.size(); ++c)
@@ -342,7 +313,7 @@ void World::Implementation::step() {
         if (body.moves() && (!body.asleep || body.unposed)) pose(body);
         body.was_given = false;
     }
-    contacts.find(settings, planes, joined, bodies, here, sharing == Sharing::pairs);
+    contacts.find(contact_scene());
     find_islands();
     held_before.resize(constraints.size());
     for (std::size_t c = 0; c < constraints.size(); ++c) held_before[c] = constraints[c].holds;
@@ -368,6 +339,7 @@ World::World(const WorldDefinition& definition) : implementation_(std::make_uniq
     w.settings = definition.settings;
     w.planes = definition.planes;
     w.solver = std::make_unique<IslandSolver>(w.settings, w.bodies, w.contacts.manifolds(), w.constraints);
+    w.solver->record(&w.contacts.paths());
     for (const WorldBody& body : definition.bodies) w.add(body);
     for (const PointConstraint& constraint : definition.constraints) add_constraint(constraint);
 }
@@ -504,6 +476,7 @@ World::Energy World::energy() const {
         if (!c.holds) continue;
         const Eigen::Vector3d b =
             c.definition.body_b >= 0 ? at(c.definition.body_b, c.definition.point_b) : c.definition.point_b;
+        if (std::isinf(c.definition.stiffness)) continue;  // the ends are together
         e.springs +=
             c.definition.stiffness / 2 * (at(c.definition.body_a, c.definition.point_a) - b).squaredNorm();
     }

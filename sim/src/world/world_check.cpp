@@ -80,7 +80,8 @@ void check_constraint(const PointConstraint& constraint, int bodies) {
         refuse(who, "second body", constraint.body_b, "another body than the first");
     check_vector(who, "first point [m]", constraint.point_a, kFurthest);
     check_vector(who, "second point [m]", constraint.point_b, kFurthest);
-    check_range(who, "stiffness [N/m]", constraint.stiffness, 1e-9, 1e15);
+    if (constraint.stiffness != std::numeric_limits<double>::infinity())
+        check_range(who, "stiffness [N/m]", constraint.stiffness, 1e-9, 1e15);
     check_range(who, "damping ratio", constraint.damping_ratio, 0, 1e3);
     if (!(constraint.breaking_force > 0))
         refuse(who, "breaking force [N]", constraint.breaking_force, "a number above 0");

@@ -1,61 +1,122 @@
 #pragma once
+#include "world/body_path.h"
 #include "world/broad_phase.h"
-#include "world/island_solver.h"
+#include "world/narrow_phase.h"
+#include "world/time_of_impact.h"
 
 namespace sim {
 
-/// Finds the contacts of a step: broad phase, samples against implicit surfaces both ways, manifolds,
-/// impulses of the step before; wakes sleepers that are touched.
+/// What the contacts of a step are made for.
+struct ContactScene {
+    const WorldSettings& settings;
+    const std::vector<WorldPlane>& planes;
+    const std::vector<std::pair<int, int>>& joined;  ///< pairs (a < b, ascending) that do not collide
+    std::vector<MovingBody>& bodies;
+    const std::vector<int>& here;  ///< ids of those that take part, ascending
+    /// Of an own and a foreign body only the pairs of which the lower number is own, and no two foreign ones.
+    bool among_ghosts;
+};
+
+/// Finds the contacts of a step: broad phase over the bounds that free motion sweeps, narrow phase,
+/// manifolds, impulses of the step before; wakes sleepers that are touched.
+///
+/// A pair is slow if its surfaces move against each other, ringing apart, by at most kSlow of the smaller half
+/// extent within the step. Its contacts are found where it is, as half-spaces that stand still over the step:
+/// with a motion d a pair of balls that a half-space stops would have missed each other by less than
+/// d^2 / (2 (r_a + r_b)), so by less than half a per cent of r. Edges are sharper, and normals of balls turn by
+/// up to d / (r_a + r_b): where such a contact is not touched yet, would stop the free motion, and may turn, the
+/// pair is treated as a fast one.
+///
+/// A fast pair that carries no load has its time of impact on the paths of free motion (time_of_impact.h):
+/// none, no contact; else its contact is found where the bodies are then, as one that begins at that time
+/// (IslandSolver: impacts). Of a body's impacts those later than a substep after its first are left to
+/// unforeseen(), which runs after the islands have been solved: it follows the paths really taken of bodies
+/// that left the foreseen ones, or touch and turn, and adds the contacts that they lead to. A pair that touches
+/// already meets again where it is kInside deep in each other, a little deeper every time.
 class WorldContacts {
 public:
-    /// `joined`: pairs (a < b, ascending) that a constraint joins; they do not collide.
-    /// here: ids of those that take part, ascending. among_ghosts: of an own and a foreign body only the
-    /// pairs of which the lower number is own, and no two foreign ones.
-    void find(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
-              const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies,
-              const std::vector<int>& here, bool among_ghosts);
+    void find(const ContactScene& scene);
+
+    /// After a solve: contacts for what the paths really taken lead to. Adds at most one impact a body and
+    /// lists it; the worlds' islands then are solved again. Empty: nothing unforeseen.
+    struct Meeting {
+        int a, b;
+        double time;    ///< since the step's start [s]
+        bool touching;  ///< had a contact already, and still went on inside
+    };
+    const std::vector<Meeting>& unforeseen(const ContactScene& scene, const std::vector<bool>& solved);
+    /// Of several impacts of a pair within the step only the last is one of its past in the next.
+    void keep_last();
+    /// The pair's manifold in this step, if it has one; the first of several.
+    [[nodiscard]] const Manifold* find_now(int a, int b) {
+        return find_now(static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b));
+    }
+    /// Impulses of the last step again, for a manifold whose island is solved once more.
+    void rewarm(Manifold& manifold) const;
+    std::vector<BodyPath>& paths() noexcept { return paths_; }  ///< of each body; set by solver and find
 
     std::vector<Manifold>& manifolds() noexcept { return manifolds_; }  ///< of the last step
     [[nodiscard]] const std::vector<Manifold>& manifolds() const noexcept { return manifolds_; }
     [[nodiscard]] int pairs() const noexcept { return pairs_; }  ///< tested in the last step
-    [[nodiscard]] std::uint64_t fallbacks() const noexcept { return finder_.fallbacks(); }
+    [[nodiscard]] std::uint64_t fallbacks() const noexcept { return narrow_.fallbacks(); }
+    [[nodiscard]] std::uint64_t impacts() const noexcept {
+        return impacts_;
+    }  ///< of fast pairs, since the start
 
 private:
-    struct Speed {
-        double surface;  // of the surface about the centre, at most [m/s]
-        double grown;    // how far any point may come in the step, and the slop [m]
+    /// How far a body's free motion takes it in the step.
+    struct Reach {
+        Eigen::Vector3d moved = Eigen::Vector3d::Zero();  // the centre [m]
+        double turned = 0;                                // its surface about the centre [m]
+        double rung = 0;                                  // its surface, by modes [m]
     };
-    bool find_once(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
-                   const std::vector<std::pair<int, int>>& joined, std::vector<MovingBody>& bodies,
-                   const std::vector<int>& here);
-    [[nodiscard]] bool resolved_here(const std::vector<MovingBody>& bodies, int i, int j) const;
-    void meet_pair(const WorldSettings& settings, std::vector<MovingBody>& bodies, int i, int j);
-    void meet_planes(const WorldSettings& settings, const std::vector<WorldPlane>& planes,
-                     const MovingBody& body, int i);
-    void meet(const MovingBody& a, const MovingBody& b, float margin, Manifold& manifold);
-    void meet_plane(const MovingBody& a, const WorldPlane& plane, float height, float margin,
-                    Manifold& manifold);
-    void part(const PosedBody& a, const PosedBody& b, const Eigen::Vector3f& between, const Manifold* before,
-              Manifold& manifold);
-    void fill(float size, const Eigen::Vector3f& between, Manifold& manifold);
+    void set_reach(const ContactScene& scene, int id);
+    bool find_once(const ContactScene& scene);
+    [[nodiscard]] bool may_meet(const ContactScene& scene, const std::pair<int, int>& pair) const;
+    void meet_pair(const ContactScene& scene, int i, int j);
+    [[nodiscard]] bool pass_by(const ContactScene& scene, int i, int j) const;
+    void meet_near(const ContactScene& scene, int i, int j, double margin, const Manifold* before);
+    void meet_fast(const ContactScene& scene, int i, int j, const Manifold* before);
+    void wake(const ContactScene& scene, int i, int j);
+    void meet_planes(const ContactScene& scene, int i);
     const Manifold* last(std::uint64_t key);
+    [[nodiscard]] const Manifold* find_last(std::uint64_t key) const;
+    [[nodiscard]] Manifold* find_now(std::uint64_t key);
+    [[nodiscard]] int impacts_of(int i, int j) const;  // of a pair in this step
+
+    // Fast pairs, world_impacts.cpp.
+    [[nodiscard]] Impact foresee(const ContactScene& scene, int i, int j);
+    void follow(const ContactScene& scene, int i);
+    void accept_impacts(const ContactScene& scene);
+    bool add_impact(const ContactScene& scene, const Meeting& meeting);
+    [[nodiscard]] bool left_path(const ContactScene& scene, int i) const;
+    void meet_unforeseen(const ContactScene& scene, int i, int j);
 
     BroadPhase broad_;
-    SampleFinder finder_;
-    std::vector<SampleContact> found_;
-    std::vector<ContactCandidate> candidates_;
-    PointChooser chooser_;
-    std::vector<Speed> speeds_;                 // of each body
+    NarrowPhase narrow_;
+    std::vector<Reach> reach_;                  // of each body
     std::vector<Manifold> manifolds_, before_;  // by ascending keys
     std::size_t next_before_ = 0;               // first of before_ whose key has not been passed
+    std::vector<BodyPath> paths_;               // of each body
+    std::vector<bool> followed_;                // paths_ holds the free motion of this step
+    std::vector<bool> watched_;                 // has a contact that turns on: see unforeseen
+    std::vector<double> first_;                 // of each body: time of its first impact
+    std::vector<Meeting> meetings_;
+    PosedBody at_[2];  // where an impact is
     int pairs_ = 0;
-    bool woke_ = false, among_ghosts_ = false;
+    bool woke_ = false;
+    std::uint64_t impacts_ = 0;
 };
 
+/// Speed at which a body's surface moves along its normals by spin, at most [m/s]. A ball's does not.
+[[nodiscard]] double turning_speed(const MovingBody& body) noexcept;
 /// How far a body's contacts may begin beyond its surface in the next step [m].
 [[nodiscard]] double contact_reach(const MovingBody& body, const WorldSettings& settings);
 
 /// Wakes every body of the group that fell asleep with this one.
 void wake_group(std::vector<MovingBody>& bodies, int body);
+
+constexpr double kTouching = 1e-3;  ///< of the smaller half extent: tolerance of a time of impact
+constexpr double kSlow = 0.1;       ///< of the smaller half extent: relative motion in a step of slow pairs
 
 }  // namespace sim

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "sim/world.h"
+#include "world/island_solver.h"
 #include "world/world_contacts.h"
 
 namespace sim {
@@ -21,11 +22,21 @@ struct World::Implementation {
     std::vector<Island> islands;
     std::vector<int> parent, place;  // union-find; a root's island
     std::size_t islands_used = 0;
+    /// What a solve changed besides the bodies' states, kept of every island at its first body.
+    struct Outcome {
+        Eigen::Vector3d outside = Eigen::Vector3d::Zero();
+        std::uint64_t limited = 0, broken = 0;
+    };
+    std::vector<Outcome> outcomes;
+    std::vector<WorldBodyState> started;  // of bodies that are solved, when the step began
+    std::vector<bool> at_limit_before;    // at_limit of bodies, then
+    std::vector<std::pair<Eigen::Vector3f, bool>> springs_before;  // impulse and whether it held, then
+    std::vector<bool> solved,
+        again;  // of each body: its island went through the solver, and has to once more
     WorldCounts counts;
     std::vector<QuarantinedBody> quarantined;
     std::vector<FirstStep> limited, broken;
-    std::vector<std::uint8_t> held_before;  // constraints, when the last step began
-    std::uint64_t free_limited = 0;
+    std::vector<std::uint8_t> held_before;                     // constraints, when the last step began
     Eigen::Vector3d outside = Eigen::Vector3d::Zero();         // impulse, see World::outside_impulse
     Eigen::Vector3d outside_before = Eigen::Vector3d::Zero();  // when the last step began
 
@@ -33,9 +44,10 @@ struct World::Implementation {
 
     // Sharing.
     Sharing sharing = Sharing::alone;
-    BroadPhase neighbours;    // loose boxes, to find what may reach own islands
-    std::vector<int> owned;   // pairs: own and fixed bodies, ascending
-    std::vector<int> placed;  // pairs: ghosts of the next step
+    BroadPhase neighbours;                        // loose boxes, to find what may reach own islands
+    std::vector<double> reaches, quick, fastest;  // islands: of each body, each fast one, each set
+    std::vector<int> owned;                       // pairs: own and fixed bodies, ascending
+    std::vector<int> placed;                      // pairs: ghosts of the next step
     int cross_contacts = 0;
     struct LooseBall {
         Eigen::Vector3d center;
@@ -58,21 +70,31 @@ struct World::Implementation {
     void join(int a, int b);                                ///< union-find
     void start_union();                                     ///< union-find: each body alone
     [[nodiscard]] bool any_awake() const;
-    void gather();                   // who takes part in the step
-    void gather_islands();           // who may reach an own body's island
+    void gather();          // who takes part in the step
+    void gather_islands();  // who may reach an own body's island
+    void join_neighbours(const std::vector<double>& reach);
     void list_owned();               ///< fills `owned`
     void gather_pairs();             // own bodies and the ghosts that were placed
     void forget_foreign_contacts();  ///< at the end of a step
     void stop_at_planes(MovingBody& body, const Eigen::Vector3d& before) const;
-    void dismiss_ghosts();                            ///< at the end of a step
-    void find_islands();                              ///< of contacts and constraints
-    void solve_islands();                             ///< in order of ids
-    void tell_broken(std::uint64_t broken_before);    ///< constraints, of the step
-    void tell_limited(std::uint64_t limited_before);  ///< bodies, of the step
+    void dismiss_ghosts();  ///< at the end of a step
+    void find_islands();    ///< of contacts and constraints
+    void solve_islands();   ///< in order of ids, again where something unforeseen meets
+    void start_solving();   ///< notes what solve_again goes back to
+    [[nodiscard]] bool is_solved(const Island& island) const;
+    void solve_island(const Island& island);  ///< over the step
+    void move_alone(int body);                ///< over the step
+    void solve_again();                       ///< islands of bodies in `again`, from the step's start
+    void hold_apart(const WorldContacts::Meeting& meeting);
+    std::vector<WorldContacts::Meeting> last;  ///< what meets after all rounds
+    void sum_outcomes();                       ///< of all islands
+    [[nodiscard]] ContactScene contact_scene();
     void put_to_sleep();                              ///< islands that are still
     void count_work();                                ///< see World::work
     void step();                                      ///< see World::step
     [[nodiscard]] int still_steps_to_sleep() const;   ///< half a second
+    void tell_broken(std::uint64_t broken_before);    ///< constraints, of the step
+    void tell_limited(std::uint64_t limited_before);  ///< bodies, of the step
 };
 
 }  // namespace sim

@@ -88,27 +88,55 @@ int first_mover(const std::vector<MovingBody>& bodies, const PointConstraint& c)
 
 }  // namespace
 
-// Bodies that may be in an island with an own body: joined by overlapping loose boxes, constraints, or having
-// fallen asleep together. A superset of the islands is enough: what is left out can neither touch nor wake an
-// own body in this step.
-void World::Implementation::gather_islands() {
-    start_union();
+// Joins bodies whose loose boxes overlap; reach: how far beyond itself a body may come, and touch [m].
+void World::Implementation::join_neighbours(const std::vector<double>& reach) {
     auto& boxes = neighbours.boxes();
     boxes.clear();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         const MovingBody& body = bodies[i];
         if (!body.moves()) continue;
-        const double half = loose_radius(*body.kind, body.state.q) + contact_reach(body, settings);
+        const double half = loose_radius(*body.kind, body.state.q) + reach[i];
         boxes.push_back({body.state.position.array() - half, body.state.position.array() + half,
                          static_cast<int>(i), !body.asleep});
-        if (body.asleep && body.sleep_group >= 0) join(static_cast<int>(i), body.sleep_group);
     }
     for (const auto& [a, b] : neighbours.find()) join(a, b);
+}
+
+// Bodies that may be in an island with an own body: joined by overlapping loose boxes, constraints, or having
+// fallen asleep together. A superset of the islands is enough: what is left out can neither touch nor wake an
+// own body in this step. What a fast body hits may fly off at up to twice its speed, and hit others in the
+// same step: sets with a fast body reach that far, and so do those that they reach.
+void World::Implementation::gather_islands() {
+    start_union();
+    reaches.resize(bodies.size());
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        const MovingBody& body = bodies[i];
+        reaches[i] = contact_reach(body, settings);
+        if (body.moves() && body.asleep && body.sleep_group >= 0) join(static_cast<int>(i), body.sleep_group);
+    }
     for (const HeldConstraint& c : constraints) {
         const int a = c.definition.body_a, b = c.definition.body_b;
         if (c.holds && b >= 0 && bodies[static_cast<std::size_t>(a)].moves() &&
             bodies[static_cast<std::size_t>(b)].moves())
             join(a, b);
+    }
+    quick.assign(bodies.size(), 0);
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+        if (bodies[i].moves() && reaches[i] > (kSlow + kSlop) * smallest_half(bodies[i].posed))
+            quick[i] = reaches[i];
+    join_neighbours(reaches);
+    for (bool any = true; any;) {
+        any = false;
+        fastest.assign(bodies.size(), 0);
+        for (std::size_t i = 0; i < bodies.size(); ++i) {
+            double& most = fastest[static_cast<std::size_t>(root(static_cast<int>(i)))];
+            most = std::max(most, quick[i]);
+        }
+        for (std::size_t i = 0; i < bodies.size(); ++i) {
+            const double most = 2 * fastest[static_cast<std::size_t>(root(static_cast<int>(i)))];
+            if (most > reaches[i] && bodies[i].moves()) any = true, reaches[i] = most;
+        }
+        if (any) join_neighbours(reaches);
     }
     place.assign(bodies.size(), 0);
     for (std::size_t i = 0; i < bodies.size(); ++i)

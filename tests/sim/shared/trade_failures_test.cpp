@@ -106,7 +106,7 @@ TEST_P(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerA
     std::uint64_t trades = 0, reowned = 0;
     for (unsigned seed = 0; seed < runs; ++seed) {
         SCOPED_TRACE("seed " + std::to_string(seed));
-        std::mt19937 random(seed);
+        std::mt19937 random(seed + 1);
         auto uniform = [&random] { return static_cast<double>(random()) / 4294967296.0; };
         sim::SimulatedProcessors how = processors();
         how.count = 1 + static_cast<int>(random() % 5);

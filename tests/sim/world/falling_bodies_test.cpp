@@ -45,7 +45,7 @@ TEST(FallingBalls, AfterFourSecondsOursAndBulletsLieInTheBoxInPilesOfOneHeight) 
     if (!sim_bench::bullet_is_there()) GTEST_SKIP() << "built without Bullet";
     const int count = 25, steps = 240;
     sim::World soft(sim_bench::falling_balls(count)), stiff(sim_bench::falling_balls(count, 0));
-    BulletWorld bullet(sim_bench::falling_balls(count), BulletKind::rigid);
+    BulletWorld bullet(sim_bench::falling_balls(count), BulletKind::spheres);
     for (int i = 0; i < steps; ++i) {
         soft.step();
         stiff.step();
@@ -54,7 +54,8 @@ TEST(FallingBalls, AfterFourSecondsOursAndBulletsLieInTheBoxInPilesOfOneHeight) 
     const double bullet_height = mean_height(count, [&](int i) { return bullet.position(i); });
     const double stiff_height = mean_height(count, [&](int i) { return stiff.state(i).position; });
     const double soft_height = mean_height(count, [&](int i) { return soft.state(i).position; });
-    // Bullet's hulls are 4 cm thicker all round; otherwise chance alone tells the piles apart.
+    // Rigid balls roll alike in both; chance alone tells the piles apart. (Bullet's hulls are 4 cm thicker all
+    // round, and roll as polyhedra.)
     EXPECT_NEAR(stiff_height, bullet_height, 0.12 * bullet_height);
     // Soft balls of 5 kN carry each other with a contact stiffness of some 50 kN/m: they sag by a tenth and
     // more.

@@ -1,0 +1,501 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "world/island_solver.h"
+
+// Islands solved directly, in substeps of two halves; see IslandSolver.
+
+namespace sim {
+namespace {
+
+constexpr double kFirm = 1e-9;  // least compliance of a spring, share of the bodies' own
+constexpr double kSoft = 3e-4;  // compliance of an overlap over a substep, share of the bodies' own, at most
+constexpr double kOverlap =
+    1e-4;  // at which it carries its load of the substep before, share of the bodies' size
+constexpr double kHeld = 1e-2, kHeldAlong = 0.1;  // of a contact's impulse to the round before's; friction's
+constexpr double kCorrected = 0.2;                // share of an overlap that a substep takes back
+constexpr int kMostTurns = 12;                    // of the ends' Newton iteration
+constexpr double kResolved = 0.25;                // h^2 k / m of a spring up to which its motion is followed
+constexpr double kEndTolerance = 1e-8;            // of a gap [m]
+constexpr double kMostFall = 1.2e-3;              // in a substep, share of a body's size
+constexpr int kMostFallLevel = 6;                 // for that a substep is halved so often at most
+constexpr double kMostTurn = 0.04;                // of a spring's arm in a substep [rad]
+
+}  // namespace
+
+Eigen::Vector3d IslandSolver::in_world(const ContactRows& c, const Eigen::Vector3d& p) const {
+    return p[0] * c.point->normal.cast<double>() + p[1] * c.tangent[0].cast<double>() +
+           p[2] * c.tangent[1].cast<double>();
+}
+
+// Whether one factorisation takes at most so many multiply-adds.
+bool IslandSolver::begin_direct(double most, bool with_contacts) {
+    sizes_.clear();
+    std::uint32_t at = 0;
+    for (const BodyRows& rows : rows_of_) sizes_.push_back(with_contacts ? 6 + rows.body->kind->modes : 0);
+    for (const SpringRows& s : springs_)
+        for (const Side& side : s.side)
+            if (side.body >= 0) {
+                const auto i = static_cast<std::size_t>(side.body);
+                sizes_[i] = 6 + rows_of_[i].body->kind->modes;
+            }
+    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
+        rows_of_[i].at = at;
+        at += static_cast<std::uint32_t>(sizes_[i]);
+    }
+    for (auto* list : {&wide_y_, &wide_start_, &wide_free_, &wide_held_, &gradient_, &step_})
+        list->assign(at, 0.);
+    ends_.resize(rows_of_.size());
+    std::uint32_t wide = 0;
+    auto reserve = [&](Rows& rows) {
+        for (int side = 0; side < 2; ++side) {
+            if (rows.side[side].body < 0) continue;
+            rows.wide[side] = wide;
+            wide += 3 * static_cast<std::uint32_t>(sizes_[static_cast<std::size_t>(rows.side[side].body)]);
+        }
+    };
+    for (ContactRows& c : contacts_) reserve(c);
+    for (SpringRows& s : springs_) reserve(s);
+    wide_rows_.resize(wide);
+    direct_contacts_.assign(contacts_.size(), {});
+    factor_.begin(sizes_);
+    if (with_contacts)
+        for (const ContactRows& c : contacts_) factor_.couple(c.side[0].body, c.side[1].body);
+    for (const SpringRows& s : springs_) factor_.couple(s.side[0].body, s.side[1].body);
+    const double cost = factor_.analyse(most);
+    const bool cheap = std::isfinite(cost);
+    (with_contacts ? direct_ : springs_direct_) = cheap;
+    return cheap;
+}
+
+// The rows in double precision, without padding. Over the first half of a substep's impulses modes yield as they will to
+// the whole, that is to twice as much.
+void IslandSolver::widen(Rows& rows, bool positions) {
+    const double yields = mode_scale(positions);
+    for (int which = 0; which < 2; ++which) {
+        const Side& side = rows.side[which];
+        if (side.body < 0) continue;
+        const int size = sizes_[static_cast<std::size_t>(side.body)];
+        for (int r = 0; r < 3; ++r) {
+            const float* from = jacobians_.data() + side.rows + r * side.width;
+            double* to = wide_rows_.data() + rows.wide[which] + r * size;
+            std::copy_n(from, 6, to);
+            for (int k = 6; k < size; ++k) to[k] = yields * from[2 + k];
+        }
+    }
+}
+
+// Rows follow the bodies.
+void IslandSolver::follow(bool positions) {
+    for (BodyRows& rows : rows_of_) {
+        rows.place = rows.body->state.position;
+        rows.frame = rows.body->state.orientation.toRotationMatrix();
+        rows.body_from_world = rows.frame.transpose().cast<float>();
+    }
+    for (SpringRows& s : springs_) write_spring(s), widen(s, positions);
+    for (ContactRows& c : contacts_) write_contact(c), widen(c, positions);
+}
+
+// Half of the substep's gravity and forces.
+void IslandSolver::kick() {
+    for (const BodyRows& rows : rows_of_) {
+        MovingBody& body = *rows.body;
+        const double mass = body.kind->mass.mass;
+        const Eigen::Vector3d change = h_ / 2 * body.gravity_scale * settings_->gravity;
+        body.state.velocity += change;
+        if (body.own) outside_ += mass * change;
+        if (!body.pushed) continue;
+        body.state.velocity += h_ / 2 / mass * body.force;
+        body.state.angular_momentum += h_ / 2 * body.torque;
+    }
+}
+
+// The bodies' velocities after a share of the substep's gravity and forces, and their modes' mean rates under
+// what has been given to them.
+void IslandSolver::load_wide(bool positions) {
+    const double share = positions ? 0.5 : 0, scale = 1 / mode_scale(positions);
+    for (const BodyRows& rows : rows_of_) {
+        const MovingBody& body = *rows.body;
+        const BodyKind& kind = *body.kind;
+        const WorldBodyState& s = body.state;
+        const Eigen::Matrix3d turned = s.orientation.toRotationMatrix();
+        Eigen::Vector3d velocity = s.velocity + share * h_ * body.gravity_scale * settings_->gravity;
+        Eigen::Vector3d momentum = s.angular_momentum;
+        if (body.pushed) {
+            velocity += share * h_ / kind.mass.mass * body.force;
+            momentum += share * h_ * body.torque;
+        }
+        const Eigen::Vector3d spin =
+            rows.frame.transpose() *
+            (turned * (turned.transpose() * momentum).cwiseQuotient(kind.mass.inertia));
+        double* y = wide_free_.data() + rows.at;
+        for (int i = 0; i < 3; ++i) {
+            y[i] = kind.root_mass * velocity[i];
+            y[3 + i] = kind.root_inertia[i] * spin[i];
+        }
+        const HeldSteps& step = of_substep(kind).held;
+        for (int k = 0; k < kind.modes; ++k) {
+            y[6 + k] = (step.mean_z[k] * s.q[k] + step.mean_rate[k] * s.q_dot[k]) / step.root_compliance[k] +
+                       wide_held_[rows.at + 6 + static_cast<std::size_t>(k)];
+            if (body.pushed) y[6 + k] += step.root_compliance[k] * h_ * body.modal_force[k];
+            y[6 + k] *= scale;
+        }
+    }
+    wide_start_ = wide_free_;
+}
+
+void IslandSolver::find_ends() {
+    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
+        if (sizes_[i] == 0) continue;
+        const BodyRows& rows = rows_of_[i];
+        const BodyKind& kind = *rows.body->kind;
+        const WorldBodyState& s = rows.body->state;
+        const double *y = wide_y_.data() + rows.at, *start = wide_free_.data() + rows.at;
+        Eigen::Vector3d change;
+        for (int k = 0; k < 3; ++k) change[k] = kind.root_inertia[k] * (y[3 + k] - start[3 + k]);
+        ends_[i].position = s.position + h_ / kind.root_mass * Eigen::Vector3d(y[0], y[1], y[2]);
+        Eigen::Vector3d momentum = s.angular_momentum + rows.frame * change;
+        if (rows.body->pushed) momentum += h_ / 2 * rows.body->torque;
+        ends_[i].orientation = rows.rotation.advance(s.orientation, momentum);
+    }
+}
+
+// Between a spring's ends where the substep's velocities bring them.
+Eigen::Vector3d IslandSolver::gap_at_end(const SpringRows& spring) const {
+    const PointConstraint& held = spring.constraint->definition;
+    auto end = [this](int body, const Eigen::Vector3d& rest) -> Eigen::Vector3d {
+        if (body < 0) return rest;
+        const MovingBody& b = (*bodies_)[static_cast<std::size_t>(body)];
+        if (local(body) < 0) return b.state.position + b.state.orientation * rest;
+        const auto i = static_cast<std::size_t>(local(body));
+        const BodyKind& kind = *b.kind;
+        Eigen::Vector3d point = rest;
+        if (kind.modes > 0) {
+            alignas(32) float shapes[3 * kMostModes];
+            kind.shapes_at(rest.cast<float>(), shapes);
+            const double* y = wide_y_.data() + rows_of_[i].at + 6;
+            for (int k = 0; k < kind.modes; ++k) {
+                const double q =
+                    b.state.q[k] + mode_scale(true) * h_ * of_substep(kind).held.root_compliance[k] * y[k];
+                for (int axis = 0; axis < 3; ++axis)
+                    point[axis] += static_cast<double>(shapes[axis * kind.mode_width + k]) * q;
+            }
+        }
+        return ends_[i].position + ends_[i].orientation * point;
+    };
+    return end(held.body_a, held.point_a) - end(held.body_b, held.point_b);
+}
+
+// Whether no spring's arm turns further than the scheme is accurate for: the energy of a turn of t in a substep
+// is off by about t^2 / 12 of itself for as long as it lasts.
+bool IslandSolver::turns_little() const {
+    for (const SpringRows& s : springs_) {
+        const PointConstraint& held = s.constraint->definition;
+        for (int side = 0; side < 2; ++side) {
+            if (s.side[side].body < 0) continue;
+            const auto i = static_cast<std::size_t>(s.side[side].body);
+            const Eigen::Vector3d& arm = side == 0 ? held.point_a : held.point_b;
+            const Eigen::Vector3d turn = ends_[i].orientation * arm - rows_of_[i].frame * arm;
+            if (turn.squaredNorm() > kMostTurn * kMostTurn * arm.squaredNorm()) return false;
+        }
+    }
+    return true;
+}
+
+// The least half extent of the bodies that rows join [m].
+double IslandSolver::size_of(const Rows& rows) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Side& side : rows.side)
+        if (side.body >= 0)
+            least = std::min(least,
+                             rows_of_[static_cast<std::size_t>(side.body)].body->kind->half_box.minCoeff());
+    return least;
+}
+
+// A contact's problem of one half: what the start has seen of it, and the speed that is wanted.
+void IslandSolver::begin_contact(std::size_t i, const Eigen::Vector3d& seen_so_far,
+                                 const Eigen::Vector3d& guess, double bias, bool positions) {
+    const ContactRows& c = contacts_[i];
+    DirectContact& d = direct_contacts_[i];
+    d.soft = positions;
+    const double by_load = kCorrected * kOverlap * size_of(c) * settings_->substeps /
+                           (settings_->dt * std::max(c.at_move[0], 0.f));
+    d.normal_gamma =
+        positions ? std::min(kSoft * c.k[0][0], by_load) : std::min(kHeld * c.k[0][0], 10 * by_load);
+    d.tangent_gamma = kHeldAlong / c.slide_mass;
+    d.bias = bias;
+    d.active = c.begins <= substep_;
+    d.before = d.active ? guess : Eigen::Vector3d(Eigen::Vector3d::Zero());
+    d.bound = c.friction * d.before[0];
+    give(c, d.before - seen_so_far, wide_start_);
+}
+
+// Whether the springs' ends were brought to where they belong.
+bool IslandSolver::solve_positions() {
+    const double whole = settings_->dt / settings_->substeps;
+    const double scale = h_ / last_h_;  // the impulses of the substep before, over this one
+    for (std::size_t i = 0; i < contacts_.size(); ++i) {
+        const ContactRows& c = contacts_[i];
+        const double now = c.now;
+        begin_contact(i, Eigen::Vector3d::Zero(), scale * Eigen::Vector3d(0, c.at_move[1], c.at_move[2]),
+                      now > 0 ? now / h_ : std::max(kCorrected * now / whole, -double{kPushSpeed}), true);
+    }
+    wide_y_ = wide_start_;
+    for (std::size_t i = 0; i < contacts_.size(); ++i) {
+        const double normal = scale * static_cast<double>(contacts_[i].at_move[0]);
+        direct_contacts_[i].bound = static_cast<double>(contacts_[i].friction) * normal;
+        give(contacts_[i], {normal, 0, 0}, wide_y_);
+    }
+    for (SpringRows& s : springs_) {
+        set_firmness(s, true);
+        give(s, scale * s.moved, wide_y_);
+    }
+    double before = std::numeric_limits<double>::infinity(), size = before;
+    for (const SpringRows& s : springs_) size = std::min(size, size_of(s));
+    const double enough = kEndTolerance * size;
+    for (int turn = 0; turn <= kMostTurns; ++turn) {
+        find_ends();
+        double worst = 0;
+        for (SpringRows& s : springs_) {
+            const Eigen::Vector3d gap = gap_at_end(s) + s.lag * s.gap;
+            worst = std::max(worst, (gap + h_ * s.gamma * s.impulse).norm());
+            s.offset = gap / h_ - seen(s, wide_y_);
+        }
+        if (turn > 0 && worst <= enough) return turns_little();
+        if (turn == kMostTurns || !(turn < 2 || worst < 0.7 * before)) return false;
+        if (turn > 0) before = worst;
+        turn == 1 ? settle_contacts() : minimise(contacts_.empty());  // once near the ends
+    }
+    return false;
+}
+
+void IslandSolver::move_directly() {
+    for (SpringRows& s : springs_) s.moved = s.impulse;
+    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
+        WorldBodyState& s = rows_of_[i].body->state;
+        s.position = ends_[i].position;
+        s.orientation = ends_[i].orientation;
+    }
+    std::fill(gradient_.begin(), gradient_.end(), 0.);
+    for (std::size_t i = 0; i < contacts_.size(); ++i) {
+        ContactRows& c = contacts_[i];
+        c.now += static_cast<float>(h_ * seen(c, wide_y_)[0]);
+        const Eigen::Vector3d& p = direct_contacts_[i].impulse;
+        for (int k = 0; k < 3; ++k) {
+            c.impulse[k] -= c.at_move[k];  // of the second half before
+            c.at_move[k] = static_cast<float>(p[k]);
+        }
+        const Eigen::Vector3d kept(c.at_move[0], c.at_move[1], c.at_move[2]);
+        if (!kept.isZero(0)) apply(c, in_world(c, kept), place_now(c));
+        give(c, p, gradient_);
+    }
+    auto along = [](const Eigen::Vector3d& p) {
+        return std::array<float, 3>{float(p[0]), float(p[1]), float(p[2])};
+    };
+    for (SpringRows& s : springs_) {
+        const auto p = along(s.moved);
+        if (s.told) tell(s, -1, s.moved, s.moved, {p[0], p[1], p[2]}, s.place);
+        apply(s, s.moved, s.place);
+        give(s, s.moved, gradient_);
+    }
+    for (const BodyRows& rows : rows_of_)
+        for (std::size_t k = 6; k < 6 + static_cast<std::size_t>(rows.body->kind->modes); ++k)
+            wide_held_[rows.at + k] = gradient_[rows.at + k] / mode_scale(true);
+}
+
+void IslandSolver::solve_velocities() {
+    for (std::size_t i = 0; i < contacts_.size(); ++i) {
+        const ContactRows& c = contacts_[i];
+        const Eigen::Vector3d so_far = direct_contacts_[i].impulse;
+        Eigen::Vector3d guess =
+            so_far + h_ / last_h_ * Eigen::Vector3d(c.impulse[0], c.impulse[1], c.impulse[2]);
+        guess[0] = std::max(guess[0], 0.);
+        begin_contact(i, so_far, guess, std::max(0.f, c.now) / h_, false);
+    }
+    for (SpringRows& s : springs_) {
+        set_firmness(s, false), s.offset.setZero();
+        if (s.resolved) give(s, s.moved, wide_start_);
+    }
+    wide_y_ = wide_start_;
+    for (const SpringRows& s : springs_)
+        if (!s.resolved) give(s, s.moved, wide_y_);
+    settle_contacts();
+    for (SpringRows& s : springs_)
+        if (s.resolved) s.impulse = s.moved;
+}
+
+void IslandSolver::finish_directly(bool last) {
+    for (const BodyRows& rows : rows_of_) {
+        float *y = y_.data() + rows.offset, *start = start_.data() + rows.offset;
+        const double *wide = wide_y_.data() + rows.at, *before = wide_free_.data() + rows.at;
+        const int modes = rows.body->kind->modes;
+        for (int i = 0; i < 6; ++i)
+            y[i] = static_cast<float>(wide[i]), start[i] = static_cast<float>(before[i]);
+        for (int k = 6; k < 6 + modes; ++k) {
+            y[2 + k] = static_cast<float>(wide[k]);
+            start[2 + k] = static_cast<float>(before[k] - wide_held_[rows.at + static_cast<std::size_t>(k)]);
+        }
+        for (int k = 8 + modes; k < rows.width; ++k) y[k] = start[k] = 0;
+        y[6] = y[7] = start[6] = start[7] = 0;
+    }
+    for (std::size_t i = 0; i < contacts_.size(); ++i) {
+        ContactRows& c = contacts_[i];
+        for (int k = 0; k < 3; ++k) c.impulse[k] = static_cast<float>(direct_contacts_[i].impulse[k]);
+        c.largest = std::max(c.largest, c.impulse[0]);
+    }
+    note_work();
+    if (last) restitute();
+    ring_on();
+    for (const ContactRows& c : contacts_) {
+        const Eigen::Vector3d p(c.impulse[0], c.impulse[1], c.impulse[2]),
+            at_move(c.at_move[0], c.at_move[1], c.at_move[2]);
+        if (p.isZero(0) && at_move.isZero(0)) continue;
+        if (c.told) tell(c, c.pair, in_world(c, p), in_world(c, at_move), c.impulse, place_now(c));
+        apply(c, in_world(c, p - at_move), place_now(c));
+    }
+    for (SpringRows& s : springs_) {
+        const float p[3] = {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])};
+        if (s.told) tell(s, -1, s.impulse, Eigen::Vector3d::Zero(), p, s.place);
+        apply(s, s.impulse, s.place);
+    }
+    for (const BodyRows& rows : rows_of_) {
+        MovingBody& body = *rows.body;
+        const Eigen::Vector3d entered = body.state.velocity;
+        body.state.velocity *= of_substep(*body.kind).drag;
+        body.state.angular_momentum *= of_substep(*body.kind).drag;
+        if (body.own) outside_ += body.kind->mass.mass * (body.state.velocity - entered);
+        step_modes(rows);
+    }
+}
+
+// The springs of an island whose contacts are swept over: their impulses on top of those so far, from y_ and
+// back to it.
+void IslandSolver::solve_springs(bool positions) {
+    if (!springs_direct_) return;
+    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
+        if (sizes_[i] == 0) continue;
+        const BodyRows& rows = rows_of_[i];
+        for (const auto& [from, to] : {std::pair{&start_, &wide_start_}, std::pair{&y_, &wide_y_}}) {
+            std::copy_n(from->data() + rows.offset, 6, to->data() + rows.at);
+            std::copy_n(from->data() + rows.offset + 8, sizes_[i] - 6, to->data() + rows.at + 6);
+        }
+    }
+    if (positions) find_ends();
+    for (SpringRows& s : springs_) {
+        widen(s, positions);
+        set_firmness(s, positions);
+        if (positions)
+            s.offset = gap_at_end(s) / h_ - seen(s, wide_y_) + s.gamma * s.moved;
+        else
+            s.offset = s.gamma * s.after;
+    }
+    wide_start_ = wide_y_;
+    minimise(true);
+    for (SpringRows& s : springs_) (positions ? s.moved : s.after) += s.impulse;
+    auto to_float = [](double x) { return static_cast<float>(x); };
+    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
+        if (sizes_[i] == 0) continue;
+        const double* wide = wide_y_.data() + rows_of_[i].at;
+        float* y = y_.data() + rows_of_[i].offset;
+        std::transform(wide, wide + 6, y, to_float);
+        std::transform(wide + 6, wide + sizes_[i], y + 8, to_float);
+    }
+}
+
+// How far a unit of impulse lets a spring's ends move, and change their speed.
+//
+// Directly, a spring's force acts half before and half after the bodies move. With w = h^2 k / m of the bodies' mass there: what
+// the substep resolves (w up to kResolved) by the trapezoidal rule, which keeps a spring's energy: each half is
+//   1/2 h (k (C0 + C1) / 2 + c (C1 - C0) / h),  C0, C1: the ends' gap before and after;
+// what is stiffer holds: the first half is 1/2 h k C1, the second takes all speed between the ends.
+void IslandSolver::set_firmness(SpringRows& s, bool positions) const {
+    const PointConstraint& held = s.constraint->definition;
+    const double own = (s.k[0][0] + s.k[1][1] + s.k[2][2]) / 3, k = held.stiffness;
+    const double w = h_ * h_ * k * own;
+    if (direct_) {
+        const double loss = 2 * held.damping_ratio / std::sqrt(w);
+        s.resolved = w <= kResolved;
+        s.lag = s.resolved ? (0.5 - loss) / (0.5 + loss) : 0;
+        const double yields = positions    ? 2 / w / (s.resolved ? 0.5 + loss : 1)
+                              : s.resolved ? std::numeric_limits<double>::infinity()
+                                           : 0;
+        s.gamma = own * std::max(yields, kFirm);
+        return;
+    }
+    const double damping = 2 * held.damping_ratio * std::sqrt(k / own);
+    const double firm = positions ? h_ * k : damping + h_ * k * w / (1 + w);
+    s.gamma = std::max(1 / (h_ * firm), kFirm * own);
+}
+
+// A substep, or two of half its length where the springs' ends turn too far for one.
+void IslandSolver::direct_substep(int level, bool first, bool last) {
+    level_ = level;
+    h_ = settings_->dt / settings_->substeps / (1 << level);
+    for (BodyRows& rows : rows_of_) rows.rotation = FreeRotation(rows.body->kind->mass.inertia, h_);
+    if (((falls_little() || level >= kMostFallLevel) && try_substep(first, last)) ||
+        level + 1 == kSubstepLevels)
+        return;
+    remaining_ += h_ / 2;
+    direct_substep(level + 1, first, false);
+    remaining_ -= settings_->dt / settings_->substeps / (2 << level);
+    direct_substep(level + 1, false, last);
+}
+
+// Where the bodies' paths are asked for, a leg per substep, however often that was halved.
+void IslandSolver::begin_legs() {
+    for (const BodyRows& rows : rows_of_) {
+        if (!paths_) return;
+        (*paths_)[static_cast<std::size_t>(rows.body - bodies_->data())].legs.push_back(
+            {.start = settings_->dt / settings_->substeps * substep_,
+             .position = rows.body->state.position,
+             .orientation = rows.body->state.orientation});
+    }
+}
+
+void IslandSolver::end_legs() {
+    for (const BodyRows& rows : rows_of_) {
+        if (!paths_) return;
+        BodyPath::Leg& leg = (*paths_)[static_cast<std::size_t>(rows.body - bodies_->data())].legs.back();
+        leg.velocity = (rows.body->state.position - leg.position) * (settings_->substeps / settings_->dt);
+        leg.momentum = rows.body->state.angular_momentum;
+    }
+}
+
+// Whether weight moves no body by more than a small share of its size in a substep: stacks sway in longer ones.
+bool IslandSolver::falls_little() const {
+    const double fall = h_ * h_ * settings_->gravity.norm();
+    return contacts_.empty() || std::ranges::all_of(rows_of_, [fall](const BodyRows& rows) {
+               return fall <= 2 * kMostFall * rows.body->kind->half_box.minCoeff();
+           });
+}
+
+// False: nothing has been done, for the substep is too long.
+bool IslandSolver::try_substep(bool first, bool last) {
+    std::fill(wide_held_.begin(), wide_held_.end(), 0.);
+    for (BodyRows& rows : rows_of_) rows.place = rows.body->state.position;
+    follow(true);
+    load_wide(true);
+    for (ContactRows& c : contacts_) {
+        if (first) {
+            c.now = c.separation;
+            for (int k = 0; k < 3; ++k) c.at_move[k] = c.impulse[k] / 2;  // at rest
+        }
+        if (c.restitution > 0 && c.largest == 0) c.approach = static_cast<float>(seen(c, wide_free_)[0]);
+    }
+    const bool reached = solve_positions();
+    if (!reached && level_ + 1 < kSubstepLevels) return false;
+    find_ends();
+    kick();
+    move_directly();
+    kick();
+    follow(false);
+    load_wide(false);
+    solve_velocities();
+    finish_directly(last);
+    last_h_ = h_;
+    return true;
+}
+
+}  // namespace sim

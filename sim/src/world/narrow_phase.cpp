@@ -1,0 +1,268 @@
+#include "world/narrow_phase.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "shape/closest_point.h"
+
+namespace sim {
+namespace {
+
+constexpr float kDeep =
+    0.04f;  // of the size: a contact that begins deeper is one of bodies put inside each other
+// A body is in another if its centre is, or is nearer to it than this share of its own smallest half extent.
+constexpr double kBuried = 0.2;
+constexpr std::uint32_t kNearest = 0x7ffffffd;  // feature of the nearest points of a pair
+constexpr std::uint32_t kParting = 0x7ffffffe;  // feature of the one contact of bodies inside each other
+constexpr std::uint32_t kFoot = 0x7fffffff;     // feature of a body's lowest point over a plane
+constexpr float kManifoldTolerance = 0.02f;
+constexpr double kExact = 1e-5;           // of the size: tolerance of distances
+constexpr double kOnSurface = 1e-3;       // of the way from the centre
+constexpr std::uint32_t kOfB = 1u << 31;  // feature: a sample of b
+
+bool is_sample(std::uint32_t feature) {
+    return (feature & ~kOfB) < kNearest;
+}
+
+bool is_buried(const PosedBody& body, const PosedBody& in) {
+    const Eigen::Vector3d centre = in.rotation.transpose() * (body.position - in.position);
+    return in.kind->surface.distance(centre).distance < kBuried * smallest_half(body);
+}
+
+void finish(const Manifold* before, float size, Manifold& manifold) {
+    if (manifold.count == 0) return;
+    const float deepest = -manifold.points[0].separation;
+    manifold.emerging = before ? before->emerging && deepest > 0.01f * size : deepest > kDeep * size;
+    manifold.impulse_reach = 0.1f * size;
+    if (before) take_impulses(*before, manifold.impulse_reach, manifold);
+}
+
+// The contact's distance to the surface itself, where that to first order, a lower bound, is not right:
+// outside, where the foot of the normal is not on the surface.
+void measure_exactly(const PosedBody& implicit, SampleContact& contact) {
+    const BodyKind& kind = *implicit.kind;
+    if (contact.separation <= 0 || kind.ellipsoid || kind.surface.has_bumps()) return;
+    const Eigen::Vector3d foot = (contact.rest - contact.separation * contact.normal).cast<double>();
+    if (std::abs(kind.surface.base().value(foot) - 1) < kOnSurface) return;
+    Deformation deformation;
+    if (kind.linear()) {
+        deformation.matrix = implicit.deformation.cast<double>();
+        deformation.inverse = implicit.deformation_inverse.cast<double>();
+    }
+    const ClosestPoint at =
+        closest_point(kind.surface.base(), deformation, deformation.matrix * contact.rest.cast<double>());
+    contact.separation = static_cast<float>(at.distance);
+    contact.normal = at.normal.cast<float>();
+}
+
+// Bodies put so deep into each other that surface samples no longer tell which way is out: one contact along
+// the line of the centres (straight up where they coincide), as deep as the bodies overlap along it.
+void part(const PosedBody& a, const PosedBody& b, const Eigen::Vector3f& between, const Manifold* before,
+          Manifold& manifold) {
+    ManifoldPoint& point = manifold.points[0];
+    manifold.count = 1;
+    const float distance = between.norm();
+    point.normal =
+        distance > 1e-6f * a.radius ? Eigen::Vector3f(between / distance) : Eigen::Vector3f::UnitY();
+    const auto [sample_a, reach_a] =
+        a.furthest_sample(-(a.rotation.transpose().cast<float>() * point.normal));
+    const auto [sample_b, reach_b] = b.furthest_sample(b.rotation.transpose().cast<float>() * point.normal);
+    point.feature = kParting;
+    point.separation = distance - reach_a - reach_b;
+    point.arm_a = (-reach_a - 0.5f * point.separation) * point.normal;
+    point.arm_b = point.arm_a + between;
+    point.rest_a.setZero(), point.rest_b.setZero();
+    point.sample_a = sample_a, point.sample_b = sample_b;
+    manifold.emerging = true;
+    manifold.impulse_reach = a.radius;
+    if (before) take_impulses(*before, manifold.impulse_reach, manifold);
+}
+
+}  // namespace
+
+double smallest_half(const PosedBody& body) noexcept {
+    return body.kind->definition.shape.base.semi_axes.minCoeff();
+}
+
+void NarrowPhase::pair(const PosedBody& a, const PosedBody& b, const PairSearch& search, Manifold& manifold) {
+    const float size = static_cast<float>(std::min(smallest_half(a), smallest_half(b)));
+    between_ = (a.position - b.position).cast<float>();
+    const bool smooth = !a.kind->surface.has_bumps() && !b.kind->surface.has_bumps();
+    candidates_.clear();
+    sources_.clear();
+    const float tolerance = kManifoldTolerance * size;
+    if (smooth && (is_round(a) || is_round(b)) && nearest(a, b, search.margin)) {
+        choose(tolerance, search.before);
+        return fill(size, search.before, manifold);
+    }
+    const float lowest = find_samples(a, b, search.margin);
+    turn_a_ = a.rotation.cast<float>(), turn_b_ = b.rotation.cast<float>();
+    if (lowest < 0 && (!search.before || search.before->emerging || search.may_part) &&
+        (is_buried(a, b) || is_buried(b, a)))
+        return part(a, b, between_, search.before, manifold);
+    const bool edges = lowest > 0 && !(a.kind->ellipsoid && b.kind->ellipsoid);
+    if (smooth && (search.nearest || edges)) (void)nearest(a, b, search.margin);
+    const float first = candidates_.empty() ? lowest : std::min(lowest, candidates_.front().separation);
+    sources_.assign(candidates_.size(), -1);
+    add_samples(a, b, std::min(search.margin, PointChooser::reach(first, tolerance)));
+    do choose(tolerance, search.before);
+    while (lowest <= 0 && measure_chosen(a, b, tolerance));
+    fill(size, search.before, manifold);
+}
+
+// Adds the nearest points if they are within the margin; whether the distance could be told at all.
+bool NarrowPhase::nearest(const PosedBody& a, const PosedBody& b, float margin) {
+    const ConvexBody of_a(a), of_b(b);
+    const ConvexDistance d =
+        distance_between({&of_a, a.position, a.rotation}, {&of_b, b.position, b.rotation},
+                         kExact * std::min(smallest_half(a), smallest_half(b)));
+    if (!d.apart) return false;
+    if (d.gap > static_cast<double>(margin)) return true;
+    ContactCandidate& point = candidates_.emplace_back();
+    point.feature = kNearest;
+    point.separation = static_cast<float>(d.gap);
+    point.normal = d.normal.cast<float>();
+    point.arm_a = (d.arm_a - 0.5 * d.gap * d.normal).cast<float>();
+    point.rest_a = d.rest_a.cast<float>(), point.rest_b = d.rest_b.cast<float>();
+    return true;
+}
+
+// Samples of either body in the other, or near it; returns the lowest separation. Where none is inside, their
+// distances are exact.
+float NarrowPhase::find_samples(const PosedBody& a, const PosedBody& b, float margin) {
+    found_.clear();
+    finder_.find(a, b, margin, found_);
+    of_a_ = found_.size();
+    finder_.find(b, a, margin, found_);
+    float lowest = 1e30f;
+    for (const SampleContact& contact : found_) lowest = std::min(lowest, contact.separation);
+    if (lowest <= 0) return lowest;
+    lowest = 1e30f;
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+        measure_exactly(i < of_a_ ? b : a, found_[i]);
+        if (found_[i].separation < margin) lowest = std::min(lowest, found_[i].separation);
+    }
+    return lowest;
+}
+
+void NarrowPhase::add_samples(const PosedBody& a, const PosedBody& b, float out) {
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+        if (found_[i].separation > out) continue;
+        candidates_.push_back(candidate_of(a, b, i));
+        sources_.push_back(static_cast<int>(i));
+    }
+}
+
+ContactCandidate NarrowPhase::candidate_of(const PosedBody& a, const PosedBody& b, std::size_t found) const {
+    const SampleContact& contact = found_[found];
+    const bool b_sampled = found >= of_a_;
+    const Eigen::Vector3f normal = (b_sampled ? turn_a_ : turn_b_) * contact.normal;
+    const Eigen::Vector3f place =
+        b_sampled ? turn_b_ * b.sample(contact.sample) : turn_a_ * a.sample(contact.sample);
+    const Eigen::Vector3f arm = place - 0.5f * contact.separation * normal;
+    ContactCandidate point;
+    point.feature = static_cast<std::uint32_t>(contact.sample) | (b_sampled ? kOfB : 0u);
+    point.separation = contact.separation;
+    point.rest_a = point.rest_b = contact.rest;
+    point.normal = b_sampled ? Eigen::Vector3f(-normal) : normal;
+    point.arm_a = b_sampled ? Eigen::Vector3f(arm - between_) : arm;
+    return point;
+}
+
+// Makes what was chosen exact; whether something is further out than was thought.
+bool NarrowPhase::measure_chosen(const PosedBody& a, const PosedBody& b, float tolerance) {
+    bool moved = false;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(count_); ++k) {
+        const auto at = static_cast<std::size_t>(chosen_[k]);
+        if (sources_[at] < 0) continue;
+        const auto found = static_cast<std::size_t>(std::exchange(sources_[at], -1));
+        const float before = found_[found].separation;
+        measure_exactly(found < of_a_ ? b : a, found_[found]);
+        if (found_[found].separation == before) continue;
+        candidates_[at] = candidate_of(a, b, found);
+        moved = moved || found_[found].separation > before + 0.1f * tolerance;
+    }
+    return moved;
+}
+
+void NarrowPhase::plane(const PosedBody& a, const Eigen::Vector3d& plane_normal, float height, float margin,
+                        const Manifold* before, Manifold& manifold) {
+    const Eigen::Vector3d down = -(a.rotation.transpose() * plane_normal);
+    const Eigen::Vector3f n = -down.cast<float>();
+    const float* x = a.sample_data();
+    const int stride = a.kind->batches * kLanes;
+    const Eigen::Matrix3f turn = a.rotation.cast<float>();
+    const Eigen::Vector3f normal = plane_normal.cast<float>();
+    const float size = static_cast<float>(smallest_half(a)), tolerance = kManifoldTolerance * size;
+    candidates_.clear();
+    float lowest = margin;
+    if (a.kind->ellipsoid) {
+        // Of bent bodies one more sample, where they would touch at rest.
+        ConvexBody::Point point;
+        if (is_bent(a)) {
+            point.rest = a.kind->surface.base().support(down);
+            point.place = a.deformed(point.rest);
+        } else {
+            const ConvexBody body(a);
+            point = body.support(down);
+            point.place += body.margin() * down;
+        }
+        ContactCandidate foot;
+        foot.feature = kFoot;
+        foot.rest_a = foot.rest_b = point.rest.cast<float>();
+        const Eigen::Vector3f place = turn * point.place.cast<float>();
+        foot.separation = normal.dot(place) + height;
+        foot.normal = normal;
+        foot.arm_a = place - 0.5f * foot.separation * normal;
+        if (foot.separation < margin) candidates_.push_back(foot);
+    }
+    for (int first = 0; first < (is_round(a) ? 0 : stride); first += kLanes) {
+        const Lanes s = n.x() * load_lanes(x + first) + n.y() * load_lanes(x + stride + first) +
+                        n.z() * load_lanes(x + 2 * stride + first) + height;
+        const float out = std::min(margin, PointChooser::reach(lowest, tolerance));
+        for (unsigned left = bits_of(s < out); left != 0; left &= left - 1) {
+            const int lane = std::countr_zero(left);
+            if (first + lane >= a.kind->samples) break;
+            lowest = std::min(lowest, s[lane]);
+            ContactCandidate& point = candidates_.emplace_back();
+            point.feature = static_cast<std::uint32_t>(first + lane);
+            point.separation = s[lane];
+            point.normal = normal;
+            point.arm_a = turn * a.sample(first + lane) - 0.5f * s[lane] * normal;
+            point.rest_a.setZero(), point.rest_b.setZero();
+        }
+    }
+    choose(tolerance, before);
+    fill(size, before, manifold);
+}
+
+// The manifold's points out of the chosen candidates, with the impulses of the step before.
+void NarrowPhase::fill(float size, const Manifold* before, Manifold& manifold) {
+    manifold.count = count_;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
+        const ContactCandidate& from = candidates_[static_cast<std::size_t>(chosen_[i])];
+        ManifoldPoint& point = manifold.points[i];
+        point.feature = from.feature;
+        point.separation = from.separation;
+        point.normal = from.normal;
+        point.arm_a = from.arm_a;
+        if (manifold.b >= kFirstPlane) {
+            point.arm_b.setZero();
+        } else {
+            point.arm_b = from.arm_a + between_;
+        }
+        point.rest_a = from.rest_a, point.rest_b = from.rest_b;
+        const int sample = static_cast<int>(from.feature & ~kOfB);
+        if (is_sample(from.feature)) (from.feature & kOfB ? point.sample_b : point.sample_a) = sample;
+    }
+    finish(before, size, manifold);
+}
+
+// Up to four of the candidates.
+void NarrowPhase::choose(float tolerance, const Manifold* before) {
+    count_ = chooser_.choose(candidates_, tolerance, before, chosen_);
+}
+
+}  // namespace sim

@@ -1,0 +1,58 @@
+#pragma once
+#include "world/convex_distance.h"
+#include "world/implicit_contact.h"
+#include "world/manifold.h"
+
+namespace sim {
+
+/// How near each other the surfaces of a pair are looked for.
+struct PairSearch {
+    float margin;                      ///< largest separation [m]
+    const Manifold* before = nullptr;  ///< the pair's manifold in the last step
+    bool may_part = false;             ///< bodies may be put inside each other at any time
+    bool nearest = false;              ///< with the nearest points of the pair, whatever the samples say
+};
+
+/// Contact points of one pair of bodies, or of a body and a plane, as they are posed.
+///
+/// Where one of a pair is round (convex_body.h: is_round) it touches with its nearest point, a single one,
+/// and rolls as round as it is; likewise on a plane. Other pairs have samples of either in the other's
+/// implicit surface, the distances of those outside made exact (closest_point.h: to first order a sample
+/// beside a thin body seems to touch it), and where no sample is inside also the nearest points of the pair:
+/// edges on edges. Allocates only while its buffers grow.
+class NarrowPhase {
+public:
+    void pair(const PosedBody& a, const PosedBody& b, const PairSearch& search, Manifold& manifold);
+    /// height: of the centre over the plane [m].
+    void plane(const PosedBody& a, const Eigen::Vector3d& normal, float height, float margin,
+               const Manifold* before, Manifold& manifold);
+    [[nodiscard]] std::uint64_t fallbacks() const noexcept { return finder_.fallbacks(); }
+
+private:
+    [[nodiscard]] bool nearest(const PosedBody& a, const PosedBody& b, float margin);
+    float find_samples(const PosedBody& a, const PosedBody& b, float margin);
+    void add_samples(const PosedBody& a, const PosedBody& b, float out);
+    [[nodiscard]] ContactCandidate candidate_of(const PosedBody& a, const PosedBody& b,
+                                                std::size_t found) const;
+    void choose(float tolerance, const Manifold* before);
+    bool measure_chosen(const PosedBody& a, const PosedBody& b, float tolerance);
+    void fill(float size, const Manifold* before, Manifold& manifold);
+
+    Eigen::Matrix3f turn_a_, turn_b_;  // of the pair
+    Eigen::Vector3f between_;          // from b's centre to a's
+    SampleFinder finder_;
+    std::vector<SampleContact> found_;
+    std::size_t of_a_ = 0;  // samples of a among found_, the first
+    std::vector<ContactCandidate> candidates_;
+    std::vector<int> sources_;  // of candidates: of which of found_, if its distance is not exact yet, or -1
+    PointChooser chooser_;
+    std::array<int, kManifoldPoints> chosen_{};
+    int count_ = 0;  // of chosen_
+};
+
+/// Smallest semi-axis [m].
+[[nodiscard]] double smallest_half(const PosedBody& body) noexcept;
+
+constexpr double kSlop = 0.005;  ///< of the smaller half extent: contacts exist from here on
+
+}  // namespace sim

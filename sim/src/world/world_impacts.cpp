@@ -1,0 +1,223 @@
+#include <algorithm>
+#include <cmath>
+
+#include "world/world_contacts.h"
+
+// Fast pairs: impacts on paths of free motion, and on those really taken.
+
+namespace sim {
+namespace {
+
+// A pair that touches already meets once more where it is this deep inside each other, shares of the smallest
+// semi-axes; bent bodies may be pressed in. With every impact within the step a little deeper.
+constexpr double kInside = 0.1, kInsideBent = 0.5, kDeeper = 0.05, kDeepest = 0.9;
+
+double size_of(const MovingBody& a, const MovingBody& b) {
+    return std::min(smallest_half(a.posed), smallest_half(b.posed));
+}
+
+// Whether surfaces moved against each other by more than `least` [m] on their paths.
+bool is_far(const BodyPath& pa, const BodyPath& pb, double least, const MovingBody& a, const MovingBody& b) {
+    double sum = 0;
+    along(pa, pb, 0, [&](const BodyPath::Leg& of_a, const BodyPath::Leg& of_b, double span) {
+        sum += span * ((of_a.velocity - of_b.velocity).norm() + of_a.spin.norm() * turn_reach_of(*a.kind) +
+                       of_b.spin.norm() * turn_reach_of(*b.kind));
+        return sum <= least;
+    });
+    return sum > least;
+}
+
+// A pair's impacts in their order.
+bool by_key(const Manifold& a, const Manifold& b) {
+    return a.key() != b.key() ? a.key() < b.key() : a.points[0].begins < b.points[0].begins;
+}
+
+}  // namespace
+
+const Manifold* WorldContacts::find_last(std::uint64_t key) const {
+    const auto at = std::lower_bound(before_.begin(), before_.end(), key,
+                                     [](const Manifold& m, std::uint64_t k) { return m.key() < k; });
+    return at != before_.end() && at->key() == key ? &*at : nullptr;
+}
+
+Manifold* WorldContacts::find_now(std::uint64_t key) {
+    const auto at = std::lower_bound(manifolds_.begin(), manifolds_.end(), key,
+                                     [](const Manifold& m, std::uint64_t k) { return m.key() < k; });
+    return at != manifolds_.end() && at->key() == key ? &*at : nullptr;
+}
+
+int WorldContacts::impacts_of(int i, int j) const {
+    const auto count = std::count_if(manifolds_.begin(), manifolds_.end(), [&](const Manifold& m) {
+        return m.a == i && m.b == j && m.points[0].begins >= 0;
+    });
+    return static_cast<int>(count);
+}
+
+void WorldContacts::rewarm(Manifold& manifold) const {
+    for (ManifoldPoint& point : manifold.points) point.normal_impulse = 0, point.friction_impulse.setZero();
+    const Manifold* before = find_last(manifold.key());
+    if (before && manifold.points[0].begins < 0) take_impulses(*before, manifold.impulse_reach, manifold);
+}
+
+void WorldContacts::follow(const ContactScene& scene, int i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (followed_[at]) return;
+    follow_freely(scene.bodies[at], scene.settings, paths_[at]);
+    followed_[at] = true;
+}
+
+Impact WorldContacts::foresee(const ContactScene& scene, int i, int j) {
+    follow(scene, i), follow(scene, j);
+    const MovingBody &a = scene.bodies[static_cast<std::size_t>(i)],
+                     &b = scene.bodies[static_cast<std::size_t>(j)];
+    return time_of_impact(ConvexBody(a.posed), paths_[static_cast<std::size_t>(i)], ConvexBody(b.posed),
+                          paths_[static_cast<std::size_t>(j)], kTouching * size_of(a, b));
+}
+
+// Of a moving body's impacts, those within a substep of its first: the first may keep it from the others.
+void WorldContacts::accept_impacts(const ContactScene& scene) {
+    const double substep = scene.settings.dt / scene.settings.substeps;
+    for (const Meeting& m : meetings_)
+        for (const int id : {m.a, m.b}) first_[static_cast<std::size_t>(id)] = 1e300;
+    for (const Meeting& m : meetings_)
+        for (const int id : {m.a, m.b}) {
+            double& first = first_[static_cast<std::size_t>(id)];
+            if (scene.bodies[static_cast<std::size_t>(id)].moves()) first = std::min(first, m.time);
+        }
+    const std::size_t count = manifolds_.size();
+    for (const Meeting& m : meetings_)
+        if (m.time <=
+            substep + std::min(first_[static_cast<std::size_t>(m.a)], first_[static_cast<std::size_t>(m.b)]))
+            (void)add_impact(scene, m);
+    if (manifolds_.size() > count) std::sort(manifolds_.begin(), manifolds_.end(), by_key);
+}
+
+// The contact of a pair where its paths bring it at a time. Its separation now is what its rows, which stand
+// still over the step, close until then. false: it has none there.
+bool WorldContacts::add_impact(const ContactScene& scene, const Meeting& meeting) {
+    const int ids[2] = {meeting.a, meeting.b};
+    BodyPath::Way way[2];
+    for (std::size_t side = 0; side < 2; ++side) {
+        const auto id = static_cast<std::size_t>(ids[side]);
+        const BodyPath::Pose pose = paths_[id].at(meeting.time);
+        at_[side].kind = scene.bodies[id].kind;
+        at_[side].set(pose.position, pose.orientation, scene.bodies[id].state.q);
+        way[side] = paths_[id].until(meeting.time);
+    }
+    const MovingBody &a = scene.bodies[static_cast<std::size_t>(meeting.a)],
+                     &b = scene.bodies[static_cast<std::size_t>(meeting.b)];
+    Manifold manifold;
+    manifold.a = meeting.a, manifold.b = meeting.b;
+    const float margin = static_cast<float>(kSlow * size_of(a, b));
+    narrow_.pair(at_[0], at_[1], {margin, find_last(manifold.key()), scene.among_ghosts, true}, manifold);
+    if (manifold.count == 0) return false;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(manifold.count); ++i) {
+        ManifoldPoint& p = manifold.points[i];
+        const Eigen::Vector3d n = p.normal.cast<double>();
+        const double closed =
+            n.dot(way[0].moved - way[1].moved + way[0].turned.cross(p.arm_a.cast<double>()) -
+                  way[1].turned.cross(p.arm_b.cast<double>()));
+        const double gap = std::max(static_cast<double>(p.separation), 0.0);
+        p.gap = gap > 2 * kTouching * size_of(a, b) ? static_cast<float>(gap) : 0;
+        p.separation = static_cast<float>(gap - closed);
+        p.begins = static_cast<float>(meeting.time);
+        p.normal_impulse = 0, p.friction_impulse.setZero();
+    }
+    manifold.emerging = false;
+    manifold.friction = std::sqrt(a.friction * b.friction);
+    manifold.restitution = std::max(a.restitution, b.restitution);
+    ++impacts_;
+    manifolds_.push_back(manifold);
+    return true;
+}
+
+void WorldContacts::keep_last() {
+    const auto again = [](const Manifold& a, const Manifold& b) { return a.key() == b.key(); };
+    auto kept = manifolds_.begin();
+    for (auto next = manifolds_.begin(); next != manifolds_.end(); ++next) {
+        if (kept != manifolds_.begin() && again(*std::prev(kept), *next)) --kept;
+        *kept++ = *next;
+    }
+    manifolds_.erase(kept, manifolds_.end());
+}
+
+// Whether the solved motion differs from the free one by more than slow pairs may move.
+bool WorldContacts::left_path(const ContactScene& scene, int i) const {
+    if (watched_[static_cast<std::size_t>(i)]) return true;
+    const MovingBody& body = scene.bodies[static_cast<std::size_t>(i)];
+    const Reach& reach = reach_[static_cast<std::size_t>(i)];
+    const double least = kSlow * smallest_half(body.posed);
+    const Eigen::Vector3d aside = body.state.position - body.posed.position - reach.moved;
+    if (aside.squaredNorm() > least * least) return true;
+    return scene.settings.dt * turning_speed(body) > reach.turned + least;
+}
+
+// Bodies that left their free paths, against all that their paths come near.
+const std::vector<WorldContacts::Meeting>& WorldContacts::unforeseen(const ContactScene& scene,
+                                                                     const std::vector<bool>& solved) {
+    meetings_.clear();
+    bool any = false;
+    auto& boxes = broad_.boxes();
+    boxes.clear();
+    for (const int id : scene.here) {
+        const auto at = static_cast<std::size_t>(id);
+        if (solved[at] && left_path(scene, id)) any = true;
+    }
+    if (!any) return meetings_;
+    const double substep = scene.settings.dt / scene.settings.substeps;
+    for (const int id : scene.here) {
+        const auto at = static_cast<std::size_t>(id);
+        const MovingBody& body = scene.bodies[at];
+        const bool left = solved[at] && left_path(scene, id);
+        if (!solved[at]) {
+            follow(scene, id);
+        } else {
+            set_spins(body, paths_[at]);
+        }
+        Eigen::Vector3d low = body.posed.position, high = low;
+        for (std::size_t i = 0; i < paths_[at].legs.size(); ++i) {
+            const BodyPath::Leg& leg = paths_[at].legs[i];
+            const Eigen::Vector3d end = leg.position + (paths_[at].end_of(i) - leg.start) * leg.velocity;
+            low = low.cwiseMin(leg.position).cwiseMin(end), high = high.cwiseMax(leg.position).cwiseMax(end);
+        }
+        const double radius = static_cast<double>(body.posed.radius);
+        boxes.push_back({low.array() - radius, high.array() + radius, id, left});
+    }
+    for (const auto& pair : broad_.find())
+        if (may_meet(scene, pair)) meet_unforeseen(scene, pair.first, pair.second);
+    if (meetings_.empty()) return meetings_;
+    // Each body's first.
+    for (const Meeting& m : meetings_)
+        for (const int id : {m.a, m.b}) first_[static_cast<std::size_t>(id)] = 1e300;
+    for (const Meeting& m : meetings_)
+        for (const int id : {m.a, m.b}) {
+            double& first = first_[static_cast<std::size_t>(id)];
+            if (scene.bodies[static_cast<std::size_t>(id)].moves()) first = std::min(first, m.time);
+        }
+    std::erase_if(meetings_, [&](const Meeting& m) {
+        return m.time > substep + std::min(first_[static_cast<std::size_t>(m.a)],
+                                           first_[static_cast<std::size_t>(m.b)]);
+    });
+    std::erase_if(meetings_, [&](const Meeting& m) { return !add_impact(scene, m); });
+    std::sort(manifolds_.begin(), manifolds_.end(), by_key);
+    return meetings_;
+}
+
+void WorldContacts::meet_unforeseen(const ContactScene& scene, int i, int j) {
+    const MovingBody &a = scene.bodies[static_cast<std::size_t>(i)],
+                     &b = scene.bodies[static_cast<std::size_t>(j)];
+    if (!a.moves() && !b.moves()) return;
+    const BodyPath &pa = paths_[static_cast<std::size_t>(i)], &pb = paths_[static_cast<std::size_t>(j)];
+    const double size = size_of(a, b);
+    const Manifold* now = find_now(static_cast<std::uint64_t>(i) << 32 | static_cast<std::uint32_t>(j));
+    if (now && !is_far(pa, pb, kSlow * size, a, b)) return;
+    const bool bent = is_bent(a.posed) || is_bent(b.posed);
+    const double inside =
+        now ? std::min((bent ? kInsideBent : kInside) + kDeeper * impacts_of(i, j), kDeepest) : 0;
+    const ConvexBody of_a(a.posed, inside), of_b(b.posed, inside);
+    const Impact impact = time_of_impact(of_a, pa, of_b, pb, kTouching * size);
+    if (!impact.meets || (impact.at_once && now)) return;
+    meetings_.push_back({i, j, impact.time, now != nullptr});
+}
+
+}  // namespace sim
