@@ -15,7 +15,7 @@ struct PosedBody {
     LaneArray polynomial;  ///< displacement: [brick][27][3], whole lanes in all; modal bodies only
     Eigen::Matrix3f deformation = Eigen::Matrix3f::Identity();  ///< D of (2.12), linear bodies
     Eigen::Matrix3f deformation_inverse = Eigen::Matrix3f::Identity();
-    Eigen::Vector3f half_box = Eigen::Vector3f::Zero();                             ///< of the deformed body, its own axes [m]
+    Eigen::Vector3f half_box = Eigen::Vector3f::Zero();   ///< of the deformed body, its own axes [m]
     float radius = 0;                                     ///< [m]
     float sample_reach = 0;                               ///< how far samples are from their rest places [m]
     Eigen::Vector3d half_aabb = Eigen::Vector3d::Zero();  ///< world axes [m]
