@@ -219,8 +219,9 @@ TEST(BenchHard, TwoShortScenesRunBesideThePeersThatAreThere) {
                 engines.insert(run.engine);
                 EXPECT_GT(run.ms_per_s, 0);
                 EXPECT_EQ(run.figures.quarantined, 0);
-                const bool missed = scene.scene.name == "ghost" && run.engine != "MusicWorld";
-                EXPECT_TRUE(!missed || run.figures.right) << run.engine << ' ' << run.figures.error;
+                // Peers find no way past the card; nobody may invent a contact.
+                const bool expected = scene.scene.name == "ghost" || run.engine == "MusicWorld";
+                EXPECT_TRUE(!expected || run.figures.right) << run.engine << ' ' << run.figures.error;
             }
     EXPECT_EQ(engines.size(), 1 + sim_bench::rigid_peers().size());
     const app::Figures figures = app::figures_of(bench);

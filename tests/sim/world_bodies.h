@@ -1,6 +1,9 @@
 #pragma once
 #include <sim/world.h>
 
+#include <cmath>
+#include <random>
+
 /// Bodies for tests of the world.
 namespace world_test {
 
@@ -39,5 +42,23 @@ inline sim::WorldDefinition weightless() {
 inline void run(sim::World& world, int steps) {
     for (int i = 0; i < steps; ++i) world.step();
 }
+
+/// Random numbers, the same with every standard library.
+class Draw {
+public:
+    explicit Draw(unsigned seed) : random_(seed) {}
+    double between(double a, double b) { return a + (b - a) * (random_() / 4294967296.0); }
+    double scale(double a, double b) { return std::exp(between(std::log(a), std::log(b))); }
+    int below(int n) { return static_cast<int>(random_() % static_cast<unsigned>(n)); }
+    Eigen::Vector3d direction() {
+        Eigen::Vector3d v;
+        do v = {between(-1, 1), between(-1, 1), between(-1, 1)};
+        while (v.norm() > 1 || v.norm() < 0.1);
+        return v.normalized();
+    }
+
+private:
+    std::mt19937 random_;
+};
 
 }  // namespace world_test

@@ -9,9 +9,11 @@
 namespace sim {
 namespace {
 
+constexpr int kBody = 6;  // coordinates of a rigid body, the size that most have: known to the compiler
 using Panel = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-using ConstPanel = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+using BodyPanel = Eigen::Map<Eigen::Matrix<double, kBody, kBody>, 0, Eigen::OuterStride<>>;
 using RowTriple = Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>>;
+using BodyTriple = Eigen::Map<const Eigen::Matrix<double, 3, kBody, Eigen::RowMajor>>;
 
 }  // namespace
 
@@ -119,6 +121,12 @@ void BlockCholesky::add(int a, const double* rows_a, int b, const double* rows_b
         const int at = position_[static_cast<std::size_t>(column)];
         Panel target(block(position_[static_cast<std::size_t>(row)], at), height, width,
                      Eigen::OuterStride<>(columns_[static_cast<std::size_t>(at)].height));
+        if (height == kBody && width == kBody) {
+            const Eigen::Matrix<double, 3, kBody> weighted = weight * BodyTriple(of_column);
+            BodyPanel(target.data(), Eigen::OuterStride<>(target.outerStride())).noalias() +=
+                BodyTriple(of_row).transpose() * weighted;
+            return;
+        }
         const RowTriple left(of_row, 3, height), right(of_column, 3, width);
         for (int j = 0; j < width; ++j) {
             const Eigen::Vector3d w = weight * right.col(j);
@@ -130,60 +138,84 @@ void BlockCholesky::add(int a, const double* rows_a, int b, const double* rows_b
     if (a >= 0 && b >= 0) put(b, rows_b, a, rows_a);
 }
 
-void BlockCholesky::factor() {
-    for (std::size_t p = 0; p < columns_.size(); ++p) {
-        const Column& c = columns_[p];
-        Panel panel(values_.data() + c.start, c.height, c.size, Eigen::OuterStride<>(c.height));
-        auto top = panel.topRows(c.size);
-        for (int j = 0; j < c.size; ++j) {  // unblocked: at most some tens of rows
-            double pivot = top(j, j) - top.row(j).head(j).squaredNorm();
-            pivot = std::sqrt(std::max(pivot, 1e-300));
-            top(j, j) = pivot;
-            for (int i = j + 1; i < static_cast<int>(c.height); ++i)
-                panel(i, j) = (panel(i, j) - panel.row(i).head(j).dot(top.row(j).head(j))) / pivot;
-        }
-        for (std::uint32_t j = 0; j < c.count; ++j) {
-            const Block& column = blocks_[c.first + j];
-            const Column& target = columns_[static_cast<std::size_t>(column.position)];
-            const auto of_column = panel.middleRows(column.below, target.size);
-            for (std::uint32_t i = j; i < c.count; ++i) {
-                const Block& row = blocks_[c.first + i];
-                const int rows = columns_[static_cast<std::size_t>(row.position)].size;
-                Panel at(block(row.position, column.position), rows, target.size,
-                         Eigen::OuterStride<>(target.height));
-                at.noalias() -= panel.middleRows(row.below, rows).lazyProduct(of_column.transpose());
+// kSize: of the column, kBody, or Eigen::Dynamic.
+template <int kSize>
+void BlockCholesky::factor_column(const Column& c) {
+    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, kSize>, 0, Eigen::OuterStride<>> panel(
+        values_.data() + c.start, c.height, c.size, Eigen::OuterStride<>(c.height));
+    for (int j = 0; j < c.size; ++j) {  // unblocked: at most some tens of columns
+        const int below = static_cast<int>(c.height) - j;
+        auto column = panel.col(j).tail(below);
+        for (int k = 0; k < j; ++k) column -= panel(j, k) * panel.col(k).tail(below);
+        column /= std::sqrt(std::max(column[0], 1e-300));
+    }
+    for (std::uint32_t j = 0; j < c.count; ++j) {
+        const Block& column = blocks_[c.first + j];
+        const Column& target = columns_[static_cast<std::size_t>(column.position)];
+        for (std::uint32_t i = j; i < c.count; ++i) {
+            const Block& row = blocks_[c.first + i];
+            const int rows = columns_[static_cast<std::size_t>(row.position)].size;
+            double* at = block(row.position, column.position);
+            if (kSize == kBody && rows == kBody && target.size == kBody) {
+                BodyPanel(at, Eigen::OuterStride<>(target.height)).noalias() -=
+                    panel.template middleRows<kBody>(row.below) *
+                    panel.template middleRows<kBody>(column.below).transpose();
+            } else {
+                Panel(at, rows, target.size, Eigen::OuterStride<>(target.height)).noalias() -=
+                    panel.middleRows(row.below, rows)
+                        .lazyProduct(panel.middleRows(column.below, target.size).transpose());
             }
         }
     }
 }
 
+void BlockCholesky::factor() {
+    for (const Column& c : columns_)
+        c.size == kBody ? factor_column<kBody>(c) : factor_column<Eigen::Dynamic>(c);
+}
+
+// x <- L^-1 x of a column, and x <- L^-T x.
+template <int kSize>
+void BlockCholesky::solve_down(const Column& c, double* x) const {
+    const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, kSize>, 0, Eigen::OuterStride<>> panel(
+        values_.data() + c.start, c.height, c.size, Eigen::OuterStride<>(c.height));
+    Eigen::Map<Eigen::Matrix<double, kSize, 1>> own(x + offset(c.node), c.size);
+    for (int j = 0; j < c.size; ++j) {
+        own[j] /= panel(j, j);
+        for (int i = j + 1; i < c.size; ++i) own[i] -= panel(i, j) * own[j];
+    }
+    for (std::uint32_t i = 0; i < c.count; ++i) {
+        const Block& row = blocks_[c.first + i];
+        const Column& other = columns_[static_cast<std::size_t>(row.position)];
+        Eigen::Map<Eigen::VectorXd>(x + offset(other.node), other.size).noalias() -=
+            panel.middleRows(row.below, other.size).lazyProduct(own);
+    }
+}
+
+template <int kSize>
+void BlockCholesky::solve_up(const Column& c, double* x) const {
+    const Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, kSize>, 0, Eigen::OuterStride<>> panel(
+        values_.data() + c.start, c.height, c.size, Eigen::OuterStride<>(c.height));
+    Eigen::Map<Eigen::Matrix<double, kSize, 1>> own(x + offset(c.node), c.size);
+    for (std::uint32_t i = 0; i < c.count; ++i) {
+        const Block& row = blocks_[c.first + i];
+        const Column& other = columns_[static_cast<std::size_t>(row.position)];
+        own.noalias() -=
+            panel.middleRows(row.below, other.size)
+                .transpose()
+                .lazyProduct(Eigen::Map<const Eigen::VectorXd>(x + offset(other.node), other.size));
+    }
+    for (int j = c.size - 1; j >= 0; --j) {
+        for (int i = j + 1; i < c.size; ++i) own[j] -= panel(i, j) * own[i];
+        own[j] /= panel(j, j);
+    }
+}
+
 void BlockCholesky::solve(double* x) const {
-    auto part = [&](int node) {
-        return Eigen::Map<Eigen::VectorXd>(x + offsets_[static_cast<std::size_t>(node)],
-                                           sizes_[static_cast<std::size_t>(node)]);
-    };
-    for (const Column& c : columns_) {
-        const ConstPanel panel(values_.data() + c.start, c.height, c.size, Eigen::OuterStride<>(c.height));
-        auto own = part(c.node);
-        panel.topRows(c.size).triangularView<Eigen::Lower>().solveInPlace(own);
-        for (std::uint32_t i = 0; i < c.count; ++i) {
-            const Block& row = blocks_[c.first + i];
-            const Column& other = columns_[static_cast<std::size_t>(row.position)];
-            part(other.node).noalias() -= panel.middleRows(row.below, other.size).lazyProduct(own);
-        }
-    }
-    for (auto at = columns_.rbegin(); at != columns_.rend(); ++at) {
-        const Column& c = *at;
-        const ConstPanel panel(values_.data() + c.start, c.height, c.size, Eigen::OuterStride<>(c.height));
-        auto own = part(c.node);
-        for (std::uint32_t i = 0; i < c.count; ++i) {
-            const Block& row = blocks_[c.first + i];
-            const Column& other = columns_[static_cast<std::size_t>(row.position)];
-            own.noalias() -=
-                panel.middleRows(row.below, other.size).transpose().lazyProduct(part(other.node));
-        }
-        panel.topRows(c.size).triangularView<Eigen::Lower>().transpose().solveInPlace(own);
-    }
+    for (const Column& c : columns_)
+        c.size == kBody ? solve_down<kBody>(c, x) : solve_down<Eigen::Dynamic>(c, x);
+    for (auto c = columns_.rbegin(); c != columns_.rend(); ++c)
+        c->size == kBody ? solve_up<kBody>(*c, x) : solve_up<Eigen::Dynamic>(*c, x);
 }
 
 }  // namespace sim

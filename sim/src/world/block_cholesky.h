@@ -40,6 +40,13 @@ private:
         std::uint32_t below;  // rows of the column above it
     };
     double* block(int row, int column);  // by position; row >= column
+    template <int kSize>
+    void factor_column(const Column& c);
+    template <int kSize>
+    void solve_down(const Column& c, double* x) const;
+    template <int kSize>
+    void solve_up(const Column& c, double* x) const;
+    [[nodiscard]] int offset(int node) const { return offsets_[static_cast<std::size_t>(node)]; }
     template <typename Visitor>
     void each_neighbour(std::size_t node, Visitor visit) const;  // ascending
 

@@ -18,10 +18,11 @@ constexpr double kHeld = 1e-2, kHeldAlong = 0.1;  // of a contact's impulse to t
 constexpr double kCorrected = 0.2;                // share of an overlap that a substep takes back
 constexpr int kMostTurns = 12;                    // of the ends' Newton iteration
 constexpr double kResolved = 0.25;                // h^2 k / m of a spring up to which its motion is followed
-constexpr double kEndTolerance = 1e-8;            // of a gap [m]
-constexpr double kMostFall = 1.2e-3;              // in a substep, share of a body's size
-constexpr int kMostFallLevel = 6;                 // for that a substep is halved so often at most
-constexpr double kMostTurn = 0.04;                // of a spring's arm in a substep [rad]
+constexpr double kSoftSpring = 0.05, kMostDamped = 0.5;  // see springs_are_soft
+constexpr double kEndTolerance = 1e-8;                   // of a gap, share of a body's size
+constexpr double kMostFall = 1.2e-3;                     // in a substep, share of a body's size
+constexpr int kMostFallLevel = 6;                        // for that a substep is halved so often at most
+constexpr double kMostTurn = 0.04;                       // of a spring's arm in a substep [rad]
 
 }  // namespace
 
@@ -30,25 +31,33 @@ Eigen::Vector3d IslandSolver::in_world(const ContactRows& c, const Eigen::Vector
            p[2] * c.tangent[1].cast<double>();
 }
 
-// Whether one factorisation takes at most so many multiply-adds.
-bool IslandSolver::begin_direct(double most, bool with_contacts) {
+// Prepares a direct solution; false: a factorisation takes more than so many multiply-adds. Stiff springs are solved directly
+// all the same, with sweeps over the contacts.
+bool IslandSolver::begin_direct(double most, bool must) {
     sizes_.clear();
-    std::uint32_t at = 0;
-    for (const BodyRows& rows : rows_of_) sizes_.push_back(with_contacts ? 6 + rows.body->kind->modes : 0);
-    for (const SpringRows& s : springs_)
-        for (const Side& side : s.side)
-            if (side.body >= 0) {
-                const auto i = static_cast<std::size_t>(side.body);
-                sizes_[i] = 6 + rows_of_[i].body->kind->modes;
-            }
-    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
-        rows_of_[i].at = at;
-        at += static_cast<std::uint32_t>(sizes_[i]);
+    std::uint32_t at = 0, wide = 0;
+    for (BodyRows& rows : rows_of_) {
+        sizes_.push_back(6 + rows.body->kind->modes);
+        rows.at = at;
+        at += static_cast<std::uint32_t>(sizes_.back());
     }
+    auto couple = [this](bool with_contacts) {
+        factor_.begin(sizes_);
+        if (with_contacts)
+            for (const ContactRows& c : contacts_) factor_.couple(c.side[0].body, c.side[1].body);
+        for (const SpringRows& s : springs_) factor_.couple(s.side[0].body, s.side[1].body);
+    };
+    couple(true);
+    with_contacts_ = std::isfinite(factor_.analyse(most));
+    if (!with_contacts_) {
+        if (!must && springs_are_soft()) return false;
+        couple(false);
+        (void)factor_.analyse(std::numeric_limits<double>::infinity());
+    }
+    direct_ = true;
     for (auto* list : {&wide_y_, &wide_start_, &wide_free_, &wide_held_, &gradient_, &step_})
         list->assign(at, 0.);
     ends_.resize(rows_of_.size());
-    std::uint32_t wide = 0;
     auto reserve = [&](Rows& rows) {
         for (int side = 0; side < 2; ++side) {
             if (rows.side[side].body < 0) continue;
@@ -60,14 +69,7 @@ bool IslandSolver::begin_direct(double most, bool with_contacts) {
     for (SpringRows& s : springs_) reserve(s);
     wide_rows_.resize(wide);
     direct_contacts_.assign(contacts_.size(), {});
-    factor_.begin(sizes_);
-    if (with_contacts)
-        for (const ContactRows& c : contacts_) factor_.couple(c.side[0].body, c.side[1].body);
-    for (const SpringRows& s : springs_) factor_.couple(s.side[0].body, s.side[1].body);
-    const double cost = factor_.analyse(most);
-    const bool cheap = std::isfinite(cost);
-    (with_contacts ? direct_ : springs_direct_) = cheap;
-    return cheap;
+    return true;
 }
 
 // The rows in double precision, without padding. Over the first half of a substep's impulses modes yield as they will to
@@ -89,6 +91,7 @@ void IslandSolver::widen(Rows& rows, bool positions) {
 
 // Rows follow the bodies.
 void IslandSolver::follow(bool positions) {
+    factored_ = false;
     for (BodyRows& rows : rows_of_) {
         rows.place = rows.body->state.position;
         rows.frame = rows.body->state.orientation.toRotationMatrix();
@@ -148,7 +151,6 @@ void IslandSolver::load_wide(bool positions) {
 
 void IslandSolver::find_ends() {
     for (std::size_t i = 0; i < rows_of_.size(); ++i) {
-        if (sizes_[i] == 0) continue;
         const BodyRows& rows = rows_of_[i];
         const BodyKind& kind = *rows.body->kind;
         const WorldBodyState& s = rows.body->state;
@@ -159,6 +161,7 @@ void IslandSolver::find_ends() {
         Eigen::Vector3d momentum = s.angular_momentum + rows.frame * change;
         if (rows.body->pushed) momentum += h_ / 2 * rows.body->torque;
         ends_[i].orientation = rows.rotation.advance(s.orientation, momentum);
+        ends_[i].momentum = momentum;
     }
 }
 
@@ -226,10 +229,12 @@ void IslandSolver::begin_contact(std::size_t i, const Eigen::Vector3d& seen_so_f
         positions ? std::min(kSoft * c.k[0][0], by_load) : std::min(kHeld * c.k[0][0], 10 * by_load);
     d.tangent_gamma = kHeldAlong / c.slide_mass;
     d.bias = bias;
-    d.active = c.begins <= substep_;
+    d.active = static_cast<double>(c.point->begins) < time_ + h_;
     d.before = d.active ? guess : Eigen::Vector3d(Eigen::Vector3d::Zero());
     d.bound = c.friction * d.before[0];
     give(c, d.before - seen_so_far, wide_start_);
+    d.impulse = d.before;
+    if (!with_contacts_) set_mobility(c, d);
 }
 
 // Whether the springs' ends were brought to where they belong.
@@ -247,6 +252,9 @@ bool IslandSolver::solve_positions() {
         const double normal = scale * static_cast<double>(contacts_[i].at_move[0]);
         direct_contacts_[i].bound = static_cast<double>(contacts_[i].friction) * normal;
         give(contacts_[i], {normal, 0, 0}, wide_y_);
+        if (with_contacts_) continue;
+        direct_contacts_[i].impulse[0] = normal;
+        give(contacts_[i], {normal, 0, 0}, wide_start_);
     }
     for (SpringRows& s : springs_) {
         set_firmness(s, true);
@@ -255,6 +263,7 @@ bool IslandSolver::solve_positions() {
     double before = std::numeric_limits<double>::infinity(), size = before;
     for (const SpringRows& s : springs_) size = std::min(size, size_of(s));
     const double enough = kEndTolerance * size;
+    const int settles = springs_.empty() ? 0 : 1;  // the turn, once near the ends
     for (int turn = 0; turn <= kMostTurns; ++turn) {
         find_ends();
         double worst = 0;
@@ -263,15 +272,35 @@ bool IslandSolver::solve_positions() {
             worst = std::max(worst, (gap + h_ * s.gamma * s.impulse).norm());
             s.offset = gap / h_ - seen(s, wide_y_);
         }
-        if (turn > 0 && worst <= enough) return turns_little();
+        if (turn > (contacts_.empty() ? 0 : settles) && worst <= enough) return turns_little();
         if (turn == kMostTurns || !(turn < 2 || worst < 0.7 * before)) return false;
         if (turn > 0) before = worst;
-        turn == 1 ? settle_contacts() : minimise(contacts_.empty());  // once near the ends
+        turn == settles || !with_contacts_ ? settle_contacts() : minimise();
     }
     return false;
 }
 
+// y_ and start_ from a half's solution, for what is measured and put right in single precision.
+void IslandSolver::narrow(bool positions) {
+    const double scale = mode_scale(positions);
+    for (const BodyRows& rows : rows_of_) {
+        float *y = y_.data() + rows.offset, *start = start_.data() + rows.offset;
+        const double *wide = wide_y_.data() + rows.at, *before = wide_free_.data() + rows.at;
+        const int modes = rows.body->kind->modes;
+        for (int i = 0; i < 6; ++i)
+            y[i] = static_cast<float>(wide[i]), start[i] = static_cast<float>(before[i]);
+        for (int k = 6; k < 6 + modes; ++k) {
+            y[2 + k] = static_cast<float>(scale * wide[k]);
+            start[2 + k] =
+                static_cast<float>(scale * before[k] - wide_held_[rows.at + static_cast<std::size_t>(k)]);
+        }
+        for (int k = 8 + modes; k < rows.width; ++k) y[k] = start[k] = 0;
+        y[6] = y[7] = start[6] = start[7] = 0;
+    }
+}
+
 void IslandSolver::move_directly() {
+    narrow(true);
     for (SpringRows& s : springs_) s.moved = s.impulse;
     for (std::size_t i = 0; i < rows_of_.size(); ++i) {
         WorldBodyState& s = rows_of_[i].body->state;
@@ -287,6 +316,8 @@ void IslandSolver::move_directly() {
             c.impulse[k] -= c.at_move[k];  // of the second half before
             c.at_move[k] = static_cast<float>(p[k]);
         }
+        c.largest = std::max(c.largest, c.at_move[0]);
+        note_work(c, c.at_move[0]);
         const Eigen::Vector3d kept(c.at_move[0], c.at_move[1], c.at_move[2]);
         if (!kept.isZero(0)) apply(c, in_world(c, kept), place_now(c));
         give(c, p, gradient_);
@@ -327,25 +358,13 @@ void IslandSolver::solve_velocities() {
 }
 
 void IslandSolver::finish_directly(bool last) {
-    for (const BodyRows& rows : rows_of_) {
-        float *y = y_.data() + rows.offset, *start = start_.data() + rows.offset;
-        const double *wide = wide_y_.data() + rows.at, *before = wide_free_.data() + rows.at;
-        const int modes = rows.body->kind->modes;
-        for (int i = 0; i < 6; ++i)
-            y[i] = static_cast<float>(wide[i]), start[i] = static_cast<float>(before[i]);
-        for (int k = 6; k < 6 + modes; ++k) {
-            y[2 + k] = static_cast<float>(wide[k]);
-            start[2 + k] = static_cast<float>(before[k] - wide_held_[rows.at + static_cast<std::size_t>(k)]);
-        }
-        for (int k = 8 + modes; k < rows.width; ++k) y[k] = start[k] = 0;
-        y[6] = y[7] = start[6] = start[7] = 0;
-    }
+    narrow(false);
     for (std::size_t i = 0; i < contacts_.size(); ++i) {
         ContactRows& c = contacts_[i];
         for (int k = 0; k < 3; ++k) c.impulse[k] = static_cast<float>(direct_contacts_[i].impulse[k]);
         c.largest = std::max(c.largest, c.impulse[0]);
     }
-    note_work();
+    for (ContactRows& c : contacts_) note_work(c, c.impulse[0] - c.at_move[0]);
     if (last) restitute();
     ring_on();
     for (const ContactRows& c : contacts_) {
@@ -370,43 +389,35 @@ void IslandSolver::finish_directly(bool last) {
     }
 }
 
-// The springs of an island whose contacts are swept over: their impulses on top of those so far, from y_ and
-// back to it.
-void IslandSolver::solve_springs(bool positions) {
-    if (!springs_direct_) return;
-    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
-        if (sizes_[i] == 0) continue;
-        const BodyRows& rows = rows_of_[i];
-        for (const auto& [from, to] : {std::pair{&start_, &wide_start_}, std::pair{&y_, &wide_y_}}) {
-            std::copy_n(from->data() + rows.offset, 6, to->data() + rows.at);
-            std::copy_n(from->data() + rows.offset + 8, sizes_[i] - 6, to->data() + rows.at + 6);
-        }
-    }
-    if (positions) find_ends();
+// Whether all act as forces may, held over a substep: h^2 k / m, and the share of their ends' speed that damping takes.
+bool IslandSolver::springs_are_soft() {
+    return std::ranges::all_of(springs_, [this](SpringRows& s) {
+        write_spring(s);
+        const double w =
+            h_ * h_ * s.constraint->definition.stiffness * (s.k[0][0] + s.k[1][1] + s.k[2][2]) / 3;
+        return w <= kSoftSpring && 2 * s.constraint->definition.damping_ratio * std::sqrt(w) <= kMostDamped;
+    });
+}
+
+// Their forces, over the substep, where nothing holds.
+void IslandSolver::pull_springs() {
     for (SpringRows& s : springs_) {
-        widen(s, positions);
-        set_firmness(s, positions);
-        if (positions)
-            s.offset = gap_at_end(s) / h_ - seen(s, wide_y_) + s.gamma * s.moved;
-        else
-            s.offset = s.gamma * s.after;
-    }
-    wide_start_ = wide_y_;
-    minimise(true);
-    for (SpringRows& s : springs_) (positions ? s.moved : s.after) += s.impulse;
-    auto to_float = [](double x) { return static_cast<float>(x); };
-    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
-        if (sizes_[i] == 0) continue;
-        const double* wide = wide_y_.data() + rows_of_[i].at;
-        float* y = y_.data() + rows_of_[i].offset;
-        std::transform(wide, wide + 6, y, to_float);
-        std::transform(wide + 6, wide + sizes_[i], y + 8, to_float);
+        write_spring(s);
+        const PointConstraint& held = s.constraint->definition;
+        const double own = (s.k[0][0] + s.k[1][1] + s.k[2][2]) / 3;
+        float v[3];
+        speeds(s, v);
+        const Eigen::Vector3d speed(v[0], v[1], v[2]);
+        s.moved.setZero();
+        s.impulse = -h_ * held.stiffness * s.gap -
+                    2 * held.damping_ratio * h_ * std::sqrt(held.stiffness / own) * speed;
+        push_by(s, {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])});
     }
 }
 
 // How far a unit of impulse lets a spring's ends move, and change their speed.
 //
-// Directly, a spring's force acts half before and half after the bodies move. With w = h^2 k / m of the bodies' mass there: what
+// A spring's force acts half before and half after the bodies move. With w = h^2 k / m of the bodies' mass there: what
 // the substep resolves (w up to kResolved) by the trapezoidal rule, which keeps a spring's energy: each half is
 //   1/2 h (k (C0 + C1) / 2 + c (C1 - C0) / h),  C0, C1: the ends' gap before and after;
 // what is stiffer holds: the first half is 1/2 h k C1, the second takes all speed between the ends.
@@ -414,52 +425,42 @@ void IslandSolver::set_firmness(SpringRows& s, bool positions) const {
     const PointConstraint& held = s.constraint->definition;
     const double own = (s.k[0][0] + s.k[1][1] + s.k[2][2]) / 3, k = held.stiffness;
     const double w = h_ * h_ * k * own;
-    if (direct_) {
-        const double loss = 2 * held.damping_ratio / std::sqrt(w);
-        s.resolved = w <= kResolved;
-        s.lag = s.resolved ? (0.5 - loss) / (0.5 + loss) : 0;
-        const double yields = positions    ? 2 / w / (s.resolved ? 0.5 + loss : 1)
-                              : s.resolved ? std::numeric_limits<double>::infinity()
-                                           : 0;
-        s.gamma = own * std::max(yields, kFirm);
+    if (!std::isfinite(w)) {
+        s.resolved = false, s.lag = 0, s.gamma = kFirm * own;
         return;
     }
-    const double damping = 2 * held.damping_ratio * std::sqrt(k / own);
-    const double firm = positions ? h_ * k : damping + h_ * k * w / (1 + w);
-    s.gamma = std::max(1 / (h_ * firm), kFirm * own);
+    const double loss = 2 * held.damping_ratio / std::sqrt(w);
+    s.resolved = w <= kResolved;
+    s.lag = s.resolved ? (0.5 - loss) / (0.5 + loss) : 0;
+    const double yields = positions    ? 2 / w / (s.resolved ? 0.5 + loss : 1)
+                          : s.resolved ? std::numeric_limits<double>::infinity()
+                                       : 0;
+    s.gamma = own * std::max(yields, kFirm);
 }
 
 // A substep, or two of half its length where the springs' ends turn too far for one.
-void IslandSolver::direct_substep(int level, bool first, bool last) {
+void IslandSolver::direct_substep(int level, bool last) {
     level_ = level;
     h_ = settings_->dt / settings_->substeps / (1 << level);
     for (BodyRows& rows : rows_of_) rows.rotation = FreeRotation(rows.body->kind->mass.inertia, h_);
-    if (((falls_little() || level >= kMostFallLevel) && try_substep(first, last)) ||
-        level + 1 == kSubstepLevels)
+    if (((falls_little() || level >= kMostFallLevel) && try_substep(last)) || level + 1 == kSubstepLevels)
         return;
     remaining_ += h_ / 2;
-    direct_substep(level + 1, first, false);
+    direct_substep(level + 1, false);
     remaining_ -= settings_->dt / settings_->substeps / (2 << level);
-    direct_substep(level + 1, false, last);
+    direct_substep(level + 1, last);
 }
 
-// Where the bodies' paths are asked for, a leg per substep, however often that was halved.
-void IslandSolver::begin_legs() {
-    for (const BodyRows& rows : rows_of_) {
-        if (!paths_) return;
-        (*paths_)[static_cast<std::size_t>(rows.body - bodies_->data())].legs.push_back(
-            {.start = settings_->dt / settings_->substeps * substep_,
-             .position = rows.body->state.position,
-             .orientation = rows.body->state.orientation});
-    }
-}
-
-void IslandSolver::end_legs() {
-    for (const BodyRows& rows : rows_of_) {
-        if (!paths_) return;
-        BodyPath::Leg& leg = (*paths_)[static_cast<std::size_t>(rows.body - bodies_->data())].legs.back();
-        leg.velocity = (rows.body->state.position - leg.position) * (settings_->substeps / settings_->dt);
-        leg.momentum = rows.body->state.angular_momentum;
+// What bodies do in this substep, of their paths.
+void IslandSolver::write_legs() {
+    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
+        const WorldBodyState& s = rows_of_[i].body->state;
+        (*paths_)[static_cast<std::size_t>(rows_of_[i].body - bodies_->data())].legs.push_back(
+            {.start = time_,
+             .position = s.position,
+             .orientation = s.orientation,
+             .velocity = (ends_[i].position - s.position) / h_,
+             .momentum = ends_[i].momentum});
     }
 }
 
@@ -472,30 +473,95 @@ bool IslandSolver::falls_little() const {
 }
 
 // False: nothing has been done, for the substep is too long.
-bool IslandSolver::try_substep(bool first, bool last) {
+bool IslandSolver::try_substep(bool last) {
     std::fill(wide_held_.begin(), wide_held_.end(), 0.);
     for (BodyRows& rows : rows_of_) rows.place = rows.body->state.position;
     follow(true);
     load_wide(true);
     for (ContactRows& c : contacts_) {
-        if (first) {
+        if (fresh_) {
             c.now = c.separation;
             for (int k = 0; k < 3; ++k) c.at_move[k] = c.impulse[k] / 2;  // at rest
         }
+        // An impact begins where the bodies touch.
+        const double begins = static_cast<double>(c.point->begins);
+        if (begins >= time_ && begins < time_ + h_) c.now = std::max(c.now, 0.f);
         if (c.restitution > 0 && c.largest == 0) c.approach = static_cast<float>(seen(c, wide_free_)[0]);
     }
     const bool reached = solve_positions();
     if (!reached && level_ + 1 < kSubstepLevels) return false;
     find_ends();
     kick();
+    if (paths_) write_legs();
     move_directly();
+    const bool stale = !last && moved_on();
     kick();
     follow(false);
     load_wide(false);
     solve_velocities();
-    finish_directly(last);
-    last_h_ = h_;
+    finish_directly(last || stale);
+    last_h_ = h_, time_ += h_, fresh_ = false;
+    if (stale) find_again();
     return true;
+}
+
+void IslandSolver::note_places() {
+    for (BodyRows& rows : rows_of_) {
+        rows.found_at = rows.body->state.position;
+        rows.found_turned = rows.body->state.orientation;
+    }
+}
+
+// Whether bodies have left where contacts were found by so much that these are others.
+bool IslandSolver::moved_on() const {
+    return std::ranges::any_of(rows_of_, [](const BodyRows& rows) {
+        const WorldBodyState& s = rows.body->state;
+        const double turn = 2 * (rows.found_turned.conjugate() * s.orientation).vec().norm();
+        const double moved = (s.position - rows.found_at).norm() + turn * turn_reach_of(*rows.body->kind);
+        return moved > kSlow * rows.body->kind->half_box.minCoeff();
+    });
+}
+
+// The contacts anew, where the bodies are.
+void IslandSolver::find_again() {
+    const std::vector<int>& of_island = island_->manifolds;
+    if (!found_again_) {
+        found_.clear();
+        for (const int m : of_island) found_.push_back((*manifolds_)[static_cast<std::size_t>(m)]);
+    }
+    for (const ContactRows& c : contacts_) {
+        std::ptrdiff_t place = c.manifold - (found_again_ ? found_ : *manifolds_).data();
+        if (!found_again_)
+            place = std::ranges::lower_bound(of_island, static_cast<int>(place)) - of_island.begin();
+        ManifoldPoint& point = found_[static_cast<std::size_t>(place)]
+                                   .points[static_cast<std::size_t>(c.point - c.manifold->points.data())];
+        keep_impulse(c, point);
+        point.separation = c.now;
+    }
+    contact_finder_.find(*scene_, island_->bodies, time_, found_);
+    found_again_ = true;
+    note_places();
+    fresh_ = true;
+    if (found_.empty() && contacts_.empty()) return;
+    std::size_t floats = 0;
+    auto width_of = [this](int id) {
+        return id >= 0 && id < kFirstPlane && local(id) >= 0
+                   ? 3 * static_cast<std::size_t>((*bodies_)[static_cast<std::size_t>(id)].kind->width)
+                   : 0;
+    };
+    for (const Manifold& m : found_)
+        floats += static_cast<std::size_t>(m.count) * (width_of(m.a) + width_of(m.b));
+    for (const SpringRows& s : springs_)
+        floats += width_of(s.constraint->definition.body_a) + width_of(s.constraint->definition.body_b);
+    jacobians_.resize(floats);
+    jacobians_used_ = 0;
+    contacts_.clear(), impacts_.clear();
+    for (Manifold& m : found_)
+        for (std::size_t i = 0; i < static_cast<std::size_t>(m.count); ++i) add_contact(m, m.points[i]);
+    for (SpringRows& s : springs_)
+        for (Side& side : s.side) side = reserve_rows(side.body);
+    (void)begin_direct(springs_.empty() ? std::numeric_limits<double>::infinity() : most_with_springs(),
+                       true);
 }
 
 }  // namespace sim

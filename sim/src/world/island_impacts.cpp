@@ -193,7 +193,7 @@ void IslandSolver::aim(ContactRows& c) const {
 // Of bodies with modes, out of the energy that the impact took.
 void IslandSolver::rebound(ContactRows& c) {
     if (is_rigid(c) || c.point->gap > 0) return;
-    note_work(c);
+    note_work(c, c.impulse[0]);
     restitute(c);
 }
 

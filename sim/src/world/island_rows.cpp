@@ -62,6 +62,8 @@ void IslandSolver::begin(const Island& island) {
     y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
     std::fill_n(moved_.data(), offset, 0.f);
 
+    found_again_ = false, fresh_ = true, time_ = 0;
+    note_places();
     std::size_t triples = 0, floats = 0;
     auto width_of = [this](int id) {
         return id >= 0 && id < kFirstPlane && local(id) >= 0
@@ -81,7 +83,7 @@ void IslandSolver::begin(const Island& island) {
     jacobians_.resize(floats);
     jacobians_used_ = 0;
     contacts_.clear(), springs_.clear(), impacts_.clear();
-    any_told_ = direct_ = springs_direct_ = false;
+    any_told_ = direct_ = false;
     first_crossed_ = crossed_.size();
     contacts_.reserve(triples);
     for (const Turn& turn : in_turns(island))
@@ -92,9 +94,7 @@ void IslandSolver::begin(const Island& island) {
         const ContactRows &a = contacts_[i], &b = contacts_[j];
         return std::tuple(a.point->begins, a.manifold, i) < std::tuple(b.point->begins, b.manifold, j);
     });
-    if (springs_.empty()) return;
-    if (begin_direct(kMostWithSprings * static_cast<double>(rows_of_.size()))) return;
-    begin_direct(std::numeric_limits<double>::infinity(), false);
+    if (!springs_.empty()) (void)begin_direct(most_with_springs());
 }
 
 const std::vector<IslandSolver::Turn>& IslandSolver::in_turns(const Island& island) {
@@ -259,12 +259,14 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     contacts_.push_back(c);
 }
 
-// The rows of a contact, in the bodies' frames as they are now. Directly, at the one point at which its impulses act.
+// The rows of a contact, in the bodies' frames as they are now. Directly, at the one point at which its impulses act, once
+// it has begun.
 void IslandSolver::write_contact(ContactRows& c) {
     alignas(32) float scratch[2][3 * kMostModes];
     const ManifoldPoint& point = *c.point;
     Eigen::Vector3f arms[2] = {point.arm_a, point.arm_b};
-    if (direct_ && c.side[0].body >= 0 && c.side[1].body >= 0) {
+    if (direct_ && c.side[0].body >= 0 && c.side[1].body >= 0 &&
+        static_cast<double>(point.begins) < time_ + h_) {
         const Eigen::Vector3d at = place_now(c);
         for (int side = 0; side < 2; ++side)
             arms[side] = (at - rows_of_[static_cast<std::size_t>(c.side[side].body)].place).cast<float>();
@@ -287,7 +289,7 @@ void IslandSolver::add_spring(HeldConstraint& constraint) {
     const PointConstraint& held = constraint.definition;
     SpringRows s{};
     s.impulse = constraint.impulse.cast<double>() / 2;  // each half, at rest
-    s.place.setZero(), s.moved.setZero(), s.offset.setZero(), s.after.setZero(), s.gap.setZero();
+    s.place.setZero(), s.moved.setZero(), s.offset.setZero(), s.gap.setZero();
     auto local_of = [this](int body) { return body >= 0 ? local(body) : -1; };
     s.side[0] = reserve_rows(local_of(held.body_a));
     s.side[1] = reserve_rows(local_of(held.body_b));

@@ -25,7 +25,8 @@ float root(float x) {
 
 }  // namespace
 
-void IslandSolver::solve(const Island& island) {
+void IslandSolver::solve(const Island& island, const ContactScene& scene) {
+    scene_ = &scene, island_ = &island;
     begin(island);
     before_.resize(bodies_->size());
     double fastest = 0, size = 1;
@@ -68,9 +69,7 @@ void IslandSolver::advance() {
             substep(first, last);
             continue;
         }
-        begin_legs();
-        direct_substep(0, first, last);
-        end_legs();
+        direct_substep(0, last);
     }
 }
 
@@ -97,37 +96,19 @@ void IslandSolver::substep(bool first, bool last) {
     if (!first && !contacts_.empty()) turn_frames();
     load_velocities();
     if (!impacts_.empty()) strike();
-    for (SpringRows& s : springs_) write_spring(s), s.moved.setZero(), s.after.setZero();
+    pull_springs();
     warm_start(first);
-    solve_springs(true);
     sweep(Push::soft);
-    solve_springs(true);
     push_out();
-    apply_springs(true);
-    for (int i = 0; i < 2; ++i) {
-        solve_springs(false);
-        sweep(Push::none);
-    }
-    solve_springs(false);
+    for (int i = 0; i < 2; ++i) sweep(Push::none);
     note_work();
     if (last) restitute();
-    apply_springs(false);
-    finish();
-}
-
-// What solve_springs found, and the springs' rows where the bodies are now.
-void IslandSolver::apply_springs(bool positions) {
     for (SpringRows& s : springs_) {
-        s.impulse = positions ? s.moved : s.after;
-        const Eigen::Vector3d at_move = positions ? s.impulse : Eigen::Vector3d::Zero();
-        const Eigen::Vector3f p = s.impulse.cast<float>();
-        if (s.told) tell(s, -1, s.impulse, at_move, {p[0], p[1], p[2]}, s.place);
+        const float p[3] = {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])};
+        if (s.told) tell(s, -1, s.impulse, s.impulse, p, s.place);
         apply(s, s.impulse, s.place);
     }
-    for (BodyRows& rows : rows_of_)
-        if (!springs_.empty()) rows.place = rows.body->state.position;
-    if (positions)
-        for (SpringRows& s : springs_) write_spring(s);
+    finish();
 }
 
 void IslandSolver::load_velocities() {
@@ -257,10 +238,10 @@ void IslandSolver::solve_contact(ContactRows& c, Push push) {
 // Energy that a contact's normal impulse takes out in this substep, where it may have to give some back: held
 // over the substep, it does p (v0 + v1) / 2 on the rigid part and p G on the modes.
 void IslandSolver::note_work() {
-    for (ContactRows& c : contacts_) note_work(c);
+    for (ContactRows& c : contacts_) note_work(c, c.impulse[0]);
 }
 
-void IslandSolver::note_work(ContactRows& c) {
+void IslandSolver::note_work(ContactRows& c, float impulse) {
     if (c.restitution == 0 || c.largest == 0) return;
     float mean = 0;
     for (const Side& side : c.side) {
@@ -270,7 +251,7 @@ void IslandSolver::note_work(ContactRows& c) {
         mean += (dot(d, before, 8) + dot(d, after, 8)) / 2;
         if (side.width > 8) mean += dot(d + 8, after + 8, side.width - 8);
     }
-    c.taken -= c.impulse[0] * mean;
+    c.taken -= impulse * mean;
 }
 
 // A rebound to e times the approach, by an impulse p whose work p v + p^2 (K_rigid / 2 + K_modes) is at most
@@ -479,11 +460,13 @@ void IslandSolver::step_modes(const BodyRows& rows) {
     if (limit_deformation(body)) ++limited_;
 }
 
+void IslandSolver::keep_impulse(const ContactRows& c, ManifoldPoint& point) {
+    point.normal_impulse = c.impulse[0];
+    point.friction_impulse = c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1];
+}
+
 void IslandSolver::keep_impulses() {
-    for (const ContactRows& c : contacts_) {
-        c.point->normal_impulse = c.impulse[0];
-        c.point->friction_impulse = c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1];
-    }
+    for (const ContactRows& c : contacts_) keep_impulse(c, *c.point);
     for (const SpringRows& s : springs_) {
         s.constraint->impulse = (s.moved + s.impulse).cast<float>();
         const double force = s.constraint->impulse.norm() / h_;

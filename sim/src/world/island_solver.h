@@ -5,8 +5,7 @@
 
 #include "shape/lanes.h"
 #include "world/block_cholesky.h"
-#include "world/body_path.h"
-#include "world/manifold.h"
+#include "world/island_contacts.h"
 
 namespace sim {
 
@@ -62,7 +61,7 @@ struct Island {
 /// A substep then has two halves, as RATTLE (Andersen 1983) for rigid springs:
 ///   half of gravity; impulses P by which springs' ends meet where the bodies *will be*, and contacts close
 ///   their gaps; move; the other half; impulses V by which what holds has no speed between its ends
-/// which is of second order and bounds the energy of joints at any stiffness. P is found by Newton's method on
+/// which is of second order and gives joints no energy while its equations are solved. P is found by Newton's method on
 /// the poses at the end with the rows of the start; each of its steps, and V, minimise
 ///   1/2 |y - y_free|^2 + sum over rows of what they hold (a convex problem; Castro et al. 2022)
 /// with H = 1 + sum of D^T D / gamma, factorised as BlockCholesky: O(bodies) for chains, stacks and trees.
@@ -70,7 +69,10 @@ struct Island {
 /// compliance: they are held to the round before's impulses (proximal point method). Modes see all of a
 /// substep's impulse in its first half. A substep is halved, and again, where an arm of a spring turns further
 /// than kMostTurn, Newton's method does not converge, or weight moves a body by more than kMostFall of its size.
-/// Where a factorisation is too dear, springs alone are solved directly, between sweeps over the contacts.
+/// Where bodies have moved by more than kSlow of their size since contacts were found, these are found again
+/// (IslandContacts): the step goes on as a new one would begin.
+/// Where a factorisation is too dear, springs alone are factorised, and solved in turn with sweeps over the contacts; if all
+/// are soft (springs_are_soft) they are forces, held over each substep of the sweeps (symplectic Euler).
 ///
 /// Deterministic: sweeps go over springs, then contacts, in the order of ids (see in_turns). No allocation
 /// once the buffers have grown.
@@ -80,7 +82,11 @@ public:
                  std::vector<Manifold>& manifolds, std::vector<HeldConstraint>& constraints)
         : settings_(&settings), bodies_(&bodies), manifolds_(&manifolds), constraints_(&constraints) {}
 
-    void solve(const Island& island);  ///< over one step
+    void solve(const Island& island, const ContactScene& scene);  ///< over one step
+    /// The contacts that the last island ends the step with, if they were found again within it; else nullptr.
+    [[nodiscard]] const std::vector<Manifold>* found() const noexcept {
+        return found_again_ ? &found_ : nullptr;
+    }
     /// Where solve writes the paths of its bodies, one a body of the world; must stay. nullptr: nowhere.
     void record(std::vector<BodyPath>* paths) noexcept { paths_ = paths; }
     /// What planes, fixed bodies, places, gravity and drag gave own bodies since the last call [N s].
@@ -110,6 +116,8 @@ private:
         Eigen::Matrix3f body_from_world;
         std::uint32_t at;                                   // of wide_y_
         FreeRotation rotation{Eigen::Vector3d::Ones(), 0};  // over the substep, direct solutions
+        Eigen::Vector3d found_at;                           // its centre when contacts were last found
+        Eigen::Quaterniond found_turned;                    // its orientation, then
     };
     /// One body's part of a row triple.
     struct Side {
@@ -149,7 +157,6 @@ private:
         double lag;              // of their gap, what counts of the one before the substep
         Eigen::Vector3d gap;     // between the ends [m]
         Eigen::Vector3d impulse, moved;  // of the velocities' solution, of the positions' [N s]
-        Eigen::Vector3d after;           // of velocities, where contacts are swept over
     };
     /// A contact in a direct solution.
     struct DirectContact {
@@ -160,6 +167,9 @@ private:
         double bound;                        // of the friction impulse [N s]
         Eigen::Vector3d before;              // of `impulse`, what `start` has seen
         Eigen::Vector3d impulse;
+        Eigen::Matrix3d weight, factored;  // see weight_of; those in the factorisation
+        Eigen::Matrix3d mobility;          // K, where it is solved alone
+        Eigen::Matrix2d tangent_inverse;   // of K's
     };
     /// A place on a body that rows act on.
     struct Place {
@@ -211,22 +221,29 @@ private:
     void write_spring(SpringRows& spring);
 
     // Directly; direct_solution.cpp.
-    bool begin_direct(double most, bool with_contacts = true);
-    void solve_springs(bool positions);
+    bool begin_direct(double most, bool must = false);
+    [[nodiscard]] double most_with_springs() const noexcept {
+        return kMostWithSprings * static_cast<double>(rows_of_.size());
+    }
+    [[nodiscard]] bool springs_are_soft();
+    void pull_springs();
     void set_firmness(SpringRows& spring, bool positions) const;
     [[nodiscard]] bool turns_little() const;
     [[nodiscard]] bool falls_little() const;
     [[nodiscard]] double residual() const;
-    void direct_substep(int level, bool first, bool last);
-    bool try_substep(bool first, bool last);
-    void begin_legs();
-    void end_legs();
+    void direct_substep(int level, bool last);
+    bool try_substep(bool last);
+    void write_legs();
+    [[nodiscard]] bool moved_on() const;
+    void find_again();
+    void note_places();
+    static void keep_impulse(const ContactRows& contact, ManifoldPoint& point);
     void follow(bool positions);
     void kick();
     void load_wide(bool positions);
     void widen(Rows& rows, bool positions);
     [[nodiscard]] double mode_scale(bool positions) const noexcept {
-        return direct_ && positions ? std::numbers::sqrt2 : 1;
+        return positions ? std::numbers::sqrt2 : 1;
     }
     void find_ends();
     [[nodiscard]] Eigen::Vector3d gap_at_end(const SpringRows& spring) const;
@@ -236,13 +253,19 @@ private:
                        double bias, bool positions);
     [[nodiscard]] double size_of(const Rows& rows) const;
     void solve_velocities();
-    void minimise(bool springs_only);
+    void settle_in_turn();
+    [[nodiscard]] double left_open() const;
+    [[nodiscard]] Eigen::Vector3d solve_alone(const ContactRows& contact, DirectContact& direct) const;
+    void set_mobility(const ContactRows& contact, DirectContact& direct) const;
+    void minimise();
     [[nodiscard]] Eigen::Vector3d seen(const Rows& rows, const AlignedDoubles& y) const;
     void give(const Rows& rows, const Eigen::Vector3d& impulse, AlignedDoubles& y) const;
     [[nodiscard]] Eigen::Vector3d impulse_of(const DirectContact& contact,
                                              const Eigen::Vector3d& speed) const;
     void gradient();
+    [[nodiscard]] Eigen::Matrix3d weight_of(const ContactRows& contact, const DirectContact& direct) const;
     void assemble();
+    void narrow(bool positions);
     void move_directly();
     void finish_directly(bool last);
     [[nodiscard]] Place place(int body, const Eigen::Vector3f& arm, int sample, const Eigen::Vector3f& rest,
@@ -258,7 +281,6 @@ private:
 
     void advance();
     void substep(bool first, bool last);
-    void apply_springs(bool positions);
     void load_velocities();
     void warm_start(bool first);
     enum class Push { none, soft, all };
@@ -268,7 +290,7 @@ private:
     void push_by(const Rows& rows, const float (&impulse)[3]);
     void solve_contact(ContactRows& contact, Push push);
     void note_work();
-    void note_work(ContactRows& contact);
+    void note_work(ContactRows& contact, float impulse);
     void restitute();
     void restitute(ContactRows& contact);
     void move();
@@ -296,6 +318,13 @@ private:
     std::vector<HeldConstraint>* constraints_;
     std::vector<BodyPath>* paths_ = nullptr;
     int substep_ = 0;
+    const ContactScene* scene_ = nullptr;  // of the island that is being solved
+    const Island* island_ = nullptr;
+    IslandContacts contact_finder_;
+    std::vector<Manifold> found_;  // again, within the step
+    bool found_again_ = false;
+    bool fresh_ = true;  // contacts, in the first substep since they were found
+    double time_ = 0;    // since the step's start [s], direct solutions
 
     std::vector<BodyRows> rows_of_;  // per island body
     std::vector<int> local_;         // world body -> island body or -1
@@ -319,20 +348,22 @@ private:
     double remaining_ = 0;               // of the step after this substep [s]
 
     // Of direct solutions, in double precision: body by body velocity, spin, modes, without lanes' padding.
-    bool direct_ = false;          // contacts, too
-    bool springs_direct_ = false;  // springs alone, between sweeps over the contacts
+    bool direct_ = false;         // this island is solved directly
+    bool with_contacts_ = false;  // they are factorised, too; else swept over
     struct Before {
         WorldBodyState state;
         bool at_limit;
     };
     std::vector<Before> before_;  // per world body, the last island's when the step began
     BlockCholesky factor_;
+    bool factored_ = false;  // rows and springs have not changed since
     std::vector<int> sizes_;
     std::vector<DirectContact> direct_contacts_;
     AlignedDoubles wide_rows_, wide_y_, wide_start_, wide_free_, wide_held_, gradient_, step_;
     struct End0 {
         Eigen::Vector3d position;
         Eigen::Quaterniond orientation;
+        Eigen::Vector3d momentum;  // with which it turns there [kg m^2/s]
     };
     std::vector<End0> ends_;  // of the bodies, at the end of the substep
 };

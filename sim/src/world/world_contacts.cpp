@@ -91,6 +91,7 @@ void WorldContacts::find(const ContactScene& scene) {
     reach_.resize(scene.bodies.size());
     paths_.resize(scene.bodies.size());
     first_.resize(scene.bodies.size());
+    known_.clear();
     while (find_once(scene)) {
     }
 }
@@ -130,7 +131,7 @@ bool WorldContacts::find_once(const ContactScene& scene) {
     auto pair = pairs.begin();
     for (const int i : scene.here) {
         for (; pair != pairs.end() && pair->first == i; ++pair)
-            if (may_meet(scene, *pair)) meet_pair(scene, i, pair->second);
+            if (scene.may_meet(*pair)) meet_pair(scene, i, pair->second);
         if (!woke_) meet_planes(scene, i);
     }
     if (!woke_ && !meetings_.empty()) accept_impacts(scene);
@@ -138,13 +139,22 @@ bool WorldContacts::find_once(const ContactScene& scene) {
 }
 
 // Among ghosts: of an own and a ghost body, those whose lower number is own; a ghost's with what is fixed.
-bool WorldContacts::may_meet(const ContactScene& scene, const std::pair<int, int>& pair) const {
-    if (!scene.joined.empty() && std::binary_search(scene.joined.begin(), scene.joined.end(), pair))
-        return false;
-    if (!scene.among_ghosts) return true;
-    const MovingBody &a = scene.bodies[static_cast<std::size_t>(pair.first)],
-                     &b = scene.bodies[static_cast<std::size_t>(pair.second)];
+bool ContactScene::may_meet(const std::pair<int, int>& pair) const {
+    if (!joined.empty() && std::binary_search(joined.begin(), joined.end(), pair)) return false;
+    if (!among_ghosts) return true;
+    const MovingBody &a = bodies[static_cast<std::size_t>(pair.first)],
+                     &b = bodies[static_cast<std::size_t>(pair.second)];
     return a.own || !a.moves() || !b.moves();
+}
+
+void ContactScene::set_surface(Manifold& manifold) const {
+    const MovingBody& a = bodies[static_cast<std::size_t>(manifold.a)];
+    const bool on_plane = manifold.b >= kFirstPlane;
+    const auto b = static_cast<std::size_t>(on_plane ? manifold.b - kFirstPlane : manifold.b);
+    const float friction = on_plane ? static_cast<float>(planes[b].friction) : bodies[b].friction,
+                restitution = on_plane ? static_cast<float>(planes[b].restitution) : bodies[b].restitution;
+    manifold.friction = std::sqrt(a.friction * friction);
+    manifold.restitution = std::max(a.restitution, restitution);
 }
 
 // Keys must ascend from call to call.
@@ -208,8 +218,7 @@ void WorldContacts::meet_near(const ContactScene& scene, int i, int j, double ma
         manifolds_.pop_back();
         return;
     }
-    manifold.friction = std::sqrt(a.friction * b.friction);
-    manifold.restitution = std::max(a.restitution, b.restitution);
+    scene.set_surface(manifold);
 }
 
 // What carried load a step ago mostly touches still.
@@ -263,8 +272,7 @@ void WorldContacts::meet_planes(const ContactScene& scene, int i) {
             manifolds_.pop_back();
             continue;
         }
-        manifold.friction = std::sqrt(body.friction * static_cast<float>(plane.friction));
-        manifold.restitution = std::max(body.restitution, static_cast<float>(plane.restitution));
+        scene.set_surface(manifold);
     }
 }
 

@@ -15,6 +15,9 @@ struct ContactScene {
     const std::vector<int>& here;  ///< ids of those that take part, ascending
     /// Of an own and a foreign body only the pairs of which the lower number is own, and no two foreign ones.
     bool among_ghosts;
+
+    [[nodiscard]] bool may_meet(const std::pair<int, int>& pair) const;  ///< a < b
+    void set_surface(Manifold& manifold) const;                          ///< friction and restitution
 };
 
 /// Finds the contacts of a step: broad phase over the bounds that free motion sweeps, narrow phase,
@@ -53,6 +56,10 @@ public:
     }
     /// Impulses of the last step again, for a manifold whose island is solved once more.
     void rewarm(Manifold& manifold) const;
+    /// Replaces the contacts of an island's bodies (ascending ids) by those that it found within the step.
+    void replace(const std::vector<int>& bodies, const std::vector<Manifold>& by);
+    /// From now on in this step the pair counts as one that has a contact.
+    void note_known(std::uint64_t key) { known_.push_back(key); }
     std::vector<BodyPath>& paths() noexcept { return paths_; }  ///< of each body; set by solver and find
 
     std::vector<Manifold>& manifolds() noexcept { return manifolds_; }  ///< of the last step
@@ -72,7 +79,6 @@ private:
     };
     void set_reach(const ContactScene& scene, int id);
     bool find_once(const ContactScene& scene);
-    [[nodiscard]] bool may_meet(const ContactScene& scene, const std::pair<int, int>& pair) const;
     void meet_pair(const ContactScene& scene, int i, int j);
     [[nodiscard]] bool pass_by(const ContactScene& scene, int i, int j) const;
     void meet_near(const ContactScene& scene, int i, int j, double margin, const Manifold* before);
@@ -102,7 +108,8 @@ private:
     std::vector<bool> watched_;                 // has a contact that turns on: see unforeseen
     std::vector<double> first_;                 // of each body: time of its first impact
     std::vector<Meeting> meetings_;
-    PosedBody at_[2];  // where an impact is
+    std::vector<std::uint64_t> known_;  // pairs
+    PosedBody at_[2];                   // where an impact is
     int pairs_ = 0;
     bool woke_ = false;
     std::uint64_t impacts_ = 0;

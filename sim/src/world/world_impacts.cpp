@@ -74,7 +74,8 @@ Impact WorldContacts::foresee(const ContactScene& scene, int i, int j) {
                           paths_[static_cast<std::size_t>(j)], kTouching * size_of(a, b));
 }
 
-// Of a moving body's impacts, those within a substep of its first: the first may keep it from the others.
+// Keeps of a moving body's meetings those within a substep of its first, which may keep it from the others, and
+// of these those that are contacts.
 void WorldContacts::accept_impacts(const ContactScene& scene) {
     const double substep = scene.settings.dt / scene.settings.substeps;
     for (const Meeting& m : meetings_)
@@ -84,12 +85,12 @@ void WorldContacts::accept_impacts(const ContactScene& scene) {
             double& first = first_[static_cast<std::size_t>(id)];
             if (scene.bodies[static_cast<std::size_t>(id)].moves()) first = std::min(first, m.time);
         }
-    const std::size_t count = manifolds_.size();
-    for (const Meeting& m : meetings_)
-        if (m.time <=
-            substep + std::min(first_[static_cast<std::size_t>(m.a)], first_[static_cast<std::size_t>(m.b)]))
-            (void)add_impact(scene, m);
-    if (manifolds_.size() > count) std::sort(manifolds_.begin(), manifolds_.end(), by_key);
+    std::erase_if(meetings_, [&](const Meeting& m) {
+        return m.time > substep + std::min(first_[static_cast<std::size_t>(m.a)],
+                                           first_[static_cast<std::size_t>(m.b)]) ||
+               !add_impact(scene, m);
+    });
+    std::sort(manifolds_.begin(), manifolds_.end(), by_key);
 }
 
 // The contact of a pair where its paths bring it at a time. Its separation now is what its rows, which stand
@@ -124,11 +125,19 @@ bool WorldContacts::add_impact(const ContactScene& scene, const Meeting& meeting
         p.normal_impulse = 0, p.friction_impulse.setZero();
     }
     manifold.emerging = false;
-    manifold.friction = std::sqrt(a.friction * b.friction);
-    manifold.restitution = std::max(a.restitution, b.restitution);
+    scene.set_surface(manifold);
     ++impacts_;
     manifolds_.push_back(manifold);
     return true;
+}
+
+void WorldContacts::replace(const std::vector<int>& bodies, const std::vector<Manifold>& by) {
+    std::erase_if(manifolds_, [&](const Manifold& m) {
+        return std::binary_search(bodies.begin(), bodies.end(), m.a) ||
+               std::binary_search(bodies.begin(), bodies.end(), m.b);
+    });
+    manifolds_.insert(manifolds_.end(), by.begin(), by.end());
+    std::sort(manifolds_.begin(), manifolds_.end(), by_key);
 }
 
 void WorldContacts::keep_last() {
@@ -164,7 +173,6 @@ const std::vector<WorldContacts::Meeting>& WorldContacts::unforeseen(const Conta
         if (solved[at] && left_path(scene, id)) any = true;
     }
     if (!any) return meetings_;
-    const double substep = scene.settings.dt / scene.settings.substeps;
     for (const int id : scene.here) {
         const auto at = static_cast<std::size_t>(id);
         const MovingBody& body = scene.bodies[at];
@@ -184,22 +192,9 @@ const std::vector<WorldContacts::Meeting>& WorldContacts::unforeseen(const Conta
         boxes.push_back({low.array() - radius, high.array() + radius, id, left});
     }
     for (const auto& pair : broad_.find())
-        if (may_meet(scene, pair)) meet_unforeseen(scene, pair.first, pair.second);
+        if (scene.may_meet(pair)) meet_unforeseen(scene, pair.first, pair.second);
     if (meetings_.empty()) return meetings_;
-    // Each body's first.
-    for (const Meeting& m : meetings_)
-        for (const int id : {m.a, m.b}) first_[static_cast<std::size_t>(id)] = 1e300;
-    for (const Meeting& m : meetings_)
-        for (const int id : {m.a, m.b}) {
-            double& first = first_[static_cast<std::size_t>(id)];
-            if (scene.bodies[static_cast<std::size_t>(id)].moves()) first = std::min(first, m.time);
-        }
-    std::erase_if(meetings_, [&](const Meeting& m) {
-        return m.time > substep + std::min(first_[static_cast<std::size_t>(m.a)],
-                                           first_[static_cast<std::size_t>(m.b)]);
-    });
-    std::erase_if(meetings_, [&](const Meeting& m) { return !add_impact(scene, m); });
-    std::sort(manifolds_.begin(), manifolds_.end(), by_key);
+    accept_impacts(scene);
     return meetings_;
 }
 
@@ -209,7 +204,8 @@ void WorldContacts::meet_unforeseen(const ContactScene& scene, int i, int j) {
     if (!a.moves() && !b.moves()) return;
     const BodyPath &pa = paths_[static_cast<std::size_t>(i)], &pb = paths_[static_cast<std::size_t>(j)];
     const double size = size_of(a, b);
-    const Manifold* now = find_now(static_cast<std::uint64_t>(i) << 32 | static_cast<std::uint32_t>(j));
+    const std::uint64_t key = static_cast<std::uint64_t>(i) << 32 | static_cast<std::uint32_t>(j);
+    const bool now = find_now(key) || std::ranges::find(known_, key) != known_.end();
     if (now && !is_far(pa, pb, kSlow * size, a, b)) return;
     const bool bent = is_bent(a.posed) || is_bent(b.posed);
     const double inside =
@@ -217,7 +213,7 @@ void WorldContacts::meet_unforeseen(const ContactScene& scene, int i, int j) {
     const ConvexBody of_a(a.posed, inside), of_b(b.posed, inside);
     const Impact impact = time_of_impact(of_a, pa, of_b, pb, kTouching * size);
     if (!impact.meets || (impact.at_once && now)) return;
-    meetings_.push_back({i, j, impact.time, now != nullptr});
+    meetings_.push_back({i, j, impact.time, now});
 }
 
 }  // namespace sim

@@ -26,6 +26,8 @@ struct World::Implementation {
     struct Outcome {
         Eigen::Vector3d outside = Eigen::Vector3d::Zero();
         std::uint64_t limited = 0, broken = 0;
+        bool found = false;               // contacts, within the step
+        std::vector<Manifold> manifolds;  // those
     };
     std::vector<Outcome> outcomes;
     std::vector<WorldBodyState> started;  // of bodies that are solved, when the step began

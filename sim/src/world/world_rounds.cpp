@@ -79,10 +79,14 @@ void World::Implementation::move_alone(int id) {
 
 void World::Implementation::solve_island(const Island& island) {
     Outcome& outcome = outcomes[static_cast<std::size_t>(island.bodies.front())];
-    outcome = {};
+    outcome.outside.setZero(), outcome.limited = outcome.broken = 0, outcome.found = false;
     if (island.manifolds.empty() && island.constraints.empty()) return move_alone(island.bodies.front());
     const std::uint64_t limits = solver->deformations_limited(), breaks = solver->constraints_broken();
-    solver->solve(island);
+    solver->solve(island, contact_scene());
+    if (const std::vector<Manifold>* found = solver->found()) {
+        outcome.found = true, outcome.manifolds = *found;
+        for (const Manifold& m : *found) contacts.note_known(m.key());
+    }
     outcome.limited = solver->deformations_limited() - limits;
     outcome.broken = solver->constraints_broken() - breaks;
     outcome.outside = solver->take_outside_impulse();
@@ -194,6 +198,11 @@ void World::Implementation::solve_islands() {
         for (const WorldContacts::Meeting& meeting : meetings)
             again[static_cast<std::size_t>(meeting.a)] = again[static_cast<std::size_t>(meeting.b)] = true;
         solve_again();
+    }
+    for (std::size_t i = 0; i < islands_used; ++i) {
+        if (!is_solved(islands[i])) continue;
+        const Outcome& outcome = outcomes[static_cast<std::size_t>(islands[i].bodies.front())];
+        if (outcome.found) contacts.replace(islands[i].bodies, outcome.manifolds);
     }
     contacts.keep_last();
     counts.islands = awake;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "world_bodies.h"
 
@@ -13,23 +12,6 @@ using Eigen::Vector3d;
 using sim::Fidelity;
 
 namespace {
-
-class Draw {
-public:
-    explicit Draw(unsigned seed) : random_(seed) {}
-    double between(double a, double b) { return a + (b - a) * (random_() / 4294967296.0); }
-    double scale(double a, double b) { return std::exp(between(std::log(a), std::log(b))); }
-    int below(int n) { return static_cast<int>(random_() % static_cast<unsigned>(n)); }
-    Vector3d direction() {
-        Vector3d v;
-        do v = {between(-1, 1), between(-1, 1), between(-1, 1)};
-        while (v.norm() > 1 || v.norm() < 0.1);
-        return v.normalized();
-    }
-
-private:
-    std::mt19937 random_;
-};
 
 struct Shot {
     sim::WorldDefinition world;

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <numbers>
-#include <random>
 
 #include "world_bodies.h"
 
@@ -13,24 +12,6 @@ using Eigen::Vector3d;
 using sim::Fidelity;
 
 namespace {
-
-// The same numbers with every standard library.
-class Draw {
-public:
-    explicit Draw(unsigned seed) : random_(seed) {}
-    double between(double a, double b) { return a + (b - a) * (random_() / 4294967296.0); }
-    double scale(double a, double b) { return std::exp(between(std::log(a), std::log(b))); }
-    int below(int n) { return static_cast<int>(random_() % static_cast<unsigned>(n)); }
-    Vector3d direction() {
-        Vector3d v;
-        do v = {between(-1, 1), between(-1, 1), between(-1, 1)};
-        while (v.norm() > 1 || v.norm() < 0.1);
-        return v.normalized();
-    }
-
-private:
-    std::mt19937 random_;
-};
 
 sim::WorldDefinition any_step(Draw& draw) {
     constexpr double kSteps[] = {1.0 / 30, 1.0 / 60, 1.0 / 120, 1.0 / 480};
