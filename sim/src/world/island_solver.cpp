@@ -12,6 +12,7 @@ using ModeArray = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostModes, 1>;  //
 
 // Speeds by which swept contacts may miss: at rest, of the smallest body's size a second, and as a share of the fastest body's.
 constexpr double kMissedAtRest = 1e-3, kMissedShare = 0.03;
+constexpr double kMostGained = 3e-3;  // energy, of the motion's and of weight times size
 
 void clear(StepImpulse& impulse) {
     impulse.linear.setZero(), impulse.angular.setZero(), impulse.displacement.setZero();
@@ -28,36 +29,65 @@ float root(float x) {
 void IslandSolver::solve(const Island& island, const ContactScene& scene) {
     scene_ = &scene, island_ = &island;
     begin(island);
-    before_.resize(bodies_->size());
-    double fastest = 0, size = 1;
-    for (const int id : island.bodies) {
-        const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
-        Before& before = before_[static_cast<std::size_t>(id)];
-        before.state = body.state, before.at_limit = body.at_limit;
-        fastest = std::max(fastest, body.state.velocity.squaredNorm());
-        size = std::min(size, 2 * body.kind->half_box.minCoeff());
-    }
-    const Eigen::Vector3d outside = outside_;
-    const std::uint64_t limited = limited_;
+    note_start();
     advance();
-    const double enough = kMissedAtRest * size + kMissedShare * std::sqrt(fastest);
-    const double most = kMostWithContacts * static_cast<double>(rows_of_.size());
-    if (!direct_ && impacts_.empty() && residual() > enough && begin_direct(most)) {
-        for (const int id : island.bodies) {
-            MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
-            const Before& before = before_[static_cast<std::size_t>(id)];
-            body.state = before.state, body.at_limit = before.at_limit, body.limited_now = false;
-            body.was_given = false;
-        }
-        outside_ = outside, limited_ = limited;
-        crossed_.resize(first_crossed_);
-        begin(island);
-        begin_direct(most);
+    if (!direct_ && is_far_from_solved() && begin_direct(most_with_contacts())) {
+        // Of contacts that contradict each other the exact answer is worse than sweeps that give up.
+        const double swept = energy();
+        go_back();
+        begin_direct(most_with_contacts());
         advance();
+        const double gained = energy() - std::max(swept, energy_before_);
+        if (!(gained < kMostGained * scale_)) go_back(), advance();
     }
     if (any_told_) settle_given();
     keep_impulses();
     for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
+}
+
+// What a solution is measured by, and taken back to.
+void IslandSolver::note_start() {
+    before_.resize(bodies_->size());
+    outside_before_ = outside_, limited_before_ = limited_;
+    energy_before_ = energy();
+    fastest_ = scale_ = 0, smallest_ = 1;
+    for (const int id : island_->bodies) {
+        const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        Before& before = before_[static_cast<std::size_t>(id)];
+        before.state = body.state, before.at_limit = body.at_limit;
+        fastest_ = std::max(fastest_, body.state.velocity.norm());
+        smallest_ = std::min(smallest_, 2 * body.kind->half_box.minCoeff());
+        scale_ += body.kind->mass.mass * (body.state.velocity.squaredNorm() / 2 +
+                                          settings_->gravity.norm() * body.kind->half_box.minCoeff());
+    }
+}
+
+void IslandSolver::go_back() {
+    for (const int id : island_->bodies) {
+        MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        const Before& before = before_[static_cast<std::size_t>(id)];
+        body.state = before.state, body.at_limit = before.at_limit, body.limited_now = false;
+        body.was_given = false;
+    }
+    outside_ = outside_before_, limited_ = limited_before_;
+    crossed_.resize(first_crossed_);
+    begin(*island_);
+}
+
+// Kinetic and potential, with that of modes [J].
+double IslandSolver::energy() const {
+    double sum = 0;
+    for (const int id : island_->bodies) {
+        const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        const WorldBodyState& s = body.state;
+        const Eigen::Vector3d own = s.orientation.conjugate() * s.angular_momentum;
+        const double mass = body.kind->mass.mass;
+        sum += mass / 2 * s.velocity.squaredNorm() +
+               own.cwiseAbs2().cwiseQuotient(body.kind->mass.inertia).sum() / 2 -
+               mass * body.gravity_scale * settings_->gravity.dot(s.position) +
+               (s.q_dot.squaredNorm() + s.q.cwiseProduct(body.kind->basis.omega).squaredNorm()) / 2;
+    }
+    return sum;
 }
 
 void IslandSolver::advance() {
@@ -71,6 +101,10 @@ void IslandSolver::advance() {
         }
         direct_substep(0, last);
     }
+}
+
+bool IslandSolver::is_far_from_solved() const {
+    return impacts_.empty() && residual() > kMissedAtRest * smallest_ + kMissedShare * fastest_;
 }
 
 // By how much speeds miss what contacts demand, at most [m/s]: the change of the impulses that would satisfy a

@@ -57,7 +57,8 @@ struct Island {
 /// their rows.
 ///
 /// Directly (direct_solution.cpp) go islands with springs, and islands whose contacts a step's sweeps leave far
-/// from solved (kMissedAtRest, kMissedShare), where a factorisation is cheap enough; such a step is taken anew.
+/// from solved (kMissedAtRest, kMissedShare), where a factorisation is cheap enough; such a step is taken anew,
+/// and kept if it gives no energy (contacts of bodies deep in each other may contradict each other).
 /// A substep then has two halves, as RATTLE (Andersen 1983) for rigid springs:
 ///   half of gravity; impulses P by which springs' ends meet where the bodies *will be*, and contacts close
 ///   their gaps; move; the other half; impulses V by which what holds has no speed between its ends
@@ -185,6 +186,13 @@ private:
     };
 
     void begin(const Island& island);
+    void note_start();
+    void go_back();  ///< to it
+    [[nodiscard]] double energy() const;
+    [[nodiscard]] bool is_far_from_solved() const;
+    [[nodiscard]] double most_with_contacts() const noexcept {
+        return kMostWithContacts * static_cast<double>(rows_of_.size());
+    }
     /// The contacts in windows of kWindow, within a window by turn, then by ids. Contacts of one turn share
     /// no body, so sweeping in this order gives the bits of the order by ids, but the processor can work on
     /// several at once; windows keep the bodies they use in its cache.
@@ -354,6 +362,9 @@ private:
         WorldBodyState state;
         bool at_limit;
     };
+    double energy_before_ = 0, fastest_ = 0, smallest_ = 0, scale_ = 0;  // see note_start
+    Eigen::Vector3d outside_before_ = Eigen::Vector3d::Zero();
+    std::uint64_t limited_before_ = 0;
     std::vector<Before> before_;  // per world body, the last island's when the step began
     BlockCholesky factor_;
     bool factored_ = false;  // rows and springs have not changed since
