@@ -163,7 +163,7 @@ PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, co
     result.options.picture_predictor = picture_specification(options.picture_predictor);
     result.options.sound_predictor = sound_specification(options.sound_predictor);
     if (const std::string& sound = result.options.sound_predictor; !is_external(sound))
-        result.sound_models = tracking::make_predictor(sound)->models();
+        result.sound_models = make_any_predictor(sound, {})->models();
     result.trace = trace.file;
     result.kit_name = kit.name;
     result.trace_source = trace.source;
