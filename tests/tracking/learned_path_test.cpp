@@ -96,6 +96,24 @@ TEST(LearnedPath, GoesThroughTheNetworksAnswersAndItsVelocityIsItsSlope) {
     EXPECT_EQ(path.after(0).position, frame.position);
 }
 
+TEST(LearnedPath, EvaluatesTheNetworkThatItsModelStates) {
+    RandomStream random(9);
+    for (const std::size_t hidden : {4, 7, 24, 32, 40, 64, 65, 100, 128}) {
+        const PathModel model = model_of_random_weights(hidden, hidden);
+        StickHistory::Inputs inputs;
+        for (float& x : inputs) x = random.uniform() < 0.3 ? 0.0F : static_cast<float>(random.normal());
+        PathOutputs outputs;
+        evaluate(model, inputs, outputs);
+        Eigen::VectorXd h = inputs.cast<double>();
+        for (std::size_t l = 0; l < model.layers.size(); ++l) {
+            h = (model.layers[l].weights.cast<double>() * h + model.layers[l].bias.cast<double>()).eval();
+            if (l < 2) h = h.cwiseMax(0.1 * h).eval();
+        }
+        // 300 roundings of 6e-8 of sums of order 1.
+        EXPECT_LT((outputs.cast<double>() - h).cwiseAbs().maxCoeff(), 2e-6) << hidden;
+    }
+}
+
 TEST(LearnedPath, WithoutAnswersIsTheFadingVelocity) {
     Learned zero(std::make_shared<const PathModel>(model_of_zeros()), kShaft);
     const Vector3d v(1.5, -0.5, 0.25);
