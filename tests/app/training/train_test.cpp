@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "files/bad_input.h"
+#include "files/checksum.h"
 #include "sample_recordings.h"
 #include "temporary_folder.h"
 
@@ -84,6 +86,24 @@ TEST(Provenance, SaysWhatAModelWasMadeOfAndWhetherThatWasSynthetic) {
     EXPECT_TRUE(value_of("error").starts_with("0.0333 s ahead: 8.0 mm RMS with the shaft, 10.0 without"));
     all[1].trace.source = "a person";
     EXPECT_EQ(lines_of().front().second, "recordings");
+}
+
+TEST(BundledModel, IsOfTheBundledSyntheticTracesAsTheyAre) {
+    const std::filesystem::path top = MUSICWORLD_SOURCE_DIR;
+    const tracking::PathModel model = tracking::read_path_model(top / "assets/models/general.model");
+    ASSERT_FALSE(model.provenance.empty());
+    EXPECT_EQ(model.provenance.front(),
+              std::pair(std::string("trained_on"), std::string("synthetic traces alone")));
+    int inputs = 0;
+    for (const auto& [key, value] : model.provenance) {
+        if (key != "input") continue;
+        ++inputs;
+        const std::size_t blank = value.find(' ');
+        const std::string file = value.substr(blank + 1);
+        EXPECT_TRUE(file.starts_with("assets/traces/")) << file;
+        EXPECT_EQ(app::sha256_of_file(top / file), value.substr(0, blank)) << "train it again: " << file;
+    }
+    EXPECT_EQ(inputs, 3);
 }
 
 }  // namespace
