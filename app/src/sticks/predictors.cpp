@@ -39,21 +39,24 @@ bool needs_model(const std::string& name) {
     return name == "learned" || name == "arbitrated";
 }
 
-/// With the file of the model that is named, or of the bundled one.
-std::string with_model_file(const std::string& specification) {
+/// The part of a specification that names its model, as [begin, end); none where it names none.
+std::optional<std::pair<std::size_t, std::size_t>> model_part(const std::string& specification) {
     constexpr std::string_view kKey = "model=";
-    const std::size_t colon = specification.find(':');
-    std::size_t key = colon;
+    std::size_t key = specification.find(':');
     while (key != std::string::npos && specification.compare(key + 1, kKey.size(), kKey) != 0)
         key = specification.find(',', key + 1);
-    if (key == std::string::npos)
-        return fmt::format("{}{}model={}", specification, colon == std::string::npos ? ":" : ",",
-                           find_bundled(kBundledModel, "models", ".model").string());
-    const std::size_t begin = key + 1 + kKey.size(),
-                      end = std::min(specification.find(',', begin), specification.size());
-    return specification.substr(0, begin) +
-           find_bundled(specification.substr(begin, end - begin), "models", ".model").string() +
-           specification.substr(end);
+    if (key == std::string::npos) return std::nullopt;
+    const std::size_t begin = key + 1 + kKey.size();
+    return std::pair(begin, std::min(specification.find(',', begin), specification.size()));
+}
+
+/// With the file of the model that is named, or of the bundled one.
+std::string with_model_file(const std::string& specification) {
+    const std::string file = model_file(specification)->string();
+    if (const auto part = model_part(specification))
+        return specification.substr(0, part->first) + file + specification.substr(part->second);
+    return fmt::format("{}{}model={}", specification,
+                       specification.find(':') == std::string::npos ? ":" : ",", file);
 }
 
 std::unique_ptr<tracking::Predictor> make_internal(const std::string& specification,
@@ -90,6 +93,13 @@ std::string unescaped(std::string part) {
 
 bool is_auto(const std::string& specification) {
     return specification.substr(0, specification.find(':')) == kAuto;
+}
+
+std::optional<std::filesystem::path> model_file(const std::string& specification) {
+    if (!needs_model(specification.substr(0, specification.find(':')))) return std::nullopt;
+    const auto part = model_part(specification);
+    return find_bundled(part ? specification.substr(part->first, part->second - part->first) : kBundledModel,
+                        "models", ".model");
 }
 
 std::string confirming_specification(const std::string& specification) {

@@ -1,7 +1,9 @@
 #pragma once
 #include <tracking/predictor.h>
 
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -28,6 +30,8 @@ struct TrackedStick {
 /// A predictor's specification with `auto` resolved: what measurements chose for pictures and for sound.
 [[nodiscard]] std::string picture_specification(const std::string& specification);
 [[nodiscard]] std::string sound_specification(const std::string& specification);
+/// The file of the network that a resolved specification names; none without one. Throws BadInput.
+[[nodiscard]] std::optional<std::filesystem::path> model_file(const std::string& specification);
 /// The filter that confirms the strikes of a sound predictor's specification; empty for none. With `auto`,
 /// contacts less than 50 ms ahead must be confirmed by a second filter (keep_confirmed in sticks/stick.h).
 [[nodiscard]] std::string confirming_specification(const std::string& sound_specification);

@@ -68,6 +68,13 @@ TEST(Predictors, AutoDrawsWithItsModelAndTheFilterOrTheBundledOne) {
     EXPECT_EQ(app::picture_specification("learned:model=mine.model"), "learned:model=mine.model");
 }
 
+TEST(Predictors, TheFileOfAModelIsTheOneNamedOrTheBundledOne) {
+    EXPECT_EQ(app::model_file("cv:q=1"), std::nullopt);
+    EXPECT_EQ(app::model_file("learned")->filename(), "general.model");
+    EXPECT_EQ(app::model_file("arbitrated:decay=4,model=general,q=1"), app::model_file("learned"));
+    EXPECT_THROW((void)app::model_file("learned:model=no such model"), app::BadInput);
+}
+
 TEST(Predictors, LearnedFollowsTheShaftThatItIsTold) {
     const std::vector<double> leads = {0.05};
     const auto along_z = app::make_any_predictor("learned", leads, {"left", -Eigen::Vector3d::UnitZ()});
