@@ -44,6 +44,6 @@ floors() {
         case " $* " in *" $folder "*) ;; *) complain "$area/src/$folder has no place among the floors" ;; esac
     done
 }
-floors app statistics files process report scene kit sticks strikes pictures sensors play traces simulate compare latency realtime commands
+floors app statistics files process report scene kit sticks strikes pictures sensors play traces simulate compare training latency realtime commands
 floors sim shape modes struck world messages shared workers
 exit $status

@@ -126,6 +126,7 @@ void add_commands(CLI::App& tree) {
     Command program(tree);
     add_play_command(program);
     add_predict_command(program);
+    add_train_command(program);
     add_kit_command(program);
     add_compare_command(program);
     add_latency_command(program);

@@ -1,10 +1,16 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <new>
+#include <string>
+#include <vector>
 
+#include "model_of_random_weights.h"
 #include "tracking/predictor.h"
 
 namespace {
@@ -67,8 +73,23 @@ void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept {
 namespace tracking {
 namespace {
 
+/// A model of the greatest size in a file, while this lives.
+struct ModelFile {
+    std::string path = testing::TempDir() + "allocation_" + std::to_string(getpid()) + ".model";
+
+    ModelFile() {
+        std::ofstream(path, std::ios::binary)
+            << format_path_model(model_of_random_weights(PathModel::kMostHidden, 1));
+    }
+    ~ModelFile() { std::remove(path.c_str()); }
+};
+
 TEST(Allocation, CorrectAndPredictOfEveryPredictorAllocateNothing) {
-    for (const std::string& name : predictor_names()) {
+    const ModelFile model;
+    std::vector<std::string> specifications = predictor_names();
+    for (const char* name : {"learned:model=", "arbitrated:model="})
+        specifications.push_back(name + model.path);
+    for (const std::string& name : specifications) {
         const long before_making = allocations;
         const auto predictor = make_predictor(name);
         EXPECT_GT(allocations, before_making);  // the counter counts
@@ -83,6 +104,7 @@ TEST(Allocation, CorrectAndPredictOfEveryPredictorAllocateNothing) {
             sample.has_orientation = i % 5 != 0;
             (void)predictor->correct(sample);
             sum += predictor->predict(1.0 / 15).position.x();
+            if (const auto covariance = predictor->covariance(1.0 / 15)) sum += covariance->position(0, 0);
         }
         EXPECT_EQ(allocations, before) << name;
         EXPECT_TRUE(std::isfinite(sum));

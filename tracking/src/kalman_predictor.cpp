@@ -4,7 +4,8 @@ namespace tracking {
 KalmanPredictor::KalmanPredictor(const MotionModel& model, const KalmanOptions& options)
     : position_(model, options.steady_rate_hz),
       gate_(OutlierGate::of_positions(options.gate_sigmas)),
-      rotation_(model, options.gate_sigmas) {}
+      rotation_(options.turning.value_or(model), options.gate_sigmas),
+      turns_otherwise_(options.turning.has_value()) {}
 
 SampleStatus KalmanPredictor::correct(const PoseSample& sample) noexcept {
     return clock_.take(

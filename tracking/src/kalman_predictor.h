@@ -11,6 +11,8 @@ namespace tracking {
 struct KalmanOptions {
     double gate_sigmas = 0;  ///< <= 0: no gate. Otherwise impossible samples (OutlierGate) answer `outlier`
     double steady_rate_hz = 0;  ///< > 0: the steady gain of this rate (PositionFilter)
+    /// Of the rotation, scaled likewise, where it differs from the position's.
+    std::optional<MotionModel> turning = std::nullopt;
 };
 
 /// Kalman filter of a pose with a given model of motion (Friedmann 1992, 3.1-3.19 and section 3.2): a
@@ -28,6 +30,7 @@ public:
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
     [[nodiscard]] std::optional<Motion> motion() const noexcept override {
+        if (turns_otherwise_) return std::nullopt;  // a Motion has one law
         return rotation_.motion(position_.now().x);
     }
 
@@ -41,6 +44,7 @@ private:
     PositionFilter position_;
     OutlierGate gate_;
     RotationFilter rotation_;
+    bool turns_otherwise_;
 };
 
 }  // namespace tracking

@@ -3,9 +3,11 @@
 #include <array>
 #include <cmath>
 
+#include "arbitrated.h"
 #include "extrapolators.h"
 #include "interacting_models.h"
 #include "kalman_predictor.h"
+#include "learned_path.h"
 #include "least_squares.h"
 #include "model_bank.h"
 #include "smoothers.h"
@@ -134,7 +136,7 @@ std::unique_ptr<Predictor> make_imm(Specification& specification) {
     MotionModel noise{MotionModel::Singer{1, 1}};
     set_noise(specification, noise);
     InteractingModels::Options options{};
-    options.alpha = decay_rate(specification, 3);
+    options.alpha = decay_rate(specification, 200);
     options.density = {density(specification, "q1", 1e9), density(specification, "q2", 3e10),
                        density(specification, "q3", 1e12)};
     options.switching_rate = specification.number("rate", 10, 1e-3, 1e4);
@@ -142,6 +144,30 @@ std::unique_ptr<Predictor> make_imm(Specification& specification) {
     options.initial_variance = noise.initial_variance;
     options.gate_sigmas = gate(specification);
     return std::make_unique<InteractingModels>(options);
+}
+
+std::shared_ptr<const PathModel> read_model(Specification& specification) {
+    return std::make_shared<const PathModel>(
+        read_path_model(specification.text("model", "model=FILE, a file of `musicworld train`")));
+}
+
+std::unique_ptr<Predictor> make_learned(Specification& specification, const Eigen::Vector3d& shaft) {
+    return std::make_unique<Learned>(read_model(specification), shaft);
+}
+
+/// The filter is `cv`, whose velocity fades while its turning lasts.
+std::unique_ptr<Predictor> make_arbitrated(Specification& specification, const Eigen::Vector3d& shaft) {
+    const double q = density(specification, "q", 1e7);
+    MotionModel fading = constant_velocity(q, specification.number("decay", 8, 1e-3, 1000)),
+                lasting = constant_velocity(q);
+    for (MotionModel* model : {&fading, &lasting}) {
+        set_noise(specification, *model);
+        if (!specification.has("r")) model->measurement_variance = square(0.5 * kMetres);
+    }
+    const double sigmas = specification.has("gate") ? gate(specification) : 5;
+    return std::make_unique<Arbitrated>(
+        std::make_unique<KalmanPredictor>(fading, KalmanOptions{sigmas, 0, lasting}),
+        read_model(specification), shaft);
 }
 
 struct Entry {
@@ -173,8 +199,15 @@ const std::vector<std::string>& predictor_names() {
     return names;
 }
 
-std::unique_ptr<Predictor> make_predictor(const std::string& text) {
+std::unique_ptr<Predictor> make_predictor(const std::string& text, const Eigen::Vector3d& shaft) {
     Specification specification(text);
+    if (specification.name() == "learned" || specification.name() == "arbitrated") {
+        std::unique_ptr<Predictor> predictor = specification.name() == "learned"
+                                                   ? make_learned(specification, shaft)
+                                                   : make_arbitrated(specification, shaft);
+        specification.require_no_others();
+        return predictor;
+    }
     std::string known;
     for (const Entry& entry : kPredictors) {
         if (specification.name() == entry.name) {
@@ -184,7 +217,8 @@ std::unique_ptr<Predictor> make_predictor(const std::string& text) {
         }
         known += std::string(known.empty() ? "" : ", ") + entry.name;
     }
-    specification.fail("name " + in_quotes(specification.name()), "one of " + known);
+    specification.fail("name " + in_quotes(specification.name()),
+                       "one of " + known + ", learned, arbitrated");
 }
 
 PointMotion point_of(const PosePrediction& pose, const Eigen::Vector3d& point_body) noexcept {

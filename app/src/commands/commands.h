@@ -14,6 +14,7 @@ void add_record_command(Command& program);
 void add_schema_command(Command& program);
 void add_simulate_command(Command& program);
 void add_trace_command(Command& program);
+void add_train_command(Command& program);
 void add_convert_command(Command& trace);  ///< below `trace`
 /// Adds `keys`, `worker`, which joins a simulation, and the hidden `sensor`, which the program itself starts.
 void add_worker_commands(Command& program);

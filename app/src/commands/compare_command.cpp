@@ -20,8 +20,8 @@ namespace {
 
 std::vector<std::string> all_predictors() {
     std::vector<std::string> all = {"auto"};
-    for (const std::string& name : tracking::predictor_names())
-        if (name != "auto") all.push_back(name);
+    std::ranges::copy(tracking::predictor_names(), std::back_inserter(all));
+    all.emplace_back("learned");
     return all;
 }
 

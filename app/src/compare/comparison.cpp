@@ -19,6 +19,7 @@ namespace app {
 namespace {
 
 constexpr double kMm = 1e-3, kMs = 1e-3;
+constexpr std::size_t kFewestRecordings = 5;  // that make an interval
 
 std::vector<tracking::SensorModel> sensors_of(const MapAxes& axes, const ComparisonOptions& options) {
     std::vector<tracking::SensorModel> sensors;
@@ -99,7 +100,7 @@ void add_cells(std::vector<MapCell>& cells, const std::vector<Runner>& runners,
                        lead_s,
                        runner.pooled.rms(),
                        baseline->pooled.rms(),
-                       paired_difference(pairs, sensor.seed),
+                       paired_difference(pairs, sensor.seed, kFewestRecordings),
                        {}};
         cells.push_back(std::move(cell));
     }
@@ -142,7 +143,7 @@ std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const 
     if (const auto replay = entrant.replays.find({stick.number, lead}); replay != entrant.replays.end())
         return make_replay(replay->second);
     return make_any_predictor(instead.empty() ? entrant.used[stick.recording][lead] : instead, leads_s,
-                              stick.name);
+                              {stick.name, stick.shaft});
 }
 
 HitScore hits_of(const Entrant& entrant, const Field& field, const SensedStick& stick, std::size_t lead,
@@ -152,7 +153,8 @@ HitScore hits_of(const Entrant& entrant, const Field& field, const SensedStick& 
     const auto timing = make_entrant(entrant, stick, lead, strike_leads(when), entrant.strikes_by);
     std::unique_ptr<tracking::Predictor> confirming;
     if (!entrant.confirmed_by.empty())
-        confirming = make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), stick.name);
+        confirming =
+            make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), {stick.name, stick.shaft});
     return evaluate_strikes(recording.tracks[stick.stick], stick.samples, {*timing, confirming.get()},
                             recording.geometry, options.surface, when);
 }
@@ -225,7 +227,7 @@ double nanoseconds_per_sample(const std::string& specification, const SensedStic
     const std::span timed = std::span(stick.samples).first(std::min(stick.samples.size(), kMostTimedSamples));
     std::vector<double> costs;
     for (std::size_t pass = 0; pass < kCostPasses; ++pass) {
-        const auto predictor = make_any_predictor(specification, stick.leads_s);
+        const auto predictor = make_any_predictor(specification, stick.leads_s, {stick.name, stick.shaft});
         const auto start = std::chrono::steady_clock::now();
         for (const tracking::PoseSample& sample : timed) {
             const double behind_s = tracking::feed(*predictor, sample);
@@ -495,7 +497,8 @@ std::vector<PairedResult> pair_with_baselines(const Comparison& comparison,
             }
             if (result.baseline.empty()) continue;
             const StickRows& base = rows[{result.baseline, lead_s}];
-            result.by_recording = paired_difference(paired_sums(own, base, &ComparisonRow::trace), seed);
+            result.by_recording =
+                paired_difference(paired_sums(own, base, &ComparisonRow::trace), seed, kFewestRecordings);
             result.rms_mm = result.baseline_rms_mm + result.by_recording.difference_mm;
             if (const auto persons = paired_sums(own, base, &ComparisonRow::person); persons.size() >= 2)
                 result.by_person = paired_difference(persons, seed);

@@ -52,7 +52,7 @@ struct PairedResult {
     std::string predictor, baseline;
     double lead_s = 0;
     double rms_mm = 0, baseline_rms_mm = 0;
-    PairedDifference by_recording;
+    PairedDifference by_recording;              ///< an interval with five recordings or more
     std::optional<PairedDifference> by_person;  ///< with two persons or more
 };
 

@@ -43,7 +43,7 @@ const std::vector<Grid> kGrids = {
     {"bank", true, {"cv= 1e7 1e8 1e9", "alpha= 10 30 100", "singer= 1e10 1e11 1e12"}},
     {"imm",
      true,
-     {"alpha= 3 10 30 100", "q1=1e8,q2=3e9,q3=1e11 q1=1e9,q2=3e10,q3=1e12 q1=1e10,q2=3e11,q3=1e13"}}};
+     {"alpha= 10 30 100 300", "q1=1e8,q2=3e9,q3=1e11 q1=1e9,q2=3e10,q3=1e12 q1=1e10,q2=3e11,q3=1e13"}}};
 
 /// Each specification with each parameter of an axis.
 std::vector<std::string> crossed(const std::vector<std::string>& specifications, const std::string& axis) {
@@ -64,12 +64,12 @@ std::vector<std::string> crossed(const std::vector<std::string>& specifications,
 }
 
 constexpr const char* kFromFiles = "predictions made elsewhere; their cost is not known";
-constexpr const char* kAuto = "auto";
 constexpr const char* kParabola = "least-squares:degree=2,n=4";
 
 std::string description_of(const std::string& specification) {
-    if (specification == kAuto)
-        return fmt::format("the program's default: {} draws (errors), {} strikes, {} confirms",
+    if (is_auto(specification))
+        return fmt::format("{}{} draws (errors), {} strikes, {} confirms",
+                           specification == "auto" ? "the program's default: " : "",
                            picture_specification(specification), sound_specification(specification),
                            confirming_specification(specification));
     if (is_external(specification)) return "a child process; its cost is not measured";
@@ -84,7 +84,7 @@ Entrant named(const std::string& specification, const Field& scored, const Compa
     entrant.used.assign(
         scored.recordings.size(),
         std::vector<std::string>(options.leads_s.size(), picture_specification(specification)));
-    entrant.strikes_by = specification == kAuto ? sound_specification(specification) : "";
+    entrant.strikes_by = is_auto(specification) ? sound_specification(specification) : "";
     entrant.confirmed_by = confirming_specification(specification);
     return entrant;
 }
@@ -274,7 +274,8 @@ TuningTable::TuningTable(std::vector<std::string> specifications, const std::vec
     sums_.resize(specifications_.size() * recordings_ * leads_);
     parallel_for(specifications_.size(), threads, [&](std::size_t candidate) {
         for (const SensedStick& stick : sticks) {
-            const auto predictor = make_any_predictor(specifications_[candidate], stick.leads_s);
+            const auto predictor =
+                make_any_predictor(specifications_[candidate], stick.leads_s, {stick.name, stick.shaft});
             const std::vector<SquareSum> scored = score_positions(stick, *predictor);
             for (std::size_t lead = 0; lead < leads_; ++lead)
                 sums_[(candidate * recordings_ + stick.recording) * leads_ + lead].add(scored[lead]);
@@ -304,7 +305,7 @@ std::vector<std::string> specifications_of(const ComparisonOptions& options) {
         if (std::ranges::find(all, specification) == all.end()) all.push_back(specification);
     };
     std::ranges::for_each(options.predictors, add);
-    for (const char* baseline : {"naive", "difference", kParabola}) add(baseline);
+    for (const char* baseline : {"hold", "naive", "difference", kParabola}) add(baseline);
     return all;
 }
 

@@ -77,10 +77,10 @@ struct EntrantList {
     std::string tuned_on;  ///< what the tuned ones were tuned on, one sentence
 };
 
-/// The predictors named, without repetitions, and the baselines (naive, difference, the parabola).
+/// The predictors named, without repetitions, and the baselines (hold, naive, difference, the parabola).
 [[nodiscard]] std::vector<std::string> specifications_of(const ComparisonOptions& options);
 
-/// Those named, then the baselines that were not (naive, difference, the parabola), then the tuned ones of
+/// Those named, then the baselines that were not (hold, naive, difference, the parabola), then the tuned ones of
 /// each family among them: on `tuning` (of --tune) without the one scored (known by its samples), or, if that
 /// is empty, on all others scored (two recordings or more), and on those of other persons (two persons or
 /// more); last the files of `--predictions`, each at its lead on the recording whose samples it answers.

@@ -217,7 +217,10 @@ std::vector<LeadScore> score_predictor(const SensedStick& stick, tracking::Predi
 std::vector<SquareSum> score_positions(const SensedStick& stick, tracking::Predictor& predictor) {
     std::vector<SquareSum> sums(stick.leads_s.size());
     for (std::size_t i = 0; i < stick.samples.size(); ++i) {
-        const double behind_s = tracking::feed(predictor, {stick.samples[i].t_s, stick.samples[i].position});
+        const tracking::PoseSample& sample = stick.samples[i];
+        const double behind_s = tracking::feed(
+            predictor,
+            predictor.heeds_orientation() ? sample : tracking::PoseSample{sample.t_s, sample.position});
         for (std::size_t lead = 0; lead < sums.size(); ++lead)
             if (const std::optional<Truth>& truth = stick.truth(i, lead))
                 sums[lead].add(

@@ -57,7 +57,8 @@ struct LeadScore {
 [[nodiscard]] std::vector<LeadScore> score_predictor(const SensedStick& stick,
                                                      tracking::Predictor& predictor);
 
-/// The position errors alone [mm], for tuning and maps: orientation is neither filtered nor scored.
+/// The position errors alone [mm], for tuning and maps: orientation is not scored, and filtered only where the
+/// positions depend on it.
 [[nodiscard]] std::vector<SquareSum> score_positions(const SensedStick& stick,
                                                      tracking::Predictor& predictor);
 

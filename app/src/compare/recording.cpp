@@ -150,6 +150,7 @@ SensedStick sense_stick(const Recording& recording, std::size_t stick, const tra
     sensed.stick = stick;
     sensed.name = recorded.name;
     sensed.tip = recording.geometry.tip;
+    sensed.shaft = recording.geometry.shaft;
     sensed.samples = tracking::sense(recording.trace, stick, sensor);
     sensed.rate_hz = sensor.rate_hz > 0 ? sensor.rate_hz : median_rate(recorded.samples);
     sensed.leads_s.assign(leads_s.begin(), leads_s.end());

@@ -65,6 +65,7 @@ struct SensedStick {
     std::size_t number = 0;     ///< index among the sticks of all recordings
     std::string name;
     Eigen::Vector3d tip = Eigen::Vector3d::Zero();
+    Eigen::Vector3d shaft = -Eigen::Vector3d::UnitZ();
     double rate_hz = 0;  ///< the sensor's; the recording's own median if the sensor keeps its times
     std::vector<tracking::PoseSample> samples;  ///< in order of arrival
     std::vector<double> leads_s;

@@ -46,7 +46,7 @@ public:
           states_(parts.trace.sticks.size()) {
         const PlayOptions& o = parts.options;
         const StickPredictors predictors =
-            stick_predictors(o.picture_predictor, o.sound_predictor, o.sound_lead_s);
+            stick_predictors(o.picture_predictor, o.sound_predictor, o.sound_lead_s, parts.stick.shaft);
         for (const tracking::StickTrace& stick : parts.trace.sticks) {
             filters_.emplace_back(predictors, stick.name);
             sticks_.emplace_back(static_cast<std::uint32_t>(sticks_.size()), parts.stick, o.sound_lead_s);

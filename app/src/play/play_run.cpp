@@ -163,7 +163,7 @@ PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, co
     result.options.picture_predictor = picture_specification(options.picture_predictor);
     result.options.sound_predictor = sound_specification(options.sound_predictor);
     if (const std::string& sound = result.options.sound_predictor; !is_external(sound))
-        result.sound_models = tracking::make_predictor(sound)->models();
+        result.sound_models = make_any_predictor(sound, {})->models();
     result.trace = trace.file;
     result.kit_name = kit.name;
     result.trace_source = trace.source;
@@ -173,6 +173,9 @@ PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, co
     for (const Instrument& instrument : kit.instruments) result.instruments.push_back(instrument.name);
     if (trace_is_file) result.inputs.emplace_back(options.trace.string(), sha256_of_file(options.trace));
     for (const fs::path& file : kit.files) result.inputs.emplace_back(file.string(), sha256_of_file(file));
+    for (const std::string& each : {result.options.picture_predictor, result.options.sound_predictor})
+        if (const std::optional<fs::path> model = model_file(each))
+            result.inputs.emplace_back(model->string(), sha256_of_file(*model));
     return result;
 }
 

@@ -106,7 +106,7 @@ void RealtimeSession::start_sensors() {
     o.sticks.clear();
     for (const tracking::StickTrace& each : trace.sticks) o.sticks.push_back(each.name);
     o.predictors = stick_predictors(options.play.picture_predictor, options.play.sound_predictor,
-                                    options.play.sound_lead_s);
+                                    options.play.sound_lead_s, stick.shaft);
     o.period_s = period_s();
     o.realtime = options.realtime_priority;
     if (const ArtificialLoad::Part& stall = options.disturbance.stall; stall.amount > 0) {

@@ -108,6 +108,9 @@ void for_each_sensor_option(auto& task, const auto& field) {
     field("--sound", task.predictors.sound, "Predictor of sound");
     field("--confirming", task.predictors.confirming, "Predictor that confirms contacts; none if left out");
     field("--sound-lead", task.predictors.sound_lead_s, "Contacts are looked for so far ahead [s]");
+    field("--shaft-x", task.predictors.shaft.x(), "Of the tracked body, from hand to tip, unit");
+    field("--shaft-y", task.predictors.shaft.y(), "likewise");
+    field("--shaft-z", task.predictors.shaft.z(), "likewise");
     field("--state-fd", task.state_fds, "Shared memory; once for each stick");
     field("--wake-fd", task.wake_fd, "eventfd");
     field("--life-fd", task.life_fd, "Pipe that ends with the application");

@@ -61,14 +61,18 @@ double median(std::vector<double> values) {
     return quantile(std::move(values), 0.5);
 }
 
-PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint64_t seed) {
+PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint64_t seed,
+                                   std::size_t fewest) {
     PairedDifference result;
     PairedSums whole;
     for (const PairedSums& group : groups) whole.add(group);
     result.n = groups.size();
     result.ratio = ratio_of(whole);
     result.difference_mm = whole.a.rms() - whole.b.rms();
-    if (groups.size() < 2) return result;
+    if (groups.size() < fewest) {
+        for (const PairedSums& group : groups) result.ratios.push_back(ratio_of(group));
+        return result;
+    }
     std::mt19937_64 random(seed);
     std::vector<double> ratios, differences;
     for (std::size_t i = 0; i < kResamples; ++i) {
@@ -89,7 +93,8 @@ PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint
 std::string verdict(const PairedDifference& d) {
     if (std::isinf(d.ratio)) return "the baseline errs nothing, so there is no ratio";
     if (!d.has_interval())
-        return fmt::format("ratio {:.3f}; no interval from one recording or person", d.ratio);
+        return fmt::format("ratio {:.3f}, no interval from so few ({:.3f})", d.ratio,
+                           fmt::join(d.ratios, ", "));
     const std::string high = std::isinf(d.high) ? "no bound" : fmt::format("{:.3f}", d.high);
     const std::string range = fmt::format("({:.3f} to {}, n = {})", d.low, high, d.n);
     if (d.gain()) return fmt::format("{:.1f} % better {}", 100 * (1 - d.ratio), range);

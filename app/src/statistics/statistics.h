@@ -43,24 +43,27 @@ struct PairedSums {
 };
 
 /// The ratio RMS of a / RMS of b, pooled over n groups, with the 95 % interval of a bootstrap over the
-/// groups: each group is drawn with its pair, so what both share cancels. Below 1: a errs less.
+/// groups: each group is drawn with its pair, so what both share cancels. Below 1: a errs less. Of too few groups
+/// a bootstrap knows nothing: these have the single ratios instead.
 struct PairedDifference {
-    std::size_t n = 0;         ///< groups
-    double ratio = 1;          ///< of the RMS errors; infinite where only b errs nothing
-    double low = 1, high = 1;  ///< 95 % interval of the ratio; meaningless for n < 2
+    std::size_t n = 0;           ///< groups
+    double ratio = 1;            ///< of the RMS errors; infinite where only b errs nothing
+    double low = 1, high = 1;    ///< 95 % interval of the ratio; meaningless without has_interval()
+    std::vector<double> ratios;  ///< of the groups, in their order; only without has_interval()
     double difference_mm = 0, difference_low_mm = 0, difference_high_mm = 0;  ///< RMS of a - RMS of b
 
-    [[nodiscard]] bool has_interval() const { return n >= 2; }
+    [[nodiscard]] bool has_interval() const { return ratios.empty() && n > 0; }
     [[nodiscard]] bool gain() const { return has_interval() && high < 1; }
     [[nodiscard]] bool loss() const { return has_interval() && low > 1; }
 };
 
 /// Percentile bootstrap, kResamples draws of n groups with replacement from a generator seeded by `seed`;
-/// independent of the standard library's distributions.
-[[nodiscard]] PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint64_t seed);
+/// independent of the standard library's distributions. `fewest` >= 2: groups that make an interval.
+[[nodiscard]] PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint64_t seed,
+                                                 std::size_t fewest = 2);
 
 /// "3.1 % better (0.95 to 0.99, n = 24)", "no measurable gain (0.98 to 1.02, n = 24)", "4.0 % worse (...)",
-/// or that n is too small for an interval, or the baseline without error.
+/// "ratio 0.912, no interval from so few (0.88, 0.94)", or that the baseline errs nothing.
 [[nodiscard]] std::string verdict(const PairedDifference& difference);
 
 }  // namespace app

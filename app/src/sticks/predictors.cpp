@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "files/assets.h"
 #include "files/bad_input.h"
 #include "sticks/external_predictor.h"
 
@@ -15,9 +16,10 @@ constexpr std::string_view kExternal = "exec:";
 
 // What `auto` stands for, as measured on recorded mallets and sabers (docs/results.md). Pictures want the
 // least mean error: a velocity that fades with the lead errs 5 to 25 % less than one that lasts, on every
-// recording. Strikes want a path that bends: constant acceleration times them best, and the constant
+// recording, and a network errs less where it knows the motion. Strikes want a path that bends: constant acceleration times them best, and the constant
 // velocity, which does not overshoot after a rebound, confirms them.
-constexpr const char* kAutoPicture = "cv:q=1e7,decay=8,r=0.5,gate=5";
+constexpr std::string_view kAuto = "auto", kAutoModel = "auto:model=";
+constexpr const char* kAutoPicture = "arbitrated";
 constexpr const char* kAutoSound = "ca:q=7e8,gate=5";
 constexpr const char* kAutoConfirming = "cv:q=1e8,gate=5";
 
@@ -31,14 +33,43 @@ std::string command_of(const std::string& specification) {
     return command;
 }
 
-std::unique_ptr<tracking::Predictor> make_internal(const std::string& specification) {
+constexpr const char* kBundledModel = "general";
+
+bool needs_model(const std::string& name) {
+    return name == "learned" || name == "arbitrated";
+}
+
+/// The part of a specification that names its model, as [begin, end); none where it names none.
+std::optional<std::pair<std::size_t, std::size_t>> model_part(const std::string& specification) {
+    constexpr std::string_view kKey = "model=";
+    std::size_t key = specification.find(':');
+    while (key != std::string::npos && specification.compare(key + 1, kKey.size(), kKey) != 0)
+        key = specification.find(',', key + 1);
+    if (key == std::string::npos) return std::nullopt;
+    const std::size_t begin = key + 1 + kKey.size();
+    return std::pair(begin, std::min(specification.find(',', begin), specification.size()));
+}
+
+/// With the file of the model that is named, or of the bundled one.
+std::string with_model_file(const std::string& specification) {
+    const std::string file = model_file(specification)->string();
+    if (const auto part = model_part(specification))
+        return specification.substr(0, part->first) + file + specification.substr(part->second);
+    return fmt::format("{}{}model={}", specification,
+                       specification.find(':') == std::string::npos ? ":" : ",", file);
+}
+
+std::unique_ptr<tracking::Predictor> make_internal(const std::string& specification,
+                                                   const TrackedStick& stick) {
     const std::vector<std::string>& names = tracking::predictor_names();
-    if (const std::string name = specification.substr(0, specification.find(':'));
-        std::find(names.begin(), names.end(), name) == names.end())
-        throw BadInput(fmt::format("error: found predictor \"{}\", expected auto, exec:CMD or one of {}",
-                                   name, fmt::join(names, ", ")));
+    const std::string name = specification.substr(0, specification.find(':'));
+    if (std::find(names.begin(), names.end(), name) == names.end() && !needs_model(name))
+        throw BadInput(fmt::format(
+            "error: found predictor \"{}\", expected auto, exec:CMD or one of {}, learned, arbitrated", name,
+            fmt::join(names, ", ")));
     try {
-        return tracking::make_predictor(specification);
+        return tracking::make_predictor(needs_model(name) ? with_model_file(specification) : specification,
+                                        stick.shaft);
     } catch (const std::invalid_argument& wrong) {
         throw BadInput(fmt::format("error: {}", wrong.what()));
     }
@@ -60,16 +91,27 @@ std::string unescaped(std::string part) {
 
 }  // namespace
 
+bool is_auto(const std::string& specification) {
+    return specification.substr(0, specification.find(':')) == kAuto;
+}
+
+std::optional<std::filesystem::path> model_file(const std::string& specification) {
+    if (!needs_model(specification.substr(0, specification.find(':')))) return std::nullopt;
+    const auto part = model_part(specification);
+    return find_bundled(part ? specification.substr(part->first, part->second - part->first) : kBundledModel,
+                        "models", ".model");
+}
+
 std::string confirming_specification(const std::string& specification) {
-    return specification == "auto" ? kAutoConfirming : "";
+    return is_auto(specification) ? kAutoConfirming : "";
 }
 
 std::string picture_specification(const std::string& specification) {
-    return specification == "auto" ? kAutoPicture : specification;
+    return is_auto(specification) ? kAutoPicture + specification.substr(kAuto.size()) : specification;
 }
 
 std::string sound_specification(const std::string& specification) {
-    return specification == "auto" ? kAutoSound : specification;
+    return is_auto(specification) ? kAutoSound : specification;
 }
 
 bool is_external(const std::string& specification) {
@@ -78,16 +120,23 @@ bool is_external(const std::string& specification) {
 
 std::unique_ptr<tracking::Predictor> make_any_predictor(const std::string& specification,
                                                         std::span<const double> leads_s,
-                                                        const std::string& stick) {
-    if (!is_external(specification)) return make_internal(specification);
-    return std::make_unique<ExternalPredictor>(command_of(specification), leads_s, stick);
+                                                        const TrackedStick& stick) {
+    if (!is_external(specification)) return make_internal(specification, stick);
+    return std::make_unique<ExternalPredictor>(command_of(specification), leads_s, stick.name);
 }
 
 void check_specification(const std::string& specification) {
-    if (is_external(specification))
+    if (is_external(specification)) {
         (void)command_of(specification);
-    else if (specification != "auto")
-        (void)make_internal(specification);
+        return;
+    }
+    if (is_auto(specification) && specification != kAuto &&
+        (!specification.starts_with(kAutoModel) || specification.find(',') != std::string::npos))
+        throw BadInput(
+            fmt::format("error: found predictor \"{}\", expected auto or auto:model=FILE; to set parameters "
+                        "say arbitrated:model=FILE,KEY=VALUE",
+                        specification));
+    (void)make_internal(picture_specification(specification), {});
 }
 
 std::vector<std::string> split_specifications(const std::string& list) {

@@ -1,30 +1,42 @@
 #pragma once
 #include <tracking/predictor.h>
 
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 namespace app {
 
+/// What a predictor may know of the stick that it follows.
+struct TrackedStick {
+    std::string name = "-";                             ///< external predictors get it
+    Eigen::Vector3d shaft = -Eigen::Vector3d::UnitZ();  ///< unit, hand to tip, in the body's frame
+};
+
 /// Makes any predictor that the command line may name: those of tracking::make_predictor and `exec:CMD`, a
-/// child process (ExternalPredictor). `auto` must have been resolved before. `leads_s` are the leads that
-/// will be asked for: an external predictor computes these, in between its answers are interpolated. `stick`
-/// is the name that an external predictor gets. Throws BadInput with one line; std::runtime_error when the
-/// child fails.
+/// child process (ExternalPredictor). A network's `model=` may name a bundled one, which it is by default. `auto`
+/// must have been resolved before. `leads_s` are the leads that will be asked for: an external predictor
+/// computes these, in between its answers are interpolated. Throws BadInput with one line, tracking::TraceError
+/// for a file that is no model; std::runtime_error when the child fails.
 [[nodiscard]] std::unique_ptr<tracking::Predictor> make_any_predictor(const std::string& specification,
                                                                       std::span<const double> leads_s,
-                                                                      const std::string& stick = "-");
+                                                                      const TrackedStick& stick = {});
 
+/// `auto`, or `auto:model=FILE`.
+[[nodiscard]] bool is_auto(const std::string& specification);
 /// A predictor's specification with `auto` resolved: what measurements chose for pictures and for sound.
 [[nodiscard]] std::string picture_specification(const std::string& specification);
 [[nodiscard]] std::string sound_specification(const std::string& specification);
+/// The file of the network that a resolved specification names; none without one. Throws BadInput.
+[[nodiscard]] std::optional<std::filesystem::path> model_file(const std::string& specification);
 /// The filter that confirms the strikes of a sound predictor's specification; empty for none. With `auto`,
 /// contacts less than 50 ms ahead must be confirmed by a second filter (keep_confirmed in sticks/stick.h).
 [[nodiscard]] std::string confirming_specification(const std::string& sound_specification);
 
-/// Throws BadInput if make_any_predictor would; starts no child.
+/// Throws what make_any_predictor would, `auto` being allowed; starts no child.
 void check_specification(const std::string& specification);
 
 /// True for `exec:CMD`: its time includes a process and two messages, and is marked as external.

@@ -25,11 +25,12 @@ tracking::PosePath path_of(const tracking::Predictor& predictor, double reach_s,
     return path;
 }
 
-void begin_anew(std::unique_ptr<tracking::Predictor>& predictor, const std::string& specification) {
+void begin_anew(std::unique_ptr<tracking::Predictor>& predictor, const std::string& specification,
+                const TrackedStick& stick) {
     if (auto* external = dynamic_cast<ExternalPredictor*>(predictor.get()))
         external->begin_anew();
     else if (predictor)
-        predictor = make_any_predictor(specification, {});
+        predictor = make_any_predictor(specification, {}, stick);
 }
 
 }  // namespace
@@ -108,18 +109,20 @@ sim::TipPath Stick::measured_path() const {
     return path;
 }
 
-StickPredictors stick_predictors(const std::string& picture, const std::string& sound, double sound_lead_s) {
+StickPredictors stick_predictors(const std::string& picture, const std::string& sound, double sound_lead_s,
+                                 const Eigen::Vector3d& shaft) {
     return {picture_specification(picture), sound_specification(sound), confirming_specification(sound),
-            sound_lead_s};
+            sound_lead_s, shaft};
 }
 
 StickFilters::StickFilters(const StickPredictors& predictors, const std::string& stick)
     : predictors_(predictors),
+      stick_{stick, predictors.shaft},
       picture_(
-          make_any_predictor(predictors.picture, leads_up_to(kLongestPredictionS, kPicturePieces), stick)),
-      sound_(make_any_predictor(predictors.sound, path_leads(predictors.sound_lead_s), stick)) {
+          make_any_predictor(predictors.picture, leads_up_to(kLongestPredictionS, kPicturePieces), stick_)),
+      sound_(make_any_predictor(predictors.sound, path_leads(predictors.sound_lead_s), stick_)) {
     if (!predictors.confirming.empty())
-        confirming_ = make_any_predictor(predictors.confirming, path_leads(kConfirmingLeadS), stick);
+        confirming_ = make_any_predictor(predictors.confirming, path_leads(kConfirmingLeadS), stick_);
 }
 
 tracking::SampleStatus StickFilters::correct(const tracking::PoseSample& sample,
@@ -158,9 +161,9 @@ void StickFilters::say_paths(tracking::StickState& state) const {
 }
 
 void StickFilters::begin_anew() {
-    app::begin_anew(picture_, predictors_.picture);
-    app::begin_anew(sound_, predictors_.sound);
-    app::begin_anew(confirming_, predictors_.confirming);
+    app::begin_anew(picture_, predictors_.picture, stick_);
+    app::begin_anew(sound_, predictors_.sound, stick_);
+    app::begin_anew(confirming_, predictors_.confirming, stick_);
 }
 
 }  // namespace app

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "kit/kit.h"
+#include "sticks/predictors.h"
 
 namespace app {
 
@@ -19,11 +20,13 @@ struct StickPredictors {
     std::string picture, sound;
     std::string confirming;          ///< confirms the strikes that `sound` predicts; empty: none
     double sound_lead_s = 1.0 / 15;  ///< how far ahead contacts are looked for
+    Eigen::Vector3d shaft = -Eigen::Vector3d::UnitZ();  ///< of the sticks (StickGeometry)
 };
 
 /// With `auto` resolved. Starts nothing.
 [[nodiscard]] StickPredictors stick_predictors(const std::string& picture, const std::string& sound,
-                                               double sound_lead_s);
+                                               double sound_lead_s,
+                                               const Eigen::Vector3d& shaft = -Eigen::Vector3d::UnitZ());
 
 /// One stick's filters, which get the same samples: what they know is a StickState, offline and in real time.
 /// One thread at a time.
@@ -45,6 +48,7 @@ private:
     void say_paths(tracking::StickState& state) const;
 
     StickPredictors predictors_;
+    TrackedStick stick_;
     std::unique_ptr<tracking::Predictor> picture_, sound_, confirming_;  // confirming_ may be none
 };
 

@@ -42,7 +42,8 @@ std::string predict_table(const tracking::Trace& seen, const std::string& specif
     std::vector<Row> rows;
     for (std::size_t i = 0; i < seen.sticks.size(); ++i) {
         const std::unique_ptr<tracking::Predictor> predictor =
-            make_any_predictor(picture_specification(specification), leads, seen.sticks[i].name);
+            make_any_predictor(picture_specification(specification), leads,
+                               {seen.sticks[i].name, seen.shaft.value_or(-Eigen::Vector3d::UnitZ())});
         predict_stick(seen.sticks[i], i, *predictor, lead_s, rows);
     }
     // A stick's times differ. (stable_sort's buffer is not aligned for what holds Eigen's types.)

@@ -344,7 +344,10 @@ TEST_F(Comparisons, TheGridsOfAMapNameTheBestEstimatorOfEverySensor) {
         made.result.predictor = name;
         made.result.lead_s = 0.1;
         made.result.rms_mm = rms_mm;
-        made.result.by_recording = {5, 0.5 * (low + high), low, high, 0, 0, 0};
+        made.result.by_recording.n = 5;
+        made.result.by_recording.ratio = 0.5 * (low + high);
+        made.result.by_recording.low = low;
+        made.result.by_recording.high = high;
         return made;
     };
     comparison.map = {cell(60, 1, "cv*", 8, 0.85, 0.95), cell(60, 1, "ca*", 9, 0.98, 1.01),

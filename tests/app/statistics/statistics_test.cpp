@@ -121,6 +121,20 @@ TEST(PairedDifference, BetterOnHalfAndWorseOnHalfIsNoMeasurableGain) {
     EXPECT_TRUE(app::verdict(d).starts_with("no measurable gain"));
 }
 
+TEST(PairedDifference, FewerThanItTakesHaveTheirSingleRatiosInsteadOfAnInterval) {
+    const std::vector<PairedSums> groups = {sums(1, 4, 10), sums(9, 4, 10), sums(4, 4, 10), sums(1, 1, 10),
+                                            sums(1, 1, 10)};
+    const PairedDifference four = app::paired_difference(std::span(groups).first(4), 1, 5);
+    EXPECT_FALSE(four.has_interval());
+    EXPECT_FALSE(four.gain());
+    EXPECT_FALSE(four.loss());
+    EXPECT_EQ(four.ratios, (std::vector{0.5, 1.5, 1.0, 1.0}));
+    EXPECT_EQ(app::verdict(four), "ratio 1.074, no interval from so few (0.500, 1.500, 1.000, 1.000)");
+    const PairedDifference five = app::paired_difference(groups, 1, 5);
+    EXPECT_TRUE(five.has_interval());
+    EXPECT_TRUE(five.ratios.empty());
+}
+
 TEST(PairedDifference, OneRecordingHasNoInterval) {
     const std::vector<PairedSums> one = {sums(1, 4, 10)};
     const PairedDifference d = app::paired_difference(one, 1);

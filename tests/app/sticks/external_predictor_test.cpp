@@ -81,7 +81,7 @@ void expect_no_children_left() {
 TEST(ExternalPredictor, TheExampleIsDifference) {
     if (!has_python()) GTEST_SKIP() << "needs python3";
     const auto own = tracking::make_predictor("difference");
-    const auto external = app::make_any_predictor(kExample, kLeads, "left");
+    const auto external = app::make_any_predictor(kExample, kLeads, {"left"});
     for (const PoseSample& sample : waving(200)) {
         EXPECT_EQ(external->correct(sample), own->correct(sample));
         external->require_working();

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "files/bad_input.h"
 
 namespace {
@@ -28,9 +30,11 @@ TEST(SplitSpecifications, RefusesEmptyParts) {
 }
 
 TEST(CheckSpecification, TakesEveryKindAndRefusesTheRestInOneLine) {
-    for (const char* good : {"auto", "cv:q=1e8,gate=5", "exec:does not start here"})
+    for (const char* good : {"auto", "auto:model=general", "learned", "learned:model=general",
+                             "arbitrated:decay=4", "cv:q=1e8,gate=5", "exec:does not start here"})
         EXPECT_NO_THROW(app::check_specification(good)) << good;
-    for (const char* bad : {"", "oracle", "ca:q=much", "auto:q=1", "exec:", "exec:  ", "exec"}) {
+    for (const char* bad : {"", "oracle", "ca:q=much", "auto:q=1", "auto:model=general,q=1", "learned:q=1",
+                            "learned:model=no such model", "exec:", "exec:  ", "exec"}) {
         try {
             app::check_specification(bad);
             ADD_FAILURE() << bad;
@@ -50,6 +54,42 @@ TEST(MakeAnyPredictor, MakesThoseOfTracking) {
     EXPECT_THROW((void)app::make_any_predictor("auto", leads), app::BadInput) << "to be resolved before";
     EXPECT_TRUE(app::is_external("exec:a"));
     EXPECT_FALSE(app::is_external("cv"));
+}
+
+TEST(Predictors, AutoDrawsWithItsModelAndTheFilterOrTheBundledOne) {
+    EXPECT_EQ(app::picture_specification("auto"), "arbitrated");
+    EXPECT_EQ(app::picture_specification("auto:model=mine.model"), "arbitrated:model=mine.model");
+    for (const char* each : {"auto", "auto:model=mine.model"}) {
+        EXPECT_EQ(app::sound_specification(each), app::sound_specification("auto"));
+        EXPECT_EQ(app::confirming_specification(each), app::confirming_specification("auto"));
+        EXPECT_TRUE(app::is_auto(each));
+    }
+    EXPECT_FALSE(app::is_auto("cv:q=1"));
+    EXPECT_EQ(app::picture_specification("learned:model=mine.model"), "learned:model=mine.model");
+}
+
+TEST(Predictors, TheFileOfAModelIsTheOneNamedOrTheBundledOne) {
+    EXPECT_EQ(app::model_file("cv:q=1"), std::nullopt);
+    EXPECT_EQ(app::model_file("learned")->filename(), "general.model");
+    EXPECT_EQ(app::model_file("arbitrated:decay=4,model=general,q=1"), app::model_file("learned"));
+    EXPECT_THROW((void)app::model_file("learned:model=no such model"), app::BadInput);
+}
+
+TEST(Predictors, LearnedFollowsTheShaftThatItIsTold) {
+    const std::vector<double> leads = {0.05};
+    const auto along_z = app::make_any_predictor("learned", leads, {"left", -Eigen::Vector3d::UnitZ()});
+    const auto along_y = app::make_any_predictor("learned", leads, {"left", Eigen::Vector3d::UnitY()});
+    const auto named =
+        app::make_any_predictor("learned:model=general", leads, {"left", -Eigen::Vector3d::UnitZ()});
+    for (int i = 0; i < 30; ++i) {
+        tracking::PoseSample sample{i / 60.0, {0, 1 + 0.2 * std::sin(0.2 * i), 0}};
+        sample.orientation = Eigen::AngleAxisd(0.5 * std::sin(0.2 * i), Eigen::Vector3d::UnitX());
+        sample.has_orientation = true;
+        for (tracking::Predictor* each : {along_z.get(), along_y.get(), named.get()})
+            (void)each->correct(sample);
+    }
+    EXPECT_NE(along_z->predict(0.05).position, along_y->predict(0.05).position);
+    EXPECT_EQ(along_z->predict(0.05).position, named->predict(0.05).position);
 }
 
 }  // namespace

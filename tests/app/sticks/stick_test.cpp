@@ -46,7 +46,7 @@ TEST_P(EveryPredictor, PublishesThePathThatItPredicts) {
     const app::StickPredictors predictors = app::stick_predictors("hold", GetParam(), kSoundLeadS);
     app::StickFilters filters(predictors, "left");
     const std::vector<double> leads = app::path_leads(kSoundLeadS);
-    const auto own = app::make_any_predictor(predictors.sound, leads, "left");
+    const auto own = app::make_any_predictor(predictors.sound, leads, {"left"});
     tracking::StickState state;
     for (const PoseSample& sample : waving()) {
         const tracking::SampleStatus status = own->correct(sample);
@@ -66,6 +66,7 @@ INSTANTIATE_TEST_SUITE_P(
     Specifications, EveryPredictor,
     testing::Values("hold", "difference", "naive", "least-squares", "least-squares:degree=3,n=8",
                     "double-exponential", "one-euro", "thesis", "cv:decay=8", "ca", "singer", "bank", "imm",
+                    "learned", "arbitrated",
                     "exec:read h; set -- $h; shift 3; n=$#; echo position velocity; while read t x y z r; do "
                     "[ $t = restart ] && continue; a=; i=0; while [ $i -lt $n ]; do "
                     "a=\"$a $x 0.$i $z 1 $y 0\"; i=$((i+1)); done; echo $a; done"));

@@ -43,6 +43,8 @@ public:
     [[nodiscard]] virtual std::optional<PoseCovariance> covariance(double /*lead_s*/) const noexcept {
         return std::nullopt;
     }
+    /// Whether predicted positions depend on orientations.
+    [[nodiscard]] virtual bool heeds_orientation() const noexcept { return false; }
     /// What predict() depends on, as a value: motion()->after(lead_s) is predict(lead_s). None where a Motion
     /// cannot say it: polynomials of degree 3, programs of one's own.
     [[nodiscard]] virtual std::optional<Motion> motion() const noexcept { return std::nullopt; }
@@ -91,17 +93,22 @@ inline constexpr double kGapS = 0.1;
 ///   singer:alpha=3,q=1e10   acceleration that decays at alpha [1/s], driven by density q [mm^2/s^5]
 ///   bank:cv=1e7,ca=3e8,alpha=30,singer=1e11,lead=0.0667   the model that was right a lead ago (3.28);
 ///                           score=likelihood: most likely (3.27) instead of nearest
-///   imm:alpha=3,q1=1e9,q2=3e10,q3=1e12,rate=10             interacting Singer models, switching at `rate`
+///   imm:alpha=200,q1=1e9,q2=3e10,q3=1e12,rate=10             interacting Singer models, switching at `rate`
+///   learned:model=FILE      a network (path_model.h) from the last 0.25 s: position, shaft, its own uncertainty
+///   arbitrated:model=FILE,q=1e7,decay=8,r=0.5,gate=5      `cv` and that network, weighed by the errors that they
+///                           turned out to make; its turning lasts
 ///
 /// The numbers shown are the defaults. Orientation is filtered by the same model about its own quaternion.
 /// thesis, cv, ca, singer, bank and imm also take: `r=0.25`, the sensor's noise; `p0=10`, `v0=1000`,
 /// `a0=1e4`, standard deviations of the start; `gate=G`: samples beyond G standard deviations that a stick
 /// cannot have made (25 m/s, 3000 m/s^2, contacts excepted) are outliers. thesis, cv, ca and singer take
-/// `steady=HZ`: the steady gain of that rate. Throws std::invalid_argument with one line (found, expected)
-/// for an unknown name, key or value.
-[[nodiscard]] std::unique_ptr<Predictor> make_predictor(const std::string& specification);
+/// `steady=HZ`: the steady gain of that rate. `shaft`, a unit vector from hand to tip in the tracked body's frame,
+/// is what learned and arbitrated follow. Throws std::invalid_argument with one line (found, expected) for an
+/// unknown name, key or value, TraceError for a file that is no model.
+[[nodiscard]] std::unique_ptr<Predictor> make_predictor(
+    const std::string& specification, const Eigen::Vector3d& shaft = -Eigen::Vector3d::UnitZ());
 
-/// The names make_predictor knows, in the order of the documentation.
+/// The names make_predictor knows that need no model, in the order of the documentation.
 [[nodiscard]] const std::vector<std::string>& predictor_names();
 
 /// Position and velocity of a point fixed in the tracked body. `point_body` [m].

@@ -1,0 +1,100 @@
+#include "training/train.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "files/bad_input.h"
+#include "files/checksum.h"
+
+namespace app {
+namespace {
+
+constexpr std::size_t kOneIn = 5;
+constexpr std::size_t kFewestSamples = 20;  // of a stick, to be parted
+
+tracking::TrainingStick stick_of(const Recording& recording, std::size_t stick, std::size_t number) {
+    const MarkedTimes& marks = recording.marks[stick];
+    return {recording.trace.sticks[stick],
+            recording.geometry.shaft,
+            marks.flagged_s,
+            marks.flagged_rotations_s,
+            number,
+            false};
+}
+
+bool is_synthetic(const Recording& recording) {
+    return recording.trace.source.starts_with("synthetic");
+}
+
+}  // namespace
+
+TrainingField training_field(std::span<const Recording> recordings) {
+    TrainingField field;
+    const bool whole = recordings.size() >= kOneIn;
+    for (std::size_t r = 0; r < recordings.size(); ++r)
+        for (std::size_t s = 0; s < recordings[r].trace.sticks.size(); ++s) {
+            tracking::TrainingStick stick = stick_of(recordings[r], s, r);
+            if (whole) {
+                stick.held_out = r % kOneIn == kOneIn - 1;
+                field.sticks.push_back(std::move(stick));
+                continue;
+            }
+            std::vector<tracking::PoseSample>& samples = stick.stick.samples;
+            if (samples.size() < kFewestSamples)
+                throw BadInput(fmt::format(
+                    "{}: error: found {} samples of stick {}, expected at least {}; give longer recordings",
+                    recordings[r].trace.file, samples.size(), stick.stick.name, kFewestSamples));
+            tracking::TrainingStick end = stick;
+            const auto cut = samples.size() - samples.size() / kOneIn;
+            end.held_out = true;
+            end.stick.samples.erase(end.stick.samples.begin(),
+                                    end.stick.samples.begin() + static_cast<std::ptrdiff_t>(cut));
+            samples.resize(cut);
+            field.sticks.push_back(std::move(stick));
+            field.sticks.push_back(std::move(end));
+        }
+    field.held_out = whole ? fmt::format("every fifth of {} recordings", recordings.size())
+                           : fmt::format("the last fifth of each of {} recordings", recordings.size());
+    return field;
+}
+
+std::vector<std::pair<std::string, std::string>> provenance_of(std::span<const Recording> recordings,
+                                                               const TrainingField& field,
+                                                               const tracking::TrainingOptions& options,
+                                                               const tracking::TrainingResult& result,
+                                                               const std::string& version) {
+    std::vector<std::pair<std::string, std::string>> lines;
+    const bool synthetic = std::ranges::all_of(recordings, is_synthetic);
+    lines.emplace_back("trained_on", synthetic ? "synthetic traces alone" : "recordings");
+    lines.emplace_back("made_by", "musicworld " + version);
+    std::string command = "musicworld train";
+    for (const Recording& recording : recordings) command += " " + recording.trace.file;
+    lines.emplace_back("command", fmt::format("{} --hidden {} --steps {} --seed {}", command, options.hidden,
+                                              options.steps, options.seed));
+    for (const Recording& recording : recordings)
+        lines.emplace_back("input", sha256_of_file(recording.trace.file) + " " + recording.trace.file);
+    lines.emplace_back("held_out", field.held_out);
+    lines.emplace_back("examples", fmt::format("{}, {} steps", result.examples, result.steps));
+    for (const tracking::TrainingScore& s : result.scores)
+        lines.emplace_back(
+            "error", fmt::format("{:.4f} s ahead: {:.1f} mm RMS with the shaft, {:.1f} without; the "
+                                 "fading velocity {:.1f}; regions of 50 and 95 % hold {:.3f}, {:.3f}",
+                                 s.lead_s, s.with_shaft_mm, s.position_only_mm, s.fading_mm, s.inside_50,
+                                 s.inside_95));
+    return lines;
+}
+
+std::string format_training_text(const tracking::TrainingResult& result, const TrainingField& field) {
+    std::string text = fmt::format(
+        "{} examples, {} steps. Held out: {}, at 60 Hz with 0.25 mm of noise; RMS mm of the tracked "
+        "point:\n\n"
+        "lead s  with the shaft  position only  fading velocity  inside 50  inside 95\n",
+        result.examples, result.steps, field.held_out);
+    for (const tracking::TrainingScore& s : result.scores)
+        text += fmt::format("{:6.4f}  {:14.1f}  {:13.1f}  {:15.1f}  {:9.3f}  {:9.3f}\n", s.lead_s,
+                            s.with_shaft_mm, s.position_only_mm, s.fading_mm, s.inside_50, s.inside_95);
+    return text;
+}
+
+}  // namespace app

@@ -1,0 +1,192 @@
+#include "arbitrated.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "model_of_random_weights.h"
+#include "tracking/sensor.h"
+
+namespace tracking {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+constexpr const char* kFilter = "cv:q=1e7,decay=8,r=0.5,gate=5";
+const Vector3d kShaft = Vector3d::UnitY();
+
+Arbitrated arbitrated(PathModel model) {
+    return {make_predictor(kFilter), std::make_shared<const PathModel>(std::move(model)), kShaft};
+}
+
+/// Motion of many kinds, none of which a network of random weights knows.
+PoseSample motion(int kind, int i) {
+    const double t = i / 60.0, s = std::sin(7 * t), c = std::cos(11 * t);
+    Vector3d p = Vector3d::Zero();
+    if (kind == 0) p = {0.3 * s, 0.2 * std::abs(c), 0.1 * t};
+    if (kind == 1) p = {std::floor(2 * t) * 0.3, 0.9, 0};                        // leaps
+    if (kind == 2) p = {0.2 * std::sin(t * t), 0.4 * std::sin(3 * t * t), 0.1};  // a chirp
+    if (kind == 3) p = {t, 2 * t, -t};
+    if (kind == 4)
+        p = 0.001 * Vector3d(std::sin(31.0 * i), std::cos(17.0 * i), std::sin(5.0 * i * i));  // noise
+    if (kind == 5)
+        p = {0, 0.5 * std::abs(std::sin(9 * t)) * (std::fmod(t, 4) < 2 ? 1 : 0.1), 0};  // comes and goes
+    return {t, p, Quaterniond(Eigen::AngleAxisd(s, Vector3d::UnitX())), true};
+}
+constexpr int kKinds = 6;
+
+/// RMS of predictions 1/15 s ahead against the path itself.
+double rms_of(Predictor& predictor, int kind, int count) {
+    double sum = 0;
+    for (int i = 0; i < count; ++i) {
+        (void)predictor.correct(motion(kind, i));
+        sum += (predictor.predict(4 / 60.0).position - motion(kind, i + 4).position).squaredNorm();
+    }
+    return std::sqrt(sum / count);
+}
+
+TEST(Arbiter, FindsTheShareOfLeastSquares) {
+    // Errors of the filter e, of the model -e / 2: p = F + a (M - F) is right with a = 2/3.
+    Arbiter arbiter;
+    for (int i = 0; i < 600; ++i) {
+        const Vector3d e = Vector3d(std::sin(0.3 * i), std::cos(0.7 * i), 1);
+        arbiter.learn(e, -e / 2, Vector3d::Zero(), 1 / 60.0);
+        if (i < 14) {
+            EXPECT_EQ(arbiter.share(), 0) << "nothing before 0.25 s";
+        }
+        if (i > 15) {
+            EXPECT_NEAR(arbiter.share(), 2.0 / 3, 1e-7) << "rounding, under a root";
+        }
+    }
+}
+
+TEST(Arbiter, FollowsOnlyAsFarAsLeastSquaresIsSure) {
+    // The model takes one component of the error away; the other, as large as `left`, stays: a = 1, and the variance
+    // of a is left^2 over the number of independent errors.
+    for (const double left : {0.1, 0.5}) {
+        Arbiter arbiter;
+        for (int i = 0; i < 6000; ++i)
+            arbiter.learn(Vector3d(1, left, 0), Vector3d(0, left, 0), Vector3d::Zero(), 1 / 60.0);
+        EXPECT_NEAR(arbiter.share(), 1 - left * std::sqrt(0.15 / 2), 1e-9) << left;
+    }
+}
+
+TEST(Arbiter, TrustsNoModelThatIsNotClearlyBetter) {
+    for (const double of_filter : {0.84, 0.86, 1.0, 1.2}) {
+        Arbiter arbiter;
+        for (int i = 0; i < 6000; ++i) {
+            const Vector3d e(std::sin(0.3 * i), 0, 0), other(0, of_filter * std::sin(0.3 * i), 0);
+            arbiter.learn(e, other, Vector3d::Zero(), 1 / 60.0);
+        }
+        EXPECT_EQ(arbiter.share() > 0, of_filter < 0.85) << of_filter;
+    }
+}
+
+TEST(Arbiter, ForgetsAModelThatTurnsBad) {
+    Arbiter arbiter;
+    const Vector3d right = Vector3d::Zero(), wrong(0.1, 0, 0), worse(0.3, 0, 0);
+    for (int i = 0; i < 600; ++i) arbiter.learn(wrong, right, right, 1 / 60.0);
+    EXPECT_EQ(arbiter.share(), 1);
+    int samples = 0;
+    for (; arbiter.share() > 0.2; ++samples) arbiter.learn(wrong, worse, right, 1 / 60.0);
+    EXPECT_LT(samples, 120) << "the two seconds of its memory";
+}
+
+TEST(SpreadScale, MakesTheRegionsOfNormalErrorsHoldWhatTheySay) {
+    RandomStream random(4);
+    for (const double sigma : {0.05, 1.0, 30.0}) {
+        SpreadScale scale;
+        int inside_50 = 0, inside_95 = 0;
+        constexpr int kSettling = 2000, kCount = 20000;
+        for (int i = 0; i < kSettling + kCount; ++i) {
+            const double square = random.normal_vector(sigma).squaredNorm();
+            if (i >= kSettling) {
+                inside_50 += square <= 2.3659738843753377 * scale.factor();
+                inside_95 += square <= 7.814727903251179 * scale.factor();
+            }
+            scale.learn(square);
+        }
+        // Four standard errors are 0.014 and 0.006; the scale's own wandering adds as much again.
+        EXPECT_NEAR(inside_50 / double(kCount), 0.5, 0.03) << sigma;
+        EXPECT_NEAR(inside_95 / double(kCount), 0.95, 0.015) << sigma;
+    }
+}
+
+TEST(Arbitrated, IsTheFilterToTheBitBeforeErrorsAreKnownAndWhereTheModelIsWorse) {
+    for (int kind = 0; kind < kKinds; ++kind) {
+        Arbitrated both = arbitrated(model_of_random_weights(16, 3));
+        const auto filter = make_predictor(kFilter);
+        for (int i = 0; i < 15; ++i) {
+            EXPECT_EQ(both.correct(motion(kind, i)), filter->correct(motion(kind, i)));
+            EXPECT_EQ(both.predict(0.05).position, filter->predict(0.05).position);
+            EXPECT_EQ(both.predict(0.05).velocity, filter->predict(0.05).velocity);
+            EXPECT_EQ(both.predict(0.05).orientation.coeffs(), filter->predict(0.05).orientation.coeffs());
+        }
+    }
+}
+
+TEST(Arbitrated, IsNeverMuchWorseThanTheFilterWhateverTheModelSays) {
+    for (int kind = 0; kind < kKinds; ++kind)
+        for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+            Arbitrated both = arbitrated(model_of_random_weights(16, seed));
+            const auto filter = make_predictor(kFilter);
+            const double of_filter = rms_of(*filter, kind, 3000), of_both = rms_of(both, kind, 3000);
+            // 1 % is what is promised on recordings.
+            EXPECT_LT(of_both, 1.01 * of_filter) << kind << ' ' << seed;
+        }
+}
+
+TEST(Arbitrated, BecomesTheModelWhereThatIsRight) {
+    // Constant velocity: the fading filter lags, a network that takes the fading back does not.
+    PathModel lasting = model_of_zeros();
+    for (std::size_t l = 0; l < kNodes; ++l) {
+        // Velocities of the newest two spans are inputs over the speed; the first layers pass +x and -x.
+        const auto row = static_cast<Eigen::Index>(6 * l);
+        const double missing = kPathLeads[l] - fading_way(kPathLeads[l]);
+        lasting.layers[2].weights(row + 1, 0) = static_cast<float>(missing);
+        lasting.layers[2].weights(row + 1, 1) = static_cast<float>(-missing);
+    }
+    for (PathModel::Layer* layer : {&lasting.layers[0], &lasting.layers[1]}) layer->weights.setZero();
+    lasting.layers[0].weights(0, 1) = 1, lasting.layers[0].weights(1, 1) = -1;  // upward velocity
+    lasting.layers[1].weights(0, 0) = lasting.layers[1].weights(1, 1) = 1;
+    // f(f(x)) - f(f(-x)) = (1 + 0.01) x
+    lasting.layers[2].weights /= 1.01F;
+    Arbitrated both = arbitrated(lasting);
+    const auto up = [](int i) { return PoseSample{i / 60.0, {0, 0.8 * i / 60.0, 0}}; };
+    for (int i = 0; i < 300; ++i) (void)both.correct(up(i));
+    const auto filter = make_predictor(kFilter);
+    for (int i = 0; i < 300; ++i) (void)filter->correct(up(i));
+    const Vector3d truth(0, 0.8 * (299 / 60.0 + 1.0 / 15), 0);
+    EXPECT_GT((filter->predict(1.0 / 15).position - truth).norm(), 0.01);
+    EXPECT_LT((both.predict(1.0 / 15).position - truth).norm(), 1e-3);
+}
+
+TEST(Arbitrated, KeepsWhatItLearnedOverGapsAndFollowsTheFiltersGate) {
+    Arbitrated both = arbitrated(model_of_random_weights(16, 3));
+    const auto filter = make_predictor(kFilter);
+    for (int i = 0; i < 900; ++i) {
+        PoseSample sample = motion(0, i);
+        if (i > 400) sample.t_s += 0.3;                // a gap
+        if (i % 97 == 50) sample.position.x() += 3.0;  // an outlier
+        const SampleStatus status = filter->correct(sample);
+        EXPECT_EQ(both.correct(sample), status);
+        EXPECT_EQ(both.time_s(), filter->time_s());
+        EXPECT_TRUE(both.predict(0.1).position.allFinite());
+        EXPECT_TRUE(both.covariance(0.1)->position.allFinite());
+    }
+}
+
+TEST(Arbitrated, ItsVelocityIsTheSlopeOfItsPath) {
+    Arbitrated both = arbitrated(model_of_random_weights(16, 3));
+    for (int i = 0; i < 400; ++i) (void)both.correct(motion(5, i));
+    constexpr double kStep = 1e-6;
+    for (const double lead : {0.005, 0.02, 0.05, 0.09, 0.12, 0.149, 0.2}) {
+        const Vector3d slope =
+            (both.predict(lead + kStep).position - both.predict(lead - kStep).position) / (2 * kStep);
+        EXPECT_LT((both.predict(lead).velocity - slope).norm(), 1e-5) << lead;
+    }
+}
+
+}  // namespace
+}  // namespace tracking

@@ -1,0 +1,99 @@
+#include "tracking/path_model.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+
+#include "learned_path.h"
+#include "model_of_random_weights.h"
+#include "mutation.h"
+#include "tracking/trace.h"
+
+namespace tracking {
+namespace {
+
+std::string message_of(const std::string& bytes) {
+    try {
+        (void)parse_path_model(bytes, "m.model");
+    } catch (const TraceError& error) {
+        return error.what();
+    }
+    return "accepted";
+}
+
+TEST(PathModel, ComesBackToTheBit) {
+    PathModel model = model_of_random_weights(32, 7);
+    model.provenance = {{"made_by", "a test: with a colon"}, {"input", "abc"}, {"input", "def"}};
+    const std::string bytes = format_path_model(model);
+    const PathModel back = parse_path_model(bytes, "m.model");
+    EXPECT_EQ(format_path_model(back), bytes);
+    EXPECT_EQ(back.provenance, model.provenance);
+    for (std::size_t i = 0; i < model.layers.size(); ++i) {
+        EXPECT_EQ(back.layers[i].weights, model.layers[i].weights);
+        EXPECT_EQ(back.layers[i].bias, model.layers[i].bias);
+    }
+}
+
+TEST(PathModel, OfTheGreatestSizeTakesLessThan200kB) {
+    EXPECT_LT(format_path_model(model_of_random_weights(PathModel::kMostHidden, 1)).size(), 200000U);
+}
+
+TEST(PathModel, EveryTruncationAndEveryChangedByteIsRefusedWithItsPlace) {
+    const std::string bytes = format_path_model(model_of_random_weights(8, 3));
+    for (std::size_t length = 0; length < bytes.size(); length += length < 200 ? 1 : 97)
+        EXPECT_TRUE(message_of(bytes.substr(0, length)).starts_with("m.model:")) << length;
+    for (std::size_t at = 0; at < bytes.size(); at += at < 200 ? 1 : 97) {
+        std::string changed = bytes;
+        changed[at] = static_cast<char>(changed[at] ^ 0x20);
+        EXPECT_TRUE(message_of(changed).starts_with("m.model:")) << at;
+    }
+    EXPECT_TRUE(message_of(bytes + "x").starts_with("m.model:byte"));
+}
+
+TEST(PathModel, SaysWhatIsWrong) {
+    const PathModel good = model_of_random_weights(8, 3);
+    const std::string bytes = format_path_model(good);
+    EXPECT_NE(message_of("t,stick,px\n0,left,1\n\n").find("m.model:1:1: error: found"), std::string::npos);
+    std::string other = bytes;
+    other.replace(other.find(" 1\n"), 3, " 2\n");
+    EXPECT_NE(message_of(other).find("MusicWorld path model 1"), std::string::npos);
+    std::string sizes = bytes;
+    sizes.replace(sizes.find(" 8 8 "), 5, " 8 9 ");
+    EXPECT_NE(message_of(sizes).find("bytes of weights, expected"), std::string::npos);
+    sizes.replace(sizes.find("sizes: "), 9, "sizes: 87");
+    EXPECT_NE(message_of(sizes).find("m.model:2:8: error: found"), std::string::npos);
+    for (const float wrong :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e7F}) {
+        PathModel bad = good;
+        bad.layers[1].weights(3, 2) = wrong;
+        EXPECT_NE(message_of(format_path_model(bad)).find("a finite one"), std::string::npos) << wrong;
+    }
+}
+
+TEST(PathModel, ProvenanceThatTheFormatCannotHoldIsRefused) {
+    PathModel model = model_of_random_weights(8, 3);
+    for (const auto& line :
+         {std::pair("two words", "x"), {"", "x"}, {"key", "two\nlines"}, {"checksum", "0"}}) {
+        model.provenance = {line};
+        EXPECT_THROW((void)format_path_model(model), std::invalid_argument) << line.first;
+    }
+}
+
+TEST(PathModel, MutatedFilesAreRefusedOrHarmless) {
+    const std::string bytes = format_path_model(model_of_random_weights(8, 3));
+    std::mt19937 random(5);
+    int refused = 0;
+    for (int i = 0; i < 3000; ++i) {
+        try {
+            (void)parse_path_model(mutated(bytes, random), "fuzz.model");
+        } catch (const TraceError& error) {
+            ++refused;
+            expect_located(error.what());
+        }
+    }
+    EXPECT_GT(refused, 2700);  // the others' edits leave every byte as it was
+}
+
+}  // namespace
+}  // namespace tracking

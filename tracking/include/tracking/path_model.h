@@ -1,0 +1,51 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace tracking {
+
+/// A network that says where a stick goes, from its last 0.25 s: predictor `learned`.
+///
+///   x  inputs (StickHistory), h1 = f(W1 x + b1), h2 = f(W2 h1 + b2), y = W3 h2 + b3, f(z) = max(z, z / 10)
+///
+/// Plain numbers; what they mean is said where they are used. A model of other sizes does not exist: the
+/// reader refuses it.
+struct PathModel {
+    /// Counted up with each change of the inputs, of the outputs or of the file.
+    static constexpr int kVersion = 1;
+    static constexpr std::size_t kLeastHidden = 4, kMostHidden = 128;
+
+    struct Layer {
+        Eigen::MatrixXf weights;  ///< outputs x inputs
+        Eigen::VectorXf bias;
+    };
+    std::array<Layer, 3> layers;
+    /// Where it comes from: (key, value), each on one line; keys are words.
+    std::vector<std::pair<std::string, std::string>> provenance;
+};
+
+/// The file: a head of lines of text, an empty line, then the weights.
+///
+///   MusicWorld path model 1
+///   KEY: VALUE                      the provenance, any number of lines
+///   sizes: INPUTS HIDDEN1 HIDDEN2 OUTPUTS
+///   checksum: 16 hex digits         FNV-1a 64 of all bytes before this line and of the weights
+///   (empty)
+///   W1, b1, W2, b2, W3, b3          IEEE floats of 4 bytes, little-endian, matrices by columns
+///
+/// `head -n 20 FILE` shows where a model comes from. parse_path_model(format_path_model(m)) is m to the bit.
+/// Throws std::invalid_argument for provenance that the format cannot hold.
+[[nodiscard]] std::string format_path_model(const PathModel& model);
+
+/// Throws TraceError with FILE:LINE or FILE:byte N, what was found and expected, for anything else than a whole
+/// and finite model of this version and these sizes; `name` stands for the file. (Fuzzed.)
+[[nodiscard]] PathModel parse_path_model(std::string_view bytes, const std::string& name);
+[[nodiscard]] PathModel read_path_model(const std::filesystem::path& file);
+
+}  // namespace tracking

@@ -1,0 +1,165 @@
+#include "arbitrated.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "tracking/rotation.h"
+
+namespace tracking {
+namespace {
+
+constexpr double kRecentS = 2, kLongS = 10;
+constexpr double kSilentS = 0.25;
+constexpr double kClearlyBetter = 0.85;  // of the filter's RMS
+constexpr double kIndependentS = 0.15;   // errors closer together are much alike
+constexpr double kMostPendingHz = 500;   // predictions made more often are not all remembered
+constexpr double kSpreadStep = 0.02;
+constexpr double kSpreadOfWay = 0.3;  // of the filter, by the way at the recent speed
+constexpr double kMostLogScale = 10;
+/// Squared radii of the 50 and 95 % regions of a normal error in three dimensions.
+constexpr double kRadius50 = 2.3659738843753377, kRadius95 = 7.814727903251179;
+constexpr double kImportance95 = 2.5;  // of an error outside the 95 % region, beside one outside the other
+constexpr double kLeastSpreadM = 1e-4;
+
+}  // namespace
+
+void Arbiter::learn(const Eigen::Vector3d& filter, const Eigen::Vector3d& model, const Eigen::Vector3d& truth,
+                    double dt_s) noexcept {
+    const Eigen::Vector3d way = model - filter, error = filter - truth;
+    const double recent = std::exp(-dt_s / kRecentS), long_past = std::exp(-dt_s / kLongS);
+    against_ = recent * against_ - dt_s * error.dot(way);
+    square_ = recent * square_ + dt_s * way.squaredNorm();
+    filter_recent_ = recent * filter_recent_ + dt_s * error.squaredNorm();
+    filter_square_ = long_past * filter_square_ + dt_s * error.squaredNorm();
+    model_square_ = long_past * model_square_ + dt_s * (model - truth).squaredNorm();
+    known_s_ += dt_s;
+    share_ = 0;
+    const bool better = model_square_ < kClearlyBetter * kClearlyBetter * filter_square_;
+    if (known_s_ < kSilentS || !better || !(square_ > 0)) return;
+    const double a = against_ / square_, left = std::max(0.0, filter_recent_ - a * against_);
+    const double independent = std::max(1.0, std::min(known_s_, kRecentS) / kIndependentS);
+    share_ = std::clamp(a - std::sqrt(left / (square_ * independent)), 0.0, 1.0);
+}
+
+void SpreadScale::learn(double square) noexcept {
+    const double in_units = square * std::exp(-log_);
+    const double outside =
+        (in_units > kRadius50 ? 0.5 : -0.5) + kImportance95 * (in_units > kRadius95 ? 0.95 : -0.05);
+    log_ = std::clamp(log_ + kSpreadStep * outside, -kMostLogScale, kMostLogScale);
+}
+
+double SpreadScale::factor() const noexcept {
+    return std::exp(log_);
+}
+
+Arbitrated::Arbitrated(std::unique_ptr<Predictor> filter, std::shared_ptr<const PathModel> model,
+                       const Eigen::Vector3d& shaft)
+    : filter_(std::move(filter)), learned_(std::move(model), shaft), shaft_(shaft) {
+    for (std::size_t l = 0; l < kNodes; ++l)
+        leads_[l].ring.resize(static_cast<std::size_t>(kPathLeads[l] * kMostPendingHz) + 2);
+}
+
+SampleStatus Arbitrated::correct(const PoseSample& sample) noexcept {
+    const SampleStatus status = filter_->correct(sample);
+    if (!is_taken(status)) return status;
+    if (status == SampleStatus::reinitialised) {
+        for (std::size_t l = 0; l < kNodes; ++l) {
+            leads_[l].count = 0;
+            leads_[l].last_due_s = sample.t_s + kPathLeads[l];
+        }
+        learned_.forget();
+        oriented_ = false;
+    } else {
+        judge(sample);
+    }
+    (void)learned_.correct(sample);
+    newest_ = sample;
+    oriented_ = oriented_ || sample.has_orientation;
+    remember();
+    return status;
+}
+
+/// The truth is the path between the newest two samples.
+void Arbitrated::judge(const PoseSample& sample) noexcept {
+    const double step_s = sample.t_s - newest_.t_s;
+    const bool turned = sample.has_orientation && newest_.has_orientation;
+    for (Lead& lead : leads_)
+        for (; lead.count > 0 && lead.ring[lead.first].due_s <= sample.t_s;
+             lead.first = (lead.first + 1) % lead.ring.size(), --lead.count) {
+            const Pending& p = lead.ring[lead.first];
+            const double share = (p.due_s - newest_.t_s) / step_s;
+            const double dt_s = std::clamp(p.due_s - lead.last_due_s, 0.0, kGapS);
+            lead.last_due_s = p.due_s;
+            const Eigen::Vector3d truth = newest_.position + share * (sample.position - newest_.position);
+            lead.position.learn(p.filter, p.model, truth, dt_s);
+            const Eigen::LLT<Eigen::Matrix3d> root(p.covariance);
+            if (root.info() == Eigen::Success)
+                lead.spread.learn(
+                    root.matrixL().solve(p.filter + p.share * (p.model - p.filter) - truth).squaredNorm());
+            if (!turned || p.filter_shaft.isZero(0)) continue;
+            const Eigen::Vector3d before = newest_.orientation * shaft_, now = sample.orientation * shaft_;
+            lead.shaft.learn(p.filter_shaft, p.model_shaft, before + share * (now - before), dt_s);
+        }
+}
+
+void Arbitrated::remember() noexcept {
+    for (std::size_t l = 0; l < kNodes; ++l) {
+        Lead& lead = leads_[l];
+        if (lead.count == lead.ring.size()) continue;
+        const PosePrediction filter = filter_->predict(kPathLeads[l]),
+                             model = learned_.predict(kPathLeads[l]);
+        Pending& p = lead.ring[(lead.first + lead.count++) % lead.ring.size()];
+        p = {newest_.t_s + kPathLeads[l], lead.position.share(),   filter.position,        model.position,
+             Eigen::Vector3d::Zero(),     Eigen::Vector3d::Zero(), unscaled(kPathLeads[l])};
+        if (!oriented_) continue;
+        p.filter_shaft = filter.orientation * shaft_;
+        p.model_shaft = model.orientation * shaft_;
+    }
+}
+
+Arbitrated::Share Arbitrated::share(double lead_s, Arbiter Lead::*of) const noexcept {
+    std::size_t i = 0;
+    while (i < kNodes && kPathLeads[i] <= lead_s) ++i;
+    const auto at = [&](std::size_t l) { return (leads_[l].*of).share(); };
+    if (i == 0) return {at(0), 0};
+    if (i == kNodes) return {at(kNodes - 1), 0};
+    const double slope = (at(i) - at(i - 1)) / (kPathLeads[i] - kPathLeads[i - 1]);
+    return {at(i - 1) + slope * (lead_s - kPathLeads[i - 1]), slope};
+}
+
+PosePrediction Arbitrated::predict(double lead_s) const noexcept {
+    PosePrediction pose = filter_->predict(lead_s);
+    const Share of_position = share(lead_s, &Lead::position), of_shaft = share(lead_s, &Lead::shaft);
+    if (of_position.value == 0 && of_position.slope == 0 && of_shaft.value == 0) return pose;
+    const PosePrediction model = learned_.predict(lead_s);
+    const Eigen::Vector3d way = model.position - pose.position;
+    pose.position += of_position.value * way;
+    pose.velocity += of_position.value * (model.velocity - pose.velocity) + of_position.slope * way;
+    if (!oriented_ || of_shaft.value == 0) return pose;
+    const Eigen::Vector3d turn = logarithm(model.orientation * pose.orientation.conjugate());
+    pose.orientation = (exponential(of_shaft.value * turn) * pose.orientation).normalized();
+    pose.angular_velocity += of_shaft.value * (model.angular_velocity - pose.angular_velocity);
+    return pose;
+}
+
+Eigen::Matrix3d Arbitrated::unscaled(double lead_s) const noexcept {
+    const double a = share(lead_s, &Lead::position).value;
+    const double spread = kLeastSpreadM + kSpreadOfWay * lead_s * learned_.path().frame().speed;
+    Eigen::Matrix3d covariance = (1 - a) * (1 - a) * spread * spread * Eigen::Matrix3d::Identity();
+    if (a > 0) covariance += a * a * learned_.path().covariance(lead_s).position;
+    return covariance;
+}
+
+std::optional<PoseCovariance> Arbitrated::covariance(double lead_s) const noexcept {
+    std::size_t l = 0;
+    while (l + 1 < kNodes && kPathLeads[l] < lead_s) ++l;
+    const double share = this->share(lead_s, &Lead::shaft).value;
+    PoseCovariance covariance = filter_->covariance(lead_s).value_or(PoseCovariance{});
+    const PoseCovariance of_model = learned_.path().covariance(lead_s);
+    covariance.position = leads_[l].spread.factor() * unscaled(lead_s);
+    covariance.rotation += share * (of_model.rotation - covariance.rotation);
+    return covariance;
+}
+
+}  // namespace tracking

@@ -1,0 +1,98 @@
+#pragma once
+#include <array>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "kalman_predictor.h"
+#include "learned_path.h"
+
+namespace tracking {
+
+/// Which of two predictions of a vector to trust, from the errors that they turned out to make.
+///
+///   p = F + a (M - F),  a = a* - s,  0 <= a <= 1
+///   a* = -sum w e_F.(M - F) / D,  D = sum w |M - F|^2,  w = exp(-age / 2 s)      (least squares)
+///   s^2 = (sum w |e_F|^2 - a*^2 D) / (D n)                                       (its variance)
+///
+/// with n = 2 s / 0.15 s independent errors, fewer at the beginning: the share is what least squares is sure of, so
+/// a model that helps by chance is not followed. a = 0 until errors of 0.25 s are known, and unless the RMS of e_M
+/// over 10 s (weights exp(-age / 10 s)) is below 0.85 of that of e_F. Friedmann's choice of the model that was
+/// right (3.28), made continuous.
+class Arbiter {
+public:
+    /// The predictions F and M of `truth`, which came `dt_s` after the truth before.
+    void learn(const Eigen::Vector3d& filter, const Eigen::Vector3d& model, const Eigen::Vector3d& truth,
+               double dt_s) noexcept;
+    [[nodiscard]] double share() const noexcept { return share_; }
+
+private:
+    double known_s_ = 0, filter_recent_ = 0, against_ = 0, square_ = 0, filter_square_ = 0, model_square_ = 0,
+           share_ = 0;
+};
+
+/// Scales a stated variance so that its regions of 50 and 95 % hold what they say: the logarithm of the factor
+/// moves by a small step after each error (Robbins and Monro 1951).
+class SpreadScale {
+public:
+    /// `square`: an error's squared distance in units of the stated covariance, without this factor.
+    void learn(double square) noexcept;
+    [[nodiscard]] double factor() const noexcept;
+
+private:
+    double log_ = 0;
+};
+
+/// Predictor `arbitrated`: a filter and a network, weighed against each other for each lead, for the position
+/// and for the shaft's direction (Arbiter). Starts as the filter, and is the filter wherever the network is
+/// not clearly better. What it has learned of both outlasts gaps. Samples that the filter's gate refuses
+/// reach neither.
+///
+/// Between the leads of the network shares are interpolated linearly; orientations are turned from the
+/// filter's towards the network's by the share. The stated covariance of positions is (1 - a)^2 r^2 + a^2 C
+/// with the covariance C that the network states and r 0.3 of the way at the recent speed, scaled for each lead by what
+/// the errors turned out to be (SpreadScale). Allocates when it is made only.
+class Arbitrated final : public Predictor {
+public:
+    Arbitrated(std::unique_ptr<Predictor> filter, std::shared_ptr<const PathModel> model,
+               const Eigen::Vector3d& shaft);
+
+    [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
+    [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override;
+    [[nodiscard]] double time_s() const noexcept override { return filter_->time_s(); }
+    [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
+    [[nodiscard]] bool heeds_orientation() const noexcept override { return true; }
+
+private:
+    /// Two predictions for one time, until it comes.
+    struct Pending {
+        double due_s = 0, share = 0;  // the share of the model in the position
+        Eigen::Vector3d filter, model, filter_shaft, model_shaft;
+        Eigen::Matrix3d covariance;
+    };
+    /// Those of one lead, oldest first.
+    struct Lead {
+        std::vector<Pending> ring;
+        std::size_t first = 0, count = 0;
+        double last_due_s = 0;
+        Arbiter position, shaft;
+        SpreadScale spread;
+    };
+    /// Of a lead, from the shares at the network's leads; with the slope over the lead.
+    struct Share {
+        double value = 0, slope = 0;
+    };
+    [[nodiscard]] Share share(double lead_s, Arbiter Lead::*of) const noexcept;
+    [[nodiscard]] Eigen::Matrix3d unscaled(double lead_s) const noexcept;
+    void judge(const PoseSample& sample) noexcept;
+    void remember() noexcept;
+
+    std::unique_ptr<Predictor> filter_;
+    Learned learned_;
+    Eigen::Vector3d shaft_;
+    PoseSample newest_;
+    bool oriented_ = false;
+    std::array<Lead, kNodes> leads_;
+};
+
+}  // namespace tracking

@@ -1,0 +1,175 @@
+#include "tracking/path_model.h"
+
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <stdexcept>
+
+#include "learned_path.h"
+#include "text_cursor.h"
+#include "tracking/import.h"
+#include "tracking/trace.h"
+
+namespace tracking {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the file's floats are copied");
+
+constexpr std::string_view kTitle = "MusicWorld path model ";
+constexpr std::string_view kSizes = "sizes: ", kChecksum = "checksum: ";
+constexpr std::size_t kLongestHead = 1 << 16;
+constexpr float kGreatestWeight = 1e6F;
+constexpr const char* kRemedy = "make it again with `musicworld train`";
+
+std::string titled() {
+    std::string title(kTitle);
+    return title += std::to_string(PathModel::kVersion);
+}
+
+/// FNV-1a (Fowler, Noll, Vo), 64 bits.
+std::uint64_t hash(std::string_view bytes, std::uint64_t state = 0xcbf29ce484222325ULL) {
+    for (const char byte : bytes) state = (state ^ static_cast<unsigned char>(byte)) * 0x100000001b3ULL;
+    return state;
+}
+
+std::string checksum_line(std::uint64_t number) {
+    std::string line(kChecksum);
+    for (int shift = 60; shift >= 0; shift -= 4) line += "0123456789abcdef"[(number >> shift) % 16];
+    return line;
+}
+
+template <class Layers, class Take>
+void for_each_block(Layers& layers, const Take& take) {
+    for (auto& layer : layers) {
+        take(std::span(layer.weights.data(), static_cast<std::size_t>(layer.weights.size())));
+        take(std::span(layer.bias.data(), static_cast<std::size_t>(layer.bias.size())));
+    }
+}
+
+std::string sizes_of(const PathModel& model) {
+    std::string text = std::to_string(model.layers[0].weights.cols());
+    for (const PathModel::Layer& layer : model.layers)
+        text.append(1, ' ').append(std::to_string(layer.weights.rows()));
+    return text;
+}
+
+bool is_word(std::string_view text) {
+    return !text.empty() && text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == text.npos;
+}
+
+/// INPUTS HIDDEN1 HIDDEN2 OUTPUTS.
+std::array<std::size_t, 4> parse_sizes(const Line& line) {
+    const std::string expected = "sizes " + std::to_string(StickHistory::kInputs) + " N N " +
+                                 std::to_string(kPathOutputs) + " with N from " +
+                                 std::to_string(PathModel::kLeastHidden) + " to " +
+                                 std::to_string(PathModel::kMostHidden);
+    std::array<std::size_t, 4> sizes{};
+    const std::string_view text = line.text().substr(kSizes.size());
+    const char* at = text.data();
+    const char* const end = at + text.size();
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+        const auto [stop, failed] = std::from_chars(at, end, sizes[i]);
+        const bool last = i + 1 == sizes.size();
+        if (failed != std::errc() || (last ? stop != end : stop == end || *stop != ' '))
+            line.fail(kSizes.size(), in_quotes(text), expected, kRemedy);
+        at = last ? stop : stop + 1;
+    }
+    const auto within = [](std::size_t n) {
+        return n >= PathModel::kLeastHidden && n <= PathModel::kMostHidden;
+    };
+    if (sizes[0] != StickHistory::kInputs || sizes[3] != kPathOutputs || !within(sizes[1]) ||
+        !within(sizes[2]))
+        line.fail(kSizes.size(), in_quotes(text), expected, kRemedy);
+    return sizes;
+}
+
+[[noreturn]] void fail_at(const std::string& name, std::size_t byte, const std::string& found,
+                          const std::string& expected) {
+    throw TraceError(name + ":byte " + std::to_string(byte) + ": error: found " + found + ", expected " +
+                     expected + "; " + kRemedy);
+}
+
+}  // namespace
+
+std::string format_path_model(const PathModel& model) {
+    std::string head = titled() + "\n";
+    for (const auto& [key, value] : model.provenance) {
+        const std::string line = key + ": " + value;
+        if (!is_word(key) || line.starts_with(kSizes) || line.starts_with(kChecksum) ||
+            first_unprintable(value) != value.npos || head.size() + line.size() > kLongestHead / 2)
+            throw std::invalid_argument("path model: found provenance " + in_quotes(line) +
+                                        ", expected a word and one short line of text");
+        head += line + "\n";
+    }
+    head += std::string(kSizes) + sizes_of(model) + "\n";
+    std::string weights;
+    for_each_block(model.layers, [&](std::span<const float> block) {
+        weights.append(reinterpret_cast<const char*>(block.data()), block.size_bytes());
+    });
+    return head.append(checksum_line(hash(weights, hash(head)))).append("\n\n").append(weights);
+}
+
+PathModel parse_path_model(std::string_view bytes, const std::string& name) {
+    const std::size_t end = bytes.substr(0, kLongestHead).find("\n\n");
+    if (end == bytes.npos)
+        throw TraceError(name +
+                         ":1:1: error: found no end of a model's head, expected a file that begins with " +
+                         in_quotes(titled()) + "; " + kRemedy);
+    const std::string_view weights = bytes.substr(end + 2);
+    LineReader lines(bytes.substr(0, end + 1), name);
+    const Line title = lines.next();
+    if (title.text() != titled()) title.fail(0, in_quotes(title.text()), in_quotes(titled()), kRemedy);
+    PathModel model;
+    while (true) {
+        if (lines.at_end()) fail_at(name, end, "the end of the head", "the line \"sizes: ...\"");
+        const Line line = lines.next();
+        line.require_text();
+        if (line.text().starts_with(kSizes)) {
+            const std::array<std::size_t, 4> sizes = parse_sizes(line);
+            for (std::size_t i = 0; i < model.layers.size(); ++i) {
+                model.layers[i].weights.resize(static_cast<Eigen::Index>(sizes[i + 1]),
+                                               static_cast<Eigen::Index>(sizes[i]));
+                model.layers[i].bias.resize(static_cast<Eigen::Index>(sizes[i + 1]));
+            }
+            break;
+        }
+        const std::size_t colon = line.text().find(": ");
+        if (colon == line.text().npos || !is_word(line.text().substr(0, colon)))
+            line.fail(0, in_quotes(line.text()), "\"key: value\"", kRemedy);
+        model.provenance.emplace_back(line.text().substr(0, colon), line.text().substr(colon + 2));
+    }
+    std::size_t expected = 0;
+    for_each_block(model.layers, [&](std::span<float> block) { expected += block.size_bytes(); });
+    if (weights.size() != expected)
+        fail_at(name, end + 2, std::to_string(weights.size()) + " bytes of weights",
+                std::to_string(expected) + " for these sizes");
+    const std::string_view before = bytes.substr(0, bytes.find("\nchecksum: ") + 1);
+    if (lines.at_end()) fail_at(name, end, "no checksum", "the line \"checksum: ...\" after the sizes");
+    const Line sum = lines.next();
+    const std::string right = checksum_line(hash(weights, hash(before)));
+    if (sum.text() != right) sum.fail(0, in_quotes(sum.text()), in_quotes(right), kRemedy);
+    if (!lines.at_end()) {
+        const Line more = lines.next();
+        more.fail(0, in_quotes(more.text()), "an empty line", kRemedy);
+    }
+    std::size_t at = 0;
+    for_each_block(model.layers, [&](std::span<float> block) {
+        std::memcpy(block.data(), weights.data() + at, block.size_bytes());
+        for (std::size_t i = 0; i < block.size(); ++i)
+            if (!(std::abs(block[i]) <= kGreatestWeight))
+                fail_at(name, end + 2 + at + i * sizeof(float), "a weight of " + std::to_string(block[i]),
+                        "a finite one of at most 1e6");
+        at += block.size_bytes();
+    });
+    return model;
+}
+
+PathModel read_path_model(const std::filesystem::path& file) {
+    const std::string name = file.string();
+    return parse_path_model(read_bytes(name), name);
+}
+
+}  // namespace tracking

@@ -1,0 +1,418 @@
+#include "tracking/training.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+
+#include "learned_path.h"
+#include "network_training.h"
+#include "training_examples.h"
+
+namespace tracking {
+namespace {
+
+constexpr std::size_t kRenditions = 12, kMostExamples = 300000, kMostValidation = 30000;
+constexpr double kUsualRateHz = 60, kLeastRateHz = 30, kMostRateHz = 150, kNoiseM = 0.25e-3;
+constexpr Eigen::Index kBatch = 256;
+constexpr double kRate = 2e-3, kWarmUpSteps = 500;
+constexpr float kDecay = 0.1F;
+constexpr double kShaftWeight = 0.5;                     // of the shaft in the loss, beside the position
+constexpr std::size_t kValidations = 24, kPatience = 3;  // parts of the steps
+constexpr double kSettlingS = 0.5;
+constexpr double kFirstLogSpread = -3;
+constexpr double kSpreadWeight = 0.05;  // of the errors' likelihood, beside the loss
+/// Squared radii of the 50 and 95 % regions of a normal error in three dimensions.
+constexpr double kRadius50 = 2.3659738843753377, kRadius95 = 7.814727903251179;
+
+/// The k-th way in which a stick is seen: a third of them by the usual sensor.
+Rendition rendition_of(std::size_t k, std::uint64_t seed, double share) {
+    RandomStream random(seed);
+    Rendition r;
+    r.sensor.seed = seed;
+    r.sensor.noise_m = kNoiseM;
+    r.sensor.rate_hz =
+        kUsualRateHz * std::exp(0.06 * (random.uniform() - 0.5));  // any phase of the recording
+    r.orientation = random.uniform() > 0.3;
+    if (k % 3 != 0) {
+        r.sensor.rate_hz = kLeastRateHz * std::exp(random.uniform() * std::log(kMostRateHz / kLeastRateHz));
+        if (random.uniform() < 0.5) r.sensor.jitter_s = 0.004 * random.uniform();
+        if (random.uniform() < 0.5) r.sensor.drop_out = 0.15 * random.uniform();
+    }
+    if (k % 2 == 1) r.slower = std::exp(0.6 * (random.uniform() - 0.5));
+    r.share = share * std::min(1.0, kUsualRateHz / r.sensor.rate_hz);
+    return r;
+}
+
+double duration_of(std::span<const TrainingStick> sticks, bool held_out) {
+    double sum = 0;
+    for (const TrainingStick& s : sticks)
+        if (s.held_out == held_out) sum += s.stick.samples.back().t_s - s.stick.samples.front().t_s;
+    return sum;
+}
+
+Examples learning_examples(std::span<const TrainingStick> sticks, std::uint64_t seed) {
+    const double expected = duration_of(sticks, false) * kRenditions * kUsualRateHz;
+    const double share = std::min(1.0, static_cast<double>(kMostExamples) / (1.1 * expected));
+    ExampleCollector collector(kMostExamples);
+    for (std::size_t k = 0; k < kRenditions; ++k)
+        for (std::size_t i = 0; i < sticks.size(); ++i)
+            if (!sticks[i].held_out) collector.add(sticks[i], rendition_of(k, mixed_seed(seed, k, i), share));
+    return std::move(collector).finish();
+}
+
+/// What the sticks held out look like to the sensor that scores are stated for.
+Examples usual_examples(std::span<const TrainingStick> sticks, bool orientation) {
+    const double expected = duration_of(sticks, true) * kUsualRateHz;
+    ExampleCollector collector(kMostValidation);
+    for (const TrainingStick& stick : sticks) {
+        if (!stick.held_out) continue;
+        Rendition r;
+        r.sensor.rate_hz = kUsualRateHz;
+        r.sensor.noise_m = kNoiseM;
+        r.orientation = orientation;
+        r.share = std::min(1.0, static_cast<double>(kMostValidation) / (1.1 * expected));
+        r.from_s = kSettlingS;
+        collector.add(stick, r);
+    }
+    return std::move(collector).finish();
+}
+
+/// Inputs are learned from as (x - mean) / deviation; across has no mean, so that mirroring is a sign.
+struct Scaling {
+    Eigen::VectorXf mean, deviation;
+
+    explicit Scaling(const Eigen::MatrixXf& inputs) : mean(inputs.rowwise().mean()) {
+        for (std::size_t v = 0; v < StickHistory::kVectors; ++v)
+            mean[static_cast<Eigen::Index>(3 * v + 2)] = 0;
+        deviation = (inputs.colwise() - mean).rowwise().squaredNorm() / static_cast<float>(inputs.cols());
+        deviation = deviation.cwiseSqrt().array() + 1e-3F;
+    }
+    void apply(Eigen::MatrixXf& inputs) const {
+        inputs.colwise() -= mean;
+        inputs.array().colwise() /= deviation.array();
+    }
+    /// Into the first layer.
+    void fold_into(PathModel::Layer& layer) const {
+        layer.weights = layer.weights * deviation.cwiseInverse().asDiagonal();
+        layer.bias -= layer.weights * mean;
+    }
+};
+
+/// What each squared residual counts in the loss.
+struct LossWeights {
+    Eigen::VectorXf of_output = Eigen::VectorXf::Zero(2 * kNodes);  ///< lead x (position, shaft)
+    std::vector<float> of_example;
+
+    explicit LossWeights(const Examples& e) : of_example(e.speed) {
+        scale(e);
+        std::map<std::size_t, std::pair<double, double>> recordings;  // loss of the fading velocity, count
+        for (Eigen::Index i = 0; i < e.count(); ++i) {
+            auto& [sum, count] = recordings[e.recording[static_cast<std::size_t>(i)]];
+            sum += loss(e, i);
+            count += 1;
+        }
+        double sum = 0;
+        for (std::size_t i = 0; i < of_example.size(); ++i) {
+            const auto& [loss, count] = recordings[e.recording[i]];
+            of_example[i] *= static_cast<float>(std::sqrt(count) / std::max(loss, 1e-9));
+            sum += of_example[i];
+        }
+        for (float& weight : of_example)
+            weight *= static_cast<float>(static_cast<double>(of_example.size()) / sum);
+        scale(e);
+    }
+
+private:
+    [[nodiscard]] double loss(const Examples& e, Eigen::Index i) const {
+        double sum = 0;
+        for (Eigen::Index j = 0; j < of_output.size(); ++j)
+            sum += static_cast<double>(of_output[j]) *
+                   static_cast<double>(e.means.col(i).segment<3>(3 * j).squaredNorm());
+        return sum * static_cast<double>(of_example[static_cast<std::size_t>(i)]);
+    }
+    /// The fading velocity then has a loss of 1, and of kShaftWeight, at each lead.
+    void scale(const Examples& e) {
+        for (Eigen::Index j = 0; j < of_output.size(); ++j) {
+            double sum = 0, known = 0;
+            for (Eigen::Index i = 0; i < e.count(); ++i) {
+                sum += static_cast<double>(of_example[static_cast<std::size_t>(i)]) *
+                       static_cast<double>(e.means.col(i).segment<3>(3 * j).squaredNorm());
+                known += static_cast<double>(e.known(j, i));
+            }
+            of_output[j] = sum > 0 ? static_cast<float>((j % 2 == 0 ? 1 : kShaftWeight) * known / sum) : 0;
+        }
+    }
+};
+
+/// Weights of the squares of an example's residuals.
+Eigen::VectorXf weights_of(const Examples& e, const LossWeights& loss, Eigen::Index i) {
+    Eigen::VectorXf weights(kPathMeans);
+    for (Eigen::Index j = 0; j < loss.of_output.size(); ++j)
+        weights.segment<3>(3 * j).setConstant(e.known(j, i) * loss.of_output[j] *
+                                              loss.of_example[static_cast<std::size_t>(i)]);
+    return weights;
+}
+
+/// Examples drawn at random with replacement, half of them mirrored.
+struct Batch {
+    Eigen::MatrixXf inputs = Eigen::MatrixXf(StickHistory::kInputs, kBatch),
+                    means = Eigen::MatrixXf(kPathMeans, kBatch), weights = means;
+
+    void draw(const Examples& e, const LossWeights& loss, RandomStream& random) {
+        for (Eigen::Index b = 0; b < kBatch; ++b) {
+            const auto i = std::min(
+                e.count() - 1, static_cast<Eigen::Index>(random.uniform() * static_cast<double>(e.count())));
+            inputs.col(b) = e.inputs.col(i);
+            means.col(b) = e.means.col(i);
+            if (random.uniform() < 0.5) mirror(inputs.col(b), means.col(b));
+            weights.col(b) = weights_of(e, loss, i);
+        }
+    }
+};
+
+double rate_at(std::size_t step, std::size_t steps) {
+    const double share = static_cast<double>(step) / static_cast<double>(steps);
+    return kRate * std::min(1.0, static_cast<double>(step) / kWarmUpSteps) * 0.5 *
+           (1 + std::cos(std::numbers::pi * share));
+}
+
+double mean_loss(const Layers& layers, const Examples& e, const LossWeights& loss) {
+    Activations a;
+    run_forward(layers, e.inputs, a);
+    double sum = 0;
+    for (Eigen::Index i = 0; i < e.count(); ++i)
+        sum += static_cast<double>(
+            (a.outputs.col(i).head<kPathMeans>() - e.means.col(i)).cwiseAbs2().dot(weights_of(e, loss, i)));
+    return sum / static_cast<double>(e.count());
+}
+
+/// A residual of position in units of what the network says of it, and of the shaft, at a lead: whitened as
+/// ErrorShape says.
+Eigen::Vector3d whitened(const Eigen::Ref<const Eigen::VectorXf>& outputs, const Eigen::VectorXf& residual,
+                         std::size_t lead) {
+    return shape_of(outputs, lead)
+        .whitened(residual.segment<3>(static_cast<Eigen::Index>(6 * lead)).cast<double>());
+}
+double whitened_shaft(const Eigen::Ref<const Eigen::VectorXf>& outputs, const Eigen::VectorXf& residual,
+                      std::size_t lead) {
+    return static_cast<double>(residual.segment<3>(static_cast<Eigen::Index>(6 * lead + 3)).norm()) *
+           std::exp(-shape_of(outputs, lead).log_shaft);
+}
+
+/// One training of one network.
+class Learner {
+public:
+    Learner(const Examples& learning, const std::array<Examples, 2>& held_out, const TrainingOptions& options)
+        : learning_(learning),
+          held_out_(held_out),
+          options_(options),
+          random_(mixed_seed(options.seed, 2, 0)),
+          layers_(initial_layers(StickHistory::kInputs, options.hidden, kPathOutputs, random_)) {
+        for (std::size_t lead = 0; lead < kNodes; ++lead) {
+            const auto at = static_cast<Eigen::Index>(kPathMeans + kShapeNumbers * lead);
+            layers_[2].bias.segment<3>(at).setConstant(kFirstLogSpread);
+            layers_[2].bias[at + 6] = kFirstLogSpread;
+        }
+    }
+
+    /// Returns the steps taken.
+    std::size_t learn() {
+        const LossWeights loss(learning_);
+        const std::array<LossWeights, 2> validation = {LossWeights(held_out_[0]), LossWeights(held_out_[1])};
+        const std::size_t every = std::max<std::size_t>(1, options_.steps / kValidations);
+        Layers best = layers_;
+        double least = std::numeric_limits<double>::infinity();
+        std::size_t best_at = 0, step = 0;
+        while (step < options_.steps && step - best_at <= options_.steps / kPatience) {
+            ++step;
+            batch_.draw(learning_, loss, random_);
+            improve(static_cast<float>(rate_at(step, options_.steps)));
+            if (step % every != 0 && step != options_.steps) continue;
+            const double now = 0.5 * (mean_loss(layers_, held_out_[0], validation[0]) +
+                                      mean_loss(layers_, held_out_[1], validation[1]));
+            if (now < least) least = now, best = layers_, best_at = step;
+            if (options_.progress &&
+                !options_.progress(static_cast<double>(step) / static_cast<double>(options_.steps), now))
+                break;
+        }
+        layers_ = std::move(best);
+        return step;
+    }
+    [[nodiscard]] const Layers& layers() const { return layers_; }
+
+private:
+    void improve(float rate) {
+        run_forward(layers_, batch_.inputs, activations_);
+        slope_.topRows<kPathMeans>() =
+            (activations_.outputs.topRows<kPathMeans>() - batch_.means).cwiseProduct(batch_.weights) /
+            static_cast<float>(kBatch);
+        for (Eigen::Index b = 0; b < kBatch; ++b) set_spread_slopes(b);
+        run_backward(layers_, batch_.inputs, activations_, slope_, gradient_);
+        for (std::size_t i = 0; i < layers_.size(); ++i) adams_[i].step(layers_[i], gradient_[i], rate);
+    }
+    /// Slopes of the negative logarithm of the likelihood of normal errors, sum(l + w^2 / 2) with the whitened
+    /// residual w, by what the network says of them; the residual is taken as given. What lies beyond kFarthest
+    /// standard deviations counts as if it lay there.
+    void set_spread_slopes(Eigen::Index b) {
+        static constexpr double kFarthest = 5;
+        const Eigen::VectorXf residual = activations_.outputs.col(b).head<kPathMeans>() - batch_.means.col(b);
+        const auto outputs = activations_.outputs.col(b);
+        const auto within = [](double x) { return std::clamp(x, -kFarthest, kFarthest); };
+        for (std::size_t lead = 0; lead < kNodes; ++lead) {
+            Eigen::Matrix<double, kShapeNumbers, 1> slope = Eigen::Matrix<double, kShapeNumbers, 1>::Zero();
+            const auto at = static_cast<Eigen::Index>(6 * lead);
+            if (batch_.weights(at, b) > 0) {
+                const Eigen::Vector3d w = whitened(outputs, residual, lead).unaryExpr(within);
+                const ErrorShape shape = shape_of(outputs, lead);
+                const auto of_regression = [&](int i, int j) {
+                    return w[i] *
+                           within(std::exp(-shape.log_spread[i]) * static_cast<double>(residual[at + j]));
+                };
+                slope << 1 - w[0] * w[0], 1 - w[1] * w[1], 1 - w[2] * w[2], of_regression(1, 0),
+                    of_regression(2, 0), of_regression(2, 1), 0;
+            }
+            if (batch_.weights(at + 3, b) > 0) {
+                const double w = within(whitened_shaft(outputs, residual, lead));
+                slope[6] = 3 - w * w;
+            }
+            slope_.col(b).segment<kShapeNumbers>(
+                static_cast<Eigen::Index>(kPathMeans + kShapeNumbers * lead)) =
+                (kSpreadWeight / static_cast<double>(kBatch) * slope).cast<float>();
+        }
+    }
+
+    const Examples& learning_;
+    const std::array<Examples, 2>& held_out_;
+    const TrainingOptions& options_;
+    RandomStream random_;
+    Layers layers_, gradient_ = layers_;
+    std::array<Adam, 3> adams_ = {Adam(layers_[0], kDecay), Adam(layers_[1], kDecay),
+                                  Adam(layers_[2], kDecay)};
+    Batch batch_;
+    Activations activations_;
+    Eigen::MatrixXf slope_ = Eigen::MatrixXf(kPathOutputs, kBatch);
+};
+
+/// Squared errors over what the spreads say of them, ascending, of position (k = 0) or shaft (3) at a lead.
+std::vector<double> normalised_squares(const Layers& layers, const std::array<Examples, 2>& held_out,
+                                       std::size_t lead, std::size_t k) {
+    std::vector<double> squares;
+    for (const Examples& e : held_out) {
+        Activations a;
+        run_forward(layers, e.inputs, a);
+        for (Eigen::Index i = 0; i < e.count(); ++i) {
+            if (!(e.known(static_cast<Eigen::Index>(2 * lead + (k == 3 ? 1 : 0)), i) > 0)) continue;
+            const Eigen::VectorXf residual = a.outputs.col(i).head<kPathMeans>() - e.means.col(i);
+            const double of_shaft = whitened_shaft(a.outputs.col(i), residual, lead);
+            squares.push_back(k == 3 ? of_shaft * of_shaft
+                                     : whitened(a.outputs.col(i), residual, lead).squaredNorm());
+        }
+    }
+    std::sort(squares.begin(), squares.end());
+    return squares;
+}
+
+double share_below(const std::vector<double>& ascending, double limit) {
+    const auto above = std::upper_bound(ascending.begin(), ascending.end(), limit);
+    return static_cast<double>(above - ascending.begin()) / static_cast<double>(ascending.size());
+}
+
+/// The factor of variances with which the regions of 50 and 95 % hold what they say as nearly as can be; an error
+/// of 1 % of the latter counts as one of 2.5 % of the former.
+double calibrating_factor(const std::vector<double>& squares) {
+    constexpr int kTries = 64;
+    constexpr double kImportance = 2.5;
+    double best = 1, least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i <= kTries; ++i) {
+        const double factor = std::exp2(8.0 * i / kTries - 3);
+        const double miss = std::max(std::abs(share_below(squares, kRadius50 * factor) - 0.5),
+                                     kImportance * std::abs(share_below(squares, kRadius95 * factor) - 0.95));
+        if (miss < least) least = miss, best = factor;
+    }
+    return best;
+}
+
+void calibrate(Layers& layers, const std::array<Examples, 2>& held_out) {
+    for (std::size_t lead = 0; lead < kNodes; ++lead)
+        for (const std::size_t k : {0, 3}) {
+            const std::vector<double> squares = normalised_squares(layers, held_out, lead, k);
+            if (squares.empty()) continue;
+            const auto shift = static_cast<float>(0.5 * std::log(calibrating_factor(squares)));
+            const auto first = static_cast<Eigen::Index>(kPathMeans + kShapeNumbers * lead);
+            layers[2].bias.segment(k == 3 ? first + 6 : first, k == 3 ? 1 : 3).array() += shift;
+        }
+}
+
+/// RMS in mm of the tracked point's residuals, and of what the network has to predict, at a lead.
+std::pair<double, double> rms_mm(const Layers& layers, const Examples& e, std::size_t lead) {
+    Activations a;
+    run_forward(layers, e.inputs, a);
+    double sum = 0, fading = 0, count = 0;
+    const auto at = static_cast<Eigen::Index>(6 * lead);
+    for (Eigen::Index i = 0; i < e.count(); ++i) {
+        if (!(e.known(static_cast<Eigen::Index>(2 * lead), i) > 0)) continue;
+        const double unit = 1e3 * static_cast<double>(e.speed[static_cast<std::size_t>(i)]);
+        const Eigen::Vector3f truth = e.means.col(i).segment<3>(at);
+        sum += unit * unit * static_cast<double>((a.outputs.col(i).segment<3>(at) - truth).squaredNorm());
+        fading += unit * unit * static_cast<double>(truth.squaredNorm());
+        count += 1;
+    }
+    return {std::sqrt(sum / count), std::sqrt(fading / count)};
+}
+
+std::vector<TrainingScore> scores_of(const Layers& layers, const std::array<Examples, 2>& held_out) {
+    std::vector<TrainingScore> scores;
+    for (std::size_t lead = 0; lead < kNodes; ++lead) {
+        TrainingScore score;
+        score.lead_s = kPathLeads[lead];
+        std::tie(score.with_shaft_mm, score.fading_mm) = rms_mm(layers, held_out[0], lead);
+        score.position_only_mm = rms_mm(layers, held_out[1], lead).first;
+        const std::vector<double> squares = normalised_squares(layers, held_out, lead, 0);
+        score.inside_50 = share_below(squares, kRadius50);
+        score.inside_95 = share_below(squares, kRadius95);
+        scores.push_back(score);
+    }
+    return scores;
+}
+
+void check(const TrainingOptions& options, const Examples& learning,
+           const std::array<Examples, 2>& held_out) {
+    const auto require = [](bool holds, const std::string& found, const std::string& expected) {
+        if (!holds) throw std::invalid_argument("training: found " + found + ", expected " + expected);
+    };
+    require(options.hidden >= PathModel::kLeastHidden && options.hidden <= PathModel::kMostHidden,
+            std::to_string(options.hidden) + " hidden units", "4 to 128");
+    require(options.steps > 0, "no steps", "at least one");
+    require(learning.count() >= kBatch, std::to_string(learning.count()) + " samples to learn from",
+            "at least " + std::to_string(kBatch) + "; give longer or more recordings");
+    require(held_out[0].count() > 0, "nothing held out that can be scored",
+            "more than 0.5 s of another recording");
+}
+
+}  // namespace
+
+TrainingResult train_path_model(std::span<const TrainingStick> sticks, const TrainingOptions& options) {
+    Examples learning = learning_examples(sticks, options.seed);
+    std::array<Examples, 2> held_out = {usual_examples(sticks, true), usual_examples(sticks, false)};
+    check(options, learning, held_out);
+    const Scaling scaling(learning.inputs);
+    scaling.apply(learning.inputs);
+    for (Examples& e : held_out) scaling.apply(e.inputs);
+
+    TrainingResult result;
+    result.examples = static_cast<std::size_t>(learning.count());
+    Learner learner(learning, held_out, options);
+    result.steps = learner.learn();
+    result.model.layers = learner.layers();
+    calibrate(result.model.layers, held_out);
+    result.scores = scores_of(result.model.layers, held_out);
+    scaling.fold_into(result.model.layers[0]);
+    return result;
+}
+
+}  // namespace tracking
