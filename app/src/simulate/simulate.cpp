@@ -143,8 +143,10 @@ public:
     void note(const std::string& what) override { result_.notes.push_back(what); }
 
     /// After the last step; `wall`: since the scene was read.
-    [[nodiscard]] SimulateResult finish(const sim::DistributedResult& run, const WallTimer& wall) {
+    [[nodiscard]] SimulateResult finish(const sim::DistributedResult& run, const WallTimer& wall,
+                                        std::optional<KeptAccuracy> accuracy) {
         bar_.clear();
+        result_.accuracy = std::move(accuracy);
         take_result(run);
         result_.wall_s = wall.seconds();
         if (folder_) write_products(wall);
@@ -237,6 +239,7 @@ private:
     std::size_t next_frame_ = 0;
 };
 
+/// Of the scene's own dt.
 std::uint64_t last_step(const SimulateOptions& options, const Scene& scene) {
     constexpr double kLongestRestS = 600;
     if (options.steps) return *options.steps;
@@ -244,9 +247,10 @@ std::uint64_t last_step(const SimulateOptions& options, const Scene& scene) {
     return std::uint64_t(std::llround(std::ceil(seconds / scene.world.settings.dt - 1e-6)));
 }
 
-sim::DistributedSettings settings_of(const SimulateOptions& options, const Scene& scene) {
+sim::DistributedSettings settings_of(const SimulateOptions& options, const Scene& scene,
+                                     std::uint64_t steps) {
     sim::DistributedSettings settings;
-    settings.steps = last_step(options, scene);
+    settings.steps = steps;
     settings.until_rest = options.until_rest;
     settings.all_to_first = scene.workers.all_to_first;
     settings.market.from_step = scene.workers.balance_from;
@@ -291,6 +295,18 @@ sim::DistributedResult run(const Scene& scene, const SimulateOptions& options,
     return sim::run_distributed(scene, settings, launch_of(*options.workers), observer);
 }
 
+/// Changes what is left to a scene's accuracy.
+KeptAccuracy keep(double accuracy, const SimulateOptions& options, std::uint64_t steps, Scene& scene) {
+    ProgressBar bar(options.progress);
+    KeptAccuracy kept;
+    kept.report = sim::keep_accuracy(scene, {accuracy, steps, options.until_rest, options.dt_s.has_value()},
+                                     [&](double share) { bar.show(share); });
+    bar.clear();
+    for (std::size_t b = 0; b < kept.report.bodies.size(); ++b)
+        kept.names.push_back(name_of(scene, static_cast<int>(b)));
+    return kept;
+}
+
 void check(const SimulateOptions& options, const Scene& scene) {
     if (options.until_rest && !scene.world.settings.sleeping)
         throw BadInput(fmt::format(
@@ -316,6 +332,8 @@ Json json_of(const std::vector<Mishap>& mishaps, const char* of) {
 Json details_of(const SimulateResult& r) {
     std::vector<std::string> notes = r.notes;
     for (std::string& line : r.mishaps.lines()) notes.push_back(std::move(line));
+    if (r.accuracy && !r.accuracy->is_kept())
+        for (std::string& line : r.accuracy->lines()) notes.push_back(std::move(line));
     Json quarantined = Json::array();
     for (const Mishap& m : r.mishaps.quarantined)
         quarantined.push_back({{"body", m.name}, {"step", m.step}, {"what", m.what}});
@@ -327,6 +345,7 @@ Json details_of(const SimulateResult& r) {
         {"time_s", r.time_s},
         {"fidelity",
          {{"rigid", r.rigid}, {"linear", r.linear}, {"modal", r.modal}, {"groups_cut", r.groups_cut}}},
+        {"accuracy", r.accuracy ? r.accuracy->json() : Json()},
         {"energy_start_j", r.energy_start.total()},
         {"energy_parts_j",
          {{"kinetic", e.kinetic},
@@ -381,20 +400,25 @@ Json workers_of(const SimulateResult& r) {
 }  // namespace
 
 SimulateResult simulate(const SimulateOptions& options) {
-    const Scene scene = read_scene(options.scene, options.dt_s);
+    Scene scene = read_scene(options.scene, options.dt_s);
     check(options, scene);
     const WallTimer wall;
-    const sim::DistributedSettings settings = settings_of(options, scene);
-    SimulateRecord record(options, scene, settings.steps);
-    sim::DistributedResult done;
     try {
-        done = run(scene, options, settings, record);
+        std::uint64_t steps = last_step(options, scene);
+        std::optional<KeptAccuracy> accuracy;
+        if (const std::optional<double> asked = options.accuracy ? options.accuracy : scene.accuracy) {
+            accuracy = keep(*asked, options, steps, scene);
+            steps *= std::uint64_t(accuracy->report.step_parts);
+        }
+        const sim::DistributedSettings settings = settings_of(options, scene, steps);
+        SimulateRecord record(options, scene, steps);
+        const sim::DistributedResult done = run(scene, options, settings, record);
+        return record.finish(done, wall, std::move(accuracy));
     } catch (const sim::InputError& wrong) {
         if (!wrong.names_place()) throw;
         throw BadInput(
             fmt::format("{}: error: {}", scene.file.string(), wrong.what()));  // no single key shows it
     }
-    return record.finish(done, wall);
 }
 
 std::string format_simulate(const SimulateResult& r) {
