@@ -15,8 +15,8 @@ constexpr std::size_t kMostBodies = 8;  // that are told of
 using Json = nlohmann::ordered_json;
 
 std::string parts_of(const sim::BodyError& e) {
-    return fmt::format("step {:.2g}, truncation {:.2g}, mesh {:.2g}, samples {:.2g}", e.step, e.truncation,
-                       e.mesh, e.sampling);
+    return fmt::format("step {:.2g}, truncation {:.2g}, mesh {:.2g}, linearity {:.2g}, samples {:.2g}",
+                       e.step, e.truncation, e.mesh, e.linearity, e.sampling);
 }
 
 }  // namespace
@@ -65,6 +65,7 @@ Json KeptAccuracy::json() const {
                           {"step", e.step},
                           {"truncation", e.truncation},
                           {"mesh", e.mesh},
+                          {"linearity", e.linearity},
                           {"samples", e.sampling},
                           {"loaded_s", e.loaded_s}});
     }

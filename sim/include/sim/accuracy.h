@@ -12,10 +12,11 @@ namespace sim {
 struct BodyError {
     double mesh = 0;        ///< finite elements against their limit
     double truncation = 0;  ///< compliance of the modes that are left out, under the loads that acted
+    double linearity = 0;   ///< large deformations against modes that add up
     double sampling = 0;    ///< sagitta: how far the surface bulges between the samples that touch
     double step = 0;        ///< length of a step: by how much paths change when it is halved
-    double loaded_s = 0;    ///< when the load acted that the first three are of
-    [[nodiscard]] double total() const noexcept { return mesh + truncation + sampling + step; }
+    double loaded_s = 0;    ///< when the load acted that all but the step's are of
+    [[nodiscard]] double total() const noexcept { return mesh + truncation + linearity + sampling + step; }
 };
 
 struct AccuracyRequest {
@@ -42,7 +43,7 @@ struct AccuracyReport {
 ///
 /// 1. A trial with rigid bodies finds what presses on each body where: impacts' speeds, forces that last.
 /// 2. Of all bodies of one shape and material the cheapest way is taken whose mesh, truncation (ContactCompliance) and sampling under these
-///    loads err by at most 0.7 of what is allowed; if none does, the cheapest near the best (1.3 times).
+///    loads err, with 3 (u / extent)^2 for large displacements u, by at most 0.7 of what is allowed; if none does, the cheapest near the best (1.3 times).
 /// 3. dt is halved, up to kMostHalvings times, until halving it moves no body's surface by more than what is
 ///    left; the error of the finer of two trials is taken to be their difference, of the coarser twice that
 ///    (order 1). Halving ends early where it no longer brings trials together for longer: in scenes that are

@@ -186,8 +186,8 @@ ComplianceErrors ContactCompliance::errors(int place, const ContactLoad& load, F
     }
     if (load.force > 0) {
         const Patch at = patch(place, load.force);
-        const ComplianceErrors held = {load.force * std::abs(converged - used),
-                                       load.force * missed(of_patch(place, at.radius), converged, at)};
+        const ComplianceErrors held = {2 * load.force * std::abs(converged - used),
+                                       2 * load.force * missed(of_patch(place, at.radius), converged, at)};
         if (held.mesh + held.truncation > most.mesh + most.truncation) most = held;
     }
     return most;

@@ -39,7 +39,8 @@ struct ComplianceErrors {
 ///
 /// An impact at v presses with F = v sqrt(m / c) and displaces by v sqrt(m c) (5/4 of c where the patch grows:
 /// the work of F ~ u^(3/2) is 2/5 F u). It ends after pi sqrt(m c), so a compliance that is off by dc displaces
-/// paths after it by pi v |sqrt(m c) - sqrt(m (c + dc))|, which is counted.
+/// paths after it by pi v |sqrt(m c) - sqrt(m (c + dc))|, which is counted. A force that lasts came suddenly: it
+/// displaces by 2 F c at first.
 class ContactCompliance {
 public:
     static constexpr int kMostModes = 120, kFinestElements = 4;

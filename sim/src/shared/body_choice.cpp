@@ -8,6 +8,7 @@ namespace sim {
 namespace {
 
 constexpr std::array<int, 4> kTriangles = {180, 360, 1000, 2000};
+constexpr double kLinearity = 3;   // of balls of St. Venant-Kirchhoff matter, at 4 to 15 % of their diameter
 constexpr double kNearBest = 1.3;  // where nothing suffices
 constexpr double kBent = 0.01;     // as is_round: what bends more touches with its samples
 
@@ -68,9 +69,11 @@ BodyError BodyEstimates::of(const WorldBody& body, const BodyLoads& loads) const
         const PlaceLoad& at = loads[std::size_t(p)];
         if (at.load.speed <= 0 && at.load.force <= 0) continue;
         const ComplianceErrors missed = compliance_.errors(p, at.load, f.fidelity, f.modes, f.elements);
-        BodyError here{missed.mesh / extent_, missed.truncation / extent_, 0, 0,
-                       at.load.speed > 0 ? at.speed_s : at.force_s};
+        BodyError here;
+        here.mesh = missed.mesh / extent_, here.truncation = missed.truncation / extent_;
+        here.loaded_s = at.load.speed > 0 ? at.speed_s : at.force_s;
         const double bent = compliance_.displacement(p, at.load);
+        if (f.fidelity != Fidelity::rigid) here.linearity = kLinearity * std::pow(bent / extent_, 2);
         const bool round = ellipsoid_ && (f.fidelity != Fidelity::modal || bent <= kBent * thinnest_);
         if (!round) {
             // Samples s apart leave a gap of s^2 / (8 R); a patch of radius a, a^2 = R u, that holds several

@@ -9,7 +9,6 @@ namespace sim {
 void LoadWatch::press(const World& world, int body, const Eigen::Vector3d& arm, double force) {
     const auto b = static_cast<std::size_t>(body);
     const ContactCompliance* kind = (*kinds_)[b];
-    touched_[b] = true;
     if (kind == nullptr) return;
     const Eigen::Vector3d at = world.state(body).orientation.conjugate() * arm;
     now_[b][std::size_t(kind->place_at(at))] += force;
@@ -29,6 +28,8 @@ void LoadWatch::at(const World& world) {
             force += c.points[p].normal_impulse;
             arm += c.points[p].normal_impulse * c.points[p].arm_a.cast<double>();
         }
+        touched_[std::size_t(c.a)] = true;  // perhaps in earlier substeps alone
+        if (c.b < kFirstPlane) touched_[std::size_t(c.b)] = true;
         if (force <= 0) continue;
         arm /= force;
         force *= settings.substeps / settings.dt;
