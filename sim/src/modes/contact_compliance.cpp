@@ -85,6 +85,12 @@ int ContactCompliance::place_at(const Eigen::Vector3d& point) const noexcept {
     return place_of(gauge_.slope(point).gradient);
 }
 
+double ContactCompliance::radius_at(const Eigen::Vector3d& point) const {
+    const Eigen::Vector3d top = gauge_.onto_surface(point);
+    const Eigen::Vector3d normal = gauge_.slope(top).gradient.normalized();
+    return radius_of_curvature(gauge_, top, normal, widest_[static_cast<std::size_t>(place_of(normal))]);
+}
+
 double ContactCompliance::sagitta(int place, const SurfaceMesh& mesh) const {
     constexpr int kWays = 8, kTilts = 3;
     constexpr double kTilt = 0.17;  // [rad], 10 degrees
@@ -121,9 +127,10 @@ double ContactCompliance::of_modes(int place, Fidelity fidelity, int modes, int 
     return c(std::min<Eigen::Index>(modes, c.rows() - 1), place);
 }
 
-ContactCompliance::Patch ContactCompliance::patch(int place, double force) const {
+ContactCompliance::Patch ContactCompliance::patch(int place, double force, double radius) const {
     const auto p = std::size_t(place);
-    const double hertz = std::cbrt(3 * force * radius_[p] / (4 * plane_modulus_));
+    const double curved = radius > 0 ? radius : radius_[p];
+    const double hertz = std::cbrt(3 * force * curved / (4 * plane_modulus_));
     return {std::clamp(hertz, 1e-6 * widest_[p], widest_[p]), hertz < widest_[p]};
 }
 
@@ -131,20 +138,21 @@ double ContactCompliance::yielding(int place, const Patch& patch) const {
     return of_patch(place, patch.radius) * (patch.grows ? 1.25 : 1);
 }
 
-ContactCompliance::Patch ContactCompliance::impact_patch(int place, double speed) const {
+ContactCompliance::Patch ContactCompliance::impact_patch(int place, const ContactLoad& load) const {
     Patch now{0.3 * widest_[std::size_t(place)], true};
     for (int i = 0; i < 30; ++i)  // contracts by 1/3 at least
-        now = patch(place, speed * std::sqrt(mass_ / yielding(place, now)));
+        now = patch(place, load.speed * std::sqrt(mass_ / yielding(place, now)), load.radius);
     return now;
 }
 
-double ContactCompliance::contact_time(int place, double speed) const {
-    return M_PI * std::sqrt(mass_ * yielding(place, impact_patch(place, speed)));
+double ContactCompliance::contact_time(int place, const ContactLoad& load) const {
+    return M_PI * std::sqrt(mass_ * yielding(place, impact_patch(place, load)));
 }
 
-double ContactCompliance::rebound(int place, double speed, const std::function<double(double)>& sigma) const {
-    const double omega_c = M_PI / contact_time(place, speed);
-    const double whole = of_patch(place, impact_patch(place, speed).radius);
+double ContactCompliance::rebound(int place, const ContactLoad& load,
+                                  const std::function<double(double)>& sigma) const {
+    const double omega_c = M_PI / contact_time(place, load);
+    const double whole = of_patch(place, impact_patch(place, load).radius);
     const Cumulative& c = by_elements_.back();
     const Eigen::VectorXd& omega = omega_.back();
     double taken = 0, sum = 0;
@@ -159,7 +167,7 @@ double ContactCompliance::rebound(int place, double speed, const std::function<d
 
 double ContactCompliance::displacement(int place, const ContactLoad& load) const {
     const double impact =
-        load.speed > 0 ? load.speed * std::sqrt(mass_ * yielding(place, impact_patch(place, load.speed))) : 0;
+        load.speed > 0 ? load.speed * std::sqrt(mass_ * yielding(place, impact_patch(place, load))) : 0;
     return std::max(impact, load.force * of_patch(place, patch(place, load.force).radius));
 }
 
@@ -178,7 +186,7 @@ ComplianceErrors ContactCompliance::errors(int place, const ContactLoad& load, F
     };
     ComplianceErrors most;
     if (load.speed > 0) {
-        const Patch at = impact_patch(place, load.speed);
+        const Patch at = impact_patch(place, load);
         const double factor = at.grows ? 1.25 : 1;
         const double scale = M_PI * load.speed * std::sqrt(mass_ * factor);
         most = {scale * std::abs(std::sqrt(converged) - std::sqrt(used)),

@@ -14,8 +14,9 @@ constexpr int kContactPlaces = 7;  ///< of an octant: three poles, three middles
 
 /// What presses on one place of a body.
 struct ContactLoad {
-    double speed = 0;  ///< of an impact, along the normal [m/s]
-    double force = 0;  ///< that lasts [N]
+    double speed = 0;   ///< of an impact, along the normal [m/s]
+    double radius = 0;  ///< of the surface's curvature where it hits [m]; 0: as at the place
+    double force = 0;   ///< that lasts [N]
 };
 
 /// Displacements of a loaded place that a way to compute the body misses [m].
@@ -51,6 +52,8 @@ public:
     [[nodiscard]] int place_of(const Eigen::Vector3d& direction) const noexcept;
     /// The same by a point of the body, or within it.
     [[nodiscard]] int place_at(const Eigen::Vector3d& point) const noexcept;
+    /// Mean radius of curvature by a point of the surface, or within it [m].
+    [[nodiscard]] double radius_at(const Eigen::Vector3d& point) const;
     /// By how much the surface is at most further than the samples in directions within 30 degrees of a place's
     /// normal [m].
     [[nodiscard]] double sagitta(int place, const SurfaceMesh& mesh) const;
@@ -63,11 +66,12 @@ public:
     [[nodiscard]] ComplianceErrors errors(int place, const ContactLoad& load, Fidelity fidelity, int modes,
                                           int elements) const;
     /// How long an impact lasts: pi sqrt(m c) [s].
-    [[nodiscard]] double contact_time(int place, double speed) const;
+    [[nodiscard]] double contact_time(int place, const ContactLoad& load) const;
     /// Speed after an impact by the speed before it, where `sigma` gives the decay rate [1/s] of a mode by its
     /// omega: modes that are much faster than the impact follow it and take 2 sigma omega_c / omega_k^2 of what
     /// they store.
-    [[nodiscard]] double rebound(int place, double speed, const std::function<double(double)>& sigma) const;
+    [[nodiscard]] double rebound(int place, const ContactLoad& load,
+                                 const std::function<double(double)>& sigma) const;
     /// The largest number of modes up to `modes` that splits no group of equal frequencies.
     [[nodiscard]] int whole_groups(int modes, int elements) const;
 
@@ -77,8 +81,8 @@ private:
         double radius;  // [m]
         bool grows;     // with the force
     };
-    [[nodiscard]] Patch patch(int place, double force) const;
-    [[nodiscard]] Patch impact_patch(int place, double speed) const;
+    [[nodiscard]] Patch patch(int place, double force, double radius = 0) const;
+    [[nodiscard]] Patch impact_patch(int place, const ContactLoad& load) const;
     [[nodiscard]] double yielding(int place, const Patch& patch) const;
 
     Gauge gauge_;

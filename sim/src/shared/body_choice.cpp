@@ -90,8 +90,8 @@ BodyError BodyEstimates::of(const WorldBody& body, const BodyLoads& loads) const
 double BodyEstimates::shortest_impact(const BodyLoads& loads) const {
     double shortest = std::numeric_limits<double>::infinity();
     for (int p = 0; p < kContactPlaces; ++p)
-        if (const double speed = loads[std::size_t(p)].load.speed; speed > kSlowImpact)
-            shortest = std::min(shortest, compliance_.contact_time(p, speed));
+        if (const ContactLoad& load = loads[std::size_t(p)].load; load.speed > kSlowImpact)
+            shortest = std::min(shortest, compliance_.contact_time(p, load));
     return shortest;
 }
 
@@ -99,7 +99,7 @@ double BodyEstimates::rebound(const WorldBody& body, const BodyLoads& loads) con
     const auto speed = [](const PlaceLoad& at) { return at.load.speed; };
     const auto hardest = std::ranges::max_element(loads, {}, speed);
     if (speed(*hardest) <= kSlowImpact) return 0;
-    return compliance_.rebound(static_cast<int>(hardest - loads.begin()), speed(*hardest), [&](double omega) {
+    return compliance_.rebound(static_cast<int>(hardest - loads.begin()), hardest->load, [&](double omega) {
         return body.damping_alpha / 2 + omega * (body.damping_ratio + body.damping_beta / 2 * omega);
     });
 }

@@ -26,13 +26,19 @@ public:
 
 private:
     void press(const World& world, int body, const Eigen::Vector3d& arm, double force);
+    void hit(const World& world, int body);
 
     const std::vector<const ContactCompliance*>* kinds_;
     std::vector<BodyLoads> loads_;
     std::vector<Eigen::Vector3d> velocities_;
     using Forces = std::vector<std::array<double, kContactPlaces>>;
     Forces before_, now_;  // [N]
-    std::vector<bool> touched_;
+    struct Touch {
+        bool any = false;
+        double force = 0;                              // of the hardest contact [N]
+        Eigen::Vector3d at = Eigen::Vector3d::Zero();  // its middle, body frame
+    };
+    std::vector<Touch> touches_;  // of each body in this step
     std::vector<ContactRecord> contacts_;
 };
 

@@ -54,10 +54,10 @@ TEST(ContactCompliance, ABallYieldsToAnImpactAsHertzSays) {
             const Material unit{1e6, 0.3, 1000};
             const double speed = std::pow(share * 2 * radius / hertz_approach(radius, unit, 1), 1.25);
             const ContactCompliance ball({Vector3d::Constant(radius), 1, 1}, unit);
-            EXPECT_NEAR(ball.displacement(1, {speed, 0}), share * 2 * radius, 0.1 * share * 2 * radius)
+            EXPECT_NEAR(ball.displacement(1, {.speed = speed}), share * 2 * radius, 0.1 * share * 2 * radius)
                 << "radius " << radius << ", " << share << " of the diameter";
             // Hertz: 2.94 times the approach over the speed.
-            EXPECT_NEAR(ball.contact_time(1, speed), 2.94 * share * 2 * radius / speed,
+            EXPECT_NEAR(ball.contact_time(1, {.speed = speed}), 2.94 * share * 2 * radius / speed,
                         0.2 * 2.94 * share * 2 * radius / speed);
         }
 }
@@ -85,8 +85,8 @@ TEST(ContactCompliance, MoreModesYieldMoreAndRigidBodiesNotAtAll) {
             EXPECT_GE(now, before);
             before = now;
         }
-        const ComplianceErrors few = body.errors(place, {1, 0}, Fidelity::rigid, 0, 1);
-        EXPECT_NEAR(few.truncation, M_PI * body.displacement(place, {1, 0}), 1e-9 * few.truncation);
+        const ComplianceErrors few = body.errors(place, {.speed = 1}, Fidelity::rigid, 0, 1);
+        EXPECT_NEAR(few.truncation, M_PI * body.displacement(place, {.speed = 1}), 1e-9 * few.truncation);
     }
 }
 
