@@ -114,6 +114,7 @@ public:
             start(world);
         else
             result_.body_steps += std::uint64_t(world.bodies());
+        watch_spin(step, world);
         if (energy_) energy_->add(energy_row(world, !options_.workers));
         // Where rest may end the run any step may be the last.
         const bool perhaps_last = step == last_ || options_.until_rest;
@@ -170,6 +171,18 @@ private:
         const FrameThreadOptions where{options_.width, options_.height, folder_->path("frames")};
         frames_ = std::make_unique<FrameThread>(
             std::vector{stage_->description(options_.width, options_.height)}, stage_->frame(world), where);
+    }
+
+    void watch_spin(std::uint64_t step, const sim::World& world) {
+        constexpr double kMost = 0.01;
+        spun_.resize(std::size_t(world.bodies()));
+        for (int body = 0; body < world.bodies(); ++body) {
+            if (spun_[std::size_t(body)] || world.fidelity(body).fidelity == sim::Fidelity::rigid ||
+                sim::centrifugal_stretch(world, body) <= kMost)
+                continue;
+            spun_[std::size_t(body)] = true;
+            result_.mishaps.spun.push_back({name_of(scene_, body), step});
+        }
     }
 
     void describe(const sim::World& world) {
@@ -236,6 +249,7 @@ private:
     std::unique_ptr<SceneStage> stage_;
     std::unique_ptr<FrameThread> frames_;
     WorkerHistory history_;
+    std::vector<bool> spun_;  // of each body, that it was told
     std::size_t next_frame_ = 0;
 };
 
@@ -367,6 +381,7 @@ Json details_of(const SimulateResult& r) {
         {"quarantined", quarantined},
         {"constraints_broken", json_of(r.mishaps.broken, "constraint")},
         {"held_at_limit", json_of(r.mishaps.limited, "body")},
+        {"spun", json_of(r.mishaps.spun, "body")},
         {"at_rest", r.rest_reached},
         {"frames", r.frames},
         {"notes", notes},

@@ -60,4 +60,9 @@ AccuracyReport keep_accuracy(WorldScene& scene, const AccuracyRequest& request,
 
 constexpr int kMostHalvings = 5;
 
+/// How far the centrifugal load of a body's spin, which worlds leave out, would stretch it: at most this share of its
+/// largest extent. A bar of half length a, turning end over end, grows by u = rho w^2 a^3 / (3 E) at either end, so by
+/// u / a = rho w^2 a^2 / (3 E); nothing shorter or rounder grows more (a ball 0.4 times).
+[[nodiscard]] double centrifugal_stretch(const World& world, int body);
+
 }  // namespace sim

@@ -249,6 +249,17 @@ private:
 
 }  // namespace
 
+double centrifugal_stretch(const World& world, int body) {
+    const WorldBody& definition = world.definition(body);
+    if (definition.fixed) return 0;
+    const WorldBodyState state = world.state(body);
+    const Eigen::Vector3d spin = (state.orientation.conjugate() * state.angular_momentum)
+                                     .cwiseQuotient(world.rigid_mass(body).inertia);
+    const double reach = definition.shape.base.semi_axes.maxCoeff();
+    return definition.material.density_kg_m3 * spin.squaredNorm() * reach * reach /
+           (3 * definition.material.young_pa);
+}
+
 AccuracyReport keep_accuracy(WorldScene& scene, const AccuracyRequest& request,
                              const std::function<void(double)>& progress) {
     return Chooser(scene, request, progress).run();

@@ -96,6 +96,23 @@ TEST(KeptAccuracy, WhatIsNotKeptIsSaidWithTheBodyAndTheParts) {
     EXPECT_EQ(kept.lines()[0].rfind("accuracy 0.02: estimated b 0.019", 0), 0u);
 }
 
+TEST(Simulate, AModalBodyThatSpinsTooFastForModesWithoutCentrifugalLoadIsNamed) {
+    const auto spun = [](double spin) {
+        const WrittenScene scene(
+            "[settings]\ngravity = [0, 0, 0]\n[material.m]\nyoung_pa = 1e6\ndensity_kg_m3 = 1000\n[[body]]\n"
+            "name = \"bar\"\nsize = [1, 0.1, 0.1]\nfidelity = \"modal\"\nmaterial = \"m\"\nspin = [0, " +
+            std::to_string(spin) + ", 0]\n");
+        return json::parse(format_simulate(simulate(steps_of(scene, 3))));
+    };
+    // rho w^2 a^2 / (3 E) = 0.01: w = 10.95 rad/s.
+    EXPECT_TRUE(spun(10)["spun"].empty());
+    const json fast = spun(12);
+    ASSERT_EQ(fast["spun"].size(), 1u);
+    EXPECT_EQ(fast["spun"][0]["body"], "bar");
+    ASSERT_EQ(fast["notes"].size(), 1u);
+    EXPECT_NE(std::string(fast["notes"][0]).find("centrifugal"), std::string::npos);
+}
+
 TEST(KeptAccuracy, ItIsAShareFromATenThousandthToAHalf) {
     const WrittenScene wrong("[settings]\naccuracy = 2\n[[body]]\nname = \"a\"\nradius = 1\n");
     EXPECT_NE(wrong.refusal().find(":2:"), std::string::npos) << wrong.refusal();
