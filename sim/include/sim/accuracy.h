@@ -36,25 +36,28 @@ struct AccuracyReport {
     int parted_body = -1;  ///< the first of those
 };
 
-/// Chooses how a scene is computed so that every body's surface lies within `accuracy` of its largest extent of
-/// the continuum's: the same shapes of linear elastic matter with the scene's damping, friction and
-/// restitution, meshed, sampled and stepped without end. Changes `scene`: `fidelity`, `modes`, `elements` and
-/// `triangles` of bodies that are automatic and not fixed, dt, and the numbers of events' steps with it.
+/// Chooses how a scene is computed so that every body's surface lies within `accuracy` of its largest extent (root
+/// mean square over the surface) of the continuum's: the same shapes of linear elastic matter with the scene's
+/// damping, friction and restitution, meshed, sampled and stepped without end. Up to and through each of a body's
+/// contacts: rebounds part paths afterwards. Changes `scene`: `fidelity`, `modes`, `elements`, `triangles` and
+/// `restitution` of bodies that are automatic and not fixed, dt, and the numbers of events' steps with it.
 ///
 /// 1. A trial with rigid bodies finds what presses on each body where: impacts' speeds, forces that last.
-/// 2. Of all bodies of one shape and material the cheapest way is taken whose mesh, truncation (ContactCompliance) and sampling under these
-///    loads err, with 3 (u / extent)^2 for large displacements u, by at most 0.7 of what is allowed; if none does, the cheapest near the best (1.3 times).
+/// 2. All automatic bodies of one shape and material take the cheapest way whose mesh, truncation (ContactCompliance) and
+///    sampling under these loads err, with 3 (u / extent)^2 for large displacements u, by at most 0.7 of what is
+///    allowed; if none does, the cheapest near the best (1.3 times). Where an impact is too short for any step the
+///    body is rigid; a rigid one rebounds by what its modes' damping leaves (at least by its restitution).
 /// 3. dt is halved, up to kMostHalvings times, until halving it moves no body's surface by more than what is
 ///    left; the error of the finer of two trials is taken to be their difference, of the coarser twice that
-///    (order 1). Halving ends early where it no longer brings trials together for longer: in scenes that are
-///    chaotic, or whose contacts switch, nothing keeps paths together.
+///    (order 1). Halving ends early where it no longer brings trials together: in scenes that are chaotic, or
+///    whose contacts switch, nothing keeps paths together.
 /// 4. Loads of the last trial, and the first's, go into what is reported: an estimate above what was asked says
 ///    which part of it errs, where no choice sufficed or loads grew.
 ///
-/// What is computed rigid rebounds by the scene's restitution, not by its matter's elasticity. Bumps are left
-/// out of the estimates; bodies that events add are chosen for like the others. Trials run in this process, of
-/// the whole time, one after another: about three times the cost of the run itself. Deterministic.
-/// `progress` hears of each trial's share done. Throws as run_alone.
+/// Estimates leave out bumps and what a contact's error does to the next contacts. Bodies that events add are chosen
+/// for like the others. Trials run in this process, of the whole time, one after another: three to seven, about three
+/// times the cost of the run itself, and 0.15 s for each shape and material. Deterministic. `progress` hears of
+/// each trial's share done. Throws as run_alone.
 AccuracyReport keep_accuracy(WorldScene& scene, const AccuracyRequest& request,
                              const std::function<void(double)>& progress = {});
 
