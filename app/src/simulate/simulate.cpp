@@ -211,6 +211,10 @@ private:
                 {scene_.world.constraints.at(std::size_t(c.number)).name, c.step});
         for (const sim::FirstStep& b : run.limited)
             result_.mishaps.limited.push_back({name_of(scene_, b.number), b.step});
+        // Of what cannot follow its deformation anyway nothing more is said.
+        std::erase_if(result_.mishaps.spun, [this](const Mishap& spun) {
+            return std::ranges::count(result_.mishaps.limited, spun.name, &Mishap::name) > 0;
+        });
         // What a worker that died had counted of the impulse from outside is lost with it.
         if (run.lost == 0 && run.quarantined.empty()) result_.drift = momentum_->drift(run.outside_impulse);
         for (const sim::WorldEvent& event : scene_.events)
