@@ -57,9 +57,7 @@ public:
     /// By how much the surface is at most further than the samples in directions within 30 degrees of a place's
     /// normal [m].
     [[nodiscard]] double sagitta(int place, const SurfaceMesh& mesh) const;
-    [[nodiscard]] const Eigen::Vector3d& normal(int place) const { return normal_[std::size_t(place)]; }
-    [[nodiscard]] double volume() const noexcept { return volume_; }  ///< [m^3]
-    [[nodiscard]] double of_patch(int place, double radius) const;    ///< the continuum's [m/N]
+    [[nodiscard]] double of_patch(int place, double radius) const;  ///< the continuum's [m/N]
     /// Of a basis: rigid 0, linear, or the lowest `modes` of `elements` a side [m/N].
     [[nodiscard]] double of_modes(int place, Fidelity fidelity, int modes, int elements) const;
     [[nodiscard]] double displacement(int place, const ContactLoad& load) const;  ///< the continuum's [m]

@@ -36,8 +36,7 @@ private:
 
 constexpr double kSlowImpact = 0.1;  ///< [m/s], IslandSolver: slower approaches do not rebound
 
-/// What the continuum's path around an encounter may differ by for the choice of a body's mesh, modes and
-/// samples; the rest is the step's.
+/// Of the error allowed, what a body's mesh, modes and samples may take; the rest is the step's.
 constexpr double kShareOfBody = 0.7;
 
 }  // namespace sim
