@@ -16,6 +16,7 @@ struct TradeoffSetting {
     int steps_per_s = 60;
     int elements = 1;  ///< a side
     int triangles = 360;
+    double restitution = 0;
 };
 [[nodiscard]] std::string name_of(const TradeoffSetting& setting);
 
@@ -26,10 +27,16 @@ struct TradeoffPoint {
     bool pareto = false;  ///< nothing is both faster and nearer
 };
 
+/// What is chosen for an accuracy (sim/accuracy.h), from steps of 1/30 s.
+struct AutomaticPoint {
+    TradeoffPoint point;
+    double asked = 0, estimated = 0;  ///< share of the largest extent
+    double over_front = 0;  ///< time over that of the fastest point that is as near to the truth; 0: none is
+};
+
 struct Tradeoff {
     std::vector<TradeoffPoint> points;
-    TradeoffPoint automatic;     ///< what Fidelity::automatic takes, at 1/60 s, one element, 360 triangles
-    double requested_error = 0;  ///< that automatic was asked for, share of the largest extent
+    std::vector<AutomaticPoint> automatic;
     TradeoffSetting converged, finer;
     double converged_error = 0;  ///< of the converged run against the finer one
 };

@@ -91,11 +91,15 @@ TEST(Bench, TheConvergedRunHasNoErrorAgainstItselfAndARigidBodyHasSome) {
     EXPECT_EQ(made.points[1].error, 0);
     EXPECT_GT(made.points[0].error, 0.005);
     EXPECT_LT(made.points[0].error, 0.5);
-    EXPECT_GT(made.automatic.ms_per_s, 0);
+    ASSERT_GE(made.automatic.size(), 2u);
+    EXPECT_LT(made.automatic.back().asked, made.automatic.front().asked);
+    EXPECT_LT(made.automatic.back().point.error, made.automatic.front().point.error);
     const app::Figures figures = app::figures_of(made);
     const Json json = Json::parse(figures.json);
     EXPECT_EQ(json["results"].size(), 2u);
     EXPECT_EQ(json["results"][0]["modes"], 0);
+    EXPECT_EQ(json["automatic"].size(), made.automatic.size());
+    EXPECT_GT(json["automatic"][0]["estimated"], 0);
     const std::string& csv = figures.tables.at("tradeoff.csv");
     EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
 }

@@ -34,6 +34,8 @@ void print(const SimulateResult& r, const SimulateOptions& options) {
     if (!r.worker_options) fmt::print("{} asleep; ", r.counts.asleep);
     fmt::print("state {:016x}\n", r.state_hash);
     if (r.worker_options) print_workers(r);
+    if (r.accuracy)
+        for (const std::string& line : r.accuracy->lines()) fmt::print("{}\n", line);
     for (const std::string& line : r.mishaps.lines()) fmt::print("{}\n", line);
     if (options.out && r.frames > 0) fmt::print("See {}\n", (*options.out / "frames").string());
 }
@@ -80,6 +82,9 @@ void add_simulate_command(Command& program) {
         ->excludes(steps);
     command.option("--dt", o->dt_s, as::number(1e-6, 0.1, "s"),
                    "Length of a step, such as 1/60; default: the scene's");
+    command.option("--accuracy", o->accuracy, as::number(1e-4, 0.5),
+                   "Error allowed against the continuum, share of each body's largest extent, such as 0.01; "
+                   "default: the scene's, or all as it says. With --dt the step is kept");
     command.option("--until", o->until_rest, as::choice<bool>({{"rest", true}}),
                    "rest: until every body sleeps and no event is left, --steps (10 minutes) at most");
     command.option("--out", o->out, as::text("DIR"),

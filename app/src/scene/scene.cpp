@@ -21,6 +21,7 @@ namespace {
 
 constexpr std::size_t kMostBodies = 10000;
 constexpr double kLongestS = 360000;  // a hundred hours
+constexpr Range kAccuracy{1e-4, 0.5};
 constexpr double kDegree = std::numbers::pi / 180;
 
 // What a file says
@@ -390,6 +391,11 @@ void settings_keys(Fields& keys, Scene& scene) {
                 "Half a second with all points slower than this: asleep.");
     keys.fraction("seconds", scene.seconds, {1e-3, kLongestS, "s"},
                   "How long `simulate` runs unless told otherwise.");
+    keys.number(
+        "accuracy", scene.accuracy, kAccuracy,
+        "Error allowed against the continuum, share of each body's largest extent: chooses what is computed "
+        "of automatic bodies, their samples, and parts of `dt`.",
+        {.otherwise = "all as the file says", .example = "0.01"});
 }
 const TableKind<Scene> kSettings = {{"settings", "How it is computed."}, settings_keys};
 

@@ -34,6 +34,8 @@ std::vector<std::string> Mishaps::lines() const {
     tell(quarantined, "body", "taken out (beyond the world's range or not finite)");
     tell(broken, "constraint", "broken (above the breaking force)");
     tell(limited, "body", "held at the limit of deformation");
+    tell(spun, "body",
+         "spun so fast that centrifugal load, which is left out, would stretch them by over 1 %");
     return all;
 }
 

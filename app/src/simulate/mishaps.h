@@ -18,6 +18,8 @@ struct Mishaps {
     std::vector<Mishap> broken;       ///< constraints, by their breaking force
     std::vector<Mishap> limited;      ///< bodies whose deformation was held at its limit
 
+    std::vector<Mishap> spun;  ///< bodies that centrifugal load, which is left out, would stretch by over 1 %
+
     /// A line for each list that is not empty: count, the first names, the first step.
     [[nodiscard]] std::vector<std::string> lines() const;
 };

@@ -114,6 +114,7 @@ public:
             start(world);
         else
             result_.body_steps += std::uint64_t(world.bodies());
+        watch_spin(step, world);
         if (energy_) energy_->add(energy_row(world, !options_.workers));
         // Where rest may end the run any step may be the last.
         const bool perhaps_last = step == last_ || options_.until_rest;
@@ -143,8 +144,10 @@ public:
     void note(const std::string& what) override { result_.notes.push_back(what); }
 
     /// After the last step; `wall`: since the scene was read.
-    [[nodiscard]] SimulateResult finish(const sim::DistributedResult& run, const WallTimer& wall) {
+    [[nodiscard]] SimulateResult finish(const sim::DistributedResult& run, const WallTimer& wall,
+                                        std::optional<KeptAccuracy> accuracy) {
         bar_.clear();
+        result_.accuracy = std::move(accuracy);
         take_result(run);
         result_.wall_s = wall.seconds();
         if (folder_) write_products(wall);
@@ -168,6 +171,18 @@ private:
         const FrameThreadOptions where{options_.width, options_.height, folder_->path("frames")};
         frames_ = std::make_unique<FrameThread>(
             std::vector{stage_->description(options_.width, options_.height)}, stage_->frame(world), where);
+    }
+
+    void watch_spin(std::uint64_t step, const sim::World& world) {
+        constexpr double kMost = 0.01;
+        spun_.resize(std::size_t(world.bodies()));
+        for (int body = 0; body < world.bodies(); ++body) {
+            if (spun_[std::size_t(body)] || world.fidelity(body).fidelity == sim::Fidelity::rigid ||
+                sim::centrifugal_stretch(world, body) <= kMost)
+                continue;
+            spun_[std::size_t(body)] = true;
+            result_.mishaps.spun.push_back({name_of(scene_, body), step});
+        }
     }
 
     void describe(const sim::World& world) {
@@ -196,6 +211,10 @@ private:
                 {scene_.world.constraints.at(std::size_t(c.number)).name, c.step});
         for (const sim::FirstStep& b : run.limited)
             result_.mishaps.limited.push_back({name_of(scene_, b.number), b.step});
+        // Of what cannot follow its deformation anyway nothing more is said.
+        std::erase_if(result_.mishaps.spun, [this](const Mishap& spun) {
+            return std::ranges::count(result_.mishaps.limited, spun.name, &Mishap::name) > 0;
+        });
         // What a worker that died had counted of the impulse from outside is lost with it.
         if (run.lost == 0 && run.quarantined.empty()) result_.drift = momentum_->drift(run.outside_impulse);
         for (const sim::WorldEvent& event : scene_.events)
@@ -234,9 +253,11 @@ private:
     std::unique_ptr<SceneStage> stage_;
     std::unique_ptr<FrameThread> frames_;
     WorkerHistory history_;
+    std::vector<bool> spun_;  // of each body, that it was told
     std::size_t next_frame_ = 0;
 };
 
+/// Of the scene's own dt.
 std::uint64_t last_step(const SimulateOptions& options, const Scene& scene) {
     constexpr double kLongestRestS = 600;
     if (options.steps) return *options.steps;
@@ -244,9 +265,10 @@ std::uint64_t last_step(const SimulateOptions& options, const Scene& scene) {
     return std::uint64_t(std::llround(std::ceil(seconds / scene.world.settings.dt - 1e-6)));
 }
 
-sim::DistributedSettings settings_of(const SimulateOptions& options, const Scene& scene) {
+sim::DistributedSettings settings_of(const SimulateOptions& options, const Scene& scene,
+                                     std::uint64_t steps) {
     sim::DistributedSettings settings;
-    settings.steps = last_step(options, scene);
+    settings.steps = steps;
     settings.until_rest = options.until_rest;
     settings.all_to_first = scene.workers.all_to_first;
     settings.market.from_step = scene.workers.balance_from;
@@ -291,6 +313,18 @@ sim::DistributedResult run(const Scene& scene, const SimulateOptions& options,
     return sim::run_distributed(scene, settings, launch_of(*options.workers), observer);
 }
 
+/// Changes what is left to a scene's accuracy.
+KeptAccuracy keep(double accuracy, const SimulateOptions& options, std::uint64_t steps, Scene& scene) {
+    ProgressBar bar(options.progress);
+    KeptAccuracy kept;
+    kept.report = sim::keep_accuracy(scene, {accuracy, steps, options.until_rest, options.dt_s.has_value()},
+                                     [&](double share) { bar.show(share); });
+    bar.clear();
+    for (std::size_t b = 0; b < kept.report.bodies.size(); ++b)
+        kept.names.push_back(name_of(scene, static_cast<int>(b)));
+    return kept;
+}
+
 void check(const SimulateOptions& options, const Scene& scene) {
     if (options.until_rest && !scene.world.settings.sleeping)
         throw BadInput(fmt::format(
@@ -316,6 +350,8 @@ Json json_of(const std::vector<Mishap>& mishaps, const char* of) {
 Json details_of(const SimulateResult& r) {
     std::vector<std::string> notes = r.notes;
     for (std::string& line : r.mishaps.lines()) notes.push_back(std::move(line));
+    if (r.accuracy && !r.accuracy->is_kept())
+        for (std::string& line : r.accuracy->lines()) notes.push_back(std::move(line));
     Json quarantined = Json::array();
     for (const Mishap& m : r.mishaps.quarantined)
         quarantined.push_back({{"body", m.name}, {"step", m.step}, {"what", m.what}});
@@ -327,6 +363,7 @@ Json details_of(const SimulateResult& r) {
         {"time_s", r.time_s},
         {"fidelity",
          {{"rigid", r.rigid}, {"linear", r.linear}, {"modal", r.modal}, {"groups_cut", r.groups_cut}}},
+        {"accuracy", r.accuracy ? r.accuracy->json() : Json()},
         {"energy_start_j", r.energy_start.total()},
         {"energy_parts_j",
          {{"kinetic", e.kinetic},
@@ -348,6 +385,7 @@ Json details_of(const SimulateResult& r) {
         {"quarantined", quarantined},
         {"constraints_broken", json_of(r.mishaps.broken, "constraint")},
         {"held_at_limit", json_of(r.mishaps.limited, "body")},
+        {"spun", json_of(r.mishaps.spun, "body")},
         {"at_rest", r.rest_reached},
         {"frames", r.frames},
         {"notes", notes},
@@ -381,20 +419,25 @@ Json workers_of(const SimulateResult& r) {
 }  // namespace
 
 SimulateResult simulate(const SimulateOptions& options) {
-    const Scene scene = read_scene(options.scene, options.dt_s);
+    Scene scene = read_scene(options.scene, options.dt_s);
     check(options, scene);
     const WallTimer wall;
-    const sim::DistributedSettings settings = settings_of(options, scene);
-    SimulateRecord record(options, scene, settings.steps);
-    sim::DistributedResult done;
     try {
-        done = run(scene, options, settings, record);
+        std::uint64_t steps = last_step(options, scene);
+        std::optional<KeptAccuracy> accuracy;
+        if (const std::optional<double> asked = options.accuracy ? options.accuracy : scene.accuracy) {
+            accuracy = keep(*asked, options, steps, scene);
+            steps *= std::uint64_t(accuracy->report.step_parts);
+        }
+        const sim::DistributedSettings settings = settings_of(options, scene, steps);
+        SimulateRecord record(options, scene, steps);
+        const sim::DistributedResult done = run(scene, options, settings, record);
+        return record.finish(done, wall, std::move(accuracy));
     } catch (const sim::InputError& wrong) {
         if (!wrong.names_place()) throw;
         throw BadInput(
             fmt::format("{}: error: {}", scene.file.string(), wrong.what()));  // no single key shows it
     }
-    return record.finish(done, wall);
 }
 
 std::string format_simulate(const SimulateResult& r) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "simulate/kept_accuracy.h"
 #include "simulate/mishaps.h"
 
 namespace app {
@@ -30,7 +31,7 @@ struct WorkerOptions {
 
 struct SimulateOptions {
     std::filesystem::path scene;
-    std::optional<double> dt_s, seconds;
+    std::optional<double> dt_s, seconds, accuracy;  ///< in place of the scene's
     std::optional<std::uint64_t> steps;
     bool until_rest = false;
     std::optional<std::filesystem::path> out, video;
@@ -64,7 +65,8 @@ struct SimulateResult : sim::DistributedResult {
     sim::World::Energy energy_start{}, energy{};
     Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
     std::uint64_t state_hash = 0;
-    Mishaps mishaps;  ///< quarantined, broken and limited with their names
+    std::optional<KeptAccuracy> accuracy;  ///< if one was asked for
+    Mishaps mishaps;                       ///< quarantined, broken and limited with their names
     bool rest_wanted = false;
     std::size_t frames = 0;
     std::vector<std::string> notes;               ///< what was asked for and had no effect; what workers said
