@@ -134,7 +134,7 @@ public:
                  Note note = {}) {
         one({key, KeyType::columns, meaning, note}, value);
     }
-    void flag(std::string_view key, bool& value, std::string_view meaning, Note note = {}) {
+    void flag(std::string_view key, auto& value, std::string_view meaning, Note note = {}) {
         one({key, KeyType::flag, meaning, note}, value);
     }
 

@@ -3,253 +3,23 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <numbers>
-#include <random>
 
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/format_description.h"
 #include "files/toml_reader.h"
+#include "scene/scene_reader.h"
 #include "scene/shared_keys.h"
 
 namespace app {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::size_t kMostBodies = 10000;
 constexpr double kLongestS = 360000;  // a hundred hours
 constexpr Range kAccuracy{1e-4, 0.5};
 constexpr double kDegree = std::numbers::pi / 180;
-
-// What a file says
-
-class SceneReader;
-
-/// A material of a scene, with its damping.
-struct SceneMaterial {
-    sim::Material material;
-    double damping_alpha = 0, damping_beta = 0, damping_ratio = 0.05;
-};
-using SceneMaterials = std::map<std::string, SceneMaterial>;
-
-/// Copies of a body.
-struct BodyGrid {
-    std::array<int, 3> count{1, 1, 1};
-    Eigen::Vector3d step = Eigen::Vector3d::Zero();
-    double jitter_m = 0;
-    bool turned = false;
-    int seed = 1;
-};
-
-struct BodyDraft {
-    sim::WorldBody body;
-    std::optional<std::string> material;
-    std::optional<BodyGrid> grid;
-    render::Appearance look;
-    std::optional<Eigen::Vector3f> color;
-};
-
-struct ConstraintDraft {
-    sim::PointConstraint constraint;
-    std::string body;
-    std::optional<std::string> to;
-    std::optional<Eigen::Vector3d> point, to_point, place, at;
-};
-
-struct EventDraft {
-    std::optional<double> time_s;
-    std::optional<std::uint64_t> step;
-    std::vector<std::string> removed;
-    std::optional<BodyDraft> added;
-    std::optional<sim::Slowing> slowing;
-    SceneReader* reader = nullptr;
-};
-
-// Bodies of a table
-
-/// Colours of bodies that name none: one a kind, or one a copy of a grid.
-const std::array<Eigen::Vector3f, 8> kPalette = {Eigen::Vector3f(0.55f, 0.05f, 0.03f),
-                                                 {0.62f, 0.25f, 0.02f},
-                                                 {0.03f, 0.15f, 0.32f},
-                                                 {0.05f, 0.22f, 0.08f},
-                                                 Eigen::Vector3f(0.55f, 0.40f, 0.06f),
-                                                 {0.20f, 0.06f, 0.22f},
-                                                 {0.42f, 0.40f, 0.36f},
-                                                 {0.03f, 0.24f, 0.24f}};
-
-/// The named material; without a name the defaults of its keys.
-SceneMaterial material_of(const BodyDraft& draft, const SceneMaterials& materials, const Fields& at) {
-    if (!draft.material) return {};
-    const auto found = materials.find(*draft.material);
-    std::string known;
-    for (const auto& [name, material] : materials) known += (known.empty() ? "" : ", ") + name;
-    at.require(found != materials.end(), "material", fmt::format("material = \"{}\"", *draft.material),
-               known.empty() ? "a table [material.NAME] of that name"
-                             : fmt::format("one of {} or a table [material.{}]", known, *draft.material));
-    return found->second;
-}
-
-/// [0, 1), the same on every library.
-double uniform(std::mt19937_64& random) {
-    return double(random() >> 11) * 0x1p-53;
-}
-
-/// Uniform over all orientations (Shoemake 1992).
-Eigen::Quaterniond any_turn(std::mt19937_64& random) {
-    const double u = uniform(random), a = 2 * std::numbers::pi * uniform(random),
-                 b = 2 * std::numbers::pi * uniform(random);
-    return {std::sqrt(u) * std::cos(b), std::sqrt(1 - u) * std::sin(a), std::sqrt(1 - u) * std::cos(a),
-            std::sqrt(u) * std::sin(b)};
-}
-
-/// Centred about the body's own position.
-std::vector<sim::WorldBody> copies(const sim::WorldBody& body, const BodyGrid& grid) {
-    std::vector<sim::WorldBody> result;
-    std::mt19937_64 random(std::uint64_t(grid.seed));
-    const auto [nx, ny, nz] = grid.count;
-    const Eigen::Vector3d middle = 0.5 * Eigen::Vector3d(nx - 1, 0, nz - 1);
-    for (int k = 0; k < nx * ny * nz; ++k) {
-        const Eigen::Vector3d at = Eigen::Vector3i(k % nx, k / nx % ny, k / nx / ny).cast<double>();
-        sim::WorldBody copy = body;
-        copy.name = fmt::format("{}/{}", body.name, k);
-        Eigen::Vector3d away;
-        for (double& value : away.reshaped()) value = grid.jitter_m * (2 * uniform(random) - 1);
-        copy.world_from_body.translation() += grid.step.cwiseProduct(at - middle) + away;
-        if (grid.turned) copy.world_from_body.linear() = any_turn(random).toRotationMatrix();
-        result.push_back(copy);
-    }
-    return result;
-}
-
-// Bodies, constraints and events of the file
-
-/// Throws BadInput at the key for a name without a number.
-int number_of(const std::map<std::string, int>& numbers, const Fields& at, const char* key,
-              const std::string& name, const std::string& expected) {
-    const auto found = numbers.find(name);
-    at.require(found != numbers.end(), key, fmt::format("{} = \"{}\"", key, name), expected);
-    return found->second;
-}
-
-/// Puts what a file says together: bodies and constraints get numbers, events their order.
-class SceneReader {
-public:
-    Scene scene;
-    SceneMaterials materials;
-    std::optional<double> dt_s;  ///< stands in for the file's
-
-    void take_body(const Fields& at, const BodyDraft& body) {
-        add(body, named(at, body), scene.world.bodies);
-    }
-    void take_constraint(const Fields& at, const ConstraintDraft& draft) {
-        sim::PointConstraint c = draft.constraint;
-        if (c.name.empty()) c.name = fmt::format("constraint {}", scene.world.constraints.size());
-        const char* expected =
-            "the name of a [[body]] that is there from the start (copies of a grid: NAME/0, ...)";
-        c.body_a = number_of(bodies_, at, "body", draft.body, expected);
-        if (draft.to) c.body_b = number_of(bodies_, at, "to", *draft.to, expected);
-        at.require(c.body_a != c.body_b, "to", "a body bound to itself", "another body");
-        const auto one_of = [&](bool other, const char* key) {
-            at.require(!draft.at || !other, "at", fmt::format("both at and {}", key), "one of them");
-        };
-        one_of(draft.point.has_value(), "point");
-        one_of(draft.to_point.has_value(), "to_point");
-        one_of(draft.place.has_value(), "place");
-        at.require(!draft.to || !draft.place, "place", "place beside to", "to_point, a point of that body");
-        at.require(draft.to || !draft.to_point, "to_point", "to_point without to",
-                   "place, a point of the world");
-        place_constraint(draft, c);
-        at.require(constraints_.try_emplace(c.name, static_cast<int>(constraints_.size())).second, "name",
-                   fmt::format("a second constraint \"{}\"", c.name), "a name of its own");
-        scene.world.constraints.push_back(c);
-    }
-    void take_event(const Fields& at, const EventDraft& draft) {
-        TimedEvent timed{{}, draft.added, std::move(coming_)};
-        at.require(draft.time_s.has_value() != draft.step.has_value(), "time",
-                   draft.time_s ? "both time and step" : "neither time nor step", "one of them");
-        // The first step that begins at that time or later; a microstep of slack for times that are not exact.
-        const double first = std::ceil(draft.time_s.value_or(0) / scene.world.settings.dt - 1e-6);
-        timed.event.step = draft.step.value_or(std::uint64_t(std::max(0.0, first)));
-        for (const std::string& name : draft.removed)
-            timed.event.removed.push_back(
-                number_of(constraints_, at, "delete", name, "the name of a [[constraint]]"));
-        if (draft.slowing) timed.event.slowing.push_back(*draft.slowing);
-        at.require(!draft.removed.empty() || draft.added || draft.slowing, "delete",
-                   "an event without effect", "delete, add or slow");
-        events_.push_back(std::move(timed));
-    }
-    void take_added(const Fields& at, const BodyDraft& body) { coming_ = named(at, body); }
-    /// After all tables were read. Bodies that come are numbered in the order in which they come.
-    void add_events() {
-        std::stable_sort(events_.begin(), events_.end(), [](const TimedEvent& a, const TimedEvent& b) {
-            return a.event.step < b.event.step;
-        });
-        for (TimedEvent& timed : events_) {
-            timed.event.first = scene.later.size();
-            if (timed.added) add(*timed.added, timed.bodies, scene.later);
-            timed.event.end = scene.later.size();
-            scene.events.push_back(timed.event);
-        }
-    }
-
-private:
-    /// The points are given in the bodies' frames, or both at once by a place in the world (`at`); the second
-    /// one's default is where the first is at the start.
-    void place_constraint(const ConstraintDraft& draft, sim::PointConstraint& c) const {
-        const auto pose = [&](int body) -> const Eigen::Isometry3d& {
-            return scene.world.bodies[std::size_t(body)].world_from_body;
-        };
-        const Eigen::Vector3d point = draft.point.value_or(Eigen::Vector3d::Zero());
-        const Eigen::Vector3d start = draft.at.value_or(pose(c.body_a) * point);
-        c.point_a = pose(c.body_a).inverse() * start;
-        c.point_b = draft.place.value_or(start);
-        if (c.body_b >= 0) c.point_b = draft.to_point.value_or(pose(c.body_b).inverse() * c.point_b);
-    }
-    /// The bodies of a table, under names that no other has: one, or the copies of its `grid`, named NAME/0, NAME/1,
-    /// ... (x fastest, then y, then z). The name of its material must be among `materials`, or BadInput is thrown at
-    /// the table's place.
-    [[nodiscard]] std::vector<sim::WorldBody> named(const Fields& at, const BodyDraft& draft) {
-        const SceneMaterial m = material_of(draft, materials, at);
-        sim::WorldBody body = draft.body;
-        body.material = m.material;
-        body.damping_alpha = m.damping_alpha, body.damping_beta = m.damping_beta;
-        body.damping_ratio = m.damping_ratio;
-        std::vector<sim::WorldBody> bodies = draft.grid ? copies(body, *draft.grid) : std::vector{body};
-        for (const sim::WorldBody& each : bodies) {
-            const auto number = static_cast<int>(bodies_.size());
-            at.require(bodies_.try_emplace(each.name, number).second, "",
-                       fmt::format("a second body \"{}\"", each.name), "a name of its own");
-        }
-        if (bodies_.size() > kMostBodies)
-            throw BadInput(fmt::format("{}:1:1: error: found {} bodies and more, expected at most {}",
-                                       scene.file.string(), bodies_.size(), kMostBodies));
-        return bodies;
-    }
-    /// Bodies without a colour take one of eight.
-    void add(const BodyDraft& draft, const std::vector<sim::WorldBody>& bodies,
-             std::vector<sim::WorldBody>& into) {
-        BodyLook look{draft.look, kinds_++};
-        for (std::size_t k = 0; k < bodies.size(); ++k) {
-            into.push_back(bodies[k]);
-            look.appearance.color = draft.color.value_or(kPalette[(look.kind + k) % kPalette.size()]);
-            scene.looks.push_back(look);
-        }
-    }
-
-    struct TimedEvent {
-        sim::WorldEvent event;
-        std::optional<BodyDraft> added;
-        std::vector<sim::WorldBody> bodies;  ///< of `added`
-    };
-
-    std::map<std::string, int> bodies_, constraints_;
-    std::vector<TimedEvent> events_;
-    std::vector<sim::WorldBody> coming_;  ///< bodies of the event that is read
-    std::size_t kinds_ = 0;
-};
 
 // Tables within a body
 
@@ -347,6 +117,17 @@ void fidelity_keys(Fields& keys, sim::FidelityRequest& request) {
     keys.number("impact", request.impact_mps, {0.01, 1000, "m/s"}, "automatic: the fastest impact expected.");
 }
 
+void motion_key_keys(Fields& keys, sim::MotionKey& key) {
+    keys.fraction("time", key.time_s, {0, kLongestS, "s"}, "Since the start.",
+                  {.need = Need::given, .example = "1"});
+    keys.vector("position", key.position, {-kFarM, kFarM, "m"}, "Of the centre.");
+    orientation_keys(keys, key.orientation);
+}
+const TableKind<sim::MotionKey> kMotionKey = {{"motion",
+                                               "Where a body of prescribed motion is at a time; its own "
+                                               "`position` and orientation are where it begins."},
+                                              motion_key_keys};
+
 void motion_keys(Fields& keys, sim::WorldBody& body) {
     Eigen::Vector3d position(0, 0, 0);
     Eigen::Quaterniond orientation;
@@ -356,6 +137,16 @@ void motion_keys(Fields& keys, sim::WorldBody& body) {
     body.world_from_body.linear() = orientation.toRotationMatrix();
     keys.vector("velocity", body.velocity, {-kFarM, kFarM, "m/s"}, "Of the centre.");
     keys.vector("spin", body.angular_velocity, {-kFarM, kFarM, "rad/s"}, "Angular velocity, world axes.");
+    keys.tables(
+        "motion", sim::MotionKey(), kMotionKey,
+        "Prescribed: it goes from key to key at a steady velocity and turn (the shorter way), stays at the "
+        "last, and is moved by nothing else; what it meets sees its velocity.",
+        [&](Fields& at, const sim::MotionKey& key) {
+            const double before = body.motion.empty() ? 0 : body.motion.back().time_s;
+            at.require(key.time_s > before, "time", fmt::format("time = {}", key.time_s),
+                       fmt::format("a time after {} s, the one before", before));
+            body.motion.push_back(key);
+        });
 }
 
 void body_keys(Fields& keys, BodyDraft& draft) {
@@ -451,6 +242,13 @@ void constraint_keys(Fields& keys, ConstraintDraft& draft) {
     const Range anywhere{-kFarM, kFarM, "m"};
     keys.text("name", draft.constraint.name, "For events.",
               {.otherwise = "constraint N, counted from 0", .example = "\"string\""});
+    keys.choice("type", draft.constraint.joint,
+                {{"ball", sim::Joint::ball}, {"hinge", sim::Joint::hinge}, {"slider", sim::Joint::slider}},
+                "What it leaves free: ball: all turns about the point; hinge: turns about the axis; slider: "
+                "sliding along the axis, without turning. There are no limits and no motors.");
+    keys.vector("axis", draft.axis, anywhere, "In the world at the start, any length but 0.",
+                {.otherwise = "a hinge and a slider need it", .example = "[0, 1, 0]"});
+    if (draft.axis) keys.require_direction(*draft.axis, "axis");
     keys.text("body", draft.body, "The body.", {.need = Need::given, .example = "\"ball\""});
     keys.text("to", draft.to, "Another body; without: the constraint holds the point at a place.",
               {.example = "\"other\""});
@@ -463,16 +261,25 @@ void constraint_keys(Fields& keys, ConstraintDraft& draft) {
                 {.otherwise = "where the point is at the start", .example = "[0, 2, 0]"});
     keys.vector("to_point", draft.to_point, anywhere, "Of the other body.",
                 {.otherwise = "where the point is at the start", .example = "[0, 0, 0]"});
-    keys.number("stiffness", draft.constraint.stiffness, {1e-3, 1e12, "N/m"}, "Stiffness of the spring.");
+    keys.number(
+        "stiffness", draft.stiffness, {1e-3, kRigid, "N/m"},
+        "Of the spring; of each of a hinge's or slider's two points, half the smaller body's extent from "
+        "the point. 1e12: rigid.",
+        {.otherwise = "1e4; of a hinge or slider 1e12", .example = "1e6"});
     keys.number("damping_ratio", draft.constraint.damping_ratio, {0, 100},
                 "Against the effective mass; 1: critical.");
     keys.number("breaking_force", draft.constraint.breaking_force, {1e-6, 1e15, "N"},
-                "Beyond it the constraint goes.", {.otherwise = "never", .example = "1e6"});
+                "Beyond it, at any of its points, the constraint goes.",
+                {.otherwise = "never", .example = "1e6"});
+    keys.flag(
+        "collide", draft.constraint.collide, "Whether the two bodies collide.",
+        {.otherwise = "unless the point lies within both, their surfaces included", .example = "false"});
 }
-const TableKind<ConstraintDraft> kConstraint = {
-    {"constraint",
-     "A damped spring of rest length 0 between a point of a body and a place or a point of another body."},
-    constraint_keys};
+const TableKind<ConstraintDraft> kConstraint = {{"constraint",
+                                                 "A damped spring of rest length 0 between a point of a body "
+                                                 "and a place or a point of another body; or a hinge "
+                                                 "or slider."},
+                                                constraint_keys};
 
 void slow_keys(Fields& keys, sim::Slowing& slowing) {
     keys.integer("worker", slowing.worker, {0, 1000}, "Its number, from 0.",
@@ -485,21 +292,39 @@ const TableKind<sim::Slowing> kSlow = {{"slow",
                                         "and a note says so."},
                                        slow_keys};
 
+void push_keys(Fields& keys, PushDraft& push) {
+    const Range strength{-1e12, 1e12, "N"};
+    keys.text("body", push.body, "The body.", {.need = Need::given, .example = "\"ball\""});
+    keys.vector("point", push.timed.point, {-kFarM, kFarM, "m"}, "Where, in the body's frame at rest.");
+    keys.vector("force", push.force, strength, "A constant force, for `seconds`.",
+                {.otherwise = "`impulse` is needed", .example = "[0, 10, 0]"});
+    keys.fraction("seconds", push.seconds, {1e-6, kLongestS, "s"}, "How long the force acts.",
+                  {.otherwise = "a force needs it", .example = "0.5"});
+    keys.vector("impulse", push.impulse, {-1e12, 1e12, "N s"},
+                "An impulse, within the substep in which `time` falls.",
+                {.otherwise = "`force` is needed", .example = "[0, 10, 0]"});
+    keys.choice("axes", push.timed.turns, {{"world", false}, {"body", true}},
+                "In which the vector is given; those of the body turn with it.");
+}
+const TableKind<PushDraft> kPush = {{"push", "A force on a body from the event's time on, or an impulse."},
+                                    push_keys};
+
 void event_keys(Fields& keys, EventDraft& event) {
     keys.fraction("time", event.time_s, {0, kLongestS, "s"},
-                  "Before the first step that begins then or later.",
+                  "Before the first step that begins then or later; a push acts from this time on.",
                   {.otherwise = "`step` is needed", .example = "1"});
     keys.integer("step", event.step, {0, 2e9}, "Before this step, counted from 0.",
                  {.otherwise = "`time` is needed", .example = "30"});
     keys.text_or_texts("delete", event.removed, "A constraint's name, or several.",
                        {.example = "\"string\""});
     keys.table("add", event.added, kBody,
-               [&](const Fields& at, const BodyDraft& body) { event.reader->take_added(at, body); });
+               [&](const Fields& at, const BodyDraft& body) { event.reader->take_added(at, event, body); });
+    keys.table("push", event.push, kPush);
     keys.table("slow", event.slowing, kSlow);
 }
 const TableKind<EventDraft> kEvent = {
     {"event",
-     "What happens before a step: `time` or `step`, and at least one of `delete`, `add` and `slow`."},
+     "What happens before a step: `time` or `step`, and at least one of `delete`, `add`, `push` and `slow`."},
     event_keys};
 
 void scene_room_keys(Fields& keys, Scene& scene) {

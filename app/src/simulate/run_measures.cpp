@@ -39,11 +39,11 @@ std::string panel(const WorkerHistory& history, bool seconds) {
 }  // namespace
 
 MomentumWatch::MomentumWatch(const sim::WorldScene& scene, const sim::World& world) : scene_(scene) {
-    closed_ = scene.world.planes.empty() && scene.events.empty();
+    closed_ = scene.world.planes.empty() && scene.events.empty() && scene.world.forces.empty();
     for (const sim::PointConstraint& c : scene.world.constraints) closed_ = closed_ && c.body_b >= 0;
     for (int body = 0; closed_ && body < world.bodies(); ++body) {
         const sim::WorldBody& definition = world.definition(body);
-        closed_ = !definition.fixed && definition.damping_alpha == 0;
+        closed_ = definition.moves() && definition.damping_alpha == 0;
         weight_ += world.rigid_mass(body).mass * definition.gravity_scale * scene.world.settings.gravity;
     }
     momentum_ = world.momentum(), angular_momentum_ = world.angular_momentum();
@@ -53,7 +53,7 @@ MomentumWatch::MomentumWatch(const sim::WorldScene& scene, const sim::World& wor
 void MomentumWatch::look(const sim::World& world) {
     double sum = 0;
     for (int body = 0; body < world.bodies(); ++body)
-        if (!world.definition(body).fixed)
+        if (world.definition(body).moves())
             sum += world.rigid_mass(body).mass * world.state(body).velocity.norm();
     scale_ = std::max(scale_, sum);
     gained_ = world.momentum() - momentum_ - brought(world);
@@ -67,7 +67,7 @@ void MomentumWatch::look(const sim::World& world) {
 Eigen::Vector3d MomentumWatch::brought(const sim::World& world) const {
     Eigen::Vector3d sum(0, 0, 0);
     for (int body = static_cast<int>(scene_.world.bodies.size()); body < world.bodies(); ++body)
-        if (!world.definition(body).fixed)
+        if (world.definition(body).moves())
             sum += world.rigid_mass(body).mass * world.definition(body).velocity;
     return sum;
 }

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -37,6 +38,13 @@ struct FidelityChoice {        ///< see choose_fidelity
     GroupCut cut = {0, 0, 0};  ///< modal: whether `modes` cuts a group of equal frequencies
 };
 
+/// Where a prescribed motion has a body at a time.
+struct MotionKey {
+    double time_s = 0;                                                ///< since the start
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< [m]
+    Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< body to world, unit
+};
+
 /// One body of a world.
 struct WorldBody {
     std::string name;
@@ -54,6 +62,12 @@ struct WorldBody {
     Eigen::Isometry3d world_from_body = Eigen::Isometry3d::Identity();
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< of the centre of mass [m/s]
     Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< world axes [rad/s]
+    /// If not empty: the body moves as prescribed, by nothing else, and does not deform; pose and velocities
+    /// above do not count. By ascending times; from key to key at a steady velocity and turn (the shorter way),
+    /// at rest before the first and after the last. Its pose is exact at every time; contacts and joints see
+    /// its mean velocity over a substep.
+    std::vector<MotionKey> motion = {};
+    [[nodiscard]] bool moves() const noexcept { return !fixed && motion.empty(); }  ///< by forces
 };
 
 /// Half-space normal . x <= offset is solid. Static.
@@ -63,8 +77,24 @@ struct WorldPlane {
     double friction = 0.5, restitution = 0;
 };
 
-/// A damped spring of rest length 0 between a point of a body and a place, or a point of another body: the
+enum class Joint {
+    ball,   ///< one point is held: three directions
+    hinge,  ///< turns about the axis: five directions
+    slider  ///< slides along the axis, and does not turn: five directions
+};
+
+/// Damped springs of rest length 0 between points of a body and places, or points of another body: the
 /// thesis's energy constraint. Implicit in the step, so no stiffness is too large.
+///
+/// Points are held along some directions of b's frame (the world's without b) and free along the others:
+///   gap = E (p_a - p_b),  E: rows are the directions, turning with b; the impulse acts at p_a
+/// With x the axis, y and z square to it (frame_a and frame_b, which coincide where all gaps are zero), and L
+/// the largest extent of the smaller body:
+///   ball    the point                       x y z
+///   hinge   the point + L/2 x               x y z,     the point - L/2 x    y z
+///   slider  the point +- L/2 x              y z each,  the point + L/2 y    z
+/// No row follows from the others. `stiffness` and `breaking_force` are of each point. Neither limits nor
+/// motors.
 struct PointConstraint {
     std::string name;
     int body_a = 0;
@@ -74,6 +104,23 @@ struct PointConstraint {
     double stiffness = 1e4;                                           ///< [N/m]
     double damping_ratio = 1;                                         ///< against the effective mass
     double breaking_force = std::numeric_limits<double>::infinity();  ///< [N]; above it the constraint breaks
+    Joint joint = Joint::ball;
+    Eigen::Quaterniond frame_a = Eigen::Quaterniond::Identity();  ///< to a's rest frame; hinges and sliders
+    Eigen::Quaterniond frame_b = Eigen::Quaterniond::Identity();  ///< likewise of b, or the world
+    /// Whether a and b collide. Empty: unless the point lies within both, their surfaces included (rest shapes).
+    std::optional<bool> collide = {};
+};
+constexpr int kMostHeldPoints = 3;  ///< of a constraint
+
+/// A constant force on a body over a span of time; over none, an impulse. A force acts in each substep by the
+/// share of it that it lasts, so with all of force x time; an impulse over the substep in which it falls. Both
+/// act where the point is, and along the body's axes as they are, when a substep begins.
+struct TimedForce {
+    int body = 0;
+    Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< rest frame of the body
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< [N]; of an impulse [N s]
+    bool turns = false;              ///< `force` is given in the body's axes; else the world's
+    double from_s = 0, until_s = 0;  ///< since the start; equal: an impulse
 };
 
 struct WorldSettings {                                       ///< of all bodies
@@ -89,6 +136,7 @@ struct WorldDefinition {  ///< numbers of bodies and constraints are their indic
     std::vector<WorldBody> bodies;
     std::vector<WorldPlane> planes;
     std::vector<PointConstraint> constraints;
+    std::vector<TimedForce> forces;  ///< also on bodies that are added later
 };
 
 /// Exact state of one body.
@@ -128,7 +176,9 @@ struct ContactRecord {
 struct SpringRecord {
     int constraint = 0;
     bool holds = true;
-    Eigen::Vector3f impulse = Eigen::Vector3f::Zero();  ///< [N s]
+    /// At its points, along their directions [N s]; zero of points that it has not.
+    std::array<Eigen::Vector3f, kMostHeldPoints> impulses = {Eigen::Vector3f::Zero(), Eigen::Vector3f::Zero(),
+                                                             Eigen::Vector3f::Zero()};
 };
 
 /// Complete state of a world at the end of step `step`, apart from its definition.

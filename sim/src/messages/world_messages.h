@@ -76,7 +76,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kWorldProtocol = 2;  ///< version
+constexpr std::uint16_t kWorldProtocol = 3;  ///< version
 
 struct WorldHeader {
     std::uint32_t worker = kApplication;

@@ -10,7 +10,7 @@ namespace sim {
 namespace {
 
 constexpr std::uint8_t kAsleep = 1, kQuarantined = 2, kAtLimit = 4, kBroken = 8;
-constexpr std::size_t kSmallestRecord = 115, kSmallestContact = 10, kSpringBytes = 17;
+constexpr std::size_t kSmallestRecord = 115, kSmallestContact = 10, kSpringBytes = 41;
 constexpr double kFurthest = 1e7, kFastest = 1e6;  // m, m/s: as World quarantines
 
 void write_doubles(ByteWriter& out, const Eigen::VectorXd& v, bool zeros) {
@@ -126,7 +126,7 @@ SpringRecord read_spring(ByteReader& in) {
     if (constraint >= kMostWorldBodies) throw DecodeError("a constraint out of range");
     s.constraint = static_cast<int>(constraint);
     s.holds = in.flag();
-    s.impulse = read_floats(in);
+    for (Eigen::Vector3f& impulse : s.impulses) impulse = read_floats(in);
     return s;
 }
 
@@ -170,7 +170,7 @@ void write(ByteWriter& out, const std::vector<SpringRecord>& springs) {
     for (const SpringRecord& s : springs) {
         out.number(static_cast<std::uint32_t>(s.constraint));
         out.number<std::uint8_t>(s.holds);
-        write_floats(out, s.impulse);
+        for (const Eigen::Vector3f& impulse : s.impulses) write_floats(out, impulse);
     }
 }
 

@@ -10,23 +10,27 @@ namespace sim {
 namespace {
 
 //   scene       f64 dt, u32 substeps, v3 gravity, flag sleeping, f64 sleep speed, list of body,
-//               list of plane, list of constraint, list of body (added later), list of event
+//               list of plane, list of constraint, list of force, list of body (added later), list of event
 //   body        text name, v3 semi-axes, f64 e1 e2, list of bump {v3 direction, f64 height width},
 //               f64 young poisson density, f64 damping alpha beta ratio,
 //               u8 fidelity, i32 modes, i32 elements, u8 domain, f64 error, f64 impact speed,
 //               i32 triangles, f64 friction restitution, flag fixed, f64 gravity scale,
-//               f64 rotation[9] by columns, v3 translation, v3 velocity, v3 angular velocity
+//               f64 rotation[9] by columns, v3 translation, v3 velocity, v3 angular velocity,
+//               list of key {f64 time, v3 position, f64 orientation: w x y z}
 //   plane       v3 normal, f64 offset friction restitution
 //   constraint  text name, i32 body a, v3 point a, i32 body b, v3 point b,
-//               f64 stiffness damping breaking force (may be infinite)
+//               f64 stiffness damping breaking force (may be infinite),
+//               u8 joint, f64 frame of a, of b: w x y z, u8 collide (0 no, 1 yes, 2 by default)
+//   force       i32 body, v3 point, v3 force, flag turns, f64 from until
 //   event       u64 step, list of i32 constraint, u32 first, u32 end, list of {i32 worker, f64 factor}
 //   settings    u8 pace, i32 bound, u64 steps, flag until rest, flag all to first, flag trade, u64 from step,
 //               f64 smoothing steps,
 //               f64 dead band
 
 constexpr std::uint32_t kLongestName = 65536;
-constexpr std::size_t kSmallestBody = 295, kPlaneBytes = 48, kSmallestConstraint = 84, kSmallestEvent = 24,
-                      kBumpBytes = 40, kSlowingBytes = 12;
+constexpr std::uint8_t kByDefault = 2;
+constexpr std::size_t kSmallestBody = 299, kKeyBytes = 64, kPlaneBytes = 48, kSmallestConstraint = 150,
+                      kForceBytes = 69, kSmallestEvent = 24, kBumpBytes = 40, kSlowingBytes = 12;
 
 template <typename Enum>
 Enum read_enum(ByteReader& in, Enum last) {
@@ -43,6 +47,16 @@ void write_all(ByteWriter& out, const Numbers&... numbers) {
 template <typename... Numbers>
 void read_all(ByteReader& in, Numbers&... numbers) {
     ((numbers = in.number<Numbers>()), ...);
+}
+
+void write(ByteWriter& out, const Eigen::Quaterniond& q) {
+    write_all(out, q.w(), q.x(), q.y(), q.z());
+}
+
+Eigen::Quaterniond read_quaternion(ByteReader& in) {
+    double w = 0, x = 0, y = 0, z = 0;
+    read_all(in, w, x, y, z);
+    return {w, x, y, z};
 }
 
 void write(ByteWriter& out, const FidelityRequest& f) {
@@ -96,6 +110,12 @@ void write(ByteWriter& out, const WorldBody& b) {
     out.matrix(b.world_from_body.translation());
     out.matrix(b.velocity);
     out.matrix(b.angular_velocity);
+    out.count(b.motion.size());
+    for (const MotionKey& key : b.motion) {
+        out.number(key.time_s);
+        out.matrix(key.position);
+        write(out, key.orientation);
+    }
 }
 
 WorldBody read_body(ByteReader& in) {
@@ -112,6 +132,12 @@ WorldBody read_body(ByteReader& in) {
     in.matrix(b.world_from_body.translation());
     in.matrix(b.velocity);
     in.matrix(b.angular_velocity);
+    b.motion.resize(in.count(kKeyBytes));
+    for (MotionKey& key : b.motion) {
+        key.time_s = in.number<double>();
+        in.matrix(key.position);
+        key.orientation = read_quaternion(in);
+    }
     return b;
 }
 
@@ -152,6 +178,9 @@ void write(ByteWriter& out, const std::vector<PointConstraint>& constraints) {
         out.number<std::int32_t>(c.body_b);
         out.matrix(c.point_b);
         write_all(out, c.stiffness, c.damping_ratio, c.breaking_force);
+        out.number(static_cast<std::uint8_t>(c.joint));
+        write(out, c.frame_a), write(out, c.frame_b);
+        out.number(static_cast<std::uint8_t>(c.collide ? *c.collide : kByDefault));
     }
 }
 
@@ -164,8 +193,36 @@ std::vector<PointConstraint> read_constraints(ByteReader& in) {
         c.body_b = in.number<std::int32_t>();
         in.matrix(c.point_b);
         read_all(in, c.stiffness, c.damping_ratio, c.breaking_force);
+        c.joint = read_enum(in, Joint::slider);
+        c.frame_a = read_quaternion(in), c.frame_b = read_quaternion(in);
+        const auto collide = in.number<std::uint8_t>();
+        if (collide > kByDefault) throw DecodeError("a choice of " + std::to_string(collide));
+        if (collide < kByDefault) c.collide = collide == 1;
     }
     return constraints;
+}
+
+void write(ByteWriter& out, const std::vector<TimedForce>& forces) {
+    out.count(forces.size());
+    for (const TimedForce& f : forces) {
+        out.number<std::int32_t>(f.body);
+        out.matrix(f.point);
+        out.matrix(f.force);
+        out.number<std::uint8_t>(f.turns);
+        write_all(out, f.from_s, f.until_s);
+    }
+}
+
+std::vector<TimedForce> read_forces(ByteReader& in) {
+    std::vector<TimedForce> forces(in.count(kForceBytes));
+    for (TimedForce& f : forces) {
+        f.body = in.number<std::int32_t>();
+        in.matrix(f.point);
+        in.matrix(f.force);
+        f.turns = in.flag();
+        read_all(in, f.from_s, f.until_s);
+    }
+    return forces;
 }
 
 void write(ByteWriter& out, const WorldEvent& e) {
@@ -221,6 +278,9 @@ void check_scene(const WorldScene& scene) {
         last = e.step;
     }
     const std::size_t all = scene.world.bodies.size() + scene.later.size();
+    for (const TimedForce& force : scene.world.forces)
+        if (force.body >= static_cast<int>(all))
+            refuse("force", "body " + std::to_string(force.body), "one of the scene");
     if (all > kMostWorldBodies) refuse("scene", std::to_string(all) + " bodies", "at most 2^24");
 }
 
@@ -241,6 +301,7 @@ void write(ByteWriter& out, const WorldScene& scene) {
     write(out, scene.world.bodies);
     write(out, scene.world.planes);
     write(out, scene.world.constraints);
+    write(out, scene.world.forces);
     write(out, scene.later);
     out.count(scene.events.size());
     for (const WorldEvent& event : scene.events) write(out, event);
@@ -256,6 +317,7 @@ WorldScene read_scene(ByteReader& in) {
     scene.world.bodies = read_bodies(in);
     scene.world.planes = read_planes(in);
     scene.world.constraints = read_constraints(in);
+    scene.world.forces = read_forces(in);
     scene.later = read_bodies(in);
     scene.events.resize(in.count(kSmallestEvent));
     for (WorldEvent& event : scene.events) event = read_event(in);

@@ -119,7 +119,7 @@ std::vector<int> tied(const WorldScene& scene, int bodies) {
         while (root[static_cast<std::size_t>(i)] != i) i = root[static_cast<std::size_t>(i)];
         return i;
     };
-    auto fixed = [&scene](int i) { return scene.world.bodies[static_cast<std::size_t>(i)].fixed; };
+    auto fixed = [&scene](int i) { return !scene.world.bodies[static_cast<std::size_t>(i)].moves(); };
     for (const PointConstraint& c : scene.world.constraints) {
         if (c.body_b < 0 || fixed(c.body_a) || fixed(c.body_b)) continue;
         const int a = find(c.body_a), b = find(c.body_b);

@@ -63,7 +63,7 @@ std::vector<std::vector<int>> joined_lots(const WorldScene& scene) {
         while (root[static_cast<std::size_t>(body)] != body) body = root[static_cast<std::size_t>(body)];
         return body;
     };
-    auto moves = [&](int body) { return body >= 0 && !body_of(scene, body).fixed; };
+    auto moves = [&](int body) { return body >= 0 && body_of(scene, body).moves(); };
     for (const PointConstraint& c : scene.world.constraints) {
         if (!moves(c.body_a) || !moves(c.body_b)) continue;
         const int a = find(c.body_a), b = find(c.body_b);

@@ -14,7 +14,8 @@ public:
 
     /// Applies the events due before step `step` + 1: removes constraints that still hold, adds bodies.
     void apply(World& world, std::uint64_t step);
-    [[nodiscard]] bool events_left() const noexcept { return next_ < scene_.events.size(); }
+    /// Events, or forces and prescribed motions that have not ended.
+    [[nodiscard]] bool events_left() const noexcept { return next_ < scene_.events.size() || busy_; }
     [[nodiscard]] int bodies() const noexcept { return static_cast<int>(born_.size()); }  ///< with later ones
     /// Step at whose end the body first exists; the next step is the first it takes part in.
     [[nodiscard]] std::uint64_t born(int body) const { return born_[static_cast<std::size_t>(body)]; }
@@ -26,6 +27,8 @@ public:
 private:
     WorldScene scene_;
     std::size_t next_ = 0;
+    double busy_until_s_ = 0;
+    bool busy_ = true;  // a step that was applied begins before that
     int first_later_ = 0, moving_at_first_ = 0;
     std::vector<std::uint64_t> born_;
     std::vector<std::uint8_t> moves_;

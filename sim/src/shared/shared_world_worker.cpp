@@ -187,7 +187,7 @@ void SharedWorldWorker::leave() {
     std::vector<std::uint32_t> bodies;
     const World& world = exchange_->world();
     for (int i = 0; i < world.bodies(); ++i)
-        if (world.own(i) && !world.definition(i).fixed) bodies.push_back(static_cast<std::uint32_t>(i));
+        if (world.own(i) && world.definition(i).moves()) bodies.push_back(static_cast<std::uint32_t>(i));
     if (!bodies.empty()) {
         Handover handover = exchange_->give(bodies);
         handover.to = kApplication;

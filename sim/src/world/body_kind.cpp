@@ -149,7 +149,7 @@ ModalBasis basis_of(const WorldBody& body, FidelityChoice& choice) {
 }
 
 FidelityChoice choice_of(const WorldBody& body) {
-    if (body.fixed) return {Fidelity::rigid, 0, 0};
+    if (!body.moves()) return {Fidelity::rigid, 0, 0};
     if (body.fidelity.fidelity == Fidelity::automatic)
         return choose_fidelity(body.shape.base, body.material, body.fidelity);
     const int modes = body.fidelity.fidelity == Fidelity::rigid    ? 0
@@ -233,7 +233,7 @@ BodyKind make_body_kind(const WorldBody& body, const WorldSettings& settings) {
 bool same_kind(const WorldBody& a, const WorldBody& b) noexcept {
     const Material &m = a.material, &n = b.material;
     const FidelityRequest &f = a.fidelity, &g = b.fidelity;
-    return a.fixed == b.fixed && same_shape(a.shape, b.shape) && m.young_pa == n.young_pa &&
+    return a.moves() == b.moves() && same_shape(a.shape, b.shape) && m.young_pa == n.young_pa &&
            m.poisson == n.poisson && m.density_kg_m3 == n.density_kg_m3 &&
            a.damping_alpha == b.damping_alpha && a.damping_beta == b.damping_beta &&
            a.damping_ratio == b.damping_ratio && f.fidelity == g.fidelity && f.modes == g.modes &&

@@ -68,6 +68,12 @@ void along(const BodyPath& a, const BodyPath& b, double time, Visit visit) {
 /// Spins of a path that has orientations and momenta: the solver writes those of all bodies, few are asked for.
 void set_spins(const MovingBody& body, BodyPath& path);
 
+/// Where a prescribed motion (one key or more) has a body at a time since the start.
+[[nodiscard]] BodyPath::Pose pose_at(const std::vector<MotionKey>& motion, double time_s);
+
+/// The path of a prescribed motion over a step that begins at a time since the start, a leg for every part between keys.
+void follow_motion(const std::vector<MotionKey>& motion, double begins_s, double dt, BodyPath& path);
+
 /// The path of a body that nothing touches; of one that is fixed or sleeps: that it stays. Allocates only
 /// while `path` grows.
 void follow_freely(const MovingBody& body, const WorldSettings& settings, BodyPath& path);

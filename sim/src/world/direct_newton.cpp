@@ -18,7 +18,7 @@ constexpr double kLeftAtRest = 1e-6, kLeftShare = 1e-4;
 }  // namespace
 
 Eigen::Vector3d IslandSolver::seen(const Rows& rows, const AlignedDoubles& y) const {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Vector3d sum = rows.drift.cast<double>();
     for (int which = 0; which < 2; ++which) {
         const int body = rows.side[which].body;
         if (body < 0) continue;

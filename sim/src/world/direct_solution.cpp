@@ -14,6 +14,8 @@ constexpr double kFirm = 1e-9;  // least compliance of a spring, share of the bo
 constexpr double kSoft = 3e-4;  // compliance of an overlap over a substep, share of the bodies' own, at most
 constexpr double kOverlap =
     1e-4;  // at which it carries its load of the substep before, share of the bodies' size
+// Its least, well above that of springs, so that loads stay finite where these hold bodies inside each other.
+constexpr double kHardest = 1e-5;
 constexpr double kHeld = 1e-2, kHeldAlong = 0.1;  // of a contact's impulse to the round before's; friction's
 constexpr double kCorrected = 0.2;                // share of an overlap that a substep takes back
 constexpr int kMostTurns = 12;                    // of the ends' Newton iteration
@@ -103,6 +105,7 @@ void IslandSolver::follow(bool positions) {
 
 // Half of the substep's gravity and forces.
 void IslandSolver::kick() {
+    count_forces(0.5);
     for (const BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
         const double mass = body.kind->mass.mass;
@@ -171,7 +174,10 @@ Eigen::Vector3d IslandSolver::gap_at_end(const SpringRows& spring) const {
     auto end = [this](int body, const Eigen::Vector3d& rest) -> Eigen::Vector3d {
         if (body < 0) return rest;
         const MovingBody& b = (*bodies_)[static_cast<std::size_t>(body)];
-        if (local(body) < 0) return b.state.position + b.state.orientation * rest;
+        if (local(body) < 0) {
+            const BodyPath::Pose pose = pose_of(body, time_ + h_);
+            return pose.position + pose.orientation * rest;
+        }
         const auto i = static_cast<std::size_t>(local(body));
         const BodyKind& kind = *b.kind;
         Eigen::Vector3d point = rest;
@@ -188,7 +194,14 @@ Eigen::Vector3d IslandSolver::gap_at_end(const SpringRows& spring) const {
         }
         return ends_[i].position + ends_[i].orientation * point;
     };
-    return end(held.body_a, held.point_a) - end(held.body_b, held.point_b);
+    return spring.point->gap(end(held.body_a, spring.point->a), end(held.body_b, spring.point->b),
+                             orientation_at_end(held.body_b));
+}
+
+Eigen::Quaterniond IslandSolver::orientation_at_end(int body) const {
+    const int i = body < 0 ? -1 : local(body);
+    if (body >= 0 && i < 0) return pose_of(body, time_ + h_).orientation;
+    return i < 0 ? Eigen::Quaterniond::Identity() : ends_[static_cast<std::size_t>(i)].orientation;
 }
 
 // Whether no spring's arm turns further than the scheme is accurate for: the energy of a turn of t in a substep
@@ -199,9 +212,15 @@ bool IslandSolver::turns_little() const {
         for (int side = 0; side < 2; ++side) {
             if (s.side[side].body < 0) continue;
             const auto i = static_cast<std::size_t>(s.side[side].body);
-            const Eigen::Vector3d& arm = side == 0 ? held.point_a : held.point_b;
-            const Eigen::Vector3d turn = ends_[i].orientation * arm - rows_of_[i].frame * arm;
-            if (turn.squaredNorm() > kMostTurn * kMostTurn * arm.squaredNorm()) return false;
+            auto turns = [&](const Eigen::Vector3d& arm) {
+                const Eigen::Vector3d turn = ends_[i].orientation * arm - rows_of_[i].frame * arm;
+                return turn.squaredNorm() > kMostTurn * kMostTurn * arm.squaredNorm();
+            };
+            // So do the directions, but for a hinge's about its axis, which are alike.
+            if (turns(side == 0 ? s.point->a : s.point->b) ||
+                (s.point->turns &&
+                 turns((side == 0 ? held.frame_a : held.frame_b) * Eigen::Vector3d::UnitX())))
+                return false;
         }
     }
     return true;
@@ -223,10 +242,11 @@ void IslandSolver::begin_contact(std::size_t i, const Eigen::Vector3d& seen_so_f
     const ContactRows& c = contacts_[i];
     DirectContact& d = direct_contacts_[i];
     d.soft = positions;
-    const double by_load = kCorrected * kOverlap * size_of(c) * settings_->substeps /
-                           (settings_->dt * std::max(c.at_move[0], 0.f));
-    d.normal_gamma =
-        positions ? std::min(kSoft * c.k[0][0], by_load) : std::min(kHeld * c.k[0][0], 10 * by_load);
+    const double by_load =
+        std::max(kHardest * c.k[0][0], kCorrected * kOverlap * size_of(c) * settings_->substeps /
+                                           (settings_->dt * std::max(c.at_move[0], 0.f)));
+    const double softest = (positions ? kSoft : kHeld) * c.k[0][0];
+    d.normal_gamma = c.emerging ? softest : std::min(softest, positions ? by_load : 10 * by_load);
     d.tangent_gamma = kHeldAlong / c.slide_mass;
     d.bias = bias;
     d.active = static_cast<double>(c.point->begins) < time_ + h_;
@@ -327,8 +347,9 @@ void IslandSolver::move_directly() {
     };
     for (SpringRows& s : springs_) {
         const auto p = along(s.moved);
-        if (s.told) tell(s, -1, s.moved, s.moved, {p[0], p[1], p[2]}, s.place);
-        apply(s, s.moved, s.place);
+        const Eigen::Vector3d moved = in_world(s, s.moved);
+        if (s.told) tell(s, -1, moved, moved, {p[0], p[1], p[2]}, s.place);
+        apply(s, moved, s.place);
         give(s, s.moved, gradient_);
     }
     for (const BodyRows& rows : rows_of_)
@@ -376,8 +397,8 @@ void IslandSolver::finish_directly(bool last) {
     }
     for (SpringRows& s : springs_) {
         const float p[3] = {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])};
-        if (s.told) tell(s, -1, s.impulse, Eigen::Vector3d::Zero(), p, s.place);
-        apply(s, s.impulse, s.place);
+        if (s.told) tell(s, -1, in_world(s, s.impulse), Eigen::Vector3d::Zero(), p, s.place);
+        apply(s, in_world(s, s.impulse), s.place);
     }
     for (const BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
@@ -393,8 +414,8 @@ void IslandSolver::finish_directly(bool last) {
 bool IslandSolver::springs_are_soft() {
     return std::ranges::all_of(springs_, [this](SpringRows& s) {
         write_spring(s);
-        const double w =
-            h_ * h_ * s.constraint->definition.stiffness * (s.k[0][0] + s.k[1][1] + s.k[2][2]) / 3;
+        const double w = h_ * h_ * s.constraint->definition.stiffness * (s.k[0][0] + s.k[1][1] + s.k[2][2]) /
+                         s.point->held;
         return w <= kSoftSpring && 2 * s.constraint->definition.damping_ratio * std::sqrt(w) <= kMostDamped;
     });
 }
@@ -404,7 +425,7 @@ void IslandSolver::pull_springs() {
     for (SpringRows& s : springs_) {
         write_spring(s);
         const PointConstraint& held = s.constraint->definition;
-        const double own = (s.k[0][0] + s.k[1][1] + s.k[2][2]) / 3;
+        const double own = (s.k[0][0] + s.k[1][1] + s.k[2][2]) / s.point->held;
         float v[3];
         speeds(s, v);
         const Eigen::Vector3d speed(v[0], v[1], v[2]);
@@ -423,7 +444,7 @@ void IslandSolver::pull_springs() {
 // what is stiffer holds: the first half is 1/2 h k C1, the second takes all speed between the ends.
 void IslandSolver::set_firmness(SpringRows& s, bool positions) const {
     const PointConstraint& held = s.constraint->definition;
-    const double own = (s.k[0][0] + s.k[1][1] + s.k[2][2]) / 3, k = held.stiffness;
+    const double own = (s.k[0][0] + s.k[1][1] + s.k[2][2]) / s.point->held, k = held.stiffness;
     const double w = h_ * h_ * k * own;
     if (!std::isfinite(w)) {
         s.resolved = false, s.lag = 0, s.gamma = kFirm * own;
@@ -476,6 +497,7 @@ bool IslandSolver::falls_little() const {
 bool IslandSolver::try_substep(bool last) {
     std::fill(wide_held_.begin(), wide_held_.end(), 0.);
     for (BodyRows& rows : rows_of_) rows.place = rows.body->state.position;
+    set_forces();
     follow(true);
     load_wide(true);
     for (ContactRows& c : contacts_) {
@@ -494,13 +516,14 @@ bool IslandSolver::try_substep(bool last) {
     kick();
     if (paths_) write_legs();
     move_directly();
+    now_ += h_;
     const bool stale = !last && moved_on();
     kick();
     follow(false);
     load_wide(false);
     solve_velocities();
     finish_directly(last || stale);
-    last_h_ = h_, time_ += h_, fresh_ = false;
+    last_h_ = h_, time_ = now_, gone_ += 1. / (1 << level_), fresh_ = false;
     if (stale) find_again();
     return true;
 }
@@ -538,7 +561,7 @@ void IslandSolver::find_again() {
         keep_impulse(c, point);
         point.separation = c.now;
     }
-    contact_finder_.find(*scene_, island_->bodies, time_, found_);
+    contact_finder_.find(*scene_, island_->bodies, *paths_, time_, found_);
     found_again_ = true;
     note_places();
     fresh_ = true;

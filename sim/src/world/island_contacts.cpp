@@ -4,10 +4,15 @@
 
 namespace sim {
 
-const PosedBody& IslandContacts::posed(const ContactScene& scene, int id) const {
+const PosedBody& IslandContacts::posed(const ContactScene& scene, int id) {
     const auto at = std::lower_bound(ids_->begin(), ids_->end(), id);
     if (at != ids_->end() && *at == id) return posed_[static_cast<std::size_t>(at - ids_->begin())];
-    return scene.bodies[static_cast<std::size_t>(id)].posed;
+    const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
+    if (!body.travels) return body.posed;
+    const BodyPath::Pose pose = (*paths_)[static_cast<std::size_t>(id)].at(time_);
+    driven_.kind = body.kind;
+    driven_.set(pose.position, pose.orientation, body.state.q);
+    return driven_;
 }
 
 // Pairs and planes that may be near, ascending.
@@ -52,9 +57,9 @@ void IslandContacts::find_pair(const ContactScene& scene, const Manifold* before
     scene.set_surface(manifold);
 }
 
-void IslandContacts::find(const ContactScene& scene, const std::vector<int>& ids, double time,
-                          std::vector<Manifold>& manifolds) {
-    ids_ = &ids;
+void IslandContacts::find(const ContactScene& scene, const std::vector<int>& ids,
+                          const std::vector<BodyPath>& paths, double time, std::vector<Manifold>& manifolds) {
+    ids_ = &ids, paths_ = &paths, time_ = time;
     if (posed_.size() < ids.size()) posed_.resize(ids.size());
     for (std::size_t i = 0; i < ids.size(); ++i) {
         const MovingBody& body = scene.bodies[static_cast<std::size_t>(ids[i])];

@@ -11,19 +11,23 @@ namespace sim {
 /// O(n^2) tests of balls, and the narrow phase of pairs that are near. Allocates only while its buffers grow.
 class IslandContacts {
 public:
-    /// ids: the island's bodies, ascending. manifolds: its contacts by ascending keys, replaced; those that begin
-    /// after `time` [s, since the step's start] stay as they are.
-    void find(const ContactScene& scene, const std::vector<int>& ids, double time,
-              std::vector<Manifold>& manifolds);
+    /// ids: the island's bodies, ascending. paths: of all bodies, of which those of prescribed motion are followed.
+    /// manifolds: its contacts by ascending keys, replaced; those that begin after `time` [s, since the step's
+    /// start] stay as they are.
+    void find(const ContactScene& scene, const std::vector<int>& ids, const std::vector<BodyPath>& paths,
+              double time, std::vector<Manifold>& manifolds);
 
 private:
-    [[nodiscard]] const PosedBody& posed(const ContactScene& scene, int id) const;
+    const PosedBody& posed(const ContactScene& scene, int id);  // now; one that travels till the next call
     void list_keys(const ContactScene& scene);
     void find_pair(const ContactScene& scene, const Manifold* before, Manifold& manifold);
 
     NarrowPhase narrow_;
     const std::vector<int>* ids_ = nullptr;
+    const std::vector<BodyPath>* paths_ = nullptr;
+    double time_ = 0;
     std::vector<PosedBody> posed_;  // of ids_, now
+    PosedBody driven_;
     std::vector<std::uint64_t> keys_;
     std::vector<Manifold> before_;
 };

@@ -207,7 +207,8 @@ void IslandSolver::end_impact(ContactRows& c) {
         if (c.told) tell(c, c.pair, p, p, c.impulse, place_now(c));
         apply(c, p, place_now(c));
     }
-    c.separation = c.point->gap;  // with the way so far
+    const float time = c.point->begins - static_cast<float>(substep_ * h_);
+    c.separation = c.point->gap - c.drifted - time * c.drift[0];  // with the way so far
     for (const Side& side : c.side)
         if (side.body >= 0)
             c.separation -= dot(jacobians_.data() + side.rows, moved_.data() + side.y, side.width);

@@ -28,6 +28,7 @@ void set_tangents(const Eigen::Vector3f& n, Eigen::Vector3f (&t)[2]) {
 void IslandSolver::begin(const Island& island) {
     h_ = last_h_ = settings_->dt / settings_->substeps;
     level_ = 0;
+    begin_times(0);
     inverse_h_ = static_cast<float>(1 / h_);
     const double omega = 2 * std::numbers::pi * std::min(kPushHz, 0.25 / h_);
     const double a1 = 2 * kPushDamping + h_ * omega, a2 = h_ * omega * a1;
@@ -62,7 +63,7 @@ void IslandSolver::begin(const Island& island) {
     y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
     std::fill_n(moved_.data(), offset, 0.f);
 
-    found_again_ = false, fresh_ = true, time_ = 0;
+    found_again_ = false, fresh_ = true;
     note_places();
     std::size_t triples = 0, floats = 0;
     auto width_of = [this](int id) {
@@ -78,7 +79,8 @@ void IslandSolver::begin(const Island& island) {
     }
     for (const int c : island.constraints) {
         const PointConstraint& held = (*constraints_)[static_cast<std::size_t>(c)].definition;
-        floats += 3 * (width_of(held.body_a) + width_of(held.body_b));
+        floats += static_cast<std::size_t>((*constraints_)[static_cast<std::size_t>(c)].count) * 3 *
+                  (width_of(held.body_a) + width_of(held.body_b));
     }
     jacobians_.resize(floats);
     jacobians_used_ = 0;
@@ -88,13 +90,18 @@ void IslandSolver::begin(const Island& island) {
     contacts_.reserve(triples);
     for (const Turn& turn : in_turns(island))
         add_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
-    for (const int c : island.constraints) add_spring((*constraints_)[static_cast<std::size_t>(c)]);
+    for (const int c : island.constraints) {
+        HeldConstraint& held = (*constraints_)[static_cast<std::size_t>(c)];
+        for (int i = 0; i < held.count; ++i) add_spring(held, held.points[static_cast<std::size_t>(i)]);
+    }
     // A pair's points together.
     std::sort(impacts_.begin(), impacts_.end(), [this](std::size_t i, std::size_t j) {
         const ContactRows &a = contacts_[i], &b = contacts_[j];
         return std::tuple(a.point->begins, a.manifold, i) < std::tuple(b.point->begins, b.manifold, j);
     });
-    if (!springs_.empty()) (void)begin_direct(most_with_springs());
+    pushed_.clear();
+    for (std::size_t i = 0; i < rows_of_.size() && !forces_->empty(); ++i) begin_forces(static_cast<int>(i));
+    if (!springs_.empty() || contacts_.empty()) (void)begin_direct(most_with_springs(), springs_.empty());
 }
 
 const std::vector<IslandSolver::Turn>& IslandSolver::in_turns(const Island& island) {
@@ -278,6 +285,7 @@ void IslandSolver::write_contact(ContactRows& c) {
     write_rows(a, directions, 1, c.side[0]);
     write_rows(b, directions, -1, c.side[1]);
     finish_rows(c);
+    see_driven(c);
     c.inverse_normal = 1 / c.k[0][0];
     c.slide_mass = 2 / (c.k[1][1] + c.k[2][2]);
     const float det = c.k[1][1] * c.k[2][2] - c.k[1][2] * c.k[1][2];
@@ -285,10 +293,11 @@ void IslandSolver::write_contact(ContactRows& c) {
     c.inverse_tangent[2] = c.k[1][1] / det;
 }
 
-void IslandSolver::add_spring(HeldConstraint& constraint) {
+void IslandSolver::add_spring(HeldConstraint& constraint, HeldPoint& point) {
     const PointConstraint& held = constraint.definition;
     SpringRows s{};
-    s.impulse = constraint.impulse.cast<double>() / 2;  // each half, at rest
+    s.point = &point, s.axes.setIdentity();
+    s.impulse = point.impulse.cast<double>() / 2;  // each half, at rest
     s.place.setZero(), s.moved.setZero(), s.offset.setZero(), s.gap.setZero();
     auto local_of = [this](int body) { return body >= 0 ? local(body) : -1; };
     s.side[0] = reserve_rows(local_of(held.body_a));
@@ -302,6 +311,11 @@ IslandSolver::End IslandSolver::end_of(int body, const Eigen::Vector3d& rest, fl
     if (body < 0) return {rest, {-1, Eigen::Vector3f::Zero(), nullptr}};
     const MovingBody& b = (*bodies_)[static_cast<std::size_t>(body)];
     const BodyKind& kind = *b.kind;
+    if (b.travels) {
+        const BodyPath::Pose pose = pose_of(body, now_);
+        const Eigen::Vector3d arm = pose.orientation * rest;
+        return {pose.position + arm, {-1, arm.cast<float>(), nullptr}};
+    }
     Eigen::Vector3d point = rest;
     if (kind.modes > 0) {
         kind.shapes_at(rest.cast<float>(), shapes);
@@ -313,18 +327,32 @@ IslandSolver::End IslandSolver::end_of(int body, const Eigen::Vector3d& rest, fl
     return {b.state.position + arm, {local(body), arm.cast<float>(), kind.modes > 0 ? shapes : nullptr}};
 }
 
+Eigen::Quaterniond IslandSolver::orientation_of(int body) const {
+    if (body < 0) return Eigen::Quaterniond::Identity();
+    const MovingBody& b = (*bodies_)[static_cast<std::size_t>(body)];
+    return b.travels ? pose_of(body, now_).orientation : b.state.orientation;
+}
+
 // Springs act over large turns, so their arms and rows follow the bodies every substep.
 void IslandSolver::write_spring(SpringRows& s) {
     const PointConstraint& held = s.constraint->definition;
     alignas(32) float scratch[2][3 * kMostModes];
-    const End a = end_of(held.body_a, held.point_a, scratch[0]);
-    const End b = end_of(held.body_b, held.point_b, scratch[1]);
-    const Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();
+    const End a = end_of(held.body_a, s.point->a, scratch[0]);
+    End b = end_of(held.body_b, s.point->b, scratch[1]);
+    const Eigen::Quaterniond turned = orientation_of(held.body_b);
+    if (s.point->turns) {
+        s.axes = s.point->directions * turned.conjugate().toRotationMatrix();
+        b.place.arm += (a.point - b.point).cast<float>();  // of b's matter at a's point
+    }
+    const Eigen::Matrix3f axes = s.axes.cast<float>();
     write_rows(a.place, axes, 1, s.side[0]);
     write_rows(b.place, axes, -1, s.side[1]);
     finish_rows(s);
-    s.place = (a.point + b.point) / 2;
-    s.gap = a.point - b.point;
+    s.drift = axes * (speed_of(held.body_a, a.place.arm.cast<double>()) -
+                      speed_of(held.body_b, b.place.arm.cast<double>()))
+                         .cast<float>();
+    s.place = s.point->turns ? a.point : Eigen::Vector3d((a.point + b.point) / 2);
+    s.gap = s.point->gap(a.point, b.point, turned);
 }
 
 }  // namespace sim

@@ -32,14 +32,16 @@ void IslandSolver::solve(const Island& island, const ContactScene& scene) {
     note_start();
     advance();
     if (!direct_ && is_far_from_solved() && begin_direct(most_with_contacts())) {
-        // Of contacts that contradict each other the exact answer is worse than sweeps that give up.
+        // Of contacts that contradict each other the exact answer is worse than sweeps that give up: where nothing
+        // else may give energy, it shows by that.
         const double swept = energy();
         go_back();
         begin_direct(most_with_contacts());
         advance();
         const double gained = energy() - std::max(swept, energy_before_);
-        if (!(gained < kMostGained * scale_)) go_back(), advance();
+        if (!may_gain() && !(gained < kMostGained * scale_)) go_back(), advance();
     }
+    end_forces();
     if (any_told_) settle_given();
     keep_impulses();
     for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
@@ -63,6 +65,7 @@ void IslandSolver::note_start() {
 }
 
 void IslandSolver::go_back() {
+    end_forces();
     for (const int id : island_->bodies) {
         MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
         const Before& before = before_[static_cast<std::size_t>(id)];
@@ -93,7 +96,7 @@ double IslandSolver::energy() const {
 void IslandSolver::advance() {
     for (int i = 0; i < settings_->substeps; ++i) {
         remaining_ = h_ * (settings_->substeps - 1 - i);
-        substep_ = i;
+        substep_ = i, gone_ = 0;
         const bool first = i == 0, last = i + 1 == settings_->substeps;
         if (!direct_) {
             substep(first, last);
@@ -101,6 +104,11 @@ void IslandSolver::advance() {
         }
         direct_substep(0, last);
     }
+}
+
+bool IslandSolver::may_gain() const {
+    return is_carried(*island_) ||
+           std::ranges::any_of(rows_of_, [](const BodyRows& rows) { return rows.body->pushed; });
 }
 
 bool IslandSolver::is_far_from_solved() const {
@@ -127,6 +135,9 @@ double IslandSolver::residual() const {
 }
 
 void IslandSolver::substep(bool first, bool last) {
+    begin_times(substep_ * h_);
+    for (ContactRows& c : contacts_) see_driven(c);
+    set_forces();
     if (!first && !contacts_.empty()) turn_frames();
     load_velocities();
     if (!impacts_.empty()) strike();
@@ -139,8 +150,9 @@ void IslandSolver::substep(bool first, bool last) {
     if (last) restitute();
     for (SpringRows& s : springs_) {
         const float p[3] = {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])};
-        if (s.told) tell(s, -1, s.impulse, s.impulse, p, s.place);
-        apply(s, s.impulse, s.place);
+        const Eigen::Vector3d impulse = in_world(s, s.impulse);
+        if (s.told) tell(s, -1, impulse, impulse, p, s.place);
+        apply(s, impulse, s.place);
     }
     finish();
 }
@@ -192,8 +204,9 @@ void IslandSolver::warm_start(bool first) {
             if (c.restitution > 0 && c.largest == 0) speed += dot(d, start_.data() + side.y, side.width);
             if (!first || !impacts_.empty()) moved += dot(d, moved_.data() + side.y, side.width);
         }
+        if (c.restitution > 0 && c.largest == 0) speed += c.drift[0];
         if (c.largest == 0) c.approach = speed;
-        c.now = c.separation + moved;
+        c.now = c.separation + moved + c.drifted;
         if (c.impulse[0] != 0) push_by(c, c.impulse);
     }
 }
@@ -227,7 +240,7 @@ inline void IslandSolver::speeds(const Rows& rows, float (&v)[3]) const {
     Lanes sum[3] = {lanes_of(0), lanes_of(0), lanes_of(0)};
     for (const Side& side : rows.side)
         if (side.body >= 0) dot_rows(jacobians_.data() + side.rows, y_.data() + side.y, side.width, sum);
-    for (int r = 0; r < 3; ++r) v[r] = sum_of(sum[r]);
+    for (int r = 0; r < 3; ++r) v[r] = sum_of(sum[r]) + rows.drift[r];
 }
 
 inline void IslandSolver::push_by(const Rows& rows, const float (&impulse)[3]) {
@@ -277,7 +290,7 @@ void IslandSolver::note_work() {
 
 void IslandSolver::note_work(ContactRows& c, float impulse) {
     if (c.restitution == 0 || c.largest == 0) return;
-    float mean = 0;
+    float mean = c.drift[0];
     for (const Side& side : c.side) {
         if (side.body < 0) continue;
         const float* d = jacobians_.data() + side.rows;
@@ -312,7 +325,10 @@ void IslandSolver::restitute(ContactRows& c) {
 }
 
 void IslandSolver::move() {
-    for (ContactRows& c : contacts_) std::copy_n(c.impulse, 3, c.at_move);
+    for (ContactRows& c : contacts_) {
+        std::copy_n(c.impulse, 3, c.at_move);
+        c.drifted += static_cast<float>(h_) * c.drift[0];
+    }
     const float h = static_cast<float>(h_);
     for (BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
@@ -462,6 +478,7 @@ void IslandSolver::apply_contacts() {
 
 void IslandSolver::finish() {
     apply_contacts();
+    count_forces(1);
     for (const BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
@@ -502,9 +519,9 @@ void IslandSolver::keep_impulse(const ContactRows& c, ManifoldPoint& point) {
 void IslandSolver::keep_impulses() {
     for (const ContactRows& c : contacts_) keep_impulse(c, *c.point);
     for (const SpringRows& s : springs_) {
-        s.constraint->impulse = (s.moved + s.impulse).cast<float>();
-        const double force = s.constraint->impulse.norm() / h_;
-        if (!(force > s.constraint->definition.breaking_force)) continue;
+        s.point->impulse = (s.moved + s.impulse).cast<float>();
+        const double force = s.point->impulse.norm() / h_;
+        if (!s.constraint->holds || !(force > s.constraint->definition.breaking_force)) continue;
         s.constraint->holds = false;
         ++broken_;
     }

@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <numbers>
+#include <span>
 #include <vector>
 
 #include "shape/lanes.h"
@@ -13,6 +14,13 @@ namespace sim {
 /// solve, too, and one with springs.
 constexpr double kMostWithContacts = 500, kMostWithSprings = 1e4;
 constexpr float kPushSpeed = 3;  ///< at which bodies inside each other are moved apart [m/s]
+
+/// A timed force in a step. Times in substeps since the start.
+struct ActiveForce {
+    const TimedForce* force;
+    double from, until;  ///< until > from
+    double factor;       ///< of `force`: an impulse's, 1 / substep [1/s]
+};
 
 /// Bodies joined by contacts or constraints in one step, in order of ids.
 struct Island {
@@ -74,6 +82,7 @@ struct Island {
 /// (IslandContacts): the step goes on as a new one would begin.
 /// Where a factorisation is too dear, springs alone are factorised, and solved in turn with sweeps over the contacts; if all
 /// are soft (springs_are_soft) they are forces, held over each substep of the sweeps (symplectic Euler).
+/// Islands without either, where a timed force acts, go directly, too: a constant force then moves a body exactly.
 ///
 /// Deterministic: sweeps go over springs, then contacts, in the order of ids (see in_turns). No allocation
 /// once the buffers have grown.
@@ -84,10 +93,17 @@ public:
         : settings_(&settings), bodies_(&bodies), manifolds_(&manifolds), constraints_(&constraints) {}
 
     void solve(const Island& island, const ContactScene& scene);  ///< over one step
+    /// Before a step: its number, from 0, and the forces that act within it, ascending by bodies; must stay.
+    void begin_step(std::uint64_t step, const std::vector<ActiveForce>& forces) noexcept {
+        first_substep_ = static_cast<double>(step) * settings_->substeps;
+        forces_ = &forces;
+    }
     /// The contacts that the last island ends the step with, if they were found again within it; else nullptr.
     [[nodiscard]] const std::vector<Manifold>* found() const noexcept {
         return found_again_ ? &found_ : nullptr;
     }
+    /// Whether a body of it touches or is joined to what travels.
+    [[nodiscard]] bool is_carried(const Island& island) const;
     /// Where solve writes the paths of its bodies, one a body of the world; must stay. nullptr: nowhere.
     void record(std::vector<BodyPath>* paths) noexcept { paths_ = paths; }
     /// What planes, fixed bodies, places, gravity and drag gave own bodies since the last call [N s].
@@ -132,7 +148,9 @@ private:
         Side side[2];
         std::uint32_t wide[2] = {0, 0};  // where the sides' rows begin in wide_rows_
         float k[3][3];
-        bool told = false;  ///< a watched body is among them
+        Eigen::Vector3f drift =
+            Eigen::Vector3f::Zero();  ///< what they see of bodies that move as prescribed [m/s]
+        bool told = false;            ///< a watched body is among them
     };
     struct ContactRows : Rows {
         ManifoldPoint* point;
@@ -140,6 +158,7 @@ private:
         Eigen::Vector3f tangent[2];
         float separation, now, friction, restitution, approach;
         int begins = -1;    // of an impact: number of the substep
+        float drifted = 0;  // by `drift` along the normal, since the step's start [m]
         bool over = false;  // an impact that is no contact afterwards
         float bias = 0;     // of an impact: speed along the normal that it leaves, negative [m/s]
         float taken, slide_mass, inverse_normal,
@@ -151,6 +170,8 @@ private:
     };
     struct SpringRows : Rows {
         HeldConstraint* constraint;
+        HeldPoint* point;      // of it
+        Eigen::Matrix3d axes;  // rows: the point's directions, world; impulses, gap and offset are along them
         Eigen::Vector3d place;   // where the impulse acts, world
         Eigen::Vector3d offset;  // of the ends, over h, less what the rows see of the velocities [m/s]
         double gamma;            // [1/kg]: a unit of impulse lets the ends move by so much
@@ -190,9 +211,20 @@ private:
     void go_back();  ///< to it
     [[nodiscard]] double energy() const;
     [[nodiscard]] bool is_far_from_solved() const;
+    [[nodiscard]] bool may_gain() const;  // energy, from without
     [[nodiscard]] double most_with_contacts() const noexcept {
         return kMostWithContacts * static_cast<double>(rows_of_.size());
     }
+    // Bodies that move as prescribed, driven_bodies.cpp.
+    [[nodiscard]] BodyPath::Pose pose_of(int body, double time) const;
+    [[nodiscard]] Eigen::Vector3d speed_of(int body, const Eigen::Vector3d& arm) const;
+    void see_driven(ContactRows& contact) const;
+    void begin_times(double begins) noexcept { time_ = now_ = begins; }
+    // Timed forces, timed_forces.cpp: added to those that the user applies, substep by substep.
+    void begin_forces(int row);
+    void set_forces();
+    void end_forces();
+    void count_forces(double share);  // of the substep that they acted
     /// The contacts in windows of kWindow, within a window by turn, then by ids. Contacts of one turn share
     /// no body, so sweeping in this order gives the bits of the order by ids, but the processor can work on
     /// several at once; windows keep the bodies they use in its cache.
@@ -219,13 +251,14 @@ private:
     [[nodiscard]] bool is_rigid(const ContactRows& contact) const noexcept {
         return contact.side[0].width <= 8 && contact.side[1].width <= 8;
     }
-    void add_spring(HeldConstraint& constraint);
+    void add_spring(HeldConstraint& constraint, HeldPoint& point);
     /// An end of a spring, now.
     struct End {
         Eigen::Vector3d point;  // world
         Place place;
     };
     [[nodiscard]] End end_of(int body, const Eigen::Vector3d& rest, float* shapes) const;
+    [[nodiscard]] Eigen::Quaterniond orientation_of(int body) const;  // now; of -1: the world's
     void write_spring(SpringRows& spring);
 
     // Directly; direct_solution.cpp.
@@ -255,6 +288,7 @@ private:
     }
     void find_ends();
     [[nodiscard]] Eigen::Vector3d gap_at_end(const SpringRows& spring) const;
+    [[nodiscard]] Eigen::Quaterniond orientation_at_end(int body) const;
     bool solve_positions();
     void settle_contacts();
     void begin_contact(std::size_t i, const Eigen::Vector3d& seen_so_far, const Eigen::Vector3d& guess,
@@ -310,6 +344,9 @@ private:
                    const float (&along)[3], const Eigen::Vector3d& point, StepImpulse& given) const;
     void apply_contacts();
     [[nodiscard]] Eigen::Vector3d in_world(const ContactRows& contact, const Eigen::Vector3d& impulse) const;
+    [[nodiscard]] static Eigen::Vector3d in_world(const SpringRows& spring, const Eigen::Vector3d& impulse) {
+        return spring.axes.transpose() * impulse;
+    }
     void finish();
     void step_modes(const BodyRows& rows);
     void keep_impulses();
@@ -332,7 +369,19 @@ private:
     std::vector<Manifold> found_;  // again, within the step
     bool found_again_ = false;
     bool fresh_ = true;  // contacts, in the first substep since they were found
-    double time_ = 0;    // since the step's start [s], direct solutions
+    double first_substep_ = 0,
+           gone_ = 0;            // of the step, since the start; of the substep, since that [substeps]
+    double time_ = 0, now_ = 0;  // of the substep, and where the bodies are, since the step's start [s]
+    const std::vector<ActiveForce>* forces_ = nullptr;
+    struct Pushed {
+        int row;                              // of rows_of_
+        std::span<const ActiveForce> forces;  // on it
+        bool pushed;                          // by the user, with these:
+        Eigen::Vector3d force, torque;
+        Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostModes, 1> modal_force;  // not on the heap
+        Eigen::Vector3d now;                                                     // of the timed ones [N]
+    };
+    std::vector<Pushed> pushed_;
 
     std::vector<BodyRows> rows_of_;  // per island body
     std::vector<int> local_;         // world body -> island body or -1

@@ -49,7 +49,8 @@ int World::Implementation::add(const WorldBody& definition) {
     check_world_body(definition);
     MovingBody body;
     body.kind = kind_of(definition);
-    body.fixed = definition.fixed;
+    body.fixed = !definition.moves();
+    body.motion = definition.motion;
     body.gravity_scale = definition.gravity_scale;
     body.friction = static_cast<float>(definition.friction);
     body.restitution = static_cast<float>(definition.restitution);
@@ -60,8 +61,8 @@ int World::Implementation::add(const WorldBody& definition) {
     const Eigen::VectorXd zero = Eigen::VectorXd::Zero(body.kind->modes);
     body.state = {definition.world_from_body.translation(),
                   orientation,
-                  definition.fixed ? Eigen::Vector3d::Zero() : definition.velocity,
-                  definition.fixed ? Eigen::Vector3d::Zero() : momentum,
+                  body.fixed ? Eigen::Vector3d::Zero() : definition.velocity,
+                  body.fixed ? Eigen::Vector3d::Zero() : momentum,
                   zero,
                   zero};
     body.posed.kind = body.kind;
@@ -71,14 +72,14 @@ int World::Implementation::add(const WorldBody& definition) {
     body.given.modal = zero;
     definitions.push_back(definition);
     bodies.push_back(std::move(body));
-    pose(bodies.back());
+    definition.motion.empty() ? pose(bodies.back()) : place_driven(bodies.back());
     return static_cast<int>(bodies.size()) - 1;
 }
 
 void World::Implementation::set_joined() {
     joined.clear();
     for (const HeldConstraint& c : constraints)
-        if (c.holds && c.definition.body_b >= 0)
+        if (c.holds && !c.collides)
             joined.emplace_back(std::min(c.definition.body_a, c.definition.body_b),
                                 std::max(c.definition.body_a, c.definition.body_b));
     std::sort(joined.begin(), joined.end());
@@ -105,7 +106,10 @@ void World::Implementation::quarantine(int id, const std::string& what) {
 
 void World::Implementation::drop_constraints(int body) {
     for (HeldConstraint& c : constraints)
-        if (c.definition.body_a == body || c.definition.body_b == body) c.holds = false, c.impulse.setZero();
+        if (c.definition.body_a == body || c.definition.body_b == body) {
+            c.holds = false;
+            for (HeldPoint& point : c.points) point.impulse.setZero();
+        }
     set_joined();
 }
 
@@ -242,7 +246,7 @@ void World::Implementation::put_to_sleep() {
     for (std::size_t i = 0; i < islands_used; ++i) {
         const Island& island = islands[i];
         if (!is_own(island)) continue;
-        bool still = settings.sleeping;
+        bool still = settings.sleeping && !outcomes[static_cast<std::size_t>(island.bodies.front())].carried;
         for (const int id : island.bodies) {
             MovingBody& body = bodies[static_cast<std::size_t>(id)];
             const bool slow = point_speed(body) < settings.sleep_speed;
@@ -290,7 +294,7 @@ void World::Implementation::count_work() {
 // Whether anything happens in this step; in islands that others solve, too, so that contacts are forgotten
 // everywhere at once.
 bool World::Implementation::any_awake() const {
-    auto awake = [](const MovingBody& body) { return body.moves() && !body.asleep; };
+    auto awake = [](const MovingBody& body) { return body.travels || (body.moves() && !body.asleep); };
     if (sharing == Sharing::islands) return std::any_of(bodies.begin(), bodies.end(), awake);
     return std::any_of(here.begin(), here.end(),
                        [&](int i) { return awake(bodies[static_cast<std::size_t>(i)]); });
@@ -301,13 +305,18 @@ void World::Implementation::step() {
     solver->cross(sharing == Sharing::pairs);
     outside_before = outside;
     ++counts.steps;
+    begin_motions();
+    find_forces();
     gather();
     quarantine_broken();
     for (const int i : here)
         if (bodies[static_cast<std::size_t>(i)].pushed && bodies[static_cast<std::size_t>(i)].asleep)
             wake_group(bodies, i);
     counts.contacts = counts.pairs = counts.islands = 0;
-    if (!any_awake()) return dismiss_ghosts();
+    if (!any_awake()) {
+        end_motions();
+        return dismiss_ghosts();
+    }
     for (const int i : here) {
         MovingBody& body = bodies[static_cast<std::size_t>(i)];
         if (body.moves() && (!body.asleep || body.unposed)) pose(body);
@@ -325,6 +334,7 @@ void World::Implementation::step() {
     put_to_sleep();
     count_work();
     quarantine_results();
+    end_motions();
     if (sharing == Sharing::islands) forget_foreign_contacts();
     dismiss_ghosts();
     counts.pairs = contacts.pairs();
@@ -340,6 +350,8 @@ World::World(const WorldDefinition& definition) : implementation_(std::make_uniq
     w.planes = definition.planes;
     w.solver = std::make_unique<IslandSolver>(w.settings, w.bodies, w.contacts.manifolds(), w.constraints);
     w.solver->record(&w.contacts.paths());
+    w.forces = definition.forces;
+    std::ranges::stable_sort(w.forces, {}, &TimedForce::body);
     for (const WorldBody& body : definition.bodies) w.add(body);
     for (const PointConstraint& constraint : definition.constraints) add_constraint(constraint);
 }
@@ -359,7 +371,9 @@ int World::add_body(const WorldBody& body) {
 int World::add_constraint(const PointConstraint& constraint) {
     Implementation& w = *implementation_;
     check_constraint(constraint, bodies());
-    w.constraints.push_back({constraint});
+    auto kind = [&w](int body) { return w.bodies[static_cast<std::size_t>(body)].kind; };
+    w.constraints.push_back(held_constraint(constraint, *kind(constraint.body_a),
+                                            constraint.body_b < 0 ? nullptr : kind(constraint.body_b)));
     w.set_joined();
     for (const int body : {constraint.body_a, constraint.body_b})
         if (body >= 0) wake(body);
@@ -474,11 +488,16 @@ World::Energy World::energy() const {
     };
     for (const HeldConstraint& c : w.constraints) {
         if (!c.holds) continue;
-        const Eigen::Vector3d b =
-            c.definition.body_b >= 0 ? at(c.definition.body_b, c.definition.point_b) : c.definition.point_b;
         if (std::isinf(c.definition.stiffness)) continue;  // the ends are together
-        e.springs +=
-            c.definition.stiffness / 2 * (at(c.definition.body_a, c.definition.point_a) - b).squaredNorm();
+        const int b = c.definition.body_b;
+        for (int i = 0; i < c.count; ++i) {
+            const HeldPoint& point = c.points[static_cast<std::size_t>(i)];
+            const Eigen::Vector3d gap =
+                point.gap(at(c.definition.body_a, point.a), b < 0 ? point.b : at(b, point.b),
+                          b < 0 ? Eigen::Quaterniond::Identity()
+                                : w.bodies[static_cast<std::size_t>(b)].state.orientation);
+            e.springs += c.definition.stiffness / 2 * gap.squaredNorm();
+        }
     }
     return e;
 }

@@ -9,6 +9,7 @@ namespace sim {
 namespace {
 
 constexpr double kFurthest = 1e7, kFastest = 1e6, kStrongest = 1e8;  // m, m/s, m/s^2
+constexpr double kLargestForce = 1e15, kLongest = 1e9;               // N, s
 
 [[noreturn]] void refuse(const std::string& who, const std::string& what, double found,
                          const std::string& expected) {
@@ -66,6 +67,14 @@ void check_world_body(const WorldBody& body) {
     check_vector(who, "position [m]", body.world_from_body.translation(), kFurthest);
     check_vector(who, "velocity [m/s]", body.velocity, kFastest);
     check_vector(who, "angular velocity [rad/s]", body.angular_velocity, kFastest);
+    double last = -1;
+    for (const MotionKey& key : body.motion) {
+        check_range(who, "time of a motion's key [s]", key.time_s, 0, kLongest);
+        if (!(key.time_s > last)) refuse(who, "time of a motion's key [s]", key.time_s, "ascending times");
+        last = key.time_s;
+        check_vector(who, "position of a motion's key [m]", key.position, kFurthest);
+        check_range(who, "length of a motion's quaternion", key.orientation.norm(), 1 - 1e-6, 1 + 1e-6);
+    }
     const Eigen::Matrix3d r = body.world_from_body.linear();
     const double skew = (r * r.transpose() - Eigen::Matrix3d::Identity()).norm();
     if (!(skew < 1e-6) || r.determinant() < 0)
@@ -83,6 +92,8 @@ void check_constraint(const PointConstraint& constraint, int bodies) {
     if (constraint.stiffness != std::numeric_limits<double>::infinity())
         check_range(who, "stiffness [N/m]", constraint.stiffness, 1e-9, 1e15);
     check_range(who, "damping ratio", constraint.damping_ratio, 0, 1e3);
+    for (const Eigen::Quaterniond& frame : {constraint.frame_a, constraint.frame_b})
+        check_range(who, "length of a joint frame's quaternion", frame.norm(), 1 - 1e-6, 1 + 1e-6);
     if (!(constraint.breaking_force > 0))
         refuse(who, "breaking force [N]", constraint.breaking_force, "a number above 0");
 }
@@ -98,6 +109,13 @@ void check_world(const WorldDefinition& definition) {
         check_range("plane", "offset [m]", plane.offset, -kFurthest, kFurthest);
         check_range("plane", "friction", plane.friction, 0, 100);
         check_range("plane", "restitution", plane.restitution, 0, 1);
+    }
+    for (const TimedForce& force : definition.forces) {
+        check_range("force", "body", force.body, 0, std::numeric_limits<int>::max());
+        check_vector("force", "point [m]", force.point, kFurthest);
+        check_vector("force", "force [N], or impulse [N s]", force.force, kLargestForce);
+        check_range("force", "time at which it begins [s]", force.from_s, 0, kLongest);
+        check_range("force", "time at which it ends [s]", force.until_s, force.from_s, kLongest);
     }
 }
 

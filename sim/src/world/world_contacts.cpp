@@ -71,6 +71,7 @@ double turning_speed(const MovingBody& body) noexcept {
 
 double contact_reach(const MovingBody& body, const WorldSettings& settings) {
     const double slop = kSlop * smallest_half(body);
+    if (body.travels) return slop + settings.dt * point_speed(body);
     if (!body.moves() || body.asleep) return slop;
     return slop + settings.dt * (point_speed(body) + settings.dt * pull_on(body, settings).norm());
 }
@@ -100,6 +101,17 @@ void WorldContacts::set_reach(const ContactScene& scene, int id) {
     const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
     Reach& reach = reach_[static_cast<std::size_t>(id)];
     reach = {};
+    if (body.travels) {
+        const BodyPath& path = paths_[static_cast<std::size_t>(id)];
+        reach.moved = path.until(path.end).moved;
+        reach.rung = -reach.moved.norm();  // by how much its way is longer
+        for (std::size_t i = 0; i < path.legs.size(); ++i)
+            reach.rung += (path.end_of(i) - path.legs[i].start) * path.legs[i].velocity.norm();
+        for (std::size_t i = 0; i < path.legs.size(); ++i)
+            reach.turned +=
+                (path.end_of(i) - path.legs[i].start) * path.legs[i].spin.norm() * turn_reach_of(*body.kind);
+        return;
+    }
     if (!body.moves() || body.asleep) return;
     const double dt = scene.settings.dt;
     reach.moved = dt * (body.state.velocity + dt * pull_on(body, scene.settings));
@@ -123,8 +135,8 @@ bool WorldContacts::find_once(const ContactScene& scene) {
         const Eigen::Vector3d half =
             body.posed.half_aabb.array() + reach.turned + reach.rung + kSlop * smallest_half(body);
         const Eigen::Vector3d &from = body.posed.position, to = from + reach.moved;
-        boxes.push_back(
-            {from.cwiseMin(to) - half, from.cwiseMax(to) + half, id, body.moves() && !body.asleep});
+        boxes.push_back({from.cwiseMin(to) - half, from.cwiseMax(to) + half, id,
+                         body.travels || (body.moves() && !body.asleep)});
     }
     // By bodies, each with later bodies and then with planes: in the order of the manifolds' keys.
     const auto& pairs = broad_.find();
@@ -141,9 +153,10 @@ bool WorldContacts::find_once(const ContactScene& scene) {
 // Among ghosts: of an own and a ghost body, those whose lower number is own; a ghost's with what is fixed.
 bool ContactScene::may_meet(const std::pair<int, int>& pair) const {
     if (!joined.empty() && std::binary_search(joined.begin(), joined.end(), pair)) return false;
-    if (!among_ghosts) return true;
     const MovingBody &a = bodies[static_cast<std::size_t>(pair.first)],
                      &b = bodies[static_cast<std::size_t>(pair.second)];
+    if (!a.moves() && !b.moves()) return false;
+    if (!among_ghosts) return true;
     return a.own || !a.moves() || !b.moves();
 }
 

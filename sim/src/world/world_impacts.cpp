@@ -61,7 +61,7 @@ void WorldContacts::rewarm(Manifold& manifold) const {
 
 void WorldContacts::follow(const ContactScene& scene, int i) {
     const auto at = static_cast<std::size_t>(i);
-    if (followed_[at]) return;
+    if (followed_[at] || scene.bodies[at].travels) return;
     follow_freely(scene.bodies[at], scene.settings, paths_[at]);
     followed_[at] = true;
 }

@@ -16,7 +16,9 @@ struct World::Implementation {
     std::vector<std::unique_ptr<BodyKind>> kinds;
     std::vector<MovingBody> bodies;
     std::vector<HeldConstraint> constraints;
-    std::vector<std::pair<int, int>> joined;  // pairs that a constraint joins
+    std::vector<TimedForce> forces;           // ascending by bodies
+    std::vector<ActiveForce> active;          // of them in the step, ascending by bodies
+    std::vector<std::pair<int, int>> joined;  // pairs that a constraint joins and that do not collide
     WorldContacts contacts;
     std::unique_ptr<IslandSolver> solver;
     std::vector<Island> islands;
@@ -26,13 +28,14 @@ struct World::Implementation {
     struct Outcome {
         Eigen::Vector3d outside = Eigen::Vector3d::Zero();
         std::uint64_t limited = 0, broken = 0;
+        bool carried = false;             // IslandSolver::is_carried
         bool found = false;               // contacts, within the step
         std::vector<Manifold> manifolds;  // those
     };
     std::vector<Outcome> outcomes;
-    std::vector<WorldBodyState> started;  // of bodies that are solved, when the step began
-    std::vector<bool> at_limit_before;    // at_limit of bodies, then
-    std::vector<std::pair<Eigen::Vector3f, bool>> springs_before;  // impulse and whether it held, then
+    std::vector<WorldBodyState> started;       // of bodies that are solved, when the step began
+    std::vector<bool> at_limit_before;         // at_limit of bodies, then
+    std::vector<SpringRecord> springs_before;  // then
     std::vector<bool> solved,
         again;  // of each body: its island went through the solver, and has to once more
     WorldCounts counts;
@@ -60,9 +63,11 @@ struct World::Implementation {
     [[nodiscard]] bool near_own(const Eigen::Vector3d& center, double radius, int body) const;
 
     const BodyKind* kind_of(const WorldBody& body);
-    int add(const WorldBody& body);                         ///< returns its id
-    void set_joined();                                      ///< by constraints
-    void drop_constraints(int body);                        ///< of a body that is taken out
+    int add(const WorldBody& body);   ///< returns its id
+    void set_joined();                ///< by constraints
+    void drop_constraints(int body);  ///< of a body that is taken out
+    [[nodiscard]] SpringRecord spring_record(std::size_t constraint) const;
+    bool restore_spring(const SpringRecord& record);        ///< whether it held otherwise
     void pose(MovingBody& body);                            ///< for contact tests
     void quarantine(int body, const std::string& what);     ///< takes it out of the world
     void quarantine_broken();                               ///< before the step
@@ -72,6 +77,13 @@ struct World::Implementation {
     void join(int a, int b);                                ///< union-find
     void start_union();                                     ///< union-find: each body alone
     [[nodiscard]] bool any_awake() const;
+    void place_driven(MovingBody& body);
+    void set_driven(MovingBody& body, const BodyPath::Pose& now, const Eigen::Vector3d& velocity,
+                    const Eigen::Vector3d& spin);
+    void begin_motions();
+    void end_motions();
+    void find_forces();  // and who they wake
+    [[nodiscard]] bool is_forced(int body) const;
     void gather();          // who takes part in the step
     void gather_islands();  // who may reach an own body's island
     void join_neighbours(const std::vector<double>& reach);

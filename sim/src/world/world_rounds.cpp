@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <tuple>
 
 #include "world/world_implementation.h"
 
@@ -22,11 +21,11 @@ Eigen::Vector3d stop_approach(MovingBody& a, MovingBody& b, const ManifoldPoint&
                                               : on_b;
     double speed = 0, mobility = 0;
     for (const MovingBody* body : {&a, &b}) {
-        if (!body->moves()) continue;
         const Eigen::Vector3d arm = place - body->state.position, lever = arm.cross(n);
         const Eigen::Vector3d spin = spin_of(*body, body->state.orientation, body->state.angular_momentum);
         speed += (body == &a ? 1 : -1) * n.dot(body->state.velocity + spin.cross(arm));
-        mobility += 1 / body->kind->mass.mass + lever.dot(spin_of(*body, body->state.orientation, lever));
+        if (body->moves())
+            mobility += 1 / body->kind->mass.mass + lever.dot(spin_of(*body, body->state.orientation, lever));
     }
     const Eigen::Vector3d impulse = std::max(0.0, -speed) / mobility * n;
     for (MovingBody* body : {&a, &b}) {
@@ -64,7 +63,7 @@ void World::Implementation::start_solving() {
         }
     }
     springs_before.clear();
-    for (const HeldConstraint& c : constraints) springs_before.emplace_back(c.impulse, c.holds);
+    for (std::size_t c = 0; c < constraints.size(); ++c) springs_before.push_back(spring_record(c));
 }
 
 void World::Implementation::move_alone(int id) {
@@ -80,7 +79,9 @@ void World::Implementation::move_alone(int id) {
 void World::Implementation::solve_island(const Island& island) {
     Outcome& outcome = outcomes[static_cast<std::size_t>(island.bodies.front())];
     outcome.outside.setZero(), outcome.limited = outcome.broken = 0, outcome.found = false;
-    if (island.manifolds.empty() && island.constraints.empty()) return move_alone(island.bodies.front());
+    outcome.carried = solver->is_carried(island);
+    if (island.manifolds.empty() && island.constraints.empty() && !is_forced(island.bodies.front()))
+        return move_alone(island.bodies.front());
     const std::uint64_t limits = solver->deformations_limited(), breaks = solver->constraints_broken();
     solver->solve(island, contact_scene());
     if (const std::vector<Manifold>* found = solver->found()) {
@@ -114,9 +115,7 @@ void World::Implementation::solve_again() {
         for (const int m : island.manifolds)
             contacts.rewarm(contacts.manifolds()[static_cast<std::size_t>(m)]);
         for (const int c : island.constraints)
-            std::tie(constraints[static_cast<std::size_t>(c)].impulse,
-                     constraints[static_cast<std::size_t>(c)].holds) =
-                springs_before[static_cast<std::size_t>(c)];
+            (void)restore_spring(springs_before[static_cast<std::size_t>(c)]);
         solve_island(island);
     }
     ++counts.solved_again;

@@ -94,7 +94,7 @@ void World::Implementation::join_neighbours(const std::vector<double>& reach) {
     boxes.clear();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         const MovingBody& body = bodies[i];
-        if (!body.moves()) continue;
+        if (!body.moves() && quick[i] == 0) continue;
         const double half = loose_radius(*body.kind, body.state.q) + reach[i];
         boxes.push_back({body.state.position.array() - half, body.state.position.array() + half,
                          static_cast<int>(i), !body.asleep});
@@ -122,7 +122,8 @@ void World::Implementation::gather_islands() {
     }
     quick.assign(bodies.size(), 0);
     for (std::size_t i = 0; i < bodies.size(); ++i)
-        if (bodies[i].moves() && reaches[i] > (kSlow + kSlop) * smallest_half(bodies[i].posed))
+        if ((bodies[i].moves() || bodies[i].travels) &&
+            reaches[i] > (kSlow + kSlop) * smallest_half(bodies[i].posed))
             quick[i] = reaches[i];
     join_neighbours(reaches);
     for (bool any = true; any;) {
@@ -223,13 +224,26 @@ void World::contact_records(std::vector<ContactRecord>& out) const {
     }
 }
 
+SpringRecord World::Implementation::spring_record(std::size_t constraint) const {
+    const HeldConstraint& c = constraints[constraint];
+    SpringRecord record{static_cast<int>(constraint), c.holds};
+    for (std::size_t i = 0; i < c.points.size(); ++i) record.impulses[i] = c.points[i].impulse;
+    return record;
+}
+
+bool World::Implementation::restore_spring(const SpringRecord& record) {
+    HeldConstraint& c = constraints.at(static_cast<std::size_t>(record.constraint));
+    for (std::size_t i = 0; i < c.points.size(); ++i) c.points[i].impulse = record.impulses[i];
+    return std::exchange(c.holds, record.holds) != record.holds;
+}
+
 void World::spring_records(std::vector<SpringRecord>& out) const {
     out.clear();
     const Implementation& w = *implementation_;
     for (std::size_t i = 0; i < w.constraints.size(); ++i) {
         const HeldConstraint& c = w.constraints[i];
         if (w.bodies[static_cast<std::size_t>(first_mover(w.bodies, c.definition))].own)
-            out.push_back({static_cast<int>(i), c.holds, c.impulse});
+            out.push_back(w.spring_record(i));
     }
 }
 
@@ -248,9 +262,7 @@ void World::restore_contacts(const std::vector<ContactRecord>& foreign,
                     manifolds.end());
     bool changed = false;
     for (const SpringRecord& record : springs) {
-        HeldConstraint& c = w.constraints.at(static_cast<std::size_t>(record.constraint));
-        changed = changed || c.holds != record.holds;
-        c.holds = record.holds, c.impulse = record.impulse;
+        changed = w.restore_spring(record) || changed;
     }
     if (changed) w.set_joined();
 }
@@ -262,8 +274,7 @@ WorldSnapshot World::snapshot() const {
     s.bodies.reserve(w.bodies.size());
     for (int i = 0; i < bodies(); ++i) s.bodies.push_back(record(i));
     for (const Manifold& m : w.contacts.manifolds()) s.contacts.push_back(record_of(m));
-    for (std::size_t i = 0; i < w.constraints.size(); ++i)
-        s.springs.push_back({static_cast<int>(i), w.constraints[i].holds, w.constraints[i].impulse});
+    for (std::size_t i = 0; i < w.constraints.size(); ++i) s.springs.push_back(w.spring_record(i));
     return s;
 }
 
@@ -284,6 +295,7 @@ void World::rewind(const WorldSnapshot& snapshot) {
 
 void World::set_step(std::uint64_t step) {
     implementation_->counts.steps = step;
+    implementation_->end_motions();
 }
 
 Eigen::Vector3d World::outside_impulse() const {

@@ -23,17 +23,22 @@ json full_scene(const json& root) {
     json scene = example_of(root, root);
     const json body = scene["body"][0], constraint = scene["constraint"][0], event = scene["event"][0];
     scene["material"] = {{"soft", scene["material"]["one"]}};
-    scene["defaults"] = without(scene["defaults"], {"radius", "size", "bumps", "grid"});
-    json grid = without(body, {"radius"}), ball = without(body, {"radius", "grid"});
+    scene["defaults"] = without(scene["defaults"], {"radius", "size", "bumps", "grid", "motion"});
+    json grid = without(body, {"radius", "motion"}), ball = without(body, {"radius", "grid"});
     grid["name"] = "grid", ball["name"] = "ball";
     scene["body"] = json::array({grid, ball, {{"name", "other"}, {"radius", 0.5}, {"bumps", json::array()}}});
-    scene["constraint"] = json::array({without(constraint, {"at", "place"}),
-                                       {{"body", "ball"}, {"at", {0, 1, 0}}},
-                                       {{"body", "ball"}, {"place", {0, 2, 0}}}});
+    json hinge = without(constraint, {"at", "place"});
+    hinge["type"] = "hinge";
+    scene["constraint"] =
+        json::array({hinge, {{"body", "ball"}, {"at", {0, 1, 0}}}, {{"body", "ball"}, {"place", {0, 2, 0}}}});
     json late = grid;
     late["name"] = "late";
-    scene["event"] = json::array({without(event, {"step"}), {{"step", 30}, {"delete", {"string"}}}});
+    scene["event"] = json::array({without(event, {"step"}),
+                                  {{"step", 30}, {"delete", {"string"}}},
+                                  {{"step", 31}, {"push", {{"body", "other"}, {"impulse", {0, 1, 0}}}}}});
     scene["event"][0]["add"] = late;
+    scene["event"][0]["push"] = without(event["push"], {"impulse"});
+    scene["event"][0]["push"]["body"] = "other";
     return scene;
 }
 
@@ -81,9 +86,10 @@ TEST(SceneSchema, ItsTypesAndWordsAreTheReaders) {
 
 TEST(SceneSchema, WhatItRequiresTheReaderRequires) {
     EXPECT_GT(expect_required_keys_are_the_readers(
-                  scene_case(),
-                  {"/body", "/constraint", "/material", "/material/soft", "/body/0/size", "/body/0/grid",
-                   "/event/0/time", "/event/0/add/size", "/constraint/0/to", "/constraint/0/name"}),
+                  scene_case(), {"/body", "/constraint", "/material", "/material/soft", "/body/0/size",
+                                 "/body/0/grid", "/event/0/time", "/event/0/add/size", "/constraint/0/to",
+                                 "/constraint/0/name", "/constraint/0/type", "/constraint/0/axis",
+                                 "/event/0/push/force", "/event/0/push/seconds"}),
               120);
 }
 

@@ -144,6 +144,96 @@ TEST(Scene, ConstraintsGivenByAPlaceMeetThereAtTheStart) {
               1e-12);
 }
 
+TEST(Scene, HingesAndSlidersHaveTheirAxisInBothBodiesFrames) {
+    const Scene scene =
+        WrittenScene(kTwo +
+                     "[[constraint]]\nbody = \"a\"\nto = \"b\"\nat = [1.5, 2, 3]\ntype = \"hinge\"\n"
+                     "axis = [0, 0, 2]\ncollide = false\n"
+                     "[[constraint]]\nbody = \"a\"\ntype = \"slider\"\naxis = [1, 1, 0]\nstiffness = 5\n")
+            .read();
+    const auto& c = scene.world.constraints;
+    const auto& bodies = scene.world.bodies;
+    ASSERT_EQ(c.size(), 2u);
+    const Vector3d x = Vector3d::UnitX();
+    EXPECT_EQ(c[0].joint, sim::Joint::hinge);
+    EXPECT_LT((bodies[0].world_from_body.rotation() * (c[0].frame_a * x) - Vector3d(0, 0, 1)).norm(), 1e-12);
+    EXPECT_LT((bodies[1].world_from_body.rotation() * (c[0].frame_b * x) - Vector3d(0, 0, 1)).norm(), 1e-12);
+    EXPECT_LT((bodies[0].world_from_body.rotation() * (c[0].frame_a * Vector3d(0, 1, 0)) -
+               bodies[1].world_from_body.rotation() * (c[0].frame_b * Vector3d(0, 1, 0)))
+                  .norm(),
+              1e-12);
+    EXPECT_EQ(c[0].collide, std::optional(false));
+    EXPECT_TRUE(std::isinf(c[0].stiffness));
+    EXPECT_EQ(c[1].joint, sim::Joint::slider);
+    EXPECT_LT((c[1].frame_b * x - Vector3d(1, 1, 0).normalized()).norm(), 1e-12);
+    EXPECT_EQ(c[1].collide, std::nullopt);
+    EXPECT_EQ(c[1].stiffness, 5);
+}
+
+TEST(Scene, PushesHaveTheirTimeAndNameBodiesThatComeLater) {
+    const Scene scene =
+        WrittenScene(
+            kTwo +
+            "[[event]]\ntime = 2\nadd = { name = \"c\", radius = 0.1 }\n"
+            "[[event]]\ntime = 1.0041\nadd = { name = \"d\", radius = 0.1 }\n"
+            "[[event]]\ntime = 1.0041\npush = { body = \"b\", point = [0, 0.5, 0], force = [1, 2, 3], "
+            "seconds = 0.25, axes = \"body\" }\n"
+            "[[event]]\nstep = 150\npush = { body = \"c\", impulse = [0, 5, 0] }\n")
+            .read();
+    EXPECT_EQ(scene.events.size(), 2u);  // a push is no event of the world's
+    const auto& f = scene.world.forces;
+    ASSERT_EQ(f.size(), 2u);
+    EXPECT_EQ(f[0].body, 1);
+    EXPECT_EQ(f[0].point, Vector3d(0, 0.5, 0));
+    EXPECT_EQ(f[0].force, Vector3d(1, 2, 3));
+    EXPECT_TRUE(f[0].turns);
+    EXPECT_DOUBLE_EQ(f[0].from_s, 1.0041);
+    EXPECT_DOUBLE_EQ(f[0].until_s, 1.2541);
+    EXPECT_EQ(f[1].body, 3);  // c comes after d
+    EXPECT_FALSE(f[1].turns);
+    EXPECT_DOUBLE_EQ(f[1].from_s, 2.5);
+    EXPECT_EQ(f[1].from_s, f[1].until_s);
+}
+
+TEST(Scene, AMotionBeginsWhereTheBodyIs) {
+    const Scene scene =
+        WrittenScene(
+            "[[body]]\nname = \"a\"\nradius = 0.5\nposition = [1, 2, 3]\n"
+            "motion = [{ time = 1, position = [2, 2, 3] }, { time = 2, tilt_deg = [0, 90, 0] }]\n"
+            "[[event]]\ntime = 3\n[event.add]\nname = \"b\"\nradius = 0.1\nposition = [5, 0, 0]\n"
+            "motion = [{ time = 4, position = [6, 0, 0] }]\n")
+            .read();
+    const auto& motion = scene.world.bodies[0].motion;
+    ASSERT_EQ(motion.size(), 3u);
+    EXPECT_EQ(motion[0].time_s, 0);
+    EXPECT_EQ(motion[0].position, Vector3d(1, 2, 3));
+    EXPECT_EQ(motion[1].position, Vector3d(2, 2, 3));
+    EXPECT_LT((motion[2].orientation * Vector3d(0, 0, 1) - Vector3d(1, 0, 0)).norm(), 1e-12);
+    ASSERT_EQ(scene.later[0].motion.size(), 2u);
+    EXPECT_EQ(scene.later[0].motion[0].time_s, 3);
+    EXPECT_EQ(scene.later[0].motion[0].position, Vector3d(5, 0, 0));
+}
+
+TEST(Scene, PushesMotionsAndJointsThatCannotBeAreRefusedWhereTheyStand) {
+    const auto refused = [](const std::string& text, const std::string& found) {
+        EXPECT_NE(WrittenScene(kTwo + text).refusal().find(found), std::string::npos)
+            << WrittenScene(kTwo + text).refusal();
+    };
+    const std::string event = "[[event]]\ntime = 1\npush = { body = ";
+    refused(event + "\"x\", impulse = [1, 0, 0] }\n", ":12:8: error: found body = \"x\"");
+    refused(event + "\"a\" }\n", "neither force nor impulse");
+    refused(event + "\"a\", force = [1, 0, 0] }\n", "a force without seconds");
+    refused(event + "\"a\", impulse = [1, 0, 0], seconds = 1 }\n", "an impulse with seconds");
+    refused("motion = [{ time = 2 }, { time = 2 }]\n", "time = 2");
+    refused("motion = [{ time = 1 }]\ngrid = { count = [2, 1, 1], step = [1, 1, 1] }\n",
+            "a motion of the copies of a grid");
+    refused("[[event]]\ntime = 3\nadd = { name = \"c\", radius = 1, motion = [{ time = 2 }] }\n",
+            "expected a time after 3 s");
+    refused("[[constraint]]\nbody = \"a\"\ntype = \"hinge\"\n", "no key \"axis\"");
+    refused("[[constraint]]\nbody = \"a\"\naxis = [1, 0, 0]\n", "the axis of a ball");
+    refused("[[constraint]]\nbody = \"a\"\ntype = \"slider\"\naxis = [0, 0, 0]\n", "axis = [0, 0, 0]");
+}
+
 TEST(Scene, MigrationStartsOnOneWorkerTradesFromStep50AndLoadsAWorkerFromStep150) {
     const Scene scene = read_scene(find_scene("migration30"));
     EXPECT_TRUE(scene.workers.all_to_first);

@@ -80,6 +80,13 @@ sim::WorldScene scene() {
     s.world.bodies[1].shape.bumps.push_back({{0, 1, 0}, 0.1, 0.3});
     s.world.constraints.push_back({"hangs", 0, {0, 0.5, 0}, -1, {0, 2, 0}});
     s.world.constraints.push_back({"joins", 0, {0, 0, 0}, 1, {0, 0, 1}, 1e5, 0.5, 40});
+    sim::PointConstraint hinge{"turns", 2, {0, 0, 0.5}, 1};
+    hinge.joint = sim::Joint::hinge, hinge.collide = false;
+    hinge.frame_a = hinge.frame_b = Eigen::Quaterniond(0.6, 0, 0.8, 0);
+    s.world.constraints.push_back(hinge);
+    s.world.forces = {{1, {0, 0.1, 0}, {1, 2, 3}, true, 0.5, 0.75}};
+    s.world.bodies.push_back(world_test::ball({9, 1, 0}));
+    s.world.bodies[3].motion = {{0, {9, 1, 0}}, {1, {8, 1, 0}, Eigen::Quaterniond(0, 1, 0, 0)}};
     s.later = {world_test::box({0, 5, 0}, {1, 1, 2})};
     s.events = {{10, {0}, 0, 0, {}}, {20, {}, 0, 1, {{1, 2.5}}}};
     return s;
@@ -96,7 +103,9 @@ sim::StepReport report() {
 std::vector<sim::WorldMessage> samples() {
     Rng rng(6);
     std::vector<sim::WorldRecord> records = {record(rng, 0, 12), record(rng, 1, 0), record(rng, 2, 6)};
-    const std::vector<sim::SpringRecord> springs = {{0, true, {1, 2, 3}}, {1, false, {0, 0, 0}}};
+    const std::vector<sim::SpringRecord> springs = {
+        {0, true, {Eigen::Vector3f(1, 2, 3), Eigen::Vector3f(4, 5, 6), Eigen::Vector3f(7, 8, 9)}},
+        {1, false}};
     const std::vector<sim::ContactRecord> contacts = {contact(rng), contact(rng), contact(rng)};
     sim::DistributedSettings settings;
     settings.pace = sim::Pace::bounded, settings.bound = 4, settings.steps = 500;
@@ -354,10 +363,14 @@ TEST(WorldMessages, ScenesThatWorldWouldRefuseAreRefused) {
     };
     wrong([](auto& m) { m.scene.world.bodies[0].material.poisson = 0.7; });
     wrong([](auto& m) { m.scene.world.bodies[0].fidelity.modes = 121; });
-    wrong([](auto& m) { m.scene.world.constraints[0].body_a = 3; });
+    wrong([](auto& m) { m.scene.world.constraints[0].body_a = 4; });
+    wrong([](auto& m) { m.scene.world.constraints[2].frame_a.w() = 2; });
+    wrong([](auto& m) { m.scene.world.forces[0].body = 5; });
+    wrong([](auto& m) { m.scene.world.forces[0].until_s = 0.4; });
+    wrong([](auto& m) { m.scene.world.bodies[3].motion[1].time_s = 0; });
     wrong([](auto& m) { m.scene.world.settings.dt = std::nan(""); });
     wrong([](auto& m) { m.scene.later[0].triangles = 1 << 30; });
-    wrong([](auto& m) { m.scene.events[0].removed = {2}; });
+    wrong([](auto& m) { m.scene.events[0].removed = {3}; });
     wrong([](auto& m) { m.scene.events[1].end = 2; });
     wrong([](auto& m) { m.scene.events[1].step = 3; });
     wrong([](auto& m) { m.scene.events[1].slowing[0].factor = 0; });

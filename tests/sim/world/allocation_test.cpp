@@ -118,6 +118,15 @@ TEST(World, AWarmStepOfAPileAllocatesNothing) {
         body.world_from_body.translation() = Eigen::Vector3d(0.1 * i, 0.6 + 1.1 * i, 0);
         definition.bodies.push_back(body);
     }
+    sim::WorldBody door = definition.bodies[2], belt = definition.bodies[0];
+    door.world_from_body.translation() = Eigen::Vector3d(5, 1, 0);
+    belt.world_from_body.translation() = Eigen::Vector3d(0, 0.5, 1.1);
+    for (int k = 0; k < 1000; ++k) belt.motion.push_back({0.03 * k, {0.001 * (k % 2), 0.5, 1.1}});
+    definition.bodies.insert(definition.bodies.end(), {door, belt});
+    sim::PointConstraint hinge;
+    hinge.joint = sim::Joint::hinge, hinge.body_a = 6, hinge.point_b = {5, 1, 0};
+    definition.constraints.push_back(hinge);
+    for (const int i : {2, 6}) definition.forces.push_back({i, {0, 0.1, 0}, {0.01, 0, 0}, true, 0, 100});
     sim::World world(definition);
     for (int i = 0; i < 300; ++i) world.step();
     const std::size_t before = allocations;
