@@ -20,7 +20,7 @@ static_assert(std::endian::native == std::endian::little, "the file's floats are
 
 constexpr std::string_view kTitle = "MusicWorld path model ";
 constexpr std::string_view kSizes = "sizes: ", kChecksum = "checksum: ";
-constexpr std::size_t kLongestHead = 1 << 16;
+constexpr std::size_t kLongestHead = 1 << 20;
 constexpr float kGreatestWeight = 1e6F;
 constexpr const char* kRemedy = "make it again with `musicworld train`";
 
@@ -92,11 +92,9 @@ std::array<std::size_t, 4> parse_sizes(const Line& line) {
                      expected + "; " + kRemedy);
 }
 
-}  // namespace
-
-std::string format_path_model(const PathModel& model) {
+std::string head_of(const Provenance& provenance) {
     std::string head = titled() + "\n";
-    for (const auto& [key, value] : model.provenance) {
+    for (const auto& [key, value] : provenance) {
         const std::string line = key + ": " + value;
         if (!is_word(key) || line.starts_with(kSizes) || line.starts_with(kChecksum) ||
             first_unprintable(value) != value.npos || head.size() + line.size() > kLongestHead / 2)
@@ -104,6 +102,17 @@ std::string format_path_model(const PathModel& model) {
                                         ", expected a word and one short line of text");
         head += line + "\n";
     }
+    return head;
+}
+
+}  // namespace
+
+void check_provenance(const Provenance& provenance) {
+    (void)head_of(provenance);
+}
+
+std::string format_path_model(const PathModel& model) {
+    std::string head = head_of(model.provenance);
     head += std::string(kSizes) + sizes_of(model) + "\n";
     std::string weights;
     for_each_block(model.layers, [&](std::span<const float> block) {

@@ -31,15 +31,19 @@ void train(TrainOptions o) {
         throw BadInput(
             "error: found no trace among the files, expected at least one recording to learn from");
     const TrainingField field = training_field(recordings);
+    auto provenance = [&](const tracking::TrainingResult& result) {
+        return provenance_of(recordings, field, o, result, MUSICWORLD_VERSION);
+    };
     ProgressBar bar(true);
     o.progress = [&bar](double share, double) {
         bar.show(share);
         return true;
     };
     try {
+        tracking::check_provenance(provenance({}));
         tracking::TrainingResult result = tracking::train_path_model(field.sticks, o);
         bar.clear();
-        result.model.provenance = provenance_of(recordings, field, o, result, MUSICWORLD_VERSION);
+        result.model.provenance = provenance(result);
         write_finished_file(o.out, tracking::format_path_model(result.model));
         fmt::print("{}", format_training_text(result, field));
     } catch (const std::invalid_argument& wrong) {

@@ -428,6 +428,7 @@ SimulateResult simulate(const SimulateOptions& options) {
         if (const std::optional<double> asked = options.accuracy ? options.accuracy : scene.accuracy) {
             accuracy = keep(*asked, options, steps, scene);
             steps *= std::uint64_t(accuracy->report.step_parts);
+            scene.workers.balance_from *= std::uint64_t(accuracy->report.step_parts);
         }
         const sim::DistributedSettings settings = settings_of(options, scene, steps);
         SimulateRecord record(options, scene, steps);

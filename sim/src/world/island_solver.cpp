@@ -41,6 +41,7 @@ void IslandSolver::solve(const Island& island, const ContactScene& scene) {
         const double gained = energy() - std::max(swept, energy_before_);
         if (!may_gain() && !(gained < kMostGained * scale_)) go_back(), advance();
     }
+    if (springs_.empty() && !may_gain()) calm();
     end_forces();
     if (any_told_) settle_given();
     keep_impulses();
@@ -75,6 +76,40 @@ void IslandSolver::go_back() {
     outside_ = outside_before_, limited_ = limited_before_;
     crossed_.resize(first_crossed_);
     begin(*island_);
+}
+
+// The last resort: bodies that contacts alone hold have no more energy than they had. What they got beyond kMostGained is
+// taken from their motion about their common centre of mass, so that linear momentum is kept; else from all of it.
+void IslandSolver::calm() {
+    const double gained = energy() - energy_before_;
+    if (!(gained > kMostGained * scale_)) return;
+    Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
+    double mass = 0;
+    for (const BodyRows& rows : rows_of_) {
+        mass += rows.body->kind->mass.mass;
+        momentum += rows.body->kind->mass.mass * rows.body->state.velocity;
+    }
+    Eigen::Vector3d common = momentum / mass;
+    auto motion = [&] {
+        double sum = 0;
+        for (const BodyRows& rows : rows_of_) {
+            const WorldBodyState& s = rows.body->state;
+            const Eigen::Vector3d own = s.orientation.conjugate() * s.angular_momentum;
+            sum +=
+                (rows.body->kind->mass.mass * (s.velocity - common).squaredNorm() +
+                 own.cwiseAbs2().cwiseQuotient(rows.body->kind->mass.inertia).sum() + s.q_dot.squaredNorm()) /
+                2;
+        }
+        return sum;
+    };
+    if (motion() < gained) common.setZero();  // then it came from outside
+    const double left = std::sqrt(std::max(0., 1 - gained / motion()));
+    for (const BodyRows& rows : rows_of_) {
+        WorldBodyState& s = rows.body->state;
+        s.velocity = common + left * (s.velocity - common);
+        s.angular_momentum *= left;
+        s.q_dot *= left;
+    }
 }
 
 // Kinetic and potential, with that of modes [J].

@@ -66,7 +66,7 @@ struct Island {
 ///
 /// Directly (direct_solution.cpp) go islands with springs, and islands whose contacts a step's sweeps leave far
 /// from solved (kMissedAtRest, kMissedShare), where a factorisation is cheap enough; such a step is taken anew,
-/// and kept if it gives no energy (contacts of bodies deep in each other may contradict each other).
+/// and kept unless it gives energy, more than kMostGained (contacts of bodies deep in each other may contradict each other).
 /// A substep then has two halves, as RATTLE (Andersen 1983) for rigid springs:
 ///   half of gravity; impulses P by which springs' ends meet where the bodies *will be*, and contacts close
 ///   their gaps; move; the other half; impulses V by which what holds has no speed between its ends
@@ -209,6 +209,7 @@ private:
     void begin(const Island& island);
     void note_start();
     void go_back();  ///< to it
+    void calm();
     [[nodiscard]] double energy() const;
     [[nodiscard]] bool is_far_from_solved() const;
     [[nodiscard]] bool may_gain() const;  // energy, from without

@@ -10,6 +10,9 @@
 
 namespace tracking {
 
+/// Where a model comes from: words and lines of text.
+using Provenance = std::vector<std::pair<std::string, std::string>>;
+
 /// A network that says where a stick goes, from its last 0.25 s: predictor `learned`.
 ///
 ///   x  inputs (StickHistory), h1 = f(W1 x + b1), h2 = f(W2 h1 + b2), y = W3 h2 + b3, f(z) = max(z, z / 10)
@@ -27,7 +30,7 @@ struct PathModel {
     };
     std::array<Layer, 3> layers;
     /// Where it comes from: (key, value), each on one line; keys are words.
-    std::vector<std::pair<std::string, std::string>> provenance;
+    Provenance provenance;
 };
 
 /// The file: a head of lines of text, an empty line, then the weights.
@@ -40,8 +43,9 @@ struct PathModel {
 ///   W1, b1, W2, b2, W3, b3          IEEE floats of 4 bytes, little-endian, matrices by columns
 ///
 /// `head -n 20 FILE` shows where a model comes from. parse_path_model(format_path_model(m)) is m to the bit.
-/// Throws std::invalid_argument for provenance that the format cannot hold.
+/// Throws std::invalid_argument for provenance that the format cannot hold, as check_provenance does.
 [[nodiscard]] std::string format_path_model(const PathModel& model);
+void check_provenance(const Provenance& provenance);
 
 /// Throws TraceError with FILE:LINE or FILE:byte N, what was found and expected, for anything else than a whole
 /// and finite model of this version and these sizes; `name` stands for the file. (Fuzzed.)
