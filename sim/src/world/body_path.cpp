@@ -5,13 +5,6 @@
 #include "world/free_rotation.h"
 
 namespace sim {
-namespace {
-
-// Free rotation is split into parts of about so much.
-constexpr double kPart = 0.5;  // [rad]
-constexpr int kMostParts = 16;
-
-}  // namespace
 
 Eigen::Vector3d spin_of(const MovingBody& body, const Eigen::Quaterniond& orientation,
                         const Eigen::Vector3d& momentum) {
@@ -19,21 +12,10 @@ Eigen::Vector3d spin_of(const MovingBody& body, const Eigen::Quaterniond& orient
     return r * (r.transpose() * momentum).cwiseQuotient(body.kind->mass.inertia);
 }
 
-Eigen::Quaterniond turned_freely(const Eigen::Quaterniond& orientation, const Eigen::Vector3d& momentum,
-                                 const Eigen::Vector3d& inertia, double time) {
-    const double most = momentum.norm() / inertia.minCoeff() * time;
-    if (!(most > 0)) return orientation;
-    const int parts = std::clamp(static_cast<int>(most / kPart), 1, kMostParts);
-    const FreeRotation part(inertia, time / parts);
-    Eigen::Quaterniond turned = orientation;
-    for (int i = 0; i < parts; ++i) turned = part.advance(turned, momentum);
-    return turned;
-}
-
 BodyPath::Pose BodyPath::at(double time) const {
     const Leg& leg = leg_at(time);
     const double gone = time - leg.start;
-    return {leg.position + gone * leg.velocity, turned_freely(leg.orientation, leg.momentum, inertia, gone)};
+    return {leg.position + gone * leg.velocity, rotate_freely(leg.orientation, leg.momentum, inertia, gone)};
 }
 
 BodyPath::Way BodyPath::until(double time) const {

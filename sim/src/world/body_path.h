@@ -60,11 +60,6 @@ void along(const BodyPath& a, const BodyPath& b, double time, Visit visit) {
 [[nodiscard]] Eigen::Vector3d spin_of(const MovingBody& body, const Eigen::Quaterniond& orientation,
                                       const Eigen::Vector3d& momentum);
 
-/// A body's orientation after a time of free rotation [s].
-[[nodiscard]] Eigen::Quaterniond turned_freely(const Eigen::Quaterniond& orientation,
-                                               const Eigen::Vector3d& momentum,
-                                               const Eigen::Vector3d& inertia, double time);
-
 /// Spins of a path that has orientations and momenta: the solver writes those of all bodies, few are asked for.
 void set_spins(const MovingBody& body, BodyPath& path);
 

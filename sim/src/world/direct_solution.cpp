@@ -24,6 +24,7 @@ constexpr double kSoftSpring = 0.05, kMostDamped = 0.5;  // see springs_are_soft
 constexpr double kEndTolerance = 1e-8;                   // of a gap, share of a body's size
 constexpr double kMostFall = 1.2e-3;                     // in a substep, share of a body's size
 constexpr int kMostFallLevel = 6;                        // for that a substep is halved so often at most
+constexpr double kFree = 1e6;                            // of a speed: no contact holds it [m/s]
 constexpr double kMostTurn = 0.04;                       // of a spring's arm in a substep [rad]
 
 }  // namespace
@@ -322,11 +323,6 @@ void IslandSolver::narrow(bool positions) {
 void IslandSolver::move_directly() {
     narrow(true);
     for (SpringRows& s : springs_) s.moved = s.impulse;
-    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
-        WorldBodyState& s = rows_of_[i].body->state;
-        s.position = ends_[i].position;
-        s.orientation = ends_[i].orientation;
-    }
     std::fill(gradient_.begin(), gradient_.end(), 0.);
     for (std::size_t i = 0; i < contacts_.size(); ++i) {
         ContactRows& c = contacts_[i];
@@ -352,6 +348,11 @@ void IslandSolver::move_directly() {
         apply(s, moved, s.place);
         give(s, s.moved, gradient_);
     }
+    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
+        WorldBodyState& s = rows_of_[i].body->state;
+        s.position += h_ * s.velocity;
+        s.orientation = ends_[i].orientation;
+    }
     for (const BodyRows& rows : rows_of_)
         for (std::size_t k = 6; k < 6 + static_cast<std::size_t>(rows.body->kind->modes); ++k)
             wide_held_[rows.at + k] = gradient_[rows.at + k] / mode_scale(true);
@@ -364,7 +365,9 @@ void IslandSolver::solve_velocities() {
         Eigen::Vector3d guess =
             so_far + h_ / last_h_ * Eigen::Vector3d(c.impulse[0], c.impulse[1], c.impulse[2]);
         guess[0] = std::max(guess[0], 0.);
-        begin_contact(i, so_far, guess, std::max(0.f, c.now) / h_, false);
+        // What may rebound keeps its speed until it meets.
+        const double allowed = c.restitution > 0 && is_rigid(c) ? kFree : c.now / h_;
+        begin_contact(i, so_far, guess, c.now > 0 ? allowed : 0, false);
     }
     for (SpringRows& s : springs_) {
         set_firmness(s, false), s.offset.setZero();
@@ -414,25 +417,28 @@ void IslandSolver::finish_directly(bool last) {
 bool IslandSolver::springs_are_soft() {
     return std::ranges::all_of(springs_, [this](SpringRows& s) {
         write_spring(s);
-        const double w = h_ * h_ * s.constraint->definition.stiffness * (s.k[0][0] + s.k[1][1] + s.k[2][2]) /
-                         s.point->held;
+        const double w = h_ * h_ * s.constraint->definition.stiffness * mobility_of(s);
         return w <= kSoftSpring && 2 * s.constraint->definition.damping_ratio * std::sqrt(w) <= kMostDamped;
     });
 }
 
-// Their forces, over the substep, where nothing holds.
+// Their forces, over the substep, where nothing holds: given before the bodies move.
 void IslandSolver::pull_springs() {
     for (SpringRows& s : springs_) {
         write_spring(s);
         const PointConstraint& held = s.constraint->definition;
-        const double own = (s.k[0][0] + s.k[1][1] + s.k[2][2]) / s.point->held;
+        const double own = mobility_of(s);
         float v[3];
         speeds(s, v);
         const Eigen::Vector3d speed(v[0], v[1], v[2]);
         s.moved.setZero();
         s.impulse = -h_ * held.stiffness * s.gap -
                     2 * held.damping_ratio * h_ * std::sqrt(held.stiffness / own) * speed;
-        push_by(s, {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])});
+        const float p[3] = {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])};
+        push_by(s, p);
+        const Eigen::Vector3d impulse = in_world(s, s.impulse);
+        if (s.told) tell(s, -1, impulse, impulse, p, s.place);
+        apply(s, impulse, s.place);
     }
 }
 
@@ -444,7 +450,7 @@ void IslandSolver::pull_springs() {
 // what is stiffer holds: the first half is 1/2 h k C1, the second takes all speed between the ends.
 void IslandSolver::set_firmness(SpringRows& s, bool positions) const {
     const PointConstraint& held = s.constraint->definition;
-    const double own = (s.k[0][0] + s.k[1][1] + s.k[2][2]) / s.point->held, k = held.stiffness;
+    const double own = mobility_of(s), k = held.stiffness;
     const double w = h_ * h_ * k * own;
     if (!std::isfinite(w)) {
         s.resolved = false, s.lag = 0, s.gamma = kFirm * own;
@@ -459,13 +465,13 @@ void IslandSolver::set_firmness(SpringRows& s, bool positions) const {
     s.gamma = own * std::max(yields, kFirm);
 }
 
-// A substep, or two of half its length where the springs' ends turn too far for one.
+// A substep, or two of half its length where the springs' ends turn too far for one, or something rebounds late in it.
 void IslandSolver::direct_substep(int level, bool last) {
     level_ = level;
     h_ = settings_->dt / settings_->substeps / (1 << level);
     for (BodyRows& rows : rows_of_) rows.rotation = FreeRotation(rows.body->kind->mass.inertia, h_);
-    if (((falls_little() || level >= kMostFallLevel) && try_substep(last)) || level + 1 == kSubstepLevels)
-        return;
+    const bool is_short = (falls_little() || level >= kMostFallLevel) && strike_at_start();
+    if ((is_short && try_substep(last)) || level + 1 == kSubstepLevels) return;
     remaining_ += h_ / 2;
     direct_substep(level + 1, false);
     remaining_ -= settings_->dt / settings_->substeps / (2 << level);
@@ -578,7 +584,8 @@ void IslandSolver::find_again() {
         floats += width_of(s.constraint->definition.body_a) + width_of(s.constraint->definition.body_b);
     jacobians_.resize(floats);
     jacobians_used_ = 0;
-    contacts_.clear(), impacts_.clear();
+    contacts_.clear(), impacts_.clear(), first_contact_.clear();
+    any_bounce_ = false;
     for (Manifold& m : found_)
         for (std::size_t i = 0; i < static_cast<std::size_t>(m.count); ++i) add_contact(m, m.points[i]);
     for (SpringRows& s : springs_)

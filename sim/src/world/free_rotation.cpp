@@ -1,5 +1,6 @@
 #include "world/free_rotation.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace sim {
@@ -50,9 +51,13 @@ struct Turning {
         m[kLast] = cos_whole * m[kLast] - sin_whole * momentum;
     }
 
-    // Half a turn about b, one about c, half a turn about b.
+    // Half a turn about b, one about c, half a turn about b, in so many parts.
     template <int B, int C>
-    void split(double rate_b, double rate_c) {
+    void split(double rate_b, double rate_c, int parts) {
+        if (parts > 1) [[unlikely]] {
+            rate_b /= parts, rate_c /= parts;
+            for (int i = 1; i < parts; ++i) split<B, C>(rate_b, rate_c, 1);
+        }
         turn<B>(rate_b);
         turn<C>(rate_c);
         turn<B>(rate_b);
@@ -75,6 +80,7 @@ FreeRotation::FreeRotation(const Eigen::Vector3d& inertia, double dt) noexcept :
     world_rate_ = dt / 2 * shared;
     rate_b_ = dt / 4 * (inverse[(reference_ + 1) % 3] - shared);
     rate_c_ = dt / 2 * (inverse[(reference_ + 2) % 3] - shared);
+    most_rate_ = std::max(16 * rate_b_ * rate_b_, 4 * rate_c_ * rate_c_) / (kMostTurn * kMostTurn);
 }
 
 Eigen::Quaterniond FreeRotation::advance(const Eigen::Quaterniond& body_to_world,
@@ -82,14 +88,17 @@ Eigen::Quaterniond FreeRotation::advance(const Eigen::Quaterniond& body_to_world
     const Eigen::Quaterniond& q = body_to_world;
     const Eigen::Vector3d m = q.conjugate() * angular_momentum_world;
     Turning body{q.w(), {q.x(), q.y(), q.z()}, {m.x(), m.y(), m.z()}};
+    const double wanted = m.squaredNorm() * most_rate_;  // its square
+    const int parts =
+        wanted < 1 ? 1 : static_cast<int>(std::sqrt(std::min(wanted, kMostParts * kMostParts))) + 1;
     if (rate_b_ == 0 && rate_c_ == 0) {
         // A sphere: the turn about the momentum is all.
     } else if (reference_ == 0) {
-        body.split<1, 2>(rate_b_, rate_c_);
+        body.split<1, 2>(rate_b_, rate_c_, parts);
     } else if (reference_ == 1) {
-        body.split<2, 0>(rate_b_, rate_c_);
+        body.split<2, 0>(rate_b_, rate_c_, parts);
     } else {
-        body.split<0, 1>(rate_b_, rate_c_);
+        body.split<0, 1>(rate_b_, rate_c_, parts);
     }
 
     const Eigen::Vector3d half_turn = world_rate_ * angular_momentum_world;

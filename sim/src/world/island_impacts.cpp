@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <tuple>
 #include <utility>
 
 #include "world/convex_body.h"
@@ -11,9 +13,17 @@
 namespace sim {
 namespace {
 
-constexpr double kFrameTurn = 0.05;  // [rad]
+constexpr double kFrameTurn = 0.05;   // [rad]
+constexpr double kFastestRest = 0.1;  // slower approaches may be those of what rests [m/s]
 constexpr int kImpactSweeps = 30;
+constexpr float kSettled = 1e-6f;     // change of impulses in a sweep, share
 constexpr double kStandsStill = 0.1;  // of the smaller half extent, in what is left of the step
+constexpr double kTouches = 1e-3;     // of the smaller half extent: gap of what takes part in an impact
+constexpr int kPasses = 8;            // over a substep's impacts: of what rattles the rest does not rebound
+constexpr int kStrikeLevel = 2;       // so often a substep is halved for an impact, directly
+constexpr int kReflections = 200;     // of an impact
+constexpr float kRounding = 1e-6f;    // of speeds
+constexpr float kSlowest = 1e-4f;     // approach that is reflected, of the impact's first
 
 double smallest_half(const BodyKind& kind) {
     return kind.definition.shape.base.semi_axes.minCoeff();
@@ -21,116 +31,350 @@ double smallest_half(const BodyKind& kind) {
 
 }  // namespace
 
-// The substep's impacts in their order.
+// The substep's impacts in their order, then those that they lead to.
 void IslandSolver::strike() {
-    bool any = false;
-    for (std::size_t i = 0, next; i < impacts_.size(); i = next) {
-        const ContactRows& c = contacts_[impacts_[i]];
-        for (next = i + 1; next < impacts_.size() && contacts_[impacts_[next]].manifold == c.manifold;
-             ++next) {
-        }
-        if (!hits(c)) continue;
-        if (!any) turned_.assign(rows_of_.size(), false);
-        any = true;
-        strike(i, next);
-    }
-    if (!any) return;
-    auto has_turned = [this](const Side& side) {
-        return side.body >= 0 && turned_[static_cast<std::size_t>(side.body)];
-    };
-    for (ContactRows& c : contacts_)
-        if (!hits(c) && (has_turned(c.side[0]) || has_turned(c.side[1]))) write_contact(c);
-    for (const BodyRows& rows : rows_of_)
-        std::copy_n(y_.data() + rows.offset, 8, start_.data() + rows.offset);
+    for (int pass = 0; pass < kPasses && find_hits(); ++pass)
+        for (const Hit& hit : hits_) strike(hit);
 }
 
-// One pair's impact. Friction and Newton's rebound can give a slender body more energy than it had; then it
-// goes without friction, which for one point cannot, and if need be without rebound, which never can.
-void IslandSolver::strike(std::size_t first, std::size_t last) {
-    const ContactRows& c = contacts_[impacts_[first]];
-    // Bodies with modes take time: theirs is a contact from this substep on, which rebounds when the step ends, if
-    // it may stand still until then.
-    if (!is_rigid(c) && !goes_far(c)) {
-        for (std::size_t i = first; i < last; ++i) contacts_[impacts_[i]].begins = substep_ - 1;
-        return;
+// Directly, where joints want every body at the same time, impacts of rigid bodies that rebound act when the substep begins;
+// what does not rebound is stopped by its contact. False: one comes so late that the substep has to be halved first.
+bool IslandSolver::strike_at_start() {
+    if (!any_bounce_) return true;
+    set_forces();
+    load_velocities();
+    const double soon = settings_->dt / settings_->substeps / (1 << kStrikeLevel);
+    for (int pass = 0; pass < kPasses && find_hits(); ++pass) {
+        if (level_ < kStrikeLevel && hits_.back().time > soon) return false;
+        for (const Hit& hit : hits_) strike(hit);
     }
-    const double time = std::clamp(static_cast<double>(c.point->begins) - substep_ * h_, 0.0, h_);
+    return true;
+}
+
+bool IslandSolver::find_hits() {
+    hits_.clear();
+    for (const std::size_t i : impacts_) {
+        ContactRows& c = contacts_[i];
+        if (c.begins != substep_) continue;
+        const double time = static_cast<double>(c.point->begins) - time_;
+        if (direct_ && (c.restitution == 0 || !is_rigid(c) || time >= h_)) continue;
+        // Bodies with modes take time: theirs is a contact from this substep on, which rebounds when the step ends, if
+        // it may stand still until then.
+        if (!is_rigid(c) && !goes_far(c)) {
+            c.begins = substep_ - 1;
+        } else {
+            hits_.push_back({std::clamp(time, 0.0, h_), i});
+        }
+    }
+    if (any_bounce_)
+        for (std::size_t i = 0; i < contacts_.size(); ++i)
+            if (const double time = meets_at(contacts_[i]); time < h_) hits_.push_back({time, i});
+    std::sort(hits_.begin(), hits_.end(), [](const Hit& a, const Hit& b) {
+        return std::tuple(a.time, a.contact) < std::tuple(b.time, b.contact);
+    });
+    if (!hits_.empty() && first_contact_.empty()) list_contacts();
+    return !hits_.empty();
+}
+
+// The contacts of each body.
+void IslandSolver::list_contacts() {
+    first_contact_.assign(rows_of_.size() + 1, 0);
+    auto each = [this](auto visit) {
+        for (std::size_t i = 0; i < contacts_.size(); ++i)
+            for (const Side& side : contacts_[i].side)
+                if (side.body >= 0) visit(static_cast<std::size_t>(side.body), i);
+    };
+    each([this](std::size_t body, std::size_t) { ++first_contact_[body + 1]; });
+    for (std::size_t i = 1; i < first_contact_.size(); ++i) first_contact_[i] += first_contact_[i - 1];
+    contacts_of_.resize(first_contact_.back());
+    next_turn_.assign(rows_of_.size(), 0);
+    each([this](std::size_t body, std::size_t i) {
+        contacts_of_[first_contact_[body] + static_cast<std::size_t>(next_turn_[body]++)] = i;
+    });
+}
+
+// When a contact that may rebound closes its gap, since the substep's start; infinity: not within it.
+double IslandSolver::meets_at(const ContactRows& c) const {
+    constexpr double kNever = std::numeric_limits<double>::infinity();
+    if (c.restitution == 0 || c.over || c.emerging || c.begins >= substep_ || !is_rigid(c)) return kNever;
+    float v[3];
+    speeds(c, v);
+    if (v[0] >= -std::max(least_bounce(c), rounding(c))) return kNever;
+    double time = 0;
+    for (const Side& side : c.side)
+        if (side.body >= 0) time = std::max(time, rows_of_[static_cast<std::size_t>(side.body)].time);
+    time += std::max(gap_at(c, time), 0.0) / -static_cast<double>(v[0]);
+    return time < h_ ? time : kNever;
+}
+
+// One impact: of a pair, and of all that touches it then.
+void IslandSolver::strike(const Hit& hit) {
+    const ContactRows& seed = contacts_[hit.contact];
+    const bool foreseen = seed.begins == substep_;
+    double time = foreseen ? hit.time : meets_at(seed);  // after what came before
+    if (!(time <= h_)) return;
+    for (const Side& side : seed.side)
+        if (side.body >= 0) time = std::max(time, rows_of_[static_cast<std::size_t>(side.body)].time);
+    any_struck_ = true;
+    hit_bodies_.clear(), struck_.clear();
+    for (const Side& side : seed.side)
+        if (side.body >= 0) reach(side.body, time);
+    float v[3];
+    speeds(seed, v);
+    const float least = kSlowest * std::abs(v[0]);
+    for (int i = 0; i < kReflections && gather(*seed.manifold, time, least); ++i) reflect();
+    for (const std::size_t i : striking_) contacts_[i].striking = false;
+    for (const std::size_t i : holding_) springs_[i].struck = false;
+    striking_.clear(), holding_.clear();
+    for (const int body : hit_bodies_) {
+        BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+        load_rigid(rows, h_);
+        rows.struck = false;
+    }
+    if (foreseen) {
+        const auto at = static_cast<std::size_t>(seed.side[seed.side[0].body >= 0 ? 0 : 1].body);
+        for (std::size_t k = first_contact_[at]; k < first_contact_[at + 1]; ++k)
+            if (ContactRows& c = contacts_[contacts_of_[k]]; c.manifold == seed.manifold) end_impact(c);
+    }
+    for (const std::size_t i : struck_) {  // they are contacts as before
+        ContactRows& c = contacts_[i];
+        c.struck = false;
+        std::copy_n(c.at_move, 3, c.impulse);
+        for (float& half : c.at_move) half *= 0.5f;  // directly
+        c.largest = c.taken = c.approach = 0;
+    }
+}
+
+// Takes a body into the impact.
+void IslandSolver::reach(int body, double time) {
+    BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+    if (rows.struck) return;
+    rows.struck = true;
+    hit_bodies_.push_back(body);
+    go_to(rows, time);
+    const auto at = static_cast<std::size_t>(body);
+    for (std::size_t k = first_contact_[at]; k < first_contact_[at + 1]; ++k)
+        write_contact(contacts_[contacts_of_[k]]);
+    // Joints that do not yield within a substep take part.
+    for (std::size_t i = 0; direct_ && i < springs_.size(); ++i) {
+        SpringRows& s = springs_[i];
+        if (s.side[0].body != body && s.side[1].body != body) continue;
+        for (const Side& side : s.side)
+            if (side.body >= 0) reach(side.body, time);
+        write_spring(s);
+        const double yields = s.constraint->definition.stiffness * h_ * h_ * mobility_of(s);
+        if (yields < 1 || std::exchange(s.struck, true)) continue;
+        holding_.push_back(i);
+    }
+}
+
+// Impulses by which the joints' ends keep their speeds.
+void IslandSolver::hold_springs() {
+    for (const std::size_t i : holding_) {
+        SpringRows& s = springs_[i];
+        float v[3];
+        speeds(s, v);
+        Eigen::Matrix3f k;
+        for (int row = 0; row < 3; ++row)
+            for (int column = 0; column < 3; ++column) k(row, column) = s.k[row][column];
+        for (int row = 0; row < 3; ++row)
+            if (k(row, row) == 0) k(row, row) = 1;  // free there
+        const Eigen::Vector3f p =
+            k.llt().solve(Eigen::Vector3f(s.kept[0] - v[0], s.kept[1] - v[1], s.kept[2] - v[2]));
+        for (int row = 0; row < 3; ++row) s.strike[row] += p[row];
+        push_by(s, {p[0], p[1], p[2]});
+    }
+}
+
+// What has to be reflected together: all that approaches by more than `least`; whether there is any. Of a pair that
+// does not rebound all points, so that they are left at rest together.
+bool IslandSolver::gather(const Manifold& seed, double time, float least) {
+    for (const std::size_t i : striking_) contacts_[i].striking = false;
+    striking_.clear();
+    bool any = false;
+    for (std::size_t k = 0; k < hit_bodies_.size(); ++k) {
+        const auto at = static_cast<std::size_t>(hit_bodies_[k]);
+        for (std::size_t j = first_contact_[at]; j < first_contact_[at + 1]; ++j) {
+            ContactRows& c = contacts_[contacts_of_[j]];
+            if (c.striking || !touches(c, seed, time)) continue;
+            // What carries load approaches by its weight, too.
+            const bool carries = c.begins < 0 && c.restitution == 0;
+            auto approaches = [&] {
+                speeds(c, c.kept);
+                return c.kept[0] < -std::max({least, carries ? 2 * least_bounce(c) : 0, rounding(c)});
+            };
+            bool approaching = approaches();
+            if (!approaching && c.manifold->restitution > 0) continue;
+            for (const Side& side : c.side)
+                if (side.body >= 0) reach(side.body, time);
+            approaching = approaches();
+            if (!approaching && c.manifold->restitution > 0) continue;
+            any = any || approaching;
+            c.approach = c.kept[0];
+            aim(c);
+            c.striking = true;
+            striking_.push_back(contacts_of_[j]);
+        }
+    }
+    return any;
+}
+
+// Whether a contact may take part in an impact of a pair at a time.
+bool IslandSolver::touches(const ContactRows& c, const Manifold& seed, double time) const {
+    if (c.over || c.emerging || c.begins > substep_) return false;
+    const bool of_seed = c.manifold == &seed;
+    if (of_seed && c.begins == substep_) return c.point->gap == 0;
+    if (!of_seed && (c.manifold->restitution == 0 || !is_rigid(c))) return false;
+    return gap_at(c, time) <= kTouches * size_of(c);
+}
+
+// Between surfaces that go on as they move now.
+double IslandSolver::gap_at(const ContactRows& c, double time) const {
+    double gap = static_cast<double>(direct_ ? c.now : c.separation + c.drifted) +
+                 time * static_cast<double>(c.drift[0]);
     for (const Side& side : c.side) {
         if (side.body < 0) continue;
-        go_to(rows_of_[static_cast<std::size_t>(side.body)], time);
-        turned_[static_cast<std::size_t>(side.body)] = true;
-        std::copy_n(y_.data() + side.y, side.width, kept_.data() + side.y);
+        const float* d = jacobians_.data() + side.rows;
+        if (!direct_) gap += static_cast<double>(dot(d, moved_.data() + side.y, 8));
+        gap += (time - rows_of_[static_cast<std::size_t>(side.body)].time) *
+               static_cast<double>(dot(d, y_.data() + side.y, 8));
     }
-    for (std::size_t i = first; i < last; ++i) {
-        ContactRows& contact = contacts_[impacts_[i]];
-        write_contact(contact);
-        contact.slide_mass *= 0.5f;  // sure to settle
-        speeds(contact, contact.kept);
-        contact.approach = contact.kept[0];
-        aim(contact);
-    }
-    for (const Strike how : {Strike::rough, Strike::smooth, Strike::soft})
-        if (sweep_impact(first, last, how)) break;
-    for (std::size_t i = first; i < last; ++i) end_impact(contacts_[impacts_[i]]);
+    return gap;
 }
 
-// Whether it takes energy, if anything.
-bool IslandSolver::sweep_impact(std::size_t first, std::size_t last, Strike how) {
-    if (how != Strike::rough)
-        for (const Side& side : contacts_[impacts_[first]].side)
-            if (side.body >= 0) std::copy_n(kept_.data() + side.y, side.width, y_.data() + side.y);
-    for (std::size_t i = first; i < last; ++i) {
-        ContactRows& c = contacts_[impacts_[i]];
-        std::fill_n(c.impulse, 3, 0.f);
-        c.largest = c.taken = 0;
-        if (how == Strike::soft) c.bias = std::max(c.bias, 0.f);
+// The gathered contacts' impulses, applied.
+void IslandSolver::reflect() {
+    for (const int body : hit_bodies_) {
+        const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+        std::copy_n(y_.data() + rows.offset, rows.width, kept_.data() + rows.offset);
     }
-    for (int sweep = 0; sweep < kImpactSweeps; ++sweep)
-        for (std::size_t i = first; i < last; ++i) {
-            ContactRows& c = contacts_[impacts_[i]];
-            const float friction = c.friction;
-            if (how != Strike::rough) c.friction = 0;
+    for (const std::size_t i : striking_) {
+        ContactRows& c = contacts_[i];
+        if (std::exchange(c.struck, true)) continue;
+        struck_.push_back(i);
+        std::copy_n(c.impulse, 3, c.at_move);  // for the sweeps to come
+    }
+    for (const std::size_t i : holding_) speeds(springs_[i], springs_[i].kept);
+    sweep_impact(true);
+    double share = share_of_impact();
+    if (!(share > 0)) {
+        sweep_impact(false);
+        share = share_of_impact();
+    }
+    const float scale = share > 0 ? static_cast<float>(share) : 0;
+    for (const int body : hit_bodies_) {
+        const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+        float *y = y_.data() + rows.offset, *kept = kept_.data() + rows.offset;
+        for (int i = 0; i < rows.width; ++i) y[i] = kept[i] + scale * (y[i] - kept[i]);
+    }
+    for (const std::size_t i : striking_) {
+        ContactRows& c = contacts_[i];
+        for (float& p : c.impulse) p *= scale;
+        apply(c, c.impulse, c.impulse);
+        std::fill_n(c.impulse, 3, 0.f);
+    }
+    for (const std::size_t i : holding_) {
+        SpringRows& s = springs_[i];
+        for (float& p : s.strike) p *= scale;
+        const Eigen::Vector3d p = in_world(s, {s.strike[0], s.strike[1], s.strike[2]});
+        if (s.told) tell(s, -1, p, p, s.strike, s.place);
+        apply(s, p, s.place);
+    }
+}
+
+void IslandSolver::sweep_impact(bool friction) {
+    for (const int body : hit_bodies_) {
+        const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
+        std::copy_n(kept_.data() + rows.offset, rows.width, y_.data() + rows.offset);
+    }
+    for (const std::size_t i : striking_) std::fill_n(contacts_[i].impulse, 3, 0.f);
+    for (const std::size_t i : holding_) std::fill_n(springs_[i].strike, 3, 0.f);
+    float change = 1, size = 0;
+    for (int sweep = 0; sweep < kImpactSweeps && change > kSettled * size; ++sweep) {
+        change = size = 0;
+        for (const std::size_t i : striking_) {
+            ContactRows& c = contacts_[i];
+            const float along = c.friction, slide_mass = c.slide_mass;
+            if (!friction) c.friction = 0;
+            c.slide_mass *= 0.5f;  // sure to settle
+            const float before[3] = {c.impulse[0], c.impulse[1], c.impulse[2]};
             solve_contact(c, Push::none);
-            c.friction = friction;
+            for (int k = 0; k < 3; ++k)
+                change += std::abs(c.impulse[k] - before[k]), size += std::abs(c.impulse[k]);
+            c.friction = along, c.slide_mass = slide_mass;
         }
-    if (how != Strike::soft)
-        for (std::size_t i = first; i < last; ++i) rebound(contacts_[impacts_[i]]);
-    float work = 0, size = 0;
-    for (std::size_t i = first; i < last; ++i) {
-        const ContactRows& c = contacts_[impacts_[i]];
+        hold_springs();
+    }
+}
+
+// What of the impulses that were found keeps the balance of energy; see IslandSolver.
+double IslandSolver::share_of_impact() const {
+    double given = 0, rigid = 0, modes = 0, returned = 0;
+    bool smooth = true;
+    for (const std::size_t i : striking_) {
+        const ContactRows& c = contacts_[i];
         float v[3];
         speeds(c, v);
         for (int k = 0; k < 3; ++k) {
-            work += c.impulse[k] * (c.kept[k] + v[k]) / 2;
-            size += std::abs(c.impulse[k] * c.kept[k]);
+            const auto p = static_cast<double>(c.impulse[k]);
+            given += p * static_cast<double>(c.kept[k]);
+            rigid += p * (static_cast<double>(v[k]) - static_cast<double>(c.kept[k]));
+        }
+        returned += static_cast<double>(c.impulse[0]) * static_cast<double>(c.bias);
+        smooth = smooth && is_rigid(c) && c.impulse[1] == 0 && c.impulse[2] == 0;
+        for (const Side& side : c.side)
+            for (int k = 0; side.body >= 0 && k < 3; ++k)
+                for (int j = 8; j < side.width; ++j) {
+                    const std::uint32_t at = side.y + static_cast<std::uint32_t>(j);
+                    const double push = static_cast<double>(
+                        c.impulse[k] *
+                        jacobians_.data()[side.rows + static_cast<std::uint32_t>(k * side.width + j)]);
+                    modes += push * static_cast<double>(y_.data()[at] - kept_.data()[at]);
+                    given += push * static_cast<double>(kept_.data()[at] - start_.data()[at]);
+                }
+    }
+    for (const std::size_t i : holding_) {
+        const SpringRows& s = springs_[i];
+        float v[3];
+        speeds(s, v);
+        for (int k = 0; k < 3; ++k) {
+            given += static_cast<double>(s.strike[k] * s.kept[k]);
+            rigid += static_cast<double>(s.strike[k] * (v[k] - s.kept[k]));
         }
     }
-    return work <= 1e-4f * size;
+    rigid -= modes;
+    return smooth ? std::min(2.0, -(given + returned) / rigid) : std::min(1.0, -given / (rigid / 2 + modes));
 }
 
-// Takes a body to a time of the substep with the velocities that it has.
+// Takes a body to a time of the substep with the velocities that it has; its speeds are those that it has there.
 void IslandSolver::go_to(BodyRows& rows, double time) {
     MovingBody& body = *rows.body;
-    const BodyKind& kind = *body.kind;
     WorldBodyState& s = body.state;
-    float *y = y_.data() + rows.offset, *start = start_.data() + rows.offset;
-    const double gone = time - rows.time;
-    Eigen::Vector3d velocity = s.velocity + h_ * body.gravity_scale * settings_->gravity;
-    Eigen::Vector3d momentum = s.angular_momentum;
-    if (body.pushed) {
-        velocity += h_ / kind.mass.mass * body.force;
-        momentum += h_ * body.torque;
-    }
+    const float* y = y_.data() + rows.offset;
+    const double gone = direct_ ? 0 : time - rows.time;
     if (gone > 0) {
+        const Eigen::Vector3d velocity = s.velocity + velocity_given(body, h_),
+                              momentum = s.angular_momentum + momentum_given(body, h_);
         if (paths_) write_leg(rows, velocity, momentum);
         for (int i = 0; i < 6; ++i)
             moved_.data()[rows.offset + static_cast<std::uint32_t>(i)] += static_cast<float>(gone) * y[i];
         rows.place += gone * velocity;
         rows.time = time;
-        s.orientation = turned_freely(s.orientation, momentum, kind.mass.inertia, gone);
+        s.orientation = rotate_freely(s.orientation, momentum, body.kind->mass.inertia, gone);
     }
     turn_frame(rows, s.orientation.toRotationMatrix());
-    const Eigen::Vector3d spin = rows.frame.transpose() * spin_of(body, s.orientation, momentum);
+    load_rigid(rows, direct_ ? 0 : time);
+}
+
+// Its speeds after so much of the substep's gravity and forces [s].
+void IslandSolver::load_rigid(BodyRows& rows, double gone) {
+    const MovingBody& body = *rows.body;
+    const BodyKind& kind = *body.kind;
+    float *y = y_.data() + rows.offset, *start = start_.data() + rows.offset;
+    const Eigen::Vector3d velocity = body.state.velocity + velocity_given(body, gone),
+                          spin = rows.frame.transpose() *
+                                 spin_of(body, body.state.orientation,
+                                         body.state.angular_momentum + momentum_given(body, gone));
     for (int i = 0; i < 3; ++i) {
         y[i] = start[i] = static_cast<float>(kind.root_mass * velocity[i]);
         y[3 + i] = start[3 + i] = static_cast<float>(kind.root_inertia[i] * spin[i]);
@@ -141,14 +385,26 @@ void IslandSolver::write_leg(const BodyRows& rows, const Eigen::Vector3d& veloci
                              const Eigen::Vector3d& momentum) {
     if (h_ - rows.time < 1e-9 * h_) return;
     (*paths_)[static_cast<std::size_t>(rows.body - bodies_->data())].legs.push_back(
-        {.start = substep_ * h_ + rows.time,
+        {.start = time_ + rows.time,
          .position = rows.place,
          .orientation = rows.body->state.orientation,
          .velocity = velocity,
          .momentum = momentum});
 }
 
-// Frames follow bodies that turned, with what is written in them: rows, and the way so far.
+// Gaps of bodies that impacts took on close in what is left of the substep.
+void IslandSolver::stretch_gaps() {
+    for (ContactRows& c : contacts_) {
+        double gone = 0;
+        for (const Side& side : c.side)
+            if (side.body >= 0) gone = std::max(gone, rows_of_[static_cast<std::size_t>(side.body)].time);
+        c.now += static_cast<float>(gone) * c.drift[0];
+        if (gone > 0 && c.now > 0) c.now *= static_cast<float>(h_ / std::max(h_ - gone, 1e-6 * h_));
+    }
+}
+
+// Frames follow bodies that turned, with what is written in them: rows, and the way so far. Rows of contacts that rebound
+// follow the place where they act, too.
 void IslandSolver::turn_frames() {
     turned_.assign(rows_of_.size(), false);
     bool any = false;
@@ -165,7 +421,7 @@ void IslandSolver::turn_frames() {
         return side.body >= 0 && turned_[static_cast<std::size_t>(side.body)];
     };
     for (ContactRows& c : contacts_)
-        if (any && (has_turned(c.side[0]) || has_turned(c.side[1]))) write_contact(c);
+        if (follows(c) || (any && (has_turned(c.side[0]) || has_turned(c.side[1])))) write_contact(c);
 }
 
 void IslandSolver::turn_frame(BodyRows& rows, const Eigen::Matrix3d& frame) {
@@ -179,43 +435,51 @@ void IslandSolver::turn_frame(BodyRows& rows, const Eigen::Matrix3d& frame) {
     for (int k = 0; k < 3; ++k) moved[k] = static_cast<float>(again[k]);
 }
 
-// The speed that an impact leaves: what the gap allows until the substep ends; rigid bodies rebound.
+// Approaches up to this one do not rebound: those that weight brings about within a few substeps [m/s].
+float IslandSolver::least_bounce(const ContactRows& c) const {
+    const Eigen::Vector3d& g = settings_->gravity;
+    const double h = settings_->dt / settings_->substeps,
+                 along = std::abs(g.dot(c.point->normal.cast<double>())) + 0.1 * g.norm();
+    return static_cast<float>(std::min(kFastestRest, 4 * h * along));
+}
+
+// Of speeds along a contact, in single precision [m/s].
+float IslandSolver::rounding(const ContactRows& c) const {
+    float sum = 0;
+    for (const Side& side : c.side) {
+        if (side.body < 0) continue;
+        const float *d = jacobians_.data() + side.rows, *y = y_.data() + side.y;
+        sum += std::sqrt(dot(d, d, 8) * dot(y, y, 8));
+    }
+    return kRounding * sum;
+}
+
+// The speed that an impact leaves: e times the approach; of bodies with modes, what leaves e^2 of the energy that stopping
+// them takes, K / 2 of the rigid part for a unit of impulse.
 void IslandSolver::aim(ContactRows& c) const {
-    const float h = static_cast<float>(h_);
-    const float left = static_cast<float>((c.begins + 1) * h_) - c.point->begins;
-    if (c.point->gap > 0) {
-        c.bias = c.point->gap / std::max(left, 0.01f * h);
-    } else {
-        c.bias = is_rigid(c) && c.approach < -kBounceThreshold ? c.restitution * c.approach : 0;
-    }
+    c.bias = 0;
+    const float e = c.approach < -least_bounce(c) ? c.manifold->restitution : 0;
+    if (e == 0) return;
+    float rigid = 0;
+    for (const Side& side : c.side)
+        if (side.body >= 0) rigid += dot(jacobians_.data() + side.rows, jacobians_.data() + side.rows, 8);
+    const float whole = std::max(c.k[0][0], rigid), firm = 2 * whole - rigid;
+    c.bias = c.approach * ((whole + std::sqrt(whole * whole - firm * rigid * (1 - e * e))) / firm - 1);
 }
 
-// Of bodies with modes, out of the energy that the impact took.
-void IslandSolver::rebound(ContactRows& c) {
-    if (is_rigid(c) || c.point->gap > 0) return;
-    note_work(c, c.impulse[0]);
-    restitute(c);
-}
-
-// The impact is over: applied at once, and no guess for the substeps to come.
+// A foreseen impact is over; no guess for the substeps to come.
 void IslandSolver::end_impact(ContactRows& c) {
+    if (c.begins != substep_) return;
+    c.begins = substep_ - 1;
+    if (direct_) return;
     c.over = goes_far(c);
-    if (c.impulse[0] != 0) {
-        const Eigen::Vector3d p =
-            (c.impulse[0] * c.point->normal + c.impulse[1] * c.tangent[0] + c.impulse[2] * c.tangent[1])
-                .cast<double>();
-        if (c.told) tell(c, c.pair, p, p, c.impulse, place_now(c));
-        apply(c, p, place_now(c));
-    }
-    const float time = c.point->begins - static_cast<float>(substep_ * h_);
+    const float time = c.point->begins - static_cast<float>(time_);
     c.separation = c.point->gap - c.drifted - time * c.drift[0];  // with the way so far
     for (const Side& side : c.side)
         if (side.body >= 0)
             c.separation -= dot(jacobians_.data() + side.rows, moved_.data() + side.y, side.width);
     // One of bodies that ring is told from a new one.
-    std::fill_n(c.impulse, 3, 0.f), std::fill_n(c.at_move, 3, 0.f);
-    if (substep_ + 1 == settings_->substeps && !is_rigid(c)) c.impulse[0] = 1e-20f;
-    c.approach = 0;
+    if (substep_ + 1 == settings_->substeps && !is_rigid(c)) c.impulse[0] = c.at_move[0] = 1e-20f;
 }
 
 // Whether an impact's bodies move too far in what is left of the step for a contact that stands still.
@@ -233,26 +497,6 @@ bool IslandSolver::goes_far(const ContactRows& c) const {
     }
     if (!is_rigid(c)) way += static_cast<double>(std::hypot(v[1], v[2]));
     return way * (remaining_ + h_) > kStandsStill * size;
-}
-
-// A contact of bodies that move on in the step, in double precision and at one place of space a pair: what moved its
-// bodies where they were before, what came after where it took them. So angular momentum is kept to rounding.
-void IslandSolver::apply_moving(const ContactRows& c) {
-    auto world = [&c](const float(&p)[3]) -> Eigen::Vector3d {
-        return (p[0] * c.point->normal + p[1] * c.tangent[0] + p[2] * c.tangent[1]).cast<double>();
-    };
-    const Eigen::Vector3d at_move = world(c.at_move), after = world(c.impulse) - at_move;
-    apply(c, at_move, place_now(c));
-    if (after.isZero(0)) return;
-    Eigen::Vector3d places[2];
-    for (int i = 0; i < 2; ++i) {
-        if (c.side[i].body < 0) continue;
-        BodyRows& rows = rows_of_[static_cast<std::size_t>(c.side[i].body)];
-        places[i] = std::exchange(rows.place, rows.body->state.position);
-    }
-    apply(c, after, place_now(c));
-    for (int i = 0; i < 2; ++i)
-        if (c.side[i].body >= 0) rows_of_[static_cast<std::size_t>(c.side[i].body)].place = places[i];
 }
 
 }  // namespace sim

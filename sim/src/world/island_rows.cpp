@@ -2,7 +2,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <tuple>
 
 #include "world/island_solver.h"
 #include "world/row_kernels.h"
@@ -12,7 +11,6 @@
 namespace sim {
 namespace {
 
-constexpr double kMoving = 0.05;  // of the smallest half extent, in a step
 constexpr double kPushHz = 30, kPushDamping = 10;
 
 /// Two unit vectors square to n and to each other.
@@ -47,14 +45,11 @@ void IslandSolver::begin(const Island& island) {
         rows.place = body.state.position, rows.frame = body.posed.rotation;
         rows.body_from_world = body.posed.rotation.transpose().cast<float>();
         rows.rotation = body.substep_rotation;
-        const double speed = body.state.velocity.norm() + body.state.angular_momentum.norm() /
-                                                              body.kind->mass.inertia.minCoeff() *
-                                                              body.kind->surface.bounding_radius();
-        rows.moving = speed * settings_->dt > kMoving * body.kind->definition.shape.base.semi_axes.minCoeff();
+        rows.inverse_mass = 1 / body.kind->mass.mass;
         if (paths_) {
             BodyPath& path = (*paths_)[static_cast<std::size_t>(id)];
             path.legs.clear();
-            path.legs.reserve(2 * static_cast<std::size_t>(settings_->substeps));
+            path.legs.reserve(4 * static_cast<std::size_t>(settings_->substeps));
             path.end = settings_->dt;
             path.inertia = body.kind->mass.inertia;
         }
@@ -85,20 +80,19 @@ void IslandSolver::begin(const Island& island) {
     jacobians_.resize(floats);
     jacobians_used_ = 0;
     contacts_.clear(), springs_.clear(), impacts_.clear();
-    any_told_ = direct_ = false;
+    any_told_ = direct_ = any_bounce_ = any_struck_ = false;
+    first_contact_.clear();
     first_crossed_ = crossed_.size();
     contacts_.reserve(triples);
+    for (auto* list : {&striking_, &struck_}) list->reserve(triples);
+    hits_.reserve(triples), contacts_of_.reserve(2 * triples);
+    first_contact_.reserve(rows_of_.size() + 1), hit_bodies_.reserve(rows_of_.size());
     for (const Turn& turn : in_turns(island))
         add_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
     for (const int c : island.constraints) {
         HeldConstraint& held = (*constraints_)[static_cast<std::size_t>(c)];
         for (int i = 0; i < held.count; ++i) add_spring(held, held.points[static_cast<std::size_t>(i)]);
     }
-    // A pair's points together.
-    std::sort(impacts_.begin(), impacts_.end(), [this](std::size_t i, std::size_t j) {
-        const ContactRows &a = contacts_[i], &b = contacts_[j];
-        return std::tuple(a.point->begins, a.manifold, i) < std::tuple(b.point->begins, b.manifold, j);
-    });
     pushed_.clear();
     for (std::size_t i = 0; i < rows_of_.size() && !forces_->empty(); ++i) begin_forces(static_cast<int>(i));
     if (!springs_.empty() || contacts_.empty()) (void)begin_direct(most_with_springs(), springs_.empty());
@@ -251,8 +245,6 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
     c.emerging = manifold.emerging;
     c.firm = point.begins >= 0;
-    for (const Side& side : c.side)
-        c.moving = c.moving || (side.body >= 0 && rows_of_[static_cast<std::size_t>(side.body)].moving);
     c.pair = note_pair(manifold);
     c.told = note_told(c, true) || c.pair >= 0;
     c.impulse[0] = point.normal_impulse;
@@ -260,20 +252,21 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
     if (point.begins >= 0) {
         impacts_.push_back(contacts_.size());
-        c.begins =
-            std::clamp(static_cast<int>(static_cast<double>(point.begins) / h_), 0, settings_->substeps - 1);
+        c.begins = std::clamp(
+            static_cast<int>(static_cast<double>(point.begins) * settings_->substeps / settings_->dt), 0,
+            settings_->substeps - 1);
     }
+    any_bounce_ = any_bounce_ || (c.restitution > 0 && is_rigid(c));
     contacts_.push_back(c);
 }
 
-// The rows of a contact, in the bodies' frames as they are now. Directly, at the one point at which its impulses act, once
-// it has begun.
+// The rows of a contact, in the bodies' frames as they are now, at the one point at which its impulses act, once it has
+// begun.
 void IslandSolver::write_contact(ContactRows& c) {
     alignas(32) float scratch[2][3 * kMostModes];
     const ManifoldPoint& point = *c.point;
     Eigen::Vector3f arms[2] = {point.arm_a, point.arm_b};
-    if (direct_ && c.side[0].body >= 0 && c.side[1].body >= 0 &&
-        static_cast<double>(point.begins) < time_ + h_) {
+    if (c.side[0].body >= 0 && c.side[1].body >= 0 && static_cast<double>(point.begins) < time_ + h_) {
         const Eigen::Vector3d at = place_now(c);
         for (int side = 0; side < 2; ++side)
             arms[side] = (at - rows_of_[static_cast<std::size_t>(c.side[side].body)].place).cast<float>();
@@ -324,7 +317,9 @@ IslandSolver::End IslandSolver::end_of(int body, const Eigen::Vector3d& rest, fl
                 point[axis] += static_cast<double>(shapes[axis * kind.mode_width + k]) * b.state.q[k];
     }
     const Eigen::Vector3d arm = b.state.orientation * point;
-    return {b.state.position + arm, {local(body), arm.cast<float>(), kind.modes > 0 ? shapes : nullptr}};
+    const Eigen::Vector3d& centre =
+        local(body) < 0 ? b.state.position : rows_of_[static_cast<std::size_t>(local(body))].place;
+    return {centre + arm, {local(body), arm.cast<float>(), kind.modes > 0 ? shapes : nullptr}};
 }
 
 Eigen::Quaterniond IslandSolver::orientation_of(int body) const {

@@ -24,6 +24,10 @@ float root(float x) {
     return _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(x)));
 }
 
+float length(float x, float y) {
+    return root(x * x + y * y);
+}
+
 }  // namespace
 
 void IslandSolver::solve(const Island& island, const ContactScene& scene) {
@@ -147,7 +151,8 @@ bool IslandSolver::may_gain() const {
 }
 
 bool IslandSolver::is_far_from_solved() const {
-    return impacts_.empty() && residual() > kMissedAtRest * smallest_ + kMissedShare * fastest_;
+    return impacts_.empty() && !any_struck_ &&
+           residual() > kMissedAtRest * smallest_ + kMissedShare * fastest_;
 }
 
 // By how much speeds miss what contacts demand, at most [m/s]: the change of the impulses that would satisfy a
@@ -161,10 +166,10 @@ double IslandSolver::residual() const {
         const float bias = c.now > 0 ? c.now * inverse_h_ : 0;
         const float normal = std::max(c.impulse[0] - c.inverse_normal * (v[0] + bias), 0.f);
         float t[2] = {c.impulse[1] - c.slide_mass * v[1], c.impulse[2] - c.slide_mass * v[2]};
-        const float along = std::hypot(t[0], t[1]), most = c.friction * c.impulse[0];
+        const float along = length(t[0], t[1]), most = c.friction * c.impulse[0];
         if (along > most) t[0] *= most / along, t[1] *= most / along;
         worst = std::max({worst, std::abs(normal - c.impulse[0]) * c.k[0][0],
-                          std::hypot(t[0] - c.impulse[1], t[1] - c.impulse[2]) / c.slide_mass});
+                          length(t[0] - c.impulse[1], t[1] - c.impulse[2]) / c.slide_mass});
     }
     return worst;
 }
@@ -175,20 +180,17 @@ void IslandSolver::substep(bool first, bool last) {
     set_forces();
     if (!first && !contacts_.empty()) turn_frames();
     load_velocities();
-    if (!impacts_.empty()) strike();
+    ring_on();
+    if (any_bounce_ || !impacts_.empty()) strike();
     pull_springs();
     warm_start(first);
     sweep(Push::soft);
     push_out();
+    for (ContactRows& c : contacts_)
+        if (follows(c)) write_contact(c);
     for (int i = 0; i < 2; ++i) sweep(Push::none);
     note_work();
     if (last) restitute();
-    for (SpringRows& s : springs_) {
-        const float p[3] = {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])};
-        const Eigen::Vector3d impulse = in_world(s, s.impulse);
-        if (s.told) tell(s, -1, impulse, impulse, p, s.place);
-        apply(s, impulse, s.place);
-    }
     finish();
 }
 
@@ -203,12 +205,8 @@ void IslandSolver::load_velocities() {
             rows.body_from_world = rows.frame.transpose().cast<float>();
         }
         const Eigen::Matrix3d& frame = rows.frame;
-        Eigen::Vector3d velocity = s.velocity + h_ * body.gravity_scale * settings_->gravity;
-        Eigen::Vector3d momentum = s.angular_momentum;
-        if (body.pushed) {
-            velocity += h_ / kind.mass.mass * body.force;
-            momentum += h_ * body.torque;
-        }
+        const Eigen::Vector3d velocity = s.velocity + velocity_given(body, h_),
+                              momentum = s.angular_momentum + momentum_given(body, h_);
         const Eigen::Matrix3d turned = s.orientation.toRotationMatrix();
         const Eigen::Vector3d spin =
             frame.transpose() * (turned * (turned.transpose() * momentum).cwiseQuotient(kind.mass.inertia));
@@ -237,13 +235,14 @@ void IslandSolver::warm_start(bool first) {
             if (side.body < 0) continue;
             const float* d = jacobians_.data() + side.rows;
             if (c.restitution > 0 && c.largest == 0) speed += dot(d, start_.data() + side.y, side.width);
-            if (!first || !impacts_.empty()) moved += dot(d, moved_.data() + side.y, side.width);
+            if (!first || any_struck_) moved += dot(d, moved_.data() + side.y, side.width);
         }
         if (c.restitution > 0 && c.largest == 0) speed += c.drift[0];
         if (c.largest == 0) c.approach = speed;
         c.now = c.separation + moved + c.drifted;
         if (c.impulse[0] != 0) push_by(c, c.impulse);
     }
+    if (any_struck_) stretch_gaps();
 }
 
 // Positions move with velocities that also push emerging bodies out; the velocities themselves never see it.
@@ -271,14 +270,14 @@ void IslandSolver::sweep(Push push) {
 }
 
 // What the rows see of the velocities.
-inline void IslandSolver::speeds(const Rows& rows, float (&v)[3]) const {
+[[gnu::always_inline]] inline void IslandSolver::speeds(const Rows& rows, float (&v)[3]) const {
     Lanes sum[3] = {lanes_of(0), lanes_of(0), lanes_of(0)};
     for (const Side& side : rows.side)
         if (side.body >= 0) dot_rows(jacobians_.data() + side.rows, y_.data() + side.y, side.width, sum);
     for (int r = 0; r < 3; ++r) v[r] = sum_of(sum[r]) + rows.drift[r];
 }
 
-inline void IslandSolver::push_by(const Rows& rows, const float (&impulse)[3]) {
+[[gnu::always_inline]] inline void IslandSolver::push_by(const Rows& rows, const float (&impulse)[3]) {
     for (const Side& side : rows.side)
         if (side.body >= 0)
             add_rows_to(jacobians_.data() + side.rows, impulse, side.width, y_.data() + side.y);
@@ -288,7 +287,7 @@ void IslandSolver::solve_contact(ContactRows& c, Push push) {
     float v[3];
     speeds(c, v);
     // Selected, not branched: which case it is cannot be foretold.
-    const bool hit = hits(c),
+    const bool hit = c.striking,
                soft = !hit && c.now <= 0 && (push == Push::all || (push == Push::soft && !c.emerging));
     const float bias = hit         ? c.bias
                        : c.now > 0 ? c.now * inverse_h_
@@ -343,14 +342,21 @@ void IslandSolver::restitute() {
 }
 
 void IslandSolver::restitute(ContactRows& c) {
-    if (c.restitution == 0 || c.largest == 0 || c.approach > -kBounceThreshold) return;
+    if (c.restitution == 0 || c.largest == 0 || c.approach >= -least_bounce(c)) return;
+    if (!direct_ && is_rigid(c)) return;  // impacts did
     float v[3];
     speeds(c, v);
-    float rigid = 0;
-    for (const Side& side : c.side)
-        if (side.body >= 0) rigid += dot(jacobians_.data() + side.rows, jacobians_.data() + side.rows, 8);
-    // The modes yield to p under the impulse of this substep, too.
-    const float modes = c.k[0][0] - rigid, firm = rigid / 2 + modes, slope = v[0] + modes * c.impulse[0];
+    float rigid = 0, slope = v[0];
+    for (const Side& side : c.side) {
+        if (side.body < 0) continue;
+        const float *d = jacobians_.data() + side.rows, *y = y_.data() + side.y,
+                    *start = start_.data() + side.y;
+        rigid += dot(d, d, 8);
+        // The modes yield to p under all impulses of this substep, too.
+        if (side.width > 8)
+            slope += dot(d + 8, y + 8, side.width - 8) - dot(d + 8, start + 8, side.width - 8);
+    }
+    const float modes = c.k[0][0] - rigid, firm = rigid / 2 + modes;
     const float budget = c.restitution * c.restitution * std::max(c.taken, 0.f);
     const float most = (std::sqrt(slope * slope + 4 * firm * budget) - slope) / (2 * firm);
     const float wanted = -c.inverse_normal * (v[0] + c.restitution * c.approach);
@@ -363,26 +369,23 @@ void IslandSolver::move() {
     for (ContactRows& c : contacts_) {
         std::copy_n(c.impulse, 3, c.at_move);
         c.drifted += static_cast<float>(h_) * c.drift[0];
+        apply(c, c.at_move, c.at_move);
     }
     const float h = static_cast<float>(h_);
     for (BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
         const float* y = y_.data() + rows.offset;
-        const float* start = start_.data() + rows.offset;
         float* moved = moved_.data() + rows.offset;
         const double left = h_ - rows.time;
         const float rigid = static_cast<float>(left);
         for (int i = 0; i < rows.width; ++i) moved[i] += (i < 8 ? rigid : h) * y[i];
         WorldBodyState& s = body.state;
-        const Eigen::Vector3d velocity = Eigen::Vector3d(y[0], y[1], y[2]) / kind.root_mass;
-        Eigen::Vector3d change;
-        for (int i = 0; i < 3; ++i) change[i] = kind.root_inertia[i] * (y[3 + i] - start[3 + i]);
-        Eigen::Vector3d momentum = s.angular_momentum + rows.frame * change;
-        if (body.pushed) momentum += h_ * body.torque;
+        const Eigen::Vector3d velocity = s.velocity + velocity_given(body, h_),
+                              momentum = s.angular_momentum + momentum_given(body, h_);
         if (paths_) write_leg(rows, velocity, momentum);
-        s.position = rows.place + left * velocity;
-        s.orientation = rows.time > 0 ? turned_freely(s.orientation, momentum, kind.mass.inertia, left)
+        s.position = rows.place += left * velocity;
+        s.orientation = rows.time > 0 ? rotate_freely(s.orientation, momentum, kind.mass.inertia, left)
                                       : body.substep_rotation.advance(s.orientation, momentum);
     }
 }
@@ -413,7 +416,7 @@ void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const
         const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
         WorldBodyState& s = at.body->state;
         const Eigen::Vector3d p = &side == &rows.side[0] ? impulse : Eigen::Vector3d(-impulse);
-        s.velocity += p / at.body->kind->mass.mass;
+        s.velocity += at.inverse_mass * p;
         s.angular_momentum += (point - at.place).cross(p);
     }
 }
@@ -494,25 +497,24 @@ void IslandSolver::settle_given() {
     }
 }
 
-// The contacts' impulses.
-void IslandSolver::apply_contacts() {
-    ring_on();
-    for (const ContactRows& c : contacts_) {
-        if (c.impulse[0] == 0 && c.at_move[0] == 0) continue;
-        auto world = [&c](const float(&p)[3]) -> Eigen::Vector3d {
-            return (p[0] * c.point->normal + p[1] * c.tangent[0] + p[2] * c.tangent[1]).cast<double>();
-        };
-        if (c.told) tell(c, c.pair, world(c.impulse), world(c.at_move), c.impulse, place_now(c));
-        if (c.moving) {
-            apply_moving(c);
-        } else {
-            apply(c, world(c.impulse), place_now(c));
-        }
-    }
+// A contact's impulse (of it what moves its bodies), at the place where it is now.
+[[gnu::flatten]] void IslandSolver::apply(const ContactRows& c, const float (&impulse)[3],
+                                          const float (&at_move)[3]) {
+    if (impulse[0] == 0 && impulse[1] == 0 && impulse[2] == 0) return;
+    auto world = [&c](const float(&p)[3]) -> Eigen::Vector3d {
+        return (p[0] * c.point->normal + p[1] * c.tangent[0] + p[2] * c.tangent[1]).cast<double>();
+    };
+    const Eigen::Vector3d p = world(impulse), place = place_now(c);
+    if (c.told) tell(c, c.pair, p, world(at_move), impulse, place);
+    apply(c, p, place);
 }
 
 void IslandSolver::finish() {
-    apply_contacts();
+    for (const ContactRows& c : contacts_) {
+        const float after[3] = {c.impulse[0] - c.at_move[0], c.impulse[1] - c.at_move[1],
+                                c.impulse[2] - c.at_move[2]};
+        apply(c, after, {0, 0, 0});
+    }
     count_forces(1);
     for (const BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;

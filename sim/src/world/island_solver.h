@@ -38,7 +38,7 @@ struct Island {
 ///   2. one sweep over springs and contacts, overlaps pushed out softly (30 Hz, damping 10, at most 3 m/s)
 ///   3. positions and orientations move with these velocities
 ///   4. two sweeps without the push, so that it leaves no speed behind; with one, soft piles simmer (bodies
-///      that began their contact deep inside each other are pushed in a sweep of their own that only
+///      that came deep into each other are pushed in a sweep of their own that only
 ///      positions see)
 ///   5. modes step exactly under the force P / h held over h: z1 = z + h G, z1' = c z + d z' + (b / h) P
 /// and at the end of the last substep restitution. Contact forces act on a mode with its compliance over the
@@ -54,12 +54,21 @@ struct Island {
 /// the rows of springs follow the bodies every substep, as does the frame of angular rows where there is no
 /// contact.
 ///
-/// Impacts (ManifoldPoint::begins) come first in a substep, in the order of their times t: the bodies go there
-/// with the velocities that they have, their frames are those of that time, the impulses of one pair's points
-/// are found by kImpactSweeps sweeps and act at one place of space, and the bodies go on from there. So
-/// angular momentum is kept to rounding and a body may hit several times within a substep. A rebound of rigid
-/// bodies is part of the same solve. Other contacts then see the velocities that impacts left. Afterwards an
-/// impact is a contact, unless its bodies turn on too fast for one that stands still.
+/// Momentum. An impulse acts on both bodies of a pair at one place of space and at one time, in double
+/// precision: what moves them before they move, where they are; what comes after, where that took them; and
+/// they move with the velocities that it left. So linear and angular momentum are kept to rounding.
+///
+/// Impacts (island_impacts.cpp) come first in a substep, in the order of their times: those of fast pairs
+/// (ManifoldPoint::begins), and contacts of rigid bodies that rebound and close their gap within the substep.
+/// Bodies go to that time with the velocities that they have, frames with them, and on from there. An impact is
+/// shared out as generalized reflections are (Smith, Kaufman, Vouga, Tamstorf, Grinspun 2012, "Reflections on
+/// simultaneous impact"): of all that touches there, what approaches at v gets impulses P that leave v+ = -e v
+/// together (P >= 0, v+ + e v >= 0, no P where more), and so on for what then approaches, until nothing does. A
+/// row of balls so hands an impulse on, a box lands on its corners at once. With y the velocities before and d
+/// what P adds to them, the energy given is y . d + |d_rigid|^2 / 2 + |d_modes|^2 (held over the substep). Without
+/// friction P is scaled to what the rebounds demand, - sum of P v (1 - e) / 2; with friction, which may bring
+/// more (Kane), to nothing given at most: no impact gives energy, and none of e = 1 without friction takes any.
+/// Afterwards an impact is a contact, unless its bodies turn on too fast for one that stands still.
 ///
 /// Frames of bodies with unequal moments of inertia follow them where they turn by more than kFrameTurn, with
 /// their rows.
@@ -77,7 +86,8 @@ struct Island {
 /// Overlaps yield by a share of their bodies' compliance, less under heavy loads; V and friction have no
 /// compliance: they are held to the round before's impulses (proximal point method). Modes see all of a
 /// substep's impulse in its first half. A substep is halved, and again, where an arm of a spring turns further
-/// than kMostTurn, Newton's method does not converge, or weight moves a body by more than kMostFall of its size.
+/// than kMostTurn, Newton's method does not converge, or weight moves a body by more than kMostFall of its size, and up
+/// to kStrikeLevel times where a rigid body rebounds: such impacts act when a substep begins, with all joints that hold.
 /// Where bodies have moved by more than kSlow of their size since contacts were found, these are found again
 /// (IslandContacts): the step goes on as a new one would begin.
 /// Where a factorisation is too dear, springs alone are factorised, and solved in turn with sweeps over the contacts; if all
@@ -126,9 +136,10 @@ private:
         MovingBody* body;
         std::uint32_t offset;  // of y, start, moved
         int width;
-        Eigen::Vector3d place;  // of the centre, at the start of the substep or the last impact in it
+        double inverse_mass;    // [1/kg]
+        Eigen::Vector3d place;  // of the centre: where impulses act
         double time = 0;        // of that, since the substep's start [s]
-        bool moving = false;    // by more than kMoving in the step
+        bool struck = false;    // takes part in the impact that is being solved
         Eigen::Matrix3d frame;  // body to world, in which angular rows are written
         Eigen::Matrix3f body_from_world;
         std::uint32_t at;                                   // of wide_y_
@@ -157,15 +168,16 @@ private:
         const Manifold* manifold;
         Eigen::Vector3f tangent[2];
         float separation, now, friction, restitution, approach;
-        int begins = -1;    // of an impact: number of the substep
-        float drifted = 0;  // by `drift` along the normal, since the step's start [m]
-        bool over = false;  // an impact that is no contact afterwards
-        float bias = 0;     // of an impact: speed along the normal that it leaves, negative [m/s]
+        int begins = -1;        // of an impact: number of the substep
+        float drifted = 0;      // by `drift` along the normal, since the step's start [m]
+        bool over = false;      // an impact that is no contact afterwards
+        bool striking = false;  // part of the reflection that is being solved
+        bool struck = false;    // of the impact
+        float bias = 0;         // then: speed along the normal that it leaves, negative [m/s]
         float taken, slide_mass, inverse_normal,
             inverse_tangent[3];  // of K: 1/nn; [[0, 1], [1, 2]] of the tangents' 2 x 2
         float impulse[3], kept[3], at_move[3], largest;
         bool emerging, firm;  // firm: an impact, which does not yield
-        bool moving;          // a body of it does, see apply_moving
         int pair = -1;        // of crossed_
     };
     struct SpringRows : Rows {
@@ -179,6 +191,8 @@ private:
         double lag;              // of their gap, what counts of the one before the substep
         Eigen::Vector3d gap;     // between the ends [m]
         Eigen::Vector3d impulse, moved;  // of the velocities' solution, of the positions' [N s]
+        bool struck = false;             // holds in the impact that is being solved:
+        float kept[3], strike[3];        // its speeds before, its impulse
     };
     /// A contact in a direct solution.
     struct DirectContact {
@@ -235,19 +249,43 @@ private:
     void add_contact(Manifold& manifold, ManifoldPoint& point);
     void write_contact(ContactRows& contact);
     // Impacts, island_impacts.cpp.
-    [[nodiscard]] bool hits(const ContactRows& contact) const noexcept { return contact.begins == substep_; }
+    /// A contact that meets, at a time of the substep [s].
+    struct Hit {
+        double time;
+        std::size_t contact;
+    };
     void strike();
-    void strike(std::size_t first, std::size_t last);
-    enum class Strike { rough, smooth, soft };
-    bool sweep_impact(std::size_t first, std::size_t last, Strike how);
+    [[nodiscard]] bool strike_at_start();
+    bool find_hits();
+    void list_contacts();
+    [[nodiscard]] double meets_at(const ContactRows& contact) const;
+    void strike(const Hit& hit);
+    void reach(int body, double time);
+    bool gather(const Manifold& seed, double time, float least);
+    [[nodiscard]] bool touches(const ContactRows& contact, const Manifold& seed, double time) const;
+    [[nodiscard]] double gap_at(const ContactRows& contact, double time) const;
+    void reflect();
+    void hold_springs();
+    /// By how much a unit of impulse moves a spring's ends apart, mean over its directions [1/kg].
+    [[nodiscard]] static double mobility_of(const SpringRows& s) noexcept {
+        return static_cast<double>(s.k[0][0] + s.k[1][1] + s.k[2][2]) / s.point->held;
+    }
+    void sweep_impact(bool friction);
+    [[nodiscard]] double share_of_impact() const;
     void go_to(BodyRows& rows, double time);
+    void load_rigid(BodyRows& rows, double gone);
+    void stretch_gaps();
     void turn_frames();
+    /// Whether a contact's rows follow the place where it acts: of those that may rebound, for the balance of energy.
+    [[nodiscard]] static bool follows(const ContactRows& contact) noexcept {
+        return contact.firm || contact.restitution > 0;
+    }
     void turn_frame(BodyRows& rows, const Eigen::Matrix3d& frame);
     void aim(ContactRows& contact) const;
-    void rebound(ContactRows& contact);
+    [[nodiscard]] float least_bounce(const ContactRows& contact) const;
+    [[nodiscard]] float rounding(const ContactRows& contact) const;
     [[nodiscard]] bool goes_far(const ContactRows& contact) const;
     void end_impact(ContactRows& contact);
-    void apply_moving(const ContactRows& contact);
     void write_leg(const BodyRows& rows, const Eigen::Vector3d& velocity, const Eigen::Vector3d& momentum);
     [[nodiscard]] bool is_rigid(const ContactRows& contact) const noexcept {
         return contact.side[0].width <= 8 && contact.side[1].width <= 8;
@@ -343,7 +381,7 @@ private:
               const float (&along)[3], const Eigen::Vector3d& point);
     void tell_side(const Rows& rows, int side, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
                    const float (&along)[3], const Eigen::Vector3d& point, StepImpulse& given) const;
-    void apply_contacts();
+    void apply(const ContactRows& contact, const float (&impulse)[3], const float (&at_move)[3]);
     [[nodiscard]] Eigen::Vector3d in_world(const ContactRows& contact, const Eigen::Vector3d& impulse) const;
     [[nodiscard]] static Eigen::Vector3d in_world(const SpringRows& spring, const Eigen::Vector3d& impulse) {
         return spring.axes.transpose() * impulse;
@@ -356,7 +394,14 @@ private:
     void settle(const BodyRows& rows, StepImpulse& given) const;
     int note_pair(const Manifold& manifold);
 
-    static constexpr float kBounceThreshold = 0.1f;  // slower approaches do not rebound [m/s]
+    /// What gravity and forces give in a time [s]: velocity, angular momentum.
+    [[nodiscard]] Eigen::Vector3d velocity_given(const MovingBody& body, double time) const {
+        const Eigen::Vector3d fall = time * body.gravity_scale * settings_->gravity;
+        return body.pushed ? Eigen::Vector3d(fall + time / body.kind->mass.mass * body.force) : fall;
+    }
+    [[nodiscard]] static Eigen::Vector3d momentum_given(const MovingBody& body, double time) {
+        return body.pushed ? Eigen::Vector3d(time * body.torque) : Eigen::Vector3d::Zero();
+    }
 
     const WorldSettings* settings_;
     std::vector<MovingBody>* bodies_;
@@ -390,8 +435,14 @@ private:
     std::vector<int> next_turn_;  // per island body
     std::vector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
-    std::vector<std::size_t> impacts_;  // contacts, by time
-    std::vector<bool> turned_;          // per island body: its frame was
+    std::vector<std::size_t> impacts_;                      // contacts, of fast pairs
+    std::vector<Hit> hits_;                                 // of the substep, by time
+    std::vector<int> hit_bodies_;                           // of the impact that is being solved
+    std::vector<std::size_t> striking_, struck_;            // contacts, now and since it began
+    std::vector<std::size_t> holding_;                      // springs
+    std::vector<std::size_t> contacts_of_, first_contact_;  // body by body, and where each begins
+    bool any_bounce_ = false, any_struck_ = false;          // contacts that may; in this step
+    std::vector<bool> turned_;                              // per island body: its frame was
     LaneArray y_, kept_, start_, moved_, jacobians_;
     std::size_t jacobians_used_ = 0;
     double h_ = 0;       // of the substep

@@ -29,7 +29,7 @@ struct Manifold {
     int count = 0;
     std::array<ManifoldPoint, kManifoldPoints> points;
     float friction = 0, restitution = 0;
-    bool emerging = false;    ///< began deep inside each other, and still overlap
+    bool emerging = false;    ///< came deep into each other, and still overlap
     float impulse_reach = 0;  ///< how far from a point its last impulse may have been, see take_impulses [m]
     [[nodiscard]] std::uint64_t key() const noexcept {  ///< orders pairs by (a, b)
         return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);

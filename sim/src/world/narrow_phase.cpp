@@ -10,8 +10,9 @@
 namespace sim {
 namespace {
 
-constexpr float kDeep =
-    0.04f;  // of the size: a contact that begins deeper is one of bodies put inside each other
+// Of the size: a contact that begins deeper is one of bodies put inside each other. Slow pairs (kSlow) may be found after
+// they met.
+constexpr float kDeep = 0.11f;
 // A body is in another if its centre is, or is nearer to it than this share of its own smallest half extent.
 constexpr double kBuried = 0.2;
 constexpr std::uint32_t kNearest = 0x7ffffffd;  // feature of the nearest points of a pair
@@ -34,7 +35,7 @@ bool is_buried(const PosedBody& body, const PosedBody& in) {
 void finish(const Manifold* before, float size, Manifold& manifold) {
     if (manifold.count == 0) return;
     const float deepest = -manifold.points[0].separation;
-    manifold.emerging = before ? before->emerging && deepest > 0.01f * size : deepest > kDeep * size;
+    manifold.emerging = deepest > (before && before->emerging ? 0.01f : kDeep) * size;
     manifold.impulse_reach = 0.1f * size;
     if (before) take_impulses(*before, manifold.impulse_reach, manifold);
 }

@@ -3,7 +3,7 @@
 namespace sim {
 namespace {
 
-constexpr int kMostDistances = 128;
+constexpr int kMostDistances = 1024;
 constexpr double kShare = 0.1;  // of a gap: how exactly it has to be known
 
 PlacedConvex placed(const ConvexBody& body, const BodyPath::Pose& pose) {
@@ -44,7 +44,8 @@ Impact time_of_impact(const ConvexBody& a, const BodyPath& path_a, const ConvexB
         bool used_up = false;
         along(path_a, path_b, time, [&](const BodyPath::Leg& of_a, const BodyPath::Leg& of_b, double span) {
             const double closing = -gap.normal.dot(of_a.velocity - of_b.velocity) +
-                                   of_a.spin.norm() * gap.turn_a + of_b.spin.norm() * gap.turn_b;
+                                   gap.normal.cross(of_a.spin).norm() * gap.turn_a +
+                                   gap.normal.cross(of_b.spin).norm() * gap.turn_b;
             used_up = closing * span > left;
             time += used_up ? left / closing : span;
             left -= closing * span;

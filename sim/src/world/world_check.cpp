@@ -133,8 +133,9 @@ std::string what_is_broken(const MovingBody& body) {
     const double norm = s.orientation.squaredNorm();
     if (!(norm > 0.5 && norm < 2)) return "orientation";
     if (!finite_and_below(s.velocity, kFastest)) return "velocity";
-    if (!finite_and_below(s.angular_momentum.cwiseAbs() / body.kind->mass.inertia.minCoeff(), kFastest))
-        return "angular momentum";
+    const Eigen::Vector3d spin =
+        (s.orientation.conjugate() * s.angular_momentum).cwiseQuotient(body.kind->mass.inertia);
+    if (!finite_and_below(spin, kFastest)) return "angular momentum";
     if (!s.q.allFinite() || (body.kind->modes > 0 && s.q.cwiseAbs().dot(body.kind->gradient_bound) > 1e6))
         return "modal coordinates";
     if (!s.q_dot.allFinite() ||

@@ -252,9 +252,12 @@ void WorldContacts::meet_fast(const ContactScene& scene, int i, int j, const Man
         return wake(scene, i, j);
     }
     wake(scene, i, j);
-    // Turning on, other places of them may meet.
-    if (reach_[static_cast<std::size_t>(i)].turned + reach_[static_cast<std::size_t>(j)].turned >
-        kSlow * size)
+    watch_turning(i, j, kSlow * size);
+}
+
+// Turning on, other places of a pair that touches may meet, even if this one holds nothing up.
+void WorldContacts::watch_turning(int i, int j, double least) {
+    if (reach_[static_cast<std::size_t>(i)].turned + reach_[static_cast<std::size_t>(j)].turned > least)
         watched_[static_cast<std::size_t>(i)] = watched_[static_cast<std::size_t>(j)] = true;
 }
 

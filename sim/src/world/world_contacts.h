@@ -83,6 +83,7 @@ private:
     [[nodiscard]] bool pass_by(const ContactScene& scene, int i, int j) const;
     void meet_near(const ContactScene& scene, int i, int j, double margin, const Manifold* before);
     void meet_fast(const ContactScene& scene, int i, int j, const Manifold* before);
+    void watch_turning(int i, int j, double least);
     void wake(const ContactScene& scene, int i, int j);
     void meet_planes(const ContactScene& scene, int i);
     const Manifold* last(std::uint64_t key);

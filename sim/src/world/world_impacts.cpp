@@ -126,6 +126,7 @@ bool WorldContacts::add_impact(const ContactScene& scene, const Meeting& meeting
     }
     manifold.emerging = false;
     scene.set_surface(manifold);
+    watch_turning(meeting.a, meeting.b, kSlow * size_of(a, b));
     ++impacts_;
     manifolds_.push_back(manifold);
     return true;

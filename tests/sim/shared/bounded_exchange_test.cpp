@@ -177,27 +177,36 @@ TEST(BoundedExchange, StacksAcrossWorkersStandAsHighAsInOneProcess) {
         }
 }
 
-TEST(BoundedExchange, APileSharedByThreeAtRandomPacesHasItsMomentumAndItsHeight) {
-    const WorldDefinition d = sim_bench::falling_balls(60);
-    World alone(d);
-    world_test::run(alone, 400);
-    double height = 0;
-    for (int b = 0; b < 60; ++b) height += alone.state(b).position.y() / 60;
-    for (const int bound : {0, 4}) {
+// Piles are chaotic: another order of impacts is another packing. Of ten starts that differed by 1e-7 m the heights had a
+// standard deviation of 2.7 %; so means of five starts are compared, whose difference has one of 1.7 %.
+TEST(BoundedExchange, PilesSharedByThreeAtRandomPacesHaveTheirMomentumAndTheirHeight) {
+    constexpr int kStarts = 5, kBodies = 60;
+    auto height_of = [](const auto& holder) {
+        double sum = 0;
+        for (int b = 0; b < kBodies; ++b) sum += holder.state(b).position.y() / kBodies;
+        return sum;
+    };
+    double alone_height = 0, shared_height[2] = {0, 0};
+    for (int start = 0; start < kStarts; ++start) {
+        WorldDefinition d = sim_bench::falling_balls(kBodies);
+        d.bodies[0].world_from_body.translation().x() += 1e-7 * start;
+        World alone(d);
+        world_test::run(alone, 400);
+        alone_height += height_of(alone) / kStarts;
         std::vector<int> owner;
         for (const WorldBody& body : d.bodies)
             owner.push_back(slab(body.world_from_body.translation().x(), d));
-        Crew crew(d, 3, bound, 400, owner);
-        crew.run_at_random(7);
-        double mean = 0;
-        for (int b = 0; b < 60; ++b) mean += crew.state(b).position.y() / 60;
-        EXPECT_LT((crew.momentum() - crew.outside()).norm(), 1e-9 * crew.weight() * 400 / 60.0);
-        // Piles are chaotic: another order of impacts is another packing, some centimetres lower or higher.
-        EXPECT_NEAR(mean, height, 0.06 * height) << bound;
-        // As deep in each other as alone (0.075 m), or half as deep again.
-        EXPECT_LT(crew.deepest_overlap(2 * sim_bench::kBallRadius_m), 0.12);
-        EXPECT_LE(crew.largest_age(), bound);
+        for (const int bound : {0, 4}) {
+            Crew crew(d, 3, bound, 400, owner);
+            crew.run_at_random(7 + static_cast<unsigned>(start));
+            shared_height[bound > 0] += height_of(crew) / kStarts;
+            EXPECT_LT((crew.momentum() - crew.outside()).norm(), 1e-9 * crew.weight() * 400 / 60.0);
+            // As deep in each other as alone (0.075 m), or half as deep again.
+            EXPECT_LT(crew.deepest_overlap(2 * sim_bench::kBallRadius_m), 0.12);
+            EXPECT_LE(crew.largest_age(), bound);
+        }
     }
+    for (const double height : shared_height) EXPECT_NEAR(height, alone_height, 0.06 * alone_height);
 }
 
 TEST(BoundedExchange, AConstraintThatBreaksAtItsOwnerBreaksEverywhere) {

@@ -107,6 +107,18 @@ TEST(FreeRotation, Over600SecondsMomentumHoldsTo1EMinus12AndEnergyTo5EMinus4With
     EXPECT_LT(seen.energy_error_late, 1.05 * seen.energy_error_early);
 }
 
+TEST(FreeRotation, StepsOfUpToAHundredRadiansKeepTheEnergy) {
+    for (const double turn : {0.3, 3.0, 30.0, 100.0}) {
+        const Vector3d momentum = kInertia.cwiseProduct(turn * Vector3d(0.6, 0.7, 0.4));
+        const double before = energy(Quaterniond::Identity(), momentum, kInertia);
+        Quaterniond q = Quaterniond::Identity();
+        for (int i = 0; i < 100; ++i) {
+            q = sim::rotate_freely(q, momentum, kInertia, 1);
+            ASSERT_NEAR(energy(q, momentum, kInertia) / before, 1, 3e-4) << turn << " rad, step " << i;
+        }
+    }
+}
+
 TEST(FreeRotation, HalvingTheStepQuartersTheErrorOfATumble) {
     for (const Vector3d& inertia : {Vector3d(1, 2, 3), Vector3d(3, 1, 2.5), Vector3d(2, 3, 1)}) {
         const Vector3d omega(1, 3, -2);

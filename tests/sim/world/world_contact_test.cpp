@@ -164,7 +164,9 @@ TEST(WorldContact, ADroppedBallReboundsWithHalfItsSpeed) {
         world.step();
         up = world.state(0).velocity.y();
     }
-    EXPECT_NEAR(up / std::sqrt(2 * 9.81 * 1.5), 0.5, 0.01);
+    // It rebounds within a step: what it rose by until the step's end belongs to the speed at the floor.
+    const double rebound = std::sqrt(up * up + 2 * 9.81 * (world.state(0).position.y() - 0.5));
+    EXPECT_NEAR(rebound / std::sqrt(2 * 9.81 * 1.5), 0.5, 0.005);
 }
 
 class WorldFriction : public testing::TestWithParam<double> {};
