@@ -250,7 +250,7 @@ void IslandSolver::begin_contact(std::size_t i, const Eigen::Vector3d& seen_so_f
     d.normal_gamma = c.emerging ? softest : std::min(softest, positions ? by_load : 10 * by_load);
     d.tangent_gamma = kHeldAlong / c.slide_mass;
     d.bias = bias;
-    d.active = static_cast<double>(c.point->begins) < time_ + h_;
+    d.active = c.starts < time_ + h_;
     d.before = d.active ? guess : Eigen::Vector3d(Eigen::Vector3d::Zero());
     d.bound = c.friction * d.before[0];
     give(c, d.before - seen_so_far, wide_start_);
@@ -512,8 +512,7 @@ bool IslandSolver::try_substep(bool last) {
             for (int k = 0; k < 3; ++k) c.at_move[k] = c.impulse[k] / 2;  // at rest
         }
         // An impact begins where the bodies touch.
-        const double begins = static_cast<double>(c.point->begins);
-        if (begins >= time_ && begins < time_ + h_) c.now = std::max(c.now, 0.f);
+        if (c.starts >= time_ && c.starts < time_ + h_) c.now = std::max(c.now, 0.f);
         if (c.restitution > 0 && c.largest == 0) c.approach = static_cast<float>(seen(c, wide_free_)[0]);
     }
     const bool reached = solve_positions();
@@ -565,8 +564,9 @@ void IslandSolver::find_again() {
         ManifoldPoint& point = found_[static_cast<std::size_t>(place)]
                                    .points[static_cast<std::size_t>(c.point - c.manifold->points.data())];
         keep_impulse(c, point);
-        point.separation = c.now;
+        point.separation = c.now, point.begins = static_cast<float>(c.starts);
     }
+    std::erase_if(found_, [](const Manifold& m) { return std::isinf(m.points[0].begins); });
     contact_finder_.find(*scene_, island_->bodies, *paths_, time_, found_);
     found_again_ = true;
     note_places();

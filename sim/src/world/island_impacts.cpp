@@ -56,8 +56,12 @@ bool IslandSolver::find_hits() {
     for (const std::size_t i : impacts_) {
         ContactRows& c = contacts_[i];
         if (c.begins != substep_) continue;
-        const double time = static_cast<double>(c.point->begins) - time_;
+        const double time = c.starts - time_;
         if (direct_ && (c.restitution == 0 || !is_rigid(c) || time >= h_)) continue;
+        if (direct_ && is_elsewhere(c, std::max(time, 0.))) {
+            c.starts = std::numeric_limits<double>::infinity();
+            continue;
+        }
         // Bodies with modes take time: theirs is a contact from this substep on, which rebounds when the step ends, if
         // it may stand still until then.
         if (!is_rigid(c) && !goes_far(c)) {
@@ -74,6 +78,20 @@ bool IslandSolver::find_hits() {
     });
     if (!hits_.empty() && first_contact_.empty()) list_contacts();
     return !hits_.empty();
+}
+
+// Whether an impact was foreseen on other paths than the bodies took: they do not meet where it acts.
+bool IslandSolver::is_elsewhere(const ContactRows& c, double time) const {
+    if (c.side[0].body < 0 || c.side[1].body < 0) return false;
+    Eigen::Vector3d apart = Eigen::Vector3d::Zero();
+    for (const Side& side : c.side) {
+        const BodyRows& rows = rows_of_[static_cast<std::size_t>(side.body)];
+        const bool first = &side == &c.side[0];
+        const Eigen::Vector3f& arm = first ? c.point->arm_a : c.point->arm_b;
+        const Eigen::Vector3d there = rows.place + arm.cast<double>() + time * rows.body->state.velocity;
+        apart += first ? there : Eigen::Vector3d(-there);
+    }
+    return apart.norm() > kSlow * size_of(c);
 }
 
 // The contacts of each body.
@@ -471,9 +489,12 @@ void IslandSolver::aim(ContactRows& c) const {
 void IslandSolver::end_impact(ContactRows& c) {
     if (c.begins != substep_) return;
     c.begins = substep_ - 1;
-    if (direct_) return;
+    if (direct_) {
+        c.starts = std::min(c.starts, time_);
+        return;
+    }
     c.over = goes_far(c);
-    const float time = c.point->begins - static_cast<float>(time_);
+    const float time = static_cast<float>(c.starts - time_);
     c.separation = c.point->gap - c.drifted - time * c.drift[0];  // with the way so far
     for (const Side& side : c.side)
         if (side.body >= 0)

@@ -237,6 +237,7 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     c.point = &point;
     c.side[0] = reserve_rows(moving(manifold.a));
     c.side[1] = reserve_rows(moving(manifold.b));
+    c.starts = static_cast<double>(point.begins);
     set_tangents(point.normal, c.tangent);
     write_contact(c);
     c.separation = c.now = point.separation;
@@ -244,17 +245,16 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     // Only what comes together rebounds, not what rests and rings.
     c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
     c.emerging = manifold.emerging;
-    c.firm = point.begins >= 0;
+    c.firm = c.starts >= 0;
     c.pair = note_pair(manifold);
     c.told = note_told(c, true) || c.pair >= 0;
     c.impulse[0] = point.normal_impulse;
     c.impulse[1] = point.friction_impulse.dot(c.tangent[0]);
     c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
-    if (point.begins >= 0) {
+    if (c.firm) {
         impacts_.push_back(contacts_.size());
-        c.begins = std::clamp(
-            static_cast<int>(static_cast<double>(point.begins) * settings_->substeps / settings_->dt), 0,
-            settings_->substeps - 1);
+        c.begins = std::clamp(static_cast<int>(c.starts * settings_->substeps / settings_->dt), 0,
+                              settings_->substeps - 1);
     }
     any_bounce_ = any_bounce_ || (c.restitution > 0 && is_rigid(c));
     contacts_.push_back(c);
@@ -266,7 +266,7 @@ void IslandSolver::write_contact(ContactRows& c) {
     alignas(32) float scratch[2][3 * kMostModes];
     const ManifoldPoint& point = *c.point;
     Eigen::Vector3f arms[2] = {point.arm_a, point.arm_b};
-    if (c.side[0].body >= 0 && c.side[1].body >= 0 && static_cast<double>(point.begins) < time_ + h_) {
+    if (c.side[0].body >= 0 && c.side[1].body >= 0 && c.starts < time_ + h_) {
         const Eigen::Vector3d at = place_now(c);
         for (int side = 0; side < 2; ++side)
             arms[side] = (at - rows_of_[static_cast<std::size_t>(c.side[side].body)].place).cast<float>();

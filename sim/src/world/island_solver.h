@@ -168,6 +168,7 @@ private:
         const Manifold* manifold;
         Eigen::Vector3f tangent[2];
         float separation, now, friction, restitution, approach;
+        double starts;          // of an impact: when it acts, else negative; infinite: it does not happen [s]
         int begins = -1;        // of an impact: number of the substep
         float drifted = 0;      // by `drift` along the normal, since the step's start [m]
         bool over = false;      // an impact that is no contact afterwards
@@ -257,6 +258,7 @@ private:
     void strike();
     [[nodiscard]] bool strike_at_start();
     bool find_hits();
+    [[nodiscard]] bool is_elsewhere(const ContactRows& contact, double time) const;
     void list_contacts();
     [[nodiscard]] double meets_at(const ContactRows& contact) const;
     void strike(const Hit& hit);
