@@ -62,6 +62,21 @@ inline sim::World alone(const sim::WorldScene& scene, std::uint64_t steps,
     return world;
 }
 
+/// So many steps in lockstep.
+inline sim::DistributedSettings lockstep(std::uint64_t steps) {
+    sim::DistributedSettings settings;
+    settings.steps = steps;
+    return settings;
+}
+
+/// Workers in this process, by a clock that is modelled.
+inline sim::SimulatedProcessors processors(int count) {
+    sim::SimulatedProcessors how;
+    how.count = count;
+    how.modelled = true;
+    return how;
+}
+
 /// At the end of every step, from 0.
 inline std::vector<std::uint64_t> hashes_alone(const sim::WorldScene& scene, std::uint64_t steps) {
     std::vector<std::uint64_t> hashes;

@@ -1,11 +1,8 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
-#include <fstream>
 #include <new>
 #include <string>
 #include <vector>
@@ -73,25 +70,14 @@ void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept {
 namespace tracking {
 namespace {
 
-/// A model of the greatest size in a file, while this lives.
-struct ModelFile {
-    std::string path = testing::TempDir() + "allocation_" + std::to_string(getpid()) + ".model";
-
-    ModelFile() {
-        std::ofstream(path, std::ios::binary)
-            << format_path_model(model_of_random_weights(PathModel::kMostHidden, 1));
-    }
-    ~ModelFile() { std::remove(path.c_str()); }
-};
-
 TEST(Allocation, CorrectAndPredictOfEveryPredictorAllocateNothing) {
-    const ModelFile model;
-    std::vector<std::string> specifications = predictor_names();
-    for (const char* name : {"learned:model=", "arbitrated:model="})
-        specifications.push_back(name + model.path);
-    for (const std::string& name : specifications) {
+    const auto greatest =
+        std::make_shared<const PathModel>(model_of_random_weights(PathModel::kMostHidden, 1));
+    std::vector<std::string> names = predictor_names();
+    names.insert(names.end(), model_predictor_names().begin(), model_predictor_names().end());
+    for (const std::string& name : names) {
         const long before_making = allocations;
-        const auto predictor = make_predictor(name);
+        const auto predictor = make_predictor(name, Eigen::Vector3d::UnitY(), greatest);
         EXPECT_GT(allocations, before_making);  // the counter counts
         double sum = 0;
         const long before = allocations;

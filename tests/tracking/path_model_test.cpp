@@ -63,6 +63,11 @@ TEST(PathModel, SaysWhatIsWrong) {
     EXPECT_NE(message_of(sizes).find("bytes of weights, expected"), std::string::npos);
     sizes.replace(sizes.find("sizes: "), 9, "sizes: 87");
     EXPECT_NE(message_of(sizes).find("m.model:2:8: error: found"), std::string::npos);
+    std::string early = bytes;
+    early.insert(early.find("sizes: "), "checksum: 0\n");
+    EXPECT_NE(message_of(early).find("m.model:2:1: error: found 'checksum: 0', expected the line \"sizes"),
+              std::string::npos)
+        << message_of(early);
     for (const float wrong :
          {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e7F}) {
         PathModel bad = good;

@@ -110,22 +110,35 @@ TEST(Training, HalvesTheErrorOnStrokesThatItHasNotSeenAndStatesItHonestly) {
     }
 }
 
-TEST(Training, LearnsNothingFromWhatIsHeldOutOrFlagged) {
-    std::vector<TrainingStick> sticks = some_strokes();
+TEST(Training, LearnsNothingFromWhatIsFlagged) {
     TrainingOptions options = small_options();
     options.steps = 20;  // too few to be stopped
+    const auto learned = [&](bool flagged, bool corrupted) {
+        std::vector<TrainingStick> sticks = some_strokes();
+        // Of examples whose truth or history (0.25 s, played up to 1.35 times as fast, and a sample before) holds
+        // what is corrupted, all are within 50 ms of a flag.
+        for (int i = -1; flagged && i < 12; ++i) sticks[0].flagged_s.push_back(3 + 0.05 * i);
+        for (PoseSample& sample : sticks[0].stick.samples)
+            if (corrupted && std::abs(sample.t_s - 3.0) < 0.04) {
+                sample.position += Eigen::Vector3d(1, -2, 0.5);
+                sample.orientation = Eigen::Quaterniond(0, 1, 0, 0);
+            }
+        return format_path_model(train_path_model(sticks, options).model);
+    };
+    EXPECT_EQ(learned(true, true), learned(true, false));
+    EXPECT_NE(learned(false, true), learned(false, false));
+}
+
+TEST(Training, LearnsNothingFromWhatIsHeldOut) {
+    TrainingOptions options = small_options();
+    options.steps = 20;  // too few to be stopped
+    std::vector<TrainingStick> sticks = some_strokes();
     const PathModel plain = train_path_model(sticks, options).model;
-    std::vector<TrainingStick> other = sticks;
-    other[0].flagged_s = {3.0};
-    for (PoseSample& sample : other[0].stick.samples)  // noise where nothing is learned from, but the history
-        if (std::abs(sample.t_s - 3.0) < 0.02) sample.position.x() += 0.001;
-    EXPECT_NE(train_path_model(other, options).model.layers[0].weights, plain.layers[0].weights);
-    TrainingStick longer = sticks[3];
-    for (PoseSample& sample : longer.stick.samples) sample.position.y() += 0.3;  // elsewhere: the same motion
-    other = sticks;
-    other[3] = longer;
-    // Floats of the inputs are the same to 1e-7; what is learned does not depend on it at all.
-    EXPECT_EQ(train_path_model(other, options).model.layers[0].weights, plain.layers[0].weights);
+    sticks[3] = strokes(1.1, 5, 3, true);
+    // The covariances' scale, which is of the errors held out, is in the last layer alone.
+    EXPECT_EQ(train_path_model(sticks, options).model.layers[0].weights, plain.layers[0].weights);
+    sticks[3].held_out = false, sticks[4].held_out = true;
+    EXPECT_NE(train_path_model(sticks, options).model.layers[0].weights, plain.layers[0].weights);
 }
 
 TEST(Training, StopsWhenAskedAndRefusesWhatCannotBe) {
@@ -146,6 +159,14 @@ TEST(Training, StopsWhenAskedAndRefusesWhatCannotBe) {
     for (TrainingStick& stick : short_ones)
         if (!stick.held_out) stick.stick.samples.resize(2);
     EXPECT_THROW((void)train_path_model(short_ones, small_options()), std::invalid_argument);
+    std::vector<TrainingStick> without_a_sample = some_strokes();
+    for (TrainingStick& stick : without_a_sample)
+        if (stick.held_out) stick.stick.samples.clear();
+    EXPECT_THROW((void)train_path_model(without_a_sample, small_options()), std::invalid_argument);
+    std::vector<TrainingStick> short_held_out = some_strokes();
+    for (TrainingStick& stick : short_held_out)  // nothing 0.15 s after the first 0.5 s
+        if (stick.held_out) stick.stick.samples.resize(75);
+    EXPECT_THROW((void)train_path_model(short_held_out, small_options()), std::invalid_argument);
     options.hidden = 1000;
     EXPECT_THROW((void)train_path_model(some_strokes(), options), std::invalid_argument);
 }

@@ -75,6 +75,7 @@ SampleStatus Arbitrated::correct(const PoseSample& sample) noexcept {
     }
     (void)learned_.correct(sample);
     newest_ = sample;
+    newest_.orientation.normalize();
     oriented_ = oriented_ || sample.has_orientation;
     remember();
     return status;
@@ -98,7 +99,8 @@ void Arbitrated::judge(const PoseSample& sample) noexcept {
                 lead.spread.learn(
                     root.matrixL().solve(p.filter + p.share * (p.model - p.filter) - truth).squaredNorm());
             if (!turned || p.filter_shaft.isZero(0)) continue;
-            const Eigen::Vector3d before = newest_.orientation * shaft_, now = sample.orientation * shaft_;
+            const Eigen::Vector3d before = newest_.orientation * shaft_,
+                                  now = sample.orientation.normalized() * shaft_;
             lead.shaft.learn(p.filter_shaft, p.model_shaft, before + share * (now - before), dt_s);
         }
 }

@@ -145,6 +145,8 @@ PathModel parse_path_model(std::string_view bytes, const std::string& name) {
             }
             break;
         }
+        if (line.text().starts_with(kChecksum))
+            line.fail(0, in_quotes(line.text()), "the line \"sizes: ...\" before the checksum", kRemedy);
         const std::size_t colon = line.text().find(": ");
         if (colon == line.text().npos || !is_word(line.text().substr(0, colon)))
             line.fail(0, in_quotes(line.text()), "\"key: value\"", kRemedy);

@@ -146,33 +146,33 @@ std::unique_ptr<Predictor> make_imm(Specification& specification) {
     return std::make_unique<InteractingModels>(options);
 }
 
-std::shared_ptr<const PathModel> read_model(Specification& specification) {
-    return std::make_shared<const PathModel>(
-        read_path_model(specification.text("model", "model=FILE, a file of `musicworld train`")));
-}
+using Model = std::shared_ptr<const PathModel>;
 
-std::unique_ptr<Predictor> make_learned(Specification& specification, const Eigen::Vector3d& shaft) {
-    return std::make_unique<Learned>(read_model(specification), shaft);
+std::unique_ptr<Predictor> make_learned(Specification&, const Eigen::Vector3d& shaft, Model model) {
+    return std::make_unique<Learned>(std::move(model), shaft);
 }
 
 /// The filter is `cv`, whose velocity fades while its turning lasts.
-std::unique_ptr<Predictor> make_arbitrated(Specification& specification, const Eigen::Vector3d& shaft) {
+std::unique_ptr<Predictor> make_arbitrated(Specification& specification, const Eigen::Vector3d& shaft,
+                                           Model model) {
     const double q = density(specification, "q", 1e7);
     MotionModel fading = constant_velocity(q, specification.number("decay", 8, 1e-3, 1000)),
                 lasting = constant_velocity(q);
-    for (MotionModel* model : {&fading, &lasting}) {
-        set_noise(specification, *model);
-        if (!specification.has("r")) model->measurement_variance = square(0.5 * kMetres);
+    for (MotionModel* motion : {&fading, &lasting}) {
+        set_noise(specification, *motion);
+        if (!specification.has("r")) motion->measurement_variance = square(0.5 * kMetres);
     }
     const double sigmas = specification.has("gate") ? gate(specification) : 5;
     return std::make_unique<Arbitrated>(
-        std::make_unique<KalmanPredictor>(fading, KalmanOptions{sigmas, 0, lasting}),
-        read_model(specification), shaft);
+        std::make_unique<KalmanPredictor>(fading, KalmanOptions{sigmas, 0, lasting}), std::move(model),
+        shaft);
 }
 
+/// One of the two makes it.
 struct Entry {
     const char* name;
     std::unique_ptr<Predictor> (*make)(Specification&);
+    std::unique_ptr<Predictor> (*make_of_model)(Specification&, const Eigen::Vector3d&, Model) = nullptr;
 };
 
 constexpr auto kPredictors = std::to_array<Entry>({{"hold", make_hold},
@@ -186,39 +186,45 @@ constexpr auto kPredictors = std::to_array<Entry>({{"hold", make_hold},
                                                    {"ca", make_ca},
                                                    {"singer", make_singer},
                                                    {"bank", make_bank},
-                                                   {"imm", make_imm}});
+                                                   {"imm", make_imm},
+                                                   {"learned", nullptr, make_learned},
+                                                   {"arbitrated", nullptr, make_arbitrated}});
+
+std::vector<std::string> names_of(bool need_model) {
+    std::vector<std::string> names;
+    for (const Entry& entry : kPredictors)
+        if ((entry.make_of_model != nullptr) == need_model) names.emplace_back(entry.name);
+    return names;
+}
 
 }  // namespace
 
 const std::vector<std::string>& predictor_names() {
-    static const std::vector<std::string> names = [] {
-        std::vector<std::string> all;
-        for (const Entry& entry : kPredictors) all.emplace_back(entry.name);
-        return all;
-    }();
+    static const std::vector<std::string> names = names_of(false);
     return names;
 }
 
-std::unique_ptr<Predictor> make_predictor(const std::string& text, const Eigen::Vector3d& shaft) {
+const std::vector<std::string>& model_predictor_names() {
+    static const std::vector<std::string> names = names_of(true);
+    return names;
+}
+
+std::unique_ptr<Predictor> make_predictor(const std::string& text, const Eigen::Vector3d& shaft,
+                                          std::shared_ptr<const PathModel> model) {
     Specification specification(text);
-    if (specification.name() == "learned" || specification.name() == "arbitrated") {
-        std::unique_ptr<Predictor> predictor = specification.name() == "learned"
-                                                   ? make_learned(specification, shaft)
-                                                   : make_arbitrated(specification, shaft);
+    std::string known;
+    for (const Entry& entry : kPredictors) {
+        known += std::string(known.empty() ? "" : ", ") + entry.name;
+        if (specification.name() != entry.name) continue;
+        if (entry.make_of_model != nullptr && model == nullptr)
+            specification.fail("no model", "one of `musicworld train`");
+        std::unique_ptr<Predictor> predictor =
+            entry.make_of_model != nullptr ? entry.make_of_model(specification, shaft, std::move(model))
+                                           : entry.make(specification);
         specification.require_no_others();
         return predictor;
     }
-    std::string known;
-    for (const Entry& entry : kPredictors) {
-        if (specification.name() == entry.name) {
-            std::unique_ptr<Predictor> predictor = entry.make(specification);
-            specification.require_no_others();
-            return predictor;
-        }
-        known += std::string(known.empty() ? "" : ", ") + entry.name;
-    }
-    specification.fail("name " + in_quotes(specification.name()),
-                       "one of " + known + ", learned, arbitrated");
+    specification.fail("name " + in_quotes(specification.name()), "one of " + known);
 }
 
 PointMotion point_of(const PosePrediction& pose, const Eigen::Vector3d& point_body) noexcept {

@@ -63,13 +63,6 @@ bool Specification::word(const std::string& key, const std::string& only) {
     return true;
 }
 
-std::string Specification::text(const std::string& key, const std::string& expected) {
-    asked_[key] = true;
-    const auto given = values_.find(key);
-    if (given == values_.end()) fail("no " + key, expected);
-    return given->second;
-}
-
 void Specification::require_no_others() const {
     std::string known;
     for (const auto& [key, asked] : asked_) known += (known.empty() ? "" : ", ") + key;

@@ -20,8 +20,6 @@ public:
                                     std::size_t most);
     /// The word given for `key`, or empty; throws unless it is `only`.
     [[nodiscard]] bool word(const std::string& key, const std::string& only);
-    /// The text given for `key`; throws where there is none, with `expected` in the message.
-    [[nodiscard]] std::string text(const std::string& key, const std::string& expected);
     [[nodiscard]] bool has(const std::string& key) const { return values_.contains(key); }
     /// Throws for a key that was given and never asked for.
     void require_no_others() const;

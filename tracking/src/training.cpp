@@ -51,7 +51,8 @@ Rendition rendition_of(std::size_t k, std::uint64_t seed, double share) {
 double duration_of(std::span<const TrainingStick> sticks, bool held_out) {
     double sum = 0;
     for (const TrainingStick& s : sticks)
-        if (s.held_out == held_out) sum += s.stick.samples.back().t_s - s.stick.samples.front().t_s;
+        if (s.held_out == held_out && !s.stick.samples.empty())
+            sum += s.stick.samples.back().t_s - s.stick.samples.front().t_s;
     return sum;
 }
 
@@ -390,8 +391,11 @@ void check(const TrainingOptions& options, const Examples& learning,
     require(options.steps > 0, "no steps", "at least one");
     require(learning.count() >= kBatch, std::to_string(learning.count()) + " samples to learn from",
             "at least " + std::to_string(kBatch) + "; give longer or more recordings");
-    require(held_out[0].count() > 0, "nothing held out that can be scored",
-            "more than 0.5 s of another recording");
+    for (const Examples& e : held_out)
+        for (std::size_t lead = 0; lead < kNodes; ++lead)
+            require(e.count() > 0 && e.known.row(static_cast<Eigen::Index>(2 * lead)).any(),
+                    "nothing held out that can be scored " + std::to_string(kPathLeads[lead]) + " s ahead",
+                    "more than 0.5 s of another recording, not all of it flagged");
 }
 
 }  // namespace

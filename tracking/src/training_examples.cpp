@@ -31,6 +31,7 @@ ExampleCollector::ExampleCollector(std::size_t reserve) {
 }
 
 void ExampleCollector::add(const TrainingStick& source, const Rendition& rendition) {
+    if (source.stick.samples.empty()) return;
     const StickTrace truth = played_slower(source.stick, rendition.slower);
     const double first_s = truth.samples.front().t_s + rendition.from_s;
     const auto flagged = [&](const std::vector<double>& times, double t_s, double lead_s) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 #include <string_view>
 
@@ -173,9 +174,10 @@ PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, co
     for (const Instrument& instrument : kit.instruments) result.instruments.push_back(instrument.name);
     if (trace_is_file) result.inputs.emplace_back(options.trace.string(), sha256_of_file(options.trace));
     for (const fs::path& file : kit.files) result.inputs.emplace_back(file.string(), sha256_of_file(file));
+    std::set<fs::path> models;
     for (const std::string& each : {result.options.picture_predictor, result.options.sound_predictor})
-        if (const std::optional<fs::path> model = model_file(each))
-            result.inputs.emplace_back(model->string(), sha256_of_file(*model));
+        if (const std::optional<fs::path> model = model_file(each)) models.insert(*model);
+    for (const fs::path& model : models) result.inputs.emplace_back(model.string(), sha256_of_file(model));
     return result;
 }
 

@@ -98,13 +98,13 @@ private:
 class SimulateRecord : public sim::DistributedObserver {
 public:
     /// `last`: the step that ends the run at the latest.
-    SimulateRecord(const SimulateOptions& options, const Scene& scene, std::uint64_t last)
-        : options_(options), scene_(scene), last_(last), bar_(options.progress) {
+    SimulateRecord(const SimulateOptions& options, const Scene& scene, std::uint64_t last,
+                   std::unique_ptr<OutputFolder> folder)
+        : options_(options), scene_(scene), last_(last), bar_(options.progress), folder_(std::move(folder)) {
         result_.scene = scene.file, result_.name = scene.name;
         result_.dt_s = scene.world.settings.dt;
         result_.rest_wanted = options.until_rest;
         result_.worker_options = options.workers;
-        if (options.out) folder_ = std::make_unique<OutputFolder>(*options.out, kSimulateProducts);
     }
 
     void at(std::uint64_t step, const sim::World& world) override {
@@ -421,6 +421,8 @@ Json workers_of(const SimulateResult& r) {
 SimulateResult simulate(const SimulateOptions& options) {
     Scene scene = read_scene(options.scene, options.dt_s);
     check(options, scene);
+    std::unique_ptr<OutputFolder> folder;
+    if (options.out) folder = std::make_unique<OutputFolder>(*options.out, kSimulateProducts);
     const WallTimer wall;
     try {
         std::uint64_t steps = last_step(options, scene);
@@ -431,7 +433,7 @@ SimulateResult simulate(const SimulateOptions& options) {
             scene.workers.balance_from *= std::uint64_t(accuracy->report.step_parts);
         }
         const sim::DistributedSettings settings = settings_of(options, scene, steps);
-        SimulateRecord record(options, scene, steps);
+        SimulateRecord record(options, scene, steps, std::move(folder));
         const sim::DistributedResult done = run(scene, options, settings, record);
         return record.finish(done, wall, std::move(accuracy));
     } catch (const sim::InputError& wrong) {

@@ -18,7 +18,7 @@ constexpr std::string_view kExternal = "exec:";
 // least mean error: a velocity that fades with the lead errs 5 to 25 % less than one that lasts, on every
 // recording, and a network errs less where it knows the motion. Strikes want a path that bends: constant acceleration times them best, and the constant
 // velocity, which does not overshoot after a rebound, confirms them.
-constexpr std::string_view kAuto = "auto", kAutoModel = "auto:model=";
+constexpr std::string_view kAuto = "auto";
 constexpr const char* kAutoPicture = "arbitrated";
 constexpr const char* kAutoSound = "ca:q=7e8,gate=5";
 constexpr const char* kAutoConfirming = "cv:q=1e8,gate=5";
@@ -35,51 +35,64 @@ std::string command_of(const std::string& specification) {
 
 constexpr const char* kBundledModel = "general";
 
-bool needs_model(const std::string& name) {
-    return name == "learned" || name == "arbitrated";
+bool needs_model(const std::string& specification) {
+    return std::ranges::count(tracking::model_predictor_names(),
+                              specification.substr(0, specification.find(':'))) > 0;
 }
 
-/// The part of a specification that names its model, as [begin, end); none where it names none.
-std::optional<std::pair<std::size_t, std::size_t>> model_part(const std::string& specification) {
+/// A specification without the file of its model, and that file, if it names one.
+struct PartedSpecification {
+    std::string rest;
+    std::optional<std::string> model = {};
+};
+
+/// Where ",KEY=" begins, or the end.
+std::size_t end_of_value(const std::string& specification, std::size_t from) {
+    for (std::size_t comma = specification.find(',', from); comma != std::string::npos;
+         comma = specification.find(',', comma + 1)) {
+        const std::size_t end =
+            specification.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789", comma + 1);
+        if (end != std::string::npos && end > comma + 1 && specification[end] == '=') return comma;
+    }
+    return specification.size();
+}
+
+/// The file's name may hold commas.
+PartedSpecification part_model(const std::string& specification) {
     constexpr std::string_view kKey = "model=";
     std::size_t key = specification.find(':');
     while (key != std::string::npos && specification.compare(key + 1, kKey.size(), kKey) != 0)
         key = specification.find(',', key + 1);
-    if (key == std::string::npos) return std::nullopt;
-    const std::size_t begin = key + 1 + kKey.size();
-    return std::pair(begin, std::min(specification.find(',', begin), specification.size()));
-}
-
-/// With the file of the model that is named, or of the bundled one.
-std::string with_model_file(const std::string& specification) {
-    const std::string file = model_file(specification)->string();
-    if (const auto part = model_part(specification))
-        return specification.substr(0, part->first) + file + specification.substr(part->second);
-    return fmt::format("{}{}model={}", specification,
-                       specification.find(':') == std::string::npos ? ":" : ",", file);
+    if (key == std::string::npos) return {specification};
+    const std::size_t begin = key + 1 + kKey.size(), end = end_of_value(specification, begin);
+    std::string rest = specification.substr(0, key);
+    if (end < specification.size()) rest += specification[key] + specification.substr(end + 1);
+    return {rest, specification.substr(begin, end - begin)};
 }
 
 std::unique_ptr<tracking::Predictor> make_internal(const std::string& specification,
-                                                   const TrackedStick& stick) {
-    const std::vector<std::string>& names = tracking::predictor_names();
-    const std::string name = specification.substr(0, specification.find(':'));
-    if (std::find(names.begin(), names.end(), name) == names.end() && !needs_model(name))
-        throw BadInput(fmt::format(
-            "error: found predictor \"{}\", expected auto, exec:CMD or one of {}, learned, arbitrated", name,
-            fmt::join(names, ", ")));
+                                                   const Eigen::Vector3d& shaft,
+                                                   std::shared_ptr<const tracking::PathModel> model) {
     try {
-        return tracking::make_predictor(needs_model(name) ? with_model_file(specification) : specification,
-                                        stick.shaft);
+        return tracking::make_predictor(specification, shaft, std::move(model));
     } catch (const std::invalid_argument& wrong) {
         throw BadInput(fmt::format("error: {}", wrong.what()));
     }
 }
 
+void check_name(const std::string& specification) {
+    const std::string name = specification.substr(0, specification.find(':'));
+    const std::vector<std::string>&names = tracking::predictor_names(),
+          &of_model = tracking::model_predictor_names();
+    if (std::ranges::count(names, name) == 0 && std::ranges::count(of_model, name) == 0)
+        throw BadInput(fmt::format("error: found predictor \"{}\", expected auto, exec:CMD or one of {}, {}",
+                                   name, fmt::join(names, ", "), fmt::join(of_model, ", ")));
+}
+
 /// The end of the part that begins at `begin`: its comma, or the list's end.
 std::size_t end_of_part(const std::string& list, std::size_t begin) {
-    const bool external = list.compare(begin, kExternal.size(), kExternal) == 0;
     std::size_t end = list.find(',', begin);
-    while (external && end != std::string::npos && list[end - 1] == '\\') end = list.find(',', end + 1);
+    while (end != std::string::npos && end > begin && list[end - 1] == '\\') end = list.find(',', end + 1);
     return std::min(end, list.size());
 }
 
@@ -96,10 +109,8 @@ bool is_auto(const std::string& specification) {
 }
 
 std::optional<std::filesystem::path> model_file(const std::string& specification) {
-    if (!needs_model(specification.substr(0, specification.find(':')))) return std::nullopt;
-    const auto part = model_part(specification);
-    return find_bundled(part ? specification.substr(part->first, part->second - part->first) : kBundledModel,
-                        "models", ".model");
+    if (!needs_model(specification)) return std::nullopt;
+    return find_bundled(part_model(specification).model.value_or(kBundledModel), "models", ".model");
 }
 
 std::string confirming_specification(const std::string& specification) {
@@ -118,11 +129,25 @@ bool is_external(const std::string& specification) {
     return specification.starts_with(kExternal);
 }
 
+PredictorMaker::PredictorMaker(const std::string& specification) : specification_(specification) {
+    if (is_external(specification)) return;
+    check_name(specification);
+    if (const std::optional<std::filesystem::path> file = model_file(specification)) {
+        specification_ = part_model(specification).rest;
+        model_ = std::make_shared<const tracking::PathModel>(tracking::read_path_model(*file));
+    }
+}
+
+std::unique_ptr<tracking::Predictor> PredictorMaker::make(std::span<const double> leads_s,
+                                                          const TrackedStick& stick) const {
+    if (!is_external(specification_)) return make_internal(specification_, stick.shaft, model_);
+    return std::make_unique<ExternalPredictor>(command_of(specification_), leads_s, stick.name);
+}
+
 std::unique_ptr<tracking::Predictor> make_any_predictor(const std::string& specification,
                                                         std::span<const double> leads_s,
                                                         const TrackedStick& stick) {
-    if (!is_external(specification)) return make_internal(specification, stick);
-    return std::make_unique<ExternalPredictor>(command_of(specification), leads_s, stick.name);
+    return PredictorMaker(specification).make(leads_s, stick);
 }
 
 void check_specification(const std::string& specification) {
@@ -130,13 +155,12 @@ void check_specification(const std::string& specification) {
         (void)command_of(specification);
         return;
     }
-    if (is_auto(specification) && specification != kAuto &&
-        (!specification.starts_with(kAutoModel) || specification.find(',') != std::string::npos))
+    if (is_auto(specification) && part_model(specification).rest != kAuto)
         throw BadInput(
             fmt::format("error: found predictor \"{}\", expected auto or auto:model=FILE; to set parameters "
                         "say arbitrated:model=FILE,KEY=VALUE",
                         specification));
-    (void)make_internal(picture_specification(specification), {});
+    (void)make_any_predictor(picture_specification(specification), {});
 }
 
 std::vector<std::string> split_specifications(const std::string& list) {
@@ -151,9 +175,9 @@ std::vector<std::string> split_specifications(const std::string& list) {
         const bool continues = !parts.empty() && !is_external(parts.back()) &&
                                part.find('=') != std::string::npos && part.find(':') == std::string::npos;
         if (continues)
-            parts.back() += "," + part;
+            parts.back() += "," + unescaped(std::move(part));
         else
-            parts.push_back(is_external(part) ? unescaped(std::move(part)) : std::move(part));
+            parts.push_back(unescaped(std::move(part)));
         begin = end + 1;
     }
     return parts;

@@ -1,4 +1,5 @@
 #pragma once
+#include <tracking/path_model.h>
 #include <tracking/predictor.h>
 
 #include <filesystem>
@@ -16,11 +17,25 @@ struct TrackedStick {
     Eigen::Vector3d shaft = -Eigen::Vector3d::UnitZ();  ///< unit, hand to tip, in the body's frame
 };
 
-/// Makes any predictor that the command line may name: those of tracking::make_predictor and `exec:CMD`, a
-/// child process (ExternalPredictor). A network's `model=` may name a bundled one, which it is by default. `auto`
-/// must have been resolved before. `leads_s` are the leads that will be asked for: an external predictor
-/// computes these, in between its answers are interpolated. Throws BadInput with one line, tracking::TraceError
-/// for a file that is no model; std::runtime_error when the child fails.
+/// What makes predictors of any kind that the command line may name: those of tracking::make_predictor and
+/// `exec:CMD`, a child process (ExternalPredictor). A network's `model=FILE` may be a bundled one's name, which it is
+/// by default; the file is read once, here.
+class PredictorMaker {
+public:
+    /// `auto` must have been resolved before. Throws BadInput with one line, tracking::TraceError for a file that
+    /// is no model.
+    explicit PredictorMaker(const std::string& specification);
+    /// `leads_s` are the leads that will be asked for: an external predictor computes these, in between its answers
+    /// are interpolated. Throws BadInput with one line; std::runtime_error when the child fails.
+    [[nodiscard]] std::unique_ptr<tracking::Predictor> make(std::span<const double> leads_s,
+                                                            const TrackedStick& stick = {}) const;
+
+private:
+    std::string specification_;  // without the model
+    std::shared_ptr<const tracking::PathModel> model_;
+};
+
+/// PredictorMaker(specification).make(leads_s, stick).
 [[nodiscard]] std::unique_ptr<tracking::Predictor> make_any_predictor(const std::string& specification,
                                                                       std::span<const double> leads_s,
                                                                       const TrackedStick& stick = {});
@@ -42,9 +57,8 @@ void check_specification(const std::string& specification);
 /// True for `exec:CMD`: its time includes a process and two messages, and is marked as external.
 [[nodiscard]] bool is_external(const std::string& specification);
 
-/// Splits a comma-separated list of specifications: a part with `=` but no `:` belongs to the one before, and
-/// `exec:` takes the rest of its part up to the next comma that is not escaped as `\,`. Throws BadInput for
-/// empty parts.
+/// Splits a comma-separated list of specifications: a part with `=` but no `:` belongs to the one before, unless that
+/// is `exec:`. A comma within a command or a file's name is escaped as `\,`. Throws BadInput for empty parts.
 [[nodiscard]] std::vector<std::string> split_specifications(const std::string& list);
 
 }  // namespace app

@@ -25,14 +25,6 @@ tracking::PosePath path_of(const tracking::Predictor& predictor, double reach_s,
     return path;
 }
 
-void begin_anew(std::unique_ptr<tracking::Predictor>& predictor, const std::string& specification,
-                const TrackedStick& stick) {
-    if (auto* external = dynamic_cast<ExternalPredictor*>(predictor.get()))
-        external->begin_anew();
-    else if (predictor)
-        predictor = make_any_predictor(specification, {}, stick);
-}
-
 }  // namespace
 
 std::vector<double> leads_up_to(double lead_s, std::size_t pieces) {
@@ -116,22 +108,21 @@ StickPredictors stick_predictors(const std::string& picture, const std::string& 
 }
 
 StickFilters::StickFilters(const StickPredictors& predictors, const std::string& stick)
-    : predictors_(predictors),
-      stick_{stick, predictors.shaft},
-      picture_(
-          make_any_predictor(predictors.picture, leads_up_to(kLongestPredictionS, kPicturePieces), stick_)),
-      sound_(make_any_predictor(predictors.sound, path_leads(predictors.sound_lead_s), stick_)) {
+    : stick_{stick, predictors.shaft},
+      sound_lead_s_(predictors.sound_lead_s),
+      picture_(predictors.picture, leads_up_to(kLongestPredictionS, kPicturePieces), stick_),
+      sound_(predictors.sound, path_leads(predictors.sound_lead_s), stick_) {
     if (!predictors.confirming.empty())
-        confirming_ = make_any_predictor(predictors.confirming, path_leads(kConfirmingLeadS), stick_);
+        confirming_.emplace(predictors.confirming, path_leads(kConfirmingLeadS), stick_);
 }
 
 tracking::SampleStatus StickFilters::correct(const tracking::PoseSample& sample,
                                              tracking::StickState& state) {
-    (void)picture_->correct(sample);
-    if (confirming_) (void)confirming_->correct(sample);
-    const tracking::SampleStatus status = sound_->correct(sample);
-    picture_->require_working();
-    sound_->require_working();
+    (void)picture_.predictor->correct(sample);
+    if (confirming_) (void)confirming_->predictor->correct(sample);
+    const tracking::SampleStatus status = sound_.predictor->correct(sample);
+    picture_.predictor->require_working();
+    sound_.predictor->require_working();
     say_paths(state);  // a sample that one filter refuses may count for another
     if (!is_taken(status)) {
         ++state.refused;
@@ -146,24 +137,32 @@ tracking::SampleStatus StickFilters::correct(const tracking::PoseSample& sample,
 }
 
 void StickFilters::say_paths(tracking::StickState& state) const {
-    state.picture = path_of(*picture_, kLongestPredictionS, kPicturePieces);
-    state.picture_t_s = picture_->time_s();
-    state.sound = path_of(*sound_, predictors_.sound_lead_s, kPathPieces);
-    state.model = sound_->selected();
-    state.models = sound_->models();
+    const tracking::Predictor &picture = *picture_.predictor, &sound = *sound_.predictor;
+    state.picture = path_of(picture, kLongestPredictionS, kPicturePieces);
+    state.picture_t_s = picture.time_s();
+    state.sound = path_of(sound, sound_lead_s_, kPathPieces);
+    state.model = sound.selected();
+    state.models = sound.models();
     assert(state.models <= tracking::StickState::kMostModels);
     for (std::size_t i = 0; i < state.models && state.models > 1; ++i)
-        state.sound_models[i] = sound_->motion_of_model(i).value_or(state.sound_models[i]);
+        state.sound_models[i] = sound.motion_of_model(i).value_or(state.sound_models[i]);
     if (!confirming_) return;
     state.confirms = 1;
-    state.confirming = confirming_->motion().value_or(state.confirming);
-    state.confirming_t_s = confirming_->time_s();
+    state.confirming = confirming_->predictor->motion().value_or(state.confirming);
+    state.confirming_t_s = confirming_->predictor->time_s();
+}
+
+void StickFilters::Filter::begin_anew(const TrackedStick& stick) {
+    if (auto* external = dynamic_cast<ExternalPredictor*>(predictor.get()))
+        external->begin_anew();
+    else
+        predictor = maker.make({}, stick);
 }
 
 void StickFilters::begin_anew() {
-    app::begin_anew(picture_, predictors_.picture, stick_);
-    app::begin_anew(sound_, predictors_.sound, stick_);
-    app::begin_anew(confirming_, predictors_.confirming, stick_);
+    picture_.begin_anew(stick_);
+    sound_.begin_anew(stick_);
+    if (confirming_) confirming_->begin_anew(stick_);
 }
 
 }  // namespace app

@@ -47,9 +47,20 @@ public:
 private:
     void say_paths(tracking::StickState& state) const;
 
-    StickPredictors predictors_;
+    /// A predictor, and what makes another like it.
+    struct Filter {
+        Filter(const std::string& specification, std::span<const double> leads_s, const TrackedStick& stick)
+            : maker(specification), predictor(maker.make(leads_s, stick)) {}
+        void begin_anew(const TrackedStick& stick);
+
+        PredictorMaker maker;
+        std::unique_ptr<tracking::Predictor> predictor;
+    };
+
     TrackedStick stick_;
-    std::unique_ptr<tracking::Predictor> picture_, sound_, confirming_;  // confirming_ may be none
+    double sound_lead_s_;
+    Filter picture_, sound_;
+    std::optional<Filter> confirming_;
 };
 
 /// 0 to lead in eight equal pieces: the nodes of a predicted path.

@@ -40,17 +40,18 @@ struct AccuracyReport {
 /// mean square over the surface) of the continuum's: the same shapes of linear elastic matter with the scene's
 /// damping, friction and restitution, meshed, sampled and stepped without end. Up to and through each of a body's
 /// contacts: rebounds part paths afterwards. Changes `scene`: `fidelity`, `modes`, `elements`, `triangles` and
-/// `restitution` of bodies that are automatic and not fixed, dt, and the numbers of events' steps with it.
+/// `restitution` of bodies that are automatic and move by forces, dt, and the numbers of events' steps with it.
 ///
 /// 1. A trial with rigid bodies finds what presses on each body where: impacts' speeds, forces that last.
 /// 2. All automatic bodies of one shape and material take the cheapest way whose mesh, truncation (ContactCompliance) and
 ///    sampling under these loads err, with 3 (u / extent)^2 for large displacements u, by at most 0.7 of what is
 ///    allowed; if none does, the cheapest near the best (1.3 times). Where an impact is too short for any step the
 ///    body is rigid; a rigid one rebounds by what its modes' damping leaves (at least by its restitution).
-/// 3. dt is halved, up to kMostHalvings times, until halving it moves no body's surface by more than what is
-///    left; the error of the finer of two trials is taken to be their difference, of the coarser twice that
-///    (order 1). Halving ends early where it no longer brings trials together: in scenes that are chaotic, or
-///    whose contacts switch, nothing keeps paths together.
+/// 3. dt is halved, up to three times for short impacts before trials are compared and up to kMostHalvings times
+///    from there on (8 in all), until halving it moves no body's surface by more than what is left; the error of
+///    the finer of two trials is taken to be their difference, of the coarser twice that (order 1). Halving ends
+///    early where it no longer brings trials together: in scenes that are chaotic, or whose contacts switch,
+///    nothing keeps paths together.
 /// 4. Loads of the last trial, and the first's, go into what is reported: an estimate above what was asked says
 ///    which part of it errs, where no choice sufficed or loads grew.
 ///

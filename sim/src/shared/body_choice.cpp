@@ -64,7 +64,7 @@ double BodyEstimates::sagitta(int place, int triangles) const {
 BodyError BodyEstimates::of(const WorldBody& body, const BodyLoads& loads) const {
     const FidelityRequest& f = body.fidelity;
     BodyError most;
-    if (body.fixed) return most;
+    if (!body.moves()) return most;
     for (int p = 0; p < kContactPlaces; ++p) {
         const PlaceLoad& at = loads[std::size_t(p)];
         if (at.load.speed <= 0 && at.load.force <= 0) continue;

@@ -128,7 +128,7 @@ public:
         : scene_(&scene), request_(request), progress_(progress), count_(count_of(scene)) {
         estimates_.resize(count_), compliances_.resize(count_);
         for (std::size_t b = 0; b < count_; ++b)
-            if (const WorldBody& body = body_of(scene, b); !body.fixed) {
+            if (const WorldBody& body = body_of(scene, b); body.moves()) {
                 estimates_[b] = estimates_of(body);
                 compliances_[b] = &estimates_[b]->compliance();
             }
@@ -153,7 +153,7 @@ private:
     }
     [[nodiscard]] bool is_open(std::size_t b) const {  // left to the choice
         const WorldBody& body = body_of(*scene_, b);
-        return !body.fixed && body.fidelity.fidelity == Fidelity::automatic;
+        return body.moves() && body.fidelity.fidelity == Fidelity::automatic;
     }
     std::unique_ptr<Trial> tried(const WorldScene& scene, int parts) {
         ++report_.trials;
@@ -181,7 +181,7 @@ private:
         }
         for (std::size_t b = 0; b < count_; ++b)
             if (const WorldBody& body = body_of(*scene_, b);
-                !body.fixed && body.fidelity.fidelity != Fidelity::rigid)
+                body.moves() && body.fidelity.fidelity != Fidelity::rigid)
                 shortest = std::min(shortest, estimates_[b]->shortest_impact(loads_[b]));
         while (!request_.keep_step && first_ < kMostFirst && kStepsOfImpact * dt / first_ > shortest)
             first_ *= 2;
@@ -241,7 +241,7 @@ private:
     std::size_t count_;
     AccuracyReport report_;
     std::vector<Estimates> kinds_;
-    std::vector<const BodyEstimates*> estimates_;  // of each body; none: fixed
+    std::vector<const BodyEstimates*> estimates_;  // of each body; none: not moved by forces
     std::vector<const ContactCompliance*> compliances_;
     std::vector<BodyLoads> loads_;
     int first_ = 1;  // parts of a step in the coarser of the first two trials
@@ -251,7 +251,7 @@ private:
 
 double centrifugal_stretch(const World& world, int body) {
     const WorldBody& definition = world.definition(body);
-    if (definition.fixed) return 0;
+    if (!definition.moves()) return 0;
     const WorldBodyState state = world.state(body);
     const Eigen::Vector3d spin = (state.orientation.conjugate() * state.angular_momentum)
                                      .cwiseQuotient(world.rigid_mass(body).inertia);

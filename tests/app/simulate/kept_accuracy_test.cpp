@@ -61,6 +61,13 @@ TEST(KeptAccuracy, TheOptionStandsInForTheScenesAndAStepThatIsGivenStays) {
     EXPECT_TRUE(json::parse(format_simulate(simulate(steps_of(plain, 2))))["accuracy"].is_null());
 }
 
+TEST(KeptAccuracy, AFolderThatCannotBeIsRefusedBeforeAnyTrial) {
+    const WrittenScene scene(kBall);
+    SimulateOptions options = steps_of(scene, 1'000'000'000);  // trials of which would take days
+    options.out = scene.file();
+    EXPECT_THROW((void)simulate(options), BadInput);
+}
+
 TEST(KeptAccuracy, WorkersComputeWhatWasChosenForOneProcess) {
     const WrittenScene scene(kBall);
     const SimulateResult alone = simulate(steps_of(scene, 12));

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
 
 #include "files/bad_input.h"
+#include "temporary_folder.h"
 
 namespace {
 
@@ -73,6 +75,28 @@ TEST(Predictors, TheFileOfAModelIsTheOneNamedOrTheBundledOne) {
     EXPECT_EQ(app::model_file("learned")->filename(), "general.model");
     EXPECT_EQ(app::model_file("arbitrated:decay=4,model=general,q=1"), app::model_file("learned"));
     EXPECT_THROW((void)app::model_file("learned:model=no such model"), app::BadInput);
+}
+
+TEST(Predictors, AModelsFileMayLieInAFolderWithCommas) {
+    const TemporaryFolder folder;
+    const std::filesystem::path odd = folder.path() / "a,b, c=d";
+    std::filesystem::create_directory(odd);
+    std::filesystem::copy(*app::model_file("learned"), odd / "mine.model");
+    const std::string file = (odd / "mine.model").string();
+    for (const std::string& each :
+         {"learned:model=" + file, "arbitrated:model=" + file + ",q=1e8", "arbitrated:q=1e8,model=" + file}) {
+        EXPECT_EQ(app::model_file(each), odd / "mine.model");
+        EXPECT_NO_THROW((void)app::make_any_predictor(each, {})) << each;
+    }
+    EXPECT_NO_THROW(app::check_specification("auto:model=" + file));
+    EXPECT_EQ(app::split_specifications("hold,learned:model=a\\,b,q=1,cv"),
+              (Parts{"hold", "learned:model=a,b,q=1", "cv"}));
+    setenv("MUSICWORLD_ASSETS", odd.c_str(), 1);
+    for (const char* each : {"kits", "models"}) std::filesystem::create_directory(odd / each);
+    std::filesystem::copy(odd / "mine.model", odd / "models" / "general.model");
+    for (const char* each : {"auto", "learned", "arbitrated:q=1e8"})
+        EXPECT_NO_THROW(app::check_specification(each)) << each;
+    unsetenv("MUSICWORLD_ASSETS");
 }
 
 TEST(Predictors, LearnedFollowsTheShaftThatItIsTold) {

@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "sticks/predictors.h"
+#include "temporary_folder.h"
 
 namespace {
 
@@ -90,6 +91,24 @@ TEST(StickFilters, BegunAnewTheyAreAsInTheBeginning) {
         EXPECT_EQ(difference(first.sound.after(0.05), second.sound.after(0.05)), 0) << sound;
         EXPECT_EQ(difference(first.picture.after(0.05), second.picture.after(0.05)), 0) << sound;
     }
+}
+
+TEST(StickFilters, AModelsFileIsReadOnce) {
+    const TemporaryFolder folder;
+    const std::filesystem::path file = folder.path() / "mine.model";
+    std::filesystem::copy(*app::model_file("learned"), file);
+    app::StickFilters filters(
+        app::stick_predictors("auto:model=" + file.string(), "learned:model=" + file.string(), kSoundLeadS),
+        "left");
+    std::filesystem::remove(file);
+    tracking::StickState first, second;
+    for (tracking::StickState* state : {&first, &second}) {  // laps of a repeated trace
+        for (const PoseSample& sample : waving()) (void)filters.correct(sample, *state);
+        filters.begin_anew();
+    }
+    EXPECT_EQ(second.starts, 2u);
+    EXPECT_EQ(difference(first.sound.after(0.05), second.sound.after(0.05)), 0);
+    EXPECT_EQ(difference(first.picture.after(0.05), second.picture.after(0.05)), 0);
 }
 
 TEST(StickFilters, AFailedExternalPredictorIsThrown) {

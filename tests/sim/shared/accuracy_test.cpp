@@ -203,21 +203,26 @@ TEST(Accuracy, WhatIsAskedForChoosesAndTighterAskingNeverCostsLess) {
     EXPECT_GE(modes, 75);
 }
 
-TEST(Accuracy, ItChangesNeitherNamedNorFixedBodiesNorAStepThatIsKept) {
+TEST(Accuracy, ItChangesNeitherNamedNorFixedNorPrescribedBodiesNorAStepThatIsKept) {
     WorldScene scene = scene_of(falling(Vector3d::Constant(0.5), 1, {2e5, 0.3, 300}, 1), 1.0 / 60);
     scene.world.bodies[0].fidelity.fidelity = Fidelity::linear;
     scene.world.bodies.push_back(world_test::box({3, 1, 0}, {0.5, 0.5, 0.5}));
-    scene.world.bodies.back().fixed = true;
     scene.world.bodies.back().fidelity.fidelity = Fidelity::automatic;
+    scene.world.bodies.push_back(scene.world.bodies.back());
+    scene.world.bodies[1].fixed = true;
+    // It pushes the ball from below: pressed on, but no force moves or bends it.
+    scene.world.bodies[2].motion = {{0, {0, -1, 0}}, {0.2, {0, 0.2, 0}}};
     const AccuracyReport report =
         keep_accuracy(scene, {.accuracy = 0.01, .steps = 12, .until_rest = false, .keep_step = true});
     EXPECT_EQ(scene.world.bodies[0].fidelity.fidelity, Fidelity::linear);
     EXPECT_EQ(scene.world.bodies[0].triangles, 360);
     EXPECT_EQ(scene.world.bodies[1].fidelity.fidelity, Fidelity::automatic);
+    EXPECT_EQ(scene.world.bodies[2].fidelity.fidelity, Fidelity::automatic);
     EXPECT_EQ(report.step_parts, 1);
     EXPECT_EQ(scene.world.settings.dt, 1.0 / 60);
     EXPECT_GT(report.bodies[0].truncation, 0.01) << "a linear body cannot show this contact";
     EXPECT_EQ(report.bodies[1].total(), 0);
+    EXPECT_LT(report.bodies[2].total(), 1e-6) << "its path is given: paths are kept as floats";
 }
 
 TEST(Accuracy, EventsKeepTheirTimeWhereStepsAreDivided) {

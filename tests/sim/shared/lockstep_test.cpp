@@ -5,23 +5,6 @@
 using namespace world_test;
 using Failure = sim::SimulatedProcessors::Failure;
 
-namespace {
-
-sim::DistributedSettings lockstep(std::uint64_t steps) {
-    sim::DistributedSettings settings;
-    settings.steps = steps;
-    return settings;
-}
-
-sim::SimulatedProcessors processors(int count) {
-    sim::SimulatedProcessors how;
-    how.count = count;
-    how.modelled = true;
-    return how;
-}
-
-}  // namespace
-
 TEST(Lockstep, EveryStepHasTheHashOfOneProcessWith1To7Workers) {
     const sim::WorldScene scene = busy_scene();
     const std::vector<std::uint64_t> expected = hashes_alone(scene, 120);

@@ -37,24 +37,15 @@ sim::WorldScene scheduled() {
     return scene;
 }
 
-sim::SimulatedProcessors processors(int count) {
-    sim::SimulatedProcessors how;
-    how.count = count;
-    how.modelled = true;
-    return how;
-}
-
 }  // namespace
 
 TEST(Schedule, EveryStepOfWorkersInLockstepHasTheHashOfOneProcess) {
     const sim::WorldScene scene = scheduled();
     const std::vector<std::uint64_t> expected = hashes_alone(scene, 110);
     for (const int workers : {1, 2, 3, 7}) {
-        sim::DistributedSettings settings;
-        settings.steps = 110;
         Record record;
         const sim::DistributedResult result =
-            sim::simulate_processors(scene, settings, processors(workers), record);
+            sim::simulate_processors(scene, lockstep(110), processors(workers), record);
         EXPECT_EQ(record.hashes, expected) << workers;
         EXPECT_EQ(result.refused_messages, 0u) << record.notes;
     }
@@ -78,8 +69,8 @@ TEST(Schedule, BoundedWorkersGiveEveryForceOnce) {
         all.z() += 3;
     }
     for (const int bound : {0, 4}) {
-        sim::DistributedSettings settings;
-        settings.pace = sim::Pace::bounded, settings.bound = bound, settings.steps = 90;
+        sim::DistributedSettings settings = lockstep(90);
+        settings.pace = sim::Pace::bounded, settings.bound = bound;
         struct : Record {
             Eigen::Vector3d momentum;
             void at(std::uint64_t step, const sim::World& world) override {
@@ -104,8 +95,8 @@ TEST(Schedule, ARunUntilRestWaitsForWhatIsToCome) {
     far.motion = {{0, {20, 0.5, 0}}, {5, {20, 0.5, 0}}, {6, {30, 0.5, 0}}};
     for (const bool driven : {false, true}) {
         if (driven) scene.world.bodies.push_back(far);
-        sim::DistributedSettings settings;
-        settings.steps = 2000, settings.until_rest = true;
+        sim::DistributedSettings settings = lockstep(2000);
+        settings.until_rest = true;
         Record record;
         const sim::DistributedResult result = sim::run_alone(scene, settings, record);
         EXPECT_TRUE(result.rest_reached);

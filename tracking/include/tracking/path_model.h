@@ -15,10 +15,20 @@ using Provenance = std::vector<std::pair<std::string, std::string>>;
 
 /// A network that says where a stick goes, from its last 0.25 s: predictor `learned`.
 ///
-///   x  inputs (StickHistory), h1 = f(W1 x + b1), h2 = f(W2 h1 + b2), y = W3 h2 + b3, f(z) = max(z, z / 10)
+///   x  88 inputs, h1 = f(W1 x + b1), h2 = f(W2 h1 + b2), y = W3 h2 + b3 65 outputs, f(z) = max(z, z / 10)
 ///
-/// Plain numbers; what they mean is said where they are used. A model of other sizes does not exist: the
-/// reader refuses it.
+/// Vectors are in axes that turn with the motion: forward (horizontal, along the principal direction of the recent
+/// motion, towards where the shaft points), up, across; lengths and speeds are over the RMS speed v of the last
+/// 0.25 s [m/s], so that outputs of length are in s.
+///
+///   x  13 mean velocities of the tracked point between ages up to 0.25 s, over v; 13 of a point 0.4 m along the
+///      shaft relative to it; the shaft's direction; 1 if that is known; log(v / 1.5 m/s); the newest four periods
+///      between samples [1/60 s]; the part of the 0.25 s that samples cover              (StickHistory)
+///   y  for each of the leads 1/60, 1/30, 1/15, 1/10 and 0.15 s: what is added to the position and to 0.4 m of the
+///      shaft's direction after velocities that fade at 8 /s, over v [s]; then for each lead the seven numbers of
+///      the errors' distribution                                           (kPathLeads, ErrorShape)
+///
+/// A model of other sizes does not exist: the reader refuses it.
 struct PathModel {
     /// Counted up with each change of the inputs, of the outputs or of the file.
     static constexpr int kVersion = 1;

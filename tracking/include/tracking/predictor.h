@@ -11,6 +11,8 @@
 
 namespace tracking {
 
+struct PathModel;
+
 /// Covariance of the errors of a prediction as the estimator itself states it. World frame.
 struct PoseCovariance {
     Eigen::Matrix3d position = Eigen::Matrix3d::Zero();  ///< [m^2]
@@ -94,22 +96,26 @@ inline constexpr double kGapS = 0.1;
 ///   bank:cv=1e7,ca=3e8,alpha=30,singer=1e11,lead=0.0667   the model that was right a lead ago (3.28);
 ///                           score=likelihood: most likely (3.27) instead of nearest
 ///   imm:alpha=200,q1=1e9,q2=3e10,q3=1e12,rate=10             interacting Singer models, switching at `rate`
-///   learned:model=FILE      a network (path_model.h) from the last 0.25 s: position, shaft, its own uncertainty
-///   arbitrated:model=FILE,q=1e7,decay=8,r=0.5,gate=5      `cv` and that network, weighed by the errors that they
-///                           turned out to make; its turning lasts
+///   learned                 a network, `model`, from the last 0.25 s: position, shaft, its own uncertainty
+///   arbitrated:q=1e7,decay=8,r=0.5,gate=5                    `cv` and that network, weighed by the errors that
+///                           they turned out to make; its turning lasts
 ///
 /// The numbers shown are the defaults. Orientation is filtered by the same model about its own quaternion.
 /// thesis, cv, ca, singer, bank and imm also take: `r=0.25`, the sensor's noise; `p0=10`, `v0=1000`,
 /// `a0=1e4`, standard deviations of the start; `gate=G`: samples beyond G standard deviations that a stick
 /// cannot have made (25 m/s, 3000 m/s^2, contacts excepted) are outliers. thesis, cv, ca and singer take
 /// `steady=HZ`: the steady gain of that rate. `shaft`, a unit vector from hand to tip in the tracked body's frame,
-/// is what learned and arbitrated follow. Throws std::invalid_argument with one line (found, expected) for an
-/// unknown name, key or value, TraceError for a file that is no model.
+/// is what learned and arbitrated follow; predictors share `model`, which nothing changes. Throws
+/// std::invalid_argument with one line (found, expected) for an unknown name, key or value, and where there is
+/// no model for what needs one.
 [[nodiscard]] std::unique_ptr<Predictor> make_predictor(
-    const std::string& specification, const Eigen::Vector3d& shaft = -Eigen::Vector3d::UnitZ());
+    const std::string& specification, const Eigen::Vector3d& shaft = -Eigen::Vector3d::UnitZ(),
+    std::shared_ptr<const PathModel> model = {});
 
-/// The names make_predictor knows that need no model, in the order of the documentation.
+/// The names make_predictor knows that need no model, and those that need one, in the order of the
+/// documentation.
 [[nodiscard]] const std::vector<std::string>& predictor_names();
+[[nodiscard]] const std::vector<std::string>& model_predictor_names();
 
 /// Position and velocity of a point fixed in the tracked body. `point_body` [m].
 struct PointMotion {
