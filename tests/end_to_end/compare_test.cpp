@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "program.h"
 
@@ -67,6 +70,64 @@ TEST(Compare, WhatPredictWroteScoresAsThePredictorItself) {
     EXPECT_EQ(rows, 2);                             // two sticks of one trace at one lead
     EXPECT_NEAR(rms["mine"], rms["thesis"], 1e-6);  // t + lead is rounded where it is written
     EXPECT_NEAR(tip["mine"], tip["thesis"], 1e-6);
+}
+
+TEST(Compare, AnExperimentRepeatsItFromAnywhereAndRefusesOtherBytes) {
+    const Folder folder;
+    const std::string trace = (folder / "mine.csv").string();
+    fs::copy_file(bundled("traces/roll.csv"), trace);
+    const auto compare = [&](std::vector<std::string> arguments, const std::string& out) {
+        arguments.insert(arguments.begin(), "compare");
+        arguments.insert(arguments.end(), {"--out", (folder / out).string()});
+        return run(arguments);
+    };
+    const std::string samples = (folder / "samples.csv").string();
+    const Ended first =
+        compare({"flourish", trace, "--predictors", "cv:decay=8,learned", "--no-cost", "--leads", "1/30",
+                 "--tune", "feints", "roll", "--rate", "60", "--plane", "contact+0.02", "--samples", samples},
+                "a");
+    ASSERT_EQ(first.status, 0) << first.err;
+    const std::string experiment = (folder / "a" / "experiment.toml").string();
+    const Ended second = compare({"--experiment", experiment}, "b");
+    ASSERT_EQ(second.status, 0) << second.err;
+    EXPECT_EQ(second.out, first.out);
+    EXPECT_EQ(read_tree(folder / "a", {}), read_tree(folder / "b", {}));
+
+    // Of what it says of itself.
+    const auto json = nlohmann::json::parse(read(folder / "a" / "compare.json"));
+    std::set<std::string> inputs;
+    for (const auto& input : json["inputs"]) inputs.insert(fs::path(input["file"]).filename());
+    EXPECT_EQ(inputs,
+              (std::set<std::string>{"general.model", "mine.csv", "flourish.csv", "feints.csv", "roll.csv"}));
+    std::map<std::string, std::pair<double, int>> squares;
+    for (const auto& row : read_csv(samples)) {
+        auto& [sum, count] = squares[row.at("trace") + row.at("stick") + row.at("predictor")];
+        sum += std::pow(std::stod(row.at("error_mm")), 2), ++count;
+        EXPECT_NEAR(
+            std::hypot(std::stod(row.at("ex_mm")), std::stod(row.at("ey_mm")), std::stod(row.at("ez_mm"))),
+            std::stod(row.at("error_mm")), 2e-4)
+            << "four digits";
+    }
+    for (const auto& row : json["results"]) {
+        const auto& [sum, count] =
+            squares.at(row["trace"].get<std::string>() + row["stick"].get<std::string>() +
+                       row["predictor"].get<std::string>());
+        EXPECT_EQ(count, row["predictions"]);
+        EXPECT_NEAR(std::sqrt(sum / count), row["rms_mm"], 1e-4) << row;
+    }
+    int svg = 0, png = 0;
+    for (const auto& figure : fs::directory_iterator(folder / "a" / "figures")) {
+        svg += figure.path().extension() == ".svg";
+        png += figure.path().extension() == ".png" && fs::file_size(figure) > 1000;
+    }
+    EXPECT_GT(svg, 4);
+    EXPECT_EQ(svg, png);
+
+    expect_refused(compare({"--experiment", experiment, "--no-tuning"}, "c"), "--no-tuning");
+    expect_refused(compare({}, "c"), "TRACE");
+    std::ofstream(trace, std::ios::app) << "\n";
+    expect_refused(compare({"--experiment", experiment}, "c"), "mine.csv with other bytes");
+    expect_refused(compare({"--experiment", trace}, "c"), "mine.csv:");
 }
 
 TEST(Compare, BadUsageIsOneLineAndLeavesNothing) {

@@ -13,6 +13,7 @@
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 extern char** environ;
 
@@ -127,8 +128,16 @@ std::vector<std::map<std::string, std::string>> read_csv(const fs::path& file) {
     std::istringstream lines(read(file));
     const auto fields = [](const std::string& line) {
         std::vector<std::string> result;
-        std::istringstream stream(line);
-        for (std::string field; std::getline(stream, field, ',');) result.push_back(field);
+        std::string field;
+        bool quoted = false;
+        for (const char c : line + ",") {
+            if (c == '"')
+                quoted = !quoted;
+            else if (c == ',' && !quoted)
+                result.push_back(std::exchange(field, ""));
+            else
+                field += c;
+        }
         return result;
     };
     std::string line;

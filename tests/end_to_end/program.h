@@ -54,7 +54,7 @@ void write(const std::filesystem::path& file, const std::string& text);
 std::map<std::string, std::string> read_tree(const std::filesystem::path& folder,
                                              const std::vector<std::string>& except);
 
-/// Rows of a CSV file by column name (no quoting).
+/// Rows of a CSV file by column name (no quotes within quotes).
 std::vector<std::map<std::string, std::string>> read_csv(const std::filesystem::path& file);
 /// Interleaved samples of a WAV file.
 std::vector<int> read_wav(const std::filesystem::path& file, int& channels);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace app {
 
 Command::Command(CLI::App& app)
@@ -53,6 +55,30 @@ CLI::Option* Command::flag(const std::string& name, bool& target, const std::str
         if (option->count() > 0 && option->as<bool>()) target = value;
     });
     return option;
+}
+
+std::vector<std::string> Command::given_but(const std::vector<std::string>& names) const {
+    std::vector<std::string> arguments, options;
+    for (const CLI::Option* option :
+         app_->get_options([](const CLI::Option* each) { return each->count() > 0; })) {
+        const std::vector<std::string>& words = option->results();
+        if (!option->nonpositional()) {
+            arguments.insert(arguments.end(), words.begin(), words.end());
+            continue;
+        }
+        const std::string name = "--" + option->get_lnames().front();
+        if (std::ranges::count(names, name) > 0) continue;
+        if (option->get_items_expected_max() == 0) {  // a flag
+            options.push_back(name);
+        } else if (words.size() == 1) {
+            options.push_back(name + "=" + words.front());
+        } else {
+            options.push_back(name);
+            options.insert(options.end(), words.begin(), words.end());
+        }
+    }
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return arguments;
 }
 
 }  // namespace app

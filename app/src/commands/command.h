@@ -75,6 +75,10 @@ public:
     /// A switch that sets `target` to `value`.
     CLI::Option* flag(const std::string& name, bool& target, const std::string& help, bool value = true);
 
+    /// The words that were given, so that they mean the same again: arguments, then options in the order of their
+    /// declaration, but those of these names.
+    [[nodiscard]] std::vector<std::string> given_but(const std::vector<std::string>& names) const;
+
 private:
     struct Declared {
         std::string placeholder, range, otherwise;

@@ -10,6 +10,8 @@
 #include <tuple>
 
 #include "compare/entrants.h"
+#include "compare/experiment.h"
+#include "compare/sample_errors.h"
 #include "files/bad_input.h"
 #include "process/parallel.h"
 #include "sticks/predictors.h"
@@ -84,6 +86,7 @@ std::vector<Runner> runners_of(const TuningTable& table, const MapField& field, 
 
 void add_cells(std::vector<MapCell>& cells, const std::vector<Runner>& runners,
                const tracking::SensorModel& sensor, double lead_s) {
+    const auto estimators = static_cast<std::size_t>(std::ranges::count(runners, false, &Runner::baseline));
     const Runner* baseline = nullptr;
     for (const Runner& runner : runners)
         if (runner.baseline && (baseline == nullptr || runner.pooled.rms() < baseline->pooled.rms()))
@@ -100,7 +103,7 @@ void add_cells(std::vector<MapCell>& cells, const std::vector<Runner>& runners,
                        lead_s,
                        runner.pooled.rms(),
                        baseline->pooled.rms(),
-                       paired_difference(pairs, sensor.seed, kFewestRecordings),
+                       paired_difference(pairs, sensor.seed, kFewestRecordings, estimators),
                        {}};
         cells.push_back(std::move(cell));
     }
@@ -243,12 +246,18 @@ double nanoseconds_per_sample(const std::string& specification, const SensedStic
 /// The rows of one entrant on one stick, a lead each; those without predictions have no `used`. `losses`: of
 /// an entrant that learns an advance.
 std::vector<ComparisonRow> rows_of(const Entrant& entrant, const Field& field, const SensedStick& stick,
-                                   const AdvanceLosses* losses, const ComparisonOptions& options) {
+                                   const AdvanceLosses* losses, const ComparisonOptions& options,
+                                   SampleRows* samples) {
     const Recording& recording = field.recordings[stick.recording];
     std::vector<ComparisonRow> rows(stick.leads_s.size());
     for (const std::vector<std::size_t>& pass : passes_of(entrant, stick.recording)) {
         const auto predictor = make_entrant(entrant, stick, pass.front(), stick.leads_s);
-        const std::vector<LeadScore> scores = score_predictor(stick, *predictor);
+        SeePrediction see;
+        if (samples != nullptr)
+            see = [&](std::size_t sample, std::size_t lead, const auto& predicted, const auto& covariance) {
+                if (std::ranges::count(pass, lead) > 0) samples->add(sample, lead, predicted, covariance);
+            };
+        const std::vector<LeadScore> scores = score_predictor(stick, *predictor, see);
         for (const std::size_t lead : pass) {
             ComparisonRow& row = rows[lead];
             row.trace = recording.trace.file;
@@ -364,12 +373,20 @@ std::vector<ComparisonRow> score_entrants(const Field& field, const Field& tunin
         (!tuning.recordings.empty() || field.recordings.size() > 1))
         losses.emplace(others, *learner, options);
     std::vector<std::vector<ComparisonRow>> parts(field.sticks.size() * entrants.size());
+    std::optional<OrderedFile> file;
+    if (options.samples) file.emplace(*options.samples, SampleRows::header());
     const auto score = [&](std::size_t i) {
         const auto entrant = entrants.begin() + static_cast<std::ptrdiff_t>(i % entrants.size());
-        parts[i] = rows_of(*entrant, field, field.sticks[i / entrants.size()],
-                           entrant == learner && losses ? &*losses : nullptr, options);
+        const SensedStick& stick = field.sticks[i / entrants.size()];
+        const Recording& recording = field.recordings[stick.recording];
+        std::optional<SampleRows> samples;
+        if (file) samples.emplace(stick, recording.trace.file, recording.person, entrant->name);
+        parts[i] = rows_of(*entrant, field, stick, entrant == learner && losses ? &*losses : nullptr, options,
+                           samples ? &*samples : nullptr);
+        if (file) file->add(i, samples->take());
     };
     parallel_for(parts.size(), options.threads, score, options.progress);
+    if (file) file->finish();
     std::vector<ComparisonRow> rows;
     for (std::size_t i = 0; i < parts.size(); ++i) {
         std::erase_if(parts[i], [](const ComparisonRow& row) { return row.used.empty(); });
@@ -497,11 +514,11 @@ std::vector<PairedResult> pair_with_baselines(const Comparison& comparison,
             }
             if (result.baseline.empty()) continue;
             const StickRows& base = rows[{result.baseline, lead_s}];
-            result.by_recording =
-                paired_difference(paired_sums(own, base, &ComparisonRow::trace), seed, kFewestRecordings);
+            result.by_recording = paired_difference(paired_sums(own, base, &ComparisonRow::trace), seed,
+                                                    kFewestRecordings, comparison.estimators);
             result.rms_mm = result.baseline_rms_mm + result.by_recording.difference_mm;
             if (const auto persons = paired_sums(own, base, &ComparisonRow::person); persons.size() >= 2)
-                result.by_person = paired_difference(persons, seed);
+                result.by_person = paired_difference(persons, seed, 2, comparison.estimators);
             results.push_back(std::move(result));
         }
     return results;
@@ -545,6 +562,7 @@ std::vector<MapCell> best_cells(const std::vector<MapCell>& map) {
 Comparison compare(const ComparisonOptions& options) {
     Comparison comparison;
     comparison.options = options;
+    comparison.inputs = inputs_of(options);
     const Field field = read_scored(options);
     for (const Recording& recording : field.recordings)
         if (std::ranges::find(comparison.persons, recording.person) == comparison.persons.end())
@@ -554,6 +572,8 @@ Comparison compare(const ComparisonOptions& options) {
                        : Field();
     const EntrantList list = enter(options, field, tuning);
     comparison.tuned_on = list.tuned_on;
+    comparison.estimators =
+        static_cast<std::size_t>(std::ranges::count(list.entrants, false, &Entrant::baseline));
     comparison.rows = score_entrants(field, tuning, list.entrants, options);
     for (const Entrant& entrant : list.entrants) {
         comparison.predictors.emplace_back(entrant.name, entrant.description);

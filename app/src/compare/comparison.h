@@ -43,7 +43,8 @@ struct ComparisonSummary : PredictorScore {
     std::optional<std::pair<double, double>> advance_s;  ///< least and most that was learned; none if not
 };
 
-/// An estimator against the best baseline at a lead.
+/// An estimator against the best baseline at a lead. The intervals of all estimators at a lead hold at 95 % at once
+/// (Bonferroni), so that they hold for the one that is picked among them.
 ///
 /// Baselines are hold, naive, difference and least-squares (the parabola), as named and tuned on the same
 /// split as the estimator. The best one is that of least RMS on the recordings scored: the choice favours the
@@ -84,8 +85,14 @@ struct MapCell {
     PairedResult result;
 };
 
+/// A file that was read.
+struct InputFile {
+    std::string file, sha256;
+};
+
 /// What to compare, and how it is sensed.
 struct ComparisonOptions {
+    std::vector<std::string> arguments;  ///< of the command that asks, for the record
     std::vector<std::string> traces, predictors, tune_traces;
     std::vector<std::pair<std::string, std::string>> predictions;  ///< name, file in `predict`'s format
     PersonNames persons;
@@ -94,6 +101,7 @@ struct ComparisonOptions {
     StrikeSurface surface;
     std::string surface_text;  ///< as given
     bool tuning = true, cost = true, map = false;
+    std::optional<std::string> samples;  ///< file for every single error (SampleRows)
     unsigned threads = 1;
     std::function<void(double)> progress;  ///< share of the work done; may be empty
 };
@@ -108,7 +116,9 @@ struct Comparison {
     std::vector<LeadCurve> curves;
     StickFigure figure;
     std::vector<MapCell> map;
-    std::string tuned_on;  ///< one sentence
+    std::string tuned_on;        ///< one sentence
+    std::size_t estimators = 0;  ///< entrants that are no baselines: intervals hold for all of them at once
+    std::vector<InputFile> inputs;
 };
 
 /// Compares. A pure function of the files and options but for ns_per_sample and `exec:` predictors with a

@@ -176,9 +176,8 @@ std::string heading(const Comparison& c) {
     return text +
            "<p class=note>Samples are taken at uniform times by linear interpolation, with noise; truth "
            "likewise at t + lead from the noiseless recording. The first 0.5 s and gaps are left out. "
-           "Intervals are 95 %, by bootstrap over recordings or persons; n is their number. NAME* runs the "
-           "parameters that erred least on other recordings, NAME** on recordings of other persons. The best "
-           "baseline is chosen on the scored recordings themselves, which favours it.</p>\n";
+           "Intervals are by bootstrap over recordings or persons; n is their number. NAME* runs the "
+           "parameters that erred least on other recordings, NAME** on recordings of other persons.</p>\n";
 }
 
 /// The predictors whose strikes are shown as histograms: of each lead the best F1, then auto, thesis and
@@ -309,13 +308,13 @@ std::string sections(const Comparison& c, PlotGallery& plots) {
                     "Share of position errors inside the regions that a predictor states, and the mean "
                     "negative log likelihood (nats, metres).",
                     by_lead(c, calibration_table));
-    text +=
-        section("Where filters pay",
-                "Estimators and baselines tuned alike for each sensor, on other recordings; position only, "
-                "true time stamps. A cell: the estimator that errs least there and by how much less than the "
-                "best baseline, with the 95 % interval by recording (of the gain in RMS error). The best is "
-                "picked on the scored recordings; the intervals do not correct for that.",
-                map_section(c));
+    text += section(
+        "Where filters pay",
+        "Estimators and baselines tuned alike for each sensor, on other recordings; position only, "
+        "true time stamps. A cell: the estimator that errs least there and by how much less than the "
+        "best baseline, with the interval by recording (of the gain in RMS error), which holds at 95 % "
+        "for all estimators of a cell at once.",
+        map_section(c));
     return text + section("Predictors", "Parameters in mm and s.", predictor_table(c).html());
 }
 
@@ -327,9 +326,12 @@ std::string map_grids(const Comparison& comparison) {
     return text;
 }
 
-std::string format_comparison_report(const Comparison& comparison, const std::filesystem::path& scratch) {
+std::string format_comparison_report(const Comparison& comparison, const std::filesystem::path& scratch,
+                                     const std::filesystem::path& figures) {
     PlotGallery plots;
     const std::string body = heading(comparison) + plots.symbols() + sections(comparison, plots);
+    std::filesystem::create_directory(figures);
+    plots.write_files(figures, scratch);
     return report_page(kTitle, plots.drawn(body, scratch));
 }
 

@@ -111,6 +111,54 @@ Figures figures_of(const MapCell& cell) {
            figures_of(cell.result);
 }
 
+/// What the columns of readers' tables mean, by their names as results have them.
+constexpr std::pair<std::string_view, const char*> kMeanings[] = {
+    {"rms_mm", "root of the mean squared error of the tracked point"},
+    {"p95_mm", "95 % of the errors are below"},
+    {"free_rms_mm", "RMS where the truth is not within 50 ms of an impact or a flagged time"},
+    {"unflagged_rms_mm", "RMS not within 50 ms of a flagged time"},
+    {"tip_rms_mm", "RMS at the stick's tip: of position and orientation"},
+    {"rotation_rms_deg", "RMS angle between predicted and true orientation, degrees"},
+    {"ns_per_sample", "time that a sample and its predictions take, nanoseconds"},
+    {"hits/true", "contacts of the recorded path"},
+    {"hits/predicted", "strikes that were fixed and not cancelled"},
+    {"hits/matched", "of these, within 30 ms of a contact of their own"},
+    {"hits/precision", "matched / predicted"},
+    {"hits/recall", "matched / true"},
+    {"hits/f1", "2 matched / (true + predicted)"},
+    {"hits/median_ms", "half of the matched strikes err by less, in time"},
+    {"hits/p95_ms", "95 % of them do"},
+    {"hits/false_per_min", "predicted and not matched, a minute"},
+    {"hits/false_per_min_without_cancel", "likewise if nothing were cancelled"},
+    {"hits/advance_low_ms", "contacts were taken to come earlier by this, at least"},
+    {"hits/advance_high_ms", "and at most"},
+    {"calibration/count", "predictions with a stated covariance"},
+    {"calibration/inside_50", "share of the errors within the region stated to hold 50 %"},
+    {"calibration/inside_95", "likewise 95 %"},
+    {"calibration/negative_log_likelihood", "of the errors, mean, nats with metres: less is better"},
+    {"by_recording/verdict", "RMS against the baseline's; the interval is of resampled recordings"},
+    {"by_person/verdict", "likewise of resampled persons"},
+    {"by_recording/difference_mm", "RMS - the baseline's, and its interval, low to high"},
+    {"jitter_ms", "standard deviation of the sampling times"},
+    {"drop_out", "share of the samples lost"}};
+
+/// Of those columns that stand in any of the tables.
+std::string legend_of(const std::vector<Table>& tables, bool tuned) {
+    Table legend = Table::of({"name", "meaning"});
+    for (const auto& [name, meaning] : kMeanings)
+        for (const Table& table : tables)
+            if (const auto column = std::ranges::find(table.columns, name, &Column::name);
+                column != table.columns.end()) {
+                legend.add(
+                    {table.headings()[static_cast<std::size_t>(column - table.columns.begin())], meaning});
+                break;
+            }
+    if (!tuned) return legend.text();
+    legend.add({"NAME*", "parameters that erred least on other recordings"});
+    legend.add({"NAME**", "likewise on recordings of other persons"});
+    return legend.text();
+}
+
 /// A row for each result.
 template <class Result>
 Table table_of(const std::vector<Result>& results) {
@@ -126,6 +174,21 @@ Table table_at(const std::vector<Result>& results, double lead_s) {
     for (const Result& result : results)
         if (result.lead_s == lead_s) table.add_figures(figures_of(result));
     return table;
+}
+
+/// Those of `cells` that `figures` have take their place; the others, but by person, come behind.
+Figures with_map_cell(Figures figures, const Figures& cells, bool empty) {
+    const std::size_t own = figures.size();
+    for (Figure cell : cells) {
+        const auto end = figures.begin() + static_cast<std::ptrdiff_t>(own);
+        const auto same = std::find_if(figures.begin(), end,
+                                       [&](const Figure& figure) { return figure.column == cell.column; });
+        if (same != end && !empty) same->cell = cell.cell;
+        if (same != end || cell.column.starts_with("by_person/")) continue;
+        if (empty) cell.cell = Cell();
+        figures.push_back(std::move(cell));
+    }
+    return figures;
 }
 
 Json summary_json(const Comparison& comparison) {
@@ -162,6 +225,7 @@ Json settings_of(const Comparison& comparison) {
             {"tune", o.tune_traces},
             {"tuned", comparison.tuned_on},
             {"surface", o.surface_text},
+            {"estimators", comparison.estimators},
             {"release_margin_s", kReleaseMarginS},
             {"protocol", kProtocol}};
 }
@@ -189,6 +253,20 @@ std::string strike_winner(const Comparison& comparison, double lead_s) {
 
 Table result_table(const Comparison& comparison) {
     return table_of(comparison.rows);
+}
+
+Table csv_table(const Comparison& comparison) {
+    if (comparison.map.empty()) return result_table(comparison);
+    const Figures map_columns = figures_of(MapCell());
+    Table table;
+    for (const ComparisonRow& row : comparison.rows)
+        table.add_figures(with_map_cell(figures_of(row), map_columns, true));
+    for (const MapCell& cell : comparison.map) {
+        Figures figures = figures_of(ComparisonRow());
+        for (Figure& figure : figures) figure.cell = Cell();
+        table.add_figures(with_map_cell(std::move(figures), figures_of(cell), false));
+    }
+    return table;
 }
 
 Table error_table(const Comparison& comparison, double lead_s) {
@@ -262,7 +340,7 @@ std::vector<std::string> winners(const Comparison& comparison) {
                                        best->predictor, best->error.position.rms());
         for (const PairedResult& paired : comparison.paired)
             if (paired.predictor == best->predictor && paired.lead_s == lead_s) {
-                text += fmt::format("; against the best baseline {} ({:.1f} mm): {}", paired.baseline,
+                text += fmt::format("; the best baseline, {}, {:.1f} mm. Against it: {}", paired.baseline,
                                     paired.baseline_rms_mm, verdict(paired.by_recording));
                 if (paired.by_person) text += fmt::format("; by person: {}", verdict(*paired.by_person));
             }
@@ -273,10 +351,13 @@ std::vector<std::string> winners(const Comparison& comparison) {
 }
 
 std::string selection_caution(const Comparison& comparison) {
-    return fmt::format(
-        "These are the best of {} entrants, picked on the very recordings that they are scored on: the "
-        "intervals do not correct for that choice.",
-        comparison.predictors.size());
+    const std::string all = comparison.estimators == 1
+                                ? "The interval holds at 95 %"
+                                : fmt::format(
+                                      "Intervals hold at 95 % for all {} estimators of a lead at once "
+                                      "(Bonferroni), so for the best of them, too",
+                                      comparison.estimators);
+    return all + "; the best baseline is picked on the very recordings that are scored, which favours it.";
 }
 
 std::string map_sentence(const Comparison& comparison, double lead_s) {
@@ -304,9 +385,20 @@ std::string map_sentence(const Comparison& comparison, double lead_s) {
 }
 
 std::string format_comparison_json(const Comparison& comparison) {
-    Json json = {{"settings", settings_of(comparison)}, {"results", result_table(comparison).json()},
-                 {"summary", summary_json(comparison)}, {"paired", table_of(comparison.paired).json()},
-                 {"winners", winners(comparison)},      {"winners_caution", selection_caution(comparison)}};
+    Json inputs = Json::array();
+    for (const auto& [file, sha256] : comparison.inputs)
+        inputs.push_back({{"file", file}, {"sha256", sha256}});
+    const std::uint64_t seed = comparison.options.sensor.seed;
+    Json json = {{"settings", settings_of(comparison)},
+                 {"results", result_table(comparison).json()},
+                 {"summary", summary_json(comparison)},
+                 {"paired", table_of(comparison.paired).json()},
+                 {"winners", winners(comparison)},
+                 {"winners_caution", selection_caution(comparison)},
+                 {"arguments", comparison.options.arguments},
+                 {"inputs", inputs},
+                 {"seeds", {{"sensor", seed}, {"intervals", seed}}},
+                 {"versions", {{"musicworld", MUSICWORLD_VERSION}}}};
     if (comparison.options.map) json["map"] = table_of(comparison.map).json();
     return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -314,20 +406,29 @@ std::string format_comparison_json(const Comparison& comparison) {
 std::string format_comparison_text(const Comparison& comparison) {
     std::string text = fmt::format("{} of {}; {}\n", counted(comparison.options.traces.size(), "recording"),
                                    counted(comparison.persons.size(), "person"), comparison.tuned_on);
+    std::vector<Table> shown;
+    const bool tuned = std::ranges::any_of(comparison.predictors,
+                                           [](const auto& named) { return named.first.ends_with('*'); });
     for (const double lead_s : comparison.options.leads_s) {
         text += fmt::format("\n{:.1f} ms ahead\n", 1e3 * lead_s);
-        for (const auto& table : {error_table, strike_table, calibration_table, paired_table})
-            if (const std::string rows = table(comparison, lead_s).text(); !rows.empty()) text += "\n" + rows;
+        for (const auto& table : {error_table, strike_table, calibration_table, paired_table}) {
+            Table rows = table(comparison, lead_s);
+            if (rows.rows.empty()) continue;
+            text += "\n" + rows.text();
+            shown.push_back(std::move(rows));
+        }
     }
-    if (!comparison.map.empty())
+    if (!comparison.map.empty()) {
+        shown.push_back(map_table(comparison));
         text +=
             "\nWhere filters pay, each sensor and lead: the best estimator against the best baseline, tuned "
             "alike\n\n" +
-            map_table(comparison).text();
+            shown.back().text();
+    }
+    text += "\n" + legend_of(shown, tuned) + "\n";
     for (const double lead_s : comparison.options.leads_s)
         if (const std::string sentence = map_sentence(comparison, lead_s); !sentence.empty())
             text += sentence + "\n";
-    text += '\n';
     for (const std::string& sentence : winners(comparison)) text += sentence + "\n";
     return text + selection_caution(comparison) + "\n";
 }

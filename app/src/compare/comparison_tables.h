@@ -11,8 +11,10 @@ namespace app {
 // Figures that do not exist (no orientation, no surface, no stated covariance, no cost measured, a ratio of
 // nothing) are none in every table.
 
-/// compare.csv and `results` of compare.json: by recording, stick, predictor and lead.
+/// `results` of compare.json: by recording, stick, predictor and lead.
 [[nodiscard]] Table result_table(const Comparison& comparison);
+/// compare.csv: the same, and with a map a row for each of its cells, which are of no trace.
+[[nodiscard]] Table csv_table(const Comparison& comparison);
 
 // Tables for readers, over all recordings; without rows where there is nothing to show.
 
@@ -29,8 +31,8 @@ namespace app {
 /// Each predictor: what it is and which parameters ran.
 [[nodiscard]] Table predictor_table(const Comparison& comparison);
 
-/// Text of compare.json: `settings`, `results`, `summary` (the same over all recordings), `paired`, `winners`
-/// and, with a map, `map`. Numbers read back to the same double.
+/// Text of compare.json: `settings`, `results`, `summary` (the same over all recordings), `paired`, `winners`,
+/// where it all comes from and, with a map, `map`. Numbers read back to the same double.
 [[nodiscard]] std::string format_comparison_json(const Comparison& comparison);
 
 /// The summaries of a lead with true strikes, the best F1 first.
@@ -41,7 +43,7 @@ namespace app {
 /// "33.3 ms ahead singer* errs least, ...; of 292 true strikes ca predicts most, ...", a sentence a lead.
 [[nodiscard]] std::vector<std::string> winners(const Comparison& comparison);
 
-/// A caution: the winners' intervals do not include among how many they were picked.
+/// What the intervals correct for, and what they do not.
 [[nodiscard]] std::string selection_caution(const Comparison& comparison);
 
 /// "66.7 ms ahead an estimator gains in 40 of 64 sensors, 3.1 % in the median (cv* 30, singer* 10)", of one
@@ -53,14 +55,16 @@ namespace app {
     return 100 * (1 - ratio);
 }
 
-/// What the command prints: the tables for readers at each lead, the map, the winners.
+/// What the command prints: the tables for readers at each lead, the map, a legend, the winners.
 [[nodiscard]] std::string format_comparison_text(const Comparison& comparison);
 
 /// Text of compare's report.html: which predictor wins, figures 3-1 to 3-3 of the thesis redone, error
 /// against lead and cost, strikes, calibration, paired differences, the map. One page that needs nothing
-/// beside it, in the style of play's report. Plots are drawn by gnuplot with temporary files in `scratch`.
+/// beside it, in the style of play's report. Plots are drawn by gnuplot with temporary files in `scratch`. `figures`:
+/// a folder that is made and gets each plot as SVG and PNG.
 [[nodiscard]] std::string format_comparison_report(const Comparison& comparison,
-                                                   const std::filesystem::path& scratch);
+                                                   const std::filesystem::path& scratch,
+                                                   const std::filesystem::path& figures);
 
 /// The map on one screen: a sentence a lead (in how many sensors which estimator gains), then a table a lead,
 /// sensors down (rate, jitter, drop-outs), noise across; a cell names the best estimator and its gain over

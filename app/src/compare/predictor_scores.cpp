@@ -200,15 +200,18 @@ void add(std::optional<Calibration>& sum, const std::optional<Calibration>& othe
     sum->singular += other->singular;
 }
 
-std::vector<LeadScore> score_predictor(const SensedStick& stick, tracking::Predictor& predictor) {
+std::vector<LeadScore> score_predictor(const SensedStick& stick, tracking::Predictor& predictor,
+                                       const SeePrediction& see) {
     std::vector<LeadScore> scores(stick.leads_s.size());
     for (std::size_t i = 0; i < stick.samples.size(); ++i) {
         const double behind_s = tracking::feed(predictor, stick.samples[i]);
         for (std::size_t lead = 0; lead < scores.size(); ++lead)
             if (const std::optional<Truth>& truth = stick.truth(i, lead)) {
                 const double ahead_s = stick.leads_s[lead] + behind_s;
-                scores[lead].add(predictor.predict(ahead_s), *truth, stick.tip,
-                                 predictor.covariance(ahead_s));
+                const tracking::PosePrediction predicted = predictor.predict(ahead_s);
+                const std::optional<tracking::PoseCovariance> covariance = predictor.covariance(ahead_s);
+                scores[lead].add(predicted, *truth, stick.tip, covariance);
+                if (see) see(i, lead, predicted, covariance);
             }
     }
     return scores;

@@ -3,6 +3,7 @@
 #include <tracking/trace.h>
 
 #include <Eigen/Core>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -52,10 +53,14 @@ struct LeadScore {
     [[nodiscard]] std::optional<Calibration> calibration() const;
 };
 
+/// Gets each prediction that is scored, by sample and lead.
+using SeePrediction = std::function<void(std::size_t, std::size_t, const tracking::PosePrediction&,
+                                         const std::optional<tracking::PoseCovariance>&)>;
+
 /// Errors of a predictor (fresh, fed here) at every lead of the stick, in one pass over its samples. A
-/// prediction is for sample time + lead also where the predictor ignored the sample.
-[[nodiscard]] std::vector<LeadScore> score_predictor(const SensedStick& stick,
-                                                     tracking::Predictor& predictor);
+/// prediction is for sample time + lead also where the predictor ignored the sample. `see` may be empty.
+[[nodiscard]] std::vector<LeadScore> score_predictor(const SensedStick& stick, tracking::Predictor& predictor,
+                                                     const SeePrediction& see = {});
 
 /// The position errors alone [mm], for tuning and maps: orientation is not scored, and filtered only where the
 /// positions depend on it.

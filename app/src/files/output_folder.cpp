@@ -52,13 +52,18 @@ bool is_frame_name(const std::string& name) {
     return digits != std::string::npos && digits >= 6 && name.substr(digits) == ".png";
 }
 
-/// finish() replaces `frames` as a whole, so it must hold nothing but pictures of a run.
-void check_frames(const fs::path& frames) {
+bool is_figure_name(const std::string& name) {
+    return name.find_first_not_of("0123456789") >= 2 && name.find('_') != std::string::npos &&
+           (name.ends_with(".svg") || name.ends_with(".png"));
+}
+
+/// finish() replaces `frames` and `figures` as a whole, so they must hold nothing but pictures of a run.
+void check_pictures(const fs::path& frames, bool (*is_name)(const std::string&)) {
     std::error_code error;
     if (!fs::is_directory(fs::symlink_status(frames, error))) return;
     for (fs::directory_iterator entry(frames, error), end; !error && entry != end; entry.increment(error)) {
         const std::string name = entry->path().filename().string();
-        if (!is_frame_name(name))
+        if (!is_name(name))
             throw BadInput(
                 fmt::format("{}: error: found {}, expected only pictures of an earlier run (they are "
                             "replaced); choose another --out or move the file away",
@@ -115,8 +120,9 @@ OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_v
             fmt::format("{}: error: found another run writing into it, expected one run a folder; "
                         "wait for it or choose another --out",
                         folder_.string()));
-    if (std::find(products_.begin(), products_.end(), "frames") != products_.end())
-        check_frames(folder_ / "frames");
+    for (const auto& [pictures, is_name] :
+         {std::pair("frames", &is_frame_name), {"figures", &is_figure_name}})
+        if (std::ranges::count(products_, pictures) > 0) check_pictures(folder_ / pictures, is_name);
     notice_ = std::make_unique<InterruptionNotice>(staging_);
     fs::remove_all(staging_, error);
     if (!error) fs::create_directory(staging_, error);

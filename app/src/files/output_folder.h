@@ -22,8 +22,8 @@ inline constexpr std::array<std::string_view, 16> kPlayProducts = {
 /// `simulate`: times.csv or, with workers, timing.csv and workers.svg.
 inline constexpr std::array<std::string_view, 7> kSimulateProducts = {
     "summary.json", "frames", "states.csv", "energy.csv", "times.csv", "timing.csv", "workers.svg"};
-inline constexpr std::array<std::string_view, 3> kCompareProducts = {"compare.json", "compare.csv",
-                                                                     "report.html"};
+inline constexpr std::array<std::string_view, 5> kCompareProducts = {
+    "compare.json", "compare.csv", "report.html", "experiment.toml", "figures"};
 inline constexpr std::array<std::string_view, 3> kModesProducts = {"modes.json", "modes.png", "frames"};
 
 /// The folder that a run writes its products into, all of them or none. They are staged in its hidden
@@ -34,7 +34,7 @@ class OutputFolder {
 public:
     /// Makes the folder (parents too) and an empty staging folder, removing one that an interrupted run left.
     /// Throws BadInput when that cannot be: a file is in the way, no permission, another run is writing
-    /// there, or `frames` holds files that no run wrote and finish() would delete.
+    /// there, or `frames` or `figures` hold files that no run wrote and finish() would delete.
     explicit OutputFolder(const std::filesystem::path& folder,
                           std::span<const std::string_view> products = kPlayProducts);
     /// Without finish(): removes what was staged, and the folder if this run made it and nothing else is in

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <iterator>
 #include <map>
 #include <stdexcept>
+#include <tuple>
 
 #include "files/bad_input.h"
 #include "files/output_folder.h"
@@ -99,8 +101,8 @@ std::vector<std::string> draw_svg(const std::vector<PlotScript>& scripts, const 
     std::string commands;
     for (std::size_t i = 0; i < scripts.size(); ++i)
         commands += fmt::format(
-            "reset\nset terminal svg size {},{} noenhanced font 'sans-serif,12'\nset output {}\n{}\n"
-            "set output\n",
+            "reset\nunset key\nset terminal svg size {},{} noenhanced font 'sans-serif,12'\nset output {}\n"
+            "{}\nset output\n",
             scripts[i].width, scripts[i].height, gnuplot_string(svg_file(i).string()), scripts[i].commands);
     const fs::path script = scratch / "plots.gp";
     write_file(script, commands);
@@ -140,13 +142,16 @@ void PlotPanel::add(std::string data, std::string_view style) {
     data_ += std::move(data) + "e\n";
 }
 
-std::string PlotPanel::text() const {
-    return clauses_.empty() ? "plot NaN\n" : "plot " + clauses_ + "\n" + data_;
+std::string PlotPanel::text(const std::vector<PlotLine>& key) const {
+    std::string clauses = clauses_.empty() ? "NaN" : clauses_;
+    for (const PlotLine& line : key)
+        clauses += fmt::format(", NaN {} title {}", style_of(line, 2), gnuplot_string(line.name));
+    return "plot " + clauses + "\n" + data_;
 }
 
 std::string plot_axes() {
     return fmt::format(
-        "unset key\nset border 3 lt 1 lw 1 lc {0}\nset tics nomirror out scale 0.6 textcolor {0}\n"
+        "set border 3 lt 1 lw 1 lc {0}\nset tics nomirror out scale 0.6 textcolor {0}\n"
         "set grid lt 1 lw 0.6 lc {1}\n",
         gnuplot_colour(colours::axis), gnuplot_colour(colours::grid));
 }
@@ -166,7 +171,9 @@ PlotScript plot_of(int width, int height, const PlotAxis& x, const PlotAxis& y, 
         commands += fmt::format("set {}range [{}:{}]\n", name, axis->low, axis->high);
         if (axis->tics > 0) commands += round_tics(name, axis->high - axis->low, axis->tics);
     }
-    return {width, height, commands.append(more) + panel.text(), std::move(legend)};
+    commands.append(more);
+    std::string plain = commands + panel.text(), keyed = commands + panel.text(legend);
+    return {width, height, std::move(plain), std::move(legend), std::move(keyed)};
 }
 
 Histogram histogram(std::span<const double> values, double bin) {
@@ -258,6 +265,34 @@ std::string PlotGallery::in_page(std::size_t number, std::string_view drawn) con
     // The definitions, left out, stood inside the canvas's group.
     return fmt::format("<svg role=\"img\" aria-label=\"{}\" {}>\n<g>\n{}", html(labels_[number]),
                        span_of(drawn, "viewBox=\"", "\""), svg);
+}
+
+void PlotGallery::write_files(const fs::path& folder, const fs::path& scratch) const {
+    constexpr int kTitleHeight = 30, kKeyRowHeight = 18, kKeyWidth = 170;
+    std::string commands;
+    for (std::size_t i = 0; i < plots_.size(); ++i) {
+        const PlotScript& plot = plots_[i];
+        std::string name = fmt::format("{:02}_{}", i + 1, labels_[i].substr(0, 60));
+        for (char& c : name)
+            if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '.') c = '_';
+        const int columns = std::max(1, plot.width / kKeyWidth),
+                  rows = (static_cast<int>(plot.legend.size()) + columns - 1) / columns;
+        for (const auto& [ending, terminal, size] :
+             {std::tuple("svg", "svg size {},{} noenhanced font 'sans-serif,12' background rgb 'white'", 1),
+              {"png",
+               "pngcairo size {},{} noenhanced font 'sans-serif,12' fontscale 2 linewidth 2 pointscale 2",
+               2}})
+            commands += fmt::format(
+                "reset\nset terminal {}\nset output {}\nset title {}\n"
+                "set key noautotitle outside bottom center horizontal maxrows {}\n{}\nset output\n",
+                fmt::format(fmt::runtime(terminal), size * plot.width,
+                            size * (plot.height + kTitleHeight + kKeyRowHeight * rows)),
+                gnuplot_string((folder / (name + "." + ending)).string()), gnuplot_string(labels_[i]),
+                std::max(1, rows), plot.keyed.empty() ? plot.commands : plot.keyed);
+    }
+    const fs::path script = scratch / "figures.gp";
+    write_file(script, commands);
+    run_gnuplot(script, scratch / "figures.log");
 }
 
 std::string PlotGallery::drawn(std::string page, const fs::path& scratch) const {

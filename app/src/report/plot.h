@@ -23,6 +23,7 @@ struct PlotScript {
     int width = 640, height = 240;  ///< SVG units
     std::string commands;
     std::vector<PlotLine> legend = {};
+    std::string keyed = {};  ///< the commands with the legend as a key, for a file of its own
 };
 
 /// Draws every script with one gnuplot process in the C locale and without the user's start-up files; returns
@@ -42,14 +43,14 @@ class PlotPanel {
 public:
     /// `data`: lines of numbers; empty data is left out. `style`: e.g. "with lines lc rgb '#ff0000'".
     void add(std::string data, std::string_view style);
-    /// The plot command; axes without data where nothing was added.
-    [[nodiscard]] std::string text() const;
+    /// The plot command; axes without data where nothing was added. `key`: lines that stand in the key.
+    [[nodiscard]] std::string text(const std::vector<PlotLine>& key = {}) const;
 
 private:
     std::string clauses_, data_;
 };
 
-/// Axes and grid as all plots have them, no key.
+/// Axes and grid as all plots have them.
 [[nodiscard]] std::string plot_axes();
 /// An axis: what is along it, its range, and about how many round tics it has; 0: gnuplot's own.
 struct PlotAxis {
@@ -128,6 +129,10 @@ public:
     [[nodiscard]] static std::string symbols() { return "<!--symbols-->"; }
     /// The page with its plots in their places. Throws as draw_svg() does.
     [[nodiscard]] std::string drawn(std::string page, const std::filesystem::path& scratch) const;
+
+    /// Writes each plot with its label and its legend, on white: 01_LABEL.svg and 01_LABEL.png, of twice the size,
+    /// and so on. Throws as draw_svg() does.
+    void write_files(const std::filesystem::path& folder, const std::filesystem::path& scratch) const;
 
 private:
     [[nodiscard]] std::string in_page(std::size_t number, std::string_view drawn) const;

@@ -25,20 +25,6 @@ std::string last_part(const std::string& name) {
     return name.substr(name.rfind('/') + 1);
 }
 
-/// What readers see above each column.
-std::vector<std::string> headings_of(const std::vector<Column>& columns) {
-    std::vector<std::string> headings;
-    for (const Column& column : columns) {
-        std::string name = last_part(column.name);
-        const auto same = [&](const Column& other) { return last_part(other.name) == name; };
-        if (std::ranges::count_if(columns, same) > 1) name = column.name;
-        std::ranges::replace(name, '/', ' ');
-        std::ranges::replace(name, '_', ' ');
-        headings.push_back(column.unit.empty() ? name : name + " " + column.unit);
-    }
-    return headings;
-}
-
 /// Characters of UTF-8.
 std::size_t width_of(std::string_view text) {
     return static_cast<std::size_t>(std::count_if(
@@ -152,9 +138,22 @@ Table Table::part(std::initializer_list<std::string_view> names) const {
     return part;
 }
 
+std::vector<std::string> Table::headings() const {
+    std::vector<std::string> headings;
+    for (const Column& column : columns) {
+        std::string name = last_part(column.name);
+        const auto same = [&](const Column& other) { return last_part(other.name) == name; };
+        if (std::ranges::count_if(columns, same) > 1) name = column.name;
+        std::ranges::replace(name, '/', ' ');
+        std::ranges::replace(name, '_', ' ');
+        headings.push_back(column.unit.empty() ? name : name + " " + column.unit);
+    }
+    return headings;
+}
+
 std::string Table::text() const {
     if (rows.empty()) return {};
-    std::vector<std::vector<std::string>> lines = {headings_of(columns)};
+    std::vector<std::vector<std::string>> lines = {headings()};
     for (const auto& row : rows) {
         std::vector<std::string>& line = lines.emplace_back();
         for (std::size_t i = 0; i < row.size(); ++i) line.push_back(row[i].shown(columns[i].format, "-"));
@@ -185,7 +184,7 @@ std::string Table::html() const {
     if (rows.empty()) return {};
     const auto kind = [&](std::size_t column) { return columns[column].format.empty() ? "" : " class=n"; };
     std::string text = "<div class=scroll><table class=wide><tr>";
-    const std::vector<std::string> headings = headings_of(columns);
+    const std::vector<std::string> headings = this->headings();
     for (std::size_t i = 0; i < columns.size(); ++i)
         text += fmt::format("<th{}>{}", kind(i), app::html(headings[i]));
     for (const auto& row : rows) {

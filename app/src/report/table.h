@@ -74,6 +74,8 @@ struct Table {
     /// These columns, without the rows in which all but the first of them is none.
     [[nodiscard]] Table part(std::initializer_list<std::string_view> names) const;
 
+    /// What readers see above each column.
+    [[nodiscard]] std::vector<std::string> headings() const;
     /// Aligned for a terminal, "-" for none; empty without rows.
     [[nodiscard]] std::string text() const;
     /// Header and rows (RFC 4180, but lines end with \n).

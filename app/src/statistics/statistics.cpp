@@ -24,7 +24,7 @@ double between(double low, double high, double fraction) {
     return low == high ? low : std::lerp(low, high, fraction);
 }
 
-constexpr std::size_t kResamples = 2000;
+constexpr std::size_t kResamples = 10000;
 
 double ratio_of(const PairedSums& sums) {
     const double a = sums.a.rms(), b = sums.b.rms();
@@ -61,8 +61,8 @@ double median(std::vector<double> values) {
     return quantile(std::move(values), 0.5);
 }
 
-PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint64_t seed,
-                                   std::size_t fewest) {
+PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint64_t seed, std::size_t fewest,
+                                   std::size_t together) {
     PairedDifference result;
     PairedSums whole;
     for (const PairedSums& group : groups) whole.add(group);
@@ -82,11 +82,11 @@ PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint
         ratios.push_back(ratio_of(drawn));
         differences.push_back(drawn.a.rms() - drawn.b.rms());
     }
-    constexpr double kLow = 0.025, kHigh = 0.975;  // of 95 %
-    result.low = quantile_in_place(ratios, kLow);
-    result.high = quantile_in_place(ratios, kHigh);
-    result.difference_low_mm = quantile_in_place(differences, kLow);
-    result.difference_high_mm = quantile_in_place(differences, kHigh);
+    const double below = 0.025 / static_cast<double>(std::max<std::size_t>(1, together));
+    result.low = quantile_in_place(ratios, below);
+    result.high = quantile_in_place(ratios, 1 - below);
+    result.difference_low_mm = quantile_in_place(differences, below);
+    result.difference_high_mm = quantile_in_place(differences, 1 - below);
     return result;
 }
 
@@ -95,11 +95,16 @@ std::string verdict(const PairedDifference& d) {
     if (!d.has_interval())
         return fmt::format("ratio {:.3f}, no interval from so few ({:.3f})", d.ratio,
                            fmt::join(d.ratios, ", "));
-    const std::string high = std::isinf(d.high) ? "no bound" : fmt::format("{:.3f}", d.high);
-    const std::string range = fmt::format("({:.3f} to {}, n = {})", d.low, high, d.n);
-    if (d.gain()) return fmt::format("{:.1f} % better {}", 100 * (1 - d.ratio), range);
-    if (d.loss()) return fmt::format("{:.1f} % worse {}", 100 * (d.ratio - 1), range);
-    return fmt::format("no measurable gain {}", range);
+    const auto percent = [](double ratio) { return 100 * std::abs(1 - ratio); };
+    if (d.gain())
+        return fmt::format("{:.1f} % better ({:.1f} to {:.1f} %, n = {})", percent(d.ratio), percent(d.high),
+                           percent(d.low), d.n);
+    if (d.loss())
+        return fmt::format("{:.1f} % worse ({:.1f} to {}, n = {})", percent(d.ratio), percent(d.low),
+                           std::isinf(d.high) ? "no bound" : fmt::format("{:.1f} %", percent(d.high)), d.n);
+    const std::string worst =
+        std::isinf(d.high) ? "worse without bound" : fmt::format("{:.1f} % worse", percent(d.high));
+    return fmt::format("no measurable gain ({} to {:.1f} % better, n = {})", worst, percent(d.low), d.n);
 }
 
 }  // namespace app

@@ -42,13 +42,13 @@ struct PairedSums {
     void add(const PairedSums& other) { a.add(other.a), b.add(other.b); }
 };
 
-/// The ratio RMS of a / RMS of b, pooled over n groups, with the 95 % interval of a bootstrap over the
-/// groups: each group is drawn with its pair, so what both share cancels. Below 1: a errs less. Of too few groups
-/// a bootstrap knows nothing: these have the single ratios instead.
+/// The ratio RMS of a / RMS of b, pooled over n groups, with the interval of a bootstrap over the groups: each
+/// group is drawn with its pair, so what both share cancels. Below 1: a errs less. Of too few groups a bootstrap
+/// knows nothing: these have the single ratios instead.
 struct PairedDifference {
     std::size_t n = 0;           ///< groups
     double ratio = 1;            ///< of the RMS errors; infinite where only b errs nothing
-    double low = 1, high = 1;    ///< 95 % interval of the ratio; meaningless without has_interval()
+    double low = 1, high = 1;    ///< of the ratio; meaningless without has_interval()
     std::vector<double> ratios;  ///< of the groups, in their order; only without has_interval()
     double difference_mm = 0, difference_low_mm = 0, difference_high_mm = 0;  ///< RMS of a - RMS of b
 
@@ -58,12 +58,14 @@ struct PairedDifference {
 };
 
 /// Percentile bootstrap, kResamples draws of n groups with replacement from a generator seeded by `seed`;
-/// independent of the standard library's distributions. `fewest` >= 2: groups that make an interval.
+/// independent of the standard library's distributions. `fewest` >= 2: groups that make an interval. `together`:
+/// how many differences there are whose intervals shall hold at 95 % all at once: each is of 1 - 0.05 / together
+/// (Bonferroni 1936).
 [[nodiscard]] PairedDifference paired_difference(std::span<const PairedSums> groups, std::uint64_t seed,
-                                                 std::size_t fewest = 2);
+                                                 std::size_t fewest = 2, std::size_t together = 1);
 
-/// "3.1 % better (0.95 to 0.99, n = 24)", "no measurable gain (0.98 to 1.02, n = 24)", "4.0 % worse (...)",
-/// "ratio 0.912, no interval from so few (0.88, 0.94)", or that the baseline errs nothing.
+/// "3.1 % better (1.0 to 5.1 %, n = 24)", "4.0 % worse (...)", "no measurable gain (2.0 % worse to 0.5 % better, n =
+/// 24)", "ratio 0.912, no interval from so few (0.880, 0.940)", or that the baseline errs nothing.
 [[nodiscard]] std::string verdict(const PairedDifference& difference);
 
 }  // namespace app

@@ -361,6 +361,20 @@ TEST_F(Comparisons, TheGridsOfAMapNameTheBestEstimatorOfEverySensor) {
         "100.0 ms ahead the best estimator gains measurably over the best baseline in 1 of 2 sensors, 10.0 % "
         "in the median of these (cv* 1).");
     EXPECT_EQ(app::map_grids({}), "");
+    comparison.rows.emplace_back().predictor = "cv*";
+    const app::Table csv = app::csv_table(comparison);
+    ASSERT_EQ(csv.rows.size(), 1 + 3u) << "every cell, not the best ones alone";
+    const auto value = [&](std::size_t row, const std::string& column) {
+        const auto found = std::ranges::find(csv.columns, column, &app::Column::name);
+        return csv.rows[row].at(static_cast<std::size_t>(found - csv.columns.begin())).plain();
+    };
+    EXPECT_EQ(value(0, "jitter_ms"), "");
+    EXPECT_EQ(value(2, "trace"), "");
+    EXPECT_EQ(value(2, "predictor"), "ca*");
+    EXPECT_EQ(value(2, "rate_hz"), "60");
+    EXPECT_EQ(value(2, "rms_mm"), "9");
+    EXPECT_EQ(value(2, "jitter_ms"), "3");
+    EXPECT_EQ(value(2, "by_recording/low"), "0.98");
 }
 
 }  // namespace

@@ -96,7 +96,7 @@ TEST(PairedDifference, TenPercentInEveryRecordingIsAGainHoweverTheRecordingsDiff
     EXPECT_NEAR(d.low, 0.9, 1e-12);
     EXPECT_NEAR(d.high, 0.9, 1e-12);
     EXPECT_TRUE(d.gain());
-    EXPECT_EQ(app::verdict(d), "10.0 % better (0.900 to 0.900, n = 4)");
+    EXPECT_EQ(app::verdict(d), "10.0 % better (10.0 to 10.0 %, n = 4)");
 }
 
 TEST(PairedDifference, ABaselineWithoutErrorIsWordedNotDividedBy) {
@@ -151,10 +151,36 @@ TEST(PairedDifference, TheIntervalOf400GroupsIsTheNormalOne) {
         groups.push_back(sums(0.5 + static_cast<double>(random() >> 11) / 9007199254740992.0, 1, 1));
     const PairedDifference d = app::paired_difference(groups, 1);
     // ratio^2 is the mean of numbers even in [0.5, 1.5], standard error 0.2887/20; halved by the root. The
-    // bootstrap's own quantiles of 2000 draws and the sample's deviation vary by 5 % each: three of these.
+    // bootstrap's own quantiles of 10000 draws and the sample's deviation vary by 5 % each: three of these.
     const double half_width = 1.96 * 0.2887 / 20 / 2;
     EXPECT_NEAR((d.high - d.low) / 2, half_width, 0.2 * half_width);
     EXPECT_NEAR(d.ratio, 1, 3.5 * 0.2887 / 20 / 2);
+}
+
+TEST(PairedDifference, IntervalsOf20TogetherAreThoseOfAHalfPercentInAllTails) {
+    std::vector<PairedSums> groups;
+    std::mt19937_64 random(3);
+    for (int i = 0; i < 400; ++i)
+        groups.push_back(sums(0.5 + static_cast<double>(random() >> 11) / 9007199254740992.0, 1, 1));
+    const PairedDifference one = app::paired_difference(groups, 1),
+                           of_20 = app::paired_difference(groups, 1, 2, 20);
+    EXPECT_EQ(of_20.ratio, one.ratio);
+    // Normal quantiles of 1 - 0.025 / 20 and 0.975. Of 10000 draws the outer one's standard error is 3 %.
+    EXPECT_NEAR((of_20.high - of_20.low) / (one.high - one.low), 3.0233 / 1.9600, 0.12);
+    EXPECT_LT(of_20.difference_low_mm, one.difference_low_mm);
+    EXPECT_GT(of_20.difference_high_mm, one.difference_high_mm);
+}
+
+TEST(PairedDifference, AVerdictHasOneUnit) {
+    std::vector<PairedSums> worse, open;
+    for (int i = 0; i < 12; ++i) {
+        worse.push_back(sums(1.44, 1, 10));
+        open.push_back(sums(i % 2 == 0 ? 0.64 : 1.44, 1, 10));
+    }
+    EXPECT_EQ(app::verdict(app::paired_difference(worse, 1)), "20.0 % worse (20.0 to 20.0 %, n = 12)");
+    const std::string undecided = app::verdict(app::paired_difference(open, 1));
+    EXPECT_NE(undecided.find(" % worse to "), std::string::npos) << undecided;
+    EXPECT_NE(undecided.find(" % better, n = 12)"), std::string::npos) << undecided;
 }
 
 TEST(PairedDifference, TheSameSeedDrawsTheSameInterval) {
