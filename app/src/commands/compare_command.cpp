@@ -87,9 +87,15 @@ std::shared_ptr<ComparisonOptions> declare_comparison(Command& command) {
                 o->surface_text = "plane " + text;
             })
         ->excludes(kit);
-    command.options("--tune", o->tune_traces, trace,
-                    "Tune, and learn the advance of auto's strikes, on these traces (without the one scored) "
-                    "instead of on the others compared; --map does not use them");
+    CLI::Option* tune = command.options(
+        "--tune", o->tune_traces, trace,
+        "Tune, and learn the advance of auto's strikes, on these traces (without the one scored) "
+        "instead of on the others compared; --map does not use them");
+    command
+        .options(
+            "--transfer", o->transfer, as::text("PERSON|TRACE"),
+            "Train a network on these persons' recordings, or traces, tune on them, and score the others")
+        ->excludes(tune);
     command.options("--predictions", o->predictions, as::named("NAME=FILE[@TRACE]"),
                     "Predictions made elsewhere, in predict's format");
     command.options("--person", o->persons, as::named("TEXT=NAME", as::PartedAt::last),

@@ -9,9 +9,11 @@
 #include <memory>
 #include <tuple>
 
+#include "compare/comparison_figures.h"
 #include "compare/entrants.h"
 #include "compare/experiment.h"
 #include "compare/sample_errors.h"
+#include "compare/transfer.h"
 #include "files/bad_input.h"
 #include "process/parallel.h"
 #include "sticks/predictors.h"
@@ -122,33 +124,6 @@ Field read_scored(const ComparisonOptions& options) {
     return field;
 }
 
-/// The leads that one predictor serves in one pass: those for which the same specification runs.
-std::vector<std::vector<std::size_t>> passes_of(const Entrant& entrant, std::size_t recording) {
-    const std::vector<std::string>& used = entrant.used[recording];
-    std::vector<std::vector<std::size_t>> passes;
-    for (std::size_t lead = 0; lead < used.size(); ++lead) {
-        if (used[lead].empty()) continue;
-        const auto same =
-            std::ranges::find_if(passes, [&](const auto& pass) { return used[pass.front()] == used[lead]; });
-        if (same == passes.end() || !entrant.replays.empty())
-            passes.push_back({lead});
-        else
-            same->push_back(lead);
-    }
-    return passes;
-}
-
-/// A fresh predictor at a lead at which `used` is not empty; `leads_s` will be asked for. `instead`: the
-/// specification that runs unless it is empty or a file answers.
-std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const SensedStick& stick,
-                                                  std::size_t lead, std::span<const double> leads_s,
-                                                  const std::string& instead = {}) {
-    if (const auto replay = entrant.replays.find({stick.number, lead}); replay != entrant.replays.end())
-        return make_replay(replay->second);
-    return make_any_predictor(instead.empty() ? entrant.used[stick.recording][lead] : instead, leads_s,
-                              {stick.name, stick.shaft});
-}
-
 HitScore hits_of(const Entrant& entrant, const Field& field, const SensedStick& stick, std::size_t lead,
                  const ComparisonOptions& options, double advance_s) {
     const Recording& recording = field.recordings[stick.recording];
@@ -226,11 +201,11 @@ void keep(double value) {
 
 /// Wall time of a sample: correct() and predict() at every lead, nothing else; the median over several passes
 /// of a fresh predictor over the first samples. The only figure that differs between runs.
-double nanoseconds_per_sample(const std::string& specification, const SensedStick& stick) {
+double nanoseconds_per_sample(const PredictorMaker& maker, const SensedStick& stick) {
     const std::span timed = std::span(stick.samples).first(std::min(stick.samples.size(), kMostTimedSamples));
     std::vector<double> costs;
     for (std::size_t pass = 0; pass < kCostPasses; ++pass) {
-        const auto predictor = make_any_predictor(specification, stick.leads_s, {stick.name, stick.shaft});
+        const auto predictor = maker.make(stick.leads_s, {stick.name, stick.shaft});
         const auto start = std::chrono::steady_clock::now();
         for (const tracking::PoseSample& sample : timed) {
             const double behind_s = tracking::feed(*predictor, sample);
@@ -279,84 +254,6 @@ std::vector<ComparisonRow> rows_of(const Entrant& entrant, const Field& field, c
     return rows;
 }
 
-constexpr double kLongestS = 0.150, kStepS = 0.010;
-constexpr double kWindowS = 3, kZoomS = 0.6;
-
-/// Of the leads asked for, the one nearest to `lead_s`.
-std::size_t nearest(const std::vector<double>& asked_s, double lead_s) {
-    const auto distance = [&](double asked) { return std::abs(asked - lead_s); };
-    return static_cast<std::size_t>(std::ranges::min_element(asked_s, {}, distance) - asked_s.begin());
-}
-
-LeadCurve curve_of(const Entrant& entrant, std::span<const SensedStick> sticks,
-                   const std::vector<double>& asked_s) {
-    const std::vector<double>& leads_s = sticks.front().leads_s;
-    std::vector<SquareSum> sums(leads_s.size());
-    for (const SensedStick& stick : sticks) {
-        for (const std::vector<std::size_t>& pass : passes_of(entrant, stick.recording)) {
-            const auto predictor = make_entrant(entrant, stick, pass.front(), leads_s);
-            const std::vector<SquareSum> scored = score_positions(stick, *predictor);
-            for (std::size_t lead = 0; lead < leads_s.size(); ++lead)
-                if (std::ranges::count(pass, nearest(asked_s, leads_s[lead])) > 0)
-                    sums[lead].add(scored[lead]);
-        }
-    }
-    LeadCurve curve{entrant.name, {}};
-    for (std::size_t lead = 0; lead < leads_s.size(); ++lead)
-        if (sums[lead].count > 0) curve.rms_mm.emplace_back(leads_s[lead], sums[lead].rms());
-    return curve;
-}
-
-/// Start of the `length_s` in [from_s, to_s] in which the recorded point rises and falls most.
-double liveliest(const std::vector<tracking::PoseSample>& samples, double from_s, double to_s,
-                 double length_s) {
-    double best = -1, start_s = from_s, sum = 0;
-    std::size_t first = 0;
-    while (first + 1 < samples.size() && samples[first].t_s < from_s) ++first;
-    const auto way = [&](std::size_t i) {
-        return std::abs(samples[i].position.y() - samples[i - 1].position.y());
-    };
-    for (std::size_t i = first + 1; i < samples.size() && samples[i].t_s <= to_s; ++i) {
-        sum += way(i);
-        while (samples[i].t_s - samples[first].t_s > length_s) sum -= way(++first);
-        if (sum > best) best = sum, start_s = samples[first].t_s;
-    }
-    return start_s;
-}
-
-FigurePath path_of(const Entrant& entrant, const SensedStick& stick, std::size_t lead,
-                   const StickFigure& figure) {
-    FigurePath path{entrant.name, entrant.used[stick.recording][lead], stick.leads_s[lead], {}};
-    const auto predictor = make_entrant(entrant, stick, lead, stick.leads_s);
-    for (const tracking::PoseSample& sample : stick.samples) {
-        const double behind_s = tracking::feed(*predictor, sample),
-                     t_s = predictor->time_s() + behind_s + path.lead_s;
-        if (t_s >= figure.from_s && t_s <= figure.to_s)
-            path.height_m.emplace_back(t_s, predictor->predict(path.lead_s + behind_s).position.y());
-    }
-    return path;
-}
-
-/// Names of the predictors whose paths are drawn.
-std::vector<std::string> drawn_predictors(const Comparison& comparison) {
-    const std::vector<double>& leads_s = comparison.options.leads_s;
-    const double middle_s = leads_s[leads_s.size() / 2];
-    const ComparisonSummary* best = nullptr;
-    bool thesis = false, naive = false;
-    for (const ComparisonSummary& summary : comparison.summaries) {
-        thesis = thesis || summary.predictor == "thesis";
-        naive = naive || summary.predictor == "naive";
-        if (summary.lead_s == middle_s && !summary.baseline && !summary.external &&
-            (best == nullptr || summary.error.position.rms() < best->error.position.rms()))
-            best = &summary;
-    }
-    std::vector<std::string> names;
-    if (thesis) names.emplace_back("thesis");
-    if (best != nullptr && best->predictor != "thesis") names.push_back(best->predictor);
-    if (naive) names.emplace_back("naive");
-    return names;
-}
-
 /// Runs every entrant over every stick of the field at every lead: errors and calibration; strikes, if there
 /// is a surface, those of an entrant that learns an advance with the one that it learned (on `tuning`, of
 /// --tune, or, if that is empty, on all others of the field; never on the one that is scored); cost, if asked
@@ -394,54 +291,15 @@ std::vector<ComparisonRow> score_entrants(const Field& field, const Field& tunin
             if (!options.cost || row.external) continue;
             // A specification that runs at several leads is measured once.
             const auto same = std::ranges::find(parts[i], row.used, &ComparisonRow::used);
-            row.ns_per_sample = &*same != &row
-                                    ? same->ns_per_sample
-                                    : nanoseconds_per_sample(row.used, field.sticks[i / entrants.size()]);
+            row.ns_per_sample =
+                &*same != &row
+                    ? same->ns_per_sample
+                    : nanoseconds_per_sample(PredictorMaker(row.used, entrants[i % entrants.size()].model),
+                                             field.sticks[i / entrants.size()]);
         }
         std::ranges::move(parts[i], std::back_inserter(rows));
     }
     return rows;
-}
-
-/// RMS over leads of 0 to 150 ms of every entrant whose cost is not external, over all recordings; a tuned
-/// one runs, at each lead, the parameters chosen for the nearest lead asked for.
-std::vector<LeadCurve> lead_curves(std::span<const Recording> recordings,
-                                   const std::vector<Entrant>& entrants, const ComparisonOptions& options) {
-    std::vector<double> leads_s;
-    for (int k = 0; k * kStepS < kLongestS + kStepS / 2; ++k) leads_s.push_back(k * kStepS);
-    const std::vector<SensedStick> sticks = sense_all(recordings, options.sensor, leads_s);
-    std::vector<LeadCurve> curves(entrants.size());
-    parallel_for(entrants.size(), options.threads, [&](std::size_t i) {
-        if (!entrants[i].external) curves[i] = curve_of(entrants[i], sticks, options.leads_s);
-    });
-    std::erase_if(curves, [](const LeadCurve& curve) { return curve.predictor.empty(); });
-    return curves;
-}
-
-/// The data of figures 3-1 to 3-3 of the thesis, redone on the first stick of the first recording: its 3 s
-/// of most motion, and 0.6 s of these. Predicted are naive, thesis and the estimator of least RMS at the
-/// middle lead, as far as they take part.
-StickFigure stick_figure(const Field& field, const std::vector<Entrant>& entrants,
-                         const Comparison& comparison) {
-    const SensedStick& stick = field.sticks.front();
-    const tracking::Trace& trace = field.recordings.front().trace;
-    const std::vector<tracking::PoseSample>& recorded = trace.sticks.front().samples;
-    StickFigure figure;
-    figure.trace = trace.file;
-    figure.stick = stick.name;
-    figure.from_s = liveliest(recorded, recorded.front().t_s + kSettlingS, recorded.back().t_s, kWindowS);
-    figure.to_s = figure.from_s + kWindowS;
-    figure.zoom_from_s = liveliest(recorded, figure.from_s, figure.to_s, kZoomS);
-    figure.zoom_to_s = figure.zoom_from_s + kZoomS;
-    for (const tracking::PoseSample& sample : recorded)
-        if (sample.t_s >= figure.from_s && sample.t_s <= figure.to_s)
-            figure.recorded_m.emplace_back(sample.t_s, sample.position.y());
-    for (const std::string& name : drawn_predictors(comparison)) {
-        const Entrant& entrant = *std::ranges::find(entrants, name, &Entrant::name);
-        for (std::size_t lead = 0; lead < stick.leads_s.size(); ++lead)
-            figure.paths.push_back(path_of(entrant, stick, lead, figure));
-    }
-    return figure;
 }
 
 ComparisonSummary summary_of(const Entrant& entrant, double lead_s, const std::vector<ComparisonRow>& rows) {
@@ -559,7 +417,8 @@ std::vector<MapCell> best_cells(const std::vector<MapCell>& map) {
     return best;
 }
 
-Comparison compare(const ComparisonOptions& options) {
+Comparison compare(const ComparisonOptions& asked) {
+    const ComparisonOptions options = asked.transfer.empty() ? asked : parted_for_transfer(asked);
     Comparison comparison;
     comparison.options = options;
     comparison.inputs = inputs_of(options);
@@ -568,9 +427,12 @@ Comparison compare(const ComparisonOptions& options) {
         if (std::ranges::find(comparison.persons, recording.person) == comparison.persons.end())
             comparison.persons.push_back(recording.person);
     const Field tuning =
-        options.tuning ? read_field(options.tune_traces, options.persons, options.sensor, options.leads_s)
-                       : Field();
-    const EntrantList list = enter(options, field, tuning);
+        options.tuning || !options.transfer.empty()
+            ? read_field(options.tune_traces, options.persons, options.sensor, options.leads_s)
+            : Field();
+    EntrantList list = enter(options, field, tuning);
+    if (!options.transfer.empty())
+        std::ranges::move(trained_entrants(options, field, tuning), std::back_inserter(list.entrants));
     comparison.tuned_on = list.tuned_on;
     comparison.estimators =
         static_cast<std::size_t>(std::ranges::count(list.entrants, false, &Entrant::baseline));

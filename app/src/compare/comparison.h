@@ -1,6 +1,7 @@
 #pragma once
 // What is compared and what comes of it.
 #include <tracking/sensor.h>
+#include <tracking/training.h>
 
 #include <functional>
 #include <optional>
@@ -94,6 +95,8 @@ struct InputFile {
 struct ComparisonOptions {
     std::vector<std::string> arguments;  ///< of the command that asks, for the record
     std::vector<std::string> traces, predictors, tune_traces;
+    std::vector<std::string> transfer;   ///< persons or traces to train a network on, and to tune on
+    tracking::TrainingOptions training;  ///< of that network
     std::vector<std::pair<std::string, std::string>> predictions;  ///< name, file in `predict`'s format
     PersonNames persons;
     std::vector<double> leads_s;

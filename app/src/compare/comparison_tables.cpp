@@ -223,6 +223,7 @@ Json settings_of(const Comparison& comparison) {
             {"late", o.sensor.late},
             {"seed", o.sensor.seed},
             {"tune", o.tune_traces},
+            {"transfer", o.transfer},
             {"tuned", comparison.tuned_on},
             {"surface", o.surface_text},
             {"estimators", comparison.estimators},
@@ -389,16 +390,17 @@ std::string format_comparison_json(const Comparison& comparison) {
     for (const auto& [file, sha256] : comparison.inputs)
         inputs.push_back({{"file", file}, {"sha256", sha256}});
     const std::uint64_t seed = comparison.options.sensor.seed;
-    Json json = {{"settings", settings_of(comparison)},
-                 {"results", result_table(comparison).json()},
-                 {"summary", summary_json(comparison)},
-                 {"paired", table_of(comparison.paired).json()},
-                 {"winners", winners(comparison)},
-                 {"winners_caution", selection_caution(comparison)},
-                 {"arguments", comparison.options.arguments},
-                 {"inputs", inputs},
-                 {"seeds", {{"sensor", seed}, {"intervals", seed}}},
-                 {"versions", {{"musicworld", MUSICWORLD_VERSION}}}};
+    Json json = {
+        {"settings", settings_of(comparison)},
+        {"results", result_table(comparison).json()},
+        {"summary", summary_json(comparison)},
+        {"paired", table_of(comparison.paired).json()},
+        {"winners", winners(comparison)},
+        {"winners_caution", selection_caution(comparison)},
+        {"arguments", comparison.options.arguments},
+        {"inputs", inputs},
+        {"seeds", {{"sensor", seed}, {"intervals", seed}, {"training", comparison.options.training.seed}}},
+        {"versions", {{"musicworld", MUSICWORLD_VERSION}}}};
     if (comparison.options.map) json["map"] = table_of(comparison.map).json();
     return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

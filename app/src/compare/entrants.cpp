@@ -112,11 +112,9 @@ Entrant tuned(const std::string& family, Tuning tuning, const TuningTable& table
     return entrant;
 }
 
-/// `named`: recordings of --tune, none where the `others` that are compared serve.
-std::string tuned_sentence(std::size_t named, std::size_t others, bool by_person) {
-    return fmt::format("tuned by RMS at each lead on {}, never on the recording that is scored{}",
-                       named > 0 ? counted(named, "recording") + " named by --tune"
-                                 : "the other " + counted(others, "recording"),
+/// `from`: the recordings that tune.
+std::string tuned_sentence(const std::string& from, bool by_person) {
+    return fmt::format("tuned by RMS at each lead on {}, never on the recording that is scored{}", from,
                        by_person ? "; ** on recordings of other persons only" : "");
 }
 
@@ -138,7 +136,11 @@ std::string enter_tuned(std::vector<Entrant>& entrants, const std::vector<std::s
             if (!entrant.used.empty()) entrants.push_back(std::move(entrant));
         }
     if (entrants.size() == untuned) return "nothing is tuned: a recording has no others to be tuned on";
-    return tuned_sentence(named.recordings.size(), scored.recordings.size() - 1,
+    const std::size_t others = scored.recordings.size() - 1, given = named.recordings.size();
+    return tuned_sentence(given == 0 ? "the other " + counted(others, "recording")
+                          : options.transfer.empty()
+                              ? counted(given, "recording") + " named by --tune"
+                              : "the " + counted(given, "recording") + " of --transfer",
                           entrants.back().tuning == Tuning::other_persons);
 }
 
@@ -297,6 +299,30 @@ std::optional<std::size_t> TuningTable::best(const std::string& family, std::siz
         best = candidate;
     }
     return best;
+}
+
+std::vector<std::vector<std::size_t>> passes_of(const Entrant& entrant, std::size_t recording) {
+    const std::vector<std::string>& used = entrant.used[recording];
+    std::vector<std::vector<std::size_t>> passes;
+    for (std::size_t lead = 0; lead < used.size(); ++lead) {
+        if (used[lead].empty()) continue;
+        const auto same =
+            std::ranges::find_if(passes, [&](const auto& pass) { return used[pass.front()] == used[lead]; });
+        if (same == passes.end() || !entrant.replays.empty())
+            passes.push_back({lead});
+        else
+            same->push_back(lead);
+    }
+    return passes;
+}
+
+std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const SensedStick& stick,
+                                                  std::size_t lead, std::span<const double> leads_s,
+                                                  const std::string& instead) {
+    if (const auto replay = entrant.replays.find({stick.number, lead}); replay != entrant.replays.end())
+        return make_replay(replay->second);
+    return PredictorMaker(instead.empty() ? entrant.used[stick.recording][lead] : instead, entrant.model)
+        .make(leads_s, {stick.name, stick.shaft});
 }
 
 std::vector<std::string> specifications_of(const ComparisonOptions& options) {

@@ -1,5 +1,6 @@
 #pragma once
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -69,8 +70,19 @@ struct Entrant {
     /// Recording x lead: the specification that runs, or the file that answers; empty: does not take part.
     std::vector<std::vector<std::string>> used = {};
     std::map<std::pair<std::size_t, std::size_t>, StickPredictions> replays =
-        {};  ///< (stick among all, lead): the file's answers
+        {};                                                 ///< (stick among all, lead): the file's answers
+    std::shared_ptr<const tracking::PathModel> model = {};  ///< that runs, in place of a file's
 };
+
+/// The leads that one predictor serves in one pass: those for which the same specification runs.
+[[nodiscard]] std::vector<std::vector<std::size_t>> passes_of(const Entrant& entrant, std::size_t recording);
+
+/// A fresh predictor at a lead at which `used` is not empty; `leads_s` will be asked for. `instead`: the
+/// specification that runs unless it is empty or a file answers.
+[[nodiscard]] std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant,
+                                                                const SensedStick& stick, std::size_t lead,
+                                                                std::span<const double> leads_s,
+                                                                const std::string& instead = {});
 
 struct EntrantList {
     std::vector<Entrant> entrants;

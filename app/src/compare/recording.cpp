@@ -54,18 +54,6 @@ void add_marks(Recording& recording, const fs::path& file, const std::string& he
             std::ranges::sort(*times);
 }
 
-/// The folder, and a first word such as "p3", "player2", "subject01" or "s1".
-std::string person_of(const std::string& file, const PersonNames& persons) {
-    for (const auto& [text, name] : persons)
-        if (file.find(text) != std::string::npos) return name;
-    std::error_code error;
-    const fs::path whole = fs::absolute(file, error).lexically_normal();
-    const std::string folder = whole.parent_path().filename().string(), stem = whole.stem().string();
-    const std::string word = stem.substr(0, stem.find_first_of("_-. "));
-    static const std::regex kNumbersPeople("(p|s|player|person|subject)[0-9]+");
-    return std::regex_match(word, kNumbersPeople) ? folder + "/" + word : folder;
-}
-
 void require_distinct(std::span<const Recording> recordings) {
     for (std::size_t i = 0; i < recordings.size(); ++i)
         for (std::size_t before = 0; before < i; ++before)
@@ -99,6 +87,17 @@ std::optional<Truth> truth_at(const Recording& recording, std::size_t stick, dou
 }
 
 }  // namespace
+
+std::string person_of(const std::string& file, const PersonNames& persons) {
+    for (const auto& [text, name] : persons)
+        if (file.find(text) != std::string::npos) return name;
+    std::error_code error;
+    const fs::path whole = fs::absolute(file, error).lexically_normal();
+    const std::string folder = whole.parent_path().filename().string(), stem = whole.stem().string();
+    const std::string word = stem.substr(0, stem.find_first_of("_-. "));
+    static const std::regex kNumbersPeople("(p|s|player|person|subject)[0-9]+");
+    return std::regex_match(word, kNumbersPeople) ? folder + "/" + word : folder;
+}
 
 Recording recording_of(tracking::Trace trace, std::string person) {
     Recording recording{std::move(trace), std::move(person), {}, {}, {}};

@@ -36,6 +36,9 @@ struct Recording {
 /// (TEXT, NAME) pairs: the first TEXT that a path contains names its person.
 using PersonNames = std::vector<std::pair<std::string, std::string>>;
 
+/// Who plays, as above.
+[[nodiscard]] std::string person_of(const std::string& file, const PersonNames& persons);
+
 /// Throws tracking::TraceError and BadInput with the place of the fault.
 [[nodiscard]] Recording read_recording(const std::string& file, const PersonNames& persons = {});
 

@@ -129,8 +129,10 @@ bool is_external(const std::string& specification) {
     return specification.starts_with(kExternal);
 }
 
-PredictorMaker::PredictorMaker(const std::string& specification) : specification_(specification) {
-    if (is_external(specification)) return;
+PredictorMaker::PredictorMaker(const std::string& specification,
+                               std::shared_ptr<const tracking::PathModel> model)
+    : specification_(specification), model_(std::move(model)) {
+    if (is_external(specification) || model_) return;
     check_name(specification);
     if (const std::optional<std::filesystem::path> file = model_file(specification)) {
         specification_ = part_model(specification).rest;

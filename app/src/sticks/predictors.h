@@ -22,9 +22,10 @@ struct TrackedStick {
 /// by default; the file is read once, here.
 class PredictorMaker {
 public:
-    /// `auto` must have been resolved before. Throws BadInput with one line, tracking::TraceError for a file that
-    /// is no model.
-    explicit PredictorMaker(const std::string& specification);
+    /// `auto` must have been resolved before. `model`: what a network runs in place of its file. Throws BadInput with
+    /// one line, tracking::TraceError for a file that is no model.
+    explicit PredictorMaker(const std::string& specification,
+                            std::shared_ptr<const tracking::PathModel> model = {});
     /// `leads_s` are the leads that will be asked for: an external predictor computes these, in between its answers
     /// are interpolated. Throws BadInput with one line; std::runtime_error when the child fails.
     [[nodiscard]] std::unique_ptr<tracking::Predictor> make(std::span<const double> leads_s,

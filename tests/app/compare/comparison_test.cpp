@@ -251,6 +251,32 @@ TEST_F(Advances, ACopyOfTheRecordingScoredTeachesNothing) {
     EXPECT_NE(without.tuned_on.find("1 recording named by --tune"), std::string::npos) << without.tuned_on;
 }
 
+TEST_F(Comparisons, TransferTrainsOnOnePersonAndScoresTheOther) {
+    options_.training.hidden = 8;
+    options_.training.steps = 60;
+    const std::string folder = folder_.filename();
+    const auto compared = [&](std::vector<std::string> transfer) {
+        options_.transfer = std::move(transfer);
+        return app::compare(options_);
+    };
+    const app::Comparison by_person = compared({folder + "/p2"});
+    const auto rows_by = [&](const std::string& name) {
+        return std::ranges::count(by_person.rows, name, &app::ComparisonRow::predictor);
+    };
+    for (const char* name : {"learned*", "arbitrated*", "cv*", "cv**"}) EXPECT_EQ(rows_by(name), 2) << name;
+    for (const app::ComparisonRow& row : by_person.rows) EXPECT_EQ(row.trace, options_.traces[0]);
+    EXPECT_NE(by_person.tuned_on.find("on the 1 recording of --transfer"), std::string::npos);
+    EXPECT_EQ(by_person.inputs.size(), 2U);
+    const std::string text = app::format_comparison_text(by_person);
+    EXPECT_EQ(app::format_comparison_text(compared({options_.traces[1]})), text) << "by its file";
+    EXPECT_NE(text.find("learned*"), std::string::npos);
+
+    EXPECT_THROW((void)compared({"p2"}), app::BadInput) << "neither a person nor a file";
+    EXPECT_THROW((void)compared({folder + "/p1", folder + "/p2"}), app::BadInput) << "nothing is left";
+    fs::copy_file(file("p1_strokes.csv"), file("copy.csv"));
+    EXPECT_THROW((void)compared({file("copy.csv")}), app::BadInput) << "scored on what it is trained on";
+}
+
 TEST_F(Comparisons, ARecordingIsComparedOnceByWhateverName) {
     EXPECT_NE(app::compare(options_).tuned_on.find("the other 1 recording,"), std::string::npos);
     const std::string first = options_.traces[0], copy = file("copy.csv");
