@@ -11,8 +11,6 @@
 namespace app {
 namespace {
 
-constexpr std::int64_t kHeadStartNs = 20'000'000;  // so that the first sample of a replay is in time
-
 void print(const RecordResult& result, const std::string& out) {
     for (const RecordedStick& stick : result.sticks)
         fmt::print("{}: {}: {} in {:.3f} s, {:.2f} per second, {}{}\n", out, stick.name,

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <lo/lo.h>
 #include <lo/lo_lowlevel.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -196,6 +197,18 @@ int take(const char* path, const char* types, lo_arg** arguments, int count, lo_
     return 0;
 }
 
+bool is_of_this_machine(const sockaddr_storage& sender) {
+    if (sender.ss_family == AF_INET) {
+        sockaddr_in v4{};
+        std::memcpy(&v4, &sender, sizeof v4);
+        return ntohl(v4.sin_addr.s_addr) >> 24 == 127;
+    }
+    sockaddr_in6 v6{};
+    std::memcpy(&v6, &sender, sizeof v6);
+    const std::uint8_t* bytes = v6.sin6_addr.s6_addr;
+    return IN6_IS_ADDR_LOOPBACK(&v6.sin6_addr) || (IN6_IS_ADDR_V4MAPPED(&v6.sin6_addr) && bytes[12] == 127);
+}
+
 thread_local int error_number = 0;  // of the operating system, for liblo's newest error
 void keep_number(int number, const char*, const char*) {
     error_number = number;
@@ -330,7 +343,8 @@ void check_osc_port(const std::string& port) {
             fmt::format("error: found source \"osc:{}\", expected a UDP port such as osc:9000", port));
 }
 
-OscSource::OscSource(const std::string& port, const SourceOptions& options) : LiveSource(options.sticks) {
+OscSource::OscSource(const std::string& port, const SourceOptions& options)
+    : LiveSource(options.sticks), local_(options.local) {
     check_osc_port(port);
     server_ = lo_server_new_with_proto(port.c_str(), LO_UDP, &keep_number);
     if (!server_) throw std::runtime_error("error: " + cannot("open UDP port " + port, error_number));
@@ -346,8 +360,16 @@ void OscSource::receive(std::int64_t deadline_ns) {
     const int socket = lo_server_get_socket_fd(server_);
     if (!readable_until(socket, deadline_ns)) return;
     std::vector<char> bytes(kLargestDatagram);
-    const ssize_t size = recv(socket, bytes.data(), bytes.size(), MSG_DONTWAIT);
-    if (size > 0) datagram({bytes.data(), static_cast<std::size_t>(size)});
+    sockaddr_storage sender{};
+    socklen_t length = sizeof sender;
+    const ssize_t size = recvfrom(socket, bytes.data(), bytes.size(), MSG_DONTWAIT,
+                                  reinterpret_cast<sockaddr*>(&sender), &length);
+    if (size <= 0) return;
+    if (local_ && !is_of_this_machine(sender))
+        malformed(
+            "osc: error: found a datagram of another machine, expected those of this one; see --remote");
+    else
+        datagram({bytes.data(), static_cast<std::size_t>(size)});
 }
 
 void OscSource::datagram(std::span<const char> datagram) {

@@ -136,6 +136,7 @@ protected:
 
 private:
     void* server_;  // lo_server
+    bool local_;
 };
 
 /// Throws BadInput for what is no port.

@@ -93,6 +93,7 @@ struct SourceOptions {
     double speed = 1;     ///< of a replay
     bool resume = false;  ///< begin at the current time: samples of a trace that are due have been seen
     std::string stream_head = {};  ///< with `resume`: what stream_head() was
+    bool local = false;            ///< of `osc`: what other machines send is left out
 };
 
 /// Throws BadInput for a source that does not exist, is not one, or lacks a stick that was asked for.
@@ -104,6 +105,8 @@ void check_source(const SourceOptions& options);
 /// Opens it. Throws as check_source(); std::runtime_error when it cannot be opened now.
 [[nodiscard]] std::unique_ptr<SampleSource> open_source(const SourceOptions& options);
 
+/// So long before its epoch a replay is opened, so that its first sample is in time [ns].
+inline constexpr std::int64_t kHeadStartNs = 20'000'000;
 /// The longest time that next() may be asked to wait, so that the caller can be stopped [ns].
 inline constexpr std::int64_t kSourcePatienceNs = 50'000'000;
 

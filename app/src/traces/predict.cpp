@@ -48,17 +48,21 @@ std::string predict_table(const tracking::Trace& seen, const std::string& specif
     }
     // A stick's times differ. (stable_sort's buffer is not aligned for what holds Eigen's types.)
     std::ranges::sort(rows, {}, [](const Row& row) { return std::tuple(row.sample_t_s, row.stick); });
-    Table table = Table::of({"t", "stick", "px", "py", "pz", "qw", "qx", "qy", "qz"});
-    for (const auto& [sample_t_s, stick, predicted] : rows) {
-        const Eigen::Vector3d& p = predicted.position;
-        const Eigen::Quaterniond& q = predicted.orientation;
-        const auto turn = [oriented = predicted.has_orientation](double part) {
-            return oriented ? Cell(part) : Cell();
-        };
-        table.add({predicted.t_s, seen.sticks[stick].name, p.x(), p.y(), p.z(), turn(q.w()), turn(q.x()),
-                   turn(q.y()), turn(q.z())});
-    }
-    return table.csv();
+    std::string table = predicted_row_header();
+    for (const Row& row : rows) table += predicted_row(seen.sticks[row.stick].name, row.predicted);
+    return table;
+}
+
+std::string predicted_row_header() {
+    return csv_line({"t", "stick", "px", "py", "pz", "qw", "qx", "qy", "qz"});
+}
+
+std::string predicted_row(const std::string& stick, const tracking::PoseSample& predicted) {
+    const Eigen::Vector3d& p = predicted.position;
+    const Eigen::Quaterniond& q = predicted.orientation;
+    const auto turn = [&](double part) { return predicted.has_orientation ? Cell(part) : Cell(); };
+    return csv_line(
+        {predicted.t_s, stick, p.x(), p.y(), p.z(), turn(q.w()), turn(q.x()), turn(q.y()), turn(q.z())});
 }
 
 }  // namespace app

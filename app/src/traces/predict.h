@@ -20,4 +20,8 @@ namespace app {
 [[nodiscard]] std::string predict_table(const tracking::Trace& seen, const std::string& specification,
                                         double lead_s);
 
+/// A row of it, and what stands above the rows; `predicted.t_s` is the time predicted for.
+[[nodiscard]] std::string predicted_row(const std::string& stick, const tracking::PoseSample& predicted);
+[[nodiscard]] std::string predicted_row_header();
+
 }  // namespace app

@@ -1,9 +1,10 @@
 // Decoders and sources of live samples, within this process.
 #include "sensors/live_sources.h"
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <ifaddrs.h>
 #include <lo/lo.h>
+#include <net/if.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -350,6 +351,45 @@ TEST_F(OscSourceTest, MutatedDatagramsGiveSoundSamplesOrOneLine) {
     EXPECT_GT(source.faults().malformed, 1000u);
     EXPECT_EQ(source.faults().first.find_first_of(std::string("\n\r\0", 3)), std::string::npos);
     EXPECT_LE(source.sticks().names().size(), 16u);
+}
+
+/// Sends a pose to a port of the machine's address `to`.
+void send_pose(const sockaddr_in& to, int port) {
+    sockaddr_in address = to;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    const auto bytes = bytes_of("/left", floats({1, 2, 3}));
+    const int descriptor = socket(AF_INET, SOCK_DGRAM, 0);
+    (void)!sendto(descriptor, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&address),
+                  sizeof address);
+    close(descriptor);
+}
+
+TEST(OscSender, OfAnotherMachineIsLeftOutWhereItShallBe) {
+    // What is sent to another address of this machine comes from there: as if from another machine.
+    sockaddr_in loopback{}, other{};
+    loopback.sin_family = AF_INET, loopback.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    ifaddrs* interfaces = nullptr;
+    ASSERT_EQ(getifaddrs(&interfaces), 0);
+    for (const ifaddrs* each = interfaces; each != nullptr; each = each->ifa_next)
+        if (each->ifa_addr != nullptr && each->ifa_addr->sa_family == AF_INET &&
+            (each->ifa_flags & IFF_LOOPBACK) == 0)
+            std::memcpy(&other, each->ifa_addr, sizeof other);
+    freeifaddrs(interfaces);
+    for (const bool local : {false, true}) {
+        const int port = app::free_udp_port();
+        app::SourceOptions options;
+        options.local = local;
+        OscSource source(std::to_string(port), options);
+        SourceSample sample;
+        const auto comes = [&](const sockaddr_in& to) {
+            send_pose(to, port);
+            return source.next(sample, app::monotonic_ns() + 2'000'000'000) == SourceStatus::sample;
+        };
+        EXPECT_TRUE(comes(loopback)) << local;
+        if (other.sin_family != AF_INET) continue;  // this machine has no other
+        EXPECT_EQ(comes(other), !local);
+        EXPECT_EQ(source.faults().malformed, local ? 1u : 0u);
+    }
 }
 
 TEST(OscPorts, AreChecked) {
