@@ -124,19 +124,6 @@ Field read_scored(const ComparisonOptions& options) {
     return field;
 }
 
-HitScore hits_of(const Entrant& entrant, const Field& field, const SensedStick& stick, std::size_t lead,
-                 const ComparisonOptions& options, double advance_s) {
-    const Recording& recording = field.recordings[stick.recording];
-    const StrikeTiming when{stick.leads_s[lead], advance_s};
-    const auto timing = make_entrant(entrant, stick, lead, strike_leads(when), entrant.strikes_by);
-    std::unique_ptr<tracking::Predictor> confirming;
-    if (!entrant.confirmed_by.empty())
-        confirming =
-            make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), {stick.name, stick.shaft});
-    return evaluate_strikes(recording.tracks[stick.stick], stick.samples, {*timing, confirming.get()},
-                            recording.geometry, options.surface, when);
-}
-
 /// Advances that learning tries: -8 to 14 ms.
 constexpr std::size_t kAdvances = 23;
 constexpr double advance_s(std::size_t k) {
@@ -168,9 +155,9 @@ public:
         : field_(field), leads_(options.leads_s.size()), losses_(field.sticks.size() * leads_) {
         parallel_for(losses_.size(), options.threads, [&](std::size_t i) {
             for (std::size_t k = 0; k < kAdvances; ++k)
-                losses_[i][k] =
-                    hits_of(entrant, field, field.sticks[i / leads_], i % leads_, options, advance_s(k))
-                        .loss();
+                losses_[i][k] = strikes_of(entrant, field, field.sticks[i / leads_], i % leads_, options,
+                                           {options.leads_s[i % leads_], advance_s(k)})
+                                    .loss();
         });
     }
 
@@ -248,7 +235,8 @@ std::vector<ComparisonRow> rows_of(const Entrant& entrant, const Field& field, c
             row.calibration = scores[lead].calibration();
             if (losses) row.advance_s = losses->best_s(recording, lead);
             if (options.surface.kind != StrikeSurface::Kind::none)
-                row.hits = hits_of(entrant, field, stick, lead, options, row.advance_s.value_or(0));
+                row.hits =
+                    strikes_of(entrant, field, stick, lead, options, {row.lead_s, row.advance_s.value_or(0)});
         }
     }
     return rows;
@@ -445,7 +433,7 @@ Comparison compare(const ComparisonOptions& asked) {
                 comparison.summaries.push_back(std::move(summary));
     }
     comparison.paired = pair_with_baselines(comparison, list.entrants);
-    comparison.curves = lead_curves(field.recordings, list.entrants, options);
+    comparison.curves = lead_curves(field, list.entrants, options);
     comparison.figure = stick_figure(field, list.entrants, comparison);
     if (options.map) comparison.map = map_sensors(field.recordings, options);
     return comparison;

@@ -61,8 +61,17 @@ struct PairedResult {
 /// RMS over lead, of one predictor over all recordings.
 struct LeadCurve {
     std::string predictor;
-    std::vector<std::pair<double, double>> rms_mm;  ///< lead [s], RMS
+    std::vector<std::pair<double, double>> rms_mm;    ///< lead [s], RMS
+    std::vector<std::pair<double, HitScore>> hits{};  ///< lead [s], strikes; of those that tells_how_far()
+
+    /// The lead at which the RMS passes a value [s]; none where it does not.
+    [[nodiscard]] std::optional<double> passes(double rms) const;
+    /// The lead at which the strikes' F1 falls below a value [s]; none where it does not.
+    [[nodiscard]] std::optional<double> falls_below(double f1) const;
 };
+/// Whether the question how far ahead one can predict is asked of a predictor: naive and thesis of 1992, auto, and
+/// what is learned.
+[[nodiscard]] bool tells_how_far(const std::string& predictor);
 
 /// What a predictor said of a stick's height at one lead: (time predicted for [s], height [m]).
 struct FigurePath {

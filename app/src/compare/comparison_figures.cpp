@@ -38,6 +38,29 @@ LeadCurve curve_of(const Entrant& entrant, std::span<const SensedStick> sticks,
     return curve;
 }
 
+std::vector<std::pair<double, HitScore>> hits_over_lead(const Entrant& entrant, const Field& field,
+                                                        const ComparisonOptions& options) {
+    std::vector<std::pair<double, HitScore>> hits;
+    for (const double lead_s : {0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.1, 0.125, 0.15}) {
+        hits.emplace_back(lead_s, HitScore());
+        for (const SensedStick& stick : field.sticks)
+            hits.back().second.add(strikes_of(entrant, field, stick, 0, options, {lead_s}));
+    }
+    return hits;
+}
+
+/// The lead from which on what `above` says of a point is > 0, linearly between the points before and after.
+template <class Points, class Above>
+std::optional<double> crossing_s(const Points& points, const Above& above) {
+    double before_s = 0, before = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const double lead_s = points[i].first, now = above(points[i].second);
+        if (now > 0) return i == 0 ? lead_s : std::lerp(before_s, lead_s, before / (before - now));
+        before_s = lead_s, before = now;
+    }
+    return std::nullopt;
+}
+
 /// Start of the `length_s` in [from_s, to_s] in which the recorded point rises and falls most.
 double liveliest(const std::vector<tracking::PoseSample>& samples, double from_s, double to_s,
                  double length_s) {
@@ -90,14 +113,31 @@ std::vector<std::string> drawn_predictors(const Comparison& comparison) {
 
 }  // namespace
 
-std::vector<LeadCurve> lead_curves(std::span<const Recording> recordings,
-                                   const std::vector<Entrant>& entrants, const ComparisonOptions& options) {
+bool tells_how_far(const std::string& predictor) {
+    const std::string family = family_of(predictor.substr(0, predictor.find('*')));
+    return predictor == "naive" || predictor == "thesis" || family == "auto" || family == "learned" ||
+           family == "arbitrated";
+}
+
+std::optional<double> LeadCurve::passes(double rms) const {
+    return crossing_s(rms_mm, [rms](const double& value) { return value - rms; });
+}
+
+std::optional<double> LeadCurve::falls_below(double f1) const {
+    return crossing_s(hits, [f1](const HitScore& score) { return f1 - score.f1(); });
+}
+
+std::vector<LeadCurve> lead_curves(const Field& field, const std::vector<Entrant>& entrants,
+                                   const ComparisonOptions& options) {
     std::vector<double> leads_s;
     for (int k = 0; k * kStepS < kLongestS + kStepS / 2; ++k) leads_s.push_back(k * kStepS);
-    const std::vector<SensedStick> sticks = sense_all(recordings, options.sensor, leads_s);
+    const std::vector<SensedStick> sticks = sense_all(field.recordings, options.sensor, leads_s);
     std::vector<LeadCurve> curves(entrants.size());
     parallel_for(entrants.size(), options.threads, [&](std::size_t i) {
-        if (!entrants[i].external) curves[i] = curve_of(entrants[i], sticks, options.leads_s);
+        if (entrants[i].external) return;
+        curves[i] = curve_of(entrants[i], sticks, options.leads_s);
+        if (options.surface.kind != StrikeSurface::Kind::none && tells_how_far(entrants[i].name))
+            curves[i].hits = hits_over_lead(entrants[i], field, options);
     });
     std::erase_if(curves, [](const LeadCurve& curve) { return curve.predictor.empty(); });
     return curves;

@@ -121,6 +121,51 @@ PlotScript curves_plot(const Comparison& comparison) {
                    "set xtics 10\n", legend);
 }
 
+/// RMS over lead of those that tell how far, up to about three times what hurts.
+PlotScript how_far_plot(const Comparison& comparison) {
+    constexpr double kHighestMm = 60;
+    std::vector<PlotLine> legend;
+    PlotPanel panel;
+    for (const double limit_mm : {10.0, 20.0})
+        panel.add(fmt::format("0 {0}\n150 {0}\n", limit_mm),
+                  "with lines lt 1 lw 1 dt '-' lc " + gnuplot_colour(colours::wrong));
+    for (const LeadCurve& curve : comparison.curves) {
+        if (!tells_how_far(curve.predictor)) continue;
+        legend.push_back(line_of(legend.size(), curve.predictor));
+        Points points;
+        for (const auto& [lead_s, rms_mm] : curve.rms_mm) points.emplace_back(1e3 * lead_s, rms_mm);
+        panel.add(text_of(points, 0, 150, 1), style_of(legend.back(), 2));
+    }
+    return plot_of(kHalf, 320, {"lead, ms", 0, 150}, {"RMS error, mm", 0, kHighestMm, 6}, panel,
+                   "set xtics 25\n", legend);
+}
+
+/// F1 of their strikes over lead.
+PlotScript how_far_strikes_plot(const Comparison& comparison) {
+    std::vector<PlotLine> legend;
+    PlotPanel panel;
+    for (const LeadCurve& curve : comparison.curves) {
+        if (curve.hits.empty()) continue;
+        legend.push_back(line_of(legend.size(), curve.predictor));
+        Points points;
+        for (const auto& [lead_s, hits] : curve.hits)
+            if (const double f1 = hits.f1(); f1 == f1) points.emplace_back(1e3 * lead_s, f1);
+        panel.add(text_of(points, 0, 150, 1), style_of(legend.back(), 2));
+    }
+    return plot_of(kHalf, 320, {"lead, ms", 0, 150}, {"F1 of strikes", 0, 1, 5}, panel, "set xtics 25\n",
+                   legend);
+}
+
+/// Empty where none of them takes part.
+std::string how_far_content(const Comparison& c, PlotGallery& plots) {
+    const Table table = how_far_table(c);
+    if (table.rows.empty()) return {};
+    std::string figures = plots.element(how_far_plot(c), "How far ahead: error against lead");
+    if (std::ranges::any_of(c.curves, [](const LeadCurve& curve) { return !curve.hits.empty(); }))
+        figures += plots.element(how_far_strikes_plot(c), "How far ahead: strikes against lead");
+    return plots.pair(figures) + table.html();
+}
+
 /// Cost of a sample against RMS at a lead: an open point a predictor as named, a filled one as tuned; a
 /// colour a family, and a square where its legend is dashed.
 PlotScript cost_plot(const Comparison& comparison, double lead_s) {
@@ -270,7 +315,13 @@ std::string sections(const Comparison& c, PlotGallery& plots) {
     for (const std::string& name : names)
         zoomed += plots.element(zoomed_plot(c.figure, name),
                                 fmt::format("Figure {}: {}", name == "naive" ? "3-3" : "3-2", name));
-    std::string text = section(
+    std::string text =
+        section("How far ahead before it hurts?",
+                html(how_far_sentence(c)) +
+                    " RMS of the tracked point over all recordings; the red lines are 10 and 20 "
+                    "mm. Strikes, where there is a surface, without an advance.",
+                how_far_content(c, plots));
+    text += section(
         "A stick and its predictions",
         fmt::format("{}, stick {}. Each predicted point stands at the time that it was predicted for.",
                     html(c.figure.trace), html(c.figure.stick)),

@@ -15,6 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr double kHurtsMm = 10, kPoorF1 = 0.9;
 constexpr const char* kProtocol =
     "samples at uniform times by linear interpolation plus noise; truth likewise at t + lead from the "
     "noiseless recording; first 0.5 s and gaps left out; free: truth not within 50 ms of impacts or flags";
@@ -302,6 +303,31 @@ Table map_table(const Comparison& comparison) {
                "drop_out", "lead_s", "rms_mm", "baseline_rms_mm"});
 }
 
+Table how_far_table(const Comparison& comparison) {
+    Table table = Table::of(
+        {"predictor", "over_10_mm_from:.0f:ms", "over_20_mm_from:.0f:ms", "f1_below_0.9_from:.0f:ms"});
+    const auto ms = [](const std::optional<double>& s) { return s ? Cell(1e3 * *s) : Cell(); };
+    for (const LeadCurve& curve : comparison.curves)
+        if (tells_how_far(curve.predictor))
+            table.add({curve.predictor, ms(curve.passes(kHurtsMm)), ms(curve.passes(2 * kHurtsMm)),
+                       ms(curve.falls_below(kPoorF1))});
+    return table;
+}
+
+std::string how_far_sentence(const Comparison& comparison) {
+    const auto from = [](const std::optional<double>& s) {
+        if (!s) return std::string("nowhere up to 150 ms");
+        return *s == 0 ? "at any lead" : fmt::format("from {:.0f} ms ahead on", 1e3 * *s);
+    };
+    std::string text;
+    for (const LeadCurve& curve : comparison.curves)
+        if (tells_how_far(curve.predictor))
+            text += fmt::format("{}{} errs by more than {:g} mm {}, by more than {:g} mm {}",
+                                text.empty() ? "" : "; ", curve.predictor, kHurtsMm,
+                                from(curve.passes(kHurtsMm)), 2 * kHurtsMm, from(curve.passes(2 * kHurtsMm)));
+    return text.empty() ? text : text + ".";
+}
+
 Table predictor_table(const Comparison& comparison) {
     Table table = Table::of({"predictor", "what it is", "what ran, and on how many sticks and leads"});
     for (const auto& [name, description] : comparison.predictors) {
@@ -390,11 +416,19 @@ std::string format_comparison_json(const Comparison& comparison) {
     for (const auto& [file, sha256] : comparison.inputs)
         inputs.push_back({{"file", file}, {"sha256", sha256}});
     const std::uint64_t seed = comparison.options.sensor.seed;
+    Table curves = Table::of({"predictor", "lead_s", "rms_mm"});
+    for (const LeadCurve& curve : comparison.curves)
+        for (const auto& [lead_s, rms_mm] : curve.rms_mm) curves.add({curve.predictor, lead_s, rms_mm});
+    Table strikes = Table::of({"predictor", "lead_s", "f1", "median_ms", "false_per_min"});
+    for (const LeadCurve& curve : comparison.curves)
+        for (const auto& [lead_s, hits] : curve.hits)
+            strikes.add({curve.predictor, lead_s, hits.f1(), hits.median_ms(), hits.false_per_min()});
     Json json = {
         {"settings", settings_of(comparison)},
         {"results", result_table(comparison).json()},
         {"summary", summary_json(comparison)},
         {"paired", table_of(comparison.paired).json()},
+        {"lead_curves", {{"errors", curves.json()}, {"strikes", strikes.json()}}},
         {"winners", winners(comparison)},
         {"winners_caution", selection_caution(comparison)},
         {"arguments", comparison.options.arguments},
@@ -432,6 +466,8 @@ std::string format_comparison_text(const Comparison& comparison) {
         if (const std::string sentence = map_sentence(comparison, lead_s); !sentence.empty())
             text += sentence + "\n";
     for (const std::string& sentence : winners(comparison)) text += sentence + "\n";
+    if (const std::string sentence = how_far_sentence(comparison); !sentence.empty())
+        text += "How far ahead before it hurts? " + sentence + "\n";
     return text + selection_caution(comparison) + "\n";
 }
 

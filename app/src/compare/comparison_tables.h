@@ -28,6 +28,8 @@ namespace app {
 [[nodiscard]] Table paired_table(const Comparison& comparison, double lead_s);
 /// Each sensor and lead: the best estimator against the best baseline.
 [[nodiscard]] Table map_table(const Comparison& comparison);
+/// The leads at which errors and strikes of those that tell_how_far() become bad [ms].
+[[nodiscard]] Table how_far_table(const Comparison& comparison);
 /// Each predictor: what it is and which parameters ran.
 [[nodiscard]] Table predictor_table(const Comparison& comparison);
 
@@ -42,6 +44,9 @@ namespace app {
 
 /// "33.3 ms ahead singer* errs least, ...; of 292 true strikes ca predicts most, ...", a sentence a lead.
 [[nodiscard]] std::vector<std::string> winners(const Comparison& comparison);
+
+/// "auto errs by more than 10 mm from 34 ms ahead on, by more than 20 mm from 52 ms on", of each that tells how far.
+[[nodiscard]] std::string how_far_sentence(const Comparison& comparison);
 
 /// What the intervals correct for, and what they do not.
 [[nodiscard]] std::string selection_caution(const Comparison& comparison);

@@ -325,6 +325,18 @@ std::unique_ptr<tracking::Predictor> make_entrant(const Entrant& entrant, const 
         .make(leads_s, {stick.name, stick.shaft});
 }
 
+HitScore strikes_of(const Entrant& entrant, const Field& field, const SensedStick& stick, std::size_t lead,
+                    const ComparisonOptions& options, const StrikeTiming& timing) {
+    const Recording& recording = field.recordings[stick.recording];
+    const auto predictor = make_entrant(entrant, stick, lead, strike_leads(timing), entrant.strikes_by);
+    std::unique_ptr<tracking::Predictor> confirming;
+    if (!entrant.confirmed_by.empty())
+        confirming =
+            make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), {stick.name, stick.shaft});
+    return evaluate_strikes(recording.tracks[stick.stick], stick.samples, {*predictor, confirming.get()},
+                            recording.geometry, options.surface, timing);
+}
+
 std::vector<std::string> specifications_of(const ComparisonOptions& options) {
     std::vector<std::string> all;
     const auto add = [&](const std::string& specification) {

@@ -84,6 +84,11 @@ struct Entrant {
                                                                 std::span<const double> leads_s,
                                                                 const std::string& instead = {});
 
+/// The strikes of an entrant on one stick of a field, by what runs at `lead`, an index.
+[[nodiscard]] HitScore strikes_of(const Entrant& entrant, const Field& field, const SensedStick& stick,
+                                  std::size_t lead, const ComparisonOptions& options,
+                                  const StrikeTiming& timing);
+
 struct EntrantList {
     std::vector<Entrant> entrants;
     std::string tuned_on;  ///< what the tuned ones were tuned on, one sentence

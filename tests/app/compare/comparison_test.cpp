@@ -251,6 +251,56 @@ TEST_F(Advances, ACopyOfTheRecordingScoredTeachesNothing) {
     EXPECT_NE(without.tuned_on.find("1 recording named by --tune"), std::string::npos) << without.tuned_on;
 }
 
+TEST_F(Comparisons, HowFarAheadIsToldByTheSameErrorsAndStrikesAsTheLeadsAskedFor) {
+    options_.predictors = {"naive", "thesis", "auto", "cv"};
+    options_.tuning = false;
+    options_.surface.kind = app::StrikeSurface::Kind::above_contact;
+    options_.surface.height_m = 0.02;
+    options_.surface_text = "plane contact+0.02";
+    const app::Comparison comparison = app::compare(options_);
+    int told = 0;
+    for (const app::LeadCurve& curve : comparison.curves) {
+        const auto summary = std::ranges::find_if(comparison.summaries, [&](const auto& s) {
+            return s.predictor == curve.predictor && s.lead_s == 0.1;
+        });
+        ASSERT_NE(summary, comparison.summaries.end());
+        const auto error = std::ranges::find(curve.rms_mm, 0.1, &std::pair<double, double>::first);
+        ASSERT_NE(error, curve.rms_mm.end());
+        EXPECT_NEAR(error->second, summary->error.position.rms(), 1e-9) << curve.predictor;
+        EXPECT_EQ(curve.hits.empty(), !app::tells_how_far(curve.predictor)) << curve.predictor;
+        if (curve.hits.empty()) continue;
+        ++told;
+        const auto hits = std::ranges::find(curve.hits, 0.1, &std::pair<double, app::HitScore>::first);
+        ASSERT_NE(hits, curve.hits.end());
+        EXPECT_EQ(hits->second.errors_ms, summary->hits->errors_ms) << curve.predictor;
+        EXPECT_EQ(hits->second.predicted, summary->hits->predicted) << curve.predictor;
+    }
+    EXPECT_EQ(told, 3);
+    EXPECT_EQ(app::how_far_table(comparison).rows.size(), 3U);
+    const auto json = nlohmann::json::parse(app::format_comparison_json(comparison));
+    EXPECT_EQ(json["lead_curves"]["errors"].size(), comparison.curves.size() * 16);
+    EXPECT_EQ(json["lead_curves"]["strikes"].size(), 3U * 9);
+}
+
+TEST(LeadCurve, PassesWhereTheLineBetweenItsPointsDoes) {
+    app::LeadCurve curve{"auto", {{0, 1}, {0.05, 6}, {0.1, 16}, {0.15, 15}}};
+    EXPECT_DOUBLE_EQ(*curve.passes(11), 0.075);
+    EXPECT_DOUBLE_EQ(*curve.passes(0.5), 0) << "from the first on";
+    EXPECT_EQ(curve.passes(16), std::nullopt);
+    app::HitScore good, poor;
+    good.true_contacts = good.predicted = good.matched = 10;
+    poor.true_contacts = poor.predicted = 10, poor.matched = 5;
+    curve.hits = {{0.02, good}, {0.06, poor}};
+    EXPECT_NEAR(*curve.falls_below(0.9), 0.028, 1e-12);
+    EXPECT_EQ(curve.falls_below(0.4), std::nullopt);
+    app::Comparison comparison;
+    comparison.curves = {curve, {"cv", {{0, 100}}}, {"naive", {{0, 30}}}};
+    EXPECT_EQ(
+        app::how_far_sentence(comparison),
+        "auto errs by more than 10 mm from 70 ms ahead on, by more than 20 mm nowhere up to 150 ms; naive "
+        "errs by more than 10 mm at any lead, by more than 20 mm at any lead.");
+}
+
 TEST_F(Comparisons, TransferTrainsOnOnePersonAndScoresTheOther) {
     options_.training.hidden = 8;
     options_.training.steps = 60;
