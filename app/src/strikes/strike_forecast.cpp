@@ -10,7 +10,8 @@ constexpr double kDeepest = 4;
 constexpr double kLearningRate = 2;  // [1/s]
 constexpr double kLeastSlope = 0.1;
 constexpr double kLongestWeightS = 0.05;
-constexpr double kUnstatedM = 1e-3;  // standard deviation where none is stated
+constexpr double kLeastDepthM = 3e-3;  // of a contact, as scores have it
+constexpr double kUnstatedM = 1e-3;    // standard deviation where none is stated
 
 }  // namespace
 
@@ -93,17 +94,19 @@ std::optional<NextStrike> StrikeForecast::after(const tracking::Predictor& predi
     newest_s_ = t_s;
     if (since_s > tracking::kGapS) {
         forecasts_.clear();
-        std::ranges::fill(distances_, std::nullopt);
+        outside_.assign(bodies_.size(), false);
     }
     std::optional<NextStrike> next;
     double greatest = 0;
     for (std::size_t body = 0; body < bodies_.size(); ++body) {
         const double distance =
             sim::rest_distance(bodies_[body], tips[0].position, geometry_.radius_m).distance;
-        if (distances_[body].value_or(0) > 0 && distance <= 0)
+        if (outside_[body] && distance <= -kLeastDepthM) {
+            outside_[body] = false;
             for (Forecast& forecast : forecasts_)
                 forecast.came = forecast.came || (forecast.body == body && forecast.due_s >= t_s);
-        distances_[body] = distance;
+        }
+        outside_[body] = outside_[body] || distance > 0;
         if (distance > reach_m) continue;
         const std::optional<Depth> depth = depth_in(bodies_[body], tips, distance);
         if (!depth || (next && depth->z <= greatest)) continue;

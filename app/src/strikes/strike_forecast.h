@@ -29,15 +29,15 @@ inline constexpr double kStrikeHorizonS = 0.15;
 ///   probability = 1 / (1 + exp(-(a + b z))),  z the greatest up to the horizon         (Platt 1999)
 ///
 /// of the body whose z is greatest; `in_s` is when the mean path meets it, or, if it does not, when z is greatest. A
-/// surface that the tip is in counts once it has left it. A stick does not pass where it strikes, so what the
-/// errors of a path say is no probability of a strike: a and b begin as 0 and 1 and follow what came of the
-/// forecasts 0.15 s later, by steps of the likelihood's slope, 2 /s times the time between samples.
+/// surface that the tip is in counts once it has left it. A stick does not pass where it strikes, so what the errors
+/// of a path say is no probability of a strike: a and b begin as 0 and 1 and follow what came of the forecasts
+/// 0.15 s later (contacts are 3 mm deep), by steps of the likelihood's slope, 2 /s times the time between samples.
 ///
 /// One thread. Deterministic.
 class StrikeForecast {
 public:
     StrikeForecast(const StickGeometry& geometry, const std::vector<sim::BodyDefinition>& bodies)
-        : geometry_(geometry), bodies_(bodies), distances_(bodies.size()) {}
+        : geometry_(geometry), bodies_(bodies), outside_(bodies.size()) {}
 
     /// After the predictor has got a sample of that time; predictions are from `behind_s` before it. None where no
     /// body is in reach.
@@ -76,7 +76,7 @@ private:
 
     StickGeometry geometry_;
     std::vector<sim::BodyDefinition> bodies_;
-    std::vector<std::optional<double>> distances_;  // of the newest tip from each body
+    std::vector<bool> outside_;  // of each body, the tip was, and has not struck since
     double a_ = 0, b_ = 1;
     std::optional<double> newest_s_;
     std::deque<Forecast> forecasts_;  // by time
