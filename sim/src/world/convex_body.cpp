@@ -45,8 +45,7 @@ bool is_round(const PosedBody& posed) noexcept {
 
 ConvexBody::ConvexBody(const PosedBody& posed, double inside) noexcept
     : posed_(&posed),
-      scale_(1 - inside * smallest_axis(*posed.kind) *
-                     posed.kind->definition.shape.base.semi_axes.cwiseInverse().array()),
+      scale_(1 - inside * posed.kind->definition.shape.base.semi_axes.cwiseInverse().array()),
       inside_(inside > 0),
       hull_(posed.kind->modes > 0 && !posed.kind->linear() && !is_round(posed)) {
     const BodyKind& kind = *posed.kind;

@@ -16,8 +16,8 @@ namespace sim {
 /// Borrows the posed body. Pure, no allocation.
 class ConvexBody {
 public:
-    /// inside: a share of the smallest semi-axis by which the body is made smaller along every axis, for tests
-    /// how deep two are in each other.
+    /// inside: by how much the body is made smaller along every axis, less than the smallest semi-axis, for tests how deep
+    /// two are in each other [m].
     explicit ConvexBody(const PosedBody& posed, double inside = 0) noexcept;
 
     struct Point {

@@ -24,6 +24,7 @@ constexpr double kSoftSpring = 0.05, kMostDamped = 0.5;  // see springs_are_soft
 constexpr double kEndTolerance = 1e-8;                   // of a gap, share of a body's size
 constexpr double kMostFall = 1.2e-3;                     // in a substep, share of a body's size
 constexpr int kMostFallLevel = 6;                        // for that a substep is halved so often at most
+constexpr int kMostFollowLevel = 8;                      // likewise for their motion, where they are followed
 constexpr double kFree = 1e6;                            // of a speed: no contact holds it [m/s]
 constexpr double kMostTurn = 0.04;                       // of a spring's arm in a substep [rad]
 
@@ -470,7 +471,8 @@ void IslandSolver::direct_substep(int level, bool last) {
     level_ = level;
     h_ = settings_->dt / settings_->substeps / (1 << level);
     for (BodyRows& rows : rows_of_) rows.rotation = FreeRotation(rows.body->kind->mass.inertia, h_);
-    const bool is_short = (falls_little() || level >= kMostFallLevel) && strike_at_start();
+    const bool is_short = (falls_little() || level >= kMostFallLevel) &&
+                          (!follow_ || moves_little() || level >= kMostFollowLevel) && strike_at_start();
     if ((is_short && try_substep(last)) || level + 1 == kSubstepLevels) return;
     remaining_ += h_ / 2;
     direct_substep(level + 1, false);
@@ -550,6 +552,38 @@ bool IslandSolver::moved_on() const {
     });
 }
 
+bool IslandSolver::may_follow(const Island& island) const {
+    const double dt = settings_->dt, shortest = dt / settings_->substeps / (1 << kMostFollowLevel);
+    bool thin = false;
+    for (const int id : island.bodies) {
+        const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        const double least = kSlow * body.kind->half_box.minCoeff();
+        if ((body.state.velocity.norm() + turning_speed(body)) * shortest > least) return false;
+        thin = thin || dt * dt * settings_->gravity.norm() > least;
+    }
+    return thin;
+}
+
+bool IslandSolver::moves_little() const {
+    return std::ranges::all_of(rows_of_, [this](const BodyRows& rows) {
+        const MovingBody& body = *rows.body;
+        return (body.state.velocity.norm() + turning_speed(body)) * h_ <
+               kSlow * body.kind->half_box.minCoeff();
+    });
+}
+
+// The contacts where the bodies are when the step begins; what was foreseen does not count.
+void IslandSolver::start_following() {
+    found_.clear();
+    for (const int m : island_->manifolds) {
+        found_.push_back((*manifolds_)[static_cast<std::size_t>(m)]);
+        for (ManifoldPoint& point : found_.back().points) point.begins = -1, point.gap = 0;
+    }
+    contact_finder_.find(*scene_, island_->bodies, *paths_, time_, found_);
+    take_found(most_with_springs());
+    if (!direct_) (void)begin_direct(most_with_springs(), true);
+}
+
 // The contacts anew, where the bodies are.
 void IslandSolver::find_again() {
     const std::vector<int>& of_island = island_->manifolds;
@@ -568,6 +602,11 @@ void IslandSolver::find_again() {
     }
     std::erase_if(found_, [](const Manifold& m) { return std::isinf(m.points[0].begins); });
     contact_finder_.find(*scene_, island_->bodies, *paths_, time_, found_);
+    take_found(springs_.empty() ? std::numeric_limits<double>::infinity() : most_with_springs());
+}
+
+// Rows of the contacts that were found.
+void IslandSolver::take_found(double most) {
     found_again_ = true;
     note_places();
     fresh_ = true;
@@ -590,8 +629,7 @@ void IslandSolver::find_again() {
         for (std::size_t i = 0; i < static_cast<std::size_t>(m.count); ++i) add_contact(m, m.points[i]);
     for (SpringRows& s : springs_)
         for (Side& side : s.side) side = reserve_rows(side.body);
-    (void)begin_direct(springs_.empty() ? std::numeric_limits<double>::infinity() : most_with_springs(),
-                       true);
+    (void)begin_direct(most, true);
 }
 
 }  // namespace sim

@@ -30,10 +30,11 @@ float length(float x, float y) {
 
 }  // namespace
 
-void IslandSolver::solve(const Island& island, const ContactScene& scene) {
-    scene_ = &scene, island_ = &island;
+void IslandSolver::solve(const Island& island, const ContactScene& scene, bool follow) {
+    scene_ = &scene, island_ = &island, follow_ = follow;
     begin(island);
     note_start();
+    if (follow) start_following();
     advance();
     if (!direct_ && is_far_from_solved() && begin_direct(most_with_contacts())) {
         // Of contacts that contradict each other the exact answer is worse than sweeps that give up: where nothing

@@ -89,7 +89,7 @@ struct Island {
 /// than kMostTurn, Newton's method does not converge, or weight moves a body by more than kMostFall of its size, and up
 /// to kStrikeLevel times where a rigid body rebounds: such impacts act when a substep begins, with all joints that hold.
 /// Where bodies have moved by more than kSlow of their size since contacts were found, these are found again
-/// (IslandContacts): the step goes on as a new one would begin.
+/// (IslandContacts): the step goes on as a new one would begin. So do islands of thin bodies that met unforeseen (may_follow).
 /// Where a factorisation is too dear, springs alone are factorised, and solved in turn with sweeps over the contacts; if all
 /// are soft (springs_are_soft) they are forces, held over each substep of the sweeps (symplectic Euler).
 /// Islands without either, where a timed force acts, go directly, too: a constant force then moves a body exactly.
@@ -102,7 +102,12 @@ public:
                  std::vector<Manifold>& manifolds, std::vector<HeldConstraint>& constraints)
         : settings_(&settings), bodies_(&bodies), manifolds_(&manifolds), constraints_(&constraints) {}
 
-    void solve(const Island& island, const ContactScene& scene);  ///< over one step
+    /// Over one step. follow: see may_follow.
+    void solve(const Island& island, const ContactScene& scene, bool follow = false);
+    /// Whether an island in which bodies met unforeseen can be followed: solved directly, in substeps in which none of its
+    /// bodies moves by more than kSlow of its size, contacts found again in each. Islands of bodies so small or thin that
+    /// weight alone takes one further than that in a step, unless they are too fast.
+    [[nodiscard]] bool may_follow(const Island& island) const;
     /// Before a step: its number, from 0, and the forces that act within it, ascending by bodies; must stay.
     void begin_step(std::uint64_t step, const std::vector<ActiveForce>& forces) noexcept {
         first_substep_ = static_cast<double>(step) * settings_->substeps;
@@ -222,6 +227,8 @@ private:
     };
 
     void begin(const Island& island);
+    void start_following();
+    [[nodiscard]] bool moves_little() const;
     void note_start();
     void go_back();  ///< to it
     void calm();
@@ -318,6 +325,7 @@ private:
     void write_legs();
     [[nodiscard]] bool moved_on() const;
     void find_again();
+    void take_found(double most);
     void note_places();
     static void keep_impulse(const ContactRows& contact, ManifoldPoint& point);
     void follow(bool positions);
@@ -460,6 +468,7 @@ private:
 
     // Of direct solutions, in double precision: body by body velocity, spin, modes, without lanes' padding.
     bool direct_ = false;         // this island is solved directly
+    bool follow_ = false;         // and followed
     bool with_contacts_ = false;  // they are factorised, too; else swept over
     struct Before {
         WorldBodyState state;

@@ -18,6 +18,11 @@ constexpr double kBuried = 0.2;
 constexpr std::uint32_t kNearest = 0x7ffffffd;  // feature of the nearest points of a pair
 constexpr std::uint32_t kParting = 0x7ffffffe;  // feature of the one contact of bodies inside each other
 constexpr std::uint32_t kFoot = 0x7fffffff;     // feature of a body's lowest point over a plane
+constexpr float kShallow = 0.3f;  // of the size: deeper in, a sample may be nearer to another face
+constexpr float kAlike = 0.95f;   // cosine between normals
+constexpr float kBeside = 0.3f;   // cosine with the axis, of normals of samples beside a body
+constexpr double kSmaller[] = {0.25, 0.6,
+                               0.9};  // by so much bodies are made smaller to find how they overlap
 constexpr float kManifoldTolerance = 0.02f;
 constexpr double kExact = 1e-5;           // of the size: tolerance of distances
 constexpr double kOnSurface = 1e-3;       // of the way from the centre
@@ -98,18 +103,22 @@ void NarrowPhase::pair(const PosedBody& a, const PosedBody& b, const PairSearch&
         choose(tolerance, search.before);
         return fill(size, search.before, manifold);
     }
-    const float lowest = find_samples(a, b, search.margin);
+    float lowest = find_samples(a, b, search.margin);
     turn_a_ = a.rotation.cast<float>(), turn_b_ = b.rotation.cast<float>();
     if (lowest < 0 && (!search.before || search.before->emerging || search.may_part) &&
         (is_buried(a, b) || is_buried(b, a)))
         return part(a, b, between_, search.before, manifold);
-    const bool edges = lowest > 0 && !(a.kind->ellipsoid && b.kind->ellipsoid);
-    if (smooth && (search.nearest || edges)) (void)nearest(a, b, search.margin);
+    const bool curved = a.kind->ellipsoid && b.kind->ellipsoid, edges = lowest > 0 && !curved;
+    bool apart = lowest > 0 || curved || agree(size);
+    if (smooth && (search.nearest || edges)) apart = nearest(a, b, search.margin) || !edges;
+    const bool along = smooth && !apart && measure_along_axis(a, b);
+    if (along)
+        for (const SampleContact& contact : found_) lowest = std::min(lowest, contact.separation);
     const float first = candidates_.empty() ? lowest : std::min(lowest, candidates_.front().separation);
     sources_.assign(candidates_.size(), -1);
     add_samples(a, b, std::min(search.margin, PointChooser::reach(first, tolerance)));
     do choose(tolerance, search.before);
-    while (lowest <= 0 && measure_chosen(a, b, tolerance));
+    while (!along && lowest <= 0 && measure_chosen(a, b, tolerance));
     fill(size, search.before, manifold);
 }
 
@@ -146,6 +155,84 @@ float NarrowPhase::find_samples(const PosedBody& a, const PosedBody& b, float ma
         if (found_[i].separation < margin) lowest = std::min(lowest, found_[i].separation);
     }
     return lowest;
+}
+
+// Whether samples inside tell by themselves how the bodies touch: a face on a face, or an edge on a face.
+bool NarrowPhase::agree(float size) const {
+    std::size_t lowest = 0;
+    for (std::size_t i = 1; i < found_.size(); ++i)
+        if (found_[i].separation < found_[lowest].separation) lowest = i;
+    if (found_[lowest].separation < -kShallow * size) return false;
+    const Eigen::Vector3f out = normal_of(lowest);
+    int inside = 0;
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+        if (found_[i].separation > 0) continue;
+        if (normal_of(i).dot(out) < kAlike) return false;
+        ++inside;
+    }
+    return inside > 2;
+}
+
+// World axes, from b towards a.
+Eigen::Vector3f NarrowPhase::normal_of(std::size_t found) const {
+    return found < of_a_ ? Eigen::Vector3f(turn_b_ * found_[found].normal)
+                         : Eigen::Vector3f(-(turn_a_ * found_[found].normal));
+}
+
+// Of smooth bodies that overlap: the axis along which the least part of them does, between the nearest points of the bodies
+// made smaller, and everything measured along it. False: not even their innermost parts are apart.
+bool NarrowPhase::measure_along_axis(const PosedBody& a, const PosedBody& b) {
+    const double size = std::min(smallest_half(a), smallest_half(b));
+    Eigen::Vector3d axis = Eigen::Vector3d::Zero();
+    const ConvexBody whole_a(a), whole_b(b);
+    auto separation = [&](const Eigen::Vector3d& n) {
+        return n.dot(between_.cast<double>() +
+                     a.rotation * whole_a.support(-(a.rotation.transpose() * n)).place -
+                     b.rotation * whole_b.support(b.rotation.transpose() * n).place) -
+               whole_a.margin() - whole_b.margin();
+    };
+    for (const double inside : kSmaller) {
+        const ConvexBody of_a(a, inside * size), of_b(b, inside * size);
+        const ConvexDistance d =
+            distance_between({&of_a, a.position, a.rotation}, {&of_b, b.position, b.rotation}, kExact * size);
+        if (!d.apart || !(d.gap > kExact * size)) continue;
+        axis = d.normal;
+        ContactCandidate& point = candidates_.emplace_back();
+        point.feature = kNearest;
+        point.separation = static_cast<float>(separation(axis));
+        point.normal = axis.cast<float>();
+        point.arm_a = (d.arm_a - 0.5 * d.gap * d.normal).cast<float>();
+        point.rest_a = d.rest_a.cast<float>(), point.rest_b = d.rest_b.cast<float>();
+        break;
+    }
+    if (axis.isZero(0)) return false;
+    const Eigen::Vector3f n = axis.cast<float>();
+    auto furthest = [](const ConvexBody& convex, const Eigen::Vector3d& along) {
+        return static_cast<float>(along.dot(convex.support(along).place) + convex.margin());
+    };
+    const Eigen::Vector3f out_of_b = turn_b_.transpose() * n, out_of_a = -(turn_a_.transpose() * n);
+    const float top_b = furthest(whole_b, out_of_b.cast<double>()),
+                top_a = furthest(whole_a, out_of_a.cast<double>());
+    std::size_t kept = 0, kept_of_a = 0;
+    for (std::size_t i = 0; i < found_.size(); ++i) {
+        SampleContact contact = found_[i];
+        const bool of_a = i < of_a_;
+        const float along = normal_of(i).dot(n);
+        if (contact.separation > 0 && along < kBeside) continue;  // beside the other, not over it
+        // Both the plane at the nearest place and that at the furthest hold the body: the nearer one is nearer to it.
+        const Eigen::Vector3f place =
+            of_a ? Eigen::Vector3f(turn_b_.transpose() * (turn_a_ * a.sample(contact.sample) + between_))
+                 : Eigen::Vector3f(turn_a_.transpose() * (turn_b_ * b.sample(contact.sample) - between_));
+        const float height = (of_a ? out_of_b : out_of_a).dot(place) - (of_a ? top_b : top_a);
+        const float own = along > kBeside ? contact.separation / along : height;
+        contact.separation = contact.separation > 0 ? own : std::max(own, height);
+        contact.normal = of_a ? out_of_b : out_of_a;
+        found_[kept++] = contact;
+        kept_of_a += of_a;
+    }
+    found_.resize(kept);
+    of_a_ = kept_of_a;
+    return true;
 }
 
 void NarrowPhase::add_samples(const PosedBody& a, const PosedBody& b, float out) {

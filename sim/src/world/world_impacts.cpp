@@ -211,7 +211,7 @@ void WorldContacts::meet_unforeseen(const ContactScene& scene, int i, int j) {
     const bool bent = is_bent(a.posed) || is_bent(b.posed);
     const double inside =
         now ? std::min((bent ? kInsideBent : kInside) + kDeeper * impacts_of(i, j), kDeepest) : 0;
-    const ConvexBody of_a(a.posed, inside), of_b(b.posed, inside);
+    const ConvexBody of_a(a.posed, inside * size), of_b(b.posed, inside * size);
     const Impact impact = time_of_impact(of_a, pa, of_b, pb, kTouching * size);
     if (!impact.meets || (impact.at_once && now)) return;
     meetings_.push_back({i, j, impact.time, now});

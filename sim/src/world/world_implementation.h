@@ -96,9 +96,9 @@ struct World::Implementation {
     void solve_islands();   ///< in order of ids, again where something unforeseen meets
     void start_solving();   ///< notes what solve_again goes back to
     [[nodiscard]] bool is_solved(const Island& island) const;
-    void solve_island(const Island& island);  ///< over the step
-    void move_alone(int body);                ///< over the step
-    void solve_again();                       ///< islands of bodies in `again`, from the step's start
+    void solve_island(const Island& island, bool follow);  ///< over the step
+    void move_alone(int body);                             ///< over the step
+    void solve_again();  ///< islands of bodies in `again`, from the step's start
     void hold_apart(const WorldContacts::Meeting& meeting);
     std::vector<WorldContacts::Meeting> last;  ///< what meets after all rounds
     void sum_outcomes();                       ///< of all islands

@@ -76,14 +76,14 @@ void World::Implementation::move_alone(int id) {
     if (body.pushed && sharing == Sharing::pairs) outcome.outside -= settings.dt * body.force;
 }
 
-void World::Implementation::solve_island(const Island& island) {
+void World::Implementation::solve_island(const Island& island, bool follow) {
     Outcome& outcome = outcomes[static_cast<std::size_t>(island.bodies.front())];
     outcome.outside.setZero(), outcome.limited = outcome.broken = 0, outcome.found = false;
     outcome.carried = solver->is_carried(island);
     if (island.manifolds.empty() && island.constraints.empty() && !is_forced(island.bodies.front()))
         return move_alone(island.bodies.front());
     const std::uint64_t limits = solver->deformations_limited(), breaks = solver->constraints_broken();
-    solver->solve(island, contact_scene());
+    solver->solve(island, contact_scene(), follow && solver->may_follow(island));
     if (const std::vector<Manifold>* found = solver->found()) {
         outcome.found = true, outcome.manifolds = *found;
         for (const Manifold& m : *found) contacts.note_known(m.key());
@@ -116,7 +116,7 @@ void World::Implementation::solve_again() {
             contacts.rewarm(contacts.manifolds()[static_cast<std::size_t>(m)]);
         for (const int c : island.constraints)
             (void)restore_spring(springs_before[static_cast<std::size_t>(c)]);
-        solve_island(island);
+        solve_island(island, true);
     }
     ++counts.solved_again;
 }
@@ -181,7 +181,7 @@ void World::Implementation::solve_islands() {
     for (std::size_t i = 0; i < islands_used; ++i) {
         if (!is_solved(islands[i])) continue;
         awake += is_own(islands[i]);
-        solve_island(islands[i]);
+        solve_island(islands[i], false);
     }
     for (int round = 0; round <= kRounds; ++round) {
         const auto& meetings = contacts.unforeseen(contact_scene(), solved);
