@@ -130,7 +130,8 @@ std::vector<CLI::Option*> add_realtime_options(Command& command, RealtimeOptions
                            "How long; a shorter trace is played again and again; 0: the trace once"),
             command
                 .option("--source", o.sensors.source, as::text("SOURCE"),
-                        "Sensors instead of TRACE: stdin, zmq:ENDPOINT, osc:PORT, trace:FILE")
+                        "Sensors instead of TRACE: stdin, zmq:ENDPOINT, osc:PORT (this machine) or "
+                        "osc:*:PORT (any), trace:FILE")
                 ->excludes(trace),
             command.option("--sticks", o.sensors.sticks, as::list_of(as::text("NAME")),
                            "Names of the sticks of --source"),

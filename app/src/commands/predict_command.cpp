@@ -22,7 +22,6 @@ namespace {
 
 struct PredictOptions {
     std::string trace, out, send;
-    bool remote = false;
     LivePredictOptions live;
     tracking::SensorModel sensor;
 };
@@ -57,8 +56,8 @@ void check(const PredictOptions& o, const std::vector<std::string>& given, bool 
         refuse_options(live ? "--source without --send" : "--send without --source", "both");
     if (!live && o.live.leads_s.size() > 1)
         refuse_options(fmt::format("{} leads", o.live.leads_s.size()), "one: several are for --send");
-    const std::vector<std::string> of_live = {"--kit",    "--tip",    "--shaft", "--seconds",
-                                              "--sticks", "--remote", "--speed"};
+    const std::vector<std::string> of_live = {"--kit",     "--tip",    "--shaft",
+                                              "--seconds", "--sticks", "--speed"};
     for (const std::string& word : given) {
         const std::string name = word.substr(0, word.find('='));
         if (!name.starts_with("--")) continue;
@@ -80,7 +79,6 @@ void predict(PredictOptions o, const std::vector<std::string>& given) {
         const LivePredictResult result = predict_live(o.live, *rows);
         if (result.faults.malformed > 0) print_to_errors(result);
     } else if (!o.live.source.source.empty()) {
-        o.live.source.local = !o.remote;
         o.live.source.epoch_ns = monotonic_ns() + kHeadStartNs;
         const std::unique_ptr<PredictionSink> sink = open_prediction_sink(o.send);
         print_to_errors(predict_live(o.live, *sink));
@@ -118,7 +116,6 @@ void add_predict_command(Command& program) {
                 "From the first sample on; 0: until the source ends, Ctrl-C or SIGTERM");
     live.option("--speed", o->live.source.speed, as::number_above(0, as::kAny), "Of a replay, for tests")
         ->group("");
-    live.flag("--remote", o->remote, "Also take what other machines send to osc:PORT");
     add_sensor_model_options(command, o->sensor);
     command.runs([o, command] {
         predict(*o, command.given_but({"--predictor", "--lead", "--source", "--send"}));

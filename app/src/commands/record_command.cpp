@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <memory>
 
 #include "commands/command.h"
@@ -11,6 +12,19 @@
 namespace app {
 namespace {
 
+void print_clock(const RecordedStick& stick, const std::string& out) {
+    const ClockEstimate& clock = stick.clock.estimate;
+    fmt::print("{}: {}: times: {}; offset {:.6f} s, drift {:.1f} ppm, delay p95 {:.2f} ms, {}\n", out,
+               stick.name, name_of(stick.clock.clock), clock.offset_s, clock.drift_ppm,
+               clock.delay_p95_s * 1e3, counted(clock.jumps, "jump"));
+    if (stick.apart_s != 0)
+        fmt::print("{}: {}: its clock is {:.3f} s from the first stick's; its times are put on that one's\n",
+                   out, stick.name, std::abs(stick.apart_s));
+    if (stick.clock.wall && std::abs(stick.clock.ahead_s) > kFarFromWallS)
+        fmt::print("{}: {}: its clock is {:.3f} s {} this machine's\n", out, stick.name,
+                   std::abs(stick.clock.ahead_s), stick.clock.ahead_s > 0 ? "ahead of" : "behind");
+}
+
 void print(const RecordResult& result, const std::string& out) {
     for (const RecordedStick& stick : result.sticks)
         fmt::print("{}: {}: {} in {:.3f} s, {:.2f} per second, {}{}\n", out, stick.name,
@@ -19,10 +33,7 @@ void print(const RecordResult& result, const std::string& out) {
                    counted(stick.gaps, "gap"),
                    stick.gaps == 0 ? "" : fmt::format(", the longest {:.3f} s", stick.longest_gap_s));
     for (const std::string& name : result.alone) fmt::print("{}: {}: one sample, left out\n", out, name);
-    const ClockEstimate& clock = result.clock.estimate;
-    fmt::print("{}: times: {}; offset {:.6f} s, drift {:.1f} ppm, delay p95 {:.2f} ms, {}\n", out,
-               name_of(result.clock.clock), clock.offset_s, clock.drift_ppm, clock.delay_p95_s * 1e3,
-               counted(clock.jumps, "jump"));
+    for (const RecordedStick& stick : result.sticks) print_clock(stick, out);
     if (result.late > 0)
         fmt::print("{}: {} late or repeated, left out\n", out, counted(result.late, "sample"));
     if (result.faults.foreign > 0)
@@ -40,7 +51,7 @@ void add_record_command(Command& program) {
     Command command = program.command("record", "Write what a source of samples gives to a trace");
     auto o = std::make_shared<RecordOptions>();
     command.required("--source", o->source.source, as::text("SOURCE"),
-                     "trace:FILE, stdin, zmq:ENDPOINT or osc:PORT");
+                     "trace:FILE, stdin, zmq:ENDPOINT, osc:PORT (this machine) or osc:*:PORT (any)");
     command.required("--out", o->out, as::text("FILE"), "Trace to write (CSV); replaced if there is one");
     command.option("--seconds", o->seconds, as::number(0, as::kAny, "s"),
                    "From the first sample on; 0: until the source ends, Ctrl-C or SIGTERM");

@@ -273,7 +273,7 @@ std::string format_latency_page(const LatencyReport& report, const PlayResult& p
     body += "<h2>Over time</h2>\n" + plots.element(leads_plot(realtime), "Leads and delays") +
             plots.element(frames_plot(realtime), "Frames") +
             plots.element(error_plot(report), "Error of the drawn sticks");
-    if (!realtime.clocks.empty()) body += "<h2>Clocks</h2>\n" + clock_table(realtime).html();
+    if (!realtime.clocks.empty()) body += "<h2>Clocks</h2>\n" + clock_table(play, realtime).html();
     body += remarks(realtime);
     return report_page("Latency of " + trace_name(play), plots.drawn(std::move(body), scratch));
 }

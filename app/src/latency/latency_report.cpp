@@ -404,11 +404,14 @@ Table spread_table(const LatencyReport& report) {
     return table;
 }
 
-Table clock_table(const RealtimeResult& realtime) {
-    Table table = Table::of({"clock", "offset_s:.6f", "drift_ppm:.1f", "delay_p95_ms:.2f", "jumps:d"});
-    for (const ClockReport& c : realtime.clocks)
-        table.add({name_of(c.clock), c.estimate.offset_s, c.estimate.drift_ppm, c.estimate.delay_p95_s * 1e3,
-                   c.estimate.jumps});
+Table clock_table(const PlayResult& play, const RealtimeResult& realtime) {
+    Table table = Table::of({"stick", "clock", "offset_s:.6f", "drift_ppm:.1f", "delay_p95_ms:.2f", "jumps:d",
+                             "ahead_of_wall_s:.3f"});
+    for (std::size_t i = 0; i < realtime.clocks.size() && i < play.sticks.size(); ++i) {
+        const ClockReport& c = realtime.clocks[i];
+        table.add({play.sticks[i], name_of(c.clock), c.estimate.offset_s, c.estimate.drift_ppm,
+                   c.estimate.delay_p95_s * 1e3, c.estimate.jumps, c.wall ? Cell(c.ahead_s) : Cell()});
+    }
     return table;
 }
 
@@ -470,7 +473,7 @@ std::string format_latency_json(const LatencyReport& report, const PlayResult& p
                          {"sound", Cell(report.sound_lead_needed_ms).json()}}},
                        {"drawn_error_mm", errors_of(report)},
                        {"leads", lead_table(realtime).json()},
-                       {"clocks", clock_table(realtime).json()},
+                       {"clocks", clock_table(play, realtime).json()},
                        {"events", events_of(realtime)}};
     return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

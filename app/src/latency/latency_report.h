@@ -163,8 +163,8 @@ struct LatencyReport {
 /// Sound minus picture [ms], against the drawn path and against the first frame behind the surface; a row
 /// without values if there are none.
 [[nodiscard]] Table spread_table(const LatencyReport& report);
-/// The clocks of the sensors' sources.
-[[nodiscard]] Table clock_table(const RealtimeResult& realtime);
+/// The clock of each stick's source.
+[[nodiscard]] Table clock_table(const PlayResult& play, const RealtimeResult& realtime);
 
 /// The rows behind the figures, by the files that they are written to: samples.csv, frames.csv, notes.csv,
 /// blocks.csv, leads.csv, errors.csv. Times in ns and `at_s` count from the run's epoch, `t_s` and `onset_s`

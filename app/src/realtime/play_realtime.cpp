@@ -17,8 +17,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kEventKinds[] = {"silent",       "back",      "restarted", "ended",
-                                       "clock jumped", "malformed", "failed"};  // by SensorEvent::Kind
+constexpr const char* kEventKinds[] = {"silent",       "back",      "restarted", "ended", "clock jumped",
+                                       "clocks apart", "malformed", "failed"};  // by SensorEvent::Kind
 static_assert(std::size(kEventKinds) == static_cast<std::size_t>(SensorEvent::Kind::failed) + 1);
 
 constexpr double kSameSpeed = 1e-6;  // relative: far below a step of MIDI or 24 bits
@@ -278,7 +278,7 @@ Json summary_of(const RealtimeOutcome& o) {
               {"departures", o.offline.departures.size()},
               {"unexplained", o.offline.unexplained()}}},
             {"quality", quality_json(r)},
-            {"sensors", {{"clocks", clock_table(r).json()}, {"events", events}}},
+            {"sensors", {{"clocks", clock_table(o.play, r).json()}, {"events", events}}},
             {"priorities", priorities},
             {"disturbed_by", r.disturbed_by},
             {"audio_device", r.audio_device},

@@ -9,7 +9,9 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "files/file_descriptor.h"
 #include "sensors/sample_source.h"
 
 namespace app {
@@ -124,9 +126,9 @@ protected:
 /// Without a time argument the time tag of the bundle counts, if it has one; else the time of arrival.
 class OscSource final : public LiveSource {
 public:
-    /// Throws BadInput for what is no port, std::runtime_error for one that is taken.
-    OscSource(const std::string& port, const SourceOptions& options);
-    ~OscSource() override;
+    /// `where`: PORT, on this machine's loopback alone; ADDRESS:PORT, that address of this machine, * for all of
+    /// them. Throws BadInput for what is none of these, std::runtime_error for a port that is taken.
+    OscSource(const std::string& where, const SourceOptions& options);
 
     /// Takes the bytes of a datagram as if they had arrived.
     void datagram(std::span<const char> bytes);
@@ -135,11 +137,10 @@ protected:
     void receive(std::int64_t deadline_ns) override;
 
 private:
-    void* server_;  // lo_server
-    bool local_;
+    std::vector<FileDescriptor> sockets_;
 };
 
-/// Throws BadInput for what is no port.
-void check_osc_port(const std::string& port);
+/// Throws BadInput unless it is PORT or ADDRESS:PORT.
+void check_osc_port(const std::string& where);
 
 }  // namespace app

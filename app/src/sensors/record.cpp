@@ -7,8 +7,11 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "files/bad_input.h"
 #include "files/output_folder.h"
@@ -60,6 +63,8 @@ public:
 private:
     struct Stick : RecordedStick {
         double interval_s = 0;  // between samples, smoothed
+        SourceClock source_clock;
+        bool met = false;  // a sample has come
     };
     struct Row {
         std::size_t stick;
@@ -97,11 +102,12 @@ private:
     void take(const SourceSample& given) {
         if (first_ns_ == 0) begin(given);
         tracking::PoseSample sample = given.sample;
-        sample.t_s = time_of(given);
         if (given.stick >= sticks_.size()) sticks_.resize(given.stick + 1);
         Stick& stick = sticks_[given.stick];
         stick.name = source_->sticks().names()[given.stick];
-        if (stick.samples > 0 && !(sample.t_s > stick.last_s)) {
+        const std::optional<double> t_s = time_of(given, stick);
+        sample.t_s = t_s.value_or(0);
+        if (!t_s || (stick.samples > 0 && !(sample.t_s > stick.last_s))) {
             ++result_.late;
             return;
         }
@@ -112,31 +118,44 @@ private:
 
     void begin(const SourceSample& first) {
         first_ns_ = first.read_ns;
-        result_.clock.clock = source_->replayed() ? SampleClock::replayed
-                              : first.has_time    ? SampleClock::source
-                                                  : SampleClock::arrival;
+        clock_ = source_->replayed() ? SampleClock::replayed
+                 : first.has_time    ? SampleClock::source
+                                     : SampleClock::arrival;
         if (source_->replayed())
-            result_.clock.estimate.offset_s =
-                to_s(first.due_ns - options_.source.epoch_ns) - first.sample.t_s;
+            replay_offset_s_ = to_s(first.due_ns - options_.source.epoch_ns) - first.sample.t_s;
         SourceHead head = source_->head();
         const std::string origin = std::exchange(head.keys.source, {});
-        head.keys.source = fmt::format("recorded; clock of the times: {}{}", name_of(result_.clock.clock),
+        head.keys.source = fmt::format("recorded; clock of the times: {}{}", name_of(clock_),
                                        head.base_s == 0 ? "" : fmt::format(" minus {:.0f} s", head.base_s));
         if (!origin.empty()) head.keys.source += "; " + origin;
         oriented_ = head.oriented;
         head_ = tracking::format_trace_head(head.keys, oriented_);
     }
 
-    /// The time that the recording says: the source's, unchanged but for jumps of its clock.
-    double time_of(const SourceSample& given) {
+    /// The time that the recording says: the source's, unchanged but for jumps of its clock, and on the first
+    /// stick's clock where the two are far apart. None for a sample that cannot be of its stick's clock.
+    std::optional<double> time_of(const SourceSample& given, Stick& stick) {
         const double arrival_s = to_s(given.read_ns - first_ns_);
         if (source_->replayed()) {
             delays_.add(to_s(given.read_ns - given.due_ns));
             return given.sample.t_s;
         }
         if (!given.has_time) return arrival_s;
-        (void)clock_.map(given.stick, given.sample.t_s, arrival_s);
-        return given.sample.t_s + clock_.shift_s();
+        if (!stick.source_clock.map(given.sample.t_s, arrival_s)) return std::nullopt;
+        const double apart_s = to_recorded_s(stick.source_clock) - first_to_recorded_s_;
+        if (!std::exchange(stick.met, true)) {
+            if (!met_)
+                first_to_recorded_s_ = to_recorded_s(stick.source_clock);
+            else if (std::abs(apart_s) > kFarApartS)
+                stick.apart_s = apart_s;
+            met_ = true;
+        }
+        return given.sample.t_s + stick.source_clock.shift_s() + stick.apart_s;
+    }
+
+    /// Our time minus that which a stick's samples would have in the recording.
+    static double to_recorded_s(const SourceClock& clock) {
+        return clock.estimate().offset_s - clock.shift_s();
     }
 
     static void note(Stick& stick, double t_s) {
@@ -155,15 +174,13 @@ private:
     }
 
     RecordResult finish() {
-        for (const Stick& stick : sticks_) {
+        for (Stick& stick : sticks_) {
             if (stick.samples == 1) result_.alone.push_back(stick.name);
-            if (stick.samples >= 2) result_.sticks.push_back(stick);
+            if (stick.samples < 2) continue;
+            stick.clock = clock_report(stick);
+            result_.sticks.push_back(stick);
         }
         result_.faults = source_->faults();
-        if (source_->replayed())
-            result_.clock.estimate.delay_p95_s = delays_.p95();
-        else if (result_.clock.clock == SampleClock::source)
-            result_.clock.estimate = clock_.estimate();
         if (result_.sticks.empty())
             throw std::runtime_error(fmt::format(
                 "error: found no stick with two samples from {}, expected some{}", options_.source.source,
@@ -177,6 +194,17 @@ private:
         return std::move(result_);
     }
 
+    [[nodiscard]] ClockReport clock_report(const Stick& stick) const {
+        if (clock_ == SampleClock::replayed) return {clock_, {replay_offset_s_, 0, delays_.p95(), 0, 0}};
+        if (clock_ == SampleClock::arrival) return {clock_};
+        ClockReport report{clock_, stick.source_clock.estimate()};
+        const double reading_s = to_s(monotonic_ns() - first_ns_) - report.estimate.offset_s;
+        const std::optional<double> ahead_s = ahead_of_wall(source_->head().base_s + reading_s);
+        report.wall = ahead_s.has_value();
+        report.ahead_s = ahead_s.value_or(0);
+        return report;
+    }
+
     const RecordOptions& options_;
     fs::path partial_;
     FileDescriptor file_;
@@ -184,7 +212,10 @@ private:
     std::string head_;
     std::vector<Row> rows_;  // not yet written
     std::unique_ptr<SampleSource> source_;
-    SourceClock clock_;
+    SampleClock clock_ = SampleClock::source;
+    double replay_offset_s_ = 0;
+    bool met_ = false;  // the first stick's clock: it gives first_to_recorded_s_
+    double first_to_recorded_s_ = 0;
     DelayPercentile delays_;
     std::vector<Stick> sticks_;
     RecordResult result_;

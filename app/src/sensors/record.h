@@ -22,6 +22,9 @@ struct RecordedStick {
     double first_s = 0, last_s = 0;
     std::uint64_t gaps = 0;  ///< longer than 2.5 intervals and 20 ms
     double longest_gap_s = 0;
+    ClockReport clock;
+    double apart_s =
+        0;  ///< its clock behind the first stick's where they are far apart: was added to its times
 };
 
 struct RecordResult {
@@ -29,12 +32,11 @@ struct RecordResult {
     std::vector<std::string> alone;     ///< sticks with one sample, left out
     std::uint64_t late = 0;             ///< samples not newer than the one before, left out
     SourceFaults faults;
-    ClockReport clock;
 };
 
 /// Writes what a source gives to a native trace, with the times that the source gave (from the whole second
-/// of the first one, where they count from long ago; its clock's jumps taken out, so that times increase), or
-/// the times of arrival since the first sample where it gives none. Rows go to OUT.partial every 0.2 s, so a
+/// of the first one, where they count from long ago; its clock's jumps taken out, so that times increase; a stick
+/// whose clock is far from the first one's is put on that), or the times of arrival since the first sample where it gives none. Rows go to OUT.partial every 0.2 s, so a
 /// crash loses at most that and leaves a trace up to the last complete line; at the end (the source's,
 /// `seconds`, SIGINT or SIGTERM) it becomes OUT. The file says which clock its times are of, and names
 /// neither files, hosts nor ports.

@@ -93,7 +93,6 @@ struct SourceOptions {
     double speed = 1;     ///< of a replay
     bool resume = false;  ///< begin at the current time: samples of a trace that are due have been seen
     std::string stream_head = {};  ///< with `resume`: what stream_head() was
-    bool local = false;            ///< of `osc`: what other machines send is left out
 };
 
 /// Throws BadInput for a source that does not exist, is not one, or lacks a stick that was asked for.

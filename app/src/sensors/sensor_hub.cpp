@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <stdexcept>
@@ -27,6 +28,8 @@ constexpr std::int64_t kLookEveryNs = 1'000'000;
 constexpr std::int64_t kLeastSilenceNs = 100'000'000;
 constexpr std::int64_t kFirstSampleWithinNs = 2'000'000'000;  // a player may take the sticks up later
 constexpr double kSilentIntervals = 3;
+constexpr std::int64_t kJumpsToldEveryNs = 1'000'000'000;
+constexpr std::int64_t kApartForNs = 1'000'000'000;
 
 std::string how(int status) {
     return WIFSIGNALED(status) ? fmt::format("was killed by signal {}", WTERMSIG(status))
@@ -152,18 +155,61 @@ void SensorHub::watch_stick(std::size_t index) {
                           : "no sample yet"));
 }
 
-/// Jumps of the source's clock, malformed messages.
+/// Jumps of the stick's clock: not each of one that jumps all the time.
+void SensorHub::watch_clock(std::size_t index) {
+    const ClockEstimate clock = memory_[index]->report.read().value_or(SensorReport{}).clock.estimate;
+    SeenStick& stick = seen_[index];
+    const std::int64_t now = monotonic_ns();
+    if (clock.jumps <= stick.jumps || now - stick.jump_told_ns < kJumpsToldEveryNs) return;
+    stick.jumps = clock.jumps;
+    stick.jump_told_ns = now;
+    add(SensorEvent::Kind::clock_jumped, {index},
+        fmt::format("the source's clock jumped by {:+.3f} s ({} so far); its offset is estimated anew",
+                    clock.last_jump_s, clock.jumps));
+}
+
+/// True once, when `far` has held for a second.
+bool SensorHub::lasts(bool far, std::int64_t& since_ns) {
+    if (since_ns < 0) return false;
+    const std::int64_t now = monotonic_ns();
+    if (!far || since_ns == 0) since_ns = far ? now : 0;
+    if (!far || now - since_ns < kApartForNs) return false;
+    since_ns = -1;
+    return true;
+}
+
+/// Clocks of senders that are far from each other's, and from this machine's.
+void SensorHub::watch_clocks_of(const Sensor& sensor) {
+    std::optional<std::size_t> first;
+    double first_offset_s = 0;
+    for (const std::size_t index : sensor.sticks) {
+        const SensorReport report = memory_[index]->report.read().value_or(SensorReport{});
+        const ClockReport& clock = report.clock;
+        SeenStick& stick = seen_[index];
+        if (report.read == 0 || clock.clock != SampleClock::source) continue;
+        if (lasts(clock.wall && std::abs(clock.ahead_s) > kFarFromWallS, stick.far_from_ours_ns))
+            add(SensorEvent::Kind::clocks_apart, {index},
+                fmt::format("the source's clock is {:.3f} s {} this machine's", std::abs(clock.ahead_s),
+                            clock.ahead_s > 0 ? "ahead of" : "behind"));
+        if (!first) {
+            first = index;
+            first_offset_s = clock.estimate.offset_s;
+            continue;
+        }
+        const double apart_s = std::abs(clock.estimate.offset_s - first_offset_s);
+        if (lasts(apart_s > kFarApartS, stick.far_from_other_ns))
+            add(SensorEvent::Kind::clocks_apart, {*first, index},
+                fmt::format("their clocks are {:.3f} s apart; each is followed by itself", apart_s));
+    }
+}
+
+/// Malformed messages.
 void SensorHub::watch_source(const Sensor& sensor) {
     const SensorReport report = report_of(sensor);
     SeenStick& first = seen_[sensor.sticks.front()];
-    if (report.clock.estimate.jumps > first.jumps)
-        add(SensorEvent::Kind::clock_jumped, sensor.sticks,
-            fmt::format("the source's clock jumped by {:+.3f} s ({} so far); its offset is estimated anew",
-                        report.clock.estimate.last_jump_s, report.clock.estimate.jumps));
     if (report.malformed > 0 && first.malformed == 0)
         add(SensorEvent::Kind::malformed, sensor.sticks,
             fmt::format("left out what it could not read: {}", report.text.data()));
-    first.jumps = report.clock.estimate.jumps;
     first.malformed = std::max(first.malformed, report.malformed);
 }
 
@@ -199,7 +245,7 @@ void SensorHub::restart(Sensor& sensor) {
     try {
         start(sensor);
         sensor.over = false;
-        seen_[sensor.sticks.front()].jumps = 0;
+        for (const std::size_t stick : sensor.sticks) seen_[stick].jumps = 0;
         add(SensorEvent::Kind::restarted, sensor.sticks,
             fmt::format("its process {}; started again ({} of at most {} times in 10 s)", how(sensor.status),
                         recent.size(), kMostRestarts));
@@ -233,6 +279,8 @@ std::vector<SensorEvent> SensorHub::watch() {
         look_after(sensor);
         if (was_over) continue;
         watch_source(sensor);
+        for (const std::size_t stick : sensor.sticks) watch_clock(stick);
+        watch_clocks_of(sensor);
         if (sensor.over) continue;
         for (const std::size_t stick : sensor.sticks) watch_stick(stick);
     }
@@ -247,7 +295,8 @@ bool SensorHub::ended() const {
 
 std::vector<ClockReport> SensorHub::clocks() const {
     std::vector<ClockReport> clocks;
-    for (const Sensor& sensor : sensors_) clocks.push_back(report_of(sensor).clock);
+    for (const SharedSensorMemory& memory : memory_)
+        clocks.push_back(memory->report.read().value_or(SensorReport{}).clock);
     return clocks;
 }
 

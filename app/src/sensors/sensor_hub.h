@@ -11,7 +11,7 @@ namespace app {
 
 /// What happened to a sensor that the user should know.
 struct SensorEvent {
-    enum class Kind { silent, back, restarted, ended, clock_jumped, malformed, failed };
+    enum class Kind { silent, back, restarted, ended, clock_jumped, clocks_apart, malformed, failed };
     Kind kind = Kind::silent;
     double at_s = 0;  ///< since the epoch
     std::vector<std::string> sticks;
@@ -44,7 +44,7 @@ public:
     [[nodiscard]] std::vector<SensorEvent> watch();
     /// Every source has ended, and all that it gave has been published.
     [[nodiscard]] bool ended() const;
-    [[nodiscard]] std::vector<ClockReport> clocks() const;  ///< one per process
+    [[nodiscard]] std::vector<ClockReport> clocks() const;  ///< one per stick
     /// How a live stream began.
     [[nodiscard]] SharedStreamHead stream_head() const {
         return memory_.front()->head.read().value_or(SharedStreamHead{});
@@ -67,6 +67,9 @@ private:
         std::int64_t silent_since_ns = 0;  ///< 0: not silent
         std::uint64_t pid = 0;             ///< that the counts of the process below are of
         std::uint64_t jumps = 0, malformed = 0;
+        std::int64_t jump_told_ns = 0;
+        /// Since when its clock has been far from another stick's, and from this machine's; 0: it is not, < 0: that was told.
+        std::int64_t far_from_other_ns = 0, far_from_ours_ns = 0;
     };
 
     void start(Sensor& sensor) const;
@@ -76,6 +79,9 @@ private:
     void add(SensorEvent::Kind kind, const std::vector<std::size_t>& sticks, const std::string& text);
     void fail(const Sensor& sensor, const std::string& why);
     void watch_stick(std::size_t index);
+    void watch_clock(std::size_t index);
+    void watch_clocks_of(const Sensor& sensor);
+    [[nodiscard]] static bool lasts(bool far, std::int64_t& since_ns);
     void watch_source(const Sensor& sensor);
     void look_after(Sensor& sensor);
     void restart(Sensor& sensor);

@@ -41,13 +41,25 @@ void add_one(int eventfd) {
     (void)!write(eventfd, &one, sizeof one);
 }
 
-/// Blocks the signals that end this process, in this thread and those it starts; readable when one came.
+/// Blocks SIGTERM in this thread and those it starts; readable when it came. A terminal's SIGINT and SIGHUP reach
+/// the hub, too, whose end ends this process.
 FileDescriptor make_signal_fd() {
+    for (const int signal : {SIGINT, SIGHUP}) (void)std::signal(signal, SIG_IGN);
     sigset_t ending;
     sigemptyset(&ending);
-    for (const int signal : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&ending, signal);
+    sigaddset(&ending, SIGTERM);
     pthread_sigmask(SIG_BLOCK, &ending, nullptr);
     return FileDescriptor(signalfd(-1, &ending, SFD_CLOEXEC | SFD_NONBLOCK));
+}
+
+/// Ends this process by SIGTERM, so that its hub sees an interruption.
+void end_interrupted() {
+    (void)std::signal(SIGTERM, SIG_DFL);
+    sigset_t ending;
+    sigemptyset(&ending);
+    sigaddset(&ending, SIGTERM);
+    (void)raise(SIGTERM);
+    pthread_sigmask(SIG_UNBLOCK, &ending, nullptr);
 }
 
 class Sensor {
@@ -77,8 +89,10 @@ public:
         add_one(task_.wake_fd);
         stop();
         report();
+        interrupted_ = watched[2].revents != 0;
         return phase_ == SensorPhase::failed ? 1 : 0;
     }
+    [[nodiscard]] bool interrupted() const { return interrupted_; }
 
 private:
     struct Stick {
@@ -97,6 +111,8 @@ private:
         double last_s = 0;  // when the newest sample was read
         std::uint64_t read = 0;
         double interval_s = 0;
+        SourceClock clock;
+        ClockReport clock_report;
     };
 
     // The reader.
@@ -113,6 +129,7 @@ private:
                     note_source();
                 if (status == SourceStatus::ended) break;
             }
+            if (stop.stop_requested()) return;  // which is no end of the source
             for (Stick& stick : sticks_) stick.samples.close();
         } catch (const std::exception& wrong) {
             fail(wrong.what());
@@ -121,8 +138,7 @@ private:
     void pass(SourceSample sample) {
         note(sample);
         keep_head();
-        if (settling(sample)) return;
-        put_on_our_clock(sample);
+        if (settling(sample) || !put_on_our_clock(sample)) return;
         if (source_->quiet_until_ns() != 0) note_source();
         BoundedQueue<SourceSample>& samples = sticks_[sample.stick].samples;
         if (source_->replayed())
@@ -138,19 +154,26 @@ private:
         if (first_read_ns_ == 0) first_read_ns_ = sample.read_ns;
         return sample.read_ns - first_read_ns_ < kSettlingNs;
     }
-    void put_on_our_clock(SourceSample& sample) {
+    /// False for a sample that cannot be of its stick's clock.
+    bool put_on_our_clock(SourceSample& sample) {
         const double arrival_s = since_epoch_s(sample.read_ns);
         if (source_->replayed()) {
             delays_.add(to_s(sample.read_ns - sample.due_ns));
             replay_offset_s_ = since_epoch_s(sample.due_ns) - sample.sample.t_s -
                                static_cast<double>(sample.lap) * task_.period_s;
-            return;
+            return true;
         }
-        sample.sample.t_s =
-            sample.has_time ? clock_.map(sample.stick, sample.sample.t_s, arrival_s) : arrival_s;
-        sample.due_ns = task_.epoch_ns + to_ns(sample.sample.t_s);
-        const std::lock_guard lock(mutex_);
-        report_.clock.clock = sample.has_time ? SampleClock::source : SampleClock::arrival;
+        Stick& stick = sticks_[sample.stick];
+        const std::optional<double> ours_s =
+            sample.has_time ? stick.clock.map(sample.sample.t_s, arrival_s) : arrival_s;
+        {
+            const std::lock_guard lock(mutex_);
+            stick.clock_report.clock = sample.has_time ? SampleClock::source : SampleClock::arrival;
+        }
+        if (!ours_s) return false;
+        sample.sample.t_s = *ours_s;
+        sample.due_ns = task_.epoch_ns + to_ns(*ours_s);
+        return true;
     }
     void note(const SourceSample& sample) {
         Stick& stick = sticks_[sample.stick];
@@ -161,17 +184,28 @@ private:
         stick.interval_s += (stick.interval_s == 0 ? 1 : kSmoothing) * (interval_s - stick.interval_s);
     }
     void note_source() {
-        ClockEstimate estimate = clock_.estimate();
-        if (source_->replayed()) estimate = {replay_offset_s_, 0, delays_.p95(), 0, 0};
         noted_ns_ = monotonic_ns();
         keep_head();
         const SourceFaults faults = source_->faults();
         const std::lock_guard lock(mutex_);
         report_.malformed = faults.malformed;
         report_.set_text(one_line(faults.first, 240));
-        report_.clock.estimate = estimate;
+        for (Stick& stick : sticks_) note_clock(stick);
         const std::int64_t quiet_until_ns = source_->quiet_until_ns();
         if (std::exchange(report_.quiet_until_ns, quiet_until_ns) != quiet_until_ns) add_one(changed_.get());
+    }
+    void note_clock(Stick& stick) {
+        ClockReport& report = stick.clock_report;
+        if (source_->replayed()) {
+            report.estimate = {replay_offset_s_, 0, delays_.p95(), 0, 0};
+            return;
+        }
+        report.estimate = stick.clock.estimate();
+        if (report.clock != SampleClock::source) return;
+        const double reading_s = since_epoch_s(monotonic_ns()) - report.estimate.offset_s;
+        const std::optional<double> ahead_s = ahead_of_wall(source_->head().base_s + reading_s);
+        report.wall = ahead_s.has_value();
+        report.ahead_s = ahead_s.value_or(0);
     }
     /// True if the reader was held up just now.
     bool stall_if_due(const std::stop_token& stop) {
@@ -222,6 +256,7 @@ private:
             SensorReport report = report_;
             report.phase = phase_;
             report.interval_s = stick.interval_s;
+            report.clock = stick.clock_report;
             report.read = stick.read;
             if (!failure_.empty()) report.set_text(failure_);
             stick.memory->report.publish(report);
@@ -290,7 +325,6 @@ private:
     std::deque<Stick> sticks_;
     std::unique_ptr<SampleSource> source_;
     std::int64_t first_read_ns_ = 0;  // of a live source; the reader's
-    SourceClock clock_;               // the reader's
     DelayPercentile delays_;          // of replayed samples; the reader's
     double replay_offset_s_ = 0;      // the reader's, as the next three
     std::string head_;
@@ -302,6 +336,7 @@ private:
     std::atomic<SensorPhase> phase_ = SensorPhase::starting;
     std::atomic<std::size_t> filtering_ = 0;  // sticks that still have samples to come
     FileDescriptor changed_;                  // eventfd: there is something to report
+    bool interrupted_ = false;                // by SIGTERM
     std::jthread reader_;
 };
 
@@ -342,7 +377,15 @@ void SharedSensorMemory::Unmap::operator()(SensorMemory* memory) const {
 int run_sensor(const SensorTask& task) {
     const rlimit no_core{0, 0};
     (void)setrlimit(RLIMIT_CORE, &no_core);
-    return Sensor(task).run();
+    bool interrupted = false;
+    int status = 0;
+    {
+        Sensor sensor(task);
+        status = sensor.run();
+        interrupted = sensor.interrupted();
+    }
+    if (interrupted) end_interrupted();
+    return status;
 }
 
 std::vector<std::string> sensor_arguments(const SensorTask& task) {

@@ -27,8 +27,8 @@ struct SensorReport {
     double interval_s = 0;            ///< between the stick's samples, smoothed; 0: not known
     std::uint64_t read = 0;           ///< samples of the stick that the reader got
     std::uint64_t malformed = 0;      ///< messages or rows
-    ClockReport clock;
-    std::array<char, 256> text{};  ///< why it failed, or what the first malformed message was; ends with 0
+    ClockReport clock;                ///< of the stick's samples
+    std::array<char, 256> text{};     ///< why it failed, or what the first malformed message was; ends with 0
 
     void set_text(std::string_view line);
 };
@@ -119,8 +119,8 @@ void for_each_sensor_option(auto& task, const auto& field) {
 
 /// A sensor process: one thread reads the source at its own pace, one per stick filters and publishes (a slow
 /// external predictor holds up its own stick alone), and this one reports and watches for the end. Returns the
-/// exit status: 0 when the source has ended, the hub is gone or SIGTERM came; 1 when it failed, which its report
-/// says.
+/// exit status: 0 when the source has ended or the hub is gone; 1 when it failed, which its report says. SIGTERM
+/// ends it in order, as a process that was ended by it; SIGINT and SIGHUP are the hub's to answer.
 [[nodiscard]] int run_sensor(const SensorTask& task);
 
 /// The words after the program's name with which the command `sensor` gets a task.

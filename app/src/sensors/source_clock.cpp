@@ -1,6 +1,7 @@
 #include "sensors/source_clock.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 
 #include "statistics/statistics.h"
@@ -10,7 +11,7 @@ namespace {
 
 constexpr double kBucketS = 0.1;
 constexpr double kSettlingRate = 0.5, kSlewRate = 200e-6;
-constexpr int kBehindInARow = 3;
+constexpr int kStraysInARow = 3;
 constexpr double kLateForS = 0.5;
 constexpr std::int64_t kFewestSeconds = 5;  // that a drift is estimated from
 constexpr double kLeastStepS = 1e-6;
@@ -29,31 +30,47 @@ double DelayPercentile::p95() const noexcept {
     return quantile_in_place(std::span(values).first(std::min(count_, values.size())), 0.95);
 }
 
-double SourceClock::map(std::size_t stick, double source_s, double arrival_s) noexcept {
-    Stick& own = sticks_[stick];
+std::optional<double> ahead_of_wall(double reading_s) noexcept {
+    constexpr double kFrom1900S = 2208988800.0, kYearS = 366 * 86400.0;
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    const double ahead_s = reading_s - std::chrono::duration<double>(now).count();
+    for (const double ahead : {ahead_s, ahead_s - kFrom1900S})
+        if (std::abs(ahead) < kYearS) return ahead;
+    return std::nullopt;
+}
+
+std::optional<double> SourceClock::map(double source_s, double arrival_s) noexcept {
     const double delay = arrival_s - source_s;
-    if (!started_)
+    if (!started_) {
         begin(source_s, arrival_s);
-    else if (jumped(own, source_s, arrival_s))
-        jump(source_s, arrival_s);
-    if (own.started && source_s <= own.newest) return source_s + offset_s_;  // late: so is its mapped time
-    own = {source_s, source_s, 0, true};
+    } else {
+        const Fit found = fit(source_s, arrival_s);
+        if (strays_for_long(found, source_s) || (found == Fit::in_order && stays_late(delay, arrival_s)))
+            jump(source_s, arrival_s);
+        else if (found == Fit::behind)
+            return source_s + offset_s_;  // late: so is its mapped time
+        else if (found == Fit::ahead)
+            return std::nullopt;
+    }
     take(delay, arrival_s);
     steer(source_s);
     latest_mapped_s_ = std::max(latest_mapped_s_, source_s + offset_s_);
     return source_s + offset_s_;
 }
 
-bool SourceClock::jumped(Stick& stick, double source_s, double arrival_s) noexcept {
-    const double delay = arrival_s - source_s;
-    if (!stick.started) return false;
-    if (source_s < stick.newest) {
-        stick.behind = source_s > stick.previous || stick.behind == 0 ? stick.behind + 1 : 1;
-        stick.previous = source_s;
-        return stick.behind == kBehindInARow;
-    }
-    if (source_s - stick.newest > kJumpS && delay < target(arrival_s) - kJumpS) return true;
-    return stays_late(delay, arrival_s);
+SourceClock::Fit SourceClock::fit(double source_s, double arrival_s) const noexcept {
+    if (source_s <= newest_s_) return Fit::behind;
+    return source_s + offset_s_ > arrival_s + kJumpS ? Fit::ahead : Fit::in_order;
+}
+
+/// A repeated sample is none of a clock that jumped.
+bool SourceClock::strays_for_long(Fit fit, double source_s) noexcept {
+    if (fit == Fit::behind && source_s == newest_s_) return false;
+    const bool goes_on = fit == stray_ && source_s > stray_s_;
+    stray_ = fit;
+    stray_s_ = source_s;
+    strays_ = fit == Fit::in_order ? 0 : goes_on ? strays_ + 1 : 1;
+    return strays_ == kStraysInARow;
 }
 
 bool SourceClock::stays_late(double delay, double arrival_s) noexcept {
@@ -70,13 +87,13 @@ void SourceClock::begin(double source_s, double arrival_s) noexcept {
     offset_s_ = target_s_ = arrival_s - source_s;
     begun_s_ = newest_s_ = source_s;
     late_since_s_ = -1;
+    strays_ = 0;
 }
 
 void SourceClock::jump(double source_s, double arrival_s) noexcept {
     const double old_offset_s = offset_s_;
     window_.fill({});
     seconds_.fill({});
-    sticks_.fill({});
     delays_.clear();
     begin(source_s, arrival_s);
     offset_s_ = std::max(offset_s_, latest_mapped_s_ + kLeastStepS - source_s);

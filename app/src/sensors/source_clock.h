@@ -3,8 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-
-#include "sensors/sample_source.h"
+#include <optional>
 
 namespace app {
 
@@ -34,13 +33,26 @@ enum class SampleClock : std::uint64_t { replayed, source, arrival };
 /// "the trace's own, replayed", "the source's" or "arrival".
 [[nodiscard]] const char* name_of(SampleClock clock);
 
-/// How that clock relates to ours, which counts from the epoch.
+/// Beyond this two clocks are far from each other [s]: more than a sample is under way.
+inline constexpr double kFarApartS = 0.25;
+/// Beyond this a wall clock is far from this machine's [s]: one that is set from time to time is nearer.
+inline constexpr double kFarFromWallS = 1;
+
+/// How the clock of a stick's samples relates to ours, which counts from the epoch.
 struct ClockReport {
     SampleClock clock = SampleClock::replayed;
     ClockEstimate estimate = {};
+    /// Whether the source's times are wall time (NTP's of 1900 or Unix's of 1970), and by how much its clock is
+    /// ahead of this machine's then, the least delay not counted.
+    bool wall = false;
+    double ahead_s = 0;
 };
 
-/// Puts the times of a source's samples on our clock.
+/// By how much a clock whose reading now is `reading_s` is ahead of this machine's wall clock, if it counts from
+/// 1900 or 1970: if it is within a year of that.
+[[nodiscard]] std::optional<double> ahead_of_wall(double reading_s) noexcept;
+
+/// Puts the times of a stick's samples on our clock. Each stick has one: its sender may have a clock of its own.
 ///
 /// Of each sample the arrival minus its own time is the clocks' offset and the delay on the way, which is
 /// >= 0: the least of a window is the offset (one-way minimum filter: Paxson 1998, Cristian's lower bound
@@ -49,20 +61,21 @@ struct ClockReport {
 ///   target     the least arrival - time of the newest 2 s
 ///   offset     starts at the first sample's; follows the target by at most half of the time that passes for
 ///              kSettlingS, then by at most 200 ppm of it: differences of mapped times stay true
-///   mapped     sample's time + offset, strictly increasing for samples that come in order
+///   mapped     sample's time + offset, strictly increasing for samples that come in order; never more than
+///              kJumpS after the arrival
 ///   drift      slope of the least arrival - time of each second (least squares, 64 s)
 ///
-/// A jump is a step of more than kJumpS between two samples of a stick by which they would arrive that much
-/// before they were taken; three samples in a row in order among themselves but before an older one; or
-/// samples that all come kJumpS later than they used to for half a second. The offset is then estimated anew
-/// from that sample's arrival. A single late sample is none: its mapped time is late, too.
+/// A sample that lies before an older one is late, and so is its mapped time; one that would be mapped to more
+/// than kJumpS after its arrival cannot be of this clock, and is not mapped. Three of one kind in a row, in
+/// order among themselves, are a jump of the clock; so are samples that all come kJumpS later than they used
+/// to for half a second. The offset is then estimated anew from that sample's arrival.
 /// Bounded memory; no allocation. One thread.
 class SourceClock {
 public:
     static constexpr double kSettlingS = 0.25, kJumpS = 0.25;
 
-    /// The sample's time on our clock. `arrival_s` does not decrease.
-    [[nodiscard]] double map(std::size_t stick, double source_s, double arrival_s) noexcept;
+    /// The sample's time on our clock; none for one that cannot be of this clock. `arrival_s` does not decrease.
+    [[nodiscard]] std::optional<double> map(double source_s, double arrival_s) noexcept;
     [[nodiscard]] ClockEstimate estimate() const noexcept;
     /// What jumps have added to the source's times, so that these go on increasing: minus all jumps.
     [[nodiscard]] double shift_s() const noexcept { return shift_s_; }
@@ -73,13 +86,10 @@ private:
         std::int64_t index = kNever;
         double least = 0;
     };
-    struct Stick {
-        double newest = 0, previous = 0;  ///< source times: the latest, and that of the sample before
-        int behind = 0;                   ///< samples in a row before `newest`, in order among themselves
-        bool started = false;
-    };
+    enum class Fit { in_order, behind, ahead };
 
-    [[nodiscard]] bool jumped(Stick& stick, double source_s, double arrival_s) noexcept;
+    [[nodiscard]] Fit fit(double source_s, double arrival_s) const noexcept;
+    [[nodiscard]] bool strays_for_long(Fit fit, double source_s) noexcept;
     [[nodiscard]] bool stays_late(double delay, double arrival_s) noexcept;
     void begin(double source_s, double arrival_s) noexcept;
     void jump(double source_s, double arrival_s) noexcept;
@@ -88,13 +98,15 @@ private:
     [[nodiscard]] double target(double arrival_s) const noexcept;
     [[nodiscard]] double drift_ppm() const noexcept;
 
-    std::array<Stick, StickNames::kMostSticks> sticks_{};
     std::array<Bucket, 20> window_{};   // of 0.1 s
     std::array<Bucket, 64> seconds_{};  // of 1 s
     DelayPercentile delays_;
     bool started_ = false;
     double offset_s_ = 0, target_s_ = 0;
     double begun_s_ = 0, newest_s_ = 0;  // source times
+    Fit stray_ = Fit::in_order;          // of the newest samples in a row, in order among themselves:
+    double stray_s_ = 0;                 // time of the last
+    int strays_ = 0;
     double latest_mapped_s_ = 0;
     double late_since_s_ = -1;
     std::uint64_t jumps_ = 0;

@@ -1,10 +1,9 @@
 // Decoders and sources of live samples, within this process.
 #include "sensors/live_sources.h"
 
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <ifaddrs.h>
 #include <lo/lo.h>
-#include <net/if.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -353,47 +352,65 @@ TEST_F(OscSourceTest, MutatedDatagramsGiveSoundSamplesOrOneLine) {
     EXPECT_LE(source.sticks().names().size(), 16u);
 }
 
-/// Sends a pose to a port of the machine's address `to`.
-void send_pose(const sockaddr_in& to, int port) {
-    sockaddr_in address = to;
-    address.sin_port = htons(static_cast<std::uint16_t>(port));
-    const auto bytes = bytes_of("/left", floats({1, 2, 3}));
-    const int descriptor = socket(AF_INET, SOCK_DGRAM, 0);
-    (void)!sendto(descriptor, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&address),
-                  sizeof address);
-    close(descriptor);
+TEST_F(OscSourceTest, BundlesOfBundlesAreTakenToADepthAndBrokenOnesAreCounted) {
+    const std::vector<char> message = bytes_of("/left", floats({1, 2, 3}));
+    const auto bundle = [](const std::vector<char>& inside, std::size_t said) {
+        std::string text("#bundle", 8);
+        text += std::string("\0\0\0\0\0\0\0\1", 8);  // at once
+        for (const int shift : {24, 16, 8, 0}) text += static_cast<char>(said >> shift & 0xff);
+        text.append(inside.begin(), inside.end());
+        return std::vector<char>(text.begin(), text.end());
+    };
+    std::vector<char> nested = message;
+    for (int depth = 1; depth <= 10; ++depth) {
+        nested = bundle(nested, nested.size());
+        source.datagram(nested);
+        EXPECT_EQ(next(), depth <= 8 ? SourceStatus::sample : SourceStatus::waiting) << depth;
+    }
+    EXPECT_EQ(source.faults().malformed, 2u);
+    for (const std::size_t said : {message.size() + 4, std::size_t(0xffffffff), std::size_t(0x80000000)})
+        source.datagram(bundle(message, said));
+    source.datagram(std::vector<char>(nested.begin(), nested.begin() + 12));
+    EXPECT_EQ(next(), SourceStatus::waiting);
+    EXPECT_EQ(source.faults().malformed, 6u);
 }
 
-TEST(OscSender, OfAnotherMachineIsLeftOutWhereItShallBe) {
-    // What is sent to another address of this machine comes from there: as if from another machine.
-    sockaddr_in loopback{}, other{};
-    loopback.sin_family = AF_INET, loopback.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    ifaddrs* interfaces = nullptr;
-    ASSERT_EQ(getifaddrs(&interfaces), 0);
-    for (const ifaddrs* each = interfaces; each != nullptr; each = each->ifa_next)
-        if (each->ifa_addr != nullptr && each->ifa_addr->sa_family == AF_INET &&
-            (each->ifa_flags & IFF_LOOPBACK) == 0)
-            std::memcpy(&other, each->ifa_addr, sizeof other);
-    freeifaddrs(interfaces);
-    for (const bool local : {false, true}) {
-        const int port = app::free_udp_port();
-        app::SourceOptions options;
-        options.local = local;
-        OscSource source(std::to_string(port), options);
-        SourceSample sample;
-        const auto comes = [&](const sockaddr_in& to) {
-            send_pose(to, port);
-            return source.next(sample, app::monotonic_ns() + 2'000'000'000) == SourceStatus::sample;
-        };
-        EXPECT_TRUE(comes(loopback)) << local;
-        if (other.sin_family != AF_INET) continue;  // this machine has no other
-        EXPECT_EQ(comes(other), !local);
-        EXPECT_EQ(source.faults().malformed, local ? 1u : 0u);
+/// Whether a datagram to that address of this machine reaches the source.
+bool reaches(app::SampleSource& source, const char* address, int port) {
+    const std::vector<char> message = bytes_of("/left", floats({1, 2, 3}));
+    const int descriptor = socket(AF_INET, SOCK_DGRAM, 0);
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(static_cast<std::uint16_t>(port));
+    inet_pton(AF_INET, address, &to.sin_addr);
+    (void)sendto(descriptor, message.data(), message.size(), 0, reinterpret_cast<sockaddr*>(&to), sizeof to);
+    close(descriptor);
+    SourceSample sample;  // what was sent on this machine is there at once
+    return source.next(sample, app::monotonic_ns() + 100'000'000) == SourceStatus::sample;
+}
+
+TEST(OscPorts, AreOfLoopbackUnlessAllOrAnAddressIsAskedFor) {
+    const int port = app::free_udp_port();
+    const std::string number = std::to_string(port);
+    {
+        OscSource loopback(number, {});
+        EXPECT_TRUE(reaches(loopback, "127.0.0.1", port));
+        EXPECT_FALSE(reaches(loopback, "127.0.0.2", port));  // as any other address of this machine
     }
+    {
+        OscSource all("*:" + number, {});
+        EXPECT_TRUE(reaches(all, "127.0.0.1", port));
+        EXPECT_TRUE(reaches(all, "127.0.0.2", port));
+    }
+    OscSource one("127.0.0.3:" + number, {});
+    EXPECT_FALSE(reaches(one, "127.0.0.1", port));
+    EXPECT_TRUE(reaches(one, "127.0.0.3", port));
+    EXPECT_THROW(OscSource("localhost:" + number, {}), app::BadInput);         // numbers only
+    EXPECT_THROW(OscSource("203.0.113.7:" + number, {}), std::runtime_error);  // of another machine
 }
 
 TEST(OscPorts, AreChecked) {
-    for (const char* port : {"", "0", "65536", "9000x", "-1"})
+    for (const char* port : {"", "0", "65536", "9000x", "-1", ":9000", "*:", "*:0"})
         EXPECT_THROW(app::check_osc_port(port), app::BadInput) << port;
     const int port = app::free_udp_port();
     const OscSource first(std::to_string(port), {});

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstring>
@@ -236,6 +237,26 @@ TEST(SensorHub, KilledSensorIsStartedAgainAndGoesOnAtTheCurrentTime) {
     EXPECT_EQ(starts, 2u);
 }
 
+TEST(SensorHub, ASensorThatIsInterruptedIsStartedAgainAndItsSourceHasNotEnded) {
+    SensorHub hub(options_for("trace:flourish"));
+    Watched seen;
+    watch_until(hub, 2, seen, [&] { return !seen.states[0].empty() && !seen.states[1].empty(); });
+    for (const int ignored : {SIGINT, SIGHUP}) {  // a terminal sends them to the hub, too
+        for (const int child : children()) ASSERT_EQ(kill(child, ignored), 0);
+        watch_until(hub, 2, seen,
+                    [&, samples = hub.newest(1)->samples] { return hub.newest(1)->samples > samples + 20; });
+        EXPECT_EQ(seen.messages_but_of_silence(), "");
+    }
+    ASSERT_EQ(kill(children().front(), SIGTERM), 0);
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::restarted) == 1; });
+    const std::uint64_t before = hub.newest(0)->samples;
+    watch_until(hub, 2, seen, [&] { return hub.newest(0)->samples > before + 10; });
+    EXPECT_EQ(
+        seen.messages_but_of_silence(),
+        "sensor left: its process was killed by signal 15; started again (1 of at most 5 times in 10 s)\n");
+    EXPECT_FALSE(hub.ended());
+}
+
 TEST(SensorHub, GivesUpOnASensorThatDiesAgainAndAgain) {
     SensorHub hub(options_for("trace:flourish", {"left"}));
     Watched seen;
@@ -428,6 +449,8 @@ public:
     OscSender(const OscSender&) = delete;
     OscSender& operator=(const OscSender&) = delete;
     void turn_clock_by(double seconds) { ahead_s_ = ahead_s_ + seconds; }
+    /// The right stick's sender is another one, with a clock so far ahead.
+    void set_right_apart(double seconds) { right_apart_s_ = seconds; }
     void pause(bool paused) { paused_ = paused; }
     void send_rubbish() { lo_send(to_, "/left", "s", "rubbish"); }
 
@@ -436,12 +459,12 @@ private:
         if (paused_) return;
         const double t = static_cast<double>(app::monotonic_ns()) * 1e-9;
         for (const char* stick : {"/left", "/right"})
-            lo_send(to_, stick, "dfff", t + ahead_s_, 0.1F, 1 + 0.1F * static_cast<float>(std::sin(9 * t)),
-                    0.0F);
+            lo_send(to_, stick, "dfff", t + ahead_s_ + (stick[1] == 'r' ? right_apart_s_.load() : 0), 0.1F,
+                    1 + 0.1F * static_cast<float>(std::sin(9 * t)), 0.0F);
     }
 
     lo_address to_;
-    std::atomic<double> ahead_s_ = 1e9;
+    std::atomic<double> ahead_s_ = 1e9, right_apart_s_ = 0;
     std::atomic<bool> paused_ = false;
     std::jthread thread_;
 };
@@ -467,7 +490,7 @@ TEST(SensorHub, LiveSticksShareAProcessAndSurviveWhatHappensToIt) {
     EXPECT_EQ(hub.clocks().at(0).clock, app::SampleClock::source);
 
     sender.turn_clock_by(-7);
-    watch_until(hub, 2, seen, [&] { return seen.count(Kind::clock_jumped) == 1; });
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::clock_jumped) == 2; });
     sender.send_rubbish();
     watch_until(hub, 2, seen, [&] { return seen.count(Kind::malformed) == 1; });
     sender.pause(true);
@@ -479,8 +502,9 @@ TEST(SensorHub, LiveSticksShareAProcessAndSurviveWhatHappensToIt) {
     watch_until(hub, 2, seen, grown_by(100));
 
     const std::string messages = seen.all_messages();
-    EXPECT_NE(messages.find("sensor left, right: the source's clock jumped by -7.0"), std::string::npos)
-        << messages;
+    for (const std::string stick : {"left", "right"})
+        EXPECT_NE(messages.find("sensor " + stick + ": the source's clock jumped by -7.0"), std::string::npos)
+            << messages;
     EXPECT_NE(messages.find("sensor left, right: left out what it could not read: osc /left: error: found 1 "
                             "arguments, expected 3"),
               std::string::npos)
@@ -498,6 +522,41 @@ TEST(SensorHub, LiveSticksShareAProcessAndSurviveWhatHappensToIt) {
             before = &state;
         }
     }
+}
+
+TEST(SensorHub, SendersWithClocksOfTheirOwnAreEachFollowedAndThatIsSaidOnce) {
+    const int port = app::free_udp_port();
+    const app::SensorOptions options = options_for("osc:" + std::to_string(port));
+    SensorHub hub(options);
+    OscSender sender(port);
+    sender.set_right_apart(3600);
+    Watched seen;
+    watch_until(hub, 2, seen, [&] { return seen.count(Kind::clocks_apart) == 1; });
+    const auto more = [&, samples = hub.newest(1)->samples] { return hub.newest(1)->samples > samples + 50; };
+    watch_until(hub, 2, seen, more);
+    const std::string messages = seen.messages_but_of_silence();
+    EXPECT_TRUE(messages.starts_with("sensor left, right: their clocks are 3600.0") ||
+                messages.starts_with("sensor left, right: their clocks are 3599.9"))
+        << messages;
+    EXPECT_EQ(std::count(messages.begin(), messages.end(), '\n'), 1) << messages;
+    for (const auto& states : seen.states)
+        for (const tracking::StickState& state : states)
+            EXPECT_NEAR(static_cast<double>(state.read_ns - options.epoch_ns) * 1e-9, state.t_s, 5);
+}
+
+TEST(SensorHub, AWallClockThatIsFarFromOursIsSaid) {
+    const int port = app::free_udp_port();
+    SensorHub hub(options_for("osc:" + std::to_string(port), {"left"}));
+    OscSender sender(port);
+    const double wall =
+        std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+    sender.turn_clock_by(wall - 1e9 - static_cast<double>(app::monotonic_ns()) * 1e-9 + 120);
+    Watched seen;
+    watch_until(hub, 1, seen, [&] { return seen.count(Kind::clocks_apart) == 1; });
+    EXPECT_TRUE(hub.clocks().at(0).wall);
+    EXPECT_NEAR(hub.clocks().at(0).ahead_s, 120, 5);  // 5: a machine held up
+    EXPECT_NE(seen.all_messages().find("s ahead of this machine's"), std::string::npos)
+        << seen.all_messages();
 }
 
 TEST(SensorHub, HeadOfAStreamIsThereBeforeItsFirstStateAndOutlivesTheSensor) {
