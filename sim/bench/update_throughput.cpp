@@ -127,7 +127,8 @@ void pass_on(sim::WorkerGate& gate, Shared& shared) {
     while (!shared.stop) {
         for (sim::WorkerGate::Event& event : gate.wait(20ms)) {
             using Kind = sim::WorkerGate::Event::Kind;
-            if (event.kind == Kind::asks_to_join) gate.admit(event.stranger, event.request.process);
+            if (event.kind == Kind::asks_to_join)
+                gate.admit(event.stranger, event.request.secret[0], event.request.secret);
             if (event.kind == Kind::message)
                 gate.send({kReceiver},
                           std::make_shared<const std::vector<std::uint8_t>>(std::move(event.bytes)));
@@ -138,6 +139,7 @@ void pass_on(sim::WorkerGate& gate, Shared& shared) {
 Throughput through_application(const ThroughputSettings& settings, const sim::WorldMessage& message) {
     const Keys keys;
     sim::WorkerGate::Settings open{"tcp://127.0.0.1:*", std::nullopt, 3600};
+    open.most_waiting = 100'000;
     std::optional<sim::WorkerKeys> one, other;
     if (settings.keys) {
         open.keys = {keys.application, {keys.sender.shown, keys.receiver.shown}};
@@ -147,9 +149,10 @@ Throughput through_application(const ThroughputSettings& settings, const sim::Wo
     zmq::context_t here, there;
     zmq::socket_t sender = sim::connect_worker(here, gate.endpoint(), one, 0);
     zmq::socket_t receiver = sim::connect_worker(there, gate.endpoint(), other, 0);
-    (void)receiver.send(zmq::buffer(sim::encode({}, sim::JoinRequest{0, kReceiver, ""})),
+    (void)receiver.send(zmq::buffer(sim::encode({}, sim::JoinRequest{0, {kReceiver}, ""})),
                         zmq::send_flags::none);
-    (void)sender.send(zmq::buffer(sim::encode({}, sim::JoinRequest{0, kSender, ""})), zmq::send_flags::none);
+    (void)sender.send(zmq::buffer(sim::encode({}, sim::JoinRequest{0, {kSender}, ""})),
+                      zmq::send_flags::none);
     Shared shared;
     const std::jthread passes([&] { pass_on(gate, shared); });
     std::this_thread::sleep_for(200ms);  // both are members

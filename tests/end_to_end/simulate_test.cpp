@@ -211,7 +211,8 @@ TEST(Simulate, TheLinesThatItPrintsForWorkersElsewhereMakeThemJoin) {
         "cd $FOLDER; $PROGRAM simulate scene.toml --steps 5 --listen tcp://127.0.0.1:0 --keys keys --expect "
         "2 "
         "--json > out 2> err & "
-        "while [ $(grep -c '^listening: ' err 2> none) -lt 2 ]; do kill -0 $! || exit 1; sleep 0.02; done; "
+        // `err` may not be there yet: then grep says nothing at all.
+        "until [ \"$(grep -c '^listening: ' err 2> none)\" = 2 ]; do kill -0 $! || exit 1; sleep 0.02; done; "
         "sed -n 's/^listening: musicworld //p' err > lines; "
         "while read -r words; do $PROGRAM $words & done < lines; wait";
     const Ended ended = run_command({"bash", "-c", script}, {"FOLDER=" + (folder / "").string(),

@@ -122,14 +122,15 @@ struct DistributedLaunch {
     std::string listen;  ///< empty: ipc in a private folder; else tcp://ADDRESS:PORT (PORT * or 0: any), also
                          ///< for workers started elsewhere
     int expect = 0;      ///< wait for so many workers before the first step (at least processes.count)
-    double wait_s = 60;  ///< for them
+    double wait_s = 60;  ///< for them; then the run begins without those that have not come
+    double longest_step_s = 30;  ///< a worker for which all have waited for so long is given up
     std::filesystem::path keys;  ///< folder made by make_keys; needed unless ipc or loopback
     std::function<void(const std::string& endpoint)> listening;  ///< called once, with the bound endpoint
 };
 
 /// Runs a scene on worker processes over ZeroMQ. Returns when all steps are done. A lost worker's bodies go
 /// on elsewhere; if none is left, in this process. Throws InputError for a scene or setting that is
-/// refused, WorkerError if workers cannot be started or do not join.
+/// refused, WorkerError if workers cannot be started, or none was and none joined.
 DistributedResult run_distributed(const WorldScene& scene, const DistributedSettings& settings,
                                   const DistributedLaunch& launch, DistributedObserver& observer);
 

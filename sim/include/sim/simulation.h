@@ -103,6 +103,7 @@ struct WorkerLaunch {
     std::string program;                 ///< absolute path
     std::vector<std::string> arguments;  ///< e.g. {"worker"}
     int count = 1;                       ///< processes
+    double join_within_s = 20;           ///< one that has not joined by then is given up
 };
 
 /// Bodies shared out to worker processes over ZeroMQ (ipc in a private 0700 folder, removed at the end; also

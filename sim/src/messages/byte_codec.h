@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
@@ -53,6 +54,12 @@ public:
         Number value;
         std::memcpy(&value, take(sizeof value).data(), sizeof value);
         return value;
+    }
+    template <std::size_t N>
+    [[nodiscard]] std::array<std::uint8_t, N> bytes() {
+        std::array<std::uint8_t, N> bytes;
+        std::memcpy(bytes.data(), take(N).data(), N);
+        return bytes;
     }
     template <typename Matrix>
     void matrix(Matrix&& m) {

@@ -10,7 +10,7 @@ namespace sim {
 namespace {
 
 constexpr std::array<std::uint8_t, 4> kStruckMagic = {'M', 'W', 'S', 'M'};
-constexpr std::uint16_t kVersion = 2;
+constexpr std::uint16_t kVersion = 3;
 constexpr std::size_t kStruckHeaderBytes = 12, kStruckChecksumBytes = 4;
 constexpr std::size_t kSmallestAssignment = 400, kRecordBytes = 120;
 constexpr std::uint32_t kMostBodies = 1u << 20;
@@ -26,10 +26,10 @@ constexpr std::array<std::uint32_t, 256> crc_table() {
 }
 
 void write_body(ByteWriter& out, const Hello& m) {
-    out.number(m.process);
+    out.append(m.secret);
 }
 void write_body(ByteWriter& out, const Heartbeat& m) {
-    out.number(m.process);
+    out.append(m.secret);
 }
 void write_body(ByteWriter&, const Welcome&) {}
 void write_body(ByteWriter&, const Stop&) {}
@@ -102,9 +102,9 @@ Answer read_answer(ByteReader& in) {
 Message read_body(std::uint16_t type, ByteReader& in) {
     switch (type) {
         case 1:
-            return Hello{in.number<std::uint32_t>()};
+            return Hello{in.bytes<16>()};
         case 2:
-            return Heartbeat{in.number<std::uint32_t>()};
+            return Heartbeat{in.bytes<16>()};
         case 3:
             return Welcome{};
         case 4:

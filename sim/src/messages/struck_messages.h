@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "messages/byte_codec.h"
+#include "messages/secret.h"
 #include "struck/stepped_body.h"
 
 namespace sim {
@@ -14,7 +15,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSM"
-//   4       2      version, 2
+//   4       2      version, 3
 //   6       2      type
 //   8       4      length of the whole message
 //   12      ...    body, by type
@@ -23,8 +24,8 @@ namespace sim {
 // f64 are IEEE doubles bit by bit, v3 = 3 f64, flag = u8 of 0 or 1, text = u32 length and bytes, list = u32
 // count and the elements.
 //
-//   1 hello      worker  u32 process id
-//   2 heartbeat  worker  u32 process id
+//   1 hello      worker  16 bytes: its secret
+//   2 heartbeat  worker  16 bytes: its secret
 //   3 welcome    app     nothing; answers a hello
 //   4 assign     app     u32 epoch, list of {definition, record, u8 stepped, f64 t_s}
 //   5 step       app     u32 epoch, u64 step, list of u32 body, request
@@ -49,10 +50,10 @@ namespace sim {
 // check_body and check_request state, and that nothing is left over; else they throw DecodeError.
 
 struct Hello {
-    std::uint32_t process;
+    Secret secret = {};
 };
 struct Heartbeat {
-    std::uint32_t process;
+    Secret secret = {};
 };
 struct Welcome {};
 struct Assignment {

@@ -15,7 +15,7 @@ constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'W'};
 constexpr std::uint16_t kUpdateType = 12;
 constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kChecksumBytes = 4, kAppliedBytes = 12;
 constexpr std::size_t kMishapBytes = 17;  // at least
-constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64;
+constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64, kLongestHost = 255;
 
 // What several messages hold.
 
@@ -32,12 +32,21 @@ void write(ByteWriter& out, const StepReport& r) {
     }
 }
 
+/// What a peer says of itself goes into reports and onto terminals: printable ASCII, a question mark for any
+/// other byte.
+std::string read_words(ByteReader& in, std::uint32_t longest) {
+    std::string text = in.text(longest);
+    for (char& c : text)
+        if (c < ' ' || c > '~') c = '?';
+    return text;
+}
+
 Mishap read_mishap(ByteReader& in) {
     const auto kind = in.number<std::uint8_t>();
     if (kind > static_cast<std::uint8_t>(Mishap::Kind::broken))
         throw DecodeError("a mishap of kind " + std::to_string(kind) + ", expected at most 2");
     Mishap m{static_cast<Mishap::Kind>(kind), in.number<std::uint32_t>(), in.number<std::uint64_t>(), {}};
-    m.what = in.text(kLongestReason);
+    m.what = read_words(in, kLongestReason);
     return m;
 }
 
@@ -85,10 +94,12 @@ std::string shortened(const std::string& text) {
 
 void write_body(ByteWriter& out, const JoinRequest& m) {
     out.number(m.fingerprint);
-    out.number(m.process);
-    out.text(shortened(m.host));
+    out.append(m.secret);
+    out.text(m.host.substr(0, kLongestHost));
 }
-void write_body(ByteWriter&, const WorldBeat&) {}
+void write_body(ByteWriter& out, const WorldBeat& m) {
+    out.append(m.secret);
+}
 void write_body(ByteWriter&, const Drained&) {}
 void write_body(ByteWriter& out, const WorkerFailure& m) {
     out.text(shortened(m.what));
@@ -167,13 +178,15 @@ void write_body(ByteWriter& out, const Handover& m) {
 
 void read_body(ByteReader& in, JoinRequest& m) {
     m.fingerprint = in.number<std::uint64_t>();
-    m.process = in.number<std::uint32_t>();
-    m.host = in.text(kLongestText);
+    m.secret = in.bytes<16>();
+    m.host = read_words(in, kLongestHost);
 }
-void read_body(ByteReader&, WorldBeat&) {}
+void read_body(ByteReader& in, WorldBeat& m) {
+    m.secret = in.bytes<16>();
+}
 void read_body(ByteReader&, Drained&) {}
 void read_body(ByteReader& in, WorkerFailure& m) {
-    m.what = in.text(kLongestText);
+    m.what = read_words(in, kLongestText);
 }
 void read_body(ByteReader& in, SceneMessage& m) {
     m.worker = in.number<std::uint32_t>();
@@ -181,7 +194,7 @@ void read_body(ByteReader& in, SceneMessage& m) {
     m.settings = read_settings(in);
 }
 void read_body(ByteReader& in, Refusal& m) {
-    m.why = in.text(kLongestText);
+    m.why = read_words(in, kLongestText);
 }
 void read_body(ByteReader&, EndOfRun&) {}
 void read_body(ByteReader& in, Members& m) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "messages/byte_codec.h"
+#include "messages/secret.h"
 #include "sim/distributed_world.h"
 
 namespace sim {
@@ -14,7 +15,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 1
+//   4       2      version, 4
 //   6       2      type
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
@@ -27,8 +28,8 @@ namespace sim {
 // and bytes, list = u32 count and the elements, b/m = u32: body below 2^24, and number of modes (at most
 // 128) times 2^24.
 //
-//    1 join       worker  u64 fingerprint, u32 process id, text host
-//    2 beat       both    nothing
+//    1 join       worker  u64 fingerprint, 16 bytes: its secret, text host
+//    2 beat       both    16 bytes: the worker's secret; zeros from the application
 //    3 drained    worker  nothing
 //    4 failure    worker  text
 //    5 scene      app     u32 worker, scene, settings
@@ -76,7 +77,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kWorldProtocol = 3;  ///< version
+constexpr std::uint16_t kWorldProtocol = 4;  ///< version
 
 struct WorldHeader {
     std::uint32_t worker = kApplication;
@@ -104,10 +105,12 @@ struct StepReport {
 // Worker to application.
 struct JoinRequest {
     std::uint64_t fingerprint = 0;
-    std::uint32_t process = 0;
-    std::string host;
+    Secret secret = {};
+    std::string host;  ///< printable ASCII, whatever was sent; at most 255 characters
 };
-struct WorldBeat {};    ///< both ways, every 0.1 s
+struct WorldBeat {  ///< both ways, every 0.1 s
+    Secret secret = {};
+};
 struct Drained {};      ///< worker: has given away all it owned and leaves
 struct WorkerFailure {  ///< worker: cannot go on
     std::string what;

@@ -32,6 +32,14 @@ std::string name(std::uint32_t worker) {
 
 }  // namespace
 
+// A record of 128 modes has 2163 bytes; a contact of 8 points 266.
+std::int64_t largest_message(const WorldScene& scene) {
+    constexpr std::size_t kRest = 1 << 20, kBody = 8192, kConstraint = 64, kLargest = 256 << 20;
+    const std::size_t bodies = scene.world.bodies.size() + scene.later.size();
+    return static_cast<std::int64_t>(
+        std::min(kLargest, kRest + kBody * bodies + kConstraint * scene.world.constraints.size()));
+}
+
 Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& settings,
                          DistributedObserver& observer)
     : scene_(scene),
@@ -75,8 +83,7 @@ std::vector<int> Coordinator::owned_by(std::uint32_t worker) const {
 std::uint32_t Coordinator::join(const JoinRequest& request) {
     const std::uint32_t worker = next_worker_++;
     send({worker}, SceneMessage{worker, scene_, settings_});
-    observer_->note(name(worker) + " joins: process " + std::to_string(request.process) +
-                    (request.host.empty() ? "" : " on " + request.host));
+    observer_->note(name(worker) + " joins" + (request.host.empty() ? "" : " from " + request.host));
     members_.push_back(worker);
     senders_[worker];
     result_.workers = std::max(result_.workers, static_cast<int>(members_.size()));
@@ -226,11 +233,13 @@ void Coordinator::lose(std::uint32_t worker, const std::string& why) {
 }
 
 void Coordinator::lose_slowest(const std::string& why) {
-    const std::uint32_t* slowest = nullptr;
-    for (const std::uint32_t& worker : members_)
-        if (!owned_by(worker).empty() && (!slowest || senders_[worker].step < senders_[*slowest].step))
-            slowest = &worker;
-    if (slowest) lose(std::uint32_t(*slowest), why);
+    const Body* oldest = nullptr;
+    for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
+        const Body& body = bodies_[static_cast<std::size_t>(i)];
+        if (view_.clock().moves(i) && is_member(body.owner) && (!oldest || body.step < oldest->step))
+            oldest = &body;
+    }
+    if (oldest) lose(oldest->owner, why);
 }
 
 // What members say.
@@ -248,11 +257,26 @@ void Coordinator::expel(std::uint32_t worker, const std::string& why) {
     lose(worker, "its message was refused: " + why);
 }
 
+// Between two steps of all bodies a member does at most `bound` + 1 steps, and makes or answers an offer for each
+// step of each member; in lockstep it repeats a step when it gets bodies of a lost one. What is relayed or kept
+// for later members is bounded by this.
+bool Coordinator::is_too_much(Sender& sender, std::size_t bytes) const {
+    constexpr std::size_t kMessages = 256, kRepeated = 8;
+    const auto steps = static_cast<std::size_t>(settings_.bound) + 2;
+    if (std::exchange(sender.messages_at, view_.step()) != view_.step())
+        sender.messages = sender.message_bytes = 0;
+    sender.message_bytes += bytes;
+    return ++sender.messages > kMessages + 8 * steps * members_.size() ||
+           sender.message_bytes > kRepeated * steps * static_cast<std::size_t>(largest_message(scene_));
+}
+
 void Coordinator::take(std::uint32_t worker, std::span<const std::uint8_t> bytes) {
     if (finished_) return;
     if (!is_member(worker)) return refuse(worker, "found a worker that is no member, expected a member");
     result_.bytes += bytes.size();
     senders_[worker].bytes += bytes.size();
+    if (is_too_much(senders_[worker], bytes.size()))
+        return expel(worker, "found more messages than steps need");
     try {
         DecodedWorldMessage decoded = decode_world(bytes);
         if (decoded.header.worker != worker || decoded.header.epoch > epoch_ ||

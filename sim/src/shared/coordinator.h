@@ -7,6 +7,9 @@
 
 namespace sim {
 
+/// No message of a worker in this scene is larger [bytes].
+[[nodiscard]] std::int64_t largest_message(const WorldScene& scene);
+
 /// Coordinator of a shared world, without clock or transport: keeps membership and the register of owners,
 /// relays messages, and assembles the view of the whole world. All traffic goes through it, so all workers
 /// see one order of events: a worker is reachable for all or for none, and each body has one owner.
@@ -25,15 +28,15 @@ public:
     std::uint32_t join(const JoinRequest& request);
     void start();  ///< assigns the bodies to the members present
     /// Handles a member's message, encoded. A message that is malformed, stale, or about bodies of others
-    /// is counted and dropped.
+    /// is counted and dropped. A member that sends far more of them than steps need is lost.
     void take(std::uint32_t worker, std::span<const std::uint8_t> bytes);
     void lose(std::uint32_t worker,
               const std::string& why);  ///< its bodies go to the others; its later messages are dropped
-    /// Removes the owner that has published least: for when nothing is published although all heartbeats
-    /// arrive.
+    /// Removes the member whose bodies hold up the others: the one that owns a body of which the oldest state
+    /// is known. What else it has said, or published again, does not count.
     void lose_slowest(const std::string& why);
-    /// Number of records published so far.
-    [[nodiscard]] std::uint64_t published() const noexcept { return result_.records; }
+    /// Steps that all bodies have done.
+    [[nodiscard]] std::uint64_t steps() const noexcept { return view_.step(); }
     [[nodiscard]] std::vector<Outgoing> outgoing();  ///< queued messages; empties the queue
     [[nodiscard]] const std::vector<std::uint32_t>& members() const noexcept { return members_; }
     [[nodiscard]] bool finished() const noexcept { return finished_; }  ///< all steps are done
@@ -60,6 +63,8 @@ private:
         std::uint64_t step = 0, bytes = 0;  ///< last published; sent since
         bool refused = false;               ///< something, and it was noted
         bool settled = false;               ///< bounded: has published the last step again
+        std::uint64_t messages_at = 0;      ///< steps of all bodies since which these were sent:
+        std::size_t messages = 0, message_bytes = 0;
     };
     struct Group {
         std::uint32_t owner;
@@ -78,6 +83,7 @@ private:
     void pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes);
     void refuse(std::uint32_t worker, const std::string& why);
     void expel(std::uint32_t worker, const std::string& why);
+    [[nodiscard]] bool is_too_much(Sender& sender, std::size_t bytes) const;
     [[nodiscard]] bool is_member(std::uint32_t worker) const;
     [[nodiscard]] bool owns(std::uint32_t worker, std::uint32_t body) const;
     [[nodiscard]] bool fits(std::uint32_t body, Eigen::Index modes) const;

@@ -88,7 +88,6 @@ private:
 void Machine::join() {
     JoinRequest request;
     request.fingerprint = 0;
-    request.process = static_cast<std::uint32_t>(processors_.size());
     request.host = "a simulated processor";
     processors_.emplace_back();
     processors_.back().free_at = now_;

@@ -53,8 +53,10 @@ zmq::socket_t connect_worker(zmq::context_t& context, const std::string& endpoin
     return socket;
 }
 
-Pulse::Pulse(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys)
+Pulse::Pulse(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys,
+             const Secret& secret)
     : endpoint_(endpoint),
+      secret_(secret),
       application_(static_cast<pid_t>(application_of(endpoint))),
       child_(application_ == getppid()),
       thread_([this, &context, keys](const std::stop_token& stop) { beat(context, keys, stop); }) {}
@@ -67,8 +69,9 @@ bool Pulse::application_process_ended() const noexcept {
 void Pulse::send_beat(zmq::socket_t& socket) const {
     const std::int64_t worker = worker_;
     const std::vector<std::uint8_t> bytes =
-        worker == kNoWorld ? encode(Heartbeat{static_cast<std::uint32_t>(getpid())})
-                           : encode(WorldHeader{static_cast<std::uint32_t>(worker), 0, 0}, WorldBeat{});
+        worker == kNoWorld
+            ? encode(Heartbeat{secret_})
+            : encode(WorldHeader{static_cast<std::uint32_t>(worker), 0, 0}, WorldBeat{secret_});
     (void)socket.send(zmq::buffer(bytes), zmq::send_flags::dontwait);
 }
 

@@ -7,6 +7,7 @@
 #include <thread>
 #include <zmq.hpp>
 
+#include "messages/secret.h"
 #include "workers/curve_keys.h"
 
 namespace sim {
@@ -20,7 +21,9 @@ namespace sim {
 /// in a world, 1.5 s without an answer to a heartbeat.
 class Pulse {
 public:
-    Pulse(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys);
+    /// `secret`: by which the application knows the beats to be this worker's.
+    Pulse(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys,
+          const Secret& secret);
 
     /// From now on sends heartbeats of worker `worker` of a world. If this process has not ended 0.4 s after
     /// the application's end, it is ended.
@@ -34,6 +37,7 @@ private:
 
     static constexpr std::int64_t kNoWorld = -1;
     const std::string endpoint_;
+    const Secret secret_;
     const pid_t application_;  ///< 0: not known
     const bool child_;         ///< of the application
     std::atomic<std::int64_t> worker_ = kNoWorld;

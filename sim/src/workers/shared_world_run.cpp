@@ -1,5 +1,3 @@
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,9 +20,12 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 constexpr auto kWait = 20ms;
 constexpr auto kEndWithin = 1s;
-constexpr double kLongestStep_s = 30;
 constexpr double kLastWords_s = 0.3;
 constexpr int kMostWorkers = 256;
+
+std::string seconds(double s) {
+    return std::to_string(std::lround(s)) + " s";
+}
 
 /// A worker in this process, for when no other is left.
 class WorkerHere {
@@ -65,12 +66,15 @@ public:
           processes_(launch.processes.program.empty() ? 0 : launch.processes.count),
           observer_(observer),
           meeting_(scene, settings, observer),
-          gate_(gate_settings(launch)) {
+          gate_(gate_settings(scene, settings, launch)) {
         if (launch.listening)
             launch.listening(launch.listen.empty() ? gate_.private_endpoint() : gate_.endpoint());
         children_.reserve(static_cast<std::size_t>(processes_));
-        for (int i = 0; i < processes_; ++i)
-            children_.push_back({WorkerProcess(launch.processes, gate_.private_endpoint())});
+        for (int i = 0; i < processes_; ++i) {
+            const Secret secret = make_secret();
+            gate_.expect(secret);
+            children_.push_back({WorkerProcess(launch.processes, gate_.private_endpoint(), secret)});
+        }
     }
 
     DistributedResult run() {
@@ -94,8 +98,14 @@ private:
         std::optional<Clock::time_point> ended = std::nullopt;  ///< seen then
     };
 
-    static WorkerGate::Settings gate_settings(const DistributedLaunch& launch) {
-        WorkerGate::Settings settings{launch.listen, std::nullopt};
+    /// A worker is sent what each other one publishes in the steps by which it may be behind; these all come at
+    /// once if it joins late.
+    static WorkerGate::Settings gate_settings(const WorldScene& scene, const DistributedSettings& run,
+                                              const DistributedLaunch& launch) {
+        WorkerGate::Settings settings;
+        settings.listen = launch.listen;
+        settings.most_waiting = 1000 + 4 * (run.bound + 2) * kMostWorkers;
+        settings.largest_message = largest_message(scene);
         if (!launch.keys.empty()) settings.keys = read_application_keys(launch.keys);
         return settings;
     }
@@ -110,13 +120,12 @@ private:
         note_refusals();
     }
 
-    /// A worker may be heard and yet publish nothing: all would wait for it.
+    /// A worker may be heard, and even publish, and yet not what all wait for.
     void look_after_progress() {
-        if (std::exchange(published_, meeting_.published()) != meeting_.published())
-            progressed_ = Clock::now();
-        if (seconds_since(progressed_) < kLongestStep_s) return;
+        if (std::exchange(steps_, meeting_.steps()) != meeting_.steps()) progressed_ = Clock::now();
+        if (seconds_since(progressed_) < launch_.longest_step_s) return;
         progressed_ = Clock::now();
-        meeting_.lose_slowest("it was the slowest, and nobody has published anything for 30 s");
+        meeting_.lose_slowest("all have waited for its bodies for " + seconds(launch_.longest_step_s));
     }
 
     void wait_for_workers() {
@@ -126,11 +135,19 @@ private:
             for (WorkerGate::Event& event : gate_.wait(kWait)) take(event);
             look_after_children();
             pass_on();
-            if (seconds_since(start) > launch_.wait_s)
-                throw WorkerError(std::to_string(meeting_.members().size()) + " of " +
-                                  std::to_string(wanted) + " workers joined within " +
-                                  std::to_string(std::lround(launch_.wait_s)) + " s");
+            if (seconds_since(start) > launch_.wait_s) return go_without_the_rest(wanted);
         }
+    }
+
+    /// A worker that is stopped, or cannot reach us, does not hold up those that came.
+    void go_without_the_rest(std::size_t wanted) {
+        const std::string joined = std::to_string(meeting_.members().size()) + " of " +
+                                   std::to_string(wanted) + " workers joined within " +
+                                   seconds(launch_.wait_s);
+        if (meeting_.members().empty() && children_.empty()) throw WorkerError(joined);
+        for (Child& child : children_)
+            if (!child.worker && !child.ended) child.process.kill();
+        observer_.note(joined + ": the run begins without the others");
     }
 
     void take(WorkerGate::Event& event) {
@@ -154,12 +171,15 @@ private:
                            " was refused: its processor, mathematics library or build differs");
             return;
         }
+        const auto child = std::find_if(children_.begin(), children_.end(), [&](const Child& c) {
+            return !c.worker && !c.ended && c.process.secret() == event.request.secret;
+        });
+        if (child == children_.end() && meeting_.members().size() >= kMostWorkers)
+            return gate_.refuse(event.stranger, "all places are taken");
         const std::uint32_t worker = meeting_.join(event.request);
-        gate_.admit(event.stranger, worker);
+        gate_.admit(event.stranger, worker, event.request.secret);
         admitted_.push_back(worker);
-        for (Child& child : children_)
-            if (!child.worker && !child.ended && child.process.id() == event.request.process)
-                child.worker = worker;
+        if (child != children_.end()) child->worker = worker;
     }
 
     [[nodiscard]] bool is_member(std::uint32_t worker) const {
@@ -197,7 +217,7 @@ private:
     }
 
     void take_over() {
-        here_.emplace(meeting_.join({step_fingerprint(), static_cast<std::uint32_t>(getpid()), "here"}));
+        here_.emplace(meeting_.join({step_fingerprint(), {}, "here"}));
         observer_.note("no worker is left: the application goes on by itself");
     }
 
@@ -245,7 +265,7 @@ private:
     std::optional<WorkerHere> here_;
     std::size_t ended_early_ = 0;
     bool started_ = false;
-    std::uint64_t published_ = 0;
+    std::uint64_t steps_ = 0;
     Clock::time_point progressed_ = Clock::now();
     bool noted_ = false;
     std::vector<Child> children_;  // last: processes end before the gate goes

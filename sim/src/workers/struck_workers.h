@@ -14,7 +14,7 @@ namespace sim {
 /// destruction.
 ///
 /// The application holds every body's definition and its record after the last answer. A worker that exits,
-/// is silent for 1 s while an answer is awaited, breaks the protocol or does not answer within 30 s is
+/// does not say hello in time, is silent for 1 s while an answer is awaited, breaks the protocol or does not answer within 30 s is
 /// killed; its bodies are assigned, from those records, to the other workers in turn (to this process when
 /// none is left), and the step is asked for again for those of them that had not been answered. Records are
 /// exact, each body's step depends on nothing else, and merge() orders by body: the reply has the same bits
@@ -68,7 +68,8 @@ private:
     std::vector<std::uint64_t> answered_;             ///< per body: number of the last step it has made
     std::vector<std::unique_ptr<SteppedBody>> here_;  ///< bodies stepped in this process
     std::vector<std::uint32_t> orphans_;              ///< bodies of workers just lost
-    const StepRequest* request_ = nullptr;            ///< of the step under way
+    const std::chrono::duration<double> join_within_;
+    const StepRequest* request_ = nullptr;  ///< of the step under way
     std::uint64_t step_ = 0;
     double last_t_s_ = 0;
     std::uint32_t epoch_ = 0;

@@ -1,7 +1,6 @@
-#include <unistd.h>
-
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <map>
 
 #include "messages/struck_messages.h"
@@ -10,6 +9,7 @@
 #include "struck/stepped_body.h"
 #include "workers/heartbeat.h"
 #include "workers/socket_folder.h"
+#include "workers/worker_process.h"
 #include "workers/world_service.h"
 
 namespace sim {
@@ -84,6 +84,13 @@ bool wait_for_answer(zmq::socket_t& socket, const Pulse& pulse, zmq::message_t& 
     return false;
 }
 
+/// From who started it, or made here.
+Secret own_secret() {
+    const char* given = std::getenv(kSecretVariable);
+    const std::optional<Secret> secret = from_hex(given ? given : "");
+    return secret ? *secret : make_secret();
+}
+
 bool is_of_a_world(const zmq::message_t& frame) {
     return frame.to_string_view().starts_with("MWSW");
 }
@@ -92,9 +99,10 @@ bool is_of_a_world(const zmq::message_t& frame) {
 int serve(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys) {
     zmq::socket_t socket = connect_worker(context, endpoint, keys, kLingerMs);
     socket.set(zmq::sockopt::rcvtimeo, kLookMs);
-    Pulse pulse(context, endpoint, keys);
-    send(socket, join_request());
-    send(socket, encode(Hello{static_cast<std::uint32_t>(getpid())}));
+    const Secret secret = own_secret();
+    Pulse pulse(context, endpoint, keys, secret);
+    send(socket, join_request(secret));
+    send(socket, encode(Hello{secret}));
     zmq::message_t frame;
     int status = 1;
     if (wait_for_answer(socket, pulse, frame)) {

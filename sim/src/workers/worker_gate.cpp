@@ -3,6 +3,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <utility>
@@ -18,9 +19,11 @@ constexpr auto kPoll = 20ms;
 constexpr auto kLastWords = 300ms;
 constexpr auto kPaused = 250ms;  // a longer gap between two looks is ours, not the workers' silence
 constexpr int kFramesBetweenLooks = 1000;
-constexpr std::size_t kMostStrangersWaiting = 1000;
-constexpr std::int64_t kLargestMessage = 256 << 20;
-constexpr int kHighWater = 100000;
+constexpr std::size_t kMostEventsWaiting = 4096, kMostBytesWaiting = 64 << 20;
+constexpr std::size_t kLargestOfAStranger = 4096;
+constexpr double kMostJoinsAtOnce = 256, kJoinsPerSecond = 4;
+constexpr int kReceivedAhead = 1000;  // messages of a connection that wait in the socket
+constexpr auto kHandshakeWithin = 5s;
 
 enum class Type : std::uint16_t { join = 1, beat = 2 };
 
@@ -53,18 +56,24 @@ WorkerGate::WorkerGate(const Settings& settings)
       wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
     if (!settings.listen.empty()) check_endpoint(settings.listen, settings.keys.has_value());
     bind(settings);
+    may_join_ = kMostJoinsAtOnce;
     thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
 }
 
 // Options count for what is bound after them: the private folder's socket needs no keys.
 void WorkerGate::bind(const Settings& settings) {
     router_.set(zmq::sockopt::linger, 1000);
-    router_.set(zmq::sockopt::sndhwm, kHighWater);
-    router_.set(zmq::sockopt::rcvhwm, kHighWater);
-    router_.set(zmq::sockopt::maxmsgsize, kLargestMessage);
+    router_.set(zmq::sockopt::sndhwm, settings.most_waiting);
+    router_.set(zmq::sockopt::rcvhwm, kReceivedAhead);
+    router_.set(zmq::sockopt::maxmsgsize, settings.largest_message);
+    router_.set(zmq::sockopt::handshake_ivl,
+                static_cast<int>(std::chrono::milliseconds(kHandshakeWithin).count()));
     router_.set(zmq::sockopt::router_mandatory, true);
     router_.bind(folder_.endpoint());
-    if (settings.listen.empty()) return;
+    if (!settings.listen.empty()) open_door(settings);
+}
+
+void WorkerGate::open_door(const Settings& settings) {
     if (settings.keys) {
         keys_ = std::make_unique<KeyGate>(context_, settings.keys->allowed);
         router_.set(zmq::sockopt::zap_domain, KeyGate::kDomain);
@@ -75,7 +84,7 @@ void WorkerGate::bind(const Settings& settings) {
     if (listen.ends_with(":0")) listen.replace(listen.size() - 1, 1, "*");
     router_.set(zmq::sockopt::ipv6, listen.find('[') != std::string::npos);
     try {
-        router_.bind(listen);
+        listening_.emplace(context_, router_, listen);
     } catch (const zmq::error_t& e) {
         throw InputError("cannot listen at " + settings.listen + ": " + e.what() +
                          "; choose a free port of an address of this machine");
@@ -95,6 +104,8 @@ WorkerGate::~WorkerGate() {
 std::deque<WorkerGate::Event> WorkerGate::wait(std::chrono::milliseconds most) {
     std::unique_lock lock(mutex_);
     came_.wait_for(lock, most, [this] { return !events_.empty(); });
+    waiting_bytes_ = 0;
+    if (std::exchange(full_, false)) (void)eventfd_write(wake_, 1);
     return std::exchange(events_, {});
 }
 
@@ -104,8 +115,12 @@ void WorkerGate::order(Command&& command) {
     if (commands_.size() == 1) (void)eventfd_write(wake_, 1);
 }
 
-void WorkerGate::admit(const std::string& stranger, std::uint32_t worker) {
-    order({Command::Kind::admit, stranger, {}, {worker}, {}});
+void WorkerGate::expect(const Secret& secret) {
+    const std::lock_guard lock(mutex_);
+    expected_.push_back(secret);
+}
+void WorkerGate::admit(const std::string& stranger, std::uint32_t worker, const Secret& secret) {
+    order({Command::Kind::admit, stranger, {}, {worker}, {}, secret});
 }
 void WorkerGate::refuse(const std::string& stranger, const std::string& why) {
     order({Command::Kind::refuse, stranger, why, {}, {}});
@@ -126,15 +141,16 @@ void WorkerGate::serve(const std::stop_token& stop) {
         obey();
         receive();
         look_for_silence();
+        if (listening_) listening_->look();
     }
     obey();
 }
 
 void WorkerGate::poll() {
     std::array<zmq::pollitem_t, 2> items = {
-        {{router_.handle(), 0, ZMQ_POLLIN, 0}, {nullptr, wake_, ZMQ_POLLIN, 0}}};
+        {{nullptr, wake_, ZMQ_POLLIN, 0}, {router_.handle(), 0, ZMQ_POLLIN, 0}}};
     try {
-        zmq::poll(items.data(), items.size(), kPoll);
+        zmq::poll(items.data(), held_back_ ? 1 : items.size(), kPoll);
     } catch (const zmq::error_t& e) {
         if (e.num() != EINTR) throw;
     }
@@ -156,7 +172,7 @@ void WorkerGate::obey(const Command& command) {
         zmq::message_t frame = framed(Refusal{command.why});
         send_to(command.stranger, frame);
     } else if (command.kind == Command::Kind::admit) {
-        members_[command.workers[0]] = {command.stranger, Clock::now()};
+        members_[command.workers[0]] = {command.stranger, Clock::now(), false, {}, command.secret};
         numbers_[command.stranger] = command.workers[0];
     } else if (command.kind == Command::Kind::dismiss) {
         const auto found = members_.find(command.workers[0]);
@@ -188,7 +204,11 @@ bool WorkerGate::send_to(const std::string& identity, zmq::message_t& frame) {
 void WorkerGate::receive() {
     zmq::message_t identity, frame;
     for (int i = 0; i < kFramesBetweenLooks; ++i) {
-        if (!router_.recv(identity, zmq::recv_flags::dontwait)) return;
+        {
+            const std::lock_guard lock(mutex_);
+            held_back_ = full_;
+        }
+        if (held_back_ || !router_.recv(identity, zmq::recv_flags::dontwait)) return;
         bool single = identity.more() && router_.recv(frame, zmq::recv_flags::dontwait).has_value();
         for (; single && frame.more(); (void)router_.recv(frame, zmq::recv_flags::dontwait)) single = false;
         while (!single && frame.more() && router_.recv(frame, zmq::recv_flags::dontwait)) {
@@ -217,12 +237,11 @@ void WorkerGate::take(std::string&& identity, const zmq::message_t& frame) {
 
 void WorkerGate::take_beat(const std::string& identity, const zmq::message_t& frame) {
     try {
-        const auto found = members_.find(decoded(frame).header.worker);
+        const DecodedWorldMessage m = decoded(frame);
+        const auto found = members_.find(m.header.worker);
         if (found == members_.end()) return;  // it learns so when it sends something else
-        // Nobody beats for another: the first who beat for this member goes on.
-        std::string& from = found->second.beats_from;
-        if (from.empty()) from = identity;
-        if (from != identity) {
+        const Secret& secret = std::get<WorldBeat>(m.message).secret;
+        if (secret != found->second.secret || secret == Secret{}) {  // nobody beats for another
             ++refused_messages_;
             return;
         }
@@ -236,29 +255,44 @@ void WorkerGate::take_beat(const std::string& identity, const zmq::message_t& fr
 
 void WorkerGate::take_from_stranger(std::string&& identity, const zmq::message_t& frame) {
     if (is_kit(frame)) return;
+    const char* why = "not a member, or given up";
     try {
+        if (frame.size() > kLargestOfAStranger) throw DecodeError("a stranger's message that is too long");
         DecodedWorldMessage m = decoded(frame);
-        auto* request = std::get_if<JoinRequest>(&m.message);
-        const std::lock_guard lock(mutex_);
-        if (request && events_.size() < kMostStrangersWaiting) {
-            Event& event = events_.emplace_back();
-            event.kind = Event::Kind::asks_to_join;
-            event.stranger = std::move(identity), event.request = std::move(*request);
-            came_.notify_one();
-            return;
+        if (auto* request = std::get_if<JoinRequest>(&m.message)) {
+            if (may_join(request->secret)) {
+                Event event;
+                event.kind = Event::Kind::asks_to_join;
+                event.stranger = std::move(identity), event.request = std::move(*request);
+                return tell(std::move(event));
+            }
+            why = "too many workers ask to join; try again later";
         }
     } catch (const DecodeError&) {
         ++refused_messages_;
         return;
     }
     ++refused_messages_;
-    zmq::message_t answer = framed(Refusal{"not a member, or given up"});
+    zmq::message_t answer = framed(Refusal{why});
     send_to(identity, answer);
+}
+
+bool WorkerGate::may_join(const Secret& secret) {
+    {
+        const std::lock_guard lock(mutex_);
+        if (std::find(expected_.begin(), expected_.end(), secret) != expected_.end()) return true;
+    }
+    const Clock::time_point now = Clock::now();
+    const std::chrono::duration<double> passed = now - std::exchange(counted_joins_, now);
+    may_join_ = std::min(kMostJoinsAtOnce, may_join_ + kJoinsPerSecond * passed.count());
+    if (may_join_ < 1) return false;
+    --may_join_;
+    return true;
 }
 
 void WorkerGate::look_for_silence() {
     const Clock::time_point now = Clock::now();
-    const bool paused = now - std::exchange(looked_, now) > kPaused;
+    const bool paused = now - std::exchange(looked_, now) > kPaused || held_back_;
     for (auto& [worker, member] : members_) {
         if (paused) member.heard = now;
         if (member.lost) continue;
@@ -278,7 +312,9 @@ void WorkerGate::lose(std::uint32_t worker, Member& member, const std::string& w
 
 void WorkerGate::tell(Event&& event) {
     const std::lock_guard lock(mutex_);
+    waiting_bytes_ += event.bytes.size();
     events_.push_back(std::move(event));
+    full_ = events_.size() >= kMostEventsWaiting || waiting_bytes_ >= kMostBytesWaiting;
     came_.notify_one();
 }
 

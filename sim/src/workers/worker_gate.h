@@ -14,6 +14,7 @@
 #include "messages/world_messages.h"
 #include "workers/curve_keys.h"
 #include "workers/key_gate.h"
+#include "workers/listening.h"
 #include "workers/socket_folder.h"
 
 namespace sim {
@@ -22,12 +23,23 @@ namespace sim {
 /// noticed while the application is busy. A peer is a stranger (known by its ROUTER identity) until it is
 /// admitted under a worker's number. Strangers can only ask to join: other messages of a world are answered
 /// with a refusal, anything else is dropped and counted.
+///
+/// What peers may cost:
+///   connections   as long as half of this process's descriptors, or 1000 more than at first, are open, `listen`
+///                 takes no new connection; one that does not shake hands within 5 s is closed
+///   joins         256 at once, then 4 a second; more are refused. Workers that are expected always may.
+///   messages in   up to 4096, or 64 MiB and one more, wait for wait(); then the sockets hold back their senders.
+///                 None is larger than `largest_message`; a stranger's of more than 4 KiB is dropped unread.
+///   messages out  a member for which more than `most_waiting` wait to be sent has its link broken
+///   heartbeats    count for a member only with the secret with which it asked to join
 class WorkerGate {
 public:
     struct Settings {
-        std::string listen;                   ///< tcp endpoint beside the private folder's; empty: none
-        std::optional<ApplicationKeys> keys;  ///< for `listen`
-        double silence_s = 1;                 ///< a worker that is silent for so long is lost
+        std::string listen;                        ///< tcp endpoint beside the private folder's; empty: none
+        std::optional<ApplicationKeys> keys;       ///< for `listen`
+        double silence_s = 1;                      ///< a worker that is silent for so long is lost
+        int most_waiting = 10'000;                 ///< messages to one member
+        std::int64_t largest_message = 256 << 20;  ///< from a member [bytes]
     };
     /// Throws std::invalid_argument for an endpoint that is refused or taken.
     explicit WorkerGate(const Settings& settings);
@@ -48,7 +60,10 @@ public:
     /// Events that have arrived; waits for the first for at most `most`.
     [[nodiscard]] std::deque<Event> wait(std::chrono::milliseconds most);
 
-    void admit(const std::string& stranger, std::uint32_t worker);     ///< makes it a member
+    /// Requests to join with this secret are not refused for being too many.
+    void expect(const Secret& secret);
+    /// Makes it a member, whose heartbeats have that secret.
+    void admit(const std::string& stranger, std::uint32_t worker, const Secret& secret);
     void refuse(const std::string& stranger, const std::string& why);  ///< answers its request
     void send(const std::vector<std::uint32_t>& workers,
               std::shared_ptr<const std::vector<std::uint8_t>> bytes);
@@ -65,16 +80,18 @@ private:
         Clock::time_point heard;
         bool lost = false;
         std::optional<Clock::time_point> broken = {};  ///< time since which sending to it fails
-        std::string beats_from = {};                   ///< identity of its heartbeat socket
+        Secret secret = {};                            ///< of its heartbeats
     };
     struct Command {
         enum class Kind { admit, refuse, send, dismiss } kind;
         std::string stranger, why;
         std::vector<std::uint32_t> workers;
         Bytes bytes;
+        Secret secret = {};
     };
 
     void bind(const Settings& settings);
+    void open_door(const Settings& settings);
     void order(Command&& command);
     void serve(const std::stop_token& stop);
     void poll();
@@ -85,6 +102,7 @@ private:
     void take_beat(const std::string& identity, const zmq::message_t& frame);
     void take_from_stranger(std::string&& identity, const zmq::message_t& frame);
     bool send_to(const std::string& identity, zmq::message_t& frame);
+    [[nodiscard]] bool may_join(const Secret& secret);
     void look_for_silence();
     void lose(std::uint32_t worker, Member& member, const std::string& why);
     void tell(Event&& event);
@@ -98,13 +116,20 @@ private:
     int wake_;  ///< eventfd: commands are there
     std::mutex mutex_;
     std::condition_variable came_;
-    std::deque<Event> events_;       ///< under mutex_
+    std::deque<Event> events_;       ///< under mutex_, as the next three
+    std::size_t waiting_bytes_ = 0;  ///< in events_
+    bool full_ = false;              ///< events_: nothing is received until they are taken
+    std::vector<Secret> expected_;
     std::vector<Command> commands_;  ///< under mutex_
     std::atomic<std::uint64_t> refused_messages_ = 0;
     // The thread's own.
     std::map<std::uint32_t, Member> members_;
     std::map<std::string, std::uint32_t> numbers_;  ///< of identities
     Clock::time_point looked_ = Clock::now();
+    bool held_back_ = false;  ///< senders, since the last look
+    double may_join_ = 0;     ///< so many strangers now
+    Clock::time_point counted_joins_ = Clock::now();
+    std::optional<Listening> listening_;
     std::jthread thread_;  // last: starts when the rest is there
 };
 

@@ -8,6 +8,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -45,21 +46,31 @@ struct SpawnSettings {
 
 }  // namespace
 
-WorkerProcess::WorkerProcess(const WorkerLaunch& launch, const std::string& endpoint) {
+WorkerProcess::WorkerProcess(const WorkerLaunch& launch, const std::string& endpoint, const Secret& secret)
+    : secret_(secret) {
     std::vector<std::string> words = {launch.program};
     words.insert(words.end(), launch.arguments.begin(), launch.arguments.end());
     words.insert(words.end(), {"--connect", endpoint});
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
+    const std::string name = std::string(kSecretVariable) + "=";
+    std::string own = name + to_hex(secret);
+    std::vector<char*> environment = {own.data()};
+    for (char** entry = environ; *entry != nullptr; ++entry)
+        if (!std::string_view(*entry).starts_with(name)) environment.push_back(*entry);
+    environment.push_back(nullptr);
     const SpawnSettings settings;
     const int error = posix_spawn(&id_, launch.program.c_str(), &settings.files, &settings.attributes,
-                                  arguments.data(), environ);
+                                  arguments.data(), environment.data());
     if (error != 0) throw WorkerError("cannot start worker " + launch.program + ": " + std::strerror(error));
 }
 
 WorkerProcess::WorkerProcess(WorkerProcess&& other) noexcept
-    : id_(std::exchange(other.id_, -1)), ended_(other.ended_), status_(other.status_) {}
+    : secret_(other.secret_),
+      id_(std::exchange(other.id_, -1)),
+      ended_(other.ended_),
+      status_(other.status_) {}
 
 WorkerProcess::~WorkerProcess() {
     kill();

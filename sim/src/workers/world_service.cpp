@@ -90,9 +90,10 @@ private:
     void send_all() {
         for (const std::vector<std::uint8_t>& bytes : worker_.outgoing()) send(bytes);
     }
+    /// The application may be busy, with pictures, and take what it can.
     void send(const std::vector<std::uint8_t>& bytes) {
-        if (!through_signals([&] { return socket_.send(zmq::buffer(bytes), zmq::send_flags::none); }))
-            throw WorkerError("the application takes no more messages");
+        while (!through_signals([&] { return socket_.send(zmq::buffer(bytes), zmq::send_flags::none); }))
+            if (pulse_.application_gone()) return;
     }
     /// Until something comes, or a signal, or a look at the application is due.
     void wait() {
@@ -136,11 +137,10 @@ int serve_world(zmq::socket_t& socket, Pulse& pulse, zmq::message_t& first) {
     return std::holds_alternative<EndOfRun>(m.message) ? 0 : 1;
 }
 
-std::vector<std::uint8_t> join_request() {
+std::vector<std::uint8_t> join_request(const Secret& secret) {
     std::array<char, 256> host{};
     gethostname(host.data(), host.size() - 1);
-    return encode(WorldHeader{},
-                  JoinRequest{step_fingerprint(), static_cast<std::uint32_t>(getpid()), host.data()});
+    return encode(WorldHeader{}, JoinRequest{step_fingerprint(), secret, host.data()});
 }
 
 }  // namespace sim

@@ -9,6 +9,6 @@ namespace sim {
 [[nodiscard]] int serve_world(zmq::socket_t& socket, Pulse& pulse, zmq::message_t& first);
 
 /// The encoded JoinRequest, a worker's first message.
-[[nodiscard]] std::vector<std::uint8_t> join_request();
+[[nodiscard]] std::vector<std::uint8_t> join_request(const Secret& secret);
 
 }  // namespace sim

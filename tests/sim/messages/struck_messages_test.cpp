@@ -21,8 +21,8 @@ std::vector<sim::Message> samples() {
         body.step(request, answer.outcomes.back());
         assign.bodies.push_back({b, scenario.bodies()[b], body.record()});
     }
-    return {sim::Hello{42},
-            sim::Heartbeat{43},
+    return {sim::Hello{{42}},
+            sim::Heartbeat{{43}},
             sim::Welcome{},
             assign,
             sim::Step{9, 77, {0, 3, 4}, request},

@@ -109,7 +109,7 @@ std::vector<sim::WorldMessage> samples() {
     const std::vector<sim::ContactRecord> contacts = {contact(rng), contact(rng), contact(rng)};
     sim::DistributedSettings settings;
     settings.pace = sim::Pace::bounded, settings.bound = 4, settings.steps = 500;
-    return {sim::JoinRequest{0x123456789abcdef0, 42, "a host"},
+    return {sim::JoinRequest{0x123456789abcdef0, {42, 43}, "a host"},
             sim::WorldBeat{},
             sim::Drained{},
             sim::WorkerFailure{"a failure"},

@@ -81,6 +81,31 @@ TEST_P(Damage, OfAMembersMessagesCrashesNobodyAndTheOthersFinish) {
     EXPECT_GT(sent, runs / 2);
 }
 
+// Past the sockets: what a member's messages may cost the application and the others until it is lost.
+TEST_P(Damage, OfAFloodingMemberIsBounded) {
+    DistributedSettings settings;
+    settings.pace = GetParam();
+    settings.bound = GetParam() == Pace::bounded ? 2 : 0;
+    settings.steps = 60;
+    world_test::Record record;
+    Coordinator meeting(world_test::busy_scene(), settings, record);
+    for (int i = 0; i < 3; ++i) (void)meeting.join({});
+    meeting.start();
+    (void)meeting.outgoing();
+    Offer offer{1, 1, std::vector<std::uint32_t>(100'000, 0), std::vector<float>(100'000, 0.1F)};
+    std::size_t relayed = 0, sent = 0;
+    for (; sent < 100'000 && meeting.members().size() == 3; ++sent) {
+        if (sent == 1) offer.bodies.resize(1), offer.cost_s.resize(1);
+        meeting.take(0, encode({0, 0, 0}, offer));
+        for (const Coordinator::Outgoing& out : meeting.outgoing()) relayed += out.bytes->size();
+    }
+    EXPECT_EQ(meeting.members(), (std::vector<std::uint32_t>{1, 2}));
+    EXPECT_GT(sent, 300u);  // an honest one has room
+    EXPECT_LT(sent, 400u);
+    EXPECT_LT(relayed, 2u << 20);
+    EXPECT_NE(record.notes.find("more messages than steps need"), std::string::npos) << record.notes;
+}
+
 INSTANTIATE_TEST_SUITE_P(Paces, Damage, testing::Values(Pace::lockstep, Pace::bounded), [](const auto& pace) {
     return pace.param == Pace::lockstep ? "Lockstep" : "Bounded";
 });

@@ -122,13 +122,21 @@ TEST(StruckWorkers, GarbageAndForgedMessagesToItsSocketDoNoHarm) {
         std::vector<std::uint8_t> noise(rng() % 300);
         for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(rng());
         stranger.send(zmq::buffer(noise), i % 3 ? zmq::send_flags::none : zmq::send_flags::sndmore);
-        for (const sim::Message& forged :
-             {sim::Message(sim::Hello{static_cast<std::uint32_t>(getpid())}), sim::Message(sim::Stop{}),
-              sim::Message(sim::Answer{1, static_cast<std::uint64_t>(i), {}})}) {
+        for (const sim::Message& forged : {sim::Message(sim::Hello{}), sim::Message(sim::Stop{}),
+                                           sim::Message(sim::Answer{1, static_cast<std::uint64_t>(i), {}})}) {
             stranger.send(zmq::buffer(sim::encode(forged)), zmq::send_flags::none);
         }
     });
     EXPECT_EQ(pool->report().lost, 0);
+}
+
+TEST(StruckWorkers, WorkersThatDoNotJoinInTimeAreGivenUpWithTheSameBits) {
+    Scenario scenario(10);
+    const auto pool =
+        sim::make_distributed_simulation(scenario.bodies(), {"/bin/sh", {"-c", "exec sleep 1000"}, 2, 0.3});
+    expect_same_bits(*pool, scenario, 10, [](int) {});
+    EXPECT_EQ(pool->report().lost, 2);
+    EXPECT_TRUE(children_of(getpid()).empty());
 }
 
 TEST(StruckWorkers, AProgramThatIsMissingOrEndsAtOnceIsAnErrorAndLeavesNoFolder) {

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <random>
 
+#include "hostile_member.h"
 #include "key_folder.h"
 #include "messages/world_messages.h"
 #include "network_namespace.h"
@@ -188,6 +189,74 @@ TEST(SharedWorldRun, TwoWorkersOverTcpWithKeysJoinAndOneWithoutAKeyAndGarbageCha
     EXPECT_EQ(result.lost, 0);
     EXPECT_FALSE(workers[0].has_ended());  // it still waits for an answer
     for (int i : {1, 2}) EXPECT_TRUE(comes_true([&] { return workers[i].has_ended(); }));
+}
+
+/// A run with one worker of ours and a hostile one.
+sim::DistributedResult run_with(HostileMember::Habit habit, const sim::WorldScene& scene, std::uint64_t steps,
+                                Watcher& watcher, std::optional<HostileMember>& hostile) {
+    sim::DistributedLaunch launch = processes(1);
+    launch.listen = "tcp://127.0.0.1:*", launch.expect = 2, launch.longest_step_s = 1;
+    launch.listening = [&](const std::string& endpoint) { hostile.emplace(endpoint, habit, 10); };
+    return sim::run_distributed(scene, lockstep(steps), launch, watcher);
+}
+
+TEST(SharedWorldRun, AMemberThatPublishesTheSameStatesForEverIsGivenUpAndTheBitsStay) {
+    const sim::WorldScene scene = heap(9);
+    Watcher watcher;
+    std::optional<HostileMember> hostile;
+    const sim::DistributedResult result =
+        run_with(HostileMember::Habit::republishes, scene, 60, watcher, hostile);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, 60));
+    EXPECT_EQ(result.lost, 1);
+    EXPECT_TRUE(watcher.noted("is lost: all have waited for its bodies for 1 s"))
+        << testing::PrintToString(watcher.notes);
+    EXPECT_TRUE(comes_true([&] { return hostile->given_up(); }));
+}
+
+TEST(SharedWorldRun, AMemberThatFloodsAnotherWithOffersIsGivenUpAndTheBitsStay) {
+    const sim::WorldScene scene = heap(9);
+    Watcher watcher;
+    std::optional<HostileMember> hostile;
+    const sim::DistributedResult result = run_with(HostileMember::Habit::offers, scene, 60, watcher, hostile);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, 60));
+    EXPECT_EQ(result.lost, 1);
+    EXPECT_TRUE(watcher.noted("found more messages than steps need"))
+        << testing::PrintToString(watcher.notes);
+}
+
+TEST(SharedWorldRun, AStrangerThatJoinsAndFallsSilentTakesNoWorkerOfOursWithIt) {
+    const sim::WorldScene scene = heap(9);
+    Watcher watcher;
+    std::size_t ours = 0;
+    watcher.act_at = {59};
+    watcher.act = [&] { ours = children_of(getpid()).size(); };
+    std::optional<HostileMember> hostile;
+    const sim::DistributedResult result =
+        run_with(HostileMember::Habit::is_silent, scene, 60, watcher, hostile);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, 60));
+    EXPECT_EQ(result.lost, 1);
+    EXPECT_EQ(ours, 1u);
+}
+
+TEST(SharedWorldRun, WorkersThatDoNotJoinInTimeAreLeftBehindAndTheBitsStay) {
+    const sim::WorldScene scene = heap(4);
+    const std::uint64_t hash = hash_alone(scene, 40);
+    {
+        Watcher watcher;
+        sim::DistributedLaunch launch;  // one that was stopped before it joined behaves as this one
+        launch.processes = {"/bin/sh", {"-c", "exec sleep 1000"}, 1};
+        launch.wait_s = 0.4;
+        EXPECT_EQ(sim::run_distributed(scene, lockstep(40), launch, watcher).steps, 40u);
+        EXPECT_EQ(watcher.hash, hash);
+        EXPECT_TRUE(watcher.noted("0 of 1 workers joined within 0 s"));
+        EXPECT_TRUE(children_of(getpid()).empty());
+    }
+    Watcher watcher;
+    sim::DistributedLaunch launch = processes(1);
+    launch.listen = "tcp://127.0.0.1:*", launch.expect = 2, launch.wait_s = 3;
+    EXPECT_EQ(sim::run_distributed(scene, lockstep(40), launch, watcher).workers, 1);
+    EXPECT_EQ(watcher.hash, hash);
+    EXPECT_TRUE(watcher.noted("1 of 2 workers joined within 3 s: the run begins without the others"));
 }
 
 TEST(SharedWorldRun, AWorkerWithAnotherFingerprintIsRefusedInLockstep) {
