@@ -22,7 +22,7 @@ constexpr int kFramesBetweenLooks = 1000;
 constexpr std::size_t kMostEventsWaiting = 4096, kMostBytesWaiting = 64 << 20;
 constexpr std::size_t kLargestOfAStranger = 4096;
 constexpr double kMostJoinsAtOnce = 256, kJoinsPerSecond = 4;
-constexpr int kReceivedAhead = 1000;  // messages of a connection that wait in the socket
+constexpr int kReceivedAhead = 200;  // messages of a connection that wait in the socket
 constexpr auto kHandshakeWithin = 5s;
 
 enum class Type : std::uint16_t { join = 1, beat = 2 };
