@@ -203,6 +203,24 @@ TEST(Simulate, WorkersSayTheSameOfTheirBodies) {
     }
 }
 
+TEST(Simulate, WorkersThatCheckEachOtherGiveTheBitsOfOneProcessAndImpossibleChecksAreRefused) {
+    const Folder folder;
+    write(folder / "scene.toml", kScene);
+    const std::string scene = folder / "scene.toml";
+    const Ended alone = run({"simulate", scene, "--steps", "20", "--json"});
+    const Ended checked =
+        run({"simulate", scene, "--steps", "20", "--json", "--workers", "3", "--verify", "3"});
+    ASSERT_EQ(checked.status, 0) << checked.err;
+    const json result = json::parse(checked.out);
+    EXPECT_EQ(result["state_hash"], json::parse(alone.out)["state_hash"]);
+    EXPECT_EQ(result["verify"], 3);
+    EXPECT_EQ(result["workers"], 3);
+    EXPECT_EQ(result["workers_lost"], 0);
+    expect_refused(run({"simulate", scene, "--workers", "2", "--verify", "3"}), "--verify 3");
+    expect_refused(run({"simulate", scene, "--workers", "3", "--mode", "async", "--verify", "3"}),
+                   "--verify 3");
+}
+
 TEST(Simulate, TheLinesThatItPrintsForWorkersElsewhereMakeThemJoin) {
     const Folder folder;
     write(folder / "scene.toml", kScene);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 
 namespace app {
@@ -30,6 +31,13 @@ void check_together(const TypedWorkers& typed) {
         refuse_options(fmt::format("--bound {} with --mode sync", bound), "--mode async, or no --bound");
     if (o.simulated && !o.listen.empty())
         refuse_options("--listen with --processors", "one of them: simulated processors are in this process");
+    if (o.verify > 1 && (typed.async || o.simulated))
+        refuse_options(
+            fmt::format("--verify {} with {}", o.verify, typed.async ? "--mode async" : "--processors"),
+            "--mode sync and processes: only what is to the bit can be compared");
+    if (o.verify > std::max({o.count, o.expect, 1}))
+        refuse_options(fmt::format("--verify {}", o.verify),
+                       "at least as many --workers, or more to --expect: they check each other");
     if (o.listen.empty() && (!o.keys.empty() || o.expect > 0))
         refuse_options(!o.keys.empty() ? "--keys" : "--expect",
                        "--listen ENDPOINT with it, where workers of other hosts come in");
@@ -99,6 +107,9 @@ void add_worker_options(Command& command, std::optional<WorkerOptions>& options)
                    "Folder made by `musicworld keys`; needed beyond this host");
     command.option("--expect", o.expect, as::whole(0, kMostWorkers),
                    "Workers to wait for before the first step");
+    command.option(
+        "--verify", o.verify, as::whole(1, kMostWorkers),
+        "sync: so many workers compute the same bodies, and one that differs from most is given up");
     command.option(
         "--processors", o.simulated, as::processors(),
         "simulated[:latency=S,slowdown=X,cost=measured|modelled]: workers in this process, each with "

@@ -297,6 +297,7 @@ sim::DistributedLaunch launch_of(const WorkerOptions& workers) {
     launch.processes = {fs::read_symlink("/proc/self/exe").string(), {"worker"}, workers.count};
     launch.listen = workers.listen;
     launch.expect = workers.expect;
+    launch.verify = workers.verify;
     launch.keys = workers.keys;
     if (!workers.listen.empty())
         launch.listening = [keys = workers.keys](const std::string& endpoint) {
@@ -406,6 +407,7 @@ std::string clock_of(const WorkerOptions& options) {
 Json workers_of(const SimulateResult& r) {
     return {{"clock", clock_of(*r.worker_options)},
             {"balance", r.worker_options->balance},
+            {"verify", r.worker_options->verify},
             {"workers_lost", r.lost},
             {"workers_left", r.left},
             {"bodies_reowned", r.bodies_reowned},

@@ -21,6 +21,7 @@ struct WorkerOptions {
     std::string listen;  ///< endpoint; empty: in a private folder
     std::filesystem::path keys;
     int expect = 0;                                     ///< workers before the first step
+    int verify = 1;                                     ///< that compute the same bodies
     std::optional<sim::SimulatedProcessors> simulated;  ///< instead of processes
 };
 

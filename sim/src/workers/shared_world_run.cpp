@@ -10,6 +10,7 @@
 #include "shared/shared_world_worker.h"
 #include "sim/errors.h"
 #include "workers/elapsed.h"
+#include "workers/teams.h"
 #include "workers/worker_gate.h"
 #include "workers/worker_process.h"
 
@@ -66,6 +67,7 @@ public:
           processes_(launch.processes.program.empty() ? 0 : launch.processes.count),
           observer_(observer),
           meeting_(scene, settings, observer),
+          teams_(meeting_, launch.verify, observer),
           gate_(gate_settings(scene, settings, launch)) {
         if (launch.listening)
             launch.listening(launch.listen.empty() ? gate_.private_endpoint() : gate_.endpoint());
@@ -81,10 +83,11 @@ public:
         wait_for_workers();
         started_ = true;
         progressed_ = Clock::now();
-        meeting_.start();
+        teams_.start();
         const Clock::time_point start = Clock::now();
         while (!meeting_.finished()) advance();
         DistributedResult result = meeting_.result();
+        teams_.count(result);
         result.elapsed_s = seconds_since(start);
         result.refused_messages += gate_.refused_messages() + gate_.refused_keys();
         end_children();
@@ -122,7 +125,9 @@ private:
 
     /// A worker may be heard, and even publish, and yet not what all wait for.
     void look_after_progress() {
-        if (std::exchange(steps_, meeting_.steps()) != meeting_.steps()) progressed_ = Clock::now();
+        // Who has just got the bodies of a lost one has as long as that one had.
+        const std::pair now(meeting_.steps(), meeting_.result().bodies_reowned);
+        if (std::exchange(progress_, now) != now) progressed_ = Clock::now();
         if (seconds_since(progressed_) < launch_.longest_step_s) return;
         progressed_ = Clock::now();
         meeting_.lose_slowest("all have waited for its bodies for " + seconds(launch_.longest_step_s));
@@ -131,7 +136,7 @@ private:
     void wait_for_workers() {
         const auto wanted = static_cast<std::size_t>(std::max({launch_.expect, processes_, 1}));
         const Clock::time_point start = Clock::now();
-        while (meeting_.members().size() + ended_early_ < wanted) {
+        while (teams_.members() + ended_early_ < wanted) {
             for (WorkerGate::Event& event : gate_.wait(kWait)) take(event);
             look_after_children();
             pass_on();
@@ -141,10 +146,9 @@ private:
 
     /// A worker that is stopped, or cannot reach us, does not hold up those that came.
     void go_without_the_rest(std::size_t wanted) {
-        const std::string joined = std::to_string(meeting_.members().size()) + " of " +
-                                   std::to_string(wanted) + " workers joined within " +
-                                   seconds(launch_.wait_s);
-        if (meeting_.members().empty() && children_.empty()) throw WorkerError(joined);
+        const std::string joined = std::to_string(teams_.members()) + " of " + std::to_string(wanted) +
+                                   " workers joined within " + seconds(launch_.wait_s);
+        if (teams_.members() == 0 && children_.empty()) throw WorkerError(joined);
         for (Child& child : children_)
             if (!child.worker && !child.ended) child.process.kill();
         observer_.note(joined + ": the run begins without the others");
@@ -155,10 +159,10 @@ private:
         if (event.kind == Kind::asks_to_join)
             join(event);
         else if (event.kind == Kind::message)
-            meeting_.take(event.worker, event.bytes);
-        else if (is_member(event.worker)) {
+            teams_.take(event.worker, event.bytes);
+        else if (teams_.is_member(event.worker)) {
             lost_.push_back(event.worker);
-            meeting_.lose(event.worker, event.why);
+            teams_.lose(event.worker, event.why);
         }
     }
 
@@ -174,22 +178,18 @@ private:
         const auto child = std::find_if(children_.begin(), children_.end(), [&](const Child& c) {
             return !c.worker && !c.ended && c.process.secret() == event.request.secret;
         });
-        if (child == children_.end() && meeting_.members().size() >= kMostWorkers)
-            return gate_.refuse(event.stranger, "all places are taken");
-        const std::uint32_t worker = meeting_.join(event.request);
-        gate_.admit(event.stranger, worker, event.request.secret);
-        admitted_.push_back(worker);
+        const bool place = child != children_.end() || teams_.members() < kMostWorkers;
+        const std::optional<std::uint32_t> worker = place ? teams_.join(event.request) : std::nullopt;
+        if (!worker) return gate_.refuse(event.stranger, "all places are taken");
+        gate_.admit(event.stranger, *worker, event.request.secret);
+        admitted_.push_back(*worker);
         if (child != children_.end()) child->worker = worker;
-    }
-
-    [[nodiscard]] bool is_member(std::uint32_t worker) const {
-        const std::vector<std::uint32_t>& members = meeting_.members();
-        return std::find(members.begin(), members.end(), worker) != members.end();
     }
 
     void look_after_children() {
         for (Child& child : children_) {
-            if (child.worker && !is_member(*child.worker) && was_lost(*child.worker)) child.process.kill();
+            if (child.worker && !teams_.is_member(*child.worker) && was_lost(*child.worker))
+                child.process.kill();
             if (!child.process.has_ended()) continue;
             if (!child.ended) {
                 child.ended = Clock::now();
@@ -200,8 +200,8 @@ private:
             }
             // One that ended in order may have said so: that is on its way.
             const bool settled = child.process.was_killed() || seconds_since(*child.ended) > kLastWords_s;
-            if (settled && child.worker && is_member(*child.worker))
-                meeting_.lose(*child.worker, child.process.ending());
+            if (settled && child.worker && teams_.is_member(*child.worker))
+                teams_.lose(*child.worker, child.process.ending());
         }
     }
 
@@ -229,8 +229,9 @@ private:
                 for (const std::vector<std::uint8_t>& bytes : here_->outgoing())
                     meeting_.take(here_->number(), bytes), more = true;
         }
+        for (const Coordinator::Outgoing& out : teams_.outgoing()) gate_.send(out.to, out.bytes);
         std::erase_if(admitted_, [this](std::uint32_t worker) {
-            if (is_member(worker)) return false;
+            if (teams_.is_member(worker)) return false;
             gate_.dismiss(worker);
             return true;
         });
@@ -238,6 +239,7 @@ private:
 
     void deliver(Coordinator::Outgoing& out) {
         if (here_ && std::erase(out.to, here_->number()) > 0) here_->take(*out.bytes);
+        teams_.address(out);
         if (!out.to.empty()) gate_.send(out.to, std::move(out.bytes));
     }
 
@@ -259,13 +261,14 @@ private:
     const int processes_;  ///< started here
     DistributedObserver& observer_;
     Coordinator meeting_;
+    Teams teams_;
     WorkerGate gate_;
     std::vector<std::uint32_t> admitted_;  ///< by the gate, now
     std::vector<std::uint32_t> lost_;      ///< silent or out of reach
     std::optional<WorkerHere> here_;
     std::size_t ended_early_ = 0;
     bool started_ = false;
-    std::uint64_t steps_ = 0;
+    std::pair<std::uint64_t, int> progress_;  ///< steps, bodies that went to others after losses
     Clock::time_point progressed_ = Clock::now();
     bool noted_ = false;
     std::vector<Child> children_;  // last: processes end before the gate goes
@@ -280,7 +283,13 @@ DistributedResult run_distributed(const WorldScene& scene, const DistributedSett
     if (launch.processes.count < 0 || launch.processes.count > kMostWorkers)
         throw InputError("", std::to_string(launch.processes.count) + " workers",
                          "0 to " + std::to_string(kMostWorkers));
-    return SharedWorldRun(scene, settings, launch, observer).run();
+    if (launch.verify < 1 || (launch.verify > 1 && settings.pace != Pace::lockstep))
+        throw InputError("", std::to_string(launch.verify) + " workers that check each other",
+                         "1 or more, and lockstep");
+    DistributedSettings own = settings;
+    own.market.trade =
+        settings.market.trade && launch.verify == 1;  // times differ, and so would their offers
+    return SharedWorldRun(scene, own, launch, observer).run();
 }
 
 }  // namespace sim

@@ -238,11 +238,12 @@ void WorkerGate::take(std::string&& identity, const zmq::message_t& frame) {
 void WorkerGate::take_beat(const std::string& identity, const zmq::message_t& frame) {
     try {
         const DecodedWorldMessage m = decoded(frame);
-        const auto found = members_.find(m.header.worker);
-        if (found == members_.end()) return;  // it learns so when it sends something else
-        const Secret& secret = std::get<WorldBeat>(m.message).secret;
-        if (secret != found->second.secret || secret == Secret{}) {  // nobody beats for another
-            ++refused_messages_;
+        const Secret secret = std::get<WorldBeat>(m.message).secret;
+        const auto found = std::find_if(members_.begin(), members_.end(), [&secret](const auto& member) {
+            return member.second.secret == secret && secret != Secret{};
+        });
+        if (found == members_.end()) {  // who is a member no more learns so when it sends something else
+            refused_messages_ += members_.count(m.header.worker);
             return;
         }
         found->second.heard = Clock::now();

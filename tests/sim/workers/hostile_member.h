@@ -20,6 +20,7 @@ public:
     enum class Habit {
         republishes,  ///< its last states, every 10 ms
         offers,       ///< bodies to worker 0, as fast as they go out
+        lies,         ///< of where its bodies are, by a tenth of a millimetre
         is_silent     ///< nothing, and no heartbeats
     };
     HostileMember(const std::string& endpoint, Habit habit, int honest_steps,
@@ -44,7 +45,7 @@ private:
         while (!stop.stop_requested()) {
             take(socket);
             if (!worker_) continue;
-            const bool honest = steps_ < honest_steps_;
+            const bool honest = steps_ < honest_steps_ || habit_ == Habit::lies;
             if ((honest || habit_ != Habit::is_silent) &&
                 Clock::now() - beaten > std::chrono::milliseconds(50)) {
                 send(beats, sim::encode({number_, 0, 0}, sim::WorldBeat{secret}));
@@ -69,6 +70,11 @@ private:
             worker_->take(m.header, std::move(m.message));
         }
     }
+    [[nodiscard]] std::vector<std::uint8_t> moved(sim::DecodedWorldMessage&& m) const {
+        if (auto* state = std::get_if<sim::StateMessage>(&m.message))
+            for (sim::WorldRecord& record : state->bodies) record.state.position.x() += 1e-4;
+        return sim::encode(m.header, m.message);
+    }
     void serve(zmq::socket_t& socket) {
         if (worker_->ready()) {
             worker_->step();
@@ -80,7 +86,8 @@ private:
             if (std::holds_alternative<sim::StateMessage>(m.message) ||
                 std::holds_alternative<sim::UpdateMessage>(m.message))
                 states_ = bytes;
-            send(socket, bytes);
+            send(socket,
+                 habit_ == Habit::lies && steps_ > honest_steps_ ? moved(sim::decode_world(bytes)) : bytes);
         }
     }
     void be_hostile(zmq::socket_t& socket) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <array>
 #include <atomic>
 #include <future>
 #include <mutex>
@@ -197,7 +198,9 @@ sim::DistributedResult run_with(HostileMember::Habit habit, const sim::WorldScen
     sim::DistributedLaunch launch = processes(1);
     launch.listen = "tcp://127.0.0.1:*", launch.expect = 2, launch.longest_step_s = 1;
     launch.listening = [&](const std::string& endpoint) { hostile.emplace(endpoint, habit, 10); };
-    return sim::run_distributed(scene, lockstep(steps), launch, watcher);
+    sim::DistributedSettings settings = lockstep(steps);
+    settings.market.trade = false;  // so that it keeps what it says it has
+    return sim::run_distributed(scene, settings, launch, watcher);
 }
 
 TEST(SharedWorldRun, AMemberThatPublishesTheSameStatesForEverIsGivenUpAndTheBitsStay) {
@@ -257,6 +260,61 @@ TEST(SharedWorldRun, WorkersThatDoNotJoinInTimeAreLeftBehindAndTheBitsStay) {
     EXPECT_EQ(sim::run_distributed(scene, lockstep(40), launch, watcher).workers, 1);
     EXPECT_EQ(watcher.hash, hash);
     EXPECT_TRUE(watcher.noted("1 of 2 workers joined within 3 s: the run begins without the others"));
+}
+
+TEST(SharedWorldRun, OfThreeWhoComputeTheSameALiarIsGivenUpByNameAndTheBitsStay) {
+    const sim::WorldScene scene = heap(9);
+    for (const int honest : {2, 1}) {  // with one, nobody can say who is right, and the application goes on
+        Watcher watcher;
+        std::optional<HostileMember> hostile;
+        sim::DistributedLaunch launch = processes(honest);
+        launch.listen = "tcp://127.0.0.1:*", launch.expect = honest + 1, launch.verify = honest + 1;
+        launch.listening = [&](const std::string& endpoint) {
+            hostile.emplace(endpoint, HostileMember::Habit::lies, 3);
+        };
+        // So long that the liar, who is the slowest, comes to say something while it lasts.
+        const sim::DistributedResult result = sim::run_distributed(scene, lockstep(1500), launch, watcher);
+        EXPECT_EQ(watcher.hash, hash_alone(scene, 1500)) << honest;
+        EXPECT_EQ(result.steps, 1500u);
+        EXPECT_EQ(result.workers, honest + 1);
+        if (honest == 2) {
+            EXPECT_TRUE(watcher.noted("is lost: its states differ from those of the others"))
+                << testing::PrintToString(watcher.notes);
+            EXPECT_EQ(result.lost, 1);
+            EXPECT_FALSE(watcher.noted("no worker is left"));
+        } else {
+            EXPECT_TRUE(watcher.noted("no more than half agree")) << testing::PrintToString(watcher.notes);
+            EXPECT_TRUE(watcher.noted("no worker is left"));
+        }
+        EXPECT_TRUE(comes_true([&] { return hostile->given_up(); }));
+    }
+    Watcher unchecked;  // without checks the lie is believed
+    std::optional<HostileMember> hostile;
+    (void)run_with(HostileMember::Habit::lies, scene, 80, unchecked, hostile);
+    EXPECT_NE(unchecked.hash, hash_alone(scene, 80));
+}
+
+TEST(SharedWorldRun, TeamsThatCheckEachOtherSurviveKillsStopsAndDrainsWithTheSameBits) {
+    const sim::WorldScene scene = heap(9);
+    const std::uint64_t hash = hash_alone(scene, 200);
+    std::mt19937 rng(7);
+    const int runs = std::getenv("MUSICWORLD_LONG") ? 60 : 9;
+    for (int i = 0; i < runs; ++i) {
+        sim::DistributedLaunch launch = processes(i % 3 == 0 ? 5 : 6);
+        launch.verify = 2 + i % 2;  // teams of 2, 2, 2 or 2, 2, 1 or 3, 3 or 3, 2
+        Watcher watcher;
+        watcher.act_at = {10 + rng() % 80, 100 + rng() % 80};
+        watcher.act = [&,
+                       signal = std::array{SIGKILL, SIGTERM, SIGSTOP}.at(static_cast<std::size_t>(i % 3))] {
+            const std::vector<pid_t> all = children_of(getpid());
+            if (!all.empty()) ::kill(all[rng() % all.size()], signal);
+        };
+        const sim::DistributedResult result = sim::run_distributed(scene, lockstep(200), launch, watcher);
+        EXPECT_EQ(watcher.hash, hash) << i << testing::PrintToString(watcher.notes);
+        EXPECT_EQ(result.steps, 200u) << i;
+        EXPECT_FALSE(watcher.noted("differ")) << i << testing::PrintToString(watcher.notes);
+    }
+    EXPECT_TRUE(children_of(getpid()).empty());
 }
 
 TEST(SharedWorldRun, AWorkerWithAnotherFingerprintIsRefusedInLockstep) {
