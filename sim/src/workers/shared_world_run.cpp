@@ -107,6 +107,9 @@ private:
                                               const DistributedLaunch& launch) {
         WorkerGate::Settings settings;
         settings.listen = launch.listen;
+        // Workers remove the folder of an application that was killed: without any there is none.
+        settings.in_folder =
+            launch.listen.empty() || (launch.processes.count > 0 && !launch.processes.program.empty());
         settings.most_waiting = 1000 + 4 * (run.bound + 2) * kMostWorkers;
         settings.largest_message = largest_message(scene);
         if (!launch.keys.empty()) settings.keys = read_application_keys(launch.keys);

@@ -69,7 +69,7 @@ void WorkerGate::bind(const Settings& settings) {
     router_.set(zmq::sockopt::handshake_ivl,
                 static_cast<int>(std::chrono::milliseconds(kHandshakeWithin).count()));
     router_.set(zmq::sockopt::router_mandatory, true);
-    router_.bind(folder_.endpoint());
+    if (settings.in_folder) router_.bind(folder_.emplace().endpoint());
     if (!settings.listen.empty()) open_door(settings);
 }
 

@@ -38,6 +38,7 @@ public:
         std::string listen;                        ///< tcp endpoint beside the private folder's; empty: none
         std::optional<ApplicationKeys> keys;       ///< for `listen`
         double silence_s = 1;                      ///< a worker that is silent for so long is lost
+        bool in_folder = true;                     ///< listens in a private folder, too
         int most_waiting = 10'000;                 ///< messages to one member
         std::int64_t largest_message = 256 << 20;  ///< from a member [bytes]
     };
@@ -45,7 +46,9 @@ public:
     explicit WorkerGate(const Settings& settings);
     ~WorkerGate();  ///< waits at most a second for queued messages to go out
 
-    [[nodiscard]] std::string private_endpoint() const { return folder_.endpoint(); }  ///< ipc
+    [[nodiscard]] std::string private_endpoint() const {
+        return folder_->endpoint();
+    }                                                                        ///< ipc, in the folder
     [[nodiscard]] const std::string& endpoint() const { return endpoint_; }  ///< of `listen`, with its port
 
     struct Event {
@@ -108,7 +111,7 @@ private:
     void tell(Event&& event);
 
     const std::chrono::duration<double> silence_;
-    SocketFolder folder_;
+    std::optional<SocketFolder> folder_;
     zmq::context_t context_;
     std::unique_ptr<KeyGate> keys_;
     zmq::socket_t router_;

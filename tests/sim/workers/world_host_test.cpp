@@ -16,7 +16,7 @@
 #include "sim/distributed_world.h"
 #include "workers/heartbeat.h"
 #include "workers/worker_process.h"
-#include "world_bodies.h"
+#include "world_processes.h"
 
 // Real processes. What must be to the bit is compared with a World alone, so it does not matter when exactly
 // a worker is killed or stopped.
@@ -25,75 +25,10 @@ namespace {
 using namespace std::chrono_literals;
 using namespace sim_test;
 
-/// A heap of soft balls and rigid boxes that falls, touches and is joined: contacts between all workers.
-sim::WorldScene heap(int bodies) {
-    sim::WorldScene scene;
-    scene.world = world_test::on_floor();
-    for (int i = 0; i < bodies; ++i) {
-        const Eigen::Vector3d at(0.95 * (i % 3), 0.6 + 1.05 * (i / 9), 0.95 * (i / 3 % 3));
-        scene.world.bodies.push_back(i % 4 == 3 ? world_test::box(at, {0.4, 0.5, 0.4})
-                                                : world_test::ball(at, sim::Fidelity::modal));
-        scene.world.bodies.back().name += std::to_string(i);
-        scene.world.bodies.back().velocity = Eigen::Vector3d(0.1 * (i % 5) - 0.2, 0, 0.05 * (i % 7));
-    }
-    scene.world.constraints.push_back({"hangs", 0, {0, 0.5, 0}, -1, {0, 2.5, 0}});
-    scene.events = {{40, {0}, 0, 0, {}}};
-    return scene;
-}
-
-std::uint64_t hash_alone(const sim::WorldScene& scene, std::uint64_t steps) {
-    sim::World world(scene.world);
-    for (std::uint64_t i = 0; i < steps; ++i) {
-        for (const sim::WorldEvent& event : scene.events)
-            if (event.step == i)
-                for (const int c : event.removed) world.remove_constraint(c);
-        world.step();
-    }
-    return world.state_hash();
-}
-
-/// Keeps the hash of the last step, and does something at a step, once.
-class Watcher : public sim::DistributedObserver {
-public:
-    std::uint64_t last_step = 0, hash = 0;
-    std::vector<std::string> notes;
-    std::vector<std::uint64_t> act_at;
-    std::function<void()> act;
-
-    void at(std::uint64_t step, const sim::World& world) override {
-        last_step = step, hash = world.state_hash();
-        if (std::find(act_at.begin(), act_at.end(), step) != act_at.end()) act();
-    }
-    void note(const std::string& what) override { notes.push_back(what); }
-    [[nodiscard]] bool noted(const std::string& part) const {
-        return std::any_of(notes.begin(), notes.end(),
-                           [&](const std::string& n) { return n.find(part) != std::string::npos; });
-    }
-};
-
 // The programs that the tests start; these tests are never run by themselves.
 TEST(WorldProcess, DISABLED_Works) {
     const std::vector<std::string> words = command_line();
     _exit(sim::run_worker(option(words, "--connect"), option(words, "--key")));
-}
-
-sim::DistributedLaunch processes(int count) {
-    sim::DistributedLaunch launch;
-    launch.processes = run_test("WorldProcess.DISABLED_Works", count);
-    return launch;
-}
-
-/// A worker started by somebody else.
-sim::WorkerProcess start_elsewhere(const std::string& endpoint, const std::string& key = {}) {
-    sim::WorkerLaunch launch = run_test("WorldProcess.DISABLED_Works", 1);
-    if (!key.empty()) launch.arguments.insert(launch.arguments.end(), {"--key", key});
-    return {launch, endpoint};
-}
-
-sim::DistributedSettings lockstep(std::uint64_t steps) {
-    sim::DistributedSettings settings;
-    settings.steps = steps;
-    return settings;
 }
 
 TEST(SharedWorldRun, OneAndThreeProcessesComeToTheSameBitsAsOneWorldAndLeaveNoneBehind) {
@@ -451,6 +386,29 @@ TEST(SharedWorldRun, WorkersEndAndTheFolderGoesWhenTheApplicationIsKilled) {
     const auto ended = [](pid_t id) { return command_line("/proc/" + std::to_string(id)).empty(); };
     EXPECT_TRUE(comes_true([&] { return std::all_of(ids.begin(), ids.end(), ended); }));
     EXPECT_TRUE(comes_true([&] { return !std::filesystem::exists(socket.parent_path()); }));
+}
+
+/// Folders of this process's applications that workers find.
+long folders() {
+    const std::string name = "musicworld-" + std::to_string(getpid()) + "-";
+    const auto all = std::filesystem::directory_iterator(std::filesystem::temp_directory_path());
+    return std::count_if(begin(all), end(all), [&](const auto& entry) {
+        return entry.path().filename().string().starts_with(name);
+    });
+}
+
+// Workers of its own remove an application's folder if it is killed.
+TEST(SharedWorldRun, AnApplicationWithoutWorkersOfItsOwnHasNoFolderThatCouldBeLeft) {
+    std::optional<sim::WorkerProcess> worker;
+    sim::DistributedLaunch launch;
+    launch.processes = {"/nonexistent", {}, 0};
+    launch.listen = "tcp://127.0.0.1:*", launch.expect = 1;
+    launch.listening = [&](const std::string& endpoint) {
+        EXPECT_EQ(folders(), 0);
+        worker.emplace(start_elsewhere(endpoint));
+    };
+    Watcher watcher;
+    EXPECT_EQ(sim::run_distributed(heap(2), lockstep(5), launch, watcher).steps, 5u);
 }
 
 TEST(SharedWorldRun, NobodyWhoJoinsAndAProgramThatEndsAtOnceAreErrors) {
