@@ -112,6 +112,7 @@ private:
         std::uint64_t read = 0;
         double interval_s = 0;
         SourceClock clock;
+        bool clocked = false;  // a sample has begun the clock
         ClockReport clock_report;
     };
 
@@ -154,7 +155,7 @@ private:
         if (first_read_ns_ == 0) first_read_ns_ = sample.read_ns;
         return sample.read_ns - first_read_ns_ < kSettlingNs;
     }
-    /// False for a sample that cannot be of its stick's clock.
+    /// False for a sample that cannot be of its stick's clock, and for the one that begins it: that may be a stray.
     bool put_on_our_clock(SourceSample& sample) {
         const double arrival_s = since_epoch_s(sample.read_ns);
         if (source_->replayed()) {
@@ -170,7 +171,8 @@ private:
             const std::lock_guard lock(mutex_);
             stick.clock_report.clock = sample.has_time ? SampleClock::source : SampleClock::arrival;
         }
-        if (!ours_s) return false;
+        const bool begins = sample.has_time && !std::exchange(stick.clocked, true);
+        if (!ours_s || begins) return false;
         sample.sample.t_s = *ours_s;
         sample.due_ns = task_.epoch_ns + to_ns(*ours_s);
         return true;

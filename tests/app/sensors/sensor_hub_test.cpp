@@ -449,6 +449,8 @@ public:
     OscSender(const OscSender&) = delete;
     OscSender& operator=(const OscSender&) = delete;
     void turn_clock_by(double seconds) { ahead_s_ = ahead_s_ + seconds; }
+    /// Sends samples from other times and another place, too, before every fourth of its own.
+    void stray(bool strays) { strays_ = strays; }
     /// The right stick's sender is another one, with a clock so far ahead.
     void set_right_apart(double seconds) { right_apart_s_ = seconds; }
     void pause(bool paused) { paused_ = paused; }
@@ -459,13 +461,18 @@ private:
         if (paused_) return;
         const double t = static_cast<double>(app::monotonic_ns()) * 1e-9;
         for (const char* stick : {"/left", "/right"})
+            if (strays_ && sent_ % 4 == 0)
+                lo_send(to_, stick, "dfff", t + ahead_s_ + 5e7 * (sent_ % 9 - 4.5), 9.0F, 9.0F, 9.0F);
+        ++sent_;
+        for (const char* stick : {"/left", "/right"})
             lo_send(to_, stick, "dfff", t + ahead_s_ + (stick[1] == 'r' ? right_apart_s_.load() : 0), 0.1F,
                     1 + 0.1F * static_cast<float>(std::sin(9 * t)), 0.0F);
     }
 
     lo_address to_;
     std::atomic<double> ahead_s_ = 1e9, right_apart_s_ = 0;
-    std::atomic<bool> paused_ = false;
+    std::atomic<bool> paused_ = false, strays_ = false;
+    int sent_ = 0;
     std::jthread thread_;
 };
 
@@ -542,6 +549,18 @@ TEST(SensorHub, SendersWithClocksOfTheirOwnAreEachFollowedAndThatIsSaidOnce) {
     for (const auto& states : seen.states)
         for (const tracking::StickState& state : states)
             EXPECT_NEAR(static_cast<double>(state.read_ns - options.epoch_ns) * 1e-9, state.t_s, 5);
+}
+
+TEST(SensorHub, NoStrayIsEverPlayedNotEvenTheVeryFirst) {
+    const int port = app::free_udp_port();
+    SensorHub hub(options_for("osc:" + std::to_string(port)));
+    OscSender sender(port);
+    sender.stray(true);
+    Watched seen;
+    seen.states.resize(2);
+    watch_until(hub, 2, seen, [&] { return seen.states[0].size() > 100 && seen.states[1].size() > 100; });
+    for (const auto& states : seen.states)
+        for (const tracking::StickState& state : states) EXPECT_LT(state.position.y(), 2);
 }
 
 TEST(SensorHub, AWallClockThatIsFarFromOursIsSaid) {
