@@ -15,7 +15,7 @@ namespace sim {
 namespace {
 
 using namespace std::chrono_literals;
-constexpr auto kPoll = 20ms;
+constexpr auto kPoll = 20ms, kPollAtDoor = 5ms;  // in which hundreds of connections may come
 constexpr auto kLastWords = 300ms;
 constexpr auto kPaused = 250ms;  // a longer gap between two looks is ours, not the workers' silence
 constexpr int kFramesBetweenLooks = 1000;
@@ -150,7 +150,7 @@ void WorkerGate::poll() {
     std::array<zmq::pollitem_t, 2> items = {
         {{nullptr, wake_, ZMQ_POLLIN, 0}, {router_.handle(), 0, ZMQ_POLLIN, 0}}};
     try {
-        zmq::poll(items.data(), held_back_ ? 1 : items.size(), kPoll);
+        zmq::poll(items.data(), held_back_ ? 1 : items.size(), listening_ ? kPollAtDoor : kPoll);
     } catch (const zmq::error_t& e) {
         if (e.num() != EINTR) throw;
     }
