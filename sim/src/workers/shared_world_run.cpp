@@ -101,8 +101,8 @@ private:
         std::optional<Clock::time_point> ended = std::nullopt;  ///< seen then
     };
 
-    /// A worker is sent what each other one publishes in the steps by which it may be behind; these all come at
-    /// once if it joins late.
+    /// A worker is sent what each other one publishes in the steps by which it may be behind, all at once if it
+    /// joins late; and who owns each body, all at once too, after a loss.
     static WorkerGate::Settings gate_settings(const WorldScene& scene, const DistributedSettings& run,
                                               const DistributedLaunch& launch) {
         WorkerGate::Settings settings;
@@ -110,7 +110,8 @@ private:
         // Workers remove the folder of an application that was killed: without any there is none.
         settings.in_folder =
             launch.listen.empty() || (launch.processes.count > 0 && !launch.processes.program.empty());
-        settings.most_waiting = 1000 + 4 * (run.bound + 2) * kMostWorkers;
+        const auto bodies = static_cast<int>(scene.world.bodies.size() + scene.later.size());
+        settings.most_waiting = 1000 + 4 * bodies + 4 * (run.bound + 2) * kMostWorkers;
         settings.largest_message = largest_message(scene);
         if (!launch.keys.empty()) settings.keys = read_application_keys(launch.keys);
         return settings;
