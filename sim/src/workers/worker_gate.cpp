@@ -17,6 +17,7 @@ namespace {
 using namespace std::chrono_literals;
 constexpr auto kPoll = 20ms, kPollAtDoor = 5ms;  // in which hundreds of connections may come
 constexpr auto kLastWords = 300ms;
+constexpr auto kBeatUnasked = 100ms;
 constexpr auto kPaused = 250ms;  // a longer gap between two looks is ours, not the workers' silence
 constexpr int kFramesBetweenLooks = 1000;
 constexpr std::size_t kMostEventsWaiting = 4096, kMostBytesWaiting = 64 << 20;
@@ -141,6 +142,7 @@ void WorkerGate::serve(const std::stop_token& stop) {
         obey();
         receive();
         look_for_silence();
+        beat_unasked();
         if (listening_) listening_->look();
     }
     obey();
@@ -247,6 +249,7 @@ void WorkerGate::take_beat(const std::string& identity, const zmq::message_t& fr
             return;
         }
         found->second.heard = Clock::now();
+        found->second.beats_from = identity;
         zmq::message_t answer = framed(WorldBeat{});
         send_to(identity, answer);
     } catch (const DecodeError&) {
@@ -289,6 +292,17 @@ bool WorkerGate::may_join(const Secret& secret) {
     if (may_join_ < 1) return false;
     --may_join_;
     return true;
+}
+
+/// While nothing is received, so that no worker takes the application for gone.
+void WorkerGate::beat_unasked() {
+    if (!held_back_ || Clock::now() - beaten_ < kBeatUnasked) return;
+    beaten_ = Clock::now();
+    for (auto& [worker, member] : members_) {
+        if (member.lost || member.beats_from.empty()) continue;
+        zmq::message_t beat = framed(WorldBeat{});
+        send_to(member.beats_from, beat);
+    }
 }
 
 void WorkerGate::look_for_silence() {

@@ -28,7 +28,8 @@ namespace sim {
 ///   connections   as long as half of this process's descriptors, or 1000 more than at first, are open, `listen`
 ///                 takes no new connection; one that does not shake hands within 5 s is closed
 ///   joins         256 at once, then 4 a second; more are refused. Workers that are expected always may.
-///   messages in   up to 4096, or 64 MiB and one more, wait for wait(); then the sockets hold back their senders.
+///   messages in   up to 4096, or 64 MiB and one more, wait for wait(); then the sockets hold back their senders
+///                 (and heartbeats go out unasked).
 ///                 None is larger than `largest_message`; a stranger's of more than 4 KiB is dropped unread.
 ///   messages out  a member for which more than `most_waiting` wait to be sent has its link broken
 ///   heartbeats    count for a member only with the secret with which it asked to join
@@ -84,6 +85,7 @@ private:
         bool lost = false;
         std::optional<Clock::time_point> broken = {};  ///< time since which sending to it fails
         Secret secret = {};                            ///< of its heartbeats
+        std::string beats_from = {};                   ///< identity of the socket that they come from
     };
     struct Command {
         enum class Kind { admit, refuse, send, dismiss } kind;
@@ -107,6 +109,7 @@ private:
     bool send_to(const std::string& identity, zmq::message_t& frame);
     [[nodiscard]] bool may_join(const Secret& secret);
     void look_for_silence();
+    void beat_unasked();
     void lose(std::uint32_t worker, Member& member, const std::string& why);
     void tell(Event&& event);
 
@@ -129,8 +132,9 @@ private:
     std::map<std::uint32_t, Member> members_;
     std::map<std::string, std::uint32_t> numbers_;  ///< of identities
     Clock::time_point looked_ = Clock::now();
-    bool held_back_ = false;  ///< senders, since the last look
-    double may_join_ = 0;     ///< so many strangers now
+    bool held_back_ = false;                   ///< senders, since the last look
+    Clock::time_point beaten_ = Clock::now();  ///< unasked
+    double may_join_ = 0;                      ///< so many strangers now
     Clock::time_point counted_joins_ = Clock::now();
     std::optional<Listening> listening_;
     std::jthread thread_;  // last: starts when the rest is there

@@ -243,11 +243,18 @@ TEST(WorkerGate, AMemberThatSendsFasterThanTheApplicationTakesIsHeldBackAndNothi
     sim::WorkerGate gate({"", {}, 0.5});
     Peer fast(gate.private_endpoint());
     join(gate, fast, 1);
+    Peer pulse(gate.private_endpoint());
+    pulse.send(sim::WorldBeat{{1}}, 1);
+    ASSERT_TRUE(gets<sim::WorldBeat>(pulse));
     constexpr std::uint32_t kMessages = 20000;
     std::jthread sender([&] {
         for (std::uint32_t i = 0; i < kMessages; ++i) fast.send_waiting(sim::OfferAnswer{0, i, true}, 1);
     });
-    std::this_thread::sleep_for(1s);  // the application is busy, and silence is not judged meanwhile
+    // The application is busy for a second. Silence is not judged meanwhile, and it is not taken for gone.
+    int beats = 0;
+    const auto start = std::chrono::steady_clock::now();
+    while (std::chrono::steady_clock::now() - start < 1s) beats += pulse.receive().has_value();
+    EXPECT_GE(beats, 3);
     std::uint32_t next = 0;
     std::size_t most = 0;
     for (int i = 0; i < 2000 && next < kMessages; ++i) {
