@@ -14,7 +14,9 @@ TEST(KeyedHash, IsSipHash24) {
     std::iota(key.begin(), key.end(), std::uint8_t{0});
     std::vector<std::uint8_t> message(15);
     std::iota(message.begin(), message.end(), std::uint8_t{0});
-    const auto of = [&](std::size_t length) { return sim::keyed_hash(key, std::span(message).first(length)); };
+    const auto of = [&](std::size_t length) {
+        return sim::keyed_hash(key, std::span(message).first(length));
+    };
     EXPECT_EQ(of(0), 0x726fdb47dd0e0e31u);
     EXPECT_EQ(of(1), 0x74f839c593dc67fdu);
     EXPECT_EQ(of(8), 0x93f5f5799a932462u);
@@ -26,7 +28,8 @@ TEST(KeyedHash, SecretsAreRandomAndReadBackFromText) {
     EXPECT_NE(one, other);
     EXPECT_EQ(sim::from_hex(sim::to_hex(one)), one);
     EXPECT_EQ(sim::to_hex({0x0f, 0xa0}), "0fa0" + std::string(28, '0'));
-    for (const char* text : {"", "0f", "0fa00000000000000000000000000000x", "zfa00000000000000000000000000000"})
+    for (const char* text :
+         {"", "0f", "0fa00000000000000000000000000000x", "zfa00000000000000000000000000000"})
         EXPECT_FALSE(sim::from_hex(text)) << text;
 }
 
