@@ -19,7 +19,7 @@ while IFS=: read -r pattern folder; do
     [ -n "$found" ] && complain "$pattern belongs to $folder alone: $found"
 done <<'LIST'
 GL/|assimp/|spng|isa-l/:render
-csound|sndfile|smf:audio
+csound|sndfile:audio
 Spectra/:sim
 zmq:sim|app
 mujoco/|bt[A-Z]|Bullet:sim

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "report/json_document.h"
 #include "report/table.h"
 
 namespace app {
@@ -54,7 +55,7 @@ Figures figures_of(const BenchReport& report) {
         fmt::format("{}, {} cores, {}{}\n\n{}\n", report.machine.processor, report.machine.cores,
                     report.machine.compiler, report.machine.avx2 ? "" : ", without AVX2", table.text());
     for (const std::string& note : report.notes) text += note + '\n';
-    return {text, json.dump(2) + "\n"};
+    return {text, json_document(json)};
 }
 
 }  // namespace app

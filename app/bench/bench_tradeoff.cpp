@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "process/clock.h"
+#include "report/json_document.h"
 #include "report/table.h"
 
 namespace app {
@@ -198,7 +199,7 @@ std::string json_of(const Tradeoff& tradeoff) {
     json["converged"] = {{"name", name_of(tradeoff.converged)},
                          {"finer", name_of(tradeoff.finer)},
                          {"error", tradeoff.converged_error}};
-    return json.dump(2) + "\n";
+    return json_document(json);
 }
 
 std::string text_of(const Tradeoff& tradeoff) {

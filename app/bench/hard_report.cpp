@@ -9,6 +9,7 @@
 #include "bench/bench_hard.h"
 #include "bench/bench_report.h"
 #include "report/html.h"
+#include "report/json_document.h"
 #include "report/table.h"
 
 namespace app {
@@ -167,7 +168,7 @@ std::string json_of(const HardBench& bench) {
                            {"results", results_of(bench).json()},
                            {"runs", runs_of(bench).json()},
                            {"notes", bench.notes}};
-    return json.dump(2) + "\n";
+    return json_document(json);
 }
 
 std::string text_of(const HardBench& bench) {

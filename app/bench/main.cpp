@@ -25,6 +25,8 @@
 #include "files/bad_input.h"
 #include "files/output_folder.h"
 #include "process/child_process.h"
+#include "process/standard_streams.h"
+#include "report/json_document.h"
 #include "report/plot.h"
 #include "scene/scene.h"
 
@@ -41,7 +43,7 @@ struct Bench {
 };
 
 void say(const std::string& line) {
-    fmt::print(stderr, "{}\n", line);
+    tell(line);
 }
 
 /// A bundled or own scene of balls, for Bullet to have the same.
@@ -130,15 +132,16 @@ Figures run_bench(const Bench& bench, const BenchOptions& options, const std::st
     if (!folder) return figures;
     write_file(folder->path(bench.products.front()), figures.json);
     for (const auto& [name, table] : figures.tables) write_file(folder->path(name), table);
+    Plotter plotter(folder->scratch());
     for (const auto& [name, plot] : figures.plots) {
         fs::create_directories(folder->path(name).parent_path());
-        write_file(folder->path(name), draw_svg({plot}, folder->scratch()).front());
+        if (const std::string drawn = plotter.draw({plot}).front(); !drawn.empty())
+            write_file(folder->path(name), drawn);
     }
-    for (const auto& [name, page] : figures.pages) {
-        fs::create_directories(folder->scratch());
-        write_file(folder->path(name), page.plots.drawn(page.text, folder->scratch()));
-    }
+    for (const auto& [name, page] : figures.pages)
+        write_file(folder->path(name), page.plots.drawn(page.text, plotter));
     folder->finish();
+    if (!plotter.failure().empty()) throw_if_any({plotter.failure()}, out);
     return figures;
 }
 
@@ -160,7 +163,7 @@ Figures bench_all(const BenchOptions& o) {
         all.text += fmt::format("== {}\n{}\n", bench.name, one.text);
         merge(json, Json::parse(one.json));
     }
-    all.json = json.dump(2) + "\n";
+    all.json = json_document(json);
     return all;
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <render/mesh.h>
 #include <sim/errors.h>
 #include <tracking/trace.h>
 #include <unistd.h>
@@ -17,6 +18,8 @@
 #include "commands/manual.h"
 #include "commands/play_command.h"
 #include "files/bad_input.h"
+#include "process/environment.h"
+#include "process/standard_streams.h"
 
 namespace app {
 namespace {
@@ -28,9 +31,8 @@ constexpr const char* kLevel = "x86-64";
 constexpr const char* kLevel = "x86-64-v3";
 #endif
 
-int complain(std::string message, int status) {
-    std::replace(message.begin(), message.end(), '\n', ' ');
-    fmt::print(stderr, "{}\n", message);
+int complain(const std::string& message, int status) {
+    tell(message);
     return status;
 }
 
@@ -100,6 +102,8 @@ int parse_and_report(CLI::App& program, int argc, char** argv) {
         return complain(wrong.what(), kBadInput);
     } catch (const tracking::TraceError& wrong) {
         return complain(wrong.what(), kBadInput);
+    } catch (const render::MeshError& wrong) {
+        return complain(wrong.what(), kBadInput);
     } catch (const sim::InputError& wrong) {
         return complain(fmt::format("error: {}", wrong.what()), kBadInput);
     } catch (const sim::WorkerError& wrong) {
@@ -144,6 +148,11 @@ int run_commands(CLI::App& program, int argc, char** argv) {
     // A file that may not grow and a reader that went away are errors to report, not reasons to die at once.
     std::signal(SIGXFSZ, SIG_IGN);
     std::signal(SIGPIPE, SIG_IGN);
+    if (const unsigned long limit = raise_descriptor_limit(); limit < kLeastDescriptors)
+        return complain(
+            fmt::format("error: found a limit of {} open files, expected at least {}; see `ulimit -n`", limit,
+                        kLeastDescriptors),
+            kFailed);
     const int status = parse_and_report(program, argc, argv);
     if (reader_left()) {  // now, with everything in order, end as other tools do
         std::signal(SIGPIPE, SIG_DFL);

@@ -10,8 +10,9 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <stdexcept>
+#include <string>
+#include <system_error>
 
 namespace render {
 namespace {
@@ -23,6 +24,10 @@ std::string importer() {
     const std::filesystem::path installed =
         program.parent_path().parent_path() / "libexec" / "musicworld" / "musicworld_mesh_import";
     return std::filesystem::exists(installed, ignored) ? installed.string() : MUSICWORLD_MESH_IMPORT;
+}
+
+[[noreturn]] void fail(int error, const std::string& what) {
+    throw std::system_error(error, std::generic_category(), what);
 }
 
 constexpr std::chrono::seconds kLongestWait{20};
@@ -51,7 +56,7 @@ private:
 ImportProcess::ImportProcess(const std::filesystem::path& file) {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0) {
-        throw std::runtime_error(std::string("cannot make a pipe to the importer: ") + std::strerror(errno));
+        fail(errno, "error: cannot make a pipe to the importer of meshes");
     }
     pipe_ = ends[0];
     const SpawnActions actions(ends[1]);
@@ -62,7 +67,7 @@ ImportProcess::ImportProcess(const std::filesystem::path& file) {
     if (error != 0) {
         child_ = -1;
         close(pipe_);
-        throw std::runtime_error("cannot start " + program + ": " + std::strerror(error));
+        fail(error, "error: cannot start " + program);
     }
 }
 
@@ -103,7 +108,7 @@ void ImportProcess::read_until_closed(std::string& bytes) {
         if (count == 0) return;
         if (count < 0) {
             if (errno == EINTR || errno == EAGAIN) continue;
-            throw std::runtime_error(std::string("cannot read from the importer: ") + std::strerror(errno));
+            fail(errno, "error: cannot read from the importer of meshes");
         }
         bytes.append(block.data(), static_cast<std::size_t>(count));
         if (bytes.size() > kMostBytes)

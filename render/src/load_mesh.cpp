@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 
 #include "import_process.h"
 #include "mesh_stream.h"
@@ -50,8 +51,10 @@ template <typename Stage>
 auto naming_file(const std::filesystem::path& file, Stage stage) {
     try {
         return stage();
+    } catch (const std::system_error&) {  // of the machine, not of the file
+        throw;
     } catch (const std::runtime_error& error) {
-        throw std::runtime_error(file.string() + ": error: " + error.what());
+        throw MeshError(file.string() + ": error: " + error.what());
     }
 }
 

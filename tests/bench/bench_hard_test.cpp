@@ -198,10 +198,10 @@ TEST(HardComparison, WhereNothingIsRightThereIsAPageAndAPlotAllTheSame) {
     c.entrants = {{{run_of("ours", std::numeric_limits<double>::infinity(), 1, false)}}};
     const TemporaryFolder scratch;
     const app::Figures figures = app::figures_of(app::HardBench{{c}, {}});
-    EXPECT_NE(app::draw_svg({figures.plots.at("hard.svg")}, scratch.path()).front().find("a scene"),
-              std::string::npos);
+    app::Plotter plotter(scratch.path());
+    EXPECT_NE(plotter.draw({figures.plots.at("hard.svg")}).front().find("a scene"), std::string::npos);
     const app::BenchPage& page = figures.pages.at("hard.html");
-    const std::string drawn = page.plots.drawn(page.text, scratch.path());
+    const std::string drawn = page.plots.drawn(page.text, plotter);
     EXPECT_NE(drawn.find("<table"), std::string::npos);
     EXPECT_NE(drawn.find("<svg"), std::string::npos);
 }

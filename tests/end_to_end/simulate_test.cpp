@@ -95,7 +95,7 @@ TEST(Simulate, WrongScenesAreRefusedWithTheirPlaceAndNothingIsWritten) {
         EXPECT_FALSE(fs::exists(folder / "out"));
     }
     expect_one_line(run({"simulate", folder / "none.toml"}), 2, "no such file");
-    expect_one_line(run({"simulate", folder / "."}), 2, "no readable file");
+    expect_one_line(run({"simulate", folder / "."}), 2, "found a directory");
 }
 
 TEST(Simulate, WrongOptionsAreRefusedInOneLine) {

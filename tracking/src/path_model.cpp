@@ -10,7 +10,7 @@
 
 #include "learned_path.h"
 #include "text_cursor.h"
-#include "tracking/import.h"
+#include "tracking/input.h"
 #include "tracking/trace.h"
 
 namespace tracking {
@@ -180,7 +180,7 @@ PathModel parse_path_model(std::string_view bytes, const std::string& name) {
 
 PathModel read_path_model(const std::filesystem::path& file) {
     const std::string name = file.string();
-    return parse_path_model(read_bytes(name), name);
+    return parse_path_model(read_bytes(name, "a model file that can be read"), name);
 }
 
 }  // namespace tracking

@@ -48,17 +48,10 @@ std::size_t first_unprintable(std::string_view text) {
         if ((byte < 0x20 && byte != '\t') || byte == 0x7F) return i;
         const std::size_t length = byte < 0x80 ? 1 : utf8_length(text.substr(i));
         if (length == 0) return i;
+        if (byte == 0xC2 && static_cast<unsigned char>(text[i + 1]) < 0xA0) return i;  // U+0080 to U+009F
         i += length;
     }
     return std::string_view::npos;
-}
-
-std::string printable(std::string_view text) {
-    std::string out(text);
-    for (std::size_t bad = first_unprintable(out); bad != std::string::npos; bad = first_unprintable(out))
-        out[bad] = '?';
-    std::replace(out.begin(), out.end(), '\t', ' ');
-    return out;
 }
 
 std::string in_quotes(std::string_view text) {

@@ -3,6 +3,8 @@
 #include <string>
 #include <string_view>
 
+#include "tracking/input.h"
+
 namespace tracking {
 
 [[nodiscard]] inline bool is_blank(char c) {
@@ -62,9 +64,6 @@ private:
     std::string_view rest_;
     std::size_t number_ = 0;
 };
-
-/// `text` with question marks for control characters and what is not UTF-8, blanks for tabs.
-[[nodiscard]] std::string printable(std::string_view text);
 
 /// `text` in quotes, shortened, without control characters: fit for a one-line message.
 [[nodiscard]] std::string in_quotes(std::string_view text);

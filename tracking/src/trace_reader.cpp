@@ -31,6 +31,8 @@ Trace read_rows(std::string_view text, const std::string& name) {
 }  // namespace
 
 Trace parse_trace(std::string_view text, const std::string& name) {
+    if (text.empty())
+        Line(name, 1, text).fail(0, "an empty file", "a trace", "check that the trace is complete");
     if (is_bsor(text)) return parse_bsor(text, name);
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
     return read_rows(text, name);

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <tracking/input.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -13,7 +14,6 @@
 #include "commands/command.h"
 #include "commands/commands.h"
 #include "commands/worker_options.h"
-#include "files/file_descriptor.h"
 #include "process/child_process.h"
 
 namespace app {
@@ -22,7 +22,7 @@ namespace {
 /// With the words of this command. Does not return.
 void become_bench() {
     const std::string program = program_beside("musicworld_bench").string();
-    std::vector<std::string> words = split(read_file("/proc/self/cmdline"), '\0');
+    std::vector<std::string> words = split(tracking::read_bytes("/proc/self/cmdline"), '\0');
     std::vector<char*> pointers = {const_cast<char*>(program.c_str())};
     for (std::size_t i = 2; i + 1 < words.size(); ++i) pointers.push_back(words[i].data());  // after `bench`
     pointers.push_back(nullptr);

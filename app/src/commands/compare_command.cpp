@@ -12,6 +12,7 @@
 #include "compare/experiment.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
+#include "files/output_file.h"
 #include "files/output_folder.h"
 #include "kit/kit.h"
 #include "process/parallel.h"
@@ -131,21 +132,24 @@ void run(ComparisonOptions options, const fs::path& folder) {
     options.traces = found_traces(options.traces);
     options.tune_traces = found_traces(options.tune_traces);
     options.threads = worthwhile_threads();
+    require_gnuplot();
     OutputFolder out(folder, kCompareProducts);
-    if (options.samples) (void)partial_name(*options.samples);  // refused before minutes have passed
+    if (options.samples) OutputFile{*options.samples};  // refused before minutes have passed
     ProgressBar bar(true);
     options.progress = [&bar](double share) { bar.show(share); };
     const Comparison comparison = compare(options);
     write_file(out.path("compare.json"), format_comparison_json(comparison));
     write_file(out.path("compare.csv"), csv_table(comparison).csv());
-    write_file(out.path("report.html"),
-               format_comparison_report(comparison, out.scratch(), out.path("figures")));
+    write_page(out, "report.html", [&](Plotter& plotter) {
+        return format_comparison_report(comparison, plotter, out.path("figures"));
+    });
     write_file(out.path("experiment.toml"),
                format_experiment(
                    {MUSICWORLD_VERSION, fs::current_path().string(), options.arguments, comparison.inputs}));
     out.finish();
     bar.clear();
     fmt::print("{}", format_comparison_text(comparison));
+    throw_if_any(out.failures(), folder);
 }
 
 }  // namespace

@@ -1,15 +1,18 @@
 #include <fmt/format.h>
+#include <render/mesh.h>
 #include <render/renderer.h>
+#include <tracking/input.h>
 
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <set>
 
 #include "commands/command.h"
 #include "commands/commands.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/output_folder.h"
+#include "files/output_file.h"
 #include "kit/kit.h"
 #include "pictures/kit_stage.h"
 #include "strikes/kit_fit.h"
@@ -115,7 +118,7 @@ void make_new(const std::string& name, const std::string& out) {
     if (name.find_first_of("\"\\") != std::string::npos || std::ranges::any_of(name, is_control))
         refuse_options("a kit's name with quotes, backslashes or control characters", "plain text");
     constexpr std::string_view kName = "NAME";
-    std::string kit = read_file(assets_folder() / "templates" / "kit.toml");
+    std::string kit = tracking::read_bytes((assets_folder() / "templates" / "kit.toml").string(), "a kit");
     write_finished_file(out, kit.replace(kit.find(kName), kName.size(), name));
 }
 
@@ -141,13 +144,20 @@ void add_draw(Command& kit) {
     command.runs([o] { draw_kit(*o); });
 }
 
+std::vector<fs::path> meshes_of(const Kit& kit) {
+    std::set<fs::path> meshes = {kit.stick.mesh};
+    for (const Instrument& instrument : kit.instruments) meshes.insert(instrument.mesh);
+    return {meshes.begin(), meshes.end()};
+}
+
 void add_kit_check(Command& kit) {
-    Command command = kit.command("check", "Check kits; the first fault ends it");
+    Command command = kit.command("check", "Check kits and their meshes; the first fault ends it");
     auto names = std::make_shared<std::vector<std::string>>();
     command.options("KIT", *names, as::text("KIT"), "Kits: files, or names of bundled ones")->required();
     command.runs([names] {
         for (const std::string& name : *names) {
             const Kit checked = read_kit(find_kit(name));
+            (void)render::load_meshes(meshes_of(checked));
             fmt::print("{}: in order, {}\n", checked.file.string(),
                        counted(checked.instruments.size(), "instrument"));
         }

@@ -9,6 +9,7 @@
 #include "files/output_folder.h"
 #include "latency/latency_comparison.h"
 #include "latency/latency_report.h"
+#include "process/stop_signals.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -43,6 +44,7 @@ void compare(const LatencyOptions& o) {
 
 void measure(const LatencyOptions& o, const RunInTime& run) {
     const bool kept = !o.play.out.empty();
+    const StopSignals signals;  // until the temporary folder is gone
     RealtimeOptions options = o;
     if (!kept) options.play.out = make_folder();
     const auto remove = [kept](const fs::path* folder) {
@@ -55,6 +57,7 @@ void measure(const LatencyOptions& o, const RunInTime& run) {
                             : format_latency_text(outcome.latency, outcome.realtime));
     if (kept && !o.json) fmt::print("Look at {}\n", (options.play.out / "latency.html").string());
     if (!outcome.failure.empty()) throw std::runtime_error(outcome.failure);
+    if (kept) throw_if_any(outcome.play.failures, options.play.out);
 }
 
 }  // namespace

@@ -55,8 +55,12 @@ constexpr std::string_view kManualEnd = R"(.SH ENVIRONMENT
 .TP
 \fBMUSICWORLD_ASSETS\fR
 The folder of kits, scenes and traces, in place of the installed one.
+.SH OUTPUTS
+They are made beside their place, saved to the disk and renamed. Only regular files are replaced: symbolic links are
+followed, devices and pipes written to. Inputs are regular files; a trace may be a pipe.
 .SH EXIT STATUS
-0: done; 1: failed while running; 2: bad usage or bad input, with one line on standard error.
+0: done; 1: failed while running, or plots or a video could not be made (all else is then in place); 2: bad usage or
+bad input, with one line on standard error.
 )";
 
 std::string shell_quoted(std::string_view text) {

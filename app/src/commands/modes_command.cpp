@@ -13,6 +13,7 @@
 #include "commands/commands.h"
 #include "files/output_folder.h"
 #include "pictures/mode_pictures.h"
+#include "report/json_document.h"
 
 namespace app {
 namespace {
@@ -142,7 +143,7 @@ std::string format_mode_json(const ModeReport& report) {
                  {"discretisation_error", numbers(errors)},
                  {"discretisation_error_from_elements", sim::finer_elements(r.elements)},
                  {"cut", {{"count", cut.count}, {"below", cut.below}, {"above", cut.above}}}};
-    return json.dump(2) + "\n";
+    return json_document(json);
 }
 
 void write_products(const ModesOptions& a, const ModeReport& report) {

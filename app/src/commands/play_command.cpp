@@ -10,6 +10,7 @@
 #include "files/output_folder.h"
 #include "kit/kit.h"
 #include "play/play.h"
+#include "process/standard_streams.h"
 #include "sticks/predictors.h"
 #include "strikes/true_contacts.h"
 
@@ -53,6 +54,7 @@ void play_offline(const PlayOptions& options) {
                (result.t_end_s - result.t0_s) / result.wall_s);
     print_if_apart(result);
     print_places(options);
+    throw_if_any(result.failures, options.out);
 }
 
 void play_in_time(const RealtimeOptions& options) {
@@ -68,19 +70,20 @@ void play_in_time(const RealtimeOptions& options) {
                    (options.play.out / "departures.csv").string());
     print_places(options.play);
     if (!outcome.failure.empty()) throw std::runtime_error(outcome.failure);
+    throw_if_any(outcome.play.failures, options.play.out);
 }
 
 void check_video(const PlayOptions& o) {
     if (!o.video) return;
     if (o.width % 2 != 0 || o.height % 2 != 0)
         refuse_options(fmt::format("--video with --size {}x{}", o.width, o.height), "even sides");
-    (void)partial_name(*o.video);
+    const OutputFile can_be(*o.video);
 }
 
 }  // namespace
 
 RealtimeOutcome play_realtime_and_warn(const RealtimeOptions& options) {
-    return play_realtime(options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); });
+    return play_realtime(options, [](const std::string& line) { tell(line); });
 }
 
 CLI::Option* add_play_options(Command& command, PlayOptions& o) {

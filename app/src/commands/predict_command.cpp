@@ -10,7 +10,7 @@
 #include "commands/sensor_model_options.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/output_folder.h"
+#include "files/output_file.h"
 #include "process/clock.h"
 #include "sticks/predictors.h"
 #include "traces/live_predict.h"

@@ -7,6 +7,8 @@
 #include "commands/commands.h"
 #include "commands/worker_options.h"
 #include "files/bad_input.h"
+#include "files/output_folder.h"
+#include "process/standard_streams.h"
 #include "scene/scene.h"
 #include "simulate/simulate.h"
 
@@ -43,7 +45,7 @@ void print(const SimulateResult& r, const SimulateOptions& options) {
 void simulate_and_print(const SimulateOptions& options, bool json, bool allow_quarantine) {
     const SimulateResult result = simulate(options);
     for (const std::string& note : result.worker_options ? std::vector<std::string>{} : result.notes)
-        fmt::print(stderr, "{}: note: {}\n", result.scene.string(), note);
+        tell(fmt::format("{}: note: {}", result.scene.string(), note));
     if (json)
         fmt::print("{}", format_simulate(result));
     else
@@ -53,7 +55,8 @@ void simulate_and_print(const SimulateOptions& options, bool json, bool allow_qu
             "{}: error: found {} taken out, expected none; shorten the step (--dt), soften what drives them, "
             "or take it as it is (--allow-quarantine)",
             result.scene.string(), counted(taken_out, "body")));
-    if (!options.until_rest || result.rest_reached) return;
+    if (!options.until_rest || result.rest_reached)
+        return throw_if_any(result.failures, options.out.value_or(""));
     const std::string awake =
         result.worker_options
             ? "bodies"

@@ -8,7 +8,7 @@
 #include "commands/commands.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/output_folder.h"
+#include "files/output_file.h"
 #include "kit/drum_score.h"
 #include "kit/kit.h"
 #include "traces/trace_info.h"

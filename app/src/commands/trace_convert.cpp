@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 #include <tracking/import.h>
+#include <tracking/input.h>
 
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <set>
@@ -12,7 +12,7 @@
 #include "commands/sensor_model_options.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/output_folder.h"
+#include "files/output_file.h"
 #include "traces/map_file.h"
 #include "traces/sensor_model.h"
 #include "traces/trace_info.h"
@@ -66,10 +66,8 @@ std::optional<tracking::ColumnMap> map_of(const ConvertOptions& o, const std::st
 }
 
 /// The word after `Stick-` in a Vicon export's first line; empty without one.
-std::string named_by_export(const std::string& file) {
-    std::ifstream in(find_trace(file), std::ios::binary);
-    std::string line;
-    std::getline(in, line);
+std::string named_by_export(std::string_view text) {
+    std::string line(text.substr(0, text.find('\n')));
     while (!line.empty() && (line.back() == '\r' || line.back() == ',')) line.pop_back();
     constexpr std::string_view kMark = "Stick-";
     const bool marked = line.starts_with(kMark) && line.find(',') == std::string::npos;
@@ -77,11 +75,11 @@ std::string named_by_export(const std::string& file) {
 }
 
 /// --sticks; else what the exports call them, if all differ; else left and right, or stick.
-std::vector<std::string> stick_names(const ConvertOptions& o) {
+std::vector<std::string> stick_names(const ConvertOptions& o, const std::vector<std::string>& texts) {
     std::vector<std::string> names = o.sticks;
     if (names.empty()) {
-        for (const std::string& file : o.in)
-            if (const std::string name = named_by_export(file); !name.empty()) names.push_back(name);
+        for (const std::string& text : texts)
+            if (const std::string name = named_by_export(text); !name.empty()) names.push_back(name);
         const bool differ = std::set<std::string>(names.begin(), names.end()).size() == o.in.size();
         if (!differ) names.clear();
     }
@@ -102,21 +100,23 @@ void refuse_table_options(const ConvertOptions& o) {
 }
 
 tracking::Trace read_inputs(const ConvertOptions& o) {
-    const std::string first = tracking::read_bytes(find_trace(o.in.front()).string());
-    const std::optional<tracking::ColumnMap> map = map_of(o, first);
+    std::vector<std::string> texts;  // each file is read once: it may be a pipe
+    texts.push_back(tracking::read_bytes(find_trace(o.in.front()).string()));
+    const std::optional<tracking::ColumnMap> map = map_of(o, texts.front());
     if (!map) {
         if (o.in.size() > 1)
             throw BadInput(fmt::format(
                 "{}: error: found {} files, expected one trace, or tables of a known kind; say --map",
                 o.in.front(), o.in.size()));
         refuse_table_options(o);
-        return tracking::parse_trace(first, o.in.front());
+        return tracking::parse_trace(texts.front(), o.in.front());
     }
     if (!o.save_map.empty()) write_finished_file(o.save_map, format_map(*map));
-    const std::vector<std::string> names = stick_names(o);
+    for (std::size_t i = 1; i < o.in.size(); ++i)
+        texts.push_back(tracking::read_bytes(find_trace(o.in[i]).string()));
+    const std::vector<std::string> names = stick_names(o, texts);
     std::vector<tracking::Table> tables;
-    for (std::size_t i = 0; i < o.in.size(); ++i)
-        tables.push_back({i == 0 ? first : tracking::read_bytes(o.in[i]), o.in[i], names[i]});
+    for (std::size_t i = 0; i < o.in.size(); ++i) tables.push_back({texts[i], o.in[i], names[i]});
     return tracking::read_tables(tables, *map);
 }
 

@@ -9,7 +9,7 @@
 #include "commands/commands.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
-#include "files/output_folder.h"
+#include "files/output_file.h"
 #include "process/progress_bar.h"
 #include "training/train.h"
 
@@ -22,7 +22,7 @@ struct TrainOptions : tracking::TrainingOptions {
 };
 
 void train(TrainOptions o) {
-    (void)partial_name(o.out);  // refused before minutes have passed
+    OutputFile out(o.out);  // refused before minutes have passed
     std::vector<Recording> recordings;
     for (const std::string& name : o.traces)
         if (!name.ends_with(".hits.csv") && !name.ends_with(".flags.csv"))
@@ -44,7 +44,8 @@ void train(TrainOptions o) {
         tracking::TrainingResult result = tracking::train_path_model(field.sticks, o);
         bar.clear();
         result.model.provenance = provenance(result);
-        write_finished_file(o.out, tracking::format_path_model(result.model));
+        write_file(out.partial(), tracking::format_path_model(result.model));
+        out.finish();
         fmt::print("{}", format_training_text(result, field));
     } catch (const std::invalid_argument& wrong) {
         throw BadInput(fmt::format("error: {}", wrong.what()));

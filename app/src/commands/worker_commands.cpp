@@ -8,6 +8,7 @@
 #include "commands/command.h"
 #include "commands/commands.h"
 #include "files/bad_input.h"
+#include "files/output_file.h"
 #include "sensors/sensor_process.h"
 #include "sticks/predictors.h"
 
@@ -35,12 +36,14 @@ void require_keys_alone(const fs::path& folder) {
 
 void make_keys(const fs::path& folder, const std::vector<std::string>& workers) {
     require_keys_alone(folder);
-    fs::path partial = (folder.has_filename() ? folder : folder.parent_path());
-    partial += ".partial";
+    const fs::path place = output_place(folder.has_filename() ? folder : folder.parent_path()).path;
+    const fs::path partial = place.string() + ".partial";
     fs::remove_all(partial);
     sim::make_keys(partial, workers);
-    fs::remove_all(folder);
-    fs::rename(partial, folder);
+    const fs::path old = place.string() + ".old";
+    if (fs::exists(place)) fs::rename(place, old);
+    put_in_place(partial, place);
+    fs::remove_all(old);
     fmt::print("Keys: {}. Workers need their NAME.key; application.key stays here.\n", folder.string());
 }
 

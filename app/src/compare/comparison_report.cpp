@@ -377,13 +377,13 @@ std::string map_grids(const Comparison& comparison) {
     return text;
 }
 
-std::string format_comparison_report(const Comparison& comparison, const std::filesystem::path& scratch,
+std::string format_comparison_report(const Comparison& comparison, Plotter& plotter,
                                      const std::filesystem::path& figures) {
     PlotGallery plots;
     const std::string body = heading(comparison) + plots.symbols() + sections(comparison, plots);
     std::filesystem::create_directory(figures);
-    plots.write_files(figures, scratch);
-    return report_page(kTitle, plots.drawn(body, scratch));
+    plots.write_files(figures, plotter);
+    return report_page(kTitle, plots.drawn(body, plotter));
 }
 
 }  // namespace app

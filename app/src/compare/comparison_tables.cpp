@@ -9,6 +9,7 @@
 #include <set>
 
 #include "files/bad_input.h"
+#include "report/json_document.h"
 
 namespace app {
 namespace {
@@ -436,7 +437,7 @@ std::string format_comparison_json(const Comparison& comparison) {
         {"seeds", {{"sensor", seed}, {"intervals", seed}, {"training", comparison.options.training.seed}}},
         {"versions", {{"musicworld", MUSICWORLD_VERSION}}}};
     if (comparison.options.map) json["map"] = table_of(comparison.map).json();
-    return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    return json_document(json);
 }
 
 std::string format_comparison_text(const Comparison& comparison) {

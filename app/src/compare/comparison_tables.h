@@ -1,9 +1,9 @@
 #pragma once
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "compare/comparison.h"
+#include "report/plot.h"
 #include "report/table.h"
 
 namespace app {
@@ -65,10 +65,8 @@ namespace app {
 
 /// Text of compare's report.html: which predictor wins, figures 3-1 to 3-3 of the thesis redone, error
 /// against lead and cost, strikes, calibration, paired differences, the map. One page that needs nothing
-/// beside it, in the style of play's report. Plots are drawn by gnuplot with temporary files in `scratch`. `figures`:
-/// a folder that is made and gets each plot as SVG and PNG.
-[[nodiscard]] std::string format_comparison_report(const Comparison& comparison,
-                                                   const std::filesystem::path& scratch,
+/// beside it, in the style of play's report. `figures`: a folder that is made and gets each plot as SVG and PNG.
+[[nodiscard]] std::string format_comparison_report(const Comparison& comparison, Plotter& plotter,
                                                    const std::filesystem::path& figures);
 
 /// The map on one screen: a sentence a lead (in how many sensors which estimator gains), then a table a lead,

@@ -1,14 +1,15 @@
 #include "compare/recording.h"
 
 #include <fmt/format.h>
+#include <tracking/input.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <regex>
+#include <sstream>
 
 #include "files/bad_input.h"
 #include "files/option_values.h"
@@ -26,7 +27,7 @@ constexpr double kNearS = 0.050;
 template <class TimesOf>
 void add_marks(Recording& recording, const fs::path& file, const std::string& header,
                const TimesOf& times_of) {
-    std::ifstream in(file);
+    std::istringstream in(tracking::read_bytes(file.string(), "marks that belong to a trace"));
     std::string line;
     for (int number = 1; std::getline(in, line); ++number) {
         if (!line.empty() && line.back() == '\r') line.pop_back();
@@ -113,12 +114,16 @@ Recording recording_of(tracking::Trace trace, std::string person) {
 Recording read_recording(const std::string& file, const PersonNames& persons) {
     Recording recording = recording_of(tracking::read_trace(file), person_of(file, persons));
     const auto beside = [&](const char* extension) { return fs::path(file).replace_extension(extension); };
-    std::error_code error;
-    if (const fs::path hits = beside(".hits.csv"); fs::exists(hits, error)) {
+    // What is there but cannot be read is an error.
+    const auto is_there = [](const fs::path& marks) {
+        std::error_code error;
+        return fs::symlink_status(marks, error).type() != fs::file_type::not_found;
+    };
+    if (const fs::path hits = beside(".hits.csv"); is_there(hits)) {
         for (MarkedTimes& marks : recording.marks) marks.impacts_s.clear();
         add_marks(recording, hits, "t,stick", [](const std::string&) { return &MarkedTimes::impacts_s; });
     }
-    if (const fs::path flags = beside(".flags.csv"); fs::exists(flags, error))
+    if (const fs::path flags = beside(".flags.csv"); is_there(flags))
         add_marks(recording, flags, "t,stick,kind", [](const std::string& kind) {
             return kind.starts_with("orientation") ? &MarkedTimes::flagged_rotations_s
                                                    : &MarkedTimes::flagged_s;

@@ -8,7 +8,6 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "files/output_folder.h"
 #include "report/table.h"
 
 namespace app {
@@ -48,14 +47,9 @@ void SampleRows::add(std::size_t sample, std::size_t lead, const tracking::PoseP
 }
 
 OrderedFile::OrderedFile(const std::filesystem::path& file, const std::string& header)
-    : file_(file), partial_(partial_name(file)), out_(partial_, std::ios::binary) {
+    : file_(file), out_(file_.partial(), std::ios::binary) {
     out_ << header;
     check();
-}
-
-OrderedFile::~OrderedFile() {
-    std::error_code ignored;  // after finish() there is none
-    std::filesystem::remove(partial_, ignored);
 }
 
 void OrderedFile::add(std::size_t part, std::string text) {
@@ -71,14 +65,14 @@ void OrderedFile::add(std::size_t part, std::string text) {
 void OrderedFile::finish() {
     out_.close();
     check();
-    std::filesystem::rename(partial_, file_);
+    file_.finish();
 }
 
 void OrderedFile::check() {
     if (!out_)
         throw std::runtime_error(
-            fmt::format("error: cannot write {}: {}; free some space or name another file", partial_.string(),
-                        std::strerror(errno)));
+            fmt::format("error: cannot write {}: {}; free some space or name another file",
+                        file_.partial().string(), std::strerror(errno)));
 }
 
 }  // namespace app

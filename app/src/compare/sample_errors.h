@@ -8,6 +8,7 @@
 
 #include "compare/predictor_scores.h"
 #include "compare/recording.h"
+#include "files/output_file.h"
 
 namespace app {
 
@@ -32,9 +33,6 @@ private:
 class OrderedFile {
 public:
     OrderedFile(const std::filesystem::path& file, const std::string& header);
-    ~OrderedFile();
-    OrderedFile(const OrderedFile&) = delete;
-    OrderedFile& operator=(const OrderedFile&) = delete;
     /// Any thread; each part once.
     void add(std::size_t part, std::string text);
     void finish();
@@ -42,7 +40,7 @@ public:
 private:
     void check();
 
-    std::filesystem::path file_, partial_;
+    OutputFile file_;
     std::ofstream out_;
     std::mutex mutex_;
     std::size_t next_ = 0;

@@ -2,13 +2,12 @@
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
+#include <tracking/input.h>
 
 #include <array>
 #include <bit>
 #include <cmath>
 #include <stdexcept>
-
-#include "files/file_descriptor.h"
 
 namespace app {
 namespace {
@@ -37,12 +36,15 @@ void probe_libm(std::uint64_t& hash) {
 
 }  // namespace
 
-std::string sha256_of_file(const std::filesystem::path& file) {
-    const std::string text = read_file(file);
+std::string sha256_of(std::string_view bytes) {
     std::array<std::uint8_t, 32> digest{};
-    if (EVP_Digest(text.data(), text.size(), digest.data(), nullptr, EVP_sha256(), nullptr) != 1)
+    if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), nullptr, EVP_sha256(), nullptr) != 1)
         throw std::runtime_error("error: found libcrypto without SHA-256, expected OpenSSL 3");
     return fmt::format("{:02x}", fmt::join(digest, ""));
+}
+
+std::string sha256_of_file(const std::filesystem::path& file) {
+    return sha256_of(tracking::read_bytes(file.string(), "a file that can be read"));
 }
 
 std::uint64_t fnv1a_64(std::span<const std::uint8_t> bytes, std::uint64_t state) noexcept {

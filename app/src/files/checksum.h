@@ -3,10 +3,13 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace app {
 
-/// SHA-256 of a file's bytes, 64 lower-case hex digits. Throws BadInput when it cannot be read.
+/// SHA-256 of bytes, 64 lower-case hex digits.
+[[nodiscard]] std::string sha256_of(std::string_view bytes);
+/// The same of a file's. Throws tracking::TraceError when it cannot be read.
 [[nodiscard]] std::string sha256_of_file(const std::filesystem::path& file);
 
 inline constexpr std::uint64_t kFnvOffset = 0xcbf29ce484222325ULL;

@@ -4,14 +4,9 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
-#include <memory>
 #include <stdexcept>
-
-#include "files/bad_input.h"
 
 namespace app {
 
@@ -27,23 +22,27 @@ bool FileDescriptor::write(std::string_view bytes) const noexcept {
 
 bool FileDescriptor::close() noexcept {
     const int number = std::exchange(number_, -1);
-    return number < 0 || ::close(number) == 0;
+    return number < 0 || ::close(number) == 0 || errno == EINTR;  // closed by then, too
+}
+
+FileDescriptor open_file(const std::filesystem::path& file, int flags, unsigned mode) noexcept {
+    int number = -1;
+    do number = ::open(file.c_str(), flags | O_CLOEXEC, mode);
+    while (number < 0 && errno == EINTR);
+    return FileDescriptor(number);
+}
+
+bool save(const FileDescriptor& file) noexcept {
+    int result = 0;
+    do result = ::fsync(file.get());
+    while (result != 0 && errno == EINTR);
+    return result == 0 || errno == EINVAL || errno == EROFS || errno == EOPNOTSUPP;
 }
 
 Pipe make_pipe() {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error("error: " + cannot("make a pipe"));
     return {FileDescriptor(ends[0]), FileDescriptor(ends[1])};
-}
-
-std::string read_file(const std::filesystem::path& file) {
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> in(std::fopen(file.c_str(), "rbe"), &std::fclose);
-    std::string text;
-    std::array<char, 65536> block;
-    while (const std::size_t got = in ? std::fread(block.data(), 1, block.size(), in.get()) : 0)
-        text.append(block.data(), got);
-    if (!in || std::ferror(in.get()) != 0) throw BadInput("error: " + cannot("read " + file.string()));
-    return text;
 }
 
 std::string cannot(std::string_view action, int error) {

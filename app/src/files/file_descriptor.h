@@ -28,15 +28,20 @@ private:
     int number_;
 };
 
+/// open(2) with O_CLOEXEC, tried again where a signal interrupts it; none: errno says why.
+[[nodiscard]] FileDescriptor open_file(const std::filesystem::path& file, int flags,
+                                       unsigned mode = 0666) noexcept;
+
+/// Has the bytes of an open file, or the names in an open folder, on the disk. False: errno says why. Places that
+/// cannot be saved so (some network file systems) count as saved.
+[[nodiscard]] bool save(const FileDescriptor& file) noexcept;
+
 /// The two ends of a pipe, which children inherit only where that is asked for.
 struct Pipe {
     FileDescriptor out, in;  ///< to read from; to write into
 };
 /// Throws std::runtime_error.
 [[nodiscard]] Pipe make_pipe();
-
-/// A file's bytes. Throws BadInput "error: cannot read FILE: REASON".
-[[nodiscard]] std::string read_file(const std::filesystem::path& file);
 
 /// "cannot ACTION: REASON" for what the operating system has refused; `error`: its number (errno's, as it is
 /// now, if it is 0).

@@ -39,14 +39,6 @@ bool is_handled_by(int signal, void (*handler)(int)) {
                                path.string(), found));
 }
 
-void check_moved(const std::error_code& error, const fs::path& path) {
-    if (error)
-        throw std::runtime_error(
-            fmt::format("{}: error: found {}, expected to put the run's results there; "
-                        "the run is not complete",
-                        path.string(), error.message()));
-}
-
 bool is_frame_name(const std::string& name) {
     const std::size_t digits = name.find_first_not_of("0123456789");
     return digits != std::string::npos && digits >= 6 && name.substr(digits) == ".png";
@@ -57,28 +49,35 @@ bool is_figure_name(const std::string& name) {
            (name.ends_with(".svg") || name.ends_with(".png"));
 }
 
+/// Products that are folders have no extension.
+void check_places(const fs::path& folder, const std::vector<std::string_view>& products) {
+    for (const std::string_view name : products) {
+        const bool is_folder = name.find('.') == std::string_view::npos;
+        const OutputPlace::Kind kind = output_place(folder / name).kind;
+        if (!is_folder && kind == OutputPlace::Kind::folder)
+            refuse(folder / name, "a folder where the run's file is to be");
+        if (is_folder && kind == OutputPlace::Kind::written_to)
+            refuse(folder / name, "a device where the run's folder is to be");
+    }
+}
+
 /// finish() replaces `frames` and `figures` as a whole, so they must hold nothing but pictures of a run.
-void check_pictures(const fs::path& frames, bool (*is_name)(const std::string&)) {
+void check_pictures(const fs::path& pictures, bool (*is_name)(const std::string&)) {
     std::error_code error;
-    if (!fs::is_directory(fs::symlink_status(frames, error))) return;
-    for (fs::directory_iterator entry(frames, error), end; !error && entry != end; entry.increment(error)) {
-        const std::string name = entry->path().filename().string();
+    if (!fs::is_directory(pictures, error)) return;
+    for (const fs::path& picture : entries_of(pictures)) {
+        const std::string name = picture.filename().string();
         if (!is_name(name))
             throw BadInput(
                 fmt::format("{}: error: found {}, expected only pictures of an earlier run (they are "
                             "replaced); choose another --out or move the file away",
-                            frames.string(), name));
+                            pictures.string(), name));
     }
-    if (error) refuse(frames, error.message());
-}
-
-std::string_view text_of(std::span<const std::uint8_t> bytes) {
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 }  // namespace
 
-/// While this lives, a SIGINT or SIGTERM that ends the program at once first says on standard error what stays
+/// While this lives, a SIGINT, SIGTERM or SIGHUP that ends the program at once first says on standard error what stays
 /// in the folder of an unfinished run. Where signals are handled or ignored already it does nothing. One at a
 /// time.
 class OutputFolder::InterruptionNotice {
@@ -93,12 +92,12 @@ public:
         struct sigaction action {};
         action.sa_handler = print_notice_and_end;
         action.sa_flags = static_cast<int>(SA_RESETHAND);
-        for (const int signal : {SIGINT, SIGTERM})
+        for (const int signal : {SIGINT, SIGTERM, SIGHUP})
             if (is_handled_by(signal, SIG_DFL)) sigaction(signal, &action, nullptr);
     }
     ~InterruptionNotice() {
         notice_size = 0;
-        for (const int signal : {SIGINT, SIGTERM})
+        for (const int signal : {SIGINT, SIGTERM, SIGHUP})
             if (is_handled_by(signal, print_notice_and_end)) std::signal(signal, SIG_DFL);
     }
     InterruptionNotice(const InterruptionNotice&) = delete;
@@ -106,13 +105,16 @@ public:
 };
 
 OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_view> products)
-    : folder_(folder), staging_(folder / ".unfinished"), products_(products.begin(), products.end()) {
+    : folder_(output_place(folder).path),
+      staging_(folder_ / ".unfinished"),
+      products_(products.begin(), products.end()) {
+    constexpr int kReserve = 16;  // a program to start takes three, a folder to look through a few
     std::error_code error;
     made_folder_ = fs::create_directories(folder_, error);
     std::error_code none;  // a path that cannot even be looked at has failed above
     if (fs::exists(folder_, none) && !fs::is_directory(folder_, none)) refuse(folder_, "a file");
     if (error) refuse(folder_, error.message());
-    lock_ = FileDescriptor(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    lock_ = open_file(folder_, O_RDONLY | O_DIRECTORY);
     if (!lock_) refuse(folder_, std::strerror(errno));
     // File systems without locks are used without.
     if (::flock(lock_.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
@@ -120,86 +122,84 @@ OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_v
             fmt::format("{}: error: found another run writing into it, expected one run a folder; "
                         "wait for it or choose another --out",
                         folder_.string()));
-    for (const auto& [pictures, is_name] :
-         {std::pair("frames", &is_frame_name), {"figures", &is_figure_name}})
-        if (std::ranges::count(products_, pictures) > 0) check_pictures(folder_ / pictures, is_name);
+    try {
+        check_places(folder_, products_);
+        for (const auto& [pictures, is_name] :
+             {std::pair("frames", &is_frame_name), {"figures", &is_figure_name}})
+            if (std::ranges::count(products_, pictures) > 0) check_pictures(folder_ / pictures, is_name);
+    } catch (const fs::filesystem_error& failed) {
+        refuse(folder_, failed.code().message());
+    }
     notice_ = std::make_unique<InterruptionNotice>(staging_);
-    fs::remove_all(staging_, error);
+    remove_tree(staging_, error);
     if (!error) fs::create_directory(staging_, error);
     if (!error) fs::create_directory(scratch(), error);
     if (error) refuse(folder_, error.message());
+    for (int i = 0; i < kReserve; ++i)
+        if (FileDescriptor spare = open_file("/dev/null", O_RDONLY)) reserve_.push_back(std::move(spare));
 }
 
 OutputFolder::~OutputFolder() {
     std::error_code ignored;  // a destructor cannot report it
-    if (!finished_) {
-        fs::remove_all(staging_, ignored);
-        if (made_folder_) fs::remove(folder_, ignored);
+    if (finishing_) return;   // what is not in place is kept
+    remove_tree(staging_, ignored);
+    if (made_folder_) fs::remove(folder_, ignored);
+}
+
+void OutputFolder::remove_earlier(std::string_view name) {
+    const OutputPlace earlier = output_place(folder_ / name);
+    using Kind = OutputPlace::Kind;
+    // One step, which cannot stop halfway; and on the same file system, unless a link leads elsewhere.
+    if (earlier.kind == Kind::folder) {
+        std::error_code elsewhere;
+        fs::rename(earlier.path, scratch() / ("earlier_" + std::string(name)), elsewhere);
+        if (elsewhere) remove_tree(earlier.path);
+    } else if (earlier.kind == Kind::file) {
+        fs::remove(earlier.path);
+    }
+}
+
+void OutputFolder::adorn(std::string_view name, const std::function<void()>& work) {
+    if (!name.empty()) adornments_.emplace_back(name);
+    try {
+        work();
+    } catch (const std::runtime_error& failed) {
+        failures_.emplace_back(failed.what());
     }
 }
 
 void OutputFolder::finish() {
-    std::error_code error;
-    fs::remove_all(scratch(), error);
-    check_moved(error, scratch());
-    for (const std::string_view name : products_) {
-        fs::remove_all(folder_ / name, error);
-        check_moved(error, folder_ / name);
-    }
-    std::vector<fs::path> staged;
-    for (const fs::directory_entry& entry : fs::directory_iterator(staging_)) staged.push_back(entry.path());
-    std::sort(staged.begin(), staged.end());
-    std::stable_partition(staged.begin(), staged.end(),
-                          [&](const fs::path& path) { return path.filename() != products_.front(); });
-    for (const fs::path& product : staged) {
-        const fs::path target = folder_ / product.filename();
-        fs::rename(product, target, error);
-        check_moved(error, target);
-    }
-    fs::remove(staging_, error);
-    check_moved(error, staging_);
-    notice_.reset();
-    finished_ = true;
-}
-
-void write_file(const fs::path& file, std::string_view text) {
-    FileDescriptor out(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-    if (!out || !out.write(text) || !out.close())
-        throw std::runtime_error("error: " + cannot("write " + file.string()) +
-                                 "; free some space or choose another --out");
-}
-
-void write_file(const fs::path& file, std::span<const std::uint8_t> bytes) {
-    write_file(file, text_of(bytes));
-}
-
-fs::path partial_name(const fs::path& file) {
-    const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
-    std::error_code error;
-    if (!file.has_filename() || fs::is_directory(file, error))
-        throw BadInput(
-            fmt::format("{}: error: found a folder, expected the name of a file to write", file.string()));
-    if (!fs::is_directory(folder, error))
-        throw BadInput(
-            fmt::format("{}: error: found no such folder, expected one to write {} into; make it first",
-                        folder.string(), file.filename().string()));
-    return file.string() + ".partial";
-}
-
-void write_finished_file(const fs::path& file, std::string_view text) {
-    const fs::path partial = partial_name(file);
+    free_reserve();
+    finishing_ = true;
     try {
-        write_file(partial, text);
-        fs::rename(partial, file);
-    } catch (const std::runtime_error&) {  // filesystem_error is one
-        std::error_code ignored;
-        fs::remove(partial, ignored);
-        throw;
+        std::vector<fs::path> staged;
+        for (const fs::path& entry : entries_of(staging_))
+            if (entry != scratch()) staged.push_back(entry);
+        remove_earlier(products_.front());
+        const auto leading = std::ranges::find(staged, products_.front(), &fs::path::filename);
+        if (leading != staged.end()) std::rotate(leading, leading + 1, staged.end());
+        for (const std::string_view name : products_)
+            if (fs::is_directory(staging_ / name) || !fs::exists(staging_ / name)) remove_earlier(name);
+        for (const fs::path& product : staged) {
+            const std::string name = product.filename().string();
+            const auto put = [&] { put_in_place(product, folder_ / name); };
+            if (std::ranges::find(adornments_, name) != adornments_.end())
+                adorn("", put);
+            else
+                put();
+        }
+    } catch (const std::runtime_error& failed) {  // filesystem_error is one
+        throw std::runtime_error(fmt::format("{}; the run is not complete, what it has computed stays in {}",
+                                             failed.what(), staging_.string()));
     }
+    std::error_code ignored;  // the next run removes it
+    remove_tree(staging_, ignored);
+    notice_.reset();
 }
 
-void write_finished_file(const fs::path& file, std::span<const std::uint8_t> bytes) {
-    write_finished_file(file, text_of(bytes));
+void throw_if_any(const std::vector<std::string>& failures, const fs::path& out) {
+    if (!failures.empty())
+        throw std::runtime_error(fmt::format("{}; all else is in {}", failures.front(), out.string()));
 }
 
 }  // namespace app

@@ -1,13 +1,15 @@
 #pragma once
 #include <array>
-#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "files/file_descriptor.h"
+#include "files/output_file.h"
 
 namespace app {
 
@@ -27,14 +29,18 @@ inline constexpr std::array<std::string_view, 5> kCompareProducts = {
 inline constexpr std::array<std::string_view, 3> kModesProducts = {"modes.json", "modes.png", "frames"};
 
 /// The folder that a run writes its products into, all of them or none. They are staged in its hidden
-/// subfolder `.unfinished`; finish() moves them into place by rename, the leading product last, so that
+/// subfolder `.unfinished`; finish() puts them in place one by one, the leading product last, so that
 /// a folder with it is a finished run. A folder serves one run at a time (advisory lock). One thread at a
 /// time.
+///
+/// It holds a few file descriptors in reserve, so that a run whose descriptors others have used up can still write
+/// what it has computed.
 class OutputFolder {
 public:
     /// Makes the folder (parents too) and an empty staging folder, removing one that an interrupted run left.
     /// Throws BadInput when that cannot be: a file is in the way, no permission, another run is writing
-    /// there, or `frames` or `figures` hold files that no run wrote and finish() would delete.
+    /// there, a product's name is a folder's, or `frames` or `figures` hold files that no run wrote and finish() would
+    /// delete.
     explicit OutputFolder(const std::filesystem::path& folder,
                           std::span<const std::string_view> products = kPlayProducts);
     /// Without finish(): removes what was staged, and the folder if this run made it and nothing else is in
@@ -48,33 +54,35 @@ public:
     /// An existing folder for temporary files; never moved into place.
     [[nodiscard]] std::filesystem::path scratch() const { return staging_ / "scratch"; }
 
-    /// Removes the products of earlier runs (known names only), moves everything staged into place, the
-    /// leading product last, and removes the staging folder. Throws std::runtime_error; the leading product
-    /// is then not there.
+    /// Makes what adorns the results and is none of them: plots, a video. `name`: the product that it is; empty
+    /// for a file elsewhere. If that, or putting it in place, throws std::runtime_error the results stand, and
+    /// failures() says why it is missing.
+    void adorn(std::string_view name, const std::function<void()>& work);
+    [[nodiscard]] const std::vector<std::string>& failures() const { return failures_; }
+
+    /// Gives back the descriptors in reserve: what is written from now on may use them.
+    void free_reserve() { reserve_.clear(); }
+    /// Puts everything staged in place (output_file.h), the leading product last, removes the products of earlier
+    /// runs (known names only) that this run has not, and the staging folder. Throws std::runtime_error; the
+    /// leading product is then not there, and what is not in place stays in the staging folder.
     void finish();
 
 private:
     class InterruptionNotice;
 
+    /// Moves what `name` leads to away, or removes what is a file; devices and pipes stay.
+    void remove_earlier(std::string_view name);
+
     std::filesystem::path folder_, staging_;
     std::vector<std::string_view> products_;
-    bool made_folder_ = false, finished_ = false;
+    bool made_folder_ = false, finishing_ = false;
     FileDescriptor lock_;
+    std::vector<FileDescriptor> reserve_;
+    std::vector<std::string> failures_, adornments_;
     std::unique_ptr<InterruptionNotice> notice_;
 };
 
-/// Writes a whole file, replacing an older one. Every write and the close are checked: throws
-/// std::runtime_error "error: cannot write FILE: REASON; ...".
-void write_file(const std::filesystem::path& file, std::span<const std::uint8_t> bytes);
-void write_file(const std::filesystem::path& file, std::string_view text);
-
-/// FILE.partial, for what becomes FILE by renaming it. Throws BadInput when FILE cannot be made there (no such
-/// folder, a folder of that name).
-[[nodiscard]] std::filesystem::path partial_name(const std::filesystem::path& file);
-
-/// Writes FILE.partial, then renames it: FILE is never seen half-written, and an older one stays until the
-/// new one is complete. Throws as partial_name(), std::runtime_error when writing fails.
-void write_finished_file(const std::filesystem::path& file, std::span<const std::uint8_t> bytes);
-void write_finished_file(const std::filesystem::path& file, std::string_view text);
+/// For the end of a command, when all is in place and printed: throws std::runtime_error if there is a failure.
+void throw_if_any(const std::vector<std::string>& failures, const std::filesystem::path& out);
 
 }  // namespace app

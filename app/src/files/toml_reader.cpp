@@ -2,9 +2,10 @@
 
 #include <fmt/format.h>
 #include <toml++/toml.h>
+#include <tracking/input.h>
+#include <tracking/trace.h>
 
 #include <algorithm>
-#include <fstream>
 
 #include "files/bad_input.h"
 #include "files/option_values.h"
@@ -18,11 +19,10 @@ struct TomlFile::Document {
 
 namespace {
 
-/// A file's text for a one-line message: control characters as '?', long ones cut.
+/// A file's text for a one-line message: long ones cut.
 std::string printable(std::string_view text) {
     constexpr std::size_t kLongest = 60;
-    std::string result(text.substr(0, kLongest));
-    std::replace_if(result.begin(), result.end(), is_control, '?');
+    const std::string result = tracking::printable(text.substr(0, kLongest));
     return text.size() > kLongest ? result + "..." : result;
 }
 
@@ -292,6 +292,14 @@ private:
     std::vector<std::string> known_, own_;
 };
 
+std::string text_of_file(const char* kind, const fs::path& file) {
+    try {
+        return tracking::read_bytes(file.string(), fmt::format("{} (TOML)", kind));
+    } catch (const tracking::TraceError& wrong) {
+        throw BadInput(wrong.what());
+    }
+}
+
 /// Calls parse(); a syntax error in `file` becomes BadInput.
 toml::table parsed(const std::string& file, const auto& parse) {
     try {
@@ -304,21 +312,58 @@ toml::table parsed(const std::string& file, const auto& parse) {
     }
 }
 
-}  // namespace
-
-TomlFile::TomlFile(const char* kind, const fs::path& file) {
-    std::error_code error;
-    std::ifstream in(file);
-    if (!in.good() || fs::is_directory(file, error))
-        throw BadInput(
-            fmt::format("{}: error: found no readable file, expected {} (TOML)", file.string(), kind));
-    const auto parse = [&] { return toml::parse(in, file.string()); };
-    document_ = std::make_shared<const Document>(Document{parsed(file.string(), parse)});
+/// Where the string that opens at `at` ends: behind its last quote, or at the end of the text.
+std::size_t end_of_string(std::string_view text, std::size_t at) {
+    const char quote = text[at];
+    const std::string_view three = text.substr(at, 3);
+    const bool many_lines = three == "\"\"\"" || three == "'''";
+    const std::string_view end = many_lines ? three : three.substr(0, 1);
+    for (at += end.size(); at < text.size(); ++at) {
+        if (text.substr(at).starts_with(end)) return at + end.size();
+        if (text[at] == '\n' && !many_lines) return at;  // an error, which the parser tells
+        if (text[at] == '\\' && quote == '"') ++at;
+    }
+    return text.size();
 }
 
-TomlFile::TomlFile(std::string_view text, const std::string& name)
-    : document_(
-          std::make_shared<const Document>(Document{parsed(name, [&] { return toml::parse(text, name); })})) {
+/// Every part of a dotted key is a table within the one before, which takes room on the stack when they are
+/// destroyed. Throws BadInput for keys and headers of more parts than any of ours has.
+void check_depth(std::string_view text, const std::string& file) {
+    constexpr int kMostParts = 16;
+    int parts = 1;
+    std::size_t line = 1, line_begin = 0;
+    for (std::size_t at = 0; at < text.size();) {
+        const char c = text[at];
+        if (c == '\n') ++line, line_begin = at + 1;
+        if (c == '"' || c == '\'') {
+            const std::size_t end = end_of_string(text, at);
+            for (; at < end; ++at)
+                if (text[at] == '\n') ++line, line_begin = at + 1;
+            continue;
+        }
+        if (c == '#') {
+            at = std::min(text.find('\n', at), text.size());
+            continue;
+        }
+        if (std::string_view("=,[]{}\n").find(c) != std::string_view::npos) parts = 1;
+        if (c == '.' && ++parts > kMostParts)
+            throw BadInput(
+                fmt::format("{}:{}:{}: error: found a key of more than {} parts, expected at most "
+                            "that many",
+                            file, line, at - line_begin + 1, kMostParts));
+        ++at;
+    }
+}
+
+}  // namespace
+
+TomlFile::TomlFile(const char* kind, const fs::path& file)
+    : TomlFile(text_of_file(kind, file), file.string()) {}
+
+TomlFile::TomlFile(std::string_view text, const std::string& name) {
+    check_depth(text, name);
+    const auto parse = [&] { return toml::parse(text, name); };
+    document_ = std::make_shared<const Document>(Document{parsed(name, parse)});
 }
 
 void read_toml(const std::vector<TomlFile>& layers, const std::string& where,

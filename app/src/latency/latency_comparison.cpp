@@ -1,16 +1,17 @@
 #include "latency/latency_comparison.h"
 
 #include <fmt/format.h>
+#include <tracking/input.h>
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "files/bad_input.h"
 #include "report/html.h"
+#include "report/json_document.h"
 
 namespace app {
 namespace {
@@ -29,9 +30,9 @@ constexpr std::array<const char*, 4> kQuantiles = {"p50_ms", "p95_ms", "p99_ms",
 /// What `latency` wrote, its stages by name.
 Json read_document(const std::filesystem::path& folder) {
     const std::filesystem::path file = folder / "latency.json";
-    std::ifstream in(file);
-    if (!in) refuse(file, "no such file");
-    Json json = Json::parse(in, nullptr, false);
+    std::error_code error;
+    if (!std::filesystem::exists(file, error)) refuse(file, "no such file");
+    Json json = Json::parse(tracking::read_bytes(file.string(), "what latency measured"), nullptr, false);
     if (json.is_discarded()) refuse(file, "a text that is not JSON");
     if (!json.is_object() || !json.contains("stages") || !json["stages"].is_array())
         refuse(file, "no stages");
@@ -114,7 +115,7 @@ std::string format_text(const LatencyComparison& c) {
 
 std::string format_json(const LatencyComparison& c) {
     const Json json = {{"a", c.a}, {"b", c.b}, {"stages", c.stages.json()}, {"figures", c.figures.json()}};
-    return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    return json_document(json);
 }
 
 std::string format_page(const LatencyComparison& c) {

@@ -253,7 +253,7 @@ std::string remarks(const RealtimeResult& realtime) {
 }  // namespace
 
 std::string format_latency_page(const LatencyReport& report, const PlayResult& play,
-                                const RealtimeResult& realtime, const std::filesystem::path& scratch) {
+                                const RealtimeResult& realtime, Plotter& plotter) {
     const Spread& ms = report.sound_minus_picture_ms;
     const double low = std::min(-60.0, std::floor(ms.percentile(0))),
                  high = std::max(140.0, std::ceil(ms.percentile(100)));
@@ -275,7 +275,7 @@ std::string format_latency_page(const LatencyReport& report, const PlayResult& p
             plots.element(error_plot(report), "Error of the drawn sticks");
     if (!realtime.clocks.empty()) body += "<h2>Clocks</h2>\n" + clock_table(play, realtime).html();
     body += remarks(realtime);
-    return report_page("Latency of " + trace_name(play), plots.drawn(std::move(body), scratch));
+    return report_page("Latency of " + trace_name(play), plots.drawn(std::move(body), plotter));
 }
 
 }  // namespace app

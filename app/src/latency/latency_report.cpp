@@ -11,6 +11,7 @@
 
 #include "kit/surface_entry.h"
 #include "process/clock.h"
+#include "report/json_document.h"
 
 namespace app {
 namespace {
@@ -475,7 +476,7 @@ std::string format_latency_json(const LatencyReport& report, const PlayResult& p
                        {"leads", lead_table(realtime).json()},
                        {"clocks", clock_table(play, realtime).json()},
                        {"events", events_of(realtime)}};
-    return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    return json_document(json);
 }
 
 }  // namespace app

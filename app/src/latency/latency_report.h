@@ -12,6 +12,7 @@
 #include "kit/kit.h"
 #include "latency/timings.h"
 #include "play/play.h"
+#include "report/plot.h"
 #include "report/table.h"
 #include "statistics/statistics.h"
 
@@ -178,11 +179,9 @@ struct LatencyReport {
 /// lead_needed_ms, deadlines, errors of the drawn sticks, and what ran where.
 [[nodiscard]] std::string format_latency_json(const LatencyReport& report, const PlayResult& play,
                                               const RealtimeResult& realtime);
-/// Text of latency's report.html: figures, stages, plots, what ran where. Plots are drawn by gnuplot with
-/// temporary files in `scratch`. In latency_page.cpp.
+/// Text of latency's report.html: figures, stages, plots, what ran where. In latency_page.cpp.
 [[nodiscard]] std::string format_latency_page(const LatencyReport& report, const PlayResult& play,
-                                              const RealtimeResult& realtime,
-                                              const std::filesystem::path& scratch);
+                                              const RealtimeResult& realtime, Plotter& plotter);
 /// For the terminal.
 [[nodiscard]] std::string format_latency_text(const LatencyReport& report, const RealtimeResult& realtime);
 

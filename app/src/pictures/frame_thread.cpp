@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "files/output_folder.h"
+#include "files/output_file.h"
 #include "process/child_process.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
@@ -173,19 +173,17 @@ void FrameThread::finish() {
     rethrow();
 }
 
+void require_ffmpeg() {
+    require_program("ffmpeg", "the video; install the package ffmpeg");
+}
+
 void make_video(const fs::path& video, double fps, bool sound, const fs::path& staging) {
     std::vector<std::string> command = {"ffmpeg", "-nostdin", "-loglevel", "error", "-y", "-framerate"};
     command.insert(command.end(), {fmt::format("{}", fps), "-i", (staging / "frames" / "%06d.png").string()});
     if (sound) command.insert(command.end(), {"-i", (staging / "audio.wav").string(), "-c:a", "aac"});
     command.insert(command.end(), {"-c:v", "libx264", "-preset", "veryfast", "-pix_fmt", "yuv420p", "-fflags",
-                                   "+bitexact", "-f", "mp4", video.string() + ".partial"});
-    try {
-        run_child(command, staging / "scratch" / "ffmpeg.log");
-    } catch (...) {
-        std::error_code ignored;
-        fs::remove(video.string() + ".partial", ignored);
-        throw;
-    }
+                                   "+bitexact", "-f", "mp4", video.string()});
+    run_child(command, staging / "scratch" / "ffmpeg.log");
 }
 
 }  // namespace app

@@ -60,8 +60,10 @@ struct FrameReport {
     std::uint64_t not_written = 0;  ///< frames in time for which writing had fallen behind by 8
 };
 
-/// Encodes the frames, and audio.wav if `sound`, of a staging folder beside the video's place, as
-/// FILE.partial.
+/// Throws std::runtime_error where ffmpeg cannot be started: before a run that ends with a video.
+void require_ffmpeg();
+/// Encodes the frames, and audio.wav if `sound`, of a staging folder into the file `video`. Throws
+/// std::runtime_error.
 void make_video(const std::filesystem::path& video, double fps, bool sound,
                 const std::filesystem::path& staging);
 

@@ -177,7 +177,8 @@ void play_through(const OfflineParts& parts, PlayResult& result) {
 
 PlayResult play(const PlayOptions& options) {
     const WallTimer wall;
-    const tracking::Trace trace = read_played_trace(options.trace);
+    require_tools(options);
+    const PlayedTrace trace = read_played_trace(options.trace);
     const Kit kit = read_kit(options.kit);
     const StickGeometry stick = stick_geometry(trace, kit.stick, options.tip, options.shaft);
     PlayResult result = describe(options, trace, kit);

@@ -54,6 +54,7 @@ struct PlayResult {
     std::vector<std::pair<std::string, std::string>> inputs;  ///< file, SHA-256
     std::string fingerprint;
     std::vector<std::pair<std::string, std::string>> versions;
+    std::vector<std::string> failures;                 ///< why plots or the video are missing
     std::vector<std::filesystem::path> report_frames;  ///< a few PNG files on disk that the report shows
 };
 

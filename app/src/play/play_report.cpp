@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 #include <openssl/evp.h>
+#include <tracking/input.h>
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +20,7 @@ namespace fs = std::filesystem;
 namespace {
 
 std::string base64_of_file(const fs::path& file) {
-    const std::string bytes = read_file(file);
+    const std::string bytes = tracking::read_bytes(file.string(), "a picture");
     std::string text((bytes.size() + 2) / 3 * 4 + 1, '\0');  // the encoder ends with a zero
     const int length =
         EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
@@ -191,7 +192,7 @@ std::string sound_section(const PlayResult& result, const std::string& plot) {
         level, result.clipped_samples, plot);
 }
 
-std::string plot_sections(const PlayResult& result, const fs::path& scratch) {
+std::string plot_sections(const PlayResult& result, Plotter& plotter) {
     PlotGallery gallery;
     const PlayPlots plots = add_play_plots(gallery, result);
     std::string text = gallery.symbols() + timeline_section(result, plots);
@@ -206,16 +207,16 @@ std::string plot_sections(const PlayResult& result, const fs::path& scratch) {
         "release margin of {:.1f} ms.</p>\n{}\n",
         result.options.sound_lead_s * 1e3, result.options.release_margin_s * 1e3, plots.leads);
     if (!plots.sound.empty()) text += sound_section(result, plots.sound);
-    return gallery.drawn(std::move(text), scratch);
+    return gallery.drawn(std::move(text), plotter);
 }
 
 }  // namespace
 
-std::string format_report(const PlayResult& result, const fs::path& scratch) {
+std::string format_report(const PlayResult& result, Plotter& plotter) {
     const std::string name = fs::path(result.trace).filename().string();
     return report_page(fmt::format("{} on {}", name, result.kit_name),
                        heading(result) + figures(result) + frames_section(result) +
-                           plot_sections(result, scratch) + provenance(result));
+                           plot_sections(result, plotter) + provenance(result));
 }
 
 }  // namespace app

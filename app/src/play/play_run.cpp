@@ -1,6 +1,7 @@
 #include "play/play_run.h"
 
 #include <fmt/format.h>
+#include <tracking/input.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/checksum.h"
+#include "report/json_document.h"
 #include "report/table.h"
 #include "sticks/predictors.h"
 #include "strikes/true_contacts.h"
@@ -52,7 +54,7 @@ void write_hits(const fs::path& file, const PlayResult& result, const Kit& kit) 
     std::stable_sort(notes.begin(), notes.end(), [](const audio::Note& a, const audio::Note& b) {
         return a.onset_sample < b.onset_sample;
     });
-    audio::write_midi(file, notes);
+    write_file(file, audio::encode_midi(notes));
 }
 
 /// Frames for the report: before, at and after the two loudest notes that lie apart.
@@ -106,8 +108,9 @@ std::string_view outcome_word(const Strike& strike) {
 
 }  // namespace
 
-tracking::Trace read_played_trace(const fs::path& file) {
-    tracking::Trace trace = tracking::read_trace(file);
+PlayedTrace read_played_trace(const fs::path& file) {
+    const std::string bytes = tracking::read_bytes(file.string());
+    PlayedTrace trace{tracking::parse_trace(bytes, file.string()), sha256_of(bytes)};
     if (const double hours = (trace.t_end_s() - trace.t0_s()) / 3600; hours > kLongestHours)
         throw BadInput(fmt::format(
             "{}: error: found {:.3g} hours between the first sample and the last, expected at most {}; "
@@ -157,8 +160,12 @@ std::unique_ptr<FrameThread> start_frames(const PlayOptions& options,
     return std::make_unique<FrameThread>(scenes, rest, where);
 }
 
-PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
-                    bool trace_is_file) {
+void require_tools(const PlayOptions& options) {
+    require_gnuplot();
+    if (options.video) require_ffmpeg();
+}
+
+PlayResult describe(const PlayOptions& options, const PlayedTrace& trace, const Kit& kit) {
     PlayResult result;
     result.options = options;
     result.options.picture_predictor = picture_specification(options.picture_predictor);
@@ -172,7 +179,7 @@ PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, co
     result.t_end_s = trace.t_end_s();
     for (const tracking::StickTrace& stick : trace.sticks) result.sticks.push_back(stick.name);
     for (const Instrument& instrument : kit.instruments) result.instruments.push_back(instrument.name);
-    if (trace_is_file) result.inputs.emplace_back(options.trace.string(), sha256_of_file(options.trace));
+    if (!trace.sha256.empty()) result.inputs.emplace_back(options.trace.string(), trace.sha256);
     for (const fs::path& file : kit.files) result.inputs.emplace_back(file.string(), sha256_of_file(file));
     std::set<fs::path> models;
     for (const std::string& each : {result.options.picture_predictor, result.options.sound_predictor})
@@ -196,16 +203,24 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     result.workers_lost = workers.lost;
     result.bodies_reowned = workers.bodies_reowned;
     result.versions.emplace_back("musicworld", MUSICWORLD_VERSION);
+    std::optional<OutputFile> video;
     if (options.video)
-        stage("video", [&] { make_video(*options.video, options.fps, options.audio, folder.path(".")); });
+        folder.adorn("", [&] {
+            video.emplace(*options.video);
+            stage("video",
+                  [&] { make_video(video->partial(), options.fps, options.audio, folder.path(".")); });
+        });
     const std::string realtime_json = realtime_part ? realtime_part() : std::string();
     write_file(folder.path("events.csv"), format_events(result));
     write_file(folder.path("contacts.csv"), format_contacts(result));
-    stage("report", [&] { write_file(folder.path("report.html"), format_report(result, folder.scratch())); });
+    stage("report", [&] {
+        write_page(folder, "report.html", [&](Plotter& plotter) { return format_report(result, plotter); });
+    });
     result.wall_s = parts.wall.seconds();
     write_file(folder.path("summary.json"), format_summary(result, realtime_json));
     folder.finish();
-    if (options.video) fs::rename(options.video->string() + ".partial", *options.video);
+    if (video) folder.adorn("", [&] { video->finish(); });
+    result.failures = folder.failures();
 }
 
 std::string format_summary(const PlayResult& r, const std::string& realtime_json) {
@@ -256,8 +271,7 @@ std::string format_summary(const PlayResult& r, const std::string& realtime_json
         {"wall_s", r.wall_s},
     };
     if (!realtime_json.empty()) summary["realtime"] = Json::parse(realtime_json);
-    // File names are bytes: what is not UTF-8 in them becomes U+FFFD.
-    return summary.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    return json_document(summary);
 }
 
 std::string format_events(const PlayResult& result) {

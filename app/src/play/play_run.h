@@ -14,6 +14,7 @@
 #include "pictures/frame_thread.h"
 #include "play/play.h"
 #include "process/clock.h"
+#include "report/plot.h"
 #include "strikes/strike.h"
 
 namespace app {
@@ -23,11 +24,17 @@ namespace app {
 /// Sound goes on this long after the last sample, then until it is silent, at most so long.
 inline constexpr double kSoundTailS = 0.5, kLongestSoundTailS = 10;
 
-/// Reads a trace that is to be played: at most three hours (a WAV file holds four). Throws BadInput.
-[[nodiscard]] tracking::Trace read_played_trace(const std::filesystem::path& file);
+/// A trace and the SHA-256 of the bytes that it was read from; empty if it came from no file.
+struct PlayedTrace : tracking::Trace {
+    std::string sha256;
+};
+/// Reads a trace that is to be played, once (it may be a pipe): at most three hours (a WAV file holds four).
+/// Throws BadInput.
+[[nodiscard]] PlayedTrace read_played_trace(const std::filesystem::path& file);
+/// Throws std::runtime_error where a program is missing that the run's end will need.
+void require_tools(const PlayOptions& options);
 /// What is known of a run before it begins.
-[[nodiscard]] PlayResult describe(const PlayOptions& options, const tracking::Trace& trace, const Kit& kit,
-                                  bool trace_is_file = true);
+[[nodiscard]] PlayResult describe(const PlayOptions& options, const PlayedTrace& trace, const Kit& kit);
 
 [[nodiscard]] std::vector<audio::Voice> voices_of(const Kit& kit);
 /// The note that sounds a strike: speed through the instrument's velocity curve, place within the struck
@@ -95,10 +102,9 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
 
 /// Text of report.html: what was played, key figures, pictures, plots and tables on one page that needs
 /// nothing beside it: no script, no font, no address; pictures and plots lie within. Light and dark follow
-/// the reader's system. All names are escaped. The frames of `report_frames` are read from disk, plots are
-/// drawn by gnuplot with temporary files in `scratch` (an existing folder). A pure function of the result
-/// without its times and workers, of the frames and of gnuplot's version. Throws std::runtime_error without
-/// gnuplot or without a frame. In play_report.cpp.
-[[nodiscard]] std::string format_report(const PlayResult& result, const std::filesystem::path& scratch);
+/// the reader's system. All names are escaped. The frames of `report_frames` are read from disk. A pure function
+/// of the result without its times and workers, of the frames and of gnuplot's version. Throws
+/// std::runtime_error without a frame. In play_report.cpp.
+[[nodiscard]] std::string format_report(const PlayResult& result, Plotter& plotter);
 
 }  // namespace app

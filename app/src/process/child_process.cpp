@@ -4,15 +4,18 @@
 #include <fmt/format.h>
 #include <spawn.h>
 #include <sys/wait.h>
+#include <tracking/input.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <stdexcept>
 
 #include "files/bad_input.h"
 #include "files/file_descriptor.h"
+#include "files/option_values.h"
 
 extern char** environ;
 
@@ -45,10 +48,10 @@ struct Preparation {
     }
 };
 
-FileDescriptor open_file(const fs::path& file, int flags) {
-    FileDescriptor opened(open(file.c_str(), flags | O_CLOEXEC, 0600));
-    if (!opened) throw std::runtime_error("error: " + cannot("open " + file.string()));
-    return opened;
+FileDescriptor opened(const fs::path& file, int flags) {
+    FileDescriptor result = open_file(file, flags, 0600);
+    if (!result) throw std::runtime_error("error: " + cannot("open " + file.string()));
+    return result;
 }
 
 std::vector<char*> pointers(const std::vector<std::string>& words) {
@@ -78,6 +81,17 @@ fs::path program_beside(const std::string& name) {
     return fs::read_symlink("/proc/self/exe").parent_path() / name;
 }
 
+void require_program(const std::string& name, const std::string& purpose) {
+    const char* path = std::getenv("PATH");
+    const std::vector<std::string> folders = split(path != nullptr ? path : "/bin:/usr/bin", ':');
+    const auto has = [&](const std::string& folder) {
+        return ::access((fs::path(folder.empty() ? "." : folder) / name).c_str(), X_OK) == 0;
+    };
+    if (std::ranges::none_of(folders, has))
+        throw std::runtime_error(
+            fmt::format("error: cannot start {}: not found on PATH, expected it for {}", name, purpose));
+}
+
 int start_child(const ChildStart& start) {
     Preparation child_side(start.own_group);
     child_side.become(start.in, STDIN_FILENO);
@@ -105,13 +119,14 @@ int wait_for_child(int pid) {
 
 void run_child(const std::vector<std::string>& command, const fs::path& log,
                const std::vector<std::string>& variables) {
-    const FileDescriptor none = open_file("/dev/null", O_RDONLY);
-    const FileDescriptor messages = open_file(log, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND);
+    const FileDescriptor none = opened("/dev/null", O_RDONLY);
+    const FileDescriptor messages = opened(log, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND);
     const int child = start_child({command, variables, none.get(), messages.get(), messages.get(), false});
     const int status = wait_for_child(child);
     if (status == 0) return;
     throw std::runtime_error(fmt::format("error: found {} ended with status {}, expected 0; it said: {}",
-                                         command[0], status, one_line(read_file(log), 400)));
+                                         command[0], status,
+                                         one_line(tracking::read_bytes(log.string(), "what it said"), 400)));
 }
 
 }  // namespace app

@@ -20,6 +20,10 @@ struct ChildStart {
 /// Starts it and returns its process id. Throws std::runtime_error (what is missing) when that fails.
 [[nodiscard]] int start_child(const ChildStart& start);
 
+/// Throws std::runtime_error "error: cannot start NAME: not found on PATH, expected it for PURPOSE" where there is
+/// no such program.
+void require_program(const std::string& name, const std::string& purpose);
+
 /// Waits for a child; returns its exit status, or 128 + the signal that ended it.
 int wait_for_child(int pid);
 

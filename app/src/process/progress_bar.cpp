@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cstdio>
+#include "process/standard_streams.h"
 
 namespace app {
 namespace {
@@ -16,14 +16,12 @@ void ProgressBar::show(double share) {
     const int cells = static_cast<int>(share * kWidth);
     if (!enabled_ || cells == drawn_) return;
     drawn_ = cells;
-    fmt::print(stderr, "\r[{:#<{}}{:.<{}}] {:3.0f} %", "", cells, "", kWidth - cells, 100 * share);
-    std::fflush(stderr);
+    tell_as_is(fmt::format("\r[{:#<{}}{:.<{}}] {:3.0f} %", "", cells, "", kWidth - cells, 100 * share));
 }
 
 void ProgressBar::clear() {
     if (!enabled_) return;
-    fmt::print(stderr, "\r{:{}}\r", "", kWidth + 10);
-    std::fflush(stderr);
+    tell_as_is(fmt::format("\r{:{}}\r", "", kWidth + 10));
 }
 
 }  // namespace app

@@ -9,6 +9,7 @@
 
 #include "play/play_run.h"
 #include "realtime/realtime_run.h"
+#include "report/json_document.h"
 #include "sticks/predictors.h"
 
 namespace app {
@@ -299,24 +300,25 @@ Table departure_table(const RealtimeOutcome& o) {
 
 /// Measures the latency of a run whose strikes are scored and writes what a run in real time has beside the
 /// products of play().
-void write_measurements(RealtimeOutcome& o, const RealtimeSession& session, const OutputFolder& folder) {
+void write_measurements(RealtimeOutcome& o, const RealtimeSession& session, OutputFolder& folder) {
     o.latency = latency_report(o.play, o.realtime, session.kit, session.stick.radius_m);
     write_file(folder.path("departures.csv"), departure_table(o).csv());
     for (const auto& [name, table] : latency_rows(o.latency, o.play, o.realtime))
         write_file(folder.path(name), table.csv());
     write_file(folder.path("latency.json"), format_latency_json(o.latency, o.play, o.realtime));
-    write_file(folder.path("latency.html"),
-               format_latency_page(o.latency, o.play, o.realtime, folder.scratch()));
+    write_page(folder, "latency.html",
+               [&](Plotter& plotter) { return format_latency_page(o.latency, o.play, o.realtime, plotter); });
 }
 
 }  // namespace
 
 RealtimeOutcome play_realtime(const RealtimeOptions& options, const Warn& warn) {
     const WallTimer wall;
+    require_tools(options.play);
     std::optional<OutputFolder> folder;  // outlives the threads that write into it
     RealtimeSession session(options);
     RealtimeOutcome outcome;
-    outcome.play = describe(session.options.play, session.trace, session.kit, !session.live);
+    outcome.play = describe(session.options.play, session.trace, session.kit);
     folder.emplace(options.play.out);
     session.start(*folder, warn);
     outcome.play.stages_s.emplace_back("start", wall.seconds());
@@ -330,7 +332,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options, const Warn& warn) 
                    {session.kit, session.stick, *session.simulation, session.frames.get(), wall}, *folder,
                    [&] {
                        write_measurements(outcome, session, *folder);
-                       return summary_of(outcome).dump(2, ' ', false, Json::error_handler_t::replace);
+                       return json_document(summary_of(outcome));
                    });
     return outcome;
 }

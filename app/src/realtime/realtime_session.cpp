@@ -7,7 +7,6 @@
 
 #include "files/assets.h"
 #include "files/option_values.h"
-#include "play/play_run.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
 #include "realtime/picture_quality.h"
@@ -36,8 +35,8 @@ void check(const RealtimeOptions& o) {
 }
 
 /// A trace that stands for the sticks of a live source, which has no samples yet.
-tracking::Trace live_trace(const SensorOptions& sensors) {
-    tracking::Trace trace;
+PlayedTrace live_trace(const SensorOptions& sensors) {
+    PlayedTrace trace;
     trace.file = trace.source = sensors.source;
     for (const std::string& name : sensors.sticks) trace.sticks.push_back({name, {{}, {}}});
     return trace;

@@ -14,7 +14,7 @@
 #include "kit/kit.h"
 #include "pictures/frame_thread.h"
 #include "pictures/kit_stage.h"
-#include "play/play.h"
+#include "play/play_run.h"
 #include "realtime/artificial_load.h"
 #include "sensors/sensor_hub.h"
 
@@ -49,8 +49,8 @@ struct RealtimeSession {
     [[nodiscard]] std::vector<std::pair<std::string, std::string>> priorities() const;
 
     RealtimeOptions options;
-    bool live = false;      ///< there is no trace
-    tracking::Trace trace;  ///< of a live source only the sticks' names
+    bool live = false;  ///< there is no trace
+    PlayedTrace trace;  ///< of a live source only the sticks' names
     Kit kit;
     StickGeometry stick;  ///< also as a live source gives it
     double seconds = 0;

@@ -1,6 +1,7 @@
 #include "report/plot.h"
 
 #include <fmt/format.h>
+#include <tracking/input.h>
 
 #include <algorithm>
 #include <cctype>
@@ -11,7 +12,6 @@
 #include <tuple>
 
 #include "files/bad_input.h"
-#include "files/output_folder.h"
 #include "process/child_process.h"
 
 namespace app {
@@ -22,14 +22,34 @@ constexpr std::array<ReportColour, 9> kLineColours = {
     colours::sticks[0], colours::sticks[1], colours::sticks[2], colours::sticks[3], colours::released,
     colours::wrong,     colours::missed,    colours::wave,      colours::cancelled};
 
-/// In the locale C, so that numbers have points, and without the user's start-up files.
-void run_gnuplot(const fs::path& script, const fs::path& messages) {
-    try {
-        run_child({"gnuplot", "--default-settings", script.string()}, messages, {"LC_ALL=C"});
-    } catch (const std::runtime_error& failed) {
-        throw std::runtime_error(
-            fmt::format("{}; the report's plots need gnuplot (package gnuplot-nox)", failed.what()));
-    }
+fs::path svg_file(const fs::path& scratch, std::size_t number) {
+    return scratch / fmt::format("plot{:03}.svg", number);
+}
+
+/// With one process: in the locale C, so that numbers have points, and without the user's start-up files.
+void run_gnuplot(const std::string& commands, const fs::path& scratch) {
+    const fs::path script = scratch / "plots.gp";
+    write_file(script, commands);
+    run_child({"gnuplot", "--default-settings", script.string()}, scratch / "plots.log", {"LC_ALL=C"});
+}
+
+/// Draws scripts, the first of which is `first`, as SVG documents.
+void draw_svg(std::span<const PlotScript> scripts, std::size_t first, const fs::path& scratch) {
+    std::string commands;
+    for (std::size_t i = 0; i < scripts.size(); ++i)
+        commands += fmt::format(
+            "reset\nunset key\nset terminal svg size {},{} noenhanced font 'sans-serif,12'\nset output {}\n"
+            "{}\nset output\n",
+            scripts[i].width, scripts[i].height, gnuplot_string(svg_file(scratch, first + i).string()),
+            scripts[i].commands);
+    run_gnuplot(commands, scratch);
+}
+
+/// Empty if it is not there or not whole.
+std::string whole_svg(const fs::path& file) {
+    std::error_code error;
+    std::string svg = fs::exists(file, error) ? tracking::read_bytes(file.string(), "a plot") : "";
+    return svg.find("</svg>") == std::string::npos ? "" : svg;
 }
 
 void replace_all(std::string& text, std::string_view from, std::string_view to) {
@@ -96,27 +116,49 @@ std::string without_ballast(std::string_view svg) {
 
 }  // namespace
 
-std::vector<std::string> draw_svg(const std::vector<PlotScript>& scripts, const fs::path& scratch) {
-    const auto svg_file = [&](std::size_t index) { return scratch / fmt::format("plot{:03}.svg", index); };
-    std::string commands;
-    for (std::size_t i = 0; i < scripts.size(); ++i)
-        commands += fmt::format(
-            "reset\nunset key\nset terminal svg size {},{} noenhanced font 'sans-serif,12'\nset output {}\n"
-            "{}\nset output\n",
-            scripts[i].width, scripts[i].height, gnuplot_string(svg_file(i).string()), scripts[i].commands);
-    const fs::path script = scratch / "plots.gp";
-    write_file(script, commands);
-    run_gnuplot(script, scratch / "plots.log");
-    std::vector<std::string> pictures;
+void require_gnuplot() {
+    require_program("gnuplot", "plots; install the package gnuplot-nox");
+}
+
+std::vector<std::string> Plotter::draw(const std::vector<PlotScript>& scripts) {
+    std::string reason;
+    const auto succeeds = [&](const auto& work) {
+        try {
+            work();
+            return true;
+        } catch (const std::runtime_error& failed) {
+            if (reason.empty()) reason = failed.what();
+            return false;
+        }
+    };
+    const bool at_once = succeeds([&] { draw_svg(scripts, 0, scratch_); });
+    std::vector<std::string> pictures(scripts.size());
     for (std::size_t i = 0; i < scripts.size(); ++i) {
-        pictures.push_back(read_file(svg_file(i)));
-        if (pictures.back().find("</svg>") == std::string::npos)
-            throw std::runtime_error(
-                fmt::format("{}: error: found an unfinished plot, expected a whole one; is the "
-                            "disk full?",
-                            svg_file(i).string()));
+        succeeds([&] {
+            if (!at_once) draw_svg(std::span(scripts).subspan(i, 1), i, scratch_);
+            pictures[i] = whole_svg(svg_file(scratch_, i));
+        });
+        if (pictures[i].empty() && failure_.empty())
+            failure_ = reason.empty() ? "error: cannot draw a plot: gnuplot left none" : reason;
     }
     return pictures;
+}
+
+void Plotter::run(const std::string& commands) {
+    try {
+        run_gnuplot(commands, scratch_);
+    } catch (const std::runtime_error& failed) {
+        if (failure_.empty()) failure_ = failed.what();
+    }
+}
+
+void write_page(OutputFolder& folder, std::string_view name,
+                const std::function<std::string(Plotter&)>& format) {
+    folder.adorn(name, [&] {
+        Plotter plotter(folder.scratch());
+        write_file(folder.path(name), format(plotter));
+        if (!plotter.failure().empty()) throw std::runtime_error(plotter.failure());
+    });
 }
 
 std::string gnuplot_string(std::string_view text) {
@@ -137,6 +179,13 @@ const ReportColour& stick_colour(std::size_t stick) {
 }
 
 void PlotPanel::add(std::string data, std::string_view style) {
+    for (std::size_t at = 0; at < data.size();) {  // NaN and infinities alone have an n
+        const std::size_t end = std::min(data.find('\n', at), data.size() - 1) + 1;
+        if (data.find('n', at) < end)
+            data.erase(at, end - at);
+        else
+            at = end;
+    }
     if (data.empty()) return;
     fmt::format_to(std::back_inserter(clauses_), "{}'-' {}", clauses_.empty() ? "" : ", ", style);
     data_ += std::move(data) + "e\n";
@@ -168,8 +217,10 @@ PlotScript plot_of(int width, int height, const PlotAxis& x, const PlotAxis& y, 
     std::string commands = plot_axes();
     for (const auto& [name, axis] : {std::pair{"x", &x}, {"y", &y}}) {
         if (!axis->label.empty()) commands += fmt::format("set {}label '{}'\n", name, axis->label);
-        commands += fmt::format("set {}range [{}:{}]\n", name, axis->low, axis->high);
-        if (axis->tics > 0) commands += round_tics(name, axis->high - axis->low, axis->tics);
+        const bool finite = std::isfinite(axis->low) && std::isfinite(axis->high);
+        const double low = finite ? axis->low : 0, high = finite ? axis->high : 1;
+        commands += fmt::format("set {}range [{}:{}]\n", name, low, high);
+        if (axis->tics > 0) commands += round_tics(name, high - low, axis->tics);
     }
     commands.append(more);
     std::string plain = commands + panel.text(), keyed = commands + panel.text(legend);
@@ -260,6 +311,7 @@ std::string PlotGallery::element(PlotScript plot, const std::string& label) {
 }
 
 std::string PlotGallery::in_page(std::size_t number, std::string_view drawn) const {
+    if (drawn.empty()) return "<p class=note>This plot could not be drawn.</p>\n";
     std::string svg = without_ballast(span_of(drawn, "</defs>", "</svg>").substr(7));
     follow_page(svg);
     // The definitions, left out, stood inside the canvas's group.
@@ -267,7 +319,7 @@ std::string PlotGallery::in_page(std::size_t number, std::string_view drawn) con
                        span_of(drawn, "viewBox=\"", "\""), svg);
 }
 
-void PlotGallery::write_files(const fs::path& folder, const fs::path& scratch) const {
+void PlotGallery::write_files(const fs::path& folder, Plotter& plotter) const {
     constexpr int kTitleHeight = 30, kKeyRowHeight = 18, kKeyWidth = 170;
     std::string commands;
     for (std::size_t i = 0; i < plots_.size(); ++i) {
@@ -290,19 +342,19 @@ void PlotGallery::write_files(const fs::path& folder, const fs::path& scratch) c
                 gnuplot_string((folder / (name + "." + ending)).string()), gnuplot_string(labels_[i]),
                 std::max(1, rows), plot.keyed.empty() ? plot.commands : plot.keyed);
     }
-    const fs::path script = scratch / "figures.gp";
-    write_file(script, commands);
-    run_gnuplot(script, scratch / "figures.log");
+    plotter.run(commands);
 }
 
-std::string PlotGallery::drawn(std::string page, const fs::path& scratch) const {
-    const std::vector<std::string> drawn = draw_svg(plots_, scratch);
+std::string PlotGallery::drawn(std::string page, Plotter& plotter) const {
+    const std::vector<std::string> drawn = plotter.draw(plots_);
     for (std::size_t i = 0; i < drawn.size(); ++i) replace_all(page, mark_of(i), in_page(i, drawn[i]));
+    const auto any = std::ranges::find_if(drawn, [](const std::string& svg) { return !svg.empty(); });
+    if (any == drawn.end()) return page;
     replace_all(
         page, symbols(),
         fmt::format(
             "<svg width=\"0\" height=\"0\" style=\"position:absolute\" aria-hidden=\"true\">{}</svg>\n",
-            span_of(drawn.front(), "<defs>", "</defs>")));
+            span_of(*any, "<defs>", "</defs>")));
     return page;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <set>
 #include <span>
 #include <string>
@@ -7,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "files/output_folder.h"
 #include "report/html.h"
 
 namespace app {
@@ -26,11 +28,31 @@ struct PlotScript {
     std::string keyed = {};  ///< the commands with the legend as a key, for a file of its own
 };
 
-/// Draws every script with one gnuplot process in the C locale and without the user's start-up files; returns
-/// an SVG document per script. Files lie in `scratch`, an existing folder. Throws std::runtime_error when
-/// gnuplot is missing or fails.
-[[nodiscard]] std::vector<std::string> draw_svg(const std::vector<PlotScript>& scripts,
-                                                const std::filesystem::path& scratch);
+/// Throws std::runtime_error where gnuplot cannot be started: before a run that ends with plots.
+void require_gnuplot();
+
+/// Draws with gnuplot. Plots adorn results and are none: one that cannot be drawn is left out, and told.
+class Plotter {
+public:
+    /// Files lie in `scratch`, an existing folder.
+    explicit Plotter(std::filesystem::path scratch) : scratch_(std::move(scratch)) {}
+
+    /// Draws every script with one gnuplot process in the C locale and without the user's start-up files, each
+    /// one again alone if that fails. An SVG document per script; empty where it could not be drawn.
+    [[nodiscard]] std::vector<std::string> draw(const std::vector<PlotScript>& scripts);
+    /// Runs gnuplot's own commands, which name where their output goes.
+    void run(const std::string& commands);
+    /// What went wrong first; empty: nothing.
+    [[nodiscard]] const std::string& failure() const { return failure_; }
+
+private:
+    std::filesystem::path scratch_;
+    std::string failure_;
+};
+
+/// Writes a page with plots, which adorns a run: the text that `format` makes.
+void write_page(OutputFolder& folder, std::string_view name,
+                const std::function<std::string(Plotter&)>& format);
 
 /// A name as a gnuplot string: quoted so that nothing in it is a command; control characters become spaces.
 [[nodiscard]] std::string gnuplot_string(std::string_view text);
@@ -41,7 +63,7 @@ struct PlotScript {
 /// One panel of a gnuplot script: series with their data inline, drawn in the order they were added.
 class PlotPanel {
 public:
-    /// `data`: lines of numbers; empty data is left out. `style`: e.g. "with lines lc rgb '#ff0000'".
+    /// `data`: lines of numbers; empty data is left out, and lines with a number that is not finite. `style`: e.g. "with lines lc rgb '#ff0000'".
     void add(std::string data, std::string_view style);
     /// The plot command; axes without data where nothing was added. `key`: lines that stand in the key.
     [[nodiscard]] std::string text(const std::vector<PlotLine>& key = {}) const;
@@ -127,12 +149,12 @@ public:
     }
     /// gnuplot's point shapes, which all plots refer to, as an invisible element; once a page.
     [[nodiscard]] static std::string symbols() { return "<!--symbols-->"; }
-    /// The page with its plots in their places. Throws as draw_svg() does.
-    [[nodiscard]] std::string drawn(std::string page, const std::filesystem::path& scratch) const;
+    /// The page with its plots in their places, and a note where one could not be drawn.
+    [[nodiscard]] std::string drawn(std::string page, Plotter& plotter) const;
 
     /// Writes each plot with its label and its legend, on white: 01_LABEL.svg and 01_LABEL.png, of twice the size,
-    /// and so on. Throws as draw_svg() does.
-    void write_files(const std::filesystem::path& folder, const std::filesystem::path& scratch) const;
+    /// and so on.
+    void write_files(const std::filesystem::path& folder, Plotter& plotter) const;
 
 private:
     [[nodiscard]] std::string in_page(std::size_t number, std::string_view drawn) const;

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <tracking/trace_rows.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -14,38 +13,30 @@
 #include <utility>
 
 #include "files/bad_input.h"
-#include "files/output_folder.h"
+#include "files/output_file.h"
 #include "process/clock.h"
 #include "process/stop_signals.h"
 
 namespace app {
-namespace fs = std::filesystem;
 namespace {
 
 constexpr std::int64_t kFlushEveryNs = 200'000'000;
 constexpr double kGapIntervals = 2.5, kLeastGapS = 0.02;
 constexpr double kIntervalSmoothing = 0.1;
 
-/// Writes a native trace that grows: OUT.partial until finish() renames it. What has been flushed is a trace, up
-/// to its last complete line: a stick's first row waits for its second one, without which no trace may have it.
+/// Writes a native trace that grows: OUT.partial until finish(), kept from the first row on. What has been flushed
+/// is a trace, up to its last complete line: a stick's first row waits for its second one, without which no trace
+/// may have it.
 class Recorder {
 public:
-    explicit Recorder(const RecordOptions& options) : options_(options), partial_(partial_name(options.out)) {
-        file_ = FileDescriptor(open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+    explicit Recorder(const RecordOptions& options) : options_(options), out_(options.out) {
+        file_ = open_file(out_.partial(), O_WRONLY | O_CREAT | O_TRUNC);
         if (!file_)
             throw BadInput(
                 fmt::format("{}: error: found no way to write it ({}), expected a file that may be written",
-                            partial_.string(), std::strerror(errno)));
-        try {
-            source_ = open_source(options.source);
-        } catch (...) {
-            remove_if_empty();
-            throw;
-        }
+                            out_.partial().string(), std::strerror(errno)));
+        source_ = open_source(options.source);
     }
-    ~Recorder() { remove_if_empty(); }
-    Recorder(const Recorder&) = delete;
-    Recorder& operator=(const Recorder&) = delete;
 
     RecordResult run() {
         const StopSignals signals;
@@ -71,12 +62,6 @@ private:
         std::string text;
     };
 
-    /// Any other OUT.partial stays, unless it was finished.
-    void remove_if_empty() const {
-        std::error_code ignored;
-        if (!wrote_) fs::remove(partial_, ignored);
-    }
-
     [[nodiscard]] bool over(std::int64_t ns) const {
         return options_.seconds > 0 && first_ns_ != 0 && to_s(ns - first_ns_) >= options_.seconds;
     }
@@ -92,11 +77,12 @@ private:
         if (text.empty()) return;
         if (!wrote_) text.insert(0, head_);
         wrote_ = true;
+        out_.keep_partial();
         if (!file_.write(text))
             throw std::runtime_error(fmt::format(
                 "{}: error: found no way to write on ({}), expected room; what was recorded until then "
                 "is kept there",
-                partial_.string(), std::strerror(errno)));
+                out_.partial().string(), std::strerror(errno)));
     }
 
     void take(const SourceSample& given) {
@@ -186,11 +172,8 @@ private:
                 "error: found no stick with two samples from {}, expected some{}", options_.source.source,
                 result_.faults.first.empty() ? "" : "; " + result_.faults.first));
         flush();
-        if (fsync(file_.get()) != 0 && errno != EINVAL && errno != EROFS)
-            throw std::runtime_error(
-                fmt::format("{}: error: found that saving it failed ({}), expected room on the disk",
-                            partial_.string(), std::strerror(errno)));
-        fs::rename(partial_, options_.out);
+        if (!file_.close()) throw std::runtime_error("error: " + cannot("write " + out_.partial().string()));
+        out_.finish();
         return std::move(result_);
     }
 
@@ -206,7 +189,7 @@ private:
     }
 
     const RecordOptions& options_;
-    fs::path partial_;
+    OutputFile out_;
     FileDescriptor file_;
     bool wrote_ = false, oriented_ = true;
     std::string head_;

@@ -1,14 +1,11 @@
 #include "simulate/simulate.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sim/errors.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <cstring>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -19,6 +16,8 @@
 #include "pictures/scene_stage.h"
 #include "process/clock.h"
 #include "process/progress_bar.h"
+#include "process/standard_streams.h"
+#include "report/json_document.h"
 #include "report/table.h"
 #include "scene/scene.h"
 #include "simulate/run_measures.h"
@@ -68,29 +67,33 @@ std::string energy_row(const sim::World& world, bool stepped) {
 class GrowingTable {
 public:
     GrowingTable(const fs::path& file, const std::string& header)
-        : file_(file), out_(file, std::ios::binary) {
-        add(header);
+        : file_(file), out_(open_file(file, O_WRONLY | O_CREAT | O_TRUNC)), rows_(header) {
+        check(bool(out_));
     }
     void add(const std::string& rows) {
-        out_ << rows;
-        check();
+        constexpr std::size_t kBlock = 65536;
+        rows_ += rows;
+        if (rows_.size() >= kBlock) write();
     }
     void finish() {
-        out_.close();
-        check();
+        write();
+        check(out_.close());
     }
 
 private:
-    void check() const {
-        if (!out_)
-            throw std::runtime_error(fmt::format(
-                "{}: error: found \"{}\", expected to write the simulation's results; free some space "
-                "or choose another --out",
-                file_.string(), std::strerror(errno)));
+    void write() {
+        check(out_.write(rows_));
+        rows_.clear();
+    }
+    void check(bool done) const {
+        if (!done)
+            throw std::runtime_error("error: " + cannot("write " + file_.string()) +
+                                     "; free some space or choose another --out");
     }
 
     fs::path file_;
-    std::ofstream out_;
+    FileDescriptor out_;
+    std::string rows_;  // not yet written
 };
 
 /// Observes a run: keeps what its result says, and writes tables and pictures while it goes on. Without a
@@ -227,19 +230,28 @@ private:
     }
 
     void write_products(const WallTimer& wall) {
+        folder_->free_reserve();
         for (GrowingTable* table : {states_.get(), energy_.get(), steps_.get()}) table->finish();
         if (frames_) frames_->finish();
-        if (options_.workers) {
-            fs::create_directories(folder_->scratch());
-            write_file(folder_->path("workers.svg"),
-                       draw_svg({workers_plot(history_)}, folder_->scratch()).front());
-        }
+        if (options_.workers)
+            folder_->adorn("workers.svg", [&] {
+                Plotter plotter(folder_->scratch());
+                const std::string plot = plotter.draw({workers_plot(history_)}).front();
+                if (plot.empty()) throw std::runtime_error(plotter.failure());
+                write_file(folder_->path("workers.svg"), plot);
+            });
         result_.frames = frames_ ? frames_->report().written.size() : 0;
-        if (options_.video) make_video(*options_.video, options_.fps, false, folder_->path("."));
+        std::optional<OutputFile> video;
+        if (options_.video)
+            folder_->adorn("", [&] {
+                video.emplace(*options_.video);
+                make_video(video->partial(), options_.fps, false, folder_->path("."));
+            });
         result_.wall_s = wall.seconds();
         write_file(folder_->path("summary.json"), format_simulate(result_));
         folder_->finish();
-        if (options_.video) fs::rename(options_.video->string() + ".partial", *options_.video);
+        if (video) folder_->adorn("", [&] { video->finish(); });
+        result_.failures = folder_->failures();
     }
 
     const SimulateOptions& options_;
@@ -289,7 +301,7 @@ void print_how_to_join(const std::string& endpoint, const fs::path& keys) {
     if (options.empty()) options.emplace_back();
     std::sort(options.begin(), options.end());
     for (const std::string& key : options)
-        fmt::print(stderr, "listening: musicworld worker --connect {}{}\n", endpoint, key);
+        tell(fmt::format("listening: musicworld worker --connect {}{}", endpoint, key));
 }
 
 sim::DistributedLaunch launch_of(const WorkerOptions& workers) {
@@ -333,6 +345,14 @@ void check(const SimulateOptions& options, const Scene& scene) {
             scene.file.string()));
     if ((options.frames || options.video) && !options.out)
         throw BadInput("error: found --frames or --video without --out, expected a folder for the pictures");
+    if (options.video) {
+        const OutputFile can_be(*options.video);
+        if (options.width % 2 != 0 || options.height % 2 != 0)
+            throw BadInput(fmt::format("error: found --video with --size {}x{}, expected even sides",
+                                       options.width, options.height));
+        require_ffmpeg();
+    }
+    if (options.workers && options.out) require_gnuplot();
 }
 
 using Json = nlohmann::ordered_json;
@@ -467,7 +487,7 @@ std::string format_simulate(const SimulateResult& r) {
         {"energy_j", r.energy.total()}};
     json.update(details_of(r));
     if (r.worker_options) json.update(workers_of(r));
-    return json.dump(2) + "\n";
+    return json_document(json);
 }
 
 }  // namespace app

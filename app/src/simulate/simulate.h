@@ -70,6 +70,7 @@ struct SimulateResult : sim::DistributedResult {
     Mishaps mishaps;                       ///< quarantined, broken and limited with their names
     bool rest_wanted = false;
     std::size_t frames = 0;
+    std::vector<std::string> failures;            ///< why plots or the video are missing
     std::vector<std::string> notes;               ///< what was asked for and had no effect; what workers said
     double wall_s = 0;                            ///< with reading, drawing and writing
     std::optional<WorkerOptions> worker_options;  ///< none: in this process

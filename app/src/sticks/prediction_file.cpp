@@ -1,7 +1,7 @@
 #include "sticks/prediction_file.h"
 
 #include <fmt/format.h>
-#include <tracking/import.h>
+#include <tracking/input.h>
 #include <tracking/rotation.h>
 #include <tracking/trace_rows.h>
 

@@ -11,6 +11,8 @@
 
 #include "files/bad_input.h"
 #include "kit/kit.h"
+#include "process/standard_streams.h"
+#include "report/json_document.h"
 #include "statistics/statistics.h"
 #include "strikes/stroke_lows.h"
 
@@ -105,7 +107,7 @@ std::vector<StickInfo> sticks_of(const tracking::Trace& trace) {
 
 void warn_of_implausible(const tracking::Trace& trace) {
     for (const std::string& line : tracking::implausible(trace))
-        fmt::print(stderr, "{}: warning: {}\n", trace.file, line);
+        tell(fmt::format("{}: warning: {}", trace.file, line));
 }
 
 std::string format_info(const tracking::Trace& trace) {
@@ -148,7 +150,7 @@ std::string format_info_json(const tracking::Trace& trace) {
     if (trace.tip) json["tip_m"] = numbers(*trace.tip);
     if (trace.shaft) json["shaft"] = numbers(*trace.shaft);
     for (const StickInfo& stick : sticks_of(trace)) json["sticks"].push_back(json_of(stick));
-    return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    return json_document(json);
 }
 
 }  // namespace app

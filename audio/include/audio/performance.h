@@ -80,7 +80,8 @@ private:
 std::size_t write_wav(const std::filesystem::path& file, const std::vector<float>& interleaved);
 
 /// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, so 1920 per second), channel 10,
-/// one note-on per note and its note-off 0.1 s later.
-void write_midi(const std::filesystem::path& file, const std::vector<Note>& notes);
+/// one note-on per note and its note-off 0.1 s later: the file's bytes. Throws std::runtime_error for a key,
+/// velocity or onset that MIDI has not.
+[[nodiscard]] std::vector<std::uint8_t> encode_midi(const std::vector<Note>& notes);
 
 }  // namespace audio

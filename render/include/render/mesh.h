@@ -2,6 +2,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -19,12 +20,18 @@ struct Mesh {
     [[nodiscard]] Eigen::AlignedBox3f bounds() const;
 };
 
+/// A file that is no mesh, or cannot be one here: one line, FILE[:LINE]: error: found ..., expected ...
+class MeshError : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
 /// Loads OBJ, GLB/glTF or STL. Plain OBJ, as assets/meshes holds, is read in this process; other files through
 /// assimp in a child process with limits on memory, processor time and waiting time (malformed files crash or
 /// hang that importer). Checked: finite values, index ranges, 1 to 500000 triangles. A part's material is the
 /// file's material name (OBJ: usemtl, no .mtl needed); node transforms of glTF are applied. Throws
-/// std::runtime_error with one line: FILE[:LINE]: error: found ..., expected ... Any thread. Costs about 20 ms
-/// for a small file that needs the child, nearly all of it the child's start.
+/// MeshError, and std::system_error where the child cannot be run. Any thread. Costs about 20 ms for a small file
+/// that needs the child, nearly all of it the child's start.
 [[nodiscard]] Mesh load_mesh(const std::filesystem::path& file);
 
 /// The same for several files, in their order; the children run side by side. The first file that fails

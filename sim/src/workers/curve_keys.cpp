@@ -35,7 +35,11 @@ bool is_key(const std::string& text) {
 void write_new(const fs::path& file, const std::string& text, mode_t mode) {
     const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
     bool written = descriptor >= 0;
-    if (written) written = write(descriptor, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+    for (std::size_t done = 0; written && done < text.size();) {
+        const ssize_t wrote = write(descriptor, text.data() + done, text.size() - done);
+        written = wrote > 0 || (wrote < 0 && errno == EINTR);
+        if (wrote > 0) done += static_cast<std::size_t>(wrote);
+    }
     if (descriptor >= 0) written = close(descriptor) == 0 && written;
     if (!written) throw WorkerError("cannot write " + file.string() + ": " + std::strerror(errno));
 }

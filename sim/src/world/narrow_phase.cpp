@@ -19,9 +19,9 @@ constexpr std::uint32_t kNearest = 0x7ffffffd;  // feature of the nearest points
 constexpr std::uint32_t kParting = 0x7ffffffe;  // feature of the one contact of bodies inside each other
 constexpr std::uint32_t kFoot = 0x7fffffff;     // feature of a body's lowest point over a plane
 constexpr float kShallow = 0.3f;  // of the size: deeper in, a sample may be nearer to another face
-constexpr float kAlike = 0.95f;   // cosine between normals
+constexpr float kContrary = 0;    // cosine between normals
 constexpr float kBeside = 0.3f;   // cosine with the axis, of normals of samples beside a body
-constexpr double kSmaller[] = {0.25, 0.6,
+constexpr double kSmaller[] = {0.01, 0.05, 0.25, 0.6,
                                0.9};  // by so much bodies are made smaller to find how they overlap
 constexpr float kManifoldTolerance = 0.02f;
 constexpr double kExact = 1e-5;           // of the size: tolerance of distances
@@ -157,20 +157,16 @@ float NarrowPhase::find_samples(const PosedBody& a, const PosedBody& b, float ma
     return lowest;
 }
 
-// Whether samples inside tell by themselves how the bodies touch: a face on a face, or an edge on a face.
+// Whether samples inside tell by themselves how the bodies touch: not deep, and not in contradiction.
 bool NarrowPhase::agree(float size) const {
     std::size_t lowest = 0;
     for (std::size_t i = 1; i < found_.size(); ++i)
         if (found_[i].separation < found_[lowest].separation) lowest = i;
     if (found_[lowest].separation < -kShallow * size) return false;
     const Eigen::Vector3f out = normal_of(lowest);
-    int inside = 0;
-    for (std::size_t i = 0; i < found_.size(); ++i) {
-        if (found_[i].separation > 0) continue;
-        if (normal_of(i).dot(out) < kAlike) return false;
-        ++inside;
-    }
-    return inside > 2;
+    for (std::size_t i = 0; i < found_.size(); ++i)
+        if (found_[i].separation <= 0 && normal_of(i).dot(out) < kContrary) return false;
+    return true;
 }
 
 // World axes, from b towards a.

@@ -19,9 +19,9 @@ struct PairSearch {
 /// and rolls as round as it is; likewise on a plane. Other pairs have samples of either in the other's
 /// implicit surface, the distances of those outside made exact (closest_point.h: to first order a sample
 /// beside a thin body seems to touch it), and where no sample is inside also the nearest points of the pair:
-/// edges on edges. Where smooth bodies overlap and their samples do not tell how (they are deep, their normals differ, or
-/// only edges cross), all is measured along one axis: that between the nearest points of the bodies made smaller by up to
-/// nine tenths of the smaller half extent, as margins of contact solvers are used (van den Bergen 2001, "Proximity queries
+/// edges on edges. Where smooth bodies overlap and their samples do not tell how (they are deep, contradict each other,
+/// or only edges cross), all is measured along one axis: that between the nearest points of the bodies made smaller, as little
+/// as parts them and up to nine tenths of the smaller half extent, as margins of contact solvers are used (van den Bergen 2001, "Proximity queries
 /// and penetration depth computation on 3D game objects"). Allocates only while its buffers grow.
 class NarrowPhase {
 public:

@@ -1,11 +1,11 @@
 #include "files/checksum.h"
 
 #include <gtest/gtest.h>
+#include <tracking/trace.h>
 
 #include <string_view>
 #include <vector>
 
-#include "files/bad_input.h"
 #include "files/output_folder.h"
 #include "sample_play_result.h"
 
@@ -35,8 +35,8 @@ TEST(Sha256, AFileThatIsMissingOrAFolderIsBadInputThatNamesIt) {
         try {
             (void)app::sha256_of_file(path);
             FAIL() << path;
-        } catch (const app::BadInput& error) {
-            EXPECT_TRUE(std::string(error.what()).starts_with("error: cannot read " + path.string() + ": "))
+        } catch (const tracking::TraceError& error) {
+            EXPECT_TRUE(std::string(error.what()).starts_with(path.string() + ":1:1: error: found "))
                 << error.what();
         }
     }

@@ -1,6 +1,8 @@
 #include "files/output_folder.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -129,10 +131,13 @@ TEST(OutputFolder, WhenMovingFailsHalfWayThereIsNoSummary) {
             FAIL() << "the run had begun";
         } catch (const std::runtime_error& error) {
             EXPECT_NE(std::string(error.what()).find("video.mp4"), std::string::npos) << error.what();
+            EXPECT_NE(std::string(error.what()).find(".unfinished"), std::string::npos) << error.what();
         }
     }
     EXPECT_FALSE(fs::exists(here.path() / "summary.json"));
-    EXPECT_FALSE(fs::exists(here.path() / ".unfinished"));
+    EXPECT_EQ(text_of(here.path() / "events.csv"), "new");
+    for (const char* name : {"summary.json", "video.mp4"})
+        EXPECT_EQ(text_of(here.path() / ".unfinished" / name), "new") << "what was computed is kept";
 }
 
 TEST(OutputFolder, AFileInTheWayIsBadInputThatNamesIt) {
@@ -149,9 +154,9 @@ TEST(OutputFolder, AFileInTheWayIsBadInputThatNamesIt) {
 /// Permission bits do not hold back the superuser; these places refuse everybody.
 TEST(OutputFolder, PlacesWhereNothingCanBeMadeAreBadInput) {
     const TemporaryFolder here;
-    fs::create_symlink(here.path() / "nowhere" / "at all", here.path() / "dangling");
+    fs::create_symlink("circle", here.path() / "circle");
     for (const fs::path& path : {fs::path("/proc/out"), fs::path("/proc"), fs::path("/dev/null/out"),
-                                 fs::path(""), here.path() / "dangling", here.path() / std::string(300, 'n')})
+                                 fs::path(""), here.path() / "circle", here.path() / std::string(300, 'n')})
         EXPECT_NE(refusal(path).find("error: found "), std::string::npos) << path;
 }
 
@@ -178,17 +183,66 @@ TEST(OutputFolder, AForeignFileInFramesIsRefusedBeforeTheRunAndKept) {
     }
 }
 
-TEST(OutputFolder, ALinkNamedFramesIsReplacedNotFollowed) {
+TEST(OutputFolder, LinksToAFolderOfTheRunAreFollowed) {
     const TemporaryFolder here;
     fs::create_directories(here.path() / "pictures");
     app::write_file(here.path() / "pictures" / "holiday.png", "mine");
     fs::create_directory(here.path() / "out");
     fs::create_directory_symlink(here.path() / "pictures", here.path() / "out" / "frames");
-    app::OutputFolder out(here.path() / "out");
-    write_frames(out, 1);
-    out.finish();
+    EXPECT_NE(refusal(here.path() / "out").find("holiday.png"), std::string::npos);
     EXPECT_EQ(text_of(here.path() / "pictures" / "holiday.png"), "mine");
-    EXPECT_TRUE(fs::is_directory(fs::symlink_status(here.path() / "out" / "frames")));
+    fs::remove(here.path() / "pictures" / "holiday.png");
+    app::write_file(here.path() / "pictures" / "000007.png", "old");
+    fs::create_directory_symlink("to be made", here.path() / "dangling");
+    fs::create_directory_symlink("out", here.path() / "link");
+    for (const char* name : {"link", "dangling"}) {
+        app::OutputFolder out(here.path() / name);
+        write_frames(out, 1);
+        out.finish();
+        EXPECT_TRUE(fs::is_symlink(here.path() / name));
+    }
+    EXPECT_TRUE(fs::is_symlink(here.path() / "out" / "frames"));
+    EXPECT_EQ(names_in(here.path() / "pictures"), (Names{"000000.png"}));
+    EXPECT_EQ(names_in(here.path() / "to be made" / "frames"), (Names{"000000.png"}));
+}
+
+TEST(OutputFolder, WhatAdornsARunMayFailAndIsTold) {
+    const TemporaryFolder here;
+    app::OutputFolder out(here.path() / "out");
+    app::write_file(out.path("summary.json"), "{}");
+    fs::create_directory(here.path() / "out" / "page.html");  // in the way
+    out.adorn("page.html", [&] { app::write_file(out.path("page.html"), "page"); });
+    out.adorn("report.html", [] { throw std::runtime_error("error: no plots"); });
+    out.finish();
+    EXPECT_EQ(names_in(here.path() / "out"), (Names{"page.html", "summary.json"}));
+    ASSERT_EQ(out.failures().size(), 2u);
+    EXPECT_EQ(out.failures()[0], "error: no plots");
+    EXPECT_NE(out.failures()[1].find("page.html"), std::string::npos) << out.failures()[1];
+    EXPECT_THROW(app::throw_if_any(out.failures(), here.path()), std::runtime_error);
+    EXPECT_NO_THROW(app::throw_if_any({}, here.path()));
+}
+
+/// All descriptors but those in reserve are used up when the products are written.
+TEST(OutputFolder, FinishesWithTheDescriptorsInReserve) {
+    const TemporaryFolder here;
+    std::vector<app::FileDescriptor> others;
+    app::OutputFolder out(here.path() / "out");
+    rlimit before{};
+    ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
+    rlimit small = before;
+    small.rlim_cur = 256;
+    ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &small), 0);
+    while (app::FileDescriptor other = app::open_file("/dev/null", O_RDONLY))
+        others.push_back(std::move(other));
+    EXPECT_THROW(app::write_file(out.path("events.csv"), "id\n"), std::runtime_error);
+    out.free_reserve();
+    app::write_file(out.path("events.csv"), "id\n");
+    app::write_file(out.path("summary.json"), "{}");
+    write_frames(out, 3);
+    out.finish();
+    others.clear();
+    ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &before), 0);
+    EXPECT_EQ(names_in(here.path() / "out"), (Names{"events.csv", "frames", "summary.json"}));
 }
 
 TEST(WriteFile, AFullDiskIsARuntimeErrorThatNamesTheFileAndTheReason) {

@@ -160,7 +160,8 @@ TEST(LatencyReport, SkippedSamplesAndMissedStrokesStandInEveryForm) {
     };
     EXPECT_TRUE(row("samples seen").ends_with(" 907 100 807")) << row("samples seen");
     EXPECT_TRUE(row("strokes").ends_with(" 12 9 3")) << row("strokes");
-    const std::string page = format_latency_page(report, run.play, run.realtime, folder.path());
+    app::Plotter plotter(folder.path());
+    const std::string page = format_latency_page(report, run.play, run.realtime, plotter);
     EXPECT_NE(page.find("<b>807 of 907</b><span>samples skipped"), std::string::npos);
     EXPECT_NE(page.find("<b>3 of 12</b><span>strokes missed"), std::string::npos);
     const Json json = Json::parse(format_latency_json(report, run.play, run.realtime));
@@ -274,7 +275,8 @@ TEST(LatencyTables, SayWhereANoteHasNoPicture) {
 TEST(LatencyPage, IsOnePageWithAllPlots) {
     const TemporaryFolder folder;
     const SampleRun run;
-    const std::string page = format_latency_page(run.report(), run.play, run.realtime, folder.path());
+    app::Plotter plotter(folder.path());
+    const std::string page = format_latency_page(run.report(), run.play, run.realtime, plotter);
     std::size_t plots = 0;
     for (std::size_t at = page.find("<div class=plot>"); at != std::string::npos;
          at = page.find("<div class=plot>", at + 1))
@@ -288,7 +290,8 @@ TEST(LatencyPage, StandsForARunWithoutAnything) {
     const TemporaryFolder folder;
     SampleRun run;
     run.realtime = RealtimeResult();
-    const std::string page = format_latency_page(run.report(), run.play, run.realtime, folder.path());
+    app::Plotter plotter(folder.path());
+    const std::string page = format_latency_page(run.report(), run.play, run.realtime, plotter);
     EXPECT_NE(page.find("There were no notes;"), std::string::npos);
     EXPECT_TRUE(page.ends_with("</html>\n"));
 }

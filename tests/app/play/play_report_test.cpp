@@ -16,7 +16,10 @@ namespace fs = std::filesystem;
 
 std::string report_of(const app::PlayResult& result) {
     const TemporaryFolder scratch;
-    return app::format_report(result, scratch.path());
+    app::Plotter plotter(scratch.path());
+    std::string page = app::format_report(result, plotter);
+    EXPECT_EQ(plotter.failure(), "");
+    return page;
 }
 
 std::size_t count(const std::string& text, const std::string& part) {
@@ -160,15 +163,37 @@ TEST(Report, FramesAreWithinWithTheirTimeAndTheNearestNote) {
     }
 }
 
-TEST(Report, WithoutGnuplotSaysWhatToInstall) {
+TEST(Report, WithoutGnuplotIsAPageWithoutPlotsAndBeforeARunSaysWhatToInstall) {
     const TemporaryFolder empty;
     const Variable path("PATH", empty.path().string());
+    app::Plotter plotter(empty.path());
+    const std::string page = app::format_report(sample_play_result(), plotter);
+    EXPECT_TRUE(holds(plotter.failure(), "gnuplot")) << plotter.failure();
+    EXPECT_TRUE(holds(page, "could not be drawn"));
+    EXPECT_TRUE(page.ends_with("</html>\n"));
     try {
-        (void)report_of(sample_play_result());
+        app::require_gnuplot();
         FAIL();
     } catch (const std::runtime_error& error) {
         EXPECT_TRUE(holds(error.what(), "gnuplot-nox")) << error.what();
     }
+}
+
+/// gnuplot ends at the first plot of nothing but NaN, and at a range of NaN.
+TEST(Gnuplot, NumbersThatAreNotFiniteAreLeftOut) {
+    const TemporaryFolder here;
+    app::Plotter plotter(here.path());
+    app::PlotPanel some, none;
+    some.add("0 1\n1 nan\n2 -inf\n3 2\n", "with lines");
+    none.add("0 nan\n1 -nan", "with lines");
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_TRUE(holds(some.text(), "\n0 1\n3 2\ne\n")) << some.text();
+    const std::vector<std::string> drawn =
+        plotter.draw({app::plot_of(100, 100, {"x", 0, 3, 4}, {"y", nan, 2, 4}, some),
+                      app::plot_of(100, 100, {"x", 0, 3}, {"y", 0, nan}, none)});
+    EXPECT_EQ(plotter.failure(), "");
+    EXPECT_FALSE(drawn[0].empty());
+    EXPECT_FALSE(drawn[1].empty());
 }
 
 TEST(Report, AnHourIsTwelveRowsAndUnder4Megabytes) {
@@ -265,13 +290,14 @@ TEST(PlotPanel, TheEnvelopeIsTheLowestAndHighestSampleOfBothChannels) {
 
 TEST(Gnuplot, AMistakeInAScriptIsReportedInOneLineWithItsMessage) {
     const TemporaryFolder here;
-    try {
-        (void)app::draw_svg({{100, 100, "plot no_such_thing"}}, here.path());
-        FAIL();
-    } catch (const std::runtime_error& error) {
-        EXPECT_TRUE(holds(error.what(), "no_such_thing")) << error.what();
-        EXPECT_FALSE(holds(error.what(), "\n"));
-    }
+    app::Plotter plotter(here.path());
+    const app::PlotScript good{100, 100, "plot x"};
+    const std::vector<std::string> drawn = plotter.draw({good, {100, 100, "plot no_such_thing"}, good});
+    EXPECT_TRUE(holds(plotter.failure(), "no_such_thing")) << plotter.failure();
+    EXPECT_FALSE(holds(plotter.failure(), "\n"));
+    EXPECT_TRUE(holds(drawn[0], "</svg>"));
+    EXPECT_EQ(drawn[1], "");
+    EXPECT_EQ(drawn[2], drawn[0]) << "the plots after it are drawn";
 }
 
 TEST(Html, EscapesMarkupAndControlCharacters) {

@@ -143,6 +143,18 @@ sim::Update there_and_back(const sim::Update& u) {
     return std::get<sim::UpdateMessage>(sim::decode_world(bytes).message).bodies.at(0);
 }
 
+/// They are shown on terminals and stand in JSON documents.
+TEST(WorldMessages, WordsOfPeersBecomePrintableWhereTheyArrive) {
+    const std::string bad = "h\xff\x1b[31m\n";
+    const auto arrived = [&](const sim::WorldMessage& message) {
+        return sim::decode_world(std::visit([](const auto& m) { return sim::encode(kHeader, m); }, message))
+            .message;
+    };
+    EXPECT_EQ(std::get<sim::JoinRequest>(arrived(sim::JoinRequest{1, {}, bad})).host, "h??[31m?");
+    EXPECT_EQ(std::get<sim::WorkerFailure>(arrived(sim::WorkerFailure{bad})).what, "h??[31m?");
+    EXPECT_EQ(std::get<sim::Refusal>(arrived(sim::Refusal{bad})).why, "h??[31m?");
+}
+
 TEST(WorldMessages, EveryTypeComesBackAndIsTheSameWhenWrittenAgain) {
     for (const sim::WorldMessage& message : samples()) {
         const std::vector<std::uint8_t> bytes = sim::encode(kHeader, message);

@@ -57,7 +57,4 @@ struct Table {
 /// first row of the first table. Throws TraceError with its place; nothing is guessed.
 [[nodiscard]] Trace read_tables(const std::vector<Table>& tables, const ColumnMap& map);
 
-/// A file's bytes, at most 1 GiB. Throws TraceError.
-[[nodiscard]] std::string read_bytes(const std::string& file);
-
 }  // namespace tracking
