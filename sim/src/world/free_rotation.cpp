@@ -90,7 +90,7 @@ Eigen::Quaterniond FreeRotation::advance(const Eigen::Quaterniond& body_to_world
     Turning body{q.w(), {q.x(), q.y(), q.z()}, {m.x(), m.y(), m.z()}};
     const double wanted = m.squaredNorm() * most_rate_;  // its square
     const int parts =
-        wanted < 1 ? 1 : static_cast<int>(std::sqrt(std::min(wanted, kMostParts * kMostParts))) + 1;
+        !(wanted >= 1) ? 1 : static_cast<int>(std::sqrt(std::min(kMostParts * kMostParts, wanted))) + 1;
     if (rate_b_ == 0 && rate_c_ == 0) {
         // A sphere: the turn about the momentum is all.
     } else if (reference_ == 0) {

@@ -59,7 +59,7 @@ bool IslandSolver::find_hits() {
         const double time = c.starts - time_;
         if (direct_ && (c.restitution == 0 || !is_rigid(c) || time >= h_)) continue;
         if (direct_ && is_elsewhere(c, std::max(time, 0.))) {
-            c.starts = std::numeric_limits<double>::infinity();
+            c.starts = std::numeric_limits<double>::infinity(), c.over = true;
             continue;
         }
         // Bodies with modes take time: theirs is a contact from this substep on, which rebounds when the step ends, if
@@ -361,7 +361,9 @@ double IslandSolver::share_of_impact() const {
         }
     }
     rigid -= modes;
-    return smooth ? std::min(2.0, -(given + returned) / rigid) : std::min(1.0, -given / (rigid / 2 + modes));
+    // Of joints that are not solved exactly the part has either sign: no share gives energy.
+    return smooth ? std::min({2.0, -(given + returned) / rigid, -2 * given / rigid})
+                  : std::min(1.0, -given / (rigid / 2 + modes));
 }
 
 // Takes a body to a time of the substep with the velocities that it has; its speeds are those that it has there.

@@ -253,8 +253,9 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
     if (c.firm) {
         impacts_.push_back(contacts_.size());
-        c.begins = std::clamp(static_cast<int>(c.starts * settings_->substeps / settings_->dt), 0,
-                              settings_->substeps - 1);
+        c.begins = static_cast<int>(
+            std::min(c.starts * settings_->substeps / settings_->dt, settings_->substeps - 1.));
+        c.over = std::isinf(c.starts);
     }
     any_bounce_ = any_bounce_ || (c.restitution > 0 && is_rigid(c));
     contacts_.push_back(c);

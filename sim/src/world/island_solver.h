@@ -75,7 +75,7 @@ struct Island {
 ///
 /// Directly (direct_solution.cpp) go islands with springs, and islands whose contacts a step's sweeps leave far
 /// from solved (kMissedAtRest, kMissedShare), where a factorisation is cheap enough; such a step is taken anew,
-/// and kept unless it gives energy, more than kMostGained (contacts of bodies deep in each other may contradict each other).
+/// and kept unless it gives energy, more than kWorse (contacts of bodies deep in each other may contradict each other).
 /// A substep then has two halves, as RATTLE (Andersen 1983) for rigid springs:
 ///   half of gravity; impulses P by which springs' ends meet where the bodies *will be*, and contacts close
 ///   their gaps; move; the other half; impulses V by which what holds has no speed between its ends

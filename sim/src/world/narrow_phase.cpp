@@ -110,7 +110,7 @@ void NarrowPhase::pair(const PosedBody& a, const PosedBody& b, const PairSearch&
         return part(a, b, between_, search.before, manifold);
     const bool curved = a.kind->ellipsoid && b.kind->ellipsoid, edges = lowest > 0 && !curved;
     bool apart = lowest > 0 || curved || agree(size);
-    if (smooth && (search.nearest || edges)) apart = nearest(a, b, search.margin) || !edges;
+    if (smooth && (search.nearest || edges)) apart = nearest(a, b, search.margin) || (apart && !edges);
     const bool along = smooth && !apart && measure_along_axis(a, b);
     if (along)
         for (const SampleContact& contact : found_) lowest = std::min(lowest, contact.separation);

@@ -88,6 +88,26 @@ TEST(Joints, GiveNoEnergyAtAnySizeStepOrStiffness) {
                 }
 }
 
+// A ball that falls on a free chain without loss, where joints want every body at once.
+TEST(Joints, GiveNoEnergyToWhatReboundsFromThem) {
+    for (const int count : {2, 20, 60})
+        for (const double dt : {1.0 / 60, 1.0 / 240}) {
+            sim::WorldDefinition definition = row_of_balls(count, 0.1, 1e12);
+            definition.constraints.erase(definition.constraints.begin());  // from the wall
+            definition.settings.dt = dt;
+            definition.settings.gravity.setZero();
+            sim::WorldBody falls = ball({0.1 * (count / 2 + 0.5), 0.2, 0}, Fidelity::rigid, 0.04, 1000);
+            falls.velocity = {0, -5, 0};
+            definition.bodies.push_back(falls);
+            for (sim::WorldBody& body : definition.bodies) body.restitution = 1, body.friction = 0;
+            sim::World world(definition);
+            const double all = world.energy().total();
+            // What joints give back later, when nothing touches any more, is not taken: 0.25 % of 60 balls at 1/240 s.
+            EXPECT_LT(most_gained(world, 3, dt, all), dt > 0.01 ? 1e-3 : 4e-3)
+                << count << " balls, " << dt << " s";
+        }
+}
+
 // Of any size, step, stiffness, fidelity and shape; thrown about; over a floor or not; with rebounds or not.
 TEST(Joints, GiveNoEnergyToWhatWhipsAndCollides) {
     for (unsigned seed = 301; seed <= 340; ++seed) {
@@ -253,7 +273,7 @@ TEST(Stacks, OfCardsThatFallInAHeapRiseByLittle) {
                 least = std::min(least, world.energy().total());
                 rise = std::max(rise, world.energy().total() - least);
             }
-            // 1.5 % where bodies are pushed out of each other; without a bound it was a thousandfold.
-            EXPECT_LT(rise / first, 0.05) << thickness << " m, " << dt << " s";
+            // 0.3 % where bodies are pushed out of each other and none moves from which it could be taken.
+            EXPECT_LT(rise / first, 0.01) << thickness << " m, " << dt << " s";
         }
 }
