@@ -1,6 +1,8 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <map>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -72,22 +74,6 @@ struct WorkerStep {
     int cross_contacts = 0;   ///< points between bodies of different owners that it resolved
 };
 
-/// Receives a run's progress. Calls come in order, from one thread.
-class DistributedObserver {
-public:
-    virtual ~DistributedObserver() = default;
-    /// `world`: all bodies at the end of step `step` (0: the start), exact in lockstep, else as published.
-    virtual void at(std::uint64_t step, const World& world) { (void)step, (void)world; }
-    /// After at(), perhaps more than once: `world` as the next step begins. Alone the events before that step
-    /// have been applied; among workers they are seen with the step.
-    virtual void ready(std::uint64_t step, const World& world) { (void)step, (void)world; }
-    virtual void worked(const WorkerStep& step) { (void)step; }             ///< a worker has published a step
-    virtual void moved(std::uint64_t step, int bodies, int from, int to) {  ///< from -1: none
-        (void)step, (void)bodies, (void)from, (void)to;
-    }
-    virtual void note(const std::string& what) { (void)what; }  ///< joins, losses, refusals, in words
-};
-
 struct DistributedResult {    ///< of a whole run
     std::uint64_t steps = 0;  ///< done by every body
     double elapsed_s = 0;  ///< from the first step's start to the last one's end, of the clock that was used
@@ -109,11 +95,45 @@ struct DistributedResult {    ///< of a whole run
     bool rest_reached = false;                                  ///< until_rest: every body came to rest
 };
 
+/// Where a run in lockstep or in one process is at the end of a step: all that its next steps and its result
+/// depend on, apart from its scene and settings.
+struct RunState {
+    WorldSnapshot world;       ///< without its outside impulse
+    DistributedResult result;  ///< so far
+    /// World::outside_impulse of each worker, by its number; in one process worker 0's.
+    std::map<std::uint32_t, Eigen::Vector3d> outside;
+};
+
+/// For a file; see run_state.cpp for the layout.
+[[nodiscard]] std::vector<std::uint8_t> encode(const RunState& state);
+/// Throws InputError unless it is a state that a run of the scene can be in; no bytes make it read or allocate more than
+/// they hold.
+[[nodiscard]] RunState decode_run_state(std::span<const std::uint8_t> bytes, const WorldScene& scene);
+
+/// Receives a run's progress. Calls come in order, from one thread.
+class DistributedObserver {
+public:
+    virtual ~DistributedObserver() = default;
+    /// Before at(), from step 1 on, in lockstep and in one process: `state` gives what a run goes on from that begins with
+    /// at() of this step.
+    virtual void done(std::uint64_t step, const std::function<RunState()>& state) { (void)step, (void)state; }
+    /// `world`: all bodies at the end of step `step` (0: the start), exact in lockstep, else as published.
+    virtual void at(std::uint64_t step, const World& world) { (void)step, (void)world; }
+    /// After at(), perhaps more than once: `world` as the next step begins. Alone the events before that step
+    /// have been applied; among workers they are seen with the step.
+    virtual void ready(std::uint64_t step, const World& world) { (void)step, (void)world; }
+    virtual void worked(const WorkerStep& step) { (void)step; }             ///< a worker has published a step
+    virtual void moved(std::uint64_t step, int bodies, int from, int to) {  ///< from -1: none
+        (void)step, (void)bodies, (void)from, (void)to;
+    }
+    virtual void note(const std::string& what) { (void)what; }  ///< joins, losses, refusals, in words
+};
+
 /// Runs a scene in this process, without workers: pace, bound and market of `settings` do not count, nor does
-/// who is to be slower. elapsed_s and cpu_s are of the steps alone; each is told as worker 0's. Throws
-/// InputError for a scene that is refused.
+/// who is to be slower. elapsed_s and cpu_s are of the steps alone; each is told as worker 0's. `from`: goes on from
+/// there, after at(0), to the same bits as without the interruption. Throws InputError for a scene that is refused.
 DistributedResult run_alone(const WorldScene& scene, const DistributedSettings& settings,
-                            DistributedObserver& observer);
+                            DistributedObserver& observer, const RunState* from = nullptr);
 
 /// Where workers come from.
 struct DistributedLaunch {
@@ -132,9 +152,10 @@ struct DistributedLaunch {
 
 /// Runs a scene on worker processes over ZeroMQ. Returns when all steps are done. A lost worker's bodies go
 /// on elsewhere; if none is left, in this process. Throws InputError for a scene or setting that is
-/// refused, WorkerError if workers cannot be started, or none was and none joined.
+/// refused, WorkerError if workers cannot be started, or none was and none joined. `from`, in lockstep: as run_alone.
 DistributedResult run_distributed(const WorldScene& scene, const DistributedSettings& settings,
-                                  const DistributedLaunch& launch, DistributedObserver& observer);
+                                  const DistributedLaunch& launch, DistributedObserver& observer,
+                                  const RunState* from = nullptr);
 
 /// Simulated processors: workers in this process, each with a clock of its own that advances by the cost of
 /// its work. Messages arrive `latency_s` after they were sent; events happen in the order of simulated time.

@@ -187,6 +187,7 @@ struct WorldSnapshot {
     std::vector<WorldRecord> bodies;
     std::vector<ContactRecord> contacts;
     std::vector<SpringRecord> springs;
+    Eigen::Vector3d outside = Eigen::Vector3d::Zero();  ///< World::outside_impulse
 };
 
 /// Impulse that other moving bodies gave a body in one step.
@@ -247,6 +248,13 @@ struct WorldCounts {
     std::uint64_t impacts = 0;               ///< of fast bodies, found by their time of impact
     std::uint64_t solved_again = 0;  ///< rounds in which islands were solved once more: bodies met unforeseen
     std::uint64_t held_apart = 0;    ///< bodies held where they met, as those rounds did not suffice
+};
+
+/// What a world has told of its past; no step depends on it.
+struct WorldPast {
+    WorldCounts counts;
+    std::vector<QuarantinedBody> quarantined;
+    std::vector<FirstStep> limited, broken;
 };
 
 /// Many modal bodies that fall, touch, deform and hang together (thesis 2.2, 2.3.1, 2.6). See world.cpp and
@@ -316,6 +324,7 @@ public:
                           const std::vector<SpringRecord>& springs);
     [[nodiscard]] WorldSnapshot snapshot() const;
     void rewind(const WorldSnapshot& snapshot);  ///< bodies added later stay as they are
+    void recall(const WorldPast& past);          ///< after rewind to a snapshot of another world: its past
     void set_step(std::uint64_t step);           ///< time_s and counts().steps continue from here
 
     // pairs.

@@ -133,10 +133,7 @@ void write_body(ByteWriter& out, const Ownership& m) {
     write_applied(out, m.sources, m.applied);
 }
 void write_body(ByteWriter& out, const SnapshotMessage& m) {
-    out.number(m.snapshot.step);
-    write(out, m.snapshot.bodies);
-    write(out, m.snapshot.contacts);
-    write(out, m.snapshot.springs);
+    write(out, m.snapshot);
 }
 void write_body(ByteWriter& out, const StateMessage& m) {
     write(out, m.report);
@@ -209,10 +206,7 @@ void read_body(ByteReader& in, Ownership& m) {
     read_applied(in, m.sources, m.applied);
 }
 void read_body(ByteReader& in, SnapshotMessage& m) {
-    m.snapshot.step = in.number<std::uint64_t>();
-    m.snapshot.bodies = read_world_records(in);
-    m.snapshot.contacts = read_contact_records(in);
-    m.snapshot.springs = read_spring_records(in);
+    m.snapshot = read_snapshot(in);
 }
 void read_body(ByteReader& in, StateMessage& m) {
     m.report = read_report(in);

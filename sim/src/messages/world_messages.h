@@ -15,7 +15,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 4
+//   4       2      version, 5
 //   6       2      type
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
@@ -37,7 +37,7 @@ namespace sim {
 //    7 end        app     nothing
 //    8 members    app     list of u32
 //    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of applied
-//   10 snapshot   app     u64 step, list of record, list of contact, list of spring
+//   10 snapshot   app     u64 step, list of record, list of contact, list of spring, v3 outside impulse
 //   11 state      worker  report, list of record, list of contact, list of spring
 //   12 update     worker  report, lists of applied, update, push, u32 (constraints that broke)
 //   13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds}
@@ -77,7 +77,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kWorldProtocol = 4;  ///< version
+constexpr std::uint16_t kWorldProtocol = 5;  ///< version
 
 struct WorldHeader {
     std::uint32_t worker = kApplication;
@@ -143,7 +143,7 @@ struct Ownership {
     std::vector<std::uint64_t> applied;  ///< bounded: see UpdateMessage; one for each entry of `sources`
     std::vector<std::uint32_t> sources;
 };
-/// Everything at the end of a step that all have done, for a worker that joins late.
+/// Everything at the end of a step that all have done, for a worker that joins late, or a run that goes on from there.
 struct SnapshotMessage {
     WorldSnapshot snapshot;
 };

@@ -174,6 +174,14 @@ void write(ByteWriter& out, const std::vector<SpringRecord>& springs) {
     }
 }
 
+void write(ByteWriter& out, const WorldSnapshot& snapshot) {
+    out.number(snapshot.step);
+    write(out, snapshot.bodies);
+    write(out, snapshot.contacts);
+    write(out, snapshot.springs);
+    out.matrix(snapshot.outside);
+}
+
 std::vector<WorldRecord> read_world_records(ByteReader& in) {
     std::vector<WorldRecord> records(in.count(kSmallestRecord));
     for (WorldRecord& r : records) r = read_record(in);
@@ -190,6 +198,17 @@ std::vector<SpringRecord> read_spring_records(ByteReader& in) {
     std::vector<SpringRecord> springs(in.count(kSpringBytes));
     for (SpringRecord& s : springs) s = read_spring(in);
     return springs;
+}
+
+WorldSnapshot read_snapshot(ByteReader& in) {
+    WorldSnapshot snapshot;
+    snapshot.step = in.number<std::uint64_t>();
+    snapshot.bodies = read_world_records(in);
+    snapshot.contacts = read_contact_records(in);
+    snapshot.springs = read_spring_records(in);
+    in.matrix(snapshot.outside);
+    if (!snapshot.outside.allFinite()) throw DecodeError("an impulse that is not finite");
+    return snapshot;
 }
 
 }  // namespace sim

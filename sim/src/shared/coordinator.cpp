@@ -41,7 +41,7 @@ std::int64_t largest_message(const WorldScene& scene) {
 }
 
 Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& settings,
-                         DistributedObserver& observer)
+                         DistributedObserver& observer, const RunState* from)
     : scene_(scene),
       settings_(settings),
       observer_(&observer),
@@ -51,6 +51,28 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
         const std::uint64_t born = view_.clock().born(static_cast<int>(bodies_.size()));
         bodies_.push_back({kApplication, born, std::move(record), none_, 0});
     }
+    if (from) go_to(*from);
+}
+
+void Coordinator::go_to(const RunState& from) {
+    goes_on_ = true;
+    view_.jump(from.world);
+    for (const WorldRecord& record : from.world.bodies) {
+        Body& body = bodies_[static_cast<std::size_t>(record.body)];
+        body.record = record, body.step = from.world.step;
+    }
+    outside_ = from.outside;
+    result_ = from.result;
+    for (const QuarantinedBody& q : std::exchange(result_.quarantined, {})) quarantined_[q.body] = q;
+    for (const FirstStep& first : std::exchange(result_.limited, {})) limited_[first.number] = first.step;
+    for (const FirstStep& first : std::exchange(result_.broken, {})) broken_[first.number] = first.step;
+}
+
+RunState Coordinator::state() const {
+    RunState state{view_.snapshot(), result_, outside_};
+    state.result.steps = view_.step();
+    name_mishaps(state.result);
+    return state;
 }
 
 void Coordinator::send(std::vector<std::uint32_t> to, const WorldMessage& message) {
@@ -122,8 +144,16 @@ void Coordinator::catch_up(std::uint32_t worker) {
 
 void Coordinator::start() {
     started_ = true;
-    observer_->at(0, view_.world());
-    observer_->ready(0, view_.world());
+    if (goes_on_) {
+        observer_->at(0, World(scene_.world));
+        WorldSnapshot snapshot = view_.snapshot();
+        for (const std::uint32_t member : members_) {
+            snapshot.outside = outside_[member];
+            send({member}, SnapshotMessage{snapshot});
+        }
+    }
+    observer_->at(view_.step(), view_.world());
+    observer_->ready(view_.step(), view_.world());
     send(members_, Members{members_});
     if (members_.empty()) {  // all lost before: the next to join gets everything
         std::vector<int> all;
@@ -515,6 +545,7 @@ void Coordinator::advance() {
         if (settings_.pace == Pace::bounded) release();
         if (!view_.advance()) return;
         const World& world = view_.world();
+        if (settings_.pace == Pace::lockstep) observer_->done(view_.step(), [this] { return state(); });
         observer_->at(view_.step(), world);
         observer_->ready(view_.step(), world);
         std::erase_if(kept_, [this](const auto& kept) { return kept.first <= view_.step(); });
@@ -534,21 +565,22 @@ void Coordinator::end(bool rest) {
     result_.steps = view_.step();
     result_.rest_reached = rest;
     result_.counts = view_.world().counts();
-    name_mishaps();
+    name_mishaps(result_);
+    result_.outside_impulse.setZero();
     for (const auto& [worker, impulse] : outside_) result_.outside_impulse += impulse;
     send(members_, EndOfRun{});
 }
 
 // Those of the steps that all have done, in order of steps.
-void Coordinator::name_mishaps() {
+void Coordinator::name_mishaps(DistributedResult& result) const {
     const auto in_order = [&](const auto& a, const auto& b) { return a.step < b.step; };
     for (const auto& [body, q] : quarantined_)
-        if (q.step <= result_.steps) result_.quarantined.push_back(q);
-    std::stable_sort(result_.quarantined.begin(), result_.quarantined.end(), in_order);
+        if (q.step <= result.steps) result.quarantined.push_back(q);
+    std::stable_sort(result.quarantined.begin(), result.quarantined.end(), in_order);
     for (const auto& [told, named] :
-         {std::pair(&limited_, &result_.limited), std::pair(&broken_, &result_.broken)}) {
+         {std::pair(&limited_, &result.limited), std::pair(&broken_, &result.broken)}) {
         for (const auto& [number, step] : *told)
-            if (step <= result_.steps) named->push_back({number, step});
+            if (step <= result.steps) named->push_back({number, step});
         std::stable_sort(named->begin(), named->end(), in_order);
     }
 }

@@ -18,7 +18,9 @@ namespace sim {
 /// from the step before which they are added.
 class Coordinator {
 public:
-    Coordinator(const WorldScene& scene, const DistributedSettings& settings, DistributedObserver& observer);
+    /// `from`: the run goes on from there.
+    Coordinator(const WorldScene& scene, const DistributedSettings& settings, DistributedObserver& observer,
+                const RunState* from = nullptr);
 
     struct Outgoing {
         std::vector<std::uint32_t> to;
@@ -40,7 +42,8 @@ public:
     [[nodiscard]] std::vector<Outgoing> outgoing();  ///< queued messages; empties the queue
     [[nodiscard]] const std::vector<std::uint32_t>& members() const noexcept { return members_; }
     [[nodiscard]] bool finished() const noexcept { return finished_; }  ///< all steps are done
-    [[nodiscard]] const DistributedResult& result() const noexcept { return result_; }  ///< no elapsed_s
+    /// elapsed_s is that of the state which the run went on from.
+    [[nodiscard]] const DistributedResult& result() const noexcept { return result_; }
     /// Owner by the register; kApplication: none.
     [[nodiscard]] std::uint32_t owner(int body) const {
         return bodies_[static_cast<std::size_t>(body)].owner;
@@ -104,7 +107,9 @@ private:
     void advance();
     void release();
     void end(bool rest);
-    void name_mishaps();
+    void name_mishaps(DistributedResult& result) const;
+    void go_to(const RunState& from);
+    [[nodiscard]] RunState state() const;
 
     void send(std::vector<std::uint32_t> to, const WorldMessage& message);
 
@@ -118,7 +123,7 @@ private:
     std::vector<std::uint32_t> members_;
     std::map<std::uint32_t, Sender> senders_;
     std::uint32_t next_worker_ = 0, epoch_ = 0;
-    bool started_ = false, finished_ = false;
+    bool started_ = false, finished_ = false, goes_on_ = false;
     std::vector<Outgoing> queue_;
     /// State and update messages of steps that the view has not reached, for workers that join later.
     std::deque<std::pair<std::uint64_t, std::shared_ptr<const std::vector<std::uint8_t>>>> kept_;

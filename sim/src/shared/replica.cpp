@@ -110,7 +110,8 @@ bool Replica::advance(bool along) {
         ++step_;
         Known& known = at(step_);
         sort_contacts(known);
-        world_.rewind({step_, std::move(known.bodies), std::move(known.contacts), std::move(known.springs)});
+        world_.rewind({step_, std::move(known.bodies), std::move(known.contacts), std::move(known.springs),
+                       world_.outside_impulse()});
     }
     whole_ = true;
     known_.erase(known_.begin(), known_.upper_bound(step_));

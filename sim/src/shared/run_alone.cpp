@@ -1,4 +1,5 @@
 #include <ctime>
+#include <utility>
 
 #include "shared/replica.h"
 #include "sim/distributed_world.h"
@@ -23,29 +24,56 @@ void timed_step(World& world, DistributedResult& result, WorkerStep& told) {
     told.bodies = world.bodies();
 }
 
+void tell_past(const World& world, DistributedResult& result) {
+    result.outside_impulse = world.outside_impulse();
+    result.counts = world.counts();
+    result.quarantined = world.quarantined();
+    result.limited = world.limited(), result.broken = world.broken();
+}
+
+RunState state_of(const World& world, const DistributedResult& result) {
+    RunState state{world.snapshot(), result, {}};
+    tell_past(world, state.result);
+    state.outside[0] = std::exchange(state.world.outside, Eigen::Vector3d::Zero());
+    return state;
+}
+
+void go_to(const RunState& from, World& world, SceneClock& clock) {
+    WorldSnapshot snapshot = from.world;
+    for (const auto& [worker, impulse] : from.outside) snapshot.outside += impulse;
+    clock.apply(world, snapshot.step - 1);
+    world.rewind(snapshot);
+    const DistributedResult& r = from.result;
+    world.recall({r.counts, r.quarantined, r.limited, r.broken});
+}
+
 }  // namespace
 
 DistributedResult run_alone(const WorldScene& scene, const DistributedSettings& settings,
-                            DistributedObserver& observer) {
+                            DistributedObserver& observer, const RunState* from) {
     World world(scene.world);
     SceneClock clock(scene);
     DistributedResult result;
     WorkerStep told;
     const auto rests = [&] { return !clock.events_left() && world.all_asleep(); };
     observer.at(0, world);
-    for (; result.steps < settings.steps; observer.at(result.steps, world)) {
+    if (from) {
+        go_to(*from, world, clock);
+        result = from->result;
+        observer.at(result.steps, world);
+    }
+    while (result.steps < settings.steps) {
         clock.apply(world, result.steps);
         observer.ready(result.steps, world);
         if (settings.until_rest && rests()) break;
         timed_step(world, result, told);
         observer.worked(told);
+        observer.done(result.steps, [&] { return state_of(world, result); });
+        observer.at(result.steps, world);
     }
     observer.ready(result.steps, world);
     result.rest_reached = rests();
-    result.outside_impulse = world.outside_impulse();
-    result.counts = world.counts();
-    result.quarantined = world.quarantined();
-    result.limited = world.limited(), result.broken = world.broken();
+    tell_past(world, result);
     return result;
 }
 

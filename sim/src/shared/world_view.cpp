@@ -41,6 +41,11 @@ void WorldView::break_constraint(int constraint) {
     replica_.world().remove_constraint(constraint);
 }
 
+void WorldView::jump(const WorldSnapshot& snapshot) {
+    replica_.jump(snapshot);
+    step_ = snapshot.step;
+}
+
 bool WorldView::advance() {
     if (pace_ == Pace::bounded) return advance_bounded();
     if (!replica_.advance(true)) return false;

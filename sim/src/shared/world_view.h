@@ -18,7 +18,8 @@ public:
     void take(std::uint64_t step, const std::vector<WorldRecord>& records);
     /// Bounded: nothing more will be published of this body.
     void release(int body) { released_[static_cast<std::size_t>(body)] = 1; }
-    void break_constraint(int constraint);  ///< bounded: its owner reported the break
+    void break_constraint(int constraint);     ///< bounded: its owner reported the break
+    void jump(const WorldSnapshot& snapshot);  ///< lockstep: to the end of a later step
     /// Advances by one step if all its states are known; returns whether it did.
     [[nodiscard]] bool advance();
 

@@ -61,12 +61,12 @@ private:
 class SharedWorldRun {
 public:
     SharedWorldRun(const WorldScene& scene, const DistributedSettings& settings,
-                   const DistributedLaunch& launch, DistributedObserver& observer)
+                   const DistributedLaunch& launch, DistributedObserver& observer, const RunState* from)
         : settings_(settings),
           launch_(launch),
           processes_(launch.processes.program.empty() ? 0 : launch.processes.count),
           observer_(observer),
-          meeting_(scene, settings, observer),
+          meeting_(scene, settings, observer, from),
           teams_(meeting_, launch.verify, observer),
           gate_(gate_settings(scene, settings, launch)) {
         if (launch.listening)
@@ -88,7 +88,7 @@ public:
         while (!meeting_.finished()) advance();
         DistributedResult result = meeting_.result();
         teams_.count(result);
-        result.elapsed_s = seconds_since(start);
+        result.elapsed_s += seconds_since(start);
         result.refused_messages += gate_.refused_messages() + gate_.refused_keys();
         end_children();
         return result;
@@ -281,7 +281,8 @@ private:
 }  // namespace
 
 DistributedResult run_distributed(const WorldScene& scene, const DistributedSettings& settings,
-                                  const DistributedLaunch& launch, DistributedObserver& observer) {
+                                  const DistributedLaunch& launch, DistributedObserver& observer,
+                                  const RunState* from) {
     check_scene(scene);
     check_settings(settings);
     if (launch.processes.count < 0 || launch.processes.count > kMostWorkers)
@@ -290,10 +291,11 @@ DistributedResult run_distributed(const WorldScene& scene, const DistributedSett
     if (launch.verify < 1 || (launch.verify > 1 && settings.pace != Pace::lockstep))
         throw InputError("", std::to_string(launch.verify) + " workers that check each other",
                          "1 or more, and lockstep");
+    if (from && settings.pace != Pace::lockstep) throw InputError("", "a state out of step", "lockstep");
     DistributedSettings own = settings;
     own.market.trade =
         settings.market.trade && launch.verify == 1;  // times differ, and so would their offers
-    return SharedWorldRun(scene, own, launch, observer).run();
+    return SharedWorldRun(scene, own, launch, observer, from).run();
 }
 
 }  // namespace sim

@@ -322,6 +322,7 @@ void World::Implementation::step() {
         if (body.moves() && (!body.asleep || body.unposed)) pose(body);
         body.was_given = false;
     }
+    const auto [fallbacks_before, impacts_before] = std::pair(contacts.fallbacks(), contacts.impacts());
     contacts.find(contact_scene());
     find_islands();
     held_before.resize(constraints.size());
@@ -338,7 +339,8 @@ void World::Implementation::step() {
     if (sharing == Sharing::islands) forget_foreign_contacts();
     dismiss_ghosts();
     counts.pairs = contacts.pairs();
-    counts.inverse_fallbacks = contacts.fallbacks();
+    counts.inverse_fallbacks += contacts.fallbacks() - fallbacks_before;
+    counts.impacts += contacts.impacts() - impacts_before;
     counts.asleep = static_cast<int>(
         std::count_if(bodies.begin(), bodies.end(), [](const MovingBody& b) { return b.asleep; }));
 }

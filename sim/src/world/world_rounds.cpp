@@ -205,7 +205,6 @@ void World::Implementation::solve_islands() {
     }
     contacts.keep_last();
     counts.islands = awake;
-    counts.impacts = contacts.impacts();
     sum_outcomes();
 }
 

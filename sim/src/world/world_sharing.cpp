@@ -275,12 +275,13 @@ WorldSnapshot World::snapshot() const {
     for (int i = 0; i < bodies(); ++i) s.bodies.push_back(record(i));
     for (const Manifold& m : w.contacts.manifolds()) s.contacts.push_back(record_of(m));
     for (std::size_t i = 0; i < w.constraints.size(); ++i) s.springs.push_back(w.spring_record(i));
+    s.outside = w.outside;
     return s;
 }
 
 void World::rewind(const WorldSnapshot& snapshot) {
     Implementation& w = *implementation_;
-    if (snapshot.step + 1 == w.counts.steps) w.outside = w.outside_before;
+    w.outside = snapshot.outside;
     set_step(snapshot.step);
     for (const WorldRecord& record : snapshot.bodies) restore(record);
     w.contacts.manifolds().clear();
@@ -291,6 +292,14 @@ void World::rewind(const WorldSnapshot& snapshot) {
     for (const FirstStep& first : w.limited)
         if (undone(first)) w.bodies[static_cast<std::size_t>(first.number)].limited_step = 0;
     std::erase_if(w.limited, undone);
+}
+
+void World::recall(const WorldPast& past) {
+    Implementation& w = *implementation_;
+    w.counts = past.counts;
+    w.quarantined = past.quarantined, w.limited = past.limited, w.broken = past.broken;
+    for (const FirstStep& first : past.limited)
+        w.bodies.at(static_cast<std::size_t>(first.number)).limited_step = first.step;
 }
 
 void World::set_step(std::uint64_t step) {
