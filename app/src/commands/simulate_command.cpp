@@ -1,5 +1,8 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <memory>
 #include <stdexcept>
 
@@ -10,10 +13,13 @@
 #include "files/output_folder.h"
 #include "process/standard_streams.h"
 #include "scene/scene.h"
+#include "simulate/checkpoint.h"
 #include "simulate/simulate.h"
 
 namespace app {
 namespace {
+
+namespace fs = std::filesystem;
 
 void print_workers(const SimulateResult& r) {
     const WorkerOptions& o = *r.worker_options;
@@ -67,16 +73,15 @@ void simulate_and_print(const SimulateOptions& options, bool json, bool allow_qu
         result.scene.string(), awake, counted(result.steps, "step")));
 }
 
-}  // namespace
+struct Options : SimulateOptions {
+    bool json = false, allow_quarantine = false;
+    std::optional<fs::path> resume;
+};
 
-void add_simulate_command(Command& program) {
-    Command command = program.command("simulate", "Let the bodies of a scene fall, touch and bend");
-    struct Options : SimulateOptions {
-        bool json = false, allow_quarantine = false;
-    };
+std::shared_ptr<Options> declare_simulation(Command& command) {
     auto o = std::make_shared<Options>();
     o->progress = true;
-    command.required("SCENE", o->scene, as::text("SCENE"), "Scene: a file, or the name of a bundled one");
+    command.option("SCENE", o->scene, as::text("SCENE"), "Scene: a file, or the name of a bundled one");
     CLI::Option* steps = command.option("--steps", o->steps, as::whole(0, 1'000'000'000),
                                         "Steps to do; default: as long as the scene says");
     command
@@ -99,15 +104,93 @@ void add_simulate_command(Command& program) {
         "--size", as::pixels(16, 8192), "Size of the frames",
         [o = o.get()](const Eigen::Vector2i& size) { o->width = size.x(), o->height = size.y(); }, "640x480");
     command.option("--video", o->video, as::text("FILE"), "Also make a video (MP4) of the frames");
+    command.option("--checkpoint", o->checkpoint, as::whole(1, 1'000'000'000, "steps"),
+                   "Save after every so many steps, in --out, what --resume goes on from");
+    command.option("--resume", o->resume, as::text("DIR"),
+                   "Instead of SCENE: go on with the interrupted run in this folder, with its options");
     add_worker_options(command, o->workers);
     command.flag(
         "--allow-quarantine", o->allow_quarantine,
         "Exit status 0 also if bodies left the world's range or became not finite and were taken out");
     command.flag("--json", o->json, "Print one JSON document instead of words");
-    command.runs([o] {
-        o->scene = find_scene(o->scene);
-        o->frames = o->frames || o->video.has_value();
-        simulate_and_print(*o, o->json, o->allow_quarantine);
+    return o;
+}
+
+/// Of a run that goes on: how it is done and told may be another than it was, what comes out may not.
+bool may_change(const std::string& name) {
+    constexpr std::array<std::string_view, 9> kHow = {"--checkpoint", "--workers", "--balance",
+                                                      "--listen",     "--keys",    "--expect",
+                                                      "--verify",     "--json",    "--allow-quarantine"};
+    return std::ranges::count(kHow, name) > 0;
+}
+
+std::string name_of(const std::string& word) {
+    return word.substr(0, word.find('='));
+}
+
+/// The words of the command that began a run, and of those `given` now what may change.
+std::vector<std::string> words_of(const Checkpoint& saved, const std::vector<std::string>& given,
+                                  const fs::path& file) {
+    std::vector<std::string> words = saved.words;
+    for (const std::string& word : given) {
+        if (may_change(name_of(word))) {
+            std::erase_if(words, [&](const std::string& old) { return name_of(old) == name_of(word); });
+            words.push_back(word);
+        } else if (std::ranges::count(words, word) == 0) {
+            throw BadInput(fmt::format(
+                "{}: error: found {} for a run that began with {}, expected the same or nothing",
+                file.string(), one_line(word), one_line(fmt::format("{}", fmt::join(saved.words, " ")))));
+        }
+    }
+    return words;
+}
+
+/// The options of the interrupted run in `given.resume`. Names of files begin in its folder from here on.
+Options resumed(const Options& given, const Command& command) {
+    const fs::path out = fs::absolute(*given.resume), file = checkpoint_file(*given.resume);
+    std::error_code error;
+    if (given.out && !fs::equivalent(*given.out, out, error))
+        refuse_options("--out " + given.out->string() + " with --resume " + given.resume->string(),
+                       "the same folder, or no --out");
+    const Checkpoint saved = read_checkpoint(file);
+    const std::vector<std::string> words = words_of(saved, command.given_but({"--resume", "--out"}), file);
+    fs::current_path(saved.directory, error);
+    if (error)
+        throw BadInput(fmt::format("{}: error: found {}, expected the folder in which the run began",
+                                   saved.directory.string(), error.message()));
+    CLI::App line("", "simulate");
+    Command again(line);
+    const std::shared_ptr<Options> o = declare_simulation(again);
+    again.runs([] {});
+    try {
+        line.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+    } catch (const CLI::ParseError& wrong) {
+        throw BadInput(fmt::format("{}: error: found {}, expected options of simulate; begin the run anew",
+                                   file.string(), one_line(wrong.what())));
+    }
+    if (static_cast<bool>(o->workers) != saved.has_workers)
+        throw BadInput(fmt::format(
+            "{}: error: found a run {} workers, expected one {} them: their tables differ", file.string(),
+            saved.has_workers ? "with" : "without", saved.has_workers ? "without" : "with"));
+    o->words = words;
+    o->out = out;
+    o->goes_on = true;
+    return *o;
+}
+
+}  // namespace
+
+void add_simulate_command(Command& program) {
+    Command command = program.command("simulate", "Let the bodies of a scene fall, touch and bend");
+    const std::shared_ptr<Options> o = declare_simulation(command);
+    command.runs([o, command] {
+        if (o->scene.empty() && !o->resume)
+            refuse_options("no SCENE", "one, or --resume DIR; see `musicworld simulate --help`");
+        o->words = command.given_but({"--resume", "--out"});
+        Options options = o->resume ? resumed(*o, command) : *o;
+        options.scene = find_scene(options.scene);
+        options.frames = options.frames || options.video.has_value();
+        simulate_and_print(options, options.json, options.allow_quarantine);
     });
 }
 

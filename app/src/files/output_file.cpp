@@ -92,16 +92,11 @@ void write_to_device(const fs::path& staged, const fs::path& device) {
     fs::remove(staged, ignored);
 }
 
-void save_one(const fs::path& path) {
-    const FileDescriptor file = open_file(path, O_RDONLY);
-    if (!file || !save(file)) throw std::runtime_error("error: " + cannot("save " + path.string()));
-}
-
 /// A file, or a folder and all that it holds.
 void save_all(const fs::path& path) {
     if (fs::is_directory(path))
         for (const fs::path& entry : entries_of(path)) save_all(entry);
-    save_one(path);
+    save_on_disk(path);
 }
 
 void move(const fs::path& staged, const fs::path& target) {
@@ -118,7 +113,7 @@ void move(const fs::path& staged, const fs::path& target) {
     } else if (error) {
         throw std::runtime_error("error: " + cannot("write " + target.string(), error.value()));
     }
-    save_one(folder_of(target));
+    save_on_disk(folder_of(target));
 }
 
 }  // namespace
@@ -135,6 +130,11 @@ void write_file(const fs::path& file, std::string_view text) {
 
 void write_file(const fs::path& file, std::span<const std::uint8_t> bytes) {
     write_file(file, text_of(bytes));
+}
+
+void save_on_disk(const fs::path& path) {
+    const FileDescriptor file = open_file(path, O_RDONLY);
+    if (!file || !save(file)) throw std::runtime_error("error: " + cannot("save " + path.string()));
 }
 
 // The library gives up where a signal interrupts it.

@@ -29,6 +29,8 @@ struct OutputPlace {
 
 /// What lies in a folder, by name. Throws std::filesystem::filesystem_error.
 [[nodiscard]] std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder);
+/// Has a file's bytes, or a folder's names, on the disk. Throws std::runtime_error.
+void save_on_disk(const std::filesystem::path& path);
 /// Removes a folder and all that it holds, if it is there.
 void remove_tree(const std::filesystem::path& folder, std::error_code& error);
 void remove_tree(const std::filesystem::path& folder);

@@ -82,10 +82,12 @@ void check_pictures(const fs::path& pictures, bool (*is_name)(const std::string&
 /// time.
 class OutputFolder::InterruptionNotice {
 public:
-    explicit InterruptionNotice(const fs::path& unfinished) {
+    explicit InterruptionNotice(const fs::path& unfinished, bool kept = false) {
         const std::string text =
-            fmt::format("{}interrupted: what was done so far stays in {}, which the next run there removes\n",
-                        isatty(STDERR_FILENO) != 0 ? "\n" : "", unfinished.string());
+            fmt::format("{}interrupted: what was done so far stays in {}, which {}\n",
+                        isatty(STDERR_FILENO) != 0 ? "\n" : "", unfinished.string(),
+                        kept ? "simulate --resume goes on with and any other run there removes"
+                             : "the next run there removes");
         const std::size_t size = std::min(text.size(), notice.size());
         std::copy_n(text.begin(), size, notice.begin());
         notice_size = static_cast<std::sig_atomic_t>(size);
@@ -104,7 +106,7 @@ public:
     InterruptionNotice& operator=(const InterruptionNotice&) = delete;
 };
 
-OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_view> products)
+OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_view> products, bool goes_on)
     : folder_(output_place(folder).path),
       staging_(folder_ / ".unfinished"),
       products_(products.begin(), products.end()) {
@@ -130,8 +132,12 @@ OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_v
     } catch (const fs::filesystem_error& failed) {
         refuse(folder_, failed.code().message());
     }
-    notice_ = std::make_unique<InterruptionNotice>(staging_);
-    remove_tree(staging_, error);
+    if (goes_on) {
+        keep();
+    } else {
+        notice_ = std::make_unique<InterruptionNotice>(staging_);
+        remove_tree(staging_, error);
+    }
     if (!error) fs::create_directory(staging_, error);
     if (!error) fs::create_directory(scratch(), error);
     if (error) refuse(folder_, error.message());
@@ -140,10 +146,23 @@ OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_v
 }
 
 OutputFolder::~OutputFolder() {
-    std::error_code ignored;  // a destructor cannot report it
-    if (finishing_) return;   // what is not in place is kept
+    std::error_code ignored;          // a destructor cannot report it
+    if (finishing_ || kept_) return;  // what is not in place is kept
     remove_tree(staging_, ignored);
     if (made_folder_) fs::remove(folder_, ignored);
+}
+
+void OutputFolder::keep() {
+    if (std::exchange(kept_, true)) return;
+    notice_.reset();
+    notice_ = std::make_unique<InterruptionNotice>(staging_, true);
+}
+
+void OutputFolder::take_back(std::string_view name) {
+    std::error_code none;
+    const OutputPlace place = output_place(folder_ / name);
+    const bool is_product = place.kind == OutputPlace::Kind::file || place.kind == OutputPlace::Kind::folder;
+    if (is_product && !fs::exists(staging_ / name, none)) fs::rename(place.path, staging_ / name);
 }
 
 void OutputFolder::remove_earlier(std::string_view name) {

@@ -41,9 +41,10 @@ public:
     /// Throws BadInput when that cannot be: a file is in the way, no permission, another run is writing
     /// there, a product's name is a folder's, or `frames` or `figures` hold files that no run wrote and finish() would
     /// delete.
+    /// `goes_on`: keeps what the interrupted run has staged, to go on with it.
     explicit OutputFolder(const std::filesystem::path& folder,
-                          std::span<const std::string_view> products = kPlayProducts);
-    /// Without finish(): removes what was staged, and the folder if this run made it and nothing else is in
+                          std::span<const std::string_view> products = kPlayProducts, bool goes_on = false);
+    /// Without finish() or keep(): removes what was staged, and the folder if this run made it and nothing else is in
     /// it.
     ~OutputFolder();
     OutputFolder(const OutputFolder&) = delete;
@@ -60,6 +61,11 @@ public:
     void adorn(std::string_view name, const std::function<void()>& work);
     [[nodiscard]] const std::vector<std::string>& failures() const { return failures_; }
 
+    /// From now on what is staged stays without finish(), too: a run can go on with it.
+    void keep();
+    /// Of a run that goes on: stages a product again that the interrupted run had begun to put in place.
+    void take_back(std::string_view name);
+
     /// Gives back the descriptors in reserve: what is written from now on may use them.
     void free_reserve() { reserve_.clear(); }
     /// Puts everything staged in place (output_file.h), the leading product last, removes the products of earlier
@@ -75,7 +81,7 @@ private:
 
     std::filesystem::path folder_, staging_;
     std::vector<std::string_view> products_;
-    bool made_folder_ = false, finishing_ = false;
+    bool made_folder_ = false, finishing_ = false, kept_ = false;
     FileDescriptor lock_;
     std::vector<FileDescriptor> reserve_;
     std::vector<std::string> failures_, adornments_;

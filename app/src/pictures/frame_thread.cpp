@@ -74,6 +74,8 @@ void FrameThread::run(const std::function<void()>& work) {
     pictures_.close();
     ready_ = true;
     ready_.notify_one();
+    written_ = std::numeric_limits<std::uint64_t>::max();
+    written_.notify_one();
 }
 
 void FrameThread::rethrow() {
@@ -141,6 +143,8 @@ void FrameThread::write_all() {
         write_file(options_.folder / fmt::format("{:06}.png", picture.index),
                    render::encode_png(enlarged(std::move(picture.image), options_.width, options_.height)));
         report_.written.emplace_back(picture.index, monotonic_ns());
+        ++written_;
+        written_.notify_one();
     }
 }
 
@@ -152,7 +156,13 @@ bool FrameThread::push(FrameJob job) {
         turn_ = Turn::drawing;
     }
     if (!jobs_.push(std::move(job))) rethrow();
+    ++pushed_;
     return true;
+}
+
+void FrameThread::drain() {
+    for (std::uint64_t now = written_; now < pushed_; now = written_) written_.wait(now);
+    rethrow();
 }
 
 /// The timing of the frame that was drawn last, unless it was taken already.

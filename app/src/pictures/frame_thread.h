@@ -85,6 +85,8 @@ public:
     bool push(FrameJob job);
     /// With the policy `refuse`: frames drawn since the last call, in time or late.
     [[nodiscard]] std::vector<DrawnFrame> take_done();
+    /// With the policy `wait`: returns when the frames at hand are drawn and written.
+    void drain();
     /// Lets the frames at hand be drawn and written. Then take_done() has the rest.
     void finish();
 
@@ -112,6 +114,8 @@ private:
     BoundedQueue<FrameJob> jobs_{16};
     BoundedQueue<Picture> pictures_{8};
     std::atomic<bool> ready_ = false;
+    std::uint64_t pushed_ = 0;                // of the pushing thread
+    std::atomic<std::uint64_t> written_ = 0;  // or given up, as a thread has failed
 
     std::atomic<Turn> turn_ = Turn::free;
     DrawnFrame drawn_;

@@ -55,12 +55,12 @@ void MomentumWatch::look(const sim::World& world) {
     for (int body = 0; body < world.bodies(); ++body)
         if (world.definition(body).moves())
             sum += world.rigid_mass(body).mass * world.state(body).velocity.norm();
-    scale_ = std::max(scale_, sum);
+    largest_.scale = std::max(largest_.scale, sum);
     gained_ = world.momentum() - momentum_ - brought(world);
     if (!closed_) return;
-    linear_ = std::max(linear_, (gained_ - weight_ * world.time_s()).norm());
+    largest_.linear = std::max(largest_.linear, (gained_ - weight_ * world.time_s()).norm());
     if (weight_.isZero())
-        angular_ = std::max(angular_, (world.angular_momentum() - angular_momentum_).norm());
+        largest_.angular = std::max(largest_.angular, (world.angular_momentum() - angular_momentum_).norm());
 }
 
 /// Momentum of bodies that came later, as they came.
@@ -74,9 +74,11 @@ Eigen::Vector3d MomentumWatch::brought(const sim::World& world) const {
 
 std::optional<MomentumDrift> MomentumWatch::drift(const std::optional<Eigen::Vector3d>& outside) const {
     if (closed_)
-        return MomentumDrift{linear_, weight_.isZero() ? std::optional(angular_) : std::nullopt, scale_};
+        return MomentumDrift{largest_.linear,
+                             weight_.isZero() ? std::optional(largest_.angular) : std::nullopt,
+                             largest_.scale};
     if (!outside) return {};
-    return MomentumDrift{(gained_ - *outside).norm(), {}, scale_};
+    return MomentumDrift{(gained_ - *outside).norm(), {}, largest_.scale};
 }
 
 void WorkerHistory::add(const sim::WorkerStep& step) {

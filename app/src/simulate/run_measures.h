@@ -1,8 +1,10 @@
 #pragma once
 #include <sim/distributed_world.h>
 
+#include <algorithm>
 #include <map>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "report/plot.h"
@@ -19,6 +21,12 @@ public:
     /// `outside`: the impulse since the start, if it is known. None: unknown.
     [[nodiscard]] std::optional<MomentumDrift> drift(const std::optional<Eigen::Vector3d>& outside) const;
 
+    struct Largest {  ///< seen so far: of MomentumDrift, where nothing but gravity acts
+        double linear = 0, angular = 0, scale = 0;
+    };
+    [[nodiscard]] const Largest& largest() const { return largest_; }
+    void go_on(const Largest& seen) { largest_ = seen; }  ///< after the start
+
 private:
     [[nodiscard]] Eigen::Vector3d brought(const sim::World& world) const;
 
@@ -26,7 +34,7 @@ private:
     bool closed_ = false;  ///< nothing acts from outside but gravity
     Eigen::Vector3d weight_ = Eigen::Vector3d::Zero(), momentum_, angular_momentum_;
     Eigen::Vector3d gained_ = Eigen::Vector3d::Zero();  ///< since the start, but by bodies that came later
-    double linear_ = 0, angular_ = 0, scale_ = 0;
+    Largest largest_;
 };
 
 /// What each worker did over the steps, for plots: at most a few thousand points per worker, however long.
@@ -38,13 +46,19 @@ public:
         double seconds;
     };
 
+    WorkerHistory() = default;
+    WorkerHistory(std::uint64_t every, std::map<int, std::vector<Point>> workers)
+        : workers_(std::move(workers)), every_(std::max<std::uint64_t>(every, 1)) {}
+
     void add(const sim::WorkerStep& step);
+    /// Steps that are kept are multiples of it.
+    [[nodiscard]] std::uint64_t every() const { return every_; }
     /// By worker, in order of steps.
     [[nodiscard]] const std::map<int, std::vector<Point>>& workers() const { return workers_; }
 
 private:
     std::map<int, std::vector<Point>> workers_;
-    std::uint64_t every_ = 1;  ///< steps that are kept: multiples of it
+    std::uint64_t every_ = 1;
 };
 
 /// Bodies of each worker and its seconds per step over the steps (figures 2-6 and 2-7 of the thesis).

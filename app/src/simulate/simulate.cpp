@@ -1,6 +1,5 @@
 #include "simulate/simulate.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sim/errors.h>
 
@@ -11,263 +10,23 @@
 #include <stdexcept>
 
 #include "files/bad_input.h"
+#include "files/checksum.h"
 #include "files/output_folder.h"
 #include "pictures/frame_thread.h"
-#include "pictures/scene_stage.h"
 #include "process/clock.h"
 #include "process/progress_bar.h"
 #include "process/standard_streams.h"
 #include "report/json_document.h"
 #include "report/table.h"
 #include "scene/scene.h"
-#include "simulate/run_measures.h"
+#include "simulate/checkpoint.h"
+#include "simulate/simulate_record.h"
 #include "statistics/statistics.h"
 
 namespace app {
 namespace {
 
 namespace fs = std::filesystem;
-
-// The header of each table. states.csv: a body per row at each frame's time; `modes`: its modal coordinates,
-// separated by blanks. energy.csv: the world before the first step and after each. times.csv: what each step
-// took. timing.csv: each step of each worker, in the order in which they ended.
-constexpr const char* kStates = "frame,t_s,body,px,py,pz,qw,qx,qy,qz,vx,vy,vz,lx,ly,lz,modes\n";
-constexpr const char* kEnergy =
-    "step,t_s,kinetic_j,potential_j,elastic_j,springs_j,px,py,pz,lx,ly,lz,contacts,pairs,islands,asleep\n";
-constexpr const char* kTimes = "step,elapsed_s\n";
-constexpr const char* kTiming =
-    "worker,step,seconds,smoothed_s,waited_s,bodies,lead,ghost_age,bytes,cross_contacts\n";
-
-const std::string& name_of(const Scene& scene, int body) {
-    const auto b = static_cast<std::size_t>(body), now = scene.world.bodies.size();
-    return b < now ? scene.world.bodies[b].name : scene.later[b - now].name;
-}
-
-std::string state_row(const Scene& scene, const sim::World& world, int body, std::size_t frame) {
-    const sim::WorldBodyState s = world.state(body);
-    const Eigen::Vector3d &p = s.position, &v = s.velocity, &l = s.angular_momentum;
-    const Eigen::Quaterniond& q = s.orientation;
-    return csv_line({frame, world.time_s(), name_of(scene, body), p.x(), p.y(), p.z(), q.w(), q.x(), q.y(),
-                     q.z(), v.x(), v.y(), v.z(), l.x(), l.y(), l.z(),
-                     fmt::format("{}", fmt::join(s.q.begin(), s.q.end(), " "))});
-}
-
-/// `stepped`: in this process, so that the world knows its contacts; else their cells are empty.
-std::string energy_row(const sim::World& world, bool stepped) {
-    const sim::World::Energy e = world.energy();
-    const Eigen::Vector3d p = world.momentum(), l = world.angular_momentum();
-    const sim::WorldCounts& n = world.counts();
-    const auto found = [&](const auto& count) { return stepped ? Cell(count) : Cell(); };
-    return csv_line({n.steps, world.time_s(), e.kinetic, e.potential, e.elastic, e.springs, p.x(), p.y(),
-                     p.z(), l.x(), l.y(), l.z(), found(n.contacts), found(n.pairs), found(n.islands),
-                     found(n.asleep)});
-}
-
-/// A CSV file that grows while a simulation runs. Throws std::runtime_error when it cannot be written.
-class GrowingTable {
-public:
-    GrowingTable(const fs::path& file, const std::string& header)
-        : file_(file), out_(open_file(file, O_WRONLY | O_CREAT | O_TRUNC)), rows_(header) {
-        check(bool(out_));
-    }
-    void add(const std::string& rows) {
-        constexpr std::size_t kBlock = 65536;
-        rows_ += rows;
-        if (rows_.size() >= kBlock) write();
-    }
-    void finish() {
-        write();
-        check(out_.close());
-    }
-
-private:
-    void write() {
-        check(out_.write(rows_));
-        rows_.clear();
-    }
-    void check(bool done) const {
-        if (!done)
-            throw std::runtime_error("error: " + cannot("write " + file_.string()) +
-                                     "; free some space or choose another --out");
-    }
-
-    fs::path file_;
-    FileDescriptor out_;
-    std::string rows_;  // not yet written
-};
-
-/// Observes a run: keeps what its result says, and writes tables and pictures while it goes on. Without a
-/// folder it writes nothing.
-class SimulateRecord : public sim::DistributedObserver {
-public:
-    /// `last`: the step that ends the run at the latest.
-    SimulateRecord(const SimulateOptions& options, const Scene& scene, std::uint64_t last,
-                   std::unique_ptr<OutputFolder> folder)
-        : options_(options), scene_(scene), last_(last), bar_(options.progress), folder_(std::move(folder)) {
-        result_.scene = scene.file, result_.name = scene.name;
-        result_.dt_s = scene.world.settings.dt;
-        result_.rest_wanted = options.until_rest;
-        result_.worker_options = options.workers;
-    }
-
-    void at(std::uint64_t step, const sim::World& world) override {
-        constexpr std::uint64_t kMomentumEvery =
-            10;  // [steps] the sum over all bodies holds up workers' messages
-        if (step == 0)
-            start(world);
-        else
-            result_.body_steps += std::uint64_t(world.bodies());
-        watch_spin(step, world);
-        if (energy_) energy_->add(energy_row(world, !options_.workers));
-        // Where rest may end the run any step may be the last.
-        const bool perhaps_last = step == last_ || options_.until_rest;
-        if (perhaps_last || !options_.workers || step % kMomentumEvery == 0) momentum_->look(world);
-        if (perhaps_last) describe(world);
-        bar_.show(last_ > 0 ? double(step) / double(last_) : 1);
-    }
-
-    /// Takes frames: the first state that is not before a frame's time.
-    void ready(std::uint64_t, const sim::World& world) override {
-        if (!folder_) return;
-        for (; double(next_frame_) / options_.fps <= world.time_s() + 1e-9; ++next_frame_) {
-            for (int body = 0; body < world.bodies(); ++body)
-                states_->add(state_row(scene_, world, body, next_frame_));
-            if (frames_) frames_->push({.index = next_frame_, .state = stage_->frame(world)});
-        }
-    }
-
-    void worked(const sim::WorkerStep& s) override {
-        if (!steps_) return;
-        steps_->add(options_.workers ? csv_line({s.worker, s.step, s.seconds, s.smoothed_s, s.waited_s,
-                                                 s.bodies, s.lead, s.ghost_age, s.bytes, s.cross_contacts})
-                                     : csv_line({s.step, s.seconds}));
-        if (options_.workers) history_.add(s);
-    }
-
-    void note(const std::string& what) override { result_.notes.push_back(what); }
-
-    /// After the last step; `wall`: since the scene was read.
-    [[nodiscard]] SimulateResult finish(const sim::DistributedResult& run, const WallTimer& wall,
-                                        std::optional<KeptAccuracy> accuracy) {
-        bar_.clear();
-        result_.accuracy = std::move(accuracy);
-        take_result(run);
-        result_.wall_s = wall.seconds();
-        if (folder_) write_products(wall);
-        return std::move(result_);
-    }
-
-private:
-    void start(const sim::World& world) {
-        momentum_.emplace(scene_, world);
-        result_.energy_start = world.energy();
-        if (!folder_) return;
-        const auto table = [&](const char* name, const char* header) {
-            return std::make_unique<GrowingTable>(folder_->path(name), header);
-        };
-        states_ = table("states.csv", kStates);
-        energy_ = table("energy.csv", kEnergy);
-        steps_ = options_.workers ? table("timing.csv", kTiming) : table("times.csv", kTimes);
-        if (!options_.frames) return;
-        fs::create_directory(folder_->path("frames"));
-        stage_ = std::make_unique<SceneStage>(scene_, world);
-        const FrameThreadOptions where{options_.width, options_.height, folder_->path("frames")};
-        frames_ = std::make_unique<FrameThread>(
-            std::vector{stage_->description(options_.width, options_.height)}, stage_->frame(world), where);
-    }
-
-    void watch_spin(std::uint64_t step, const sim::World& world) {
-        constexpr double kMost = 0.01;
-        spun_.resize(std::size_t(world.bodies()));
-        for (int body = 0; body < world.bodies(); ++body) {
-            if (spun_[std::size_t(body)] || world.fidelity(body).fidelity == sim::Fidelity::rigid ||
-                sim::centrifugal_stretch(world, body) <= kMost)
-                continue;
-            spun_[std::size_t(body)] = true;
-            result_.mishaps.spun.push_back({name_of(scene_, body), step});
-        }
-    }
-
-    void describe(const sim::World& world) {
-        result_.bodies = world.bodies();
-        result_.rigid = result_.linear = result_.modal = result_.groups_cut = 0;
-        for (int body = 0; body < world.bodies(); ++body) {
-            const sim::FidelityChoice choice = world.fidelity(body);
-            const sim::Fidelity fidelity = choice.fidelity;
-            result_.groups_cut += choice.cut.below < choice.cut.count;
-            (fidelity == sim::Fidelity::rigid    ? result_.rigid
-             : fidelity == sim::Fidelity::linear ? result_.linear
-                                                 : result_.modal) += 1;
-        }
-        result_.time_s = world.time_s();
-        result_.energy = world.energy();
-        result_.momentum = world.momentum(), result_.angular_momentum = world.angular_momentum();
-        result_.state_hash = world.state_hash();
-    }
-
-    void take_result(const sim::DistributedResult& run) {
-        static_cast<sim::DistributedResult&>(result_) = run;
-        for (const sim::QuarantinedBody& q : run.quarantined)
-            result_.mishaps.quarantined.push_back({name_of(scene_, q.body), q.step, q.what});
-        for (const sim::FirstStep& c : run.broken)
-            result_.mishaps.broken.push_back(
-                {scene_.world.constraints.at(std::size_t(c.number)).name, c.step});
-        for (const sim::FirstStep& b : run.limited)
-            result_.mishaps.limited.push_back({name_of(scene_, b.number), b.step});
-        // Of what cannot follow its deformation anyway nothing more is said.
-        std::erase_if(result_.mishaps.spun, [this](const Mishap& spun) {
-            return std::ranges::count(result_.mishaps.limited, spun.name, &Mishap::name) > 0;
-        });
-        // What a worker that died had counted of the impulse from outside is lost with it.
-        if (run.lost == 0 && run.quarantined.empty()) result_.drift = momentum_->drift(run.outside_impulse);
-        for (const sim::WorldEvent& event : scene_.events)
-            if (!options_.workers && (event.step < run.steps || run.rest_reached))
-                for (const sim::Slowing& slowing : event.slowing)
-                    note(
-                        fmt::format("at {} s worker {} is to be slower {} times: not done, as there are no "
-                                    "workers in one process",
-                                    double(event.step) * result_.dt_s, slowing.worker, slowing.factor));
-    }
-
-    void write_products(const WallTimer& wall) {
-        folder_->free_reserve();
-        for (GrowingTable* table : {states_.get(), energy_.get(), steps_.get()}) table->finish();
-        if (frames_) frames_->finish();
-        if (options_.workers)
-            folder_->adorn("workers.svg", [&] {
-                Plotter plotter(folder_->scratch());
-                const std::string plot = plotter.draw({workers_plot(history_)}).front();
-                if (plot.empty()) throw std::runtime_error(plotter.failure());
-                write_file(folder_->path("workers.svg"), plot);
-            });
-        result_.frames = frames_ ? frames_->report().written.size() : 0;
-        std::optional<OutputFile> video;
-        if (options_.video)
-            folder_->adorn("", [&] {
-                video.emplace(*options_.video);
-                make_video(video->partial(), options_.fps, false, folder_->path("."));
-            });
-        result_.wall_s = wall.seconds();
-        write_file(folder_->path("summary.json"), format_simulate(result_));
-        folder_->finish();
-        if (video) folder_->adorn("", [&] { video->finish(); });
-        result_.failures = folder_->failures();
-    }
-
-    const SimulateOptions& options_;
-    const Scene& scene_;
-    std::uint64_t last_;
-    SimulateResult result_;
-    ProgressBar bar_;
-    std::optional<MomentumWatch> momentum_;
-    std::unique_ptr<OutputFolder> folder_;
-    std::unique_ptr<GrowingTable> states_, energy_, steps_;
-    std::unique_ptr<SceneStage> stage_;
-    std::unique_ptr<FrameThread> frames_;
-    WorkerHistory history_;
-    std::vector<bool> spun_;  // of each body, that it was told
-    std::size_t next_frame_ = 0;
-};
 
 /// Of the scene's own dt.
 std::uint64_t last_step(const SimulateOptions& options, const Scene& scene) {
@@ -319,11 +78,12 @@ sim::DistributedLaunch launch_of(const WorkerOptions& workers) {
 }
 
 sim::DistributedResult run(const Scene& scene, const SimulateOptions& options,
-                           const sim::DistributedSettings& settings, sim::DistributedObserver& observer) {
-    if (!options.workers) return sim::run_alone(scene, settings, observer);
+                           const sim::DistributedSettings& settings, sim::DistributedObserver& observer,
+                           const sim::RunState* from) {
+    if (!options.workers) return sim::run_alone(scene, settings, observer, from);
     if (options.workers->simulated)
         return sim::simulate_processors(scene, settings, *options.workers->simulated, observer);
-    return sim::run_distributed(scene, settings, launch_of(*options.workers), observer);
+    return sim::run_distributed(scene, settings, launch_of(*options.workers), observer, from);
 }
 
 /// Changes what is left to a scene's accuracy.
@@ -345,6 +105,14 @@ void check(const SimulateOptions& options, const Scene& scene) {
             scene.file.string()));
     if ((options.frames || options.video) && !options.out)
         throw BadInput("error: found --frames or --video without --out, expected a folder for the pictures");
+    if (options.checkpoint > 0 && !options.out)
+        throw BadInput("error: found --checkpoint without --out, expected a folder to save it in");
+    if (options.checkpoint > 0 && options.workers &&
+        (options.workers->pace == sim::Pace::bounded || options.workers->simulated))
+        throw BadInput(
+            "error: found --checkpoint with --mode async or --processors, expected --mode sync and "
+            "processes: what "
+            "depends on who was faster cannot go on as it was");
     if (options.video) {
         const OutputFile can_be(*options.video);
         if (options.width % 2 != 0 || options.height % 2 != 0)
@@ -353,6 +121,47 @@ void check(const SimulateOptions& options, const Scene& scene) {
         require_ffmpeg();
     }
     if (options.workers && options.out) require_gnuplot();
+}
+
+/// What a run's checkpoints say of it.
+Checkpoint about(const SimulateOptions& options, const Scene& scene) {
+    return {options.words,
+            fs::current_path(),
+            MUSICWORLD_VERSION,
+            program_build(),
+            sha256_of_file(scene.file),
+            options.workers.has_value(),
+            {},
+            {}};
+}
+
+/// Of the run in `options.out`, whose scene and program must be those of `run`.
+void take_saved(const SimulateOptions& options, Checkpoint& run) {
+    const fs::path file = checkpoint_file(*options.out);
+    Checkpoint saved = read_checkpoint(file);
+    const auto expect = [&](const std::string& what, const std::string& found, const std::string& expected) {
+        if (found != expected)
+            throw BadInput(fmt::format("{}: error: found a run of {} {}, expected {}; begin it anew",
+                                       file.string(), what, one_line(found), expected));
+    };
+    expect("version", saved.version, run.version);
+    expect("build and processor", saved.build, run.build);
+    expect("a scene with SHA-256", saved.scene_sha256, run.scene_sha256);
+    run.record = std::move(saved.record);
+    run.state = std::move(saved.state);
+}
+
+sim::RunState state_of(const Checkpoint& saved, const SimulateOptions& options, const Scene& scene,
+                       std::uint64_t steps) {
+    const std::string file = checkpoint_file(*options.out).string();
+    try {
+        sim::RunState state = sim::decode_run_state(saved.state, scene);
+        if (state.result.steps <= steps) return state;
+        throw BadInput(fmt::format("{}: error: found step {}, expected at most {}; begin the run anew", file,
+                                   state.result.steps, steps));
+    } catch (const sim::InputError& wrong) {
+        throw BadInput(fmt::format("{}: error: {}; begin the run anew", file, wrong.what()));
+    }
 }
 
 using Json = nlohmann::ordered_json;
@@ -444,7 +253,11 @@ SimulateResult simulate(const SimulateOptions& options) {
     Scene scene = read_scene(options.scene, options.dt_s);
     check(options, scene);
     std::unique_ptr<OutputFolder> folder;
-    if (options.out) folder = std::make_unique<OutputFolder>(*options.out, kSimulateProducts);
+    if (options.out)
+        folder = std::make_unique<OutputFolder>(*options.out, kSimulateProducts, options.goes_on);
+    Checkpoint kept;
+    if (options.checkpoint > 0 || options.goes_on) kept = about(options, scene);
+    if (options.goes_on) take_saved(options, kept);
     const WallTimer wall;
     try {
         std::uint64_t steps = last_step(options, scene);
@@ -455,8 +268,10 @@ SimulateResult simulate(const SimulateOptions& options) {
             scene.workers.balance_from *= std::uint64_t(accuracy->report.step_parts);
         }
         const sim::DistributedSettings settings = settings_of(options, scene, steps);
-        SimulateRecord record(options, scene, steps, std::move(folder));
-        const sim::DistributedResult done = run(scene, options, settings, record);
+        std::optional<sim::RunState> from;
+        if (options.goes_on) from = state_of(kept, options, scene, steps);
+        SimulateRecord record(options, scene, steps, std::move(folder), std::move(kept));
+        const sim::DistributedResult done = run(scene, options, settings, record, from ? &*from : nullptr);
         return record.finish(done, wall, std::move(accuracy));
     } catch (const sim::InputError& wrong) {
         if (!wrong.names_place()) throw;

@@ -41,6 +41,9 @@ struct SimulateOptions {
     int width = 640, height = 480;
     bool progress = false;
     std::optional<WorkerOptions> workers;  ///< none: all in this process
+    std::uint64_t checkpoint = 0;          ///< steps after which one is saved in `out`; 0: none
+    bool goes_on = false;                  ///< from the checkpoint in `out`
+    std::vector<std::string> words;        ///< of the command: what a checkpoint says of it
 };
 
 /// Momentum that came from nowhere.
