@@ -104,8 +104,8 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
         "--size", as::pixels(16, 8192), "Size of the frames",
         [o = o.get()](const Eigen::Vector2i& size) { o->width = size.x(), o->height = size.y(); }, "640x480");
     command.option("--video", o->video, as::text("FILE"), "Also make a video (MP4) of the frames");
-    command.option("--checkpoint", o->checkpoint, as::whole(1, 1'000'000'000, "steps"),
-                   "Save after every so many steps, in --out, what --resume goes on from");
+    command.option("--checkpoint", o->checkpoint, as::whole(0, 1'000'000'000, "steps"),
+                   "Save after every so many steps, in --out, what --resume goes on from; 0: never");
     command.option("--resume", o->resume, as::text("DIR"),
                    "Instead of SCENE: go on with the interrupted run in this folder, with its options");
     add_worker_options(command, o->workers);
