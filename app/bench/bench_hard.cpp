@@ -27,16 +27,7 @@ class OurRigid : public RigidPeer {
 public:
     explicit OurRigid(const sim::WorldDefinition& definition) : world_(definition) {}
     void step() override { world_.step(); }
-    [[nodiscard]] std::vector<RigidState> states() override {
-        std::vector<RigidState> all;
-        for (int i = 0; i < world_.bodies(); ++i) {
-            const sim::WorldBodyState s = world_.state(i);
-            const Eigen::Vector3d own = s.orientation.conjugate() * s.angular_momentum;
-            const Eigen::Vector3d spin = own.cwiseQuotient(world_.rigid_mass(i).inertia);
-            all.push_back({s.position, s.orientation, s.velocity, s.orientation * spin});
-        }
-        return all;
-    }
+    [[nodiscard]] std::vector<RigidState> states() override { return rigid_states(world_); }
     [[nodiscard]] const sim::World& world() const { return world_; }
 
 private:

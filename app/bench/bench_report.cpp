@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -21,6 +23,11 @@ Table table_of(const std::vector<BenchResult>& results) {
 }
 
 }  // namespace
+
+std::string lower(std::string name) {
+    std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
+    return name;
+}
 
 MachineName machine_name() {
     MachineName name;

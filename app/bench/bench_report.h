@@ -17,6 +17,8 @@ struct MachineName {
 };
 [[nodiscard]] MachineName machine_name();
 
+[[nodiscard]] std::string lower(std::string name);  ///< as it stands in a figure's name
+
 /// One measured figure; beside a peer's, where there is one.
 struct BenchResult {
     std::string name;

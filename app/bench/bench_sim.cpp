@@ -11,6 +11,7 @@
 #include <memory>
 #include <vector>
 
+#include "bench/rest_overlap.h"
 #include "process/clock.h"
 #include "statistics/statistics.h"
 
@@ -94,11 +95,13 @@ MachineSpeed measure_machine_speed() {
 
 constexpr int kTurn = 25;  // steps
 constexpr int kSamples = 182;
+constexpr int kMostBeside = 400;  // more take peers many minutes and MuJoCo gigabytes
 
 /// Milliseconds a step of one round.
 struct Round {
     double ours = 0, rigid = 0, reduced = 0;
-    double contacts = 0;  ///< of ours, mean over the steps
+    std::vector<double> equal;  ///< of the peers at equal overlap, in order
+    double contacts = 0;        ///< of ours, mean over the steps
 };
 
 template <typename World>
@@ -108,23 +111,40 @@ double timed_ms(World& world, int steps) {
     return 1e3 * (thread_cpu_s() - begin);
 }
 
-Round run_round(const sim::WorldDefinition& definition, const SimBenchOptions& options) {
+Round run_round(const sim::WorldDefinition& definition, const std::vector<EqualPeer>& peers, bool bullet,
+                const SimBenchOptions& options) {
     sim::World ours(definition);
     std::unique_ptr<sim_bench::BulletWorld> rigid, reduced;
-    if (sim_bench::bullet_is_there()) {
-        rigid = std::make_unique<sim_bench::BulletWorld>(definition, sim_bench::BulletKind::rigid);
+    if (bullet) rigid = std::make_unique<sim_bench::BulletWorld>(definition, sim_bench::BulletKind::rigid);
+    if (bullet && definition.bodies.front().fidelity.modes > 0)
         reduced = std::make_unique<sim_bench::BulletWorld>(definition, sim_bench::BulletKind::reduced);
-    }
+    std::vector<std::unique_ptr<sim_bench::RigidPeer>> equal;
+    for (const EqualPeer& peer : peers) equal.push_back(peer.start(definition));
     Round sum;
+    sum.equal.resize(equal.size());
     for (int done = 0; done < options.steps; done += kTurn) {
         const int steps = std::min(kTurn, options.steps - done);
         sum.ours += timed_ms(ours, steps);
         sum.contacts += ours.counts().contacts * static_cast<double>(steps);
         if (rigid) sum.rigid += timed_ms(*rigid, steps);
         if (reduced) sum.reduced += timed_ms(*reduced, steps);
+        for (std::size_t i = 0; i < equal.size(); ++i) sum.equal[i] += timed_ms(*equal[i], steps);
     }
-    const double share = 1.0 / options.steps;
-    return {sum.ours * share, sum.rigid * share, sum.reduced * share, sum.contacts * share};
+    for (double* ms : {&sum.ours, &sum.rigid, &sum.reduced, &sum.contacts}) *ms /= options.steps;
+    for (double& ms : sum.equal) ms /= options.steps;
+    return sum;
+}
+
+/// Of our balls, over the end of a run.
+double overlap_at_rest(const sim::WorldDefinition& definition, int steps) {
+    sim::World world(definition);
+    const int rest = std::min(kRestSteps, steps);
+    double sum = 0;
+    for (int done = 0; done < steps; ++done) {
+        world.step();
+        if (done >= steps - rest) sum += mean_overlap(definition, world);
+    }
+    return sum / rest;
 }
 
 double median_over(const std::vector<Round>& rounds, const std::function<double(const Round&)>& value) {
@@ -138,14 +158,13 @@ int rounds_for(int bodies, const SimBenchOptions& options) {
     return bodies <= 25 ? 5 : bodies <= 100 ? 3 : 1;
 }
 
-BenchResult against(const std::string& name, const char* peer, const std::vector<Round>& rounds,
-                    double Round::*theirs) {
+/// Beside a peer, by what each took in every round.
+BenchResult against(const std::string& name, const std::string& peer, const std::string& version,
+                    const std::vector<Round>& rounds, const std::function<double(const Round&)>& theirs) {
     BenchResult result{name, median_over(rounds, [](const Round& r) { return r.ours; }), "ms a step"};
-    if (!sim_bench::bullet_is_there()) return result;
-    result.peer = peer;
-    result.peer_version = "Bullet " + sim_bench::bullet_version();
-    result.peer_value = median_over(rounds, [&](const Round& r) { return r.*theirs; });
-    result.ratio = median_over(rounds, [&](const Round& r) { return r.ours / r.*theirs; });
+    result.peer = peer, result.peer_version = version;
+    result.peer_value = median_over(rounds, theirs);
+    result.ratio = median_over(rounds, [&](const Round& r) { return r.ours / theirs(r); });
     return result;
 }
 
@@ -153,12 +172,16 @@ void add_results(BenchReport& report, const std::string& prefix, const sim::Worl
                  const MachineSpeed& speed, const std::vector<Round>& rounds) {
     const int bodies = static_cast<int>(definition.bodies.size());
     const int modes = definition.bodies.front().fidelity.modes;
-    report.results.push_back(
-        against(prefix + "_vs_bullet_rigid", "btRigidBody convex hulls", rounds, &Round::rigid));
-    report.results.push_back(against(prefix + "_vs_bullet_reduced",
-                                     "btReducedDeformableBody (no contact among them)", rounds,
-                                     &Round::reduced));
-    const double per_body_us = 1e3 * report.results.back().value / bodies;
+    const std::string version = "Bullet " + sim_bench::bullet_version();
+    if (rounds.front().rigid > 0)
+        report.results.push_back(against(prefix + "_vs_bullet_rigid", "btRigidBody convex hulls", version,
+                                         rounds, [](const Round& r) { return r.rigid; }));
+    if (rounds.front().reduced > 0)
+        report.results.push_back(against(prefix + "_vs_bullet_reduced",
+                                         "btReducedDeformableBody (no contact among them)", version, rounds,
+                                         [](const Round& r) { return r.reduced; }));
+    const double step_ms = median_over(rounds, [](const Round& r) { return r.ours; });
+    const double per_body_us = 1e3 * step_ms / bodies;
     const double contacts = median_over(rounds, [](const Round& r) { return r.contacts; }) / bodies;
     const LeastWork work = least_work(modes, kSamples, definition.settings.substeps, contacts);
     const double bound_us = 1e6 * std::max(work.flops / speed.flops, work.bytes / speed.bytes_per_second);
@@ -168,17 +191,42 @@ void add_results(BenchReport& report, const std::string& prefix, const sim::Worl
     report.results.push_back({prefix + "_share_of_bound", bound_us / per_body_us, "reached"});
 }
 
+/// Peers whose balls overlap at rest no more than ours; what they overlap goes into the report.
+std::vector<EqualPeer> equal_peers(BenchReport& report, const std::string& prefix,
+                                   const sim::WorldDefinition& definition, const SimBenchOptions& options,
+                                   const std::function<void(const std::string&)>& progress) {
+    progress(prefix + ", overlaps at rest");
+    const double ours = overlap_at_rest(definition, options.steps);
+    report.results.push_back({prefix + "_overlap_at_rest", 100 * ours, "% of the diameter"});
+    std::vector<EqualPeer> peers;
+    for (const sim_bench::PeerLibrary& library : sim_bench::rigid_peers()) {
+        progress(fmt::format("{}, overlaps of {}", prefix, library.name));
+        if (std::optional<EqualPeer> equal = cheapest_equal(library, definition, options.steps, ours)) {
+            report.notes.push_back(fmt::format("{}: {} {} at equal overlap: {}; it overlaps by {:.2g} %.",
+                                               prefix, library.name, library.version, equal->words(),
+                                               100 * equal->overlap));
+            peers.push_back(std::move(*equal));
+        } else {
+            report.notes.push_back(
+                fmt::format("{}: no setting of {} {} overlaps as little as ours down to a sixteenth of the "
+                            "step, or within two minutes of processor time.",
+                            prefix, library.name, library.version));
+        }
+    }
+    return peers;
+}
+
+/// What a body costs among more, against the first number.
 void add_growth(BenchReport& report, const SimBenchOptions& options) {
     const auto cost = [&](int bodies) {
         const std::string name = fmt::format("bodies{}_modal{}_per_body", bodies, options.modes);
-        const auto found = std::find_if(report.results.begin(), report.results.end(),
-                                        [&](const BenchResult& r) { return r.name == name; });
-        return found->value;
+        return std::ranges::find(report.results, name, &BenchResult::name)->value;
     };
-    const int first = options.bodies.front(), last = options.bodies.back();
-    if (first == last) return;
-    report.results.push_back(
-        {fmt::format("per_body_at_{}_over_{}", last, first), cost(last) / cost(first), "times the cost"});
+    const int first = options.bodies.front();
+    for (const int bodies : options.bodies)
+        if (bodies != first)
+            report.results.push_back({fmt::format("per_body_at_{}_over_{}", bodies, first),
+                                      cost(bodies) / cost(first), "times the cost"});
 }
 
 }  // namespace
@@ -197,10 +245,21 @@ BenchReport bench_sim(const SimBenchOptions& options,
     report.results.push_back({"core_peak_single_precision", 1e-9 * speed.flops, "Gflop/s"});
     report.results.push_back({"core_memory_read", 1e-9 * speed.bytes_per_second, "GB/s"});
     const auto measure = [&](const std::string& prefix, const sim::WorldDefinition& definition) {
+        const int bodies = static_cast<int>(definition.bodies.size());
+        const bool beside = bodies <= kMostBeside;
+        std::vector<EqualPeer> peers;
+        if (beside) peers = equal_peers(report, prefix, definition, options, progress);
         std::vector<Round> rounds;
-        for (int i = 0; i < rounds_for(static_cast<int>(definition.bodies.size()), options); ++i) {
+        for (int i = 0; i < rounds_for(bodies, options); ++i) {
             progress(fmt::format("{}, round {}", prefix, i + 1));
-            rounds.push_back(run_round(definition, options));
+            rounds.push_back(run_round(definition, peers, beside && sim_bench::bullet_is_there(), options));
+        }
+        for (std::size_t i = 0; i < peers.size(); ++i) {
+            const sim_bench::PeerLibrary& library = peers[i].library;
+            report.results.push_back(
+                against(fmt::format("{}_vs_{}_at_equal_overlap", prefix, lower(library.name)),
+                        library.name + " " + peers[i].words(), library.name + " " + library.version, rounds,
+                        [i](const Round& r) { return r.equal[i]; }));
         }
         add_results(report, prefix, definition, speed, rounds);
     };
@@ -216,6 +275,14 @@ BenchReport bench_sim(const SimBenchOptions& options,
         fmt::format("{} steps of 1/60 s ({} substeps of ours), one thread, processor time, in turns of {} "
                     "steps; nothing sleeps.",
                     options.steps, sim::WorldSettings{}.substeps, kTurn));
+    report.notes.push_back(
+        fmt::format("Equal overlap: the mean depth of all pairs that overlap, along the line of centres, "
+                    "over the last {} steps; "
+                    "ours where the modes have moved the surfaces. Of each peer the cheapest of its methods "
+                    "and steps, halved from "
+                    "1/60 s, that overlaps no more; its balls are rigid spheres. Among more than {} balls "
+                    "ours are alone.",
+                    kRestSteps, kMostBeside));
     report.notes.push_back(std::string(options.scene
                                            ? "The scene's bodies and planes, without its constraints."
                                            : "Balls of 0.5 m, 182 vertices, 360 triangles, falling into a "

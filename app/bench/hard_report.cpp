@@ -84,11 +84,6 @@ Table entrants_of(const HardComparison& scene) {
     return table;
 }
 
-std::string lower(std::string name) {
-    std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
-    return name;
-}
-
 /// As every benchmark's results, and the errors. Ours is the run at equal error; at the scene's step if none is.
 Table results_of(const HardBench& bench) {
     Table table =

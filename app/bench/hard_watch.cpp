@@ -66,6 +66,17 @@ RigidState state_at_start(const sim::WorldBody& body) {
 
 }  // namespace
 
+std::vector<RigidState> rigid_states(const sim::World& world) {
+    std::vector<RigidState> all;
+    for (int i = 0; i < world.bodies(); ++i) {
+        const sim::WorldBodyState s = world.state(i);
+        const Vector3d own = s.orientation.conjugate() * s.angular_momentum;
+        const Vector3d spin = own.cwiseQuotient(world.rigid_mass(i).inertia);
+        all.push_back({s.position, s.orientation, s.velocity, s.orientation * spin});
+    }
+    return all;
+}
+
 const std::vector<HardScene>& hard_scenes() {
     // The limits are those of each scene's head.
     static const std::vector<HardScene> kScenes = {{"table", Right::lands, 5.0 / 80, 0.06},

@@ -46,6 +46,9 @@ struct HardFigures {
     bool right = false;  ///< error (gains_none: energy_gained) within the limit, none of the first three
 };
 
+/// Of all bodies of our world. A body's rotation is that of its rest shape with the same angular momentum.
+[[nodiscard]] std::vector<sim_bench::RigidState> rigid_states(const sim::World& world);
+
 /// Judges a run by its states, whoever computed them. Spheres and boxes are taken as such, see peer_shape;
 /// other bodies by their boxes.
 class HardWatch {

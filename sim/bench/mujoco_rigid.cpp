@@ -36,8 +36,9 @@ public:
 
     [[nodiscard]] std::string xml() const {
         const std::string solref = number(2 * settings_.dt) + " 1";
-        // Room for 20 contacts a body, which are rows of four edges each.
-        const std::size_t contacts = 20 * (world_.bodies.size() + 1), rows = 4 * contacts;
+        // A contact is rows of four edges.
+        const std::size_t contacts = std::size_t(settings_.contacts_per_body) * (world_.bodies.size() + 1),
+                          rows = 4 * contacts;
         std::string text =
             "<mujoco>\n<compiler angle=\"radian\"/>\n<size" + attribute("nconmax", std::to_string(contacts)) +
             attribute("njmax", std::to_string(rows)) +

@@ -21,6 +21,7 @@ struct PeerSettings {
     bool sleeping = false;
     bool hulls = false;  ///< hulls of our samples, also where the peer has spheres and boxes of its own
     std::string method;  ///< one of PeerLibrary::methods
+    int contacts_per_body = 20;  ///< room for them, where a peer needs to know
 };
 
 /// The bodies of a world, all of them rigid, in another library. Superquadrics of exponents 1 are spheres if

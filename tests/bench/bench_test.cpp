@@ -1,3 +1,4 @@
+#include <falling_bodies.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include "bench/bench_report.h"
 #include "bench/bench_sim.h"
 #include "bench/bench_tradeoff.h"
+#include "bench/rest_overlap.h"
 
 namespace {
 
@@ -56,8 +58,51 @@ TEST(Bench, FourBallsRunBesideBulletAndEveryFigureIsThere) {
     }
     for (const char* name :
          {"bodies4_modal12_vs_bullet_rigid", "bodies4_modal12_vs_bullet_reduced", "bodies9_modal12_per_body",
-          "bodies9_modal12_share_of_bound", "per_body_at_9_over_4"})
+          "bodies9_modal12_share_of_bound", "per_body_at_9_over_4", "bodies4_modal12_overlap_at_rest"})
         EXPECT_TRUE(names.count(name)) << name;
+}
+
+TEST(RestOverlap, IsTheMeanDepthOfThePairsThatOverlapAlsoWhereModesMoveTheSurface) {
+    sim::WorldDefinition definition;
+    definition.planes.push_back({});
+    for (const sim::Fidelity fidelity : {sim::Fidelity::rigid, sim::Fidelity::linear}) {
+        definition.bodies.clear();
+        for (const double x : {0.0, 0.98, 3.0}) {
+            sim::WorldBody ball;
+            ball.shape.base.semi_axes.setConstant(0.5);
+            ball.material = {1e6, 0.3, 1000};
+            ball.fidelity.fidelity = fidelity;
+            ball.world_from_body.translation() = Eigen::Vector3d(x, x > 2 ? 0.49 : 0.6, 0);
+            definition.bodies.push_back(ball);
+        }
+        sim::World world(definition);
+        // 20 mm of two balls and 10 mm in the floor, of a metre.
+        EXPECT_NEAR(app::mean_overlap(definition, world), 0.015, 1e-12);
+        std::vector<sim_bench::RigidState> states;
+        for (const sim::WorldBody& body : definition.bodies)
+            states.push_back({body.world_from_body.translation(), Eigen::Quaterniond::Identity(),
+                              Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()});
+        EXPECT_NEAR(app::mean_overlap(definition, states), 0.015, 1e-12);
+        if (fidelity == sim::Fidelity::rigid) continue;
+        // A ball that is stretched along x reaches further into its neighbour, by what its mode moves the pole.
+        sim::WorldBodyState state = world.state(0);
+        const Eigen::Matrix3Xd pole = sim::mode_shapes_at(world.basis(0), {0.5, 0, 0});
+        Eigen::Index mode = 0;
+        pole.row(0).cwiseAbs().maxCoeff(&mode);
+        state.q[mode] = 0.004 / pole(0, mode);
+        world.set_state(0, state);
+        EXPECT_NEAR(app::mean_overlap(definition, world), (0.024 + 0.01) / 2, 1e-12);
+    }
+}
+
+TEST(RestOverlap, APeerAtEqualOverlapOverlapsNoMoreAndOneThatMustNotOverlapIsNotFound) {
+    const sim::WorldDefinition world = sim_bench::falling_balls(4, 0);
+    for (const sim_bench::PeerLibrary& library : sim_bench::rigid_peers()) {
+        const auto equal = app::cheapest_equal(library, world, 120, 0.01);
+        ASSERT_TRUE(equal) << library.name;
+        EXPECT_LE(equal->overlap, 0.01) << library.name;
+        EXPECT_FALSE(app::cheapest_equal(library, world, 120, -1)) << library.name;
+    }
 }
 
 app::TradeoffPoint point(double ms_per_s, double error) {

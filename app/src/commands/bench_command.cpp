@@ -72,6 +72,7 @@ void add_bench_options(Command& program, BenchOptions& o) {
                    "hard: of the step, at most, for peers to be as near as we are");
     program.option("--rounds", o.sim.rounds, as::whole(0, 1000),
                    "sim: how often each; 0: five, three for 100, one for more");
+    program.option("--modes", o.sim.modes, as::whole(0, 75), "sim: of each ball; 0: rigid ones");
     program.option("--scene", o.scene, as::text("SCENE"),
                    "sim: balls of a scene, e.g. benchmark25, instead of the piles");
     program.flag("--json", o.json, "Print one JSON document");
