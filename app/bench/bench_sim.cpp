@@ -209,7 +209,7 @@ std::vector<EqualPeer> equal_peers(BenchReport& report, const std::string& prefi
         } else {
             report.notes.push_back(
                 fmt::format("{}: no setting of {} {} overlaps as little as ours down to a sixteenth of the "
-                            "step, or within two minutes of processor time.",
+                            "step, or within half a minute of processor time.",
                             prefix, library.name, library.version));
         }
     }

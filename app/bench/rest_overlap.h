@@ -36,6 +36,6 @@ struct EqualPeer {
 /// of processor time is given up. Empty: no setting does.
 [[nodiscard]] std::optional<EqualPeer> cheapest_equal(const sim_bench::PeerLibrary& library,
                                                       const sim::WorldDefinition& world, int steps,
-                                                      double most, double longest_s = 120);
+                                                      double most, double longest_s = 30);
 
 }  // namespace app
