@@ -1,6 +1,7 @@
 #include "workers/teams.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "messages/keyed_hash.h"
@@ -11,7 +12,8 @@ namespace {
 constexpr std::uint64_t kStepsKept =
     10'000;                             // by which a member may be behind the others and still be checked
 constexpr int kMostMessagesAStep = 64;  // it is repeated when other members are lost
-constexpr std::size_t kMostStepsAhead = 1'000'000;
+constexpr std::size_t kMostWaiting = 100'000;  // states of a member, about 25 MB of hashes
+constexpr std::size_t kMostBytes = 256 << 20;  // of a team's waiting states
 
 }  // namespace
 
@@ -26,7 +28,7 @@ std::optional<std::uint32_t> Teams::join(const JoinRequest& request) {
     const std::uint32_t member = size_ == 1 ? team->first : next_++;
     if (size_ > 1)
         observer_.note("member " + std::to_string(member) + " is of worker " + std::to_string(team->first));
-    team->second.members.insert(member);
+    team->second.members.try_emplace(member);
     team_of_[member] = team->first;
     most_ = std::max(most_, team_of_.size());
     for (const auto& bytes : team->second.heard) queue_.push_back({{member}, bytes});
@@ -47,14 +49,14 @@ void Teams::address(Coordinator::Outgoing& out) {
     for (const std::uint32_t number : out.to) {
         const auto found = teams_.find(number);
         if (found == teams_.end()) continue;
-        members.insert(members.end(), found->second.members.begin(), found->second.members.end());
+        for (const auto& [member, waiting] : found->second.members) members.push_back(member);
         if (size_ > 1 && !started_) found->second.heard.push_back(out.bytes);
     }
     out.to = std::move(members);
 }
 
 std::vector<Coordinator::Outgoing> Teams::outgoing() {
-    std::erase_if(team_of_, [this](const auto& m) { return is_lost(m.second); });
+    lost_ += static_cast<int>(std::erase_if(team_of_, [this](const auto& m) { return is_lost(m.second); }));
     std::erase_if(teams_, [this](const auto& t) { return is_lost(t.first); });
     return std::exchange(queue_, {});
 }
@@ -86,8 +88,7 @@ void Teams::take_checked(std::uint32_t member, std::uint32_t number, const std::
     if (const auto* failure = std::get_if<WorkerFailure>(&m.message)) return give_up(member, failure->what);
     auto* state = std::get_if<StateMessage>(&m.message);
     if (!state) return;  // what it would hand over or sell is its team's
-    if (m.header.worker != number || m.header.step > meeting_.steps() + kMostStepsAhead)
-        return give_up(member, "found another worker's number, or a step far ahead");
+    if (m.header.worker != number) return give_up(member, "found another worker's number");
     if (m.header.step + kStepsKept <= meeting_.steps()) return;
     // What is not to be compared, or in an order that depends on what came before.
     state->report = StepReport{.mishaps = std::move(state->report.mishaps)};
@@ -99,11 +100,11 @@ void Teams::take_checked(std::uint32_t member, std::uint32_t number, const std::
         for (int shift = 0; shift < 32; shift += 8)
             bodies.push_back(static_cast<std::uint8_t>(record.body >> shift));
     const std::vector<std::uint8_t> all = encode({number, 0, m.header.step}, m.message);
-    judge(member, number, m.header.step, {keyed_hash(key_, all), keyed_hash(key_, bodies)}, bytes);
+    hear(member, number, m.header.step, {keyed_hash(key_, all), keyed_hash(key_, bodies)}, bytes);
 }
 
-void Teams::judge(std::uint32_t member, std::uint32_t number, std::uint64_t step, const Content& content,
-                  const std::vector<std::uint8_t>& bytes) {
+void Teams::hear(std::uint32_t member, std::uint32_t number, std::uint64_t step, const Content& content,
+                 const std::vector<std::uint8_t>& bytes) {
     Team& team = teams_.at(number);
     Step& at = team.steps[step];
     if (++at.messages[member] > kMostMessagesAStep)
@@ -113,38 +114,80 @@ void Teams::judge(std::uint32_t member, std::uint32_t number, std::uint64_t step
         if (agreed.bodies == content.bodies)
             return give_up(member, "its states differ from those of the others");
     }
-    std::size_t votes = 1;
-    std::set<std::uint32_t> of_these_bodies = {member};
-    std::map<std::uint64_t, std::size_t> voices;
-    for (const Said& other : at.said) {
-        if (other.member == member && other.content == content) return;
-        votes += other.content == content;
-        if (other.content.bodies != content.bodies) continue;
-        of_these_bodies.insert(other.member);
-        ++voices[other.content.all];
+    auto claim = std::ranges::find(at.waiting, content, &Claim::content);
+    if (claim == at.waiting.end()) claim = at.waiting.insert(claim, {content, {}, {}});
+    if (std::ranges::count(claim->members, member) > 0) return;
+    claim->members.push_back(member);
+    if (claim->members.size() == 2 && team.bytes <= kMostBytes) {
+        claim->bytes = bytes;
+        team.bytes += bytes.size();
     }
-    const std::size_t all = team.members.size();
-    if (2 * votes > all) return agree(number, step, content, bytes);
-    ++voices[content.all];
-    at.said.push_back({member, content});
-    const auto best = std::max_element(voices.begin(), voices.end(),
-                                       [](const auto& a, const auto& b) { return a.second < b.second; });
-    if (2 * (best->second + all - of_these_bodies.size()) <= all)
-        meeting_.lose(number, "its members publish different states, and no more than half agree");
+    if (++team.members.at(member) > kMostWaiting)
+        return give_up(member, "found more states ahead of the others than can wait");
+    judge(number, step, step);
 }
 
-void Teams::agree(std::uint32_t number, std::uint64_t step, const Content& content,
-                  const std::vector<std::uint8_t>& bytes) {
+/// Steps that wait, in order: each member publishes them in order, so what is agreed on does not overtake.
+void Teams::judge(std::uint32_t number, std::uint64_t first, std::uint64_t last) {
     Team& team = teams_.at(number);
-    Step& at = team.steps[step];
     std::set<std::uint32_t> liars;
-    for (const Said& other : at.said)
-        if (other.content.bodies == content.bodies && !(other.content == content)) liars.insert(other.member);
-    std::erase_if(at.said, [&](const Said& s) { return s.content.bodies == content.bodies; });
-    at.agreed.push_back(content);
-    std::erase_if(team.steps, [step](const auto& old) { return old.first + kStepsKept < step; });
-    meeting_.take(number, bytes);
-    for (const std::uint32_t liar : liars) give_up(liar, "its states differ from those of the others");
+    std::uint64_t newest = 0;
+    for (auto at = team.steps.lower_bound(first);
+         at != team.steps.end() && at->first <= last && !is_lost(number); ++at) {
+        const std::size_t before = at->second.agreed.size();
+        agree(number, at->second, liars);
+        if (at->second.agreed.size() > before) newest = at->first;
+        check_majority(number, at->second);
+    }
+    while (!team.steps.empty() && team.steps.begin()->first + kStepsKept < newest) {
+        for (const Claim& claim : team.steps.begin()->second.waiting) forget(team, claim);
+        team.steps.erase(team.steps.begin());
+    }
+    for (const std::uint32_t liar : liars)
+        if (is_member(liar)) give_up(liar, "its states differ from those of the others");
+}
+
+/// Passes on what more than half of the team say of a step.
+void Teams::agree(std::uint32_t number, Step& at, std::set<std::uint32_t>& liars) {
+    Team& team = teams_.at(number);
+    while (!is_lost(number)) {
+        const auto found = std::ranges::find_if(
+            at.waiting, [&](const Claim& claim) { return 2 * claim.members.size() > team.members.size(); });
+        if (found == at.waiting.end()) return;
+        const Claim agreed = *found;
+        std::erase_if(at.waiting, [&](const Claim& claim) {
+            if (claim.content.bodies != agreed.content.bodies) return false;
+            if (claim.content != agreed.content) liars.insert(claim.members.begin(), claim.members.end());
+            forget(team, claim);
+            return true;
+        });
+        at.agreed.push_back(agreed.content);
+        if (agreed.bytes.empty())
+            meeting_.lose(number, "more of its members' states wait for others than can be kept");
+        else
+            meeting_.take(number, agreed.bytes);
+    }
+}
+
+/// Gives up a team of which no more than half can come to say the same of some bodies.
+void Teams::check_majority(std::uint32_t number, const Step& at) {
+    const std::size_t all = teams_.at(number).members.size();
+    for (const Claim& claim : at.waiting) {
+        std::set<std::uint32_t> spoken;
+        std::size_t most = 0;
+        for (const Claim& other : at.waiting) {
+            if (other.content.bodies != claim.content.bodies) continue;
+            spoken.insert(other.members.begin(), other.members.end());
+            most = std::max(most, other.members.size());
+        }
+        if (2 * (most + all - spoken.size()) <= all)
+            return meeting_.lose(number, "its members publish different states, and no more than half agree");
+    }
+}
+
+void Teams::forget(Team& team, const Claim& claim) {
+    team.bytes -= claim.bytes.size();
+    for (const std::uint32_t member : claim.members) --team.members.at(member);
 }
 
 void Teams::lose(std::uint32_t member, const std::string& why) {
@@ -165,12 +208,20 @@ void Teams::remove(std::uint32_t member) {
     const std::uint32_t number = team_of_.at(member);
     team_of_.erase(member);
     Team& team = teams_.at(number);
+    for (auto& [step, at] : team.steps) {
+        at.messages.erase(member);
+        std::erase_if(at.waiting, [&](Claim& claim) {
+            std::erase(claim.members, member);
+            if (claim.members.empty()) team.bytes -= claim.bytes.size();
+            return claim.members.empty();
+        });
+    }
     team.members.erase(member);
-    for (auto& [step, at] : team.steps)
-        std::erase_if(at.said, [member](const Said& said) { return said.member == member; });
-    const std::size_t left = team.members.size();
-    if (left < (started_ ? 2u : 1u))
+    if (is_lost(number)) return;
+    if (team.members.size() < (started_ ? 2u : 1u))
         meeting_.lose(number, "too few of its members are left to check each other");
+    else
+        judge(number, 0, std::numeric_limits<std::uint64_t>::max());
 }
 
 void Teams::count(DistributedResult& result) const {

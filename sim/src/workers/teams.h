@@ -13,8 +13,12 @@ namespace sim {
 /// published the same ones. A member that has published others of the same bodies is given up. A team of which
 /// less than two are left, or in which no more than half agree, is given up as a whole: nobody can say then who is
 /// right. What a worker reports of its times and costs is not checked, and members of a team do not trade; after
-/// the start no more may join. A member that knows all other bodies may be far ahead of the rest of its team; what
-/// it says is kept as a hash until then.
+/// the start no more may join. A member that knows all other bodies may be far ahead of the rest of its team: what
+/// it says is kept as a hash until a second member says the same, and then whole until more than half do. When a
+/// member goes, what waits is judged again, in the order of steps.
+///
+/// What members may cost: one for which more than 100,000 states wait is given up; of states that two members say
+/// 256 MiB and one more a team are kept.
 ///
 /// Teams of one are what a run without such checks has: everything is passed on as it comes, and the member has
 /// the coordinator's number.
@@ -45,26 +49,31 @@ private:
         std::uint64_t all, bodies;
         bool operator==(const Content&) const = default;
     };
-    struct Said {
-        std::uint32_t member;
+    /// What some members say, of which there may be more.
+    struct Claim {
         Content content;
+        std::vector<std::uint32_t> members;  ///< who say so
+        std::vector<std::uint8_t> bytes;     ///< of its message, once two say so
     };
     struct Step {
-        std::vector<Said> said;                 ///< not agreed on
+        std::vector<Claim> waiting;             ///< not agreed on
         std::vector<Content> agreed;            ///< passed on
         std::map<std::uint32_t, int> messages;  ///< of each member
     };
     struct Team {
-        std::set<std::uint32_t> members;
+        std::map<std::uint32_t, std::size_t> members;  ///< and in how many waiting claims each is
         std::vector<std::shared_ptr<const std::vector<std::uint8_t>>> heard;  ///< before the start
         std::map<std::uint64_t, Step> steps;
+        std::size_t bytes = 0;  ///< of waiting claims
     };
 
     void take_checked(std::uint32_t member, std::uint32_t number, const std::vector<std::uint8_t>& bytes);
-    void judge(std::uint32_t member, std::uint32_t number, std::uint64_t step, const Content& content,
-               const std::vector<std::uint8_t>& bytes);
-    void agree(std::uint32_t number, std::uint64_t step, const Content& content,
-               const std::vector<std::uint8_t>& bytes);
+    void hear(std::uint32_t member, std::uint32_t number, std::uint64_t step, const Content& content,
+              const std::vector<std::uint8_t>& bytes);
+    void judge(std::uint32_t number, std::uint64_t first, std::uint64_t last);
+    void agree(std::uint32_t number, Step& at, std::set<std::uint32_t>& liars);
+    void check_majority(std::uint32_t number, const Step& at);
+    static void forget(Team& team, const Claim& claim);
     void give_up(std::uint32_t member, const std::string& why);
     void remove(std::uint32_t member);
     [[nodiscard]] bool is_lost(std::uint32_t number) const;

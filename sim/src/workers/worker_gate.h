@@ -30,7 +30,8 @@ namespace sim {
 ///   joins         256 at once, then 4 a second; more are refused. Workers that are expected always may.
 ///   messages in   up to 4096, or 64 MiB and one more, wait for wait(); then the sockets hold back their senders
 ///                 (and heartbeats go out unasked).
-///                 None is larger than `largest_message`; a stranger's of more than 4 KiB is dropped unread.
+///                 None is larger than `largest_message`; a stranger's of more than 4 KiB is dropped when ZeroMQ
+///                 has received it whole.
 ///   messages out  a member for which more than `most_waiting` wait to be sent has its link broken
 ///   heartbeats    count for a member only with the secret with which it asked to join
 class WorkerGate {

@@ -252,6 +252,38 @@ TEST(SharedWorldRun, TeamsThatCheckEachOtherSurviveKillsStopsAndDrainsWithTheSam
     EXPECT_TRUE(children_of(getpid()).empty());
 }
 
+/// Two of four have said what half of the team is not enough for; of three it is, also for what waits.
+TEST(SharedWorldRun, OfATeamOfFourTwoMayStopAndTheOthersGoOnWithTheSameBits) {
+    const sim::WorldScene scene = heap(9);
+    sim::DistributedLaunch launch = processes(4);
+    launch.verify = 4;
+    Watcher watcher;
+    watcher.act_at = {10};
+    watcher.act = [] {
+        const std::vector<pid_t> all = children_of(getpid());
+        for (const std::size_t i : {0, 1}) ::kill(all.at(i), SIGSTOP);
+    };
+    const sim::DistributedResult result = sim::run_distributed(scene, lockstep(200), launch, watcher);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, 200));
+    EXPECT_EQ(result.lost, 2) << testing::PrintToString(watcher.notes);
+    EXPECT_EQ(result.workers, 4);
+    EXPECT_FALSE(watcher.noted("no worker is left")) << testing::PrintToString(watcher.notes);
+}
+
+TEST(SharedWorldRun, WithATeamAllItsMembersAreLost) {
+    const sim::WorldScene scene = heap(9);
+    sim::DistributedLaunch launch = processes(2);
+    launch.verify = 2;
+    Watcher watcher;
+    watcher.act_at = {10};
+    watcher.act = [] { ::kill(children_of(getpid()).front(), SIGTERM); };  // one leaves in order
+    const sim::DistributedResult result = sim::run_distributed(scene, lockstep(200), launch, watcher);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, 200));
+    EXPECT_EQ(result.left, 1);
+    EXPECT_EQ(result.lost, 1) << "its impulses are not known";
+    EXPECT_TRUE(watcher.noted("no worker is left")) << testing::PrintToString(watcher.notes);
+}
+
 TEST(SharedWorldRun, AWorkerWithAnotherFingerprintIsRefusedInLockstep) {
     const sim::WorldScene scene = heap(4);
     sim::DistributedLaunch launch = processes(1);
