@@ -187,13 +187,16 @@ void require_ffmpeg() {
     require_program("ffmpeg", "the video; install the package ffmpeg");
 }
 
-void make_video(const fs::path& video, double fps, bool sound, const fs::path& staging) {
+std::unique_ptr<OutputFile> make_video(const fs::path& video, double fps, bool sound,
+                                       const fs::path& staging) {
+    auto made = std::make_unique<OutputFile>(video);
     std::vector<std::string> command = {"ffmpeg", "-nostdin", "-loglevel", "error", "-y", "-framerate"};
     command.insert(command.end(), {fmt::format("{}", fps), "-i", (staging / "frames" / "%06d.png").string()});
     if (sound) command.insert(command.end(), {"-i", (staging / "audio.wav").string(), "-c:a", "aac"});
     command.insert(command.end(), {"-c:v", "libx264", "-preset", "veryfast", "-pix_fmt", "yuv420p", "-fflags",
-                                   "+bitexact", "-f", "mp4", video.string()});
+                                   "+bitexact", "-f", "mp4", made->partial().string()});
     run_child(command, staging / "scratch" / "ffmpeg.log");
+    return made;
 }
 
 }  // namespace app

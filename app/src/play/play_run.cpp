@@ -203,12 +203,11 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     result.workers_lost = workers.lost;
     result.bodies_reowned = workers.bodies_reowned;
     result.versions.emplace_back("musicworld", MUSICWORLD_VERSION);
-    std::optional<OutputFile> video;
+    std::unique_ptr<OutputFile> video;
     if (options.video)
         folder.adorn("", [&] {
-            video.emplace(*options.video);
             stage("video",
-                  [&] { make_video(video->partial(), options.fps, options.audio, folder.path(".")); });
+                  [&] { video = make_video(*options.video, options.fps, options.audio, folder.path(".")); });
         });
     const std::string realtime_json = realtime_part ? realtime_part() : std::string();
     write_file(folder.path("events.csv"), format_events(result));

@@ -275,12 +275,10 @@ void SimulateRecord::write_products(const WallTimer& wall, double before_s) {
             write_file(folder_->path("workers.svg"), plot);
         });
     result_.frames = frames_ ? next_frame_ : 0;
-    std::optional<OutputFile> video;
+    std::unique_ptr<OutputFile> video;
     if (options_.video)
-        folder_->adorn("", [&] {
-            video.emplace(*options_.video);
-            make_video(video->partial(), options_.fps, false, folder_->path("."));
-        });
+        folder_->adorn("",
+                       [&] { video = make_video(*options_.video, options_.fps, false, folder_->path(".")); });
     result_.wall_s = before_s + wall.seconds();
     write_file(folder_->path("summary.json"), format_simulate(result_));
     folder_->finish();
