@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -15,7 +16,12 @@ bool FileDescriptor::write(std::string_view bytes) const noexcept {
         const ssize_t wrote = ::write(number_, bytes.data(), bytes.size());
         if (wrote > 0) bytes.remove_prefix(static_cast<std::size_t>(wrote));
         if (wrote == 0) errno = ENOSPC;
-        if (wrote == 0 || (wrote < 0 && errno != EINTR)) return false;
+        if (wrote < 0 && errno == EAGAIN) {  // one that was opened elsewhere, not to wait
+            pollfd room{number_, POLLOUT, 0};
+            (void)::poll(&room, 1, -1);
+        } else if (wrote == 0 || (wrote < 0 && errno != EINTR)) {
+            return false;
+        }
     }
     return true;
 }

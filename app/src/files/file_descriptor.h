@@ -19,7 +19,7 @@ public:
 
     [[nodiscard]] int get() const noexcept { return number_; }
     [[nodiscard]] explicit operator bool() const noexcept { return number_ >= 0; }
-    /// Writes all of it; false: errno says why not.
+    /// Writes all of it, waiting for room; false: errno says why not.
     [[nodiscard]] bool write(std::string_view bytes) const noexcept;
     /// False if the system could not write what was still to be written (errno says why).
     bool close() noexcept;

@@ -67,7 +67,8 @@ FileDescriptor open_device(const fs::path& device) {
         return FileDescriptor(fcntl(own, F_DUPFD_CLOEXEC, 0));
     const auto deadline = std::chrono::steady_clock::now() + kPatience;
     FileDescriptor out = open_file(device, O_WRONLY | O_NOCTTY | O_NONBLOCK);
-    while (!out && errno == ENXIO && std::chrono::steady_clock::now() < deadline) {
+    while (!out && errno == ENXIO && fs::is_fifo(device, ignored) &&
+           std::chrono::steady_clock::now() < deadline) {
         std::this_thread::sleep_for(kLookAgain);
         out = open_file(device, O_WRONLY | O_NOCTTY | O_NONBLOCK);
     }
@@ -78,8 +79,9 @@ FileDescriptor open_device(const fs::path& device) {
 void write_to_device(const fs::path& staged, const fs::path& device) {
     std::fflush(stdout);  // what was printed before comes before
     const FileDescriptor in = open_file(staged, O_RDONLY);
+    if (!in) fail(device);
     FileDescriptor out = open_device(device);
-    if (!in || !out) fail(device);
+    if (!out) fail(device);
     std::array<char, 65536> block;
     for (;;) {
         const ssize_t got = ::read(in.get(), block.data(), block.size());
@@ -92,6 +94,13 @@ void write_to_device(const fs::path& staged, const fs::path& device) {
     fs::remove(staged, ignored);
 }
 
+/// One that may be written to but not read cannot be saved, and counts as saved.
+void save_names_of(const fs::path& folder) {
+    const FileDescriptor names = open_file(folder, O_RDONLY);
+    if (!names && errno == EACCES) return;
+    if (!names || !save(names)) throw std::runtime_error("error: " + cannot("save " + folder.string()));
+}
+
 /// A file, or a folder and all that it holds.
 void save_all(const fs::path& path) {
     if (fs::is_directory(path))
@@ -99,21 +108,44 @@ void save_all(const fs::path& path) {
     save_on_disk(path);
 }
 
+/// Where a file may be staged beside `file`: where there is none, or a regular one, which a run has left.
+fs::path free_partial_of(const fs::path& file) {
+    const fs::path partial = partial_of(file);
+    std::error_code error;
+    const fs::file_type type = fs::symlink_status(partial, error).type();
+    if (type != fs::file_type::not_found && type != fs::file_type::regular)
+        refuse(partial, "what is no file", "move it away");
+    return partial;
+}
+
+/// By way of a copy beside it.
+void move_across_file_systems(const fs::path& staged, const fs::path& target) {
+    const fs::path partial = free_partial_of(target);
+    std::error_code error;
+    fs::remove(partial, error);
+    try {
+        fs::copy(staged, partial, fs::copy_options::recursive);
+        save_all(partial);
+        fs::rename(partial, target);
+    } catch (const std::runtime_error& failed) {
+        remove_tree(partial, error);
+        const auto* reason = dynamic_cast<const fs::filesystem_error*>(&failed);
+        if (!reason) throw;
+        errno = reason->code().value();
+        fail(target);
+    }
+    remove_tree(staged, error);
+}
+
 void move(const fs::path& staged, const fs::path& target) {
     save_all(staged);
     std::error_code error;
     fs::rename(staged, target, error);
-    if (error == std::errc::cross_device_link) {
-        const fs::path partial = partial_of(target);
-        remove_tree(partial);
-        fs::copy(staged, partial, fs::copy_options::recursive);
-        save_all(partial);
-        fs::rename(partial, target);
-        remove_tree(staged);
-    } else if (error) {
+    if (error == std::errc::cross_device_link)
+        move_across_file_systems(staged, target);
+    else if (error)
         throw std::runtime_error("error: " + cannot("write " + target.string(), error.value()));
-    }
-    save_on_disk(folder_of(target));
+    save_names_of(folder_of(target));
 }
 
 }  // namespace
@@ -188,6 +220,7 @@ OutputPlace output_place(const fs::path& name) {
         case fs::file_type::none:
             refuse(name, error.message(), "choose another");
         default:
+            if (of_process) return {path, Kind::written_to};  // open already: a stream
             refuse(name, "a socket", "choose another");
     }
 }
@@ -215,11 +248,8 @@ OutputFile::OutputFile(fs::path file) : file_(std::move(file)) {
         throw BadInput(
             fmt::format("{}: error: found no such folder, expected one to write {} into; make it first",
                         folder.string(), file_.filename().string()));
-    partial_ = partial_of(place.path);
-    const fs::file_type type = fs::symlink_status(partial_, error).type();
-    if (type != fs::file_type::not_found && type != fs::file_type::regular)
-        refuse(partial_, "what is no file", "move it away");
-    kept_ = type == fs::file_type::regular;  // not ours, until it is written
+    partial_ = free_partial_of(place.path);
+    kept_ = fs::exists(fs::symlink_status(partial_, error));  // not ours, until it is written
 }
 
 OutputFile::~OutputFile() {

@@ -23,7 +23,8 @@ struct OutputPlace {
     std::filesystem::path path;  ///< behind all symbolic links
     enum class Kind { nothing, file, folder, written_to } kind;
 };
-/// Throws BadInput for what can be no output: links in a circle, a socket, a name that is too long, a place that
+/// Throws BadInput for what can be no output: links in a circle, a socket (but an open one, such as standard output
+/// may be), a name that is too long, a place that
 /// may not be looked at.
 [[nodiscard]] OutputPlace output_place(const std::filesystem::path& name);
 
@@ -36,9 +37,11 @@ void remove_tree(const std::filesystem::path& folder, std::error_code& error);
 void remove_tree(const std::filesystem::path& folder);
 
 /// Saves a staged file, or a folder with all that it holds, to the disk and moves it to where `name` leads;
-/// across file systems by a copy. A file that is there is replaced at once, a folder must have gone before. To a
-/// device or a pipe the bytes are written; a named pipe is given ten seconds to be opened by a reader. Throws
-/// std::runtime_error; what was there is then as it was, and what was staged still there.
+/// across file systems by a copy beside it, NAME.partial, where nothing but a regular file may be. A file that is
+/// there is replaced at once, a folder must have gone before. A folder that it lies in and that may not be read has
+/// its names not saved. To a device, a pipe or an open stream the bytes are written; a named pipe is given ten
+/// seconds to be opened by a reader. Throws std::runtime_error; what was staged is then still there, and what was
+/// there is as it was, unless it is already replaced and its folder cannot be saved.
 void put_in_place(const std::filesystem::path& staged, const std::filesystem::path& name);
 
 /// A file that is made beside its place and put there when it is whole.

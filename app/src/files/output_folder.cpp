@@ -217,8 +217,12 @@ void OutputFolder::finish() {
 }
 
 void throw_if_any(const std::vector<std::string>& failures, const fs::path& out) {
-    if (!failures.empty())
-        throw std::runtime_error(fmt::format("{}; all else is in {}", failures.front(), out.string()));
+    constexpr std::string_view kError = "error: ";
+    if (failures.empty()) return;
+    std::string all = failures.front();
+    for (const std::string_view more : std::span(failures).subspan(1))
+        all += fmt::format("; {}", more.substr(more.starts_with(kError) ? kError.size() : 0));
+    throw std::runtime_error(fmt::format("{}; all else is in {}", all, out.string()));
 }
 
 }  // namespace app

@@ -28,9 +28,10 @@ inline constexpr std::array<std::string_view, 5> kCompareProducts = {
     "compare.json", "compare.csv", "report.html", "experiment.toml", "figures"};
 inline constexpr std::array<std::string_view, 3> kModesProducts = {"modes.json", "modes.png", "frames"};
 
-/// The folder that a run writes its products into, all of them or none. They are staged in its hidden
-/// subfolder `.unfinished`; finish() puts them in place one by one, the leading product last, so that
-/// a folder with it is a finished run. A folder serves one run at a time (advisory lock). One thread at a
+/// The folder that a run writes its products into. They are staged in its hidden subfolder `.unfinished`: until
+/// finish() the products of an earlier run stay. finish() puts them in place one by one, the leading product
+/// last, so that a folder with it is a finished run, though adornments may be missing; one that stopped halfway has
+/// some of the others and not the leading one. A folder serves one run at a time (advisory lock). One thread at a
 /// time.
 ///
 /// It holds a few file descriptors in reserve, so that a run whose descriptors others have used up can still write
@@ -88,7 +89,8 @@ private:
     std::unique_ptr<InterruptionNotice> notice_;
 };
 
-/// For the end of a command, when all is in place and printed: throws std::runtime_error if there is a failure.
+/// For the end of a command, when all is in place and printed: throws std::runtime_error, with all failures, if there
+/// is one.
 void throw_if_any(const std::vector<std::string>& failures, const std::filesystem::path& out);
 
 }  // namespace app

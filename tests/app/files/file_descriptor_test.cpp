@@ -5,6 +5,9 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstring>
+#include <string>
+#include <thread>
 
 namespace {
 
@@ -37,6 +40,23 @@ TEST(FileDescriptor, APipeEndsWithItsWriterAndIsNotInherited) {
     char byte = 0;
     EXPECT_EQ(read(pipe.out.get(), &byte, 1), 1);
     EXPECT_EQ(read(pipe.out.get(), &byte, 1), 0);
+}
+
+/// A pipe holds 64 KiB.
+TEST(FileDescriptor, WritesAllIntoAPipeThatDoesNotWait) {
+    app::Pipe pipe = app::make_pipe();
+    ASSERT_EQ(fcntl(pipe.in.get(), F_SETFL, O_NONBLOCK), 0);
+    const std::string text(300'000, 'x');
+    std::string got;
+    std::thread reader([&] {
+        char block[4096];
+        for (ssize_t size = 0; (size = read(pipe.out.get(), block, sizeof block)) > 0;)
+            got.append(block, static_cast<std::size_t>(size));
+    });
+    EXPECT_TRUE(pipe.in.write(text)) << strerror(errno);
+    pipe.in.close();
+    reader.join();
+    EXPECT_EQ(got, text);
 }
 
 TEST(Cannot, SaysWhatTheSystemRefusedAndWhy) {

@@ -111,7 +111,46 @@ TEST(PutInPlace, CopiesToAnotherFileSystem) {
     EXPECT_EQ(text_of(other / "folder/one"), "1");
     EXPECT_EQ(count_in(other), 2u);
     EXPECT_EQ(count_in(here.path()), 2u) << "the links alone";
+
+    // What lies where the copy is to be made and is no file is another's.
+    fs::create_directory(other / "file.partial");
+    std::ofstream(other / "file.partial/mine") << "mine";
+    EXPECT_THROW(app::put_in_place(here.write("staged", "new"), here.path() / "file"), app::BadInput);
+    EXPECT_EQ(text_of(other / "file.partial/mine"), "mine");
+    EXPECT_EQ(text_of(other / "file"), "text");
+    EXPECT_EQ(text_of(here.path() / "staged"), "new");
     fs::remove_all(other);
+}
+
+TEST(PutInPlace, AFolderThatMayBeWrittenButNotReadDoes) {
+    if (geteuid() != 0) GTEST_SKIP() << "needs to become another user";
+    constexpr uid_t kNobody = 65534;
+    const TemporaryFolder here;
+    fs::permissions(here.path(), fs::perms(0733));
+    ASSERT_EQ(seteuid(kNobody), 0);
+    std::string failure;
+    try {
+        app::write_finished_file(here.path() / "file", std::string("text"));
+    } catch (const std::exception& failed) {
+        failure = failed.what();
+    }
+    ASSERT_EQ(seteuid(0), 0);
+    EXPECT_EQ(failure, "");
+    EXPECT_EQ(text_of(here.path() / "file"), "text");
+}
+
+/// As standard output of a program that a server started.
+TEST(PutInPlace, AnOpenSocketIsWrittenTo) {
+    int ends[2];
+    ASSERT_EQ(socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);
+    const std::string name = "/dev/fd/" + std::to_string(ends[0]);
+    EXPECT_EQ(app::output_place(name).kind, Kind::written_to);
+    app::write_finished_file(name, std::string("text"));
+    char got[5] = {};
+    EXPECT_EQ(read(ends[1], got, 4), 4);
+    EXPECT_STREQ(got, "text");
+    close(ends[0]);
+    close(ends[1]);
 }
 
 }  // namespace
