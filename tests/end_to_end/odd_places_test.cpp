@@ -298,6 +298,39 @@ TEST(OddPlaces, ResultsStandWhenPlotsOrTheVideoFail) {
     EXPECT_EQ(names_in(folder / "."), (Names{"bin"})) << "no half a video";
 }
 
+TEST(OddPlaces, AToolThatDiesHalfWayHarmsNoOlderVideoAndIsAskedAgainForFigures) {
+    const Folder folder;
+    fs::create_directory(folder / "bin");
+    const auto program = [&](const std::string& name, const std::string& lines) {
+        write(folder / "bin" / name, "#!/bin/sh\n" + lines);
+        fs::permissions(folder / "bin" / name, fs::perms::owner_all);
+    };
+    const std::string path = "PATH=" + (folder / "bin").string() + ":" + std::getenv("PATH");
+    const fs::path out = folder / "out", video = folder / "v.mp4";
+    program("ffmpeg", "for file; do :; done\necho half > \"$file\"\nkill -9 $$\n");
+    write(video, "whole");
+    for (const Names& words : {Names{"play", "roll", "--size", "32x32", "--fps", "5"},
+                               Names{"simulate", "joints", "--steps", "9", "--size", "32x32"}}) {
+        Names all = words;
+        all.insert(all.end(), {"--video", video, "--out", out});
+        EXPECT_EQ(run(all, {path}).status, 1);
+        EXPECT_EQ(read(video), "whole") << words[0];
+        EXPECT_EQ(names_in(folder / "."), (Names{"bin", "out", "v.mp4"}));
+    }
+    program("gnuplot", "if [ ! -e '" + (folder / "bin/asked").string() + "' ]; then touch '" +
+                           (folder / "bin/asked").string() +
+                           "'; exit 0; fi\nPATH=${PATH#*:} exec gnuplot \"$@\"\n");
+    const Ended ended = run({"compare", bundled("traces/roll.csv"), "--predictors", "hold,ca", "--leads",
+                             "1/30", "--no-tuning", "--no-cost", "--out", folder / "compared"},
+                            {path});
+    EXPECT_EQ(ended.status, 0) << ended.err;
+    const Names figures = names_in(folder / "compared/figures");
+    EXPECT_GE(figures.size(), 4u);
+    EXPECT_EQ(figures.size() % 2, 0u);
+    for (const std::string& figure : figures)
+        EXPECT_GT(fs::file_size(folder / "compared/figures" / figure), 500u);
+}
+
 TEST(OddPlaces, ToolsThatTheEndWillNeedAreLookedForFirst) {
     const Folder folder;
     fs::create_directory(folder / "bin");

@@ -140,6 +140,7 @@ void run(ComparisonOptions options, const fs::path& folder) {
     const Comparison comparison = compare(options);
     write_file(out.path("compare.json"), format_comparison_json(comparison));
     write_file(out.path("compare.csv"), csv_table(comparison).csv());
+    out.adorn("figures", [&] { fs::create_directory(out.path("figures")); });
     write_page(out, "report.html", [&](Plotter& plotter) {
         return format_comparison_report(comparison, plotter, out.path("figures"));
     });

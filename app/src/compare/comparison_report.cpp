@@ -381,7 +381,6 @@ std::string format_comparison_report(const Comparison& comparison, Plotter& plot
                                      const std::filesystem::path& figures) {
     PlotGallery plots;
     const std::string body = heading(comparison) + plots.symbols() + sections(comparison, plots);
-    std::filesystem::create_directory(figures);
     plots.write_files(figures, plotter);
     return report_page(kTitle, plots.drawn(body, plotter));
 }

@@ -65,7 +65,7 @@ namespace app {
 
 /// Text of compare's report.html: which predictor wins, figures 3-1 to 3-3 of the thesis redone, error
 /// against lead and cost, strikes, calibration, paired differences, the map. One page that needs nothing
-/// beside it, in the style of play's report. `figures`: a folder that is made and gets each plot as SVG and PNG.
+/// beside it, in the style of play's report. `figures`: an existing folder that gets each plot as SVG and PNG.
 [[nodiscard]] std::string format_comparison_report(const Comparison& comparison, Plotter& plotter,
                                                    const std::filesystem::path& figures);
 

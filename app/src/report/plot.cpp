@@ -10,6 +10,7 @@
 #include <map>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
 
 #include "files/bad_input.h"
 #include "process/child_process.h"
@@ -33,23 +34,16 @@ void run_gnuplot(const std::string& commands, const fs::path& scratch) {
     run_child({"gnuplot", "--default-settings", script.string()}, scratch / "plots.log", {"LC_ALL=C"});
 }
 
-/// Draws scripts, the first of which is `first`, as SVG documents.
-void draw_svg(std::span<const PlotScript> scripts, std::size_t first, const fs::path& scratch) {
-    std::string commands;
-    for (std::size_t i = 0; i < scripts.size(); ++i)
-        commands += fmt::format(
-            "reset\nunset key\nset terminal svg size {},{} noenhanced font 'sans-serif,12'\nset output {}\n"
-            "{}\nset output\n",
-            scripts[i].width, scripts[i].height, gnuplot_string(svg_file(scratch, first + i).string()),
-            scripts[i].commands);
-    run_gnuplot(commands, scratch);
+std::string read_if_there(const fs::path& file) {
+    std::error_code error;
+    return fs::exists(file, error) ? tracking::read_bytes(file.string(), "a plot") : "";
 }
 
-/// Empty if it is not there or not whole.
-std::string whole_svg(const fs::path& file) {
-    std::error_code error;
-    std::string svg = fs::exists(file, error) ? tracking::read_bytes(file.string(), "a plot") : "";
-    return svg.find("</svg>") == std::string::npos ? "" : svg;
+/// By its end.
+bool is_whole(const fs::path& file) {
+    const std::string picture = read_if_there(file);
+    if (file.extension() == ".svg") return picture.find("</svg>") != std::string::npos;
+    return picture.ends_with("IEND\xae\x42\x60\x82");
 }
 
 void replace_all(std::string& text, std::string_view from, std::string_view to) {
@@ -121,34 +115,44 @@ void require_gnuplot() {
 }
 
 std::vector<std::string> Plotter::draw(const std::vector<PlotScript>& scripts) {
+    std::vector<PlotFile> pictures;
+    for (const PlotScript& script : scripts) {
+        const fs::path file = svg_file(scratch_, pictures.size());
+        pictures.push_back(
+            {file, fmt::format("reset\nunset key\nset terminal svg size {},{} noenhanced font "
+                               "'sans-serif,12'\nset output {}\n{}\nset output\n",
+                               script.width, script.height, gnuplot_string(file.string()), script.commands)});
+    }
+    draw_files(pictures);
+    std::vector<std::string> drawn;
+    for (const PlotFile& picture : pictures) drawn.push_back(read_if_there(picture.file));
+    return drawn;
+}
+
+void Plotter::draw_files(const std::vector<PlotFile>& pictures) {
     std::string reason;
-    const auto succeeds = [&](const auto& work) {
+    const auto is_done = [&](const std::string& commands) {
         try {
-            work();
+            run_gnuplot(commands, scratch_);
             return true;
         } catch (const std::runtime_error& failed) {
             if (reason.empty()) reason = failed.what();
             return false;
         }
     };
-    const bool at_once = succeeds([&] { draw_svg(scripts, 0, scratch_); });
-    std::vector<std::string> pictures(scripts.size());
-    for (std::size_t i = 0; i < scripts.size(); ++i) {
-        succeeds([&] {
-            if (!at_once) draw_svg(std::span(scripts).subspan(i, 1), i, scratch_);
-            pictures[i] = whole_svg(svg_file(scratch_, i));
-        });
-        if (pictures[i].empty() && failure_.empty())
-            failure_ = reason.empty() ? "error: cannot draw a plot: gnuplot left none" : reason;
+    std::error_code ignored;
+    std::string all;
+    for (const PlotFile& picture : pictures) {
+        fs::remove(picture.file, ignored);
+        all += picture.commands;
     }
-    return pictures;
-}
-
-void Plotter::run(const std::string& commands) {
-    try {
-        run_gnuplot(commands, scratch_);
-    } catch (const std::runtime_error& failed) {
-        if (failure_.empty()) failure_ = failed.what();
+    const bool at_once = is_done(all);
+    for (const PlotFile& picture : pictures) {
+        if (at_once && is_whole(picture.file)) continue;
+        if (is_done(picture.commands) && is_whole(picture.file)) continue;
+        fs::remove(picture.file, ignored);
+        if (failure_.empty())
+            failure_ = reason.empty() ? "error: cannot draw a plot: gnuplot left none" : reason;
     }
 }
 
@@ -178,17 +182,23 @@ const ReportColour& stick_colour(std::size_t stick) {
     return colours::sticks[stick % colours::sticks.size()];
 }
 
-void PlotPanel::add(std::string data, std::string_view style) {
-    for (std::size_t at = 0; at < data.size();) {  // NaN and infinities alone have an n
-        const std::size_t end = std::min(data.find('\n', at), data.size() - 1) + 1;
-        if (data.find('n', at) < end)
-            data.erase(at, end - at);
-        else
-            at = end;
+void PlotPanel::add(std::string_view data, std::string_view style) {
+    std::string finite;
+    bool gap = false;  // an empty line, which two lines of numbers are not joined over
+    for (std::size_t at = 0; at < data.size();) {
+        const std::size_t end = std::min(data.find('\n', at), data.size());
+        const std::string_view line = data.substr(at, end - at);
+        at = end + 1;
+        if (line.empty() || line.find('n') != std::string_view::npos) {  // NaN and infinities alone have an n
+            gap = !finite.empty();
+            continue;
+        }
+        if (std::exchange(gap, false)) finite += '\n';
+        finite.append(line) += '\n';
     }
-    if (data.empty()) return;
+    if (finite.empty()) return;
     fmt::format_to(std::back_inserter(clauses_), "{}'-' {}", clauses_.empty() ? "" : ", ", style);
-    data_ += std::move(data) + "e\n";
+    data_ += finite + "e\n";
 }
 
 std::string PlotPanel::text(const std::vector<PlotLine>& key) const {
@@ -206,6 +216,7 @@ std::string plot_axes() {
 }
 
 double round_step(double span, int count) {
+    if (!(std::isfinite(span) && span > 0)) span = 1;
     const double rough = span / count, power = std::pow(10.0, std::floor(std::log10(rough)));
     for (const double factor : {1.0, 2.0, 5.0})
         if (factor * power >= rough * (1 - 1e-9)) return factor * power;
@@ -229,7 +240,8 @@ PlotScript plot_of(int width, int height, const PlotAxis& x, const PlotAxis& y, 
 
 Histogram histogram(std::span<const double> values, double bin) {
     std::map<int, int> bins;
-    for (const double value : values) ++bins[static_cast<int>(std::floor(value / bin))];
+    for (const double value : values)
+        if (std::isfinite(value)) ++bins[static_cast<int>(std::floor(value / bin))];
     Histogram made;
     if (bins.empty()) return made;
     for (int at = bins.begin()->first - 1, last = bins.rbegin()->first + 1; at <= last; ++at) {
@@ -257,9 +269,10 @@ std::string round_tics(std::string_view axis, double span, int count) {
 
 void ThinnedMarks::add(double x, double y, std::string_view rest) {
     const auto pixel = [](double value, double low, double high, int size) {
+        if (!(high > low)) return 0;
         return static_cast<int>(std::floor(std::clamp((value - low) / (high - low), -1.0, 2.0) * size));
     };
-    if (!(x >= area_.x_low && x <= area_.x_high)) return;
+    if (!(x >= area_.x_low && x <= area_.x_high) || !std::isfinite(x) || !std::isfinite(y)) return;
     const std::pair<int, int> place = {pixel(x, area_.x_low, area_.x_high, area_.width),
                                        pixel(y, area_.y_low, area_.y_high, area_.height)};
     if (taken_.insert(place).second)
@@ -321,7 +334,7 @@ std::string PlotGallery::in_page(std::size_t number, std::string_view drawn) con
 
 void PlotGallery::write_files(const fs::path& folder, Plotter& plotter) const {
     constexpr int kTitleHeight = 30, kKeyRowHeight = 18, kKeyWidth = 170;
-    std::string commands;
+    std::vector<PlotFile> pictures;
     for (std::size_t i = 0; i < plots_.size(); ++i) {
         const PlotScript& plot = plots_[i];
         std::string name = fmt::format("{:02}_{}", i + 1, labels_[i].substr(0, 60));
@@ -333,16 +346,20 @@ void PlotGallery::write_files(const fs::path& folder, Plotter& plotter) const {
              {std::tuple("svg", "svg size {},{} noenhanced font 'sans-serif,12' background rgb 'white'", 1),
               {"png",
                "pngcairo size {},{} noenhanced font 'sans-serif,12' fontscale 2 linewidth 2 pointscale 2",
-               2}})
-            commands += fmt::format(
-                "reset\nset terminal {}\nset output {}\nset title {}\n"
-                "set key noautotitle outside bottom center horizontal maxrows {}\n{}\nset output\n",
-                fmt::format(fmt::runtime(terminal), size * plot.width,
-                            size * (plot.height + kTitleHeight + kKeyRowHeight * rows)),
-                gnuplot_string((folder / (name + "." + ending)).string()), gnuplot_string(labels_[i]),
-                std::max(1, rows), plot.keyed.empty() ? plot.commands : plot.keyed);
+               2}}) {
+            const fs::path file = folder / (name + "." + ending);
+            pictures.push_back(
+                {file,
+                 fmt::format(
+                     "reset\nset terminal {}\nset output {}\nset title {}\n"
+                     "set key noautotitle outside bottom center horizontal maxrows {}\n{}\nset output\n",
+                     fmt::format(fmt::runtime(terminal), size * plot.width,
+                                 size * (plot.height + kTitleHeight + kKeyRowHeight * rows)),
+                     gnuplot_string(file.string()), gnuplot_string(labels_[i]), std::max(1, rows),
+                     plot.keyed.empty() ? plot.commands : plot.keyed)});
+        }
     }
-    plotter.run(commands);
+    plotter.draw_files(pictures);
 }
 
 std::string PlotGallery::drawn(std::string page, Plotter& plotter) const {

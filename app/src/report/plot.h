@@ -31,17 +31,24 @@ struct PlotScript {
 /// Throws std::runtime_error where gnuplot cannot be started: before a run that ends with plots.
 void require_gnuplot();
 
-/// Draws with gnuplot. Plots adorn results and are none: one that cannot be drawn is left out, and told.
+/// Commands of gnuplot and the picture that they make: an SVG or a PNG file.
+struct PlotFile {
+    std::filesystem::path file;
+    std::string commands;
+};
+
+/// Draws with gnuplot. Plots adorn results and are none: one that cannot be drawn does not keep the others from
+/// being drawn, has no file, and failure() says why.
 class Plotter {
 public:
     /// Files lie in `scratch`, an existing folder.
     explicit Plotter(std::filesystem::path scratch) : scratch_(std::move(scratch)) {}
 
-    /// Draws every script with one gnuplot process in the C locale and without the user's start-up files, each
-    /// one again alone if that fails. An SVG document per script; empty where it could not be drawn.
+    /// An SVG document per script; empty where it could not be drawn.
     [[nodiscard]] std::vector<std::string> draw(const std::vector<PlotScript>& scripts);
-    /// Runs gnuplot's own commands, which name where their output goes.
-    void run(const std::string& commands);
+    /// Draws all with one gnuplot process in the C locale and without the user's start-up files; those that are not
+    /// whole then, or all if the process failed, again each alone. What is left is whole.
+    void draw_files(const std::vector<PlotFile>& pictures);
     /// What went wrong first; empty: nothing.
     [[nodiscard]] const std::string& failure() const { return failure_; }
 
@@ -63,8 +70,9 @@ void write_page(OutputFolder& folder, std::string_view name,
 /// One panel of a gnuplot script: series with their data inline, drawn in the order they were added.
 class PlotPanel {
 public:
-    /// `data`: lines of numbers; empty data is left out, and lines with a number that is not finite. `style`: e.g. "with lines lc rgb '#ff0000'".
-    void add(std::string data, std::string_view style);
+    /// `data`: lines of numbers; without any it is left out. One with a number that is not finite is a gap in a
+    /// line. `style`: e.g. "with lines lc rgb '#ff0000'".
+    void add(std::string_view data, std::string_view style);
     /// The plot command; axes without data where nothing was added. `key`: lines that stand in the key.
     [[nodiscard]] std::string text(const std::vector<PlotLine>& key = {}) const;
 
@@ -89,6 +97,7 @@ struct Histogram {
     std::string data;
     int highest = 1;
 };
+/// Values that are not finite are left out.
 [[nodiscard]] Histogram histogram(std::span<const double> values, double bin);
 /// gnuplot's "with boxes ..." of a histogram.
 [[nodiscard]] std::string boxes_of(const ReportColour& colour);
@@ -96,7 +105,7 @@ struct Histogram {
 [[nodiscard]] std::string plot_margins(int top, int bottom, int height);
 
 /// Tics every `step`, a round number of which about `count` fit into `span`, with as many decimals as they
-/// need.
+/// need. A span that is not finite or not above 0 counts as 1.
 [[nodiscard]] std::string round_tics(std::string_view axis, double span, int count);
 [[nodiscard]] double round_step(double span, int count);
 
@@ -107,7 +116,8 @@ struct PlotArea {
 };
 
 /// Marks of one kind, as lines of numbers: those outside of the range in x and those within a pixel of an
-/// earlier one are left out, so that the number of marks is bounded however long the recording.
+/// earlier one are left out, so that the number of marks is bounded however long the recording; and those that are
+/// not finite.
 class ThinnedMarks {
 public:
     explicit ThinnedMarks(const PlotArea& area) : area_(area) {}
@@ -153,7 +163,7 @@ public:
     [[nodiscard]] std::string drawn(std::string page, Plotter& plotter) const;
 
     /// Writes each plot with its label and its legend, on white: 01_LABEL.svg and 01_LABEL.png, of twice the size,
-    /// and so on.
+    /// and so on, into an existing folder.
     void write_files(const std::filesystem::path& folder, Plotter& plotter) const;
 
 private:

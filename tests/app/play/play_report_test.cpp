@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <optional>
+#include <set>
 #include <sstream>
 
 #include "files/output_folder.h"
@@ -180,14 +181,14 @@ TEST(Report, WithoutGnuplotIsAPageWithoutPlotsAndBeforeARunSaysWhatToInstall) {
 }
 
 /// gnuplot ends at the first plot of nothing but NaN, and at a range of NaN.
-TEST(Gnuplot, NumbersThatAreNotFiniteAreLeftOut) {
+TEST(Gnuplot, NumbersThatAreNotFiniteAreGaps) {
     const TemporaryFolder here;
     app::Plotter plotter(here.path());
     app::PlotPanel some, none;
     some.add("0 1\n1 nan\n2 -inf\n3 2\n", "with lines");
     none.add("0 nan\n1 -nan", "with lines");
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    EXPECT_TRUE(holds(some.text(), "\n0 1\n3 2\ne\n")) << some.text();
+    EXPECT_TRUE(holds(some.text(), "\n0 1\n\n3 2\ne\n")) << some.text();
     const std::vector<std::string> drawn =
         plotter.draw({app::plot_of(100, 100, {"x", 0, 3, 4}, {"y", nan, 2, 4}, some),
                       app::plot_of(100, 100, {"x", 0, 3}, {"y", 0, nan}, none)});
@@ -256,6 +257,15 @@ TEST(PlotPanel, RoundStepsAreOneTwoOrFiveTimesAPowerOfTen) {
     EXPECT_DOUBLE_EQ(app::round_step(100, 10), 10);
     EXPECT_DOUBLE_EQ(app::round_step(0.7, 4), 0.2);
     EXPECT_DOUBLE_EQ(app::round_step(600, 12), 50);
+    for (const double none : {0.0, -1.0, std::nan(""), HUGE_VAL})
+        EXPECT_EQ(app::round_tics("x", none, 4), app::round_tics("x", 1, 4)) << none;
+}
+
+TEST(PlotPanel, ANumberThatIsNotFiniteIsAGapInALine) {
+    app::PlotPanel panel;
+    panel.add("nan 1\n1 2\n2 3\n3 nan\n4 -inf\n5 6\n6 nan\n", "with lines");
+    panel.add("1 nan\n", "with points");
+    EXPECT_EQ(panel.text(), "plot '-' with lines\n1 2\n2 3\n\n5 6\ne\n");
 }
 
 TEST(PlotPanel, MarksWithinAPixelAreThinnedAndThoseOutsideLeftOut) {
@@ -265,7 +275,11 @@ TEST(PlotPanel, MarksWithinAPixelAreThinnedAndThoseOutsideLeftOut) {
     marks.add(5.02, 0.9);
     marks.add(10.1, 0.5);
     marks.add(std::nan(""), 0.5);
+    marks.add(5.5, std::nan(""));
     EXPECT_EQ(marks.text(), "5.0100 0.5010 \n5.0200 0.9000 \n");
+    app::ThinnedMarks flat({0, 10, 1, 1, 100, 100});
+    flat.add(5, 1);
+    EXPECT_EQ(flat.text(), "5.0000 1.0000 \n");
 }
 
 /// A ramp of a second: column i of ten holds the samples i / 10 to (i + 1) / 10 - 1 / 48000, the right
@@ -298,6 +312,21 @@ TEST(Gnuplot, AMistakeInAScriptIsReportedInOneLineWithItsMessage) {
     EXPECT_TRUE(holds(drawn[0], "</svg>"));
     EXPECT_EQ(drawn[1], "");
     EXPECT_EQ(drawn[2], drawn[0]) << "the plots after it are drawn";
+}
+
+TEST(Gnuplot, AFigureThatCannotBeDrawnLeavesNoFileAndTheOthersAreWhole) {
+    const TemporaryFolder here;
+    fs::create_directory(here.path() / "figures");
+    app::Plotter plotter(here.path());
+    app::PlotGallery gallery;
+    (void)gallery.add({100, 100, "plot no_such_thing"}, "bad");
+    (void)gallery.add({100, 100, "plot x"}, "good");
+    gallery.write_files(here.path() / "figures", plotter);
+    EXPECT_TRUE(holds(plotter.failure(), "no_such_thing")) << plotter.failure();
+    std::set<std::string> names;
+    for (const fs::directory_entry& entry : fs::directory_iterator(here.path() / "figures"))
+        names.insert(entry.path().filename().string());
+    EXPECT_EQ(names, (std::set<std::string>{"02_good.png", "02_good.svg"}));
 }
 
 TEST(Html, EscapesMarkupAndControlCharacters) {
