@@ -26,6 +26,27 @@ TEST(PredictLive, OfStandardInputItWritesWhatItWritesOfTheFile) {
     EXPECT_EQ(stream.err, "");
 }
 
+/// 200 rows at 100 Hz, the eleventh with a time far away. The first row has no answer; at the worst the stray one
+/// is answered and the two after it are left out.
+TEST(PredictLive, AStrayTimeCostsNoMoreThanThreeAnswersAndIsTold) {
+    const Folder folder;
+    for (const double stray_s : {5e7, -5e7}) {
+        std::string rows;
+        std::istringstream head(read(bundled("traces/roll.csv")));
+        for (std::string line; std::getline(head, line) && (line.starts_with('#') || line.starts_with("t,"));)
+            rows += line + "\n";
+        for (int i = 0; i < 200; ++i)
+            rows += std::to_string(i == 10 ? stray_s : 0.01 * i) + ",left,0.1,1,0.2,1,0,0,0\n";
+        write(folder / "rows", rows);
+        const Ended ended = run_command({"sh", "-c", "\"$0\" predict - --predictor ca --lead 0.01 < \"$1\"",
+                                         MUSICWORLD_PROGRAM, folder / "rows"});
+        ASSERT_EQ(ended.status, 0) << ended.err;
+        EXPECT_GE(std::count(ended.out.begin(), ended.out.end(), '\n'), 1 + 199 - 3) << stray_s;
+        EXPECT_NE(ended.err.find(stray_s < 0 ? "1 sample left out" : "2 samples left out"), std::string::npos)
+            << ended.err;
+    }
+}
+
 /// Where the client's stick is: 0.2 m up and down.
 double height(double t) {
     return 1 + 0.2 * std::sin(8 * t);

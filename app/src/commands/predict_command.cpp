@@ -30,6 +30,10 @@ void print_to_errors(const LivePredictResult& r) {
     fmt::print(stderr,
                "{}, from sample to answer {:.0f} us in the median, {:.0f} us at p99, {:.0f} us at most\n",
                counted(r.answers, "answer"), 1e6 * r.p50_s, 1e6 * r.p99_s, 1e6 * r.most_s);
+    if (r.unsent > 0) fmt::print(stderr, "{} could not be sent\n", counted(r.unsent, "answer"));
+    if (r.left_out > 0)
+        fmt::print(stderr, "{} left out, before an older one of their stick\n",
+                   counted(r.left_out, "sample"));
     if (r.faults.malformed > 0)
         fmt::print(stderr, "{} left out, the first: {}\n", counted(r.faults.malformed, "message"),
                    r.faults.first);
@@ -77,7 +81,7 @@ void predict(PredictOptions o, const std::vector<std::string>& given) {
         o.live.source.source = "stdin";
         const std::unique_ptr<PredictionSink> rows = make_row_sink();
         const LivePredictResult result = predict_live(o.live, *rows);
-        if (result.faults.malformed > 0) print_to_errors(result);
+        if (result.faults.malformed > 0 || result.left_out > 0) print_to_errors(result);
     } else if (!o.live.source.source.empty()) {
         o.live.source.epoch_ns = monotonic_ns() + kHeadStartNs;
         const std::unique_ptr<PredictionSink> sink = open_prediction_sink(o.send);

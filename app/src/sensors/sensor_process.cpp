@@ -35,6 +35,7 @@ constexpr std::size_t kMostQueued = 256;  // samples of a stick on their way fro
 constexpr int kReportEveryMs = 50;
 constexpr double kSmoothing = 0.1;       // of the interval between samples
 constexpr double kLongestIntervalS = 1;  // longer ones are pauses
+constexpr double kMostLateS = 10;        // of a sample that is of use
 
 void add_one(int eventfd) {
     const std::uint64_t one = 1;
@@ -155,7 +156,8 @@ private:
         if (first_read_ns_ == 0) first_read_ns_ = sample.read_ns;
         return sample.read_ns - first_read_ns_ < kSettlingNs;
     }
-    /// False for a sample that cannot be of its stick's clock, and for the one that begins it: that may be a stray.
+    /// False for a sample that cannot be of its stick's clock or is long past, and for the one that begins it: that
+    /// may be a stray.
     bool put_on_our_clock(SourceSample& sample) {
         const double arrival_s = since_epoch_s(sample.read_ns);
         if (source_->replayed()) {
@@ -172,7 +174,7 @@ private:
             stick.clock_report.clock = sample.has_time ? SampleClock::source : SampleClock::arrival;
         }
         const bool begins = sample.has_time && !std::exchange(stick.clocked, true);
-        if (!ours_s || begins) return false;
+        if (!ours_s || begins || *ours_s < arrival_s - kMostLateS) return false;
         sample.sample.t_s = *ours_s;
         sample.due_ns = task_.epoch_ns + to_ns(*ours_s);
         return true;

@@ -11,6 +11,7 @@
 #include "process/clock.h"
 #include "process/stop_signals.h"
 #include "report/table.h"
+#include "sensors/source_clock.h"
 #include "statistics/statistics.h"
 #include "sticks/predictors.h"
 #include "strikes/strike_forecast.h"
@@ -25,7 +26,11 @@ constexpr std::size_t kMostDelays = 10'000'000;
 struct LiveStick {
     std::unique_ptr<tracking::Predictor> predictor;
     std::optional<StrikeForecast> strikes;
-    double newest_s = 0;
+    SourceClock clock;
+    std::optional<double> first_s;  ///< the source's
+    double newest_s = 0;            ///< of what time_of() gave
+    double latest_s = 0;            ///< of all times, since the first
+    double pauses_s = 0;            ///< one for each jump of the clock
     bool started = false, oriented = false;
 };
 
@@ -53,6 +58,8 @@ public:
         }
         LivePredictResult result;
         result.answers = answers_;
+        result.left_out = left_out_;
+        result.unsent = sink_.unsent();
         result.faults = source_->faults();
         if (delays_s_.empty()) return result;
         result.p50_s = quantile(delays_s_, 0.5);
@@ -64,17 +71,20 @@ public:
 private:
     void take(const SourceSample& taken) {
         tracking::PoseSample sample = taken.sample;
-        if (!taken.has_time) sample.t_s = to_s(taken.read_ns);
         LiveStick& stick = sticks_[taken.stick];
         const std::string& name = source_->sticks().names()[taken.stick];
         if (!stick.predictor) start(stick, name);
+        const std::optional<double> t_s = time_of(taken, stick);
+        if (!t_s || (stick.started && !(*t_s > stick.newest_s))) {
+            ++left_out_;
+            return;
+        }
+        sample.t_s = stick.newest_s = *t_s;
         const double behind_s = tracking::feed(*stick.predictor, sample);
         stick.oriented = stick.oriented || sample.has_orientation;
-        if (stick.started && !(sample.t_s > stick.newest_s)) return;
-        stick.newest_s = sample.t_s;
         if (!std::exchange(stick.started, true)) return;
         prediction_.stick = name;
-        prediction_.t_s = sample.t_s + (taken.has_time ? source_->head().base_s : 0);
+        prediction_.t_s = taken.has_time ? taken.sample.t_s + source_->head().base_s : sample.t_s;
         prediction_.oriented = stick.oriented;
         prediction_.poses.clear();
         for (const double lead_s : options_.leads_s)
@@ -89,6 +99,21 @@ private:
         sink_.send(prediction_);
         ++answers_;
         if (delays_s_.size() < kMostDelays) delays_s_.push_back(to_s(monotonic_ns() - taken.read_ns));
+    }
+
+    /// The time that the predictor is told: the source's, unchanged but for jumps of its clock, at which the
+    /// predictor starts anew. None for a sample that cannot be of its stick's clock.
+    std::optional<double> time_of(const SourceSample& taken, LiveStick& stick) const {
+        const double t_s = taken.sample.t_s;
+        if (!taken.has_time) return to_s(taken.read_ns);
+        if (source_->replayed()) return t_s;
+        const double shift_s = stick.clock.shift_s();
+        if (!stick.first_s) stick.first_s = t_s;
+        // Samples may come faster or slower than they were taken: a clock that has never been seen late or early.
+        stick.latest_s = std::max(stick.latest_s, t_s + shift_s - *stick.first_s);
+        if (!stick.clock.map(t_s, stick.latest_s)) return std::nullopt;
+        if (stick.clock.shift_s() != shift_s) stick.pauses_s += 2 * tracking::kGapS;
+        return t_s + stick.clock.shift_s() + stick.pauses_s;
     }
 
     void start(LiveStick& stick, const std::string& name) {
@@ -109,7 +134,7 @@ private:
     std::unique_ptr<SampleSource> source_;
     std::vector<LiveStick> sticks_;  // by the source's index
     Prediction prediction_;
-    std::uint64_t answers_ = 0;
+    std::uint64_t answers_ = 0, left_out_ = 0;
     std::vector<double> delays_s_;
 };
 

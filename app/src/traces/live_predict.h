@@ -39,10 +39,13 @@ class PredictionSink {
 public:
     virtual ~PredictionSink() = default;
     virtual void send(const Prediction& prediction) = 0;
+    /// So many of them could not be sent.
+    [[nodiscard]] virtual std::uint64_t unsent() const { return 0; }
 };
 
 /// `osc:PORT` (of this machine), `osc:HOST:PORT` or `zmq:ENDPOINT` (a publisher that binds it). The messages are
-/// in assets/predictions.md. Throws BadInput for what is none, std::runtime_error for an endpoint that is taken.
+/// in assets/predictions.md. A host's name is looked up now, once. Throws BadInput for what is none,
+/// std::runtime_error for an endpoint that is taken.
 [[nodiscard]] std::unique_ptr<PredictionSink> open_prediction_sink(const std::string& destination);
 /// Rows on standard output, as predict_table() has them; for one lead.
 [[nodiscard]] std::unique_ptr<PredictionSink> make_row_sink();
@@ -58,11 +61,15 @@ struct LivePredictOptions {
 
 struct LivePredictResult {
     std::uint64_t answers = 0;
+    std::uint64_t left_out = 0;               ///< samples before an older one of their stick
+    std::uint64_t unsent = 0;                 ///< answers that could not be sent
     double p50_s = 0, p99_s = 0, most_s = 0;  ///< from a sample's arrival to its answer's departure
     SourceFaults faults;
 };
 
-/// Answers each sample that is newer than all before it of its stick, from the second one on, as soon as it comes.
+/// Answers each sample that is newer than all before it of its stick, from the second one on, as soon as it comes. A
+/// stray time costs no more than three samples (SourceClock). Samples may come faster or slower than they were taken:
+/// their times alone are looked at, so that answers do not depend on the load.
 /// Throws BadInput for what cannot be, std::runtime_error when the source or an external predictor fails.
 [[nodiscard]] LivePredictResult predict_live(const LivePredictOptions& options, PredictionSink& sink);
 

@@ -1,7 +1,11 @@
 #include <fmt/format.h>
 #include <lo/lo.h>
+#include <netdb.h>
+#include <sys/socket.h>
 
+#include <cerrno>
 #include <charconv>
+#include <cstdlib>
 #include <iterator>
 #include <memory>
 #include <stdexcept>
@@ -9,6 +13,7 @@
 #include <zmq.hpp>
 
 #include "files/bad_input.h"
+#include "files/file_descriptor.h"
 #include "traces/live_predict.h"
 
 namespace app {
@@ -23,11 +28,26 @@ constexpr std::string_view kToOsc = "osc:", kToZmq = "zmq:";
                     destination));
 }
 
-/// One bundle a sample.
+/// One bundle a sample. The host's name is looked up once: a look-up may take longer than a sample lasts.
 class OscSink final : public PredictionSink {
 public:
-    OscSink(const std::string& host, const std::string& port)
-        : address_(lo_address_new_with_proto(LO_UDP, host.c_str(), port.c_str()), lo_address_free) {}
+    OscSink(const std::string& host, const std::string& port) {
+        addrinfo wanted{}, *found = nullptr;
+        wanted.ai_socktype = SOCK_DGRAM;
+        int failed = 0;
+        for (const int family : {AF_INET, AF_INET6}) {  // who listens for OSC often has IPv4 alone
+            wanted.ai_family = family;
+            failed = getaddrinfo(host.c_str(), port.c_str(), &wanted, &found);
+            if (failed == 0) break;
+        }
+        if (failed != 0)
+            throw BadInput(fmt::format("error: found --send to {}, expected a host that can be found: {}",
+                                       host, gai_strerror(failed)));
+        const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> addresses(found, freeaddrinfo);
+        address_.assign(reinterpret_cast<const char*>(found->ai_addr), found->ai_addrlen);
+        socket_ = FileDescriptor(::socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC, found->ai_protocol));
+        if (!socket_) throw std::runtime_error("error: " + cannot("open a socket to " + host));
+    }
 
     void send(const Prediction& p) override {
         const Bundle bundle(lo_bundle_new(LO_TT_IMMEDIATE), lo_bundle_free_recursive);
@@ -53,12 +73,25 @@ public:
             lo_message_add_string(message, p.strike->instrument.c_str());
             lo_bundle_add_message(bundle.get(), ("/musicworld/next_strike/" + p.stick).c_str(), message);
         }
-        (void)lo_send_bundle(address_.get(), bundle.get());  // nobody need listen
+        std::size_t size = 0;
+        const std::unique_ptr<void, decltype(&std::free)> bytes(
+            lo_bundle_serialise(bundle.get(), nullptr, &size), std::free);
+        // Nobody need listen: this socket is not connected, and so is not told.
+        ssize_t sent = -1;
+        do
+            sent = ::sendto(socket_.get(), bytes.get(), size, MSG_DONTWAIT | MSG_NOSIGNAL,
+                            reinterpret_cast<const sockaddr*>(address_.data()),
+                            static_cast<socklen_t>(address_.size()));
+        while (sent < 0 && errno == EINTR);
+        if (sent < 0) ++unsent_;
     }
+    [[nodiscard]] std::uint64_t unsent() const override { return unsent_; }
 
 private:
     using Bundle = std::unique_ptr<std::remove_pointer_t<lo_bundle>, decltype(&lo_bundle_free_recursive)>;
-    std::unique_ptr<std::remove_pointer_t<lo_address>, decltype(&lo_address_free)> address_;
+    FileDescriptor socket_;
+    std::string address_;  // a sockaddr
+    std::uint64_t unsent_ = 0;
 };
 
 /// One message a sample: a row for each lead, and one for the strike.
@@ -113,8 +146,9 @@ std::unique_ptr<PredictionSink> open_prediction_sink(const std::string& destinat
     if (!destination.starts_with(kToOsc)) refuse_destination(destination);
     const std::string rest = destination.substr(kToOsc.size());
     const std::size_t colon = rest.rfind(':');
-    const std::string host = colon == std::string::npos ? "127.0.0.1" : rest.substr(0, colon),
-                      port = colon == std::string::npos ? rest : rest.substr(colon + 1);
+    std::string host = colon == std::string::npos ? "127.0.0.1" : rest.substr(0, colon);
+    if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+    const std::string port = colon == std::string::npos ? rest : rest.substr(colon + 1);
     unsigned number = 0;
     const auto [end, failed] = std::from_chars(port.data(), port.data() + port.size(), number);
     if (host.empty() || failed != std::errc{} || end != port.data() + port.size() || number < 1 ||

@@ -1,5 +1,8 @@
 // What leaves for other programs.
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <zmq.hpp>
 
@@ -40,6 +43,32 @@ TEST(PredictionSinks, OverZeroMQASampleIsAMessageOfRows) {
               "predicted,12.5,left,0.25,1,2,3,0,1,0,0,1,2,3,5,6,9\n"
               "next_strike,12.5,left,0.0625,0.75,hi-hat\n");
     EXPECT_THROW((void)app::open_prediction_sink("zmq:" + endpoint + "/no/such/folder"), std::runtime_error);
+}
+
+app::Prediction small_prediction(std::size_t poses) {
+    app::Prediction prediction{"left", 12.5, true, {}, {}};
+    prediction.poses.resize(poses);
+    return prediction;
+}
+
+/// A datagram holds 64 KiB.
+TEST(PredictionSinks, OverOscAHostIsFoundOnceAndWhatCannotBeSentIsCounted) {
+    const int reader = socket(AF_INET6, SOCK_DGRAM, 0);
+    sockaddr_in6 address{};
+    address.sin6_family = AF_INET6, address.sin6_addr = in6addr_loopback;
+    socklen_t size = sizeof address;
+    if (bind(reader, reinterpret_cast<sockaddr*>(&address), size) != 0) GTEST_SKIP() << "needs IPv6";
+    (void)getsockname(reader, reinterpret_cast<sockaddr*>(&address), &size);
+    const auto sink = app::open_prediction_sink("osc:[::1]:" + std::to_string(ntohs(address.sin6_port)));
+    sink->send(small_prediction(2));
+    char bundle[1024] = {};
+    EXPECT_GT(recv(reader, bundle, sizeof bundle, MSG_DONTWAIT), 100);
+    EXPECT_STREQ(bundle, "#bundle");
+    EXPECT_EQ(sink->unsent(), 0u);
+    sink->send(small_prediction(2000));
+    EXPECT_EQ(sink->unsent(), 1u);
+    close(reader);
+    EXPECT_THROW((void)app::open_prediction_sink("osc:no..host:9000"), app::BadInput);
 }
 
 TEST(PredictionSinks, WhatIsNoDestinationIsRefused) {
