@@ -34,7 +34,7 @@ void add_marks(Recording& recording, const fs::path& file, const std::string& he
         if (number == 1 && !line.starts_with(header))
             throw BadInput(
                 fmt::format("{}:1:1: error: found \"{}\", expected the columns {}; mend it or move it away",
-                            file.string(), line.substr(0, 60), header));
+                            file.string(), tracking::printable(line.substr(0, 60)), header));
         if (number == 1 || line.empty()) continue;
         const std::vector<std::string> fields = split(line);
         double t_s = 0;
@@ -44,7 +44,7 @@ void add_marks(Recording& recording, const fs::path& file, const std::string& he
             throw BadInput(
                 fmt::format("{}:{}:1: error: found \"{}\", expected a time in seconds and a stick; mend it "
                             "or move the file away",
-                            file.string(), number, line.substr(0, 60)));
+                            file.string(), number, tracking::printable(line.substr(0, 60))));
         const auto times = times_of(fields.size() > 2 ? fields[2] : "");
         for (std::size_t i = 0; i < recording.marks.size(); ++i)
             if (fields[1] == recording.trace.sticks[i].name || fields[1] == "both")

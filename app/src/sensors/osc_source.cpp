@@ -231,7 +231,7 @@ void OscSource::receive(std::int64_t deadline_ns) {
 
 void OscSource::datagram(std::span<const char> bytes) {
     read_ns_ = monotonic_ns();
-    take_packet(bytes, LO_TT_IMMEDIATE, 0, *this);
+    take_packet(bytes, lo_timetag{0, 1}, 0, *this);  // at once
 }
 
 }  // namespace app

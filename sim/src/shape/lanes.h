@@ -46,10 +46,20 @@ inline void store_lanes(float* aligned, Lanes value) noexcept {  ///< eight floa
     return result;
 #endif
 }
+/// Lane i is that of `v` with the number order[i].
+[[nodiscard]] inline Lanes picked(Lanes v, LaneMask order) noexcept {
+#if __has_builtin(__builtin_shuffle)
+    return __builtin_shuffle(v, order);
+#else  // clang
+    Lanes result{};
+    for (int i = 0; i < kLanes; ++i) result[i] = v[order[i]];
+    return result;
+#endif
+}
 /// Sum in a fixed order: ((0 + 4) + (2 + 6)) + ((1 + 5) + (3 + 7)).
 [[nodiscard]] inline float sum_of(Lanes v) noexcept {
-    const Lanes half = v + __builtin_shuffle(v, LaneMask{4, 5, 6, 7, 4, 5, 6, 7});
-    const Lanes quarter = half + __builtin_shuffle(half, LaneMask{2, 3, 2, 3, 2, 3, 2, 3});
+    const Lanes half = v + picked(v, LaneMask{4, 5, 6, 7, 4, 5, 6, 7});
+    const Lanes quarter = half + picked(half, LaneMask{2, 3, 2, 3, 2, 3, 2, 3});
     return quarter[0] + quarter[1];
 }
 

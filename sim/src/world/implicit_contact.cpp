@@ -187,7 +187,7 @@ void SampleFinder::gather(const PosedBody& sampled, const PosedBody& implicit, f
 void SampleFinder::keep(const Lanes (&x)[3], int first, unsigned lanes) {
     const LaneMask order = *reinterpret_cast<const LaneMask*>(kPacking.order[lanes]);
     for (int i = 0; i < 3; ++i) {
-        const Lanes packed = __builtin_shuffle(x[i], order);
+        const Lanes packed = picked(x[i], order);
         std::memcpy(near_place_.data() + static_cast<std::size_t>(i) * capacity_ + near_count_, &packed,
                     sizeof(packed));
     }

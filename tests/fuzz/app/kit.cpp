@@ -1,0 +1,15 @@
+// Kits (TOML).
+#include "kit/kit.h"
+
+#include "files/bad_input.h"
+#include "fuzz_target.h"
+#include "written_input.h"
+
+void fuzz(std::string_view bytes) {
+    static const WrittenInput input("fuzz.toml");
+    try {
+        (void)app::read_kit(input.with(bytes));
+    } catch (const app::BadInput& fault) {
+        require_located(fault, "");
+    }
+}
