@@ -68,7 +68,12 @@ std::vector<audio::Voice> voices() {
     return {voice("drum"), voice("drum"), voice("cymbal"), voice("bell"), voice("string"), voice("cymbal")};
 }
 
-void play(audio::LivePerformance& live, double seconds) {
+/// Returns the blocks of real time.
+std::vector<BlockTiming> play(audio::LivePerformance& live, double seconds) {
+    std::vector<BlockTiming> blocks;
+    const auto take = [&] {
+        for (const BlockTiming& block : live.take_blocks()) blocks.push_back(block);
+    };
     const std::int64_t epoch = audio::monotonic_ns() + 100'000'000;
     live.start(epoch);
     for (std::uint64_t id = 1; static_cast<double>(id) / 16 < seconds; ++id) {
@@ -77,13 +82,16 @@ void play(audio::LivePerformance& live, double seconds) {
         audio::Note note{
             .id = id, .voice = static_cast<std::uint32_t>(id % 6), .onset_sample = onset, .speed_mps = 4};
         live.schedule(note);
+        take();
     }
     audio::sleep_until_ns(epoch + static_cast<std::int64_t>(1e9 * seconds));
+    take();
+    return blocks;
 }
 
-void report(const audio::LivePerformance& live, bool json) {
+void report(const audio::LivePerformance& live, const std::vector<BlockTiming>& blocks, bool json) {
     Lateness all[] = {{"started - planned", {}}, {"done - started", {}}, {"done - planned", {}}};
-    for (const BlockTiming& block : live.blocks()) {
+    for (const BlockTiming& block : blocks) {
         all[0].ns.push_back(block.started_ns - block.planned_ns);
         all[1].ns.push_back(block.done_ns - block.started_ns);
         all[2].ns.push_back(block.done_ns - block.planned_ns);
@@ -119,9 +127,9 @@ int main(int count, char** arguments) {
     try {
         audio::LivePerformance live(MUSICWORLD_SOURCE_DIR "/assets/orchestra/musicworld.orc", voices(),
                                     options);
-        play(live, seconds);
+        const std::vector<BlockTiming> blocks = play(live, seconds);
         (void)live.finish(0, 0);
-        report(live, json);
+        report(live, blocks, json);
     } catch (const std::exception& error) {
         std::fprintf(stderr, "error: %s\n", error.what());
         return 1;

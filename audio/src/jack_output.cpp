@@ -129,8 +129,8 @@ void JackOutput::connect_midi(const std::string& peer) {
                     jack_port_name(midi_) + "` stays open";
 }
 
-void JackOutput::start(const float* recording, std::int64_t epoch_ns) noexcept {
-    recording_ = recording;
+void JackOutput::start(std::span<const float> ring, std::int64_t epoch_ns) noexcept {
+    ring_ = ring;
     epoch_ns_ = epoch_ns;
     sounding_.store(true, std::memory_order_seq_cst);
 }
@@ -231,11 +231,14 @@ void JackOutput::play(const Cycle& cycle) noexcept {
 
 void JackOutput::copy_sound(std::int64_t first, std::int32_t frames, float* left, float* right) noexcept {
     const std::int64_t there = published_.load(std::memory_order_acquire);
+    const auto room = static_cast<std::int64_t>(ring_.size() / 2);
     for (std::int32_t i = 0; i < frames; ++i) {
         const std::int64_t sample = first + i;
-        const bool silent = sample < 0 || sample >= there;
-        left[i] = silent ? 0.0F : recording_[2 * sample];
-        right[i] = silent ? 0.0F : recording_[2 * sample + 1];
+        // Half of the ring is left to what is being written.
+        const bool silent = sample < 0 || sample >= there || sample < there - room / 2;
+        const auto at = static_cast<std::size_t>(silent ? 0 : 2 * (sample % room));
+        left[i] = silent ? 0.0F : ring_[at];
+        right[i] = silent ? 0.0F : ring_[at + 1];
     }
     const std::int64_t end = first + frames;
     if (end > 0 && end > there) underruns_.fetch_add(1, std::memory_order_relaxed);

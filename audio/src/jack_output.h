@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "command_queue.h"
@@ -41,9 +42,9 @@ public:
     JackOutput(const JackOutput&) = delete;
     JackOutput& operator=(const JackOutput&) = delete;
 
-    /// From here on sound is played: interleaved stereo that stays where it is; `publish` sets how much of
-    /// it is ready; sample 0 is due at epoch_ns.
-    void start(const float* recording, std::int64_t epoch_ns) noexcept;
+    /// From here on sound is played: interleaved stereo, in a ring that stays where it is and holds what was
+    /// published last; `publish` sets how much of it is ready; sample 0 is due at epoch_ns.
+    void start(std::span<const float> ring, std::int64_t epoch_ns) noexcept;
     void publish(std::int64_t frames) noexcept { published_.store(frames, std::memory_order_release); }
     /// Hands a stroke over; false where that cannot be. Wait-free.
     [[nodiscard]] bool send(const MidiStroke& stroke) noexcept;
@@ -91,7 +92,7 @@ private:
 
     // Shared.
     CommandQueue<MidiStroke> strokes_{MidiEvents::kCapacity};
-    const float* recording_ = nullptr;  // with epoch_ns_, written before sounding_
+    std::span<const float> ring_;  // with epoch_ns_, written before sounding_
     std::int64_t epoch_ns_ = 0;
     std::atomic<bool> sounding_{false}, in_cycle_{false}, ended_{false};
     std::atomic<std::int64_t> published_{0};

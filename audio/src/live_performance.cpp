@@ -45,12 +45,12 @@ std::vector<PlayedNote> LivePerformance::take_played() {
     return implementation_->thread.take_played();
 }
 
-std::vector<float> LivePerformance::finish(std::int64_t minimum_samples, std::int64_t tail_samples) {
+std::int64_t LivePerformance::finish(std::int64_t minimum_samples, std::int64_t tail_samples) {
     return implementation_->thread.finish(minimum_samples, tail_samples);
 }
 
-std::span<const BlockTiming> LivePerformance::blocks() const {
-    return implementation_->thread.timings();
+std::vector<BlockTiming> LivePerformance::take_blocks() {
+    return implementation_->thread.take_blocks();
 }
 
 int LivePerformance::block_size() const {

@@ -3,7 +3,9 @@
 #include <xmmintrin.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -14,7 +16,9 @@ namespace {
 
 constexpr std::size_t kQueueLength = 1024;
 constexpr std::size_t kNotesAhead = 4096;
-constexpr double kNotesPerSecond = 1000;
+constexpr std::size_t kBlocksWaiting = 32768;
+constexpr std::int64_t kRingSamples = 1 << 20;  // 22 s; whole blocks of any power of two
+constexpr std::chrono::milliseconds kBetweenHandingsOver{20};
 constexpr std::int64_t kLongestSleepNs = 20'000'000;  // of a wait in which finish() must be heard
 
 /// A vector with that capacity, its memory touched so that no later use of it makes a page fault.
@@ -55,7 +59,9 @@ LiveThread::LiveThread(const std::filesystem::path& orchestra, const std::vector
     : options_(checked(options)),
       longest_samples_(static_cast<std::int64_t>(std::ceil(options.longest_s * kSampleRate))),
       commands_(kQueueLength),
-      played_(2 * kNotesAhead + static_cast<std::size_t>(kNotesPerSecond * options.longest_s)),
+      played_(2 * kNotesAhead),
+      timings_(kBlocksWaiting),
+      ring_(2 * kRingSamples),
       notes_(kNotesAhead),
       taken_(reserved<TakenNote>(kNotesAhead)),
       jack_(open_jack(options)) {
@@ -67,6 +73,7 @@ LiveThread::LiveThread(const std::filesystem::path& orchestra, const std::vector
         thread_.join();
         throw;
     }
+    taker_ = std::jthread([this](const std::stop_token& stop) { hand_over(stop); });
 }
 
 LiveThread::~LiveThread() {
@@ -87,7 +94,7 @@ void LiveThread::start(std::int64_t epoch_ns) {
     set_state(State::running);
 }
 
-std::vector<float> LiveThread::finish(std::int64_t minimum_samples, std::int64_t tail_samples) {
+std::int64_t LiveThread::finish(std::int64_t minimum_samples, std::int64_t tail_samples) {
     if (minimum_samples < 0 || tail_samples < 0 || state() == State::finishing) {
         throw std::logic_error(
             "finish: found a negative number of samples or a second call, expected neither");
@@ -95,7 +102,10 @@ std::vector<float> LiveThread::finish(std::int64_t minimum_samples, std::int64_t
     minimum_samples_ = minimum_samples;
     tail_samples_ = tail_samples;
     set_state(State::finishing);
-    return recording_.get_future().get();
+    const std::int64_t kept = kept_samples_.get_future().get();
+    taker_ = {};  // hands over what is left
+    if (sink_failure_) std::rethrow_exception(sink_failure_);
+    return kept;
 }
 
 LiveThread::Counts LiveThread::counts() const noexcept {
@@ -122,11 +132,11 @@ void LiveThread::run(const std::filesystem::path& orchestra, const std::vector<V
     }
     try {
         perform();
-        recording_.set_value(std::move(output_));
+        kept_samples_.set_value(renderer_->kept_samples(minimum_samples_, tail_samples_));
     } catch (...) {
         failed_.store(true, std::memory_order_release);
         play_on_device(false);
-        recording_.set_exception(std::current_exception());
+        kept_samples_.set_exception(std::current_exception());
     }
     renderer_.reset();  // Csound dies on its own thread
 }
@@ -136,10 +146,11 @@ void LiveThread::prepare(const std::filesystem::path& orchestra, const std::vect
     _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);  // as Performance: decayed modes must not cost
     renderer_.emplace(orchestra, voices);
     if (!renderer_->warm_up()) renderer_.emplace(orchestra, voices);
-    const auto block = static_cast<std::size_t>(renderer_->block_size());
-    const auto blocks = static_cast<std::size_t>(longest_samples_) / block + 1;
-    output_ = reserved<float>(2 * block * blocks);
-    timings_ = reserved<BlockTiming>(blocks);
+    if (kRingSamples % renderer_->block_size() != 0)
+        throw std::runtime_error("live performance: found blocks of " +
+                                 std::to_string(renderer_->block_size()) +
+                                 " samples, expected a power of two");
+    block_ = reserved<float>(2 * static_cast<std::size_t>(renderer_->block_size()));
     busy_begin_s_ = thread_seconds();
 }
 
@@ -154,7 +165,10 @@ void LiveThread::perform() {
     fixed_sample_.store(std::max(end, renderer_->position()), std::memory_order_seq_cst);
     read_commands();
     start_notes_before(end);
-    renderer_->finish(output_, minimum_samples_, tail_samples_);
+    while (renderer_->goes_on(minimum_samples_, tail_samples_)) {
+        wait_for_room();
+        render_block();
+    }
     measure_busy();
 }
 
@@ -162,9 +176,11 @@ void LiveThread::play_on_device(bool on) noexcept {
     if (!jack_ || on == on_device_) return;
     on_device_ = on;
     if (on) {
-        jack_->start(output_.data(), epoch_ns_);
+        jack_->start(ring_, epoch_ns_);
     } else if (!jack_->stop()) {
-        abandoned_ = std::exchange(output_, std::vector<float>(output_));
+        while (handed_over_.load(std::memory_order_acquire) < rendered_.load(std::memory_order_relaxed))
+            sleep_until_ns(monotonic_ns() + kLongestSleepNs);
+        abandoned_ = std::exchange(ring_, std::vector<float>(ring_));
     }
 }
 
@@ -193,14 +209,56 @@ void LiveThread::play_block(std::int64_t planned_ns) {
     fixed_sample_.store(end, std::memory_order_seq_cst);  // before the queue is read: see the header
     read_commands();
     start_notes_before(end);
-    renderer_->render_block(output_);
+    render_block();
     if (on_device_) jack_->publish(end);
     timing.done_ns = monotonic_ns();
     note_timing(timing, epoch_ns_ + samples_ns(begin));
 }
 
+/// Into the ring.
+void LiveThread::render_block() {
+    const std::int64_t begin = renderer_->position();
+    if (begin + renderer_->block_size() - handed_over_.load(std::memory_order_acquire) > kRingSamples)
+        throw std::runtime_error("the sound could not be kept: the disk took nothing for 20 s");
+    block_.clear();
+    renderer_->render_block(block_);
+    std::ranges::copy(block_, ring_.begin() + 2 * (begin % kRingSamples));
+    rendered_.store(renderer_->position(), std::memory_order_release);
+}
+
+/// Not in real time.
+void LiveThread::wait_for_room() {
+    while (renderer_->position() + renderer_->block_size() - handed_over_.load(std::memory_order_acquire) >
+           kRingSamples)
+        sleep_until_ns(monotonic_ns() + kLongestSleepNs);
+}
+
+/// The taker's thread: gives the sink what was rendered, until it is told to stop and nothing is left.
+void LiveThread::hand_over(const std::stop_token& stop) {
+    for (;;) {
+        const bool last = stop.stop_requested();
+        const std::int64_t rendered = rendered_.load(std::memory_order_acquire);
+        std::int64_t begin = handed_over_.load(std::memory_order_relaxed);
+        while (begin < rendered) {
+            const std::int64_t at = begin % kRingSamples,
+                               count = std::min(rendered - begin, kRingSamples - at);
+            try {
+                if (options_.take_sound && !sink_failure_)
+                    options_.take_sound(std::span(ring_).subspan(static_cast<std::size_t>(2 * at),
+                                                                 static_cast<std::size_t>(2 * count)));
+            } catch (...) {
+                sink_failure_ = std::current_exception();
+                failed_.store(true, std::memory_order_release);
+            }
+            handed_over_.store(begin += count, std::memory_order_release);
+        }
+        if (last) return;
+        std::this_thread::sleep_for(kBetweenHandingsOver);
+    }
+}
+
 void LiveThread::note_timing(const BlockTiming& timing, std::int64_t due_ns) noexcept {
-    timings_.push_back(timing);
+    if (!timings_.try_push(timing)) overflows_.fetch_add(1, std::memory_order_relaxed);
     if (timing.done_ns > due_ns) blocks_late_.fetch_add(1, std::memory_order_relaxed);
     blocks_done_.fetch_add(1, std::memory_order_relaxed);
     measure_busy();
@@ -242,7 +300,7 @@ std::int64_t LiveThread::send_stroke(const Note& note) noexcept {
 }
 
 void LiveThread::answer(const PlayedNote& note) noexcept {
-    if (!played_.try_add(note)) overflows_.fetch_add(1, std::memory_order_relaxed);
+    if (!played_.try_push(note)) overflows_.fetch_add(1, std::memory_order_relaxed);
 }
 
 void LiveThread::measure_busy() noexcept {

@@ -1,11 +1,12 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
+#include <exception>
 #include <filesystem>
 #include <future>
 #include <memory>
 #include <optional>
-#include <span>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -14,7 +15,6 @@
 #include "command_queue.h"
 #include "jack_output.h"
 #include "live_notes.h"
-#include "played_log.h"
 #include "renderer.h"
 
 namespace audio {
@@ -27,7 +27,7 @@ struct LiveCommand {
 
 /// The audio thread of a LivePerformance, which documents what it does: Csound lives and dies on it. A block
 /// at a time it publishes which notes are fixed, reads the commands, takes the notes that are due, and
-/// renders them into memory that was reserved before the start.
+/// renders them into a ring, from which a thread of their own takes the samples.
 class LiveThread {
 public:
     enum class State : int { waiting, running, finishing, stopping };
@@ -52,9 +52,9 @@ public:
     // The caller's thread.
     void start(std::int64_t epoch_ns);
     bool send(const LiveCommand& command) noexcept;
-    [[nodiscard]] std::vector<PlayedNote> take_played() { return played_.take(); }
-    [[nodiscard]] std::vector<float> finish(std::int64_t minimum_samples, std::int64_t tail_samples);
-    [[nodiscard]] std::span<const BlockTiming> timings() const { return timings_; }  ///< after finish()
+    [[nodiscard]] std::vector<PlayedNote> take_played() { return taken_from(played_); }
+    [[nodiscard]] std::vector<BlockTiming> take_blocks() { return taken_from(timings_); }
+    [[nodiscard]] std::int64_t finish(std::int64_t minimum_samples, std::int64_t tail_samples);
     [[nodiscard]] const StartUp& start_up() const { return start_up_; }
     [[nodiscard]] const JackOutput* device() const { return jack_.get(); }  ///< null: none
 
@@ -68,6 +68,12 @@ public:
     [[nodiscard]] Counts counts() const noexcept;
 
 private:
+    template <class T>
+    static std::vector<T> taken_from(CommandQueue<T>& queue) {
+        std::vector<T> all;
+        for (T each; queue.try_pop(each);) all.push_back(each);
+        return all;
+    }
     void run(const std::filesystem::path& orchestra, const std::vector<Voice>& voices) noexcept;
     void prepare(const std::filesystem::path& orchestra, const std::vector<Voice>& voices);
     void perform();
@@ -75,6 +81,9 @@ private:
     void perform_in_time();
     [[nodiscard]] bool wait_until(std::int64_t planned_ns);
     void play_block(std::int64_t planned_ns);
+    void render_block();
+    void wait_for_room();
+    void hand_over(const std::stop_token& stop);
     void read_commands() noexcept;
     void obey(const LiveCommand& command) noexcept;
     void start_notes_before(std::int64_t end);
@@ -90,7 +99,11 @@ private:
 
     // Shared.
     CommandQueue<LiveCommand> commands_;
-    PlayedLog played_;
+    CommandQueue<PlayedNote> played_;
+    CommandQueue<BlockTiming> timings_;
+    std::vector<float> ring_;  // sample n lies at n mod kRingSamples, both channels
+    std::atomic<std::int64_t> rendered_{0}, handed_over_{0};  // samples
+    std::exception_ptr sink_failure_;                         // the taker's; the caller's after its end
     std::atomic<State> state_{State::waiting};
     std::int64_t epoch_ns_ = 0;                            // written before `running`
     std::int64_t minimum_samples_ = 0, tail_samples_ = 0;  // written before `finishing`
@@ -99,19 +112,20 @@ private:
     std::atomic<std::uint64_t> overflows_{0}, refused_{0}, blocks_done_{0}, blocks_late_{0};
     std::atomic<double> busy_s_{0};
     std::promise<StartUp> prepared_;
-    std::promise<std::vector<float>> recording_;
+    std::promise<std::int64_t> kept_samples_;
 
     // The audio thread's.
     std::optional<Renderer> renderer_;
     LiveNotes notes_;
     std::vector<TakenNote> taken_;
-    std::vector<float> output_, abandoned_;  // the latter JACK's thread may still read
-    std::vector<BlockTiming> timings_;       // the caller's after finish()
-    std::unique_ptr<JackOutput> jack_;       // after output_ and abandoned_, which it reads
-    bool on_device_ = false;                 // from its start to its stop
+    std::vector<float> block_;          // the newest
+    std::vector<float> abandoned_;      // a ring that JACK's thread may still read
+    std::unique_ptr<JackOutput> jack_;  // after ring_ and abandoned_, which it reads
+    bool on_device_ = false;            // from its start to its stop
     double busy_begin_s_ = 0;
 
     std::thread thread_;
+    std::jthread taker_;  // last: it ends first
 };
 
 }  // namespace audio

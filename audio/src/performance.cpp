@@ -148,7 +148,10 @@ struct Performance::Implementation {
         if (const auto* render = std::get_if<RenderTo>(&command))
             renderer.render_to(render->sample, rendered);
         if (const auto* finish = std::get_if<Finish>(&command)) {
-            renderer.finish(rendered, finish->minimum_samples, finish->tail_samples);
+            while (renderer.goes_on(finish->minimum_samples, finish->tail_samples))
+                renderer.render_block(rendered);
+            rendered.resize(2 * static_cast<std::size_t>(
+                                    renderer.kept_samples(finish->minimum_samples, finish->tail_samples)));
         }
     }
 

@@ -122,7 +122,12 @@ void Renderer::render_to(std::int64_t sample, std::vector<float>& output) {
 
 void Renderer::render_block(std::vector<float>& output) {
     start_due_notes();
-    for (const double value : engine_.render_block()) output.push_back(static_cast<float>(value));
+    const std::size_t begin = output.size();
+    for (const double value : engine_.render_block()) {
+        output.push_back(static_cast<float>(value));
+        if (std::abs(output.back()) >= kSilence)
+            loud_ = position_ + static_cast<std::int64_t>((output.size() - begin + 1) / 2);
+    }
     position_ += block_size();
 }
 
@@ -178,14 +183,12 @@ bool Renderer::sounding() const {
     return next_due_ < due_.size() || ends_.front() > static_cast<double>(position_);
 }
 
-void Renderer::finish(std::vector<float>& output, std::int64_t minimum_samples, std::int64_t tail_samples) {
-    const std::int64_t limit = minimum_samples + tail_samples;
-    while (position_ < minimum_samples || (position_ < limit && sounding())) render_block(output);
-    const auto last_loud =
-        std::find_if(output.rbegin(), output.rend(), [](float value) { return std::abs(value) >= kSilence; });
-    const std::int64_t loud_frames = (output.rend() - last_loud + 1) / 2;
-    const std::int64_t frames = std::clamp(loud_frames, minimum_samples, limit);
-    output.resize(static_cast<std::size_t>(2 * frames));
+bool Renderer::goes_on(std::int64_t minimum_samples, std::int64_t tail_samples) const {
+    return position_ < minimum_samples || (position_ < minimum_samples + tail_samples && sounding());
+}
+
+std::int64_t Renderer::kept_samples(std::int64_t minimum_samples, std::int64_t tail_samples) const {
+    return std::clamp(loud_, minimum_samples, minimum_samples + tail_samples);
 }
 
 }  // namespace audio

@@ -52,8 +52,10 @@ public:
     void render_block(std::vector<float>& output);
     /// Renders whole blocks up to `sample`, a multiple of the block size.
     void render_to(std::int64_t sample, std::vector<float>& output);
-    /// Performance::finish, of all that `output` holds.
-    void finish(std::vector<float>& output, std::int64_t minimum_samples, std::int64_t tail_samples);
+    /// Whether more blocks are to be rendered until what Performance::finish says is there.
+    [[nodiscard]] bool goes_on(std::int64_t minimum_samples, std::int64_t tail_samples) const;
+    /// How much of all that was rendered is then kept.
+    [[nodiscard]] std::int64_t kept_samples(std::int64_t minimum_samples, std::int64_t tail_samples) const;
 
 private:
     Renderer(const std::string& text, const std::string& source, const std::vector<Voice>& voices);
@@ -71,7 +73,7 @@ private:
     std::vector<Note> due_;     ///< from next_due_ on still to be started
     std::size_t next_due_ = 0;
     std::vector<double> p_fields_;
-    std::int64_t position_ = 0;
+    std::int64_t position_ = 0, loud_ = 0;  ///< loud_: up to the last sample that is not silent
 };
 
 }  // namespace audio

@@ -99,7 +99,7 @@ int to_pcm(float value, std::size_t& clipped) {
 
 }  // namespace
 
-std::size_t write_wav(const std::filesystem::path& file, const std::vector<float>& interleaved) {
+std::size_t write_wav(const std::filesystem::path& file, std::span<const float> interleaved) {
     if (interleaved.size() % 2 != 0)
         throw std::logic_error("write_wav: found an odd number of samples, expected pairs");
     SF_INFO format{};

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -63,7 +64,7 @@ inline app::PlayResult sample_play_result() {
     for (int i = 0; i < 72000; ++i) {
         const float sample =
             0.5F * std::sin(static_cast<float>(i) * 0.05F) * std::exp(-static_cast<float>(i) / 20000);
-        r.audio.insert(r.audio.end(), {sample, 0.5F * sample});
+        r.audio.append(std::array{sample, 0.5F * sample});
     }
     r.wall_s = 0.5;
     r.stages_s = {{"tracking", 0.1}, {"drawing", 0.3}};

@@ -115,8 +115,9 @@ TEST_F(JackOutput, ServerOfAnotherRateOrOfTooLongAPeriodIsRefused) {
 TEST_F(JackOutput, SoundThatArrivesIsTheRecordingAtItsDueTime) {
     const Server server(128);
     ASSERT_TRUE(server.is_up());
+    rendering::Kept kept;
     LivePerformance live(kOrchestra, {voice("cymbal", {}, 0.3), voice("drum", {}, 0.8)},
-                         {.longest_s = 5, .jack_audio = true});
+                         kept.with({.longest_s = 5, .jack_audio = true}));
     Listener listener;
     ASSERT_TRUE(listener.connect("musicworld:out_l", "listener:in_l"));
     ASSERT_TRUE(listener.connect("musicworld:out_r", "listener:in_r"));
@@ -129,11 +130,11 @@ TEST_F(JackOutput, SoundThatArrivesIsTheRecordingAtItsDueTime) {
     const std::int64_t epoch = audio::monotonic_ns() + 100 * kMs;
     live.start(epoch);
     wait_until(epoch + 2500 * kMs);
-    const std::vector<float> samples = live.finish(0, 4 * kSecond);
+    const std::vector<float>& samples = kept.finish(live, 0, 4 * kSecond);
     listener.stop();
     EXPECT_EQ(samples,
               rendering::render({voice("cymbal", {}, 0.3), voice("drum", {}, 0.8)}, notes, 0, 4 * kSecond));
-    const auto in_time = static_cast<std::int64_t>(live.blocks().size()) * live.block_size();
+    const auto in_time = static_cast<std::int64_t>(live.take_blocks().size()) * live.block_size();
     std::vector<std::int64_t> shifts;
     int missing = 0;
     for (const Cycle& cycle : listener.cycles()) {
@@ -237,8 +238,9 @@ TEST_F(JackOutput, StrokesArriveInTheFrameOfTheirOnsetAndCancelledOnesSendNothin
 TEST_F(JackOutput, ServerThatEndsLeavesTheRecordingWhole) {
     Server server(128);
     ASSERT_TRUE(server.is_up());
+    rendering::Kept kept;
     LivePerformance live(kOrchestra, {voice("drum")},
-                         {.longest_s = 3, .jack_audio = true, .midi_port = "strokes"});
+                         kept.with({.longest_s = 3, .jack_audio = true, .midi_port = "strokes"}));
     const std::vector<Note> notes{note(1, 4800), note(2, 24000)};
     for (const Note& each : notes) ASSERT_TRUE(live.schedule(each));
     const std::int64_t epoch = audio::monotonic_ns() + 50 * kMs;
@@ -246,7 +248,8 @@ TEST_F(JackOutput, ServerThatEndsLeavesTheRecordingWhole) {
     wait_until(epoch + 200 * kMs);
     server.end();
     wait_until(epoch + 700 * kMs);
-    EXPECT_EQ(live.finish(kSecond, kSecond), rendering::render({voice("drum")}, notes, kSecond, kSecond));
+    EXPECT_EQ(kept.finish(live, kSecond, kSecond),
+              rendering::render({voice("drum")}, notes, kSecond, kSecond));
     EXPECT_NE(live.device().find("the server ended"), std::string::npos) << live.device();
 }
 

@@ -19,6 +19,7 @@ namespace {
 using audio::LivePerformance;
 using audio::Note;
 using audio::PlayedNote;
+using rendering::Kept;
 using rendering::kOrchestra;
 using rendering::note;
 using rendering::voice;
@@ -64,7 +65,8 @@ bool same(const std::vector<float>& a, const std::vector<float>& b) {
 }
 
 TEST(LivePerformance, SecondOfNotesSentAsTimeGoesEqualsTheOfflineOneToTheBit) {
-    LivePerformance live(kOrchestra, four_voices(), {.longest_s = 3});
+    Kept kept;
+    LivePerformance live(kOrchestra, four_voices(), kept.with({.longest_s = 3}));
     std::mt19937 random(1992);
     std::vector<Note> notes;
     start(live);
@@ -79,7 +81,7 @@ TEST(LivePerformance, SecondOfNotesSentAsTimeGoesEqualsTheOfflineOneToTheBit) {
         notes.push_back(each);
     }
     wait_for_sample(live, notes.back().onset_sample + 1);
-    const std::vector<float> samples = live.finish(2 * kSecond, kSecond);
+    const std::vector<float>& samples = kept.finish(live, 2 * kSecond, kSecond);
     const std::vector<PlayedNote> played = live.take_played();
     ASSERT_EQ(played.size(), notes.size());
     EXPECT_TRUE(std::ranges::is_sorted(played, {}, &PlayedNote::onset_sample));
@@ -87,17 +89,18 @@ TEST(LivePerformance, SecondOfNotesSentAsTimeGoesEqualsTheOfflineOneToTheBit) {
     EXPECT_TRUE(same(samples, offline(notes, played, 2 * kSecond, kSecond)));
     EXPECT_EQ(live.refused_changes(), 0U);
     EXPECT_EQ(live.queue_overflows(), 0U);
-    EXPECT_GT(live.blocks().size(), 1000U);
+    EXPECT_GT(live.take_blocks().size(), 1000U);
 }
 
 TEST(LivePerformance, EveryBlockIsPlannedTheLeadAheadAndNoneIsSkipped) {
-    LivePerformance live(kOrchestra, {voice("drum")}, {.output_lead_s = 0.01, .longest_s = 1});
+    Kept kept;
+    LivePerformance live(kOrchestra, {voice("drum")}, kept.with({.output_lead_s = 0.01, .longest_s = 1}));
     const std::int64_t epoch = audio::monotonic_ns() + 30'000'000;
     live.start(epoch);
     wait_for_sample(live, 9600);
-    const std::vector<float> samples = live.finish(0, 0);
+    const std::vector<float>& samples = kept.finish(live, 0, 0);
     EXPECT_TRUE(samples.empty());
-    const auto blocks = live.blocks();
+    const auto blocks = live.take_blocks();
     for (std::size_t i = 0; i < blocks.size(); ++i) {
         const auto first_sample = static_cast<std::int64_t>(i) * live.block_size();
         EXPECT_EQ(blocks[i].planned_ns, epoch + audio::samples_ns(first_sample) - 10'000'000);
@@ -112,13 +115,14 @@ TEST(LivePerformance, EveryBlockIsPlannedTheLeadAheadAndNoneIsSkipped) {
 }
 
 TEST(LivePerformance, NoteThatComesTooLateSoundsWithTheNextBlockAndSaysSo) {
-    LivePerformance live(kOrchestra, four_voices(), {.longest_s = 2});
+    Kept kept;
+    LivePerformance live(kOrchestra, four_voices(), kept.with({.longest_s = 2}));
     start(live);
     wait_for_sample(live, 4800);
     const std::int64_t before = live.fixed_sample();
     ASSERT_TRUE(live.schedule(note(1, 100, 5)));
     wait_for_sample(live, before + 9600);
-    const std::vector<float> samples = live.finish(0, rendering::kLongTail);
+    const std::vector<float>& samples = kept.finish(live, 0, rendering::kLongTail);
     const std::vector<PlayedNote> played = live.take_played();
     ASSERT_EQ(played.size(), 1U);
     EXPECT_EQ(played[0].planned_sample, 100);
@@ -129,14 +133,15 @@ TEST(LivePerformance, NoteThatComesTooLateSoundsWithTheNextBlockAndSaysSo) {
 }
 
 TEST(LivePerformance, TakenNoteIsLeftAloneByMovesAndCancelsWhichAreCounted) {
-    LivePerformance live(kOrchestra, four_voices(), {.longest_s = 2});
+    Kept kept;
+    LivePerformance live(kOrchestra, four_voices(), kept.with({.longest_s = 2}));
     ASSERT_TRUE(live.schedule(note(1, 1000, 5)));
     start(live);
     wait_for_sample(live, 2000);
     EXPECT_TRUE(live.schedule(note(1, 20000, 8)));
     EXPECT_TRUE(live.cancel(1));
     EXPECT_TRUE(live.cancel(77)) << "never known";
-    const std::vector<float> samples = live.finish(kSecond, kSecond);
+    const std::vector<float>& samples = kept.finish(live, kSecond, kSecond);
     EXPECT_EQ(live.refused_changes(), 3U);
     EXPECT_TRUE(same(samples, rendering::render(four_voices(), {note(1, 1000, 5)}, kSecond, kSecond)));
 }
@@ -186,7 +191,8 @@ TEST(LivePerformance, AllocatesNothingOnItsThreadWhileItRuns) {
 }
 
 TEST(LivePerformance, PastItsReservedLengthTheRestIsRenderedByFinish) {
-    LivePerformance live(kOrchestra, four_voices(), {.longest_s = 0.1});
+    Kept kept;
+    LivePerformance live(kOrchestra, four_voices(), kept.with({.longest_s = 0.1}));
     const std::vector<Note> notes{note(1, 1000), note(2, 20000, 4, 1)};
     for (const Note& each : notes) ASSERT_TRUE(live.schedule(each));
     start(live);
@@ -194,14 +200,15 @@ TEST(LivePerformance, PastItsReservedLengthTheRestIsRenderedByFinish) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     EXPECT_EQ(live.fixed_sample(), 4800) << "real time ended there";
     EXPECT_TRUE(
-        same(live.finish(kSecond, kSecond), rendering::render(four_voices(), notes, kSecond, kSecond)));
-    EXPECT_EQ(live.blocks().size(), 75U);
+        same(kept.finish(live, kSecond, kSecond), rendering::render(four_voices(), notes, kSecond, kSecond)));
+    EXPECT_EQ(live.take_blocks().size(), 75U);
 }
 
 TEST(LivePerformance, FinishedBeforeItsStartRendersAllAtOnce) {
-    LivePerformance live(kOrchestra, four_voices(), {});
+    Kept kept;
+    LivePerformance live(kOrchestra, four_voices(), kept.with({}));
     ASSERT_TRUE(live.schedule(note(1, 1000)));
-    EXPECT_TRUE(same(live.finish(kSecond, kSecond),
+    EXPECT_TRUE(same(kept.finish(live, kSecond, kSecond),
                      rendering::render(four_voices(), {note(1, 1000)}, kSecond, kSecond)));
     EXPECT_THROW((void)live.finish(0, 0), std::logic_error);
 }

@@ -1,9 +1,11 @@
 #pragma once
 #include <cstdint>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "audio/live_performance.h"
 #include "audio/performance.h"
 
 /// Shared by the tests of the sound: short ways to voices, notes and their samples.
@@ -32,6 +34,22 @@ inline std::vector<float> render(const std::vector<audio::Voice>& voices,
     for (const audio::Note& each : notes) performance.schedule(each);
     return performance.finish(minimum, tail);
 }
+
+/// Keeps the sound of a performance.
+struct Kept {
+    std::vector<float> samples;
+
+    audio::LiveOptions with(audio::LiveOptions options) {
+        options.take_sound = [this](std::span<const float> sound) {
+            samples.insert(samples.end(), sound.begin(), sound.end());
+        };
+        return options;
+    }
+    const std::vector<float>& finish(audio::LivePerformance& live, std::int64_t minimum, std::int64_t tail) {
+        samples.resize(2 * static_cast<std::size_t>(live.finish(minimum, tail)));
+        return samples;
+    }
+};
 
 /// Left channel.
 inline std::vector<double> left(const std::vector<float>& interleaved) {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "files/disk_log.h"
 #include "sensors/sensor_hub.h"
 #include "strikes/strike.h"
 
@@ -82,11 +83,11 @@ struct RealtimeResult {
     std::uint64_t laps = 1;
     double output_lead_s = 0;
     std::vector<std::string> quality_levels;  ///< what each level draws
-    std::vector<SampleTiming> samples;
-    std::vector<FrameTiming> frames;
-    std::vector<DrawnTip> tips;  ///< in order of frame, then stick
+    DiskLog<SampleTiming> samples;
+    DiskLog<FrameTiming> frames;
+    DiskLog<DrawnTip> tips;  ///< in order of frame, then stick
     std::vector<NoteTiming> notes;
-    std::vector<audio::BlockTiming> blocks;  ///< nanoseconds since the epoch
+    DiskLog<audio::BlockTiming> blocks;  ///< nanoseconds since the epoch
     std::vector<LeadStep> leads;
     std::vector<SensorEvent> events;
     std::vector<ClockReport> clocks;

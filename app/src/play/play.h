@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "files/disk_log.h"
 #include "kit/kit.h"
 #include "strikes/strike.h"
 #include "strikes/true_contacts.h"
@@ -45,7 +46,7 @@ struct PlayResult {
     std::vector<TrueContact> contacts;     ///< by time
     StrikeScore score;
     std::vector<TipTrack> tracks;
-    std::vector<float> audio;         ///< interleaved stereo, 48 kHz; empty with --no-audio
+    DiskLog<float> audio;             ///< interleaved stereo, 48 kHz; empty with --no-audio
     std::size_t samples_refused = 0;  ///< reports that the filters ignored
     std::size_t clipped_samples = 0;
     double wall_s = 0;

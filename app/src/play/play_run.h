@@ -1,4 +1,5 @@
 #pragma once
+#include <audio/live_performance.h>
 #include <audio/performance.h>
 #include <sim/simulation.h>
 #include <tracking/trace.h>
@@ -7,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "files/output_folder.h"
@@ -64,9 +66,12 @@ struct RunParts {
 /// Sound: audio::Performance or audio::LivePerformance.
 template <class Sound>
 void finish_sound(Sound& sound, double seconds, PlayResult& result, const OutputFolder& folder) {
-    const double length = (seconds + kSoundTailS) * audio::kSampleRate;
-    result.audio = sound.finish(static_cast<std::int64_t>(std::ceil(length)),
-                                static_cast<std::int64_t>(kLongestSoundTailS * audio::kSampleRate));
+    const auto length = static_cast<std::int64_t>(std::ceil((seconds + kSoundTailS) * audio::kSampleRate));
+    const auto tail = static_cast<std::int64_t>(kLongestSoundTailS * audio::kSampleRate);
+    if constexpr (std::is_same_v<Sound, audio::LivePerformance>)
+        result.audio.cut(2 * static_cast<std::size_t>(sound.finish(length, tail)));  // which has taken it
+    else
+        result.audio.append(sound.finish(length, tail));
     result.clipped_samples = audio::write_wav(folder.path("audio.wav"), result.audio);
     result.stages_s.emplace_back("sound (own thread)", sound.busy_s());
     result.versions.emplace_back("csound", sound.version());

@@ -29,7 +29,7 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// Age of the newest sample that a note could use: the onset of its strike, on the lap's clock, less the
 /// sample's time.
-double pose_age_s(const std::vector<SampleTiming>& samples, const NoteTiming& note, const Strike& strike) {
+double pose_age_s(const DiskLog<SampleTiming>& samples, const NoteTiming& note, const Strike& strike) {
     double newest_s = strike.scheduled_at_s;
     auto sample = std::ranges::upper_bound(samples, note.played.taken_ns, {}, &SampleTiming::handed_ns);
     while (sample != samples.begin() && (--sample)->lap == note.lap)
@@ -81,7 +81,7 @@ std::vector<TipTrack> tracks_of(const RealtimeSession& session, const RealtimeRu
     for (std::size_t i = 0; i < trace.sticks.size(); ++i) {
         std::vector<tracking::PoseSample> samples;
         if (session.live) {
-            samples = run.seen()[i];
+            samples.assign(run.seen()[i].begin(), run.seen()[i].end());
         } else {
             for (std::uint64_t lap = 0; static_cast<double>(lap) * period_s < run.end_s(); ++lap)
                 for (tracking::PoseSample sample : session.trace.sticks[i].samples) {
@@ -316,11 +316,12 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options, const Warn& warn) 
     const WallTimer wall;
     require_tools(options.play);
     std::optional<OutputFolder> folder;  // outlives the threads that write into it
+    RealtimeOutcome outcome;             // outlives the session, which writes into it
     RealtimeSession session(options);
-    RealtimeOutcome outcome;
     outcome.play = describe(session.options.play, session.trace, session.kit);
     folder.emplace(options.play.out);
-    session.start(*folder, warn);
+    outcome.play.audio = DiskLog<float>(folder->scratch());
+    session.start(*folder, outcome.play.audio, warn);
     outcome.play.stages_s.emplace_back("start", wall.seconds());
     {
         RealtimeRun run(session);

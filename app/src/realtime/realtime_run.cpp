@@ -39,10 +39,15 @@ RealtimeRun::RealtimeRun(RealtimeSession& session)
       quality_(1 / fps_, trial_of(session.frames.get())),
       render_lead_(options_.play.render_lead_s, fps_, kRenderReserveS),
       sound_lead_(options_.play.sound_lead_s, kSamplesExpectedHz,
-                  kSoundReserveS + options_.play.release_margin_s),
-      seen_(samples_seen_.size()) {
-    for (std::uint32_t i = 0; i < seen_.size(); ++i)
+                  kSoundReserveS + options_.play.release_margin_s) {
+    for (std::uint32_t i = 0; i < samples_seen_.size(); ++i) {
         sticks_.emplace_back(i, session.stick, options_.play.sound_lead_s);
+        seen_.emplace_back(session.scratch);
+    }
+    result_.samples = DiskLog<SampleTiming>(session.scratch);
+    result_.frames = DiskLog<FrameTiming>(session.scratch);
+    result_.tips = DiskLog<DrawnTip>(session.scratch);
+    result_.blocks = DiskLog<audio::BlockTiming>(session.scratch);
     for (const QualityLevel& level : quality_levels()) result_.quality_levels.push_back(level.name);
     result_.period_s = session.period_s();
     result_.output_lead_s = options_.sound.output_lead_s;
@@ -277,13 +282,9 @@ RealtimeResult RealtimeRun::finish() {
         result_.frames_not_written = session_.frames->report().not_written;
     }
     take_notes();
+    take_blocks();
     if (session_.sound) {
         const audio::LivePerformance& sound = *session_.sound;
-        for (audio::BlockTiming block : sound.blocks()) {
-            for (std::int64_t* ns : {&block.planned_ns, &block.started_ns, &block.done_ns})
-                *ns -= session_.epoch_ns;
-            result_.blocks.push_back(block);
-        }
         result_.audio_device = sound.device();
         result_.refused_changes = sound.refused_changes();
         result_.queue_overflows = sound.queue_overflows();
@@ -350,6 +351,15 @@ void RealtimeRun::take_notes() {
     }
 }
 
+void RealtimeRun::take_blocks() {
+    if (!session_.sound) return;
+    for (audio::BlockTiming& block : session_.sound->take_blocks()) {
+        for (std::int64_t* ns : {&block.planned_ns, &block.started_ns, &block.done_ns})
+            *ns -= session_.epoch_ns;
+        result_.blocks.push_back(block);
+    }
+}
+
 std::uint64_t RealtimeRun::refused() const {
     std::uint64_t sum = 0;
     for (std::size_t i = 0; i < sticks_.size(); ++i)
@@ -368,6 +378,7 @@ void RealtimeRun::run(const Warn& warn) {
     for (;;) {
         const double now_s = to_s(now_ns());
         if (now_s >= end_s_ || StopSignals::stopped() || (session_.sensors->ended() && now_s > 0)) break;
+        if (session_.sound && session_.sound->failed()) break;  // which its end throws
         double next_s = end_s_;
         if (session_.frames) next_s = std::min(next_s, next_frame_at_s());
         wait(to_ns(next_s));
@@ -375,6 +386,7 @@ void RealtimeRun::run(const Warn& warn) {
         if (session_.frames) ask_for_frames();
         take_frames();
         take_notes();
+        take_blocks();
         follow_delays();
         if (now_s - watched_s < kWatchS) continue;
         watched_s = now_s;

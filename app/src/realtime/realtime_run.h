@@ -43,7 +43,7 @@ public:
     [[nodiscard]] const std::vector<SensorEvent>& events() const { return result_.events; }
     [[nodiscard]] const std::vector<LapStrikes>& laps() const { return laps_; }
     /// Measured poses as the loop saw them, by stick, on the run's clock: the trace of a live source.
-    [[nodiscard]] const std::vector<std::vector<tracking::PoseSample>>& seen() const { return seen_; }
+    [[nodiscard]] const std::vector<DiskLog<tracking::PoseSample>>& seen() const { return seen_; }
     [[nodiscard]] double end_s() const { return end_s_; }
     [[nodiscard]] std::uint64_t refused() const;
 
@@ -69,6 +69,7 @@ private:
     [[nodiscard]] FrameTiming& frame_of(std::uint64_t index);
     FrameTiming& settle(const DrawnFrame& drawn);
     void take_notes();
+    void take_blocks();
     void follow_delays();
     [[nodiscard]] double render_lead_s() const {
         return options_.lead_auto ? render_lead_.lead_s() : options_.play.render_lead_s;
@@ -98,7 +99,7 @@ private:
     double last_step_s_ = -1;
     std::size_t blocks_seen_ = 0, late_blocks_seen_ = 0;
     double end_s_ = 0;
-    std::vector<std::vector<tracking::PoseSample>> seen_;
+    std::vector<DiskLog<tracking::PoseSample>> seen_;
     std::vector<LapStrikes> laps_;
     RealtimeResult result_;
 };

@@ -16,8 +16,8 @@ namespace {
 
 constexpr std::string_view kTracePrefix = "trace:";
 constexpr double kBetweenLapsS = 0.25;  // more than tracking::kGapS and any note's way beyond the last sample
-constexpr double kLongestLiveS = 600;   // 23 MB of sound a minute are kept
-constexpr double kLiveSpareS = 60;      // of a live source's only lap, beyond the run
+constexpr double kLongestLiveS = 3 * 3600.0;  // as a trace that is played
+constexpr double kLiveSpareS = 60;            // of a live source's only lap, beyond the run
 constexpr double kSpareSoundS = 1;
 constexpr double kStartS = 0.7;  // from starting the sensors to the epoch, at first
 constexpr double kAheadS = 0.1;  // the epoch lies at least that far ahead when all is ready
@@ -73,23 +73,25 @@ RealtimeSession::RealtimeSession(const RealtimeOptions& asked) : options(asked),
     period_samples = static_cast<std::int64_t>(std::ceil(period_s * audio::kSampleRate));
 }
 
-void RealtimeSession::start(const OutputFolder& folder, const Warn& warn) {
+void RealtimeSession::start(const OutputFolder& folder, DiskLog<float>& recording, const Warn& warn) {
+    scratch = folder.scratch();
     const PlayOptions& o = options.play;
     stage.emplace(kit, trace.sticks.size(), stick);
     // Worker processes and ZeroMQ's threads inherit it.
     simulation_priority = set_thread_priority(ThreadRole::simulation, options.realtime_priority);
     simulation = make_simulation(kit, o.workers);
     leave_thread_priority();
-    if (o.audio) start_sound();
+    if (o.audio) start_sound(recording);
     frames = start_frames(o, scenes_of(*stage, o.width, o.height), stage->frame({}, {}), folder,
                           FramePolicy::refuse, options.realtime_priority);
     if (sound && !sound->midi_problem().empty()) warn(sound->midi_problem());
     start_sensors();
 }
 
-void RealtimeSession::start_sound() {
+void RealtimeSession::start_sound(DiskLog<float>& recording) {
     audio::LiveOptions o = options.sound;
     o.longest_s = seconds + kSpareSoundS;
+    o.take_sound = [&recording](std::span<const float> samples) { recording.append(samples); };
     o.on_thread_start = [this] {
         sound_priority = set_thread_priority(ThreadRole::sound, options.realtime_priority);
     };

@@ -3,6 +3,7 @@
 #include <sim/simulation.h>
 #include <tracking/trace.h>
 
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "files/disk_log.h"
 #include "files/output_folder.h"
 #include "kit/kit.h"
 #include "pictures/frame_thread.h"
@@ -41,8 +43,9 @@ struct RealtimeSession {
     explicit RealtimeSession(const RealtimeOptions& asked);
     RealtimeSession(const RealtimeSession&) = delete;
     RealtimeSession& operator=(const RealtimeSession&) = delete;
-    /// Makes everything that plays; frames go into `folder`.
-    void start(const OutputFolder& folder, const Warn& warn);
+    /// Makes everything that plays; frames go into `folder`, the sound as it is made to the end of `recording`, which
+    /// outlives the session.
+    void start(const OutputFolder& folder, DiskLog<float>& recording, const Warn& warn);
     /// Of a lap.
     [[nodiscard]] double period_s() const { return static_cast<double>(period_samples) / audio::kSampleRate; }
     /// Threads and what they obtained.
@@ -57,7 +60,8 @@ struct RealtimeSession {
     std::int64_t period_samples = 0;  ///< of a lap; a live source has one, longer than the run
 
     // Since start():
-    std::int64_t epoch_ns = 0;  ///< CLOCK_MONOTONIC, when the run's clock is 0
+    std::filesystem::path scratch;  ///< for what is measured
+    std::int64_t epoch_ns = 0;      ///< CLOCK_MONOTONIC, when the run's clock is 0
     std::optional<KitStage> stage;
     std::unique_ptr<sim::Simulation> simulation;
     std::unique_ptr<audio::LivePerformance> sound;  ///< absent with --no-audio
@@ -66,7 +70,7 @@ struct RealtimeSession {
     std::string simulation_priority, sound_priority, control_priority;
 
 private:
-    void start_sound();
+    void start_sound(DiskLog<float>& recording);
     void start_sensors();
 };
 

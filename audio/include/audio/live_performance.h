@@ -15,11 +15,14 @@ struct LiveOptions {
     /// A block is planned to be computed this long before its first sample is due [s]: room for lateness and
     /// for the device's buffer. Notes of that block cannot change any more then.
     double output_lead_s = 0.004;
-    double longest_s = 60;       ///< of sound, for which memory is reserved; real time ends there
+    double longest_s = 60;       ///< of sound; real time ends there
     bool jack_audio = false;     ///< play through a running JACK server (its default outputs)
     std::string midi_port{};     ///< name of a MIDI output port of ours in JACK; empty: none
     std::string midi_connect{};  ///< connect that port to this one, when it is there; empty: leave it open
     std::function<void()> on_thread_start{};  ///< run first on the audio thread (its priority)
+    /// Gets the sound as it is made, interleaved stereo, on a thread of its own, which may wait for a disk: 20 s
+    /// of sound have room. What it throws, finish() throws. Empty: nobody wants it.
+    std::function<void(std::span<const float>)> take_sound{};
 };
 
 /// One block of sound in real time; nanoseconds of CLOCK_MONOTONIC.
@@ -51,8 +54,8 @@ struct PlayedNote {
 /// leaves it alone. The recorded samples equal those of the offline Performance for the same notes, with the
 /// onsets that were played.
 ///
-/// Bounds: 1024 commands between two blocks, 4096 notes ahead, 1000 notes per second on average. Running,
-/// the audio thread allocates nothing, takes no lock and makes no system call but the clock's (Csound's own
+/// Bounds: 1024 commands between two blocks, 4096 notes ahead; 8192 notes and 32768 blocks wait to be taken.
+/// Memory does not grow with time. Running, the audio thread allocates nothing, takes no lock and makes no system call but the clock's (Csound's own
 /// code excepted).
 class LivePerformance {
 public:
@@ -77,22 +80,22 @@ public:
     /// schedule or cancel has returned true, fixed_sample() is at most the note's onset (both of its onsets,
     /// for a move). Read before, it is only a hint: the next block may begin in between.
     [[nodiscard]] std::int64_t fixed_sample() const noexcept;
-    /// Whether something went wrong on the audio thread; finish() throws it.
+    /// Whether something went wrong on the audio thread, or with the sound that was taken; finish() throws it.
     [[nodiscard]] bool failed() const noexcept;
     /// Notes sounded since the last call, in order of onset. One thread at a time.
     [[nodiscard]] std::vector<PlayedNote> take_played();
+    /// Blocks of real time done since the last call. One thread at a time.
+    [[nodiscard]] std::vector<BlockTiming> take_blocks();
     /// Ends at `minimum_samples` and the sound's tail as Performance::finish, rendered as fast as can be from
-    /// here on (a device falls silent); returns all samples. Throws what went wrong on the audio thread.
-    /// Once.
-    [[nodiscard]] std::vector<float> finish(std::int64_t minimum_samples, std::int64_t tail_samples);
+    /// here on (a device falls silent); returns the number of samples, of which take_sound has got all (and
+    /// silence beyond them, if this is called late). Throws what went wrong on the audio thread. Once.
+    [[nodiscard]] std::int64_t finish(std::int64_t minimum_samples, std::int64_t tail_samples);
 
-    /// After finish(); the counts at any time.
-    [[nodiscard]] std::span<const BlockTiming> blocks() const;  ///< those of real time
+    /// At any time.
     [[nodiscard]] int block_size() const;
-    [[nodiscard]] BlockCount block_count() const noexcept;  ///< any thread
-    [[nodiscard]] std::uint64_t refused_changes() const;    ///< cancels and moves that came too late
-    [[nodiscard]] std::uint64_t queue_overflows()
-        const;  ///< commands and answers for which there was no room
+    [[nodiscard]] BlockCount block_count() const noexcept;   ///< any thread
+    [[nodiscard]] std::uint64_t refused_changes() const;     ///< cancels and moves that came too late
+    [[nodiscard]] std::uint64_t queue_overflows() const;     ///< commands and answers without room
     [[nodiscard]] std::uint64_t device_underruns() const;    ///< JACK asked for samples that were not there
     [[nodiscard]] std::uint64_t device_corrections() const;  ///< samples dropped or repeated for JACK's clock
     [[nodiscard]] std::uint64_t late_strokes() const;        ///< MIDI notes that left later than due

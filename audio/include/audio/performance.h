@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -77,7 +78,7 @@ private:
 
 /// 48 kHz, stereo, 24-bit PCM; values beyond [-1, 1] are clipped and counted in the return value. Throws
 /// std::runtime_error (disk full, no permission).
-std::size_t write_wav(const std::filesystem::path& file, const std::vector<float>& interleaved);
+std::size_t write_wav(const std::filesystem::path& file, std::span<const float> interleaved);
 
 /// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, so 1920 per second), channel 10,
 /// one note-on per note and its note-off 0.1 s later: the file's bytes. Throws std::runtime_error for a key,

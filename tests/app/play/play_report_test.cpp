@@ -137,7 +137,8 @@ TEST(Report, OfARunWithoutAnythingIsAPageNonetheless) {
     EXPECT_FALSE(holds(page, "<h2>Sound"));
     EXPECT_FALSE(holds(page, "<h2>Frames"));
     app::PlayResult silent = sample_play_result();
-    silent.audio.assign(2 * 48000, 0.0F);
+    silent.audio = {};
+    silent.audio.append(std::vector<float>(2 * 48000));
     EXPECT_TRUE(holds(report_of(silent), "Silence"));
 }
 
