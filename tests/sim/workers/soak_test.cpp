@@ -1,9 +1,10 @@
 // A shared world among everything that goes wrong at once, for as long as is asked for: MUSICWORLD_SOAK_S seconds, an
-// hour with MUSICWORLD_LONG, a few seconds otherwise.
+// hour with MUSICWORLD_LONG, a few seconds otherwise. Last a disk that is full when the results are written.
 #include <gtest/gtest.h>
 #include <malloc.h>
 #include <netinet/in.h>
 #include <signal.h>
+#include <sys/mount.h>
 #include <sys/socket.h>
 
 #include <chrono>
@@ -15,6 +16,7 @@
 #include <random>
 
 #include "hostile_member.h"
+#include "simulate_command.h"
 #include "world_processes.h"
 
 namespace {
@@ -46,15 +48,15 @@ long descriptors() {
     return std::distance(begin(all), end(all)) - 1;
 }
 
-/// Kills, stops and drains workers of this process, and starts others in their place.
+/// Kills, stops and drains workers of a process, and starts others in their place.
 class Fate {
 public:
-    Fate(std::string endpoint, unsigned seed)
-        : thread_([this, endpoint = std::move(endpoint), seed](const std::stop_token& stop) {
+    Fate(std::string endpoint, unsigned seed, pid_t parent = getpid())
+        : thread_([this, endpoint = std::move(endpoint), seed, parent](const std::stop_token& stop) {
               std::mt19937 random(seed);
               while (!stop.stop_requested()) {
                   std::this_thread::sleep_for(std::chrono::milliseconds(100 + random() % 400));
-                  const std::vector<pid_t> all = children_of(getpid());
+                  const std::vector<pid_t> all = children_of(parent);
                   if (all.empty()) continue;
                   constexpr int kSignals[] = {SIGKILL, SIGKILL, SIGTERM, SIGTERM, SIGSTOP};
                   ::kill(all[random() % all.size()], kSignals[random() % std::size(kSignals)]);
@@ -177,6 +179,26 @@ TEST(SharedWorldSoak, AmongKillsHostileMembersAndAFloodTheBitsStayAndMemoryAndDe
     EXPECT_LE(allocated_mib(),
               1.1 * allocated_first + 1);  // 1 MiB: what threads that have ended kept for reuse
     EXPECT_GT(sent, 1000);
+}
+
+TEST(SharedWorldSoak, ADiskThatIsFullInTheEndIsSaidInOneLineAndNothingLooksFinished) {
+    const std::filesystem::path disk =
+        std::filesystem::path(testing::TempDir()) / ("disk" + std::to_string(getpid()));
+    std::filesystem::create_directory(disk);
+    if (mount("none", disk.c_str(), "tmpfs", 0, "size=64k") != 0) GTEST_SKIP() << "needs the right to mount";
+    const std::string endpoint = free_endpoint();
+    SimulateCommand run("benchmark100 --steps 300 --fps 1000 --workers 2 --listen " + endpoint + " --out " +
+                        (disk / "run").string());
+    run.wait_until_listening();
+    const Fate fate(endpoint, 3, children_of(getpid()).front());
+    const Stranger stranger(endpoint, 4);
+    const SimulateCommand::Ended ended = run.wait();
+    EXPECT_EQ(ended.status, 1) << ended.text;
+    EXPECT_NE(ended.text.find("No space left on device"), std::string::npos) << ended.text;
+    EXPECT_FALSE(std::filesystem::exists(disk / "run/summary.json"));
+    EXPECT_FALSE(std::filesystem::exists(disk / "run/states.csv"));
+    umount2(disk.c_str(), MNT_DETACH);
+    std::filesystem::remove(disk);
 }
 
 }  // namespace
