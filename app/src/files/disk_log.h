@@ -5,6 +5,7 @@
 #include <memory>
 #include <new>
 #include <span>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
@@ -81,6 +82,27 @@ public:
 private:
     GrowingFile file_;
     std::size_t size_ = 0;
+};
+
+/// Texts in the order in which they came, as a DiskLog.
+class TextLog {
+public:
+    TextLog() : TextLog(std::filesystem::path()) {}
+    explicit TextLog(const std::filesystem::path& folder) : bytes_(folder), ends_(folder) {}
+
+    void push_back(std::string_view text) {
+        bytes_.append({text.data(), text.size()});
+        ends_.push_back(bytes_.size());
+    }
+    [[nodiscard]] std::size_t size() const { return ends_.size(); }
+    [[nodiscard]] std::string_view operator[](std::size_t i) const {
+        const std::size_t begin = i == 0 ? 0 : ends_[i - 1];
+        return {bytes_.data() + begin, ends_[i] - begin};
+    }
+
+private:
+    DiskLog<char> bytes_;
+    DiskLog<std::size_t> ends_;
 };
 
 }  // namespace app

@@ -246,7 +246,7 @@ std::string remarks(const RealtimeResult& realtime) {
     Table table = Table::of({"s:.2f", "event"});
     for (const SensorEvent& event : realtime.events) table.add({event.at_s, event.message});
     for (const LeadStep& step : realtime.leads)
-        if (!step.why.empty()) table.add({step.at_s, step.why});
+        if (step.change >= 0) table.add({step.at_s, realtime.why(step)});
     return table.rows.empty() ? std::string() : "<h2>What happened</h2>\n" + table.html();
 }
 

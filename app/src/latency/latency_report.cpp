@@ -232,7 +232,7 @@ Table lead_table(const RealtimeResult& realtime) {
                              "quality", "fps", "why"});
     for (const LeadStep& l : realtime.leads)
         table.add({l.at_s, l.render_lead_s, l.sound_lead_s, l.render_delay_s, l.sound_delay_s, l.quality,
-                   l.fps, l.why});
+                   l.fps, realtime.why(l)});
     return table;
 }
 

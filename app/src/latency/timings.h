@@ -73,7 +73,7 @@ struct LeadStep {
     double render_delay_s = 0, sound_delay_s = 0;  ///< the high percentiles that they follow
     int quality = 0;
     double fps = 30;
-    std::string why;  ///< of a change of quality or rate: one line
+    std::int64_t change = -1;  ///< of quality or rate, index into RealtimeResult::changes; -1: none
 };
 
 /// What a run in real time measured, beside its PlayResult.
@@ -86,15 +86,21 @@ struct RealtimeResult {
     DiskLog<SampleTiming> samples;
     DiskLog<FrameTiming> frames;
     DiskLog<DrawnTip> tips;  ///< in order of frame, then stick
-    std::vector<NoteTiming> notes;
+    DiskLog<NoteTiming> notes;
     DiskLog<audio::BlockTiming> blocks;  ///< nanoseconds since the epoch
-    std::vector<LeadStep> leads;
+    DiskLog<LeadStep> leads;
+    TextLog changes;  ///< why quality or rate were changed: one line each
     std::vector<SensorEvent> events;
     std::vector<ClockReport> clocks;
     std::vector<std::pair<std::string, std::string>> priorities;  ///< thread, what it obtained
     std::string audio_device, disturbed_by;
     std::uint64_t refused_changes = 0, queue_overflows = 0, device_underruns = 0, frames_not_written = 0;
     std::uint64_t midi_late = 0, midi_lost = 0, device_corrections = 0;
+
+    /// Of a step that changed the quality or the rate; empty: it did not.
+    [[nodiscard]] std::string why(const LeadStep& step) const {
+        return step.change < 0 ? std::string() : std::string(changes[static_cast<std::size_t>(step.change)]);
+    }
 };
 
 }  // namespace app

@@ -20,6 +20,7 @@ double toward(double value, double target, double step) {
     return value < target ? std::min(target, value + step) : std::max(target, value - step);
 }
 
+constexpr double kRecentS = 1;
 constexpr double kReboundS = 0.05;  // a filter has seen a rebound by then
 
 }  // namespace
@@ -31,14 +32,14 @@ sim::Impulse impulse_of(const Strike& strike) {
 void DrawnStrikes::start(double T, std::span<const Strike> strikes) {
     const auto settled = [&](const Strike& strike) {
         if (strike.outcome == Outcome::cancelled) return strike.decided_at_s < T - kLongAgoS;
-        return seen_.contains(strike.id) && folded_.contains(strike.id);
+        const Mark mark = mark_of(strike.id);
+        return mark.seen && mark.folded;
     };
     while (first_open_ < strikes.size() && settled(strikes[first_open_])) ++first_open_;
     for (std::size_t i = first_open_; i < strikes.size(); ++i) {
         const Strike& strike = strikes[i];
-        if (strike.outcome == Outcome::cancelled || strike.contact_s > T || seen_.contains(strike.id))
-            continue;
-        seen_.insert(strike.id);
+        if (strike.outcome == Outcome::cancelled || strike.contact_s > T || mark_of(strike.id).seen) continue;
+        mark(strike.id).seen = true;
         drawn_.push_back({strike.id, impulse_of(strike)});
     }
 }
@@ -61,7 +62,7 @@ std::vector<sim::WeightedImpulse> DrawnStrikes::frame(double T, std::span<const 
 
     std::vector<sim::WeightedImpulse> result;
     for (const Drawn& d : drawn_) {
-        const bool is_folded = folded_.contains(d.id), replaced = is_replaced(d);
+        const bool is_folded = mark_of(d.id).folded, replaced = is_replaced(d);
         const double first_excess = d.first_weight - (is_folded && !replaced ? 1 : 0);
         const double final_excess = d.final_weight - (is_folded && replaced ? 1 : 0);
         if (first_excess != 0) result.push_back({d.first, first_excess});
@@ -69,11 +70,11 @@ std::vector<sim::WeightedImpulse> DrawnStrikes::frame(double T, std::span<const 
     }
     std::erase_if(drawn_, [&](const Drawn& d) {
         const bool faded = d.first_weight == 0 && strikes[d.id - 1].outcome == Outcome::cancelled;
-        if (faded) seen_.erase(d.id);
+        if (faded) mark(d.id).seen = false;
         const bool replaced_settled = d.final_weight == 1 && d.first_weight == 0;
         const bool first_settled =
             d.first_weight == 1 && d.final_weight == 0 && same(d.first, impulse_of(strikes[d.id - 1]));
-        return faded || (folded_.contains(d.id) && (replaced_settled || first_settled));
+        return faded || (mark_of(d.id).folded && (replaced_settled || first_settled));
     });
     return result;
 }
@@ -211,7 +212,7 @@ void StrikePipeline::finish() {
 std::vector<const Strike*> StrikePipeline::recent(std::uint32_t stick, double s) const {
     std::vector<const Strike*> found;
     const std::vector<Strike>& all = scheduler_.strikes();
-    for (auto strike = all.rbegin(); strike != all.rend() && strike->scheduled_at_s > s - 1; ++strike)
+    for (auto strike = all.rbegin(); strike != all.rend() && strike->scheduled_at_s > s - kRecentS; ++strike)
         if (strike->stick == stick && strike->outcome != Outcome::cancelled) found.push_back(&*strike);
     return found;
 }
@@ -252,6 +253,9 @@ DrawnStick StrikePipeline::drawn(std::uint32_t stick, double s, double T) {
 }
 
 FrameContents StrikePipeline::scene(double s, double T) {
+    std::erase_if(touching_, [&](std::uint64_t id) {
+        return scheduler_.strikes()[id - 1].scheduled_at_s <= s - kRecentS;
+    });
     FrameContents scene;
     for (std::uint32_t i = 0; i < sticks_.size(); ++i)
         scene.sticks.push_back(sticks_[i].started() ? std::optional(drawn(i, s, T)) : std::nullopt);

@@ -25,7 +25,7 @@ namespace app {
 class DrawnStrikes {
 public:
     /// A released strike's impulse has become part of the bodies' exact states.
-    void folded(std::uint64_t id) { folded_.insert(id); }
+    void folded(std::uint64_t id) { mark(id).folded = true; }
     /// What the frame shown at T adds to the exact states, given the strikes as known from the samples that
     /// this frame may use.
     [[nodiscard]] std::vector<sim::WeightedImpulse> frame(double T, std::span<const Strike> strikes);
@@ -37,11 +37,21 @@ private:
         double first_weight = 1;
         double final_weight = 0;  ///< of the released impulse, where it differs from the first
     };
+    struct Mark {
+        bool seen = false;  ///< drawn or settled, until cancelled and faded
+        bool folded = false;
+    };
+    Mark& mark(std::uint64_t id) {
+        if (id > marks_.size()) marks_.resize(id);
+        return marks_[id - 1];
+    }
+    [[nodiscard]] Mark mark_of(std::uint64_t id) const {
+        return id > marks_.size() ? Mark{} : marks_[id - 1];
+    }
     void start(double T, std::span<const Strike> strikes);
 
     std::vector<Drawn> drawn_;
-    std::set<std::uint64_t> seen_;  // drawn or settled, until cancelled and faded
-    std::set<std::uint64_t> folded_;
+    std::vector<Mark> marks_;  // of strike i + 1; those behind its end have none
     double last_s_ = 0;
     std::size_t first_open_ = 0;  // strikes before it are settled for good
 };
@@ -135,7 +145,7 @@ private:
     StrikeScheduler scheduler_;
     DrawnStrikes drawn_;
     std::vector<std::uint64_t> unfolded_;  // released strikes whose impulses lie ahead
-    std::set<std::uint64_t> touching_;     // strikes that a frame has shown the stick at
+    std::set<std::uint64_t> touching_;     // recent strikes that a frame has shown the stick at
     bool begun_ = false;
     double simulated_s_ = 0;
     LoopTimes times_;

@@ -240,8 +240,8 @@ void collect(RealtimeOutcome& outcome, const RealtimeSession& session, RealtimeR
 Json quality_json(const RealtimeResult& r) {
     Json changes = Json::array();
     for (const LeadStep& step : r.leads)
-        if (!step.why.empty())
-            changes.push_back({{"at_s", step.at_s}, {"level", step.quality}, {"why", step.why}});
+        if (step.change >= 0)
+            changes.push_back({{"at_s", step.at_s}, {"level", step.quality}, {"why", r.why(step)}});
     return {{"levels", r.quality_levels},
             {"first", r.leads.empty() ? Json() : Json(r.leads.front().quality)},
             {"last", r.leads.empty() ? Json() : Json(r.leads.back().quality)},

@@ -48,6 +48,11 @@ RealtimeRun::RealtimeRun(RealtimeSession& session)
     result_.frames = DiskLog<FrameTiming>(session.scratch);
     result_.tips = DiskLog<DrawnTip>(session.scratch);
     result_.blocks = DiskLog<audio::BlockTiming>(session.scratch);
+    result_.notes = DiskLog<NoteTiming>(session.scratch);
+    result_.leads = DiskLog<LeadStep>(session.scratch);
+    result_.changes = TextLog(session.scratch);
+    event_heads_ = DiskLog<EventHead>(session.scratch);
+    event_texts_ = TextLog(session.scratch);
     for (const QualityLevel& level : quality_levels()) result_.quality_levels.push_back(level.name);
     result_.period_s = session.period_s();
     result_.output_lead_s = options_.sound.output_lead_s;
@@ -293,6 +298,7 @@ RealtimeResult RealtimeRun::finish() {
         result_.midi_late = sound.late_strokes();
         result_.midi_lost = sound.lost_strokes();
     }
+    result_.events = events();
     result_.clocks = session_.sensors->clocks();
     result_.priorities = session_.priorities();
     return std::move(result_);
@@ -313,17 +319,18 @@ void RealtimeRun::take_frames() {
     }
 }
 
-void RealtimeRun::record_step(const std::string& why) {
+void RealtimeRun::record_step(std::int64_t change) {
     const std::size_t level = quality_.level();
     result_.leads.push_back({to_s(now_ns()), render_lead_s(), sound_lead_s(), render_lead_.delay_s(),
                              sound_lead_.delay_s(), static_cast<int>(level),
-                             fps_ / quality_levels()[level].rate_divisor, why});
+                             fps_ / quality_levels()[level].rate_divisor, change});
 }
 
 void RealtimeRun::change_quality(const std::optional<std::string>& why) {
     if (!why) return;
     render_lead_.forget();
-    record_step(*why);
+    result_.changes.push_back(*why);
+    record_step(static_cast<std::int64_t>(result_.changes.size()) - 1);
 }
 
 void RealtimeRun::follow_delays() {
@@ -360,6 +367,23 @@ void RealtimeRun::take_blocks() {
     }
 }
 
+void RealtimeRun::keep(const SensorEvent& event) {
+    event_heads_.push_back({event.kind, event.at_s, event.sticks.size()});
+    event_texts_.push_back(event.message);
+    for (const std::string& stick : event.sticks) event_texts_.push_back(stick);
+}
+
+std::vector<SensorEvent> RealtimeRun::events() const {
+    std::vector<SensorEvent> all;
+    std::size_t text = 0;
+    for (const EventHead& head : event_heads_) {
+        SensorEvent event{head.kind, head.at_s, {}, std::string(event_texts_[text++])};
+        for (std::size_t i = 0; i < head.sticks; ++i) event.sticks.emplace_back(event_texts_[text++]);
+        all.push_back(std::move(event));
+    }
+    return all;
+}
+
 std::uint64_t RealtimeRun::refused() const {
     std::uint64_t sum = 0;
     for (std::size_t i = 0; i < sticks_.size(); ++i)
@@ -390,9 +414,9 @@ void RealtimeRun::run(const Warn& warn) {
         follow_delays();
         if (now_s - watched_s < kWatchS) continue;
         watched_s = now_s;
-        for (SensorEvent& event : session_.sensors->watch()) {
+        for (const SensorEvent& event : session_.sensors->watch()) {
             warn(event.message);
-            result_.events.push_back(std::move(event));
+            keep(event);
         }
         bar.show(now_s / end_s_);
     }

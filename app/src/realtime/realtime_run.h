@@ -40,7 +40,7 @@ public:
     /// was finished.
     [[nodiscard]] RealtimeResult finish();
 
-    [[nodiscard]] const std::vector<SensorEvent>& events() const { return result_.events; }
+    [[nodiscard]] std::vector<SensorEvent> events() const;
     [[nodiscard]] const std::vector<LapStrikes>& laps() const { return laps_; }
     /// Measured poses as the loop saw them, by stick, on the run's clock: the trace of a live source.
     [[nodiscard]] const std::vector<DiskLog<tracking::PoseSample>>& seen() const { return seen_; }
@@ -77,7 +77,8 @@ private:
     [[nodiscard]] double sound_lead_s() const {
         return options_.lead_auto ? sound_lead_.lead_s() : options_.play.sound_lead_s;
     }
-    void record_step(const std::string& why = {});
+    void record_step(std::int64_t change = -1);
+    void keep(const SensorEvent& event);
     void change_quality(const std::optional<std::string>& why);
 
     RealtimeSession& session_;
@@ -101,6 +102,14 @@ private:
     double end_s_ = 0;
     std::vector<DiskLog<tracking::PoseSample>> seen_;
     std::vector<LapStrikes> laps_;
+    /// A SensorEvent without its texts: the message and the sticks' names, which follow each other in event_texts_.
+    struct EventHead {
+        SensorEvent::Kind kind;
+        double at_s;
+        std::size_t sticks;
+    };
+    DiskLog<EventHead> event_heads_;
+    TextLog event_texts_;
     RealtimeResult result_;
 };
 

@@ -6,6 +6,7 @@
 
 #include <fstream>
 #include <numeric>
+#include <string>
 #include <vector>
 
 #include "temporary_folder.h"
@@ -42,6 +43,17 @@ TEST(DiskLog, HoldsWhatWasAppendedInOneRowWithoutItsMemory) {
         EXPECT_EQ(std::vector(moved.begin(), moved.end()), (std::vector<std::uint64_t>{7, 1, 2}));
         EXPECT_TRUE(std::filesystem::is_empty(folder.path())) << "the file has no name";
     }
+}
+
+TEST(TextLog, GivesBackEachTextInItsPlace) {
+    const TemporaryFolder folder;
+    TextLog log(folder.path());
+    EXPECT_EQ(log.size(), 0U);
+    const std::vector<std::string> texts = {"", "one", "", std::string("zero\0inside", 11),
+                                            std::string(300'000, 'x')};
+    for (const std::string& text : texts) log.push_back(text);
+    ASSERT_EQ(log.size(), texts.size());
+    for (std::size_t i = 0; i < texts.size(); ++i) EXPECT_EQ(log[i], texts[i]) << i;
 }
 
 TEST(DiskLog, SaysThatTheDiskIsFullAndKeepsWhatItHas) {

@@ -15,7 +15,7 @@ protected:
     std::vector<SoundPicture> match(const std::vector<double>& onsets_s, std::uint32_t stick = 0,
                                     std::uint64_t lap = 0) {
         play.strikes.clear();
-        run.notes.clear();
+        run.notes.cut(0);
         sample::sound(play, run, onsets_s, stick, lap);
         return sound_and_picture(play, run, kit, sample::kTipRadius);
     }

@@ -37,8 +37,9 @@ struct SampleRun {
         sample::draw(realtime, sample::falling(0.493, sample::touch_height(kit), 2), 0.4, 0.6);
         sample::sound(play, realtime, {0.5, 0.9});
         realtime.notes[1].late_s = 0.002;
-        realtime.leads.push_back({0.25, 0.03, 0.06, 0.02, 0.01, 0, 30, ""});
-        realtime.leads.push_back({0.5, 0.04, 0.06, 0.03, 0.01, 1, 30, "frames are late: no shadows"});
+        realtime.leads.push_back({0.25, 0.03, 0.06, 0.02, 0.01, 0, 30});
+        realtime.changes.push_back("frames are late: no shadows");
+        realtime.leads.push_back({0.5, 0.04, 0.06, 0.03, 0.01, 1, 30, 0});
     }
     void add_samples() {
         for (std::int64_t i = 1; i <= 100; ++i) {

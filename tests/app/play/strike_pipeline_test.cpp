@@ -2,6 +2,7 @@
 #include "play/strike_pipeline.h"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <cmath>
 
@@ -25,6 +26,16 @@ double shown(const std::vector<sim::WeightedImpulse>& list, double folded = 0) {
 }
 
 constexpr double kFrame = 1.0 / 30;
+
+// Small pieces that stay, between those that each sample takes and gives back, leave holes that nothing fits: an hour of
+// live play would grow by 3 KiB a strike.
+TEST(DrawnStrikes, AStrikeThatIsOverLeavesNoPieceOfItsOwnInMemory) {
+    DrawnStrikes drawn;
+    const std::size_t before = mallinfo2().uordblks;  // 0 under sanitizers
+    for (std::uint64_t id = 1; id <= 10000; ++id) drawn.folded(id);
+    EXPECT_LT(mallinfo2().uordblks - before, 65536U)
+        << "two bytes a strike, in one row; a piece each is 480000";
+}
 
 TEST(DrawnStrikes, AContactIsDrawnFromTheFirstFrameAfterIt) {
     DrawnStrikes drawn;
