@@ -12,6 +12,8 @@ using ModeArray = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostModes, 1>;  //
 
 // Speeds by which swept contacts may miss: at rest, of the smallest body's size a second, and as a share of the fastest body's.
 constexpr double kMissedAtRest = 1e-3, kMissedShare = 0.03;
+constexpr double kUneven =
+    30;  // masses that touch: sweeps let the heavier press the lighter away within a step
 // Energy in a step, of the motion's and of weight times size: beyond it a direct solution is worse than sweeps; is taken away.
 constexpr double kWorse = 3e-3, kMostGained = 1e-7;
 
@@ -206,8 +208,15 @@ bool IslandSolver::may_gain() const {
 }
 
 bool IslandSolver::is_far_from_solved() const {
-    return impacts_.empty() && !any_struck_ &&
-           residual() > kMissedAtRest * smallest_ + kMissedShare * fastest_;
+    if (!impacts_.empty() || any_struck_) return false;
+    const bool uneven = std::ranges::any_of(contacts_, [this](const ContactRows& c) {
+        if (c.side[0].body < 0 || c.side[1].body < 0) return false;
+        auto mass = [&](int side) {
+            return rows_of_[static_cast<std::size_t>(c.side[side].body)].body->kind->mass.mass;
+        };
+        return std::max(mass(0) / mass(1), mass(1) / mass(0)) > kUneven;
+    });
+    return uneven || residual() > kMissedAtRest * smallest_ + kMissedShare * fastest_;
 }
 
 // By how much speeds miss what contacts demand, at most [m/s]: the change of the impulses that would satisfy a
