@@ -39,12 +39,14 @@ void IslandSolver::solve(const Island& island, const ContactScene& scene, bool f
     note_start();
     if (follow) start_following();
     advance();
-    if (!direct_ && is_far_from_solved() && begin_direct(most_with_contacts())) {
+    const bool uneven = !direct_ && is_uneven();
+    const double most = uneven ? most_with_springs() : most_with_contacts();
+    if (!direct_ && (uneven || is_far_from_solved()) && begin_direct(most)) {
         // Of contacts that contradict each other the exact answer is worse than sweeps that give up: where nothing
         // else may give energy, it shows by that.
         const double swept = energy();
         go_back();
-        begin_direct(most_with_contacts());
+        begin_direct(most);
         advance();
         const double gained = energy() - std::max(swept, energy_before_);
         if (!may_gain() && !(gained < kWorse * scale_)) go_back(), advance();
@@ -208,15 +210,19 @@ bool IslandSolver::may_gain() const {
 }
 
 bool IslandSolver::is_far_from_solved() const {
-    if (!impacts_.empty() || any_struck_) return false;
-    const bool uneven = std::ranges::any_of(contacts_, [this](const ContactRows& c) {
-        if (c.side[0].body < 0 || c.side[1].body < 0) return false;
-        auto mass = [&](int side) {
-            return rows_of_[static_cast<std::size_t>(c.side[side].body)].body->kind->mass.mass;
-        };
-        return std::max(mass(0) / mass(1), mass(1) / mass(0)) > kUneven;
-    });
-    return uneven || residual() > kMissedAtRest * smallest_ + kMissedShare * fastest_;
+    return impacts_.empty() && !any_struck_ &&
+           residual() > kMissedAtRest * smallest_ + kMissedShare * fastest_;
+}
+
+// Whether bodies touch much lighter ones, nothing else.
+bool IslandSolver::is_uneven() const {
+    return impacts_.empty() && !any_struck_ && std::ranges::any_of(contacts_, [this](const ContactRows& c) {
+               if (c.side[0].body < 0 || c.side[1].body < 0) return false;
+               auto mass = [&](int side) {
+                   return rows_of_[static_cast<std::size_t>(c.side[side].body)].body->kind->mass.mass;
+               };
+               return std::max(mass(0) / mass(1), mass(1) / mass(0)) > kUneven;
+           });
 }
 
 // By how much speeds miss what contacts demand, at most [m/s]: the change of the impulses that would satisfy a

@@ -234,6 +234,7 @@ private:
     void calm();
     [[nodiscard]] double energy() const;
     [[nodiscard]] bool is_far_from_solved() const;
+    [[nodiscard]] bool is_uneven() const;
     [[nodiscard]] bool may_gain() const;  // energy, from without
     [[nodiscard]] double most_with_contacts() const noexcept {
         return kMostWithContacts * static_cast<double>(rows_of_.size());
