@@ -143,8 +143,10 @@ TEST(LiveSoak, StraysNoiseAndKilledSensorsEndNothingAndCostNoDescriptors) {
         std::this_thread::sleep_for(3s);
         const std::vector<int> sensors = sensors_of(play.pid());
         if (sensors.empty()) continue;
-        if (descriptors_first == 0) descriptors_first = descriptors(play.pid());
-        if (resident_first == 0 && passed() > settled_s) resident_first = resident_mib(play.pid());
+        if (resident_first == 0 && passed() > settled_s) {
+            descriptors_first = descriptors(play.pid());
+            resident_first = resident_mib(play.pid());
+        }
         kill(sensors[random() % sensors.size()], random() % 2 ? SIGKILL : SIGTERM);  // at most 5 in 10 s
         ++kills;
         if (passed() > told + seconds / 20)

@@ -416,14 +416,15 @@ Table clock_table(const PlayResult& play, const RealtimeResult& realtime) {
     return table;
 }
 
-std::vector<std::pair<const char*, Table>> latency_rows(const LatencyReport& report, const PlayResult& play,
-                                                        const RealtimeResult& realtime) {
-    return {{"samples.csv", sample_table(play, realtime)},
-            {"frames.csv", frame_table(realtime)},
-            {"notes.csv", note_table(report, play, realtime)},
-            {"blocks.csv", block_table(realtime)},
-            {"leads.csv", lead_table(realtime)},
-            {"errors.csv", error_table(report, play)}};
+std::vector<std::pair<const char*, std::function<Table()>>> latency_rows(const LatencyReport& report,
+                                                                         const PlayResult& play,
+                                                                         const RealtimeResult& realtime) {
+    return {{"samples.csv", [&] { return sample_table(play, realtime); }},
+            {"frames.csv", [&] { return frame_table(realtime); }},
+            {"notes.csv", [&] { return note_table(report, play, realtime); }},
+            {"blocks.csv", [&] { return block_table(realtime); }},
+            {"leads.csv", [&] { return lead_table(realtime); }},
+            {"errors.csv", [&] { return error_table(report, play); }}};
 }
 
 std::string format_latency_text(const LatencyReport& report, const RealtimeResult& realtime) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -170,10 +171,9 @@ struct LatencyReport {
 /// The rows behind the figures, by the files that they are written to: samples.csv, frames.csv, notes.csv,
 /// blocks.csv, leads.csv, errors.csv. Times in ns and `at_s` count from the run's epoch, `t_s` and `onset_s`
 /// are on the lap's clock, onset_s in the output. The last three columns of a note without a picture are
-/// empty.
-[[nodiscard]] std::vector<std::pair<const char*, Table>> latency_rows(const LatencyReport& report,
-                                                                      const PlayResult& play,
-                                                                      const RealtimeResult& realtime);
+/// empty. One after the other, since those of a long run are large; while the arguments last.
+[[nodiscard]] std::vector<std::pair<const char*, std::function<Table()>>> latency_rows(
+    const LatencyReport& report, const PlayResult& play, const RealtimeResult& realtime);
 
 /// Text of latency.json, and of `latency --json`: stages, frames, notes, sound_minus_picture_ms,
 /// lead_needed_ms, deadlines, errors of the drawn sticks, and what ran where.

@@ -143,7 +143,11 @@ void FrameThread::write_all() {
         write_file(options_.folder / fmt::format("{:06}.png", picture.index),
                    render::encode_png(enlarged(std::move(picture.image), options_.width, options_.height)));
         report_.written.emplace_back(picture.index, monotonic_ns());
-        ++written_;
+        // Not beyond the largest, which says that a thread has failed.
+        std::uint64_t before = written_;
+        while (before != std::numeric_limits<std::uint64_t>::max() &&
+               !written_.compare_exchange_weak(before, before + 1)) {
+        }
         written_.notify_one();
     }
 }

@@ -304,7 +304,7 @@ void write_measurements(RealtimeOutcome& o, const RealtimeSession& session, Outp
     o.latency = latency_report(o.play, o.realtime, session.kit, session.stick.radius_m);
     write_file(folder.path("departures.csv"), departure_table(o).csv());
     for (const auto& [name, table] : latency_rows(o.latency, o.play, o.realtime))
-        write_file(folder.path(name), table.csv());
+        write_file(folder.path(name), table().csv());
     write_file(folder.path("latency.json"), format_latency_json(o.latency, o.play, o.realtime));
     write_page(folder, "latency.html",
                [&](Plotter& plotter) { return format_latency_page(o.latency, o.play, o.realtime, plotter); });

@@ -69,12 +69,15 @@ SimulateRecord::SimulateRecord(const SimulateOptions& options, const Scene& scen
 
 void SimulateRecord::done(std::uint64_t step, const std::function<sim::RunState()>& state) {
     if (options_.checkpoint == 0 || step % options_.checkpoint != 0) return;
-    Checkpoint now = run_;
-    now.record = save_record();
-    sim::RunState reached = state();
-    if (options_.workers) reached.result.elapsed_s += since_start_.seconds();
-    now.state = sim::encode(reached);
+    // Without a table the run is lost; without a checkpoint it is not.
+    const std::array tables = {states_->save(), energy_->save(), steps_->save()};
     try {
+        Checkpoint now = run_;
+        now.record = save_record();
+        std::ranges::copy(tables, now.record.table_bytes.begin());
+        sim::RunState reached = state();
+        if (options_.workers) reached.result.elapsed_s += since_start_.seconds();
+        now.state = sim::encode(reached);
         write_finished_file(folder_->scratch() / "checkpoint", format_checkpoint(now));
         folder_->keep();
         failing_ = false;
@@ -188,7 +191,6 @@ void SimulateRecord::find_frames() {
 
 RecordState SimulateRecord::save_record() {
     RecordState r;
-    r.table_bytes = {states_->save(), energy_->save(), steps_->save()};
     if (frames_) {
         frames_->drain();
         for (; saved_frames_ < next_frame_; ++saved_frames_) save_on_disk(frame(saved_frames_));

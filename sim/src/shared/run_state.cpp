@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -100,6 +101,8 @@ void read_result(ByteReader& in, const WorldScene& scene, const WorldSnapshot& n
     for (QuarantinedBody& q : r.quarantined) {
         const FirstStep first = read_first(in, now.bodies.size(), now.step);
         q = {first.number, first.step, in.text(kLongestReason)};
+        check(std::ranges::none_of(q.what, [](unsigned char c) { return c < 32 || c == 127; }),
+              "a reason with control characters");
     }
     read(in, r.limited, now.bodies.size(), now.step);
     read(in, r.broken, scene.world.constraints.size(), now.step);
