@@ -191,9 +191,11 @@ struct TraceRows::Reading {
                                                    : stick.file_orientation * exponential(v);
         }
         if (std::abs(q.squaredNorm() - 1) > kUnitTolerance) q.normalize();
-        if (q.dot(stick.file_orientation) < 0 && stick.samples > 0) q.coeffs() = -q.coeffs();
         stick.file_orientation = q;
-        sample.orientation = keys.z_up() ? from_z_up(q) : q;
+        // Near two orthogonal ones rounding decides the sign: it is chosen as it will be when a y-up copy is read.
+        if (keys.z_up()) q = from_z_up(q);
+        if (q.dot(stick.orientation) < 0 && stick.samples > 0) q.coeffs() = -q.coeffs();
+        sample.orientation = q;
         sample.has_orientation = true;
     }
 

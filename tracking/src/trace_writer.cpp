@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <charconv>
+#include <limits>
 #include <stdexcept>
 
 #include "text_cursor.h"
@@ -40,7 +41,8 @@ std::string format_keys(const Trace& trace) {
         append(out, trace.rate_hz);
         out += '\n';
     }
-    if (!trace.source.empty()) out += "# source: " + trace.source + "\n";
+    if (const std::string_view source = trimmed(trace.source); !source.empty())
+        out.append("# source: ").append(source) += '\n';
     if (trace.tip) {
         out += "# tip_m: ";
         append_vector(out, *trace.tip);
@@ -84,6 +86,12 @@ void append_trace_row(std::string& text, const std::string& stick, const PoseSam
 }
 
 std::string format_trace(const Trace& trace) {
+    // At equal times in the order in which a reader will come upon the sticks.
+    std::vector<const StickTrace*> sticks;
+    for (const StickTrace& stick : trace.sticks) sticks.push_back(&stick);
+    std::ranges::stable_sort(sticks, {}, [](const StickTrace* s) {
+        return s->samples.empty() ? std::numeric_limits<double>::infinity() : s->samples.front().t_s;
+    });
     bool oriented = false;
     std::size_t rows = 0;
     for (const StickTrace& stick : trace.sticks) {
@@ -94,16 +102,16 @@ std::string format_trace(const Trace& trace) {
     }
     std::string out = format_trace_head(trace, oriented);
     out.reserve(out.size() + rows * 160);
-    std::vector<std::size_t> next(trace.sticks.size(), 0);
+    std::vector<std::size_t> next(sticks.size(), 0);
     for (; rows > 0; --rows) {
-        std::size_t first = trace.sticks.size();
-        for (std::size_t i = 0; i < trace.sticks.size(); ++i) {
-            if (next[i] == trace.sticks[i].samples.size()) continue;
-            if (first == trace.sticks.size() ||
-                trace.sticks[i].samples[next[i]].t_s < trace.sticks[first].samples[next[first]].t_s)
+        std::size_t first = sticks.size();
+        for (std::size_t i = 0; i < sticks.size(); ++i) {
+            if (next[i] == sticks[i]->samples.size()) continue;
+            if (first == sticks.size() ||
+                sticks[i]->samples[next[i]].t_s < sticks[first]->samples[next[first]].t_s)
                 first = i;
         }
-        append_row(out, trace.sticks[first].name, trace.sticks[first].samples[next[first]++], oriented);
+        append_row(out, sticks[first]->name, sticks[first]->samples[next[first]++], oriented);
     }
     return out;
 }
