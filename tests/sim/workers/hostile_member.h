@@ -18,7 +18,7 @@ namespace sim_test {
 class HostileMember {
 public:
     enum class Habit {
-        republishes,  ///< its last states, every 10 ms
+        republishes,  ///< its last states, every 100 ms
         offers,       ///< bodies to worker 0, as fast as they go out
         lies,         ///< of where its bodies are, by a tenth of a millimetre
         is_silent     ///< nothing, and no heartbeats
@@ -93,7 +93,7 @@ private:
     void be_hostile(zmq::socket_t& socket) {
         if (habit_ == Habit::republishes) {
             send(socket, states_);
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+            std::this_thread::sleep_for(std::chrono::milliseconds(100));
         } else if (habit_ == Habit::offers) {
             const sim::Offer offer{0, 1, std::vector<std::uint32_t>(1000, 0), std::vector<float>(1000, 0.1F)};
             for (int i = 0; i < 100; ++i) send(socket, sim::encode({number_, 0, 0}, offer));
