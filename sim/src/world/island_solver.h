@@ -13,7 +13,8 @@ namespace sim {
 /// Multiply-adds of a factorisation per body up to which an island is solved directly: one of contacts alone, which sweeps
 /// solve, too, and one with springs.
 constexpr double kMostWithContacts = 500, kMostWithSprings = 1e4;
-constexpr float kPushSpeed = 3;  ///< at which bodies inside each other are moved apart [m/s]
+constexpr int kMostFollowLevel = 8;  ///< so often at most a substep is halved for bodies that are followed
+constexpr float kPushSpeed = 3;      ///< at which bodies inside each other are moved apart [m/s]
 
 /// A timed force in a step. Times in substeps since the start.
 struct ActiveForce {

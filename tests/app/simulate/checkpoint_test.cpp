@@ -9,6 +9,7 @@
 #include <map>
 #include <random>
 
+#include "damaged_bytes.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/checksum.h"
@@ -108,21 +109,7 @@ TEST(Checkpoint, DamagedFilesAreRefusedWithTheirPlaceAlsoWhereTheChecksumIsRight
     constexpr int kMutations = 6000;
     int refused = 0;
     for (int i = 0; i < kMutations; ++i) {
-        Bytes bad = good;
-        const std::size_t at = random() % bad.size();
-        switch (i % 4) {
-            case 0:
-                bad[at] ^= std::uint8_t(1 << random() % 8);
-                break;
-            case 1:
-                bad.resize(at);
-                break;
-            case 2:
-                std::fill_n(bad.begin() + long(at), std::min<std::size_t>(8, bad.size() - at), 0xff);
-                break;
-            default:
-                bad.insert(bad.begin() + long(at), 1 + random() % 9, std::uint8_t(random()));
-        }
+        Bytes bad = damaged(good, random);
         if (bad == good) continue;
         const bool mended = i % 8 >= 4 && bad.size() > 8;
         if (mended) {

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "damaged_bytes.h"
 #include "test_kit.h"
 
 namespace {
@@ -60,36 +61,13 @@ void seal(std::vector<std::uint8_t>& bytes) {
     std::memcpy(bytes.data() + bytes.size() - 4, &crc, 4);
 }
 
-void mutate(std::vector<std::uint8_t>& bytes, std::mt19937& rng) {
-    for (unsigned n = 1 + rng() % 3; n > 0 && !bytes.empty(); --n) {
-        const std::size_t at = rng() % bytes.size();
-        switch (rng() % 5) {
-            case 0:
-                bytes[at] ^= static_cast<std::uint8_t>(1u << rng() % 8);
-                break;
-            case 1:
-                bytes[at] = rng() % 2 ? 0xFF : 0x00;
-                break;
-            case 2:
-                bytes.resize(at);
-                break;
-            case 3:
-                bytes.insert(bytes.begin() + at, rng() % 9, static_cast<std::uint8_t>(rng()));
-                break;
-            default:
-                std::fill_n(bytes.begin() + at, std::min<std::size_t>(8, bytes.size() - at),
-                            static_cast<std::uint8_t>(rng()));
-        }
-    }
-}
-
 TEST(Messages, TwentyThousandMutationsAreRefusedOrDecodeToSomethingThatEncodesToTheSameBytes) {
     std::mt19937 rng(15);
     const std::vector<sim::Message> messages = samples();
     int refused = 0, accepted = 0;
     for (int i = 0; i < 20000; ++i) {
         std::vector<std::uint8_t> bytes = sim::encode(messages[rng() % messages.size()]);
-        mutate(bytes, rng);
+        bytes = damaged(std::move(bytes), rng);
         if (i % 4) seal(bytes);  // mostly past the checksum, so that the fields' own checks are met
         try {
             EXPECT_EQ(sim::encode(sim::decode(bytes)), bytes);

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <random>
 
+#include "damaged_bytes.h"
 #include "messages/crc32c.h"
 #include "world/manifold.h"
 #include "world_bodies.h"
@@ -284,30 +285,6 @@ void seal(std::vector<std::uint8_t>& bytes) {
     std::memcpy(bytes.data() + bytes.size() - 4, &crc, 4);
 }
 
-void mutate(std::vector<std::uint8_t>& bytes, Rng& rng) {
-    for (unsigned n = 1 + rng() % 3; n > 0 && !bytes.empty(); --n) {
-        const std::size_t at = rng() % bytes.size();
-        switch (rng() % 5) {
-            case 0:
-                bytes[at] ^= static_cast<std::uint8_t>(1u << rng() % 8);
-                break;
-            case 1:
-                bytes[at] = rng() % 2 ? 0xFF : 0x00;
-                break;
-            case 2:
-                bytes.resize(at);
-                break;
-            case 3:
-                bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(at), rng() % 9,
-                             static_cast<std::uint8_t>(rng()));
-                break;
-            default:
-                std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(at),
-                            std::min<std::size_t>(8, bytes.size() - at), static_cast<std::uint8_t>(rng()));
-        }
-    }
-}
-
 /// As a worker reads it, piece by piece: refuses what it cannot read, never reads beyond the end.
 void read_as_worker(const std::vector<std::uint8_t>& bytes) {
     try {
@@ -334,7 +311,7 @@ TEST(WorldMessages, TenThousandMutationsAreRefusedOrDecodeToAMessageThatCanBeWri
     int refused = 0, accepted = 0;
     for (int i = 0; i < count; ++i) {
         std::vector<std::uint8_t> bytes = good[rng() % good.size()];
-        mutate(bytes, rng);
+        bytes = damaged(std::move(bytes), rng);
         if (i % 4) seal(bytes);  // mostly past the checksum, so that the fields' own checks are met
         read_as_worker(bytes);
         try {

@@ -3,6 +3,7 @@
 
 #include <random>
 
+#include "damaged_bytes.h"
 #include "shared_scenes.h"
 #include "sim/distributed_world.h"
 #include "sim/errors.h"
@@ -171,21 +172,7 @@ TEST(RunState, NoBytesAreReadThatNoRunOfTheSceneCanBeIn) {
     int refused = 0;
     constexpr int kMutations = 2000;
     for (int i = 0; i < kMutations; ++i) {
-        Bytes bad = good;
-        const std::size_t at = random() % bad.size();
-        switch (i % 4) {
-            case 0:
-                bad[at] ^= std::uint8_t(1 << random() % 8);
-                break;
-            case 1:
-                bad.resize(at);
-                break;
-            case 2:
-                std::fill_n(bad.begin() + long(at), std::min<std::size_t>(4, bad.size() - at), 0xff);
-                break;
-            default:
-                bad.insert(bad.begin() + long(at), 1 + random() % 9, std::uint8_t(random()));
-        }
+        const Bytes bad = damaged(good, random);
         try {
             const sim::RunState from = sim::decode_run_state(bad, scene);
             if (i % 16 != 0) continue;

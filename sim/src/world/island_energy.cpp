@@ -1,0 +1,146 @@
+#include <cmath>
+
+#include "world/island_solver.h"
+
+// The energy of an island over a step, and what it may not gain; see IslandSolver.
+
+namespace sim {
+namespace {
+
+constexpr double kMostGained = 1e-7;  // energy in a step, of the motion's and of weight times size
+
+}  // namespace
+
+// What a solution is measured by, and taken back to.
+void IslandSolver::note_start() {
+    before_.resize(bodies_->size());
+    outside_before_ = outside_, limited_before_ = limited_;
+    energy_before_ = energy();
+    fastest_ = scale_ = 0, smallest_ = 1;
+    for (const int id : island_->bodies) {
+        const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        Before& before = before_[static_cast<std::size_t>(id)];
+        before.state = body.state, before.at_limit = body.at_limit;
+        fastest_ = std::max(fastest_, body.state.velocity.norm());
+        smallest_ = std::min(smallest_, 2 * body.kind->half_box.minCoeff());
+        scale_ += body.kind->mass.mass * (body.state.velocity.squaredNorm() / 2 +
+                                          settings_->gravity.norm() * body.kind->half_box.minCoeff());
+    }
+}
+
+void IslandSolver::go_back() {
+    end_forces();
+    for (const int id : island_->bodies) {
+        MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        const Before& before = before_[static_cast<std::size_t>(id)];
+        body.state = before.state, body.at_limit = before.at_limit, body.limited_now = false;
+        body.was_given = false;
+    }
+    outside_ = outside_before_, limited_ = limited_before_;
+    crossed_.resize(first_crossed_);
+    begin(*island_);
+}
+
+// Bodies that only contacts and joints hold have no more energy after a step than before it: contacts that are found anew, and overlaps
+// that are taken back, would give some at each step, and what leans would start to slide. What they got beyond kMostGained is
+// taken from their motion against the rigid motion of them all, so that linear and angular momentum are kept; where
+// that is not enough, it came from outside, and is taken from all of it. Not of bodies that others compute, too, at their own
+// pace: what they were told stands.
+void IslandSolver::calm() {
+    const double gained = energy() - energy_before_;
+    if (!(gained > kMostGained * scale_)) return;
+    Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), centre = momentum, turning = momentum;
+    double mass = 0;
+    for (const BodyRows& rows : rows_of_) {
+        const double m = rows.body->kind->mass.mass;
+        mass += m;
+        momentum += m * rows.body->state.velocity;
+        centre += m * rows.body->state.position;
+    }
+    Eigen::Vector3d velocity = momentum / mass, spin = Eigen::Vector3d::Zero();
+    centre /= mass;
+    auto inertia_of = [](const BodyRows& rows) -> Eigen::Matrix3d {
+        const Eigen::Matrix3d turned = rows.body->state.orientation.toRotationMatrix();
+        return turned * rows.body->kind->mass.inertia.asDiagonal() * turned.transpose();
+    };
+    Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+    for (const BodyRows& rows : rows_of_) {
+        const WorldBodyState& s = rows.body->state;
+        const double m = rows.body->kind->mass.mass;
+        const Eigen::Vector3d arm = s.position - centre;
+        inertia +=
+            inertia_of(rows) + m * (arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose());
+        turning += s.angular_momentum + m * arm.cross(s.velocity);
+    }
+    spin = inertia.ldlt().solve(turning);
+    auto common_of = [&](const BodyRows& rows) -> Eigen::Vector3d {
+        return velocity + spin.cross(rows.body->state.position - centre);
+    };
+    auto motion = [&] {
+        double sum = 0;
+        for (const BodyRows& rows : rows_of_) {
+            const WorldBodyState& s = rows.body->state;
+            const Eigen::Vector3d own =
+                s.orientation.conjugate() * (s.angular_momentum - inertia_of(rows) * spin);
+            sum +=
+                (rows.body->kind->mass.mass * (s.velocity - common_of(rows)).squaredNorm() +
+                 own.cwiseAbs2().cwiseQuotient(rows.body->kind->mass.inertia).sum() + s.q_dot.squaredNorm()) /
+                2;
+        }
+        return sum;
+    };
+    const bool enough = motion() >= gained;
+    if (!enough) velocity.setZero(), spin.setZero();
+    const double left = std::sqrt(std::max(0., 1 - gained / motion()));
+    for (const BodyRows& rows : rows_of_) {
+        WorldBodyState& s = rows.body->state;
+        const Eigen::Vector3d common = common_of(rows), turn = inertia_of(rows) * spin;
+        const Eigen::Vector3d change = (left - 1) * (s.velocity - common);
+        s.velocity += change;
+        if (!enough && rows.body->own) outside_ += rows.body->kind->mass.mass * change;
+        s.angular_momentum = turn + left * (s.angular_momentum - turn);
+        s.q_dot *= left;
+    }
+}
+
+// Kinetic and potential, with that of modes and of springs [J].
+double IslandSolver::energy() const {
+    double sum = 0;
+    for (const int id : island_->bodies) {
+        const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        const WorldBodyState& s = body.state;
+        const Eigen::Vector3d own = s.orientation.conjugate() * s.angular_momentum;
+        const double mass = body.kind->mass.mass;
+        sum += mass / 2 * s.velocity.squaredNorm() +
+               own.cwiseAbs2().cwiseQuotient(body.kind->mass.inertia).sum() / 2 -
+               mass * body.gravity_scale * settings_->gravity.dot(s.position) +
+               (s.q_dot.squaredNorm() + s.q.cwiseProduct(body.kind->basis.omega).squaredNorm()) / 2;
+    }
+    auto end = [this](int id, const Eigen::Vector3d& rest) -> Eigen::Vector3d {
+        if (id < 0) return rest;
+        const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        Eigen::Vector3d point = rest;
+        if (body.kind->modes > 0) {
+            alignas(32) float shapes[3 * kMostModes];
+            body.kind->shapes_at(rest.cast<float>(), shapes);
+            for (int k = 0; k < 3 * body.kind->modes; ++k) {
+                const int axis = k / body.kind->modes, mode = k % body.kind->modes;
+                point[axis] +=
+                    static_cast<double>(shapes[axis * body.kind->mode_width + mode]) * body.state.q[mode];
+            }
+        }
+        return body.state.position + body.state.orientation * point;
+    };
+    for (const SpringRows& s : springs_) {
+        const PointConstraint& held = s.constraint->definition;
+        if (std::isinf(held.stiffness)) continue;  // the ends are together
+        const Eigen::Quaterniond turned =
+            held.body_b < 0 ? Eigen::Quaterniond::Identity()
+                            : (*bodies_)[static_cast<std::size_t>(held.body_b)].state.orientation;
+        sum += held.stiffness / 2 *
+               s.point->gap(end(held.body_a, s.point->a), end(held.body_b, s.point->b), turned).squaredNorm();
+    }
+    return sum;
+}
+
+}  // namespace sim
