@@ -52,31 +52,14 @@ struct Case {
     }
 };
 
-/// What falls short, as far as it does: bodies that go through, energy gained. It must not get worse. A body that flies
-/// faster than sound in its matter (112 m/s in a ball of the table of 10 cm) has left what modes describe.
+/// What falls short, as far as it does: bodies that go through, energy gained. It must not get worse.
 struct Shortfall {
     int through = 0;
     double gained = kMostGained;
 };
 const std::map<std::string, Shortfall> kShortfalls = {
-    {"table 0.01 m 300 m/s 1/240 s linear", {2}},
-    {"table 0.01 m 300 m/s 1/240 s modal", {1}},
-    {"table 0.01 m 300 m/s 1/480 s modal", {2}},
-    {"table 0.1 m 300 m/s 1/240 s linear", {1}},
-    {"table 0.1 m 300 m/s 1/240 s modal", {3}},
-    {"table 0.1 m 300 m/s 1/480 s linear", {5}},
-    {"table 0.1 m 300 m/s 1/480 s modal", {8}},
-    {"card_through_wall 0.01 m 1 m/s 1/60 s modal", {1}},
-    {"card_through_wall 0.01 m 100 m/s 1/480 s modal", {1}},
-    {"card_through_wall 0.01 m 300 m/s 1/480 s modal", {1}},
-    {"card_through_wall 0.1 m 100 m/s 1/60 s modal", {1}},
-    {"card_through_wall 0.1 m 300 m/s 1/240 s modal", {1}},
-    {"card_through_wall 0.1 m 300 m/s 1/480 s modal", {1}},
-    {"card_through_wall 1 m 300 m/s 1/30 s linear", {1}},
-    {"chain20 0.01 m 1/30 s rigid", {3}},
-    {"chain20 0.01 m 1/30 s linear", {8}},
-    {"chain20 0.01 m 1/30 s modal", {7}},
-    {"chain20 0.01 m 1/60 s rigid", {5}},
+    {"chain20 0.01 m 1/30 s rigid", {3}},  {"chain20 0.01 m 1/30 s linear", {8}},
+    {"chain20 0.01 m 1/30 s modal", {7}},  {"chain20 0.01 m 1/60 s rigid", {5}},
     {"chain20 0.01 m 1/60 s linear", {7}},
 };
 

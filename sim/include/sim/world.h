@@ -305,7 +305,7 @@ public:
     /// where they were solved; in order of steps, each once. rewind takes back what it undoes.
     [[nodiscard]] const std::vector<FirstStep>& limited() const noexcept;
     [[nodiscard]] const std::vector<FirstStep>& broken() const noexcept;
-    /// All impulse that came from planes, fixed bodies, places, gravity, drag and user forces onto own bodies
+    /// All impulse that came from planes, fixed bodies, places, gravity, drag, user forces and falling asleep onto own bodies
     /// since the start [kg m/s].
     [[nodiscard]] Eigen::Vector3d outside_impulse() const;
 

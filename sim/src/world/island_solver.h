@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <array>
 #include <numbers>
 #include <span>
@@ -70,6 +71,8 @@ struct Island {
 /// friction P is scaled to what the rebounds demand, - sum of P v (1 - e) / 2; with friction, which may bring
 /// more (Kane), to nothing given at most: no impact gives energy, and none of e = 1 without friction takes any.
 /// Afterwards an impact is a contact, unless its bodies turn on too fast for one that stands still.
+///
+/// A body that strikes faster than its modes can yield within what they describe is rigid in that step (stiffen).
 ///
 /// Frames of bodies with unequal moments of inertia follow them where they turn by more than kFrameTurn, with
 /// their rows.
@@ -152,6 +155,7 @@ private:
         FreeRotation rotation{Eigen::Vector3d::Ones(), 0};  // over the substep, direct solutions
         Eigen::Vector3d found_at;                           // its centre when contacts were last found
         Eigen::Quaterniond found_turned;                    // its orientation, then
+        bool stiff = false;                                 // see stiffen
     };
     /// One body's part of a row triple.
     struct Side {
@@ -228,6 +232,7 @@ private:
     };
 
     void begin(const Island& island);
+    void stiffen(const Island& island);
     void start_following();
     [[nodiscard]] bool moves_little() const;
     void note_start();
@@ -299,7 +304,9 @@ private:
     void end_impact(ContactRows& contact);
     void write_leg(const BodyRows& rows, const Eigen::Vector3d& velocity, const Eigen::Vector3d& momentum);
     [[nodiscard]] bool is_rigid(const ContactRows& contact) const noexcept {
-        return contact.side[0].width <= 8 && contact.side[1].width <= 8;
+        return std::ranges::all_of(contact.side, [this](const Side& side) {
+            return side.width <= 8 || rows_of_[static_cast<std::size_t>(side.body)].stiff;
+        });
     }
     void add_spring(HeldConstraint& constraint, HeldPoint& point);
     /// An end of a spring, now.

@@ -263,6 +263,7 @@ void World::Implementation::put_to_sleep() {
             continue;
         for (const int id : island.bodies) {
             MovingBody& body = bodies[static_cast<std::size_t>(id)];
+            if (body.own) outside -= body.kind->mass.mass * body.state.velocity;
             body.asleep = true;
             body.sleep_group = island.bodies.front();
             stop_body(body);

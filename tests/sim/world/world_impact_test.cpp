@@ -124,6 +124,38 @@ TEST(WorldImpact, BallsOf1CmTo10MAt1To300MetresASecondDoNotPassWalls) {
     }
 }
 
+// Modes describe no impact faster than sound in the matter: the centre would run on through the wall while they yield.
+TEST(WorldImpact, SoftBodiesFasterThanSoundInTheirMatterDoNotPassWalls) {
+    Draw draw(12);
+    for (int i = 0; i < 200; ++i) {
+        sim::WorldDefinition d = any_step(draw);
+        const double s = draw.scale(0.01, 3), sound = draw.scale(3, 300),
+                     speed = std::min(300., sound * draw.scale(1, 20)), half = s * draw.scale(0.05, 0.5);
+        sim::WorldBody wall = box({0, 0, 0}, {half, 6 * s, 6 * s});
+        wall.fixed = true;
+        const Fidelity fidelity = draw.below(2) ? Fidelity::linear : Fidelity::modal;
+        sim::WorldBody shot = ball({0, 0, 0}, fidelity, s);
+        if (draw.below(2)) {
+            shot = box({0, 0, 0}, {s * draw.scale(0.05, 1), s, s});
+            shot.fidelity.fidelity = fidelity;
+        }
+        shot.material.young_pa = shot.material.density_kg_m3 * sound * sound;
+        const Vector3d way = Vector3d(1, draw.between(-0.7, 0.7), draw.between(-0.7, 0.7)).normalized();
+        shot.world_from_body.translation() =
+            Vector3d(-half - 1.8 * s, 0, 0) - draw.between(0.1, 2) * speed * d.settings.dt * way;
+        shot.velocity = speed * way;
+        d.bodies = {wall, shot};
+        sim::World world(d);
+        for (int k = 0; k < 12; ++k) {
+            world.step();
+            const Vector3d p = world.state(1).position;
+            if (std::max(std::abs(p.y()), std::abs(p.z())) > 5 * s) break;  // slid off
+            ASSERT_LT(p.x(), -half) << "case " << i << ", size " << s << " at " << speed << " m/s, "
+                                    << speed / sound << " times sound";
+        }
+    }
+}
+
 TEST(WorldImpact, ABallThatPassesAnotherByOnePercentOfItsRadiusKeepsItsVelocityToTheLastBit) {
     Draw draw(2);
     for (int i = 0; i < 200; ++i) {
