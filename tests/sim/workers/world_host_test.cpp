@@ -260,6 +260,7 @@ TEST(SharedWorldRun, TeamsThatCheckEachOtherSurviveKillsStopsAndDrainsWithTheSam
 /// Two of four have said what half of the team is not enough for; of three it is, also for what waits.
 TEST(SharedWorldRun, OfATeamOfFourTwoMayStopAndTheOthersGoOnWithTheSameBits) {
     const sim::WorldScene scene = heap(9);
+    constexpr std::uint64_t kSteps = 600;
     sim::DistributedLaunch launch = processes(4);
     launch.verify = 4;
     Watcher watcher;
@@ -268,12 +269,12 @@ TEST(SharedWorldRun, OfATeamOfFourTwoMayStopAndTheOthersGoOnWithTheSameBits) {
         const std::vector<pid_t> all = children_of(getpid());
         for (const std::size_t i : {0, 1}) ::kill(all.at(i), SIGSTOP);
     };
-    const sim::DistributedResult result = sim::run_distributed(scene, lockstep(200), launch, watcher);
-    EXPECT_EQ(watcher.hash, hash_alone(scene, 200));
-    // Without the first of them the others are most of the team: the run may end before the second is missed.
-    EXPECT_GE(result.lost, 1) << testing::PrintToString(watcher.notes);
+    const sim::DistributedResult result = sim::run_distributed(scene, lockstep(kSteps), launch, watcher);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, kSteps));
+    // Without the first of them the others are most of the team: the run may end before the second is missed. Nobody waits
+    // for anybody in one team, so a busy machine may stop members that had done all their steps: then none is.
     EXPECT_LE(result.lost, 2) << testing::PrintToString(watcher.notes);
-    EXPECT_EQ(result.steps, 200u);
+    EXPECT_EQ(result.steps, kSteps);
     EXPECT_EQ(result.workers, 4);
     EXPECT_FALSE(watcher.noted("no worker is left")) << testing::PrintToString(watcher.notes);
 }
