@@ -33,7 +33,9 @@ struct HardScene {
 /// frees (its distance from the first place that anything hangs from, else its height above the lowest plane,
 /// at least its extent).
 struct HardFigures {
-    int through = 0;  ///< bodies whose centre crossed the inner half of another one, or went beneath a plane
+    int through =
+        0;  ///< bodies whose centre crossed the inner half of another one within a step, both straight and
+            ///< on the paths that the velocities make likely, or went beneath a plane
     int quarantined = 0;  ///< taken out or no longer finite; of a library that began anew: all
     int thrown =
         0;  ///< bodies that end farther than the size from where they belong, or were faster than all
@@ -70,7 +72,7 @@ private:
                                const std::vector<sim_bench::RigidState>& s) const;
     [[nodiscard]] Eigen::Vector3d place(std::size_t body) const;
     void find_penetration(const std::vector<sim_bench::RigidState>& states);
-    void find_through(const std::vector<sim_bench::RigidState>& states);
+    void find_through(const std::vector<sim_bench::RigidState>& states, double dt);
     void find_gaps(const std::vector<sim_bench::RigidState>& states);
     void find_drift(const std::vector<sim_bench::RigidState>& states);
 

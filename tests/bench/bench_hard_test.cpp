@@ -107,6 +107,19 @@ TEST(HardWatch, ACardThatIsBehindTheWallAfterOneStepWentThroughItAndOneBesideItD
     EXPECT_FALSE(seen(world, states_of(world), Right::stops, -0.03).right);
 }
 
+TEST(HardWatch, ABallThatGoesHalfRoundAnotherInAStepDidNotGoThroughItAndOneThatFliesStraightDid) {
+    sim::WorldDefinition world;
+    world.bodies = {ball_at({0, 0, 0}), ball_at({2, 0, 0})};
+    for (const bool round : {true, false}) {
+        const Vector3d start = round ? Vector3d(0, 2 * M_PI, 0) : Vector3d(-4, 0, 0);
+        world.bodies[1].velocity = start;
+        std::vector<RigidState> states = states_of(world);
+        states[1].position = {-2, 0, 0};
+        states[1].velocity = round ? Vector3d(-start) : start;
+        EXPECT_EQ(seen(world, states, Right::gains_none).through, round ? 0 : 2);
+    }
+}
+
 TEST(HardWatch, BodiesThatAreNotFiniteAreLostAndThoseTooFastAreThrown) {
     sim::WorldDefinition world;
     world.bodies = {cube_at({0, 0.5, 0}), cube_at({0, 1.5, 0})};
