@@ -11,41 +11,65 @@
 ; Tables shared with the host:
 ;   901 one entry a choke group: onset [samples] of the group's latest choking note, written before its block
 ;   902 entry 0: the sample by which every note so far has ended, written by the notes
+; Opcodes of the host (audio/src/opcodes.h): contact_force, noise_burst, modal_bank, bessel.
 ;
 ; Each line `;@ instrument parameter default minimum maximum text` declares a parameter; the host reads these lines.
 ;
 ;@ drum   frequency_hz     180    20   2000  pitch: lowest mode of the membrane (with kettle = 1: the (1,1) mode) [Hz]
-;@ drum   decay_s          0.9    0.03 20    time in which that mode falls by 60 dB [s]
-;@ drum   damping          0.8    0    3     how much faster high modes decay: decay_s / ratio^damping
-;@ drum   hardness         0.4    0    1     of stick and head: 0 felt ... 1 wood on a tight head; brightness
+;@ drum   decay_s          1.2    0.03 20    time in which the (1,1) mode falls by 60 dB [s]; the (0,1) mode, which radiates best, is gone in about 0.4 of it
+;@ drum   damping          0.8    0    3     how much faster high modes decay: their losses grow as frequency^damping
+;@ drum   hardness         0.4    0    1     of what is struck: 0 felt ... 1 metal, a contact modulus of 1 MPa * 10^(4 hardness); the contact's length, so brightness
 ;@ drum   bend_cents       40     0    2400  how far an 8 m/s stroke starts above the pitch [cents], in proportion to the speed
 ;@ drum   bend_s           0.06   0.005 1    time constant with which the bend dies [s]
 ;@ drum   kettle           0      0    1     0 membrane in air (tom, snare, kick) ... 1 kettledrum (nearly harmonic modes)
-;@ drum   attack           0.35   0    1     noise of the stick's impact
+;@ drum   attack           0.35   0    1     sound of the contact itself
 ;@ drum   snare            0      0    1     snare wires
-;@ drum   snare_decay_s    0.22   0.02 3     time in which the wires fall by 60 dB [s]
+;@ drum   snare_decay_s    0.22   0.02 3     time in which the wires, left to themselves, fall by 60 dB [s]
 ;@ drum   rim_frequency_hz 850    100  6000  lowest mode of rim and shell, heard in zone 1 [Hz]
+;@ drum   air_load         1.2    0    5     air that moves with the head: 2 rho a / sigma (density of air, radius, head's mass an area)
+;@ drum   second_head      0      0    1     coupling to a second head by the air between: splits the modes (0,1) and (1,1) into pairs
+;@ drum   variation        0.5    0    1     small differences between equal strokes
+;@ drum   tip_radius_m     0.006  0.001 0.1  radius of the stick's tip [m]; the kit's [stick] radius unless given
+;@ drum   tip_mass_kg      0.05   0.001 5    effective mass of the stick [kg]; the kit's [stick] mass unless given
+;@ drum   tip_young_pa     1e10   1e4  1e12  Young's modulus of the tip [Pa]; the kit's [stick] young_pa unless given
 ;@ bell   frequency_hz     600    30   8000  pitch: the partial of ratio 1 [Hz]
 ;@ bell   decay_s          4      0.03 60    time in which the slowest partial falls by 60 dB [s]
 ;@ bell   partials         0      0    3     0 minor-third bell, 1 free bar (glockenspiel), 2 tuned bar (vibraphone), 3 cowbell
 ;@ bell   damping          1      0    3     how much faster high partials decay
-;@ bell   hardness         0.6    0    1     of the mallet; brightness
+;@ bell   hardness         0.6    0    1     of what is struck: 0 felt ... 1 metal; the contact's length, so brightness
 ;@ bell   warble_hz        0      0    20    beating of each partial's two halves, split evenly about its pitch [Hz]
-;@ bell   attack           0.15   0    1     noise of the impact
+;@ bell   attack           0.15   0    1     sound of the contact itself
+;@ bell   width            0.3    0    1     how far its partials lie apart, left and right
+;@ bell   variation        0.5    0    1     small differences between equal strokes
+;@ bell   tip_radius_m     0.006  0.001 0.1  radius of the mallet's tip [m]; the kit's [stick] radius unless given
+;@ bell   tip_mass_kg      0.05   0.001 5    effective mass of the mallet [kg]; the kit's [stick] mass unless given
+;@ bell   tip_young_pa     1e10   1e4  1e12  Young's modulus of the tip [Pa]; the kit's [stick] young_pa unless given
 ;@ string frequency_hz     220    25   4000  pitch: first partial [Hz]
 ;@ string decay_s          3      0.05 40    time in which the first partial falls by 60 dB [s]
 ;@ string damping          0.7    0    3     how much faster high partials decay: decay_s / n^damping
-;@ string hardness         0.55   0    1     of the hammer; brightness
+;@ string hardness         0.55   0    1     of the hammer: 0 felt ... 1 metal; the contact's length, so brightness
 ;@ string inharmonicity    0.0001 0    0.01  stiffness B: partial n lies at n f sqrt((1 + B n^2) / (1 + B))
 ;@ string strike_point     0.23   0.02 0.5   where place = 0 strikes, as a fraction of the length from the bridge
 ;@ string pluck            0      0    1     0 hammered ... 1 plucked (partials fall by a further 1/n)
-;@ string attack           0.12   0    1     noise of the impact
-;@ cymbal frequency_hz     340    60   3000  lowest partial [Hz]
+;@ string attack           0.12   0    1     sound of the contact itself
+;@ string width            0.5    0    1     how far its partials lie apart, left and right
+;@ string variation        0.5    0    1     small differences between equal strokes
+;@ string tip_radius_m     0.006  0.001 0.1  radius of the hammer's tip [m]; the kit's [stick] radius unless given
+;@ string tip_mass_kg      0.05   0.001 5    effective mass of the hammer [kg]; the kit's [stick] mass unless given
+;@ string tip_young_pa     1e10   1e4  1e12  Young's modulus of the tip [Pa]; the kit's [stick] young_pa unless given
+;@ cymbal frequency_hz     340    60   3000  lowest partial [Hz]; another one gives another plate with partials of its own
 ;@ cymbal decay_s          3      0.02 30    time in which the plate falls by 60 dB at 1 kHz [s]: crash 3, ride 4, closed hi-hat 0.12
 ;@ cymbal damping          0.45   0    2     how much faster high frequencies decay: (1 kHz / f)^damping
-;@ cymbal hardness         0.75   0    1     of the stick; brightness
-;@ cymbal noise            0.5    0    1     share of dense noise against single partials: crash 0.6, ride 0.3
-;@ cymbal spread           1      0.3  1.5   width of the partials' range: 1 reaches 36 times frequency_hz, at most 15 kHz
+;@ cymbal hardness         0.75   0    1     of the plate against the stick: 0 felt ... 1 metal; the contact's length, so brightness
+;@ cymbal noise            0.5    0    1     share of the high partials that large motion of the low ones sets going: crash 0.8, ride 0.3
+;@ cymbal build_s          0.025  0.005 0.2  time in which that drive rises [s]; it then dies within about ten times this
+;@ cymbal spread           1      0.3  1.5   width of the partials' range: 1 reaches 50 times frequency_hz, at most 18 kHz
+;@ cymbal attack           0.1    0    1     sound of the contact itself
+;@ cymbal width            0.4    0    1     how far its partials lie apart, left and right
+;@ cymbal variation        0.5    0    1     small differences between equal strokes
+;@ cymbal tip_radius_m     0.006  0.001 0.1  radius of the stick's tip [m]; the kit's [stick] radius unless given
+;@ cymbal tip_mass_kg      0.05   0.001 5    effective mass of the stick [kg]; the kit's [stick] mass unless given
+;@ cymbal tip_young_pa     1e10   1e4  1e12  Young's modulus of the tip [Pa]; the kit's [stick] young_pa unless given
 
 sr = 48000
 ksmps = 64
@@ -55,204 +79,61 @@ nchnls = 2
 giChokes ftgen 901, 0, -256, -2, 0
 giEnds   ftgen 902, 0, -1, -2, 0
 
-; Private noise: a fixed table of uniform noise (Park and Miller's generator), read from a place that depends on the
-; stroke alone. Csound's own random opcodes share one state among all notes, so that a note would depend on the others.
-giNoise  ftgen 903, 0, 65536, -2, 0
-iseed = 19920213
-index = 0
-while index < 65536 do
-  iseed = (iseed * 16807) % 2147483647
-  tableiw 2 * iseed / 2147483647 - 1, index, giNoise
-  index += 1
-od
-
-; Membrane modes (m nodal diameters, root of the Bessel function J_m, largest |J_m|) and the kettledrum's ratios to its
-; (1,1) mode, loaded by air (Fletcher and Rossing, The Physics of Musical Instruments, chapter 18).
-giDiameters ftgen 910, 0, -12, -2, 0, 1, 2, 0, 3, 1, 4, 2, 0, 5, 3, 6
-giRoots     ftgen 911, 0, -12, -2, 2.404826, 3.831706, 5.135622, 5.520078, 6.380162, 7.015587, 7.588342, 8.417244, 8.653728, 8.771484, 9.761023, 9.936110
-giPeaks     ftgen 912, 0, -12, -2, 1, 0.5819, 0.4865, 1, 0.4344, 0.5819, 0.3997, 0.4865, 1, 0.3741, 0.4344, 0.3541
-giKettle    ftgen 913, 0, -12, -2, 0.85, 1, 1.51, 1.68, 1.99, 2.09, 2.46, 2.61, 2.52, 2.89, 3.05, 3.36
+; Membrane modes (m, n) by frequency: nodal diameters m, nodal circles n and the root of the Bessel function J_m (Abramowitz and Stegun, table 9.5),
+; and a kettledrum's ratios to its (1,1) mode: 1, 1.50, 1.98, 2.44, 2.90 for one nodal circle and 1 to 5 diameters, drawn
+; together by the air outside and in the kettle (Christian, Davis, Tubis, Anderson, Mills and Rossing, Effects of air loading
+; on timpani membrane vibrations, JASA 76, 1984; Fletcher and Rossing, The Physics of Musical Instruments, chapter 18).
+giDiameters ftgen 910, 0, -32, -2, 0, 1, 2, 0, 3, 1, 4, 2, 0, 5, 3, 6, 1, 4, 7, 2, 0, 8, 5, 3, 1, 9, 6, 4, 10, 2, 7, 0, 11, 5, 8, 3
+giCircles   ftgen 912, 0, -32, -2, 1, 1, 1, 2, 1, 2, 1, 2, 3, 1, 2, 1, 3, 2, 1, 3, 4, 1, 2, 3, 4, 1, 2, 3, 1, 4, 2, 5, 1, 3, 2, 4
+giRoots     ftgen 911, 0, -32, -2, 2.404826, 3.831706, 5.135622, 5.520078, 6.380162, 7.015587, 7.588342, 8.417244, 8.653728, 8.771484, 9.761023, 9.936110, 10.173468, 11.064709, 11.086370, 11.619841, 11.791534, 12.225092, 12.338604, 13.015201, 13.323692, 13.354300, 13.589290, 14.372537, 14.475501, 14.795952, 14.821269, 14.930918, 15.589848, 15.700174, 16.037774, 16.223466
+giKettle    ftgen 913, 0, -32, -2, 0.85, 1, 1.5, 1.68, 1.98, 2.09, 2.44, 2.61, 2.52, 2.9, 3.05, 3.36, 3.19, 3.47, 3.81, 3.64, 3.69, 4.27, 3.86, 4.08, 4.17, 4.72, 4.26, 4.5, 5.17, 4.63, 4.64, 4.68, 5.62, 4.92, 5.02, 5.08
 
 ; Bell partials, ten a set: ratio, weight, decay relative to the slowest (before `damping`). Weight 0: no partial.
 giRatios  ftgen 920, 0, -40, -2, 0.5, 1, 1.2, 1.5, 2, 2.51, 2.66, 3.01, 4.17, 5.43, 1, 2.756, 5.404, 8.933, 13.345, 18.638, 1, 1, 1, 1, 1, 3.984, 10.668, 17.98, 1, 1, 1, 1, 1, 1, 1, 1.504, 2.32, 3.07, 4.22, 5.5, 6.9, 1, 1, 1
 giWeights ftgen 921, 0, -40, -2, 0.45, 0.7, 0.8, 0.25, 1, 0.3, 0.25, 0.5, 0.35, 0.25, 1, 0.6, 0.4, 0.25, 0.15, 0.1, 0, 0, 0, 0, 1, 0.35, 0.12, 0.06, 0, 0, 0, 0, 0, 0, 1, 0.9, 0.35, 0.3, 0.2, 0.12, 0.08, 0, 0, 0
 giLasting ftgen 922, 0, -40, -2, 1, 0.75, 0.7, 0.5, 0.6, 0.45, 0.4, 0.45, 0.4, 0.35, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1
 
+; The modes of the note that is being set up, four values each: frequency [Hz], T60 [s], weight, drive. modal_bank reads them as
+; it is initialised, at once, so that notes do not meet here.
+giModes ftgen 930, 0, -2048, -2, 0
+
+; Onsets within a block: in Csound 6.18 the opcodes of an instrument start at the note's own sample, those of an opcode
+; definition (UDO) at the block's first. So whatever runs with time from the onset stands in the instrument itself or in a
+; macro; the opcode definitions initialise.
+
 ; Peak amplitude of a stroke: about -9 dBFS at 8 m/s, 40 dB between 0.2 and 8 m/s.
 opcode Level, i, i
   ispeed xin
-  xout 0.355 * (limit(ispeed, 0.001, 16) / 8)^1.25
+  xout 0.355 * (limit(ispeed, 0.001, 16) / 8)^1.33
 endop
 
-; Corner frequency [Hz] of the contact: a harder and faster blow is shorter, so it excites higher modes.
-opcode Corner, i, ii
-  ihardness, ispeed xin
-  xout 150 * 2^(6.5 * ihardness) * (limit(ispeed, 0.05, 16) / 2)^0.55
+; Length of the contact [s]: a ball that strikes a plane (Hertz 1882; Johnson, Contact Mechanics, 1985, chapter 11),
+;   T = 2.943 (15 m / (16 E sqrt(R)))^(2/5) v^(-1/5),
+; with 1 / E = 1 / E_tip + 1 / E_struck. Its force is nearly half a sine (Goldsmith, Impact, 1960). A faster stroke is shorter, so
+; it excites higher modes: the stroke's brightness needs no rule of its own.
+opcode Contact, i, iiiii
+  ihardness, iradius, imass, iyoung, ispeed xin
+  istruck = 10^(6 + 4 * ihardness)
+  imodulus = 1 / (1 / istruck + 1 / iyoung)
+  xout limit(2.943 * (15 * imass / (16 * imodulus * sqrt(iradius)))^0.4 * limit(ispeed, 0.02, 16)^(-0.2), 0.0001, 0.02)
 endop
 
-; Onsets within a block: in Csound 6.18 the opcodes of an instrument start at the note's own sample, those of an opcode
-; definition (UDO) at the block's first. So whatever runs with time from the onset is a macro, which stands in the
-; instrument itself; the opcode definitions hold filters and initialisation only.
-
-; ablow: 1 at the note's first sample, 0 elsewhere.
-#define BLOW #
-  ablow linseg 1, 1 / sr, 0, 1, 0
-#
-
-; Noise aN that rises from 0 in RISE seconds and falls by 60 dB in T60; stroke and place choose where the table is read.
-#define BURST(N'PLACE'RISE'T60) #
-  iphase$N = frac(7.3137 * p7 + 3.7711 * $PLACE + 61.8033989 * $T60)
-  aenv$N expseg 1, $T60, 0.001, $T60, 0.000001, 1, 0.000001
-  arise$N linseg 0, $RISE, 1, 1, 1
-  a$N oscil 1, sr / 65536, giNoise, iphase$N
-  a$N = a$N * arise$N * aenv$N
-#
-
-; Ends a note's asound (at level 1; ilevel, iduration): fades to 0 over its last 50 ms; choked, fades within 15 ms from
-; the very sample; notes its end in table 902; pans.
-#define CLOSE #
-  p3 = iduration
-  ilast tab_i 0, giEnds
-  tabw_i max(ilast, p4 + iduration * sr + 2 * ksmps), 0, giEnds
-  afade linseg 1, iduration - 0.05, 1, 0.05, 0, 1, 0
-  asample linseg 0, 1000, 1000 * sr
-  asound = asound * ilevel * afade
-  kchoke init (p11 < 0 ? -1 : p11 - p4)
-  kover init 0
-  if kchoke < 0 && p10 >= 0 then
-    klatest tab p10, giChokes
-    kchoke = (klatest > p4 ? klatest - p4 : -1)
-  endif
-  if kchoke >= 0 then
-    aleft limit 1 - (asample - kchoke) / (0.015 * sr), 0, 1
-    asound = asound * aleft * aleft * (3 - 2 * aleft)
-    kover = (k(asample) > kchoke + 0.015 * sr + ksmps ? 1 : 0)
-  endif
-  outs asound * p5, asound * p6
-  if kover == 1 then
-    turnoff
-  endif
-#
-
-; A bank of up to 32 damped modes. Before it, in the same instrument, Put_mode fills the scratch tables; the bank reads them
-; as it is initialised, at once, so that notes do not meet there. Each mode answers the blow with
-;   weight r^n sin(theta (n + 1)),  theta = 2 pi f / sr,  r = 0.001^(1 / (t60 sr)):
-; poles at r e^(+-i theta), exact in pitch and decay. A mode rests once it is 100 dB below full scale.
-giFrequency ftgen 930, 0, -32, -2, 0
-giT60       ftgen 931, 0, -32, -2, 0
-giWeight    ftgen 932, 0, -32, -2, 0
-
-opcode Put_mode, 0, iiii
-  index, ifrequency, it60, iweight xin
-  tabw_i min(ifrequency, 20000), index, giFrequency
-  tabw_i it60, index, giT60
-  tabw_i (ifrequency < 20000 ? iweight : 0), index, giWeight
+; What a mode gets of such a pulse of unit area, up to the zeros of its spectrum.
+opcode Reaches, i, ii
+  ifrequency, icontact xin
+  ix = 2 * ifrequency * icontact
+  xout 1 / sqrt(1 + ix^4)
 endop
 
-; Blocks until mode index has fallen from ilevel to -100 dBFS; 0 where there is no such mode.
-opcode Resting_block, i, iii
-  index, icount, ilevel xin
-  it60 tab_i index, giT60
-  xout (index < icount ? 2 + it60 * limit(105 + 20 * log10(ilevel), 20, 130) / 60 * kr : 0)
+; A stroke's own number in [0, 1), a function of its onset and its instrument alone (fractions of the golden ratio's and the plastic
+; number's multiples spread evenly); and values in [-1, 1) made of it.
+opcode Seed, i, iii
+  ivariation, ionset, ifrequency xin
+  xout (ivariation > 0 ? frac(ionset * 0.6180339887498949 + ifrequency * 0.7548776662466927) : 0.5)
 endop
-
-#define MODE(I) #
-  if$I tab_i $I, giFrequency
-  it$I tab_i $I, giT60
-  iw$I tab_i $I, giWeight
-  io$I = 2 * $M_PI * if$I / sr
-  ir$I = exp(log(0.001) / (max(it$I, 0.001) * sr))
-  ib$I = iw$I * sin(io$I)
-  ic$I = -2 * ir$I * cos(io$I)
-  id$I = ir$I * ir$I
-  ie$I Resting_block $I, icount, ilevel
-  if kblock < ie$I then
-    am$I biquad ablow, ib$I, 0, 0, 1, ic$I, id$I
-    asum += am$I
-  endif
-#
-#define BENDING_MODE(I) #
-  if$I tab_i $I, giFrequency
-  it$I tab_i $I, giT60
-  iw$I tab_i $I, giWeight
-  io$I = 2 * $M_PI * if$I / sr
-  ir$I = exp(log(0.001) / (max(it$I, 0.001) * sr))
-  ib$I = iw$I * sin(io$I)
-  id$I = ir$I * ir$I
-  ie$I Resting_block $I, icount, ilevel
-  if kblock < ie$I then
-    kc$I = -2 * ir$I * cos(min(io$I * kbend, 3))
-    am$I biquad ablow, ib$I, 0, 0, 1, kc$I, id$I
-    asum += am$I
-  endif
-#
-
-opcode Bank, a, aii
-  ablow, icount, ilevel xin
-  kblock init 0
-  asum = 0
-  $MODE(0)
-  $MODE(1)
-  $MODE(2)
-  $MODE(3)
-  $MODE(4)
-  $MODE(5)
-  $MODE(6)
-  $MODE(7)
-  $MODE(8)
-  $MODE(9)
-  $MODE(10)
-  $MODE(11)
-  $MODE(12)
-  $MODE(13)
-  $MODE(14)
-  $MODE(15)
-  $MODE(16)
-  $MODE(17)
-  $MODE(18)
-  $MODE(19)
-  $MODE(20)
-  $MODE(21)
-  $MODE(22)
-  $MODE(23)
-  $MODE(24)
-  $MODE(25)
-  $MODE(26)
-  $MODE(27)
-  $MODE(28)
-  $MODE(29)
-  $MODE(30)
-  $MODE(31)
-  kblock += 1
-  xout asum
-endop
-
-; The same for at most 12 modes, their frequencies multiplied by kbend.
-opcode Bending_bank, a, akii
-  ablow, kbend, icount, ilevel xin
-  kblock init 0
-  asum = 0
-  $BENDING_MODE(0)
-  $BENDING_MODE(1)
-  $BENDING_MODE(2)
-  $BENDING_MODE(3)
-  $BENDING_MODE(4)
-  $BENDING_MODE(5)
-  $BENDING_MODE(6)
-  $BENDING_MODE(7)
-  $BENDING_MODE(8)
-  $BENDING_MODE(9)
-  $BENDING_MODE(10)
-  $BENDING_MODE(11)
-  kblock += 1
-  xout asum
-endop
-
-; A tick that starts at its largest sample, has no DC and is gone within 0.3 ms.
-opcode Tick, a, ai
-  ablow, iamp xin
-  atick biquad ablow, iamp, -iamp, 0, 1, -0.6, 0
-  xout atick
+opcode Scatter, i, ii
+  iseed, ikey xin
+  xout 2 * frac(abs(sin(iseed * 127.1 + ikey * 311.7) * 43758.5453)) - 1
 endop
 
 ; Seconds until a sound of peak ilevel that falls by 60 dB in it60 lies below -100 dBFS.
@@ -261,93 +142,153 @@ opcode Duration, i, ii
   xout 0.08 + it60 * limit(100 + 20 * log10(ilevel), 20, 120) / 60
 endop
 
-; |J_m(x)| by its power series (x below 10: 26 terms reach 1e-9).
-opcode Bessel, i, ii
-  im, ix xin
-  iterm = 1
-  ik = 1
-  while ik <= im do
-    iterm *= ix / (2 * ik)
-    ik += 1
-  od
-  isum = iterm
-  ik = 1
-  while ik <= 26 do
-    iterm *= -ix * ix / (4 * ik * (ik + im))
-    isum += iterm
-    ik += 1
-  od
-  xout abs(isum)
+opcode Put_mode, 0, iiiii
+  index, ifrequency, it60, iweight, idrive xin
+  tabw_i ifrequency, 4 * index, giModes
+  tabw_i it60, 4 * index + 1, giModes
+  tabw_i iweight, 4 * index + 2, giModes
+  tabw_i idrive, 4 * index + 3, giModes
 endop
 
-; Puts the 12 membrane modes, struck at radius iradius of 1; gives the root of the sum of squared weights.
-opcode Put_membrane, i, iiiiii
-  ifrequency, it60, idamping, icorner, ikettle, iradius xin
+; What every stroke begins with; p-fields of hardness and of the first of variation, tip_radius_m, tip_mass_kg, tip_young_pa.
+; aforce: the contact's, at most 1, of area iarea [samples]; acontact: the sound of the contact itself, as the stick's jolt grows with
+; v^(6/5) / T, so with v^(7/5), by v^(2/5) faster than the modes do.
+#define STROKE(HARDNESS'VARIATION'RADIUS'MASS'YOUNG) #
+  iseed Seed $VARIATION, p4, p12
+  ilouder Scatter iseed, 1
+  iaside Scatter iseed, 2
+  iplace = limit(p8 + 0.05 * $VARIATION * iaside, 0, 1)
+  ispeed = p7
+  ilevel Level ispeed
+  ilevel = ilevel * ampdb(0.8 * $VARIATION * ilouder)
+  icontact Contact $HARDNESS, $RADIUS, $MASS, $YOUNG, ispeed
+  iarea = 2 / $M_PI * icontact * sr
+  aforce contact_force icontact
+  arough noise_burst iseed + 0.1 * iplace + 0.01 * ispeed, 0.0001, 0.1
+  acontact butterlp aforce * (0.3 + arough) * (limit(ispeed, 0.02, 16) / 8)^0.4, limit(8 / icontact, 1000, 16000)
+  asilence = 0
+#
+
+; Ends a note's amid and aside (at level 1; ilevel, iduration, iwidth): fades to 0 over its last 50 ms; choked, fades within
+; 15 ms from the very sample; notes its end in table 902; pans, the partials up to iwidth to both sides.
+#define CLOSE #
+  p3 = iduration
+  ilast tab_i 0, giEnds
+  tabw_i max(ilast, p4 + iduration * sr + 2 * ksmps), 0, giEnds
+  afade linseg 1, iduration - 0.05, 1, 0.05, 0, 1, 0
+  asample linseg 0, 1000, 1000 * sr
+  again = ilevel * afade
+  kchoke init (p11 < 0 ? -1 : p11 - p4)
+  kover init 0
+  if kchoke < 0 && p10 >= 0 then
+    klatest tab p10, giChokes
+    kchoke = (klatest > p4 ? klatest - p4 : -1)
+  endif
+  if kchoke >= 0 then
+    aleft limit 1 - (asample - kchoke) / (0.015 * sr), 0, 1
+    again = again * aleft * aleft * (3 - 2 * aleft)
+    kover = (k(asample) > kchoke + 0.015 * sr + ksmps ? 1 : 0)
+  endif
+  outs again * (amid + iwidth * aside) * p5, again * (amid - iwidth * aside) * p6
+  if kover == 1 then
+    turnoff
+  endif
+#
+
+; Puts the membrane's 32 modes, struck at radius iradius of 1, with a second head two more; gives their number and the roots of the sums
+; of their squared amplitudes, after the contact's force and after the drive.
+; Frequencies in air: a mode of wave number k = root / a moves 2 rho / k of air an area with it (Fletcher and Rossing, chapters 3
+; and 18), so f falls by 1 / sqrt(1 + air_load / root). A second head: air and shell couple the heads, (0,1) splits by 1.81,
+; (1,1) by 1.23 (Rossing, Bork, Zhao and Fystrom, Acoustics of snare drums, JASA 92, 1992).
+; Losses: of the material, growing with frequency, and by radiation, as a monopole for m = 0, a dipole for m = 1, then hardly (Christian
+; et al. 1984). So (0,1) dies first of the low ones.
+opcode Put_membrane, iii, iiiiiiiiii
+  ifrequency, it60, idamping, icontact, ikettle, iradius, iair_load, isecond, iseed, ivariation xin
   index = 0
+  icount = 0
   isquares = 0
-  while index < 12 do
+  idrives = 0
+  ilowest = sqrt(1 + iair_load / 2.404826) / 2.404826
+  iratio11 = (3.831706 / sqrt(1 + iair_load / 3.831706) * ilowest)^(1 - ikettle)
+  while index < 32 do
     iroot tab_i index, giRoots
     im tab_i index, giDiameters
-    ipeak tab_i index, giPeaks
     iair tab_i index, giKettle
-    iratio = (iroot / 2.404826)^(1 - ikettle) * iair^ikettle
-    ; A kettledrum's axisymmetric modes radiate well: weak and short.
-    iaxial = (im == 0 ? ikettle : 0)
-    ishape Bessel im, iroot * iradius
-    iweight = ishape / ipeak / sqrt(iratio) / (1 + (ifrequency * iratio / icorner)^2) * 0.35^iaxial
-    Put_mode index, ifrequency * iratio, it60 * limit(iratio, 1, 100)^(-idamping) * 0.3^iaxial, iweight
-    isquares += iweight * iweight
+    ifree = iroot / sqrt(1 + iair_load / iroot) * ilowest
+    iratio = ifree^(1 - ikettle) * iair^ikettle
+    icircles tab_i index, giCircles
+    iradiates = (im == 0 ? 2.2 : (im == 1 ? 0.25 : 0)) / icircles
+    ishape bessel im, iroot * iradius
+    inorm bessel im + 1, iroot
+    iodd Scatter iseed, 10 + index
+    ireaches Reaches ifrequency * iratio, icontact
+    ; A kettledrum's axisymmetric modes are weak, and short as above.
+    ; Signs alternate: what one side of a nodal line sends, the other takes back, and the modes do not meet in a click.
+    iweight = abs(ishape / inorm) * iratio^(-0.25) * (im == 0 ? 0.35^ikettle : 1) * (1 + 0.2 * ivariation * iodd) * (index % 2 == 0 ? 1 : -1)
+    imode_t60 = it60 * 1.25 / ((iratio / iratio11)^idamping + iradiates)
+    isplit = (isecond > 0 && index == 0 ? 0.81 : (isecond > 0 && index == 1 ? 0.23 : 0)) * isecond
+    ihigh = (iratio / 4)^2
+    iother Scatter 0.37, index
+    idrive = iother * ihigh / (1 + ihigh)
+    Put_mode icount, ifrequency * iratio, imode_t60, iweight, idrive
+    icount += 1
+    if isplit > 0 then
+      Put_mode icount, ifrequency * iratio * (1 + isplit), imode_t60, 0.6 * isecond * iweight, 0
+      icount += 1
+    endif
+    isquares += (iweight * ireaches)^2 * (1 + (isplit > 0 ? 0.36 * isecond * isecond : 0))
+    idrives += idrive * idrive
     index += 1
   od
-  xout sqrt(isquares)
+  xout icount, sqrt(isquares), sqrt(idrives)
 endop
 
 ; Zone 0: head. Zone 1: rim shot (the head near its edge, less of it, with rim and shell).
 instr drum
-  ispeed = p7
-  iplace = p8
+  $STROKE(p15'p25'p26'p27'p28)
   irim = (p9 >= 1 ? 1 : 0)
-  ihardness = p15
   isnare = p20
-  isnare_t60 = p21
-  ilevel Level ispeed
-  icorner Corner ihardness, ispeed
-  $BLOW
+  iwidth = 0
   ; The pitch follows the membrane's tension, which grows with the stroke.
   kfall expon 1, p17, exp(-1)
   kbend = cent(p16 * limit(ispeed, 0, 16) / 8 * kfall)
-  inorm Put_membrane p12, p13, p14, icorner, p18, 0.04 + 0.8 * (irim == 1 ? 1 : iplace)
-  asound Bending_bank ablow, kbend, 12, ilevel
-  asound = asound * (irim == 1 ? 0.2 : 0.39) / inorm
-  if p19 > 0 then
-    iburst_t60 = 0.012 + 0.02 * (1 - ihardness)
-    $BURST(burst'iplace'0.0002'iburst_t60)
-    aburst butterlp aburst, limit(4 * icorner, 300, 15000)
-    asound = asound + aburst * p19 * 0.55
-  endif
+  icount, inorm, idriven Put_membrane p12, p13, p14, icontact, p18, 0.04 + 0.8 * (irim == 1 ? 1 : iplace), p23, p24, iseed, p25
+  iscale = (irim == 1 ? 0.16 : 0.36) / (inorm * iarea)
+  ; The same stretching hands motion of the low modes on to the high ones, in hard strokes only (Avanzini and Marogna, A modular
+  ; physically based approach to the sound synthesis of membrane percussion instruments, 2010; Bilbao 2012): a drive within some ms, in proportion to the bend; see instr cymbal.
+  istretch = limit(0.9 * p16 / 100 * (limit(ispeed, 0, 16) / 8)^1.5, 0, 1)
+  idrive_rms = sqrt(sr * (0.004 / 3 + 0.05 / 13.8) / 3)
+  adrive noise_burst iseed + 0.75 + 0.1 * iplace, 0.004, 0.05
+  adrive = adrive * istretch * inorm * iarea / (idriven * idrive_rms)
+  amid, aside modal_bank aforce, adrive, kbend, giModes, icount, 3e-7 / (ilevel * iscale)
+  amid = amid * iscale + acontact * p19 * 1.7
   if isnare > 0 then
-    $BURST(wires'iplace'0.0015'isnare_t60)
-    awires butterhp awires, 700
-    awires butterlp awires, limit(4500 * sqrt(ispeed / 2), 1500, 16000)
-    asound = asound + awires * isnare * 0.85
+    ; The wires leave the head where it moves faster than their tension lets them follow, and rattle until they lie on it again
+    ; (Rossing et al. 1992; Bilbao, Time domain simulation and sound synthesis for the snare drum, JASA 131, 2012): noise that follows
+    ; the head's motion above a threshold.
+    alift limit abs(amid) * ilevel - 0.0006, 0, 10
+    arattle follow2 alift / ilevel, 0.001, p21 * 2 / 3
+    awires noise_burst iseed + 0.5 + 0.1 * iplace, 0.0005, 1000
+    awires butterhp awires, 900
+    awires butterlp awires, 13000
+    amid = amid + awires * arattle * isnare * 1.3
   endif
   if irim == 1 then
-    Put_mode 0, p22, 0.09, 0.3
-    Put_mode 1, p22 * 1.72, 0.07, 0.22
-    Put_mode 2, p22 * 2.61, 0.05, 0.3 * limit(sqrt(ispeed / 8), 0, 1)
-    arim Bank ablow, 3, ilevel
-    asound = asound + arim
+    ireach Reaches p22, icontact
+    Put_mode 0, p22, 0.09, 0.22, 0
+    Put_mode 1, p22 * 1.72, 0.07, -0.16, 0
+    Put_mode 2, p22 * 2.61, 0.05, 0.15, 0
+    arim, asiderim modal_bank aforce / (iarea * ireach), asilence, 1, giModes, 3, 3e-7 / ilevel
+    amid = amid + arim
   endif
-  atick Tick ablow, 0.2
-  asound += atick
-  iduration Duration ilevel, max(p13, isnare > 0 ? isnare_t60 : 0, 0.1)
+  iduration Duration ilevel, max(p13, (isnare > 0 ? p21 : 0), 0.1)
   $CLOSE
 endin
 
 ; Puts the partials of set iset; place 1 brings out the high ones. With iwarble each is two modes that far apart.
-; Gives the number of modes and the root of the sum of squared weights.
-opcode Put_partials, ii, iiiiiii
-  iset, ifrequency, it60, idamping, icorner, iplace, iwarble xin
+; Gives the number of modes and the root of the sum of their squared amplitudes.
+opcode Put_partials, ii, iiiiiiiii
+  iset, ifrequency, it60, idamping, icontact, iplace, iwarble, iseed, ivariation xin
   index = 0
   icount = 0
   isquares = 0
@@ -357,13 +298,15 @@ opcode Put_partials, ii, iiiiiii
     ilasting tab_i iset * 10 + index, giLasting
     iat = ifrequency * iratio
     if iweight > 0 then
-      iweight = iweight * iratio^(0.6 * iplace - 0.2) / (1 + (iat / icorner)^2)
-      isquares += iweight * iweight
+      iodd Scatter iseed, 10 + index
+      ireaches Reaches iat, icontact
+      iweight = iweight * iratio^(0.6 * iplace - 0.2) * (1 + 0.15 * ivariation * iodd)
+      isquares += (iweight * ireaches)^2
       ipartial_t60 = it60 * ilasting * limit(iratio / (iset == 0 ? 0.5 : 1), 1, 100)^(-idamping)
-      Put_mode icount, max(iat - iwarble / 2, 1), ipartial_t60, (iwarble > 0 ? 0.5 : 1) * iweight
+      Put_mode icount, max(iat - iwarble / 2, 1), ipartial_t60, (iwarble > 0 ? 0.5 : 1) * iweight, 0
       icount += 1
       if iwarble > 0 then
-        Put_mode icount, iat + iwarble / 2, ipartial_t60, 0.45 * iweight
+        Put_mode icount, iat + iwarble / 2, ipartial_t60, 0.45 * iweight, 0
         icount += 1
       endif
     endif
@@ -374,38 +317,32 @@ endop
 
 ; Zone 0: body. Zone 1: shoulder (brighter, as place 1, and half as loud).
 instr bell
-  ispeed = p7
+  $STROKE(p16'p20'p21'p22'p23)
   ishoulder = (p9 >= 1 ? 1 : 0)
-  iplace = (ishoulder == 1 ? 1 : p8)
-  iset = int(p14 + 0.5)
-  ilevel Level ispeed
-  icorner Corner p16, ispeed
-  $BLOW
-  icount, inorm Put_partials iset, p12, p13, p15, max(icorner, p12), iplace, p17
-  asound Bank ablow, icount, ilevel
-  asound = asound * 0.53 / inorm * (ishoulder == 1 ? 0.5 : 1)
-  if p18 > 0 then
-    $BURST(burst'iplace'0.0002'0.02)
-    aburst butterlp aburst, limit(2 * icorner, 500, 16000)
-    asound = asound + aburst * p18 * 0.8
-  endif
-  atick Tick ablow, 0.2
-  asound += atick
+  iplace = (ishoulder == 1 ? 1 : iplace)
+  iwidth = p19
+  icount, inorm Put_partials int(p14 + 0.5), p12, p13, p15, icontact, iplace, p17, iseed, p20
+  iscale = 0.48 / (inorm * iarea) * (ishoulder == 1 ? 0.6 : 1)
+  amid, aside modal_bank aforce, asilence, 1, giModes, icount, 3e-7 / (ilevel * iscale)
+  amid = amid * iscale + acontact * p18 
+  aside = aside * iscale
   iduration Duration ilevel, max(p13, 0.05)
   $CLOSE
 endin
 
 ; Puts icount partials of a stiff string struck at ipoint of its length: weight sin(n pi ipoint), the comb of the struck
-; place. Gives the root of the sum of squared weights.
-opcode Put_string, i, iiiiiiii
-  icount, ifrequency, it60, idamping, icorner, iinharmonicity, ipoint, ipluck xin
+; place. Gives the root of the sum of their squared amplitudes.
+opcode Put_string, i, iiiiiiiiii
+  icount, ifrequency, it60, idamping, icontact, iinharmonicity, ipoint, ipluck, iseed, ivariation xin
   index = 1
   isquares = 0
   while index <= icount do
     iat = index * ifrequency * sqrt((1 + iinharmonicity * index * index) / (1 + iinharmonicity))
-    iweight = abs(sin(index * $M_PI * ipoint)) * index^(-0.3 - ipluck) / (1 + (iat / icorner)^2)
-    isquares += iweight * iweight
-    Put_mode index - 1, iat, it60 * index^(-idamping), iweight
+    iodd Scatter iseed, 10 + index
+    ireaches Reaches iat, icontact
+    iweight = sin(index * $M_PI * ipoint) * index^(-0.3 - ipluck) * (1 + 0.15 * ivariation * iodd)
+    isquares += (iweight * ireaches)^2
+    Put_mode index - 1, iat, it60 * index^(-idamping), iweight, 0
     index += 1
   od
   xout sqrt(isquares)
@@ -413,80 +350,69 @@ endop
 
 ; place 1 strikes a fifth as far from the bridge as place 0. All zones sound alike.
 instr string
-  ispeed = p7
-  ilevel Level ispeed
-  icorner Corner p15, ispeed
-  $BLOW
+  $STROKE(p15'p21'p22'p23'p24)
+  iwidth = p20
   icount = limit(int(12000 / p12), 1, 32)
-  inorm Put_string icount, p12, p13, p14, max(icorner, p12), p16, p17 * (1 - 0.8 * p8), p18
-  asound Bank ablow, icount, ilevel
-  asound = asound * 0.38 / inorm
-  if p19 > 0 then
-    $BURST(burst'p8'0.0002'0.025)
-    aburst butterlp aburst, limit(1.5 * icorner, 300, 12000)
-    asound = asound + aburst * p19 * 0.8
-  endif
-  atick Tick ablow, 0.2
-  asound += atick
+  inorm Put_string icount, p12, p13, p14, icontact, p16, p17 * (1 - 0.8 * iplace), p18, iseed, p21
+  iscale = 0.355 / (inorm * iarea)
+  amid, aside modal_bank aforce, asilence, 1, giModes, icount, 3e-7 / (ilevel * iscale)
+  amid = amid * iscale + acontact * p19 
+  aside = aside * iscale
   iduration Duration ilevel, max(p13, 0.05)
   $CLOSE
 endin
 
-; Puts 32 plate modes, spread evenly in log frequency with a fixed irregularity (golden-ratio sequence). The cup rings on
-; every fifth one. Signs alternate, or all modes would meet in a click. Gives the root of the sum of squared weights and the sign of the
-; modes' first sample, which the tick takes, so that they do not cancel.
-opcode Put_plate, ii, iiiiiii
-  ifrequency, ispan, it60, idamping, icorner, iplace, icup xin
+; Puts 448 plate modes: a thin plate has as many modes in one band of a given width as in another (Weyl's law for plates; Fletcher and
+; Rossing, chapter 3), here placed evenly in frequency with the irregularity of each cymbal's own (Scatter of its lowest partial), and
+; with shapes at the struck point of either sign. The cup rings on every fifth one. Gives the root of the sum of the squared weights,
+; for the contact's force and for the drive.
+opcode Put_plate, ii, iiiiiiiii
+  ifrequency, ihighest, it60, idamping, icontact, iplace, icup, iseed, ivariation xin
   index = 0
   isquares = 0
-  ifirst = 0
-  while index < 32 do
-    ijitter = frac(index * 0.6180339887 + 0.37) - 0.5
-    iat = ifrequency * ispan^(limit((index + 0.9 * ijitter) / 31, 0, 1))
-    iweight = (iat / ifrequency)^(0.35 + 0.3 * iplace) / (1 + (iat / icorner)^2) * (0.6 + 0.8 * frac(index * 0.7548776662))
-    iweight = iweight * (icup == 1 && index % 5 != 2 ? 0.15 : 1)
-    iweight = (index % 2 == 0 ? iweight : -iweight)
-    isquares += iweight * iweight
-    ifirst += iweight * sin(2 * $M_PI * iat / sr)
-    Put_mode index, iat, it60 * (1000 / iat)^idamping, iweight
+  idrives = 0
+  istep = (ihighest - ifrequency) / 447
+  while index < 448 do
+    iirregular Scatter ifrequency * 0.00137, index
+    ishape Scatter ifrequency * 0.00253, index + 500
+    iother Scatter ifrequency * 0.00317, index + 1000
+    iodd Scatter iseed, 10 + index
+    iat = ifrequency + istep * (index + (index > 0 ? 0.45 * iirregular : 0))
+    ireaches Reaches iat, icontact
+    iweight = (ishape + 0.3 * ivariation * iodd) * (iat / ifrequency)^(0.3 * iplace - 0.1) * (icup == 1 && index % 5 != 2 ? 0.15 : 1)
+    ihigh = (iat / 4000)^2
+    idrive = (iother + 0.3 * ivariation * iodd) * ihigh / (1 + ihigh) / (1 + (iat / 15000)^4)
+    isquares += (iweight * ireaches)^2
+    idrives += idrive * idrive
+    Put_mode index, iat, it60 * (1000 / iat)^idamping, iweight, idrive
     index += 1
   od
-  xout sqrt(isquares), (ifirst < 0 ? -1 : 1)
+  xout sqrt(isquares), sqrt(idrives)
 endop
 
 ; Zone 0: bow and edge. Zone 1: cup (clearer, less noise).
+; In large motion a cymbal's energy cascades from the low modes, which the stick reaches, to the high ones within tens of milliseconds,
+; more with a harder stroke (Rossing and Shepherd, Acoustics of cymbals, 1983; Touze and Chaigne, Lyapunov exponents from experimental
+; time series: application to cymbal vibrations, 2000; Ducceschi and Touze, Modal approach for nonlinear vibrations of damped impacted
+; plates, JSV 344, 2015). Here the high modes are driven by noise that rises in build_s, and answer as the resonators that they are.
 instr cymbal
-  ispeed = p7
-  iplace = p8
+  $STROKE(p15'p21'p22'p23'p24)
   icup = (p9 >= 1 ? 1 : 0)
   it60 = p13
   idamping = p14
-  inoise = p16 * (icup == 1 ? 0.25 : 1)
-  ilevel Level ispeed
-  icorner Corner p15, ispeed
-  icorner = max(icorner, 2 * p12)
-  ispan = limit(36^p17, 2, 15000 / p12)
-  $BLOW
-  inorm, isign Put_plate p12, ispan, it60, idamping, icorner, iplace, icup
-  aplate Bank ablow, 32, ilevel
-  asound = aplate * 0.42 / inorm * (1 - 0.8 * inoise)
-  if inoise > 0 then
-    ; Three bands of noise stand for the modes too dense to tell apart; the high ones come up last and go first.
-    ilow_t60 = it60 * (1000 / 1200)^idamping
-    $BURST(low'iplace'0.0005'ilow_t60)
-    alow butterbp alow, 1200, 1500
-    imid_t60 = it60 * (1000 / 4000)^idamping
-    $BURST(mid'iplace'0.001'imid_t60)
-    amid butterbp amid, 4000, 4000
-    ihigh_t60 = it60 * (1000 / 9000)^idamping
-    $BURST(high'iplace'0.003'ihigh_t60)
-    ahigh butterbp ahigh, 9000, 8000
-    ibright = 1 / (1 + (9000 / icorner)^1.5)
-    imiddle = 1 / (1 + (4000 / icorner)^1.5)
-    asound = asound + inoise * (alow * 0.6 + amid * imiddle * 2 + ahigh * ibright * 3.2) / (0.6 + imiddle + ibright)
-  endif
-  atick Tick ablow, 0.2 * isign
-  asound += atick
+  iwidth = p20
+  ibuild = p17
+  icascade = limit(p16 * (icup == 1 ? 0.25 : 1) * (limit(ispeed, 0.05, 16) / 8)^0.35, 0, 1)
+  ihighest = limit(p12 * 50^p18, 2 * p12, 18000)
+  idirect, idriven Put_plate p12, ihighest, it60, idamping, icontact, iplace, icup, iseed, p21
+  iforce = 0.36 * (1 - 0.8 * icascade) / (idirect * iarea)
+  ; The drive's root mean square, 1/sqrt(3), over its length: rise / 3 + T60 / 13.8.
+  idrive_t60 = 5 * ibuild
+  irandom = sqrt(sr * (ibuild / 3 + idrive_t60 / 13.8) / 3)
+  idrive = 0.3 * icascade / (idriven * irandom)
+  adrive noise_burst iseed + 0.25 + 0.1 * iplace, ibuild, idrive_t60
+  amid, aside modal_bank aforce * iforce, adrive * idrive, 1, giModes, 448, 3e-7 / ilevel
+  amid = amid + acontact * p19 
   iduration Duration ilevel, max(it60 * (1000 / limit(p12, 60, 1000))^idamping, 0.05)
   $CLOSE
 endin

@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "audio/performance.h"
+#include "opcodes.h"
 
 namespace audio {
 namespace {
@@ -48,6 +49,7 @@ CsoundEngine::CsoundEngine(const std::string& orchestra, const std::string& sour
             throw std::runtime_error(std::string("Csound refuses its option ") + option);
         }
     }
+    add_opcodes(csound_.get());
     if (csoundCompileOrc(csound_.get(), orchestra.c_str()) != 0 || csoundStart(csound_.get()) != 0)
         failed_ = true;
     check_messages();

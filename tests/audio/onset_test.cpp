@@ -14,16 +14,15 @@ constexpr std::int64_t kBlock = 64;
 constexpr std::int64_t kSpacing =
     200 * kBlock + 1;                   // 267 ms, so that each note falls one sample later in its block
 constexpr int kNotes = 2 * kBlock + 1;  // every phase twice
-constexpr double kAudible = 1e-4;
 
 /// Voices whose softest note ends, at exactly zero, within the spacing.
 audio::Voice short_voice(const std::string& instrument) {
-    return voice(instrument, {{"decay_s", 0.05}}, 0.35);
+    return voice(instrument, {{"decay_s", 0.05}, {"variation", 0}}, 0.35);
 }
 
 class Onset : public testing::TestWithParam<std::string> {};
 
-TEST_P(Onset, FirstSampleAboveMinus80DbIsTheOnsetAtEveryPhaseOfTheBlockAndBeforeItIsExactSilence) {
+TEST_P(Onset, FirstSampleIsTheOnsetAtEveryPhaseOfTheBlockAndBeforeItIsExactSilence) {
     for (const double speed : {0.2, 8.0}) {
         std::vector<audio::Note> notes;
         for (int i = 0; i < kNotes; ++i)
@@ -34,7 +33,7 @@ TEST_P(Onset, FirstSampleAboveMinus80DbIsTheOnsetAtEveryPhaseOfTheBlockAndBefore
         for (std::int64_t i = 0; i < std::ssize(sound); ++i) {
             const double x = sound[static_cast<std::size_t>(i)];
             if (next < notes.size() && i == notes[next].onset_sample) {
-                ASSERT_GT(std::abs(x), kAudible) << speed << " m/s, onset " << i;
+                ASSERT_NE(x, 0) << speed << " m/s, onset " << i;
                 ASSERT_LT(sounded, i - kBlock)
                     << "the note before is to be silent a block ahead of the onset";
                 ++next;
@@ -49,14 +48,14 @@ TEST_P(Onset, ZonesAndPlacesAtTheirExtremesStartAtTheOnset) {
     for (const int zone : {0, 1}) {
         for (const double place : {0.0, 1.0}) {
             const auto sound = left(render({voice(GetParam())}, {note(1, 1234, 0.2, 0, place, zone)}));
-            EXPECT_GT(std::abs(sound.at(1234)), kAudible);
+            EXPECT_NE(sound.at(1234), 0);
             EXPECT_TRUE(std::all_of(sound.begin(), sound.begin() + 1234, [](double x) { return x == 0; }));
         }
     }
 }
 
 TEST_P(Onset, AStrokeSoundsTheSameAtEveryPhaseOfTheBlock) {
-    Parameters parameters{{"decay_s", 0.05}};
+    Parameters parameters{{"decay_s", 0.05}, {"variation", 0}};
     if (GetParam() == "drum") parameters.insert(parameters.end(), {{"bend_cents", 0}, {"snare", 0.5}});
     std::vector<audio::Note> notes;
     for (int i = 0; i < kBlock; ++i)
@@ -88,7 +87,6 @@ TEST(OnsetRule, HalfBlockRuleAsksForTheSecondHalfOneBlockEarlier) {
 TEST(OnsetRule, OnsetsStayExactAfterTenMinutes) {
     const std::int64_t onset = 600 * 48000 + 37;
     const auto sound = left(render({short_voice("drum")}, {note(1, onset)}, 0, onset + kLongTail));
-    EXPECT_GT(std::abs(sound.at(static_cast<std::size_t>(onset))), kAudible);
     EXPECT_EQ(std::find_if(sound.begin(), sound.end(), [](double x) { return x != 0; }) - sound.begin(),
               onset);
 }

@@ -66,7 +66,8 @@ TEST_P(Sound, LoudnessRisesWithSpeedByAbout40DbFrom0Point2To8MetresASecond) {
         EXPECT_GT(levels.back(), before + 1) << speed << " m/s";
         before = levels.back();
     }
-    // Amplitude ~ v^1.25: 40.05 dB; the noises differ from stroke to stroke and the spectrum shifts.
+    // Amplitude ~ v^1.33: 42.6 dB, less what the soft stroke gains, whose low modes last longer; the strokes vary
+    // by 0.4 dB.
     EXPECT_NEAR(levels.back() - levels.front(), 40, 3);
 }
 
@@ -163,7 +164,7 @@ TEST(Pitch, DrumsSettleWithin10CentsAndStartHigherWhenStruckHarder) {
 TEST(Pitch, KettledrumSoundsItsPrincipalToneFifthAndOctave) {
     const auto sound = strike(
         voice("drum", {{"frequency_hz", 110}, {"kettle", 1}, {"decay_s", 4}, {"bend_cents", 0}}), 3, 0.8);
-    for (const double ratio : {1.0, 1.51, 1.99})
+    for (const double ratio : {1.0, 1.5, 1.98, 2.44})
         EXPECT_NEAR(cents_off(sound, 4800, 19200, 110 * ratio), 0, 10) << ratio;
 }
 

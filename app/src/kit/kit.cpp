@@ -228,6 +228,22 @@ void instrument_keys(Fields& keys, InstrumentDraft& written) {
 const TableKind<InstrumentDraft> kInstrument = {
     {"instrument", "One playable thing.", Below::defaults_of_kind}, instrument_keys};
 
+/// Gives the sound what it wants to know of the stick, where the kit's own parameters do not say it.
+void add_tip(audio::Voice& voice, const StickDefinition& stick,
+             const std::vector<audio::Instrument>& orchestra) {
+    const auto sound = std::ranges::find(orchestra, voice.instrument, &audio::Instrument::name);
+    if (sound == orchestra.end()) return;
+    const std::pair<std::string, double> tip[] = {
+        {"tip_radius_m", stick.radius_m}, {"tip_mass_kg", stick.mass_kg}, {"tip_young_pa", stick.young_pa}};
+    for (const auto& each : tip) {
+        const auto named = [&](const auto& parameter) { return parameter.first == each.first; };
+        if (std::ranges::find(sound->parameters, each.first, &audio::Parameter::name) !=
+                sound->parameters.end() &&
+            std::ranges::none_of(voice.parameters, named))
+            voice.parameters.push_back(each);
+    }
+}
+
 // The file
 
 /// What each file of a kit says for itself.
@@ -264,6 +280,10 @@ void stick_keys(Fields& keys, StickDefinition& stick) {
     }
     keys.number("radius", stick.radius_m, {0.001, 0.1, "m"}, "Radius of the tip.");
     keys.number("mass", stick.mass_kg, {0.001, 5, "kg"}, "Effective mass of the stick in a stroke.");
+    keys.number(
+        "young_pa", stick.young_pa, {1e4, 1e12, "Pa"},
+        "Young's modulus of the tip: hard wood 1e10, rubber 1e7, felt 1e6; with its radius and mass it says "
+        "how long a stroke touches (Hertz), so how bright it is.");
     std::string mesh = stick.mesh.empty() ? "stick.obj" : stick.mesh.string();
     keys.text("mesh", mesh,
               "Mesh of the stick: 0.40 m along -z from the hand at the origin; a file beside the kit or a "
@@ -296,6 +316,7 @@ void kit_keys(Fields& keys, KitDraft& written) {
             Instrument& instrument = read.instrument;
             instrument.body.name = instrument.name;
             instrument.body.stick_mass_kg = kit.stick.mass_kg;
+            add_tip(instrument.voice, kit.stick, written.orchestra);
             instrument.mesh = find_file(at, "mesh", instrument.mesh, kit.file, "meshes");
             at.require(written.names.insert(instrument.name).second, "",
                        fmt::format("a second instrument \"{}\"", instrument.name), "a name of its own");

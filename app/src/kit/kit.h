@@ -40,6 +40,7 @@ struct StickDefinition {
     std::optional<Eigen::Vector3d> shaft;  ///< unit, hand to tip
     double radius_m = 0.006;
     double mass_kg = 0.05;
+    double young_pa = 1e10;  ///< of the tip
     std::filesystem::path mesh;
 };
 

@@ -1,0 +1,57 @@
+#pragma once
+#include <array>
+#include <cstddef>
+#include <span>
+
+namespace audio {
+
+/// What a mode is, in the order of its table's columns.
+struct ModeParameters {
+    double frequency_hz = 0;
+    double t60_s = 0;   ///< time in which it falls by 60 dB
+    double weight = 0;  ///< amplitude after a unit impulse of the force
+    double drive = 0;   ///< and of the drive
+};
+
+/// Damped modes of a sounding body, each of which answers two inputs, the force F of the contact and a drive D
+/// (what other modes do to it), by the state z = x + i y:
+///   z[n] = r e^(i theta) (z[n-1] + weight F[n] + drive D[n]),  theta = 2 pi f / sr,  r = 0.001^(1 / (t60 sr)),
+/// exact in pitch and decay (Mathews and Smith, Methods for Synthesizing Very High Q Parametrically Well
+/// Behaved Two Pole Filters, 2003); what is heard is y. Single precision suffices: a rotation's coefficients
+/// keep their relative precision at low frequencies, where those of a biquad do not.
+///
+/// A trivial type without alignment of its own, which lies in memory that Csound clears and gives out again.
+/// Sixteen modes go together; once they are quiet they rest. No allocation.
+class ModalBank {
+public:
+    static constexpr std::size_t kMostModes = 512, kMostSamples = 64;
+    static constexpr std::size_t kLanes = 8, kTogether = 2 * kLanes;  ///< modes in a vector, in a group
+
+    /// A new start from rest with at most kMostModes; others are left out, as are modes from 20 kHz on.
+    /// `rest_below`: amplitude from which a group rests while nothing comes in.
+    void set(std::span<const ModeParameters> modes, double sample_rate, double rest_below) noexcept;
+    /// Multiplies all frequencies, from the next sample on; the states go on.
+    void bend(double ratio) noexcept;
+    /// At most kMostSamples. mid: the sum of all modes; side: the same with every second pair of modes
+    /// inverted, which stands for the body's directions of radiation.
+    void render(std::span<const float> force, std::span<const float> drive, std::span<float> mid,
+                std::span<float> side) noexcept;
+    [[nodiscard]] std::size_t sounding_groups() const noexcept;
+
+private:
+    using Column = std::array<float, kMostModes>;
+    struct Inputs;
+    template <bool kDriven>
+    void render_group(std::size_t first, const Inputs& inputs, float* sums) noexcept;
+    void rotate(std::size_t mode, double ratio) noexcept;
+
+    Column real_, imaginary_;  ///< z
+    Column cosine_, sine_;     ///< r e^(i theta)
+    Column weight_, drive_;    ///< gains of the inputs
+    Column angle_, radius_;    ///< theta, r; unbent
+    std::array<bool, kMostModes / kTogether> sounds_;
+    std::size_t groups_;
+    float rest_below_, ratio_;
+};
+
+}  // namespace audio

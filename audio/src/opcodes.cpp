@@ -1,0 +1,165 @@
+#include "opcodes.h"
+
+#include <csdl.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <span>
+#include <stdexcept>
+#include <string>
+
+#include "modal_bank.h"
+
+namespace audio {
+namespace {
+
+// Csound gives an opcode its memory cleared, then the arguments' addresses in the order of their types.
+
+/// The samples of this block that belong to the note.
+struct Part {
+    std::size_t begin = 0, end = 0;
+};
+
+Part part_of(const OPDS& opcode) {
+    const INSDS& note = *opcode.insdshead;
+    return {note.ksmps_offset, note.ksmps - note.ksmps_no_end};
+}
+
+void clear_around(MYFLT* out, const OPDS& opcode) {
+    const Part part = part_of(opcode);
+    std::fill(out, out + part.begin, 0.0);
+    std::fill(out + part.end, out + opcode.insdshead->ksmps, 0.0);
+}
+
+struct ContactForce {
+    OPDS h;
+    MYFLT *force, *duration_s;
+    double samples;
+    std::int64_t sample;
+
+    static int start(CSOUND* csound, void* memory) {
+        auto& self = *static_cast<ContactForce*>(memory);
+        self.samples = *self.duration_s * csound->GetSr(csound);
+        self.sample = 0;
+        return OK;
+    }
+    static int run(CSOUND*, void* memory) {
+        auto& self = *static_cast<ContactForce*>(memory);
+        clear_around(self.force, self.h);
+        const Part part = part_of(self.h);
+        for (std::size_t n = part.begin; n < part.end; ++n) {
+            const double at = static_cast<double>(self.sample++) + 0.5;
+            self.force[n] = at < self.samples ? std::sin(std::numbers::pi * at / self.samples) : 0;
+        }
+        return OK;
+    }
+};
+
+struct NoiseBurst {
+    OPDS h;
+    MYFLT *noise, *seed, *rise_s, *t60_s;
+    std::uint64_t random;
+    double rise_per_sample, risen, fall_per_sample, fallen;
+
+    static int start(CSOUND* csound, void* memory) {
+        auto& self = *static_cast<NoiseBurst*>(memory);
+        const double rate = csound->GetSr(csound);
+        self.random = std::bit_cast<std::uint64_t>(*self.seed) * 0x9E3779B97F4A7C15U | 1U;
+        self.rise_per_sample = 1 / std::max(1.0, *self.rise_s * rate);
+        self.risen = 0;
+        self.fall_per_sample = std::exp(std::log(0.001) / (std::max(*self.t60_s, 0.001) * rate));
+        self.fallen = 1;
+        return OK;
+    }
+    /// Uniform in [-1, 1): xorshift64* (Vigna, An experimental exploration of Marsaglia's xorshift
+    /// generators, scrambled, 2016).
+    double next() {
+        random ^= random >> 12;
+        random ^= random << 25;
+        random ^= random >> 27;
+        return static_cast<double>(static_cast<std::int64_t>(random * 0x2545F4914F6CDD1DU)) * 0x1p-63;
+    }
+    static int run(CSOUND*, void* memory) {
+        auto& self = *static_cast<NoiseBurst*>(memory);
+        clear_around(self.noise, self.h);
+        const Part part = part_of(self.h);
+        for (std::size_t n = part.begin; n < part.end; ++n) {
+            self.risen = std::min(1.0, self.risen + self.rise_per_sample);
+            self.noise[n] = self.fallen < 1e-4 ? 0 : self.next() * self.risen * self.fallen;
+            self.fallen *= self.fall_per_sample;
+        }
+        return OK;
+    }
+};
+
+struct Bank {
+    OPDS h;
+    MYFLT *mid, *side, *force, *drive, *ratio, *modes, *count, *rest;
+    ModalBank bank;
+
+    static int start(CSOUND* csound, void* memory) {
+        auto& self = *static_cast<Bank*>(memory);
+        MYFLT* table = nullptr;
+        const int length = csound->GetTable(csound, &table, static_cast<int>(*self.modes));
+        if (length < 0 || self.h.insdshead->ksmps > ModalBank::kMostSamples)
+            return csound->InitError(csound, "modal_bank: found no table of modes, or ksmps above 64");
+        std::array<ModeParameters, ModalBank::kMostModes> modes{};
+        const double most = std::min(static_cast<double>(modes.size()), length / 4.0);
+        const auto count = static_cast<std::size_t>(std::clamp(*self.count, 0.0, most));
+        for (std::size_t i = 0; i < count; ++i)
+            modes[i] = {table[4 * i], table[4 * i + 1], table[4 * i + 2], table[4 * i + 3]};
+        self.bank.set(std::span(modes).first(count), csound->GetSr(csound), *self.rest);
+        return OK;
+    }
+    static int run(CSOUND*, void* memory) {
+        auto& self = *static_cast<Bank*>(memory);
+        const std::size_t size = self.h.insdshead->ksmps;
+        std::array<float, ModalBank::kMostSamples> force, drive, mid, side;
+        std::copy_n(self.force, size, force.begin());
+        std::copy_n(self.drive, size, drive.begin());
+        self.bank.bend(*self.ratio);
+        self.bank.render(std::span(force).first(size), std::span(drive).first(size),
+                         std::span(mid).first(size), std::span(side).first(size));
+        std::copy_n(mid.begin(), size, self.mid);
+        std::copy_n(side.begin(), size, self.side);
+        return OK;
+    }
+};
+
+struct Bessel {
+    OPDS h;
+    MYFLT *value, *order, *x;
+
+    static int start(CSOUND*, void* memory) {
+        auto& self = *static_cast<Bessel*>(memory);
+        *self.value = ::jn(static_cast<int>(*self.order), *self.x);
+        return OK;
+    }
+};
+
+constexpr int kAtInit = 1, kAtInitAndBlock = 3;
+
+template <class Opcode>
+void add(CSOUND* csound, const char* name, const char* out, const char* in) {
+    int (*run)(CSOUND*, void*) = nullptr;
+    if constexpr (requires { &Opcode::run; }) run = &Opcode::run;
+    static_assert(sizeof(Opcode) < 65536, "Csound keeps the size in 16 bits");
+    if (csound->AppendOpcode(csound, name, static_cast<int>(sizeof(Opcode)), 0,
+                             run ? kAtInitAndBlock : kAtInit, out, in, &Opcode::start, run, run) != 0)
+        throw std::runtime_error(std::string("Csound refuses the opcode ") + name);
+}
+
+}  // namespace
+
+void add_opcodes(CSOUND_* csound) {
+    add<ContactForce>(csound, "contact_force", "a", "i");
+    add<NoiseBurst>(csound, "noise_burst", "a", "iii");
+    add<Bank>(csound, "modal_bank", "aa", "aakiii");
+    add<Bessel>(csound, "bessel", "i", "ii");
+}
+
+}  // namespace audio

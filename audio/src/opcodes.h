@@ -1,0 +1,19 @@
+#pragma once
+
+struct CSOUND_;  // Csound's own handle; csound.h stays out of this header
+
+namespace audio {
+
+/// Adds to a Csound instance, before it compiles, what an instrument of the orchestra computes with:
+///   aforce       contact_force iduration_s                      sin(pi t / duration), 0 from then on
+///   anoise       noise_burst iseed, irise_s, it60_s             white noise, risen in irise_s, down by 60 dB
+///                                                               in it60_s, exactly 0 from -80 dB on
+///   amid, aside  modal_bank aforce, adrive, kratio, imodes, icount, irest
+///                                                               see ModalBank; imodes: a table of
+///                                                               frequency, T60, weight and drive a mode
+///   ivalue       bessel iorder, ix                              J_n(x)
+/// All begin at the note's own sample, and all memory lies in the instrument's own. At most 64 samples a
+/// block and 512 modes; more are left out. Throws std::runtime_error where Csound refuses one.
+void add_opcodes(CSOUND_* csound);
+
+}  // namespace audio
