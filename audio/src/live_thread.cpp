@@ -144,8 +144,8 @@ void LiveThread::run(const std::filesystem::path& orchestra, const std::vector<V
 void LiveThread::prepare(const std::filesystem::path& orchestra, const std::vector<Voice>& voices) {
     if (options_.on_thread_start) options_.on_thread_start();
     _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);  // as Performance: decayed modes must not cost
-    renderer_.emplace(orchestra, voices);
-    if (!renderer_->warm_up()) renderer_.emplace(orchestra, voices);
+    renderer_.emplace(orchestra, voices, options_.mix);
+    if (!renderer_->warm_up()) renderer_.emplace(orchestra, voices, options_.mix);
     if (kRingSamples % renderer_->block_size() != 0)
         throw std::runtime_error("live performance: found blocks of " +
                                  std::to_string(renderer_->block_size()) +

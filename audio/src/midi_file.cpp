@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cmath>
 #include <initializer_list>
 #include <stdexcept>
 #include <string>
@@ -10,13 +12,30 @@
 namespace audio {
 namespace {
 
-constexpr int kTicksPerQuarter = 960;
-constexpr std::int64_t kSamplesPerTick = kSampleRate / (2 * kTicksPerQuarter);     // 25: 1920 ticks a second
-constexpr int kNoteTicks = 192;                                                    // 0.1 s
-constexpr std::int64_t kLastTick = 0x0FFFFFFF;                                     // a delta time has 28 bits
-constexpr std::array<std::uint8_t, 6> kTempo{0xFF, 0x51, 0x03, 0x07, 0xA1, 0x20};  // 500000 us a quarter
+constexpr double kTicksPerSecond = 1920, kMicroseconds = 1e6;
+constexpr int kNoteTicks = 192;                 // nearly 0.1 s
+constexpr std::int64_t kLastTick = 0x0FFFFFFF;  // a delta time has 28 bits
 constexpr std::array<std::uint8_t, 3> kEnd{0xFF, 0x2F, 0x00};
 constexpr int kNoteOn = 0x99, kNoteOff = 0x89;  // channel 10
+
+/// A tempo as a file states it.
+struct Clock {
+    std::uint32_t quarter_us = 500000;
+    int ticks_per_quarter = 960;
+};
+
+Clock clock_of(const MidiTime& time) {
+    const bool is_power = time.beat_unit > 0 && std::has_single_bit(static_cast<unsigned>(time.beat_unit));
+    if (!(time.tempo_bpm >= 20 && time.tempo_bpm <= 400) || time.beats < 1 || time.beats > 64 || !is_power ||
+        time.beat_unit > 32) {
+        throw std::logic_error("MIDI time: found tempo " + std::to_string(time.tempo_bpm) + ", bars of " +
+                               std::to_string(time.beats) + "/" + std::to_string(time.beat_unit) +
+                               ", expected 20 to 400, 1 to 64 beats, each a 1, 2, 4, 8, 16 or 32");
+    }
+    const double quarter_s = 60 / time.tempo_bpm;
+    return {static_cast<std::uint32_t>(std::lround(quarter_s * kMicroseconds)),
+            static_cast<int>(std::lround(quarter_s * kTicksPerSecond))};
+}
 
 struct Stroke {
     int tick = 0;
@@ -25,10 +44,12 @@ struct Stroke {
     auto order() const { return std::tuple(tick, on, key, velocity); }  // offs before ons
 };
 
-std::vector<Stroke> strokes_of(const std::vector<Note>& notes) {
+std::vector<Stroke> strokes_of(const std::vector<Note>& notes, const Clock& clock) {
+    const double ticks_per_sample =
+        clock.ticks_per_quarter / (clock.quarter_us / kMicroseconds) / kSampleRate;
     std::vector<Stroke> strokes;
     for (const Note& note : notes) {
-        const std::int64_t tick = (note.onset_sample + kSamplesPerTick / 2) / kSamplesPerTick;
+        const std::int64_t tick = std::llround(static_cast<double>(note.onset_sample) * ticks_per_sample);
         if (note.midi_note < 0 || note.midi_note > 127 || note.midi_velocity < 1 ||
             note.midi_velocity > 127 || note.onset_sample < 0 || tick > kLastTick - kNoteTicks) {
             throw std::runtime_error(
@@ -57,9 +78,16 @@ void append_delta(Bytes& track, int ticks) {
     track.push_back(static_cast<std::uint8_t>(ticks & 0x7F));
 }
 
-Bytes track_of(const std::vector<Stroke>& strokes) {
-    Bytes track = {0};
-    track.insert(track.end(), kTempo.begin(), kTempo.end());
+Bytes track_of(const std::vector<Stroke>& strokes, const MidiTime& time, const Clock& clock) {
+    Bytes track = {0, 0xFF, 0x51, 0x03};
+    append(track, clock.quarter_us, 3);
+    if (time.beats != 4 || time.beat_unit != 4) {  // as a file without one is read
+        const auto unit = static_cast<std::uint8_t>(std::countr_zero(static_cast<unsigned>(time.beat_unit)));
+        const auto clocks = static_cast<std::uint8_t>(96 / time.beat_unit);  // MIDI clocks a beat
+        for (const std::uint8_t byte : std::initializer_list<std::uint8_t>{
+                 0, 0xFF, 0x58, 0x04, static_cast<std::uint8_t>(time.beats), unit, clocks, 8})
+            track.push_back(byte);
+    }
     int tick = 0;
     for (const Stroke& stroke : strokes) {
         append_delta(track, stroke.tick - tick);
@@ -74,13 +102,14 @@ Bytes track_of(const std::vector<Stroke>& strokes) {
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_midi(const std::vector<Note>& notes) {
-    const Bytes track = track_of(strokes_of(notes));
+std::vector<std::uint8_t> encode_midi(const std::vector<Note>& notes, const MidiTime& time) {
+    const Clock clock = clock_of(time);
+    const Bytes track = track_of(strokes_of(notes, clock), time, clock);
     Bytes file = {'M', 'T', 'h', 'd'};
     append(file, 6, 4);
     append(file, 0, 2);  // format
     append(file, 1, 2);  // tracks
-    append(file, kTicksPerQuarter, 2);
+    append(file, static_cast<std::uint32_t>(clock.ticks_per_quarter), 2);
     for (const char c : {'M', 'T', 'r', 'k'}) file.push_back(static_cast<std::uint8_t>(c));
     append(file, static_cast<std::uint32_t>(track.size()), 4);
     file.insert(file.end(), track.begin(), track.end());

@@ -94,11 +94,11 @@ struct StartUp {
 }  // namespace
 
 struct Performance::Implementation {
-    Implementation(const std::filesystem::path& orchestra, const std::vector<Voice>& voices)
+    Implementation(const std::filesystem::path& orchestra, const std::vector<Voice>& voices, const Mix& mix)
         : voice_count(voices.size()) {
         std::future<StartUp> started = start_up.get_future();
         result = samples.get_future();
-        thread = std::thread([this, orchestra, voices] { run(orchestra, voices); });
+        thread = std::thread([this, orchestra, voices, mix] { run(orchestra, voices, mix); });
         try {
             start = started.get();
         } catch (...) {
@@ -116,11 +116,11 @@ struct Performance::Implementation {
     Implementation& operator=(const Implementation&) = delete;
 
     // The audio thread: Csound lives and dies here.
-    void run(const std::filesystem::path& orchestra, const std::vector<Voice>& voices) {
+    void run(const std::filesystem::path& orchestra, const std::vector<Voice>& voices, const Mix& mix) {
         _MM_SET_FLUSH_ZERO_MODE(
             _MM_FLUSH_ZERO_ON);  // decayed modes must not cost; this thread's own register
         try {
-            Renderer renderer(orchestra, voices);
+            Renderer renderer(orchestra, voices, mix);
             start_up.set_value({renderer.block_size(), renderer.version()});
             serve(renderer);
         } catch (...) {
@@ -193,8 +193,9 @@ struct Performance::Implementation {
     std::thread thread;
 };
 
-Performance::Performance(const std::filesystem::path& orchestra, const std::vector<Voice>& voices)
-    : implementation_(std::make_unique<Implementation>(orchestra, voices)) {}
+Performance::Performance(const std::filesystem::path& orchestra, const std::vector<Voice>& voices,
+                         const Mix& mix)
+    : implementation_(std::make_unique<Implementation>(orchestra, voices, mix)) {}
 
 Performance::~Performance() = default;
 

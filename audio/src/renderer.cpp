@@ -48,6 +48,14 @@ void check_mix(const Voice& voice) {
     }
 }
 
+const Mix& checked(const Mix& mix) {
+    const auto [t60_s, level_db] = mix.room;
+    if (std::abs(mix.gain_db) <= 60 && t60_s >= 0 && t60_s <= 20 && std::abs(level_db) <= 60) return mix;
+    throw std::runtime_error("mix: found gain " + std::to_string(mix.gain_db) + " dB, room of " +
+                             std::to_string(t60_s) + " s at " + std::to_string(level_db) +
+                             " dB, expected -60 to 60 dB, 0 to 20 s, -60 to 60 dB");
+}
+
 const Instrument& find_instrument(const std::vector<Instrument>& instruments, const Voice& voice) {
     const auto found = std::ranges::find(instruments, voice.instrument, &Instrument::name);
     if (found != instruments.end()) return *found;
@@ -83,17 +91,24 @@ PanGains pan_gains(double pan, double gain_db) {
     return {gain * std::cos(angle), gain * std::sin(angle)};
 }
 
-Renderer::Renderer(const std::filesystem::path& orchestra, const std::vector<Voice>& voices)
-    : Renderer(read_text(orchestra), orchestra.string(), voices) {}
+Renderer::Renderer(const std::filesystem::path& orchestra, const std::vector<Voice>& voices, const Mix& mix)
+    : Renderer(read_text(orchestra), orchestra.string(), voices, mix) {}
 
-Renderer::Renderer(const std::string& text, const std::string& source, const std::vector<Voice>& voices)
+Renderer::Renderer(const std::string& text, const std::string& source, const std::vector<Voice>& voices,
+                   const Mix& mix)
     : engine_(text, source),
       rule_(probe_onset_rule(engine_.block_size())),
+      mix_(checked(mix)),
+      room_(mix.alone ? RoomSound{} : mix.room),
       chokes_(engine_.table(kChokeTable)),
       ends_(engine_.table(kEndTable)) {
     due_.reserve(kRoomForNotes);
     p_fields_.reserve(kRoomForFields);
     voices_ = resolve_voices(engine_, parse_instruments(text, source), voices, chokes_.size());
+    for (RenderedVoice& voice : voices_) {
+        const double gain = std::pow(10.0, mix_.gain_db / 20);
+        voice.left *= gain, voice.right *= gain;
+    }
 }
 
 std::string Renderer::version() const {
@@ -123,11 +138,11 @@ void Renderer::render_to(std::int64_t sample, std::vector<float>& output) {
 void Renderer::render_block(std::vector<float>& output) {
     start_due_notes();
     const std::size_t begin = output.size();
-    for (const double value : engine_.render_block()) {
-        output.push_back(static_cast<float>(value));
-        if (std::abs(output.back()) >= kSilence)
-            loud_ = position_ + static_cast<std::int64_t>((output.size() - begin + 1) / 2);
-    }
+    for (const double value : engine_.render_block()) output.push_back(static_cast<float>(value));
+    const std::span<float> block = std::span(output).subspan(begin);
+    room_.add_to(block);
+    for (std::size_t i = 0; i < block.size(); ++i)
+        if (std::abs(block[i]) >= kSilence) loud_ = position_ + static_cast<std::int64_t>(i / 2 + 1);
     position_ += block_size();
 }
 
@@ -152,6 +167,7 @@ void Renderer::mark_chokes(std::span<const Note> notes) {
 }
 
 void Renderer::start(const Note& note, std::span<const Note> block_notes) {
+    if (mix_.alone && *mix_.alone != note.voice) return;
     const RenderedVoice& voice = voices_[note.voice];
     const auto chokes_this = [&](const Note& other) {
         return voice.choke_group >= 0 && voices_[other.voice].choke_group == voice.choke_group &&
@@ -180,7 +196,8 @@ void Renderer::start_choked(const Note& note, std::int64_t choke_sample) {
 }
 
 bool Renderer::sounding() const {
-    return next_due_ < due_.size() || ends_.front() > static_cast<double>(position_);
+    return next_due_ < due_.size() ||
+           ends_.front() + static_cast<double>(room_.tail_samples()) > static_cast<double>(position_);
 }
 
 bool Renderer::goes_on(std::int64_t minimum_samples, std::int64_t tail_samples) const {

@@ -8,6 +8,7 @@
 #include "audio/performance.h"
 #include "csound_engine.h"
 #include "onset_rule.h"
+#include "room.h"
 
 namespace audio {
 
@@ -33,8 +34,8 @@ struct PanGains {
 /// gets the group's next later onset there as p11. Equal onsets do not choke each other.
 class Renderer {
 public:
-    /// Throws std::runtime_error: orchestra, instrument, parameter, pan or gain that is not valid.
-    Renderer(const std::filesystem::path& orchestra, const std::vector<Voice>& voices);
+    /// Throws std::runtime_error: orchestra, instrument, parameter, pan, gain or room that is not valid.
+    Renderer(const std::filesystem::path& orchestra, const std::vector<Voice>& voices, const Mix& mix);
 
     [[nodiscard]] int block_size() const { return engine_.block_size(); }
     [[nodiscard]] std::string version() const;
@@ -58,7 +59,8 @@ public:
     [[nodiscard]] std::int64_t kept_samples(std::int64_t minimum_samples, std::int64_t tail_samples) const;
 
 private:
-    Renderer(const std::string& text, const std::string& source, const std::vector<Voice>& voices);
+    Renderer(const std::string& text, const std::string& source, const std::vector<Voice>& voices,
+             const Mix& mix);
     void start_due_notes();
     void mark_chokes(std::span<const Note> notes);
     void start(const Note& note, std::span<const Note> block_notes);
@@ -67,6 +69,8 @@ private:
 
     CsoundEngine engine_;
     OnsetRule rule_;
+    Mix mix_;
+    Room room_;
     std::vector<RenderedVoice> voices_;
     std::span<double> chokes_;  ///< table 901
     std::span<double> ends_;    ///< table 902

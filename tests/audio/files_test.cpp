@@ -173,6 +173,26 @@ TEST_F(Files, MidiKeepsOnsetsOfAllSizes) {
     for (std::size_t id = 1; id < 28; ++id) EXPECT_EQ(on[id], ticks[id - 1]) << id;
 }
 
+TEST_F(Files, MidiKeepsItsTimesAtAnyTempoAndTellsTempoAndTimeSignature) {
+    for (const double bpm : {20.0, 61.7, 90.0, 120.0, 133.3, 400.0}) {
+        const audio::Note late = note(1, 3600LL * 48000);
+        const std::vector<unsigned char> data = audio::encode_midi({late}, {bpm, 6, 8});
+        const long per_quarter = number(data, 12, 2), quarter_us = number(data, 26, 3);
+        EXPECT_NEAR(60e6 / static_cast<double>(quarter_us), bpm, 1e-4 * bpm);
+        EXPECT_EQ(number(data, 29, 4), 0x00FF5804);
+        EXPECT_EQ(number(data, 33, 4), 0x06030C08);  // 6, 2^3, 12 MIDI clocks a beat, 8
+        for (const MidiEvent& event : read_track(data)) {
+            if (event.status != 0x99) continue;
+            const double quarters = static_cast<double>(event.tick) / static_cast<double>(per_quarter);
+            EXPECT_NEAR(quarters * static_cast<double>(quarter_us) * 1e-6, 3600, 0.6 / 1900)
+                << bpm << ": to half a tick, after an hour";
+        }
+    }
+    EXPECT_EQ(audio::encode_midi({note(1, 480)}), audio::encode_midi({note(1, 480)}, {120, 4, 4}));
+    for (const audio::MidiTime& bad : {audio::MidiTime{19, 4, 4}, {500, 4, 4}, {120, 0, 4}, {120, 4, 3}})
+        EXPECT_THROW((void)audio::encode_midi({}, bad), std::logic_error);
+}
+
 TEST_F(Files, MidiOfNothingIsAnEmptyTrack) {
     EXPECT_EQ(read_track(audio::encode_midi({})).size(), 2U);
 }

@@ -72,8 +72,8 @@ TEST(Play, CuttingTheTraceLeavesEveryEarlierFrameAndSampleAsItWas) {
     const auto whole = short_trace(folder, "feints", 2.2);
     const std::filesystem::path part = folder / "part.csv";
     write(part, cut_trace(read(whole), cut));
-    ASSERT_EQ(run(play(whole, folder / "whole", {"--workers", "0"})).status, 0);
-    ASSERT_EQ(run(play(part, folder / "part", {"--workers", "0"})).status, 0);
+    ASSERT_EQ(run(play(whole, folder / "whole", {"--workers", "0", "--gain", "0"})).status, 0);
+    ASSERT_EQ(run(play(part, folder / "part", {"--workers", "0", "--gain", "0"})).status, 0);
 
     // Frames are shown only up to the last sample; audio goes on.
     const auto [t0, t_end] = time_span(read(part));
@@ -119,6 +119,31 @@ TEST(Play, EachInstrumentsFirstNoteSoundsAtItsPlannedSample) {
         EXPECT_EQ(static_cast<long long>(first / 2), planned) << row.at("instrument");
     }
     EXPECT_GE(done.size(), 5U) << "the flourish goes over the whole kit";
+}
+
+TEST(Play, TheSoundHasTheLoudnessAskedForAndItsStemsAreAsLong) {
+    const Folder folder;
+    for (const char* kit : {"drums", "bells", "strings"}) {
+        const std::vector<std::string> words{"--no-frames", "--kit", kit, "--stems"};
+        ASSERT_EQ(run(play(bundled("traces/flourish.csv"), folder / kit, words)).status, 0);
+        const Json loudness = summary(folder / kit).at("loudness");
+        EXPECT_NEAR(loudness.at("integrated_lufs").get<double>(), -23, 1) << kit;
+        EXPECT_LE(loudness.at("true_peak_dbtp").get<double>(), -0.99) << kit;
+        EXPECT_GT(loudness.at("range_lu").get<double>(), 0) << kit;
+        int channels = 0;
+        const std::size_t size = read_wav(folder / (std::string(kit) + "/audio.wav"), channels).size();
+        std::size_t stems = 0;
+        for (const auto& stem : std::filesystem::directory_iterator(folder / (std::string(kit) + "/stems"))) {
+            EXPECT_EQ(read_wav(stem.path(), channels).size(), size) << stem.path();
+            ++stems;
+        }
+        EXPECT_GE(stems, 3U) << kit;
+    }
+    const std::vector<std::string> fixed{"--no-frames", "--gain", "-6"};
+    ASSERT_EQ(run(play(bundled("traces/flourish.csv"), folder / "fixed", fixed)).status, 0);
+    EXPECT_EQ(summary(folder / "fixed").at("loudness").at("gain_db").get<double>(), -6);
+    EXPECT_EQ(run({"play", "flourish", "--gain", "0", "--loudness", "-20"}).status, 2);
+    EXPECT_EQ(run({"play", "flourish", "--time-signature", "4/5"}).status, 2);
 }
 
 TEST(Play, OnTheFlourishAtLeast95PercentOfTheTrueContactsSoundWithin30Ms) {

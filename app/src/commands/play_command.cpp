@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <cstdio>
 #include <memory>
+#include <tuple>
 
 #include "files/assets.h"
 #include "files/bad_input.h"
@@ -158,6 +160,39 @@ std::vector<CLI::Option*> add_realtime_options(Command& command, RealtimeOptions
                 disturb)};
 }
 
+/// "6/8".
+std::pair<int, int> parse_time_signature(const std::string& text) {
+    int beats = 0, unit = 0;
+    char rest = 0;
+    if (std::sscanf(text.c_str(), "%2d/%2d%c", &beats, &unit, &rest) != 2 || beats < 1 || beats > 64 ||
+        unit < 1 || unit > 32 || (unit & (unit - 1)) != 0)
+        throw BadInput(
+            fmt::format("error: found `{}`, expected BEATS/UNIT, 1 to 64 beats, each a 1, 2, 4, 8, "
+                        "16 or 32: 3/4",
+                        text));
+    return {beats, unit};
+}
+
+void add_mix_options(Command& command, MixOptions& o, CLI::Option* realtime) {
+    CLI::Option* gain = command.option("--gain", o.gain_db, as::number(-60, 60, "dB"),
+                                       "Gain of the whole kit instead of its own, and no loudness to reach");
+    command
+        .option("--loudness", o.loudness_lufs, as::number(-60, 0, "LUFS"),
+                "Integrated loudness of audio.wav (EBU R 128), as far as a true peak of -1 dBTP allows")
+        ->excludes(gain)
+        ->excludes(realtime);
+    command.flag("--stems", o.stems, "Also a WAV file each instrument, in stems/, without the room");
+    command.option("--tempo", o.midi.tempo_bpm, as::number(20, 400, "quarters per minute"),
+                   "Tempo of hits.mid");
+    command.option<std::string>(
+        "--time-signature", as::text("N/D", [](const std::string& text) { parse_time_signature(text); }),
+        "Time signature of hits.mid",
+        [&o](const std::string& text) {
+            std::tie(o.midi.beats, o.midi.beat_unit) = parse_time_signature(text);
+        },
+        "4/4");
+}
+
 void add_play_command(Command& program) {
     Command command = program.command("play", "Play a recorded trace into pictures and sound");
     struct Options : RealtimeOptions {
@@ -175,6 +210,7 @@ void add_play_command(Command& program) {
     CLI::Option* realtime = command.flag("--realtime", o->realtime,
                                          "Play against the wall clock, sensors in processes of their own");
     realtime->excludes(solo);
+    add_mix_options(command, o->play.mix, realtime);
     for (CLI::Option* option : add_realtime_options(command, *o, trace)) option->needs(realtime);
     command.checks([o] { check_video(o->play); });
     command.runs([o] { o->realtime ? play_in_time(*o) : play_offline(o->play); });

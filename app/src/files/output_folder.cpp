@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <tuple>
 
 #include "files/bad_input.h"
 
@@ -49,6 +50,11 @@ bool is_figure_name(const std::string& name) {
            (name.ends_with(".svg") || name.ends_with(".png"));
 }
 
+bool is_stem_name(const std::string& name) {
+    return name.find_first_not_of("0123456789") >= 2 && name.find('_') != std::string::npos &&
+           name.ends_with(".wav");
+}
+
 /// Products that are folders have no extension.
 void check_places(const fs::path& folder, const std::vector<std::string_view>& products) {
     for (const std::string_view name : products) {
@@ -61,17 +67,17 @@ void check_places(const fs::path& folder, const std::vector<std::string_view>& p
     }
 }
 
-/// finish() replaces `frames` and `figures` as a whole, so they must hold nothing but pictures of a run.
-void check_pictures(const fs::path& pictures, bool (*is_name)(const std::string&)) {
+/// finish() replaces `frames`, `figures` and `stems` as a whole, so they must hold nothing but a run's.
+void check_contents(const fs::path& pictures, const char* what, bool (*is_name)(const std::string&)) {
     std::error_code error;
     if (!fs::is_directory(pictures, error)) return;
     for (const fs::path& picture : entries_of(pictures)) {
         const std::string name = picture.filename().string();
         if (!is_name(name))
             throw BadInput(
-                fmt::format("{}: error: found {}, expected only pictures of an earlier run (they are "
+                fmt::format("{}: error: found {}, expected only {} of an earlier run (they are "
                             "replaced); choose another --out or move the file away",
-                            pictures.string(), name));
+                            pictures.string(), name, what));
     }
 }
 
@@ -126,9 +132,10 @@ OutputFolder::OutputFolder(const fs::path& folder, std::span<const std::string_v
                         folder_.string()));
     try {
         check_places(folder_, products_);
-        for (const auto& [pictures, is_name] :
-             {std::pair("frames", &is_frame_name), {"figures", &is_figure_name}})
-            if (std::ranges::count(products_, pictures) > 0) check_pictures(folder_ / pictures, is_name);
+        for (const auto& [name, what, is_name] : {std::tuple("frames", "pictures", &is_frame_name),
+                                                  {"figures", "pictures", &is_figure_name},
+                                                  {"stems", "stems", &is_stem_name}})
+            if (std::ranges::count(products_, name) > 0) check_contents(folder_ / name, what, is_name);
     } catch (const fs::filesystem_error& failed) {
         refuse(folder_, failed.code().message());
     }

@@ -17,10 +17,10 @@ namespace app {
 // so that a folder whose products are being exchanged does not look finished.
 
 /// `play`; in real time also the measurements, from latency.json on.
-inline constexpr std::array<std::string_view, 16> kPlayProducts = {
+inline constexpr std::array<std::string_view, 17> kPlayProducts = {
     "summary.json", "frames",       "audio.wav",    "events.csv",     "contacts.csv", "hits.mid",
     "report.html",  "latency.json", "latency.html", "departures.csv", "samples.csv",  "frames.csv",
-    "notes.csv",    "blocks.csv",   "leads.csv",    "errors.csv"};
+    "notes.csv",    "blocks.csv",   "leads.csv",    "errors.csv",     "stems"};
 /// `simulate`: times.csv or, with workers, timing.csv and workers.svg.
 inline constexpr std::array<std::string_view, 7> kSimulateProducts = {
     "summary.json", "frames", "states.csv", "energy.csv", "times.csv", "timing.csv", "workers.svg"};

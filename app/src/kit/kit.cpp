@@ -218,7 +218,7 @@ void instrument_keys(Fields& keys, InstrumentDraft& written) {
     audio::Voice& voice = instrument.voice;
     voice.name = instrument.name;
     voice.instrument = instrument.kind;
-    voice.pan = std::clamp(0.5 + 0.5 * instrument.body.world_from_body.translation().x(), 0.08, 0.92);
+    voice.pan = std::clamp(0.5 + 0.4 * instrument.body.world_from_body.translation().x(), 0.2, 0.8);
     keys.table("sound", written, kSound);
     keys.text("choke_group", voice.choke_group,
               "Instruments of one group silence each other (an open and a closed hi-hat); empty: none.");
@@ -292,6 +292,16 @@ void stick_keys(Fields& keys, StickDefinition& stick) {
 }
 const TableKind<StickDefinition> kStick = {{"stick", "The sticks."}, stick_keys};
 
+void mix_keys(Fields& keys, audio::Mix& mix) {
+    keys.number("gain_db", mix.gain_db, {-60, 60, "dB"},
+                "Gain of the whole kit; offline, the sound is then brought to the loudness asked for.");
+    keys.number("room_t60_s", mix.room.t60_s, {0, 20, "s"},
+                "Time in which the room's echo falls by 60 dB; 0: no room.");
+    keys.number("room_level_db", mix.room.level_db, {-60, 20, "dB"},
+                "Energy of the room's echo against the instruments' own.");
+}
+const TableKind<audio::Mix> kMix = {{"mix", "What becomes of the instruments' sum."}, mix_keys};
+
 const TableKind<render::Room> kRoom = {{"room", "The room."}, room_keys};
 
 void defaults_keys(Fields& keys, KitDraft&) {
@@ -307,6 +317,7 @@ void kit_keys(Fields& keys, KitDraft& written) {
     keys.table("stick", kit.stick, kStick, [&](Fields& at, StickDefinition& stick) {
         stick.mesh = find_file(at, "mesh", stick.mesh, kit.file, "meshes");
     });
+    keys.table("mix", kit.mix, kMix);
     keys.table("camera", kit.camera, kCamera);
     keys.table("room", kit.room, kRoom);
     keys.table("defaults", written, kDefaults);

@@ -51,6 +51,7 @@ struct Kit {
     std::string name, description;
     std::vector<Instrument> instruments;
     StickDefinition stick;
+    audio::Mix mix;
     render::Camera camera;
     render::Room room;
 };

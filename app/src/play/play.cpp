@@ -188,14 +188,15 @@ PlayResult play(const PlayOptions& options) {
     const KitStage stage(kit, trace.sticks.size(), stick);
     const std::unique_ptr<FrameThread> frames =
         start_frames(options, {stage.scene(options.width, options.height)}, stage.frame({}, {}), folder);
-    const auto sound =
-        options.audio ? std::make_unique<audio::Performance>(orchestra_file(), voices_of(kit)) : nullptr;
+    const auto sound = options.audio ? std::make_unique<audio::Performance>(orchestra_file(), voices_of(kit),
+                                                                            mix_of(options, kit))
+                                     : nullptr;
     const std::unique_ptr<sim::Simulation> simulation = make_simulation(kit, options.workers);
     result.stages_s.emplace_back("start", wall.seconds());
 
     play_through({trace, kit, options, stick, *simulation, &stage, frames.get(), sound.get()}, result);
     const double sound_s = seconds_of([&] {
-        if (sound) finish_sound(*sound, trace.t_end_s() - trace.t0_s(), result, folder);
+        if (sound) finish_sound(*sound, trace.t_end_s() - trace.t0_s(), result, kit, folder);
     });
     result.stages_s.emplace_back("sound (waiting and writing)", sound_s);
     write_products(result, {kit, stick, *simulation, frames.get(), wall}, folder);

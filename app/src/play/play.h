@@ -1,4 +1,6 @@
 #pragma once
+#include <audio/loudness.h>
+#include <audio/performance.h>
 #include <tracking/trace.h>
 
 #include <Eigen/Core>
@@ -16,6 +18,14 @@
 
 namespace app {
 
+/// How the sound of a run ends up.
+struct MixOptions {
+    double loudness_lufs = -23;     ///< of audio.wav, offline, as far as its true peak allows (-1 dBTP)
+    std::optional<double> gain_db;  ///< instead: this in place of the kit's, and no more
+    bool stems = false;             ///< also stems/, a WAV file each instrument, without the room
+    audio::MidiTime midi;           ///< of hits.mid
+};
+
 /// What `musicworld play` was asked for.
 struct PlayOptions {
     std::filesystem::path trace;
@@ -29,6 +39,7 @@ struct PlayOptions {
     bool cancelling = true, frames = true, audio = true;
     std::optional<std::uint64_t> solo;  ///< render the sound of this strike alone
     std::optional<Eigen::Vector3d> tip, shaft;
+    MixOptions mix;
     std::optional<std::filesystem::path> video;  ///< also an MP4, by ffmpeg
     bool progress = false;                       ///< draw a progress bar on standard error
 };
@@ -49,6 +60,8 @@ struct PlayResult {
     DiskLog<float> audio;             ///< interleaved stereo, 48 kHz; empty with --no-audio
     std::size_t samples_refused = 0;  ///< reports that the filters ignored
     std::size_t clipped_samples = 0;
+    audio::Loudness loudness;  ///< of audio
+    double gain_db = 0;        ///< that all instruments were given in it
     double wall_s = 0;
     std::vector<std::pair<std::string, double>> stages_s;  ///< name, seconds
     int workers_lost = 0, bodies_reowned = 0;

@@ -54,7 +54,7 @@ void write_hits(const fs::path& file, const PlayResult& result, const Kit& kit) 
     std::stable_sort(notes.begin(), notes.end(), [](const audio::Note& a, const audio::Note& b) {
         return a.onset_sample < b.onset_sample;
     });
-    write_file(file, audio::encode_midi(notes));
+    write_file(file, audio::encode_midi(notes, result.options.mix.midi));
 }
 
 /// Frames for the report: before, at and after the two loudest notes that lie apart.
@@ -97,6 +97,10 @@ Json object_json(const std::vector<std::pair<std::string, Value>>& pairs) {
     Json out = Json::object();
     for (const auto& [name, value] : pairs) out[name] = value;
     return out;
+}
+
+Json or_null(const std::optional<double>& value) {
+    return value ? Json(*value) : Json();
 }
 
 std::string_view outcome_word(const Strike& strike) {
@@ -195,6 +199,7 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
         result.stages_s.emplace_back(name, seconds_of(work));
     };
     write_hits(folder.path("hits.mid"), result, parts.kit);
+    if (options.mix.stems && options.audio) stage("stems", [&] { write_stems(result, parts.kit, folder); });
     stage("scoring", [&] { score(result, parts.kit, parts.stick); });
     if (parts.frames) take_frames(result, *parts.frames, folder.path("frames"));
     result.fingerprint =
@@ -267,6 +272,11 @@ std::string format_summary(const PlayResult& r, const std::string& realtime_json
         {"sticks", r.sticks},
         {"samples_refused", r.samples_refused},
         {"clipped_samples", r.clipped_samples},
+        {"loudness",
+         {{"integrated_lufs", or_null(r.loudness.integrated_lufs)},
+          {"range_lu", or_null(r.loudness.range_lu)},
+          {"true_peak_dbtp", or_null(r.loudness.true_peak_dbtp)},
+          {"gain_db", r.gain_db}}},
         {"wall_s", r.wall_s},
     };
     if (!realtime_json.empty()) summary["realtime"] = Json::parse(realtime_json);

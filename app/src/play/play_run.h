@@ -62,16 +62,28 @@ struct RunParts {
     const WallTimer& wall;          ///< since the start of the run
 };
 
+/// The kit's mix with the gain that was asked for.
+[[nodiscard]] audio::Mix mix_of(const PlayOptions& options, const Kit& kit);
+/// Measures result.audio, which was mixed with `mix`; with `may_change` brings it to the loudness that was
+/// asked for, unless a gain was, by one gain for all of it. In play_sound.cpp, as the next.
+void set_loudness(PlayResult& result, const audio::Mix& mix, bool may_change);
+/// Writes stems/NN_NAME.wav, as long as result.audio, for each instrument that was sounded: they add up to it
+/// without its room.
+void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& folder);
+
 /// Ends the sound of a run that lasted `seconds`: result.audio, audio.wav, version and time of the thread.
 /// Sound: audio::Performance or audio::LivePerformance.
 template <class Sound>
-void finish_sound(Sound& sound, double seconds, PlayResult& result, const OutputFolder& folder) {
+void finish_sound(Sound& sound, double seconds, PlayResult& result, const Kit& kit,
+                  const OutputFolder& folder) {
     const auto length = static_cast<std::int64_t>(std::ceil((seconds + kSoundTailS) * audio::kSampleRate));
     const auto tail = static_cast<std::int64_t>(kLongestSoundTailS * audio::kSampleRate);
-    if constexpr (std::is_same_v<Sound, audio::LivePerformance>)
+    constexpr bool is_live = std::is_same_v<Sound, audio::LivePerformance>;
+    if constexpr (is_live)
         result.audio.cut(2 * static_cast<std::size_t>(sound.finish(length, tail)));  // which has taken it
     else
         result.audio.append(sound.finish(length, tail));
+    set_loudness(result, mix_of(result.options, kit), !is_live);
     result.clipped_samples = audio::write_wav(folder.path("audio.wav"), result.audio);
     result.stages_s.emplace_back("sound (own thread)", sound.busy_s());
     result.versions.emplace_back("csound", sound.version());

@@ -221,7 +221,7 @@ OfflineComparison compare_with_offline(const std::vector<LapStrikes>& laps, cons
 void collect(RealtimeOutcome& outcome, const RealtimeSession& session, RealtimeRun& run,
              const OutputFolder& folder) {
     PlayResult& result = outcome.play;
-    if (session.sound) finish_sound(*session.sound, run.end_s(), result, folder);
+    if (session.sound) finish_sound(*session.sound, run.end_s(), result, session.kit, folder);
     outcome.realtime = run.finish();
     outcome.failure = failure_of(outcome.realtime.events);
     result.samples_refused = run.refused();

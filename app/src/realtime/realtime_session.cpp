@@ -91,6 +91,7 @@ void RealtimeSession::start(const OutputFolder& folder, DiskLog<float>& recordin
 void RealtimeSession::start_sound(DiskLog<float>& recording) {
     audio::LiveOptions o = options.sound;
     o.longest_s = seconds + kSpareSoundS;
+    o.mix = mix_of(options.play, kit);
     o.take_sound = [&recording](std::span<const float> samples) { recording.append(samples); };
     o.on_thread_start = [this] {
         sound_priority = set_thread_priority(ThreadRole::sound, options.realtime_priority);

@@ -23,6 +23,7 @@ struct LiveOptions {
     /// Gets the sound as it is made, interleaved stereo, on a thread of its own, which may wait for a disk: 20 s
     /// of sound have room. What it throws, finish() throws. Empty: nobody wants it.
     std::function<void(std::span<const float>)> take_sound{};
+    Mix mix{};
 };
 
 /// One block of sound in real time; nanoseconds of CLOCK_MONOTONIC.

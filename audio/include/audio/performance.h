@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -37,6 +38,20 @@ struct Note {
     int midi_velocity = 64;  ///< 1-127
 };
 
+/// The room around the voices.
+struct RoomSound {
+    double t60_s = 0;       ///< time in which its low frequencies fall by 60 dB; 0: no room
+    double level_db = -16;  ///< energy of the room's answer against that of the dry sound
+};
+
+/// What becomes of the voices' sum.
+struct Mix {
+    double gain_db = 0;  ///< of all
+    RoomSound room;
+    /// Sounds this voice alone, as it sounds among the others (which still choke it), without the room.
+    std::optional<std::uint32_t> alone;
+};
+
 /// An offline performance: notes are scheduled, moved and cancelled ahead of the sample up to which audio has
 /// been asked for; sound is rendered by Csound on a thread of its own. The samples are a pure function of the
 /// notes that stood when their onset was rendered: a cancelled note leaves no trace. Throws
@@ -44,7 +59,8 @@ struct Note {
 class Performance {
 public:
     /// `orchestra`: the .orc file.
-    Performance(const std::filesystem::path& orchestra, const std::vector<Voice>& voices);
+    Performance(const std::filesystem::path& orchestra, const std::vector<Voice>& voices,
+                const Mix& mix = {});
     ~Performance();
     Performance(const Performance&) = delete;
     Performance& operator=(const Performance&) = delete;
@@ -80,9 +96,18 @@ private:
 /// std::runtime_error (disk full, no permission).
 std::size_t write_wav(const std::filesystem::path& file, std::span<const float> interleaved);
 
-/// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, so 1920 per second), channel 10,
-/// one note-on per note and its note-off 0.1 s later: the file's bytes. Throws std::runtime_error for a key,
-/// velocity or onset that MIDI has not.
-[[nodiscard]] std::vector<std::uint8_t> encode_midi(const std::vector<Note>& notes);
+/// How a MIDI file counts time.
+struct MidiTime {
+    double tempo_bpm = 120;  ///< quarters a minute, 20 to 400; a file holds whole microseconds a quarter
+    int beats = 4;           ///< of a bar, 1 to 64 ...
+    int beat_unit = 4;       ///< ... each such a part of a whole note: 1, 2, 4, 8, 16, 32
+    bool operator==(const MidiTime&) const = default;
+};
+
+/// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, at any tempo nearly 1920 ticks a second), channel 10,
+/// one note-on per note and its note-off 0.1 s later: the file's bytes. Times are right whatever the tempo. Throws
+/// std::runtime_error for a key, velocity or onset that MIDI has not, and std::logic_error for such a tempo or time signature.
+[[nodiscard]] std::vector<std::uint8_t> encode_midi(const std::vector<Note>& notes,
+                                                    const MidiTime& time = {});
 
 }  // namespace audio

@@ -55,7 +55,7 @@ RealtimeOutcome run(const RealtimeOptions& options, std::vector<std::string>* wa
 /// The sound of the notes that were played, rendered offline.
 std::vector<float> offline_sound(const RealtimeOutcome& outcome) {
     const Kit kit = read_kit(outcome.play.options.kit);
-    audio::Performance performance(orchestra_file(), voices_of(kit));
+    audio::Performance performance(orchestra_file(), voices_of(kit), mix_of(outcome.play.options, kit));
     for (const Strike& strike : outcome.play.strikes)
         if (strike.outcome == Outcome::released)
             performance.schedule(note_of(strike, kit.instruments[strike.instrument]));
