@@ -11,7 +11,7 @@
 ; Tables shared with the host:
 ;   901 one entry a choke group: onset [samples] of the group's latest choking note, written before its block
 ;   902 entry 0: the sample by which every note so far has ended, written by the notes
-; Opcodes of the host (audio/src/opcodes.h): contact_force, noise_burst, modal_bank, bessel.
+; Opcodes of the host (audio/src/opcodes.h): contact_force, noise_burst, modal_bank, close_note, bessel.
 ;
 ; Each line `;@ instrument parameter default minimum maximum text` declares a parameter; the host reads these lines.
 ;
@@ -163,33 +163,26 @@ endop
   ilevel = ilevel * ampdb(0.8 * $VARIATION * ilouder)
   icontact Contact $HARDNESS, $RADIUS, $MASS, $YOUNG, ispeed
   iarea = 2 / $M_PI * icontact * sr
-  aforce contact_force icontact
-  arough noise_burst iseed + 0.1 * iplace + 0.01 * ispeed, 0.0001, 0.1
-  acontact butterlp aforce * (0.3 + arough) * (limit(ispeed, 0.02, 16) / 8)^0.4, limit(8 / icontact, 1000, 16000)
+  ktime timeinstk
+  if ktime < 0.15 * kr then
+    aforce contact_force icontact
+    arough noise_burst iseed + 0.1 * iplace + 0.01 * ispeed, 0.0001, 0.1
+    acontact butterlp aforce * (0.3 + arough) * (limit(ispeed, 0.02, 16) / 8)^0.4, limit(8 / icontact, 1000, 16000)
+  else
+    aforce = 0
+    acontact = 0
+  endif
   asilence = 0
 #
 
-; Ends a note's amid and aside (at level 1; ilevel, iduration, iwidth): fades to 0 over its last 50 ms; choked, fades within
-; 15 ms from the very sample; notes its end in table 902; pans, the partials up to iwidth to both sides.
+; Ends a note's amid and aside (at level 1; ilevel, iduration, iwidth): close_note fades to 0 over its last 50 ms, choked, within 15 ms
+; from the very sample, and pans, the partials up to iwidth to both sides; table 902 gets the note's end.
 #define CLOSE #
   p3 = iduration
   ilast tab_i 0, giEnds
   tabw_i max(ilast, p4 + iduration * sr + 2 * ksmps), 0, giEnds
-  afade linseg 1, iduration - 0.05, 1, 0.05, 0, 1, 0
-  asample linseg 0, 1000, 1000 * sr
-  again = ilevel * afade
-  kchoke init (p11 < 0 ? -1 : p11 - p4)
-  kover init 0
-  if kchoke < 0 && p10 >= 0 then
-    klatest tab p10, giChokes
-    kchoke = (klatest > p4 ? klatest - p4 : -1)
-  endif
-  if kchoke >= 0 then
-    aleft limit 1 - (asample - kchoke) / (0.015 * sr), 0, 1
-    again = again * aleft * aleft * (3 - 2 * aleft)
-    kover = (k(asample) > kchoke + 0.015 * sr + ksmps ? 1 : 0)
-  endif
-  outs again * (amid + iwidth * aside) * p5, again * (amid - iwidth * aside) * p6
+  aleft, aright, kover close_note amid, aside, ilevel * p5, ilevel * p6, iwidth, iduration, p4, p10, p11, giChokes
+  outs aleft, aright
   if kover == 1 then
     turnoff
   endif
@@ -255,13 +248,22 @@ instr drum
   icount, inorm, idriven Put_membrane p12, p13, p14, icontact, p18, 0.04 + 0.8 * (irim == 1 ? 1 : iplace), p23, p24, iseed, p25
   iscale = (irim == 1 ? 0.16 : 0.36) / (inorm * iarea)
   ; The same stretching hands motion of the low modes on to the high ones, in hard strokes only (Avanzini and Marogna, A modular
-  ; physically based approach to the sound synthesis of membrane percussion instruments, 2010; Bilbao 2012): a drive within some ms, in proportion to the bend; see instr cymbal.
+  ; physically based approach to the sound synthesis of membrane percussion instruments, 2010; Bilbao 2012): a drive within some ms,
+  ; in proportion to the bend; see instr cymbal.
   istretch = limit(0.9 * p16 / 100 * (limit(ispeed, 0, 16) / 8)^1.5, 0, 1)
   idrive_rms = sqrt(sr * (0.004 / 3 + 0.05 / 13.8) / 3)
-  adrive noise_burst iseed + 0.75 + 0.1 * iplace, 0.004, 0.05
-  adrive = adrive * istretch * inorm * iarea / (idriven * idrive_rms)
-  amid, aside modal_bank aforce, adrive, kbend, giModes, icount, 3e-7 / (ilevel * iscale)
-  amid = amid * iscale + acontact * p19 * 1.7
+  if ktime < 0.15 * kr then
+    adrive noise_burst iseed + 0.75 + 0.1 * iplace, 0.004, 0.05
+    adrive = adrive * istretch * inorm * iarea / (idriven * idrive_rms) * iscale
+    ahead = aforce * iscale
+  else
+    adrive = 0
+    ahead = 0
+  endif
+  amid, aside modal_bank ahead, adrive, kbend, giModes, icount, 3e-7 / ilevel
+  if ktime < 0.15 * kr then
+    amid = amid + acontact * p19 * 1.7
+  endif
   if isnare > 0 then
     ; The wires leave the head where it moves faster than their tension lets them follow, and rattle until they lie on it again
     ; (Rossing et al. 1992; Bilbao, Time domain simulation and sound synthesis for the snare drum, JASA 131, 2012): noise that follows
@@ -323,9 +325,10 @@ instr bell
   iwidth = p19
   icount, inorm Put_partials int(p14 + 0.5), p12, p13, p15, icontact, iplace, p17, iseed, p20
   iscale = 0.48 / (inorm * iarea) * (ishoulder == 1 ? 0.6 : 1)
-  amid, aside modal_bank aforce, asilence, 1, giModes, icount, 3e-7 / (ilevel * iscale)
-  amid = amid * iscale + acontact * p18 
-  aside = aside * iscale
+  amid, aside modal_bank aforce * iscale, asilence, 1, giModes, icount, 3e-7 / ilevel
+  if ktime < 0.15 * kr then
+    amid = amid + acontact * p18
+  endif
   iduration Duration ilevel, max(p13, 0.05)
   $CLOSE
 endin
@@ -355,9 +358,10 @@ instr string
   icount = limit(int(12000 / p12), 1, 32)
   inorm Put_string icount, p12, p13, p14, icontact, p16, p17 * (1 - 0.8 * iplace), p18, iseed, p21
   iscale = 0.355 / (inorm * iarea)
-  amid, aside modal_bank aforce, asilence, 1, giModes, icount, 3e-7 / (ilevel * iscale)
-  amid = amid * iscale + acontact * p19 
-  aside = aside * iscale
+  amid, aside modal_bank aforce * iscale, asilence, 1, giModes, icount, 3e-7 / ilevel
+  if ktime < 0.15 * kr then
+    amid = amid + acontact * p19
+  endif
   iduration Duration ilevel, max(p13, 0.05)
   $CLOSE
 endin
@@ -410,9 +414,16 @@ instr cymbal
   idrive_t60 = 5 * ibuild
   irandom = sqrt(sr * (ibuild / 3 + idrive_t60 / 13.8) / 3)
   idrive = 0.3 * icascade / (idriven * irandom)
-  adrive noise_burst iseed + 0.25 + 0.1 * iplace, ibuild, idrive_t60
-  amid, aside modal_bank aforce * iforce, adrive * idrive, 1, giModes, 448, 3e-7 / ilevel
-  amid = amid + acontact * p19 
+  if ktime < (7 * ibuild + 0.01) * kr then
+    adrive noise_burst iseed + 0.25 + 0.1 * iplace, ibuild, idrive_t60
+    adrive = adrive * idrive
+  else
+    adrive = 0
+  endif
+  amid, aside modal_bank aforce * iforce, adrive, 1, giModes, 448, 3e-7 / ilevel
+  if ktime < 0.15 * kr then
+    amid = amid + acontact * p19
+  endif
   iduration Duration ilevel, max(it60 * (1000 / limit(p12, 60, 1000))^idamping, 0.05)
   $CLOSE
 endin

@@ -9,6 +9,7 @@ namespace audio {
 namespace {
 
 constexpr double kHighestHz = 20000;
+constexpr float kHeardBend = 3e-6F;  // 0.005 cents: a smaller change of the bend is left out
 constexpr std::size_t kLanes = ModalBank::kLanes;
 // Signs of a vector's modes in the side signal.
 constexpr std::array<float, kLanes> kSides{1, -1, -1, 1, 1, -1, -1, 1};
@@ -62,7 +63,7 @@ void ModalBank::rotate(std::size_t mode, double ratio) noexcept {
 }
 
 void ModalBank::bend(double ratio) noexcept {
-    if (static_cast<float>(ratio) == ratio_) return;
+    if (std::abs(static_cast<float>(ratio) - ratio_) < kHeardBend) return;
     ratio_ = static_cast<float>(ratio);
     for (std::size_t i = 0; i < groups_ * kTogether; ++i)
         if (sounds_[i / kTogether]) rotate(i, ratio);

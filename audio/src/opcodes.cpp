@@ -87,11 +87,13 @@ struct NoiseBurst {
         auto& self = *static_cast<NoiseBurst*>(memory);
         clear_around(self.noise, self.h);
         const Part part = part_of(self.h);
+        double risen = self.risen, fallen = self.fallen;
         for (std::size_t n = part.begin; n < part.end; ++n) {
-            self.risen = std::min(1.0, self.risen + self.rise_per_sample);
-            self.noise[n] = self.fallen < 1e-4 ? 0 : self.next() * self.risen * self.fallen;
-            self.fallen *= self.fall_per_sample;
+            risen = std::min(1.0, risen + self.rise_per_sample);
+            self.noise[n] = fallen < 1e-4 ? 0 : self.next() * risen * fallen;
+            fallen *= self.fall_per_sample;
         }
+        self.risen = risen, self.fallen = fallen;
         return OK;
     }
 };
@@ -130,6 +132,60 @@ struct Bank {
     }
 };
 
+struct CloseNote {
+    OPDS h;
+    MYFLT *left, *right, *over;
+    MYFLT *mid, *side, *left_gain, *right_gain, *width, *duration_s, *onset, *group, *choke_onset,
+        *chokes_table;
+    const MYFLT* latest_choke;  // of its group; null: it has none
+    double choke, end, sample;  // samples from the onset; choke below 0: none yet
+
+    static constexpr double kChokedS = 0.015, kFadeS = 0.05;
+
+    static int start(CSOUND* csound, void* memory) {
+        auto& self = *static_cast<CloseNote*>(memory);
+        MYFLT* chokes = nullptr;
+        const int length = csound->GetTable(csound, &chokes, static_cast<int>(*self.chokes_table));
+        const auto group = static_cast<int>(*self.group);
+        if (group >= length) return csound->InitError(csound, "close_note: found no such choke group");
+        self.latest_choke = group >= 0 ? chokes + group : nullptr;
+        self.choke = *self.choke_onset < 0 ? -1 : *self.choke_onset - *self.onset;
+        self.end = *self.duration_s * csound->GetSr(csound);
+        self.sample = 0;
+        return OK;
+    }
+    [[nodiscard]] double gain(double at, double rate) const {
+        double gain = std::clamp((end - at) / (kFadeS * rate), 0.0, 1.0);
+        if (choke >= 0) {
+            const double rest = std::clamp(1 - (at - choke) / (kChokedS * rate), 0.0, 1.0);
+            gain *= rest * rest * (3 - 2 * rest);
+        }
+        return gain;
+    }
+    static int run(CSOUND* csound, void* memory) {
+        auto& self = *static_cast<CloseNote*>(memory);
+        clear_around(self.left, self.h);
+        clear_around(self.right, self.h);
+        if (self.choke < 0 && self.latest_choke && *self.latest_choke > *self.onset)
+            self.choke = *self.latest_choke - *self.onset;
+        const double rate = csound->GetSr(csound), width = *self.width, left = *self.left_gain,
+                     right = *self.right_gain, block = self.h.insdshead->ksmps;
+        const bool steady = self.choke < 0 && self.sample + block < self.end - kFadeS * rate;
+        const Part part = part_of(self.h);
+        double at = self.sample;
+        for (std::size_t n = part.begin; n < part.end; ++n) {
+            const double gain = steady ? 1 : self.gain(at, rate);
+            const double mid = gain * self.mid[n], side = gain * width * self.side[n];
+            self.left[n] = left * (mid + side);
+            self.right[n] = right * (mid - side);
+            at += 1;
+        }
+        self.sample = at;
+        *self.over = self.choke >= 0 && at > self.choke + kChokedS * rate ? 1 : 0;
+        return OK;
+    }
+};
+
 struct Bessel {
     OPDS h;
     MYFLT *value, *order, *x;
@@ -159,6 +215,7 @@ void add_opcodes(CSOUND_* csound) {
     add<ContactForce>(csound, "contact_force", "a", "i");
     add<NoiseBurst>(csound, "noise_burst", "a", "iii");
     add<Bank>(csound, "modal_bank", "aa", "aakiii");
+    add<CloseNote>(csound, "close_note", "aak", "aaiiiiiiii");
     add<Bessel>(csound, "bessel", "i", "ii");
 }
 

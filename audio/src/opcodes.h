@@ -11,6 +11,9 @@ namespace audio {
 ///   amid, aside  modal_bank aforce, adrive, kratio, imodes, icount, irest
 ///                                                               see ModalBank; imodes: a table of
 ///                                                               frequency, T60, weight and drive a mode
+///   aleft, aright, kover  close_note amid, aside, ileft, iright, iwidth, iduration_s, ionset, igroup, ichoke, ichokes
+///                                                               the end of a note: gains, fade, choke; kover is 1
+///                                                               once it is choked to silence
 ///   ivalue       bessel iorder, ix                              J_n(x)
 /// All begin at the note's own sample, and all memory lies in the instrument's own. At most 64 samples a
 /// block and 512 modes; more are left out. Throws std::runtime_error where Csound refuses one.
