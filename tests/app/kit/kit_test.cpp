@@ -62,12 +62,35 @@ TEST(Kit, ReadsWhatTheFileSaysAndTheDefaultsBelowIt) {
     EXPECT_EQ(snare.body.shape.e1, 0.1);
     EXPECT_EQ(snare.voice.instrument, "drum");
     EXPECT_EQ(snare.voice.gain_db, -3);
-    EXPECT_EQ(snare.voice.parameters, (std::vector<std::pair<std::string, double>>{{"frequency_hz", 200}}));
+    // Its own, and what its sound wants to know of the stick.
+    EXPECT_EQ(
+        snare.voice.parameters,
+        (std::vector<std::pair<std::string, double>>{
+            {"frequency_hz", 200}, {"tip_radius_m", 0.01}, {"tip_mass_kg", 0.05}, {"tip_young_pa", 1e10}}));
     EXPECT_EQ(snare.zones[0].name, "head");
     EXPECT_EQ(snare.mesh.filename(), "drum.obj");
     EXPECT_EQ(bell.zones[0].midi_note, 80);
     EXPECT_EQ(bell.zones[1].midi_note, 81);
     EXPECT_TRUE(bell.body.stand.hinged);
+}
+
+TEST(Kit, TheStickIsHeardUnlessAnInstrumentSaysOtherwiseAndTheMixIsRead) {
+    const WrittenKit written(
+        "[stick]\nyoung_pa = 2e6\n[mix]\ngain_db = -4\nroom_t60_s = 2\n" +
+        instrument("sound = { tip_young_pa = 3e7 }\n") +
+        "[[instrument]]\nname = \"b\"\nkind = \"bell\"\nsize = [1, 1, 1]\nposition = [2, 0, 0]\n");
+    const Kit kit = written.read();
+    const auto young = [&](std::size_t i) {
+        double found = 0;
+        for (const auto& [name, value] : kit.instruments[i].voice.parameters)
+            if (name == "tip_young_pa") found = value;
+        return found;
+    };
+    EXPECT_EQ(young(0), 3e7);
+    EXPECT_EQ(young(1), 2e6);
+    EXPECT_EQ(kit.mix.gain_db, -4);
+    EXPECT_EQ(kit.mix.room.t60_s, 2);
+    EXPECT_EQ(kit.mix.room.level_db, -14);  // defaults.toml
 }
 
 TEST(Kit, APositiveTiltAboutXTurnsAHeadTowardsThePlayer) {
@@ -175,6 +198,8 @@ TEST(Kit, MalformedKitsEndInBadInputAtThePlace) {
         {"pan", instrument("sound = { pan = 2 }\n"), "6:17", "pan = 2"},
         {"choke group", instrument("choke_group = 1\n"), "6:15", "choke_group = 1"},
         {"velocity curve", instrument("velocity_curve = 0\n"), "6:18", "velocity_curve = 0"},
+        {"stick modulus", "[stick]\nyoung_pa = 0\n" + instrument(""), "2:12", "young_pa = 0"},
+        {"room", "[mix]\nroom_t60_s = -1\n" + instrument(""), "2:14", "room_t60_s = -1"},
         {"stick length", "[stick]\nlength = -1\n" + instrument(""), "2:10", "length = -1"},
         {"stick shaft zero", "[stick]\nshaft = [0, 0, 0]\n" + instrument(""), "2:9", "shaft = [0, 0, 0]"},
         {"stick key", "[stick]\nlenght = 1\n" + instrument(""), "2:1", "unknown key \"lenght\""},
