@@ -98,6 +98,14 @@ std::span<double> CsoundEngine::table(int number) {
     return {values, static_cast<std::size_t>(length)};
 }
 
+void CsoundEngine::make_table(int number, std::span<const float> values) {
+    const std::string code = "imade ftgen " + std::to_string(number) + ", 0, -" +
+                             std::to_string(values.size()) + ", -2, 0\nreturn imade\n";
+    if (csoundEvalCode(csound_.get(), code.c_str()) != number) failed_ = true;
+    check_messages();
+    std::ranges::copy(values, table(number).begin());
+}
+
 void CsoundEngine::start_note(std::span<const double> p_fields) {
     if (csoundScoreEvent(csound_.get(), 'i', p_fields.data(), static_cast<long>(p_fields.size())) != 0) {
         failed_ = true;

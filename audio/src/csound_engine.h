@@ -23,6 +23,8 @@ public:
     [[nodiscard]] double instrument_number(const std::string& name);
     /// The function table; valid until the engine ends. Throws std::runtime_error.
     [[nodiscard]] std::span<double> table(int number);
+    /// Makes a function table of these values. Throws std::runtime_error.
+    void make_table(int number, std::span<const float> values);
     /// Adds an `i` event: p1, p2, ... with p2 in seconds from the current block's start.
     void start_note(std::span<const double> p_fields);
     /// Renders the next block: block_size() frames of interleaved stereo, valid until the next call. Throws

@@ -1,18 +1,23 @@
 #include "renderer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <set>
 #include <stdexcept>
 
 #include "audio/orchestra.h"
+#include "audio/own_orchestra.h"
 
 namespace audio {
 namespace {
 
 constexpr int kChokeTable = 901;
 constexpr int kEndTable = 902;
+constexpr int kFirstSampleTable = 10000;
+constexpr const char* kSampleInstrument = "sample";
 constexpr float kSilence = 1e-4F;                                 // -80 dBFS
 constexpr std::size_t kRoomForNotes = 4096, kRoomForFields = 64;  // taken ahead; more is allowed
 // Warm-up: so many notes of each voice at once find their memory in place later; choked notes are over within
@@ -68,17 +73,43 @@ const Instrument& find_instrument(const std::vector<Instrument>& instruments, co
                              "`, expected one of: " + known);
 }
 
+/// The orchestra with what its voices need behind it: the instrument of recorded sounds, orchestras of one's own.
+std::string with_own_sounds(const std::filesystem::path& orchestra, const std::vector<Voice>& voices) {
+    std::string text = read_text(orchestra);
+    const auto sampled = [](const Voice& voice) { return voice.samples != nullptr; };
+    if (std::ranges::any_of(voices, sampled))
+        text += "\n" + read_text(orchestra.parent_path() / "samples.orc");
+    std::vector<std::string> taken = {kSampleInstrument};
+    for (const Instrument& bundled : parse_instruments(text, orchestra.string()))
+        taken.push_back(bundled.name);
+    std::set<std::filesystem::path> own;
+    for (const Voice& voice : voices) {
+        if (voice.own_orchestra.empty() || !own.insert(voice.own_orchestra).second) continue;
+        text += "\n" + read_own_orchestra(voice.own_orchestra, taken);
+    }
+    return text;
+}
+
 std::vector<RenderedVoice> resolve_voices(CsoundEngine& engine, const std::vector<Instrument>& instruments,
                                           const std::vector<Voice>& voices, std::size_t choke_capacity) {
     ChokeGroups groups(choke_capacity);
+    int next_table = kFirstSampleTable;
     std::vector<RenderedVoice> rendered;
     for (const Voice& voice : voices) {
         check_mix(voice);
-        const Instrument& instrument = find_instrument(instruments, voice);
         const PanGains gains = pan_gains(voice.pan, voice.gain_db);
-        rendered.push_back({engine.instrument_number(instrument.name), gains.left, gains.right,
-                            groups.number(voice.choke_group),
-                            resolve_parameters(instrument, voice.parameters, "voice " + voice.name)});
+        RenderedVoice& made = rendered.emplace_back();
+        made.left = gains.left, made.right = gains.right;
+        made.choke_group = groups.number(voice.choke_group);
+        if (voice.samples) {
+            made.instrument = engine.instrument_number(kSampleInstrument);
+            made.samples.emplace(engine, voice.samples, next_table);
+            next_table += static_cast<int>(voice.samples->waves.size());
+            continue;
+        }
+        const Instrument& instrument = find_instrument(instruments, voice);
+        made.instrument = engine.instrument_number(instrument.name);
+        made.parameters = resolve_parameters(instrument, voice.parameters, "voice " + voice.name);
     }
     return rendered;
 }
@@ -92,7 +123,7 @@ PanGains pan_gains(double pan, double gain_db) {
 }
 
 Renderer::Renderer(const std::filesystem::path& orchestra, const std::vector<Voice>& voices, const Mix& mix)
-    : Renderer(read_text(orchestra), orchestra.string(), voices, mix) {}
+    : Renderer(with_own_sounds(orchestra, voices), orchestra.string(), voices, mix) {}
 
 Renderer::Renderer(const std::string& text, const std::string& source, const std::vector<Voice>& voices,
                    const Mix& mix)
@@ -121,7 +152,12 @@ bool Renderer::warm_up() {
         for (std::uint32_t voice = 0; voice < voices_.size(); ++voice)
             notes.push_back({.id = 1, .voice = voice});
     }
-    for (const Note& note : notes) start_choked(note, 1);
+    for (const Note& note : notes) {
+        const RenderedVoice& voice = voices_[note.voice];
+        const auto fields =
+            voice.samples ? std::span<const double>(voice.samples->first()) : voice.parameters;
+        start_event(note, 1, {voice.left, voice.right}, fields);
+    }
     bool silent = false;
     for (int block = 0; block < kWarmBlocks; ++block) {
         const std::span<const double> frames = engine_.render_block();
@@ -178,20 +214,32 @@ void Renderer::start(const Note& note, std::span<const Note> block_notes) {
 }
 
 void Renderer::start_choked(const Note& note, std::int64_t choke_sample) {
+    RenderedVoice& voice = voices_[note.voice];
+    if (!voice.samples) {
+        start_event(note, choke_sample, {voice.left, voice.right}, voice.parameters);
+        return;
+    }
+    for (const SampleVoice::Event& event : voice.samples->strike(note)) {
+        start_event(note, choke_sample, {voice.left * event.left, voice.right * event.right}, event.fields);
+    }
+}
+
+void Renderer::start_event(const Note& note, std::int64_t choke_sample, PanGains gains,
+                           std::span<const double> parameters) {
     const RenderedVoice& voice = voices_[note.voice];
     const int offset = static_cast<int>(note.onset_sample - position_);
     p_fields_ = {voice.instrument,
                  onset_p2(rule_, offset, block_size()),
                  1,  // the instrument sets its own duration
                  static_cast<double>(note.onset_sample),
-                 voice.left,
-                 voice.right,
+                 gains.left,
+                 gains.right,
                  note.speed_mps,
                  note.place,
                  static_cast<double>(note.zone),
                  static_cast<double>(voice.choke_group),
                  static_cast<double>(choke_sample)};
-    p_fields_.insert(p_fields_.end(), voice.parameters.begin(), voice.parameters.end());
+    p_fields_.insert(p_fields_.end(), parameters.begin(), parameters.end());
     engine_.start_note(p_fields_);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "csound_engine.h"
 #include "onset_rule.h"
 #include "room.h"
+#include "sample_voice.h"
 
 namespace audio {
 
@@ -17,7 +19,8 @@ struct RenderedVoice {
     double instrument = 0;       ///< number in Csound
     double left = 0, right = 0;  ///< gains: constant power pan times the voice's gain
     int choke_group = -1;
-    std::vector<double> parameters;  ///< in the declared order, p12 on
+    std::vector<double> parameters;        ///< in the declared order, p12 on
+    std::optional<SampleVoice> samples{};  ///< recorded sounds instead
 };
 
 /// Constant power: left^2 + right^2 = gain^2, pan 0 left ... 1 right.
@@ -61,6 +64,8 @@ public:
 private:
     Renderer(const std::string& text, const std::string& source, const std::vector<Voice>& voices,
              const Mix& mix);
+    void start_event(const Note& note, std::int64_t choke_sample, PanGains gains,
+                     std::span<const double> parameters);
     void start_due_notes();
     void mark_chokes(std::span<const Note> notes);
     void start(const Note& note, std::span<const Note> block_notes);

@@ -1,3 +1,4 @@
+#include <audio/samples.h>
 #include <fmt/format.h>
 #include <render/mesh.h>
 #include <render/renderer.h>
@@ -13,8 +14,12 @@
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/output_file.h"
+#include "files/output_folder.h"
 #include "kit/kit.h"
+#include "kit/kit_copy.h"
 #include "pictures/kit_stage.h"
+#include "play/audition.h"
+#include "report/plot.h"
 #include "strikes/kit_fit.h"
 
 namespace app {
@@ -45,6 +50,11 @@ void show_instrument(const Instrument& instrument) {
                                                        body.stand.frequency_hz, body.stand.damping_ratio)
                                          : "fixed");
     fmt::print("  zones       {}\n", zones_text(instrument));
+    if (const auto& samples = instrument.voice.samples) {
+        fmt::print("  sound       {}, {}\n", samples->files.front().string(),
+                   counted(samples->regions.size(), "region"));
+        return;
+    }
     fmt::print("  sound       {}", instrument.voice.instrument);
     for (const auto& [name, value] : instrument.voice.parameters) fmt::print(", {} = {}", name, value);
     fmt::print("\n");
@@ -59,6 +69,32 @@ void show_kit(const std::string& name) {
     for (const Instrument& instrument : kit.instruments) show_instrument(instrument);
 }
 
+std::vector<fs::path> meshes_of(const Kit& kit) {
+    std::set<fs::path> meshes = {kit.stick.mesh};
+    for (const Instrument& instrument : kit.instruments) meshes.insert(instrument.mesh);
+    return {meshes.begin(), meshes.end()};
+}
+
+/// A line for each mesh whose size is not its body's, with the scale that would make it so.
+void tell_sizes(const Kit& kit) {
+    for (const Instrument& instrument : kit.instruments) {
+        const Eigen::AlignedBox3f bounds = render::load_mesh(instrument.mesh).bounds();
+        const double extent = bounds.sizes().cast<double>().maxCoeff(),
+                     size = 2 * instrument.body.shape.semi_axes.maxCoeff(),
+                     drawn = instrument.mesh_scale_m ? extent * *instrument.mesh_scale_m : extent / 2 * size;
+        if (!(extent > 0) || (drawn < 2 * size && drawn > size / 2)) continue;
+        constexpr std::pair<double, const char*> kUnits[] = {
+            {1, "metres"}, {0.001, "millimetres"}, {0.01, "centimetres"}, {0.0254, "inches"}};
+        std::string offer = fmt::format("mesh_scale = {:.3g} makes it as large", size / extent);
+        for (const auto& [unit, name] : kUnits)
+            if (extent * unit < 1.5 * size && extent * unit > size / 1.5)
+                offer = fmt::format("mesh_scale = {} if it is in {}", unit, name);
+        fmt::print("{}: \"{}\" is {:.3g} m large, its mesh {} is drawn {:.3g} m large: {}\n",
+                   kit.file.string(), instrument.name, size, instrument.mesh.filename().string(), drawn,
+                   offer);
+    }
+}
+
 struct DrawOptions {
     std::string kit, out;
     Eigen::Vector2i size = {640, 480};  // [pixels]
@@ -68,6 +104,7 @@ void draw_kit(const DrawOptions& o) {
     if (fs::path(o.out).extension() != ".png")
         refuse_options("--out " + o.out, "a file whose name ends in .png");
     const Kit kit = read_kit(find_kit(o.kit));
+    tell_sizes(kit);
     const KitStage stage(kit, 0, StickGeometry{});
     render::Renderer renderer(stage.scene(o.size.x(), o.size.y()));
     render::Image image;
@@ -144,10 +181,16 @@ void add_draw(Command& kit) {
     command.runs([o] { draw_kit(*o); });
 }
 
-std::vector<fs::path> meshes_of(const Kit& kit) {
-    std::set<fs::path> meshes = {kit.stick.mesh};
-    for (const Instrument& instrument : kit.instruments) meshes.insert(instrument.mesh);
-    return {meshes.begin(), meshes.end()};
+/// Names what of sample files is not followed.
+void tell_ignored(const Kit& kit) {
+    std::set<std::string> told;
+    for (const Instrument& instrument : kit.instruments) {
+        const auto& samples = instrument.voice.samples;
+        if (!samples || samples->ignored.empty() || !told.insert(samples->files.front().string()).second)
+            continue;
+        fmt::print("{}: not followed: {}\n", samples->files.front().string(),
+                   fmt::join(samples->ignored, ", "));
+    }
 }
 
 void add_kit_check(Command& kit) {
@@ -158,10 +201,64 @@ void add_kit_check(Command& kit) {
         for (const std::string& name : *names) {
             const Kit checked = read_kit(find_kit(name));
             (void)render::load_meshes(meshes_of(checked));
+            tell_ignored(checked);
+            tell_sizes(checked);
             fmt::print("{}: in order, {}\n", checked.file.string(),
                        counted(checked.instruments.size(), "instrument"));
         }
     });
+}
+
+struct AuditionOptions {
+    std::string kit, instrument, out = "audition";
+    std::vector<double> speeds_mps = {1, 3, 8};
+};
+
+void hear(const AuditionOptions& o) {
+    const Kit kit = read_kit(find_kit(o.kit));
+    require_gnuplot();
+    OutputFolder out(o.out, kAuditionProducts);
+    const Audition heard = audition(kit, o.instrument, o.speeds_mps);
+    (void)audio::write_wav(out.path("audition.wav"), heard.sound);
+    out.adorn("audition.png", [&] {
+        Plotter plotter(out.scratch());
+        const fs::path file = out.path("audition.png");
+        plotter.draw_files({{file, audition_sheet(kit, heard, file.string())}});
+        if (!plotter.failure().empty()) throw std::runtime_error(plotter.failure());
+    });
+    out.finish();
+    for (const AuditionRow& row : heard.rows) {
+        const Instrument& instrument = kit.instruments[row.instrument];
+        fmt::print("{:6.1f} s  {}, {}:", row.onset_s, instrument.name,
+                   instrument.zones[static_cast<std::size_t>(row.zone)].name);
+        for (std::size_t i = 0; i < o.speeds_mps.size(); ++i)
+            fmt::print("  {:g} m/s peak {:.1f} dBFS", o.speeds_mps[i], level_of(heard, row, i).peak_db);
+        fmt::print("\n");
+    }
+    fmt::print("Listen to {}, look at {}\n", (fs::path(o.out) / "audition.wav").string(),
+               (fs::path(o.out) / "audition.png").string());
+    throw_if_any(out.failures(), o.out);
+}
+
+void add_audition(Command& kit) {
+    Command command = kit.command("audition", "Hear a kit: every zone struck at several speeds");
+    auto o = std::make_shared<AuditionOptions>();
+    command.required("KIT", o->kit, as::text("KIT"), "Kit: a file, or the name of a bundled one");
+    command.option("--instrument", o->instrument, as::text("NAME"), "Only this one");
+    command.option("--speeds", o->speeds_mps, as::list_of(as::number(0.2, 20, "m/s")),
+                   "Speeds of the strokes");
+    command.option("--out", o->out, as::text("DIR"), "Folder for audition.wav and audition.png");
+    command.runs([o] { hear(*o); });
+}
+
+void add_copy(Command& kit) {
+    Command command = kit.command("copy", "Copy a kit with all that it needs, to change it or to pass it on");
+    auto name = std::make_shared<std::string>(), out = std::make_shared<std::string>();
+    command.required("KIT", *name, as::text("KIT"), "Kit: a file, or the name of a bundled one");
+    command.required(
+        "--out", *out, as::text("FILE"),
+        "Kit to write (TOML), replaced if there is one; what it needs comes to FILE-files beside it");
+    command.runs([name, out] { copy_kit(find_kit(*name), *out); });
 }
 
 void add_new(Command& kit) {
@@ -175,7 +272,7 @@ void add_new(Command& kit) {
 }  // namespace
 
 void add_kit_command(Command& program) {
-    Command kit = program.command("kit", "List, show, check, draw, fit or make kits");
+    Command kit = program.command("kit", "List, show, check, draw, hear, copy, fit or make kits");
     kit.command("list", "List the bundled kits").runs(list_kits);
     Command show = kit.command("show", "Show what a kit holds");
     auto name = std::make_shared<std::string>();
@@ -185,6 +282,8 @@ void add_kit_command(Command& program) {
     add_draw(kit);
     add_fit(kit);
     add_new(kit);
+    add_copy(kit);
+    add_audition(kit);
 }
 
 }  // namespace app

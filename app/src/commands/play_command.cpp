@@ -1,9 +1,11 @@
 #include "commands/play_command.h"
 
 #include <fmt/format.h>
+#include <sim/simulation.h>
 
 #include <Eigen/Geometry>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <tuple>
 
@@ -31,20 +33,41 @@ std::string strikes_text(const StrikeScore& s) {
                        counted(s.true_contacts, "strike"), s.false_notes, s.cancelled);
 }
 
-/// Says where tips and instruments were if none met.
+/// Where a tip came nearest to an instrument.
+struct NearestMiss {
+    double distance_m = std::numeric_limits<double>::infinity();
+    std::string instrument, stick;
+    double t_s = 0;
+};
+NearestMiss nearest_miss(const PlayResult& result, const Kit& kit) {
+    constexpr std::size_t kMostSamples = 20000;  // of a stick: long recordings are looked at in steps
+    NearestMiss nearest;
+    for (const TipTrack& track : result.tracks)
+        for (std::size_t i = 0; i < track.tip.size(); i += 1 + track.tip.size() / kMostSamples)
+            for (const Instrument& instrument : kit.instruments) {
+                const double distance =
+                    sim::rest_distance(instrument.body, track.tip[i], kit.stick.radius_m).distance;
+                if (distance < nearest.distance_m)
+                    nearest = {distance, instrument.name, track.stick, track.t_s[i]};
+            }
+    return nearest;
+}
+
+/// Says how far tips and instruments were apart if none met.
 void print_if_apart(const PlayResult& result) {
     if (result.score.true_contacts + result.score.released > 0 || result.tracks.empty()) return;
-    Eigen::AlignedBox3d tips, instruments;
+    const Kit kit = read_kit(result.options.kit);
+    const NearestMiss miss = nearest_miss(result, kit);
+    Eigen::AlignedBox3d tips;
     for (const TipTrack& track : result.tracks)
         for (const Eigen::Vector3d& tip : track.tip) tips.extend(tip);
-    for (const Instrument& instrument : read_kit(result.options.kit).instruments)
-        instruments.extend(instrument.body.world_from_body.translation());
     fmt::print(
-        "no stick met an instrument: the tips moved within ({:.2f}) to ({:.2f}) m, the instruments lie "
+        "no stick met an instrument: stick {} came nearest, {:.3f} m from \"{}\" at {:.2f} s; the tips moved "
         "within "
-        "({:.2f}) to ({:.2f}) m; check --tip, or place a kit with `kit fit {}`\n",
-        fmt::join(tips.min(), ", "), fmt::join(tips.max(), ", "), fmt::join(instruments.min(), ", "),
-        fmt::join(instruments.max(), ", "), result.trace);
+        "({:.2f}) to ({:.2f}) m; check --tip, or place a kit where they strike with `kit fit {} --out "
+        "fitted.toml`\n",
+        miss.stick, miss.distance_m, miss.instrument, miss.t_s, fmt::join(tips.min(), ", "),
+        fmt::join(tips.max(), ", "), result.trace);
 }
 
 void play_offline(const PlayOptions& options) {

@@ -34,7 +34,13 @@ enum class Need {
     no,
     given,  ///< in the table or in the defaults below it
     here,   ///< in the table itself, and not in defaults; a text is not empty
+    own,    ///< likewise, or in the table of an included file that it changes
 };
+
+/// Whether the defaults do not give a key.
+[[nodiscard]] inline bool is_own(Need need) {
+    return need == Need::here || need == Need::own;
+}
 
 /// What else is to be said of a key.
 struct Note {
@@ -229,6 +235,8 @@ public:
     /// A reader throws BadInput at the key's place unless `holds`; without a key, at the table's.
     virtual void require(bool holds, std::string_view key, const std::string& found,
                          const std::string& expected) const = 0;
+    /// The file that gives a key its value; empty: none does (or a describer runs).
+    [[nodiscard]] virtual std::string file_of(std::string_view key) const = 0;
     /// A vector that gives a direction is not zero.
     void require_direction(const Eigen::Vector3d& value, std::string_view key) const;
 

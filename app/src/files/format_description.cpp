@@ -18,6 +18,7 @@ public:
         format_.tables[table_].parameter_range = any;
     }
     void require(bool, std::string_view, const std::string&, const std::string&) const override {}
+    [[nodiscard]] std::string file_of(std::string_view) const override { return {}; }
 
 protected:
     bool read(const Key& key, KeyValue& value) override {
@@ -41,7 +42,7 @@ protected:
 private:
     void add(DescribedKey key) {
         std::vector<DescribedKey>& keys = format_.tables[table_].keys;
-        if (!format_.tables[table_].below.empty() && key.key.note.need == Need::here) return;
+        if (!format_.tables[table_].below.empty() && is_own(key.key.note.need)) return;
         keys.push_back(std::move(key));
     }
 
@@ -102,7 +103,7 @@ std::string type_schema(const Key& key) {
         return "\"type\": \"string\", \"enum\": " + json_list(key.words, json_text);
     return range_schema(key.type, key.range,
                         std::string(R"("type": "string", "pattern": "^[^\\u0000-\\u001f\\u007f]*$")") +
-                            (key.note.need == Need::here ? ", \"minLength\": 1" : ""));
+                            (is_own(key.note.need) ? ", \"minLength\": 1" : ""));
 }
 
 std::string reference_to(const std::string& table) {
@@ -169,6 +170,7 @@ std::string type_text(const DescribedKey& described) {
 std::string default_text(const DescribedTable& table, const DescribedKey& described) {
     if (is_required(table, described)) return "required";
     if (described.key.note.need == Need::given) return "required, here or in the defaults";
+    if (described.key.note.need == Need::own) return "required, here or in the included instrument";
     if (*described.key.note.otherwise) return described.key.note.otherwise;
     const std::string value = value_text(described.key, described.fallback);
     return value.empty() || value == "\"\"" ? "" : fmt::format("`{}`", value);

@@ -26,6 +26,7 @@ inline constexpr std::array<std::string_view, 7> kSimulateProducts = {
     "summary.json", "frames", "states.csv", "energy.csv", "times.csv", "timing.csv", "workers.svg"};
 inline constexpr std::array<std::string_view, 5> kCompareProducts = {
     "compare.json", "compare.csv", "report.html", "experiment.toml", "figures"};
+inline constexpr std::array<std::string_view, 2> kAuditionProducts = {"audition.wav", "audition.png"};
 inline constexpr std::array<std::string_view, 3> kModesProducts = {"modes.json", "modes.png", "frames"};
 
 /// The folder that a run writes its products into. They are staged in its hidden subfolder `.unfinished`: until

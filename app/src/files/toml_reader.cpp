@@ -15,6 +15,7 @@ namespace fs = std::filesystem;
 
 struct TomlFile::Document {
     toml::table root;
+    std::shared_ptr<const Document> includer{};
 };
 
 namespace {
@@ -57,12 +58,36 @@ std::string expected_of(const Key& key) {
 
 using Layers = std::vector<const toml::table*>;
 
+/// A stack of files; which includes which.
+struct Files {
+    Layers roots;
+    std::vector<Layers> includers;  ///< of each: the files that include it, and those that include them
+
+    [[nodiscard]] bool includes(std::size_t outer, std::size_t inner) const {
+        return std::ranges::find(includers[inner], roots[outer]) != includers[inner].end();
+    }
+    /// Whether a file that includes this one leaves out its entries of that name.
+    [[nodiscard]] bool removed(std::size_t file, const std::string& name) const {
+        return std::ranges::any_of(includers[file], [&](const toml::table* includer) {
+            const toml::array* names = (*includer)["remove"].as_array();
+            return names && std::ranges::any_of(*names, [&](const toml::node& entry) {
+                       return entry.value_or(std::string()) == name;
+                   });
+        });
+    }
+};
+
+std::string name_of(const toml::table& entry) {
+    return entry["name"].value_or(std::string());
+}
+
 /// Reads the keys of a stack of TOML tables (an instrument, then the defaults of its kind).
 class TomlReader final : public Fields {
 public:
-    /// `where` names the table in messages; `root` is the file's stack. All must outlive the reader.
-    TomlReader(Layers layers, std::string where, const Layers& root)
-        : layers_(std::move(layers)), where_(std::move(where)), root_(root) {}
+    /// `where` names the table in messages; the first `own` layers are the table itself, the others its defaults. All
+    /// must outlive the reader.
+    TomlReader(Layers layers, std::string where, const Files& files, std::size_t own = 1)
+        : layers_(std::move(layers)), where_(std::move(where)), files_(files), own_layers_(own) {}
 
     void parameters(Parameters& values, const std::vector<ParameterRange>& known, Range any,
                     std::string_view meaning) override {
@@ -77,14 +102,18 @@ public:
                  const std::string& expected) const override {
         if (!holds && !missing_) throw fault(key, found, expected);
     }
+    [[nodiscard]] std::string file_of(std::string_view key) const override {
+        const toml::node* node = get(key);
+        return node && node->source().path ? *node->source().path : "";
+    }
     /// Refuses keys that were not declared, if it has `all`, then what is missing: it may be misspelt.
     void done(bool all = true) const {
         const auto among = [](const std::vector<std::string>& keys, std::string_view key) {
             return std::ranges::find(keys, key) != keys.end();
         };
-        for (const toml::table* layer : all ? layers_ : Layers())
-            for (const auto& [key, node] : *layer)
-                if (!among(known_, key.str()) || (layer != layers_.front() && among(own_, key.str())))
+        for (std::size_t i = 0; all && i < layers_.size(); ++i)
+            for (const auto& [key, node] : *layers_[i])
+                if (!among(known_, key.str()) || (i >= own_layers_ && among(own_, key.str())))
                     throw fault_at(key.source(),
                                    fmt::format("unknown key \"{}\" in {}", printable(key.str()), where_),
                                    fmt::format("only {}{}", fmt::join(known_, ", "),
@@ -95,9 +124,9 @@ public:
 protected:
     bool read(const Key& key, KeyValue& value) override {
         known_.emplace_back(key.name);
-        const bool own = key.note.need == Need::here;
+        const bool own = is_own(key.note.need);
         if (own) own_.emplace_back(key.name);
-        const toml::node* node = own ? layers_.front()->get(key.name) : get(key.name);
+        const toml::node* node = get(key.name, own ? own_layers_ : layers_.size());
         if (!node && key.note.need == Need::no) return false;
         if (!node && !missing_)
             missing_ = fault("", fmt::format("no key \"{}\" in {}", key.name, where_),
@@ -114,14 +143,14 @@ protected:
         known_.emplace_back(key.name);
         if (missing_) return;
         if (key.form == TableForm::array) {
-            for (const toml::table* entry : entries(key)) visit_table({entry}, key, {}, visit);
+            for (Layers& entry : entries(key)) visit_table(std::move(entry), key, {}, visit);
             return;
         }
         const Layers inner = merged(key.name, key.table->example);
         if (key.form == TableForm::merged || (key.form == TableForm::optional && !inner.empty()))
             visit_table(inner, key, {}, visit);
         if (key.form != TableForm::named) return;
-        const TomlReader all(inner, fmt::format("{}, {}", where_, key.name), root_);
+        const TomlReader all(inner, fmt::format("{}, {}", where_, key.name), files_);
         for (const toml::table* table : inner)
             for (const auto& [name, node] : *table)
                 all.visit_table(all.merged(name.str()), {name.str(), TableForm::merged, key.table},
@@ -129,11 +158,12 @@ protected:
     }
 
 private:
-    [[nodiscard]] const toml::node* get(std::string_view key) const {
-        for (const toml::table* layer : layers_)
-            if (const toml::node* node = layer->get(key)) return node;
+    [[nodiscard]] const toml::node* get(std::string_view key, std::size_t layers) const {
+        for (std::size_t i = 0; i < std::min(layers, layers_.size()); ++i)
+            if (const toml::node* node = layers_[i]->get(key)) return node;
         return nullptr;
     }
+    [[nodiscard]] const toml::node* get(std::string_view key) const { return get(key, layers_.size()); }
     [[nodiscard]] BadInput fault(std::string_view key, const std::string& found,
                                  const std::string& expected) const {
         const toml::node* node = key.empty() ? nullptr : get(key);
@@ -248,38 +278,87 @@ private:
             }
         return inner;
     }
-    /// The tables of the array at a key: of the first layer that has it, or of all.
-    [[nodiscard]] Layers entries(const TableKey& key) const {
-        Layers result;
-        for (const toml::table* layer : layers_) {
-            const toml::node* node = layer->get(key.name);
+    /// The tables of the array at a key: of the first layer that has it, or of all. Above those of included files lie
+    /// those of the files that include them and have the same name.
+    [[nodiscard]] std::vector<Layers> entries(const TableKey& key) const {
+        struct Entry {
+            std::string name;
+            std::vector<std::size_t> files;
+        };
+        std::vector<Layers> result;
+        std::vector<Entry> found;
+        for (std::size_t file = 0; file < layers_.size(); ++file) {
+            const toml::node* node = layers_[file]->get(key.name);
             if (!node) continue;
-            const toml::array* array = node->as_array();
-            if (!array)
-                throw fault_at(node->source(), fmt::format("{} = {} in {}", key.name, kind_of(*node), where_),
-                               "an array of tables");
-            for (const toml::node& entry : *array) result.push_back(table_in(entry, ""));
-            if (key.table->below == Below::nothing) break;
+            const bool alone = key.table->below == Below::nothing;
+            for (const toml::node& at : array_at(key, *node)) {
+                const toml::table* table = table_in(at, "");
+                const std::string name = alone ? "" : name_of(*table);
+                if (!alone && files_.removed(file, name)) continue;
+                const auto changes = [&](const Entry& entry) {
+                    return !name.empty() && entry.name == name &&
+                           std::ranges::all_of(
+                               entry.files, [&](std::size_t outer) { return files_.includes(outer, file); });
+                };
+                const auto changing = std::ranges::find_if(found, changes);
+                if (changing == found.end()) {
+                    found.push_back({name, {file}});
+                    result.push_back({table});
+                } else {
+                    changing->files.push_back(file);
+                    result[static_cast<std::size_t>(changing - found.begin())].push_back(table);
+                }
+            }
+            if (alone) return result;
         }
+        check_removals(key);
         return result;
+    }
+    [[nodiscard]] const toml::array& array_at(const TableKey& key, const toml::node& node) const {
+        if (!node.is_array())
+            throw fault_at(node.source(), fmt::format("{} = {} in {}", key.name, kind_of(node), where_),
+                           "an array of tables");
+        return *node.as_array();
+    }
+    /// Whatever a file leaves out is in a file that it includes.
+    void check_removals(const TableKey& key) const {
+        for (std::size_t outer = 0; outer < layers_.size(); ++outer) {
+            const toml::array* names = (*layers_[outer])["remove"].as_array();
+            if (!names || layers_.size() != files_.roots.size()) continue;
+            std::vector<std::string> there;
+            for (std::size_t file = 0; file < layers_.size(); ++file) {
+                const toml::array* inner = (*layers_[file])[key.name].as_array();
+                if (!inner || !files_.includes(outer, file)) continue;
+                for (const toml::node& entry : *inner)
+                    if (entry.is_table()) there.push_back(name_of(*entry.as_table()));
+            }
+            for (const toml::node& name : *names)
+                if (std::ranges::find(there, name.value_or(std::string())) == there.end())
+                    throw fault_at(name.source(), fmt::format("{} in remove", kind_of(name)),
+                                   fmt::format("the name of an included {}{}", key.table->name,
+                                               nearest_hint(name.value_or(std::string()), there)));
+        }
     }
     /// Visits the tables `layers` at a key, which have the file's defaults of their kind below them.
     void visit_table(Layers layers, const TableKey& key, const std::string& name, const Visit& visit) const {
         std::string place = fmt::format("{}, {}", where_, key.name);
+        const std::size_t own = key.table->below == Below::nothing ? 1 : layers.size();
         if (key.table->below != Below::nothing) {
             const auto text = [&](const char* inner) {
-                return (*layers.front())[inner].value_or(std::string());
+                for (std::size_t i = 0; i < own; ++i)
+                    if (const toml::node* node = layers[i]->get(inner)) return node->value_or(std::string());
+                return std::string();
             };
             const std::string kind = text("kind"), called = text("name");
             if (!called.empty()) place = fmt::format("{} \"{}\"", key.table->name, printable(called));
-            for (const toml::table* file : root_) {
+            for (const toml::table* file : files_.roots) {
                 const toml::table* defaults = (*file)["defaults"].as_table();
                 if (defaults && key.table->below == Below::defaults_of_kind)
                     defaults = (*defaults)[kind].as_table();
                 if (defaults) layers.push_back(defaults);
             }
         }
-        TomlReader inner(std::move(layers), place, root_);
+        TomlReader inner(std::move(layers), place, files_, own);
         visit.keys(inner, name);
         inner.done();
         if (visit.take) visit.take(inner);
@@ -287,7 +366,8 @@ private:
 
     Layers layers_;
     std::string where_;
-    const Layers& root_;
+    const Files& files_;
+    std::size_t own_layers_;
     std::optional<BadInput> missing_;
     std::vector<std::string> known_, own_;
 };
@@ -357,20 +437,26 @@ void check_depth(std::string_view text, const std::string& file) {
 
 }  // namespace
 
-TomlFile::TomlFile(const char* kind, const fs::path& file)
-    : TomlFile(text_of_file(kind, file), file.string()) {}
+TomlFile::TomlFile(const char* kind, const fs::path& file, const TomlFile* includer)
+    : TomlFile(text_of_file(kind, file), file.string(), includer) {}
 
-TomlFile::TomlFile(std::string_view text, const std::string& name) {
+TomlFile::TomlFile(std::string_view text, const std::string& name, const TomlFile* includer) {
     check_depth(text, name);
     const auto parse = [&] { return toml::parse(text, name); };
-    document_ = std::make_shared<const Document>(Document{parsed(name, parse)});
+    document_ = std::make_shared<const Document>(
+        Document{parsed(name, parse), includer ? includer->document_ : nullptr});
 }
 
 void read_toml(const std::vector<TomlFile>& layers, const std::string& where,
                const std::function<void(Fields&)>& keys, bool all) {
-    Layers roots;
-    for (const TomlFile& layer : layers) roots.push_back(&layer.document_->root);
-    TomlReader reader(roots, where, roots);
+    Files files;
+    for (const TomlFile& layer : layers) {
+        files.roots.push_back(&layer.document_->root);
+        Layers& includers = files.includers.emplace_back();
+        for (const auto* at = layer.document_->includer.get(); at; at = at->includer.get())
+            includers.push_back(&at->root);
+    }
+    TomlReader reader(files.roots, where, files);
     keys(reader);
     reader.done(all);
 }

@@ -13,9 +13,11 @@ namespace app {
 class TomlFile {
 public:
     /// `kind` is what it should be, "a kit". Throws BadInput: no file, a folder, a syntax error (with its place).
-    TomlFile(const char* kind, const std::filesystem::path& file);
+    /// `includer` is the file that includes it: its entries of an array with names change those of this file that have
+    /// the same name, and its array of texts `remove` leaves some out.
+    TomlFile(const char* kind, const std::filesystem::path& file, const TomlFile* includer = nullptr);
     /// `name` stands for the file in messages.
-    TomlFile(std::string_view text, const std::string& name);
+    TomlFile(std::string_view text, const std::string& name, const TomlFile* includer = nullptr);
 
 private:
     friend void read_toml(const std::vector<TomlFile>& layers, const std::string& where,

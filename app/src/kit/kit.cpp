@@ -1,6 +1,8 @@
 #include "kit/kit.h"
 
 #include <audio/orchestra.h>
+#include <audio/own_orchestra.h>
+#include <audio/samples.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,14 +25,29 @@ bool is_file(const fs::path& path) {
     return fs::is_regular_file(path, error);
 }
 
-/// The file of that name beside the kit or in a folder of bundled ones.
+/// The file of that name beside the file that names it, beside the kit or, if there is such a folder, in a folder of
+/// bundled ones.
 fs::path find_file(const Fields& at, const char* key, const fs::path& name, const fs::path& kit,
                    const char* bundled) {
-    const fs::path beside = kit.parent_path() / name, other = assets_folder() / bundled / name;
-    const bool found = is_file(beside);
-    at.require(found || is_file(other), key, fmt::format("{} \"{}\", which is no file", key, name.string()),
-               fmt::format("a file beside {} or among the bundled {}", kit.filename().string(), bundled));
-    return found ? beside : other;
+    const fs::path beside = kit.parent_path() / name;
+    std::vector<fs::path> places = {beside};
+    if (const std::string file = at.file_of(key); !file.empty())
+        places.insert(places.begin(), fs::path(file).parent_path() / name);
+    if (bundled) places.push_back(assets_folder() / bundled / name);
+    const auto found = std::ranges::find_if(places, is_file);
+    at.require(found != places.end(), key, fmt::format("{} \"{}\", which is no file", key, name.string()),
+               fmt::format("a file beside {}{}", kit.filename().string(),
+                           bundled ? fmt::format(" or among the bundled {}", bundled) : ""));
+    return found == places.end() ? beside : *found;
+}
+
+/// What a library reads; its complaints, which name their place, become BadInput.
+auto read_sound(const auto& read) {
+    try {
+        return read();
+    } catch (const std::runtime_error& wrong) {
+        throw BadInput(wrong.what());
+    }
 }
 
 // Tables within an instrument
@@ -120,7 +137,25 @@ std::vector<ParameterRange> parameters_of(const std::string& sound, Fields& keys
 struct InstrumentDraft {
     Instrument instrument;
     const std::vector<audio::Instrument>* orchestra = nullptr;  ///< the sounds that there are
+    fs::path kit{};                                             ///< the kit's file
+    fs::path samples{};                                         ///< empty: none
 };
+
+/// The sounds that there are, with those of an orchestra of one's own.
+std::vector<audio::Instrument> with_own(const std::vector<audio::Instrument>& bundled, const fs::path& own,
+                                        const Fields& keys) {
+    std::vector<std::string> taken = {"sample"};
+    for (const audio::Instrument& instrument : bundled) taken.push_back(instrument.name);
+    std::vector<audio::Instrument> all = bundled;
+    const std::vector<audio::Instrument> added = read_sound(
+        [&] { return audio::parse_instruments(audio::read_own_orchestra(own, taken), own.string()); });
+    for (const audio::Instrument& instrument : added) {
+        keys.require(std::ranges::find(taken, instrument.name) == taken.end(), "orchestra",
+                     fmt::format("a second `{}` in {}", instrument.name, own.string()), "names of its own");
+        all.push_back(instrument);
+    }
+    return all;
+}
 
 void sound_keys(Fields& keys, InstrumentDraft& written) {
     audio::Voice& voice = written.instrument.voice;
@@ -129,10 +164,29 @@ void sound_keys(Fields& keys, InstrumentDraft& written) {
     keys.number("gain_db", voice.gain_db, {-60, 20, "dB"}, "Gain.");
     keys.number("pan", voice.pan, {0, 1}, "0 left ... 1 right, constant power.",
                 {.otherwise = "from the position's x", .example = "0.5"});
+    std::string samples, own;
+    keys.text(
+        "samples", samples,
+        "Recorded sounds instead of the orchestra's: a file beside this one. WAV, FLAC or another sound "
+        "file; SFZ; "
+        "SoundFont (.sf2); DrumGizmo (.xml). A zone's midi_note chooses the key, the speed the velocity: "
+        "127 (v / 8 m/s)^0.7.",
+        {.example = "\"snare.wav\""});
+    if (!samples.empty()) written.samples = find_file(keys, "samples", samples, written.kit, nullptr);
+    keys.text("orchestra", own,
+              "A Csound orchestra of your own, a file beside this one, in which `instrument` may be.",
+              {.example = "\"mine.orc\""});
     static const std::vector<audio::Instrument> kNone;
+    std::vector<audio::Instrument> known = written.orchestra ? *written.orchestra : kNone;
+    if (!own.empty()) {
+        const fs::path file = find_file(keys, "orchestra", own, written.kit, nullptr);
+        const std::size_t bundled = known.size();
+        known = with_own(known, file, keys);
+        const auto found = std::ranges::find(known, voice.instrument, &audio::Instrument::name);
+        if (found - known.begin() >= static_cast<std::ptrdiff_t>(bundled)) voice.own_orchestra = file;
+    }
     keys.parameters(
-        voice.parameters,
-        parameters_of(voice.instrument, keys, written.orchestra ? *written.orchestra : kNone), {-1e9, 1e9},
+        voice.parameters, parameters_of(voice.instrument, keys, known), {-1e9, 1e9},
         "A parameter of the orchestra's instrument. The header of assets/orchestra/musicworld.orc lists "
         "them with their ranges.");
 }
@@ -200,11 +254,14 @@ void zones_keys(Fields& keys, Instrument& instrument) {
 
 void instrument_keys(Fields& keys, InstrumentDraft& written) {
     Instrument& instrument = written.instrument;
-    keys.text("name", instrument.name, "Name, different from all others.",
+    keys.text("name", instrument.name,
+              "Name, different from all others of the file. An instrument of that name in an included file "
+              "is changed: "
+              "keys that are given here stand over its own.",
               {.need = Need::here, .example = "\"snare\""});
     keys.choice("kind", instrument.kind,
                 {{"drum", "drum"}, {"bell", "bell"}, {"string", "string"}, {"cymbal", "cymbal"}},
-                "What it is; chooses the defaults.", {.need = Need::here, .example = "\"drum\""});
+                "What it is; chooses the defaults.", {.need = Need::own, .example = "\"drum\""});
     body_keys(keys, written);
     zones_keys(keys, instrument);
     std::string mesh = instrument.kind + ".obj";
@@ -214,6 +271,11 @@ void instrument_keys(Fields& keys, InstrumentDraft& written) {
               "half extents, so it should fill [-1, 1] in x, y, z.",
               {.otherwise = "KIND.obj", .example = "\"drum.obj\""});
     instrument.mesh = mesh;
+    keys.number("mesh_scale", instrument.mesh_scale_m, {1e-6, 1e3, "m"},
+                "Length of one unit of the mesh, which then keeps its own size: 1 for a mesh in metres, "
+                "0.001 for one in "
+                "millimetres. `kit check` says which fits.",
+                {.otherwise = "the half extents", .example = "0.001"});
     keys.table("look", instrument.look, kLook);
     audio::Voice& voice = instrument.voice;
     voice.name = instrument.name;
@@ -249,7 +311,7 @@ void add_tip(audio::Voice& voice, const StickDefinition& stick,
 /// What each file of a kit says for itself.
 struct KitHeader {
     std::string name, description;
-    std::vector<std::string> include;
+    std::vector<std::string> include, remove;
 };
 void header_keys(Fields& keys, KitHeader& header) {
     keys.text("name", header.name, "Name of the kit.", {.otherwise = "the file's", .example = "\"Drums\""});
@@ -258,6 +320,8 @@ void header_keys(Fields& keys, KitHeader& header) {
                "Further kit files, relative to this one or among the bundled kits. Their instruments join "
                "this kit's.",
                {.example = "[\"bells.toml\"]"});
+    keys.texts("remove", header.remove, "Names of instruments of the included files that are left out.",
+               {.example = "[\"C5\"]"});
 }
 
 /// A kit as its files say it.
@@ -310,6 +374,22 @@ void defaults_keys(Fields& keys, KitDraft&) {
 const TableKind<KitDraft> kDefaults = {
     {"defaults", "What instruments of a kind have unless they say otherwise."}, defaults_keys};
 
+/// Reads the recorded sounds of an instrument for the MIDI notes of its zones.
+void take_samples(InstrumentDraft& read, Kit& kit) {
+    audio::Voice& voice = read.instrument.voice;
+    const auto note = [&](const fs::path& file) {
+        if (std::ranges::find(kit.sound_files, file) == kit.sound_files.end())
+            kit.sound_files.push_back(file);
+    };
+    if (!voice.own_orchestra.empty()) note(voice.own_orchestra);
+    if (read.samples.empty()) return;
+    std::vector<int> notes;
+    for (const ZoneSound& zone : read.instrument.zones) notes.push_back(zone.midi_note);
+    voice.samples = read_sound([&] { return audio::read_samples(read.samples, notes); });
+    if (voice.choke_group.empty()) voice.choke_group = voice.samples->choke_group;
+    for (const fs::path& file : voice.samples->files) note(file);
+}
+
 void kit_keys(Fields& keys, KitDraft& written) {
     KitHeader header;
     header_keys(keys, header);
@@ -322,7 +402,7 @@ void kit_keys(Fields& keys, KitDraft& written) {
     keys.table("room", kit.room, kRoom);
     keys.table("defaults", written, kDefaults);
     keys.tables(
-        "instrument", InstrumentDraft{{}, &written.orchestra}, kInstrument,
+        "instrument", InstrumentDraft{{}, &written.orchestra, kit.file}, kInstrument,
         "The playable things, 1 to 64 with all included files.", [&](Fields& at, InstrumentDraft& read) {
             Instrument& instrument = read.instrument;
             instrument.body.name = instrument.name;
@@ -331,6 +411,7 @@ void kit_keys(Fields& keys, KitDraft& written) {
             instrument.mesh = find_file(at, "mesh", instrument.mesh, kit.file, "meshes");
             at.require(written.names.insert(instrument.name).second, "",
                        fmt::format("a second instrument \"{}\"", instrument.name), "a name of its own");
+            take_samples(read, kit);
             kit.instruments.push_back(instrument);
         });
 }
@@ -346,13 +427,14 @@ const TableKind<KitDraft> kKitFile = {{"kit",
 // Reading
 
 /// Adds a file of a kit: the kit itself first, then its includes in order, the assets' defaults last.
-void load(Kit& kit, std::vector<TomlFile>& documents, const fs::path& file) {
+void load(Kit& kit, std::vector<TomlFile>& documents, const fs::path& file,
+          const TomlFile* includer = nullptr) {
     if (std::ranges::find(kit.files, file) != kit.files.end()) return;
     if (kit.files.size() > 32)
         throw BadInput(
             fmt::format("{}: error: found more than 32 included files, expected fewer", file.string()));
-    const TomlFile document("a kit", file);
-    KitHeader header{file.stem().string(), {}, {}};
+    const TomlFile document("a kit", file, includer);
+    KitHeader header{file.stem().string(), {}, {}, {}};
     std::vector<fs::path> includes;
     const auto read_header = [&](Fields& keys) {
         header_keys(keys, header);
@@ -363,7 +445,7 @@ void load(Kit& kit, std::vector<TomlFile>& documents, const fs::path& file) {
     if (kit.files.empty()) kit.name = header.name, kit.description = header.description;
     kit.files.push_back(file);
     documents.push_back(document);
-    for (const fs::path& include : includes) load(kit, documents, include);
+    for (const fs::path& include : includes) load(kit, documents, include, &document);
 }
 
 }  // namespace

@@ -99,7 +99,9 @@ render::FrameState KitStage::frame(std::span<const sim::ModalState> bodies,
     for (std::size_t i = 0; i < kit_.instruments.size(); ++i) {
         const sim::BodyDefinition& body = kit_.instruments[i].body;
         Eigen::Matrix4d matrix = sim::body_matrix(body, bodies.empty() ? sim::ModalState{} : bodies[i]);
-        matrix.leftCols<3>() *= body.shape.semi_axes.asDiagonal();
+        const std::optional<double>& scale = kit_.instruments[i].mesh_scale_m;
+        const Eigen::Vector3d sides = scale ? Eigen::Vector3d::Constant(*scale) : body.shape.semi_axes;
+        matrix.leftCols<3>() *= sides.asDiagonal();
         add(matrix.cast<float>(), true);
     }
     for (const Prop& prop : props_) add(prop.matrix, true);

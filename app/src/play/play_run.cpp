@@ -1,5 +1,6 @@
 #include "play/play_run.h"
 
+#include <audio/samples.h>
 #include <fmt/format.h>
 #include <tracking/input.h>
 
@@ -138,8 +139,7 @@ audio::Note note_of(const Strike& strike, const Instrument& instrument) {
     note.place = place_of(strike, instrument);
     note.zone = strike.zone;
     note.midi_note = instrument.zones[static_cast<std::size_t>(strike.zone)].midi_note;
-    note.midi_velocity =
-        static_cast<int>(std::clamp(std::round(127 * std::pow(strike.speed_mps / 8, 0.7)), 1.0, 127.0));
+    note.midi_velocity = audio::stroke_velocity(strike.speed_mps);
     return note;
 }
 
@@ -184,7 +184,8 @@ PlayResult describe(const PlayOptions& options, const PlayedTrace& trace, const 
     for (const tracking::StickTrace& stick : trace.sticks) result.sticks.push_back(stick.name);
     for (const Instrument& instrument : kit.instruments) result.instruments.push_back(instrument.name);
     if (!trace.sha256.empty()) result.inputs.emplace_back(options.trace.string(), trace.sha256);
-    for (const fs::path& file : kit.files) result.inputs.emplace_back(file.string(), sha256_of_file(file));
+    for (const auto* files : {&kit.files, &kit.sound_files})
+        for (const fs::path& file : *files) result.inputs.emplace_back(file.string(), sha256_of_file(file));
     std::set<fs::path> models;
     for (const std::string& each : {result.options.picture_predictor, result.options.sound_predictor})
         if (const std::optional<fs::path> model = model_file(each)) models.insert(*model);

@@ -11,6 +11,8 @@
 
 namespace audio {
 
+struct SampleSet;
+
 inline constexpr int kSampleRate = 48000;
 
 /// A playable voice: an instrument of the orchestra with its parameters.
@@ -24,6 +26,12 @@ struct Voice {
     /// A new note fades the group's older ones from its own first sample to exact zero within 15 ms; notes of
     /// equal onset leave each other alone. Empty: none.
     std::string choke_group;
+    /// Recorded sounds that it plays instead of the instrument (audio/samples.h). They do not change; the kit that read
+    /// them and the performances of its voices own them together.
+    std::shared_ptr<const SampleSet> samples{};
+    /// The file whose instrument it is, an orchestra of one's own that is put behind the performance's (audio/orchestra.h).
+    /// Empty: an instrument of the performance's orchestra.
+    std::filesystem::path own_orchestra{};
 };
 
 /// One strike as the audio hears it.

@@ -11,7 +11,8 @@
 namespace app {
 namespace {
 
-constexpr const char* kBundled[] = {"drums", "bells", "strings"};
+constexpr const char* kBundled[] = {"drums",   "bells",   "strings", "rock",
+                                    "timpani", "marimba", "harp",    "pads"};
 
 /// Extent of a body along world y at its middle.
 Eigen::Vector3d top_of(const Instrument& instrument) {

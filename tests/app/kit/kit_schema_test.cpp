@@ -20,11 +20,26 @@ std::string refusal_of(const json& kit) {
     return {};
 }
 
+/// The files that the examples name, beside the written kit; several processes may do this at once.
+void write_named_files() {
+    const std::filesystem::path folder = ::testing::TempDir(),
+                                own = "musicworld_" + std::to_string(::getpid());
+    const auto put = [&](const char* name) { std::filesystem::rename(folder / own, folder / name); };
+    (void)audio::write_wav(folder / own, std::vector<float>(64, 0.5F));
+    put("snare.wav");
+    std::ofstream(folder / own) << ";@ gong frequency_hz 100 20 2000 pitch [Hz]\n";
+    put("mine.orc");
+    std::ofstream(folder / own) << "[[instrument]]\nname = \"C5\"\nkind = \"bell\"\n";
+    put("removed.toml");
+}
+
 const FormatCase& kit_case() {
     static const FormatCase format = [] {
+        write_named_files();
         const json root = json::parse(json_schema(kit_format()));
         json full = example_of(root, root);
-        full["include"] = {"defaults.toml"};  // bells would take the defaults' sound, which is a drum's
+        full["include"] = {"defaults.toml",
+                           "removed.toml"};  // bells would take the defaults' sound, which is a drum's
         // Instruments take what they say before what the defaults say; so that defaults are read too, each kind
         // has one that says little.
         for (const char* kind : {"drum", "cymbal", "bell", "string"})
@@ -60,7 +75,9 @@ TEST(KitSchema, WhatItRequiresTheReaderRequires) {
     std::vector<std::string> needed;  // by the instruments that leave them to the defaults
     for (const std::string kind : {"drum", "cymbal", "bell", "string"})
         for (const char* key : {"", "/size", "/position"}) needed.push_back("/defaults/" + kind + key);
-    for (const char* key : {"/defaults", "/instrument"}) needed.push_back(key);
+    // What the file removes is in what it includes; an instrument that changes an included one leaves its kind to it.
+    for (const char* key : {"/defaults", "/instrument", "/include", "/instrument/0/kind"})
+        needed.push_back(key);
     EXPECT_GT(expect_required_keys_are_the_readers(kit_case(), needed), 250);
 }
 

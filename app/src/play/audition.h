@@ -1,0 +1,38 @@
+#pragma once
+#include <span>
+#include <string>
+#include <vector>
+
+#include "kit/kit.h"
+
+namespace app {
+
+/// Each zone of a kit's instruments, struck in its middle at several speeds.
+struct AuditionRow {
+    std::size_t instrument = 0;
+    int zone = 0;
+    double onset_s = 0;  ///< of its first stroke; the others follow kAuditionSpacingS apart
+};
+inline constexpr double kAuditionSpacingS = 1.5;
+
+struct Audition {
+    std::vector<double> speeds_mps;
+    std::vector<AuditionRow> rows;
+    std::vector<float> sound;  ///< 48 kHz, interleaved stereo, from 0.1 s before the first stroke
+};
+
+/// Instrument by instrument, zone by zone. `only`: one instrument's name; empty: all. Throws BadInput for a name that
+/// the kit does not have.
+[[nodiscard]] Audition audition(const Kit& kit, const std::string& only, std::span<const double> speeds_mps);
+
+/// Greatest sample and root of the mean square of 100 ms from the onset, both sides, in dB of full scale; -200 for silence.
+struct StrokeLevel {
+    double peak_db = -200, rms_db = -200;
+};
+[[nodiscard]] StrokeLevel level_of(const Audition& heard, const AuditionRow& row, std::size_t speed);
+
+/// gnuplot's commands of its picture, a PNG file: a row for each zone, a panel for each speed, all of one row at one
+/// scale.
+[[nodiscard]] std::string audition_sheet(const Kit& kit, const Audition& heard, const std::string& file);
+
+}  // namespace app

@@ -1,0 +1,211 @@
+#include <audio/samples.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "damaged_bytes.h"
+#include "files/bad_input.h"
+#include "kit/kit_copy.h"
+#include "play/audition.h"
+#include "temporary_folder.h"
+#include "written_kit.h"
+
+namespace app {
+namespace {
+
+/// A folder with a kit, an included one and sounds.
+class KitFolder {
+public:
+    KitFolder() {
+        std::filesystem::create_directories(folder_.path() / "inner");
+        for (const char* name : {"hit.wav", "inner/own.wav"})
+            (void)audio::write_wav(folder_.path() / name, std::vector<float>(960, 0.5F));
+        text("inner/base.toml", R"(
+[[instrument]]
+name = "snare"
+kind = "drum"
+size = [0.36, 0.14, 0.36]
+position = [0, 0.7, -0.45]
+midi_note = 38
+sound = { frequency_hz = 190, snare = 0.8 }
+
+[[instrument]]
+name = "tom"
+kind = "drum"
+size = [0.3, 0.2, 0.3]
+position = [0.5, 0.7, -0.45]
+sound = { samples = "own.wav" }
+)");
+    }
+    void text(const std::string& name, const std::string& text) const {
+        std::ofstream(folder_.path() / name) << text;
+    }
+    [[nodiscard]] Kit kit(const std::string& text) const {
+        this->text("kit.toml", text);
+        return read_kit(folder_.path() / "kit.toml");
+    }
+    [[nodiscard]] std::filesystem::path operator/(const std::string& name) const {
+        return folder_.path() / name;
+    }
+    [[nodiscard]] std::string fault(const std::string& text) const {
+        try {
+            (void)kit(text);
+        } catch (const BadInput& wrong) {
+            return wrong.what();
+        }
+        return "";
+    }
+
+private:
+    TemporaryFolder folder_;
+};
+
+const std::string kInclude = "include = [\"inner/base.toml\"]\n";
+
+TEST(IncludedKits, AKeyOfAnInstrumentIsChangedByItsNameAndTheOthersStay) {
+    const KitFolder folder;
+    const Kit kit =
+        folder.kit(kInclude + "[[instrument]]\nname = \"snare\"\nsound = { frequency_hz = 150 }\n");
+    ASSERT_EQ(kit.instruments.size(), 2u);
+    const Instrument& snare = kit.instruments[0];
+    EXPECT_EQ(snare.voice.parameters,
+              (std::vector<std::pair<std::string, double>>{{"frequency_hz", 150}, {"snare", 0.8}}));
+    EXPECT_EQ(snare.kind, "drum");
+    EXPECT_EQ(snare.body.world_from_body.translation(), Eigen::Vector3d(0, 0.7, -0.45));
+}
+
+TEST(IncludedKits, InstrumentsAreLeftOutByRemoveAndMayBeMadeAnew) {
+    const KitFolder folder;
+    const Kit fewer = folder.kit("remove = [\"tom\"]\n" + kInclude);
+    ASSERT_EQ(fewer.instruments.size(), 1u);
+    EXPECT_EQ(fewer.instruments[0].name, "snare");
+    const Kit anew = folder.kit("remove = [\"tom\"]\n" + kInclude +
+                                "[[instrument]]\nname = \"tom\"\nkind = \"cymbal\"\nsize = [0.4, 0.02, 0.4]\n"
+                                "position = [0.5, 1, -0.5]\n");
+    ASSERT_EQ(anew.instruments.size(), 2u);
+    EXPECT_EQ(anew.instruments[0].kind, "cymbal");
+    EXPECT_FALSE(anew.instruments[0].voice.samples);
+}
+
+TEST(IncludedKits, WhatIsMisspeltOrTwiceIsRefusedWithItsPlace) {
+    const KitFolder folder;
+    EXPECT_NE(folder.fault("remove = [\"tomm\"]\n" + kInclude)
+                  .find("kit.toml:1:11: error: found \"tomm\" in remove, expected the name of an included "
+                        "instrument; "
+                        "the nearest is tom"),
+              std::string::npos);
+    EXPECT_NE(folder.fault(kInclude + "[[instrument]]\nname = \"snare\"\n[[instrument]]\nname = \"snare\"\n")
+                  .find("no key \"kind\""),
+              std::string::npos);
+    EXPECT_NE(folder.fault(kInclude + "[[instrument]]\nname = \"snare\"\nsound = { frequency = 150 }\n")
+                  .find("unknown key \"frequency\""),
+              std::string::npos);
+    folder.text("inner/other.toml",
+                "[[instrument]]\nname = \"tom\"\nkind = \"drum\"\nsize = [0.3, 0.2, 0.3]\n"
+                "position = [0, 0, 0]\n");
+    EXPECT_NE(folder.fault("include = [\"inner/base.toml\", \"inner/other.toml\"]\n")
+                  .find("a second instrument \"tom\""),
+              std::string::npos);
+}
+
+TEST(OwnSounds, SamplesLieBesideTheFileThatNamesThem) {
+    const KitFolder folder;
+    const Kit kit =
+        folder.kit(kInclude + "[[instrument]]\nname = \"snare\"\nsound = { samples = \"hit.wav\" }\n");
+    ASSERT_TRUE(kit.instruments[0].voice.samples);
+    ASSERT_TRUE(kit.instruments[1].voice.samples);
+    EXPECT_EQ(kit.instruments[1].voice.samples->waves.size(), 2u);
+    EXPECT_EQ(kit.sound_files.size(), 2u);
+    EXPECT_NE(folder.fault(kInclude + "[[instrument]]\nname = \"snare\"\nsound = { samples = \"no.wav\" }\n")
+                  .find("kit.toml:4:21: error: found samples \"no.wav\", which is no file"),
+              std::string::npos);
+}
+
+TEST(OwnSounds, AnOwnOrchestraAddsInstruments) {
+    const KitFolder folder;
+    folder.text("mine.orc",
+                ";@ gong frequency_hz 100 20 2000 pitch [Hz]\ninstr gong\nablow linseg 1, 1 / sr, 0, 1, 0\n"
+                "ilevel = 0.1\niduration = 1\nasound reson ablow, p12, 5\n"
+                "amid = asound\naside = 0 * asound\niwidth = 0\n$CLOSE\nendin\n");
+    const std::string with =
+        "[[instrument]]\nname = \"gong\"\nkind = \"cymbal\"\nsize = [0.4, 0.02, 0.4]\n"
+        "position = [0, 1, -0.5]\nsound = { orchestra = \"mine.orc\", instrument = \"gong\", ";
+    const Kit kit = folder.kit(with + "frequency_hz = 90 }\n");
+    EXPECT_EQ(kit.instruments[0].voice.own_orchestra.filename(), "mine.orc");
+    EXPECT_NE(folder.fault(with + "pitch = 90 }\n").find("unknown key \"pitch\""), std::string::npos);
+    audio::Performance performance(MUSICWORLD_SOURCE_DIR "/assets/orchestra/musicworld.orc",
+                                   {kit.instruments[0].voice});
+    performance.schedule({1, 0, 1000, 5, 0, 0, 49, 90});
+    const std::vector<float> sound = performance.finish(2000, 48000);
+    EXPECT_TRUE(std::all_of(sound.begin(), sound.begin() + 2000, [](float x) { return x == 0; }));
+    EXPECT_NE(sound.at(2000), 0);
+}
+
+TEST(OwnSounds, DamagedKitsAreReadOrRefusedInOneLineWithTheirPlace) {
+    const KitFolder folder;
+    const std::string good = "remove = [\"tom\"]\n" + kInclude +
+                             "[[instrument]]\nname = \"snare\"\nmesh_scale = 0.5\n"
+                             "sound = { samples = \"hit.wav\", gain_db = -3, pan = 0.4 }\n";
+    std::mt19937 random(17);
+    int refused = 0;
+    for (int i = 0; i < 300; ++i) {
+        const std::vector<std::uint8_t> bad = damaged({good.begin(), good.end()}, random);
+        const std::string fault = folder.fault({bad.begin(), bad.end()});
+        if (fault.empty()) continue;
+        ++refused;
+        EXPECT_NE(fault.find("error: found "), std::string::npos) << fault;
+        EXPECT_NE(fault.find(", expected "), std::string::npos) << fault;
+        EXPECT_NE(fault.find(".toml:"), std::string::npos) << fault;
+        EXPECT_EQ(fault.find_first_of("\n\r"), std::string::npos) << fault;
+    }
+    EXPECT_GT(refused, 100);
+}
+
+TEST(KitCopy, ACopyNeedsNothingOfTheOriginalAndKeepsItsText) {
+    const KitFolder folder;
+    folder.text("inner/drum2.obj", "v -1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    folder.text("inner/set.sfz", "<control> default_path=../\n<region> sample=hit.wav key=38\n");
+    const Kit kit = folder.kit("# my kit\n" + kInclude +
+                               "[[instrument]]\nname = \"snare\" # changed\nmesh = \"inner/drum2.obj\"\n"
+                               "sound = { samples = \"inner/set.sfz\", gain_db = -1 }\n");
+    std::filesystem::create_directories(folder / "there");
+    copy_kit(kit.file, folder / "there/mine.toml");
+    for (const char* name : {"kit.toml", "hit.wav", "inner"}) std::filesystem::remove_all(folder / name);
+    const Kit copy = read_kit(folder / "there/mine.toml");
+    ASSERT_EQ(copy.instruments.size(), kit.instruments.size());
+    EXPECT_EQ(copy.instruments[0].voice.samples->waves, kit.instruments[0].voice.samples->waves);
+    EXPECT_EQ(copy.instruments[1].voice.samples->waves, kit.instruments[1].voice.samples->waves);
+    EXPECT_EQ(copy.instruments[0].mesh.filename(), "drum2.obj");
+    std::ifstream stream(copy.file);
+    const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+    EXPECT_EQ(text,
+              "# my kit\ninclude = ['mine-files/base.toml']\n[[instrument]]\nname = \"snare\" # changed\n"
+              "mesh = 'mine-files/drum2.obj'\n"
+              "sound = { samples = 'mine-files/set/inner/set.sfz', gain_db = -1 }\n");
+}
+
+TEST(KitCopy, ABundledKitAndWhatItIncludesBecomeOnesOwn) {
+    const KitFolder folder;
+    copy_kit(std::filesystem::path(MUSICWORLD_SOURCE_DIR) / "assets/kits/rock.toml", folder / "mine.toml");
+    EXPECT_TRUE(std::filesystem::is_regular_file(folder / "mine-files/drums.toml"));
+    EXPECT_EQ(read_kit(folder / "mine.toml").instruments.size(), 10u);
+    EXPECT_THROW(copy_kit(folder / "mine.toml", folder / "mine.toml"), BadInput);
+}
+
+TEST(KitAudition, EveryZoneIsHeardAtEverySpeedAtItsOnset) {
+    const KitFolder folder;
+    const Kit kit =
+        folder.kit(kInclude + "[[instrument]]\nname = \"snare\"\nsound = { samples = \"hit.wav\" }\n");
+    const std::vector<double> speeds = {1, 8};
+    const Audition heard = audition(kit, "", speeds);
+    ASSERT_EQ(heard.rows.size(), 4u);  // head and rim of two drums
+    for (const AuditionRow& row : heard.rows)
+        // A wave of 0.5; at 8 m/s as it is, at 1 m/s (velocity 30) (30/127)^2 of it; no pan law is louder than 1.
+        EXPECT_NEAR(level_of(heard, row, 1).peak_db - level_of(heard, row, 0).peak_db,
+                    40 * std::log10(127.0 / 30), 0.01);
+    EXPECT_EQ(audition(kit, "tom", speeds).rows.size(), 2u);
+    EXPECT_THROW((void)audition(kit, "tim", speeds), BadInput);
+}
+
+}  // namespace
+}  // namespace app

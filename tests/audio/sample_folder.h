@@ -1,0 +1,58 @@
+#pragma once
+#include <gtest/gtest.h>
+#include <sndfile.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "audio/samples.h"
+
+/// A folder of sounds for as long as a test needs it.
+class SampleFolder {
+public:
+    SampleFolder() : path_(testing::TempDir() + "musicworld-samples-" + std::to_string(getpid())) {
+        std::filesystem::remove_all(path_);
+        std::filesystem::create_directories(path_);
+    }
+    ~SampleFolder() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    SampleFolder(const SampleFolder&) = delete;
+    SampleFolder& operator=(const SampleFolder&) = delete;
+
+    [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+    std::filesystem::path text(const std::string& name, const std::string& text) const {
+        std::ofstream(path_ / name, std::ios::binary) << text;
+        return path_ / name;
+    }
+    /// 32-bit float WAV, or 24-bit FLAC by its name.
+    std::filesystem::path sound(const std::string& name, const std::vector<float>& samples, int channels = 1,
+                                int rate_hz = 48000) const {
+        SF_INFO info{};
+        info.channels = channels, info.samplerate = rate_hz;
+        info.format =
+            name.ends_with(".flac") ? SF_FORMAT_FLAC | SF_FORMAT_PCM_24 : SF_FORMAT_WAV | SF_FORMAT_FLOAT;
+        SNDFILE* file = sf_open((path_ / name).c_str(), SFM_WRITE, &info);
+        EXPECT_NE(file, nullptr);
+        sf_writef_float(file, samples.data(), static_cast<sf_count_t>(samples.size()) / channels);
+        sf_close(file);
+        return path_ / name;
+    }
+
+private:
+    std::filesystem::path path_;
+};
+
+/// What reading these samples complains of; empty: nothing.
+inline std::string fault_of(const std::filesystem::path& file, const std::vector<int>& keys = {38}) {
+    try {
+        (void)audio::read_samples(file, keys);
+    } catch (const audio::SampleError& fault) {
+        return fault.what();
+    }
+    return "";
+}
