@@ -14,12 +14,13 @@ namespace render {
     X(PFNGLBINDRENDERBUFFERPROC, BindRenderbuffer)                             \
     X(PFNGLBINDTEXTUREPROC, BindTexture)                                       \
     X(PFNGLBINDVERTEXARRAYPROC, BindVertexArray)                               \
-    X(PFNGLBLITFRAMEBUFFERPROC, BlitFramebuffer)                               \
     X(PFNGLBUFFERDATAPROC, BufferData)                                         \
     X(PFNGLBUFFERSUBDATAPROC, BufferSubData)                                   \
     X(PFNGLCHECKFRAMEBUFFERSTATUSPROC, CheckFramebufferStatus)                 \
     X(PFNGLCLEARPROC, Clear)                                                   \
     X(PFNGLCLEARCOLORPROC, ClearColor)                                         \
+    X(PFNGLCLEARDEPTHPROC, ClearDepth)                                         \
+    X(PFNGLCOLORMASKPROC, ColorMask)                                           \
     X(PFNGLCOMPILESHADERPROC, CompileShader)                                   \
     X(PFNGLCREATEPROGRAMPROC, CreateProgram)                                   \
     X(PFNGLCREATESHADERPROC, CreateShader)                                     \
@@ -54,9 +55,11 @@ namespace render {
     X(PFNGLREADBUFFERPROC, ReadBuffer)                                         \
     X(PFNGLREADPIXELSPROC, ReadPixels)                                         \
     X(PFNGLRENDERBUFFERSTORAGEMULTISAMPLEPROC, RenderbufferStorageMultisample) \
+    X(PFNGLSCISSORPROC, Scissor)                                               \
     X(PFNGLSHADERSOURCEPROC, ShaderSource)                                     \
     X(PFNGLTEXBUFFERPROC, TexBuffer)                                           \
     X(PFNGLTEXIMAGE2DPROC, TexImage2D)                                         \
+    X(PFNGLTEXIMAGE2DMULTISAMPLEPROC, TexImage2DMultisample)                   \
     X(PFNGLTEXPARAMETERIPROC, TexParameteri)                                   \
     X(PFNGLUNIFORM1FPROC, Uniform1f)                                           \
     X(PFNGLUNIFORM1IPROC, Uniform1i)                                           \

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "shaders.h"
+
 namespace render {
 
 void require_complete(const GlFunctions& gl, const char* what, int width, int height) {
@@ -19,78 +21,103 @@ GLuint make_framebuffer(const GlFunctions& gl) {
     return framebuffer;
 }
 
-GLuint make_color_texture(const GlFunctions& gl, int width, int height) {
+GLuint make_texture(const GlFunctions& gl, GLenum format, int width, int height) {
     GLuint texture = 0;
     gl.GenTextures(1, &texture);
     gl.BindTexture(GL_TEXTURE_2D, texture);
-    gl.TexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, width, height, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+    gl.TexImage2D(GL_TEXTURE_2D, 0, static_cast<GLint>(format), width, height, 0,
+                  format == GL_R32F ? GL_RED : GL_RGBA, format == GL_R32F ? GL_FLOAT : GL_UNSIGNED_BYTE,
+                  nullptr);
     gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     return texture;
 }
 
-PictureTarget::PictureTarget(const GlFunctions& gl, int width, int height, int samples)
+PictureTarget::PictureTarget(const GlFunctions& gl, int width, int height, bool multisampling)
     : gl_(gl),
       width_(width),
       height_(height),
-      rgba_(std::size_t{4} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
-    GLint most = 0;
-    gl_.GetIntegerv(GL_MAX_SAMPLES, &most);
-    const GLsizei used = samples <= 1 ? 0 : std::min(samples, most);
-    const auto attach_buffer = [&](GLenum point, GLenum format, GLsizei count) {
+      tile_program_(gl, shaders::tile_vertex(), shaders::tile_fragment()),
+      quads_(gl),
+      objects_kind_(multisampling ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D),
+      rgb_(std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+    const auto attach_buffer = [&](GLenum point, GLenum format, GLsizei samples) {
         GLuint buffer = 0;
         gl_.GenRenderbuffers(1, &buffer);
         gl_.BindRenderbuffer(GL_RENDERBUFFER, buffer);
-        gl_.RenderbufferStorageMultisample(GL_RENDERBUFFER, count, format, width_, height_);
+        gl_.RenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, width_, height_);
         gl_.FramebufferRenderbuffer(GL_FRAMEBUFFER, point, GL_RENDERBUFFER, buffer);
     };
     picture_ = make_framebuffer(gl_);
     attach_buffer(GL_COLOR_ATTACHMENT0, GL_RGBA8, 0);
     require_complete(gl_, "picture", width, height);
-    objects_texture_ = make_color_texture(gl_, width, height);
-    sampled_ = objects_ = make_framebuffer(gl_);
-    gl_.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, objects_texture_, 0);
-    if (used > 0) {
-        sampled_ = make_framebuffer(gl_);
-        attach_buffer(GL_COLOR_ATTACHMENT0, GL_RGBA8, used);
+    if (multisampling) {
+        gl_.GenTextures(1, &objects_texture_);
+        gl_.BindTexture(objects_kind_, objects_texture_);
+        gl_.TexImage2DMultisample(objects_kind_, shaders::kSamples, GL_RGBA8, width, height, GL_TRUE);
+    } else {
+        objects_texture_ = make_texture(gl_, GL_RGBA8, width, height);
     }
-    attach_buffer(GL_DEPTH_ATTACHMENT, GL_DEPTH_COMPONENT32F, used);
+    objects_ = make_framebuffer(gl_);
+    gl_.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, objects_kind_, objects_texture_, 0);
+    attach_buffer(GL_DEPTH_ATTACHMENT, GL_DEPTH_COMPONENT32F, multisampling ? shaders::kSamples : 0);
     require_complete(gl_, "picture", width, height);
+    gl_.Disable(GL_SCISSOR_TEST);
+    gl_.ClearDepth(0);
+    gl_.Clear(GL_DEPTH_BUFFER_BIT);
+    gl_.ClearDepth(1);
 }
 
-void PictureTarget::begin_objects() const {
-    gl_.BindFramebuffer(GL_FRAMEBUFFER, sampled_);
+void PictureTarget::set_depth(float depth) const {
+    tile_program_.use();
+    tile_program_.set("depth", depth);
+    gl_.DepthFunc(GL_ALWAYS);
+    quads_.draw();
+    gl_.DepthFunc(GL_LESS);
+}
+
+void PictureTarget::begin_objects(const TileMask& mask) {
+    gl_.BindFramebuffer(GL_FRAMEBUFFER, objects_);
     gl_.Viewport(0, 0, width_, height_);
-    gl_.ClearColor(0, 0, 0, 0);
-    gl_.Clear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+    quads_.take(mask);
+    set_depth(1);
 }
 
-void PictureTarget::begin_background(GLuint objects_unit) const {
-    if (objects_ != sampled_) {
-        gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, sampled_);
-        gl_.BindFramebuffer(GL_DRAW_FRAMEBUFFER, objects_);
-        gl_.BlitFramebuffer(0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT, GL_NEAREST);
-    }
+void PictureTarget::end_objects() const {
+    gl_.ColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
+    set_depth(0);
+    gl_.ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+}
+
+const TileQuads& PictureTarget::begin_picture(const TileMask& mask, GLuint objects_unit) {
     gl_.ActiveTexture(GL_TEXTURE0 + objects_unit);
-    gl_.BindTexture(GL_TEXTURE_2D, objects_texture_);
+    gl_.BindTexture(objects_kind_, objects_texture_);
     gl_.BindFramebuffer(GL_FRAMEBUFFER, picture_);
+    gl_.Viewport(0, 0, width_, height_);
+    quads_.take(mask);
+    return quads_;
 }
 
-void PictureTarget::read(Image& image) {
-    gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, picture_);
-    gl_.ReadPixels(0, 0, width_, height_, GL_RGBA, GL_UNSIGNED_BYTE, rgba_.data());
+void PictureTarget::read(const PixelBox& box, Image& image) {
+    if (!box.empty()) {
+        const auto width = static_cast<std::size_t>(box.right - box.left);
+        rgba_.resize(4 * width * static_cast<std::size_t>(box.top - box.bottom));
+        gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, picture_);
+        gl_.ReadPixels(box.left, box.bottom, box.right - box.left, box.top - box.bottom, GL_RGBA,
+                       GL_UNSIGNED_BYTE, rgba_.data());
+        for (int y = box.bottom; y < box.top; ++y) {
+            const std::uint8_t* from = rgba_.data() + 4 * width * static_cast<std::size_t>(y - box.bottom);
+            std::uint8_t* to =
+                rgb_.data() + 3 * (static_cast<std::ptrdiff_t>(height_ - 1 - y) * width_ + box.left);
+            // Four bytes at a time, the fourth overwritten by the next pixel; the last pixel of a row has room
+            // for three.
+            for (std::size_t x = 0; x + 1 < width; ++x, from += 4, to += 3) std::copy_n(from, 4, to);
+            std::copy_n(from, 3, to);
+        }
+    }
     image.width = width_;
     image.height = height_;
-    const auto width = static_cast<std::size_t>(width_), height = static_cast<std::size_t>(height_);
-    image.rgb.resize(3 * width * height);
-    for (std::size_t y = 0; y < height; ++y) {
-        const std::uint8_t* from = rgba_.data() + 4 * width * (height - 1 - y);
-        std::uint8_t* to = image.rgb.data() + 3 * width * y;
-        // Four bytes at a time, the fourth overwritten by the next pixel; the last pixel of a row has room
-        // for three.
-        for (std::size_t x = 0; x + 1 < width; ++x, from += 4, to += 3) std::copy_n(from, 4, to);
-        std::copy_n(from, 3, to);
-    }
+    image.rgb = rgb_;
 }
 
 ShadowTarget::ShadowTarget(const GlFunctions& gl, int size) : gl_(gl), size_(std::max(size, 1)) {
@@ -109,12 +136,17 @@ ShadowTarget::ShadowTarget(const GlFunctions& gl, int size) : gl_(gl), size_(std
     gl_.DrawBuffer(GL_NONE);
     gl_.ReadBuffer(GL_NONE);
     require_complete(gl_, "shadow", size_, size_);
-    begin();
+    gl_.Disable(GL_SCISSOR_TEST);
+    gl_.Clear(GL_DEPTH_BUFFER_BIT);
 }
 
 void ShadowTarget::begin() const {
     gl_.BindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
     gl_.Viewport(0, 0, size_, size_);
+}
+
+void ShadowTarget::begin(const PixelBox& box) const {
+    gl_.Scissor(box.left, box.bottom, box.right - box.left, box.top - box.bottom);
     gl_.Clear(GL_DEPTH_BUFFER_BIT);
 }
 

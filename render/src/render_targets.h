@@ -1,39 +1,53 @@
 #pragma once
 #include "gl_functions.h"
+#include "gl_program.h"
 #include "render/scene.h"
+#include "tile_mask.h"
+#include "tile_quads.h"
 
 namespace render {
 
-/// A texture of 8-bit display colours, read texel by texel.
-[[nodiscard]] GLuint make_color_texture(const GlFunctions& gl, int width, int height);
-[[nodiscard]] GLuint make_framebuffer(const GlFunctions& gl);  ///< bound
+/// A texture read texel by texel: GL_RGBA8 for display colours, GL_R32F.
+[[nodiscard]] GLuint make_texture(const GlFunctions& gl, GLenum format, int width, int height);
+/// Bound.
+[[nodiscard]] GLuint make_framebuffer(const GlFunctions& gl);
 /// Throws std::runtime_error unless the bound framebuffer is complete.
 void require_complete(const GlFunctions& gl, const char* what, int width, int height);
 
-/// The framebuffers of one picture. The objects are drawn with several samples per pixel over nothing (all
-/// 0), resolved into a texture, and a second pass with one sample per pixel puts them before the background:
-/// the background costs no samples. End with their context.
+/// The framebuffers of one picture, which is drawn tile by tile. The objects are drawn with several samples
+/// per pixel over nothing (all 0); a second pass with one sample per pixel takes their mean and puts it before
+/// the background: the background costs no samples. Tiles that are not drawn keep samples and pixels.
+///
+/// Tiles are told apart by depth: it is 0, nearer than any object, except in those being drawn. End with their
+/// context.
 class PictureTarget {
 public:
-    /// Samples above what the device has are cut to that. Throws std::runtime_error when the framebuffer
-    /// cannot be made.
-    PictureTarget(const GlFunctions& gl, int width, int height, int samples);
+    /// Throws std::runtime_error when the framebuffer cannot be made.
+    PictureTarget(const GlFunctions& gl, int width, int height, bool multisampling);
 
-    /// Cleared; objects are drawn from now on.
-    void begin_objects() const;
-    /// Resolves the objects' samples into the texture of this unit; from now on the background is drawn
-    /// (every pixel, no depth).
-    void begin_background(GLuint objects_unit) const;
-    /// Copies the picture out, top row first.
-    void read(Image& image);
+    /// For the uniforms that the renderer sets in all shaders.
+    [[nodiscard]] const GlProgram& program() const { return tile_program_; }
+
+    /// Empties the mask's tiles; objects are drawn from now on, in these tiles only.
+    void begin_objects(const TileMask& mask);
+    void end_objects() const;
+    /// Binds the objects' samples to the texture unit; from now on pixels are drawn (no depth), by the tiles'
+    /// rectangles.
+    [[nodiscard]] const TileQuads& begin_picture(const TileMask& mask, GLuint objects_unit);
+    /// The picture, top row first; what has changed lies within the box.
+    void read(const PixelBox& box, Image& image);
 
 private:
+    void set_depth(float depth) const;
+
     const GlFunctions& gl_;
     int width_, height_;
-    GLuint sampled_ = 0, objects_ = 0,
-           picture_ = 0;  ///< framebuffers; the first two are the same without multisampling
-    GLuint objects_texture_ = 0;
-    std::vector<std::uint8_t> rgba_;  ///< bottom row first
+    GlProgram tile_program_;
+    TileQuads quads_;
+    GLenum objects_kind_;  ///< of texture
+    GLuint objects_ = 0, picture_ = 0, objects_texture_ = 0;
+    std::vector<std::uint8_t> rgba_;  ///< of the box, bottom row first
+    std::vector<std::uint8_t> rgb_;   ///< of the picture, top row first
 };
 
 /// A depth picture seen from the light, for comparison look-ups. Ends with its context.
@@ -42,8 +56,10 @@ public:
     /// Size 0 keeps one texel that is always lit.
     ShadowTarget(const GlFunctions& gl, int size);
 
-    /// Cleared to "lit"; draws go here from now on.
+    /// Draws go here from now on.
     void begin() const;
+    /// Clears a box to "lit"; draws are cut to it.
+    void begin(const PixelBox& box) const;
     void bind(GLuint unit) const;
 
 private:

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "changes.h"
 #include "gl_functions.h"
 #include "gl_program.h"
 #include "osmesa_context.h"
@@ -9,14 +10,28 @@
 #include "scene_geometry.h"
 #include "shaders.h"
 #include "stage.h"
+#include "tile_mask.h"
 #include "view.h"
 
 namespace render {
 namespace {
 
 constexpr GLuint kMatrixUnit = 0, kShadowUnit = 1, kObjectsUnit = 2, kLitUnit = 3, kDarkUnit = 4,
-                 kModesUnit = 5;
-constexpr int kMostPixels = 8192;  // pixels
+                 kModesUnit = 5, kOpenUnit = 6;
+/// Balls of a radius below this share of the distance from the eye to the target darken the floor by less
+/// than one of 255 levels, unless they lie on it.
+constexpr float kLeastBall = 0.02f;
+constexpr float kShadowShift = 2.5f;  // of a receiver along its normal, more than the filter reaches [texels]
+constexpr int kMostPixels = 8192;     // pixels
+
+bool looks_somewhere(const Camera& camera) {
+    return camera.eye.allFinite() && camera.target.allFinite() &&
+           (camera.target - camera.eye).norm() > 1e-6f && camera.vertical_fov_deg >= 1 &&
+           camera.vertical_fov_deg <= 150;
+}
+constexpr const char* kBadCamera =
+    "camera: error: found eye, target or field of view out of range, expected two places and 1 to 150 "
+    "degrees";
 
 SceneDescription checked(const SceneDescription& scene) {
     if (scene.width < 1 || scene.height < 1 || scene.width > kMostPixels || scene.height > kMostPixels) {
@@ -27,14 +42,7 @@ SceneDescription checked(const SceneDescription& scene) {
         throw std::runtime_error("shadow: error: found a size of " + std::to_string(scene.shadow_size) +
                                  ", expected 0 to 8192");
     }
-    const Camera& camera = scene.camera;
-    const bool looks =
-        camera.eye.allFinite() && camera.target.allFinite() && (camera.target - camera.eye).norm() > 1e-6f;
-    if (!looks || !(camera.vertical_fov_deg >= 1 && camera.vertical_fov_deg <= 150)) {
-        throw std::runtime_error(
-            "camera: error: found eye, target or field of view out of range, expected two places and 1 to "
-            "150 degrees");
-    }
+    if (!looks_somewhere(scene.camera)) throw std::runtime_error(kBadCamera);
     if (!scene.key_light.towards_light.allFinite() || scene.key_light.towards_light.norm() < 1e-6f) {
         throw std::runtime_error("key light: error: found no direction, expected one");
     }
@@ -47,69 +55,116 @@ struct Renderer::Implementation {
     explicit Implementation(const SceneDescription& description);
 
     DrawTimes draw(const FrameState& frame, Image& image);
+    [[nodiscard]] Views views() const;
+    void look_from(const Camera& from);
+    void draw_shadow();
+    void draw_objects();
     void set_uniforms(const GlProgram& program) const;
 
     SceneDescription scene;
+    Camera camera;
     OsmesaContext context;
     GlFunctions gl;
     Eigen::Matrix4f clip, light;  ///< clip space of the camera and of the light, from world
-    float texel;                  ///< of the shadow map [m]
+    Eigen::Matrix4f on_map;  ///< of the shadow map: texture coordinates and depth, all in [0, 1], from world
+    float texel;             ///< of the shadow map [m], 0: no shadow
+    bool multisampling;
     PictureTarget picture;
     ShadowTarget shadow;
     SceneGeometry geometry;
     GlProgram shadow_program, object_program;
     Stage stage;
+    Changes changes;
 };
+
+namespace {
+
+float aspect_of(const SceneDescription& scene) {
+    return static_cast<float>(scene.width) / static_cast<float>(scene.height);
+}
+
+/// Of the shadow map [m].
+float texel_of(const SceneDescription& scene) {
+    if (scene.shadow_size == 0) return 0;
+    return 2 * shadow_reach(scene.camera, aspect_of(scene)) / static_cast<float>(scene.shadow_size);
+}
+
+}  // namespace
 
 Renderer::Implementation::Implementation(const SceneDescription& description)
     : scene(checked(description)),
-      picture(gl, scene.width, scene.height, scene.samples),
+      camera(scene.camera),
+      clip(clip_from_world(scene.camera, aspect_of(scene))),
+      light(light_from_world(scene.key_light, scene.camera.target,
+                             shadow_reach(scene.camera, aspect_of(scene)))),
+      on_map((Eigen::Translation3f(0.5f, 0.5f, 0.5f) * Eigen::Scaling(0.5f)).matrix() * light),
+      texel(texel_of(scene)),
+      multisampling(scene.samples > 1),
+      picture(gl, scene.width, scene.height, multisampling),
       shadow(gl, scene.shadow_size),
       geometry(gl, scene),
       shadow_program(gl, shaders::shadow_vertex(geometry.bends()), shaders::shadow_fragment()),
       object_program(gl, shaders::object_vertex(geometry.bends()),
                      shaders::object_fragment(!scene.solids.empty())),
-      stage(gl, scene) {
-    const float aspect = static_cast<float>(scene.width) / static_cast<float>(scene.height);
-    const float reach = shadow_reach(scene.camera, aspect);
-    clip = clip_from_world(scene.camera, aspect);
-    light = light_from_world(scene.key_light, scene.camera.target, reach);
-    texel = scene.shadow_size > 0 ? 2 * reach / static_cast<float>(scene.shadow_size) : 0;
+      stage(gl, scene, multisampling),
+      changes(views(), geometry.bounds()) {
     gl.Enable(GL_CULL_FACE);
-    gl.DepthFunc(GL_LEQUAL);
+    gl.DepthFunc(GL_LESS);
     gl.PolygonOffset(1.5f, 2.0f);  // shadow map only
-    set_uniforms(object_program);
-    for (const GlProgram* program : stage.programs()) set_uniforms(*program);
     gl.Disable(GL_DEPTH_TEST);
-    stage.bake(kLitUnit, kDarkUnit);
+    look_from(scene.camera);
     shadow_program.use();
     shadow_program.set("matrices", static_cast<int>(kMatrixUnit));
     shadow_program.set("modes", static_cast<int>(kModesUnit));
     shadow_program.set("clip_from_light_world", light);
+    shadow.bind(kShadowUnit);
+}
+
+Views Renderer::Implementation::views() const {
+    return {clip,
+            light,
+            scene.width,
+            scene.height,
+            scene.shadow_size,
+            scene.room.floor_height,
+            shaders::kShadowFilter,
+            kShadowShift * texel,
+            shaders::kBeyondObject};
+}
+
+/// Of what was drawn from elsewhere nothing is kept.
+void Renderer::Implementation::look_from(const Camera& from) {
+    camera = from;
+    clip = clip_from_world(camera, aspect_of(scene));
+    changes = Changes(views(), geometry.bounds());
+    set_uniforms(object_program);
+    set_uniforms(picture.program());
+    for (const GlProgram* program : stage.programs()) set_uniforms(*program);
+    stage.bake(clip, kLitUnit, kDarkUnit, kOpenUnit);
 }
 
 void Renderer::Implementation::set_uniforms(const GlProgram& program) const {
     const Room& room = scene.room;
     const KeyLight& key = scene.key_light;
     const auto width = static_cast<float>(scene.width), height = static_cast<float>(scene.height);
-    const Eigen::Affine3f to_texture = Eigen::Translation3f(0.5f, 0.5f, 0.5f) * Eigen::Scaling(0.5f);
-    const Eigen::Vector3f key_light = 1.9f * key.strength * key.color;
+    const Eigen::Vector3f key_light = 1.6f * key.strength * key.color;
     program.use();
     program.set("picture", Eigen::Vector3f(width, height, 4 / (width * width + height * height)));
     program.set("clip_from_world", clip);
-    program.set("shadow_from_world", Eigen::Matrix4f(to_texture.matrix() * light));
+    program.set("shadow_from_world", on_map);
     program.set("shadow_map", static_cast<int>(kShadowUnit));
     program.set("shadow_texel", scene.shadow_size > 0 ? 1 / static_cast<float>(scene.shadow_size) : 0.0f);
-    program.set("shadow_offset", 1.5f * texel);
+    program.set("shadow_offset", kShadowShift * texel);
     program.set("matrices", static_cast<int>(kMatrixUnit));
     program.set("modes", static_cast<int>(kModesUnit));
     program.set("objects", static_cast<int>(kObjectsUnit));
     program.set("lit_floor", static_cast<int>(kLitUnit));
     program.set("dark_floor", static_cast<int>(kDarkUnit));
+    program.set("open_floor", static_cast<int>(kOpenUnit));
     program.set("floor_color", room.floor_color);
     program.set("wall_color", room.wall_color);
     program.set("floor_height", room.floor_height);
-    program.set("eye", scene.camera.eye);
+    program.set("eye", camera.eye);
     program.set("towards_light", Eigen::Vector3f(key.towards_light.normalized()));
     program.set("key_light", key_light);
     program.set("sky_light", Eigen::Vector3f(0.13f, 0.13f, 0.15f));
@@ -118,33 +173,57 @@ void Renderer::Implementation::set_uniforms(const GlProgram& program) const {
     program.set("fill_light", Eigen::Vector3f(0.07f, 0.085f, 0.13f));
 }
 
-DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) {
-    context.make_current();
-    geometry.update(frame, scene.camera.eye);
+void Renderer::Implementation::draw_shadow() {
+    shadow.begin();
     gl.Enable(GL_DEPTH_TEST);
-    if (scene.shadow_size > 0) {
-        shadow.begin();
-        gl.Enable(GL_POLYGON_OFFSET_FILL);
-        gl.Enable(GL_DEPTH_CLAMP);  // what is nearer to the light than the map's depth still casts
+    gl.Enable(GL_SCISSOR_TEST);
+    gl.Enable(GL_POLYGON_OFFSET_FILL);
+    gl.Enable(GL_DEPTH_CLAMP);  // what is nearer to the light than the map's depth still casts
+    for (const PixelBox& box : changes.shadow()) {
+        shadow.begin(box);
         shadow_program.use();
-        geometry.draw(kMatrixUnit, kModesUnit);
-        gl.Disable(GL_DEPTH_CLAMP);
-        gl.Disable(GL_POLYGON_OFFSET_FILL);
+        geometry.draw(kMatrixUnit, kModesUnit, [&](std::size_t object) {
+            return std::vector<PixelBox>(changes.shadow_box(object).meets(box) ? 1 : 0, box);
+        });
     }
-    shadow.bind(kShadowUnit);
-    picture.begin_objects();
+    gl.Disable(GL_DEPTH_CLAMP);
+    gl.Disable(GL_POLYGON_OFFSET_FILL);
+    gl.Disable(GL_SCISSOR_TEST);
+    gl.Disable(GL_DEPTH_TEST);
+}
+
+void Renderer::Implementation::draw_objects() {
+    gl.Enable(GL_DEPTH_TEST);
+    picture.begin_objects(changes.objects());
     object_program.use();
+    gl.Enable(GL_SCISSOR_TEST);
     gl.Enable(
         GL_CLIP_DISTANCE0);  // the floor, which is laid under the objects afterwards, hides what is below it
-    geometry.draw(kMatrixUnit, kModesUnit);
+    geometry.draw(kMatrixUnit, kModesUnit, [this](std::size_t object) { return changes.boxes(object); });
     gl.Disable(GL_CLIP_DISTANCE0);
+    gl.Disable(GL_SCISSOR_TEST);
+    picture.end_objects();
     gl.Disable(GL_DEPTH_TEST);
-    picture.begin_background(kObjectsUnit);
-    stage.draw(geometry.volume_balls(shaders::kMaxBalls));
+}
+
+DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) {
+    context.make_current();
+    const Camera& from = frame.camera ? *frame.camera : scene.camera;
+    if (!looks_somewhere(from)) throw std::invalid_argument(std::string("Renderer::draw: ") + kBadCamera);
+    const float map_texel = scene.shadow_size > 0 ? 1 / static_cast<float>(scene.shadow_size) : 0.0f;
+    geometry.update(frame, from.eye, on_map, shaders::kBeyondObject * map_texel);
+    if (from != camera) look_from(from);
+    changes.update(frame);
+    if (!changes.shadow().empty()) draw_shadow();
+    if (!changes.objects().empty()) draw_objects();
+    const float least = kLeastBall * (scene.camera.target - scene.camera.eye).norm();
+    TileMask drawn = changes.picture();
+    if (stage.darken(geometry.volume_balls(shaders::kMaxBalls, least))) drawn.fill();
+    if (!drawn.empty()) stage.draw(picture.begin_picture(drawn, kObjectsUnit));
     DrawTimes times;
     gl.Finish();
     times.drawn = std::chrono::steady_clock::now();
-    picture.read(image);
+    picture.read(drawn.bounds(), image);
     times.read = std::chrono::steady_clock::now();
     return times;
 }
@@ -156,6 +235,10 @@ Renderer::~Renderer() = default;
 
 DrawTimes Renderer::draw(const FrameState& frame, Image& image) {
     return implementation_->draw(frame, image);
+}
+
+void Renderer::forget() {
+    implementation_->changes.forget();
 }
 
 std::string Renderer::version() const {

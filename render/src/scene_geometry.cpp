@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <stdexcept>
+#include <tuple>
 
 namespace render {
 namespace {
@@ -56,6 +57,17 @@ void append_object(const Mesh& mesh, const Look& look, std::size_t object, GLint
     }
 }
 
+using Reach = std::vector<Eigen::Vector3f>;
+
+/// Of each mode: how far it moves a vertex at most, by component.
+Reach reach_of(const ModeShapes& modes) {
+    const auto count = static_cast<std::size_t>(modes.count);
+    Reach reach(count, Eigen::Vector3f::Zero());
+    for (std::size_t i = 0; i < modes.displacement.size(); ++i)
+        reach[i % count] = reach[i % count].cwiseMax(modes.displacement[i].cwiseAbs());
+    return reach;
+}
+
 /// The cofactor matrix: the inverse transpose times the determinant, defined for flattened bodies too.
 Eigen::Matrix3f cofactors(const Eigen::Matrix3f& m) {
     Eigen::Matrix3f result;
@@ -96,18 +108,24 @@ SceneGeometry::SceneGeometry(const GlFunctions& gl, const SceneDescription& scen
         meshes.push_back(solid >= 0 ? &scene.solids[static_cast<std::size_t>(solid)].mesh
                                     : &loaded[mesh_of_object[i]]);
     }
-    make_buffers(scene.objects, meshes);
+    make_buffers(scene, meshes);
 }
 
-void SceneGeometry::make_buffers(const std::vector<SceneObject>& objects,
-                                 const std::vector<const Mesh*>& meshes) {
+void SceneGeometry::make_buffers(const SceneDescription& scene, const std::vector<const Mesh*>& meshes) {
+    const std::vector<SceneObject>& objects = scene.objects;
     std::vector<Vertex> vertices;
     std::vector<GLuint> indices;
     for (std::size_t i = 0; i < objects.size(); ++i) {
         const Mesh& mesh = *meshes[i];
-        const Eigen::Vector3f center = mesh.bounds().center();
-        objects_.push_back({static_cast<GLsizei>(indices.size()), static_cast<GLsizei>(3 * mesh.triangles()),
-                            center, volume_of(mesh, center), modes_.count(objects[i].solid)});
+        const Eigen::AlignedBox3f box = mesh.bounds();
+        const int solid = objects[i].solid;
+        objects_.push_back(
+            {static_cast<GLsizei>(indices.size()),
+             static_cast<GLsizei>(3 * mesh.triangles()),
+             {box, solid < 0 ? Reach{} : reach_of(scene.solids[static_cast<std::size_t>(solid)].modes)},
+             volume_of(mesh, box.center()),
+             modes_.count(solid),
+             objects[i].stands});
         append_object(mesh, objects[i].look, i, modes_.first_texel(objects[i].solid),
                       modes_.texels_a_vertex(objects[i].solid), vertices, indices);
     }
@@ -136,14 +154,27 @@ void SceneGeometry::make_buffers(const std::vector<SceneObject>& objects,
     gl_.GenTextures(1, &matrix_texture_);
 }
 
-void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye) {
+/// Where the object lies in the shadow map, a little more: what of it a pixel may look up.
+void SceneGeometry::add_box(const FrameState& frame, std::size_t object,
+                            const Eigen::Matrix4f& shadow_from_world, float beyond) {
+    const Eigen::AlignedBox3f box = objects_[object].bounds.grown(frame, object);
+    const Eigen::Matrix4f matrix = shadow_from_world * frame.world_from_object[object];
+    const Eigen::Vector3f center = (matrix * box.center().homogeneous()).head<3>();
+    const Eigen::Vector3f half =
+        0.5f * (matrix.topLeftCorner<3, 3>().cwiseAbs() * box.sizes()) + Eigen::Vector3f::Constant(beyond);
+    matrix_rows_[8 * object + 6].head<3>() = center - half;
+    matrix_rows_[8 * object + 7].head<3>() = center + half;
+}
+
+void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye,
+                           const Eigen::Matrix4f& shadow_from_world, float beyond) {
     if (frame.world_from_object.size() != objects_.size() || frame.visible.size() != objects_.size()) {
         throw std::invalid_argument("Renderer::draw: found a frame of " +
                                     std::to_string(frame.world_from_object.size()) + " matrices, expected " +
                                     std::to_string(objects_.size()));
     }
     drawn_.clear();
-    matrix_rows_.assign(6 * objects_.size(), Eigen::Vector4f::Zero());
+    matrix_rows_.assign(8 * objects_.size(), Eigen::Vector4f::Zero());
     for (std::size_t i = 0; i < objects_.size(); ++i) {
         if (!frame.visible[i]) continue;
         const Eigen::Matrix4f& world_from_object = frame.world_from_object[i];
@@ -156,16 +187,14 @@ void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye) 
         const Eigen::Matrix3f normals =
             determinant < 0 ? Eigen::Matrix3f(-cofactors(linear)) : cofactors(linear);
         for (int row = 0; row < 3; ++row) {
-            matrix_rows_[6 * i + static_cast<std::size_t>(row)] = world_from_object.row(row).transpose();
-            matrix_rows_[6 * i + 3 + static_cast<std::size_t>(row)].head<3>() = normals.row(row).transpose();
+            matrix_rows_[8 * i + static_cast<std::size_t>(row)] = world_from_object.row(row).transpose();
+            matrix_rows_[8 * i + 3 + static_cast<std::size_t>(row)].head<3>() = normals.row(row).transpose();
         }
         add_modal(frame, i);
-        Drawn drawn{i, 0, determinant < 0, Eigen::Vector4f::Zero()};
-        drawn.ball.head<3>() = linear * objects_[i].center + world_from_object.topRightCorner<3, 1>();
-        drawn.ball.w() =
-            std::cbrt(objects_[i].volume * std::abs(determinant) * 0.75f / std::numbers::pi_v<float>);
-        drawn.distance = (drawn.ball.head<3>() - eye).norm();
-        drawn_.push_back(drawn);
+        add_box(frame, i, shadow_from_world, beyond);
+        const Eigen::Vector3f center =
+            linear * objects_[i].bounds.box.center() + world_from_object.topRightCorner<3, 1>();
+        drawn_.push_back({i, (center - eye).norm(), determinant < 0, world_from_object});
     }
     std::stable_sort(drawn_.begin(), drawn_.end(),
                      [](const Drawn& a, const Drawn& b) { return a.distance < b.distance; });
@@ -184,15 +213,15 @@ void SceneGeometry::add_modal(const FrameState& frame, std::size_t object) {
                                     std::to_string(object) + ", expected " + std::to_string(count) +
                                     " finite ones");
     }
-    matrix_rows_[6 * object + 3].w() = static_cast<float>(matrix_rows_.size());
-    matrix_rows_[6 * object + 4].w() = static_cast<float>(count);
+    matrix_rows_[8 * object + 3].w() = static_cast<float>(matrix_rows_.size());
+    matrix_rows_[8 * object + 4].w() = static_cast<float>(count);
     for (int k = 0; k < count; ++k) {
         if (k % 4 == 0) matrix_rows_.push_back(Eigen::Vector4f::Zero());
         matrix_rows_.back()[k % 4] = frame.modal[object][k];
     }
 }
 
-void SceneGeometry::draw(GLuint matrix_unit, GLuint mode_unit) const {
+void SceneGeometry::draw(GLuint matrix_unit, GLuint mode_unit, const BoxesOf& boxes_of) const {
     modes_.bind(mode_unit);
     gl_.ActiveTexture(GL_TEXTURE0 + matrix_unit);
     gl_.BindTexture(GL_TEXTURE_BUFFER, matrix_texture_);
@@ -201,17 +230,35 @@ void SceneGeometry::draw(GLuint matrix_unit, GLuint mode_unit) const {
     for (const Drawn& drawn : drawn_) {
         const Object& object = objects_[drawn.object];
         gl_.FrontFace(drawn.mirrored ? GL_CW : GL_CCW);
-        gl_.DrawElements(GL_TRIANGLES, object.index_count, GL_UNSIGNED_INT,
-                         offset(static_cast<std::size_t>(object.first_index) * sizeof(GLuint)));
+        for (const PixelBox& box : boxes_of(drawn.object)) {
+            gl_.Scissor(box.left, box.bottom, box.right - box.left, box.top - box.bottom);
+            gl_.DrawElements(GL_TRIANGLES, object.index_count, GL_UNSIGNED_INT,
+                             offset(static_cast<std::size_t>(object.first_index) * sizeof(GLuint)));
+        }
     }
     gl_.FrontFace(GL_CCW);
 }
 
-std::vector<Eigen::Vector4f> SceneGeometry::volume_balls(std::size_t limit) const {
+std::vector<ObjectBounds> SceneGeometry::bounds() const {
+    std::vector<ObjectBounds> all;
+    for (const Object& object : objects_) all.push_back(object.bounds);
+    return all;
+}
+
+std::vector<Eigen::Vector4f> SceneGeometry::volume_balls(std::size_t limit, float least) const {
     std::vector<Eigen::Vector4f> balls;
-    for (const Drawn& drawn : drawn_) balls.push_back(drawn.ball);
-    std::stable_sort(balls.begin(), balls.end(),
-                     [](const Eigen::Vector4f& a, const Eigen::Vector4f& b) { return a.w() > b.w(); });
+    for (const Drawn& drawn : drawn_) {
+        const Object& object = objects_[drawn.object];
+        const Eigen::Matrix4f matrix = object.stands.value_or(drawn.world_from_object);
+        const float volume = object.volume * std::abs(matrix.topLeftCorner<3, 3>().determinant());
+        Eigen::Vector4f ball = matrix * object.bounds.box.center().homogeneous();
+        ball.w() = std::cbrt(volume * 0.75f / std::numbers::pi_v<float>);
+        if (ball.w() >= least) balls.push_back(ball);
+    }
+    // By place where sizes are equal, as the order of drawing follows the objects' motion.
+    std::sort(balls.begin(), balls.end(), [](const Eigen::Vector4f& a, const Eigen::Vector4f& b) {
+        return std::tuple(-a.w(), a.x(), a.y(), a.z()) < std::tuple(-b.w(), b.x(), b.y(), b.z());
+    });
     balls.resize(std::min(limit, balls.size()));
     return balls;
 }

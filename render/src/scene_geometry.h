@@ -1,6 +1,9 @@
 #pragma once
+#include <functional>
+#include <optional>
 #include <vector>
 
+#include "changes.h"
 #include "gl_functions.h"
 #include "mode_texture.h"
 #include "render/mesh.h"
@@ -18,17 +21,24 @@ public:
     SceneGeometry(const GlFunctions& gl, const SceneDescription& scene);
 
     /// Takes the frame's matrices, drops hidden objects and sorts the rest by distance from the eye, nearest
-    /// first. Throws std::invalid_argument for a frame that does not fit the scene or a visible object's
-    /// matrix that is not finite.
-    void update(const FrameState& frame, const Eigen::Vector3f& eye);
+    /// first. `shadow_from_world`: to texture coordinates and depth, all in [0, 1]; `beyond`: how far from its box
+    /// there an object may be looked up. Throws std::invalid_argument for a frame that does not fit the scene or a
+    /// visible object's matrix that is not finite.
+    void update(const FrameState& frame, const Eigen::Vector3f& eye, const Eigen::Matrix4f& shadow_from_world,
+                float beyond);
 
-    /// Draws what update() kept, with the program in use; the matrices and the shapes of modes are bound to
-    /// the given texture units.
-    void draw(GLuint matrix_unit, GLuint mode_unit) const;
+    /// Where an object, by its number, is drawn.
+    using BoxesOf = std::function<std::vector<PixelBox>(std::size_t)>;
+    /// Draws what update() kept, each object cut to its boxes, with the program in use; the matrices and the
+    /// shapes of modes are bound to the given texture units.
+    void draw(GLuint matrix_unit, GLuint mode_unit, const BoxesOf& boxes_of) const;
+    /// Of all objects, in order.
+    [[nodiscard]] std::vector<ObjectBounds> bounds() const;
     [[nodiscard]] bool bends() const { return !modes_.empty(); }
 
-    /// (centre, radius) of balls with the volumes of the visible objects, largest first, at most `limit`.
-    [[nodiscard]] std::vector<Eigen::Vector4f> volume_balls(std::size_t limit) const;
+    /// (centre, radius) of balls with the volumes of the visible objects where these stand, largest first, at
+    /// most `limit`, none of a radius below `least` [m].
+    [[nodiscard]] std::vector<Eigen::Vector4f> volume_balls(std::size_t limit, float least) const;
     [[nodiscard]] std::size_t triangles() const;
 
     // Vertex attributes, as the shaders number them.
@@ -38,27 +48,30 @@ public:
 private:
     struct Object {
         GLsizei first_index, index_count;
-        Eigen::Vector3f center;  ///< of the mesh's bounds, object frame
-        float volume;            ///< of the mesh, object frame
+        ObjectBounds bounds;  ///< of its mesh
+        float volume;         ///< of the mesh, object frame
         int modes;
+        std::optional<Eigen::Matrix4f> stands;  ///< see SceneObject
     };
     struct Drawn {
         std::size_t object;
         float distance;
         bool mirrored;
-        Eigen::Vector4f ball;
+        Eigen::Matrix4f world_from_object;
     };
 
-    void make_buffers(const std::vector<SceneObject>& objects, const std::vector<const Mesh*>& meshes);
+    void make_buffers(const SceneDescription& scene, const std::vector<const Mesh*>& meshes);
     void add_modal(const FrameState& frame, std::size_t object);
+    void add_box(const FrameState& frame, std::size_t object, const Eigen::Matrix4f& shadow_from_world,
+                 float beyond);
 
     const GlFunctions& gl_;
     std::vector<Object> objects_;
     std::vector<Drawn> drawn_;
     std::vector<Eigen::Vector4f>
-        matrix_rows_;  ///< six an object: three of world_from_object, three of the normals' matrix (their
-                       ///< last places: where its modal coordinates begin, how many there are); then the
-                       ///< modal coordinates
+        matrix_rows_;  ///< eight an object: three of world_from_object, three of the normals' matrix (their
+    ///< last places: where its modal coordinates begin, how many there are), the corners of
+    ///< its box in the shadow map; then the modal coordinates
     ModeTexture modes_;
     GLuint vertex_array_ = 0, matrix_buffer_ = 0, matrix_texture_ = 0;
 };

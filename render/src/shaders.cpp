@@ -5,7 +5,7 @@ namespace {
 
 const char* const kVersion = "#version 330 core\n";
 
-/// World position of a vertex from the matrices' buffer: six texels an object.
+/// World position of a vertex from the matrices' buffer: eight texels an object.
 const char* const kObjectMatrices = R"(
 uniform samplerBuffer matrices;
 vec3 to_world(vec3 position, int object) {
@@ -80,7 +80,7 @@ float spot(vec3 at) {
 }
 )";
 
-/// Part of the key light that the shadow map lets through: the mean of comparisons of 2x2 texels at two
+/// Part of the key light that the shadow map lets through: the mean of comparisons of 2x2 texels at four
 /// places around; 1 outside the map. Look-ups are the dearest part of the fragment shaders.
 const char* const kShadow = R"(
 uniform sampler2DShadow shadow_map;
@@ -92,11 +92,9 @@ float within_map(vec3 at, float lit) {
     vec2 from_center = abs(at.xy - 0.5);
     return mix(1.0, lit, step(max(from_center.x, from_center.y), 0.495));
 }
-float shadow_light_sharp(vec3 at) {
-    return within_map(at, 0.5 * (shadow_look_up(at, vec2(0.5, 0.9)) + shadow_look_up(at, vec2(-0.5, -0.9))));
-}
-float shadow_light_soft(vec3 at) {
-    return within_map(at, 0.5 * (shadow_look_up(at, vec2(0.7, 1.1)) + shadow_look_up(at, vec2(-0.7, -1.1))));
+float shadow_light(vec3 at) {
+    return within_map(at, 0.25 * (shadow_look_up(at, vec2(0.5, 1.0)) + shadow_look_up(at, vec2(-1.0, 0.5)) +
+                                  shadow_look_up(at, vec2(-0.5, -1.0)) + shadow_look_up(at, vec2(1.0, -0.5))));
 }
 )";
 
@@ -110,14 +108,14 @@ uniform mat4 clip_from_light_world;
 )" + kObjectMatrices +
            (bending ? std::string(kBend) + R"(
 void main() {
-    int object = 6 * int(roughness_lathed_object.z);
+    int object = 8 * int(roughness_lathed_object.z);
     vec3 bent = position, normal = vec3(0.0), groove = vec3(0.0);
     bend(bent, normal, groove, object);
     gl_Position = clip_from_light_world * vec4(to_world(bent, object), 1.0);
 }
 )"
                     : R"(
-void main() { gl_Position = clip_from_light_world * vec4(to_world(position, 6 * int(roughness_lathed_object.z)), 1.0); }
+void main() { gl_Position = clip_from_light_world * vec4(to_world(position, 8 * int(roughness_lathed_object.z)), 1.0); }
 )");
 }
 
@@ -147,24 +145,24 @@ layout(location = 1) in vec3 rest_normal;
 layout(location = 2) in vec4 color_metallic;
 layout(location = 3) in vec3 roughness_lathed_object;
 uniform mat4 clip_from_world;
-uniform mat4 shadow_from_world;  // texture coordinates and depth, all in [0, 1]
-uniform float shadow_offset;     // along the normal [m]
-uniform float floor_height;      // nothing below is seen
+uniform float floor_height;  // nothing below is seen
 uniform vec3 sky_light, ground_light, fill_light;
-out vec3 v_world, v_normal, v_groove, v_shadow;
+out vec3 v_world, v_normal, v_groove;
 out vec3 v_around;  // diffuse light of the surroundings
 flat out vec4 v_color_metallic;
 flat out vec2 v_roughness_lathed;
+flat out vec3 v_least, v_most;  // of the object in the shadow map
 )" + kObjectMatrices +
            (bending ? bend_it : keep_it) + R"(
 void main() {
-    int object = 6 * int(roughness_lathed_object.z);
+    int object = 8 * int(roughness_lathed_object.z);
     vec3 position, normal, groove;
     deform(position, normal, groove, object);
     v_world = to_world(position, object);
     v_normal = normalize(rotate(normal, object + 3));
     v_groove = rotate(groove, object);
-    v_shadow = (shadow_from_world * vec4(v_world + shadow_offset * v_normal, 1.0)).xyz;
+    v_least = texelFetch(matrices, object + 6).xyz;
+    v_most = texelFetch(matrices, object + 7).xyz;
     float towards_fill = 0.5 + 0.5 * dot(v_normal, vec3(0.62, 0.25, 0.74));
     v_around = mix(ground_light, sky_light, 0.5 + 0.5 * v_normal.y);
     v_around += fill_light * (towards_fill * towards_fill);
@@ -184,12 +182,17 @@ std::string object_fragment(bool coarse) {
     // not, as the room's lights would else be mirrored in what is seen from behind.
     const std::string turn = coarse ? "    n = normalize(n - v * min(dot(n, v), 0.0));\n" : "";
     return std::string(kVersion) + R"(
-in vec3 v_world, v_normal, v_groove, v_shadow, v_around;
+in vec3 v_world, v_normal, v_groove, v_around;
 flat in vec4 v_color_metallic;
 flat in vec2 v_roughness_lathed;
+flat in vec3 v_least, v_most;
+uniform mat4 shadow_from_world;  // texture coordinates and depth, all in [0, 1]
+uniform float shadow_offset;     // along the normal [m]
 uniform vec3 eye, towards_light, key_light, sky_light, ground_light;
 )" + kPicture +
            kSpot + kShadow + R"(
+const float kMostChange = )" +
+           std::to_string(kMostChange) + R"(;
 vec3 surroundings(vec3 r, float roughness) {
     float blur = 0.08 + 0.8 * roughness;
     vec3 light = mix(ground_light, sky_light, smoothstep(-blur, blur, r.y));
@@ -214,7 +217,13 @@ void main() {
     float d = th * th / (along * along) + bh2 / (across * across) + nh * nh;
     float bound = along * across * d * d * max(lh * lh, 0.1) * (4.0 * roughness + 2.0);
     float highlight = min(1.0 / bound, 30.0);
-    vec3 key = key_light * (shadow_light_sharp(v_shadow) * spot(v_shadow) * nl);
+    // Of a triangle seen from its edge the place at the pixel's middle lies anywhere; beyond the object it is lit.
+    vec3 on_map = (shadow_from_world * vec4(v_world, 1.0)).xyz;
+    vec3 change = abs(dFdx(on_map)) + abs(dFdy(on_map));
+    bool beyond = any(lessThan(on_map, v_least)) || any(greaterThan(on_map, v_most)) ||
+                  max(max(change.x, change.y), change.z) > kMostChange * shadow_texel;
+    vec3 off_surface = on_map + mat3(shadow_from_world) * (shadow_offset * normalize(v_normal));
+    vec3 key = key_light * ((beyond ? 1.0 : shadow_light(off_surface)) * spot(on_map) * nl);
 
     vec3 grooved = normalize(mix(n, v - groove * dot(groove, v), 0.45 * lathed));
     float grazing = 1.0 - nv, grazing2 = grazing * grazing;
@@ -297,34 +306,68 @@ void main() { write_picture(backdrop(), 1.0); }
 )";
 }
 
-/// The objects' picture (colour times coverage, coverage) over the baked floor, which the shadow map and the
-/// balls darken.
-std::string floor_fragment() {
+/// How open the sky is to a point of the floor.
+std::string floor_open_fragment() {
     return std::string(kVersion) + R"(
-in vec3 v_shadow;
 in float v_open;
-uniform sampler2D objects, lit_floor, dark_floor;
 out vec4 fragment;
-)" + kShadow +
-           R"(
-void main() {
-    ivec2 at = ivec2(gl_FragCoord.xy);
-    vec4 object = texelFetch(objects, at, 0);
-    vec3 lit = texelFetch(lit_floor, at, 0).rgb * (0.7 + 0.3 * v_open);
-    vec3 dark = texelFetch(dark_floor, at, 0).rgb * v_open;
-    fragment = vec4(object.rgb + (1.0 - object.a) * mix(dark, lit, shadow_light_soft(v_shadow)), 1.0);
-}
+void main() { fragment = vec4(v_open); }
 )";
 }
 
-std::string backdrop_fragment() {
+std::string tile_vertex() {
     return std::string(kVersion) + R"(
-uniform sampler2D objects, lit_floor;
+layout(location = 0) in vec2 corner;  // [pixels]
+uniform vec3 picture;
+uniform float depth;
+void main() { gl_Position = vec4(2.0 * corner / picture.xy - 1.0, 2.0 * depth - 1.0, 1.0); }
+)";
+}
+
+std::string tile_fragment() {
+    return std::string(kVersion) + R"(
 out vec4 fragment;
+void main() { fragment = vec4(0.0); }
+)";
+}
+
+/// The objects' picture (colour times coverage, coverage) over the baked floor, which the shadow map and the
+/// sky's openness darken. Above the floor's edge both bakes are the wall and the sky is open.
+std::string picture_fragment(bool multisampling) {
+    const std::string object = multisampling ? R"(
+uniform sampler2DMS objects;
+vec4 object_at(ivec2 at) {
+    return 0.25 * (texelFetch(objects, at, 0) + texelFetch(objects, at, 1) + texelFetch(objects, at, 2) +
+                   texelFetch(objects, at, 3));
+}
+)"
+                                             : R"(
+uniform sampler2D objects;
+vec4 object_at(ivec2 at) { return texelFetch(objects, at, 0); }
+)";
+    static_assert(kSamples == 4);
+    return std::string(kVersion) + R"(
+uniform sampler2D lit_floor, dark_floor, open_floor;
+uniform mat4 shadow_from_world;
+uniform vec3 eye, ray, ray_x, ray_y;  // through the pixel (x, y): ray + x ray_x + y ray_y
+uniform float floor_height;
+out vec4 fragment;
+)" + kShadow +
+           object + R"(
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
-    vec4 object = texelFetch(objects, at, 0);
-    fragment = vec4(object.rgb + (1.0 - object.a) * texelFetch(lit_floor, at, 0).rgb, 1.0);
+    vec4 object = object_at(at);
+    vec3 light = vec3(0.0);
+    if (object.a < 1.0) {
+        vec3 along = ray + gl_FragCoord.x * ray_x + gl_FragCoord.y * ray_y;
+        float distance = clamp((floor_height - eye.y) / along.y, 0.0, 1e4);
+        vec3 shadow = (shadow_from_world * vec4(eye + distance * along, 1.0)).xyz;
+        float open = texelFetch(open_floor, at, 0).r;
+        vec3 lit = texelFetch(lit_floor, at, 0).rgb * (0.7 + 0.3 * open);
+        vec3 dark = texelFetch(dark_floor, at, 0).rgb * open;
+        light = mix(dark, lit, shadow_light(shadow));
+    }
+    fragment = vec4(object.rgb + (1.0 - object.a) * light, 1.0);
 }
 )";
 }

@@ -46,16 +46,20 @@ std::vector<GLuint> floor_triangles() {
 
 }  // namespace
 
-Stage::Stage(const GlFunctions& gl, const SceneDescription& scene)
+Stage::Stage(const GlFunctions& gl, const SceneDescription& scene, bool multisampling)
     : gl_(gl),
       width_(scene.width),
       height_(scene.height),
       floor_bake_(gl, shaders::floor_vertex(), shaders::floor_bake_fragment()),
       backdrop_bake_(gl, shaders::backdrop_vertex(), shaders::backdrop_bake_fragment()),
-      floor_(gl, shaders::floor_vertex(), shaders::floor_fragment()),
-      backdrop_(gl, shaders::backdrop_vertex(), shaders::backdrop_fragment()),
-      lit_texture_(make_color_texture(gl, width_, height_)),
-      dark_texture_(make_color_texture(gl, width_, height_)) {
+      open_(gl, shaders::floor_vertex(), shaders::floor_open_fragment()),
+      picture_(gl, shaders::tile_vertex(), shaders::picture_fragment(multisampling)),
+      lit_texture_(make_texture(gl, GL_RGBA8, width_, height_)),
+      dark_texture_(make_texture(gl, GL_RGBA8, width_, height_)),
+      open_texture_(make_texture(gl, GL_R32F, width_, height_)),
+      lit_framebuffer_(framebuffer_of(lit_texture_)),
+      dark_framebuffer_(framebuffer_of(dark_texture_)),
+      open_framebuffer_(framebuffer_of(open_texture_)) {
     const Eigen::Vector3f center(scene.camera.target.x(), scene.room.floor_height, scene.camera.target.z());
     make_floor(center);
     floor_bake_.use();
@@ -82,40 +86,75 @@ void Stage::make_floor(const Eigen::Vector3f& center) {
 }
 
 std::vector<const GlProgram*> Stage::programs() const {
-    return {&floor_bake_, &backdrop_bake_, &floor_, &backdrop_};
+    return {&floor_bake_, &backdrop_bake_, &open_, &picture_};
 }
 
-void Stage::bake(GLuint lit_unit, GLuint dark_unit) {
-    bake_one(lit_texture_, 1);
-    bake_one(dark_texture_, 0);
-    gl_.ActiveTexture(GL_TEXTURE0 + lit_unit);
-    gl_.BindTexture(GL_TEXTURE_2D, lit_texture_);
-    gl_.ActiveTexture(GL_TEXTURE0 + dark_unit);
-    gl_.BindTexture(GL_TEXTURE_2D, dark_texture_);
-}
-
-void Stage::bake_one(GLuint texture, float key_part) const {
-    (void)make_framebuffer(gl_);
+GLuint Stage::framebuffer_of(GLuint texture) const {
+    const GLuint framebuffer = make_framebuffer(gl_);
     gl_.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, texture, 0);
     require_complete(gl_, "background", width_, height_);
+    return framebuffer;
+}
+
+void Stage::begin(GLuint framebuffer) const {
+    gl_.BindFramebuffer(GL_FRAMEBUFFER, framebuffer);
     gl_.Viewport(0, 0, width_, height_);
-    floor_bake_.use();
-    floor_bake_.set("key_part", key_part);
-    draw_shapes(backdrop_bake_, floor_bake_);
 }
 
-void Stage::draw(const std::vector<Eigen::Vector4f>& balls) const {
-    floor_.use();
-    floor_.set("balls", balls);
-    floor_.set("ball_count", static_cast<int>(balls.size()));
-    draw_shapes(backdrop_, floor_);
+void Stage::bake(const Eigen::Matrix4f& clip_from_world, GLuint lit_unit, GLuint dark_unit,
+                 GLuint open_unit) {
+    bake_one(lit_framebuffer_, 1);
+    bake_one(dark_framebuffer_, 0);
+    balls_.reset();
+    const auto bind = [this](GLuint unit, GLuint texture) {
+        gl_.ActiveTexture(GL_TEXTURE0 + unit);
+        gl_.BindTexture(GL_TEXTURE_2D, texture);
+    };
+    bind(lit_unit, lit_texture_);
+    bind(dark_unit, dark_texture_);
+    bind(open_unit, open_texture_);
+    // The ray of a pixel is where it meets the plane at distance 1 (w = 1), from the eye.
+    const Eigen::Matrix3d world_from_clip =
+        (Eigen::Matrix3d() << clip_from_world.block<2, 3>(0, 0).cast<double>(),
+         clip_from_world.block<1, 3>(3, 0).cast<double>())
+            .finished()
+            .inverse();
+    picture_.use();
+    picture_.set("ray", Eigen::Vector3f((world_from_clip * Eigen::Vector3d(-1, -1, 1)).cast<float>()));
+    picture_.set("ray_x", Eigen::Vector3f((world_from_clip.col(0) * 2 / width_).cast<float>()));
+    picture_.set("ray_y", Eigen::Vector3f((world_from_clip.col(1) * 2 / height_).cast<float>()));
+    picture_.set("depth", 0.5f);
 }
 
-void Stage::draw_shapes(const GlProgram& backdrop, const GlProgram& floor) const {
-    backdrop.use();
+void Stage::bake_one(GLuint framebuffer, float key_part) const {
+    begin(framebuffer);
+    backdrop_bake_.use();
     gl_.BindVertexArray(empty_array_);
     gl_.DrawArrays(GL_TRIANGLES, 0, 3);
-    floor.use();
+    floor_bake_.use();
+    floor_bake_.set("key_part", key_part);
+    draw_floor();
+}
+
+bool Stage::darken(const std::vector<Eigen::Vector4f>& balls) {
+    if (balls_ == balls) return false;
+    balls_ = balls;
+    begin(open_framebuffer_);
+    gl_.ClearColor(1, 1, 1, 1);
+    gl_.Clear(GL_COLOR_BUFFER_BIT);
+    open_.use();
+    open_.set("balls", balls);
+    open_.set("ball_count", static_cast<int>(balls.size()));
+    draw_floor();
+    return true;
+}
+
+void Stage::draw(const TileQuads& tiles) const {
+    picture_.use();
+    tiles.draw();
+}
+
+void Stage::draw_floor() const {
     gl_.BindVertexArray(floor_array_);
     gl_.DrawElements(GL_TRIANGLES, floor_indices_, GL_UNSIGNED_INT, nullptr);
 }

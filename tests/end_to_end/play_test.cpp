@@ -66,6 +66,63 @@ TEST(Play, EventsAndSoundDoNotDependOnWhetherFramesAreDrawn) {
             << name;
 }
 
+/// [s], by ffprobe.
+double length_of(const std::filesystem::path& video, const std::string& stream) {
+    const Ended ended = run_command({"ffprobe", "-v", "error", "-select_streams", stream, "-show_entries",
+                                     "stream=duration", "-of", "csv=p=0", video.string()});
+    EXPECT_EQ(ended.status, 0) << ended.err;
+    return std::stod(ended.out);
+}
+
+TEST(Play, AVideoLastsAsLongAsItsSoundIsNamedAtTheEndAndStandsInPlaceOfTheFrames) {
+    const Folder folder;
+    const auto trace = short_trace(folder, "roll", 1.5);
+    const std::filesystem::path video = folder / "take.mp4";
+    const Ended ended = run(play(trace, folder / "out", {"--video", video.string(), "--fps", "10"}));
+    ASSERT_EQ(ended.status, 0) << ended.err;
+    EXPECT_NE(ended.out.find("watch " + video.string()), std::string::npos) << ended.out;
+    EXPECT_FALSE(std::filesystem::exists(folder / "out/frames"));
+    EXPECT_NE(read(folder / "out/report.html").find("data:image/png"), std::string::npos)
+        << "the report still shows some";
+    const double picture_s = length_of(video, "v"), sound_s = length_of(video, "a");
+    const auto [t0, t_end] = time_span(read(trace));
+    EXPECT_GT(sound_s, t_end - t0 + 0.49) << "it rings out";
+    EXPECT_GE(picture_s, sound_s - 1e-3);
+    EXPECT_LT(picture_s, sound_s + 0.1 + 1e-3) << "to the next frame";
+    ASSERT_EQ(
+        run(play(trace, folder / "out", {"--video", video.string(), "--fps", "10", "--keep-frames"})).status,
+        0);
+    EXPECT_TRUE(std::filesystem::exists(folder / "out/frames/000010.png"));
+    EXPECT_EQ(run(play(trace, folder / "out", {"--keep-frames"})).status, 2)
+        << "they are kept without a video";
+}
+
+TEST(Play, ACameraChangesThePicturesAndNothingElse) {
+    const Folder folder;
+    const auto trace = short_trace(folder, "roll", 0.6);
+    write(folder / "path.toml",
+          "[[camera]]\ntime = 0\neye = [0, 1.5, 1.5]\ntarget = [0, 0.7, 0]\n"
+          "[[camera]]\ntime = 0.3\neye = [1, 1.5, 1.5]\ntarget = [0, 0.7, 0]\n");
+    const std::string path = folder / "path.toml";
+    const std::vector<std::vector<std::string>> cameras = {
+        {}, {"--camera", "top"}, {"--camera", "0,1.5,1.5:0,0.7,0"}, {"--camera", path}};
+    std::set<std::string> first, last;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        const std::filesystem::path out = folder / std::to_string(i);
+        ASSERT_EQ(run(play(trace, out, cameras[i])).status, 0);
+        first.insert(read(out / "frames/000000.png"));
+        last.insert(read(out / "frames/000010.png"));
+        for (const char* name : {"events.csv", "audio.wav", "hits.mid"})
+            EXPECT_EQ(read(out / name), read(folder / (std::string("0/") + name))) << name;
+    }
+    EXPECT_EQ(first.size(), 4u) << "a path's light stands by the kit's camera";
+    EXPECT_EQ(last.size(), 4u);
+    const Ended wrong = run(play(trace, folder / "wrong", {"--camera", "behind"}));
+    EXPECT_EQ(wrong.status, 2);
+    EXPECT_NE(wrong.err.find("found --camera behind, expected drummer, front, top, side"), std::string::npos)
+        << wrong.err;
+}
+
 TEST(Play, CuttingTheTraceLeavesEveryEarlierFrameAndSampleAsItWas) {
     const Folder folder;
     const double cut = 1.203;  // between samples, in the middle of strokes

@@ -66,14 +66,24 @@ TEST(Simulate, UntilRestEndsWithZeroAtRestAndWithOneWhenTheStepsDoNotSuffice) {
     EXPECT_EQ(json::parse(early.out)["at_rest"], false);
 }
 
-TEST(Simulate, AVideoIsMadeBesideTheFrames) {
+TEST(Simulate, AVideoIsMadeWithFramesThatAreKeptIfAskedFor) {
     const Folder folder;
     write(folder / "scene.toml", kScene);
-    const Ended ended = run({"simulate", folder / "scene.toml", "--steps", "30", "--out", folder / "out",
-                             "--video", folder / "fall.mp4", "--size", "96x64"});
+    const std::vector<std::string> words = {
+        "simulate", folder / "scene.toml", "--steps", "30",   "--out", folder / "out",
+        "--video",  folder / "fall.mp4",   "--size",  "96x64"};
+    const Ended ended = run(words);
     EXPECT_EQ(ended.status, 0) << ended.err;
-    EXPECT_EQ(read(folder / "fall.mp4").substr(4, 4), "ftyp");
+    EXPECT_NE(ended.out.find("Watch " + (folder / "fall.mp4").string()), std::string::npos) << ended.out;
+    EXPECT_EQ(ended.out.find("frames"), std::string::npos) << ended.out;
+    const std::string video = read(folder / "fall.mp4");
+    EXPECT_EQ(video.substr(4, 4), "ftyp");
+    EXPECT_FALSE(fs::exists(folder / "out" / "frames"));
+    std::vector<std::string> kept = words;
+    kept.emplace_back("--frames");
+    EXPECT_EQ(run(kept).status, 0);
     EXPECT_TRUE(fs::exists(folder / "out" / "frames" / "000015.png"));
+    EXPECT_EQ(read(folder / "fall.mp4"), video);
 }
 
 TEST(Simulate, WrongScenesAreRefusedWithTheirPlaceAndNothingIsWritten) {

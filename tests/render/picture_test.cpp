@@ -253,4 +253,46 @@ TEST(Picture, FramesAndScenesThatMakeNoSenseAreRefused) {
     EXPECT_THROW(render::Renderer{scene}, std::runtime_error);
 }
 
+/// A plate on which no shadow can fall, seen from 2 to 60 degrees above it: a shadow map changes no pixel of it.
+/// One that its surface shadows by itself would dot it.
+TEST(Picture, APlateShadowsNotItselfHoweverFlatItIsSeen) {
+    const TemporaryFolder folder;
+    render::SceneDescription scene;
+    scene.objects.push_back({"plate", folder.write("box.obj", box_obj()), {{{1, 0, 0}, 0, 1}, {}}});
+    scene.room.floor_color = scene.room.wall_color = Vector3f::Zero();
+    scene.width = 320, scene.height = 240;
+    const Matrix4f matrix = (Eigen::Translation3f(0, 0.5f, 0) * Eigen::Scaling(0.6f, 0.05f, 0.6f)).matrix();
+    for (const float degrees : {2, 5, 9, 14, 20, 35, 60})
+        for (const float around : {0.0f, 0.4f, 2.0f, 4.0f}) {
+            const float angle = degrees * 3.14159265f / 180;
+            scene.camera.target = {0, 0.55f, 0};
+            scene.camera.eye =
+                scene.camera.target + 2.5f * Vector3f(std::sin(around) * std::cos(angle), std::sin(angle),
+                                                      std::cos(around) * std::cos(angle));
+            scene.camera.vertical_fov_deg = 35;
+            scene.shadow_size = 0;
+            render::Renderer without(scene);
+            const render::Image plain = picture(without, {matrix});
+            scene.shadow_size = 512;
+            render::Renderer with(scene);
+            const render::Image shadowed = picture(with, {matrix});
+            // Its upper side is the brightest; the others may lie in its shadow. Pixels at its edge are partly of
+            // its rounding, which is narrower than they are.
+            const auto is_upper = [&](int x, int y) {
+                return plain.rgb[static_cast<std::size_t>(3 * (y * scene.width + x))] >= 180;
+            };
+            int upper = 0, dotted = 0;
+            for (int y = 1; y + 1 < scene.height; ++y)
+                for (int x = 1; x + 1 < scene.width; ++x) {
+                    if (!is_upper(x, y) || !is_upper(x - 1, y) || !is_upper(x + 1, y) ||
+                        !is_upper(x, y - 1) || !is_upper(x, y + 1))
+                        continue;
+                    ++upper;
+                    dotted += brightness(shadowed, x, y) != brightness(plain, x, y);
+                }
+            EXPECT_GT(upper, 100) << degrees << " " << around;
+            EXPECT_EQ(dotted, 0) << degrees << " " << around;
+        }
+}
+
 }  // namespace

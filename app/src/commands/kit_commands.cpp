@@ -98,6 +98,7 @@ void tell_sizes(const Kit& kit) {
 struct DrawOptions {
     std::string kit, out;
     Eigen::Vector2i size = {640, 480};  // [pixels]
+    CameraChoice camera;
 };
 
 void draw_kit(const DrawOptions& o) {
@@ -105,7 +106,7 @@ void draw_kit(const DrawOptions& o) {
         refuse_options("--out " + o.out, "a file whose name ends in .png");
     const Kit kit = read_kit(find_kit(o.kit));
     tell_sizes(kit);
-    const KitStage stage(kit, 0, StickGeometry{});
+    const KitStage stage(kit, 0, StickGeometry{}, o.camera);
     render::Renderer renderer(stage.scene(o.size.x(), o.size.y()));
     render::Image image;
     renderer.draw(stage.frame({}, {}), image);
@@ -178,6 +179,8 @@ void add_draw(Command& kit) {
     command.required("KIT", o->kit, as::text("KIT"), "Kit: a file, or the name of a bundled one");
     command.required("--out", o->out, as::text("FILE"), "Picture to write (PNG)");
     command.option("--size", o->size, as::pixels(16, 8192), "Its size");
+    command.option("--camera", o->camera, camera_format(),
+                   "Where it is seen from; default: the kit's camera");
     command.runs([o] { draw_kit(*o); });
 }
 

@@ -4,6 +4,7 @@
 #include <sim/simulation.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstdio>
 #include <limits>
 #include <memory>
@@ -21,10 +22,13 @@
 namespace app {
 namespace {
 
-void print_places(const PlayOptions& options) {
+void print_places(const PlayResult& result) {
+    const PlayOptions& options = result.options;
+    const bool frames_kept = options.frames && (!options.video || options.keep_frames);
     fmt::print("Look at {}", (options.out / "report.html").string());
     if (options.audio) fmt::print(", listen to {}", (options.out / "audio.wav").string());
-    if (options.frames) fmt::print(", see {}", (options.out / "frames").string());
+    if (frames_kept) fmt::print(", see {}", (options.out / "frames").string());
+    if (options.video && result.failures.empty()) fmt::print(", watch {}", options.video->string());
     fmt::print("\n");
 }
 
@@ -78,7 +82,7 @@ void play_offline(const PlayOptions& options) {
                                           : "unknown (nothing matched)",
                (result.t_end_s - result.t0_s) / result.wall_s);
     print_if_apart(result);
-    print_places(options);
+    print_places(result);
     throw_if_any(result.failures, options.out);
 }
 
@@ -93,7 +97,7 @@ void play_in_time(const RealtimeOptions& options) {
         fmt::print("{} offline: {} here, {} unexplained ({})\n", counted(offline.offline_strikes, "strike"),
                    counted(offline.departures.size(), "departure"), offline.unexplained(),
                    (options.play.out / "departures.csv").string());
-    print_places(options.play);
+    print_places(outcome.play);
     if (!outcome.failure.empty()) throw std::runtime_error(outcome.failure);
     throw_if_any(outcome.play.failures, options.play.out);
 }
@@ -118,8 +122,10 @@ CLI::Option* add_play_options(Command& command, PlayOptions& o) {
     command.option("--kit", o.kit, as::text("KIT"), "Kit: a file, or the name of a bundled one");
     command.option("--fps", o.fps, as::number(1, 1000, "frames per second"), "Frame rate");
     command.option<Eigen::Vector2i>(
-        "--size", as::pixels(16, 4096), "Size of the frames",
+        "--size", as::pixels(16, 8192), "Size of the frames",
         [&o](const Eigen::Vector2i& size) { o.width = size.x(), o.height = size.y(); }, "640x480");
+    command.option("--camera", o.camera, camera_format(),
+                   "Where pictures are seen from; default: the kit's camera");
     const auto predictor = as::text("PREDICTOR", check_specification);
     CLI::Option* both = command.option<std::string>(
         "--predictor", predictor, "Predictor of pictures and sound",
@@ -228,11 +234,21 @@ void add_play_command(Command& program) {
         command.option("--solo", o->play.solo, as::whole(0, std::numeric_limits<std::int64_t>::max()),
                        "Render the sound of one note alone, by its id in events.csv");
     CLI::Option* no_frames = command.flag("--no-frames", o->play.frames, "Draw nothing", false);
-    command.option("--video", o->play.video, as::text("FILE"), "Also make a video (MP4) of frames and sound")
-        ->excludes(no_frames);
+    CLI::Option* video = command.option("--video", o->play.video, as::text("FILE"),
+                                        "Make a video (MP4) of frames and sound, in place of the frames");
+    video->excludes(no_frames);
+    command.flag("--keep-frames", o->play.keep_frames, "Keep the frames beside the video, too")->needs(video);
+    CLI::Option* show = command.option<std::vector<std::string>>(
+        "--show", as::list_of(as::choice({"ghosts", "marks"})),
+        "Also draw ghosts of the sticks (measured, predicted, true) and marks of strikes",
+        [shown = &o->play.shown](const std::vector<std::string>& what) {
+            shown->ghosts = std::ranges::count(what, "ghosts") > 0;
+            shown->marks = std::ranges::count(what, "marks") > 0;
+        });
+    show->excludes(no_frames);
     CLI::Option* realtime = command.flag("--realtime", o->realtime,
                                          "Play against the wall clock, sensors in processes of their own");
-    realtime->excludes(solo);
+    realtime->excludes(solo)->excludes(show);
     add_mix_options(command, o->play.mix, realtime);
     for (CLI::Option* option : add_realtime_options(command, *o, trace)) option->needs(realtime);
     command.checks([o] { check_video(o->play); });

@@ -45,7 +45,8 @@ void print(const SimulateResult& r, const SimulateOptions& options) {
     if (r.accuracy)
         for (const std::string& line : r.accuracy->lines()) fmt::print("{}\n", line);
     for (const std::string& line : r.mishaps.lines()) fmt::print("{}\n", line);
-    if (options.out && r.frames > 0) fmt::print("See {}\n", (*options.out / "frames").string());
+    if (options.out && options.frames) fmt::print("See {}\n", (*options.out / "frames").string());
+    if (options.video && r.failures.empty()) fmt::print("Watch {}\n", options.video->string());
 }
 
 void simulate_and_print(const SimulateOptions& options, bool json, bool allow_quarantine) {
@@ -103,7 +104,10 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
     command.option<Eigen::Vector2i>(
         "--size", as::pixels(16, 8192), "Size of the frames",
         [o = o.get()](const Eigen::Vector2i& size) { o->width = size.x(), o->height = size.y(); }, "640x480");
-    command.option("--video", o->video, as::text("FILE"), "Also make a video (MP4) of the frames");
+    command.option("--camera", o->camera, camera_format(),
+                   "Where pictures are seen from; default: the scene's camera");
+    command.option("--video", o->video, as::text("FILE"),
+                   "Make a video (MP4); without --frames its frames are not kept");
     command.option("--checkpoint", o->checkpoint, as::whole(0, 1'000'000'000, "steps"),
                    "Save after every so many steps, in --out, what --resume goes on from; 0: never");
     command.option("--resume", o->resume, as::text("DIR"),
@@ -189,7 +193,6 @@ void add_simulate_command(Command& program) {
         o->words = command.given_but({"--resume", "--out"});
         Options options = o->resume ? resumed(*o, command) : *o;
         options.scene = find_scene(options.scene);
-        options.frames = options.frames || options.video.has_value();
         simulate_and_print(options, options.json, options.allow_quarantine);
     });
 }

@@ -165,6 +165,10 @@ void OutputFolder::keep() {
     notice_ = std::make_unique<InterruptionNotice>(staging_, true);
 }
 
+void OutputFolder::drop(std::string_view name) const {
+    fs::rename(staging_ / name, scratch() / name);
+}
+
 void OutputFolder::take_back(std::string_view name) {
     std::error_code none;
     const OutputPlace place = output_place(folder_ / name);

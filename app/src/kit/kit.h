@@ -25,7 +25,8 @@ struct Instrument {
     std::string name;
     std::string kind;  ///< drum | bell | string | cymbal
     sim::BodyDefinition body;
-    std::filesystem::path mesh;  ///< unit mesh, scaled to the body's semi-axes, or one with a scale of its own
+    std::filesystem::path
+        mesh;  ///< unit mesh, scaled to the body's semi-axes, or one with a scale of its own
     std::optional<double> mesh_scale_m;  ///< length of one unit of the mesh [m]; empty: a unit mesh
     render::Look look;
     audio::Voice voice;
@@ -48,13 +49,13 @@ struct StickDefinition {
 /// A kit file, checked and complete.
 struct Kit {
     std::filesystem::path file;
-    std::vector<std::filesystem::path> files;  ///< it and all that it includes, for provenance
+    std::vector<std::filesystem::path> files;        ///< it and all that it includes, for provenance
     std::vector<std::filesystem::path> sound_files;  ///< samples and orchestras of its own, likewise
     std::string name, description;
     std::vector<Instrument> instruments;
     StickDefinition stick;
     audio::Mix mix;
-    render::Camera camera;
+    std::optional<render::Camera> camera;  ///< none: fitted to the instruments
     render::Room room;
 };
 

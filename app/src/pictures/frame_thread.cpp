@@ -109,6 +109,7 @@ void FrameThread::try_out(render::Renderer& renderer, const render::FrameState& 
     const int frames = options_.policy == FramePolicy::refuse ? kWarmFrames + kTrialFrames : 1;
     for (int i = 0; i < frames && (times_s.empty() || all.seconds() < kLongestTrialS); ++i) {
         const WallTimer one;
+        renderer.forget();  // a whole picture is the most that a frame may take
         renderer.draw(rest, image);
         if (i >= kWarmFrames) times_s.push_back(one.seconds());
     }
@@ -191,12 +192,13 @@ void require_ffmpeg() {
     require_program("ffmpeg", "the video; install the package ffmpeg");
 }
 
-std::unique_ptr<OutputFile> make_video(const fs::path& video, double fps, bool sound,
+std::unique_ptr<OutputFile> make_video(const fs::path& video, double fps, std::size_t held, bool sound,
                                        const fs::path& staging) {
     auto made = std::make_unique<OutputFile>(video);
     std::vector<std::string> command = {"ffmpeg", "-nostdin", "-loglevel", "error", "-y", "-framerate"};
     command.insert(command.end(), {fmt::format("{}", fps), "-i", (staging / "frames" / "%06d.png").string()});
     if (sound) command.insert(command.end(), {"-i", (staging / "audio.wav").string(), "-c:a", "aac"});
+    if (held > 0) command.insert(command.end(), {"-vf", fmt::format("tpad=stop_mode=clone:stop={}", held)});
     command.insert(command.end(), {"-c:v", "libx264", "-preset", "veryfast", "-pix_fmt", "yuv420p", "-fflags",
                                    "+bitexact", "-f", "mp4", made->partial().string()});
     run_child(command, staging / "scratch" / "ffmpeg.log");

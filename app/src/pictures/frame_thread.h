@@ -65,9 +65,10 @@ struct FrameReport {
 /// Throws std::runtime_error where ffmpeg cannot be started: before a run that ends with a video.
 void require_ffmpeg();
 /// Encodes the frames, and audio.wav if `sound`, of a staging folder into a file that OutputFile::finish() puts in
-/// place as `video`. Throws std::runtime_error; nothing of it is left then.
+/// place as `video`. The last frame stays for `held` more. Throws std::runtime_error; nothing of it is left then.
 [[nodiscard]] std::unique_ptr<OutputFile> make_video(const std::filesystem::path& video, double fps,
-                                                     bool sound, const std::filesystem::path& staging);
+                                                     std::size_t held, bool sound,
+                                                     const std::filesystem::path& staging);
 
 /// Draws frames on a thread of its own, which owns the renderers, and encodes and writes them as
 /// FOLDER/000000.png on another. push(), take_done() and finish() are for one thread; failures of either

@@ -4,14 +4,41 @@
 #include <sim/simulation.h>
 #include <tracking/rotation.h>
 
+#include <array>
+
 #include "files/assets.h"
 #include "pictures/stage_parts.h"
 
 namespace app {
 namespace {
 
-constexpr int kKitShadowTexels = 512;       // per side: 1024 costs a tenth of a frame more and shows no more
+constexpr int kMostShadowTexels = 4096;     // per side
 constexpr double kMeshStickLengthM = 0.40;  // of stick.obj and mallet.obj, hand to tip
+/// A body whose surface is nowhere farther from rest is drawn at rest: a tenth of a pixel of a picture of 4K
+/// across a kit, so that what has rung out stands still. [m]
+constexpr double kRestM = 5e-5;
+
+// Linear RGB: of where a stick was measured, is predicted and truly is; of notes released, late and cancelled.
+const std::array<Eigen::Vector3f, 3> kGhostColors = {Eigen::Vector3f(0.02f, 0.12f, 0.80f),
+                                                     Eigen::Vector3f(0.80f, 0.45f, 0.02f),
+                                                     Eigen::Vector3f(0.02f, 0.55f, 0.05f)};
+const std::array<Eigen::Vector3f, 3> kMarkColors = {Eigen::Vector3f(0.02f, 0.55f, 0.05f),
+                                                    Eigen::Vector3f(0.80f, 0.30f, 0.01f),
+                                                    Eigen::Vector3f(0.70f, 0.01f, 0.02f)};
+constexpr std::size_t kMostMarks = 12;  // of a kind
+constexpr double kGhostAcross = 0.6;    // of a stick's thickness
+constexpr double kMarkRadiusM = 0.03, kMarkHalfHeightM = 0.002;
+
+render::Look plain(const Eigen::Vector3f& color) {
+    return {{color, 0.0f, 0.8f}, {}};
+}
+
+Eigen::Matrix4f disc_at(const StrikeMark& mark) {
+    const Eigen::Matrix3d turned =
+        tracking::rotation_between(Eigen::Vector3d::UnitY(), mark.normal).toRotationMatrix();
+    return affine_matrix(turned * Eigen::Vector3d(kMarkRadiusM, kMarkHalfHeightM, kMarkRadiusM).asDiagonal(),
+                         mark.point + kMarkHalfHeightM * mark.normal);
+}
 
 render::Look chrome() {
     render::Look look;
@@ -20,10 +47,46 @@ render::Look chrome() {
     return look;
 }
 
+/// Of the body's surface, in units of its semi-axes.
+Eigen::Matrix4f matrix_of(const sim::BodyDefinition& body, const sim::ModalState& state) {
+    Eigen::Matrix4d matrix = sim::body_matrix(body, state);
+    matrix.leftCols<3>() *= body.shape.semi_axes.asDiagonal();
+    return matrix.cast<float>();
+}
+
+/// Of boxes around the instruments at rest.
+std::vector<Eigen::Vector3f> corners_of(const Kit& kit) {
+    std::vector<Eigen::Vector3f> corners;
+    for (const Instrument& instrument : kit.instruments) {
+        const Eigen::AlignedBox3d box(-instrument.body.shape.semi_axes, instrument.body.shape.semi_axes);
+        for (int i = 0; i < 8; ++i) {
+            const auto corner = static_cast<Eigen::AlignedBox3d::CornerType>(i);
+            corners.push_back((instrument.body.world_from_body * box.corner(corner)).cast<float>());
+        }
+    }
+    return corners;
+}
+
+/// The same of an instrument's mesh, which may have a size of its own.
+Eigen::Matrix4f mesh_matrix(const Instrument& instrument, const sim::ModalState& state) {
+    if (!instrument.mesh_scale_m) return matrix_of(instrument.body, state);
+    Eigen::Matrix4d matrix = sim::body_matrix(instrument.body, state);
+    matrix.leftCols<3>() *= *instrument.mesh_scale_m;
+    return matrix.cast<float>();
+}
+
+/// A bound of how far a point of [-1, 1]^3 lies from where the other matrix puts it.
+double farthest(const Eigen::Matrix4f& a, const Eigen::Matrix4f& b) {
+    const Eigen::Matrix4f difference = a - b;
+    return double(
+        (difference.leftCols<3>().cwiseAbs().rowwise().sum() + difference.col(3).cwiseAbs()).maxCoeff());
+}
+
 }  // namespace
 
-KitStage::KitStage(const Kit& kit, std::size_t sticks, const StickGeometry& stick)
-    : kit_(kit), sticks_(sticks), stick_(stick) {
+KitStage::KitStage(const Kit& kit, std::size_t sticks, const StickGeometry& stick, CameraChoice camera,
+                   Shown shown)
+    : kit_(kit), sticks_(sticks), stick_(stick), camera_(std::move(camera)), shown_(shown) {
     for (const Instrument& instrument : kit_.instruments)
         if (instrument.drawn_stand && instrument.kind != "string") add_stand(instrument);
     add_string_frame();
@@ -31,6 +94,10 @@ KitStage::KitStage(const Kit& kit, std::size_t sticks, const StickGeometry& stic
 
 void KitStage::add_stand(const Instrument& instrument) {
     const sim::BodyDefinition& body = instrument.body;
+    if (instrument.kind == "bell") {
+        add_gallows(instrument);
+        return;
+    }
     const bool below = instrument.kind == "drum";
     const Eigen::Vector3d hold(0, below ? -body.shape.semi_axes.y() : 0, 0);
     const Eigen::Vector3d top = body.world_from_body * hold;
@@ -38,6 +105,20 @@ void KitStage::add_stand(const Instrument& instrument) {
     if (height < 0.05) return;
     const double spread = below ? std::max(1.0, 2.2 * body.shape.semi_axes.x() / 0.5) : 1.0;
     add_prop(instrument.name + " stand", "stand.obj", chrome(), {spread, height, spread}, top);
+}
+
+/// A post behind the bell and an arm from its top to over the crown, from which the bell hangs.
+void KitStage::add_gallows(const Instrument& instrument) {
+    const sim::BodyDefinition& body = instrument.body;
+    const Eigen::Vector3d half = body.shape.semi_axes;
+    const Eigen::Vector3d crown = body.world_from_body * Eigen::Vector3d(0, half.y(), 0);
+    const double thick = 0.006, length = std::max(half.x(), half.z()) + 0.05;
+    const Eigen::Vector3d top = crown + Eigen::Vector3d(0, 0.5 * thick, -length);  // through the crown's eye
+    if (top.y() - kit_.room.floor_height < 0.05) return;
+    add_prop(instrument.name + " stand", "stand.obj", chrome(), {1, top.y() - kit_.room.floor_height, 1},
+             top);
+    add_prop(instrument.name + " arm", "bar.obj", chrome(), {thick, thick, 0.5 * length + thick},
+             top + Eigen::Vector3d(0, 0, 0.5 * length));
 }
 
 void KitStage::add_string_frame() {
@@ -52,6 +133,16 @@ void KitStage::add_string_frame() {
     const Eigen::Vector3d size(box.sizes().x() + 0.12, thickness, box.sizes().z() + 0.12);
     const Eigen::Vector3d place(box.center().x(), box.min().y() - gap, box.center().z());
     add_prop("soundboard", "string_frame.obj", wood(0.26f, 0.13f, 0.06f, 0.4f), 0.5 * size, place);
+    for (const Instrument& instrument : kit_.instruments) {
+        if (instrument.kind != "string" || !instrument.drawn_stand) continue;
+        for (const double side : {-1.0, 1.0}) {  // a bridge of its own at each end
+            const Eigen::Vector3d end = instrument.body.world_from_body *
+                                        Eigen::Vector3d(side * instrument.body.shape.semi_axes.x(), 0, 0);
+            const double half = 0.5 * (end.y() - place.y());
+            add_prop(instrument.name + " bridge", "bar.obj", wood(0.10f, 0.045f, 0.02f, 0.4f),
+                     {0.006, half, 0.012}, end - Eigen::Vector3d(0, half, 0));
+        }
+    }
     const double height = std::max(0.05, place.y() - kit_.room.floor_height);
     add_prop("soundboard stand", "stand.obj", chrome(), {1.5, height, 1.5}, place);
 }
@@ -65,50 +156,90 @@ void KitStage::add_prop(const std::string& name, const char* mesh, const render:
 render::SceneDescription KitStage::scene(int width, int height) const {
     render::SceneDescription scene;
     for (const Instrument& instrument : kit_.instruments)
-        scene.objects.push_back({instrument.name, instrument.mesh, instrument.look});
-    for (const Prop& prop : props_) scene.objects.push_back(prop.object);
+        scene.objects.push_back(
+            {instrument.name, instrument.mesh, instrument.look, -1, mesh_matrix(instrument, {})});
+    for (const Prop& prop : props_) {
+        scene.objects.push_back(prop.object);
+        scene.objects.back().stands = prop.matrix;
+    }
     for (std::size_t i = 0; i < sticks_; ++i)
         scene.objects.push_back(
             {fmt::format("stick {}", i), kit_.stick.mesh, wood(0.62f, 0.40f, 0.20f, 0.38f)});
-    scene.camera = kit_.camera;
+    describe_annotations(scene);
+    scene.camera = standing_camera(camera_, kit_.camera, corners_of(kit_),
+                                   static_cast<float>(width) / static_cast<float>(height));
     scene.room = kit_.room;
     scene.width = width;
     scene.height = height;
-    scene.shadow_size = kKitShadowTexels;
+    // The map is 1.25 times as wide as the picture at the target: a texel is there smaller than a pixel.
+    scene.shadow_size = std::min(kMostShadowTexels, 8 * std::max(width, height) / 5);
     return scene;
 }
 
-Eigen::Matrix4f KitStage::stick_matrix(const tracking::PosePrediction& pose) const {
+/// As add_annotations() places them.
+void KitStage::describe_annotations(render::SceneDescription& scene) const {
+    if (shown_.ghosts)
+        for (std::size_t i = 0; i < sticks_; ++i)
+            for (const Eigen::Vector3f& color : kGhostColors)
+                scene.objects.push_back({fmt::format("ghost of stick {}", i), kit_.stick.mesh, plain(color)});
+    if (shown_.marks)
+        for (const Eigen::Vector3f& color : kMarkColors)
+            for (std::size_t i = 0; i < kMostMarks; ++i)
+                scene.objects.push_back({"mark", assets_folder() / "meshes" / "drum.obj", plain(color)});
+}
+
+void KitStage::add_annotations(render::FrameState& state, const Annotations& annotations) const {
+    const auto add = [&](const std::optional<Eigen::Matrix4f>& matrix) {
+        state.world_from_object.push_back(matrix.value_or(Eigen::Matrix4f::Identity()));
+        state.visible.push_back(matrix.has_value());
+    };
+    for (std::size_t i = 0; shown_.ghosts && i < sticks_; ++i) {
+        const StickGhosts ghosts = i < annotations.ghosts.size() ? annotations.ghosts[i] : StickGhosts();
+        for (const auto* pose : {&ghosts.measured, &ghosts.predicted, &ghosts.truth})
+            add(*pose ? std::optional(stick_matrix(**pose, kGhostAcross)) : std::nullopt);
+    }
+    if (!shown_.marks) return;
+    for (const MarkKind kind : {MarkKind::released, MarkKind::late, MarkKind::cancelled}) {
+        std::size_t drawn = 0;
+        for (const StrikeMark& mark : annotations.marks)
+            if (mark.kind == kind && drawn < kMostMarks) add(disc_at(mark)), ++drawn;
+        for (; drawn < kMostMarks; ++drawn) add(std::nullopt);
+    }
+}
+
+Eigen::Matrix4f KitStage::stick_matrix(const tracking::PosePrediction& pose, double across) const {
     // The mesh runs along -z and has its bead's centre at (0, 0, -0.40).
     const Eigen::Quaterniond body_from_mesh =
         tracking::rotation_between(-Eigen::Vector3d::UnitZ(), stick_.shaft);
     const double scale = stick_.length_m / kMeshStickLengthM;
     const Eigen::Matrix3d world_from_body = pose.orientation.toRotationMatrix();
     const Eigen::Vector3d hand = stick_.tip + stick_.shaft * -stick_.length_m;
-    return affine_matrix(world_from_body * (body_from_mesh.toRotationMatrix() * scale),
+    const Eigen::Vector3d size(across * scale, across * scale, scale);
+    return affine_matrix(world_from_body * body_from_mesh.toRotationMatrix() * size.asDiagonal(),
                          world_from_body * hand + pose.position);
 }
 
 render::FrameState KitStage::frame(std::span<const sim::ModalState> bodies,
-                                   std::span<const std::optional<tracking::PosePrediction>> sticks) const {
+                                   std::span<const std::optional<tracking::PosePrediction>> sticks,
+                                   double t_s, const Annotations& annotations) const {
     render::FrameState state;
+    state.camera = moving_camera(camera_, t_s);
     const auto add = [&](const Eigen::Matrix4f& matrix, bool visible) {
         state.world_from_object.push_back(matrix);
         state.visible.push_back(visible);
     };
     for (std::size_t i = 0; i < kit_.instruments.size(); ++i) {
         const sim::BodyDefinition& body = kit_.instruments[i].body;
-        Eigen::Matrix4d matrix = sim::body_matrix(body, bodies.empty() ? sim::ModalState{} : bodies[i]);
-        const std::optional<double>& scale = kit_.instruments[i].mesh_scale_m;
-        const Eigen::Vector3d sides = scale ? Eigen::Vector3d::Constant(*scale) : body.shape.semi_axes;
-        matrix.leftCols<3>() *= sides.asDiagonal();
-        add(matrix.cast<float>(), true);
+        const bool rests =
+            bodies.empty() || farthest(matrix_of(body, bodies[i]), matrix_of(body, {})) < kRestM;
+        add(mesh_matrix(kit_.instruments[i], rests ? sim::ModalState{} : bodies[i]), true);
     }
     for (const Prop& prop : props_) add(prop.matrix, true);
     for (std::size_t i = 0; i < sticks_; ++i) {
         const bool visible = i < sticks.size() && sticks[i].has_value();
         add(visible ? stick_matrix(*sticks[i]) : Eigen::Matrix4f(Eigen::Matrix4f::Identity()), visible);
     }
+    add_annotations(state, annotations);
     return state;
 }
 

@@ -36,7 +36,8 @@ Eigen::Matrix3d uniform_strain(const sim::ModalBasis& basis, const Eigen::Vector
 
 }  // namespace
 
-SceneStage::SceneStage(const Scene& scene, const sim::World& world) : scene_(scene) {
+SceneStage::SceneStage(const Scene& scene, const sim::World& world, CameraChoice camera)
+    : scene_(scene), camera_(std::move(camera)) {
     const std::size_t now = scene.world.bodies.size();
     sim::WorldDefinition later;
     later.bodies = scene.later;
@@ -49,6 +50,20 @@ SceneStage::SceneStage(const Scene& scene, const sim::World& world) : scene_(sce
         add_solid(here ? world : coming, static_cast<int>(here ? body : body - now));
     }
     if (scene.box) add_kerbs();
+    for (CameraAt& place : camera_.places) place.camera = scaled(place.camera);
+    add_corners(frame(world));
+}
+
+void SceneStage::add_corners(const render::FrameState& first) {
+    for (std::size_t k = 0; k < first.visible.size(); ++k) {
+        if (!first.visible[k]) continue;
+        const int solid = k < scene_.looks.size() ? solid_of_kind_[scene_.looks[k].kind] : kerb_solid_;
+        const Eigen::AlignedBox3f box = solids_[static_cast<std::size_t>(solid)].mesh.bounds();
+        for (int i = 0; i < 8; ++i) {
+            const auto corner = static_cast<Eigen::AlignedBox3f::CornerType>(i);
+            corners_.push_back((first.world_from_object[k] * box.corner(corner).homogeneous()).head<3>());
+        }
+    }
 }
 
 void SceneStage::add_solid(const sim::World& world, int body) {
@@ -84,13 +99,22 @@ render::SceneDescription SceneStage::description(int width, int height) const {
     for (std::size_t k = 0; k < kerbs_.size(); ++k)
         description.objects.push_back({"kerb", {}, wood(0.10f, 0.045f, 0.02f, 0.5f), kerb_solid_});
     description.solids = solids_;
-    description.camera = scene_.camera;
-    description.camera.eye *= scale, description.camera.target *= scale;
+    const std::optional<render::Camera> own =
+        scene_.camera ? std::optional(scaled(*scene_.camera)) : std::nullopt;
+    description.camera =
+        standing_camera(camera_, own, corners_, static_cast<float>(width) / static_cast<float>(height));
     description.room = scene_.room;
     description.room.floor_height *= scale;
     description.width = width, description.height = height;
     description.shadow_size = kSceneShadowTexels;
     return description;
+}
+
+/// As everything that is drawn.
+render::Camera SceneStage::scaled(render::Camera camera) const {
+    const auto scale = static_cast<float>(scene_.drawn_scale);
+    camera.eye *= scale, camera.target *= scale;
+    return camera;
 }
 
 Eigen::Matrix4f SceneStage::matrix(const Eigen::Isometry3d& pose, const Eigen::Matrix3d& strain) const {
@@ -100,6 +124,7 @@ Eigen::Matrix4f SceneStage::matrix(const Eigen::Isometry3d& pose, const Eigen::M
 
 render::FrameState SceneStage::frame(const sim::World& world) const {
     render::FrameState frame;
+    frame.camera = moving_camera(camera_, world.time_s());
     const auto now = static_cast<std::size_t>(world.bodies());
     for (std::size_t k = 0; k < scene_.looks.size(); ++k) {
         frame.visible.push_back(k < now);

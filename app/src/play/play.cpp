@@ -11,6 +11,7 @@
 #include "files/bad_input.h"
 #include "pictures/kit_stage.h"
 #include "play/play_run.h"
+#include "play/strike_marks.h"
 #include "play/strike_pipeline.h"
 #include "process/clock.h"
 #include "process/progress_bar.h"
@@ -135,8 +136,22 @@ private:
             const FrameContents contents = std::isfinite(s) ? pipeline_->scene(s, T) : FrameContents();
             const Stopwatch watch(pipeline_->times().waiting_for_frames);
             parts_.frames->push(
-                {.index = next_frame_, .state = parts_.stage->frame(contents.bodies, contents.poses())});
+                {.index = next_frame_,
+                 .state = parts_.stage->frame(contents.bodies, contents.poses(), elapsed, annotations(T))});
         }
+    }
+
+    [[nodiscard]] Annotations annotations(double T) const {
+        Annotations all;
+        for (std::size_t i = 0; parts_.options.shown.ghosts && i < sticks_.size(); ++i) {
+            StickGhosts& ghosts = all.ghosts.emplace_back();
+            ghosts.truth = recorded_pose(parts_.trace.sticks[i], T);
+            if (!sticks_[i].started()) continue;
+            ghosts.measured = recorded_pose(parts_.trace.sticks[i], sticks_[i].state().t_s);
+            ghosts.predicted = sticks_[i].pose_at(T);
+        }
+        if (parts_.options.shown.marks) all.marks = strike_marks(pipeline_->strikes(), T);
+        return all;
     }
 
     OfflineParts parts_;
@@ -185,7 +200,7 @@ PlayResult play(const PlayOptions& options) {
     result.tracks = tip_tracks(trace, stick);
     OutputFolder folder(options.out);
 
-    const KitStage stage(kit, trace.sticks.size(), stick);
+    const KitStage stage(kit, trace.sticks.size(), stick, options.camera, options.shown);
     const std::unique_ptr<FrameThread> frames =
         start_frames(options, {stage.scene(options.width, options.height)}, stage.frame({}, {}), folder);
     const auto sound = options.audio ? std::make_unique<audio::Performance>(orchestra_file(), voices_of(kit),

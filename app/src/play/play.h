@@ -13,6 +13,8 @@
 
 #include "files/disk_log.h"
 #include "kit/kit.h"
+#include "pictures/annotations.h"
+#include "pictures/camera.h"
 #include "strikes/strike.h"
 #include "strikes/true_contacts.h"
 
@@ -33,6 +35,8 @@ struct PlayOptions {
     std::filesystem::path out = "out";
     double fps = 30;
     int width = 640, height = 480;
+    CameraChoice camera;
+    Shown shown;
     std::string picture_predictor = "auto", sound_predictor = "auto";
     double render_lead_s = 1.0 / 30, sound_lead_s = 1.0 / 15, release_margin_s = 0.010;
     int workers = 1;
@@ -40,7 +44,8 @@ struct PlayOptions {
     std::optional<std::uint64_t> solo;  ///< render the sound of this strike alone
     std::optional<Eigen::Vector3d> tip, shaft;
     MixOptions mix;
-    std::optional<std::filesystem::path> video;  ///< also an MP4, by ffmpeg
+    std::optional<std::filesystem::path> video;  ///< an MP4, by ffmpeg, in place of the frames
+    bool keep_frames = false;                    ///< the frames beside the video, too
     bool progress = false;                       ///< draw a progress bar on standard error
 };
 

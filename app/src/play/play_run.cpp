@@ -91,6 +91,13 @@ void take_frames(PlayResult& result, FrameThread& frames, const fs::path& folder
     result.report_frames = frames_to_show(result, folder);
 }
 
+/// After the last frame the sound rings out: how many frames more until it has ended.
+std::size_t frames_after_last(const PlayResult& result) {
+    const double sound_s = static_cast<double>(result.audio.size()) / (2 * audio::kSampleRate);
+    const double more = std::ceil(sound_s * result.options.fps - 1e-6) - static_cast<double>(result.frames);
+    return static_cast<std::size_t>(std::max(0.0, more));
+}
+
 using Json = nlohmann::ordered_json;
 
 template <typename Value>
@@ -212,8 +219,10 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     std::unique_ptr<OutputFile> video;
     if (options.video)
         folder.adorn("", [&] {
-            stage("video",
-                  [&] { video = make_video(*options.video, options.fps, options.audio, folder.path(".")); });
+            stage("video", [&] {
+                video = make_video(*options.video, options.fps, frames_after_last(result), options.audio,
+                                   folder.path("."));
+            });
         });
     const std::string realtime_json = realtime_part ? realtime_part() : std::string();
     write_file(folder.path("events.csv"), format_events(result));
@@ -221,6 +230,7 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     stage("report", [&] {
         write_page(folder, "report.html", [&](Plotter& plotter) { return format_report(result, plotter); });
     });
+    if (video && !options.keep_frames) folder.adorn("", [&] { folder.drop("frames"); });
     result.wall_s = parts.wall.seconds();
     write_file(folder.path("summary.json"), format_summary(result, realtime_json));
     folder.finish();

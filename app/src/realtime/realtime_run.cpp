@@ -238,7 +238,7 @@ void RealtimeRun::ask_for_frame(std::uint64_t index) {
     }
     FrameJob job{index, quality_.level(), session_.epoch_ns + timing.shown_ns,
                  options_.disturbance.slower_at(to_s(start)),
-                 session_.stage->frame(contents.bodies, contents.poses())};
+                 session_.stage->frame(contents.bodies, contents.poses(), shown_s)};
     timing.query_ns = now_ns() - start;
     result_.frames.push_back(timing);
     if (session_.frames->push(std::move(job)))

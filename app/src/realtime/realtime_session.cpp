@@ -76,7 +76,7 @@ RealtimeSession::RealtimeSession(const RealtimeOptions& asked) : options(asked),
 void RealtimeSession::start(const OutputFolder& folder, DiskLog<float>& recording, const Warn& warn) {
     scratch = folder.scratch();
     const PlayOptions& o = options.play;
-    stage.emplace(kit, trace.sticks.size(), stick);
+    stage.emplace(kit, trace.sticks.size(), stick, o.camera);
     // Worker processes and ZeroMQ's threads inherit it.
     simulation_priority = set_thread_priority(ThreadRole::simulation, options.realtime_priority);
     simulation = make_simulation(kit, o.workers);

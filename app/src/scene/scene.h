@@ -38,9 +38,9 @@ struct Scene : sim::WorldScene {
     std::vector<BodyLook> looks;  ///< of all bodies
     std::optional<SceneBox> box;  ///< its planes are among the world's
     SceneWorkers workers;
-    double seconds = 10;             ///< how long it is worth looking at
-    std::optional<double> accuracy;  ///< share of each body's largest extent, see sim/accuracy.h
-    render::Camera camera;           ///< [m] of the scene, as is the room
+    double seconds = 10;                   ///< how long it is worth looking at
+    std::optional<double> accuracy;        ///< share of each body's largest extent, see sim/accuracy.h
+    std::optional<render::Camera> camera;  ///< [m] of the scene, as is the room; none: fitted to the bodies
     render::Room room;
     double drawn_scale = 1;  ///< pictures show everything this much larger: the room is a few metres wide
 };

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "pictures/camera.h"
 #include "simulate/kept_accuracy.h"
 #include "simulate/mishaps.h"
 
@@ -36,9 +37,10 @@ struct SimulateOptions {
     std::optional<std::uint64_t> steps;
     bool until_rest = false;
     std::optional<std::filesystem::path> out, video;
-    bool frames = false;
+    bool frames = false;  ///< kept in `out`; a video alone needs them only while it is made
     double fps = 30;
     int width = 640, height = 480;
+    CameraChoice camera;
     bool progress = false;
     std::optional<WorkerOptions> workers;  ///< none: all in this process
     std::uint64_t checkpoint = 0;          ///< steps after which one is saved in `out`; 0: none

@@ -150,10 +150,10 @@ void SimulateRecord::start(const sim::World& world) {
     states_ = table("states.csv", kStates, 0);
     energy_ = table("energy.csv", kEnergy, 1);
     steps_ = options_.workers ? table("timing.csv", kTiming, 2) : table("times.csv", kTimes, 2);
-    if (!options_.frames) return;
+    if (!options_.frames && !options_.video) return;
     if (from_) find_frames();
     fs::create_directory(folder_->path("frames"));
-    stage_ = std::make_unique<SceneStage>(scene_, world);
+    stage_ = std::make_unique<SceneStage>(scene_, world, options_.camera);
     const FrameThreadOptions where{options_.width, options_.height, folder_->path("frames")};
     frames_ = std::make_unique<FrameThread>(std::vector{stage_->description(options_.width, options_.height)},
                                             stage_->frame(world), where);
@@ -279,8 +279,10 @@ void SimulateRecord::write_products(const WallTimer& wall, double before_s) {
     result_.frames = frames_ ? next_frame_ : 0;
     std::unique_ptr<OutputFile> video;
     if (options_.video)
-        folder_->adorn("",
-                       [&] { video = make_video(*options_.video, options_.fps, false, folder_->path(".")); });
+        folder_->adorn("", [&] {
+            video = make_video(*options_.video, options_.fps, 0, false, folder_->path("."));
+            if (!options_.frames) folder_->drop("frames");
+        });
     result_.wall_s = before_s + wall.seconds();
     write_file(folder_->path("summary.json"), format_simulate(result_));
     folder_->finish();

@@ -21,8 +21,11 @@ public:
     Renderer(const Renderer&) = delete;
     Renderer& operator=(const Renderer&) = delete;
 
-    /// Draws one frame. The same state gives the same bytes.
+    /// Draws one frame. The same state gives the same bytes, whatever was drawn before: of the picture before,
+    /// what cannot have changed is kept.
     DrawTimes draw(const FrameState& frame, Image& image);
+    /// Nothing is kept for the next frame.
+    void forget();
 
     /// "OSMesa 22.3.6, llvmpipe ..." for reports.
     [[nodiscard]] std::string version() const;

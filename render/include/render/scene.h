@@ -2,6 +2,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,12 +46,17 @@ struct SceneObject {
     std::filesystem::path mesh;  ///< OBJ, GLB or glTF, STL
     Look look;
     int solid = -1;  ///< of the scene's solids, instead of a file
+    /// Where an object stands that stays in its place: world_from_object at rest. The floor under it is
+    /// darkened from there, whatever its motion; else from where it is in the frame.
+    std::optional<Eigen::Matrix4f> stands = std::nullopt;
 };
 
 struct Camera {
     Eigen::Vector3f eye = Eigen::Vector3f(0, 1.5f, 1.55f);  ///< [m], world
     Eigen::Vector3f target = Eigen::Vector3f(0, 0.68f, -0.25f);
     float vertical_fov_deg = 42;
+
+    bool operator==(const Camera&) const = default;
 };
 
 struct Room {
@@ -74,7 +80,7 @@ struct SceneDescription {
     Room room;
     KeyLight key_light;
     int width = 640, height = 480;
-    int samples = 4;         ///< of MSAA, 0 or 1: off
+    int samples = 4;         ///< 0 or 1: no antialiasing; else 4 a pixel
     int shadow_size = 1024;  ///< texels per side, 0: no shadow
 };
 
@@ -86,6 +92,8 @@ struct FrameState {
     /// Coordinates of each object's modes (as many as its solid has); may be empty when no object bends. The
     /// matrix comes after them.
     std::vector<Eigen::VectorXf> modal = {};
+    /// Where it is seen from; none: from the scene's camera. The light stands by the scene's.
+    std::optional<Camera> camera = std::nullopt;
 };
 
 /// Top row first, RGB, 8 bits, sRGB.

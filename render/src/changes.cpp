@@ -1,0 +1,194 @@
+#include "changes.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace render {
+namespace {
+
+constexpr float kNearest = 0.02f;       // [m] before the eye, less than the camera's near plane
+constexpr std::size_t kMostMoved = 48;  // beyond, all is drawn again: pairs with the others would cost more
+
+Eigen::Vector3f transformed(const Eigen::Matrix4f& matrix, const Eigen::Vector3f& point) {
+    return matrix.topLeftCorner<3, 3>() * point + matrix.topRightCorner<3, 1>();
+}
+
+}  // namespace
+
+Eigen::AlignedBox3f ObjectBounds::grown(const FrameState& frame, std::size_t object) const {
+    Eigen::AlignedBox3f all = box;
+    for (std::size_t k = 0; k < reach.size(); ++k) {
+        const Eigen::Vector3f grown = std::abs(frame.modal[object][static_cast<Eigen::Index>(k)]) * reach[k];
+        all.min() -= grown, all.max() += grown;
+    }
+    return all;
+}
+
+Changes::Changes(const Views& views, std::vector<ObjectBounds> bounds)
+    : views_(views),
+      world_from_light_(views.light_from_world.inverse()),
+      bounds_(std::move(bounds)),
+      objects_(views.width, views.height),
+      picture_(views.width, views.height) {
+    const float shift = views.shadow_shift * views.light_from_world.row(0).head<3>().norm();
+    const float texel = 2 / static_cast<float>(std::max(views.shadow_size, 1));
+    pad_ = shift + texel * (views.shadow_filter + views.shadow_beyond + 1);
+    depth_pad_ = views.shadow_shift * views.light_from_world.row(2).head<3>().norm() +
+                 texel * views.shadow_beyond + 1e-5f;
+}
+
+/// The part before the camera of the hull of points.
+Changes::Hull Changes::in_picture(const Points& world) const {
+    std::vector<Eigen::Vector4f> clip;
+    for (const Eigen::Vector3f& point : world) clip.push_back(views_.clip_from_world * point.homogeneous());
+    Hull seen;
+    const auto add = [&](const Eigen::Vector4f& p) {
+        seen.emplace_back(0.5f * static_cast<float>(views_.width) * (1 + p.x() / p.w()),
+                          0.5f * static_cast<float>(views_.height) * (1 + p.y() / p.w()));
+    };
+    for (const Eigen::Vector4f& a : clip) {
+        if (a.w() < kNearest) continue;
+        add(a);
+        for (const Eigen::Vector4f& b : clip)
+            if (b.w() < kNearest) add(a + (b - a) * ((a.w() - kNearest) / (a.w() - b.w())));
+    }
+    return convex_hull(std::move(seen));
+}
+
+Changes::Seen Changes::see(const FrameState& frame, std::size_t object) const {
+    Seen seen;
+    if (!frame.visible[object]) return seen;
+    if (bounds_[object].box.isEmpty()) return seen;
+    const Eigen::AlignedBox3f box = bounds_[object].grown(frame, object);
+    Points world;
+    for (int i = 0; i < 8; ++i) {
+        const auto corner = box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(i));
+        world.push_back(transformed(frame.world_from_object[object], corner));
+        seen.from_light.push_back(transformed(views_.light_from_world, world.back()));
+    }
+    const auto [nearest, farthest] =
+        std::minmax_element(seen.from_light.begin(), seen.from_light.end(),
+                            [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) { return a.z() < b.z(); });
+    seen.nearest = nearest->z() - depth_pad_, seen.farthest = farthest->z() + depth_pad_;
+    seen.hull = in_picture(world);
+    return seen;
+}
+
+bool Changes::moved(const FrameState& frame, std::size_t object) const {
+    if (frame.visible[object] != before_.visible[object]) return true;
+    if (!frame.visible[object]) return false;
+    return frame.world_from_object[object] != before_.world_from_object[object] ||
+           (!bounds_[object].reach.empty() && frame.modal[object] != before_.modal[object]);
+}
+
+void Changes::update(const FrameState& frame) {
+    moved_.assign(bounds_.size(), true);
+    std::vector<Seen> seen;
+    std::size_t moving = 0;
+    for (std::size_t i = 0; i < bounds_.size(); ++i) {
+        moved_[i] = !known_ || moved(frame, i);
+        moving += moved_[i];
+        seen.push_back(moved_[i] ? see(frame, i) : seen_[i]);
+    }
+    const bool all = !known_ || moving > kMostMoved;
+    std::swap(seen, seen_);  // from here on `seen` is where things were
+    objects_.clear(), picture_.clear(), shadow_.clear();
+    if (all) {
+        objects_.fill(), picture_.fill();
+        if (views_.shadow_size > 0) shadow_ = {{0, 0, views_.shadow_size, views_.shadow_size}};
+    } else {
+        for (std::size_t i = 0; i < bounds_.size(); ++i) {
+            if (!moved_[i]) continue;
+            add_moved(seen[i]);
+            add_moved(seen_[i]);
+        }
+        picture_.add(objects_);
+    }
+    before_ = frame;
+    known_ = true;
+}
+
+void Changes::add_moved(const Seen& seen) {
+    if (seen.from_light.empty()) return;
+    objects_.add(seen.hull);
+    if (views_.shadow_size == 0) return;
+    add_to_shadow_map(in_shadow_map(seen));
+    add_shadow(seen);
+}
+
+void Changes::add_shadow(const Seen& caster) {
+    Hull outline;  // of its shadow, in the light's x and y
+    for (const Eigen::Vector3f& corner : caster.from_light)
+        for (const float x : {-pad_, pad_})
+            for (const float y : {-pad_, pad_}) outline.emplace_back(corner.x() + x, corner.y() + y);
+    outline = convex_hull(std::move(outline));
+    const auto [left, right] =
+        std::minmax_element(outline.begin(), outline.end(),
+                            [](const Eigen::Vector2f& a, const Eigen::Vector2f& b) { return a.x() < b.x(); });
+    const auto [low, high] =
+        std::minmax_element(outline.begin(), outline.end(),
+                            [](const Eigen::Vector2f& a, const Eigen::Vector2f& b) { return a.y() < b.y(); });
+    for (std::size_t i = 0; i < seen_.size(); ++i) {
+        const Seen& other = seen_[i];
+        if (moved_[i] || other.from_light.empty() || other.farthest < caster.nearest) continue;
+        Eigen::AlignedBox3f box;
+        for (const Eigen::Vector3f& corner : other.from_light) box.extend(corner);
+        if (box.max().x() < left->x() || box.min().x() > right->x() || box.max().y() < low->y() ||
+            box.min().y() > high->y())
+            continue;
+        Points prism;
+        for (const Eigen::Vector2f& p : outline)
+            for (const float z : {std::max(caster.nearest, other.nearest), other.farthest})
+                prism.push_back(transformed(world_from_light_, {p.x(), p.y(), z}));
+        objects_.add_common(in_picture(prism), other.hull);
+    }
+    Points floor;
+    const Eigen::Vector3f ray = world_from_light_.block<3, 1>(0, 2);
+    if (std::abs(ray.y()) < 1e-3f * ray.norm()) {  // light that grazes the floor
+        picture_.fill();
+        return;
+    }
+    for (const Eigen::Vector2f& p : outline) {
+        const Eigen::Vector3f start = transformed(world_from_light_, {p.x(), p.y(), 0});
+        floor.push_back(start + ray * ((views_.floor_height - start.y()) / ray.y()));
+    }
+    picture_.add(in_picture(floor));
+}
+
+PixelBox Changes::in_shadow_map(const Seen& seen) const {
+    if (seen.from_light.empty()) return {};
+    Eigen::AlignedBox2f box;
+    for (const Eigen::Vector3f& corner : seen.from_light) box.extend(corner.head<2>());
+    const auto size = static_cast<float>(views_.shadow_size);
+    const auto texel = [&](float x) {
+        return static_cast<int>(std::clamp(std::floor(0.5f * (x + 1) * size), -2.0f, size + 2));
+    };
+    const auto within = [&](int x) { return std::clamp(x, 0, views_.shadow_size); };
+    return {within(texel(box.min().x()) - 1), within(texel(box.min().y()) - 1),
+            within(texel(box.max().x()) + 2), within(texel(box.max().y()) + 2)};
+}
+
+/// Boxes that meet become one.
+void Changes::add_to_shadow_map(PixelBox box) {
+    if (box.empty()) return;
+    for (std::size_t i = 0; i < shadow_.size();) {
+        if (!shadow_[i].meets(box)) {
+            ++i;
+            continue;
+        }
+        box.include(shadow_[i]);
+        shadow_.erase(shadow_.begin() + static_cast<std::ptrdiff_t>(i));
+        i = 0;
+    }
+    shadow_.push_back(box);
+}
+
+std::vector<PixelBox> Changes::boxes(std::size_t object) const {
+    return objects_.touched(seen_[object].hull);
+}
+
+PixelBox Changes::shadow_box(std::size_t object) const {
+    return in_shadow_map(seen_[object]);
+}
+
+}  // namespace render

@@ -1,0 +1,163 @@
+#include "tile_mask.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace render {
+namespace {
+
+/// A box may take in this much more for a run of tiles [pixels]: drawing it costs as much as one more pass over
+/// an object's triangles.
+constexpr int kMostWaste = 2048;
+
+float cross(const Eigen::Vector2f& o, const Eigen::Vector2f& a, const Eigen::Vector2f& b) {
+    return (a.x() - o.x()) * (b.y() - o.y()) - (a.y() - o.y()) * (b.x() - o.x());
+}
+
+}  // namespace
+
+bool PixelBox::meets(const PixelBox& other) const {
+    return left < other.right && other.left < right && bottom < other.top && other.bottom < top;
+}
+
+void PixelBox::include(const PixelBox& other) {
+    if (other.empty()) return;
+    if (empty()) {
+        *this = other;
+        return;
+    }
+    left = std::min(left, other.left), bottom = std::min(bottom, other.bottom);
+    right = std::max(right, other.right), top = std::max(top, other.top);
+}
+
+// Andrew's monotone chain.
+std::vector<Eigen::Vector2f> convex_hull(std::vector<Eigen::Vector2f> points) {
+    std::sort(points.begin(), points.end(), [](const Eigen::Vector2f& a, const Eigen::Vector2f& b) {
+        return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
+    });
+    if (points.size() < 3) return points;
+    std::vector<Eigen::Vector2f> hull;
+    const auto extend = [&hull](const Eigen::Vector2f& point, std::size_t keep) {
+        while (hull.size() > keep && cross(hull[hull.size() - 2], hull.back(), point) <= 0) hull.pop_back();
+        hull.push_back(point);
+    };
+    for (const Eigen::Vector2f& point : points) extend(point, 1);
+    const std::size_t lower = hull.size();
+    for (auto point = points.rbegin() + 1; point != points.rend(); ++point) extend(*point, lower);
+    hull.pop_back();
+    return hull;
+}
+
+TileMask::TileMask(int width, int height)
+    : width_(width),
+      height_(height),
+      columns_((width + kTile - 1) / kTile),
+      rows_((height + kTile - 1) / kTile),
+      marked_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)) {}
+
+void TileMask::clear() {
+    std::fill(marked_.begin(), marked_.end(), std::uint8_t{0});
+}
+
+void TileMask::fill() {
+    std::fill(marked_.begin(), marked_.end(), std::uint8_t{1});
+}
+
+bool TileMask::empty() const {
+    return std::find(marked_.begin(), marked_.end(), std::uint8_t{1}) == marked_.end();
+}
+
+/// Columns of tiles that the polygon touches in a row of tiles: the range of x of its part in the row's band.
+TileMask::Columns TileMask::columns(std::span<const Eigen::Vector2f> hull, int row) const {
+    const float low = static_cast<float>(row * kTile) - kGrown,
+                high = static_cast<float>((row + 1) * kTile) + kGrown;
+    float least = std::numeric_limits<float>::infinity(), most = -least;
+    for (std::size_t i = 0; i < hull.size(); ++i) {
+        const Eigen::Vector2f &a = hull[i], &b = hull[(i + 1) % hull.size()];
+        if (std::max(a.y(), b.y()) < low || std::min(a.y(), b.y()) > high) continue;
+        const auto x_at = [&](float y) {
+            const float rise = b.y() - a.y();
+            return rise == 0 ? a.x() : a.x() + (b.x() - a.x()) * std::clamp((y - a.y()) / rise, 0.0f, 1.0f);
+        };
+        for (const float x : {x_at(std::clamp(a.y(), low, high)), x_at(std::clamp(b.y(), low, high))}) {
+            least = std::min(least, x);
+            most = std::max(most, x);
+        }
+    }
+    if (!(least <= most)) return {0, -1};
+    const auto column = [&](float x) {
+        return static_cast<int>(std::clamp(std::floor(x / kTile), -1.0f, static_cast<float>(columns_)));
+    };
+    return {std::max(column(least - kGrown), 0), std::min(column(most + kGrown), columns_ - 1)};
+}
+
+void TileMask::add(std::span<const Eigen::Vector2f> hull) {
+    add_common(hull, hull);
+}
+
+void TileMask::add_common(std::span<const Eigen::Vector2f> hull, std::span<const Eigen::Vector2f> other) {
+    for (int row = 0; row < rows_; ++row) {
+        const Columns a = columns(hull, row), b = columns(other, row);
+        const int first = std::max(a.first, b.first), last = std::min(a.last, b.last);
+        if (first <= last) std::fill_n(marked_.begin() + row * columns_ + first, last - first + 1, 1);
+    }
+}
+
+void TileMask::add(const TileMask& other) {
+    for (std::size_t i = 0; i < marked_.size(); ++i) marked_[i] |= other.marked_[i];
+}
+
+PixelBox TileMask::box(int first, int last, int row) const {
+    return {first * kTile, row * kTile, std::min((last + 1) * kTile, width_),
+            std::min((row + 1) * kTile, height_)};
+}
+
+/// Boxes of neighbouring marked tiles of a row.
+void TileMask::add_runs(int row, Columns within, std::vector<PixelBox>& found) const {
+    const auto marks = marked_.begin() + row * columns_;
+    for (int first = within.first; first <= within.last; ++first) {
+        if (marks[first] == 0) continue;
+        int last = first;
+        while (last < within.last && marks[last + 1] != 0) ++last;
+        found.push_back(box(first, last, row));
+        first = last;
+    }
+}
+
+std::vector<PixelBox> TileMask::touched(std::span<const Eigen::Vector2f> hull) const {
+    std::vector<PixelBox> boxes, runs;
+    for (int row = 0; row < rows_; ++row) {
+        runs.clear();
+        add_runs(row, columns(hull, row), runs);
+        for (const PixelBox& run : runs) {
+            PixelBox* best = nullptr;
+            int least = kMostWaste + 1;
+            for (PixelBox& box : boxes) {
+                PixelBox both = box;
+                both.include(run);
+                const int waste = both.area() - box.area() - run.area();
+                if (waste < least) best = &box, least = waste;
+            }
+            if (best == nullptr)
+                boxes.push_back(run);
+            else
+                best->include(run);
+        }
+    }
+    return boxes;
+}
+
+PixelBox TileMask::bounds() const {
+    PixelBox all;
+    for (const PixelBox& run : runs()) all.include(run);
+    return all;
+}
+
+std::vector<PixelBox> TileMask::runs() const {
+    std::vector<PixelBox> found;
+    for (int row = 0; row < rows_; ++row) add_runs(row, {0, columns_ - 1}, found);
+    return found;
+}
+
+}  // namespace render

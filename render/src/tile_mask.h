@@ -1,0 +1,59 @@
+#pragma once
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace render {
+
+/// Pixels left <= x < right, bottom <= y < top, counted as OpenGL's windows: y up. Empty by default.
+struct PixelBox {
+    int left = 0, bottom = 0, right = 0, top = 0;
+    [[nodiscard]] bool empty() const { return left >= right || bottom >= top; }
+    [[nodiscard]] int area() const { return empty() ? 0 : (right - left) * (top - bottom); }
+    [[nodiscard]] bool meets(const PixelBox& other) const;
+    void include(const PixelBox& other);
+};
+
+/// Corners of the convex hull of points, counter-clockwise.
+[[nodiscard]] std::vector<Eigen::Vector2f> convex_hull(std::vector<Eigen::Vector2f> points);
+
+/// Which of a picture's tiles (8 x 8 pixels, those at the right and the top cut off by its edges) are meant.
+class TileMask {
+public:
+    static constexpr int kTile = 8;  ///< [pixels]
+
+    TileMask(int width, int height);
+
+    void clear();
+    void fill();
+    [[nodiscard]] bool empty() const;
+
+    /// Adds every tile that the convex polygon (pixels) grown by `kGrown` touches.
+    void add(std::span<const Eigen::Vector2f> hull);
+    /// Adds what both convex polygons touch.
+    void add_common(std::span<const Eigen::Vector2f> hull, std::span<const Eigen::Vector2f> other);
+    void add(const TileMask& other);
+
+    /// Boxes, few and not much too large, around the mask's tiles that the polygon touches.
+    [[nodiscard]] std::vector<PixelBox> touched(std::span<const Eigen::Vector2f> hull) const;
+    [[nodiscard]] PixelBox bounds() const;
+    /// The mask as boxes one tile high.
+    [[nodiscard]] std::vector<PixelBox> runs() const;
+
+    /// Rounding of vertices, and of the rasteriser's places to 1/256 pixel, stays far below it. [pixels]
+    static constexpr float kGrown = 1.5f;
+
+private:
+    struct Columns {
+        int first, last;  ///< none: first > last
+    };
+    void add_runs(int row, Columns within, std::vector<PixelBox>& found) const;
+    [[nodiscard]] Columns columns(std::span<const Eigen::Vector2f> hull, int row) const;
+    [[nodiscard]] PixelBox box(int first, int last, int row) const;
+
+    int width_, height_, columns_, rows_;
+    std::vector<std::uint8_t> marked_;  ///< [row * columns + column]
+};
+
+}  // namespace render
