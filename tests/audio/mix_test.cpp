@@ -28,7 +28,8 @@ TEST(Mix, TwoNotesTogetherAreTheSumOfEachAloneToFloatRounding) {
 
 TEST(Mix, NotesOfOneVoiceDoNotDependOnThoseBefore) {
     // A stroke reuses Csound's memory of an ended one: it must sound as the first did.
-    const std::vector<audio::Voice> voices{voice("drum", {{"decay_s", 0.1}, {"snare", 0.5}, {"variation", 0}})};
+    const std::vector<audio::Voice> voices{
+        voice("drum", {{"decay_s", 0.1}, {"snare", 0.5}, {"variation", 0}})};
     const auto sound = render(voices, {note(1, 64), note(2, 64 + 64 * 500), note(3, 64 + 64 * 1000)});
     for (std::size_t i = 0; i < 2 * 64 * 100; ++i) {
         ASSERT_EQ(sound[2 * 64 + i], sound[2 * 64 + i + 2 * 64 * 500]);

@@ -94,11 +94,11 @@ KitStage::KitStage(const Kit& kit, std::size_t sticks, const StickGeometry& stic
 
 void KitStage::add_stand(const Instrument& instrument) {
     const sim::BodyDefinition& body = instrument.body;
-    if (instrument.kind == "bell") {
+    if (instrument.kind == "bell" && body.stand.hinged) {
         add_gallows(instrument);
         return;
     }
-    const bool below = instrument.kind == "drum";
+    const bool below = instrument.kind == "drum" || !body.stand.hinged;
     const Eigen::Vector3d hold(0, below ? -body.shape.semi_axes.y() : 0, 0);
     const Eigen::Vector3d top = body.world_from_body * hold;
     const double height = top.y() - kit_.room.floor_height;

@@ -68,7 +68,9 @@ TEST(IncludedKits, AKeyOfAnInstrumentIsChangedByItsNameAndTheOthersStay) {
         folder.kit(kInclude + "[[instrument]]\nname = \"snare\"\nsound = { frequency_hz = 150 }\n");
     ASSERT_EQ(kit.instruments.size(), 2u);
     const Instrument& snare = kit.instruments[0];
-    EXPECT_EQ(snare.voice.parameters,
+    // Those after them are the stick's.
+    ASSERT_GE(snare.voice.parameters.size(), 2u);
+    EXPECT_EQ(std::vector(snare.voice.parameters.begin(), snare.voice.parameters.begin() + 2),
               (std::vector<std::pair<std::string, double>>{{"frequency_hz", 150}, {"snare", 0.8}}));
     EXPECT_EQ(snare.kind, "drum");
     EXPECT_EQ(snare.body.world_from_body.translation(), Eigen::Vector3d(0, 0.7, -0.45));
