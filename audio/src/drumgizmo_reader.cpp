@@ -11,6 +11,11 @@ namespace audio {
 namespace fs = std::filesystem;
 namespace {
 
+/// The highest velocity of a range that ends before this share of 127; the next one begins above it.
+int velocity_below(double upper) {
+    return upper >= 1 ? 127 : static_cast<int>(std::ceil(127 * upper)) - 1;
+}
+
 // What of a DrumGizmo kit is followed: instruments, their samples with power (version 2) or velocity ranges (version 1),
 // the channels marked `main` (all where none is), left and right by the channels' names. Not followed: bleed into
 // other microphones, DrumGizmo's own choice among samples and its humanising.
@@ -120,8 +125,8 @@ private:
                      const std::map<std::string, pugi::xml_node>& by_name, int low, int high,
                      const std::set<std::string>& main) {
         for (const pugi::xml_node velocity : velocities.children("velocity")) {
-            const int from = static_cast<int>(127 * xml.number(velocity, "lower", 0, 1)),
-                      to = static_cast<int>(127 * xml.number(velocity, "upper", 0, 1));
+            const int from = static_cast<int>(std::ceil(127 * xml.number(velocity, "lower", 0, 1))),
+                      to = velocity_below(xml.number(velocity, "upper", 0, 1));
             const auto refs = velocity.children("sampleref");
             const int count = static_cast<int>(std::distance(refs.begin(), refs.end()));
             int position = 0;
@@ -186,7 +191,11 @@ void add_kit(const Xml& kit, DrumGizmo& regions) {
     std::map<std::string, pugi::xml_node> by_name;
     for (const pugi::xml_node one : kit.top().child("instruments").children("instrument"))
         by_name[one.attribute("name").value()] = one;
+    constexpr int kMostMaps = 256;
+    int maps = 0;
     for (const pugi::xml_node entry : map.top().children("map")) {
+        if (++maps > kMostMaps)
+            fail_at(map.place(entry), "more than " + std::to_string(kMostMaps) + " maps", "fewer");
         const auto found = by_name.find(entry.attribute("instr").value());
         if (found == by_name.end())
             fail_at(map.place(entry), "instr=\"" + printable(entry.attribute("instr").value()) + "\"",

@@ -124,9 +124,4 @@ void ModalBank::render(std::span<const float> force, std::span<const float> driv
     }
 }
 
-std::size_t ModalBank::sounding_groups() const noexcept {
-    return static_cast<std::size_t>(
-        std::count(sounds_.begin(), sounds_.begin() + static_cast<std::ptrdiff_t>(groups_), true));
-}
-
 }  // namespace audio

@@ -21,7 +21,7 @@ struct ModeParameters {
 /// keep their relative precision at low frequencies, where those of a biquad do not.
 ///
 /// A trivial type without alignment of its own, which lies in memory that Csound clears and gives out again.
-/// Sixteen modes go together; once they are quiet they rest. No allocation.
+/// Sixteen modes go together; once they are quiet they rest for good. No allocation.
 class ModalBank {
 public:
     static constexpr std::size_t kMostModes = 512, kMostSamples = 64;
@@ -36,7 +36,6 @@ public:
     /// inverted, which stands for the body's directions of radiation.
     void render(std::span<const float> force, std::span<const float> drive, std::span<float> mid,
                 std::span<float> side) noexcept;
-    [[nodiscard]] std::size_t sounding_groups() const noexcept;
 
 private:
     using Column = std::array<float, kMostModes>;

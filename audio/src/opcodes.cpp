@@ -111,7 +111,7 @@ struct Bank {
             return csound->InitError(csound, "modal_bank: found no table of modes, or ksmps above 64");
         std::array<ModeParameters, ModalBank::kMostModes> modes{};
         const double most = std::min(static_cast<double>(modes.size()), length / 4.0);
-        const auto count = static_cast<std::size_t>(std::clamp(*self.count, 0.0, most));
+        const auto count = static_cast<std::size_t>(*self.count > 0 ? std::min(*self.count, most) : 0);
         for (std::size_t i = 0; i < count; ++i)
             modes[i] = {table[4 * i], table[4 * i + 1], table[4 * i + 2], table[4 * i + 3]};
         self.bank.set(std::span(modes).first(count), csound->GetSr(csound), *self.rest);

@@ -8,7 +8,8 @@ namespace audio {
 namespace {
 
 constexpr std::array<std::size_t, 8> kLengths{1103, 1279, 1433, 1601, 1787, 1951, 2129, 2297};  // primes
-constexpr double kHighShare = 0.5;  // of T60 at half the sample rate
+constexpr double kShortestS = 0.05;  // of T60: shorter than the lines is no room
+constexpr double kHighShare = 0.5;   // of T60 at half the sample rate
 // How each line is heard left and right: orthogonal among the even lines and among the odd ones, so that the two
 // are as different as can be.
 constexpr std::array<double, 8> kLeft{1, 1, 1, 1, -1, -1, -1, -1}, kRight{1, 1, -1, -1, 1, 1, -1, -1};
@@ -16,7 +17,7 @@ constexpr std::array<double, 8> kLeft{1, 1, 1, 1, -1, -1, -1, -1}, kRight{1, 1, 
 }  // namespace
 
 Room::Room(const RoomSound& sound) {
-    if (sound.t60_s <= 0) return;
+    if (sound.t60_s < kShortestS) return;
     const double samples = sound.t60_s * kSampleRate;
     for (std::size_t i = 0; i < kLines; ++i) {
         Line& line = lines_[i];

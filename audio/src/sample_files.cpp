@@ -61,6 +61,11 @@ Recording read_sound(const fs::path& file, const std::string& place) {
         fail_at(place, name + " of " + std::to_string(info.frames) + " frames",
                 "1 to " + std::to_string(static_cast<int>(kLongestSampleS)) + " s of sound");
     const auto channels = static_cast<std::size_t>(info.channels);
+    if (static_cast<std::size_t>(info.frames) > kMostSampleFrames / channels)
+        fail_at(place,
+                name + " of " + std::to_string(info.frames) + " frames of " + std::to_string(channels) +
+                    " channels",
+                "at most " + std::to_string(kMostSampleFrames) + " samples");
     std::vector<float> all(static_cast<std::size_t>(info.frames) * channels);
     const sf_count_t read = sf_readf_float(sound.get(), all.data(), info.frames);
     if (read != info.frames)
@@ -158,7 +163,11 @@ private:
         const auto known = recordings_.find(r.sample);
         if (known != recordings_.end()) return known->second;
         set_.files.push_back(r.sample);
-        return recordings_.emplace(r.sample, read_sound(r.sample, r.place)).first->second;
+        const Recording& read = recordings_.emplace(r.sample, read_sound(r.sample, r.place)).first->second;
+        if ((read_ += read.channels.size() * read.channels.front().size()) > kMostSampleFrames)
+            fail_at(r.place, "more than " + std::to_string(kMostSampleFrames) + " samples in the files",
+                    "less sound for one instrument");
+        return read;
     }
     static std::vector<ChannelUse> channels_of(const WrittenRegion& r, const Recording& recording) {
         for (const ChannelUse& use : r.channels)
@@ -196,7 +205,7 @@ private:
 
     SampleSet& set_;
     std::map<fs::path, Recording> recordings_;
-    std::size_t frames_ = 0;
+    std::size_t frames_ = 0, read_ = 0;
 };
 
 std::string lower_extension(const fs::path& file) {

@@ -217,7 +217,9 @@ private:
         };
         r.ampeg_delay = std::min(time(delay_volume), 10.0);
         r.ampeg_attack = time(attack_volume), r.ampeg_hold = time(hold_volume);
-        r.ampeg_decay = time(decay_volume);
+        // Of a fall by 100 dB, of which the sustain is a part (SoundFont 2.04, 8.1.2).
+        const double sustain_centibels = std::clamp(sum(preset, zone, sustain_volume), 0.0, 1000.0);
+        r.ampeg_decay = time(decay_volume) * sustain_centibels / 1000;
         r.ampeg_sustain =
             100 * std::pow(10, -std::clamp(sum(preset, zone, sustain_volume), 0.0, 1440.0) / 200);
         r.group = r.off_by = amount(zone, exclusive_class, 0);

@@ -14,6 +14,7 @@ namespace {
 
 constexpr int kDeepestInclude = 8;
 constexpr std::size_t kMostDefines = 1000, kMostLineAfterDefines = 1 << 14;
+constexpr std::size_t kMostOpcodes = 1000;  // of one header
 
 /// What a header says, over the headers above it.
 struct Opcode {
@@ -207,15 +208,18 @@ private:
             ignored_.insert("<" + printable(name) + ">");
             return;
         }
-        for (int below = level_; below <= region; ++below)
-            if (below != control) levels_[static_cast<std::size_t>(below)].clear();
+        for (int below = level_; level_ != control && below <= region; ++below)
+            levels_[static_cast<std::size_t>(below)].clear();
         place_ = place;
     }
 
     void opcode(std::string_view name, std::string_view value, const std::string& place) {
         if (level_ == none) return;
         if (level_ == control) return control_opcode(name, value, place);
-        levels_[static_cast<std::size_t>(level_)][std::string(name)] = {std::string(value), place};
+        Opcodes& given = levels_[static_cast<std::size_t>(level_)];
+        given[std::string(name)] = {std::string(value), place};
+        if (given.size() > kMostOpcodes)
+            fail_at(place, "more than " + std::to_string(kMostOpcodes) + " opcodes of one header", "fewer");
     }
     void control_opcode(std::string_view name, std::string_view value, const std::string& place) {
         if (name == "default_path") {
@@ -244,8 +248,16 @@ private:
     void end_header() {
         if (level_ != region) return;
         Opcodes all;
-        for (const Level level : {region, group, master, global})
-            all.insert(levels_[level].begin(), levels_[level].end());
+        for (const Level level : {region, group, master, global}) {
+            Opcodes& given = levels_[level];
+            // `key` stands for these three where its level does not say them.
+            if (const auto key = given.find("key"); key != given.end()) {
+                (void)take_key(key->second, "key");
+                for (const char* name : {"lokey", "hikey", "pitch_keycenter"})
+                    given.emplace(name, key->second);
+            }
+            all.insert(given.begin(), given.end());
+        }
         levels_[region].clear();
         if (result_.regions.size() >= kMostRegions)
             fail_at(place_, "more than " + std::to_string(kMostRegions) + " regions", "fewer");
@@ -259,13 +271,6 @@ private:
         if (r.sample.empty()) {
             if (sounds) fail_at(place_, "a <region> without sample", "sample=FILE");
             return {};
-        }
-        if (const auto key = all.find("key"); key != all.end()) {
-            // Its own lokey, hikey and pitch_keycenter come before `key`.
-            const int value = take_key(key->second, "key");
-            if (!all.contains("lokey")) r.lokey = value;
-            if (!all.contains("hikey")) r.hikey = value;
-            if (!all.contains("pitch_keycenter")) r.pitch_keycenter = value;
         }
         const int shift = note_offset_ + 12 * octave_offset_;
         r.lokey += shift, r.hikey += shift, r.pitch_keycenter += shift;

@@ -18,8 +18,8 @@ namespace {
 
 constexpr GLuint kMatrixUnit = 0, kShadowUnit = 1, kObjectsUnit = 2, kLitUnit = 3, kDarkUnit = 4,
                  kModesUnit = 5, kOpenUnit = 6;
-/// Balls of a radius below this share of the distance from the eye to the target darken the floor by less
-/// than one of 255 levels, unless they lie on it.
+/// Balls of a radius below this share of the distance from the eye to the target do not darken the floor beneath
+/// them: it would be little, unless they lie on it.
 constexpr float kLeastBall = 0.02f;
 constexpr float kShadowShift = 2.5f;  // of a receiver along its normal, more than the filter reaches [texels]
 constexpr int kMostPixels = 8192;     // pixels

@@ -365,7 +365,7 @@ void main() {
         float open = texelFetch(open_floor, at, 0).r;
         vec3 lit = texelFetch(lit_floor, at, 0).rgb * (0.7 + 0.3 * open);
         vec3 dark = texelFetch(dark_floor, at, 0).rgb * open;
-        light = mix(dark, lit, shadow_light(shadow));
+        light = mix(dark, lit, distance > 0.0 ? shadow_light(shadow) : 1.0);  // the wall has no shadows
     }
     fragment = vec4(object.rgb + (1.0 - object.a) * light, 1.0);
 }

@@ -7,7 +7,7 @@
 namespace render {
 namespace {
 
-constexpr float kNear = 0.05f, kFar = 60;  // [m]
+constexpr float kNear = 0.05f, kLeastFar = 60;  // [m]
 constexpr float kShadowMargin = 1.25f;
 
 /// View space: x right, y up, looking along -z.
@@ -32,11 +32,13 @@ float half_height_per_distance(const Camera& camera) {
 
 Eigen::Matrix4f clip_from_world(const Camera& camera, float aspect) {
     const float scale = 1 / half_height_per_distance(camera);
+    const float far =
+        std::max(kLeastFar, 3 * (camera.eye - camera.target).norm());  // as wide as what it looks at
     Eigen::Matrix4f projection = Eigen::Matrix4f::Zero();
     projection(0, 0) = scale / aspect;
     projection(1, 1) = scale;
-    projection(2, 2) = (kFar + kNear) / (kNear - kFar);
-    projection(2, 3) = 2 * kFar * kNear / (kNear - kFar);
+    projection(2, 2) = (far + kNear) / (kNear - far);
+    projection(2, 3) = 2 * far * kNear / (kNear - far);
     projection(3, 2) = -1;
     return projection * view_from_world(camera.eye, camera.target - camera.eye);
 }

@@ -84,6 +84,14 @@ TEST(OnsetRule, HalfBlockRuleAsksForTheSecondHalfOneBlockEarlier) {
     EXPECT_DOUBLE_EQ(audio::onset_p2(audio::OnsetRule::exact, 32, 64), 32.01 / 48000);
 }
 
+TEST(OnsetRule, OnsetsOfThePerformancesFirstBlockAreExactToo) {
+    for (const std::int64_t onset : {0, 1, 31, 32, 33, 50, 63}) {
+        const auto sound = left(render({short_voice("drum")}, {note(1, onset)}));
+        EXPECT_EQ(std::find_if(sound.begin(), sound.end(), [](double x) { return x != 0; }) - sound.begin(),
+                  onset);
+    }
+}
+
 TEST(OnsetRule, OnsetsStayExactAfterTenMinutes) {
     const std::int64_t onset = 600 * 48000 + 37;
     const auto sound = left(render({short_voice("drum")}, {note(1, onset)}, 0, onset + kLongTail));

@@ -101,7 +101,7 @@ TEST(Mix, LiveSoundsAsOfflineToTheSampleInARoom) {
 }
 
 TEST(Mix, GainOrRoomOutOfRangeIsARuntimeError) {
-    for (const audio::Mix& bad : {audio::Mix{.gain_db = 61, .room = {}, .alone = {}},
+    for (const audio::Mix& bad : {audio::Mix{.gain_db = 161, .room = {}, .alone = {}},
                                   audio::Mix{.gain_db = 0, .room = {-1, 0}, .alone = {}},
                                   audio::Mix{.gain_db = 0, .room = {1, std::nan("")}, .alone = {}}})
         EXPECT_THROW(audio::Performance(kOrchestra, {}, bad), std::runtime_error);

@@ -261,7 +261,11 @@ void add_copy(Command& kit) {
     command.required(
         "--out", *out, as::text("FILE"),
         "Kit to write (TOML), replaced if there is one; what it needs comes to FILE-files beside it");
-    command.runs([name, out] { copy_kit(find_kit(*name), *out); });
+    command.runs([name, out] {
+        const std::filesystem::path original = find_kit(*name);
+        (void)render::load_meshes(meshes_of(read_kit(original)));  // what is no mesh is not passed on
+        copy_kit(original, *out);
+    });
 }
 
 void add_new(Command& kit) {

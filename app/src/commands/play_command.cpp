@@ -24,7 +24,8 @@ namespace {
 
 void print_places(const PlayResult& result) {
     const PlayOptions& options = result.options;
-    const bool frames_kept = options.frames && (!options.video || options.keep_frames);
+    std::error_code none;
+    const bool frames_kept = options.frames && fs::exists(options.out / "frames", none);
     fmt::print("Look at {}", (options.out / "report.html").string());
     if (options.audio) fmt::print(", listen to {}", (options.out / "audio.wav").string());
     if (frames_kept) fmt::print(", see {}", (options.out / "frames").string());

@@ -45,7 +45,9 @@ void print(const SimulateResult& r, const SimulateOptions& options) {
     if (r.accuracy)
         for (const std::string& line : r.accuracy->lines()) fmt::print("{}\n", line);
     for (const std::string& line : r.mishaps.lines()) fmt::print("{}\n", line);
-    if (options.out && options.frames) fmt::print("See {}\n", (*options.out / "frames").string());
+    std::error_code none;
+    if (options.out && (options.frames || options.video) && fs::exists(*options.out / "frames", none))
+        fmt::print("See {}\n", (*options.out / "frames").string());
     if (options.video && r.failures.empty()) fmt::print("Watch {}\n", options.video->string());
 }
 

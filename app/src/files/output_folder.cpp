@@ -165,8 +165,9 @@ void OutputFolder::keep() {
     notice_ = std::make_unique<InterruptionNotice>(staging_, true);
 }
 
-void OutputFolder::drop(std::string_view name) const {
-    fs::rename(staging_ / name, scratch() / name);
+void OutputFolder::remove_product(std::string_view name) const {
+    std::error_code stays;
+    remove_tree(output_place(folder_ / name).path, stays);
 }
 
 void OutputFolder::take_back(std::string_view name) {

@@ -65,8 +65,8 @@ public:
 
     /// From now on what is staged stays without finish(), too: a run can go on with it.
     void keep();
-    /// What was staged under this name is no product any more.
-    void drop(std::string_view name) const;
+    /// After finish(): a product that something else now stands for. What cannot be removed stays, which is no loss.
+    void remove_product(std::string_view name) const;
     /// Of a run that goes on: stages a product again that the interrupted run had begun to put in place.
     void take_back(std::string_view name);
 

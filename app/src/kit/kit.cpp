@@ -360,7 +360,7 @@ void mix_keys(Fields& keys, audio::Mix& mix) {
     keys.number("gain_db", mix.gain_db, {-60, 60, "dB"},
                 "Gain of the whole kit; offline, the sound is then brought to the loudness asked for.");
     keys.number("room_t60_s", mix.room.t60_s, {0, 20, "s"},
-                "Time in which the room's echo falls by 60 dB; 0: no room.");
+                "Time in which the room's echo falls by 60 dB; below 0.05: no room.");
     keys.number("room_level_db", mix.room.level_db, {-60, 20, "dB"},
                 "Energy of the room's echo against the instruments' own.");
 }

@@ -19,6 +19,19 @@ namespace app {
 namespace fs = std::filesystem;
 namespace {
 
+/// A basic string of TOML.
+std::string in_toml(const std::string& text) {
+    std::string out = "\"";
+    for (const char c : text)
+        if (c == '"' || c == '\\')
+            (out += '\\') += c;
+        else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+            out += fmt::format("\\u{:04X}", static_cast<unsigned>(c));
+        else
+            out += c;
+    return out + "\"";
+}
+
 /// Whether a file lies in a folder.
 bool lies_in(const fs::path& file, const fs::path& folder) {
     const fs::path relative = fs::weakly_canonical(file).lexically_relative(fs::weakly_canonical(folder));
@@ -140,7 +153,7 @@ private:
             const std::size_t begin = place_in(text, named.name->source().begin),
                               end = place_in(text, named.name->source().end);
             const std::string name = to.lexically_relative(place.parent_path()).generic_string();
-            text.replace(begin, end - begin, fmt::format("'{}'", name));
+            text.replace(begin, end - begin, in_toml(name));
         }
         return text;
     }

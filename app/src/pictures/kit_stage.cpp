@@ -1,6 +1,7 @@
 #include "pictures/kit_stage.h"
 
 #include <fmt/format.h>
+#include <render/mesh.h>
 #include <sim/simulation.h>
 #include <tracking/rotation.h>
 
@@ -26,7 +27,8 @@ const std::array<Eigen::Vector3f, 3> kMarkColors = {Eigen::Vector3f(0.02f, 0.55f
                                                     Eigen::Vector3f(0.80f, 0.30f, 0.01f),
                                                     Eigen::Vector3f(0.70f, 0.01f, 0.02f)};
 constexpr std::size_t kMostMarks = 12;  // of a kind
-constexpr double kGhostAcross = 0.6;    // of a stick's thickness
+/// Of a stick's thickness, in that order: none is hidden in the stick, nor the truth in a right prediction.
+constexpr std::array<double, 3> kGhostAcross = {1.1, 1.2, 1.3};
 constexpr double kMarkRadiusM = 0.03, kMarkHalfHeightM = 0.002;
 
 render::Look plain(const Eigen::Vector3f& color) {
@@ -54,19 +56,6 @@ Eigen::Matrix4f matrix_of(const sim::BodyDefinition& body, const sim::ModalState
     return matrix.cast<float>();
 }
 
-/// Of boxes around the instruments at rest.
-std::vector<Eigen::Vector3f> corners_of(const Kit& kit) {
-    std::vector<Eigen::Vector3f> corners;
-    for (const Instrument& instrument : kit.instruments) {
-        const Eigen::AlignedBox3d box(-instrument.body.shape.semi_axes, instrument.body.shape.semi_axes);
-        for (int i = 0; i < 8; ++i) {
-            const auto corner = static_cast<Eigen::AlignedBox3d::CornerType>(i);
-            corners.push_back((instrument.body.world_from_body * box.corner(corner)).cast<float>());
-        }
-    }
-    return corners;
-}
-
 /// The same of an instrument's mesh, which may have a size of its own.
 Eigen::Matrix4f mesh_matrix(const Instrument& instrument, const sim::ModalState& state) {
     if (!instrument.mesh_scale_m) return matrix_of(instrument.body, state);
@@ -75,11 +64,28 @@ Eigen::Matrix4f mesh_matrix(const Instrument& instrument, const sim::ModalState&
     return matrix.cast<float>();
 }
 
-/// A bound of how far a point of [-1, 1]^3 lies from where the other matrix puts it.
-double farthest(const Eigen::Matrix4f& a, const Eigen::Matrix4f& b) {
+/// Of boxes around the instruments at rest.
+std::vector<Eigen::Vector3f> corners_of(const Kit& kit, const std::vector<Eigen::AlignedBox3f>& bounds) {
+    std::vector<Eigen::Vector3f> corners;
+    for (std::size_t i = 0; i < kit.instruments.size(); ++i) {
+        const Eigen::Matrix4f rest = mesh_matrix(kit.instruments[i], {});
+        for (int k = 0; k < 8; ++k) {
+            const auto corner = static_cast<Eigen::AlignedBox3f::CornerType>(k);
+            corners.push_back((rest * bounds[i].corner(corner).homogeneous()).head<3>());
+        }
+    }
+    return corners;
+}
+
+/// A bound of how far a point of the box lies from where the other matrix puts it.
+double farthest(const Eigen::Matrix4f& a, const Eigen::Matrix4f& b, const Eigen::AlignedBox3f& box) {
     const Eigen::Matrix4f difference = a - b;
-    return double(
-        (difference.leftCols<3>().cwiseAbs().rowwise().sum() + difference.col(3).cwiseAbs()).maxCoeff());
+    double most = 0;
+    for (int k = 0; k < 8; ++k) {
+        const Eigen::Vector3f corner = box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k));
+        most = std::max(most, double((difference * corner.homogeneous()).norm()));
+    }
+    return most;
 }
 
 }  // namespace
@@ -87,8 +93,13 @@ double farthest(const Eigen::Matrix4f& a, const Eigen::Matrix4f& b) {
 KitStage::KitStage(const Kit& kit, std::size_t sticks, const StickGeometry& stick, CameraChoice camera,
                    Shown shown)
     : kit_(kit), sticks_(sticks), stick_(stick), camera_(std::move(camera)), shown_(shown) {
-    for (const Instrument& instrument : kit_.instruments)
+    for (const Instrument& instrument : kit_.instruments) {
+        // Bundled meshes and those without a scale fill the body's box.
+        bounds_.push_back(instrument.mesh_scale_m
+                              ? render::load_mesh(instrument.mesh).bounds()
+                              : Eigen::AlignedBox3f(Eigen::Vector3f(-1, -1, -1), Eigen::Vector3f(1, 1, 1)));
         if (instrument.drawn_stand && instrument.kind != "string") add_stand(instrument);
+    }
     add_string_frame();
 }
 
@@ -166,7 +177,7 @@ render::SceneDescription KitStage::scene(int width, int height) const {
         scene.objects.push_back(
             {fmt::format("stick {}", i), kit_.stick.mesh, wood(0.62f, 0.40f, 0.20f, 0.38f)});
     describe_annotations(scene);
-    scene.camera = standing_camera(camera_, kit_.camera, corners_of(kit_),
+    scene.camera = standing_camera(camera_, kit_.camera, corners_of(kit_, bounds_),
                                    static_cast<float>(width) / static_cast<float>(height));
     scene.room = kit_.room;
     scene.width = width;
@@ -195,8 +206,9 @@ void KitStage::add_annotations(render::FrameState& state, const Annotations& ann
     };
     for (std::size_t i = 0; shown_.ghosts && i < sticks_; ++i) {
         const StickGhosts ghosts = i < annotations.ghosts.size() ? annotations.ghosts[i] : StickGhosts();
-        for (const auto* pose : {&ghosts.measured, &ghosts.predicted, &ghosts.truth})
-            add(*pose ? std::optional(stick_matrix(**pose, kGhostAcross)) : std::nullopt);
+        const std::array poses = {&ghosts.measured, &ghosts.predicted, &ghosts.truth};
+        for (std::size_t k = 0; k < poses.size(); ++k)
+            add(*poses[k] ? std::optional(stick_matrix(**poses[k], kGhostAcross[k])) : std::nullopt);
     }
     if (!shown_.marks) return;
     for (const MarkKind kind : {MarkKind::released, MarkKind::late, MarkKind::cancelled}) {
@@ -229,10 +241,9 @@ render::FrameState KitStage::frame(std::span<const sim::ModalState> bodies,
         state.visible.push_back(visible);
     };
     for (std::size_t i = 0; i < kit_.instruments.size(); ++i) {
-        const sim::BodyDefinition& body = kit_.instruments[i].body;
-        const bool rests =
-            bodies.empty() || farthest(matrix_of(body, bodies[i]), matrix_of(body, {})) < kRestM;
-        add(mesh_matrix(kit_.instruments[i], rests ? sim::ModalState{} : bodies[i]), true);
+        const Eigen::Matrix4f rest = mesh_matrix(kit_.instruments[i], {});
+        const Eigen::Matrix4f now = bodies.empty() ? rest : mesh_matrix(kit_.instruments[i], bodies[i]);
+        add(farthest(now, rest, bounds_[i]) < kRestM ? rest : now, true);
     }
     for (const Prop& prop : props_) add(prop.matrix, true);
     for (std::size_t i = 0; i < sticks_; ++i) {

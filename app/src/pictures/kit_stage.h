@@ -51,6 +51,7 @@ private:
     StickGeometry stick_;
     CameraChoice camera_;
     Shown shown_;
+    std::vector<Eigen::AlignedBox3f> bounds_;  ///< of the instruments' meshes, in their own units
     std::vector<Prop> props_;
 };
 

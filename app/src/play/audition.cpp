@@ -40,7 +40,7 @@ Audition audition(const Kit& kit, const std::string& only, std::span<const doubl
         throw BadInput(fmt::format("error: found --instrument {}, expected one of {}{}", one_line(only),
                                    fmt::join(names, ", "), nearest_hint(only, names)));
     Audition heard{{speeds_mps.begin(), speeds_mps.end()}, {}, {}};
-    audio::Performance performance(orchestra_file(), voices_of(kit));
+    audio::Performance performance(orchestra_file(), voices_of(kit), kit.mix);
     double at_s = kFirstS;
     std::uint64_t id = 0;
     for (std::uint32_t i = 0; i < kit.instruments.size(); ++i) {

@@ -146,7 +146,7 @@ audio::Note note_of(const Strike& strike, const Instrument& instrument) {
     note.place = place_of(strike, instrument);
     note.zone = strike.zone;
     note.midi_note = instrument.zones[static_cast<std::size_t>(strike.zone)].midi_note;
-    note.midi_velocity = audio::stroke_velocity(strike.speed_mps);
+    note.midi_velocity = audio::stroke_velocity(note.speed_mps);
     return note;
 }
 
@@ -230,11 +230,14 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     stage("report", [&] {
         write_page(folder, "report.html", [&](Plotter& plotter) { return format_report(result, plotter); });
     });
-    if (video && !options.keep_frames) folder.adorn("", [&] { folder.drop("frames"); });
     result.wall_s = parts.wall.seconds();
     write_file(folder.path("summary.json"), format_summary(result, realtime_json));
     folder.finish();
-    if (video) folder.adorn("", [&] { video->finish(); });
+    if (video)
+        folder.adorn("", [&] {
+            video->finish();
+            if (!options.keep_frames) folder.remove_product("frames");
+        });
     result.failures = folder.failures();
 }
 

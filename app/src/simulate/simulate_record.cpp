@@ -279,14 +279,16 @@ void SimulateRecord::write_products(const WallTimer& wall, double before_s) {
     result_.frames = frames_ ? next_frame_ : 0;
     std::unique_ptr<OutputFile> video;
     if (options_.video)
-        folder_->adorn("", [&] {
-            video = make_video(*options_.video, options_.fps, 0, false, folder_->path("."));
-            if (!options_.frames) folder_->drop("frames");
-        });
+        folder_->adorn(
+            "", [&] { video = make_video(*options_.video, options_.fps, 0, false, folder_->path(".")); });
     result_.wall_s = before_s + wall.seconds();
     write_file(folder_->path("summary.json"), format_simulate(result_));
     folder_->finish();
-    if (video) folder_->adorn("", [&] { video->finish(); });
+    if (video)
+        folder_->adorn("", [&] {
+            video->finish();
+            if (!options_.frames) folder_->remove_product("frames");
+        });
     result_.failures = folder_->failures();
 }
 

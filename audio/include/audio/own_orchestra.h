@@ -7,16 +7,16 @@
 namespace audio {
 
 // An orchestra of one's own: Csound instruments that are put behind the bundled orchestra, so that they have its macros
-// (CLOSE ends a note), opcodes and tables, and its p-fields. A kit is a file that people pass on, so its code may sound
-// and do nothing else: no files, no network, no processes, no text to make them of.
+// (STROKE begins a note, CLOSE ends it), opcodes and p-fields. A kit is a file that people pass on, so its code may sound and do nothing
+// else: what it may say is a list (own_orchestra.cpp), and Csound gets what was read here, not the file.
 
-/// Throws SampleError (audio/samples.h) "FILE:LINE:COLUMN: error: found ..., expected ..." for a text (of an orchestra, at
-/// most 1 MiB) with strings, preprocessor lines, macros put together of parts, opcodes that reach beyond the sound
-/// (system, fout, diskin, OSCsend ...), ftgen of a file, header values (sr, ksmps, nchnls, 0dbfs) or an instrument that has
-/// one of the names `taken`.
-void check_own_orchestra(std::string_view text, const std::string& file, std::span<const std::string> taken);
+/// What Csound gets of such a text (at most 1 MiB): instruments without their comments, lines `;@` that declare parameters between
+/// them. Throws SampleError (audio/samples.h) "FILE:LINE:COLUMN: error: found ..., expected ..." for words that are not listed, texts,
+/// anything but comments outside instruments, and an instrument that has one of the names `taken`. (Fuzzed.)
+[[nodiscard]] std::string checked_own_orchestra(std::string_view text, const std::string& file,
+                                                std::span<const std::string> taken);
 
-/// The text of such a file, checked. Throws SampleError.
+/// The same of a file. Throws SampleError.
 [[nodiscard]] std::string read_own_orchestra(const std::filesystem::path& file,
                                              std::span<const std::string> taken);
 

@@ -126,9 +126,9 @@ TEST(OwnSounds, SamplesLieBesideTheFileThatNamesThem) {
 TEST(OwnSounds, AnOwnOrchestraAddsInstruments) {
     const KitFolder folder;
     folder.text("mine.orc",
-                ";@ gong frequency_hz 100 20 2000 pitch [Hz]\ninstr gong\nablow linseg 1, 1 / sr, 0, 1, 0\n"
-                "ilevel = 0.1\niduration = 1\nasound reson ablow, p12, 5\n"
-                "amid = asound\naside = 0 * asound\niwidth = 0\n$CLOSE\nendin\n");
+                ";@ gong frequency_hz 100 20 2000 pitch [Hz]\ninstr gong\naBlow linseg 1, 1 / sr, 0, 1, 0\n"
+                "ilevel = 0.1\niduration = 1\naSound reson aBlow, p12, 5\n"
+                "amid = aSound\naside = 0 * aSound\niwidth = 0\n$CLOSE\nendin\n");
     const std::string with =
         "[[instrument]]\nname = \"gong\"\nkind = \"cymbal\"\nsize = [0.4, 0.02, 0.4]\n"
         "position = [0, 1, -0.5]\nsound = { orchestra = \"mine.orc\", instrument = \"gong\", ";
@@ -181,9 +181,9 @@ TEST(KitCopy, ACopyNeedsNothingOfTheOriginalAndKeepsItsText) {
     std::ifstream stream(copy.file);
     const std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
     EXPECT_EQ(text,
-              "# my kit\ninclude = ['mine-files/base.toml']\n[[instrument]]\nname = \"snare\" # changed\n"
-              "mesh = 'mine-files/drum2.obj'\n"
-              "sound = { samples = 'mine-files/set/inner/set.sfz', gain_db = -1 }\n");
+              "# my kit\ninclude = [\"mine-files/base.toml\"]\n[[instrument]]\nname = \"snare\" # changed\n"
+              "mesh = \"mine-files/drum2.obj\"\n"
+              "sound = { samples = \"mine-files/set/inner/set.sfz\", gain_db = -1 }\n");
 }
 
 TEST(KitCopy, ABundledKitAndWhatItIncludesBecomeOnesOwn) {

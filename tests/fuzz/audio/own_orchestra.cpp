@@ -1,6 +1,7 @@
 // Orchestras that are put behind the bundled one.
 #include "audio/own_orchestra.h"
 
+#include <string>
 #include <vector>
 
 #include "audio/samples.h"
@@ -9,7 +10,9 @@
 void fuzz(std::string_view bytes) {
     static const std::vector<std::string> kTaken = {"drum", "sample"};
     try {
-        audio::check_own_orchestra(bytes, "fuzz", kTaken);
+        const std::string text = audio::checked_own_orchestra(bytes, "fuzz", kTaken);
+        require(text.find_first_of("\"\\#{}`\r\xff") == std::string::npos, "what makes texts or macros");
+        require(audio::checked_own_orchestra(text, "fuzz", kTaken) == text, "a text that reads to another");
     } catch (const audio::SampleError& fault) {
         require_located(fault, "fuzz");
     }
