@@ -38,6 +38,8 @@ constexpr std::array<std::string_view, 132> kWords = {
 constexpr std::array<std::string_view, 21> kMoreWords = {
     "tan",   "sinh", "cosh", "tanh", "sininv", "cosinv", "taninv", "taninv2", "int",  "frac",  "round",
     "floor", "ceil", "min",  "max",  "pow",    "mod",    "ampdb",  "dbamp",   "cent", "octave"};
+constexpr std::string_view kPlain =
+    " ;@.,:+-=<>()[]/%^";  // beside words, of a line that declares a parameter
 constexpr std::string_view kSigns = "+-*/%^()[],=<>!&|?:'";
 
 bool contains(const auto& words, std::string_view word) {
@@ -87,7 +89,8 @@ private:
     void line_of(std::string_view line) {
         if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
         if (!comment_ && !within_ && line.starts_with(";@")) {
-            for (const char c : line) out_ += c >= 0x20 && c < 0x7f ? c : ' ';
+            for (const char c : line)
+                out_ += is_word(c) || kPlain.find(c) != std::string_view::npos ? c : ' ';
             return;
         }
         previous_ = {};
