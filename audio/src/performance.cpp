@@ -150,6 +150,7 @@ struct Performance::Implementation {
         if (const auto* finish = std::get_if<Finish>(&command)) {
             while (renderer.goes_on(finish->minimum_samples, finish->tail_samples))
                 renderer.render_block(rendered);
+            renderer.require_numbers();
             rendered.resize(2 * static_cast<std::size_t>(
                                     renderer.kept_samples(finish->minimum_samples, finish->tail_samples)));
         }

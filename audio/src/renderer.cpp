@@ -175,12 +175,23 @@ void Renderer::render_to(std::int64_t sample, std::vector<float>& output) {
 void Renderer::render_block(std::vector<float>& output) {
     start_due_notes();
     const std::size_t begin = output.size();
-    for (const double value : engine_.render_block()) output.push_back(static_cast<float>(value));
+    for (const double value : engine_.render_block()) {
+        if (!std::isfinite(value) && broken_ < 0) broken_ = position_;
+        output.push_back(std::isfinite(value) ? static_cast<float>(value) : 0.0F);
+    }
     const std::span<float> block = std::span(output).subspan(begin);
     room_.add_to(block);
     for (std::size_t i = 0; i < block.size(); ++i)
         if (std::abs(block[i]) >= kSilence) loud_ = position_ + static_cast<std::int64_t>(i / 2 + 1);
     position_ += block_size();
+}
+
+void Renderer::require_numbers() const {
+    if (broken_ < 0) return;
+    throw std::runtime_error(
+        "the orchestra: found samples that are no numbers from sample " + std::to_string(broken_) +
+        " on, expected finite ones; look for a division by 0 or the root of a negative number "
+        "in an instrument of your own");
 }
 
 void Renderer::start_due_notes() {

@@ -58,6 +58,8 @@ public:
     void render_to(std::int64_t sample, std::vector<float>& output);
     /// Whether more blocks are to be rendered until what Performance::finish says is there.
     [[nodiscard]] bool goes_on(std::int64_t minimum_samples, std::int64_t tail_samples) const;
+    /// Throws std::runtime_error if an instrument gave samples that are no numbers: they are silence in what was rendered.
+    void require_numbers() const;
     /// How much of all that was rendered is then kept.
     [[nodiscard]] std::int64_t kept_samples(std::int64_t minimum_samples, std::int64_t tail_samples) const;
 
@@ -83,6 +85,7 @@ private:
     std::size_t next_due_ = 0;
     std::vector<double> p_fields_;
     std::int64_t position_ = 0, loud_ = 0;  ///< loud_: up to the last sample that is not silent
+    std::int64_t broken_ = -1;  ///< first block with a sample that is no number, silenced; -1: none
 };
 
 }  // namespace audio

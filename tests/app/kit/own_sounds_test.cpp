@@ -143,6 +143,27 @@ TEST(OwnSounds, AnOwnOrchestraAddsInstruments) {
     EXPECT_NE(sound.at(2000), 0);
 }
 
+TEST(OwnSounds, AnOrchestraWhoseSoundIsNoNumberIsSaidAndSilencesNobodyElse) {
+    const KitFolder folder;
+    folder.text("mine.orc",
+                ";@ gong frequency_hz 100 20 2000 pitch [Hz]\ninstr gong\n$STROKE(0.4'0'0.01'0.05'1e9)\n"
+                "amid = aforce * sqrt(p7 - 100)\naside = 0\niwidth = 0\niduration = 1\n$CLOSE\nendin\n");
+    const Kit kit = folder.kit(
+        "[[instrument]]\nname = \"gong\"\nkind = \"cymbal\"\nsize = [0.4, 0.02, 0.4]\nposition = [0, 1, "
+        "-0.5]\n"
+        "sound = { orchestra = \"mine.orc\", instrument = \"gong\", frequency_hz = 90 }\n");
+    audio::Performance performance(MUSICWORLD_SOURCE_DIR "/assets/orchestra/musicworld.orc",
+                                   {kit.instruments[0].voice});
+    performance.schedule({1, 0, 1000, 5, 0, 0, 49, 90});
+    try {
+        (void)performance.finish(2000, 48000);
+        ADD_FAILURE();
+    } catch (const std::runtime_error& wrong) {
+        EXPECT_NE(std::string(wrong.what()).find("no numbers from sample "), std::string::npos)
+            << wrong.what();
+    }
+}
+
 TEST(OwnSounds, DamagedKitsAreReadOrRefusedInOneLineWithTheirPlace) {
     const KitFolder folder;
     const std::string good = "remove = [\"tom\"]\n" + kInclude +
