@@ -15,6 +15,8 @@ constexpr double kHighestPeakDbtp = -1;  // EBU R 128
 std::string file_name(std::size_t instrument, std::string name) {
     for (char& c : name)
         if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-') c = '_';
+    constexpr std::size_t kLongest = 100;  // a file's name has at most 255 bytes
+    if (name.size() > kLongest) name.resize(kLongest);
     return fmt::format("{:02}_{}.wav", instrument + 1, name);
 }
 
