@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include "clocks.h"
 #include "jack_server.h"
 #include "rendering.h"
+#include "sample_folder.h"
 
 // Another program sounds our strokes: DrumGizmo, with a kit of one click that is made here.
 
@@ -28,24 +28,6 @@ constexpr std::int64_t kMs = 1'000'000;
 void write(const std::filesystem::path& file, const std::string& text) {
     std::ofstream(file) << text;
 }
-
-/// A new folder, removed at the end.
-class Folder {
-public:
-    Folder() : path_(testing::TempDir() + "musicworld-clicks-" + std::to_string(getpid())) {
-        std::filesystem::create_directories(path_);
-    }
-    ~Folder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    Folder(const Folder&) = delete;
-    Folder& operator=(const Folder&) = delete;
-    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
-private:
-    std::filesystem::path path_;
-};
 
 /// One instrument of one sample, a click of 50 ms whose first sample is loud.
 void write_kit(const std::filesystem::path& folder) {
@@ -96,7 +78,7 @@ TEST(DrumGizmo, SoundsEveryStrokeAtItsOnsetPlusItsOwnConstantLatencyAndNoCancell
     for (const char* program : {"jackd", "drumgizmo"}) {
         if (!Program::is_installed(program)) GTEST_SKIP() << program << " is not installed";
     }
-    const Folder folder;
+    const SampleFolder folder;
     const std::filesystem::path& kit = folder.path();
     write_kit(kit);
     const jack_server::Server server(128);

@@ -24,6 +24,7 @@ public:
     SampleFolder(const SampleFolder&) = delete;
     SampleFolder& operator=(const SampleFolder&) = delete;
 
+    [[nodiscard]] const std::filesystem::path& path() const { return path_; }
     [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
     std::filesystem::path text(const std::string& name, const std::string& text) const {
         std::ofstream(path_ / name, std::ios::binary) << text;

@@ -32,6 +32,23 @@ sim::WorldBody frictionless(sim::WorldBody body) {
     return body;
 }
 
+/// Within 45 degrees or so of x.
+Vector3d towards_a_wall(Draw& draw) {
+    return Vector3d(1, draw.between(-0.7, 0.7), draw.between(-0.7, 0.7)).normalized();
+}
+
+/// Whether the centre of a body that flies at a wall across x comes to `x` within so many steps, before it is farther than
+/// `slid_off` from the wall's middle.
+bool comes_to(sim::World& world, int body, double x, double slid_off, int steps) {
+    for (int k = 0; k < steps; ++k) {
+        world.step();
+        const Vector3d p = world.state(body).position;
+        if (std::max(std::abs(p.y()), std::abs(p.z())) > slid_off) return false;
+        if (p.x() >= x) return true;
+    }
+    return false;
+}
+
 TEST(WorldImpact, BallsDroppedOnAWideThinTableStayOnIt) {
     sim::WorldDefinition d;
     d.bodies.push_back(box({0, 0, 0}, {1, 0.02, 1}));
@@ -78,7 +95,7 @@ TEST(WorldImpact, RigidNeedlesAndCardsThatTurnOnDoNotPassWalls) {
         sim::WorldBody wall = box({0, 0, 0}, {half, 5 * s, 5 * s}),
                        shot = box({0, 0, 0}, {s / 20, s, draw.below(2) ? s : s / 20});
         wall.fixed = true;
-        const Vector3d way = Vector3d(1, draw.between(-0.7, 0.7), draw.between(-0.7, 0.7)).normalized();
+        const Vector3d way = towards_a_wall(draw);
         const Vector3d aim(-half - 1.5 * s, draw.between(-1, 1) * s, draw.between(-1, 1) * s);
         shot.world_from_body.linear() =
             Eigen::AngleAxisd(draw.between(0, 3), draw.direction()).toRotationMatrix();
@@ -86,14 +103,7 @@ TEST(WorldImpact, RigidNeedlesAndCardsThatTurnOnDoNotPassWalls) {
         shot.velocity = speed * way;
         d.bodies = {wall, shot};
         sim::World world(d);
-        for (int k = 0; k < 12; ++k) {
-            world.step();
-            const Vector3d p = world.state(1).position;
-            if (std::max(std::abs(p.y()), std::abs(p.z())) > 3.5 * s) break;  // slid off
-            if (p.x() < 0) continue;
-            ++through;
-            break;
-        }
+        through += comes_to(world, 1, 0, 3.5 * s, 12);
     }
     // Of bodies that once are inside a thin wall no sample tells which way is out.
     EXPECT_LE(through, kCases / 100);
@@ -107,7 +117,7 @@ TEST(WorldImpact, BallsOf1CmTo10MAt1To300MetresASecondDoNotPassWalls) {
         const bool wall_first = draw.below(2) == 0;
         sim::WorldBody wall = box({0, 0, 0}, {half, 6 * r, 6 * r});
         wall.fixed = true;
-        const Vector3d way = Vector3d(1, draw.between(-0.7, 0.7), draw.between(-0.7, 0.7)).normalized();
+        const Vector3d way = towards_a_wall(draw);
         const Vector3d aim(-half - r, draw.between(-2, 2) * r, draw.between(-2, 2) * r);
         sim::WorldBody shot =
             ball(aim - draw.between(0.1, 2) * speed * d.settings.dt * way, Fidelity::rigid, r);
@@ -115,12 +125,8 @@ TEST(WorldImpact, BallsOf1CmTo10MAt1To300MetresASecondDoNotPassWalls) {
         shot.angular_velocity = draw.below(2) * draw.between(0, 20) / r * draw.direction();
         d.bodies = wall_first ? std::vector{wall, shot} : std::vector{shot, wall};
         sim::World world(d);
-        for (int k = 0; k < 6; ++k) {
-            world.step();
-            const Vector3d p = world.state(wall_first ? 1 : 0).position;
-            if (std::max(std::abs(p.y()), std::abs(p.z())) > 6 * r) break;  // slid off
-            ASSERT_LT(p.x(), -half - 0.8 * r) << "case " << i << ", r " << r << " at " << speed << " m/s";
-        }
+        ASSERT_FALSE(comes_to(world, wall_first ? 1 : 0, -half - 0.8 * r, 6 * r, 6))
+            << "case " << i << ", r " << r << " at " << speed << " m/s";
     }
 }
 
@@ -140,19 +146,15 @@ TEST(WorldImpact, SoftBodiesFasterThanSoundInTheirMatterDoNotPassWalls) {
             shot.fidelity.fidelity = fidelity;
         }
         shot.material.young_pa = shot.material.density_kg_m3 * sound * sound;
-        const Vector3d way = Vector3d(1, draw.between(-0.7, 0.7), draw.between(-0.7, 0.7)).normalized();
+        const Vector3d way = towards_a_wall(draw);
         shot.world_from_body.translation() =
             Vector3d(-half - 1.8 * s, 0, 0) - draw.between(0.1, 2) * speed * d.settings.dt * way;
         shot.velocity = speed * way;
         d.bodies = {wall, shot};
         sim::World world(d);
-        for (int k = 0; k < 12; ++k) {
-            world.step();
-            const Vector3d p = world.state(1).position;
-            if (std::max(std::abs(p.y()), std::abs(p.z())) > 5 * s) break;  // slid off
-            ASSERT_LT(p.x(), -half) << "case " << i << ", size " << s << " at " << speed << " m/s, "
-                                    << speed / sound << " times sound";
-        }
+        ASSERT_FALSE(comes_to(world, 1, -half, 5 * s, 12))
+            << "case " << i << ", size " << s << " at " << speed << " m/s, " << speed / sound
+            << " times sound";
     }
 }
 
