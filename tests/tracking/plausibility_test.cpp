@@ -95,7 +95,7 @@ TEST(Plausibility, AMirroredSceneOrSwappedNamesAreNoticed) {
                                                     -s.orientation.z());
                     },
                     0.4),  // so that the shafts point ahead throughout
-                "stick left lies 0.4 m to the right");
+                "to the right of stick right for 100 % of the time, by 0.4 m");
 }
 
 TEST(Plausibility, ShortAndPositionOnlyTracesAreJudgedOnWhatTheyHold) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "binary_place.h"
+#include "replay_frames.h"
 #include "text_cursor.h"
 #include "trace_limits.h"
 
@@ -14,8 +16,6 @@ namespace {
 constexpr std::uint32_t kMagic = 0x442d3d69;
 constexpr std::size_t kFrameBytes = 92;  // time, frames per second, three poses of seven floats
 constexpr std::array<std::size_t, 2> kHandOffset = {36, 64};
-constexpr double kStartUp = 0.5;  // s
-constexpr double kTeleport = 30;  // m/s
 
 /// Bytes with a place in a file. Little endian throughout.
 class Bytes {
@@ -23,9 +23,7 @@ public:
     Bytes(std::string_view bytes, const std::string& name) : bytes_(bytes), name_(name) {}
 
     [[noreturn]] void fail(std::size_t at, const std::string& found, const std::string& expected) const {
-        throw TraceError(printable(name_) + ":byte " + std::to_string(at) + ": error: found " + found +
-                         ", expected " + expected +
-                         "; check that the replay is complete, or download it again");
+        fail_at_byte(name_, at, found, expected, "check that the replay is complete, or download it again");
     }
 
     [[nodiscard]] std::size_t at() const { return at_; }
@@ -109,9 +107,8 @@ std::string skip_info(Bytes& in) {
 
 /// The frames as they lie in the file.
 struct Frames {
-    std::vector<std::size_t> at;  ///< where those that count begin
+    std::vector<std::size_t> at;  ///< where they begin
     std::vector<double> t_s;
-    std::size_t repeated = 0;
 };
 
 Frames read_frames(Bytes& in) {
@@ -123,34 +120,17 @@ Frames read_frames(Bytes& in) {
                 "at most the " + std::to_string(in.left() / kFrameBytes) + " that the file has room for");
     Frames frames;
     for (std::uint32_t k = 0; k < count; ++k) {
-        const std::size_t at = in.at();
-        const double t = in.float_at(at);
-        if (!(std::abs(t) <= kLatest)) in.fail(at, "a time that is no number within 1e7 s", "seconds");
+        frames.at.push_back(in.at());
+        frames.t_s.push_back(in.float_at(in.at()));
+        if (!(std::abs(frames.t_s.back()) <= kLatest))
+            in.fail(in.at(), "a time that is no number within 1e7 s", "seconds");
         in.skip(kFrameBytes, "a frame");
-        if (!frames.t_s.empty() && t <= frames.t_s.back()) {
-            ++frames.repeated;
-            continue;
-        }
-        frames.at.push_back(at);
-        frames.t_s.push_back(t);
     }
     return frames;
 }
 
 Eigen::Vector3d game_position(const Bytes& in, std::size_t at) {
     return {in.float_at(at), in.float_at(at + 4), in.float_at(at + 8)};
-}
-
-/// Index of the first frame after the start-up.
-std::size_t start_of(const Bytes& in, const Frames& frames) {
-    std::size_t first = 0;
-    for (std::size_t k = 1; k < frames.at.size() && frames.t_s[k] - frames.t_s[0] <= kStartUp; ++k)
-        for (const std::size_t hand : kHandOffset) {
-            const double way =
-                (game_position(in, frames.at[k] + hand) - game_position(in, frames.at[k - 1] + hand)).norm();
-            if (!(way <= kTeleport * (frames.t_s[k] - frames.t_s[k - 1]))) first = k;
-        }
-    return first;
 }
 
 PoseSample pose(const Bytes& in, std::size_t at, double t_s) {
@@ -171,13 +151,13 @@ PoseSample pose(const Bytes& in, std::size_t at, double t_s) {
     return sample;
 }
 
-StickTrace read_hand(const Bytes& in, const Frames& frames, std::size_t first, std::size_t hand,
-                     const char* name) {
+StickTrace read_hand(const Bytes& in, const Frames& frames, const std::vector<std::size_t>& kept,
+                     std::size_t hand, const char* name) {
     StickTrace stick{name, {}};
-    stick.samples.reserve(frames.at.size() - first);
-    for (std::size_t k = first; k < frames.at.size(); ++k) {
+    stick.samples.reserve(kept.size());
+    for (const std::size_t k : kept) {
         PoseSample sample = pose(in, frames.at[k] + hand, frames.t_s[k]);
-        if (k > first && sample.orientation.dot(stick.samples.back().orientation) < 0)
+        if (!stick.samples.empty() && sample.orientation.dot(stick.samples.back().orientation) < 0)
             sample.orientation.coeffs() *= -1;
         stick.samples.push_back(sample);
     }
@@ -202,18 +182,14 @@ Trace parse_bsor(std::string_view bytes, const std::string& name) {
     trace.shaft = -Eigen::Vector3d::UnitZ();
     const std::size_t place = in.at();
     const Frames frames = read_frames(in);
-    const std::size_t first = start_of(in, frames);
-    if (frames.at.size() < first + 2)
-        in.fail(place, std::to_string(frames.at.size() - first) + " frames after the start-up",
-                "at least two");
-    trace.sticks = {read_hand(in, frames, first, kHandOffset[0], "left"),
-                    read_hand(in, frames, first, kHandOffset[1], "right")};
-    if (frames.repeated > 0)
-        trace.remarks.push_back("left out " + std::to_string(frames.repeated) +
-                                " frames not later than the ones before");
-    if (first > 0)
-        trace.remarks.push_back("left out " + std::to_string(first) + " frames of the start-up, before " +
-                                std::to_string(frames.t_s[first]) + " s");
+    const std::vector<std::size_t> kept = frames_that_count(
+        frames.t_s, kHandOffset.size(),
+        [&](std::size_t k, std::size_t hand) { return game_position(in, frames.at[k] + kHandOffset[hand]); },
+        trace.remarks);
+    if (kept.size() < 2)
+        in.fail(place, std::to_string(kept.size()) + " frames after the start-up", "at least two");
+    trace.sticks = {read_hand(in, frames, kept, kHandOffset[0], "left"),
+                    read_hand(in, frames, kept, kHandOffset[1], "right")};
     return trace;
 }
 

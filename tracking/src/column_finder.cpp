@@ -5,32 +5,17 @@
 #include <set>
 #include <stdexcept>
 
+#include "orientation_forms.h"
+#include "trace_limits.h"
+
 namespace tracking {
 namespace {
 
-constexpr std::size_t kMostSticks = 64;
 constexpr std::string_view kStick = "{stick}";
 
 const std::vector<std::string>& position_roles() {
     static const std::vector<std::string> roles = {"px", "py", "pz"};
     return roles;
-}
-
-/// Whether `text` is what `pattern` describes; '*' stands for anything.
-bool matches(std::string_view pattern, std::string_view text) {
-    const std::size_t star = pattern.find('*');
-    if (star == std::string_view::npos) return pattern == text;
-    if (!text.starts_with(pattern.substr(0, star))) return false;
-    text.remove_prefix(star);
-    pattern.remove_prefix(star + 1);
-    for (std::size_t next = pattern.find('*'); next != std::string_view::npos; next = pattern.find('*')) {
-        const std::size_t place =
-            text.find(pattern.substr(0, next));  // the first place leaves most for the rest
-        if (place == std::string_view::npos) return false;
-        text.remove_prefix(place + next);
-        pattern.remove_prefix(next + 1);
-    }
-    return text.ends_with(pattern);
 }
 
 /// The name that stands for {stick}, so that the pattern matches; empty if none does.
@@ -82,7 +67,7 @@ private:
 
     /// A stick, or as many as {stick} finds.
     void add_sticks(const std::string& prefix) {
-        const std::string pattern = map_.columns.at(role_of(prefix, "px"));
+        const std::string pattern(without_sign(map_.columns.at(role_of(prefix, "px"))));
         if (pattern.find(kStick) == std::string::npos) {
             add_stick(prefix, prefix);
             return;
@@ -108,11 +93,13 @@ private:
         found.stick = stick;
         std::size_t base = 0;
         const auto at = [&](const std::string& role) {
-            return column(with_stick(map_.columns.at(role_of(prefix, role)), stick), base);
+            const std::string& wanted = map_.columns.at(role_of(prefix, role));
+            return SignedColumn{column(with_stick(std::string(without_sign(wanted)), stick), base),
+                                wanted.starts_with('-') ? -1.0 : 1.0};
         };
         for (std::size_t i = 0; i < 3; ++i) {
             found.position[i] = at(position_roles()[i]);
-            if (i == 0) base = found.position[0];
+            if (i == 0) base = found.position[0].index;
         }
         for (const OrientationColumns kind :
              {OrientationColumns::quaternion, OrientationColumns::euler, OrientationColumns::matrix}) {
@@ -158,7 +145,9 @@ private:
         std::string known;
         for (std::size_t i = 0; i < names_.size() && i < 12; ++i)
             if (!names_[i].empty()) known += (known.empty() ? "" : ", ") + in_quotes(names_[i]);
-        header_.fail(0, "no column " + in_quotes(pattern), "one of " + known, "correct the map");
+        const bool unsplit = names_.size() == 1 && names_[0].find_first_of(";\t,") != std::string::npos;
+        header_.fail(0, "no column " + in_quotes(pattern), "one of " + known,
+                     unsplit ? "say what stands between the columns (--separator)" : "correct the map");
     }
 
     const ColumnMap& map_;
@@ -191,6 +180,22 @@ void check_stick(const std::set<std::string>& roles, const std::string& stick, b
     if (kinds > 1) refuse("two kinds of orientation" + of, "one");
 }
 
+/// Each stick's markers: the first, then the second, then the third.
+void check_markers(const std::map<std::string, std::string>& columns) {
+    std::map<std::string, std::set<std::string>> sticks;
+    for (const auto& [role, label] : columns) {
+        const auto [stick, bare] = split_role(role);
+        if (bare != "marker" && bare != "marker2" && bare != "marker3")
+            refuse("role " + in_quotes(role) + " among markers", "marker, marker2 or marker3 of a stick");
+        if (label.empty()) refuse("no label for " + in_quotes(role), "that of a point");
+        sticks[stick].insert(bare);
+    }
+    for (const auto& [stick, roles] : sticks)
+        if (!roles.contains("marker") || (roles.contains("marker3") && !roles.contains("marker2")))
+            refuse("markers of stick " + in_quotes(stick) + " without the ones before",
+                   "marker, then marker2, then marker3");
+}
+
 bool known_role(const std::string& role) {
     for (const OrientationColumns kind :
          {OrientationColumns::quaternion, OrientationColumns::euler, OrientationColumns::matrix})
@@ -199,6 +204,27 @@ bool known_role(const std::string& role) {
 }
 
 }  // namespace
+
+bool matches(std::string_view pattern, std::string_view text) {
+    const std::size_t star = pattern.find('*');
+    if (star == std::string_view::npos) return pattern == text;
+    if (!text.starts_with(pattern.substr(0, star))) return false;
+    text.remove_prefix(star);
+    pattern.remove_prefix(star + 1);
+    for (std::size_t next = pattern.find('*'); next != std::string_view::npos; next = pattern.find('*')) {
+        const std::size_t place =
+            text.find(pattern.substr(0, next));  // the first place leaves most for the rest
+        if (place == std::string_view::npos) return false;
+        text.remove_prefix(place + next);
+        pattern.remove_prefix(next + 1);
+    }
+    return text.ends_with(pattern);
+}
+
+std::string_view without_sign(std::string_view column) {
+    if (column.starts_with('-')) column.remove_prefix(1);
+    return column;
+}
 
 std::pair<std::string, std::string> split_role(const std::string& role) {
     const std::size_t dot = role.rfind('.');
@@ -227,6 +253,22 @@ TableColumns find_columns(const ColumnMap& map, const std::vector<std::string>& 
     return Finder(map, names, header).find();
 }
 
+void check_units(const ColumnMap& map) {
+    if (!(map.metres_per_unit.value_or(1) > 0) || !(map.seconds_per_unit > 0) ||
+        !(map.rate_hz >= 0 && map.rate_hz <= 1e5))
+        refuse("a unit or rate out of range", "positive units, a rate up to 100000 Hz");
+    if (!map.frame.empty() && !axes_of(map.frame))
+        refuse("frame " + in_quotes(map.frame),
+               "unity, unreal, or where x, y and z point: a letter each of R or L, U or D, F or B");
+    if (!map.frame.empty() && map.z_up) refuse("up z and a frame", "one of them");
+}
+
+bool ColumnMap::of_markers() const {
+    return std::any_of(columns.begin(), columns.end(), [](const auto& column) {
+        return split_role(column.first).second.starts_with("marker");
+    });
+}
+
 void ColumnMap::check() const {
     if (std::string_view(",;\t ").find(separator) == std::string_view::npos)
         refuse("an unknown separator", "comma, semicolon, tab or space");
@@ -235,28 +277,30 @@ void ColumnMap::check() const {
     std::sort(sorted.begin(), sorted.end());
     if (!euler.empty() && sorted != "XYZ")
         refuse("euler " + in_quotes(euler), "an order of X, Y, Z such as XYZ");
+    check_units(*this);
+    if (of_markers()) return check_markers(columns);
     std::map<std::string, std::set<std::string>> sticks;
     for (const auto& [role, column] : columns) {
-        if (column.empty()) refuse("no column for " + in_quotes(role), "its name, #N or +N");
-        if ((column[0] == '#' || column[0] == '+') && number_after_sign(column) == 0)
+        const std::string_view bare_column = without_sign(column);
+        if (bare_column.empty()) refuse("no column for " + in_quotes(role), "its name, #N or +N");
+        if ((bare_column[0] == '#' || bare_column[0] == '+') && number_after_sign(bare_column) == 0)
             refuse("column " + in_quotes(column), "#N or +N with N from 1 to 100000");
         if (role == "t" || role == "frame" || role == "stick") {
-            if (column[0] == '+') refuse(in_quotes(column) + " for " + role, "a name or #N");
+            if (column[0] == '+' || column[0] == '-')
+                refuse(in_quotes(column) + " for " + role, "a name or #N");
             continue;
         }
         const auto [stick, bare] = split_role(role);
         if (!known_role(bare))
             refuse("role " + in_quotes(role),
                    "t, frame, stick, px py pz, qw qx qy qz, ex ey ez or m00 .. m22");
-        if (bare == "px" && column[0] == '+') refuse("'+' for px", "a name or #N");
+        if (bare == "px" && bare_column[0] == '+') refuse("'+' for px", "a name or #N");
         sticks[stick].insert(bare);
     }
     if (sticks.empty()) refuse("no columns of positions", "px=..., py=..., pz=...");
     for (const auto& [stick, roles] : sticks) check_stick(roles, stick, !euler.empty());
     if (columns.contains("stick") && sticks.size() > 1)
         refuse("a stick column and several sticks", "one of them");
-    if (!(metres_per_unit > 0) || !(seconds_per_unit > 0) || !(rate_hz >= 0 && rate_hz <= 1e5))
-        refuse("a unit or rate out of range", "positive units, a rate up to 100000 Hz");
 }
 
 }  // namespace tracking

@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "text_cursor.h"
@@ -10,12 +11,18 @@ namespace tracking {
 
 enum class OrientationColumns { none, quaternion, euler, matrix };
 
-/// The columns of one stick in a table, counted from 0.
+/// A column, counted from 0, and what its numbers are multiplied by.
+struct SignedColumn {
+    std::size_t index = 0;
+    double sign = 1;
+};
+
+/// The columns of one stick in a table.
 struct StickColumns {
     std::string stick;  ///< empty: the table names none
-    std::array<std::size_t, 3> position{};
+    std::array<SignedColumn, 3> position{};
     OrientationColumns kind = OrientationColumns::none;
-    std::vector<std::size_t> orientation;  ///< w x y z | x y z | rows of the matrix
+    std::vector<SignedColumn> orientation;  ///< w x y z | x y z | rows of the matrix
 };
 
 /// All columns that a map names, found in a table's header.
@@ -30,6 +37,15 @@ struct TableColumns {
 /// messages. Throws TraceError for columns that are not there, or there twice.
 [[nodiscard]] TableColumns find_columns(const ColumnMap& map, const std::vector<std::string>& names,
                                         const Line& header);
+
+/// Whether `text` is what `pattern` describes; '*' stands for anything.
+[[nodiscard]] bool matches(std::string_view pattern, std::string_view text);
+
+/// Throws std::invalid_argument for units, a rate or axes that cannot be.
+void check_units(const ColumnMap& map);
+
+/// A column of a map without the sign before it.
+[[nodiscard]] std::string_view without_sign(std::string_view column);
 
 /// The stick a role is of ("left" of "left.px"; empty if it says none), and the role without it.
 [[nodiscard]] std::pair<std::string, std::string> split_role(const std::string& role);

@@ -22,7 +22,10 @@ constexpr double kStrongestShare = 0.002;  // share of the accelerations
 constexpr double kOneSided = 0.45;         // length of the mean of unit vectors
 constexpr double kPair = 1.0 / 30;         // s between poses that are compared
 constexpr double kMostlyExplained = 0.5, kMuchBetter = 0.25;
-constexpr double kWrongSide = 0.05;  // m
+constexpr std::size_t kFirstMirrored = 2, kLastMirrored = 4;  // among readings()
+constexpr double kWrongSide = 0.05, kShortestArm = 0.03;      // m
+constexpr double kAhead = 0.2;  // length of the mean of unit vectors, horizontally
+constexpr double kMostOfTheTime = 0.75;
 
 std::string number(double value) {
     char text[32];
@@ -155,24 +158,40 @@ std::vector<std::pair<std::size_t, std::size_t>> pairs_of(const StickTrace& stic
     return pairs;
 }
 
+/// How much of a stick's motion is turning about a point fixed in it.
+struct Turning {
+    Vector3d pivot = Vector3d::Zero();  ///< r, from the tracked point, body frame [m]
+    double all = 0, left = 0;           ///< sums of squared motions; what r leaves of them [m^2]
+    std::size_t count = 0;
+};
+
+Turning turning_of(const StickTrace& stick, const Reading& reading) {
+    Turning turning;
+    Matrix3d normal = 1e-12 * Matrix3d::Identity();  // keeps r finite where the stick does not turn
+    Vector3d right = Vector3d::Zero();
+    for (const auto& [i, j] : pairs_of(stick)) {
+        const Vector3d way = stick.samples[j].position - stick.samples[i].position;
+        const Matrix3d turn =
+            reading.matrix(stick.samples[j].orientation) - reading.matrix(stick.samples[i].orientation);
+        normal += turn.transpose() * turn;
+        right -= turn.transpose() * way;
+        turning.all += way.squaredNorm();
+        ++turning.count;
+    }
+    turning.pivot = normal.ldlt().solve(right);
+    turning.left = turning.all - right.dot(turning.pivot);
+    return turning;
+}
+
 /// Share of the sum of squared motions that turning about a point of each stick explains.
 double explained(const Trace& trace, const Reading& reading, std::size_t& count) {
     double all = 0, left = 0;
     count = 0;
     for (const StickTrace& stick : trace.sticks) {
-        Matrix3d normal = 1e-12 * Matrix3d::Identity();  // keeps r finite where the stick does not turn
-        Vector3d right = Vector3d::Zero();
-        for (const auto& [i, j] : pairs_of(stick)) {
-            const Vector3d way = stick.samples[j].position - stick.samples[i].position;
-            const Matrix3d turn =
-                reading.matrix(stick.samples[j].orientation) - reading.matrix(stick.samples[i].orientation);
-            normal += turn.transpose() * turn;
-            right -= turn.transpose() * way;
-            all += way.squaredNorm();
-            left += way.squaredNorm();
-            ++count;
-        }
-        left -= right.dot(normal.ldlt().solve(right));
+        const Turning turning = turning_of(stick, reading);
+        all += turning.all;
+        left += turning.left;
+        count += turning.count;
     }
     return all > 0 ? 1 - left / all : 0;
 }
@@ -192,9 +211,13 @@ void judge_orientation(const Trace& trace, std::vector<std::string>& lines) {
         if (share > best) best = share, which = i;
     }
     if (best < kMostlyExplained || best < given + kMuchBetter) return;
-    lines.push_back("turning about the hand explains " + per_cent(given) + " of the motion, and " +
-                    per_cent(best) + " if the orientation is read " + readings()[which].what +
-                    ": are its convention and the axes' handedness right?");
+    lines.push_back(
+        "turning about the hand explains " + per_cent(given) + " of the motion, and " + per_cent(best) +
+        " if the orientation is read " + readings()[which].what +
+        (which >= kFirstMirrored && which <= kLastMirrored
+             ? ": do positions and orientations differ in handedness (left-handed data, as Unity's and "
+               "Unreal's, need a frame, or signs in the map, for both)?"
+             : ": are its convention and the axes' handedness right?"));
 }
 
 const StickTrace* stick_named(const Trace& trace, const char* name) {
@@ -203,32 +226,63 @@ const StickTrace* stick_named(const Trace& trace, const char* name) {
     return nullptr;
 }
 
-Vector3d mean_shaft(const StickTrace& stick, const Vector3d& shaft) {
-    Vector3d mean = Vector3d::Zero();
-    for (const PoseSample& sample : stick.samples)
-        if (sample.has_orientation) mean += sample.orientation * shaft;
-    return mean / static_cast<double>(stick.samples.size());
+/// The body axis from hand to tip: the trace's shaft, else away from the point that the stick mostly turns about.
+std::optional<Vector3d> shaft_of(const StickTrace& stick, const Trace& trace) {
+    if (trace.shaft) return trace.shaft;
+    const Turning turning = turning_of(stick, readings().front());
+    const bool turns = turning.left < (1 - kMostlyExplained) * turning.all;
+    if (!turns || turning.pivot.norm() < kShortestArm) return std::nullopt;
+    return -turning.pivot.normalized();
 }
 
-double median_along(const StickTrace& stick, const Vector3d& axis) {
-    std::vector<double> along;
-    for (const PoseSample& sample : stick.samples) along.push_back(sample.position.dot(axis));
-    return quantile(along, 0.5);
+/// Where a shaft points, averaged with the square of the speed of its turning as weight: sticks at rest point anywhere, back over the
+/// shoulder too, but who swings one swings it ahead.
+Vector3d mean_while_swinging(const StickTrace& stick, const Vector3d& shaft) {
+    Vector3d sum = Vector3d::Zero();
+    double weights = 0;
+    for (std::size_t i = 1; i < stick.samples.size(); ++i) {
+        const PoseSample &a = stick.samples[i - 1], &b = stick.samples[i];
+        if (!a.has_orientation || !b.has_orientation || b.t_s - a.t_s > kGapS) continue;
+        const Vector3d before = a.orientation * shaft, after = b.orientation * shaft;
+        const double weight = (after - before).squaredNorm() / (b.t_s - a.t_s);
+        sum += weight * (before + after) / 2;
+        weights += weight;
+    }
+    return weights > 0 ? (sum / weights).eval() : sum;
+}
+
+/// How far b is from a along an axis: at each sample of a, from the sample of b before it.
+std::vector<double> apart_along(const StickTrace& a, const StickTrace& b, const Vector3d& axis) {
+    std::vector<double> apart;
+    std::size_t k = 0;
+    for (const PoseSample& sample : a.samples) {
+        while (k + 1 < b.samples.size() && b.samples[k + 1].t_s <= sample.t_s) ++k;
+        if (std::abs(b.samples[k].t_s - sample.t_s) <= kGapS)
+            apart.push_back((b.samples[k].position - sample.position).dot(axis));
+    }
+    return apart;
 }
 
 void judge_sides(const Trace& trace, std::vector<std::string>& lines) {
     const StickTrace *left = stick_named(trace, "left"), *right = stick_named(trace, "right");
-    if (left == nullptr || right == nullptr || !trace.shaft) return;
-    Vector3d ahead = (mean_shaft(*left, *trace.shaft) + mean_shaft(*right, *trace.shaft)) / 2;
+    if (left == nullptr || right == nullptr) return;
+    const std::optional<Vector3d> left_shaft = shaft_of(*left, trace), right_shaft = shaft_of(*right, trace);
+    if (!left_shaft || !right_shaft) return;
+    Vector3d ahead =
+        (mean_while_swinging(*left, *left_shaft) + mean_while_swinging(*right, *right_shaft)) / 2;
     ahead.y() = 0;
-    if (ahead.norm() < 0.7) return;  // sabers point anywhere (0.55 on average), sticks at the drum
+    if (ahead.norm() < kAhead) return;
     const Vector3d to_the_right = ahead.normalized().cross(Vector3d::UnitY());
-    const double apart = median_along(*right, to_the_right) - median_along(*left, to_the_right);
-    if (apart > -kWrongSide) return;
+    const std::vector<double> apart = apart_along(*left, *right, to_the_right);
+    if (apart.size() < kFewest || quantile(apart, 0.5) > -kWrongSide) return;
+    const auto wrong = std::count_if(apart.begin(), apart.end(), [](double way) { return way < 0; });
+    const double share = static_cast<double>(wrong) / static_cast<double>(apart.size());
+    if (share < kMostOfTheTime) return;
     lines.push_back(
-        "stick left lies " + number(-apart) +
-        " m to the right of stick right, seen along their shafts: is an axis mirrored, the shaft's "
-        "direction wrong, or are the names swapped?");
+        "stick left lies to the right of stick right for " + per_cent(share) + " of the time, by " +
+        number(-quantile(apart, 0.5)) +
+        " m in the median, seen the way their shafts point while they swing: are the data left-handed "
+        "(as Unity's and Unreal's; say their frame), an axis mirrored, or the names swapped?");
 }
 
 }  // namespace

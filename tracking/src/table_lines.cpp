@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "column_finder.h"
+
 namespace tracking {
 namespace {
 
@@ -74,7 +76,8 @@ public:
 private:
     [[nodiscard]] bool all_by_number() const {
         return std::all_of(map_.columns.begin(), map_.columns.end(), [](const auto& column) {
-            return column.second.starts_with('#') || column.second.starts_with('+');
+            const std::string_view bare = without_sign(column.second);
+            return bare.starts_with('#') || bare.starts_with('+');
         });
     }
 

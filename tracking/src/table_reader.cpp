@@ -5,7 +5,9 @@
 #include <unordered_map>
 
 #include "column_finder.h"
+#include "iso_time.h"
 #include "orientation_forms.h"
+#include "stick_names.h"
 #include "table_lines.h"
 #include "trace_limits.h"
 #include "tracking/import.h"
@@ -14,7 +16,6 @@ namespace tracking {
 namespace {
 
 constexpr double kLargest = 1e19;  // of a time or frame as the file has it
-constexpr std::size_t kMostSticks = 64;
 
 /// One stick while tables are read.
 struct Reading {
@@ -28,17 +29,14 @@ bool is_empty(std::string_view text) {
     return text.empty() || text == "NaN" || text == "nan" || text == "NAN";
 }
 
-/// A stick's name as native files can hold it.
-std::string word(std::string_view name) {
-    std::string out = printable(name.substr(0, kLongestName));
-    for (char& c : out)
-        if (c == ' ' || c == '\t' || c == ',' || c == '"' || c == '\'') c = '_';
-    return out;
+double metres_per_unit(const ColumnMap& map) {
+    return map.metres_per_unit.value_or(map.frame == "unreal" ? 1e-2 : 1);
 }
 
 class TablesReader {
 public:
-    explicit TablesReader(const ColumnMap& map) : map_(map) {}
+    explicit TablesReader(const ColumnMap& map)
+        : map_(map), axes_(map.frame.empty() ? std::nullopt : axes_of(map.frame)) {}
 
     void read(const Table& table) {
         table_ = &table;
@@ -47,7 +45,7 @@ public:
         LineReader lines(text, table.name);
         const TableHead head = read_head(lines, map_, table.name);
         columns_ = find_columns(map_, head.names, head.header);
-        scale_ = head.metres_per_unit.value_or(map_.metres_per_unit);
+        scale_ = head.metres_per_unit.value_or(metres_per_unit(map_));
         rate_ = map_.rate_hz > 0 ? map_.rate_hz : head.rate_hz.value_or(0);
         if (columns_.time == TableColumns::kNone && !(rate_ > 0))
             head.header.fail(0, "neither a column of times nor a rate", "one of them",
@@ -114,6 +112,11 @@ private:
         }
     }
 
+    double number(const Line& line, SignedColumn column, const char* what, double limit,
+                  const char* limit_text) {
+        return column.sign * number(line, column.index, what, limit, limit_text);
+    }
+
     double number(const Line& line, std::size_t column, const char* what, double limit,
                   const char* limit_text) {
         const Field& cell = cells_[column];
@@ -125,16 +128,37 @@ private:
     }
 
     double time_of(const Line& line, std::size_t row) {
-        const bool timed = columns_.time != TableColumns::kNone;
-        double raw = static_cast<double>(row);
-        std::size_t offset = 0;
-        if (timed || columns_.frame != TableColumns::kNone) {
-            const std::size_t column = timed ? columns_.time : columns_.frame;
-            raw = number(line, column, timed ? "a time" : "a frame's number", kLargest, "1e19");
-            offset = cells_[column].offset;
-        }
-        if (!first_raw_) first_raw_ = timed && !map_.from_zero ? 0 : raw;
-        const double t = timed ? (raw - *first_raw_) * map_.seconds_per_unit : (raw - *first_raw_) / rate_;
+        if (columns_.time == TableColumns::kNone) return frame_time(line, row);
+        const Field& cell = cells_[columns_.time];
+        if (const std::optional<IsoTime> clock = iso_time(cell.text)) return clock_time(line, cell, *clock);
+        if (first_clock_)
+            line.fail(cell.offset, in_quotes(cell.text), "an ISO 8601 time, as in the rows before",
+                      "write all times in one way");
+        const double raw = number(line, columns_.time, "a time", kLargest, "1e19");
+        if (!first_raw_) first_raw_ = map_.from_zero ? raw : 0;
+        return checked(line, cell.offset, (raw - *first_raw_) * map_.seconds_per_unit);
+    }
+
+    double frame_time(const Line& line, std::size_t row) {
+        const bool counted = columns_.frame != TableColumns::kNone;
+        const double raw = counted ? number(line, columns_.frame, "a frame's number", kLargest, "1e19")
+                                   : static_cast<double>(row);
+        if (!first_raw_) first_raw_ = raw;
+        return checked(line, counted ? cells_[columns_.frame].offset : 0, (raw - *first_raw_) / rate_);
+    }
+
+    double clock_time(const Line& line, const Field& cell, const IsoTime& clock) {
+        if (first_raw_)
+            line.fail(cell.offset, in_quotes(cell.text), "a number, as in the rows before",
+                      "write all times in one way");
+        if (!first_clock_) first_clock_ = clock;
+        if (clock.form != first_clock_->form)
+            line.fail(cell.offset, in_quotes(cell.text), "a date and a zone where the rows before have them",
+                      "write all times in one way");
+        return checked(line, cell.offset, seconds_between(*first_clock_, clock));
+    }
+
+    static double checked(const Line& line, std::size_t offset, double t) {
         if (!(std::abs(t) <= kLatest))
             line.fail(offset, "a time of " + std::to_string(t) + " s", "at most 1e7 s in size",
                       "say the unit of time, or let times count from the first row");
@@ -142,10 +166,10 @@ private:
     }
 
     Reading& stick_of(const Line& line, const StickColumns& columns) {
-        std::string name = word(columns.stick.empty() ? table_->stick : columns.stick);
+        std::string name = stick_word(columns.stick.empty() ? table_->stick : columns.stick);
         std::size_t offset = 0;
         if (columns_.stick != TableColumns::kNone) {
-            name = word(cells_[columns_.stick].text);
+            name = stick_word(cells_[columns_.stick].text);
             offset = cells_[columns_.stick].offset;
         }
         if (name.empty()) line.fail(offset, "no stick name", "a word", "name the stick");
@@ -173,7 +197,7 @@ private:
 
     /// False if the stick was not seen.
     bool read_position(const Line& line, const StickColumns& columns, PoseSample& sample) {
-        const auto empty = [this](std::size_t column) { return is_empty(cells_[column].text); };
+        const auto empty = [this](SignedColumn column) { return is_empty(cells_[column.index].text); };
         if (std::all_of(columns.position.begin(), columns.position.end(), empty)) return false;
         for (std::size_t i = 0; i < 3; ++i) {
             const double value =
@@ -183,6 +207,7 @@ private:
         }
         if (map_.zero_is_lost && sample.position.isZero(0)) return false;
         if (map_.z_up) sample.position = from_z_up(sample.position);
+        if (axes_) sample.position = *axes_ * sample.position;
         return true;
     }
 
@@ -190,7 +215,7 @@ private:
                           PoseSample& sample) {
         const bool left_out =
             std::all_of(columns.orientation.begin(), columns.orientation.end(),
-                        [this](std::size_t column) { return is_empty(cells_[column].text); });
+                        [this](SignedColumn column) { return is_empty(cells_[column.index].text); });
         const std::vector<PoseSample>& before = stick.trace.samples;
         if (left_out) {
             if (!before.empty()) sample.orientation = before.back().orientation;
@@ -198,6 +223,7 @@ private:
         }
         Eigen::Quaterniond q = orientation(line, columns);
         if (map_.z_up) q = from_z_up(q);
+        if (axes_) q = from_axes(*axes_, q);
         if (!before.empty() && q.dot(before.back().orientation) < 0) q.coeffs() = -q.coeffs();
         sample.orientation = q;
         sample.has_orientation = true;
@@ -214,24 +240,24 @@ private:
         return from_euler(angles, map_.euler).normalized();
     }
 
-    Eigen::Quaterniond quaternion(const Line& line, const std::vector<std::size_t>& columns) {
+    Eigen::Quaterniond quaternion(const Line& line, const std::vector<SignedColumn>& columns) {
         double c[4];
         for (std::size_t i = 0; i < 4; ++i)
             c[i] = number(line, columns[i], "a component of a unit quaternion", 1 + kNormTolerance, "1.01");
         const Eigen::Quaterniond q(c[0], c[1], c[2], c[3]);
         if (std::abs(q.norm() - 1) > kNormTolerance)
-            line.fail(cells_[columns[0]].offset, "a quaternion of norm " + std::to_string(q.norm()),
+            line.fail(cells_[columns[0].index].offset, "a quaternion of norm " + std::to_string(q.norm()),
                       "norm 1 within 1 %", "check that the map names the four components' columns");
         return q.normalized();
     }
 
-    Eigen::Quaterniond matrix(const Line& line, const std::vector<std::size_t>& columns) {
+    Eigen::Quaterniond matrix(const Line& line, const std::vector<SignedColumn>& columns) {
         Eigen::Matrix3d m;
         for (std::size_t i = 0; i < 9; ++i)
             m(static_cast<Eigen::Index>(i / 3), static_cast<Eigen::Index>(i % 3)) =
                 number(line, columns[i], "a component of a rotation matrix", 1 + kNormTolerance, "1.01");
         const double off = (m.transpose() * m - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-        const std::size_t offset = cells_[columns[0]].offset;
+        const std::size_t offset = cells_[columns[0].index].offset;
         if (!(off <= kNormTolerance))
             line.fail(offset, "a matrix whose columns are not of length 1 at right angles",
                       "a rotation matrix", "check that the map names its nine columns");
@@ -242,10 +268,12 @@ private:
     }
 
     const ColumnMap& map_;
+    const std::optional<Eigen::Matrix3d> axes_;
     const Table* table_ = nullptr;
     TableColumns columns_;
     double scale_ = 1, rate_ = 0;
     std::optional<double> first_raw_;
+    std::optional<IsoTime> first_clock_;
     std::vector<Field> cells_;
     std::vector<Reading> sticks_;
     std::unordered_map<std::string, std::size_t> index_;

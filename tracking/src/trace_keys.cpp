@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <array>
 
+#include "orientation_forms.h"
+
 namespace tracking {
 namespace {
 
-constexpr std::array<std::string_view, 6> kKeys = {"units", "up", "rate_hz", "source", "tip_m", "shaft"};
+constexpr std::array<std::string_view, 7> kKeys = {"units",  "up",    "frame", "rate_hz",
+                                                   "source", "tip_m", "shaft"};
 constexpr double kFarthestTip = 3;  // m; a tip in mm by mistake lies beyond
 constexpr double kHighestRate = 1e5;
 
@@ -27,6 +30,7 @@ std::string_view near_miss(const std::string& key) {
     std::string lower = key;
     std::transform(lower.begin(), lower.end(), lower.begin(),
                    [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+    if (lower == "frames") return {};  // how many there are, in many a file
     for (const std::string_view known : kKeys) {
         const bool shortened = lower.size() >= 3 && known.starts_with(lower);
         if (lower == known || shortened || one_edit_apart(lower, known)) return known;
@@ -63,15 +67,24 @@ void TraceKeys::read(const Line& line) {
 
 void TraceKeys::set(const Line& line, const std::string& key, const Field& value) {
     if (key == "units") {
-        if (value.text != "m" && value.text != "mm")
-            line.fail(value.offset, "units " + in_quotes(value.text), "m or mm",
+        if (value.text != "m" && value.text != "cm" && value.text != "mm")
+            line.fail(value.offset, "units " + in_quotes(value.text), "m, cm or mm",
                       "convert the positions and say which");
-        metres_per_unit_ = value.text == "mm" ? 1e-3 : 1;
+        units_per_metre_ = value.text == "mm" ? 1000 : value.text == "cm" ? 100 : 1;
     } else if (key == "up") {
         if (value.text != "y" && value.text != "z")
             line.fail(value.offset, "up " + in_quotes(value.text), "y or z",
                       "turn the coordinates and say which axis is up");
         z_up_ = value.text == "z";
+        require_up_or_frame(line, value);
+    } else if (key == "frame") {
+        axes_ = axes_of(std::string(value.text));
+        if (!axes_)
+            line.fail(value.offset, "frame " + in_quotes(value.text),
+                      "unity, unreal, or where x, y and z point: a letter each of R or L, U or D, F or B",
+                      "name the axes, such as RUF for x right, y up, z forward");
+        unreal_ = value.text == "unreal";
+        require_up_or_frame(line, value);
     } else if (key == "rate_hz") {
         rate_hz_ = line.number_in(value, "a rate", kHighestRate, "100000 Hz");
         if (!(rate_hz_ > 0))
@@ -84,6 +97,11 @@ void TraceKeys::set(const Line& line, const std::string& key, const Field& value
     } else {
         set_shaft(line, value);
     }
+}
+
+void TraceKeys::require_up_or_frame(const Line& line, const Field& value) const {
+    if (z_up_ && axes_)
+        line.fail(value.offset, "up z and a frame", "one of them", "delete one of the two lines");
 }
 
 void TraceKeys::set_tip(const Line& line, const Field& value) {

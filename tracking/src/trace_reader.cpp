@@ -1,7 +1,9 @@
 #include "bsor_reader.h"
 #include "text_cursor.h"
+#include "tracking/import.h"
 #include "tracking/trace.h"
 #include "tracking/trace_rows.h"
+#include "xror_reader.h"
 
 namespace tracking {
 namespace {
@@ -34,6 +36,8 @@ Trace parse_trace(std::string_view text, const std::string& name) {
     if (text.empty())
         Line(name, 1, text).fail(0, "an empty file", "a trace", "check that the trace is complete");
     if (is_bsor(text)) return parse_bsor(text, name);
+    if (is_xror(text)) return parse_xror(text, name);
+    if (is_c3d(text)) return read_markers(text, name, {});
     if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
     return read_rows(text, name);
 }

@@ -150,13 +150,14 @@ struct TraceRows::Reading {
     }
 
     Eigen::Vector3d read_position(const Line& line) const {
-        const double scale = keys.metres_per_unit();
-        const char* limit = scale == 1 ? "1000 m" : "1000000 mm";
+        const double units = keys.units_per_metre();
+        const char* limit = units == 1 ? "1000 m" : units == 100 ? "100000 cm" : "1000000 mm";
         Eigen::Vector3d p;
         for (int axis = 0; axis < 3; ++axis)
             p[axis] = line.number_in(fields_[static_cast<std::size_t>(axis) + 2], "a coordinate",
-                                     kFarthest / scale, limit);
-        if (scale != 1) p /= 1000;  // 0.001 is no double: dividing keeps whole mm exact
+                                     kFarthest * units, limit);
+        p /= units;  // 0.001 is no double: dividing keeps whole mm exact
+        if (keys.axes()) return *keys.axes() * p;
         return keys.z_up() ? from_z_up(p) : p;
     }
 
@@ -194,6 +195,7 @@ struct TraceRows::Reading {
         stick.file_orientation = q;
         // Near two orthogonal ones rounding decides the sign: it is chosen as it will be when a y-up copy is read.
         if (keys.z_up()) q = from_z_up(q);
+        if (keys.axes()) q = from_axes(*keys.axes(), q);
         if (q.dot(stick.orientation) < 0 && stick.samples > 0) q.coeffs() = -q.coeffs();
         sample.orientation = q;
         sample.has_orientation = true;

@@ -23,9 +23,9 @@ namespace {
 struct ConvertOptions {
     std::vector<std::string> in, sticks;
     std::string out, map, save_map, source;
-    std::optional<std::string> euler, header;
+    std::optional<std::string> euler, header, frame;
     std::optional<double> metres_per_unit, seconds_per_unit, rate_hz;
-    std::optional<bool> z_up;
+    std::optional<bool> z_up, decimal_comma;
     std::optional<char> separator;
     std::optional<Eigen::Vector3d> tip, shaft;
     bool from_zero = false;
@@ -40,20 +40,25 @@ bool is_native(std::string_view text) {
     return text.starts_with("t,stick,") || text.starts_with("t, stick,");
 }
 
-/// The map of these files, with the options in their places; none for traces that need none.
+/// The map of these files, with the options in their places; none for traces that need none. C3D files need none, but
+/// may have one.
 std::optional<tracking::ColumnMap> map_of(const ConvertOptions& o, const std::string& first_text) {
     std::optional<tracking::ColumnMap> map;
     if (!o.map.empty()) {
         map = find_map(o.map);
         const bool spelt_out = o.map.find('=') != std::string::npos;
         if (spelt_out && o.in.front().ends_with(".tsv")) map->separator = '\t';
+    } else if (tracking::is_c3d(first_text)) {
+        map.emplace();
     } else if (!is_native(first_text)) {
         map = map_for(first_text);
     }
     if (!map) return map;
     if (o.metres_per_unit) map->metres_per_unit = *o.metres_per_unit, map->units_from.clear();
     if (o.rate_hz) map->rate_hz = *o.rate_hz;
-    map->z_up = o.z_up.value_or(map->z_up);
+    if (o.z_up) map->z_up = *o.z_up, map->frame.clear();
+    if (o.frame) map->frame = *o.frame, map->z_up = o.z_up.value_or(false);
+    map->decimal_comma = o.decimal_comma.value_or(map->decimal_comma);
     map->euler = o.euler.value_or(map->euler);
     map->separator = o.separator.value_or(map->separator);
     map->seconds_per_unit = o.seconds_per_unit.value_or(map->seconds_per_unit);
@@ -61,7 +66,7 @@ std::optional<tracking::ColumnMap> map_of(const ConvertOptions& o, const std::st
     if (o.from_zero) map->from_zero = true;
     if (o.tip) map->tip = o.tip;
     if (o.shaft) map->shaft = o.shaft;
-    map->check();
+    if (!map->columns.empty()) map->check();
     return map;
 }
 
@@ -99,6 +104,17 @@ void refuse_table_options(const ConvertOptions& o) {
                             o.in.front(), option->get_name()));
 }
 
+tracking::Trace read_c3d(const ConvertOptions& o, const std::string& bytes, const tracking::ColumnMap& map) {
+    if (!tracking::is_c3d(bytes))
+        throw BadInput(
+            fmt::format("{}: error: found a map of markers for another file, expected a C3D file; map "
+                        "its columns (px=...)",
+                        o.in.front()));
+    if (o.in.size() > 1 || !o.sticks.empty())
+        refuse_options("several files or --sticks with a C3D file", "one file and its markers (--map)");
+    return tracking::read_markers(bytes, o.in.front(), map);
+}
+
 tracking::Trace read_inputs(const ConvertOptions& o) {
     std::vector<std::string> texts;  // each file is read once: it may be a pipe
     texts.push_back(tracking::read_bytes(find_trace(o.in.front()).string()));
@@ -111,7 +127,10 @@ tracking::Trace read_inputs(const ConvertOptions& o) {
         refuse_table_options(o);
         return tracking::parse_trace(texts.front(), o.in.front());
     }
+    if (!o.save_map.empty() && map->columns.empty())
+        refuse_options("--save-map without --map", "a map of the markers");
     if (!o.save_map.empty()) write_finished_file(o.save_map, format_map(*map));
+    if (tracking::is_c3d(texts.front()) || map->of_markers()) return read_c3d(o, texts.front(), *map);
     for (std::size_t i = 1; i < o.in.size(); ++i)
         texts.push_back(tracking::read_bytes(find_trace(o.in[i]).string()));
     const std::vector<std::string> names = stick_names(o, texts);
@@ -141,12 +160,18 @@ void add_table_options(Command& command, ConvertOptions& o) {
     constexpr const char* kHeading = "Tables of other programs";
     Command tables = command.under(kHeading);
     tables.option("--map", o.map, as::text("MAP"),
-                  "Columns: \"t=Time,px=X,..\", a TOML file, or a bundled map such as optitrack");
+                  "Columns: \"t=Time,px=X,pz=-Z,..\", markers: \"left.marker=LABEL,..\", a TOML file, or a "
+                  "bundled map such as "
+                  "optitrack");
     tables.option("--save-map", o.save_map, as::text("FILE"),
                   "Write the map, with these options, to a TOML file");
     tables.option("--units", o.metres_per_unit, as::choice<double>({{"m", 1}, {"cm", 0.01}, {"mm", 0.001}}),
                   "Of positions");
     tables.option("--up", o.z_up, as::choice<bool>({{"y", false}, {"z", true}}), "Axis that points up");
+    tables.option(
+        "--frame", o.frame, as::text("AXES"),
+        "Where x, y and z point, in place of --up: unity, unreal, or three letters such as RUF (right, "
+        "up, forward)");
     tables.option("--euler", o.euler, as::text("ORDER"),
                   "Order of the intrinsic turns ex, ey, ez, such as XYZ");
     tables.option("--rate", o.rate_hz, as::number_above(0, 1e5, "Hz"),
@@ -154,6 +179,8 @@ void add_table_options(Command& command, ConvertOptions& o) {
     tables.option("--separator", o.separator,
                   as::choice<char>({{"comma", ','}, {"semicolon", ';'}, {"tab", '\t'}, {"space", ' '}}),
                   "Between the cells");
+    tables.option("--decimal", o.decimal_comma, as::choice<bool>({{"point", false}, {"comma", true}}),
+                  "Sign before the fractions of numbers");
     tables.option("--time-unit", o.seconds_per_unit,
                   as::choice<double>({{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}}), "Of times");
     tables.option("--header", o.header, as::text("CELL"), "First cell of the header's last line");
@@ -172,7 +199,7 @@ void add_convert_command(Command& trace) {
     auto o = std::make_shared<ConvertOptions>();
     command
         .options("IN", o->in, as::text("IN"),
-                 "Traces (CSV), Beat Saber replays (*.bsor), exports of other programs")
+                 "Traces (CSV), Beat Saber replays (*.bsor), *.xror, *.c3d, exports of other programs")
         ->required();
     command.required("--out", o->out, as::text("FILE"), "Trace to write (CSV); replaced if there is one");
     command.option("--tip", o->tip, as::vector_of_3(as::number(-1000, 1000, "m")),

@@ -16,7 +16,7 @@ namespace {
 template <class Value>
 using Words = std::vector<Word<Value>>;
 
-const Words<double> kMetres = {{"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}};
+const Words<std::optional<double>> kMetres = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
 const Words<double> kSeconds = {{"s", 1}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}};
 const Words<char> kSeparators = {{"comma", ','}, {"semicolon", ';'}, {"tab", '\t'}, {"space", ' '}};
 const Words<std::optional<Eigen::Vector3d>> kAxes = {
@@ -31,10 +31,16 @@ std::string word_for(const Words<Value>& words, Value value) {
 }
 
 void unit_keys(Fields& keys, tracking::ColumnMap& map) {
-    keys.choice("units", map.metres_per_unit, kMetres, "Unit of positions.");
+    keys.choice("units", map.metres_per_unit, kMetres,
+                "Unit of positions; m unless said, cm in the frame unreal.", {.example = "\"mm\""});
     keys.text("units_from", map.units_from,
               "Above the header, a cell of this text stands before the unit's name; it goes before `units`.");
     keys.choice("up", map.z_up, {{"y", false}, {"z", true}}, "The axis that points up.");
+    keys.text("frame", map.frame,
+              "Where the axes x, y and z of the world and of the tracked bodies point, in place of `up`: "
+              "three letters, R or L for right or left, U or D for up or down, F or B for forward or back; "
+              "`unity` is RUF, `unreal` FRU, ours RUB. Left-handed data become right-handed; tip_m and "
+              "shaft are meant in our axes, in which forward is -z.");
     keys.choice("euler", map.euler,
                 {{"", ""},
                  {"XYZ", "XYZ"},
@@ -46,7 +52,9 @@ void unit_keys(Fields& keys, tracking::ColumnMap& map) {
                 "Order of the intrinsic turns, where columns ex, ey, ez hold Euler angles (extrinsic ones: "
                 "write the order backwards).");
     keys.choice("angles", map.radians, {{"degrees", false}, {"radians", true}}, "Unit of Euler angles.");
-    keys.choice("time_unit", map.seconds_per_unit, kSeconds, "Unit of times.");
+    keys.choice("time_unit", map.seconds_per_unit, kSeconds,
+                "Unit of times that are numbers. Times by ISO 8601, such as 2026-05-01T12:00:00.25+02:00 or "
+                "12:00:00.25, are recognised and count from the first row's.");
     keys.flag("from_zero", map.from_zero, "Times count from the first row's.");
     keys.number("rate_hz", map.rate_hz, {0, 1e5, "Hz"},
                 "Rate of frames, where there are no times; 0: not known.");
@@ -85,9 +93,12 @@ void map_keys(Fields& keys, tracking::ColumnMap& map) {
         "columns", map.columns,
         "The column of each role, or of the roles of each stick: `t` or `frame` (neither: rows are frames), "
         "`stick` (a row a stick), `px py pz`, and one of `qw qx qy qz`, `ex ey ez` (with `euler`), `m00 m01 "
-        ".. m22` (rotation matrix, row and column), or nothing. A column is its header's cell (of a header "
+        ".. m22` (rotation matrix, row and column), or nothing. For a C3D file: `marker`, the tracked point, "
+        "`marker2` towards the tip and `marker3` "
+        "beside, with the labels of points. A column is its header's cell (of a header "
         "of several lines: the cells joined by '/'; '*' stands for anything, {stick} for a stick's name), "
-        "#N: the N-th column, or +N: N columns right of the same stick's px. [columns.left] holds the roles "
+        "#N: the N-th column, or +N: N columns right of the same stick's px; a - before it changes the sign. "
+        "[columns.left] holds the roles "
         "of the stick left. Rotations turn body to world.",
         {.need = Need::given, .example = "{\"t\": \"Time\", \"px\": \"X\", \"py\": \"Y\", \"pz\": \"Z\"}"});
 }
@@ -141,9 +152,10 @@ std::string format_map(const tracking::ColumnMap& map) {
     if (map.decimal_comma) say("decimal", "comma");
     say("header", map.header);
     say("header_from", map.header_from);
-    say("units", word_for(kMetres, map.metres_per_unit));
+    if (map.metres_per_unit) say("units", word_for(kMetres, map.metres_per_unit));
     say("units_from", map.units_from);
-    say("up", map.z_up ? "z" : "y");
+    say("frame", map.frame);
+    if (map.frame.empty()) say("up", map.z_up ? "z" : "y");
     say("euler", map.euler);
     if (map.radians) say("angles", "radians");
     say("time_unit", word_for(kSeconds, map.seconds_per_unit));

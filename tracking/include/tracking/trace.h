@@ -49,9 +49,9 @@ public:
 /// orientation is known, one of ,qw,qx,qy,qz | ,rx,ry,rz | ,ex,ey,ez; then one row per sample. Nothing is
 /// guessed: the first bad line throws TraceError with its place.
 ///
-///   keys         units (m|mm, of px, py, pz), up (y|z), rate_hz, source,
+///   keys         units (m|cm|mm, of px, py, pz), up (y|z), frame (unity|unreal|RUF, ..), rate_hz, source,
 ///                tip_m (x,y,z in metres whatever `units` says), shaft (+x|-x|+y|-y|+z|-z);
-///                tip and shaft are in the body's frame, so `up` does not turn them.
+///                tip and shaft are in the body's frame as it is read: `up` and `frame` do not turn them.
 ///                Other keys are comments, except near misses of these (`unit:`), which are errors.
 ///   q columns    body to world, norm within 1 % of 1 (then normalised; the sign that continues the sample
 ///                before is taken); all four empty: position only
@@ -59,8 +59,14 @@ public:
 ///                q_k = q_(k-1) exp(r_k), q_(-1) = 1
 ///   e columns    degrees, intrinsic X-Y-Z: q = q_x q_y q_z; all three empty: position only
 ///   up: z        (x, y, z) becomes (x, z, -y) and q becomes (sqrt 1/2, -sqrt 1/2, 0, 0) q
+///   frame        other axes, of world and bodies: right-handed or left-handed ones become ours by p' = M p,
+///                R' = M R M^T (unity: (x, y, -z) and (w, -x, -y, z); unreal: (y, z, -x) and (w, -y, -z, x),
+///                in cm unless `units` says otherwise)
 ///   limits       |coordinate| <= 1000 m, |t| <= 1e7 s; per stick t increases strictly, at least two samples;
 ///                UTF-8 without control characters, at most 1 GiB; LF or CRLF; a byte order mark is skipped
+///
+/// A file that begins as an Extended Reality Open Recording (`*.xror`, xror_reader.h) or a C3D file (`*.c3d`,
+/// import.h, each point a stick) is read as one.
 ///
 /// A file that begins as a Beat Saber Open Replay (`*.bsor`) is read as one: the sabers `left` and `right`,
 /// mirrored to right-handed axes, tip (0, 0, -0.35). Frames that do not advance and the start-up are left
