@@ -71,7 +71,7 @@ void allow_nothing_else() {
     const rlimit none{0, 0};
     (void)setrlimit(RLIMIT_CORE, &none);
     (void)setrlimit(RLIMIT_FSIZE, &none);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && defined(__x86_64__)
+#if !defined(MUSICWORLD_SANITIZED) && defined(__x86_64__)
     constexpr std::uint32_t kNumber = offsetof(seccomp_data, nr), kMachine = offsetof(seccomp_data, arch);
     sock_filter filter[] = {BPF_STMT(BPF_LD | BPF_W | BPF_ABS, kMachine),
                             BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, AUDIT_ARCH_X86_64, 0, 8),

@@ -43,7 +43,7 @@ std::optional<Eigen::Matrix3d> axes_of(const std::string& frame) {
 Eigen::Quaterniond from_axes(const Eigen::Matrix3d& m, const Eigen::Quaterniond& q) {
     Eigen::Quaterniond turned;
     turned.w() = q.w();
-    turned.vec() = m.determinant() * (m * q.vec());
+    turned.vec() = m.determinant() * (m * q.vec()) + Eigen::Vector3d::Zero();  // -0 becomes 0
     return turned;
 }
 

@@ -364,7 +364,9 @@ std::vector<PairedResult> pair_with_baselines(const Comparison& comparison,
                                                     kFewestRecordings, comparison.estimators);
             result.rms_mm = result.baseline_rms_mm + result.by_recording.difference_mm;
             if (const auto persons = paired_sums(own, base, &ComparisonRow::person); persons.size() >= 2)
-                result.by_person = paired_difference(persons, seed, 2, comparison.estimators);
+                result.by_person = paired_difference(
+                    persons, seed, result.by_recording.has_interval() ? 2 : persons.size() + 1,
+                    comparison.estimators);
             results.push_back(std::move(result));
         }
     return results;

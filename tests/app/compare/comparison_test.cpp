@@ -85,7 +85,9 @@ TEST_F(Comparisons, EveryEstimatorIsPairedWithTheBestBaselineAndTheSentenceNames
     for (const app::PairedResult& paired : comparison.paired) {
         EXPECT_TRUE(paired.predictor.starts_with("cv") || paired.predictor == "thesis") << paired.predictor;
         EXPECT_EQ(paired.by_recording.n, 2U);
-        EXPECT_TRUE(paired.by_person.has_value());
+        ASSERT_TRUE(paired.by_person.has_value());
+        EXPECT_EQ(paired.by_person->ratios.size(), 2U)
+            << "two recordings make no interval, of persons neither";
         EXPECT_NEAR(paired.by_recording.ratio, paired.rms_mm / paired.baseline_rms_mm, 1e-12);
         for (const app::ComparisonSummary& summary : comparison.summaries) {
             const bool comparable =

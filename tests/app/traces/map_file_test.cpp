@@ -235,6 +235,15 @@ TEST(Maps, AreWrittenSoThatTheyReadBackTheSame) {
     EXPECT_EQ(again.shaft, map.shaft);
     EXPECT_EQ(again.metres_per_unit, 0.01);
     EXPECT_EQ(again.separator, '\t');
+    map = app::find_map("t=Time,px=-X,py=-+1,pz=Z");
+    map.frame = "unreal";
+    std::ofstream(file) << app::format_map(map);
+    EXPECT_EQ(app::read_map(file).frame, "unreal");
+    EXPECT_FALSE(app::read_map(file).metres_per_unit) << "cm, as nobody says otherwise";
+    EXPECT_EQ(app::read_map(file).columns, map.columns);
+    map = app::find_map("left.marker=*:HAND,left.marker2=*:TIP");
+    std::ofstream(file) << app::format_map(map);
+    EXPECT_EQ(app::read_map(file).columns, map.columns);
     std::filesystem::remove(file);
 }
 
@@ -247,6 +256,9 @@ TEST(Maps, FaultsInMapFilesAreRefusedWithTheirPlace) {
         {"[columns]\npx = 3\n", ":2:"},
         {"[columns]\npx = \"X\"\n", "no column for py"},
         {"[columns\n", ":1:"},
+        {"frame = \"RUR\"\n[columns]\npx=\"X\"\npy=\"Y\"\npz=\"Z\"\n", "found frame 'RUR'"},
+        {"frame = \"unity\"\nup = \"z\"\n[columns]\npx=\"X\"\npy=\"Y\"\npz=\"Z\"\n", "up z and a frame"},
+        {"[columns.left]\nmarker2 = \"A\"\n", "without the ones before"},
         {"", ":1:1: error: found no key \"columns\""},
         {"[columns]\n", "no columns of positions"},
     };
