@@ -20,6 +20,7 @@ while IFS=: read -r pattern folder; do
 done <<'LIST'
 GL/|assimp/|spng|isa-l/:render
 csound|sndfile:audio
+bson/|fpzip:tracking
 Spectra/:sim
 zmq:sim|app
 mujoco/|bt[A-Z]|Bullet:sim
