@@ -21,6 +21,11 @@ namespace {
 
 constexpr std::size_t kMostDevices = 1000;
 
+/// As a member of a class it keeps its alignment, as an argument of a template (std::optional) it would not.
+struct Member {
+    bson_iter_t at;
+};
+
 /// A document, or a part of one, in a file.
 class Document {
 public:
@@ -47,17 +52,17 @@ public:
     }
 
     /// The member of this name; none if there is none.
-    [[nodiscard]] std::optional<bson_iter_t> find(std::string_view name) const {
-        std::optional<bson_iter_t> found;
+    [[nodiscard]] std::optional<Member> find(std::string_view name) const {
+        std::optional<Member> found;
         each([&](std::string_view key, const bson_iter_t& at) {
-            if (key == name && !found) found = at;
+            if (key == name && !found) found = Member{at};
         });
         return found;
     }
     /// The document or array of this name; none if there is none.
     [[nodiscard]] std::optional<Document> part(std::string_view name) const {
-        const std::optional<bson_iter_t> found = find(name);
-        return found ? inside(*found) : std::nullopt;
+        const std::optional<Member> found = find(name);
+        return found ? inside(found->at) : std::nullopt;
     }
     [[nodiscard]] std::optional<Document> inside(const bson_iter_t& at) const {
         Document part = *this;
@@ -73,8 +78,8 @@ public:
         return text == nullptr ? std::string() : std::string(text, length);
     }
     [[nodiscard]] std::string text(std::string_view name) const {
-        const std::optional<bson_iter_t> found = find(name);
-        return found ? text(*found) : std::string();
+        const std::optional<Member> found = find(name);
+        return found ? text(found->at) : std::string();
     }
     /// The table in a member of bytes.
     [[nodiscard]] FloatTable table(const bson_iter_t& at) const {
@@ -201,12 +206,12 @@ public:
         trace_.source = "Extended Reality Open Recording";
         if (!application.empty() && application.size() <= 100) trace_.source += ", " + printable(application);
         sticks_ = choose_sticks(read_devices(document_, columns_), trace_.remarks);
-        const std::optional<bson_iter_t> frames = document_.find("frames");
+        const std::optional<Member> frames = document_.find("frames");
         if (!frames) document_.fail(bytes.size(), "no frames", "a table of them");
-        at_ =
-            static_cast<std::size_t>(reinterpret_cast<const char*>(frames->raw) - bytes.data()) + frames->off;
+        at_ = static_cast<std::size_t>(reinterpret_cast<const char*>(frames->at.raw) - bytes.data()) +
+              frames->at.off;
         if (sticks_.empty()) document_.fail(at_, "no device with axes x, y and z", "a hand, or another");
-        table_ = document_.table(*frames);
+        table_ = document_.table(frames->at);
         if (table_.columns != columns_)
             document_.fail(at_, "frames of " + std::to_string(table_.columns) + " numbers",
                            "the time and the devices' axes, " + std::to_string(columns_));
