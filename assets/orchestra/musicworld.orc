@@ -99,23 +99,24 @@ giModes ftgen 930, 0, -2048, -2, 0
 
 ; Onsets within a block: in Csound 6.18 the opcodes of an instrument start at the note's own sample, those of an opcode
 ; definition (UDO) at the block's first. So whatever runs with time from the onset stands in the instrument itself or in a
-; macro; the opcode definitions initialise.
+; macro; the opcode definitions initialise. Each call of one takes time in every block all the same, so what every note needs is a
+; macro, which the opcode of that name wraps for orchestras of one's own.
 
 ; Peak amplitude of a stroke: about -9 dBFS at 8 m/s, 40 dB between 0.2 and 8 m/s.
+#define LEVEL(SPEED) #(0.355 * (limit($SPEED, 0.001, 16) / 8)^1.33)#
 opcode Level, i, i
   ispeed xin
-  xout 0.355 * (limit(ispeed, 0.001, 16) / 8)^1.33
+  xout $LEVEL(ispeed)
 endop
 
 ; Length of the contact [s]: a ball that strikes a plane (Hertz 1882; Johnson, Contact Mechanics, 1985, chapter 11),
 ;   T = 2.943 (15 m / (16 E sqrt(R)))^(2/5) v^(-1/5),
 ; with 1 / E = 1 / E_tip + 1 / E_struck. Its force is nearly half a sine (Goldsmith, Impact, 1960). A faster stroke is shorter, so
 ; it excites higher modes: the stroke's brightness needs no rule of its own.
+#define CONTACT(HARDNESS'RADIUS'MASS'YOUNG'SPEED) #limit(2.943 * (15 * ($MASS) * (10^(-6 - 4 * ($HARDNESS)) + 1 / ($YOUNG)) / (16 * sqrt($RADIUS)))^0.4 * limit($SPEED, 0.02, 16)^(-0.2), 0.0001, 0.02)#
 opcode Contact, i, iiiii
   ihardness, iradius, imass, iyoung, ispeed xin
-  istruck = 10^(6 + 4 * ihardness)
-  imodulus = 1 / (1 / istruck + 1 / iyoung)
-  xout limit(2.943 * (15 * imass / (16 * imodulus * sqrt(iradius)))^0.4 * limit(ispeed, 0.02, 16)^(-0.2), 0.0001, 0.02)
+  xout $CONTACT(ihardness'iradius'imass'iyoung'ispeed)
 endop
 
 ; What a mode gets of such a pulse of unit area, up to the zeros of its spectrum.
@@ -127,19 +128,22 @@ endop
 
 ; A stroke's own number in [0, 1), a function of its onset and its instrument alone (fractions of the golden ratio's and the plastic
 ; number's multiples spread evenly); and values in [-1, 1) made of it.
+#define SEED(VARIATION'ONSET'FREQUENCY) #(($VARIATION) > 0 ? frac(($ONSET) * 0.6180339887498949 + ($FREQUENCY) * 0.7548776662466927) : 0.5)#
 opcode Seed, i, iii
   ivariation, ionset, ifrequency xin
-  xout (ivariation > 0 ? frac(ionset * 0.6180339887498949 + ifrequency * 0.7548776662466927) : 0.5)
+  xout $SEED(ivariation'ionset'ifrequency)
 endop
+#define SCATTER(SEED'KEY) #(2 * frac(abs(sin(($SEED) * 127.1 + ($KEY) * 311.7) * 43758.5453)) - 1)#
 opcode Scatter, i, ii
   iseed, ikey xin
-  xout 2 * frac(abs(sin(iseed * 127.1 + ikey * 311.7) * 43758.5453)) - 1
+  xout $SCATTER(iseed'ikey)
 endop
 
 ; Seconds until a sound of peak ilevel that falls by 60 dB in it60 lies below -100 dBFS.
+#define DURATION(LEVEL'T60) #(0.08 + ($T60) * limit(100 + 20 * log10($LEVEL), 20, 120) / 60)#
 opcode Duration, i, ii
   ilevel, it60 xin
-  xout 0.08 + it60 * limit(100 + 20 * log10(ilevel), 20, 120) / 60
+  xout $DURATION(ilevel'it60)
 endop
 
 opcode Put_mode, 0, iiiii
@@ -154,14 +158,14 @@ endop
 ; aforce: the contact's, at most 1, of area iarea [samples]; acontact: the sound of the contact itself, as the stick's jolt grows with
 ; v^(6/5) / T, so with v^(7/5), by v^(2/5) faster than the modes do.
 #define STROKE(HARDNESS'VARIATION'RADIUS'MASS'YOUNG) #
-  iseed Seed $VARIATION, p4, p12
-  ilouder Scatter iseed, 1
-  iaside Scatter iseed, 2
+  iseed = $SEED($VARIATION'p4'p12)
+  ilouder = $SCATTER(iseed'1)
+  iaside = $SCATTER(iseed'2)
   iplace = limit(p8 + 0.05 * $VARIATION * iaside, 0, 1)
   ispeed = p7
-  ilevel Level ispeed
+  ilevel = $LEVEL(ispeed)
   ilevel = ilevel * ampdb(0.8 * $VARIATION * ilouder)
-  icontact Contact $HARDNESS, $RADIUS, $MASS, $YOUNG, ispeed
+  icontact = $CONTACT($HARDNESS'$RADIUS'$MASS'$YOUNG'ispeed)
   iarea = 2 / $M_PI * icontact * sr
   ktime timeinstk
   if ktime < 0.15 * kr then
@@ -188,19 +192,21 @@ endop
   endif
 #
 
-; Puts the membrane's 32 modes, struck at radius iradius of 1, with a second head two more; gives their number and the roots of the sums
-; of their squared amplitudes, after the contact's force and after the drive.
+; Puts the membrane's 32 modes, struck at radius iradius of 1, with a second head two more; gives their number, the roots of the sums
+; of their squared amplitudes, after the contact's force and after the drive, and the root mean square of their wave numbers
+; (of the lowest mode's), weighted by the force's.
 ; Frequencies in air: a mode of wave number k = root / a moves 2 rho / k of air an area with it (Fletcher and Rossing, chapters 3
 ; and 18), so f falls by 1 / sqrt(1 + air_load / root). A second head: air and shell couple the heads, (0,1) splits by 1.81,
 ; (1,1) by 1.23 (Rossing, Bork, Zhao and Fystrom, Acoustics of snare drums, JASA 92, 1992).
 ; Losses: of the material, growing with frequency, and by radiation, as a monopole for m = 0, a dipole for m = 1, then hardly (Christian
 ; et al. 1984). So (0,1) dies first of the low ones.
-opcode Put_membrane, iii, iiiiiiiiii
+opcode Put_membrane, iiii, iiiiiiiiii
   ifrequency, it60, idamping, icontact, ikettle, iradius, iair_load, isecond, iseed, ivariation xin
   index = 0
   icount = 0
   isquares = 0
   idrives = 0
+  icurved = 0
   ilowest = sqrt(1 + iair_load / 2.404826) / 2.404826
   iratio11 = (3.831706 / sqrt(1 + iair_load / 3.831706) * ilowest)^(1 - ikettle)
   while index < 32 do
@@ -229,11 +235,13 @@ opcode Put_membrane, iii, iiiiiiiiii
       Put_mode icount, ifrequency * iratio * (1 + isplit), imode_t60, 0.6 * isecond * iweight, 0
       icount += 1
     endif
-    isquares += (iweight * ireaches)^2 * (1 + (isplit > 0 ? 0.36 * isecond * isecond : 0))
+    isquare = (iweight * ireaches)^2 * (1 + (isplit > 0 ? 0.36 * isecond * isecond : 0))
+    isquares += isquare
+    icurved += isquare * (iroot / 2.404826)^2
     idrives += idrive * idrive
     index += 1
   od
-  xout icount, sqrt(isquares), sqrt(idrives)
+  xout icount, sqrt(isquares), sqrt(idrives), sqrt(icurved / isquares)
 endop
 
 ; Zone 0: head. Zone 1: rim shot (the head near its edge, less of it, with rim and shell).
@@ -245,12 +253,16 @@ instr drum
   ; The pitch follows the membrane's tension, which grows with the stroke.
   kfall expon 1, p17, exp(-1)
   kbend = cent(p16 * limit(ispeed, 0, 16) / 8 * kfall)
-  icount, inorm, idriven Put_membrane p12, p13, p14, icontact, p18, 0.04 + 0.8 * (irim == 1 ? 1 : iplace), p23, p24, iseed, p25
+  icount, inorm, idriven, iwaves Put_membrane p12, p13, p14, icontact, p18, 0.04 + 0.8 * (irim == 1 ? 1 : iplace), p23, p24, iseed, p25
   iscale = (irim == 1 ? 0.16 : 0.36) / (inorm * iarea)
   ; The same stretching hands motion of the low modes on to the high ones, in hard strokes only (Avanzini and Marogna, A modular
-  ; physically based approach to the sound synthesis of membrane percussion instruments, 2010; Bilbao 2012): a drive within some ms,
-  ; in proportion to the bend; see instr cymbal.
-  istretch = limit(0.9 * p16 / 100 * (limit(ispeed, 0, 16) / 8)^1.5, 0, 1)
+  ; physically based approach to the sound synthesis of membrane percussion instruments, 2010; Bilbao 2012): a drive within some ms;
+  ; see instr cymbal. A change of tension dT pushes a mode of wave number k and amplitude a with dT k^2 a, that is dT k times its
+  ; speed, so the drive is to the stroke's own motion as the bend times the wave numbers' root mean square: near the rim, where a
+  ; stroke moves shorter waves, it is larger. What is handed on is taken from the low modes: the energy stays, of which this drive gets
+  ; about 0.25 istretch^2 against 1.
+  istretch = limit(1.8 * p16 / 100 * (limit(ispeed, 0, 16) / 8)^1.5 * iwaves, 0, 4)
+  iscale = iscale / sqrt(1 + 0.25 * istretch * istretch)
   idrive_rms = sqrt(sr * (0.004 / 3 + 0.05 / 13.8) / 3)
   if ktime < 0.15 * kr then
     adrive noise_burst iseed + 0.75 + 0.1 * iplace, 0.004, 0.05
@@ -260,7 +272,7 @@ instr drum
     adrive = 0
     ahead = 0
   endif
-  amid, aside modal_bank ahead, adrive, kbend, giModes, icount, 3e-7 / ilevel
+  amid, aside modal_bank ahead, adrive, kbend, giModes, icount, 1e-6 / ilevel
   if ktime < 0.15 * kr then
     amid = amid + acontact * p19 * 1.7
   endif
@@ -280,10 +292,10 @@ instr drum
     Put_mode 0, p22, 0.09, 0.22, 0
     Put_mode 1, p22 * 1.72, 0.07, -0.16, 0
     Put_mode 2, p22 * 2.61, 0.05, 0.15, 0
-    arim, asiderim modal_bank aforce / (iarea * ireach), asilence, 1, giModes, 3, 3e-7 / ilevel
+    arim, asiderim modal_bank aforce / (iarea * ireach), asilence, 1, giModes, 3, 1e-6 / ilevel
     amid = amid + arim
   endif
-  iduration Duration ilevel, max(p13, (isnare > 0 ? p21 : 0), 0.1)
+  iduration = $DURATION(ilevel'max(p13, (isnare > 0 ? p21 : 0), 0.1))
   $CLOSE
 endin
 
@@ -325,11 +337,11 @@ instr bell
   iwidth = p19
   icount, inorm Put_partials int(p14 + 0.5), p12, p13, p15, icontact, iplace, p17, iseed, p20
   iscale = 0.48 / (inorm * iarea) * (ishoulder == 1 ? 0.6 : 1)
-  amid, aside modal_bank aforce * iscale, asilence, 1, giModes, icount, 3e-7 / ilevel
+  amid, aside modal_bank aforce * iscale, asilence, 1, giModes, icount, 1e-6 / ilevel
   if ktime < 0.15 * kr then
     amid = amid + acontact * p18
   endif
-  iduration Duration ilevel, max(p13, 0.05)
+  iduration = $DURATION(ilevel'max(p13, 0.05))
   $CLOSE
 endin
 
@@ -358,18 +370,18 @@ instr string
   icount = limit(int(12000 / p12), 1, 32)
   inorm Put_string icount, p12, p13, p14, icontact, p16, p17 * (1 - 0.8 * iplace), p18, iseed, p21
   iscale = 0.355 / (inorm * iarea)
-  amid, aside modal_bank aforce * iscale, asilence, 1, giModes, icount, 3e-7 / ilevel
+  amid, aside modal_bank aforce * iscale, asilence, 1, giModes, icount, 1e-6 / ilevel
   if ktime < 0.15 * kr then
     amid = amid + acontact * p19
   endif
-  iduration Duration ilevel, max(p13, 0.05)
+  iduration = $DURATION(ilevel'max(p13, 0.05))
   $CLOSE
 endin
 
 ; Puts 448 plate modes: a thin plate has as many modes in one band of a given width as in another (Weyl's law for plates; Fletcher and
 ; Rossing, chapter 3), here placed evenly in frequency with the irregularity of each cymbal's own (Scatter of its lowest partial), and
 ; with shapes at the struck point of either sign. The cup rings on every fifth one. Gives the root of the sum of the squared weights,
-; for the contact's force and for the drive.
+; for the contact's force and for the drive. Macros, since each call of an opcode definition takes as long as the rest of a mode.
 opcode Put_plate, ii, iiiiiiiii
   ifrequency, ihighest, it60, idamping, icontact, iplace, icup, iseed, ivariation xin
   index = 0
@@ -377,18 +389,21 @@ opcode Put_plate, ii, iiiiiiiii
   idrives = 0
   istep = (ihighest - ifrequency) / 447
   while index < 448 do
-    iirregular Scatter ifrequency * 0.00137, index
-    ishape Scatter ifrequency * 0.00253, index + 500
-    iother Scatter ifrequency * 0.00317, index + 1000
-    iodd Scatter iseed, 10 + index
+    iirregular = $SCATTER(ifrequency * 0.00137'index)
+    ishape = $SCATTER(ifrequency * 0.00253'index + 500)
+    iother = $SCATTER(ifrequency * 0.00317'index + 1000)
+    iodd = 0.3 * ivariation * $SCATTER(iseed'10 + index)
     iat = ifrequency + istep * (index + (index > 0 ? 0.45 * iirregular : 0))
-    ireaches Reaches iat, icontact
-    iweight = (ishape + 0.3 * ivariation * iodd) * (iat / ifrequency)^(0.3 * iplace - 0.1) * (icup == 1 && index % 5 != 2 ? 0.15 : 1)
+    ix = 2 * iat * icontact
+    iweight = (ishape + iodd) * (iat / ifrequency)^(0.3 * iplace - 0.1) * (icup == 1 && index % 5 != 2 ? 0.15 : 1)
     ihigh = (iat / 4000)^2
-    idrive = (iother + 0.3 * ivariation * iodd) * ihigh / (1 + ihigh) / (1 + (iat / 15000)^4)
-    isquares += (iweight * ireaches)^2
+    idrive = (iother + iodd) * ihigh / (1 + ihigh) / (1 + (iat / 15000)^4)
+    isquares += iweight * iweight / (1 + ix^4)
     idrives += idrive * idrive
-    Put_mode index, iat, it60 * (1000 / iat)^idamping, iweight, idrive
+    tabw_i iat, 4 * index, giModes
+    tabw_i it60 * (1000 / iat)^idamping, 4 * index + 1, giModes
+    tabw_i iweight, 4 * index + 2, giModes
+    tabw_i idrive, 4 * index + 3, giModes
     index += 1
   od
   xout sqrt(isquares), sqrt(idrives)
@@ -420,10 +435,10 @@ instr cymbal
   else
     adrive = 0
   endif
-  amid, aside modal_bank aforce * iforce, adrive, 1, giModes, 448, 3e-7 / ilevel
+  amid, aside modal_bank aforce * iforce, adrive, 1, giModes, 448, 1e-6 / ilevel
   if ktime < 0.15 * kr then
     amid = amid + acontact * p19
   endif
-  iduration Duration ilevel, max(it60 * (1000 / limit(p12, 60, 1000))^idamping, 0.05)
+  iduration = $DURATION(ilevel'max(it60 * (1000 / limit(p12, 60, 1000))^idamping, 0.05))
   $CLOSE
 endin

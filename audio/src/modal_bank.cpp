@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <cstring>
 #include <numbers>
 
@@ -11,8 +12,7 @@ namespace {
 constexpr double kHighestHz = 20000;
 constexpr float kHeardBend = 3e-6F;  // 0.005 cents: a smaller change of the bend is left out
 constexpr std::size_t kLanes = ModalBank::kLanes;
-// Signs of a vector's modes in the side signal.
-constexpr std::array<float, kLanes> kSides{1, -1, -1, 1, 1, -1, -1, 1};
+static_assert(kLanes == 8);
 
 // Sixteen lanes' worth of registers: GCC and Clang make AVX of it, or pairs of SSE, with the same results.
 using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
@@ -27,6 +27,24 @@ inline void store(float* to, const Lanes& lanes) noexcept {
 
 bool is_silent(std::span<const float> samples) noexcept {
     return std::ranges::all_of(samples, [](float x) { return x == 0; });
+}
+
+/// Four samples' lanes into mid and side: of both halves of a vector, the outer lanes less the inner ones, which the
+/// side inverts.
+void add_up_four(const float* lanes, float* mid, float* side) noexcept {
+    using Four = float __attribute__((vector_size(16)));
+    Four halves[8], both[4];
+    std::memcpy(halves, lanes, sizeof halves);
+    for (std::size_t i = 0; i < 4; ++i) both[i] = halves[2 * i] + halves[2 * i + 1];
+    const Four pairs[2] = {__builtin_shufflevector(both[0], both[1], 0, 1, 4, 5) +
+                               __builtin_shufflevector(both[0], both[1], 3, 2, 7, 6),
+                           __builtin_shufflevector(both[2], both[3], 0, 1, 4, 5) +
+                               __builtin_shufflevector(both[2], both[3], 3, 2, 7, 6)};
+    const Four outer = __builtin_shufflevector(pairs[0], pairs[1], 0, 2, 4, 6),
+               inner = __builtin_shufflevector(pairs[0], pairs[1], 1, 3, 5, 7);
+    const Four sum = outer + inner, difference = outer - inner;
+    std::memcpy(mid, &sum, sizeof sum);
+    std::memcpy(side, &difference, sizeof difference);
 }
 
 }  // namespace
@@ -58,8 +76,15 @@ void ModalBank::set(std::span<const ModeParameters> modes, double sample_rate, d
 
 void ModalBank::rotate(std::size_t mode, double ratio) noexcept {
     const double angle = std::min(static_cast<double>(angle_[mode]) * ratio, 3.0), radius = radius_[mode];
-    cosine_[mode] = static_cast<float>(radius * std::cos(angle));
-    sine_[mode] = static_cast<float>(radius * std::sin(angle));
+    const std::complex<double> once = std::polar(radius, angle);
+    std::complex<double> power = 1;
+    float* of_group = &powers_[2 * kAhead * (mode - mode % kTogether)] + mode % kTogether;
+    for (std::size_t k = 0; k < kAhead; ++k, of_group += 2 * kTogether) {
+        power = {power.real() * once.real() - power.imag() * once.imag(),
+                 power.real() * once.imag() + power.imag() * once.real()};
+        of_group[0] = static_cast<float>(power.real());
+        of_group[kTogether] = static_cast<float>(power.imag());
+    }
 }
 
 void ModalBank::bend(double ratio) noexcept {
@@ -69,20 +94,20 @@ void ModalBank::bend(double ratio) noexcept {
         if (sounds_[i / kTogether]) rotate(i, ratio);
 }
 
-template <bool kDriven>
-void ModalBank::render_group(std::size_t first, const Inputs& inputs, float* sums) noexcept {
+/// From sample `begin` on.
+void ModalBank::drive_group(std::size_t first, std::size_t begin, const Inputs& inputs,
+                            float* sums) noexcept {
     Lanes x0, x1, y0, y1, c0, c1, s0, s1, w0, w1, d0, d1;
     load(x0, &real_[first]), load(x1, &real_[first + kLanes]);
     load(y0, &imaginary_[first]), load(y1, &imaginary_[first + kLanes]);
-    load(c0, &cosine_[first]), load(c1, &cosine_[first + kLanes]);
-    load(s0, &sine_[first]), load(s1, &sine_[first + kLanes]);
+    const float* power = &powers_[2 * kAhead * first];
+    load(c0, power), load(c1, power + kLanes);
+    load(s0, power + kTogether), load(s1, power + kTogether + kLanes);
     load(w0, &weight_[first]), load(w1, &weight_[first + kLanes]);
     load(d0, &drive_[first]), load(d1, &drive_[first + kLanes]);
-    for (std::size_t n = 0; n < inputs.force.size(); ++n) {
-        if constexpr (kDriven) {
-            x0 += w0 * inputs.force[n] + d0 * inputs.drive[n];
-            x1 += w1 * inputs.force[n] + d1 * inputs.drive[n];
-        }
+    for (std::size_t n = begin; n < inputs.force.size(); ++n) {
+        x0 += w0 * inputs.force[n] + d0 * inputs.drive[n];
+        x1 += w1 * inputs.force[n] + d1 * inputs.drive[n];
         const Lanes turned0 = c0 * x0 - s0 * y0, turned1 = c1 * x1 - s1 * y1;
         y0 = s0 * x0 + c0 * y0;
         y1 = s1 * x1 + c1 * y1;
@@ -96,31 +121,67 @@ void ModalBank::render_group(std::size_t first, const Inputs& inputs, float* sum
     store(&imaginary_[first], y0), store(&imaginary_[first + kLanes], y1);
 }
 
+/// A multiple of kAhead samples without input.
+void ModalBank::ring_group(std::size_t first, std::size_t samples, float* sums) noexcept {
+    Lanes x0, x1, y0, y1;
+    load(x0, &real_[first]), load(x1, &real_[first + kLanes]);
+    load(y0, &imaginary_[first]), load(y1, &imaginary_[first + kLanes]);
+    for (std::size_t n = 0; n < samples; n += kAhead) {
+        Lanes c0, c1, s0, s1;
+        const float* power = &powers_[2 * kAhead * first];
+        for (std::size_t k = 0; k < kAhead; ++k, power += 2 * kTogether) {
+            load(c0, power), load(c1, power + kLanes);
+            load(s0, power + kTogether), load(s1, power + kTogether + kLanes);
+            Lanes sum;
+            load(sum, sums + (n + k) * kLanes);
+            store(sums + (n + k) * kLanes, sum + (s0 * x0 + c0 * y0) + (s1 * x1 + c1 * y1));
+        }
+        const Lanes turned0 = c0 * x0 - s0 * y0, turned1 = c1 * x1 - s1 * y1;
+        y0 = s0 * x0 + c0 * y0;
+        y1 = s1 * x1 + c1 * y1;
+        x0 = turned0;
+        x1 = turned1;
+    }
+    store(&real_[first], x0), store(&real_[first + kLanes], x1);
+    store(&imaginary_[first], y0), store(&imaginary_[first + kLanes], y1);
+}
+
+/// Of a group's amplitudes.
+float ModalBank::largest_square(std::size_t first) const noexcept {
+    Lanes x0, x1, y0, y1;
+    load(x0, &real_[first]), load(x1, &real_[first + kLanes]);
+    load(y0, &imaginary_[first]), load(y1, &imaginary_[first + kLanes]);
+    const Lanes square0 = x0 * x0 + y0 * y0, square1 = x1 * x1 + y1 * y1;
+    const Lanes larger = square0 > square1 ? square0 : square1;
+    float largest = larger[0];
+    for (std::size_t lane = 1; lane < kLanes; ++lane)
+        largest = larger[lane] > largest ? larger[lane] : largest;
+    return largest;
+}
+
 void ModalBank::render(std::span<const float> force, std::span<const float> drive, std::span<float> mid,
                        std::span<float> side) noexcept {
     std::array<float, kMostSamples * kLanes> sums;
     std::fill_n(sums.begin(), force.size() * kLanes, 0.0F);
     const bool driven = !is_silent(force) || !is_silent(drive);
+    const std::size_t rung = driven ? 0 : force.size() - force.size() % kAhead;
     const Inputs inputs{force, drive};
     for (std::size_t group = 0; group < groups_; ++group) {
         if (!sounds_[group]) continue;
         const std::size_t first = group * kTogether;
-        if (driven) {
-            render_group<true>(first, inputs, sums.data());
-            continue;
-        }
-        render_group<false>(first, inputs, sums.data());
-        float largest = 0;
-        for (std::size_t i = first; i < first + kTogether; ++i)
-            largest = std::max(largest, std::max(std::abs(real_[i]), std::abs(imaginary_[i])));
-        sounds_[group] = largest >= rest_below_;
+        ring_group(first, rung, sums.data());
+        drive_group(first, rung, inputs, sums.data());
+        if (driven) continue;
+        sounds_[group] = largest_square(first) >= rest_below_ * rest_below_;
     }
-    for (std::size_t n = 0; n < force.size(); ++n) {
-        mid[n] = side[n] = 0;
-        for (std::size_t lane = 0; lane < kLanes; ++lane) {
-            mid[n] += sums[n * kLanes + lane];
-            side[n] += kSides[lane] * sums[n * kLanes + lane];
-        }
+    std::size_t n = 0;
+    for (; n + 4 <= force.size(); n += 4) add_up_four(&sums[n * kLanes], &mid[n], &side[n]);
+    for (; n < force.size(); ++n) {
+        const float* lanes = &sums[n * kLanes];
+        const float outer = (lanes[0] + lanes[4]) + (lanes[3] + lanes[7]),
+                    inner = (lanes[1] + lanes[5]) + (lanes[2] + lanes[6]);
+        mid[n] = outer + inner;
+        side[n] = outer - inner;
     }
 }
 

@@ -20,12 +20,16 @@ struct ModeParameters {
 /// Behaved Two Pole Filters, 2003); what is heard is y. Single precision suffices: a rotation's coefficients
 /// keep their relative precision at low frequencies, where those of a biquad do not.
 ///
+/// Where nothing comes in, samples n + 1 to n + 4 are Im(p z), ..., Im(p^4 z) of the same z[n], p = r e^(i theta):
+/// two products each, of which none waits for another, and one rotation by p^4.
+///
 /// A trivial type without alignment of its own, which lies in memory that Csound clears and gives out again.
 /// Sixteen modes go together; once they are quiet they rest for good. No allocation.
 class ModalBank {
 public:
     static constexpr std::size_t kMostModes = 512, kMostSamples = 64;
     static constexpr std::size_t kLanes = 8, kTogether = 2 * kLanes;  ///< modes in a vector, in a group
+    static constexpr std::size_t kAhead = 4;                          ///< powers of p that are kept
 
     /// A new start from rest with at most kMostModes; others are left out, as are modes from 20 kHz on.
     /// `rest_below`: amplitude from which a group rests while nothing comes in.
@@ -40,14 +44,16 @@ public:
 private:
     using Column = std::array<float, kMostModes>;
     struct Inputs;
-    template <bool kDriven>
-    void render_group(std::size_t first, const Inputs& inputs, float* sums) noexcept;
+    void drive_group(std::size_t first, std::size_t begin, const Inputs& inputs, float* sums) noexcept;
+    void ring_group(std::size_t first, std::size_t samples, float* sums) noexcept;
+    [[nodiscard]] float largest_square(std::size_t first) const noexcept;
     void rotate(std::size_t mode, double ratio) noexcept;
 
     Column real_, imaginary_;  ///< z
-    Column cosine_, sine_;     ///< r e^(i theta)
-    Column weight_, drive_;    ///< gains of the inputs
-    Column angle_, radius_;    ///< theta, r; unbent
+    /// Real and imaginary parts of p, p^2, ... of each group: kTogether of both, power by power.
+    std::array<float, kMostModes * 2 * kAhead> powers_;
+    Column weight_, drive_;  ///< gains of the inputs
+    Column angle_, radius_;  ///< theta, r; unbent
     std::array<bool, kMostModes / kTogether> sounds_;
     std::size_t groups_;
     float rest_below_, ratio_;
