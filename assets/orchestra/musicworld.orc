@@ -5,12 +5,13 @@
 ;   p5  left gain    p6  right gain  (pan and voice gain, already multiplied)
 ;   p7  strike speed [m/s]           p8  place, 0 centre of the struck zone ... 1 its edge
 ;   p9  zone, 0 head or body, 1 and above: rim, cup, shoulder (see each instrument)
-;   p10 choke group (index into table 901, -1: none)
+;   p10 voice (index into tables 901 and 903)
 ;   p11 onset [samples] of a choking note within this note's own first block (-1: none)
 ;   p12 and on: the instrument's parameters, in the order of the lines below.
 ; Tables shared with the host:
-;   901 one entry a choke group: onset [samples] of the group's latest choking note, written before its block
+;   901 one entry a voice: onset [samples] of what has choked it last, written before that one's block
 ;   902 entry 0: the sample by which every note so far has ended, written by the notes
+;   903 one entry a voice: gain of what the room hears of it
 ; Opcodes of the host (audio/src/opcodes.h): contact_force, noise_burst, modal_bank, close_note, bessel.
 ;
 ; Each line `;@ instrument parameter default minimum maximum text` declares a parameter; the host reads these lines.
@@ -73,11 +74,13 @@
 
 sr = 48000
 ksmps = 64
-nchnls = 2
+; Left and right, and both again as the room hears them.
+nchnls = 4
 0dbfs = 1
 
 giChokes ftgen 901, 0, -256, -2, 0
 giEnds   ftgen 902, 0, -1, -2, 0
+giSends  ftgen 903, 0, -256, -2, 0
 
 ; Membrane modes (m, n) by frequency: nodal diameters m, nodal circles n and the root of the Bessel function J_m (Abramowitz and Stegun, table 9.5),
 ; and a kettledrum's ratios to its (1,1) mode: 1, 1.50, 1.98, 2.44, 2.90 for one nodal circle and 1 to 5 diameters, drawn
@@ -186,7 +189,8 @@ endop
   ilast tab_i 0, giEnds
   tabw_i max(ilast, p4 + iduration * sr + 2 * ksmps), 0, giEnds
   aleft, aright, kover close_note amid, aside, ilevel * p5, ilevel * p6, iwidth, iduration, p4, p10, p11, giChokes
-  outs aleft, aright
+  isend tab_i p10, giSends
+  outq aleft, aright, isend * aleft, isend * aright
   if kover == 1 then
     turnoff
   endif

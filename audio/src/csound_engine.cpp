@@ -55,6 +55,7 @@ CsoundEngine::CsoundEngine(const std::string& orchestra, const std::string& sour
     check_messages();
     check_format();
     block_size_ = static_cast<int>(csoundGetKsmps(csound_.get()));
+    channels_ = csoundGetNchnls(csound_.get());
 }
 
 void CsoundEngine::receive_message(CSOUND* csound, int, const char* text) {
@@ -75,10 +76,12 @@ void CsoundEngine::check_messages() const {
 
 void CsoundEngine::check_format() const {
     CSOUND* csound = csound_.get();
-    if (csoundGetSr(csound) != kSampleRate || csoundGetNchnls(csound) != 2 || csoundGet0dBFS(csound) != 1) {
+    const auto channels = csoundGetNchnls(csound);
+    if (csoundGetSr(csound) != kSampleRate || (channels != 2 && channels != 4) ||
+        csoundGet0dBFS(csound) != 1) {
         throw std::runtime_error(source_ + ": found sr " + std::to_string(csoundGetSr(csound)) + ", nchnls " +
                                  std::to_string(csoundGetNchnls(csound)) + ", 0dbfs " +
-                                 std::to_string(csoundGet0dBFS(csound)) + ", expected 48000, 2, 1");
+                                 std::to_string(csoundGet0dBFS(csound)) + ", expected 48000, 2 or 4, 1");
     }
 }
 
@@ -116,7 +119,7 @@ std::span<const double> CsoundEngine::render_block() {
     messages_.clear();
     if (csoundPerformKsmps(csound_.get()) != 0) failed_ = true;
     check_messages();
-    return {csoundGetSpout(csound_.get()), static_cast<std::size_t>(2 * block_size_)};
+    return {csoundGetSpout(csound_.get()), channels_ * static_cast<std::size_t>(block_size_)};
 }
 
 std::string CsoundEngine::version() {

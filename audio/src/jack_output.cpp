@@ -37,8 +37,9 @@ jack_client_t* open_client() {
                              " is running; start it (jackd -d alsa -r 48000 -p 128) or leave the option out");
 }
 
-jack_port_t* open_port(jack_client_t* client, const std::string& name, const char* type) {
-    jack_port_t* port = jack_port_register(client, name.c_str(), type, JackPortIsOutput, 0);
+jack_port_t* open_port(jack_client_t* client, const std::string& name, const char* type,
+                       JackPortFlags direction = JackPortIsOutput) {
+    jack_port_t* port = jack_port_register(client, name.c_str(), type, direction, 0);
     if (port != nullptr) return port;
     throw std::runtime_error("JACK: cannot make the port `" + name +
                              "`; choose a name that is new and short");
@@ -96,6 +97,10 @@ void JackOutput::open_ports(const Options& options) {
     }
     if (!options.midi_port.empty())
         midi_ = open_port(client_.get(), options.midi_port, JACK_DEFAULT_MIDI_TYPE);
+    const bool elsewhere = options.midi_input.find(':') != std::string::npos;
+    if (!options.midi_input.empty())
+        midi_input_ = open_port(client_.get(), elsewhere ? "midi_in" : options.midi_input,
+                                JACK_DEFAULT_MIDI_TYPE, JackPortIsInput);
 }
 
 void JackOutput::connect(const Options& options) {
@@ -103,6 +108,7 @@ void JackOutput::connect(const Options& options) {
                    std::to_string(jack_get_buffer_size(client_.get())) + " frames";
     if (left_ != nullptr) connect_sound();
     if (midi_ != nullptr) connect_midi(options.midi_connect);
+    if (midi_input_ != nullptr) connect_midi_input(options.midi_input);
 }
 
 void JackOutput::connect_sound() {
@@ -115,6 +121,17 @@ void JackOutput::connect_sound() {
     }
     description_ += std::string("; sound ") + jack_port_name(left_) + ", " + jack_port_name(right_) +
                     (connected.empty() ? " (not connected: no physical outputs)" : connected);
+}
+
+/// What is played on is there from the beginning: unlike a receiver, a sender that is missing is an error.
+void JackOutput::connect_midi_input(const std::string& peer) {
+    description_ += std::string("; MIDI from ") + jack_port_name(midi_input_);
+    if (peer.find(':') == std::string::npos) return;
+    if (jack_connect(client_.get(), peer.c_str(), jack_port_name(midi_input_)) != 0)
+        throw std::runtime_error("JACK: found no port `" + peer +
+                                 "` to listen to, expected a MIDI output that is there before this starts "
+                                 "(jack_lsp -t lists them)");
+    description_ += " <- " + peer;
 }
 
 void JackOutput::connect_midi(const std::string& peer) {
@@ -130,7 +147,7 @@ void JackOutput::connect_midi(const std::string& peer) {
 }
 
 void JackOutput::start(std::span<const float> ring, std::int64_t epoch_ns) noexcept {
-    ring_ = ring;
+    ring_.start(ring);
     epoch_ns_ = epoch_ns;
     sounding_.store(true, std::memory_order_seq_cst);
 }
@@ -145,30 +162,28 @@ bool JackOutput::send(const MidiStroke& stroke) noexcept {
     return true;
 }
 
-bool JackOutput::stop() noexcept {
-    const bool left = leave_recording();
-    if (last_due_ns_ == 0 || ended_.load(std::memory_order_relaxed)) return left;
+void JackOutput::stop() noexcept {
+    leave_ring();
+    if (last_due_ns_ == 0 || ended_.load(std::memory_order_relaxed)) return;
     const std::int64_t period_ns = samples_ns(jack_get_buffer_size(client_.get()));
     sleep_until_ns(last_due_ns_ + MidiEvents::kLengthNs + 2 * period_ns);
-    return left;
 }
 
 /// A cycle may never end: a server that goes away can take JACK's thread with it.
-bool JackOutput::leave_recording() noexcept {
+void JackOutput::leave_ring() noexcept {
     sounding_.store(false, std::memory_order_seq_cst);
     const std::int64_t until = monotonic_ns() + kPatienceNs;
     while (in_cycle_.load(std::memory_order_seq_cst)) {
-        if (ended_.load(std::memory_order_relaxed) || monotonic_ns() > until) return false;
+        if (ended_.load(std::memory_order_relaxed) || monotonic_ns() > until) return;
         sleep_until_ns(monotonic_ns() + 100'000);
     }
-    return true;
 }
 
 std::string JackOutput::description() const {
     return description_ + (ended_.load(std::memory_order_relaxed) ? " (the server ended)" : "");
 }
 
-JackCounts JackOutput::counts() const noexcept {
+DeviceCounts JackOutput::counts() const noexcept {
     return {underruns_.load(std::memory_order_relaxed), corrections_.load(std::memory_order_relaxed),
             late_strokes_.load(std::memory_order_relaxed), lost_strokes_.load(std::memory_order_relaxed)};
 }
@@ -187,6 +202,7 @@ void JackOutput::run_cycle(jack_nframes_t frames) noexcept {
     const Cycle cycle = this_cycle(frames);
     if (left_ != nullptr) play(cycle);
     if (midi_ != nullptr) send_strokes(cycle);
+    if (midi_input_ != nullptr) receive(cycle);
     expected_frame_ = cycle.first_frame + frames;
 }
 
@@ -219,7 +235,10 @@ void JackOutput::play(const Cycle& cycle) noexcept {
     if (sounding_.load(std::memory_order_seq_cst)) {
         const double due = static_cast<double>(cycle.begin_ns - epoch_ns_) * kSampleRate * 1e-9;
         const std::int64_t first = position_.begin_cycle(due, cycle.frames, playing_ && cycle.continuous);
-        copy_sound(first, cycle.frames, left, right);
+        const bool there = ring_.read(
+            first, cycle.frames,
+            [&](std::int32_t i, float at_left, float at_right) { left[i] = at_left, right[i] = at_right; });
+        if (!there) underruns_.fetch_add(1, std::memory_order_relaxed);
         corrections_.store(position_.corrections(), std::memory_order_relaxed);
         playing_ = true;
     } else {
@@ -229,19 +248,18 @@ void JackOutput::play(const Cycle& cycle) noexcept {
     in_cycle_.store(false, std::memory_order_seq_cst);
 }
 
-void JackOutput::copy_sound(std::int64_t first, std::int32_t frames, float* left, float* right) noexcept {
-    const std::int64_t there = published_.load(std::memory_order_acquire);
-    const auto room = static_cast<std::int64_t>(ring_.size() / 2);
-    for (std::int32_t i = 0; i < frames; ++i) {
-        const std::int64_t sample = first + i;
-        // Half of the ring is left to what is being written.
-        const bool silent = sample < 0 || sample >= there || sample < there - room / 2;
-        const auto at = static_cast<std::size_t>(silent ? 0 : 2 * (sample % room));
-        left[i] = silent ? 0.0F : ring_[at];
-        right[i] = silent ? 0.0F : ring_[at + 1];
+/// Messages of three bytes; others (clocks, system exclusive) are left out.
+void JackOutput::receive(const Cycle& cycle) noexcept {
+    void* buffer = jack_port_get_buffer(midi_input_, static_cast<jack_nframes_t>(cycle.frames));
+    const std::uint32_t count = jack_midi_get_event_count(buffer);
+    for (std::uint32_t i = 0; i < count; ++i) {
+        jack_midi_event_t event{};
+        if (jack_midi_event_get(&event, buffer, i) != 0 || event.size != 3) continue;
+        const std::int64_t at_ns = cycle.begin_ns + samples_ns(event.time);
+        const MidiMessage message{static_cast<double>(at_ns) * 1e-9, event.buffer[0], event.buffer[1],
+                                  event.buffer[2]};
+        if (!received_.try_push(message)) lost_strokes_.fetch_add(1, std::memory_order_relaxed);
     }
-    const std::int64_t end = first + frames;
-    if (end > 0 && end > there) underruns_.fetch_add(1, std::memory_order_relaxed);
 }
 
 void JackOutput::send_strokes(const Cycle& cycle) noexcept {

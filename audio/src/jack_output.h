@@ -7,57 +7,50 @@
 #include <span>
 #include <string>
 
+#include "audio/midi_reader.h"
 #include "command_queue.h"
 #include "device_position.h"
 #include "midi_events.h"
+#include "sound_device.h"
 
 namespace audio {
 
-/// What the server's own thread counted.
-struct JackCounts {
-    std::uint64_t underruns = 0;     ///< cycles that asked for samples which were not there; silence instead
-    std::uint64_t corrections = 0;   ///< samples dropped or repeated to follow the device's clock
-    std::uint64_t late_strokes = 0;  ///< MIDI notes whose frame had passed; sent at once
-    std::uint64_t lost_strokes = 0;  ///< MIDI notes for which there was no room; never sent
-};
-
-/// One client of a running JACK server: sound on two ports, strokes on a MIDI port. Sample n and a stroke of
+/// One client of a running JACK server: sound on two ports, strokes on a MIDI port, MIDI from another. Sample n and a stroke of
 /// the same due time leave in the same frame: the one that JACK's own clock gives for that moment.
 ///
 /// Threads: the constructor's (opens, connects, closes); the audio thread (start, publish, send, stop);
 /// JACK's, which reads the recording where it lies and never waits. JACK's clock is CLOCK_MONOTONIC_RAW,
 /// which drifts against CLOCK_MONOTONIC; their difference is taken anew each cycle.
-class JackOutput {
+class JackOutput : public SoundDevice {
 public:
     struct Options {
         bool sound = false;        ///< ports out_l and out_r, connected to the first two physical outputs
         std::string midi_port;     ///< name of the MIDI port; empty: none
         std::string midi_connect;  ///< its peer, where that exists
+        std::string midi_input{};  ///< a port to listen to; empty: none; without a colon a port of ours, left open
         double output_lead_s = 0;
     };
 
     /// Throws std::runtime_error: no server, another rate than 48 kHz, a period too long for the output lead.
     explicit JackOutput(const Options& options);
-    ~JackOutput();
-    JackOutput(const JackOutput&) = delete;
-    JackOutput& operator=(const JackOutput&) = delete;
+    ~JackOutput() override;
 
-    /// From here on sound is played: interleaved stereo, in a ring that stays where it is and holds what was
-    /// published last; `publish` sets how much of it is ready; sample 0 is due at epoch_ns.
-    void start(std::span<const float> ring, std::int64_t epoch_ns) noexcept;
-    void publish(std::int64_t frames) noexcept { published_.store(frames, std::memory_order_release); }
+    void start(std::span<const float> ring, std::int64_t epoch_ns) noexcept override;
+    void publish(std::int64_t frames) noexcept override { ring_.publish(frames); }
     /// Hands a stroke over; false where that cannot be. Wait-free.
     [[nodiscard]] bool send(const MidiStroke& stroke) noexcept;
-    /// Silence. Waits until every note-off is sent (0.1 s after the last stroke). False: JACK's thread was
-    /// still in a cycle when the server had ended or 0.1 s were over, and may read the recording until this
-    /// is destroyed.
-    [[nodiscard]] bool stop() noexcept;
+    /// Waits until every note-off is sent (0.1 s after the last stroke). JACK's thread may still be in a cycle, and read the
+    /// ring until this is destroyed.
+    void stop() noexcept override;
+    /// A MIDI message that came, t_s on CLOCK_MONOTONIC; false: none. One thread at a time.
+    [[nodiscard]] bool take(MidiMessage& message) noexcept { return received_.try_pop(message); }
 
     [[nodiscard]] bool has_midi() const noexcept { return midi_ != nullptr; }
-    [[nodiscard]] std::string description() const;
+    [[nodiscard]] std::string description() const override;
     /// Why the MIDI port is not connected to the peer that was asked for, one line; empty: it is.
     [[nodiscard]] const std::string& midi_problem() const noexcept { return midi_problem_; }
-    [[nodiscard]] JackCounts counts() const noexcept;
+    [[nodiscard]] DeviceCounts counts() const noexcept override;
+    [[nodiscard]] double delay_s() const noexcept override { return 0; }
 
 private:
     struct Cycle {
@@ -74,12 +67,13 @@ private:
     void connect(const Options& options);
     void connect_sound();
     void connect_midi(const std::string& peer);
+    void connect_midi_input(const std::string& peer);
     void run_cycle(jack_nframes_t frames) noexcept;
     void measure_clock() noexcept;
     [[nodiscard]] Cycle this_cycle(jack_nframes_t frames) const noexcept;
     void play(const Cycle& cycle) noexcept;
-    [[nodiscard]] bool leave_recording() noexcept;
-    void copy_sound(std::int64_t first, std::int32_t frames, float* left, float* right) noexcept;
+    void leave_ring() noexcept;
+    void receive(const Cycle& cycle) noexcept;
     void send_strokes(const Cycle& cycle) noexcept;
 
     struct Close {
@@ -87,15 +81,15 @@ private:
     };
 
     // The opening thread's.
-    jack_port_t *left_ = nullptr, *right_ = nullptr, *midi_ = nullptr;
+    jack_port_t *left_ = nullptr, *right_ = nullptr, *midi_ = nullptr, *midi_input_ = nullptr;
     std::string description_, midi_problem_;
 
     // Shared.
     CommandQueue<MidiStroke> strokes_{MidiEvents::kCapacity};
-    std::span<const float> ring_;  // with epoch_ns_, written before sounding_
+    CommandQueue<MidiMessage> received_{MidiEvents::kCapacity};
+    DeviceRing ring_;  // with epoch_ns_, written before sounding_
     std::int64_t epoch_ns_ = 0;
     std::atomic<bool> sounding_{false}, in_cycle_{false}, ended_{false};
-    std::atomic<std::int64_t> published_{0};
     std::atomic<std::uint64_t> underruns_{0}, corrections_{0}, late_strokes_{0}, lost_strokes_{0};
 
     // The audio thread's.

@@ -9,8 +9,12 @@ struct LivePerformance::Implementation {
     LiveThread thread;
     const std::size_t voice_count;
 
-    [[nodiscard]] JackCounts device_counts() const {
-        return thread.device() ? thread.device()->counts() : JackCounts{};
+    [[nodiscard]] DeviceCounts device_counts() const {
+        return thread.device() ? thread.device()->counts() : DeviceCounts{};
+    }
+    /// Those of MIDI, which is JACK's whatever plays the sound.
+    [[nodiscard]] DeviceCounts midi_counts() const {
+        return thread.jack() ? thread.jack()->counts() : DeviceCounts{};
     }
 };
 
@@ -78,16 +82,16 @@ std::uint64_t LivePerformance::device_corrections() const {
 }
 
 std::uint64_t LivePerformance::late_strokes() const {
-    return implementation_->device_counts().late_strokes;
+    return implementation_->midi_counts().late_strokes;
 }
 
 std::uint64_t LivePerformance::lost_strokes() const {
-    return implementation_->device_counts().lost_strokes;
+    return implementation_->midi_counts().lost_strokes;
 }
 
 std::string LivePerformance::midi_problem() const {
-    const JackOutput* device = implementation_->thread.device();
-    return device != nullptr ? device->midi_problem() : "";
+    const JackOutput* jack = implementation_->thread.jack();
+    return jack != nullptr ? jack->midi_problem() : "";
 }
 
 std::string LivePerformance::version() const {
@@ -95,8 +99,25 @@ std::string LivePerformance::version() const {
 }
 
 std::string LivePerformance::device() const {
-    const JackOutput* device = implementation_->thread.device();
-    return device != nullptr ? device->description() : "file only";
+    const SoundDevice* device = implementation_->thread.device();
+    const JackOutput* jack = implementation_->thread.jack();
+    if (device == nullptr) return "file only";
+    return device->description() + (jack != nullptr && device != jack ? "; " + jack->description() : "");
+}
+
+double LivePerformance::device_delay_s() const {
+    return implementation_->thread.device_delay_s();
+}
+
+std::vector<MidiMessage> LivePerformance::take_midi() {
+    std::vector<MidiMessage> messages;
+    JackOutput* jack = implementation_->thread.jack();
+    const double epoch_s = 1e-9 * static_cast<double>(implementation_->thread.epoch_ns());
+    for (MidiMessage message; jack != nullptr && jack->take(message);) {
+        message.t_s -= epoch_s;
+        messages.push_back(message);
+    }
+    return messages;
 }
 
 double LivePerformance::busy_s() const {

@@ -17,7 +17,8 @@ namespace {
 constexpr std::size_t kQueueLength = 1024;
 constexpr std::size_t kNotesAhead = 4096;
 constexpr std::size_t kBlocksWaiting = 32768;
-constexpr std::int64_t kRingSamples = 1 << 20;  // 22 s; whole blocks of any power of two
+constexpr std::int64_t kRingSamples = 1 << 20;        // 22 s; whole blocks of any power of two
+constexpr std::int64_t kDeviceRingSamples = 1 << 16;  // 1.4 s
 constexpr std::chrono::milliseconds kBetweenHandingsOver{20};
 constexpr std::int64_t kLongestSleepNs = 20'000'000;  // of a wait in which finish() must be heard
 
@@ -31,10 +32,12 @@ std::vector<T> reserved(std::size_t capacity) {
 
 /// A JACK client, where one is asked for.
 std::unique_ptr<JackOutput> open_jack(const LiveOptions& options) {
-    if (!options.jack_audio && options.midi_port.empty()) return nullptr;
-    return std::make_unique<JackOutput>(JackOutput::Options{.sound = options.jack_audio,
+    const bool sound = options.output == LiveOptions::Output::jack;
+    if (!sound && options.midi_port.empty() && options.midi_input.empty()) return nullptr;
+    return std::make_unique<JackOutput>(JackOutput::Options{.sound = sound,
                                                             .midi_port = options.midi_port,
                                                             .midi_connect = options.midi_connect,
+                                                            .midi_input = options.midi_input,
                                                             .output_lead_s = options.output_lead_s});
 }
 
@@ -63,8 +66,17 @@ LiveThread::LiveThread(const std::filesystem::path& orchestra, const std::vector
       timings_(kBlocksWaiting),
       ring_(2 * kRingSamples),
       notes_(kNotesAhead),
-      taken_(reserved<TakenNote>(kNotesAhead)),
-      jack_(open_jack(options)) {
+      taken_(reserved<TakenNote>(kNotesAhead)) {
+    if (options.output == LiveOptions::Output::alsa)
+        devices_.push_back(std::make_unique<AlsaOutput>(options.alsa_device, options.output_lead_s));
+    if (std::unique_ptr<JackOutput> jack = open_jack(options)) {
+        jack_ = jack.get();
+        devices_.push_back(std::move(jack));
+    }
+    if (options.output != LiveOptions::Output::none) {
+        device_ring_.resize(2 * kDeviceRingSamples);
+        device_delay_s_ = devices_.front()->delay_s() + static_cast<double>(Limiter::kDelay) / kSampleRate;
+    }
     std::future<StartUp> ready = prepared_.get_future();
     thread_ = std::thread([this, orchestra, voices] { run(orchestra, voices); });
     try {
@@ -173,15 +185,18 @@ void LiveThread::perform() {
 }
 
 void LiveThread::play_on_device(bool on) noexcept {
-    if (!jack_ || on == on_device_) return;
+    if (on == on_device_) return;
     on_device_ = on;
-    if (on) {
-        jack_->start(ring_, epoch_ns_);
-    } else if (!jack_->stop()) {
-        while (handed_over_.load(std::memory_order_acquire) < rendered_.load(std::memory_order_relaxed))
-            sleep_until_ns(monotonic_ns() + kLongestSleepNs);
-        abandoned_ = std::exchange(ring_, std::vector<float>(ring_));
-    }
+    for (const std::unique_ptr<SoundDevice>& device : devices_)
+        on ? device->start(device_ring_, epoch_ns_) : device->stop();
+}
+
+/// The newest block, limited, to where the devices read.
+void LiveThread::give_to_device(std::int64_t begin) noexcept {
+    if (device_ring_.empty()) return;
+    limiter_.limit(block_);
+    std::ranges::copy(block_, device_ring_.begin() + 2 * (begin % kDeviceRingSamples));
+    devices_.front()->publish(renderer_->position());
 }
 
 void LiveThread::perform_in_time() {
@@ -210,7 +225,7 @@ void LiveThread::play_block(std::int64_t planned_ns) {
     read_commands();
     start_notes_before(end);
     render_block();
-    if (on_device_) jack_->publish(end);
+    if (on_device_) give_to_device(begin);
     timing.done_ns = monotonic_ns();
     note_timing(timing, epoch_ns_ + samples_ns(begin));
 }
@@ -292,10 +307,11 @@ void LiveThread::start_notes_before(std::int64_t end) {
 
 /// When it was handed over; 0: it was not.
 std::int64_t LiveThread::send_stroke(const Note& note) noexcept {
-    if (!on_device_ || !jack_->has_midi()) return 0;
-    const MidiStroke stroke{.due_ns = epoch_ns_ + samples_ns(note.onset_sample),
-                            .key = static_cast<std::uint8_t>(std::clamp(note.midi_note, 0, 127)),
-                            .velocity = static_cast<std::uint8_t>(std::clamp(note.midi_velocity, 1, 127))};
+    if (!on_device_ || jack_ == nullptr || !jack_->has_midi() || note.choke) return 0;
+    const MidiStroke stroke{
+        .due_ns = epoch_ns_ + samples_ns(note.onset_sample) + std::llround(device_delay_s_ * 1e9),
+        .key = static_cast<std::uint8_t>(std::clamp(note.midi_note, 0, 127)),
+        .velocity = static_cast<std::uint8_t>(std::clamp(note.midi_velocity, 1, 127))};
     return jack_->send(stroke) ? monotonic_ns() : 0;
 }
 

@@ -11,9 +11,11 @@
 #include <thread>
 #include <vector>
 
+#include "alsa_output.h"
 #include "audio/live_performance.h"
 #include "command_queue.h"
 #include "jack_output.h"
+#include "limiter.h"
 #include "live_notes.h"
 #include "renderer.h"
 
@@ -56,7 +58,12 @@ public:
     [[nodiscard]] std::vector<BlockTiming> take_blocks() { return taken_from(timings_); }
     [[nodiscard]] std::int64_t finish(std::int64_t minimum_samples, std::int64_t tail_samples);
     [[nodiscard]] const StartUp& start_up() const { return start_up_; }
-    [[nodiscard]] const JackOutput* device() const { return jack_.get(); }  ///< null: none
+    [[nodiscard]] const SoundDevice* device() const {
+        return devices_.empty() ? nullptr : devices_.front().get();
+    }
+    [[nodiscard]] JackOutput* jack() const { return jack_; }  ///< null: none
+    [[nodiscard]] double device_delay_s() const { return device_delay_s_; }
+    [[nodiscard]] std::int64_t epoch_ns() const { return epoch_ns_; }
 
     // Any thread.
     [[nodiscard]] State state() const noexcept { return state_.load(std::memory_order_acquire); }
@@ -78,6 +85,7 @@ private:
     void prepare(const std::filesystem::path& orchestra, const std::vector<Voice>& voices);
     void perform();
     void play_on_device(bool on) noexcept;
+    void give_to_device(std::int64_t begin) noexcept;
     void perform_in_time();
     [[nodiscard]] bool wait_until(std::int64_t planned_ns);
     void play_block(std::int64_t planned_ns);
@@ -118,10 +126,13 @@ private:
     std::optional<Renderer> renderer_;
     LiveNotes notes_;
     std::vector<TakenNote> taken_;
-    std::vector<float> block_;          // the newest
-    std::vector<float> abandoned_;      // a ring that JACK's thread may still read
-    std::unique_ptr<JackOutput> jack_;  // after ring_ and abandoned_, which it reads
-    bool on_device_ = false;            // from its start to its stop
+    std::vector<float> block_;        // the newest
+    std::vector<float> device_ring_;  // limited, sample n at n mod kDeviceRingSamples; empty: no device
+    Limiter limiter_;
+    std::vector<std::unique_ptr<SoundDevice>> devices_;  // after device_ring_, which they read
+    JackOutput* jack_ = nullptr;                         // of devices_
+    double device_delay_s_ = 0;
+    bool on_device_ = false;  // from its start to its stop
     double busy_begin_s_ = 0;
 
     std::thread thread_;

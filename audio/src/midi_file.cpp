@@ -16,7 +16,7 @@ constexpr double kTicksPerSecond = 1920, kMicroseconds = 1e6;
 constexpr int kNoteTicks = 192;                 // nearly 0.1 s
 constexpr std::int64_t kLastTick = 0x0FFFFFFF;  // a delta time has 28 bits
 constexpr std::array<std::uint8_t, 3> kEnd{0xFF, 0x2F, 0x00};
-constexpr int kNoteOn = 0x99, kNoteOff = 0x89;  // channel 10
+constexpr int kNoteOn = 0x99, kNoteOff = 0x89, kAftertouch = 0xA9, kController = 0xB9;  // channel 10
 
 /// A tempo as a file states it.
 struct Clock {
@@ -37,31 +37,61 @@ Clock clock_of(const MidiTime& time) {
             static_cast<int>(std::lround(quarter_s * kTicksPerSecond))};
 }
 
-struct Stroke {
+/// A message of three bytes at its tick.
+struct Message {
     int tick = 0;
-    bool on = false;
-    int key = 0, velocity = 0;
-    auto order() const { return std::tuple(tick, on, key, velocity); }  // offs before ons
+    std::array<std::uint8_t, 3> bytes{};
+    /// Note-offs first, then controllers and chokes, then note-ons.
+    auto order() const {
+        const int kind = bytes[0] == kNoteOff ? 0 : bytes[0] == kNoteOn ? 2 : 1;
+        return std::tuple(tick, kind, bytes);
+    }
 };
 
-std::vector<Stroke> strokes_of(const std::vector<Note>& notes, const Clock& clock) {
+std::array<std::uint8_t, 3> bytes_of(int status, int first, int second) {
+    return {static_cast<std::uint8_t>(status), static_cast<std::uint8_t>(first),
+            static_cast<std::uint8_t>(second)};
+}
+
+bool is_data(int value) {
+    return value >= 0 && value <= 127;
+}
+
+std::vector<Message> messages_of(const std::vector<Note>& notes, const std::vector<MidiControl>& controls,
+                                 const Clock& clock) {
     const double ticks_per_sample =
         clock.ticks_per_quarter / (clock.quarter_us / kMicroseconds) / kSampleRate;
-    std::vector<Stroke> strokes;
+    const auto tick_of = [&](std::int64_t sample) {
+        return std::llround(static_cast<double>(sample) * ticks_per_sample);
+    };
+    std::vector<Message> messages;
     for (const Note& note : notes) {
-        const std::int64_t tick = std::llround(static_cast<double>(note.onset_sample) * ticks_per_sample);
-        if (note.midi_note < 0 || note.midi_note > 127 || note.midi_velocity < 1 ||
-            note.midi_velocity > 127 || note.onset_sample < 0 || tick > kLastTick - kNoteTicks) {
+        const std::int64_t at = tick_of(note.onset_sample);
+        if (!is_data(note.midi_note) || !is_data(note.midi_velocity) || note.midi_velocity == 0 ||
+            note.onset_sample < 0 || at > kLastTick - kNoteTicks) {
             throw std::runtime_error(
                 "note " + std::to_string(note.id) + ": found key " + std::to_string(note.midi_note) +
                 ", velocity " + std::to_string(note.midi_velocity) + ", onset " +
                 std::to_string(note.onset_sample) + ", expected key 0-127, velocity 1-127, onset >= 0");
         }
-        strokes.push_back({static_cast<int>(tick), true, note.midi_note, note.midi_velocity});
-        strokes.push_back({static_cast<int>(tick) + kNoteTicks, false, note.midi_note, 0});
+        const int tick = static_cast<int>(at);
+        if (note.choke) {
+            messages.push_back({tick, bytes_of(kAftertouch, note.midi_note, 127)});
+            continue;
+        }
+        messages.push_back({tick, bytes_of(kNoteOn, note.midi_note, note.midi_velocity)});
+        messages.push_back({tick + kNoteTicks, bytes_of(kNoteOff, note.midi_note, 0)});
     }
-    std::ranges::sort(strokes, {}, &Stroke::order);
-    return strokes;
+    for (const MidiControl& control : controls) {
+        const std::int64_t at = tick_of(control.sample);
+        if (!is_data(control.controller) || !is_data(control.value) || control.sample < 0 || at > kLastTick)
+            throw std::runtime_error("controller " + std::to_string(control.controller) + ": found value " +
+                                     std::to_string(control.value) + ", sample " +
+                                     std::to_string(control.sample) + ", expected 0-127, sample >= 0");
+        messages.push_back({static_cast<int>(at), bytes_of(kController, control.controller, control.value)});
+    }
+    std::ranges::sort(messages, {}, &Message::order);
+    return messages;
 }
 
 using Bytes = std::vector<std::uint8_t>;
@@ -78,7 +108,7 @@ void append_delta(Bytes& track, int ticks) {
     track.push_back(static_cast<std::uint8_t>(ticks & 0x7F));
 }
 
-Bytes track_of(const std::vector<Stroke>& strokes, const MidiTime& time, const Clock& clock) {
+Bytes track_of(const std::vector<Message>& messages, const MidiTime& time, const Clock& clock) {
     Bytes track = {0, 0xFF, 0x51, 0x03};
     append(track, clock.quarter_us, 3);
     if (time.beats != 4 || time.beat_unit != 4) {  // as a file without one is read
@@ -89,11 +119,10 @@ Bytes track_of(const std::vector<Stroke>& strokes, const MidiTime& time, const C
             track.push_back(byte);
     }
     int tick = 0;
-    for (const Stroke& stroke : strokes) {
-        append_delta(track, stroke.tick - tick);
-        for (const int byte : {stroke.on ? kNoteOn : kNoteOff, stroke.key, stroke.velocity})
-            track.push_back(static_cast<std::uint8_t>(byte));
-        tick = stroke.tick;
+    for (const Message& message : messages) {
+        append_delta(track, message.tick - tick);
+        track.insert(track.end(), message.bytes.begin(), message.bytes.end());
+        tick = message.tick;
     }
     track.push_back(0);
     track.insert(track.end(), kEnd.begin(), kEnd.end());
@@ -102,9 +131,10 @@ Bytes track_of(const std::vector<Stroke>& strokes, const MidiTime& time, const C
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_midi(const std::vector<Note>& notes, const MidiTime& time) {
+std::vector<std::uint8_t> encode_midi(const std::vector<Note>& notes, const MidiTime& time,
+                                      const std::vector<MidiControl>& controls) {
     const Clock clock = clock_of(time);
-    const Bytes track = track_of(strokes_of(notes, clock), time, clock);
+    const Bytes track = track_of(messages_of(notes, controls, clock), time, clock);
     Bytes file = {'M', 'T', 'h', 'd'};
     append(file, 6, 4);
     append(file, 0, 2);  // format

@@ -135,9 +135,9 @@ struct Bank {
 struct CloseNote {
     OPDS h;
     MYFLT *left, *right, *over;
-    MYFLT *mid, *side, *left_gain, *right_gain, *width, *duration_s, *onset, *group, *choke_onset,
+    MYFLT *mid, *side, *left_gain, *right_gain, *width, *duration_s, *onset, *voice, *choke_onset,
         *chokes_table;
-    const MYFLT* latest_choke;  // of its group; null: it has none
+    const MYFLT* latest_choke;  // of its voice
     double choke, end, sample;  // samples from the onset; choke below 0: none yet
 
     static constexpr double kChokedS = 0.015, kFadeS = 0.05;
@@ -146,9 +146,9 @@ struct CloseNote {
         auto& self = *static_cast<CloseNote*>(memory);
         MYFLT* chokes = nullptr;
         const int length = csound->GetTable(csound, &chokes, static_cast<int>(*self.chokes_table));
-        const auto group = static_cast<int>(*self.group);
-        if (group >= length) return csound->InitError(csound, "close_note: found no such choke group");
-        self.latest_choke = group >= 0 ? chokes + group : nullptr;
+        const auto voice = static_cast<int>(*self.voice);
+        if (voice < 0 || voice >= length) return csound->InitError(csound, "close_note: found no such voice");
+        self.latest_choke = chokes + voice;
         self.choke = *self.choke_onset < 0 ? -1 : *self.choke_onset - *self.onset;
         self.end = *self.duration_s * csound->GetSr(csound);
         self.sample = 0;
@@ -166,8 +166,7 @@ struct CloseNote {
         auto& self = *static_cast<CloseNote*>(memory);
         clear_around(self.left, self.h);
         clear_around(self.right, self.h);
-        if (self.choke < 0 && self.latest_choke && *self.latest_choke > *self.onset)
-            self.choke = *self.latest_choke - *self.onset;
+        if (self.choke < 0 && *self.latest_choke > *self.onset) self.choke = *self.latest_choke - *self.onset;
         const double rate = csound->GetSr(csound), width = *self.width, left = *self.left_gain,
                      right = *self.right_gain, block = self.h.insdshead->ksmps;
         const bool steady = self.choke < 0 && self.sample + block < self.end - kFadeS * rate;

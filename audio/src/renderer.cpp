@@ -16,6 +16,7 @@ namespace {
 
 constexpr int kChokeTable = 901;
 constexpr int kEndTable = 902;
+constexpr int kSendTable = 903;
 constexpr int kFirstSampleTable = 10000;
 constexpr const char* kSampleInstrument = "sample";
 constexpr float kSilence = 1e-4F;                                 // -80 dBFS
@@ -25,23 +26,15 @@ constexpr std::size_t kRoomForNotes = 4096, kRoomForFields = 64;  // taken ahead
 constexpr int kWarmCopies = 3;
 constexpr int kWarmBlocks = 16;
 
-/// Numbers of the choke groups' names, in order of appearance.
+/// Numbers of the choke groups' names, in order of appearance; -1: none.
 class ChokeGroups {
 public:
-    explicit ChokeGroups(std::size_t capacity) : capacity_(capacity) {}
     int number(const std::string& name) {
         if (name.empty()) return -1;
-        const int next = static_cast<int>(numbers_.size());
-        const int found = numbers_.try_emplace(name, next).first->second;
-        if (numbers_.size() > capacity_) {
-            throw std::runtime_error("choke group `" + name + "`: found more than " +
-                                     std::to_string(capacity_) + " groups, expected at most as many");
-        }
-        return found;
+        return numbers_.try_emplace(name, static_cast<int>(numbers_.size())).first->second;
     }
 
 private:
-    std::size_t capacity_;
     std::map<std::string, int> numbers_;
 };
 
@@ -51,10 +44,15 @@ void check_mix(const Voice& voice) {
                                  ", gain " + std::to_string(voice.gain_db) +
                                  " dB, expected pan 0 to 1, gain up to 60 dB");
     }
+    if (!(std::abs(voice.balance) <= 1) || !std::isfinite(voice.room_send_db) || voice.room_send_db > 60) {
+        throw std::runtime_error("voice " + voice.name + ": found balance " + std::to_string(voice.balance) +
+                                 ", room send " + std::to_string(voice.room_send_db) +
+                                 " dB, expected balance -1 to 1, send up to 60 dB");
+    }
 }
 
 const Mix& checked(const Mix& mix) {
-    const auto [t60_s, level_db] = mix.room;
+    const double t60_s = mix.room.t60_s, level_db = mix.room.level_db;
     if (std::abs(mix.gain_db) <= 160 && t60_s >= 0 && t60_s <= 20 && std::abs(level_db) <= 60) return mix;
     throw std::runtime_error("mix: found gain " + std::to_string(mix.gain_db) + " dB, room of " +
                              std::to_string(t60_s) + " s at " + std::to_string(level_db) +
@@ -91,15 +89,16 @@ std::string with_own_sounds(const std::filesystem::path& orchestra, const std::v
 }
 
 std::vector<RenderedVoice> resolve_voices(CsoundEngine& engine, const std::vector<Instrument>& instruments,
-                                          const std::vector<Voice>& voices, std::size_t choke_capacity) {
-    ChokeGroups groups(choke_capacity);
+                                          const std::vector<Voice>& voices) {
+    ChokeGroups groups;
     int next_table = kFirstSampleTable;
     std::vector<RenderedVoice> rendered;
     for (const Voice& voice : voices) {
         check_mix(voice);
         const PanGains gains = pan_gains(voice.pan, voice.gain_db);
         RenderedVoice& made = rendered.emplace_back();
-        made.left = gains.left, made.right = gains.right;
+        made.left = gains.left * std::min(1.0, 1 - voice.balance);
+        made.right = gains.right * std::min(1.0, 1 + voice.balance);
         made.choke_group = groups.number(voice.choke_group);
         if (voice.samples) {
             made.instrument = engine.instrument_number(kSampleInstrument);
@@ -110,6 +109,13 @@ std::vector<RenderedVoice> resolve_voices(CsoundEngine& engine, const std::vecto
         const Instrument& instrument = find_instrument(instruments, voice);
         made.instrument = engine.instrument_number(instrument.name);
         made.parameters = resolve_parameters(instrument, voice.parameters, "voice " + voice.name);
+        if (voice.pedal_parameters.empty()) continue;
+        std::vector<std::pair<std::string, double>> pressed = voice.pedal_parameters;
+        for (const auto& own : voice.parameters)
+            if (std::ranges::find(pressed, own.first, &std::pair<std::string, double>::first) ==
+                pressed.end())
+                pressed.push_back(own);
+        made.pedal_parameters = resolve_parameters(instrument, pressed, "voice " + voice.name + ", pedal");
     }
     return rendered;
 }
@@ -130,12 +136,25 @@ Renderer::Renderer(const std::string& text, const std::string& source, const std
     : engine_(text, source),
       rule_(probe_onset_rule(engine_.block_size())),
       mix_(checked(mix)),
-      room_(mix.alone ? RoomSound{} : mix.room),
+      room_(mix.alone.empty() ? mix.room : RoomSound{}, static_cast<std::size_t>(engine_.block_size())),
       chokes_(engine_.table(kChokeTable)),
       ends_(engine_.table(kEndTable)) {
     due_.reserve(kRoomForNotes);
     p_fields_.reserve(kRoomForFields);
-    voices_ = resolve_voices(engine_, parse_instruments(text, source), voices, chokes_.size());
+    if (voices.size() > chokes_.size())
+        throw std::runtime_error("voices: found " + std::to_string(voices.size()) + ", expected at most " +
+                                 std::to_string(chokes_.size()));
+    voices_ = resolve_voices(engine_, parse_instruments(text, source), voices);
+    pressed_.reserve(kRoomForFields);
+    sounds_.assign(voices.size(), mix.alone.empty());
+    for (const std::uint32_t voice : mix.alone) sounds_.at(voice) = true;
+    dry_.resize(2 * static_cast<std::size_t>(block_size()));
+    send_.resize(engine_.channels() > 2 ? dry_.size() : 0);
+    if (!send_.empty()) {
+        const std::span<double> sends = engine_.table(kSendTable);
+        for (std::size_t i = 0; i < voices.size(); ++i)
+            sends[i] = voices[i].room_send_db <= -60 ? 0 : std::pow(10.0, voices[i].room_send_db / 20);
+    }
     for (RenderedVoice& voice : voices_) {
         const double gain = std::pow(10.0, mix_.gain_db / 20);
         voice.left *= gain, voice.right *= gain;
@@ -175,12 +194,18 @@ void Renderer::render_to(std::int64_t sample, std::vector<float>& output) {
 void Renderer::render_block(std::vector<float>& output) {
     start_due_notes();
     const std::size_t begin = output.size();
-    for (const double value : engine_.render_block()) {
+    const std::span<const double> frames = engine_.render_block();
+    const std::size_t channels = engine_.channels();
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        const double value = frames[i];
         if (!std::isfinite(value) && broken_ < 0) broken_ = position_;
-        output.push_back(std::isfinite(value) ? static_cast<float>(value) : 0.0F);
+        const float sample = std::isfinite(value) ? static_cast<float>(value) : 0.0F;
+        const std::size_t frame = i / channels, channel = i % channels;
+        (channel < 2 ? dry_[2 * frame + channel] : send_[2 * frame + channel - 2]) = sample;
     }
+    output.insert(output.end(), dry_.begin(), dry_.end());
     const std::span<float> block = std::span(output).subspan(begin);
-    room_.add_to(block);
+    room_.add_answer(send_.empty() ? dry_ : send_, block);
     for (std::size_t i = 0; i < block.size(); ++i)
         if (std::abs(block[i]) >= kSilence) loud_ = position_ + static_cast<std::int64_t>(i / 2 + 1);
     position_ += block_size();
@@ -205,30 +230,44 @@ void Renderer::start_due_notes() {
     next_due_ = 0;
 }
 
+bool Renderer::chokes(const Note& note, std::uint32_t voice) const {
+    if (note.choke) return note.voice == voice;
+    const int group = voices_[note.voice].choke_group;
+    return group >= 0 && voices_[voice].choke_group == group;
+}
+
 void Renderer::mark_chokes(std::span<const Note> notes) {
-    for (const Note& note : notes) {
-        const int group = voices_[note.voice].choke_group;
-        if (group < 0) continue;
-        double& latest = chokes_[static_cast<std::size_t>(group)];
-        if (latest < static_cast<double>(position_)) latest = static_cast<double>(note.onset_sample);
-    }
+    for (const Note& note : notes)
+        for (std::uint32_t voice = 0; voice < voices_.size(); ++voice)
+            if (double& latest = chokes_[voice];
+                chokes(note, voice) && latest < static_cast<double>(position_))
+                latest = static_cast<double>(note.onset_sample);
 }
 
 void Renderer::start(const Note& note, std::span<const Note> block_notes) {
-    if (mix_.alone && *mix_.alone != note.voice) return;
-    const RenderedVoice& voice = voices_[note.voice];
-    const auto chokes_this = [&](const Note& other) {
-        return voice.choke_group >= 0 && voices_[other.voice].choke_group == voice.choke_group &&
-               other.onset_sample > note.onset_sample;
-    };
-    const auto choking = std::ranges::find_if(block_notes, chokes_this);
+    if (note.choke || !sounds_[note.voice]) return;
+    const auto choking = std::ranges::find_if(block_notes, [&](const Note& other) {
+        return other.onset_sample > note.onset_sample && chokes(other, note.voice);
+    });
     start_choked(note, choking == block_notes.end() ? -1 : choking->onset_sample);
+}
+
+std::span<const double> Renderer::parameters_of(const Note& note) {
+    const RenderedVoice& voice = voices_[note.voice];
+    if (note.pedal == 0 || voice.pedal_parameters.empty()) return voice.parameters;
+    pressed_.clear();
+    for (std::size_t i = 0; i < voice.parameters.size(); ++i) {
+        const double rest = voice.parameters[i], far = voice.pedal_parameters[i];
+        pressed_.push_back(rest * far > 0 ? rest * std::pow(far / rest, note.pedal)
+                                          : std::lerp(rest, far, note.pedal));
+    }
+    return pressed_;
 }
 
 void Renderer::start_choked(const Note& note, std::int64_t choke_sample) {
     RenderedVoice& voice = voices_[note.voice];
     if (!voice.samples) {
-        start_event(note, choke_sample, {voice.left, voice.right}, voice.parameters);
+        start_event(note, choke_sample, {voice.left, voice.right}, parameters_of(note));
         return;
     }
     for (const SampleVoice::Event& event : voice.samples->strike(note)) {
@@ -249,7 +288,7 @@ void Renderer::start_event(const Note& note, std::int64_t choke_sample, PanGains
                  note.speed_mps,
                  note.place,
                  static_cast<double>(note.zone),
-                 static_cast<double>(voice.choke_group),
+                 static_cast<double>(note.voice),
                  static_cast<double>(choke_sample)};
     p_fields_.insert(p_fields_.end(), parameters.begin(), parameters.end());
     engine_.start_note(p_fields_);

@@ -19,8 +19,9 @@ struct RenderedVoice {
     double instrument = 0;       ///< number in Csound
     double left = 0, right = 0;  ///< gains: constant power pan times the voice's gain
     int choke_group = -1;
-    std::vector<double> parameters;        ///< in the declared order, p12 on
-    std::optional<SampleVoice> samples{};  ///< recorded sounds instead
+    std::vector<double> parameters;          ///< in the declared order, p12 on
+    std::vector<double> pedal_parameters{};  ///< the same at the far end of its pedal's way
+    std::optional<SampleVoice> samples{};    ///< recorded sounds instead
 };
 
 /// Constant power: left^2 + right^2 = gain^2, pan 0 left ... 1 right.
@@ -32,9 +33,10 @@ struct PanGains {
 /// Turns notes into samples, block by block; everything on one thread.
 ///
 /// A note is handed to Csound just before the block that holds its onset, so Csound never knows a note that
-/// can still be cancelled. Choking: before a block the host writes into table 901 the group's first onset
-/// within it; every older note of the group fades from that very sample; a note started in the same block
-/// gets the group's next later onset there as p11. Equal onsets do not choke each other.
+/// can still be cancelled. Choking: before a block the host writes into table 901, for each voice, the first onset within
+/// it of what chokes that voice (a note of its group, or a choke of its own); every older note of the voice fades from that
+/// very sample; a note started in the same block gets the next later one there as p11. Equal onsets do not choke each
+/// other.
 class Renderer {
 public:
     /// Throws std::runtime_error: orchestra, instrument, parameter, pan, gain or room that is not valid.
@@ -72,6 +74,8 @@ private:
     void mark_chokes(std::span<const Note> notes);
     void start(const Note& note, std::span<const Note> block_notes);
     void start_choked(const Note& note, std::int64_t choke_sample);  ///< p11; -1: none
+    [[nodiscard]] bool chokes(const Note& note, std::uint32_t voice) const;
+    [[nodiscard]] std::span<const double> parameters_of(const Note& note);
     [[nodiscard]] bool sounding() const;
 
     CsoundEngine engine_;
@@ -83,8 +87,10 @@ private:
     std::span<double> ends_;    ///< table 902
     std::vector<Note> due_;     ///< from next_due_ on still to be started
     std::size_t next_due_ = 0;
-    std::vector<double> p_fields_;
-    std::int64_t position_ = 0, loud_ = 0;  ///< loud_: up to the last sample that is not silent
+    std::vector<double> p_fields_, pressed_;  ///< pressed_: a note's parameters by its pedal
+    std::vector<bool> sounds_;                ///< of the voices: those that the mix has
+    std::vector<float> dry_, send_;           ///< of a block
+    std::int64_t position_ = 0, loud_ = 0;    ///< loud_: up to the last sample that is not silent
     std::int64_t broken_ = -1;  ///< first block with a sample that is no number, silenced; -1: none
 };
 

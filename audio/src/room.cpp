@@ -14,9 +14,26 @@ constexpr double kHighShare = 0.5;   // of T60 at half the sample rate
 // are as different as can be.
 constexpr std::array<double, 8> kLeft{1, 1, 1, 1, -1, -1, -1, -1}, kRight{1, 1, -1, -1, 1, 1, -1, -1};
 
+/// The energy of its answer to one sample of 1 at each side.
+double energy_of(const ImpulseResponse& response) {
+    double energy = 0;
+    for (std::size_t to = 0; to < 2; ++to)
+        for (std::size_t n = 0; n < response.size(); ++n) {
+            const double both = static_cast<double>(response.from_to[0][to][n]) + response.from_to[1][to][n];
+            energy += both * both;
+        }
+    return energy;
+}
+
 }  // namespace
 
-Room::Room(const RoomSound& sound) {
+Room::Room(const RoomSound& sound, std::size_t block) {
+    if (sound.impulse) {
+        const double gain = std::pow(10.0, sound.level_db / 20) * std::sqrt(2 / energy_of(*sound.impulse));
+        convolution_ = std::make_unique<Convolution>(*sound.impulse, gain, block);
+        tail_samples_ = static_cast<std::int64_t>(sound.impulse->size());
+        return;
+    }
     if (sound.t60_s < kShortestS) return;
     const double samples = sound.t60_s * kSampleRate;
     for (std::size_t i = 0; i < kLines; ++i) {
@@ -32,7 +49,7 @@ Room::Room(const RoomSound& sound) {
     level_ = 1;
     std::vector<float> answer(2 * static_cast<std::size_t>(tail_samples_), 0.0F);
     answer[0] = answer[1] = 1;
-    add_to(answer);
+    add_answer(answer, answer);
     double energy = 0;
     for (std::size_t i = 2; i < answer.size(); ++i) energy += static_cast<double>(answer[i]) * answer[i];
     level_ = std::pow(10.0, sound.level_db / 20) * std::sqrt(2 / energy);
@@ -43,10 +60,11 @@ Room::Room(const RoomSound& sound) {
     }
 }
 
-void Room::add_to(std::span<float> interleaved) noexcept {
+void Room::add_answer(std::span<const float> input, std::span<float> output) noexcept {
+    if (convolution_) return convolution_->add_answer(input, output);
     if (level_ == 0) return;
-    for (std::size_t i = 0; i < interleaved.size(); i += 2) {
-        const std::array<double, 2> in{interleaved[i], interleaved[i + 1]};
+    for (std::size_t i = 0; i < input.size(); i += 2) {
+        const std::array<double, 2> in{input[i], input[i + 1]};
         double left = 0, right = 0, sum = 0;
         std::array<double, kLines> out;
         for (std::size_t k = 0; k < kLines; ++k) {
@@ -62,8 +80,8 @@ void Room::add_to(std::span<float> interleaved) noexcept {
             line.samples[line.at] = in[k % 2] + out[k] - sum * (2.0 / kLines);
             line.at = line.at + 1 == line.samples.size() ? 0 : line.at + 1;
         }
-        interleaved[i] = static_cast<float>(in[0] + level_ * left);
-        interleaved[i + 1] = static_cast<float>(in[1] + level_ * right);
+        output[i] = static_cast<float>(output[i] + level_ * left);
+        output[i + 1] = static_cast<float>(output[i + 1] + level_ * right);
     }
 }
 

@@ -295,4 +295,31 @@ double stroke_random(std::int64_t onset_sample, std::uint32_t voice) noexcept {
     return static_cast<double>(x >> 11) * 0x1p-53;
 }
 
+std::shared_ptr<const ImpulseResponse> read_impulse_response(const fs::path& file) {
+    const std::string place = file.string() + ":1:1";
+    const Recording recording = read_sound(file, place);
+    const std::size_t channels = recording.channels.size();
+    if (channels != 1 && channels != 2 && channels != 4)
+        fail_at(place, std::to_string(channels) + " channels", "an impulse response of 1, 2 or 4");
+    if (static_cast<double>(recording.channels[0].size()) > kLongestImpulseS * recording.rate_hz)
+        fail_at(
+            place,
+            std::to_string(static_cast<double>(recording.channels[0].size()) / recording.rate_hz) + " s",
+            "an impulse response of at most " + std::to_string(static_cast<int>(kLongestImpulseS)) + " s");
+    const auto silent = [](const std::vector<float>& samples) {
+        return std::ranges::all_of(samples, [](float x) { return std::abs(x) < 1e-6F; });
+    };
+    if (std::ranges::all_of(recording.channels, silent)) fail_at(place, "silence", "an impulse response");
+    auto response = std::make_shared<ImpulseResponse>();
+    const double ratio = kSampleRate / static_cast<double>(recording.rate_hz);
+    const auto channel = [&](std::size_t i) { return resampled(recording.channels[i], ratio, place); };
+    auto& from_to = response->from_to;
+    from_to[0][0] = channel(0);
+    from_to[1][1] = channel(channels - 1);
+    for (const auto& [from, to] : {std::pair(0, 1), std::pair(1, 0)})
+        from_to[from][to] = channels == 4 ? channel(static_cast<std::size_t>(2 * from + to))
+                                          : std::vector<float>(response->size(), 0.0F);
+    return response;
+}
+
 }  // namespace audio

@@ -17,7 +17,7 @@ std::vector<float> answer(const audio::RoomSound& sound, std::size_t frames) {
     audio::Room room(sound);
     std::vector<float> samples(2 * frames, 0.0F);
     samples[0] = 1;
-    room.add_to(samples);
+    room.add_answer(samples, samples);
     samples[0] -= 1;
     return samples;
 }
@@ -84,7 +84,8 @@ TEST(Mix, AloneEachVoiceAddsUpToTheDryMixChokesIncluded) {
     };
     const auto all = played({.gain_db = 3, .room = {}, .alone = {}});
     std::vector<std::vector<float>> stems;
-    for (std::uint32_t i = 0; i < 3; ++i) stems.push_back(played({.gain_db = 3, .room = {1, 0}, .alone = i}));
+    for (std::uint32_t i = 0; i < 3; ++i)
+        stems.push_back(played({.gain_db = 3, .room = {1, 0}, .alone = {i}}));
     for (std::size_t i = 0; i < all.size(); ++i)  // four roundings to float
         ASSERT_NEAR(all[i], stems[0][i] + stems[1][i] + stems[2][i], 2.5e-7) << i;
 }

@@ -210,10 +210,16 @@ TEST(Realtime, WhatCannotBeIsRefusedInOneLine) {
     for (const std::string source : {"osc:70000", "pigeon"})
         expect_refused(run({"play", "--realtime", "--source", source, "--out", folder / "played"}), source);
     // No JACK server runs under this name.
-    const Ended jack = run(in_time("play", folder / "played", {"--realtime", "--jack", "--no-frames"}),
-                           {"JACK_DEFAULT_SERVER=musicworld-none"});
+    const Ended jack =
+        run(in_time("play", folder / "played", {"--realtime", "--output", "jack", "--no-frames"}),
+            {"JACK_DEFAULT_SERVER=musicworld-none"});
     EXPECT_EQ(jack.status, 1);
     EXPECT_EQ(std::count(jack.err.begin(), jack.err.end(), '\n'), 1) << jack.err;
+    const Ended alsa =
+        run(in_time("play", folder / "played", {"--realtime", "--output", "alsa:no_such", "--no-frames"}));
+    EXPECT_EQ(alsa.status, 1);
+    EXPECT_EQ(std::count(alsa.err.begin(), alsa.err.end(), '\n'), 1) << alsa.err;
+    expect_refused(run({"play", "--realtime", "--output", "speaker", "--out", folder / "played"}), "speaker");
 }
 
 }  // namespace

@@ -110,6 +110,19 @@ void check_video(const PlayOptions& o) {
     const OutputFile can_be(*o.video);
 }
 
+using Output = audio::LiveOptions::Output;
+
+/// The device, and its name where it is ALSA's.
+std::pair<Output, std::string> parse_output(const std::string& text) {
+    if (text == "null") return {Output::none, ""};
+    if (text == "jack") return {Output::jack, ""};
+    if (text == "alsa") return {Output::alsa, "default"};
+    if (text == "pipewire") return {Output::alsa, "pipewire"};
+    if (text.starts_with("alsa:") && text.size() > 5) return {Output::alsa, text.substr(5)};
+    throw BadInput(
+        fmt::format("error: found `{}`, expected null, jack, alsa, alsa:DEVICE or pipewire", one_line(text)));
+}
+
 }  // namespace
 
 RealtimeOutcome play_realtime_and_warn(const RealtimeOptions& options) {
@@ -142,6 +155,11 @@ CLI::Option* add_play_options(Command& command, PlayOptions& o) {
     command.option("--tip", o.tip, as::vector_of_3(as::number(-1000, 1000, "m")),
                    "Tip in the tracked body's frame");
     command.option("--shaft", o.shaft, as::axis(), "Body axis from hand to tip");
+    command.option<std::string>(
+        "--pedals", as::text("FILE"),
+        "What feet and hands play beside the sticks: CSV `t,pedal,value` or a Standard MIDI "
+        "File",
+        [&o](const std::string& file) { o.pedals = file; });
     command.flag("--no-cancel", o.cancelling, "Play every scheduled note, also those of feints", false);
     command.flag("--no-audio", o.audio, "Sound nothing", false);
     command.checks([&o] {
@@ -161,33 +179,45 @@ std::vector<CLI::Option*> add_realtime_options(Command& command, RealtimeOptions
         if (elsewhere) o.sound.midi_connect = port;
     };
     const auto disturb = [&o](const std::string& text) { o.disturbance = parse_artificial_load(text); };
-    return {command.option("--seconds", o.seconds, as::number(0, 10800, "s"),
-                           "How long; a shorter trace is played again and again; 0: the trace once"),
-            command
-                .option("--source", o.sensors.source, as::text("SOURCE"),
-                        "Sensors instead of TRACE: stdin, zmq:ENDPOINT, osc:PORT (this machine) or "
-                        "osc:*:PORT (any), trace:FILE")
-                ->excludes(trace),
-            command.option("--sticks", o.sensors.sticks, as::list_of(as::text("NAME")),
-                           "Names of the sticks of --source"),
-            command.option("--lead", o.lead_auto, as::choice<bool>({{"fixed", false}, {"auto", true}}),
-                           "auto: leads follow the measured delays, never below those asked for"),
-            command.option(
-                "--output-lead", o.sound.output_lead_s, as::number(0.001, 1, "s"),
-                "A block of sound is computed this long before it is due, less than the release margin"),
-            command.option("--priority", o.realtime_priority,
-                           as::choice<bool>({{"auto", true}, {"normal", false}}),
-                           "auto: real-time scheduling where permitted; normal: never"),
-            command.flag("--jack", o.sound.jack_audio, "Also play through a running JACK server"),
-            command.option<std::string>("--midi-out", as::text("PORT"),
-                                        "Send each note to this JACK MIDI port (client:port); a name without "
-                                        "colon is a port of ours, left "
-                                        "open",
-                                        midi_out),
-            command.option<std::string>(
-                "--disturb", as::text("LOAD,..."),
-                "Artificial load: load:N@A-B (threads), renderer:MS@A-B, stall:MS@A (from second A to B)",
-                disturb)};
+    return {
+        command.option("--seconds", o.seconds, as::number(0, 10800, "s"),
+                       "How long; a shorter trace is played again and again; 0: the trace once"),
+        command
+            .option("--source", o.sensors.source, as::text("SOURCE"),
+                    "Sensors instead of TRACE: stdin, zmq:ENDPOINT, osc:PORT (this machine) or "
+                    "osc:*:PORT (any), trace:FILE")
+            ->excludes(trace),
+        command.option("--sticks", o.sensors.sticks, as::list_of(as::text("NAME")),
+                       "Names of the sticks of --source"),
+        command.option("--lead", o.lead_auto, as::choice<bool>({{"fixed", false}, {"auto", true}}),
+                       "auto: leads follow the measured delays, never below those asked for"),
+        command.option(
+            "--output-lead", o.sound.output_lead_s, as::number(0.001, 1, "s"),
+            "A block of sound is computed this long before it is due, less than the release margin"),
+        command.option("--priority", o.realtime_priority,
+                       as::choice<bool>({{"auto", true}, {"normal", false}}),
+                       "auto: real-time scheduling where permitted; normal: never"),
+        command.option<std::string>(
+            "--output", as::text("DEVICE", [](const std::string& text) { parse_output(text); }),
+            "What plays the sound: null (nothing), jack (a running server), alsa, alsa:DEVICE "
+            "or pipewire (by its ALSA plugin)",
+            [&o](const std::string& text) {
+                std::tie(o.sound.output, o.sound.alsa_device) = parse_output(text);
+            },
+            "null"),
+        command.option(
+            "--midi-in", o.sound.midi_input, as::text("PORT"),
+            "Listen to this JACK MIDI port (client:port) for pedals and chokes; a name without colon is a "
+            "port of ours, left open"),
+        command.option<std::string>("--midi-out", as::text("PORT"),
+                                    "Send each note to this JACK MIDI port (client:port); a name without "
+                                    "colon is a port of ours, left "
+                                    "open",
+                                    midi_out),
+        command.option<std::string>(
+            "--disturb", as::text("LOAD,..."),
+            "Artificial load: load:N@A-B (threads), renderer:MS@A-B, stall:MS@A (from second A to B)",
+            disturb)};
 }
 
 /// "6/8".
@@ -211,6 +241,7 @@ void add_mix_options(Command& command, MixOptions& o, CLI::Option* realtime) {
                 "Integrated loudness of audio.wav (EBU R 128), as far as a true peak of -1 dBTP allows")
         ->excludes(gain)
         ->excludes(realtime);
+    command.flag("--bus-stems", o.bus_stems, "Also a WAV file each [[bus]] of the kit, in stems/");
     command.flag("--stems", o.stems, "Also a WAV file each instrument, in stems/, without the room");
     command.option("--tempo", o.midi.tempo_bpm, as::number(20, 400, "quarters per minute"),
                    "Tempo of hits.mid");

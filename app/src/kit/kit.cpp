@@ -139,6 +139,7 @@ struct InstrumentDraft {
     const std::vector<audio::Instrument>* orchestra = nullptr;  ///< the sounds that there are
     fs::path kit{};                                             ///< the kit's file
     fs::path samples{};                                         ///< empty: none
+    std::vector<ParameterRange> parameters{};                   ///< of its sound
 };
 
 /// The sounds that there are, with those of an orchestra of one's own.
@@ -185,14 +186,43 @@ void sound_keys(Fields& keys, InstrumentDraft& written) {
         const auto found = std::ranges::find(known, voice.instrument, &audio::Instrument::name);
         if (found - known.begin() >= static_cast<std::ptrdiff_t>(bundled)) voice.own_orchestra = file;
     }
+    written.parameters = parameters_of(voice.instrument, keys, known);
     keys.parameters(
-        voice.parameters, parameters_of(voice.instrument, keys, known), {-1e9, 1e9},
+        voice.parameters, written.parameters, {-1e9, 1e9},
         "A parameter of the orchestra's instrument. The header of assets/orchestra/musicworld.orc lists "
         "them with their ranges.");
 }
 const TableKind<InstrumentDraft> kSound = {
     {"sound", "The orchestra's instrument and its parameters.", Below::nothing, "{ instrument = \"NAME\" }"},
     sound_keys};
+
+void pedal_sound_keys(Fields& keys, InstrumentDraft& written) {
+    keys.parameters(
+        written.instrument.voice.pedal_parameters, written.parameters, {-1e9, 1e9},
+        "A parameter of the instrument's sound as it is with the pedal away from its rest; on the way "
+        "there it goes evenly.");
+}
+const TableKind<InstrumentDraft> kPedalSound = {
+    {"pedal_sound", "What the pedal changes of the sound.", Below::nothing, "{ decay_s = 2 }"},
+    pedal_sound_keys};
+
+void pedal_keys(Fields& keys, InstrumentDraft& written) {
+    using Kind = Pedal::Kind;
+    Pedal& pedal = written.instrument.pedal;
+    keys.choice(
+        "kind", pedal.kind,
+        {{"none", Kind::none}, {"hi-hat", Kind::hi_hat}, {"damper", Kind::damper}, {"beater", Kind::beater}},
+        "hi-hat: from 0 closed (at rest) to 1 open, closing ends what rings; damper: from 1 free (at rest) "
+        "to "
+        "0 damped, damping ends what rings; beater: strikes the instrument.");
+    keys.integer("midi_note", pedal.midi_note, {0, 127},
+                 "MIDI note of strokes while the pedal is away from its rest (46: open hi-hat).",
+                 {.otherwise = "the zone's", .example = "46"});
+    keys.integer("foot_note", pedal.foot_note, {0, 127}, "MIDI note of a hi-hat that closes.");
+    keys.table("sound", written, kPedalSound);
+}
+const TableKind<InstrumentDraft> kPedal = {
+    {"pedal", "What a foot does to the instrument; `play --pedals` and `--midi-in` move it."}, pedal_keys};
 
 // [[instrument]]
 
@@ -284,6 +314,9 @@ void instrument_keys(Fields& keys, InstrumentDraft& written) {
     keys.table("sound", written, kSound);
     keys.text("choke_group", voice.choke_group,
               "Instruments of one group silence each other (an open and a closed hi-hat); empty: none.");
+    keys.table("pedal", written, kPedal);
+    keys.text("bus", instrument.bus, "Name of the [[bus]] that it is mixed in; empty: none.",
+              {.example = "\"drums\""});
     keys.number("velocity_curve", instrument.velocity_gamma, {0.2, 5},
                 "Exponent g of loudness: a stroke of v m/s sounds like one of 5 (v / 5)^g m/s.");
 }
@@ -356,15 +389,51 @@ void stick_keys(Fields& keys, StickDefinition& stick) {
 }
 const TableKind<StickDefinition> kStick = {{"stick", "The sticks."}, stick_keys};
 
-void mix_keys(Fields& keys, audio::Mix& mix) {
+struct MixDraft {
+    audio::Mix mix;
+    fs::path kit{}, impulse{};
+};
+void mix_keys(Fields& keys, MixDraft& written) {
+    audio::Mix& mix = written.mix;
     keys.number("gain_db", mix.gain_db, {-60, 60, "dB"},
                 "Gain of the whole kit; offline, the sound is then brought to the loudness asked for.");
     keys.number("room_t60_s", mix.room.t60_s, {0, 20, "s"},
                 "Time in which the room's echo falls by 60 dB; below 0.05: no room.");
     keys.number("room_level_db", mix.room.level_db, {-60, 20, "dB"},
                 "Energy of the room's echo against the instruments' own.");
+    std::string impulse;
+    keys.text(
+        "room_impulse", impulse,
+        "A recorded room instead of room_t60_s: its impulse response, a sound file beside this one, of at "
+        "most "
+        "20 s; one channel, two (left, right) or four (left to left, left to right, right to left, right to "
+        "right).",
+        {.example = "\"hall.wav\""});
+    if (!impulse.empty()) written.impulse = find_file(keys, "room_impulse", impulse, written.kit, nullptr);
 }
-const TableKind<audio::Mix> kMix = {{"mix", "What becomes of the instruments' sum."}, mix_keys};
+const TableKind<MixDraft> kMix = {{"mix", "What becomes of the instruments' sum."}, mix_keys};
+
+void bus_keys(Fields& keys, Bus& bus) {
+    keys.text("name", bus.name, "Name, as the instruments' `bus` gives it.",
+              {.need = Need::given, .example = "\"drums\""});
+    keys.number("gain_db", bus.gain_db, {-60, 20, "dB"}, "Gain of its instruments.");
+    keys.number("balance", bus.balance, {-1, 1}, "-1 their left sides alone ... 1 their right sides alone.");
+    keys.number("room_send_db", bus.room_send_db, {-60, 20, "dB"},
+                "Gain of what the room hears of them; -60: nothing.");
+}
+const TableKind<Bus> kBus = {{"bus", "Instruments that are mixed together."}, bus_keys};
+
+/// Puts the instrument on its bus.
+void mix_in(Fields& at, Instrument& instrument, const std::vector<Bus>& buses) {
+    if (instrument.bus.empty()) return;
+    const auto bus = std::ranges::find(buses, instrument.bus, &Bus::name);
+    at.require(bus != buses.end(), "bus", fmt::format("bus = \"{}\"", instrument.bus),
+               "the name of a [[bus]]");
+    if (bus == buses.end()) return;
+    instrument.voice.gain_db += bus->gain_db;
+    instrument.voice.balance = bus->balance;
+    instrument.voice.room_send_db = bus->room_send_db;
+}
 
 const TableKind<render::Room> kRoom = {{"room", "The room."}, room_keys};
 
@@ -385,6 +454,9 @@ void take_samples(InstrumentDraft& read, Kit& kit) {
     if (read.samples.empty()) return;
     std::vector<int> notes;
     for (const ZoneSound& zone : read.instrument.zones) notes.push_back(zone.midi_note);
+    const Pedal& pedal = read.instrument.pedal;
+    if (pedal.midi_note) notes.push_back(*pedal.midi_note);
+    if (pedal.kind == Pedal::Kind::hi_hat) notes.push_back(pedal.foot_note);
     voice.samples = read_sound([&] { return audio::read_samples(read.samples, notes); });
     if (voice.choke_group.empty()) voice.choke_group = voice.samples->choke_group;
     for (const fs::path& file : voice.samples->files) note(file);
@@ -397,7 +469,19 @@ void kit_keys(Fields& keys, KitDraft& written) {
     keys.table("stick", kit.stick, kStick, [&](Fields& at, StickDefinition& stick) {
         stick.mesh = find_file(at, "mesh", stick.mesh, kit.file, "meshes");
     });
-    keys.table("mix", kit.mix, kMix);
+    MixDraft mix{.mix = kit.mix, .kit = kit.file};
+    keys.table("mix", mix, kMix, [&](Fields&, MixDraft& read) {
+        kit.mix = read.mix;
+        if (read.impulse.empty()) return;
+        kit.mix.room.impulse = read_sound([&] { return audio::read_impulse_response(read.impulse); });
+        kit.sound_files.push_back(read.impulse);
+    });
+    keys.tables("bus", Bus(), kBus, "Groups that instruments are mixed in.",
+                [&](Fields& at, const Bus& read) {
+                    at.require(std::ranges::find(kit.buses, read.name, &Bus::name) == kit.buses.end(), "name",
+                               fmt::format("a second bus \"{}\"", read.name), "a name of its own");
+                    kit.buses.push_back(read);
+                });
     keys.table("camera", kit.camera, kCamera);
     keys.table("room", kit.room, kRoom);
     keys.table("defaults", written, kDefaults);
@@ -412,6 +496,7 @@ void kit_keys(Fields& keys, KitDraft& written) {
             at.require(written.names.insert(instrument.name).second, "",
                        fmt::format("a second instrument \"{}\"", instrument.name), "a name of its own");
             take_samples(read, kit);
+            mix_in(at, instrument, kit.buses);
             kit.instruments.push_back(instrument);
         });
 }
@@ -481,35 +566,6 @@ FormatDescription kit_format() {
               [&](Fields& keys) { kKitFile.keys(keys, written); });
     written.kit.stick.mesh = written.kit.stick.mesh.filename();
     return describe_format(kKitFile, written);
-}
-
-StickGeometry stick_geometry(const tracking::Trace& trace, const StickDefinition& stick,
-                             const std::optional<Eigen::Vector3d>& tip_option,
-                             const std::optional<Eigen::Vector3d>& shaft_option) {
-    StickGeometry geometry;
-    geometry.radius_m = stick.radius_m;
-    geometry.length_m = stick.length_m;
-    geometry.tip = tip_option.value_or(stick.tip.value_or(trace.tip.value_or(geometry.tip)));
-    geometry.shaft =
-        shaft_option.value_or(stick.shaft.value_or(trace.shaft.value_or(geometry.shaft))).normalized();
-    return geometry;
-}
-
-TipTrack tip_track(const tracking::StickTrace& stick, const StickGeometry& geometry) {
-    TipTrack track{stick.name, {}, {}};
-    track.t_s.reserve(stick.samples.size());
-    track.tip.reserve(stick.samples.size());
-    for (const tracking::PoseSample& sample : stick.samples) {
-        track.t_s.push_back(sample.t_s);
-        track.tip.push_back(sample.position + sample.orientation * geometry.tip);
-    }
-    return track;
-}
-
-std::vector<TipTrack> tip_tracks(const tracking::Trace& trace, const StickGeometry& geometry) {
-    std::vector<TipTrack> tracks;
-    for (const tracking::StickTrace& stick : trace.sticks) tracks.push_back(tip_track(stick, geometry));
-    return tracks;
 }
 
 }  // namespace app

@@ -20,6 +20,27 @@ struct ZoneSound {
     int midi_note = 38;
 };
 
+/// What a foot does to an instrument.
+struct Pedal {
+    enum class Kind {
+        none,
+        hi_hat,  ///< 0 closed ... 1 open, closed at rest; closing ends what rings and sounds itself
+        damper,  ///< 0 damped ... 1 free, free at rest; damping ends what rings
+        beater,  ///< strikes the instrument
+    } kind = Kind::none;
+    std::optional<int> midi_note;  ///< of strokes while the pedal is away from its rest
+    int foot_note = 44;            ///< MIDI note of what a hi-hat sounds when it closes
+    bool operator==(const Pedal&) const = default;
+};
+
+/// Instruments that are mixed together.
+struct Bus {
+    std::string name;
+    double gain_db = 0;
+    double balance = 0;       ///< -1 left alone ... 1 right alone
+    double room_send_db = 0;  ///< -60: the room hears nothing of it
+};
+
 /// One playable thing of a kit: its body, its look and its sound.
 struct Instrument {
     std::string name;
@@ -33,6 +54,8 @@ struct Instrument {
     std::vector<ZoneSound> zones;  ///< as body.zones
     double velocity_gamma = 1;     ///< loudness speed = 5 (speed / 5)^gamma [m/s]
     bool drawn_stand = true;       ///< a stand is drawn from the body down to the floor
+    Pedal pedal{};
+    std::string bus{};  ///< empty: none
 };
 
 /// The stick as the kit wants it; unset values come from the trace.
@@ -50,10 +73,11 @@ struct StickDefinition {
 struct Kit {
     std::filesystem::path file;
     std::vector<std::filesystem::path> files;        ///< it and all that it includes, for provenance
-    std::vector<std::filesystem::path> sound_files;  ///< samples and orchestras of its own, likewise
+    std::vector<std::filesystem::path> sound_files;  ///< samples, orchestras and rooms of its own, likewise
     std::string name, description;
     std::vector<Instrument> instruments;
     StickDefinition stick;
+    std::vector<Bus> buses;
     audio::Mix mix;
     std::optional<render::Camera> camera;  ///< none: fitted to the instruments
     render::Room room;

@@ -53,7 +53,7 @@ struct NamedFile {
 };
 
 void collect(const toml::node& node, const std::string& key, std::vector<NamedFile>& found) {
-    static const std::set<std::string> kKeys = {"include", "mesh", "samples", "orchestra"};
+    static const std::set<std::string> kKeys = {"include", "mesh", "samples", "orchestra", "room_impulse"};
     if (node.is_string() && kKeys.contains(key)) found.push_back({key, &node});
     if (const toml::array* array = node.as_array())
         for (const toml::node& entry : *array) collect(entry, key, found);
@@ -132,7 +132,7 @@ private:
         std::error_code error;
         for (const auto& [from, to] : known)
             if (fs::equivalent(from, file, error)) return to;
-        return key == "mesh" || key == "orchestra" ? copied(file) : fs::path();
+        return key == "mesh" || key == "orchestra" || key == "room_impulse" ? copied(file) : fs::path();
     }
     /// The text of a kit's file with the names of its copies.
     std::string rewritten(const fs::path& file, const fs::path& place) {

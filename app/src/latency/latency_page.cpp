@@ -195,8 +195,8 @@ std::string heading(const PlayResult& play, const RealtimeResult& r) {
         {"run", fmt::format("{:.1f} s, {} lap{}", r.seconds, r.laps, r.laps == 1 ? "" : "s")},
         {"pictures predicted by", play.options.picture_predictor},
         {"sounds predicted by", play.options.sound_predictor},
-        {"sound goes to", fmt::format("{}; a block is begun {:.1f} ms before it is due", r.audio_device,
-                                      1e3 * r.output_lead_s)}};
+        {"sound goes to", fmt::format("{}, {:.1f} ms late; a block is begun {:.1f} ms before it is due",
+                                      r.audio_device, 1e3 * r.device_delay_s, 1e3 * r.output_lead_s)}};
     for (const auto& [thread, obtained] : r.priorities) facts.emplace_back("priority of " + thread, obtained);
     return report_header("Latency of " + trace_name(play),
                          fmt::format("on {} in real time, by MusicWorld", play.kit_name), facts);

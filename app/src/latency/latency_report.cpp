@@ -279,6 +279,7 @@ Json run_of(const PlayResult& play, const RealtimeResult& realtime) {
             {"release_margin_s", play.options.release_margin_s},
             {"disturbed_by", realtime.disturbed_by},
             {"audio_device", realtime.audio_device},
+            {"device_delay_ms", 1e3 * realtime.device_delay_s},
             {"priorities", priorities},
             {"quality_levels", realtime.quality_levels},
             {"refused_changes", realtime.refused_changes},

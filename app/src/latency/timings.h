@@ -94,6 +94,7 @@ struct RealtimeResult {
     std::vector<ClockReport> clocks;
     std::vector<std::pair<std::string, std::string>> priorities;  ///< thread, what it obtained
     std::string audio_device, disturbed_by;
+    double device_delay_s = 0;  ///< how much later than due the device plays
     std::uint64_t refused_changes = 0, queue_overflows = 0, device_underruns = 0, frames_not_written = 0;
     std::uint64_t midi_late = 0, midi_lost = 0, device_corrections = 0;
 

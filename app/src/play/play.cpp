@@ -34,6 +34,7 @@ struct OfflineParts {
     const KitStage* stage = nullptr;
     FrameThread* frames = nullptr;
     audio::Performance* sound = nullptr;
+    const Pedals* pedals = nullptr;
 };
 
 /// The loop of an offline run: every sample of the trace in order of time through filters, contacts and
@@ -118,8 +119,9 @@ private:
         return moved;
     }
 
-    void send(const audio::Note& note, bool scheduled) {
+    void send(audio::Note note, bool scheduled) {
         if (!parts_.sound || (parts_.options.solo && *parts_.options.solo != note.id)) return;
+        if (parts_.pedals) parts_.pedals->put_on(note);
         if (scheduled)
             parts_.sound->schedule(note);
         else
@@ -164,8 +166,10 @@ private:
     std::size_t refused_ = 0;
 };
 
-void check_solo(const PlayOptions& options, const std::vector<Strike>& strikes) {
+void check_solo(const PlayOptions& options, const std::vector<Strike>& strikes, const Pedals& pedals) {
     if (!options.solo) return;
+    const auto is = [&](const PedalNote& pedal) { return pedal.note.id == *options.solo; };
+    if (std::ranges::any_of(pedals.notes(), is)) return;
     const bool released = *options.solo >= 1 && *options.solo <= strikes.size() &&
                           strikes[*options.solo - 1].outcome == Outcome::released;
     if (!released)
@@ -179,7 +183,7 @@ void play_through(const OfflineParts& parts, PlayResult& result) {
     ProgressBar bar(parts.options.progress);
     run.run(bar);
     result.strikes = run.strikes();
-    check_solo(parts.options, result.strikes);
+    check_solo(parts.options, result.strikes, result.pedals);
     result.samples_refused = run.refused();
     const LoopTimes& times = run.times();
     result.stages_s.insert(result.stages_s.end(), {{"tracking", times.tracking},
@@ -198,6 +202,10 @@ PlayResult play(const PlayOptions& options) {
     const StickGeometry stick = stick_geometry(trace, kit.stick, options.tip, options.shaft);
     PlayResult result = describe(options, trace, kit);
     result.tracks = tip_tracks(trace, stick);
+    result.pedals = Pedals(kit, trace.t0_s());
+    if (options.pedals)
+        for (const PedalMove& move : read_pedals(*options.pedals, kit, trace.t0_s()))
+            if (move.t_s <= trace.t_end_s()) result.pedals.take(move);
     OutputFolder folder(options.out);
 
     const KitStage stage(kit, trace.sticks.size(), stick, options.camera, options.shown);
@@ -209,7 +217,10 @@ PlayResult play(const PlayOptions& options) {
     const std::unique_ptr<sim::Simulation> simulation = make_simulation(kit, options.workers);
     result.stages_s.emplace_back("start", wall.seconds());
 
-    play_through({trace, kit, options, stick, *simulation, &stage, frames.get(), sound.get()}, result);
+    for (const PedalNote& pedal : result.pedals.notes())
+        if (sound && (!options.solo || *options.solo == pedal.note.id)) sound->schedule(pedal.note);
+    play_through({trace, kit, options, stick, *simulation, &stage, frames.get(), sound.get(), &result.pedals},
+                 result);
     const double sound_s = seconds_of([&] {
         if (sound) finish_sound(*sound, trace.t_end_s() - trace.t0_s(), result, kit, folder);
     });

@@ -15,6 +15,7 @@
 #include "kit/kit.h"
 #include "pictures/annotations.h"
 #include "pictures/camera.h"
+#include "play/pedals.h"
 #include "strikes/strike.h"
 #include "strikes/true_contacts.h"
 
@@ -25,6 +26,7 @@ struct MixOptions {
     double loudness_lufs = -23;     ///< of audio.wav, offline, as far as its true peak allows (-1 dBTP)
     std::optional<double> gain_db;  ///< instead: this in place of the kit's, and no more
     bool stems = false;             ///< also stems/, a WAV file each instrument, without the room
+    bool bus_stems = false;         ///< and one each bus
     audio::MidiTime midi;           ///< of hits.mid
 };
 
@@ -44,9 +46,10 @@ struct PlayOptions {
     std::optional<std::uint64_t> solo;  ///< render the sound of this strike alone
     std::optional<Eigen::Vector3d> tip, shaft;
     MixOptions mix;
-    std::optional<std::filesystem::path> video;  ///< an MP4, by ffmpeg, in place of the frames
-    bool keep_frames = false;                    ///< the frames beside the video, too
-    bool progress = false;                       ///< draw a progress bar on standard error
+    std::optional<std::filesystem::path> pedals;  ///< a schedule or a MIDI file
+    std::optional<std::filesystem::path> video;   ///< an MP4, by ffmpeg, in place of the frames
+    bool keep_frames = false;                     ///< the frames beside the video, too
+    bool progress = false;                        ///< draw a progress bar on standard error
 };
 
 /// Everything that `play` found out, for the summary, the tables and the report.
@@ -58,7 +61,9 @@ struct PlayResult {
     std::size_t frames = 0;                ///< drawn
     std::vector<std::string> sticks;       ///< names, by index
     std::vector<std::string> instruments;  ///< names, by index
+    std::vector<Eigen::Vector3d> middles;  ///< of the instruments [m], world
     std::vector<Strike> strikes;           ///< by id
+    Pedals pedals;                         ///< what feet and hands played beside the sticks
     std::vector<TrueContact> contacts;     ///< by time
     StrikeScore score;
     std::vector<TipTrack> tracks;

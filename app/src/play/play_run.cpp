@@ -46,18 +46,6 @@ void score(PlayResult& result, const Kit& kit, const StickGeometry& stick) {
                 result.options.release_margin_s);
 }
 
-/// The released notes, by onset.
-void write_hits(const fs::path& file, const PlayResult& result, const Kit& kit) {
-    std::vector<audio::Note> notes;
-    for (const Strike& strike : result.strikes)
-        if (strike.outcome == Outcome::released)
-            notes.push_back(note_of(strike, kit.instruments[strike.instrument]));
-    std::stable_sort(notes.begin(), notes.end(), [](const audio::Note& a, const audio::Note& b) {
-        return a.onset_sample < b.onset_sample;
-    });
-    write_file(file, audio::encode_midi(notes, result.options.mix.midi));
-}
-
 /// Frames for the report: before, at and after the two loudest notes that lie apart.
 std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& folder) {
     std::vector<const Strike*> loudest;
@@ -150,6 +138,17 @@ audio::Note note_of(const Strike& strike, const Instrument& instrument) {
     return note;
 }
 
+std::vector<audio::Note> notes_of(const PlayResult& result, const Kit& kit) {
+    std::vector<audio::Note> notes;
+    for (const Strike& strike : result.strikes) {
+        if (strike.outcome != Outcome::released) continue;
+        result.pedals.put_on(notes.emplace_back(note_of(strike, kit.instruments[strike.instrument])));
+    }
+    for (const PedalNote& pedal : result.pedals.notes()) notes.push_back(pedal.note);
+    std::ranges::stable_sort(notes, {}, &audio::Note::onset_sample);
+    return notes;
+}
+
 fs::path orchestra_file() {
     return assets_folder() / "orchestra" / "musicworld.orc";
 }
@@ -189,8 +188,12 @@ PlayResult describe(const PlayOptions& options, const PlayedTrace& trace, const 
     result.t0_s = trace.t0_s();
     result.t_end_s = trace.t_end_s();
     for (const tracking::StickTrace& stick : trace.sticks) result.sticks.push_back(stick.name);
-    for (const Instrument& instrument : kit.instruments) result.instruments.push_back(instrument.name);
+    for (const Instrument& instrument : kit.instruments) {
+        result.instruments.push_back(instrument.name);
+        result.middles.push_back(instrument.body.world_from_body.translation());
+    }
     if (!trace.sha256.empty()) result.inputs.emplace_back(options.trace.string(), trace.sha256);
+    if (options.pedals) result.inputs.emplace_back(options.pedals->string(), sha256_of_file(*options.pedals));
     for (const auto* files : {&kit.files, &kit.sound_files})
         for (const fs::path& file : *files) result.inputs.emplace_back(file.string(), sha256_of_file(file));
     std::set<fs::path> models;
@@ -206,8 +209,10 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     const auto stage = [&](const char* name, const auto& work) {
         result.stages_s.emplace_back(name, seconds_of(work));
     };
-    write_hits(folder.path("hits.mid"), result, parts.kit);
-    if (options.mix.stems && options.audio) stage("stems", [&] { write_stems(result, parts.kit, folder); });
+    write_file(folder.path("hits.mid"),
+               audio::encode_midi(notes_of(result, parts.kit), options.mix.midi, result.pedals.controls()));
+    if ((options.mix.stems || options.mix.bus_stems) && options.audio)
+        stage("stems", [&] { write_stems(result, parts.kit, folder); });
     stage("scoring", [&] { score(result, parts.kit, parts.stick); });
     if (parts.frames) take_frames(result, *parts.frames, folder.path("frames"));
     result.fingerprint =
@@ -293,6 +298,15 @@ std::string format_summary(const PlayResult& r, const std::string& realtime_json
           {"gain_db", r.gain_db}}},
         {"wall_s", r.wall_s},
     };
+    if (r.pedals.moves() > 0) {
+        const auto count = [&](auto has) { return std::ranges::count_if(r.pedals.notes(), has); };
+        summary["pedals"] = {
+            {"moves", r.pedals.moves()},
+            {"strokes", count([](const PedalNote& n) { return n.by == PedalMove::Kind::stroke; })},
+            {"closed",
+             count([](const PedalNote& n) { return n.by != PedalMove::Kind::stroke && !n.note.choke; })},
+            {"chokes", count([](const PedalNote& n) { return n.note.choke; })}};
+    }
     if (!realtime_json.empty()) summary["realtime"] = Json::parse(realtime_json);
     return json_document(summary);
 }
@@ -309,6 +323,14 @@ std::string format_events(const PlayResult& result) {
         table.add({s.id, result.sticks.at(s.stick), result.instruments.at(s.instrument), s.onset_s,
                    s.speed_mps, s.point_world.x(), s.point_world.y(), s.point_world.z(), s.scheduled_at_s,
                    outcome_word(s), s.moves, s.decided_at_s, model(s)});
+    for (const PedalNote& pedal : result.pedals.notes()) {
+        const audio::Note& note = pedal.note;
+        const Eigen::Vector3d& middle = result.middles.at(note.voice);
+        const double onset_s = result.t0_s + static_cast<double>(note.onset_sample) / audio::kSampleRate;
+        const char* by = note.choke ? "choke" : pedal.by == PedalMove::Kind::stroke ? "pedal" : "foot";
+        table.add({note.id, "", result.instruments.at(note.voice), onset_s, note.speed_mps, middle.x(),
+                   middle.y(), middle.z(), pedal.t_s, "released", 0, onset_s, by});
+    }
     return table.csv();
 }
 

@@ -42,6 +42,8 @@ void require_tools(const PlayOptions& options);
 /// The note that sounds a strike: speed through the instrument's velocity curve, place within the struck
 /// zone, MIDI note and velocity. MIDI velocity = 127 (v / 8 m/s)^0.7, held to 1..127.
 [[nodiscard]] audio::Note note_of(const Strike& strike, const Instrument& instrument);
+/// All notes that a run sounded, those of pedals included, by onset.
+[[nodiscard]] std::vector<audio::Note> notes_of(const PlayResult& result, const Kit& kit);
 [[nodiscard]] std::filesystem::path orchestra_file();
 [[nodiscard]] std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers);
 /// The thread that draws into the run's folder `frames`; null with --no-frames. `scenes`: one for each level
@@ -68,7 +70,7 @@ struct RunParts {
 /// asked for, unless a gain was, by one gain for all of it. In play_sound.cpp, as the next.
 void set_loudness(PlayResult& result, const audio::Mix& mix, bool may_change);
 /// Writes stems/NN_NAME.wav, as long as result.audio, for each instrument that was sounded: they add up to it
-/// without its room.
+/// without its room. With bus_stems stems/bus_NN_NAME.wav likewise for each bus.
 void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& folder);
 
 /// Ends the sound of a run that lasted `seconds`: result.audio, audio.wav, version and time of the thread.
@@ -109,7 +111,8 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
 ///   id,stick,instrument,onset_s,speed_mps,px,py,pz,scheduled_at_s,outcome,moves,decided_at_s,model
 /// stick and instrument by name; onset_s, scheduled_at_s and decided_at_s on the trace's clock [s]; px,py,pz
 /// the struck point on the surface [m], world; outcome released|cancelled; model the predictor that played
-/// it. Throws std::logic_error for a strike that is still pending: every note of a finished run was decided.
+/// it. Behind them what pedals and hands played: no stick, the middle of the instrument, model pedal, foot or choke.
+/// Throws std::logic_error for a strike that is still pending: every note of a finished run was decided.
 [[nodiscard]] std::string format_events(const PlayResult& result);
 
 /// Text of contacts.csv: a row for every true contact, by time. Columns

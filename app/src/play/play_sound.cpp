@@ -12,23 +12,20 @@ namespace {
 
 constexpr double kHighestPeakDbtp = -1;  // EBU R 128
 
-std::string file_name(std::size_t instrument, std::string name) {
+std::string file_name(std::size_t number, std::string name) {
     for (char& c : name)
         if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-') c = '_';
     constexpr std::size_t kLongest = 100;  // a file's name has at most 255 bytes
     if (name.size() > kLongest) name.resize(kLongest);
-    return fmt::format("{:02}_{}.wav", instrument + 1, name);
+    return fmt::format("{:02}_{}.wav", number + 1, name);
 }
 
-/// The instrument's notes among all, by the samples that audio.wav has.
-std::vector<float> stem(const PlayResult& result, const Kit& kit, std::uint32_t instrument) {
-    audio::Mix mix{.gain_db = result.gain_db, .room = {}, .alone = instrument};
+/// These instruments' notes among all, by the samples that audio.wav has.
+std::vector<float> stem(const PlayResult& result, const Kit& kit, std::vector<std::uint32_t> instruments) {
+    audio::Mix mix{.gain_db = result.gain_db, .room = {}, .alone = std::move(instruments)};
     audio::Performance performance(orchestra_file(), voices_of(kit), mix);
-    for (const Strike& strike : result.strikes) {
-        const bool heard = !result.options.solo || *result.options.solo == strike.id;
-        if (strike.outcome == Outcome::released && heard)
-            performance.schedule(note_of(strike, kit.instruments[strike.instrument]));
-    }
+    for (const audio::Note& note : notes_of(result, kit))
+        if (!result.options.solo || *result.options.solo == note.id) performance.schedule(note);
     return performance.finish(static_cast<std::int64_t>(result.audio.size() / 2), 0);
 }
 
@@ -56,13 +53,22 @@ void set_loudness(PlayResult& result, const audio::Mix& mix, bool may_change) {
 
 void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& folder) {
     fs::create_directory(folder.path("stems"));
-    for (std::uint32_t i = 0; i < kit.instruments.size(); ++i) {
-        const auto sounds = [&](const Strike& strike) {
-            return strike.instrument == i && strike.outcome == Outcome::released;
+    const std::vector<audio::Note> notes = notes_of(result, kit);
+    const auto write = [&](const std::string& name, const std::vector<std::uint32_t>& instruments) {
+        const auto sounds = [&](const audio::Note& note) {
+            return !note.choke && std::ranges::find(instruments, note.voice) != instruments.end();
         };
-        if (std::ranges::none_of(result.strikes, sounds)) continue;
-        (void)audio::write_wav(folder.path("stems/" + file_name(i, kit.instruments[i].name)),
-                               stem(result, kit, i));
+        if (std::ranges::any_of(notes, sounds))
+            (void)audio::write_wav(folder.path("stems/" + name), stem(result, kit, instruments));
+    };
+    const auto count = static_cast<std::uint32_t>(kit.instruments.size());
+    for (std::uint32_t i = 0; i < count && result.options.mix.stems; ++i)
+        write(file_name(i, kit.instruments[i].name), {i});
+    for (std::size_t bus = 0; bus < kit.buses.size() && result.options.mix.bus_stems; ++bus) {
+        std::vector<std::uint32_t> instruments;
+        for (std::uint32_t i = 0; i < count; ++i)
+            if (kit.instruments[i].bus == kit.buses[bus].name) instruments.push_back(i);
+        write("bus_" + file_name(bus, kit.buses[bus].name), instruments);
     }
 }
 

@@ -225,6 +225,7 @@ void collect(RealtimeOutcome& outcome, const RealtimeSession& session, RealtimeR
     outcome.realtime = run.finish();
     outcome.failure = failure_of(outcome.realtime.events);
     result.samples_refused = run.refused();
+    result.pedals = run.pedals();
     result.frames = outcome.realtime.frames.size();
     result.t_end_s = result.t0_s + run.end_s();
     result.tracks = tracks_of(session, run);
@@ -283,6 +284,7 @@ Json summary_of(const RealtimeOutcome& o) {
             {"priorities", priorities},
             {"disturbed_by", r.disturbed_by},
             {"audio_device", r.audio_device},
+            {"device_delay_s", r.device_delay_s},
             {"device_underruns", r.device_underruns},
             {"device_corrections", r.device_corrections},
             {"midi_late", r.midi_late},

@@ -16,7 +16,8 @@ namespace {
 
 constexpr double kRenderReserveS = 0.003, kSoundReserveS = 0.005;
 constexpr double kSamplesExpectedHz = 100;
-constexpr double kStepS = 0.1;  // between two recorded steps of the leads
+constexpr double kPedalsAheadS = 0.1;  // more than the loop's longest wait and a block's lead
+constexpr double kStepS = 0.1;         // between two recorded steps of the leads
 constexpr std::int64_t kLongestWaitNs = 20'000'000;
 constexpr double kWatchS = 0.05;
 constexpr double kGraceS = 0.001, kJitterS = 1e-5;
@@ -33,6 +34,7 @@ RealtimeRun::RealtimeRun(RealtimeSession& session)
     : session_(session),
       options_(session.options),
       t0_s_(session.trace.t0_s()),
+      pedals_(session.kit, t0_s_),
       samples_seen_(session.trace.sticks.size(), 0),
       starts_seen_(samples_seen_),
       fps_(options_.play.fps),
@@ -82,6 +84,8 @@ void RealtimeRun::begin_lap(std::uint64_t lap) {
     lap_ = lap;
     newest_s_ = -std::numeric_limits<double>::infinity();
     for (Stick& stick : sticks_) stick.forget();
+    next_move_ = 0;
+    pedals_.rest(static_cast<std::int64_t>(lap) * session_.period_samples);
     pipeline_ = std::make_unique<StrikePipeline>(
         session_.kit, options_.play, t0_s_, session_.stick.radius_m, sticks_, *session_.simulation,
         [this](const audio::Note& note, bool scheduled) { send(note, scheduled); });
@@ -91,7 +95,28 @@ void RealtimeRun::send(audio::Note note, bool scheduled) {
     if (!session_.sound) return;
     note.id += first_id_;
     note.onset_sample += static_cast<std::int64_t>(lap_) * session_.period_samples;
+    pedals_.put_on(note);
     (void)(scheduled ? session_.sound->schedule(note) : session_.sound->cancel(note.id));
+}
+
+/// Moves of the schedule that are due soon, and those that have come by MIDI.
+void RealtimeRun::take_pedals() {
+    if (!session_.sound) return;
+    const std::size_t known = pedals_.notes().size();
+    const std::int64_t earliest = session_.sound->fixed_sample() + session_.sound->block_size();
+    const double lap_s = static_cast<double>(lap_) * result_.period_s, now_s = t0_s_ + to_s(now_ns());
+    for (; next_move_ < session_.moves.size(); ++next_move_) {
+        PedalMove move = session_.moves[next_move_];
+        move.t_s += lap_s;
+        if (move.t_s > now_s + kPedalsAheadS) break;
+        pedals_.take(move, earliest);
+    }
+    for (audio::MidiMessage message : session_.sound->take_midi()) {
+        message.t_s += t0_s_;
+        for (const PedalMove& move : moves_of(message, session_.kit)) pedals_.take(move, earliest);
+    }
+    for (std::size_t i = known; i < pedals_.notes().size(); ++i)
+        (void)session_.sound->schedule(pedals_.notes()[i].note);
 }
 
 void RealtimeRun::wait(std::int64_t until_ns) {
@@ -291,6 +316,7 @@ RealtimeResult RealtimeRun::finish() {
     if (session_.sound) {
         const audio::LivePerformance& sound = *session_.sound;
         result_.audio_device = sound.device();
+        result_.device_delay_s = sound.device_delay_s();
         result_.refused_changes = sound.refused_changes();
         result_.queue_overflows = sound.queue_overflows();
         result_.device_underruns = sound.device_underruns();
@@ -349,6 +375,7 @@ void RealtimeRun::follow_delays() {
 void RealtimeRun::take_notes() {
     if (!session_.sound) return;
     for (audio::PlayedNote& played : session_.sound->take_played()) {
+        if (played.id >= kFirstPedalId) continue;  // no strike
         played.taken_ns -= session_.epoch_ns;
         if (played.midi_sent_ns != 0) played.midi_sent_ns -= session_.epoch_ns;
         NoteTiming note;
@@ -406,6 +433,7 @@ void RealtimeRun::run(const Warn& warn) {
         double next_s = end_s_;
         if (session_.frames) next_s = std::min(next_s, next_frame_at_s());
         wait(to_ns(next_s));
+        take_pedals();
         take_states();
         if (session_.frames) ask_for_frames();
         take_frames();

@@ -44,6 +44,7 @@ public:
     [[nodiscard]] const std::vector<LapStrikes>& laps() const { return laps_; }
     /// Measured poses as the loop saw them, by stick, on the run's clock: the trace of a live source.
     [[nodiscard]] const std::vector<DiskLog<tracking::PoseSample>>& seen() const { return seen_; }
+    [[nodiscard]] const Pedals& pedals() const { return pedals_; }  ///< on the run's clock
     [[nodiscard]] double end_s() const { return end_s_; }
     [[nodiscard]] std::uint64_t refused() const;
 
@@ -57,6 +58,7 @@ private:
     void take(const std::vector<std::uint32_t>& moved, std::int64_t taken_ns, std::int64_t query_ns);
     void begin_lap(std::uint64_t lap);
     void send(audio::Note note, bool scheduled);
+    void take_pedals();
     /// When the next frame is to be begun: a render lead before it is shown, or up to 1 ms later while a
     /// sample of before then is on its way.
     [[nodiscard]] double next_frame_at_s() const;
@@ -84,6 +86,8 @@ private:
     RealtimeSession& session_;
     const RealtimeOptions& options_;
     double t0_s_;
+    Pedals pedals_;
+    std::size_t next_move_ = 0;  // of the session's, in this lap
     std::vector<Stick> sticks_;
     std::unique_ptr<StrikePipeline> pipeline_;
     std::uint64_t lap_ = 0, first_id_ = 0;

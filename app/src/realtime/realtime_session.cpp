@@ -30,6 +30,10 @@ void check(const RealtimeOptions& o) {
                        "less than the release margin");
     if (o.play.solo)
         refuse_options("--solo with --realtime", "one of them: play the trace offline to hear one note");
+    if (o.play.pedals && !o.sound.midi_input.empty())
+        refuse_options("--pedals with --midi-in", "one of them");
+    if (!o.play.audio && (!o.sound.midi_input.empty() || o.sound.output != audio::LiveOptions::Output::none))
+        refuse_options("--output or --midi-in with --no-audio", "sound");
     if (!o.play.audio && !o.sound.midi_port.empty())
         refuse_options("--midi-out with --no-audio", "sound, whose clock times MIDI");
 }
@@ -68,6 +72,9 @@ RealtimeSession::RealtimeSession(const RealtimeOptions& asked) : options(asked),
     kit = read_kit(asked.play.kit);
     stick = stick_geometry(trace, kit.stick, asked.play.tip, asked.play.shaft);
     const double once_s = trace.t_end_s() - trace.t0_s();
+    if (asked.play.pedals)
+        for (const PedalMove& move : read_pedals(*asked.play.pedals, kit, trace.t0_s()))
+            if (live || move.t_s <= trace.t_end_s()) moves.push_back(move);
     if (seconds == 0) seconds = live ? kLongestLiveS : once_s;
     const double period_s = live ? seconds + kLiveSpareS : once_s + kBetweenLapsS;
     period_samples = static_cast<std::int64_t>(std::ceil(period_s * audio::kSampleRate));

@@ -57,6 +57,7 @@ struct RealtimeSession {
     Kit kit;
     StickGeometry stick;  ///< also as a live source gives it
     double seconds = 0;
+    std::vector<PedalMove> moves;     ///< of the schedule of pedals, within a lap
     std::int64_t period_samples = 0;  ///< of a lap; a live source has one, longer than the run
 
     // Since start():

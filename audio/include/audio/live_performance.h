@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "audio/midi_reader.h"
 #include "audio/performance.h"
 
 namespace audio {
@@ -15,10 +16,13 @@ struct LiveOptions {
     /// A block is planned to be computed this long before its first sample is due [s]: room for lateness and
     /// for the device's buffer. Notes of that block cannot change any more then.
     double output_lead_s = 0.004;
-    double longest_s = 60;       ///< of sound; real time ends there
-    bool jack_audio = false;     ///< play through a running JACK server (its default outputs)
+    double longest_s = 60;  ///< of sound; real time ends there
+    /// What plays the sound: nothing, a running JACK server (its first outputs), or a device of ALSA by its name.
+    enum class Output : std::uint8_t { none, jack, alsa } output = Output::none;
+    std::string alsa_device = "default";
     std::string midi_port{};     ///< name of a MIDI output port of ours in JACK; empty: none
     std::string midi_connect{};  ///< connect that port to this one, when it is there; empty: leave it open
+    std::string midi_input{};    ///< a JACK MIDI port to listen to; without a colon a port of ours, left open
     std::function<void()> on_thread_start{};  ///< run first on the audio thread (its priority)
     /// Gets the sound as it is made, interleaved stereo, on a thread of its own, which may wait for a disk: 20 s
     /// of sound have room. What it throws, finish() throws. Empty: nobody wants it.
@@ -47,7 +51,8 @@ struct PlayedNote {
     std::int64_t midi_sent_ns = 0;  ///< when the MIDI event was handed over with its onset's time; 0: no MIDI
 };
 
-/// A performance on the wall clock: sample n is due at epoch + n/48000 s. One thread owns Csound, computes
+/// A performance on the wall clock: sample n is due at epoch + n/48000 s. A device plays it device_delay_s later, limited
+/// to a true peak of -1 dBTP; what is recorded is not. One thread owns Csound, computes
 /// each block output_lead_s before it is due (the sooner when it has fallen behind: nothing is skipped in the
 /// recording), and never waits for anything but the clock. The caller's thread sends notes through a
 /// wait-free queue. Notes are never late silently: one that arrives after its block has begun sounds with the
@@ -60,9 +65,9 @@ struct PlayedNote {
 /// code excepted).
 class LivePerformance {
 public:
-    /// Compiles the orchestra, warms it up, connects to JACK if asked for. Throws std::runtime_error, also if
-    /// there is no JACK server, or one whose period the output lead does not cover; the text says what to
-    /// do.
+    /// Compiles the orchestra, warms it up, connects to its device if asked for. Throws std::runtime_error, also if
+    /// there is no JACK server, or one whose period the output lead does not cover, or no such device of ALSA; the text
+    /// says what to do.
     LivePerformance(const std::filesystem::path& orchestra, const std::vector<Voice>& voices,
                     const LiveOptions& options);
     ~LivePerformance();
@@ -94,19 +99,26 @@ public:
 
     /// At any time.
     [[nodiscard]] int block_size() const;
-    [[nodiscard]] BlockCount block_count() const noexcept;   ///< any thread
-    [[nodiscard]] std::uint64_t refused_changes() const;     ///< cancels and moves that came too late
-    [[nodiscard]] std::uint64_t queue_overflows() const;     ///< commands and answers without room
-    [[nodiscard]] std::uint64_t device_underruns() const;    ///< JACK asked for samples that were not there
-    [[nodiscard]] std::uint64_t device_corrections() const;  ///< samples dropped or repeated for JACK's clock
-    [[nodiscard]] std::uint64_t late_strokes() const;        ///< MIDI notes that left later than due
+    [[nodiscard]] BlockCount block_count() const noexcept;  ///< any thread
+    [[nodiscard]] std::uint64_t refused_changes() const;    ///< cancels and moves that came too late
+    [[nodiscard]] std::uint64_t queue_overflows() const;    ///< commands and answers without room
+    [[nodiscard]] std::uint64_t device_underruns()
+        const;  ///< the device asked for samples that were not there
+    [[nodiscard]] std::uint64_t device_corrections()
+        const;                                         ///< samples dropped or repeated for the device's clock
+    [[nodiscard]] std::uint64_t late_strokes() const;  ///< MIDI notes that left later than due
     /// Why the MIDI port is not connected to midi_connect, one line (it stays open); empty: nothing is wrong.
     /// From construction on.
     [[nodiscard]] std::string midi_problem() const;
     [[nodiscard]] std::string version() const;
     [[nodiscard]] std::uint64_t lost_strokes()
         const;  ///< MIDI notes that were not sent: 1024 waited for JACK, or 512 for their time, already
-    [[nodiscard]] std::string device() const;  ///< "file only" or what JACK says
+    [[nodiscard]] std::string device() const;  ///< "file only" or what the device says of itself
+    /// How much later than due a device plays [s]: the limiter's look-ahead, and what ALSA's buffer needs beyond the output
+    /// lead. 0 without a device. MIDI strokes leave as late as the sound.
+    [[nodiscard]] double device_delay_s() const;
+    /// MIDI messages that came since the last call, t_s from the epoch. One thread at a time.
+    [[nodiscard]] std::vector<MidiMessage> take_midi();
     [[nodiscard]] double busy_s() const;
 
 private:

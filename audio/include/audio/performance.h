@@ -25,13 +25,18 @@ struct Voice {
     double gain_db = 0;
     /// A new note fades the group's older ones from its own first sample to exact zero within 15 ms; notes of
     /// equal onset leave each other alone. Empty: none.
-    std::string choke_group;
+    std::string choke_group{};
     /// Recorded sounds that it plays instead of the instrument (audio/samples.h). They do not change; the kit that read
     /// them and the performances of its voices own them together.
     std::shared_ptr<const SampleSet> samples{};
     /// The file whose instrument it is, an orchestra of one's own that is put behind the performance's (audio/orchestra.h).
     /// Empty: an instrument of the performance's orchestra.
     std::filesystem::path own_orchestra{};
+    /// What these parameters are at the far end of its pedal's way (Note::pedal 1), by name. In between they go
+    /// evenly, those of a sign in ratios.
+    std::vector<std::pair<std::string, double>> pedal_parameters{};
+    double balance = 0;       ///< of its bus: -1 left alone ... 1 right alone
+    double room_send_db = 0;  ///< gain of what the room hears of it; -60 and below: nothing
 };
 
 /// One strike as the audio hears it.
@@ -44,20 +49,38 @@ struct Note {
     int zone = 0;                   ///< 0 head, 1 rim, ... (the voice's zones in the kit's order)
     int midi_note = 38;
     int midi_velocity = 64;  ///< 1-127
+    double pedal = 0;        ///< 0: the voice's pedal is at rest ... 1: at the far end of its way
+    /// Sounds nothing, but fades what the voice sounds, as a note of its choke group does: a hand, a pedal.
+    bool choke = false;
 };
+
+/// How a room answers, recorded: at 48 kHz, from each of two sides (first index) to each of two ears.
+struct ImpulseResponse {
+    std::array<std::array<std::vector<float>, 2>, 2> from_to;  ///< equally long
+    [[nodiscard]] std::size_t size() const { return from_to[0][0].size(); }
+};
+inline constexpr double kLongestImpulseS = 20;
+
+/// Reads one: a sound file of one channel (of each side, to its own ear), two (left to left, right to right) or four (left
+/// to left, left to right, right to left, right to right). Other sampling rates are resampled.
+/// Throws SampleError (audio/samples.h): no such file, another number of channels, longer than kLongestImpulseS, silent.
+[[nodiscard]] std::shared_ptr<const ImpulseResponse> read_impulse_response(const std::filesystem::path& file);
 
 /// The room around the voices.
 struct RoomSound {
     double t60_s = 0;       ///< time in which its low frequencies fall by 60 dB; 0: no room
     double level_db = -16;  ///< energy of the room's answer against that of the dry sound
+    /// A recorded room instead, brought to level_db. Empty: none.
+    std::shared_ptr<const ImpulseResponse> impulse{};
 };
 
 /// What becomes of the voices' sum.
 struct Mix {
     double gain_db = 0;  ///< of all
     RoomSound room;
-    /// Sounds this voice alone, as it sounds among the others (which still choke it), without the room.
-    std::optional<std::uint32_t> alone;
+    /// Sounds these voices alone, as they sound among the others (which still choke them), without the room. Empty:
+    /// all.
+    std::vector<std::uint32_t> alone{};
 };
 
 /// An offline performance: notes are scheduled, moved and cancelled ahead of the sample up to which audio has
@@ -112,10 +135,16 @@ struct MidiTime {
     bool operator==(const MidiTime&) const = default;
 };
 
+/// A controller of a MIDI file, on channel 10 as the notes.
+struct MidiControl {
+    std::int64_t sample = 0;
+    int controller = 4, value = 0;  ///< 0-127
+};
+
 /// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, at any tempo nearly 1920 ticks a second), channel 10,
-/// one note-on per note and its note-off 0.1 s later: the file's bytes. Times are right whatever the tempo. Throws
+/// one note-on per note and its note-off 0.1 s later, a polyphonic aftertouch of 127 for a choke: the file's bytes. Times are right whatever the tempo. Throws
 /// std::runtime_error for a key, velocity or onset that MIDI has not, and std::logic_error for such a tempo or time signature.
-[[nodiscard]] std::vector<std::uint8_t> encode_midi(const std::vector<Note>& notes,
-                                                    const MidiTime& time = {});
+[[nodiscard]] std::vector<std::uint8_t> encode_midi(const std::vector<Note>& notes, const MidiTime& time = {},
+                                                    const std::vector<MidiControl>& controls = {});
 
 }  // namespace audio

@@ -1,0 +1,122 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "rendering.h"
+
+// What ends a sound by hand or pedal, and what a pedal makes of one.
+
+namespace {
+
+using namespace rendering;
+
+audio::Note choke(std::uint64_t id, std::int64_t onset, std::uint32_t voice = 0) {
+    audio::Note made = note(id, onset, 0, voice);
+    made.choke = true;
+    return made;
+}
+
+audio::Note pressed(std::uint64_t id, std::int64_t onset, double pedal) {
+    audio::Note made = note(id, onset, 5);
+    made.pedal = pedal;
+    return made;
+}
+
+const std::vector<audio::Voice> kTwo{voice("cymbal", {{"decay_s", 4}}, 0),
+                                     voice("bell", {{"decay_s", 4}}, 0)};
+constexpr std::int64_t kFade = 720;  // 15 ms
+
+TEST(HandChoke, AVoiceWithoutAGroupEndsWithin15MsFromTheVerySampleAndNoOtherDoes) {
+    const auto free = left(render({kTwo[0]}, {note(1, 100, 8)}, 24000, 0));
+    for (const std::int64_t at : {9600, 9631, 9663, 110}) {  // the last within the stroke's first block
+        const auto choked = left(render(kTwo, {note(1, 100, 8), choke(2, at)}, 24000, 0));
+        for (std::int64_t i = 0; i < 24000; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            const double rest = std::clamp(1 - static_cast<double>(i - at) / kFade, 0.0, 1.0);
+            ASSERT_NEAR(choked[k], free[k] * rest * rest * (3 - 2 * rest), 1e-7) << at << " " << i;
+        }
+    }
+    const auto bell = left(render(kTwo, {note(1, 100, 8, 1)}, 24000, 0));
+    EXPECT_EQ(left(render(kTwo, {note(1, 100, 8, 1), choke(2, 9600)}, 24000, 0)), bell);
+    EXPECT_EQ(left(render(kTwo, {choke(2, 99, 1), choke(3, 100, 1), note(1, 100, 8, 1)}, 24000, 0)), bell)
+        << "an earlier one and an equal one";
+}
+
+/// Largest step of the second difference of samples [begin, end): what a click is.
+double roughness(const std::vector<double>& x, std::size_t begin, std::size_t end) {
+    double largest = 0;
+    for (std::size_t i = begin + 1; i + 1 < end; ++i)
+        largest = std::max(largest, std::abs(x[i + 1] - 2 * x[i] + x[i - 1]));
+    return largest;
+}
+
+TEST(HandChoke, ItMakesNoClickInALowToneThatRings) {
+    // 100 Hz: a step would stand out by its second difference, which is the ringing tone's (2 pi f / sr)^2 otherwise. The fade's own
+    // second difference is at most 6 / 720^2 of the amplitude, and twice the slopes' product 1.5 / 720 by 2 pi f / sr.
+    const audio::Voice tone =
+        voice("bell", {{"frequency_hz", 100}, {"partials", 2}, {"decay_s", 10}, {"attack", 0}}, 0);
+    for (const std::int64_t at : {24000, 24050, 24111, 24187, 24240}) {
+        const auto sound = left(render({tone}, {note(1, 0, 8), choke(2, at)}, 48000, 0));
+        const auto from = static_cast<std::size_t>(at);
+        const double before = roughness(sound, from - 2400, from),
+                     fading = roughness(sound, from - 2, from + 800);
+        double amplitude = 0;
+        for (std::size_t i = from - 2400; i < from; ++i) amplitude = std::max(amplitude, std::abs(sound[i]));
+        const double slope = 2 * 3.14159 * 100 / 48000;
+        EXPECT_LE(fading, before + amplitude * (6.0 / (720 * 720) + 2 * 1.5 / 720 * slope)) << at;
+        EXPECT_EQ(roughness(sound, from + 721, from + 4800), 0);
+    }
+}
+
+TEST(HandChoke, ACancelledOneLeavesNoTraceAndLiveSoundsAsOffline) {
+    const auto plain = render(kTwo, {note(1, 100, 8)}, 24000, 0);
+    audio::Performance performance(kOrchestra, kTwo);
+    performance.schedule(note(1, 100, 8));
+    performance.schedule(choke(2, 9000));
+    performance.advance_to(8000);
+    performance.cancel(2);
+    EXPECT_EQ(performance.finish(24000, 0), plain);
+    Kept kept;
+    audio::LivePerformance live(kOrchestra, kTwo, kept.with({}));
+    ASSERT_TRUE(live.schedule(note(1, 100, 8)));
+    ASSERT_TRUE(live.schedule(choke(2, 9000)));
+    EXPECT_EQ(kept.finish(live, 24000, 0), render(kTwo, {note(1, 100, 8), choke(2, 9000)}, 24000, 0));
+}
+
+TEST(Pedal, ItsPlaceLeadsFromOneSoundToTheOtherEvenly) {
+    audio::Voice hat = voice("cymbal", {{"decay_s", 0.16}, {"variation", 0}}, 0);
+    hat.pedal_parameters = {{"decay_s", 2.2}};
+    const auto late = [&](double pedal) {  // energy from 0.3 s on
+        const auto sound = left(render({hat}, {pressed(1, 0, pedal)}, 48000, 0));
+        double sum = 0;
+        for (std::size_t i = 14400; i < sound.size(); ++i) sum += sound[i] * sound[i];
+        return 10 * std::log10(sum + 1e-30);
+    };
+    EXPECT_GT(late(0.5), late(0) + 20);
+    EXPECT_GT(late(1), late(0.5) + 10);
+    hat.parameters[0].second = 2.2;
+    audio::Voice plain = voice("cymbal", {{"decay_s", 2.2}, {"variation", 0}}, 0);
+    EXPECT_EQ(render({hat}, {pressed(1, 0, 1)}, 48000, 0), render({plain}, {note(1, 0, 5)}, 48000, 0));
+    hat.pedal_parameters = {{"no_such", 1}};
+    EXPECT_THROW(audio::Performance(kOrchestra, {hat}), std::runtime_error);
+}
+
+TEST(Bus, BalanceAndRoomSendActOnTheirVoicesAlone) {
+    std::vector<audio::Voice> voices{voice("bell", {{"decay_s", 0.2}}), voice("bell", {{"decay_s", 0.2}})};
+    const audio::Mix mix{.gain_db = 0, .room = {.t60_s = 0.5, .level_db = -10}};
+    const auto played = [&](std::uint32_t which) {
+        audio::Performance performance(kOrchestra, voices, mix);
+        performance.schedule(note(1, 0, 5, which));
+        return performance.finish(48000, 0);
+    };
+    const auto wet = played(1);
+    voices[0].room_send_db = -60, voices[0].balance = -1;
+    EXPECT_EQ(played(1), wet);
+    const auto dry = played(0);
+    for (std::size_t i = 1; i < dry.size(); i += 2) ASSERT_EQ(dry[i], 0) << "the right side, room included";
+    voices[0].balance = 2;
+    EXPECT_THROW((void)played(0), std::runtime_error);
+}
+
+}  // namespace
