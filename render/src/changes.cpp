@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace render {
 namespace {
@@ -32,7 +33,8 @@ Changes::Changes(const Views& views, std::vector<ObjectBounds> bounds)
       picture_(views.width, views.height) {
     const float shift = views.shadow_shift * views.light_from_world.row(0).head<3>().norm();
     const float texel = 2 / static_cast<float>(std::max(views.shadow_size, 1));
-    pad_ = shift + texel * (views.shadow_filter + views.shadow_beyond + 1);
+    pad_ = shift + texel * views.shadow_filter;
+    beyond_ = texel * views.shadow_beyond;
     depth_pad_ = views.shadow_shift * views.light_from_world.row(2).head<3>().norm() +
                  texel * views.shadow_beyond + 1e-5f;
 }
@@ -66,10 +68,9 @@ Changes::Seen Changes::see(const FrameState& frame, std::size_t object) const {
         world.push_back(transformed(frame.world_from_object[object], corner));
         seen.from_light.push_back(transformed(views_.light_from_world, world.back()));
     }
-    const auto [nearest, farthest] =
-        std::minmax_element(seen.from_light.begin(), seen.from_light.end(),
-                            [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) { return a.z() < b.z(); });
-    seen.nearest = nearest->z() - depth_pad_, seen.farthest = farthest->z() + depth_pad_;
+    for (const Eigen::Vector3f& corner : seen.from_light) seen.box.extend(corner);
+    const Eigen::Vector3f more(beyond_, beyond_, depth_pad_);
+    seen.box.min() -= more, seen.box.max() += more;
     seen.hull = in_picture(world);
     return seen;
 }
@@ -81,6 +82,12 @@ bool Changes::moved(const FrameState& frame, std::size_t object) const {
            (!bounds_[object].reach.empty() && frame.modal[object] != before_.modal[object]);
 }
 
+void Changes::look_from(const Eigen::Matrix4f& clip_from_world) {
+    views_.clip_from_world = clip_from_world;
+    turned_ = true;
+    for (std::size_t i = 0; i < seen_.size(); ++i) seen_[i] = see(before_, i);
+}
+
 void Changes::update(const FrameState& frame) {
     moved_.assign(bounds_.size(), true);
     std::vector<Seen> seen;
@@ -90,11 +97,13 @@ void Changes::update(const FrameState& frame) {
         moving += moved_[i];
         seen.push_back(moved_[i] ? see(frame, i) : seen_[i]);
     }
-    const bool all = !known_ || moving > kMostMoved;
+    const bool map_too = !known_ || moving > kMostMoved;
+    all_ = map_too || turned_;
+    turned_ = false;
     std::swap(seen, seen_);  // from here on `seen` is where things were
     objects_.clear(), picture_.clear(), shadow_.clear();
-    if (all) {
-        objects_.fill(), picture_.fill();
+    if (all_) objects_.fill(), picture_.fill();
+    if (map_too) {
         if (views_.shadow_size > 0) shadow_ = {{0, 0, views_.shadow_size, views_.shadow_size}};
     } else {
         for (std::size_t i = 0; i < bounds_.size(); ++i) {
@@ -102,7 +111,6 @@ void Changes::update(const FrameState& frame) {
             add_moved(seen[i]);
             add_moved(seen_[i]);
         }
-        picture_.add(objects_);
     }
     before_ = frame;
     known_ = true;
@@ -113,46 +121,64 @@ void Changes::add_moved(const Seen& seen) {
     objects_.add(seen.hull);
     if (views_.shadow_size == 0) return;
     add_to_shadow_map(in_shadow_map(seen));
-    add_shadow(seen);
 }
 
-void Changes::add_shadow(const Seen& caster) {
-    Hull outline;  // of its shadow, in the light's x and y
-    for (const Eigen::Vector3f& corner : caster.from_light)
-        for (const float x : {-pad_, pad_})
-            for (const float y : {-pad_, pad_}) outline.emplace_back(corner.x() + x, corner.y() + y);
-    outline = convex_hull(std::move(outline));
-    const auto [left, right] =
-        std::minmax_element(outline.begin(), outline.end(),
-                            [](const Eigen::Vector2f& a, const Eigen::Vector2f& b) { return a.x() < b.x(); });
-    const auto [low, high] =
-        std::minmax_element(outline.begin(), outline.end(),
-                            [](const Eigen::Vector2f& a, const Eigen::Vector2f& b) { return a.y() < b.y(); });
-    for (std::size_t i = 0; i < seen_.size(); ++i) {
-        const Seen& other = seen_[i];
-        if (moved_[i] || other.from_light.empty() || other.farthest < caster.nearest) continue;
-        Eigen::AlignedBox3f box;
-        for (const Eigen::Vector3f& corner : other.from_light) box.extend(corner);
-        if (box.max().x() < left->x() || box.min().x() > right->x() || box.max().y() < low->y() ||
-            box.min().y() > high->y())
-            continue;
-        Points prism;
-        for (const Eigen::Vector2f& p : outline)
-            for (const float z : {std::max(caster.nearest, other.nearest), other.farthest})
-                prism.push_back(transformed(world_from_light_, {p.x(), p.y(), z}));
-        objects_.add_common(in_picture(prism), other.hull);
+void Changes::take(std::span<const ShadowChange> changes) {
+    if (all_) return;
+    for (const ShadowChange& change : changes) {
+        add_receivers(change);
+        add_floor(change);
     }
-    Points floor;
+    picture_.add(objects_);
+}
+
+/// In the light's x and y, with room for what looks up from beside.
+Eigen::AlignedBox2f Changes::around(const PixelBox& texels) const {
+    const float texel = 2 / static_cast<float>(views_.shadow_size);
+    const auto at = [&](int x, int y) {
+        return Eigen::Vector2f(texel * static_cast<float>(x) - 1, texel * static_cast<float>(y) - 1);
+    };
+    return {at(texels.left, texels.bottom) - Eigen::Vector2f::Constant(pad_),
+            at(texels.right, texels.top) + Eigen::Vector2f::Constant(pad_)};
+}
+
+void Changes::add_receivers(const ShadowChange& change) {
+    const Eigen::AlignedBox2f outline = around(change.texels);
+    Eigen::AlignedBox3f prism;
+    prism.min() << outline.min(), change.nearest - depth_pad_;
+    prism.max() << outline.max(), change.farthest + depth_pad_;
+    for (std::size_t i = 0; i < seen_.size(); ++i) {
+        if (moved_[i] || seen_[i].from_light.empty() || !prism.intersects(seen_[i].box)) continue;
+        const Eigen::AlignedBox3f common(Eigen::Vector3f(outline.min().x(), outline.min().y(),
+                                                         std::max(prism.min().z(), seen_[i].box.min().z())),
+                                         Eigen::Vector3f(outline.max().x(), outline.max().y(),
+                                                         std::min(prism.max().z(), seen_[i].box.max().z())));
+        Points corners;
+        for (int k = 0; k < 8; ++k)
+            corners.push_back(transformed(world_from_light_,
+                                          common.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k))));
+        objects_.add_common(in_picture(corners), seen_[i].hull);
+    }
+}
+
+void Changes::add_floor(const ShadowChange& change) {
     const Eigen::Vector3f ray = world_from_light_.block<3, 1>(0, 2);
     if (std::abs(ray.y()) < 1e-3f * ray.norm()) {  // light that grazes the floor
         picture_.fill();
         return;
     }
-    for (const Eigen::Vector2f& p : outline) {
+    const Eigen::AlignedBox2f outline = around(change.texels);
+    Points floor;
+    float nearest = std::numeric_limits<float>::infinity(), farthest = -nearest;  // in the light's z
+    for (int k = 0; k < 4; ++k) {
+        const Eigen::Vector2f p = outline.corner(static_cast<Eigen::AlignedBox2f::CornerType>(k));
         const Eigen::Vector3f start = transformed(world_from_light_, {p.x(), p.y(), 0});
-        floor.push_back(start + ray * ((views_.floor_height - start.y()) / ray.y()));
+        const float z = (views_.floor_height - start.y()) / ray.y();
+        nearest = std::min(nearest, z), farthest = std::max(farthest, z);
+        floor.push_back(start + z * ray);
     }
-    picture_.add(in_picture(floor));
+    if (nearest - depth_pad_ <= change.farthest && farthest + depth_pad_ >= change.nearest)
+        picture_.add(in_picture(floor));
 }
 
 PixelBox Changes::in_shadow_map(const Seen& seen) const {

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <span>
 #include <vector>
 
 #include "render/scene.h"
@@ -16,6 +17,12 @@ struct ObjectBounds {
     [[nodiscard]] Eigen::AlignedBox3f grown(const FrameState& frame, std::size_t object) const;
 };
 
+/// Where in the shadow map texels have changed, and between which depths, in the light's z.
+struct ShadowChange {
+    PixelBox texels;
+    float nearest, farthest;
+};
+
 /// How the camera and the light see the scene.
 struct Views {
     Eigen::Matrix4f clip_from_world, light_from_world;  ///< the light's is parallel: x, y, z in [-1, 1]
@@ -28,19 +35,26 @@ struct Views {
 
 /// What of a picture has to be drawn again for the next frame, all of it safely wide:
 /// - tiles that an object touches which moves, now or in the frame before;
-/// - tiles in which an object may lie in that object's shadow, now or before: the part of the shadow's prism
-///   at the other object's distances from the light, where that is seen within the other's bounds;
-/// - of the floor, the tiles in which the shadow falls;
-/// - of the shadow map, boxes around what has moved.
+/// - of the shadow map, boxes around what has moved. What has changed in them is known when they are drawn again:
+///   a comparison with a texel has another outcome only at depths between its values now and before. From these:
+/// - tiles in which another object may be looked up there: the prism of a block of texels and its depths, where
+///   that is seen within the object's bounds;
+/// - of the floor, the tiles that look up there.
 /// All else is as it was, since a pixel depends on nothing else. Bounds are boxes of eight corners.
 class Changes {
 public:
     Changes(const Views& views, std::vector<ObjectBounds> bounds);
 
-    /// Compares the frame with the one before. It must fit the scene.
+    /// Compares the frame with the one before. It must fit the scene. Then the boxes of shadow() are drawn.
     void update(const FrameState& frame);
+    /// What that has changed. Then the rest is known.
+    void take(std::span<const ShadowChange> changes);
+    /// Whether all is drawn again, whatever the shadow map's changes.
+    [[nodiscard]] bool all() const { return all_; }
     /// The next frame is drawn whole.
     void forget() { known_ = false; }
+    /// The next picture is drawn whole, from elsewhere; the shadow map stays.
+    void look_from(const Eigen::Matrix4f& clip_from_world);
 
     [[nodiscard]] const TileMask& objects() const { return objects_; }  ///< where objects are drawn again
     [[nodiscard]] const TileMask& picture() const { return picture_; }  ///< these, and the floor's shadow
@@ -57,8 +71,8 @@ private:
     /// Where an object is seen, by the camera [pixels] and by the light.
     struct Seen {
         Hull hull;
-        Points from_light;  ///< eight corners; none: not visible
-        float nearest = 0, farthest = 0;
+        Points from_light;        ///< eight corners; none: not visible
+        Eigen::AlignedBox3f box;  ///< around them, a little more
     };
 
     [[nodiscard]] Seen see(const FrameState& frame, std::size_t object) const;
@@ -66,15 +80,18 @@ private:
     [[nodiscard]] Hull in_picture(const Points& world) const;
     [[nodiscard]] PixelBox in_shadow_map(const Seen& seen) const;
     void add_moved(const Seen& seen);
-    void add_shadow(const Seen& caster);
+    void add_receivers(const ShadowChange& change);
+    void add_floor(const ShadowChange& change);
+    [[nodiscard]] Eigen::AlignedBox2f around(const PixelBox& texels) const;
     void add_to_shadow_map(PixelBox box);
 
     Views views_;
     Eigen::Matrix4f world_from_light_;
     float pad_;        ///< around a caster, in the light's x and y
+    float beyond_;     ///< around a receiver, in the light's x and y
     float depth_pad_;  ///< in the light's z
     std::vector<ObjectBounds> bounds_;
-    bool known_ = false;
+    bool known_ = false, turned_ = false, all_ = false;
     FrameState before_;
     std::vector<Seen> seen_;
     std::vector<bool> moved_;

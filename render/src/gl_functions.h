@@ -1,10 +1,12 @@
 #pragma once
 #include <GL/glcorearb.h>
 
+#include "gl_context.h"
+
 namespace render {
 
 /// The OpenGL functions the renderer calls, with the names of the specification less their gl prefix. No
-/// OpenGL library is linked (libGL beside OSMesa would answer with functions of another context): OSMesa is
+/// OpenGL library is linked (libGL beside OSMesa would answer with functions of another context): the context is
 /// asked for each.
 #define RENDER_GL_FUNCTIONS(X)                                                 \
     X(PFNGLACTIVETEXTUREPROC, ActiveTexture)                                   \
@@ -73,7 +75,7 @@ namespace render {
 
 struct GlFunctions {
     /// Needs a current context. Throws std::runtime_error when a function is missing.
-    GlFunctions();
+    explicit GlFunctions(const GlContext& context);
 
 #define RENDER_GL_MEMBER(type, name) type name = nullptr;
     RENDER_GL_FUNCTIONS(RENDER_GL_MEMBER)

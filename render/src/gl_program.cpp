@@ -15,7 +15,7 @@ GLuint compile(const GlFunctions& gl, GLenum kind, const std::string& source) {
     if (compiled == GL_TRUE) return shader;
     std::string log(4096, '\0');
     gl.GetShaderInfoLog(shader, static_cast<GLsizei>(log.size()), nullptr, log.data());
-    throw std::runtime_error("OSMesa: error: cannot compile a shader: " + std::string(log.c_str()));
+    throw std::runtime_error("OpenGL: error: cannot compile a shader: " + std::string(log.c_str()));
 }
 
 }  // namespace
@@ -31,7 +31,7 @@ GlProgram::GlProgram(const GlFunctions& gl, const std::string& vertex_source,
     if (linked == GL_TRUE) return;
     std::string log(4096, '\0');
     gl_.GetProgramInfoLog(program_, static_cast<GLsizei>(log.size()), nullptr, log.data());
-    throw std::runtime_error("OSMesa: error: cannot link shaders: " + std::string(log.c_str()));
+    throw std::runtime_error("OpenGL: error: cannot link shaders: " + std::string(log.c_str()));
 }
 
 void GlProgram::use() const {

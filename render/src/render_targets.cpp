@@ -7,10 +7,16 @@
 #include "shaders.h"
 
 namespace render {
+namespace {
+
+// Sides of the blocks in which changes of the shadow map are told: at least so many texels, at most so many a side.
+constexpr int kLeastBlock = 8, kMostBlocks = 128;
+
+}  // namespace
 
 void require_complete(const GlFunctions& gl, const char* what, int width, int height) {
     if (gl.CheckFramebufferStatus(GL_FRAMEBUFFER) == GL_FRAMEBUFFER_COMPLETE) return;
-    throw std::runtime_error(std::string("OSMesa: error: cannot make a framebuffer for a ") + what + " of " +
+    throw std::runtime_error(std::string("OpenGL: error: cannot make a framebuffer for a ") + what + " of " +
                              std::to_string(width) + "x" + std::to_string(height));
 }
 
@@ -153,6 +159,47 @@ void ShadowTarget::begin(const PixelBox& box) const {
 void ShadowTarget::bind(GLuint unit) const {
     gl_.ActiveTexture(GL_TEXTURE0 + unit);
     gl_.BindTexture(GL_TEXTURE_2D, texture_);
+}
+
+void ShadowTarget::read(const PixelBox& box, float* depths) const {
+    gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_);
+    gl_.ReadPixels(box.left, box.bottom, box.right - box.left, box.top - box.bottom, GL_DEPTH_COMPONENT,
+                   GL_FLOAT, depths);
+}
+
+void ShadowTarget::keep() {
+    if (!kept_.empty()) return;
+    kept_.resize(static_cast<std::size_t>(size_) * static_cast<std::size_t>(size_));
+    read({0, 0, size_, size_}, kept_.data());
+}
+
+std::vector<ShadowChange> ShadowTarget::changed(const std::vector<PixelBox>& boxes) {
+    const int block = std::max(kLeastBlock, size_ / kMostBlocks);
+    std::vector<ShadowChange> changes;
+    for (const PixelBox& box : boxes) {
+        drawn_.resize(static_cast<std::size_t>(box.area()));
+        read(box, drawn_.data());
+        for (int bottom = box.bottom; bottom < box.top; bottom += block)
+            for (int left = box.left; left < box.right; left += block) {
+                const PixelBox part{left, bottom, std::min(left + block, box.right),
+                                    std::min(bottom + block, box.top)};
+                float nearest = 2, farthest = -1;
+                for (int y = part.bottom; y < part.top; ++y) {
+                    float* kept = kept_.data() + static_cast<std::ptrdiff_t>(y) * size_;
+                    const float* drawn =
+                        drawn_.data() + static_cast<std::ptrdiff_t>(y - box.bottom) * (box.right - box.left) -
+                        box.left;
+                    for (int x = part.left; x < part.right; ++x) {
+                        if (kept[x] == drawn[x]) continue;
+                        nearest = std::min({nearest, kept[x], drawn[x]});
+                        farthest = std::max({farthest, kept[x], drawn[x]});
+                        kept[x] = drawn[x];
+                    }
+                }
+                if (nearest <= farthest) changes.push_back({part, 2 * nearest - 1, 2 * farthest - 1});
+            }
+    }
+    return changes;
 }
 
 }  // namespace render

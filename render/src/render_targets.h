@@ -1,4 +1,5 @@
 #pragma once
+#include "changes.h"
 #include "gl_functions.h"
 #include "gl_program.h"
 #include "render/scene.h"
@@ -62,9 +63,19 @@ public:
     void begin(const PixelBox& box) const;
     void bind(GLuint unit) const;
 
+    /// What is in the map is known from now on.
+    void keep();
+    /// Nothing is.
+    void forget() { kept_.clear(); }
+    /// Where boxes differ from what was known, in blocks; that is known then.
+    [[nodiscard]] std::vector<ShadowChange> changed(const std::vector<PixelBox>& boxes);
+
 private:
+    void read(const PixelBox& box, float* depths) const;
+
     const GlFunctions& gl_;
     int size_;
+    std::vector<float> kept_, drawn_;  ///< depths [row * size + column], of the map and of a box
     GLuint framebuffer_ = 0, texture_ = 0;
 };
 

@@ -3,9 +3,9 @@
 #include <stdexcept>
 
 #include "changes.h"
+#include "gl_context.h"
 #include "gl_functions.h"
 #include "gl_program.h"
-#include "osmesa_context.h"
 #include "render_targets.h"
 #include "scene_geometry.h"
 #include "shaders.h"
@@ -63,8 +63,8 @@ struct Renderer::Implementation {
 
     SceneDescription scene;
     Camera camera;
-    OsmesaContext context;
-    GlFunctions gl;
+    GlContext context;
+    GlFunctions gl{context};
     Eigen::Matrix4f clip, light;  ///< clip space of the camera and of the light, from world
     Eigen::Matrix4f on_map;  ///< of the shadow map: texture coordinates and depth, all in [0, 1], from world
     float texel;             ///< of the shadow map [m], 0: no shadow
@@ -132,11 +132,11 @@ Views Renderer::Implementation::views() const {
             shaders::kBeyondObject};
 }
 
-/// Of what was drawn from elsewhere nothing is kept.
+/// Of what was drawn from elsewhere the shadow map is kept.
 void Renderer::Implementation::look_from(const Camera& from) {
     camera = from;
     clip = clip_from_world(camera, aspect_of(scene));
-    changes = Changes(views(), geometry.bounds());
+    changes.look_from(clip);
     set_uniforms(object_program);
     set_uniforms(picture.program());
     for (const GlProgram* program : stage.programs()) set_uniforms(*program);
@@ -214,7 +214,10 @@ DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) 
     geometry.update(frame, from.eye, on_map, shaders::kBeyondObject * map_texel);
     if (from != camera) look_from(from);
     changes.update(frame);
+    if (!changes.all()) shadow.keep();
     if (!changes.shadow().empty()) draw_shadow();
+    changes.take(changes.all() ? std::vector<ShadowChange>() : shadow.changed(changes.shadow()));
+    if (changes.all()) shadow.forget();
     if (!changes.objects().empty()) draw_objects();
     const float least = kLeastBall * (scene.camera.target - scene.camera.eye).norm();
     TileMask drawn = changes.picture();
@@ -246,7 +249,8 @@ std::string Renderer::version() const {
     const auto text = [this](GLenum name) {
         return std::string(reinterpret_cast<const char*>(implementation_->gl.GetString(name)));
     };
-    return "OSMesa, OpenGL " + text(GL_VERSION) + ", " + text(GL_RENDERER);
+    return implementation_->context.name() + std::string(", OpenGL ") + text(GL_VERSION) + ", " +
+           text(GL_RENDERER);
 }
 
 std::size_t Renderer::triangles() const {

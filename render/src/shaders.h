@@ -8,9 +8,9 @@ inline constexpr int kSamples = 4;
 /// Where the place of a pixel on a triangle moves faster through the shadow map, from one pixel to the next, the
 /// triangle is seen from its edge. [texels]
 inline constexpr float kMostChange = 100;
-/// How far from its place a look-up reads the shadow map: 2 by the filter, the rest as the place itself is
-/// known to 1/256 pixel, in which it changes by at most kMostChange / 256, and safety. [texels]
-inline constexpr float kShadowFilter = 4.0f;
+/// How far from its place a look-up reads the shadow map: 2 by the filter, half a texel as a texel is covered by its
+/// middle, and as the place itself is known to 1/256 pixel, in which it changes by at most kMostChange / 256. [texels]
+inline constexpr float kShadowFilter = 3.0f;
 /// How far beyond an object's box in the shadow map a pixel's place may lie on it: the middle of a pixel that the
 /// object covers in part lies outside it. [texels]
 inline constexpr float kBeyondObject = 4.0f;

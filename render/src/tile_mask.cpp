@@ -68,6 +68,17 @@ bool TileMask::empty() const {
     return std::find(marked_.begin(), marked_.end(), std::uint8_t{1}) == marked_.end();
 }
 
+/// The first and the last row of tiles that the polygon may touch.
+std::pair<int, int> TileMask::rows(std::span<const Eigen::Vector2f> hull) const {
+    if (hull.empty()) return {0, -1};
+    const auto [lowest, highest] = std::minmax_element(
+        hull.begin(), hull.end(), [](const auto& a, const auto& b) { return a.y() < b.y(); });
+    const auto row = [&](float y) {
+        return static_cast<int>(std::clamp(std::floor(y / kTile), -1.0f, static_cast<float>(rows_)));
+    };
+    return {std::max(row(lowest->y() - kGrown) - 1, 0), std::min(row(highest->y() + kGrown) + 1, rows_ - 1)};
+}
+
 /// Columns of tiles that the polygon touches in a row of tiles: the range of x of its part in the row's band.
 TileMask::Columns TileMask::columns(std::span<const Eigen::Vector2f> hull, int row) const {
     const float low = static_cast<float>(row * kTile) - kGrown,
@@ -97,7 +108,8 @@ void TileMask::add(std::span<const Eigen::Vector2f> hull) {
 }
 
 void TileMask::add_common(std::span<const Eigen::Vector2f> hull, std::span<const Eigen::Vector2f> other) {
-    for (int row = 0; row < rows_; ++row) {
+    const auto [first_row, last_row] = rows(hull);
+    for (int row = first_row; row <= last_row; ++row) {
         const Columns a = columns(hull, row), b = columns(other, row);
         const int first = std::max(a.first, b.first), last = std::min(a.last, b.last);
         if (first <= last) std::fill_n(marked_.begin() + row * columns_ + first, last - first + 1, 1);
@@ -127,7 +139,8 @@ void TileMask::add_runs(int row, Columns within, std::vector<PixelBox>& found) c
 
 std::vector<PixelBox> TileMask::touched(std::span<const Eigen::Vector2f> hull) const {
     std::vector<PixelBox> boxes, runs;
-    for (int row = 0; row < rows_; ++row) {
+    const auto [first_row, last_row] = rows(hull);
+    for (int row = first_row; row <= last_row; ++row) {
         runs.clear();
         add_runs(row, columns(hull, row), runs);
         for (const PixelBox& run : runs) {

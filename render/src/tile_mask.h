@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace render {
@@ -18,10 +19,10 @@ struct PixelBox {
 /// Corners of the convex hull of points, counter-clockwise.
 [[nodiscard]] std::vector<Eigen::Vector2f> convex_hull(std::vector<Eigen::Vector2f> points);
 
-/// Which of a picture's tiles (8 x 8 pixels, those at the right and the top cut off by its edges) are meant.
+/// Which of a picture's tiles (4 x 4 pixels, as the rasteriser shades them; those at the right and the top cut off by its edges) are meant.
 class TileMask {
 public:
-    static constexpr int kTile = 8;  ///< [pixels]
+    static constexpr int kTile = 4;  ///< [pixels]
 
     TileMask(int width, int height);
 
@@ -42,13 +43,14 @@ public:
     [[nodiscard]] std::vector<PixelBox> runs() const;
 
     /// Rounding of vertices, and of the rasteriser's places to 1/256 pixel, stays far below it. [pixels]
-    static constexpr float kGrown = 1.5f;
+    static constexpr float kGrown = 0.25f;
 
 private:
     struct Columns {
         int first, last;  ///< none: first > last
     };
     void add_runs(int row, Columns within, std::vector<PixelBox>& found) const;
+    [[nodiscard]] std::pair<int, int> rows(std::span<const Eigen::Vector2f> hull) const;
     [[nodiscard]] Columns columns(std::span<const Eigen::Vector2f> hull, int row) const;
     [[nodiscard]] PixelBox box(int first, int last, int row) const;
 

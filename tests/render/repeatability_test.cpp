@@ -55,28 +55,38 @@ TEST(Repeatability, TheVersionNamesTheRasteriser) {
     EXPECT_GT(renderer.triangles(), 1000u);
 }
 
-/// Not a test of its own: run in processes of their own by the test below, since the rasteriser reads its
-/// number of threads once.
+/// Not a test of its own: run in processes of their own by the tests below, since the rasteriser reads its
+/// number of threads once, and each back end brings an OpenGL of its own.
 TEST(Repeatability, DISABLED_PrintsAHash) {
     render::Renderer renderer(small_kit());
     render::Image image;
     renderer.draw(pose(0.1f), image);
-    std::printf("hash=%llu\n", static_cast<unsigned long long>(hash(image)));
+    std::printf("version=%s\nhash=%llu\n", renderer.version().c_str(),
+                static_cast<unsigned long long>(hash(image)));
 }
 
-std::string hash_with_threads(int threads) {
+/// What that prints, with variables set ("A=1 B=2"); the exit status is 0 where it succeeds.
+std::pair<std::string, int> printed_with(const std::string& variables) {
     const std::string command =
-        "LP_NUM_THREADS=" + std::to_string(threads) + " '" +
-        std::filesystem::read_symlink("/proc/self/exe").string() +
+        variables + " '" + std::filesystem::read_symlink("/proc/self/exe").string() +
         "' --gtest_also_run_disabled_tests --gtest_filter=Repeatability.DISABLED_PrintsAHash";
     std::FILE* pipe = popen(command.c_str(), "r");
     std::string output;
     std::array<char, 4096> block;
     while (const std::size_t count = std::fread(block.data(), 1, block.size(), pipe))
         output.append(block.data(), count);
-    EXPECT_EQ(pclose(pipe), 0);
+    return {output, pclose(pipe)};
+}
+
+std::string hash_in(const std::string& output) {
     const std::size_t start = output.find("hash=");
     return start == std::string::npos ? "" : output.substr(start, output.find('\n', start) - start);
+}
+
+std::string hash_with_threads(int threads) {
+    const auto [output, status] = printed_with("LP_NUM_THREADS=" + std::to_string(threads));
+    EXPECT_EQ(status, 0) << output;
+    return hash_in(output);
 }
 
 TEST(Repeatability, NoOneOrTwoRasteriserThreadsGiveTheSameBytes) {
@@ -84,6 +94,22 @@ TEST(Repeatability, NoOneOrTwoRasteriserThreadsGiveTheSameBytes) {
     EXPECT_NE(none, "");
     EXPECT_EQ(hash_with_threads(1), none);
     EXPECT_EQ(hash_with_threads(2), none);
+}
+
+TEST(Repeatability, EglGivesTheSameBytesAsOsmesaWhereBothDrawInSoftware) {
+    const auto [output, status] = printed_with("MUSICWORLD_GL=egl");
+    ASSERT_EQ(status, 0) << output;
+    EXPECT_NE(output.find("version=EGL, OpenGL"), std::string::npos) << output;
+    EXPECT_NE(hash_in(output), "");
+    if (output.find("llvmpipe") == std::string::npos) GTEST_SKIP() << "EGL draws with another renderer";
+    EXPECT_EQ(hash_in(output), hash_in(printed_with("MUSICWORLD_GL=osmesa").first));
+}
+
+TEST(Repeatability, AnUnknownBackEndIsRefusedAndNamed) {
+    const auto [output, status] = printed_with("MUSICWORLD_GL=glx");
+    EXPECT_NE(status, 0);
+    EXPECT_NE(output.find("MUSICWORLD_GL: error: found \"glx\", expected osmesa or egl"), std::string::npos)
+        << output;
 }
 
 }  // namespace

@@ -179,8 +179,9 @@ void add_draw(Command& kit) {
     command.required("KIT", o->kit, as::text("KIT"), "Kit: a file, or the name of a bundled one");
     command.required("--out", o->out, as::text("FILE"), "Picture to write (PNG)");
     command.option("--size", o->size, as::pixels(16, 8192), "Its size");
-    command.option("--camera", o->camera, camera_format(),
-                   "Where it is seen from; default: the kit's camera");
+    command.option(
+        "--camera", o->camera, camera_format(),
+        "Where it is seen from; default: the kit's camera, else all of it from the drummer's side");
     command.runs([o] { draw_kit(*o); });
 }
 

@@ -138,8 +138,9 @@ CLI::Option* add_play_options(Command& command, PlayOptions& o) {
     command.option<Eigen::Vector2i>(
         "--size", as::pixels(16, 8192), "Size of the frames",
         [&o](const Eigen::Vector2i& size) { o.width = size.x(), o.height = size.y(); }, "640x480");
-    command.option("--camera", o.camera, camera_format(),
-                   "Where pictures are seen from; default: the kit's camera");
+    command.option(
+        "--camera", o.camera, camera_format(),
+        "Where pictures are seen from; default: the kit's camera, else all of it from the drummer's side");
     const auto predictor = as::text("PREDICTOR", check_specification);
     CLI::Option* both = command.option<std::string>(
         "--predictor", predictor, "Predictor of pictures and sound",

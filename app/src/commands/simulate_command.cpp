@@ -106,8 +106,9 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
     command.option<Eigen::Vector2i>(
         "--size", as::pixels(16, 8192), "Size of the frames",
         [o = o.get()](const Eigen::Vector2i& size) { o->width = size.x(), o->height = size.y(); }, "640x480");
-    command.option("--camera", o->camera, camera_format(),
-                   "Where pictures are seen from; default: the scene's camera");
+    command.option(
+        "--camera", o->camera, camera_format(),
+        "Where pictures are seen from; default: the scene's camera, else all bodies from the drummer's side");
     command.option("--video", o->video, as::text("FILE"),
                    "Make a video (MP4); without --frames its frames are not kept");
     command.option("--checkpoint", o->checkpoint, as::whole(0, 1'000'000'000, "steps"),

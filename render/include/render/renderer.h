@@ -11,7 +11,7 @@ struct DrawTimes {
     std::chrono::steady_clock::time_point drawn, read;
 };
 
-/// Draws a scene off screen with OSMesa. Owns the one context of its thread: construct, use and destroy it on
+/// Draws a scene off screen, with OSMesa, or with EGL where the environment variable MUSICWORLD_GL is egl. Owns the one context of its thread: construct, use and destroy it on
 /// one thread. Throws std::runtime_error ("FILE: error: found ..., expected ...") for a mesh that is missing,
 /// malformed or too large, and if no context can be made.
 class Renderer {
