@@ -311,7 +311,7 @@ private:
             }
             if (alone) return result;
         }
-        check_removals(key);
+        if (key.table->below != Below::nothing) check_removals(key);
         return result;
     }
     [[nodiscard]] const toml::array& array_at(const TableKey& key, const toml::node& node) const {

@@ -27,6 +27,8 @@ void write_named_files() {
     const auto put = [&](const char* name) { std::filesystem::rename(folder / own, folder / name); };
     (void)audio::write_wav(folder / own, std::vector<float>(64, 0.5F));
     put("snare.wav");
+    (void)audio::write_wav(folder / own, std::vector<float>(64, 0.5F));
+    put("hall.wav");
     std::ofstream(folder / own) << ";@ gong frequency_hz 100 20 2000 pitch [Hz]\n";
     put("mine.orc");
     std::ofstream(folder / own) << "[[instrument]]\nname = \"C5\"\nkind = \"bell\"\n";
@@ -76,7 +78,8 @@ TEST(KitSchema, WhatItRequiresTheReaderRequires) {
     for (const std::string kind : {"drum", "cymbal", "bell", "string"})
         for (const char* key : {"", "/size", "/position"}) needed.push_back("/defaults/" + kind + key);
     // What the file removes is in what it includes; an instrument that changes an included one leaves its kind to it.
-    for (const char* key : {"/defaults", "/instrument", "/include", "/instrument/0/kind"})
+    // An instrument names its bus.
+    for (const char* key : {"/defaults", "/instrument", "/include", "/instrument/0/kind", "/bus"})
         needed.push_back(key);
     EXPECT_GT(expect_required_keys_are_the_readers(kit_case(), needed), 250);
 }

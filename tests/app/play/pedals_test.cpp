@@ -60,7 +60,7 @@ TEST(Pedals, ASlowFallMakesASofterSoundAndAVerySlowOneNone) {
         return 0.0;
     };
     EXPECT_NEAR(chick(0.06), 0.03 / 0.06, 0.1);  // its beginning is known to a step
-    EXPECT_NEAR(chick(0.1), 0.03 / 0.1, 0.03);
+    EXPECT_NEAR(chick(0.1), 0.03 / 0.1, 0.04);
     EXPECT_EQ(chick(0.5), 0);
 }
 
