@@ -21,9 +21,9 @@ std::vector<std::string> frames(app::QualityRule& rule, double from_s, int count
 }
 
 TEST(PictureQuality, BeginsAtTheBestLevelThatFits) {
-    // 1.4 times the trial against 0.6 of a frame.
-    EXPECT_EQ(rule(0.42 * kFrameS).level(), 0u);
-    EXPECT_EQ(rule(0.44 * kFrameS).level(), 1u);
+    // 0.7 times the trial against 0.6 of a frame.
+    EXPECT_EQ(rule(0.85 * kFrameS).level(), 0u);
+    EXPECT_EQ(rule(0.87 * kFrameS).level(), 1u);
     EXPECT_EQ(rule(2 * kFrameS).level(), 3u);  // a fifth of that
     EXPECT_EQ(rule(100 * kFrameS).level(), app::quality_levels().size() - 1);
 }
