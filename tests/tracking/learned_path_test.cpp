@@ -103,7 +103,7 @@ TEST(LearnedPath, EvaluatesTheNetworkThatItsModelStates) {
         StickHistory::Inputs inputs;
         for (float& x : inputs) x = random.uniform() < 0.3 ? 0.0F : static_cast<float>(random.normal());
         PathOutputs outputs;
-        evaluate(model, inputs, outputs);
+        evaluate(model.layers, inputs, outputs);
         Eigen::VectorXd h = inputs.cast<double>();
         for (std::size_t l = 0; l < model.layers.size(); ++l) {
             h = (model.layers[l].weights.cast<double>() * h + model.layers[l].bias.cast<double>()).eval();

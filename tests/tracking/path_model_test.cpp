@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
 
+#include "contact_view.h"
 #include "learned_path.h"
 #include "model_of_random_weights.h"
 #include "mutation.h"
+#include "network_training.h"
 #include "tracking/trace.h"
 
 namespace tracking {
@@ -33,6 +36,34 @@ TEST(PathModel, ComesBackToTheBit) {
         EXPECT_EQ(back.layers[i].weights, model.layers[i].weights);
         EXPECT_EQ(back.layers[i].bias, model.layers[i].bias);
     }
+}
+
+/// With a network of contacts.
+PathModel with_contacts(std::size_t hidden) {
+    PathModel model = model_of_random_weights(hidden, 3);
+    RandomStream random(5);
+    model.contacts =
+        initial_layers(kContactInputs, std::min<std::size_t>(hidden, 64), kContactOutputs, random);
+    return model;
+}
+
+TEST(PathModel, ComesBackWithItsNetworkOfContacts) {
+    const PathModel model = with_contacts(16);
+    const std::string bytes = format_path_model(model);
+    const PathModel back = parse_path_model(bytes, "m.model");
+    EXPECT_EQ(format_path_model(back), bytes);
+    ASSERT_TRUE(back.contacts);
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ((*back.contacts)[i].weights, (*model.contacts)[i].weights);
+    EXPECT_LT(format_path_model(with_contacts(PathModel::kMostHidden)).size(), 196000U);  // and a head
+    for (std::size_t at = 0; at < bytes.size(); at += at < 300 ? 1 : 97) {
+        std::string changed = bytes;
+        changed[at] = static_cast<char>(changed[at] ^ 0x20);
+        EXPECT_TRUE(message_of(changed).starts_with("m.model:")) << at;
+        EXPECT_TRUE(message_of(bytes.substr(0, at)).starts_with("m.model:")) << at;
+    }
+    std::string other = bytes;
+    other.replace(other.find("contacts: 106"), 13, "contacts: 107");
+    EXPECT_NE(message_of(other).find("expected sizes 106 N N 19"), std::string::npos) << message_of(other);
 }
 
 TEST(PathModel, OfTheGreatestSizeTakesLessThan200kB) {

@@ -9,34 +9,16 @@
 namespace tracking {
 namespace {
 
-using Hidden = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, static_cast<int>(PathModel::kMostHidden), 1>;
-
 /// Before the first lead the spread is that of the first, in proportion to the lead down to this part of it.
 constexpr double kLeastShare = 0.2;
 // exp() of what a network says stays within what a stick can do.
 constexpr double kLeastLogSpread = -12, kMostLogSpread = 2, kMostRegression = 20;
-
-void leaky(Hidden& h) {
-    h = h.cwiseMax(kLeak * h);
-}
 
 double lead_of(std::size_t node) {
     return node == 0 ? 0 : kPathLeads[node - 1];
 }
 
 }  // namespace
-
-void evaluate(const PathModel& model, const StickHistory::Inputs& inputs, PathOutputs& outputs) noexcept {
-    const auto& [first, second, last] = model.layers;
-    Hidden h1 = first.bias;
-    h1.noalias() += first.weights * inputs;
-    leaky(h1);
-    Hidden h2 = second.bias;
-    h2.noalias() += second.weights * h1;
-    leaky(h2);
-    outputs = last.bias;
-    outputs.noalias() += last.weights * h2;
-}
 
 Eigen::Vector3d ErrorShape::whitened(const Eigen::Vector3d& e) const noexcept {
     const Eigen::Vector3d w(e[0], e[1] + regression[0] * e[0],
@@ -158,7 +140,7 @@ SampleStatus Learned::correct(const PoseSample& sample) noexcept {
     if (history_.held() > 1) {
         StickHistory::Inputs inputs;
         frame = history_.look(inputs);
-        evaluate(*model_, inputs, outputs);
+        evaluate(model_->layers, inputs, outputs);
     } else {
         frame.position = sample.position;
     }

@@ -38,10 +38,22 @@ struct ErrorShape {
 [[nodiscard]] ErrorShape shape_of(const Eigen::Ref<const Eigen::VectorXf>& outputs,
                                   std::size_t lead) noexcept;
 
-/// Allocates nothing. One product after the other in a fixed order.
-void evaluate(const PathModel& model, const StickHistory::Inputs& inputs, PathOutputs& outputs) noexcept;
 /// The slope of f left of zero.
 inline constexpr float kLeak = 0.1F;
+/// A network's answer. Allocates nothing. One product after the other in a fixed order.
+template <class Inputs, class Outputs>
+void evaluate(const PathModel::Layers& layers, const Inputs& inputs, Outputs& outputs) noexcept {
+    using Hidden = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, static_cast<int>(PathModel::kMostHidden), 1>;
+    const auto& [first, second, last] = layers;
+    Hidden h1 = first.bias;
+    h1.noalias() += first.weights * inputs;
+    h1 = h1.cwiseMax(kLeak * h1);
+    Hidden h2 = second.bias;
+    h2.noalias() += second.weights * h1;
+    h2 = h2.cwiseMax(kLeak * h2);
+    outputs = last.bias;
+    outputs.noalias() += last.weights * h2;
+}
 
 /// The path of one stick as a network answers it: position and direction of the shaft at any lead.
 ///

@@ -8,6 +8,7 @@
 #include <span>
 #include <stdexcept>
 
+#include "contact_view.h"
 #include "learned_path.h"
 #include "text_cursor.h"
 #include "tracking/input.h"
@@ -19,7 +20,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "the file's floats are copied");
 
 constexpr std::string_view kTitle = "MusicWorld path model ";
-constexpr std::string_view kSizes = "sizes: ", kChecksum = "checksum: ";
+constexpr std::string_view kSizes = "sizes: ", kContacts = "contacts: ", kChecksum = "checksum: ";
 constexpr std::size_t kLongestHead = 1 << 20;
 constexpr float kGreatestWeight = 1e6F;
 constexpr const char* kRemedy = "make it again with `musicworld train`";
@@ -41,17 +42,21 @@ std::string checksum_line(std::uint64_t number) {
     return line;
 }
 
-template <class Layers, class Take>
-void for_each_block(Layers& layers, const Take& take) {
-    for (auto& layer : layers) {
-        take(std::span(layer.weights.data(), static_cast<std::size_t>(layer.weights.size())));
-        take(std::span(layer.bias.data(), static_cast<std::size_t>(layer.bias.size())));
-    }
+template <class Model, class Take>
+void for_each_block(Model& model, const Take& take) {
+    const auto take_layers = [&](auto& layers) {
+        for (auto& layer : layers) {
+            take(std::span(layer.weights.data(), static_cast<std::size_t>(layer.weights.size())));
+            take(std::span(layer.bias.data(), static_cast<std::size_t>(layer.bias.size())));
+        }
+    };
+    take_layers(model.layers);
+    if (model.contacts) take_layers(*model.contacts);
 }
 
-std::string sizes_of(const PathModel& model) {
-    std::string text = std::to_string(model.layers[0].weights.cols());
-    for (const PathModel::Layer& layer : model.layers)
+std::string sizes_of(const PathModel::Layers& layers) {
+    std::string text = std::to_string(layers[0].weights.cols());
+    for (const PathModel::Layer& layer : layers)
         text.append(1, ' ').append(std::to_string(layer.weights.rows()));
     return text;
 }
@@ -60,30 +65,35 @@ bool is_word(std::string_view text) {
     return !text.empty() && text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == text.npos;
 }
 
-/// INPUTS HIDDEN1 HIDDEN2 OUTPUTS.
-std::array<std::size_t, 4> parse_sizes(const Line& line) {
-    const std::string expected = "sizes " + std::to_string(StickHistory::kInputs) + " N N " +
-                                 std::to_string(kPathOutputs) + " with N from " +
-                                 std::to_string(PathModel::kLeastHidden) + " to " +
+/// INPUTS HIDDEN1 HIDDEN2 OUTPUTS behind a key: layers of these sizes, still without weights.
+PathModel::Layers parse_sizes(const Line& line, std::string_view key, std::size_t inputs,
+                              std::size_t outputs) {
+    const std::string expected = "sizes " + std::to_string(inputs) + " N N " + std::to_string(outputs) +
+                                 " with N from " + std::to_string(PathModel::kLeastHidden) + " to " +
                                  std::to_string(PathModel::kMostHidden);
     std::array<std::size_t, 4> sizes{};
-    const std::string_view text = line.text().substr(kSizes.size());
+    const std::string_view text = line.text().substr(key.size());
     const char* at = text.data();
     const char* const end = at + text.size();
     for (std::size_t i = 0; i < sizes.size(); ++i) {
         const auto [stop, failed] = std::from_chars(at, end, sizes[i]);
         const bool last = i + 1 == sizes.size();
         if (failed != std::errc() || (last ? stop != end : stop == end || *stop != ' '))
-            line.fail(kSizes.size(), in_quotes(text), expected, kRemedy);
+            line.fail(key.size(), in_quotes(text), expected, kRemedy);
         at = last ? stop : stop + 1;
     }
     const auto within = [](std::size_t n) {
         return n >= PathModel::kLeastHidden && n <= PathModel::kMostHidden;
     };
-    if (sizes[0] != StickHistory::kInputs || sizes[3] != kPathOutputs || !within(sizes[1]) ||
-        !within(sizes[2]))
-        line.fail(kSizes.size(), in_quotes(text), expected, kRemedy);
-    return sizes;
+    if (sizes[0] != inputs || sizes[3] != outputs || !within(sizes[1]) || !within(sizes[2]))
+        line.fail(key.size(), in_quotes(text), expected, kRemedy);
+    PathModel::Layers layers;
+    for (std::size_t i = 0; i < layers.size(); ++i) {
+        layers[i].weights.resize(static_cast<Eigen::Index>(sizes[i + 1]),
+                                 static_cast<Eigen::Index>(sizes[i]));
+        layers[i].bias.resize(static_cast<Eigen::Index>(sizes[i + 1]));
+    }
+    return layers;
 }
 
 [[noreturn]] void fail_at(const std::string& name, std::size_t byte, const std::string& found,
@@ -96,8 +106,9 @@ std::string head_of(const Provenance& provenance) {
     std::string head = titled() + "\n";
     for (const auto& [key, value] : provenance) {
         const std::string line = key + ": " + value;
-        if (!is_word(key) || line.starts_with(kSizes) || line.starts_with(kChecksum) ||
-            first_unprintable(value) != value.npos || head.size() + line.size() > kLongestHead / 2)
+        if (!is_word(key) || line.starts_with(kSizes) || line.starts_with(kContacts) ||
+            line.starts_with(kChecksum) || first_unprintable(value) != value.npos ||
+            head.size() + line.size() > kLongestHead / 2)
             throw std::invalid_argument("path model: found provenance " + in_quotes(line) +
                                         ", expected a word and one short line of text");
         head += line + "\n";
@@ -113,9 +124,10 @@ void check_provenance(const Provenance& provenance) {
 
 std::string format_path_model(const PathModel& model) {
     std::string head = head_of(model.provenance);
-    head += std::string(kSizes) + sizes_of(model) + "\n";
+    head += std::string(kSizes) + sizes_of(model.layers) + "\n";
+    if (model.contacts) head += std::string(kContacts) + sizes_of(*model.contacts) + "\n";
     std::string weights;
-    for_each_block(model.layers, [&](std::span<const float> block) {
+    for_each_block(model, [&](std::span<const float> block) {
         weights.append(reinterpret_cast<const char*>(block.data()), block.size_bytes());
     });
     return head.append(checksum_line(hash(weights, hash(head)))).append("\n\n").append(weights);
@@ -137,37 +149,41 @@ PathModel parse_path_model(std::string_view bytes, const std::string& name) {
         const Line line = lines.next();
         line.require_text();
         if (line.text().starts_with(kSizes)) {
-            const std::array<std::size_t, 4> sizes = parse_sizes(line);
-            for (std::size_t i = 0; i < model.layers.size(); ++i) {
-                model.layers[i].weights.resize(static_cast<Eigen::Index>(sizes[i + 1]),
-                                               static_cast<Eigen::Index>(sizes[i]));
-                model.layers[i].bias.resize(static_cast<Eigen::Index>(sizes[i + 1]));
-            }
+            model.layers = parse_sizes(line, kSizes, StickHistory::kInputs, kPathOutputs);
             break;
         }
         if (line.text().starts_with(kChecksum))
             line.fail(0, in_quotes(line.text()), "the line \"sizes: ...\" before the checksum", kRemedy);
+        if (line.text().starts_with(kContacts))
+            line.fail(0, in_quotes(line.text()), "the line \"sizes: ...\" before that of contacts", kRemedy);
         const std::size_t colon = line.text().find(": ");
         if (colon == line.text().npos || !is_word(line.text().substr(0, colon)))
             line.fail(0, in_quotes(line.text()), "\"key: value\"", kRemedy);
         model.provenance.emplace_back(line.text().substr(0, colon), line.text().substr(colon + 2));
     }
+    std::optional<Line> sum;
+    if (!lines.at_end()) sum = lines.next();
+    if (sum && sum->text().starts_with(kContacts)) {
+        sum->require_text();
+        model.contacts = parse_sizes(*sum, kContacts, kContactInputs, kContactOutputs);
+        sum.reset();
+        if (!lines.at_end()) sum = lines.next();
+    }
     std::size_t expected = 0;
-    for_each_block(model.layers, [&](std::span<float> block) { expected += block.size_bytes(); });
+    for_each_block(model, [&](std::span<float> block) { expected += block.size_bytes(); });
     if (weights.size() != expected)
         fail_at(name, end + 2, std::to_string(weights.size()) + " bytes of weights",
                 std::to_string(expected) + " for these sizes");
     const std::string_view before = bytes.substr(0, bytes.find("\nchecksum: ") + 1);
-    if (lines.at_end()) fail_at(name, end, "no checksum", "the line \"checksum: ...\" after the sizes");
-    const Line sum = lines.next();
+    if (!sum) fail_at(name, end, "no checksum", "the line \"checksum: ...\" after the sizes");
     const std::string right = checksum_line(hash(weights, hash(before)));
-    if (sum.text() != right) sum.fail(0, in_quotes(sum.text()), in_quotes(right), kRemedy);
+    if (sum->text() != right) sum->fail(0, in_quotes(sum->text()), in_quotes(right), kRemedy);
     if (!lines.at_end()) {
         const Line more = lines.next();
         more.fail(0, in_quotes(more.text()), "an empty line", kRemedy);
     }
     std::size_t at = 0;
-    for_each_block(model.layers, [&](std::span<float> block) {
+    for_each_block(model, [&](std::span<float> block) {
         std::memcpy(block.data(), weights.data() + at, block.size_bytes());
         for (std::size_t i = 0; i < block.size(); ++i)
             if (!(std::abs(block[i]) <= kGreatestWeight))

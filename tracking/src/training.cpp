@@ -9,6 +9,7 @@
 #include <string>
 #include <tuple>
 
+#include "contact_training.h"
 #include "learned_path.h"
 #include "network_training.h"
 #include "training_examples.h"
@@ -416,6 +417,15 @@ TrainingResult train_path_model(std::span<const TrainingStick> sticks, const Tra
     calibrate(result.model.layers, held_out);
     result.scores = scores_of(result.model.layers, held_out);
     scaling.fold_into(result.model.layers[0]);
+    learning = {};
+    held_out = {};
+    if (std::optional<LearnedContacts> contacts = train_contacts(sticks, options)) {
+        result.model.contacts = std::move(contacts->layers);
+        result.contact_examples = contacts->examples;
+        result.contact_steps = contacts->steps;
+        result.contact_loss = contacts->loss;
+        result.contact_loss_of_shares = contacts->loss_of_shares;
+    }
     return result;
 }
 

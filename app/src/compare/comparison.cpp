@@ -150,7 +150,7 @@ std::size_t least_smoothed(std::span<const double, kAdvances> loss) {
 /// Learns by how much the contacts of an entrant come earlier: by what costs least (HitScore::loss) at a lead.
 class AdvanceLosses {
 public:
-    /// Of `auto`, the one entrant that learns; it runs the same on every recording.
+    /// Of `auto`, which runs the same on every recording.
     AdvanceLosses(const Field& field, const Entrant& entrant, const ComparisonOptions& options)
         : field_(field), leads_(options.leads_s.size()), losses_(field.sticks.size() * leads_) {
         parallel_for(losses_.size(), options.threads, [&](std::size_t i) {
@@ -251,12 +251,12 @@ std::vector<ComparisonRow> score_entrants(const Field& field, const Field& tunin
                                           const std::vector<Entrant>& entrants,
                                           const ComparisonOptions& options) {
     const Field& others = tuning.recordings.empty() ? field : tuning;
-    const auto learner =
-        std::ranges::find_if(entrants, [](const Entrant& e) { return !e.strikes_by.empty(); });
-    std::optional<AdvanceLosses> losses;
-    if (learner != entrants.end() && options.tuning && options.surface.kind != StrikeSurface::Kind::none &&
+    std::map<std::string, AdvanceLosses> losses;
+    if (options.tuning && options.surface.kind != StrikeSurface::Kind::none &&
         (!tuning.recordings.empty() || field.recordings.size() > 1))
-        losses.emplace(others, *learner, options);
+        for (const Entrant& entrant : entrants)
+            if (!entrant.strikes_by.empty())
+                losses.emplace(entrant.name, AdvanceLosses(others, entrant, options));
     std::vector<std::vector<ComparisonRow>> parts(field.sticks.size() * entrants.size());
     std::optional<OrderedFile> file;
     if (options.samples) file.emplace(*options.samples, SampleRows::header());
@@ -266,8 +266,9 @@ std::vector<ComparisonRow> score_entrants(const Field& field, const Field& tunin
         const Recording& recording = field.recordings[stick.recording];
         std::optional<SampleRows> samples;
         if (file) samples.emplace(stick, recording.trace.file, recording.person, entrant->name);
-        parts[i] = rows_of(*entrant, field, stick, entrant == learner && losses ? &*losses : nullptr, options,
-                           samples ? &*samples : nullptr);
+        const auto learned = losses.find(entrant->name);
+        parts[i] = rows_of(*entrant, field, stick, learned != losses.end() ? &learned->second : nullptr,
+                           options, samples ? &*samples : nullptr);
         if (file) file->add(i, samples->take());
     };
     parallel_for(parts.size(), options.threads, score, options.progress);

@@ -106,6 +106,7 @@ struct ComparisonOptions {
     std::vector<std::string> traces, predictors, tune_traces;
     std::vector<std::string> transfer;   ///< persons or traces to train a network on, and to tune on
     tracking::TrainingOptions training;  ///< of that network
+    double false_cost = 1;               ///< of a false sound; that of a missed strike is 1 (StrikeDecision)
     std::vector<std::pair<std::string, std::string>> predictions;  ///< name, file in `predict`'s format
     PersonNames persons;
     std::vector<double> leads_s;

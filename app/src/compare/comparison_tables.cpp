@@ -60,6 +60,10 @@ Figures scores_of(const PredictorScore& score) {
             {"hits/f1:.3f", hits(&HitScore::f1)},
             {"hits/median_ms:.1f", hits(&HitScore::median_ms)},
             {"hits/p95_ms:.1f", hits(&HitScore::p95_ms)},
+            {"hits/speed_percent:.0f", hits(&HitScore::speed_percent)},
+            {"hits/speed_db:.1f", hits(&HitScore::speed_db)},
+            {"hits/speed_bias_db:+.1f", hits(&HitScore::speed_bias_db)},
+            {"hits/place_mm:.1f", hits(&HitScore::place_mm)},
             {"hits/false_per_min:.2f", hits(&HitScore::false_per_min)},
             {"hits/false_per_min_without_cancel:.2f", hits(&HitScore::false_per_min_without_cancel)}};
 }
@@ -130,6 +134,10 @@ constexpr std::pair<std::string_view, const char*> kMeanings[] = {
     {"hits/f1", "2 matched / (true + predicted)"},
     {"hits/median_ms", "half of the matched strikes err by less, in time"},
     {"hits/p95_ms", "95 % of them do"},
+    {"hits/speed_percent", "half of them err by less, in the speed normal to the surface"},
+    {"hits/speed_db", "the same in decibels"},
+    {"hits/speed_bias_db", "median of predicted over true speed; positive: too loud"},
+    {"hits/place_mm", "half of them err by less, in place along the surface"},
     {"hits/false_per_min", "predicted and not matched, a minute"},
     {"hits/false_per_min_without_cancel", "likewise if nothing were cancelled"},
     {"hits/advance_low_ms", "contacts were taken to come earlier by this, at least"},
@@ -281,8 +289,9 @@ Table error_table(const Comparison& comparison, double lead_s) {
 Table strike_table(const Comparison& comparison, double lead_s) {
     return table_at(comparison.summaries, lead_s)
         .part({"predictor", "hits/true", "hits/predicted", "hits/matched", "hits/precision", "hits/recall",
-               "hits/f1", "hits/median_ms", "hits/p95_ms", "hits/false_per_min",
-               "hits/false_per_min_without_cancel", "hits/advance_low_ms", "hits/advance_high_ms"});
+               "hits/f1", "hits/median_ms", "hits/p95_ms", "hits/speed_db", "hits/place_mm",
+               "hits/false_per_min", "hits/false_per_min_without_cancel", "hits/advance_low_ms",
+               "hits/advance_high_ms"});
 }
 
 Table calibration_table(const Comparison& comparison, double lead_s) {

@@ -68,10 +68,11 @@ constexpr const char* kParabola = "least-squares:degree=2,n=4";
 
 std::string description_of(const std::string& specification) {
     if (is_auto(specification))
-        return fmt::format("{}{} draws (errors), {} strikes, {} confirms",
-                           specification == "auto" ? "the program's default: " : "",
-                           picture_specification(specification), sound_specification(specification),
-                           confirming_specification(specification));
+        return fmt::format(
+            "{}{} draws (errors), {} strikes, {}", specification == "auto" ? "the program's default: " : "",
+            picture_specification(specification), sound_specification(specification),
+            contact_model(specification) ? "a network of contacts decides"
+                                         : confirming_specification(specification) + " confirms");
     if (is_external(specification)) return "a child process; its cost is not measured";
     if (specification == "naive") return "baseline: the moving average of 1992, 67 ms";
     if (specification == kParabola) return "baseline: the parabola through four samples";
@@ -86,6 +87,7 @@ Entrant named(const std::string& specification, const Field& scored, const Compa
         std::vector<std::string>(options.leads_s.size(), picture_specification(specification)));
     entrant.strikes_by = is_auto(specification) ? sound_specification(specification) : "";
     entrant.confirmed_by = confirming_specification(specification);
+    entrant.contacts = contact_model(specification);
     return entrant;
 }
 
@@ -333,7 +335,10 @@ HitScore strikes_of(const Entrant& entrant, const Field& field, const SensedStic
     if (!entrant.confirmed_by.empty())
         confirming =
             make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), {stick.name, stick.shaft});
-    return evaluate_strikes(recording.tracks[stick.stick], stick.samples, {*predictor, confirming.get()},
+    std::optional<StrikeDecision> decision;
+    if (entrant.contacts) decision.emplace(entrant.contacts, options.false_cost);
+    return evaluate_strikes(recording.tracks[stick.stick], stick.samples,
+                            {*predictor, confirming.get(), decision ? &*decision : nullptr},
                             recording.geometry, options.surface, timing);
 }
 

@@ -31,12 +31,16 @@ struct Surface {
     std::size_t parts;
     std::function<std::vector<sim::Contact>(const sim::TipPath&)> sweep;    ///< contacts of a path by time
     std::function<std::vector<double>(const Eigen::Vector3d&)> clearances;  ///< of a tip, signed [m]
+    StrikeDecision::Nearest nearest;                                        ///< of a part, at rest
     std::function<std::vector<TrueContact>(const TipTrack&)> true_contacts;
 };
 
 Surface plane_at(double height_m) {
     return {1, [=](const sim::TipPath& path) { return plane_contacts(path, height_m); },
             [=](const Eigen::Vector3d& tip) { return std::vector{tip.y() - height_m}; },
+            [=](std::size_t, const Eigen::Vector3d& tip) {
+                return sim::SurfacePoint{tip.y() - height_m, Eigen::Vector3d::UnitY()};
+            },
             [=](const TipTrack& track) { return find_plane_contacts(track, height_m); }};
 }
 
@@ -56,7 +60,10 @@ Surface surface_of(const Kit& kit, double tip_radius_m) {
             all.push_back(sim::rest_distance(body, tip, tip_radius_m).distance);
         return all;
     };
-    return {bodies.size(), sweep, clearances, [=](const TipTrack& track) {
+    const auto nearest = [=](std::size_t body, const Eigen::Vector3d& tip) {
+        return sim::rest_distance(bodies[body], tip, tip_radius_m);
+    };
+    return {bodies.size(), sweep, clearances, nearest, [=](const TipTrack& track) {
                 return find_true_contacts({&track, 1}, bodies, tip_radius_m);
             }};
 }
@@ -92,9 +99,12 @@ HitScore score_of(const std::vector<Strike>& strikes, std::vector<TrueContact>& 
     HitScore hits;
     hits.true_contacts = score.true_contacts;
     hits.predicted = score.released;
-    for (const TrueContact& contact : contacts)
-        if (contact.matched_id != 0)
-            hits.errors_ms.push_back(1e3 * (strikes[contact.matched_id - 1].onset_s - contact.t_s));
+    for (const TrueContact& contact : contacts) {
+        if (contact.matched_id == 0) continue;
+        const Strike& strike = strikes[contact.matched_id - 1];
+        hits.errors_ms.push_back(1e3 * (strike.onset_s - contact.t_s));
+        if (const auto dynamics = dynamics_of(strike, contact)) hits.dynamics.push_back(*dynamics);
+    }
     hits.matched = static_cast<int>(hits.errors_ms.size());
     return hits;
 }
@@ -131,6 +141,54 @@ Expected expected_of(const tracking::Predictor& predictor, std::size_t model, co
         if (!contact.starts_inside) contact.t_s = std::max(now_s, contact.t_s - timing.advance_s);
     return expected;
 }
+
+/// What a decision makes of a sample: contacts that are kept in mind, and those that sound.
+struct Decided {
+    Expected all, sounding;
+};
+
+/// Follows the tip for a decision.
+class DecidedStrikes {
+public:
+    DecidedStrikes(const StrikeDecision& decision, const Surface& surface, const StickGeometry& geometry,
+                   const StrikeTiming& timing)
+        : decision_(decision),
+          surface_(surface),
+          geometry_(geometry),
+          timing_(timing),
+          history_(geometry.shaft, geometry.tip) {}
+
+    /// After a sample that `predictor` took.
+    [[nodiscard]] Decided after(const tracking::PoseSample& sample, bool anew,
+                                const tracking::Predictor& predictor, std::span<const double> measured) {
+        if (anew) history_.restart();
+        const double interval_s = anew ? 0 : sample.t_s - newest_s_;
+        newest_s_ = sample.t_s;
+        history_.push(sample);
+        Decided decided{{{}, {measured.begin(), measured.end()}}, {{}, {measured.begin(), measured.end()}}};
+        const auto path = predicted_path([&](double lead_s) { return predictor.predict(lead_s); },
+                                         predictor.time_s(), geometry_, 0, strike_leads(timing_));
+        if (!path || !history_.look(view_)) return decided;
+        const auto expected = decision_.after(view_, *path, {surface_.parts, surface_.nearest},
+                                              std::max(timing_.lead_s, kReleaseMarginS) + kBeyondLeadS,
+                                              interval_s, kReleaseMarginS);
+        if (!expected) return decided;
+        decided.all.contacts = surface_.sweep(expected->path);
+        for (sim::Contact& contact : decided.all.contacts)
+            contact.t_s = std::max(sample.t_s, contact.t_s - timing_.advance_s);
+        if (expected->sounds) decided.sounding = decided.all;
+        return decided;
+    }
+
+private:
+    const StrikeDecision& decision_;
+    const Surface& surface_;
+    const StickGeometry& geometry_;
+    const StrikeTiming& timing_;
+    tracking::TipHistory history_;
+    tracking::TipView view_;
+    double newest_s_ = 0;
+};
 
 }  // namespace
 
@@ -241,6 +299,33 @@ double HitScore::p95_ms() const {
     return quantile(absolute(errors_ms), 0.95);
 }
 
+namespace {
+
+template <class Value>
+double median_of(const std::vector<StrikeDynamics>& dynamics, const Value& value) {
+    std::vector<double> values;
+    for (const StrikeDynamics& each : dynamics) values.push_back(value(each));
+    return median(std::move(values));
+}
+
+}  // namespace
+
+double HitScore::speed_percent() const {
+    return median_of(dynamics, [](const StrikeDynamics& d) { return std::abs(d.speed_percent); });
+}
+
+double HitScore::speed_db() const {
+    return median_of(dynamics, [](const StrikeDynamics& d) { return std::abs(d.speed_db); });
+}
+
+double HitScore::speed_bias_db() const {
+    return median_of(dynamics, [](const StrikeDynamics& d) { return d.speed_db; });
+}
+
+double HitScore::place_mm() const {
+    return median_of(dynamics, [](const StrikeDynamics& d) { return d.place_mm; });
+}
+
 double HitScore::loss() const {
     double sum = true_contacts + predicted - 2 * matched;
     for (const double error : errors_ms) sum += 0.5 * std::abs(error) / (1e3 * kMatchWindow_s);
@@ -254,6 +339,7 @@ void HitScore::add(const HitScore& other) {
     false_without_cancel += other.false_without_cancel;
     minutes += other.minutes;
     errors_ms.insert(errors_ms.end(), other.errors_ms.begin(), other.errors_ms.end());
+    dynamics.insert(dynamics.end(), other.dynamics.begin(), other.dynamics.end());
 }
 
 std::vector<double> strike_leads(const StrikeTiming& timing) {
@@ -271,6 +357,8 @@ HitScore evaluate_strikes(const TipTrack& recorded, std::span<const tracking::Po
     tracking::Predictor* const other = predictors.confirming;
     StrikeScheduler played(rules_at(timing, true, recorded.t_s.front()), 1, surface->parts);
     StrikeScheduler uncancelled(rules_at(timing, false, recorded.t_s.front()), 1, surface->parts);
+    std::optional<DecidedStrikes> deciding;
+    if (predictors.decision) deciding.emplace(*predictors.decision, *surface, geometry, timing);
     for (const tracking::PoseSample& sample : samples) {
         const tracking::SampleStatus status = predictors.timing.correct(sample);
         if (other) (void)other->correct(sample);
@@ -278,19 +366,25 @@ HitScore evaluate_strikes(const TipTrack& recorded, std::span<const tracking::Po
             predictor.require_working();
             continue;
         }
-        std::vector<Expected> all;
-        for (std::size_t model = 0; model < predictor.models(); ++model)
+        const std::vector<double> measured =
+            surface->clearances(sample.position + sample.orientation * geometry.tip);
+        std::vector<Expected> all, confirmed;
+        if (deciding) {
+            Decided decided =
+                deciding->after(sample, status == tracking::SampleStatus::reinitialised, predictor, measured);
+            all.push_back(std::move(decided.all));
+            confirmed.push_back(std::move(decided.sounding));
+        }
+        for (std::size_t model = 0; !deciding && model < predictor.models(); ++model)
             all.push_back(expected_of(predictor, model, *surface, geometry, timing));
-        std::vector<Expected> confirmed = all;
-        if (other) {
+        if (!deciding) confirmed = all;
+        if (other && !deciding) {
             const PoseAfter pose = [&](double lead_s) { return other->predict(lead_s); };
             const std::vector<sim::Contact> confirming =
                 swept(*surface, pose, other->time_s(), geometry, path_leads(kConfirmingLeadS));
             for (Expected& expected : confirmed)
                 keep_confirmed(expected.contacts, confirming, predictor.time_s());
         }
-        const std::vector<double> measured =
-            surface->clearances(sample.position + sample.orientation * geometry.tip);
         for (const auto& [strikes, expected] : {std::pair(&played, &confirmed), {&uncancelled, &all}}) {
             strikes->advance_to(sample.t_s);
             if (status == tracking::SampleStatus::reinitialised) strikes->restart(0);

@@ -13,6 +13,8 @@
 #include "statistics/statistics.h"
 #include "sticks/predictors.h"
 #include "sticks/stick.h"
+#include "strikes/strike_decision.h"
+#include "strikes/true_contacts.h"
 
 namespace app {
 
@@ -77,9 +79,10 @@ struct StrikeSurface {
 /// The strikes that a predictor commits `lead_s` ahead, against the true contacts of the recorded path.
 struct HitScore {
     int true_contacts = 0, predicted = 0, matched = 0;
-    int false_without_cancel = 0;   ///< committed notes without a contact when nothing is cancelled
-    double minutes = 0;             ///< of the recording
-    std::vector<double> errors_ms;  ///< committed minus true time, signed, of the matched notes
+    int false_without_cancel = 0;          ///< committed notes without a contact when nothing is cancelled
+    double minutes = 0;                    ///< of the recording
+    std::vector<double> errors_ms;         ///< committed minus true time, signed, of the matched notes
+    std::vector<StrikeDynamics> dynamics;  ///< likewise, of those whose contact goes inwards
 
     [[nodiscard]] int false_notes() const { return predicted - matched; }
     /// Shares; kNoValue when nothing was predicted, there was nothing to find, or both.
@@ -88,6 +91,11 @@ struct HitScore {
     [[nodiscard]] double f1() const { return share(2 * matched, true_contacts + predicted); }
     [[nodiscard]] double median_ms() const;  ///< of |error|; kNoValue when nothing matched
     [[nodiscard]] double p95_ms() const;
+    /// Medians over the matched notes, of the sizes and, to see a bias, of the ratio itself [dB]; kNoValue likewise.
+    [[nodiscard]] double speed_percent() const;
+    [[nodiscard]] double speed_db() const;
+    [[nodiscard]] double speed_bias_db() const;
+    [[nodiscard]] double place_mm() const;
     [[nodiscard]] double false_per_min() const { return minutes > 0 ? false_notes() / minutes : 0; }
     [[nodiscard]] double false_per_min_without_cancel() const {
         return minutes > 0 ? false_without_cancel / minutes : 0;
@@ -108,6 +116,8 @@ private:
 struct StrikePredictors {
     tracking::Predictor& timing;                ///< whose path is swept
     tracking::Predictor* confirming = nullptr;  ///< must confirm near contacts (keep_confirmed); may be none
+    /// Decides in place of the confirming one; may be none.
+    const StrikeDecision* decision = nullptr;
 };
 
 /// A strike is cancelled until this long before its time.

@@ -14,6 +14,7 @@ tracking::TrainingStick stick_of(const Recording& recording, std::size_t stick, 
     const MarkedTimes& marks = recording.marks[stick];
     return {recording.trace.sticks[stick],
             recording.geometry.shaft,
+            recording.geometry.tip,
             marks.flagged_s,
             marks.flagged_rotations_s,
             number,

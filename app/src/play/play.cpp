@@ -53,8 +53,10 @@ public:
             filters_.emplace_back(predictors, stick.name);
             sticks_.emplace_back(static_cast<std::uint32_t>(sticks_.size()), parts.stick, o.sound_lead_s);
         }
-        pipeline_.emplace(parts.kit, o, t0_s_, parts.stick.radius_m, sticks_, parts.simulation,
-                          [this](const audio::Note& note, bool scheduled) { send(note, scheduled); });
+        pipeline_.emplace(
+            parts.kit, o, t0_s_, parts.stick.radius_m, sticks_, parts.simulation,
+            [this](const audio::Note& note, bool scheduled) { send(note, scheduled); },
+            contact_model(o.sound_predictor));
     }
 
     void run(ProgressBar& bar) {

@@ -41,6 +41,7 @@ struct PlayOptions {
     Shown shown;
     std::string picture_predictor = "auto", sound_predictor = "auto";
     double render_lead_s = 1.0 / 30, sound_lead_s = 1.0 / 15, release_margin_s = 0.010;
+    double false_cost = 1;  ///< of a false sound; that of a missed strike is 1 (StrikeDecision)
     int workers = 1;
     bool cancelling = true, frames = true, audio = true;
     std::optional<std::uint64_t> solo;  ///< render the sound of this strike alone

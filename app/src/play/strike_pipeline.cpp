@@ -80,9 +80,11 @@ std::vector<sim::WeightedImpulse> DrawnStrikes::frame(double T, std::span<const 
 }
 
 StrikePipeline::StrikePipeline(const Kit& kit, const PlayOptions& options, double t0_s, double tip_radius_m,
-                               const std::vector<Stick>& sticks, sim::Simulation& simulation, Notify notify)
+                               const std::vector<Stick>& sticks, sim::Simulation& simulation, Notify notify,
+                               const std::shared_ptr<const tracking::PathModel>& contacts)
     : kit_(kit),
       cancelling_(options.cancelling),
+      release_margin_s_(options.release_margin_s),
       tip_radius_m_(tip_radius_m),
       sticks_(sticks),
       simulation_(simulation),
@@ -91,7 +93,9 @@ StrikePipeline::StrikePipeline(const Kit& kit, const PlayOptions& options, doubl
                   .release_margin_s = options.release_margin_s,
                   .commit_lead_s = options.release_margin_s,
                   .cancelling = options.cancelling},
-                 sticks_.size(), kit.instruments.size()) {}
+                 sticks_.size(), kit.instruments.size()) {
+    if (contacts) decision_.emplace(contacts, options.false_cost);
+}
 
 void StrikePipeline::advance_to(double s, double fixed_s) {
     scheduler_.advance_to(s, fixed_s);
@@ -119,13 +123,33 @@ std::vector<StrikePipeline::StickPaths> StrikePipeline::add_paths(std::span<cons
     for (const std::uint32_t stick : moved) {
         const Stick& known = sticks_[stick];
         StickPaths own{stick, paths.size(), 0, std::nullopt};
-        for (std::size_t model = 0; model < known.state().models; ++model) add(known.predicted_path(model));
+        if (decision_) {
+            StrikeDecision::Path decided = decided_path(known);
+            own.sounds = decided.sounds;
+            add(std::move(decided.path));
+        } else {
+            for (std::size_t model = 0; model < known.state().models; ++model)
+                add(known.predicted_path(model));
+        }
         own.measured = add(known.measured_path());
-        if (std::optional<sim::TipPath> confirming = known.confirming_path())
+        if (std::optional<sim::TipPath> confirming = known.confirming_path(); confirming && !decision_)
             own.confirming = add(std::move(*confirming));
         all.push_back(own);
     }
     return all;
+}
+
+StrikeDecision::Path StrikePipeline::decided_path(const Stick& stick) const {
+    const StrikeDecision::Surfaces surfaces{
+        kit_.instruments.size(), [this](std::size_t instrument, const Eigen::Vector3d& tip) {
+            return sim::rest_distance(kit_.instruments[instrument].body, tip, tip_radius_m_);
+        }};
+    tracking::TipView view;
+    std::optional<StrikeDecision::Path> decided;
+    if (stick.look(view))
+        decided = decision_->after(view, stick.predicted_path(0), surfaces, stick.sound_lead_s(),
+                                   stick.interval_s(), release_margin_s_);
+    return decided.value_or(StrikeDecision::Path{stick.measured_path(), true});
 }
 
 void StrikePipeline::settle_impulses(double s, sim::StepRequest& request) {
@@ -186,6 +210,7 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
         contacts.push_back(contacts_of(path));
         if (paths.confirming && cancelling_)
             keep_confirmed(contacts.back(), contacts_of(*paths.confirming), s);
+        if (!paths.sounds && cancelling_) contacts.back().clear();
     }
     std::vector<ModelContacts> expected;
     for (std::size_t model = 0; model < contacts.size(); ++model)

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <set>
 #include <span>
@@ -14,6 +15,7 @@
 #include "process/clock.h"
 #include "sticks/stick.h"
 #include "strikes/strike.h"
+#include "strikes/strike_decision.h"
 #include "strikes/strike_scheduler.h"
 
 namespace app {
@@ -95,9 +97,11 @@ public:
     using Notify = std::function<void(const audio::Note& note, bool scheduled)>;
 
     /// The strikes follow the margin and the cancelling of the options; t0_s is audio sample 0. `simulation`
-    /// begins anew with the first step; `sticks` are kept up to date by the caller.
+    /// begins anew with the first step; `sticks` are kept up to date by the caller. `contacts`: the model that
+    /// decides the strikes (contact_model()); may be none.
     StrikePipeline(const Kit& kit, const PlayOptions& options, double t0_s, double tip_radius_m,
-                   const std::vector<Stick>& sticks, sim::Simulation& simulation, Notify notify);
+                   const std::vector<Stick>& sticks, sim::Simulation& simulation, Notify notify,
+                   const std::shared_ptr<const tracking::PathModel>& contacts = {});
 
     /// Before the samples at s (StrikeScheduler::advance_to).
     void advance_to(double s, double fixed_s = -std::numeric_limits<double>::infinity());
@@ -124,9 +128,12 @@ private:
         std::size_t predicted;                  ///< the first of the models' paths, which follow each other
         std::size_t measured;                   ///< stands still: makes no contact but by starting inside
         std::optional<std::size_t> confirming;  ///< where a second filter confirms
+        bool sounds = true;                     ///< the contacts of the predicted paths
     };
     [[nodiscard]] std::vector<StickPaths> add_paths(std::span<const std::uint32_t> moved,
                                                     std::vector<sim::TipPath>& paths) const;
+    /// The path of a stick whose strikes are decided by a network; it stands still where none is expected.
+    [[nodiscard]] StrikeDecision::Path decided_path(const Stick& stick) const;
     void take_contacts(double s, const StickPaths& paths, const sim::StepReply& reply);
     [[nodiscard]] std::vector<double> measured_clearance(const StickPaths& paths,
                                                          const sim::StepReply& reply) const;
@@ -138,10 +145,11 @@ private:
 
     const Kit& kit_;
     bool cancelling_;
-    double tip_radius_m_;
+    double release_margin_s_, tip_radius_m_;
     const std::vector<Stick>& sticks_;
     sim::Simulation& simulation_;
     Notify notify_;
+    std::optional<StrikeDecision> decision_;
     StrikeScheduler scheduler_;
     DrawnStrikes drawn_;
     std::vector<std::uint64_t> unfolded_;  // released strikes whose impulses lie ahead

@@ -88,7 +88,7 @@ void RealtimeRun::begin_lap(std::uint64_t lap) {
     pedals_.rest(static_cast<std::int64_t>(lap) * session_.period_samples);
     pipeline_ = std::make_unique<StrikePipeline>(
         session_.kit, options_.play, t0_s_, session_.stick.radius_m, sticks_, *session_.simulation,
-        [this](const audio::Note& note, bool scheduled) { send(note, scheduled); });
+        [this](const audio::Note& note, bool scheduled) { send(note, scheduled); }, session_.contacts);
 }
 
 void RealtimeRun::send(audio::Note note, bool scheduled) {

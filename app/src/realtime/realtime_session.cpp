@@ -10,6 +10,7 @@
 #include "process/clock.h"
 #include "process/thread_priority.h"
 #include "realtime/picture_quality.h"
+#include "sticks/predictors.h"
 
 namespace app {
 namespace {
@@ -71,6 +72,7 @@ RealtimeSession::RealtimeSession(const RealtimeOptions& asked) : options(asked),
     trace = live ? live_trace(asked.sensors) : read_played_trace(options.play.trace);
     kit = read_kit(asked.play.kit);
     stick = stick_geometry(trace, kit.stick, asked.play.tip, asked.play.shaft);
+    contacts = contact_model(asked.play.sound_predictor);
     const double once_s = trace.t_end_s() - trace.t0_s();
     if (asked.play.pedals)
         for (const PedalMove& move : read_pedals(*asked.play.pedals, kit, trace.t0_s()))

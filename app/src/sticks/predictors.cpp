@@ -113,6 +113,14 @@ std::optional<std::filesystem::path> model_file(const std::string& specification
     return find_bundled(part_model(specification).model.value_or(kBundledModel), "models", ".model");
 }
 
+std::shared_ptr<const tracking::PathModel> contact_model(const std::string& specification) {
+    if (!is_auto(specification)) return {};
+    const std::optional<std::filesystem::path> file = model_file(picture_specification(specification));
+    if (!file) return {};
+    auto model = std::make_shared<const tracking::PathModel>(tracking::read_path_model(*file));
+    return model->contacts ? model : nullptr;
+}
+
 std::string confirming_specification(const std::string& specification) {
     return is_auto(specification) ? kAutoConfirming : "";
 }

@@ -64,6 +64,12 @@ void keep_confirmed(std::vector<sim::Contact>& contacts, std::span<const sim::Co
 
 void Stick::take(const tracking::StickState& state) {
     interval_s_ = started() && state.t_s > state_.t_s ? state.t_s - state_.t_s : 0;
+    if (state.samples > state_.samples) {
+        if (state.starts != state_.starts || interval_s_ == 0) history_.restart();
+        // A sensor of positions alone says the identity.
+        const bool oriented = state.orientation.coeffs() != Eigen::Quaterniond::Identity().coeffs();
+        history_.push({state.t_s, state.position, state.orientation, oriented});
+    }
     state_ = state;
     measured_tip_ = state.position + state.orientation * geometry_.tip;
 }

@@ -1,5 +1,6 @@
 #pragma once
 #include <sim/simulation.h>
+#include <tracking/contact_times.h>
 #include <tracking/predictor.h>
 #include <tracking/stick_state.h>
 
@@ -93,12 +94,18 @@ class Stick {
 public:
     /// `sound_lead_s`: how far ahead predicted_path() reaches.
     Stick(std::uint32_t index, const StickGeometry& geometry, double sound_lead_s)
-        : index_(index), geometry_(geometry), sound_lead_s_(sound_lead_s) {}
+        : index_(index),
+          geometry_(geometry),
+          sound_lead_s_(sound_lead_s),
+          history_(geometry.shaft, geometry.tip) {}
 
     void take(const tracking::StickState& state);
     /// As before the first sample.
     void forget() { state_ = {}; }
-    void set_geometry(const StickGeometry& geometry) { geometry_ = geometry; }
+    void set_geometry(const StickGeometry& geometry) {
+        geometry_ = geometry;
+        history_ = tracking::TipHistory(geometry.shaft, geometry.tip);
+    }
     void set_sound_lead(double lead_s) { sound_lead_s_ = lead_s; }
 
     [[nodiscard]] const tracking::StickState& state() const { return state_; }
@@ -120,6 +127,9 @@ public:
     [[nodiscard]] sim::TipPath predicted_path(std::size_t model) const;
     /// That of the filter which confirms strikes, where there is one.
     [[nodiscard]] std::optional<sim::TipPath> confirming_path() const;
+    /// The tip as a network sees it, of the samples that take() was given; false where it has too few.
+    [[nodiscard]] bool look(tracking::TipView& view) const { return history_.look(view); }
+    [[nodiscard]] double sound_lead_s() const { return sound_lead_s_; }
     [[nodiscard]] sim::TipPath measured_path() const;
 
 private:
@@ -127,6 +137,7 @@ private:
     StickGeometry geometry_;
     double sound_lead_s_, interval_s_ = 0;
     tracking::StickState state_;
+    tracking::TipHistory history_;
     Eigen::Vector3d measured_tip_ = Eigen::Vector3d::Zero();
 };
 

@@ -233,6 +233,14 @@ void count_turns(StrikeScore& score, std::span<const Strike> strikes, std::span<
     }
 }
 
+std::optional<StrikeDynamics> dynamics_of(const Strike& strike, const TrueContact& contact) {
+    if (!(contact.speed_mps > 0) || !(strike.speed_mps > 0)) return std::nullopt;
+    const double ratio = strike.speed_mps / contact.speed_mps;
+    const Eigen::Vector3d& n = strike.normal_world;
+    const Eigen::Vector3d away = strike.point_world - contact.point_world;
+    return StrikeDynamics{100 * (ratio - 1), 20 * std::log10(ratio), 1e3 * (away - n.dot(away) * n).norm()};
+}
+
 StrikeScore score_strikes(const std::vector<Strike>& strikes, std::vector<TrueContact>& contacts) {
     assert(std::ranges::is_sorted(contacts, {}, &TrueContact::t_s) && "the true contacts are sorted by time");
     const std::vector<double> errors_ms = match(strikes, contacts);
@@ -248,6 +256,21 @@ StrikeScore score_strikes(const std::vector<Strike>& strikes, std::vector<TrueCo
     score.missed = score.true_contacts - matched;
     score.timing_median_ms = median(errors_ms);
     score.timing_p95_ms = quantile(errors_ms, 0.95);
+    std::vector<double> percent, db, place_mm;
+    for (const TrueContact& contact : contacts) {
+        if (contact.matched_id == 0) continue;
+        const auto dynamics = dynamics_of(strikes[contact.matched_id - 1], contact);
+        if (!dynamics) continue;
+        percent.push_back(std::abs(dynamics->speed_percent));
+        db.push_back(std::abs(dynamics->speed_db));
+        place_mm.push_back(dynamics->place_mm);
+    }
+    score.speed_median_percent = median(percent);
+    score.speed_p95_percent = quantile(percent, 0.95);
+    score.speed_median_db = median(db);
+    score.speed_p95_db = quantile(db, 0.95);
+    score.place_median_mm = median(place_mm);
+    score.place_p95_mm = quantile(place_mm, 0.95);
     return score;
 }
 

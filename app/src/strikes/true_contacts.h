@@ -2,6 +2,7 @@
 #include <sim/modal_body.h>
 #include <sim/simulation.h>
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,6 +16,15 @@ namespace app {
 /// [s] of each other.
 inline constexpr double kMatchWindow_s = 0.030;
 
+/// How far a note's strike is from the contact that it belongs to, beside its time.
+struct StrikeDynamics {
+    double speed_percent = 0;  ///< predicted over true normal speed, less 1
+    double speed_db = 0;       ///< 20 log10 of that ratio
+    double place_mm = 0;       ///< along the surface
+};
+/// None of a contact that does not go inwards.
+[[nodiscard]] std::optional<StrikeDynamics> dynamics_of(const Strike& strike, const TrueContact& contact);
+
 /// How the notes of a run compare with the true contacts.
 struct StrikeScore {
     int true_contacts = 0, released = 0, cancelled = 0, moved = 0, false_notes = 0, missed = 0;
@@ -23,6 +33,9 @@ struct StrikeScore {
     int false_turned_late = 0;  ///< the other false notes
     /// Of |onset - true contact| over the matched notes; kNoValue when none matched.
     double timing_median_ms = kNoValue, timing_p95_ms = kNoValue;
+    /// Of the sizes of their StrikeDynamics; kNoValue likewise.
+    double speed_median_percent = kNoValue, speed_p95_percent = kNoValue, speed_median_db = kNoValue,
+           speed_p95_db = kNoValue, place_median_mm = kNoValue, place_p95_mm = kNoValue;
 };
 
 /// Compares the released notes with the true contacts: closest pairs first (equally close ones by contact
@@ -32,6 +45,7 @@ struct StrikeScore {
 ///   false   released strikes without a contact
 ///   missed  contacts without a released strike
 ///   timing  median and p95 of |onset - contact| [ms] over the matched notes; kNoValue when nothing matched
+///   speed   likewise of the strike's normal speed against the contact's, in % and dB; place likewise [mm]
 /// The false_turned_* counts are left at 0: they need the recorded path.
 /// `contacts` must be sorted by time. A pure function of its input; O((n + m) log n) for n contacts and m
 /// strikes that are not denser than a few in the window.

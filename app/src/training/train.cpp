@@ -38,6 +38,12 @@ std::vector<std::pair<std::string, std::string>> provenance_of(std::span<const R
                                  "fading velocity {:.1f}; regions of 50 and 95 % hold {:.3f}, {:.3f}",
                                  s.lead_s, s.with_shaft_mm, s.position_only_mm, s.fading_mm, s.inside_50,
                                  s.inside_95));
+    lines.emplace_back(
+        "contact_times",
+        fmt::format("{} examples, {} steps; -ln(probability of what came) {:.3f} held out, {:.3f} "
+                    "of the shares alone",
+                    result.contact_examples, result.contact_steps, result.contact_loss,
+                    result.contact_loss_of_shares));
     return lines;
 }
 
@@ -50,6 +56,13 @@ std::string format_training_text(const tracking::TrainingResult& result, const T
     for (const tracking::TrainingScore& s : result.scores)
         text += fmt::format("{:6.4f}  {:14.1f}  {:13.1f}  {:15.1f}  {:9.3f}  {:9.3f}\n", s.lead_s,
                             s.with_shaft_mm, s.position_only_mm, s.fading_mm, s.inside_50, s.inside_95);
+    if (result.contact_examples > 0)
+        text += fmt::format(
+            "\nTime to contact: {} examples, {} steps; -ln(probability of what came) {:.3f}, of the shares "
+            "alone "
+            "{:.3f}\n",
+            result.contact_examples, result.contact_steps, result.contact_loss,
+            result.contact_loss_of_shares);
     return text;
 }
 

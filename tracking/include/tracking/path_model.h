@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -38,7 +39,10 @@ struct PathModel {
         Eigen::MatrixXf weights;  ///< outputs x inputs
         Eigen::VectorXf bias;
     };
-    std::array<Layer, 3> layers;
+    using Layers = std::array<Layer, 3>;
+    Layers layers;
+    /// The network that says when a tip meets a plane (contact_times()); none where it was not learned.
+    std::optional<Layers> contacts;
     /// Where it comes from: (key, value), each on one line; keys are words.
     Provenance provenance;
 };
@@ -48,9 +52,10 @@ struct PathModel {
 ///   MusicWorld path model 1
 ///   KEY: VALUE                      the provenance, any number of lines
 ///   sizes: INPUTS HIDDEN1 HIDDEN2 OUTPUTS
+///   contacts: INPUTS HIDDEN1 HIDDEN2 OUTPUTS     of the network of contacts, if there is one
 ///   checksum: 16 hex digits         FNV-1a 64 of all bytes before this line and of the weights
 ///   (empty)
-///   W1, b1, W2, b2, W3, b3          IEEE floats of 4 bytes, little-endian, matrices by columns
+///   W1, b1, W2, b2, W3, b3 (and of the network of contacts likewise)   IEEE floats of 4 bytes, little-endian, matrices by columns
 ///
 /// `head -n 20 FILE` shows where a model comes from. parse_path_model(format_path_model(m)) is m to the bit.
 /// Throws std::invalid_argument for provenance that the format cannot hold, as check_provenance does.

@@ -14,6 +14,7 @@ namespace tracking {
 struct TrainingStick {
     StickTrace stick;
     Eigen::Vector3d shaft = -Eigen::Vector3d::UnitZ();  ///< unit, hand to tip, in the body's frame
+    Eigen::Vector3d tip = Eigen::Vector3d::Zero();      ///< in the body's frame [m]
     /// Times that nothing is learned from, within 50 ms: of untrusted positions and orientations [s], ascending.
     std::vector<double> flagged_s, flagged_rotations_s;
     std::size_t recording = 0;  ///< that it is of: each counts by the root of its length, whatever its speed
@@ -40,6 +41,10 @@ struct TrainingResult {
     PathModel model;  ///< without provenance
     std::vector<TrainingScore> scores;
     std::size_t examples = 0, steps = 0;
+    std::size_t contact_examples = 0, contact_steps = 0;
+    /// Of the network of contacts, held out: the mean of -ln(probability of what came), and that of a network
+    /// which knows only how often each outcome comes.
+    double contact_loss = 0, contact_loss_of_shares = 0;
 };
 
 /// Learns to predict the path of a stick from its last 0.25 s.
@@ -55,6 +60,8 @@ struct TrainingResult {
 /// Hutter 2019), its rate falling as a cosine. The weights that did best on the sticks held out are kept; training
 /// ends when these have not got better for a third of the steps. Last, the covariances are scaled for each lead so
 /// that the regions of 50 and 95 % hold of the held-out errors what they say, as nearly as one factor can.
+///
+/// Then the network of contacts (PathModel::contacts) is learned from the same recordings.
 ///
 /// A pure function of its arguments, one thread; bit-identical for one build on one kind of processor (Eigen's
 /// products of matrices are parted to fit its caches). Throws

@@ -1,0 +1,57 @@
+#pragma once
+#include <sim/simulation.h>
+#include <tracking/contact_times.h>
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+
+namespace app {
+
+/// When a stick will strike, and whether its note is to sound, by the network of contacts of a model.
+///
+/// Each surface that the path of the sound's predictor comes near is looked at as the plane that touches it where it
+/// is nearest to that path. The network says when the tip meets it (tracking::contact_times); the surface that is
+/// met with the greatest probability counts. The time of the strike is the median t; its probability P that of a
+/// contact within 30 ms of t, in which a note and a contact belong together.
+///
+/// A missed strike costs 1, a false sound `false_cost`: a note sounds where false_cost (1 - P) < P. As long as another
+/// sample comes before the note is fixed, it costs nothing to wait for it: until then P = 5 % keeps it.
+///
+/// The answer is a path that meets the surface at t, to be swept as any other: along the surface that of the
+/// predictor, towards it at a constant acceleration from the tip's velocity, so that it falls all the way.
+///
+/// One thread. A pure function of its arguments.
+class StrikeDecision {
+public:
+    /// Distance of a tip from a surface, by its number, and the normal there.
+    using Nearest = std::function<sim::SurfacePoint(std::size_t, const Eigen::Vector3d&)>;
+    struct Surfaces {
+        std::size_t count = 0;
+        Nearest nearest;
+    };
+    /// What the tip is expected to do.
+    struct Path {
+        sim::TipPath path;
+        bool sounds = false;  ///< false: it is kept in mind, and not played if no other sample comes
+    };
+
+    /// `model` has a network of contacts.
+    StrikeDecision(std::shared_ptr<const tracking::PathModel> model, double false_cost)
+        : model_(std::move(model)), false_cost_(false_cost) {}
+
+    /// After a sample: `predicted` is the path of the sound's predictor; strikes are looked for `reach_s` ahead; the next
+    /// sample is expected `interval_s` later; notes are fixed `margin_s` before their onset. None where nothing is
+    /// likely to be struck, or where the tip is in a surface.
+    [[nodiscard]] std::optional<Path> after(const tracking::TipView& tip, const sim::TipPath& predicted,
+                                            const Surfaces& surfaces, double reach_s, double interval_s,
+                                            double margin_s) const;
+
+private:
+    std::shared_ptr<const tracking::PathModel> model_;
+    double false_cost_;
+};
+
+}  // namespace app
