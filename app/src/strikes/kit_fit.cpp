@@ -117,20 +117,36 @@ Lows stopped_lows(const Lows& lows) {
     return near;
 }
 
+/// Where strokes that nothing stops are at their fastest, and above nearly all places where they turn: a surface among
+/// these would be missed, and met, by millimetres.
+double height_of_passing(const Lows& lows) {
+    constexpr double kOverTurnsM = 0.05;
+    std::vector<double> fastest;
+    for (const Low& low : lows) fastest.push_back(low.fastest.y());
+    return std::max(quantile(fastest, 0.5), quantile(heights_of(lows), 0.95) + kOverTurnsM);
+}
+
+/// Where a stroke passes a height, straight through its fastest and its lowest point.
+Eigen::Vector3d passing(const Low& low, double height_m) {
+    constexpr double kFarthest = 2;  // of the way between the two
+    const Eigen::Vector3d way = low.fastest - low.tip;
+    const double share = way.y() > 0 ? std::min((height_m - low.tip.y()) / way.y(), kFarthest) : 0;
+    return low.tip + share * way;
+}
+
 FittedInstrument place_instrument(const Lows& lows) {
     FittedInstrument instrument;
     const Lows stopped = stopped_lows(lows);
     instrument.struck = !stopped.empty();
     const Lows& strokes = instrument.struck ? stopped : lows;
-    for (const Low& low : strokes) instrument.met += low.tip / static_cast<double>(strokes.size());
-    if (instrument.struck) {
-        instrument.contact_height_m = contact_height(stopped);
-        instrument.met.y() = instrument.contact_height_m + kAboveContactM;
-    } else {
-        instrument.met.y() = quantile(heights_of(lows), 0.8);
-    }
+    if (instrument.struck) instrument.contact_height_m = contact_height(stopped);
+    const double height_m =
+        instrument.struck ? instrument.contact_height_m + kAboveContactM : height_of_passing(lows);
+    const auto met = [&](const Low& low) { return instrument.struck ? low.tip : passing(low, height_m); };
+    for (const Low& low : strokes) instrument.met += met(low) / static_cast<double>(strokes.size());
+    instrument.met.y() = height_m;
     std::vector<double> reach;
-    for (const Low& low : strokes) reach.push_back((plan(low.tip) - plan(instrument.met)).norm());
+    for (const Low& low : strokes) reach.push_back((plan(met(low)) - plan(instrument.met)).norm());
     const double needed = (quantile(reach, instrument.struck ? 1.0 : 0.9) + kMarginM) / kHeadShare;
     instrument.radius_m = std::clamp(needed, kSmallestRadiusM, kLargestRadiusM);
     instrument.lows = static_cast<int>(lows.size());
@@ -249,13 +265,15 @@ std::string instrument_text(const FittedInstrument& fitted, const Form& form, st
                             std::size_t count, double tip_radius_m) {
     const double share = count > 1 ? static_cast<double>(index) / static_cast<double>(count - 1) : 0.5;
     const double pitch_hz = form.highest_hz * std::pow(form.lowest_hz / form.highest_hz, share);
-    const double diameter = 2 * fitted.radius_m;
+    constexpr double kDiscM = 0.03;  // a side hardly to be met: strokes that pass come from everywhere
+    const double diameter = 2 * fitted.radius_m,
+                 height_m = fitted.struck ? form.height_m : std::min(form.height_m, kDiscM);
     const Eigen::Vector3d& met = fitted.met;
     return fmt::format(
         "\n# {}\n[[instrument]]\nname = \"{} {}\"\nkind = \"{}\"\nsize = [{:.3f}, {:.3f}, {:.3f}]\n"
         "position = [{:.4f}, {:.4f}, {:.4f}]\nmidi_note = {}\nsound = {{ frequency_hz = {:.1f} }}\n{}",
-        describe(fitted), form.kind, index + 1, form.kind, diameter, form.height_m, diameter, met.x(),
-        met.y() - tip_radius_m - form.height_m / 2, met.z(), form.notes[index % form.notes.size()], pitch_hz,
+        describe(fitted), form.kind, index + 1, form.kind, diameter, height_m, diameter, met.x(),
+        met.y() - tip_radius_m - height_m / 2, met.z(), form.notes[index % form.notes.size()], pitch_hz,
         form.extra);
 }
 
@@ -326,8 +344,9 @@ std::string describe(const FittedInstrument& instrument) {
             "{}",
             instrument.strokes, instrument.lows, instrument.contact_height_m, strokes);
     return fmt::format(
-        "passed through: {} lows with no head under them; tips meet the instrument at y = {:.3f} m, below "
-        "which 80 % of them lie; {}",
+        "passed through: {} lows with no head under them; tips meet the instrument at y = {:.3f} m, where "
+        "they "
+        "are fast; {}",
         instrument.lows, instrument.met.y(), strokes);
 }
 

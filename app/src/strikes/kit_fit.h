@@ -34,7 +34,9 @@ struct KitFit {
 ///   struck     at least 15 % of a cluster's lows (and three) lie within 50 mm of its lowest, their
 ///              inter-quartile range is at most 30 mm and the median of their turning times at most 20 ms.
 ///              The surface is then 25 mm above contact_height.
-///   otherwise  the surface is at the 80th percentile of the cluster's lows.
+///   otherwise  the surface is at the median height of the strokes' fastest points, or 50 mm above the 95th
+///              percentile of the lows where that is higher; it stands where the strokes pass that height, and is a
+///              disc of 30 mm.
 /// The surface is what the tip's centre meets: the body's head lies the tip's radius below. Deterministic.
 /// O(n) for n samples and at most 1000 m for m lows. Throws BadInput when no stick makes a stroke.
 [[nodiscard]] KitFit fit_kit(std::span<const tracking::Trace> traces, const StickGeometry& geometry);
