@@ -20,6 +20,7 @@ constexpr std::size_t kMostContactExamples = 300000, kMostContactsHeldOut = 3000
 constexpr double kContactDepthM = 0.003, kTurnM = 0.025;
 constexpr double kPlainShare = 0.4;  // of the sightings: by the usual sensor
 constexpr Eigen::Index kContactBatch = 256;
+constexpr std::size_t kExamplesOfStep = 32, kFewestContactExamples = 8192;  // short trainings need fewer
 constexpr std::size_t kMostContactSteps = 20000, kContactChecks = 24;
 constexpr std::size_t kMostContactHidden = 64;  // so that a model stays under 200 kB
 constexpr std::size_t kStepsOfPath = 3;         // steps of the path's network to one of this
@@ -162,13 +163,21 @@ bool flagged_between(const std::vector<double>& flags, double from_s, double to_
     return next != flags.end() && *next <= to_s + kNearS;
 }
 
+/// The tip's path without what is flagged.
+TipPoints trusted_path(const StickTrace& seen, const TrainingStick& source, double slower) {
+    TipPoints path;
+    for (const PoseSample& sample : seen.samples)
+        if (!flagged_between(source.flagged_s, sample.t_s / slower, sample.t_s / slower))
+            path.push_back({sample.t_s, sample.position + sample.orientation * source.tip});
+    return path;
+}
+
 /// Adds a `share` of what is seen of the planes near the tip, at random.
 void add_examples(ContactExamples& examples, const TrainingStick& source, const Sighting& sighting,
                   double share) {
     const StickTrace truth = sighting.seen(source.stick);
-    TipPoints path;
-    for (const PoseSample& sample : truth.samples)
-        path.push_back({sample.t_s, sample.position + sample.orientation * source.tip});
+    const TipPoints path = trusted_path(truth, source, sighting.slower);
+    if (path.empty()) return;
     RandomStream random(mixed_seed(sighting.sensor.seed, 7, source.recording));
     std::vector<std::pair<Plane, std::vector<double>>> planes;
     for (std::size_t i = 0; i < kPlanesAtOnce; ++i) {
@@ -207,10 +216,11 @@ void add_examples(ContactExamples& examples, const TrainingStick& source, const 
     }
 }
 
-ContactExamples collect_contacts(std::span<const TrainingStick> sticks, bool held_out, std::uint64_t seed) {
+ContactExamples collect_contacts(std::span<const TrainingStick> sticks, bool held_out, std::size_t most,
+                                 std::uint64_t seed) {
     constexpr double kUsualHz = 60, kInReach = 0.5;  // rate; share of the planes
-    const std::size_t sightings = held_out ? kHeldOutSightings : kSightings,
-                      most = held_out ? kMostContactsHeldOut : kMostContactExamples;
+    const std::size_t sightings =
+        held_out ? kHeldOutSightings : std::max<std::size_t>(2, kSightings * most / kMostContactExamples);
     double seconds = 0;
     for (const TrainingStick& s : sticks)
         if (s.held_out == held_out && !s.stick.samples.empty())
@@ -287,13 +297,13 @@ struct ContactScaling {
 class ContactLearner {
 public:
     ContactLearner(const ContactExamples& learning, const ContactExamples& held_out,
-                   const TrainingOptions& options)
+                   const TrainingOptions& options, std::size_t steps)
         : learning_(learning),
           held_out_(held_out),
           random_(mixed_seed(options.seed, 9, 0)),
           layers_(initial_layers(kContactInputs, std::min(options.hidden, kMostContactHidden),
                                  kContactOutputs, random_)),
-          steps_(std::clamp<std::size_t>(options.steps / kStepsOfPath, 1, kMostContactSteps)) {}
+          steps_(steps) {}
 
     [[nodiscard]] LearnedContacts learn() {
         LearnedContacts best{layers_, static_cast<std::size_t>(learning_.count()), steps_,
@@ -352,13 +362,17 @@ private:
 
 std::optional<LearnedContacts> train_contacts(std::span<const TrainingStick> sticks,
                                               const TrainingOptions& options) {
-    ContactExamples learning = collect_contacts(sticks, false, options.seed),
-                    held_out = collect_contacts(sticks, true, options.seed);
+    const std::size_t steps = std::clamp<std::size_t>(options.steps / kStepsOfPath, 1, kMostContactSteps);
+    ContactExamples learning = collect_contacts(
+                        sticks, false,
+                        std::clamp(kExamplesOfStep * steps, kFewestContactExamples, kMostContactExamples),
+                        options.seed),
+                    held_out = collect_contacts(sticks, true, kMostContactsHeldOut, options.seed);
     if (learning.count() < kContactBatch || held_out.count() == 0) return std::nullopt;
     const ContactScaling scaling(learning.inputs);
     scaling.apply(learning.inputs);
     scaling.apply(held_out.inputs);
-    LearnedContacts learned = ContactLearner(learning, held_out, options).learn();
+    LearnedContacts learned = ContactLearner(learning, held_out, options, steps).learn();
     scaling.fold_into(learned.layers[0]);
     return learned;
 }
