@@ -168,8 +168,23 @@ PixelBox TileMask::bounds() const {
 }
 
 std::vector<PixelBox> TileMask::runs() const {
-    std::vector<PixelBox> found;
-    for (int row = 0; row < rows_; ++row) add_runs(row, {0, columns_ - 1}, found);
+    std::vector<PixelBox> found, row_runs;
+    std::vector<std::size_t> below, here;  // boxes that end with the row before, and with this one
+    for (int row = 0; row < rows_; ++row) {
+        row_runs.clear(), here.clear();
+        add_runs(row, {0, columns_ - 1}, row_runs);
+        for (const PixelBox& run : row_runs) {
+            const auto same = std::ranges::find_if(below, [&](std::size_t i) {
+                return found[i].left == run.left && found[i].right == run.right;
+            });
+            here.push_back(same == below.end() ? found.size() : *same);
+            if (same == below.end())
+                found.push_back(run);
+            else
+                found[*same].top = run.top;
+        }
+        std::swap(below, here);
+    }
     return found;
 }
 

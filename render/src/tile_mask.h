@@ -39,7 +39,7 @@ public:
     /// Boxes, few and not much too large, around the mask's tiles that the polygon touches.
     [[nodiscard]] std::vector<PixelBox> touched(std::span<const Eigen::Vector2f> hull) const;
     [[nodiscard]] PixelBox bounds() const;
-    /// The mask as boxes one tile high.
+    /// The mask as boxes that do not meet: runs of a row, joined with equal ones of the rows above.
     [[nodiscard]] std::vector<PixelBox> runs() const;
 
     /// Rounding of vertices, and of the rasteriser's places to 1/256 pixel, stays far below it. [pixels]
