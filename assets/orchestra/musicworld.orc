@@ -11,7 +11,7 @@
 ; Tables shared with the host:
 ;   901 one entry a voice: onset [samples] of what has choked it last, written before that one's block
 ;   902 entry 0: the sample by which every note so far has ended, written by the notes
-;   903 one entry a voice: gain of what the room hears of it
+;   903 one entry a voice: gain of what the room hears of it beyond the voice itself (0: the room hears it as it is)
 ; Opcodes of the host (audio/src/opcodes.h): contact_force, noise_burst, modal_bank, close_note, bessel.
 ;
 ; Each line `;@ instrument parameter default minimum maximum text` declares a parameter; the host reads these lines.
@@ -74,7 +74,7 @@
 
 sr = 48000
 ksmps = 64
-; Left and right, and both again as the room hears them.
+; Left and right, and what the room hears of both beyond that.
 nchnls = 4
 0dbfs = 1
 
@@ -189,8 +189,11 @@ endop
   ilast tab_i 0, giEnds
   tabw_i max(ilast, p4 + iduration * sr + 2 * ksmps), 0, giEnds
   aleft, aright, kover close_note amid, aside, ilevel * p5, ilevel * p6, iwidth, iduration, p4, p10, p11, giChokes
+  outs aleft, aright
   isend tab_i p10, giSends
-  outq aleft, aright, isend * aleft, isend * aright
+  if isend != 0 then
+    outch 3, isend * aleft, 4, isend * aright
+  endif
   if kover == 1 then
     turnoff
   endif

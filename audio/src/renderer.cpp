@@ -153,7 +153,7 @@ Renderer::Renderer(const std::string& text, const std::string& source, const std
     if (!send_.empty()) {
         const std::span<double> sends = engine_.table(kSendTable);
         for (std::size_t i = 0; i < voices.size(); ++i)
-            sends[i] = voices[i].room_send_db <= -60 ? 0 : std::pow(10.0, voices[i].room_send_db / 20);
+            sends[i] = (voices[i].room_send_db <= -60 ? 0 : std::pow(10.0, voices[i].room_send_db / 20)) - 1;
     }
     for (RenderedVoice& voice : voices_) {
         const double gain = std::pow(10.0, mix_.gain_db / 20);
@@ -203,6 +203,7 @@ void Renderer::render_block(std::vector<float>& output) {
         const std::size_t frame = i / channels, channel = i % channels;
         (channel < 2 ? dry_[2 * frame + channel] : send_[2 * frame + channel - 2]) = sample;
     }
+    for (std::size_t i = 0; i < send_.size(); ++i) send_[i] += dry_[i];
     output.insert(output.end(), dry_.begin(), dry_.end());
     const std::span<float> block = std::span(output).subspan(begin);
     room_.add_answer(send_.empty() ? dry_ : send_, block);
