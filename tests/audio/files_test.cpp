@@ -193,6 +193,27 @@ TEST_F(Files, MidiKeepsItsTimesAtAnyTempoAndTellsTempoAndTimeSignature) {
         EXPECT_THROW((void)audio::encode_midi({}, bad), std::logic_error);
 }
 
+/// LAME puts 1105 samples before the sound, and decoders hand out whole frames of 1152.
+TEST_F(Files, AnMp3SoundsAsTheSamples) {
+    const auto sound = render({voice("drum")}, {note(1, 4800, 5)}, 48000, 0);
+    std::ofstream(folder_ / "a.mp3", std::ios::binary) << audio::encode_mp3(sound);
+    EXPECT_EQ(audio::encode_mp3(sound), audio::encode_mp3(sound));
+    SF_INFO info{};
+    SNDFILE* file = sf_open((folder_ / "a.mp3").c_str(), SFM_READ, &info);
+    ASSERT_NE(file, nullptr);
+    EXPECT_EQ(info.samplerate, 48000);
+    EXPECT_EQ(info.channels, 2);
+    std::vector<float> heard(static_cast<std::size_t>(2 * info.frames));
+    EXPECT_EQ(sf_readf_float(file, heard.data(), info.frames), info.frames);
+    sf_close(file);
+    EXPECT_NEAR(static_cast<double>(info.frames), 48000, 3 * 1152);
+    double energy = 0, heard_energy = 0;
+    for (const float sample : sound) energy += static_cast<double>(sample) * static_cast<double>(sample);
+    for (const float sample : heard)
+        heard_energy += static_cast<double>(sample) * static_cast<double>(sample);
+    EXPECT_NEAR(10 * std::log10(heard_energy / energy), 0, 0.5) << "what is masked is left out";
+}
+
 TEST_F(Files, MidiOfNothingIsAnEmptyTrack) {
     EXPECT_EQ(read_track(audio::encode_midi({})).size(), 2U);
 }

@@ -53,6 +53,13 @@ struct PlayOptions {
     bool progress = false;                        ///< draw a progress bar on standard error
 };
 
+/// A stroke as the report shows it: frames that follow each other.
+struct Film {
+    std::vector<std::filesystem::path> files;  ///< PNG files on disk
+    std::size_t struck = 0;                    ///< the first that is shown after the note
+    double frame_s = 1.0 / 30;                 ///< from one to the next
+};
+
 /// Everything that `play` found out, for the summary, the tables and the report.
 struct PlayResult {
     PlayOptions options;  ///< as asked for, the predictors as specifications
@@ -81,6 +88,8 @@ struct PlayResult {
     std::vector<std::pair<std::string, std::string>> versions;
     std::vector<std::string> failures;                 ///< why plots or the video are missing
     std::vector<std::filesystem::path> report_frames;  ///< a few PNG files on disk that the report shows
+    std::vector<Film> report_films;                    ///< strokes that it shows moving
+    std::string report_video;                          ///< the video as the report refers to it; empty: none
 };
 
 /// Plays a recorded trace offline on a virtual clock into the folder `out`: frames/, audio.wav, events.csv,

@@ -12,6 +12,7 @@
 #include <set>
 #include <unordered_map>
 
+#include "report/spectrogram.h"
 #include "statistics/statistics.h"
 
 namespace app {
@@ -306,6 +307,64 @@ PlotScript sound_plot(const PlayResult& result, const std::vector<Mark>& marks, 
                    panel, round_tics("y", 2 * peak, 4));
 }
 
+/// From the loudest level, rounded up to 10 dB, down by 70 dB.
+LevelRange level_range(const Spectrogram& sound) {
+    const double loudest = *std::ranges::max_element(sound.level_db);
+    const double high_db = std::clamp(10 * std::ceil(loudest / 10), -110.0, 20.0);
+    return {high_db - 70, high_db};
+}
+
+/// Ticks of a logarithmic axis of which a row is a unit: frequencies as people call them.
+std::string frequency_tics(const Spectrogram& sound) {
+    std::string tics;
+    for (const auto& [hz, name] : {std::pair{50, "50"},
+                                   {100, "100"},
+                                   {200, "200"},
+                                   {500, "500"},
+                                   {1000, "1k"},
+                                   {2000, "2k"},
+                                   {5000, "5k"},
+                                   {10000, "10k"},
+                                   {20000, "20k"}})
+        fmt::format_to(std::back_inserter(tics), "{}'{}' {:.3f}", tics.empty() ? "" : ",", name,
+                       sound.rows * std::log(hz / sound.low_hz) / std::log(sound.high_hz / sound.low_hz));
+    return fmt::format("set ytics ({})\n", tics);
+}
+
+/// The levels as a picture, and above it the onsets of the notes heard and false.
+PlotScript spectrogram_plot(const PlayResult& result, const std::vector<Mark>& marks, LevelRange& range) {
+    constexpr int kRows = 140;
+    const Spectrogram sound = spectrogram({result.audio.data(), result.audio.size()}, kColumns, kRows);
+    range = level_range(sound);
+    const double length_s = static_cast<double>(result.audio.size() / 2) / 48000,
+                 column_s = length_s / kColumns;
+    std::string levels;
+    for (int column = 0; column < kColumns; ++column)
+        for (int row = 0; row < kRows; ++row)
+            fmt::format_to(std::back_inserter(levels), "{:.5g} {} {:.0f}\n",
+                           result.t0_s + (column + 0.5) * column_s, row + 0.5,
+                           std::clamp<double>(sound.at(column, row), range.low_db, range.high_db));
+    const PlotArea area = {result.t0_s, result.t0_s + length_s, 0, 1.09 * kRows, kColumns, 1};
+    PlotPanel panel;
+    panel.add(levels, "with image");
+    const bool few = result.strikes.size() < kWidth;  // as in sound_plot
+    for (const auto& [kind, colour] :
+         {std::pair{Kind::released, colours::released}, {Kind::wrong, colours::wrong}}) {
+        ThinnedMarks onsets(area);
+        for (const Mark& mark : marks)
+            if (few && mark.kind == kind)
+                onsets.add(mark.t_s, 1.02 * kRows, fmt::format("0 {}", 0.06 * kRows));
+        panel.add(onsets.text(), strokes(1.3, colour));
+    }
+    return plot_of(kWidth, 260, {"time, s", area.x_low, area.x_high, 12}, {"Hz", area.y_low, area.y_high},
+                   panel,
+                   frequency_tics(sound) +
+                       fmt::format("unset grid\nunset colorbox\nset cbrange [{}:{}]\n"
+                                   "set palette defined (0 '#0c0d1f', 1 '#3b2a72', 2 '#8d2f81', 3 '#dd513a', "
+                                   "4 '#fba40a', 5 '#fcffa4')\n",
+                                   range.low_db, range.high_db));
+}
+
 }  // namespace
 
 std::vector<Mark> marks_of(const PlayResult& result) {
@@ -380,7 +439,10 @@ PlayPlots add_play_plots(PlotGallery& gallery, const PlayResult& result) {
     plots.instruments =
         framed(timing_by_instrument_plot(result, notes), "onset minus true contact by instrument");
     plots.leads = framed(lead_plot(result, marks), "first prediction and decision of each note");
-    if (!result.audio.empty()) plots.sound = framed(sound_plot(result, marks, peak), "envelope of the sound");
+    if (!result.audio.empty()) {
+        plots.sound = framed(sound_plot(result, marks, peak), "envelope of the sound");
+        plots.spectrogram = framed(spectrogram_plot(result, marks, plots.levels), "spectrogram of the sound");
+    }
     if (!plots.timeline.whole)
         plots.overview =
             framed(overview_plot(result, marks, plots.timeline), "notes heard, false and missed over time");

@@ -38,6 +38,11 @@ struct Timeline {
 };
 [[nodiscard]] Timeline timeline_of(const PlayResult& result);
 
+/// What the darkest and the brightest colour of a spectrogram stand for [dB of full scale].
+struct LevelRange {
+    double low_db = -70, high_db = 0;
+};
+
 /// The plots of a run, in frames. Times on the trace's clock. Of many marks within a pixel one is kept, so that
 /// the size is bounded for any length.
 struct PlayPlots {
@@ -51,8 +56,10 @@ struct PlayPlots {
     /// For each note, first prediction and decision relative to its onset [ms]; notes by outcome, then by
     /// lead.
     std::string leads;
-    std::string sound;     ///< the whole sound, tail included, with the onsets; empty without sound
-    std::string overview;  ///< notes heard, false and missed; empty where the timeline shows all
+    std::string sound;        ///< the whole sound, tail included, with the onsets; empty without sound
+    std::string spectrogram;  ///< of all of it, with the onsets; empty without sound
+    LevelRange levels;        ///< of the spectrogram
+    std::string overview;     ///< notes heard, false and missed; empty where the timeline shows all
 };
 [[nodiscard]] PlayPlots add_play_plots(PlotGallery& gallery, const PlayResult& result);
 

@@ -1,13 +1,16 @@
 #include <fmt/format.h>
 #include <openssl/evp.h>
+#include <render/renderer.h>
 #include <tracking/input.h>
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "play/film.h"
 #include "play/play_plots.h"
 #include "play/play_run.h"
 #include "report/html.h"
@@ -19,8 +22,11 @@ namespace app {
 namespace fs = std::filesystem;
 namespace {
 
-std::string base64_of_file(const fs::path& file) {
-    const std::string bytes = tracking::read_bytes(file.string(), "a picture");
+constexpr int kFilmWidth = 240;  // pixels
+constexpr int kSlowness = 6;
+constexpr double kLongestSoundWithinS = 300;  // about 5 MB of text
+
+std::string base64(std::string_view bytes) {
     std::string text((bytes.size() + 2) / 3 * 4 + 1, '\0');  // the encoder ends with a zero
     const int length =
         EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
@@ -59,9 +65,59 @@ std::string frames_section(const PlayResult& result) {
             std::back_inserter(text),
             "<figure><img width={} height={} alt=\"frame shown at {}\" src=\"data:image/png;base64,{}\">"
             "<figcaption>{}</figcaption></figure>\n",
-            result.options.width, result.options.height, caption, base64_of_file(file), caption);
+            result.options.width, result.options.height, caption,
+            base64(tracking::read_bytes(file.string(), "a picture")), caption);
     }
     return text + "</div>\n";
+}
+
+/// The loudest strokes in slow motion: pictures side by side of which the page shows one after the other.
+std::string films_section(const PlayResult& result) {
+    std::string films;
+    for (const Film& film : result.report_films) {
+        const render::Image strip = film_strip(film, kFilmWidth);
+        if (strip.rgb.empty()) continue;
+        const std::vector<std::uint8_t> png = render::encode_png(strip);
+        const std::size_t count = film.files.size();
+        fmt::format_to(
+            std::back_inserter(films),
+            "<figure><div class=film style=\"--n:{};--s:{:.2f}s;aspect-ratio:{}/{}\"><img alt=\"{} "
+            "frames\" src=\"data:image/png;base64,{}\"></div><figcaption>{}</figcaption></figure>\n",
+            count, kSlowness * static_cast<double>(count) * film.frame_s,
+            strip.width / static_cast<int>(count), strip.height, count,
+            base64({reinterpret_cast<const char*>(png.data()), png.size()}),
+            html(frame_caption(result, film.files[film.struck])));
+    }
+    if (films.empty()) return {};
+    return fmt::format(
+        "<h2>Strokes</h2>\n<p class=note>The loudest ones that lie apart, {} times slower than they were "
+        "played; "
+        "the bar below turns green where the note begins.</p>\n<div class=frames>\n{}</div>\n",
+        kSlowness, films);
+}
+
+/// What can be heard and seen: the sound lies within the page while it is short, the video beside it.
+std::string listen_section(const PlayResult& result) {
+    std::string text;
+    if (!result.report_video.empty())
+        fmt::format_to(std::back_inserter(text),
+                       "<h2>Video</h2>\n<video controls preload=metadata src=\"{}\"></video>\n"
+                       "<p class=note>{}, which the page shows while it lies where it was made.</p>\n",
+                       html(result.report_video), html(result.options.video->filename().string()));
+    if (result.audio.empty()) return text;
+    const double length_s = static_cast<double>(result.audio.size() / 2) / audio::kSampleRate;
+    const bool within = length_s <= kLongestSoundWithinS;
+    const std::string source = within
+                                   ? "data:audio/mpeg;base64," +
+                                         base64(audio::encode_mp3({result.audio.data(), result.audio.size()}))
+                                   : "audio.wav";
+    fmt::format_to(std::back_inserter(text),
+                   "<h2>Listen</h2>\n<audio controls preload=metadata src=\"{}\"></audio>\n"
+                   "<p class=note>{:.1f} s. {}</p>\n",
+                   source, length_s,
+                   within ? "An MP3 copy within this page; the sound itself is audio.wav."
+                          : "The page plays audio.wav, which must lie beside it.");
+    return text;
 }
 
 std::string legend(const PlayResult& result) {
@@ -182,14 +238,18 @@ std::string timeline_section(const PlayResult& result, const PlayPlots& plots) {
                       legend(result), plots.rows);
 }
 
-std::string sound_section(const PlayResult& result, const std::string& plot) {
+std::string sound_section(const PlayResult& result, const PlayPlots& plots) {
     float peak = 0;
     for (const float sample : result.audio) peak = std::max(peak, std::abs(sample));
     const std::string level = peak > 0 ? fmt::format("Peak {:.1f} dBFS", 20 * std::log10(peak)) : "Silence";
     return fmt::format(
         "<h2>Sound</h2>\n<p class=note>The whole file, both channels together: lowest and highest sample "
-        "of each column; ticks below are onsets. {}, {} samples clipped.</p>\n{}\n",
-        level, result.clipped_samples, plot);
+        "of each column; ticks below are onsets. {}, {} samples clipped.</p>\n{}\n"
+        "<h3>Spectrogram</h3>\n<p class=note>Levels over time and frequency, of windows of 43 ms: from {:g} "
+        "dB "
+        "of full scale and below (dark) to {:g} dB (bright). Ticks above are onsets.</p>\n{}\n",
+        level, result.clipped_samples, plots.sound, plots.levels.low_db, plots.levels.high_db,
+        plots.spectrogram);
 }
 
 std::string plot_sections(const PlayResult& result, Plotter& plotter) {
@@ -206,7 +266,7 @@ std::string plot_sections(const PlayResult& result, Plotter& plotter) {
         "(disc) or cancellation (cross); 0 is the onset. Dashed: the sound lead of {:.1f} ms and the "
         "release margin of {:.1f} ms.</p>\n{}\n",
         result.options.sound_lead_s * 1e3, result.options.release_margin_s * 1e3, plots.leads);
-    if (!plots.sound.empty()) text += sound_section(result, plots.sound);
+    if (!plots.sound.empty()) text += sound_section(result, plots);
     return gallery.drawn(std::move(text), plotter);
 }
 
@@ -215,8 +275,8 @@ std::string plot_sections(const PlayResult& result, Plotter& plotter) {
 std::string format_report(const PlayResult& result, Plotter& plotter) {
     const std::string name = fs::path(result.trace).filename().string();
     return report_page(fmt::format("{} on {}", name, result.kit_name),
-                       heading(result) + figures(result) + frames_section(result) +
-                           plot_sections(result, plotter) + provenance(result));
+                       heading(result) + figures(result) + listen_section(result) + films_section(result) +
+                           frames_section(result) + plot_sections(result, plotter) + provenance(result));
 }
 
 }  // namespace app

@@ -5,6 +5,7 @@
 #include <tracking/input.h>
 
 #include <algorithm>
+#include <cctype>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
@@ -46,8 +47,8 @@ void score(PlayResult& result, const Kit& kit, const StickGeometry& stick) {
                 result.options.release_margin_s);
 }
 
-/// Frames for the report: before, at and after the two loudest notes that lie apart.
-std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& folder) {
+/// The loudest notes that lie apart, at most `most`.
+std::vector<const Strike*> loudest_notes(const PlayResult& result, std::size_t most) {
     std::vector<const Strike*> loudest;
     for (const Strike& strike : result.strikes)
         if (strike.outcome == Outcome::released) loudest.push_back(&strike);
@@ -55,17 +56,47 @@ std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& f
                      [](const Strike* a, const Strike* b) { return a->speed_mps > b->speed_mps; });
     std::vector<const Strike*> shown;
     for (const Strike* strike : loudest) {
-        const bool apart = shown.empty() || std::abs(strike->onset_s - shown.front()->onset_s) > kApartS;
-        if (apart && shown.size() < 2) shown.push_back(strike);
+        if (shown.size() == most) break;
+        const auto is_near = [&](const Strike* other) {
+            return std::abs(strike->onset_s - other->onset_s) <= kApartS;
+        };
+        if (std::ranges::none_of(shown, is_near)) shown.push_back(strike);
     }
+    return shown;
+}
+
+/// The first frame that is shown at or after a note.
+long frame_at(const PlayResult& result, const Strike& strike) {
+    return static_cast<long>(std::ceil((strike.onset_s - result.t0_s) * result.options.fps));
+}
+
+/// Frames for the report: at the two loudest notes that lie apart.
+std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& folder) {
     std::vector<fs::path> files;
-    for (const Strike* strike : shown) {
-        const auto at = static_cast<long>(std::ceil((strike->onset_s - result.t0_s) * result.options.fps));
-        for (const long k : {at - 2, at, at + 2})
-            if (k >= 0 && k < static_cast<long>(result.frames))
-                files.push_back(folder / fmt::format("{:06}.png", k));
-    }
+    for (const Strike* strike : loudest_notes(result, 2))
+        if (const long k = frame_at(result, *strike); k >= 0 && k < static_cast<long>(result.frames))
+            files.push_back(folder / fmt::format("{:06}.png", k));
     return files;
+}
+
+/// The loudest strokes: about 30 frames a second from a sixth of a second before the note to a third after it.
+std::vector<Film> films_to_show(const PlayResult& result, const fs::path& folder) {
+    constexpr std::size_t kFilms = 3;
+    constexpr long kBefore = 5, kAfter = 10;
+    const long step = std::max(1L, std::lround(result.options.fps / 30));
+    std::vector<Film> films;
+    for (const Strike* strike : loudest_notes(result, kFilms)) {
+        Film film;
+        film.frame_s = static_cast<double>(step) / result.options.fps;
+        for (long i = -kBefore; i <= kAfter; ++i) {
+            const long k = frame_at(result, *strike) + i * step;
+            if (k < 0 || k >= static_cast<long>(result.frames)) continue;
+            if (i < 0) ++film.struck;
+            film.files.push_back(folder / fmt::format("{:06}.png", k));
+        }
+        if (film.struck < film.files.size()) films.push_back(std::move(film));
+    }
+    return films;
 }
 
 /// Waits for the last frames; their measurements, and what the report shows of them.
@@ -77,6 +108,19 @@ void take_frames(PlayResult& result, FrameThread& frames, const fs::path& folder
     result.stages_s.emplace_back("frames (waiting at the end)", waited_s);
     result.versions.emplace_back("renderer", frames.report().version);
     result.report_frames = frames_to_show(result, folder);
+    result.report_films = films_to_show(result, folder);
+}
+
+/// A file as a page in a folder refers to it: a relative address (RFC 3986).
+std::string link_to(const fs::path& file, const fs::path& folder) {
+    const fs::path relative = fs::weakly_canonical(file).lexically_relative(fs::weakly_canonical(folder));
+    std::string link;
+    for (const char c : relative.generic_string()) {
+        const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+                           std::string_view("/-._~").find(c) != std::string_view::npos;
+        link += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+    }
+    return link;
 }
 
 /// After the last frame the sound rings out: how many frames more until it has ended.
@@ -229,6 +273,10 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
                                    folder.path("."));
             });
         });
+    if (video) {
+        result.report_video = link_to(*options.video, options.out);
+        result.report_films.clear();  // the video shows all
+    }
     const std::string realtime_json = realtime_part ? realtime_part() : std::string();
     write_file(folder.path("events.csv"), format_events(result));
     write_file(folder.path("contacts.csv"), format_contacts(result));

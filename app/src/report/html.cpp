@@ -30,6 +30,11 @@ p.note{color:var(--axis);margin:0 0 10px;max-width:95ch}
 .frames{display:grid;grid-template-columns:repeat(auto-fill,minmax(300px,1fr));gap:12px}
 figure{margin:0}
 .frames img{width:100%;height:auto;display:block;border-radius:6px;border:1px solid var(--grid)}
+audio,video{display:block;width:100%;max-width:640px;margin:0 0 6px}
+.film{overflow:hidden;width:100%;border-radius:6px;border:1px solid var(--grid)}
+.frames .film img{width:calc(100%*var(--n));max-width:none;height:100%;border:0;border-radius:0;animation:film var(--s) steps(var(--n)) infinite}
+@keyframes film{to{transform:translateX(-100%)}}
+@media(prefers-reduced-motion:reduce){.film{overflow-x:auto}.frames .film img{animation:none}}
 figcaption{color:var(--axis);font-size:12.5px;padding-top:3px}
 .plot{background:var(--card);border:1px solid var(--grid);border-radius:6px;padding:8px 10px 4px}
 .plot svg{display:block;width:100%;height:auto}

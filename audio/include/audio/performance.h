@@ -127,6 +127,10 @@ private:
 /// std::runtime_error (disk full, no permission).
 std::size_t write_wav(const std::filesystem::path& file, std::span<const float> interleaved);
 
+/// The same sound as an MP3 file, about 100 kbit/s, to be heard in a page; values beyond [-1, 1] are clipped. Throws
+/// std::runtime_error.
+[[nodiscard]] std::string encode_mp3(std::span<const float> interleaved);
+
 /// How a MIDI file counts time.
 struct MidiTime {
     double tempo_bpm = 120;  ///< quarters a minute, 20 to 400; a file holds whole microseconds a quarter

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <render/renderer.h>
 
 #include <cstdlib>
 #include <optional>
@@ -7,6 +8,7 @@
 
 #include "files/output_folder.h"
 #include "kit/kit.h"
+#include "play/film.h"
 #include "play/play_plots.h"
 #include "play/play_run.h"
 #include "report/plot.h"
@@ -54,14 +56,64 @@ TEST(Report, NeedsNothingBesideItself) {
     for (const char* outside :
          {"http:", "https:", "<script", "<link", "@import", "url(", "src=\"/", "file:", "<?xml", "<!ENTITY"})
         EXPECT_FALSE(holds(page, outside)) << outside;
-    EXPECT_EQ(count(page, " src="), count(page, " src=\"data:image/png;base64,"));
+    EXPECT_EQ(count(page, " src="),
+              count(page, " src=\"data:image/png;base64,") + count(page, " src=\"data:audio/mpeg;base64,"));
 }
 
+TEST(Report, PlaysTheSoundAShortOneFromWithinThePage) {
+    EXPECT_EQ(
+        count(report_of(sample_play_result()), "<audio controls preload=metadata src=\"data:audio/mpeg"), 1U);
+    app::PlayResult result = sample_play_result();
+    result.audio = {};
+    const std::vector<float> second(2 * 48000);
+    for (int i = 0; i <= 300; ++i) result.audio.append(second);  // five minutes stay within the page
+    EXPECT_EQ(count(report_of(result), "<audio controls preload=metadata src=\"audio.wav\">"), 1U);
+    result.audio = {};
+    EXPECT_FALSE(holds(report_of(result), "<audio"));
+}
+
+TEST(Report, ShowsTheVideoWhereItLies) {
+    app::PlayResult result = sample_play_result();
+    EXPECT_FALSE(holds(report_of(result), "<video"));
+    result.options.video = "my take.mp4";
+    result.report_video = "../my%20take.mp4";
+    EXPECT_TRUE(holds(report_of(result), "<video controls preload=metadata src=\"../my%20take.mp4\">"));
+}
+
+/// Frames of 8 x 4 pixels, the second one missing: four pictures side by side, each half as wide, with a bar of four rows.
+TEST(Report, AFilmIsItsFramesSideBySideWithABarBelow) {
+    const TemporaryFolder here;
+    app::Film film{{}, 2, 1.0 / 30};
+    for (int i = 0; i < 4; ++i) {
+        film.files.push_back(here.path() / (std::to_string(i) + ".png"));
+        render::Image frame{8, 4,
+                            std::vector<std::uint8_t>(8 * 4 * 3, static_cast<std::uint8_t>(50 * i + 20))};
+        frame.rgb[0] = static_cast<std::uint8_t>(50 * i + 24);  // a mean of four: 1 more
+        const std::vector<std::uint8_t> png = render::encode_png(frame);
+        if (i != 1) app::write_file(film.files.back(), png);
+    }
+    const render::Image strip = app::film_strip(film, 4);
+    ASSERT_EQ(strip.width, 16);
+    ASSERT_EQ(strip.height, 2 + 4);
+    const auto pixel = [&](int x, int y) {
+        return int{strip.rgb[static_cast<std::size_t>(3 * (y * 16 + x))]};
+    };
+    EXPECT_EQ(pixel(0, 0), 21);
+    EXPECT_EQ(pixel(1, 0), 20);
+    EXPECT_EQ(pixel(4, 0), 21) << "a frame that is missing shows the one before";
+    EXPECT_EQ(pixel(8, 0), 121);
+    EXPECT_EQ(pixel(15, 1), 170);
+    EXPECT_NE(pixel(0, 2), pixel(1, 2)) << "where the first frame is in the film";
+    EXPECT_EQ(pixel(8 + 2, 2), 43) << "the frame that is struck, in the colour of notes";
+    app::PlayResult result = sample_play_result();
+    result.report_films = {film};
+    EXPECT_TRUE(holds(report_of(result), "<div class=film style=\"--n:4;--s:0.80s;aspect-ratio:8/8\">"));
+}
 TEST(Report, EveryPlotIsAWholeSvgWithALabelAndFollowsThePagesColours) {
     const std::string page = report_of(sample_play_result());
-    // One row of timeline, two of timing, the leads and the sound; every mark in the legend and the symbols
+    // One row of timeline, two of timing, the leads, the sound and its spectrogram; every mark in the legend and the symbols
     // are more.
-    EXPECT_EQ(count(page, "<svg role=\"img\" aria-label=\""), 5U);
+    EXPECT_EQ(count(page, "<svg role=\"img\" aria-label=\""), 6U);
     EXPECT_EQ(count(page, "<svg"), count(page, "</svg>"));
     EXPECT_EQ(count(page, "<g>") + count(page, "<g "), count(page, "</g>"));
     EXPECT_EQ(count(page, "id='gpPt6'"), 1U) << "the symbols are defined once";
