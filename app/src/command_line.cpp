@@ -1,5 +1,6 @@
 #include "command_line.h"
 
+#include <audio/samples.h>
 #include <fmt/format.h>
 #include <poll.h>
 #include <render/mesh.h>
@@ -103,6 +104,8 @@ int parse_and_report(CLI::App& program, int argc, char** argv) {
     } catch (const tracking::TraceError& wrong) {
         return complain(wrong.what(), kBadInput);
     } catch (const render::MeshError& wrong) {
+        return complain(wrong.what(), kBadInput);
+    } catch (const audio::SampleError& wrong) {
         return complain(wrong.what(), kBadInput);
     } catch (const sim::InputError& wrong) {
         return complain(fmt::format("error: {}", wrong.what()), kBadInput);

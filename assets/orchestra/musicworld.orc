@@ -199,6 +199,12 @@ endop
   endif
 #
 
+; The same in orchestras of one's own, where $CLOSE means it: a note lasts at most a minute.
+#define OWN_CLOSE #
+  iduration = min(iduration, 60)
+  $CLOSE
+#
+
 ; Puts the membrane's 32 modes, struck at radius iradius of 1, with a second head two more; gives their number, the roots of the sums
 ; of their squared amplitudes, after the contact's force and after the drive, and the root mean square of their wave numbers
 ; (of the lowest mode's), weighted by the force's.

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -47,8 +48,10 @@ public:
                                 std::optional<double> otherwise = {}) const {
         const pugi::xml_attribute attribute = node.attribute(name);
         if (!attribute && otherwise) return *otherwise;
-        const double value = attribute.as_double(std::nan(""));
-        if (!(value >= low && value <= high))
+        const std::string_view text = attribute.value();
+        double value = 0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        if (error != std::errc() || end != text.data() + text.size() || !(value >= low && value <= high))
             fail_at(place(node), std::string(name) + "=\"" + printable(attribute.value()) + "\"",
                     "a number in range");
         return value;
@@ -161,6 +164,7 @@ private:
         if (result_.regions.size() >= kMostRegions)
             fail_at(xml.place(audio), "more than 4096 sounds", "fewer");
         WrittenRegion r;
+        r.loop_mode = LoopMode::none;
         std::string name = audio.attribute("file").value();
         if (name.empty()) fail_at(xml.place(audio), "an <audiofile> without file", "file=\"NAME.wav\"");
         std::ranges::replace(name, '\\', '/');

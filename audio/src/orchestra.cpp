@@ -22,7 +22,7 @@ std::string in_ticks(std::string_view word) {
 
 [[noreturn]] void refuse(const std::string& file, std::size_t line, const std::string& found,
                          std::string_view expected) {
-    throw std::runtime_error(file + ":" + std::to_string(line) + ": found " + found + ", expected " +
+    throw std::runtime_error(file + ":" + std::to_string(line) + ":1: error: found " + found + ", expected " +
                              std::string(expected));
 }
 
@@ -53,7 +53,9 @@ Parameter parse_parameter(std::string_view rest, const std::string& file, std::s
     parameter.name = name;
     for (double* value : {&parameter.fallback, &parameter.minimum, &parameter.maximum}) {
         const std::string_view word = take_word(rest);
-        if (!read_number(word, *value)) refuse(file, line, in_ticks(word), "a finite number");
+        if (!read_number(word, *value))
+            refuse(file, line, word.empty() ? "too few words" : in_ticks(word),
+                   std::string(kForm) + ", its numbers finite");
     }
     if (!(parameter.minimum <= parameter.fallback && parameter.fallback <= parameter.maximum)) {
         refuse(file, line, "default outside its range", "minimum <= default <= maximum");

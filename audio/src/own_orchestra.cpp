@@ -13,11 +13,11 @@ constexpr std::size_t kLongestOrchestra = 1 << 20;
 
 /// All words that stand for something else than a number, a variable of its own or an instrument's name: a list of what may be,
 /// since Csound has some two thousand opcodes, of which new ones may reach files, processes, networks or clocks. No tables are made or
-/// written, as the bundled instruments and the host read theirs; no generators that notes share.
-constexpr std::array<std::string_view, 132> kWords = {
+/// written, as the bundled instruments and the host read theirs; no generators that notes share. No loops, so that a note's work is bounded by its text.
+constexpr std::array<std::string_view, 128> kWords = {
     // syntax, casts and the header's values
-    "instr", "endin", "if", "then", "else", "elseif", "endif", "while", "until", "do", "od", "a", "k", "i",
-    "init", "sr", "kr", "ksmps", "turnoff",
+    "instr", "endin", "if", "then", "else", "elseif", "endif", "a", "k", "i", "init", "sr", "kr", "ksmps",
+    "turnoff",
     // of the bundled orchestra: what STROKE sets and CLOSE reads, its opcodes and the host's
     "amid", "aside", "asilence", "aforce", "acontact", "arough", "iduration", "ilevel", "iwidth", "iplace",
     "ispeed", "iseed", "icontact", "iarea", "ilouder", "iaside", "ktime", "Level", "Contact", "Reaches",
@@ -131,6 +131,9 @@ private:
             refuse(at, printable(word), "instruments only: instr NAME ... endin");
         } else if (word == "endin") {
             within_ = false;
+        } else if (word == "p1" || word == "p2" || word == "p3") {
+            refuse(at, std::string(word),
+                   "iduration for a note's length, which $CLOSE sets; p4 and on are the note's");
         } else if (!contains(kWords, word) && !contains(kMoreWords, word) && !is_variable(word) &&
                    !is_number(word) && !is_p_field(word)) {
             refuse(
@@ -138,7 +141,7 @@ private:
                 "an opcode that makes sound, or a variable: a, k or i and then a capital letter or a digit");
         }
         previous_ = word;
-        out_ += word;
+        out_ += word == "$CLOSE" ? "$OWN_CLOSE" : word;  // which bounds the note's length
     }
 
     void sign(char c, std::size_t at) {

@@ -14,6 +14,8 @@ namespace audio {
 struct Recording {
     double rate_hz = 48000;
     std::vector<std::vector<float>> channels;  ///< equally long
+    std::int64_t loop_start = 0,
+                 loop_end = -1;  ///< first and last frame of its loop; none: loop_end < loop_start
     [[nodiscard]] std::size_t frames() const { return channels.empty() ? 0 : channels.front().size(); }
 };
 
@@ -21,6 +23,15 @@ struct Recording {
 struct ChannelUse {
     int channel = 0;  ///< from 0
     double left = 1, right = 1;
+};
+
+/// How a sample goes on behind its loop's last frame. A stroke holds its key until the envelope has decayed and the loop was
+/// heard once.
+enum class LoopMode {
+    as_recorded,  ///< continuous where the recording has a loop
+    none,
+    continuous,  ///< again and again, through the release
+    sustain,     ///< again and again until the key is let go, then on to the end
 };
 
 /// A region as its file describes it; names as SFZ (sfzformat.com), units as there.
@@ -40,15 +51,20 @@ struct WrittenRegion {
     double delay = 0;                             ///< [s]
     double ampeg_delay = 0, ampeg_attack = 0, ampeg_hold = 0, ampeg_decay = 0;  ///< [s]
     double ampeg_sustain = 100;                                                 ///< [%]
+    double ampeg_release = 0.001;  ///< [s], by 80 dB; heard of loops alone
+    LoopMode loop_mode = LoopMode::as_recorded;
+    std::int64_t loop_start = -1, loop_end = -1;  ///< first and last frame; -1: as recorded
+    int sw_lolast = -1, sw_hilast = -1;           ///< keyswitches that it answers to; -1: all
     int group = 0, off_by = 0;
     std::vector<ChannelUse>
-        channels{};  ///< empty: of one channel both sides, of two one each, of more the first two
+        channels{};  ///< empty: of one channel both sides, of two one each; more are refused
 };
 
 struct WrittenRegions {
     std::vector<WrittenRegion> regions;
     std::vector<std::filesystem::path> files;  ///< beside the samples: the file itself and what it includes
     std::vector<std::string> ignored;
+    int sw_default = -1;  ///< the keyswitch that is down; -1: none
 };
 
 /// A letter, a digit or an underscore.

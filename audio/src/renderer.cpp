@@ -71,15 +71,20 @@ const Instrument& find_instrument(const std::vector<Instrument>& instruments, co
                              "`, expected one of: " + known);
 }
 
+/// The names that instruments of one's own may not have.
+std::vector<std::string> taken_names(const std::vector<Instrument>& bundled) {
+    std::vector<std::string> taken = {kSampleInstrument};
+    for (const Instrument& instrument : bundled) taken.push_back(instrument.name);
+    return taken;
+}
+
 /// The orchestra with what its voices need behind it: the instrument of recorded sounds, orchestras of one's own.
 std::string with_own_sounds(const std::filesystem::path& orchestra, const std::vector<Voice>& voices) {
     std::string text = read_text(orchestra);
     const auto sampled = [](const Voice& voice) { return voice.samples != nullptr; };
     if (std::ranges::any_of(voices, sampled))
         text += "\n" + read_text(orchestra.parent_path() / "samples.orc");
-    std::vector<std::string> taken = {kSampleInstrument};
-    for (const Instrument& bundled : parse_instruments(text, orchestra.string()))
-        taken.push_back(bundled.name);
+    const std::vector<std::string> taken = taken_names(parse_instruments(text, orchestra.string()));
     std::set<std::filesystem::path> own;
     for (const Voice& voice : voices) {
         if (voice.own_orchestra.empty() || !own.insert(voice.own_orchestra).second) continue;
@@ -91,7 +96,7 @@ std::string with_own_sounds(const std::filesystem::path& orchestra, const std::v
 std::vector<RenderedVoice> resolve_voices(CsoundEngine& engine, const std::vector<Instrument>& instruments,
                                           const std::vector<Voice>& voices) {
     ChokeGroups groups;
-    int next_table = kFirstSampleTable;
+    SampleTables tables(kFirstSampleTable);
     std::vector<RenderedVoice> rendered;
     for (const Voice& voice : voices) {
         check_mix(voice);
@@ -102,8 +107,7 @@ std::vector<RenderedVoice> resolve_voices(CsoundEngine& engine, const std::vecto
         made.choke_group = groups.number(voice.choke_group);
         if (voice.samples) {
             made.instrument = engine.instrument_number(kSampleInstrument);
-            made.samples.emplace(engine, voice.samples, next_table);
-            next_table += static_cast<int>(voice.samples->waves.size());
+            made.samples.emplace(engine, voice.samples, tables);
             continue;
         }
         const Instrument& instrument = find_instrument(instruments, voice);
@@ -128,8 +132,22 @@ PanGains pan_gains(double pan, double gain_db) {
     return {gain * std::cos(angle), gain * std::sin(angle)};
 }
 
-Renderer::Renderer(const std::filesystem::path& orchestra, const std::vector<Voice>& voices, const Mix& mix)
-    : Renderer(with_own_sounds(orchestra, voices), orchestra.string(), voices, mix) {}
+Renderer::Renderer(const std::filesystem::path& orchestra, const std::vector<Voice>& voices,
+                   const Mix& mix) try
+    : Renderer(with_own_sounds(orchestra, voices), orchestra.string(), voices, mix) {
+} catch (const SampleError&) {
+    throw;
+} catch (const std::runtime_error&) {
+    for (const Voice& voice : voices)  // Csound names the bundled orchestra, whichever it stopped at
+        if (!voice.own_orchestra.empty()) check_own_orchestra(orchestra, voice.own_orchestra);
+    throw;
+}
+
+void check_own_orchestra(const std::filesystem::path& orchestra, const std::filesystem::path& own) {
+    const std::string text = read_text(orchestra);
+    const std::vector<std::string> taken = taken_names(parse_instruments(text, orchestra.string()));
+    compile_own_orchestra(text, read_own_orchestra(own, taken), own.string());
+}
 
 Renderer::Renderer(const std::string& text, const std::string& source, const std::vector<Voice>& voices,
                    const Mix& mix)

@@ -1,16 +1,21 @@
-#include <samplerate.h>
 #include <sndfile.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <set>
+#include <sstream>
+#include <tuple>
 
 #include "audio/performance.h"
 #include "region_text.h"
+#include "sample_waves.h"
 
 namespace audio {
 namespace fs = std::filesystem;
@@ -18,7 +23,6 @@ namespace {
 
 constexpr std::size_t kLargestSoundFont = std::size_t{512} << 20;  // bytes
 constexpr int kMostChannels = 64;
-constexpr double kGuardS = 0.002;  // silence at a wave's end
 
 bool is_file(const fs::path& file) {
     std::error_code error;
@@ -41,6 +45,28 @@ std::string bytes_of(const fs::path& file, std::size_t most, const std::string& 
 struct CloseFile {
     void operator()(SNDFILE* file) const noexcept { sf_close(file); }
 };
+
+/// libsndfile reads what there is of a WAV, AIFF or AU file whose samples end early, and notes it in its log as
+/// "data : 96000 (should be 47978)". A length of all ones means that whoever wrote the file could not know it.
+void require_whole(SNDFILE* sound, const std::string& name, const std::string& place) {
+    std::array<char, 16384> log{};
+    (void)sf_command(sound, SFC_GET_LOG_INFO, log.data(), static_cast<int>(log.size() - 1));
+    std::istringstream lines(log.data());
+    for (std::string line; std::getline(lines, line);) {
+        constexpr std::string_view kShould = "(should be ";
+        const std::size_t length = line.find(" : "), should = line.find(kShould);
+        const bool samples =
+            line.starts_with("data") || line.starts_with(" SSND") || line.starts_with("  Data Size");
+        if (!samples || length == line.npos || should == line.npos) continue;
+        const unsigned long long said = std::strtoull(line.c_str() + length + 3, nullptr, 10),
+                                 there = std::strtoull(line.c_str() + should + kShould.size(), nullptr, 10);
+        if (said > there && said != 0xffffffff)
+            fail_at(
+                place,
+                name + " with " + std::to_string(there) + " of " + std::to_string(said) + " bytes of samples",
+                "a whole file; copy it again, or `ffmpeg -i IN OUT` keeps what there is");
+    }
+}
 
 /// Reads a sound file; `place` is where it is named.
 Recording read_sound(const fs::path& file, const std::string& place) {
@@ -66,6 +92,7 @@ Recording read_sound(const fs::path& file, const std::string& place) {
                 name + " of " + std::to_string(info.frames) + " frames of " + std::to_string(channels) +
                     " channels",
                 "at most " + std::to_string(kMostSampleFrames) + " samples");
+    require_whole(sound.get(), name, place);
     std::vector<float> all(static_cast<std::size_t>(info.frames) * channels);
     const sf_count_t read = sf_readf_float(sound.get(), all.data(), info.frames);
     if (read != info.frames)
@@ -77,136 +104,25 @@ Recording read_sound(const fs::path& file, const std::string& place) {
         fail_at(place, name + " with samples that are no numbers or beyond 1000", "samples about -1 to 1");
     Recording recording;
     recording.rate_hz = info.samplerate;
+    SF_INSTRUMENT instrument{};
+    if (sf_command(sound.get(), SFC_GET_INSTRUMENT, &instrument, sizeof instrument) == SF_TRUE &&
+        instrument.loop_count > 0 && instrument.loops[0].mode != SF_LOOP_NONE &&
+        instrument.loops[0].start < instrument.loops[0].end &&
+        static_cast<sf_count_t>(instrument.loops[0].end) <= info.frames) {
+        recording.loop_start = instrument.loops[0].start;
+        recording.loop_end =
+            std::int64_t{instrument.loops[0].end} - 1;  // libsndfile's is the first one behind
+    }
     recording.channels.assign(channels, std::vector<float>(static_cast<std::size_t>(info.frames)));
     for (std::size_t i = 0; i < all.size(); ++i) recording.channels[i % channels][i / channels] = all[i];
     return recording;
 }
-
-/// Resamples a channel so that `ratio` times as many samples last as long.
-std::vector<float> resampled(const std::vector<float>& samples, double ratio, const std::string& place) {
-    if (ratio == 1) return samples;
-    std::vector<float> result(
-        static_cast<std::size_t>(std::ceil(static_cast<double>(samples.size()) * ratio)) + 1);
-    SRC_DATA data{};
-    data.data_in = samples.data();
-    data.input_frames = static_cast<long>(samples.size());
-    data.data_out = result.data();
-    data.output_frames = static_cast<long>(result.size());
-    data.src_ratio = ratio;
-    if (const int error = src_simple(&data, SRC_SINC_BEST_QUALITY, 1); error != 0)
-        fail_at(place, std::string("a sample that libsamplerate refuses: ") + src_strerror(error),
-                "tuning within 256 times");
-    result.resize(static_cast<std::size_t>(data.output_frames_gen));
-    return result;
-}
-
-/// The region's envelope n samples after its start, the delay behind it: attack linear, decay linear in dB to the
-/// sustain (which counts as -80 dB where it is 0).
-class Envelope {
-public:
-    explicit Envelope(const WrittenRegion& r)
-        : attack_(r.ampeg_attack * kSampleRate),
-          hold_(attack_ + r.ampeg_hold * kSampleRate),
-          decay_(r.ampeg_decay * kSampleRate),
-          sustain_(r.ampeg_sustain / 100) {}
-    [[nodiscard]] double at(std::size_t n) const {
-        const auto x = static_cast<double>(n);
-        if (x < attack_) return x / attack_;
-        if (x < hold_ || sustain_ >= 1) return 1;
-        const double share = decay_ > 0 ? (x - hold_) / decay_ : 1;
-        if (share >= 1) return sustain_;
-        return std::pow(std::max(sustain_, 1e-4), share);
-    }
-
-private:
-    double attack_, hold_, decay_, sustain_;
-};
 
 /// Gains of both sides by SFZ's pan, constant power; 1 and 1 in the middle.
 std::pair<double, double> balance(double pan) {
     const double angle = (pan / 100 + 1) * std::numbers::pi / 4;
     return {std::numbers::sqrt2 * std::cos(angle), std::numbers::sqrt2 * std::sin(angle)};
 }
-
-class SetMaker {
-public:
-    explicit SetMaker(SampleSet& set) : set_(set) {}
-
-    void add(const WrittenRegion& r, int key, bool every_key) {
-        const Recording& recording = recording_of(r);
-        for (const ChannelUse& use : channels_of(r, recording)) {
-            SampleRegion region;
-            region.key = every_key ? -1 : key;
-            region.low_velocity = r.lovel, region.high_velocity = r.hivel;
-            region.low_random = r.lorand, region.high_random = r.hirand >= 1 ? 2 : r.hirand;
-            region.sequence_length = r.seq_length, region.sequence_position = r.seq_position;
-            region.velocity_track = r.amp_veltrack / 100;
-            const auto [left, right] = balance(r.pan);
-            const double gain = std::pow(10, r.volume / 20) * r.amplitude / 100;
-            region.left = gain * left * use.left, region.right = gain * right * use.right;
-            region.wave = static_cast<std::uint32_t>(set_.waves.size());
-            set_.waves.push_back(wave_of(r, recording, use.channel, key));
-            region.frames = static_cast<std::uint32_t>(set_.waves.back().size());
-            set_.waves.back().resize(set_.waves.back().size() +
-                                     static_cast<std::size_t>(kGuardS * kSampleRate));
-            frames_ += set_.waves.back().size();
-            if (frames_ > kMostSampleFrames)
-                fail_at(r.place, "more than " + std::to_string(kMostSampleFrames) + " frames of samples",
-                        "less sound for one instrument");
-            set_.regions.push_back(region);
-        }
-    }
-
-private:
-    const Recording& recording_of(const WrittenRegion& r) {
-        if (r.recording) return *r.recording;
-        const auto known = recordings_.find(r.sample);
-        if (known != recordings_.end()) return known->second;
-        set_.files.push_back(r.sample);
-        const Recording& read = recordings_.emplace(r.sample, read_sound(r.sample, r.place)).first->second;
-        if ((read_ += read.channels.size() * read.channels.front().size()) > kMostSampleFrames)
-            fail_at(r.place, "more than " + std::to_string(kMostSampleFrames) + " samples in the files",
-                    "less sound for one instrument");
-        return read;
-    }
-    static std::vector<ChannelUse> channels_of(const WrittenRegion& r, const Recording& recording) {
-        for (const ChannelUse& use : r.channels)
-            if (use.channel < 0 || use.channel >= std::ssize(recording.channels))
-                fail_at(r.place,
-                        "channel " + std::to_string(use.channel + 1) + " of a sample of " +
-                            std::to_string(recording.channels.size()),
-                        "one that it has");
-        if (!r.channels.empty()) return r.channels;
-        if (recording.channels.size() == 1) return {{0, 1, 1}};
-        return {{0, 1, 0}, {1, 0, 1}};
-    }
-    static std::vector<float> wave_of(const WrittenRegion& r, const Recording& recording, int channel,
-                                      int key) {
-        const std::vector<float>& all = recording.channels[static_cast<std::size_t>(channel)];
-        const auto length = static_cast<std::int64_t>(all.size());
-        const std::int64_t end = r.end < 0 ? length : std::min(length, r.end + 1);
-        if (r.offset >= end)
-            fail_at(r.place,
-                    "offset " + std::to_string(r.offset) + " of a sample that ends at frame " +
-                        std::to_string(end),
-                    "one before its end");
-        const double cents = r.tune + 100 * r.transpose + r.pitch_keytrack * (key - r.pitch_keycenter);
-        const double ratio = kSampleRate / recording.rate_hz / std::exp2(cents / 1200);
-        if (!(ratio > 1.0 / 250 && ratio < 250) ||
-            static_cast<double>(end - r.offset) * ratio > 2 * kLongestSampleS * kSampleRate)
-            fail_at(r.place, "a tuning of " + std::to_string(cents) + " cents", "less");
-        std::vector<float> wave = resampled({all.begin() + r.offset, all.begin() + end}, ratio, r.place);
-        const Envelope envelope(r);
-        for (std::size_t i = 0; i < wave.size(); ++i) wave[i] *= static_cast<float>(envelope.at(i));
-        const auto delay = static_cast<std::size_t>(std::lround((r.delay + r.ampeg_delay) * kSampleRate));
-        wave.insert(wave.begin(), delay, 0.0F);
-        return wave;
-    }
-
-    SampleSet& set_;
-    std::map<fs::path, Recording> recordings_;
-    std::size_t frames_ = 0, read_ = 0;
-};
 
 std::string lower_extension(const fs::path& file) {
     std::string extension = file.extension().string();
@@ -221,14 +137,135 @@ WrittenRegions single(const fs::path& file) {
     r.sample = file;
     r.place = file.string();
     r.pitch_keytrack = 0;
+    r.loop_mode = LoopMode::none;
     return {{r}, {}, {}};
 }
 
-WrittenRegions written_regions(const fs::path& file, const std::string& extension) {
+WrittenRegions written_regions(const fs::path& file) {
+    const std::string extension = lower_extension(file);
     if (extension == ".sfz") return parse_sfz(read_region_file(file), file);
     if (extension == ".sf2") return parse_sf2(bytes_of(file, kLargestSoundFont, ""), file);
     if (extension == ".xml") return parse_drumgizmo(read_region_file(file), file);
     return single(file);
+}
+
+/// Everything that makes two waves differ.
+using WaveKey = std::tuple<const Recording*, int, int, std::array<double, 14>>;
+WaveKey wave_key(const WrittenRegion& r, const Recording& recording, int channel, int key) {
+    return {&recording,
+            channel,
+            static_cast<int>(r.loop_mode),
+            {static_cast<double>(r.offset), static_cast<double>(r.end), static_cast<double>(r.loop_start),
+             static_cast<double>(r.loop_end), tuning_cents(r, key), r.delay, r.ampeg_delay, r.ampeg_attack,
+             r.ampeg_hold, r.ampeg_decay, r.ampeg_sustain, r.ampeg_release, 0, 0}};
+}
+
+}  // namespace
+
+/// A kit's.
+class SampleLibrary::Contents {
+public:
+    const Recording& recording(const fs::path& file, const std::string& place) {
+        const auto known = recordings_.find(file);
+        if (known != recordings_.end()) return known->second;
+        const Recording& read = recordings_.emplace(file, read_sound(file, place)).first->second;
+        if ((read_ += read.channels.size() * read.frames()) > kMostSampleFrames)
+            fail_at(place, "more than " + std::to_string(kMostSampleFrames) + " samples in the kit's files",
+                    "less sound");
+        return read;
+    }
+    std::shared_ptr<const std::vector<float>> wave(const WrittenRegion& r, const Recording& recording,
+                                                   int channel, int key) {
+        std::shared_ptr<const std::vector<float>>& known = waves_[wave_key(r, recording, channel, key)];
+        if (known) return known;
+        known = std::make_shared<const std::vector<float>>(make_wave(r, recording, channel, key));
+        if ((made_ += known->size()) > kMostSampleFrames)
+            fail_at(r.place,
+                    "more than " + std::to_string(kMostSampleFrames) + " frames of samples in the kit",
+                    "less sound");
+        return known;
+    }
+    const WrittenRegions& regions(const fs::path& file) {
+        const auto known = written_.find(file);
+        return known != written_.end() ? known->second
+                                       : written_.emplace(file, written_regions(file)).first->second;
+    }
+
+private:
+    std::map<fs::path, Recording> recordings_;
+    std::map<fs::path, WrittenRegions> written_;
+    std::map<WaveKey, std::shared_ptr<const std::vector<float>>> waves_;
+    std::size_t read_ = 0, made_ = 0;
+};
+
+SampleLibrary::SampleLibrary() : contents_(std::make_unique<Contents>()) {}
+SampleLibrary::~SampleLibrary() = default;
+
+namespace {
+
+class SetMaker {
+public:
+    SetMaker(SampleSet& set, SampleLibrary::Contents& library) : set_(set), library_(library) {}
+
+    void add(const WrittenRegion& r, int key, bool every_key) {
+        const Recording& recording = recording_of(r);
+        for (const ChannelUse& use : channels_of(r, recording)) {
+            SampleRegion region;
+            region.key = every_key ? -1 : key;
+            region.low_velocity = r.lovel, region.high_velocity = r.hivel;
+            region.low_random = r.lorand, region.high_random = r.hirand >= 1 ? 2 : r.hirand;
+            region.sequence_length = r.seq_length, region.sequence_position = r.seq_position;
+            region.velocity_track = r.amp_veltrack / 100;
+            const auto [left, right] = balance(r.pan);
+            const double gain = std::pow(10, r.volume / 20) * r.amplitude / 100;
+            region.left = gain * left * use.left, region.right = gain * right * use.right;
+            const std::shared_ptr<const std::vector<float>> wave =
+                library_.wave(r, recording, use.channel, key);
+            region.wave = static_cast<std::uint32_t>(set_.waves.size());
+            region.frames = static_cast<std::uint32_t>(wave->size() - kWaveGuard);
+            set_.waves.push_back(wave);
+            set_.regions.push_back(region);
+        }
+    }
+
+private:
+    const Recording& recording_of(const WrittenRegion& r) {
+        if (r.recording) return *r.recording;
+        if (std::ranges::find(set_.files, r.sample) == set_.files.end()) set_.files.push_back(r.sample);
+        return library_.recording(r.sample, r.place);
+    }
+    static std::vector<ChannelUse> channels_of(const WrittenRegion& r, const Recording& recording) {
+        for (const ChannelUse& use : r.channels)
+            if (use.channel < 0 || use.channel >= std::ssize(recording.channels))
+                fail_at(r.place,
+                        "channel " + std::to_string(use.channel + 1) + " of a sample of " +
+                            std::to_string(recording.channels.size()),
+                        "one that it has");
+        if (!r.channels.empty()) return r.channels;
+        if (recording.channels.size() > 2)
+            fail_at(r.place, "a sample of " + std::to_string(recording.channels.size()) + " channels",
+                    "one or two; `ffmpeg -i IN -ac 2 OUT` mixes them");
+        if (recording.channels.size() == 1) return {{0, 1, 1}};
+        return {{0, 1, 0}, {1, 0, 1}};
+    }
+
+    SampleSet& set_;
+    SampleLibrary::Contents& library_;
+};
+
+/// The keyswitch that is down: the one asked for, else the file's default, else its lowest.
+int switch_of(const WrittenRegions& written, const fs::path& file, std::optional<int> asked) {
+    int lowest = -1;
+    bool there = false;
+    for (const WrittenRegion& r : written.regions) {
+        if (r.sw_lolast < 0) continue;
+        there = there || (asked && *asked >= r.sw_lolast && *asked <= r.sw_hilast);
+        if (lowest < 0 || r.sw_lolast < lowest) lowest = r.sw_lolast;
+    }
+    if (asked && lowest >= 0 && !there)
+        fail_at(file.string() + ":1:1", "no region with sw_last=" + std::to_string(*asked),
+                "one of its keyswitches, the lowest is " + std::to_string(lowest));
+    return asked.value_or(written.sw_default >= 0 ? written.sw_default : lowest);
 }
 
 std::string keys_text(const WrittenRegions& written) {
@@ -256,19 +293,27 @@ std::string read_region_file(const fs::path& file, const std::string& place) {
     return bytes_of(file, kLargestRegionFile, place);
 }
 
-std::shared_ptr<const SampleSet> read_samples(const fs::path& file, std::span<const int> keys) {
+std::shared_ptr<const SampleSet> read_samples(const fs::path& file, std::span<const int> keys,
+                                              SampleLibrary& library, std::optional<int> keyswitch) {
     const std::string extension = lower_extension(file);
     const bool alone = extension != ".sfz" && extension != ".sf2" && extension != ".xml";
-    WrittenRegions written = written_regions(file, extension);
+    SampleLibrary::Contents& contents = library.contents();
+    const WrittenRegions& written = contents.regions(file);
+    const int down = switch_of(written, file, keyswitch);
     auto set = std::make_shared<SampleSet>();
     set->files = written.files;
     set->ignored = written.ignored;
-    SetMaker maker(*set);
+    const auto has_switch = [](const WrittenRegion& r) { return r.sw_lolast >= 0; };
+    if (keyswitch && std::ranges::none_of(written.regions, has_switch))
+        set->ignored.emplace_back("keyswitch of the kit, as the file has none");
+    SetMaker maker(*set, contents);
     const std::set<int> each(keys.begin(), keys.end());
     for (const int key : each) {
         bool any = false;
         for (const WrittenRegion& r : written.regions) {
-            if (key < r.lokey || key > r.hikey) continue;
+            if (key < r.lokey || key > r.hikey ||
+                (r.sw_lolast >= 0 && (down < r.sw_lolast || down > r.sw_hilast)))
+                continue;
             any = true;
             maker.add(r, key, alone);
             if (r.group != 0 && r.group == r.off_by)

@@ -4,16 +4,21 @@
 
 namespace audio {
 
-SampleVoice::SampleVoice(CsoundEngine& engine, std::shared_ptr<const SampleSet> set, int first_table)
-    : set_(std::move(set)), first_table_(first_table), counts_(set_->regions.size(), 0) {
-    for (std::size_t i = 0; i < set_->waves.size(); ++i)
-        engine.make_table(first_table_ + static_cast<int>(i), set_->waves[i]);
+int SampleTables::number(CsoundEngine& engine, const std::vector<float>& wave) {
+    const auto [known, is_new] = numbers_.try_emplace(&wave, next_);
+    if (is_new) engine.make_table(next_++, wave);
+    return known->second;
+}
+
+SampleVoice::SampleVoice(CsoundEngine& engine, std::shared_ptr<const SampleSet> set, SampleTables& tables)
+    : set_(std::move(set)), counts_(set_->regions.size(), 0) {
+    for (const auto& wave : set_->waves) tables_.push_back(tables.number(engine, *wave));
     events_.reserve(set_->regions.size());
     first_ = event(set_->regions.at(0), 1).fields;
 }
 
 SampleVoice::Event SampleVoice::event(const SampleRegion& region, double gain) const {
-    return {{static_cast<double>(first_table_) + region.wave, static_cast<double>(region.frames), gain},
+    return {{static_cast<double>(tables_[region.wave]), static_cast<double>(region.frames), gain},
             region.left,
             region.right};
 }

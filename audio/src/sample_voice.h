@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,11 +12,22 @@
 
 namespace audio {
 
+/// Csound's tables of the waves of all voices: one for each wave.
+class SampleTables {
+public:
+    explicit SampleTables(int first) : next_(first) {}
+    /// The number of the wave's table, which is made if it is new.
+    [[nodiscard]] int number(CsoundEngine& engine, const std::vector<float>& wave);
+
+private:
+    int next_;
+    std::map<const std::vector<float>*, int> numbers_;
+};
+
 /// A voice's samples in Csound's tables, and how often each region was struck.
 class SampleVoice {
 public:
-    /// Puts the waves into tables from `first_table` on.
-    SampleVoice(CsoundEngine& engine, std::shared_ptr<const SampleSet> set, int first_table);
+    SampleVoice(CsoundEngine& engine, std::shared_ptr<const SampleSet> set, SampleTables& tables);
 
     /// One event of `instr sample`.
     struct Event {
@@ -31,7 +43,7 @@ private:
     [[nodiscard]] Event event(const SampleRegion& region, double gain) const;
 
     std::shared_ptr<const SampleSet> set_;  // of the kit, whose other voices may hold it, too
-    int first_table_;
+    std::vector<int> tables_;               // by wave
     std::vector<std::uint32_t> counts_;
     std::vector<Event> events_;
     std::array<double, 3> first_{};

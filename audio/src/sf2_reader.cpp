@@ -20,6 +20,8 @@ constexpr std::size_t kMostZones = 1 << 16;
 enum Generator {
     start_offset = 0,
     end_offset = 1,
+    start_loop = 2,
+    end_loop = 3,
     start_coarse = 4,
     end_coarse = 12,
     pan = 17,
@@ -28,13 +30,17 @@ enum Generator {
     hold_volume = 35,
     decay_volume = 36,
     sustain_volume = 37,
+    release_volume = 38,
     instrument = 41,
     key_range = 43,
     velocity_range = 44,
+    start_loop_coarse = 45,
     attenuation = 48,
+    end_loop_coarse = 50,
     coarse_tune = 51,
     fine_tune = 52,
     sample_id = 53,
+    sample_modes = 54,
     scale_tuning = 56,
     exclusive_class = 57,
     root_key = 58,
@@ -222,6 +228,9 @@ private:
         r.ampeg_decay = time(decay_volume) * sustain_centibels / 1000;
         r.ampeg_sustain =
             100 * std::pow(10, -std::clamp(sum(preset, zone, sustain_volume), 0.0, 1440.0) / 200);
+        r.ampeg_release = std::min(time(release_volume), 100.0) * 0.8;  // by 80 of the 100 dB that it means
+        const int modes = amount(zone, sample_modes, 0) & 3;
+        r.loop_mode = modes == 1 ? LoopMode::continuous : modes == 3 ? LoopMode::sustain : LoopMode::none;
         r.group = r.off_by = amount(zone, exclusive_class, 0);
         cut(r, zone, number);
         result_.regions.push_back(std::move(r));
@@ -248,6 +257,13 @@ private:
         r.end = std::clamp<std::int64_t>(end - begin + offset(end_offset, end_coarse), r.offset + 1,
                                          end - begin) -
                 1;
+        if (r.loop_mode != LoopMode::none) {
+            r.loop_start = shdr.dword(number, 28) - begin + offset(start_loop, start_loop_coarse);
+            r.loop_end = shdr.dword(number, 32) - begin + offset(end_loop, end_loop_coarse) - 1;
+            // Files of one-shot sounds often leave these at 0.
+            if (r.loop_start < 0 || r.loop_end < r.loop_start || r.loop_end > r.end)
+                r.loop_mode = LoopMode::none;
+        }
         std::shared_ptr<const Recording>& known = recordings_[number];
         if (!known) known = recording(begin, end, rate);
         r.recording = known;

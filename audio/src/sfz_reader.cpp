@@ -92,6 +92,7 @@ public:
     WrittenRegions finish() {
         end_header();
         result_.ignored.assign(ignored_.begin(), ignored_.end());
+        result_.sw_default = sw_default_;
         return std::move(result_);
     }
 
@@ -279,10 +280,24 @@ private:
                     "at most seq_length, " + std::to_string(r.seq_length));
         if (r.lovel > r.hivel || r.lorand > r.hirand)
             fail_at(r.place, "a low limit above the high one", "lovel <= hivel and lorand <= hirand");
+        if ((r.sw_lolast < 0) != (r.sw_hilast < 0) || r.sw_lolast > r.sw_hilast)
+            fail_at(r.place, "sw_lolast and sw_hilast that are no range", "both, sw_lolast <= sw_hilast");
+        if (r.loop_start >= 0 && r.loop_end >= 0 && r.loop_start > r.loop_end)
+            fail_at(r.place, "loop_start=" + std::to_string(r.loop_start), "at most loop_end");
         if (!sounds || r.hikey < 0) return {};
         return r;
     }
 
+    static LoopMode loop_mode_of(const Opcode& opcode) {
+        constexpr std::pair<std::string_view, LoopMode> kModes[] = {{"no_loop", LoopMode::none},
+                                                                    {"one_shot", LoopMode::none},
+                                                                    {"loop_continuous", LoopMode::continuous},
+                                                                    {"loop_sustain", LoopMode::sustain}};
+        for (const auto& [name, mode] : kModes)
+            if (opcode.value == name) return mode;
+        fail_at(opcode.place, "loop_mode=" + printable(opcode.value),
+                "no_loop, one_shot, loop_continuous or loop_sustain");
+    }
     int take_key(const Opcode& opcode, std::string_view name) const {
         const auto key = key_of(opcode.value);
         if (!key)
@@ -304,7 +319,7 @@ private:
 
     /// False: the region does not answer a stroke (a release trigger, another controller's range).
     bool take(WrittenRegion& r, const std::string& name, const Opcode& opcode) {
-        static constexpr std::array<NumberOpcode, 15> kNumbers = {{
+        static constexpr std::array<NumberOpcode, 16> kNumbers = {{
             {"volume", &WrittenRegion::volume, -144, 48},
             {"pan", &WrittenRegion::pan, -100, 100},
             {"amplitude", &WrittenRegion::amplitude, 0, 1000},
@@ -320,6 +335,7 @@ private:
             {"ampeg_attack", &WrittenRegion::ampeg_attack, 0, 100},
             {"ampeg_hold", &WrittenRegion::ampeg_hold, 0, 100},
             {"ampeg_decay", &WrittenRegion::ampeg_decay, 0, 100},
+            {"ampeg_release", &WrittenRegion::ampeg_release, 0, 100},
         }};
         static constexpr std::array<WholeOpcode, 6> kWholes = {{
             {"lovel", &WrittenRegion::lovel, 0, 127},
@@ -364,13 +380,32 @@ private:
             r.hikey = take_key(opcode, name);
         } else if (name == "pitch_keycenter") {
             r.pitch_keycenter = opcode.value == "sample" ? 60 : take_key(opcode, name);
+        } else if (name == "loop_mode" || name == "loopmode") {
+            r.loop_mode = loop_mode_of(opcode);
+        } else if (name == "loop_start" || name == "loopstart") {
+            r.loop_start = static_cast<std::int64_t>(whole(0, 4294967296.0));
+        } else if (name == "loop_end" || name == "loopend") {
+            r.loop_end = static_cast<std::int64_t>(whole(0, 4294967296.0));
+        } else if (name == "sw_default") {
+            sw_default_ = take_key(opcode, name);
+        } else if (name == "sw_last") {
+            r.sw_lolast = r.sw_hilast = take_key(opcode, name);
+        } else if (name == "sw_lolast") {
+            r.sw_lolast = take_key(opcode, name);
+        } else if (name == "sw_hilast") {
+            r.sw_hilast = take_key(opcode, name);
+        } else if (name == "sw_lokey" || name == "sw_hikey" || name == "sw_up") {
+            (void)take_key(opcode, name);
+        } else if (name == "sw_down" || name == "sw_previous") {
+            (void)take_key(opcode, name);
+            return false;  // no other key is down, none was before
         } else if (name == "trigger") {
             return opcode.value == "attack" || opcode.value == "first";
         } else if (name.starts_with("locc") || name.starts_with("hicc")) {
             const auto controller = controllers_.find(name.substr(4));
             const double value = controller == controllers_.end() ? 0 : controller->second;
             return name.starts_with("lo") ? value >= number(0, 127) : value <= number(0, 127);
-        } else if (name != "key" && name != "ampeg_release" && name != "loop_mode") {
+        } else if (name != "key") {
             ignored_.insert(name.substr(0, 60));
         }
         return true;
@@ -381,7 +416,7 @@ private:
     std::array<Opcodes, 5> levels_;
     Level level_ = none;
     std::string place_, default_path_;
-    int note_offset_ = 0, octave_offset_ = 0;
+    int note_offset_ = 0, octave_offset_ = 0, sw_default_ = -1;
     std::map<std::string, std::string> defines_;
     std::map<std::string, double> controllers_;
     std::set<std::string> ignored_;

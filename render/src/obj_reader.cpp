@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <map>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -59,8 +58,8 @@ private:
     };
 
     [[noreturn]] void refuse(const std::string& found, const std::string& expected) const {
-        throw std::runtime_error(file_ + ":" + std::to_string(line_number_) + ": error: found " + found +
-                                 ", expected " + expected);
+        throw MeshError(file_ + ":" + std::to_string(line_number_) + ": error: found " + found +
+                        ", expected " + expected);
     }
     void read_line(std::string_view line);
     void read_triangle(std::string_view line);

@@ -153,12 +153,12 @@ TEST(OrchestraParser, BadLinesAreReportedWithFileAndLine) {
     const auto parse = [](const char* text) {
         return message_of([=] { (void)audio::parse_instruments(text, "x.orc"); });
     };
-    EXPECT_EQ(parse("sr = 1\n;@ drum\n").find("x.orc:2: found parameter ``, expected"), 0U);
-    EXPECT_EQ(parse(";@ 1drum a 1 0 2\n").find("x.orc:1: found instrument `1drum`"), 0U);
-    EXPECT_EQ(parse(";@ drum a 1 0\n").find("x.orc:1: found ``, expected a finite number"), 0U);
-    EXPECT_EQ(parse(";@ drum a 1 0 inf\n").find("x.orc:1: found `inf`"), 0U);
-    EXPECT_EQ(parse(";@ drum a 3 0 2\n").find("x.orc:1: found default outside its range"), 0U);
-    EXPECT_EQ(parse(";@ drum a 1 0 2\n;@ drum a 1 0 2\n").find("x.orc:2: found a second `a`"), 0U);
+    EXPECT_EQ(parse("sr = 1\n;@ drum\n").find("x.orc:2:1: error: found parameter ``, expected"), 0U);
+    EXPECT_EQ(parse(";@ 1drum a 1 0 2\n").find("x.orc:1:1: error: found instrument `1drum`"), 0U);
+    EXPECT_EQ(parse(";@ drum a 1 0\n").find("x.orc:1:1: error: found too few words, expected `;@ "), 0U);
+    EXPECT_EQ(parse(";@ drum a 1 0 inf\n").find("x.orc:1:1: error: found `inf`"), 0U);
+    EXPECT_EQ(parse(";@ drum a 3 0 2\n").find("x.orc:1:1: error: found default outside its range"), 0U);
+    EXPECT_EQ(parse(";@ drum a 1 0 2\n;@ drum a 1 0 2\n").find("x.orc:2:1: error: found a second `a`"), 0U);
     EXPECT_EQ(parse(";@ drum a 1 0 2 the text\r\n"), "");
     EXPECT_EQ(audio::parse_instruments(";@ drum a 1 0 2  the text \r\n", "x").at(0).parameters.at(0).text,
               "the text");

@@ -78,7 +78,7 @@ TEST(CheckedOrchestra, WhatSoundsIsAllowedAndItsCommentsDoNotReachCsound) {
               ";@ gong frequency_hz 100 20 2000 pitch    ; system  in a comment     \n"
               " \n \ninstr gong \n"
               "$STROKE(0'0'0'0' 1e10)\n\n"
-              "amid reson aforce, p12, 5\naside = 0\niduration = (p12 > 2 ? p12 : 2.5)\n$CLOSE\nendin\n");
+              "amid reson aforce, p12, 5\naside = 0\niduration = (p12 > 2 ? p12 : 2.5)\n$OWN_CLOSE\nendin\n");
 }
 
 }  // namespace

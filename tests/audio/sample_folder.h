@@ -48,10 +48,16 @@ private:
     std::filesystem::path path_;
 };
 
+inline std::shared_ptr<const audio::SampleSet> samples_of(const std::filesystem::path& file,
+                                                          const std::vector<int>& keys = {38}) {
+    audio::SampleLibrary library;
+    return audio::read_samples(file, keys, library);
+}
+
 /// What reading these samples complains of; empty: nothing.
 inline std::string fault_of(const std::filesystem::path& file, const std::vector<int>& keys = {38}) {
     try {
-        (void)audio::read_samples(file, keys);
+        (void)samples_of(file, keys);
     } catch (const audio::SampleError& fault) {
         return fault.what();
     }

@@ -19,7 +19,7 @@ audio::Note stroke(std::uint64_t id, std::int64_t onset, int velocity) {
 }
 audio::Voice sampled(const std::filesystem::path& file) {
     audio::Voice made = voice("drum", {}, 0);
-    made.samples = audio::read_samples(file, std::vector{38});
+    made.samples = samples_of(file);
     return made;
 }
 std::string sound_font() {
@@ -59,6 +59,21 @@ TEST(SoundFont, LayersOfTheDrumPresetAreHeardFromTheOnset) {
     EXPECT_NE(fault_of(file, {40})
                   .find("no sound for MIDI note 40, expected a zone's midi_note among its keys, 38 to 38"),
               std::string::npos);
+}
+
+/// Of the loud layer the key range becomes the sample mode, a loop, and the velocity range the release, of 1 s: by 100 dB.
+TEST(SoundFont, ALoopGoesOnThroughTheRelease) {
+    const SampleFolder folder;
+    std::string font = sound_font();
+    const std::size_t zone = font.find("igen") + 8 + 3 * 4;
+    font.replace(zone, 8, std::string("\x36\0\1\0\x26\0\0\0", 8));
+    const auto sound = left(render({sampled(folder.text("loop.sf2", font))}, {stroke(1, 1000, 127)}));
+    for (int i = 0; i < 600; ++i) {
+        const double level = (16384 - 64 * (i % 200)) / 32768.0;
+        ASSERT_NEAR(sound.at(1000 + static_cast<std::size_t>(i)),
+                    i < 200 ? level : level * std::pow(10, -5 * (i - 200) / 48000.0), 1e-6)
+            << i;
+    }
 }
 
 TEST(DrumGizmo, MainChannelsOfTheMappedInstrumentAreHeardInTheirPlaces) {

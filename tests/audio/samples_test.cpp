@@ -19,7 +19,7 @@ std::vector<float> ramp(int length, float first = 0.5F) {
 }
 audio::Voice sampled(const std::filesystem::path& file, double pan = 0, const std::string& group = "") {
     audio::Voice made = voice("drum", {}, pan, group);
-    made.samples = audio::read_samples(file, std::vector{38});
+    made.samples = samples_of(file);
     return made;
 }
 audio::Note stroke(std::uint64_t id, std::int64_t onset, int velocity = 127) {
@@ -180,7 +180,7 @@ TEST(Sfz, DefinesIncludesCommentsAndTriggersAreFollowed) {
         folder.text("outer.sfz",
                     "#define $KEY 38\n#define $NAME a b\n/* two\nlines */ <group> trigger=release\n"
                     "<region> sample=none.wav key=38 // not sounded\n<group>\n#include \"inner.txt\"\n");
-    const auto set = audio::read_samples(file, std::vector{38});
+    const auto set = samples_of(file);
     EXPECT_EQ(set->regions.size(), 1u);
     EXPECT_EQ(set->files.size(), 3u);
 }
@@ -190,7 +190,7 @@ TEST(Sfz, AZoneWithoutASoundOfItsOwnSoundsAsTheFirst) {
     folder.sound("a.wav", ramp(10));
     const auto file = folder.text("one.sfz", "<region> sample=a.wav key=38");
     audio::Voice made = voice("drum", {}, 0);
-    made.samples = audio::read_samples(file, std::vector{38, 37});
+    made.samples = samples_of(file, {38, 37});
     audio::Note rim = stroke(1, 100);
     rim.midi_note = 37;
     EXPECT_EQ(left(render({made}, {rim})).at(100), 0.5);
@@ -218,6 +218,84 @@ TEST(Sfz, FaultsNameTheirPlace) {
     expect("", "no <region> that a stroke sounds");
     EXPECT_NE(fault_of(folder.text("bad.wav", "RIFF....")).find("libsndfile reads"), std::string::npos);
     EXPECT_NE(fault_of(folder / "none.wav").find("which is no file"), std::string::npos);
+}
+
+/// Frames 20 to 29 of the file are heard again and again, for the 10 ms that the envelope holds.
+TEST(Samples, ALoopIsHeardUntilTheEnvelopeHasDecayed) {
+    const SampleFolder folder;
+    folder.sound("a.wav", ramp(100));
+    const auto set =
+        samples_of(folder.text("a.sfz",
+                               "<region> sample=a.wav key=38 loop_mode=loop_continuous loop_start=20 "
+                               "loop_end=29 ampeg_hold=0.01 ampeg_decay=0.0001 ampeg_sustain=0"));
+    const std::vector<float>& wave = *set->waves.at(0);
+    ASSERT_GE(set->regions.at(0).frames, 480U);  // 10 ms
+    EXPECT_LE(set->regions.at(0).frames, 490U);
+    const std::vector<float> file = ramp(100);
+    for (std::size_t i = 0; i < 480; ++i) ASSERT_EQ(wave[i], file[i < 30 ? i : 20 + (i - 20) % 10]) << i;
+}
+
+/// A WAV file's own loop (frames 20 to 29 of its chunk `smpl`) is followed in SFZ, where nothing else is said; alone it is the sound as it is.
+TEST(Samples, TheLoopOfAWavFileIsFollowedInSfz) {
+    const SampleFolder folder;
+    SF_INFO info{};
+    info.channels = 1, info.samplerate = 48000, info.format = SF_FORMAT_WAV | SF_FORMAT_FLOAT;
+    SNDFILE* file = sf_open((folder / "a.wav").c_str(), SFM_WRITE, &info);
+    SF_INSTRUMENT instrument{};
+    instrument.gain = 1, instrument.loop_count = 1;
+    instrument.loops[0] = {SF_LOOP_FORWARD, 20, 30, 0};
+    ASSERT_EQ(sf_command(file, SFC_SET_INSTRUMENT, &instrument, sizeof instrument), SF_TRUE);
+    const std::vector<float> wave = ramp(100);
+    sf_writef_float(file, wave.data(), 100);
+    sf_close(file);
+    const std::string decay =
+        "<region> sample=a.wav key=38 ampeg_hold=0.01 ampeg_decay=0.0001 ampeg_sustain=0";
+    const auto looped = samples_of(folder.text("a.sfz", decay));
+    for (std::size_t i = 0; i < 480; ++i)
+        ASSERT_EQ((*looped->waves.at(0))[i], wave[i < 30 ? i : 20 + (i - 20) % 10]) << i;
+    EXPECT_EQ(samples_of(folder.text("b.sfz", decay + " loop_mode=no_loop"))->regions.at(0).frames, 100U);
+    EXPECT_EQ(samples_of(folder / "a.wav")->regions.at(0).frames, 100U);
+}
+
+/// The key is let go when the loop was heard once: 30 frames. Then by 80 dB in 480 frames, or on to the end.
+TEST(Samples, AfterTheReleaseALoopOfLoopSustainGoesOnToTheEnd) {
+    const SampleFolder folder;
+    folder.sound("a.wav", std::vector<float>(1000, 0.5F));
+    for (const auto& [mode, frames] : {std::pair("loop_continuous", 30 + 480), {"loop_sustain", 30 + 480}}) {
+        const auto set = samples_of(
+            folder.text("a.sfz", std::string("<region> sample=a.wav key=38 loop_start=20 loop_end=29 "
+                                             "ampeg_release=0.01 loop_mode=") +
+                                     mode));
+        const std::vector<float>& wave = *set->waves.at(0);
+        EXPECT_NEAR(set->regions.at(0).frames, frames, 2) << mode;  // rounded up, and one more
+        EXPECT_FLOAT_EQ(wave[29], 0.5F);
+        EXPECT_NEAR(wave[30 + 240], 0.5e-2, 1e-4) << "-40 dB half way";
+    }
+    folder.sound("b.wav", ramp(100));
+    const auto set = samples_of(folder.text(
+        "b.sfz",
+        "<region> sample=b.wav key=38 loop_start=20 loop_end=29 ampeg_release=100 loop_mode=loop_sustain"));
+    EXPECT_EQ(set->regions.at(0).frames, 100U) << "once through, then to the end";
+}
+
+TEST(Samples, AKeyswitchChoosesItsRegions) {
+    const SampleFolder folder;
+    for (const auto& [name, value] : {std::pair("one.wav", 0.1F), {"two.wav", 0.2F}, {"any.wav", 0.3F}})
+        folder.sound(name, std::vector<float>(8, value));
+    const std::string regions =
+        "<region> sample=one.wav key=38 sw_last=24\n<region> sample=two.wav key=38 sw_last=c#1\n"
+        "<region> sample=any.wav key=38\n<region> sample=any.wav key=38 sw_down=24\n";
+    const auto heard = [&](const std::string& text, std::optional<int> down) {
+        audio::SampleLibrary library;
+        std::vector<float> values;
+        const auto set = audio::read_samples(folder.text("a.sfz", text), std::vector{38}, library, down);
+        for (const auto& wave : set->waves) values.push_back(wave->front());
+        return values;
+    };
+    EXPECT_EQ(heard(regions, {}), (std::vector<float>{0.1F, 0.3F})) << "the lowest";
+    EXPECT_EQ(heard("<global> sw_default=25\n" + regions, {}), (std::vector<float>{0.2F, 0.3F}));
+    EXPECT_EQ(heard("<global> sw_default=25\n" + regions, 24), (std::vector<float>{0.1F, 0.3F}));
+    EXPECT_THROW((void)heard(regions, 26), audio::SampleError);
 }
 
 }  // namespace

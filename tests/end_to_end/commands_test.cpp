@@ -71,7 +71,11 @@ TEST(Commands, WhatTheyWroteBeforeIsReplacedAndNothingElse) {
     const Folder folder;
     const std::string kit = (folder / "kit.toml").string(), keys = (folder / "keys").string();
     write(kit, "old");
-    EXPECT_EQ(run({"kit", "new", "fresh", "--out", kit}).status, 0);
+    expect_refused(run({"kit", "new", "fresh", "--out", kit}), "which is there already");
+    expect_refused(run({"kit", "copy", "bells", "--out", kit}), "--force");
+    expect_refused(run({"kit", "fit", "roll", "--out", kit}), "--force");
+    EXPECT_EQ(read(kit), "old");
+    EXPECT_EQ(run({"kit", "new", "fresh", "--force", "--out", kit}).status, 0);
     EXPECT_EQ(run({"kit", "check", kit}).status, 0);
     ASSERT_EQ(run({"keys", keys}).status, 0);
     const std::string first = read(folder / "keys/application.key");

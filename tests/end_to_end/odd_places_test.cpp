@@ -49,7 +49,7 @@ using Names = std::vector<std::string>;
 const std::vector<std::vector<std::string>> kWriters = {
     {"trace", "synth", "feints", "--out"},
     {"predict", "flourish", "--predictor", "hold", "--lead", "0.1", "--out"},
-    {"kit", "new", "mine", "--out"},
+    {"kit", "new", "mine", "--force", "--out"},
     {"trace", "convert", bundled("traces/roll.csv"), "--out"},
     {"record", "--source", "trace:" + bundled("traces/roll.csv").string(), "--speed", "1000", "--out"},
 };

@@ -17,6 +17,7 @@
 #include "files/output_folder.h"
 #include "kit/kit.h"
 #include "kit/kit_copy.h"
+#include "kit/mesh_contact.h"
 #include "pictures/kit_stage.h"
 #include "play/audition.h"
 #include "report/plot.h"
@@ -75,13 +76,48 @@ std::vector<fs::path> meshes_of(const Kit& kit) {
     return {meshes.begin(), meshes.end()};
 }
 
+/// "superquadric of 0.3 x 0.1 x 0.3 m, exponents 0.9 and 1, ..." and how far the mesh lies from it.
+std::string contact_text(const sim::Superquadric& shape, const sim::SurfaceError& error) {
+    const Eigen::Vector3d size = 2 * shape.semi_axes;
+    const double whole = size.maxCoeff();
+    return fmt::format(
+        "{:.3g} x {:.3g} x {:.3g} m with exponents {:.2f} and {:.2f}, from which the mesh lies "
+        "{:.1f} mm apart (RMS, {:.1f} % of its size), at most {:.1f} mm ({:.1f} %)",
+        size.x(), size.y(), size.z(), shape.e1, shape.e2, 1e3 * error.rms_m, 100 * error.rms_m / whole,
+        1e3 * error.greatest_m, 100 * error.greatest_m / whole);
+}
+
+/// A line for each own mesh: what is struck, and how far that lies from what is seen.
+void tell_contact(const Kit& kit) {
+    constexpr double kFar = 0.05;  // of the body's size
+    for (const Instrument& instrument : kit.instruments) {
+        if (instrument.mesh.parent_path() == assets_folder() / "meshes") continue;
+        const sim::Superquadric& shape = instrument.body.shape;
+        const OuterSurface outer =
+            outer_surface(render::load_mesh(instrument.mesh), instrument.body_from_mesh);
+        const sim::SurfaceError error =
+            instrument.fitted.value_or(sim::surface_error(shape, Eigen::Vector3d::Zero(), outer.points));
+        const bool is_far = error.greatest_m > 2 * kFar * shape.semi_axes.maxCoeff();
+        fmt::print("{}: \"{}\" is struck as a superquadric of {}{}{}\n", kit.file.string(), instrument.name,
+                   contact_text(shape, error),
+                   outer.hollow_m > 0
+                       ? fmt::format("; hollows of up to {:.0f} mm are closed", 1e3 * outer.hollow_m)
+                       : "",
+                   !is_far ? ""
+                   : instrument.fitted
+                       ? "; where a mesh is bent or has parts that stick out it is struck beside what is "
+                         "seen: leave such parts out, or make several instruments of it"
+                       : "; shape = \"mesh\" fits it to the mesh");
+    }
+}
+
 /// A line for each mesh whose size is not its body's, with the scale that would make it so.
 void tell_sizes(const Kit& kit) {
     for (const Instrument& instrument : kit.instruments) {
         const Eigen::AlignedBox3f bounds = render::load_mesh(instrument.mesh).bounds();
         const double extent = bounds.sizes().cast<double>().maxCoeff(),
                      size = 2 * instrument.body.shape.semi_axes.maxCoeff(),
-                     drawn = instrument.mesh_scale_m ? extent * *instrument.mesh_scale_m : extent / 2 * size;
+                     drawn = (instrument.body_from_mesh.linear() * bounds.sizes().cast<double>()).maxCoeff();
         if (!(extent > 0) || (drawn < 2 * size && drawn > size / 2)) continue;
         constexpr std::pair<double, const char*> kUnits[] = {
             {1, "metres"}, {0.001, "millimetres"}, {0.01, "centimetres"}, {0.0254, "inches"}};
@@ -113,11 +149,19 @@ void draw_kit(const DrawOptions& o) {
     write_finished_file(o.out, render::encode_png(image));
 }
 
+/// A kit is somebody's work: one that is there is replaced only if that is asked for.
+void require_new(const fs::path& out, bool force) {
+    if (!force && output_place(out).kind == OutputPlace::Kind::file)
+        refuse_options(fmt::format("--out {}, which is there already", out.string()),
+                       "a new name, or --force to replace it");
+}
+
 struct FitOptions {
     std::vector<std::string> traces;
     std::string kind = "drum", out;
     double radius_m = 0.006;
     std::optional<Eigen::Vector3d> tip, shaft;
+    bool force = false;
 };
 
 /// The sticks of all traces must be alike, as the kit has one [stick].
@@ -137,6 +181,7 @@ StickGeometry common_geometry(const std::vector<tracking::Trace>& traces, const 
 }
 
 void fit(const FitOptions& o) {
+    if (!o.out.empty()) require_new(o.out, o.force);
     std::vector<tracking::Trace> traces;
     for (const std::string& file : o.traces) traces.push_back(tracking::read_trace(find_trace(file)));
     const StickGeometry geometry = common_geometry(traces, o);
@@ -152,7 +197,8 @@ void fit(const FitOptions& o) {
         fmt::print("{} {}: {}\n", o.kind, i + 1, describe(fitted.instruments[i]));
 }
 
-void make_new(const std::string& name, const std::string& out) {
+void make_new(const std::string& name, const std::string& out, bool force) {
+    require_new(out, force);
     if (name.find_first_of("\"\\") != std::string::npos || std::ranges::any_of(name, is_control))
         refuse_options("a kit's name with quotes, backslashes or control characters", "plain text");
     constexpr std::string_view kName = "NAME";
@@ -170,6 +216,7 @@ void add_fit(Command& kit) {
                    "Tip in the tracked body's frame; the kit then says so");
     command.option("--shaft", o->shaft, as::axis(), "Body axis from hand to tip (turns the camera)");
     command.option("--out", o->out, as::text("FILE"), "Kit to write; printed if left out");
+    command.flag("--force", o->force, "Replace a kit that is there");
     command.runs([o] { fit(*o); });
 }
 
@@ -190,10 +237,10 @@ void tell_ignored(const Kit& kit) {
     std::set<std::string> told;
     for (const Instrument& instrument : kit.instruments) {
         const auto& samples = instrument.voice.samples;
-        if (!samples || samples->ignored.empty() || !told.insert(samples->files.front().string()).second)
-            continue;
-        fmt::print("{}: not followed: {}\n", samples->files.front().string(),
-                   fmt::join(samples->ignored, ", "));
+        if (!samples || samples->ignored.empty()) continue;
+        const std::string line = fmt::format("{}: not followed: {}\n", samples->files.front().string(),
+                                             fmt::join(samples->ignored, ", "));
+        if (told.insert(line).second) fmt::print("{}", line);
     }
 }
 
@@ -205,8 +252,10 @@ void add_kit_check(Command& kit) {
         for (const std::string& name : *names) {
             const Kit checked = read_kit(find_kit(name));
             (void)render::load_meshes(meshes_of(checked));
+            check_own_orchestras(checked);
             tell_ignored(checked);
             tell_sizes(checked);
+            tell_contact(checked);
             fmt::print("{}: in order, {}\n", checked.file.string(),
                        counted(checked.instruments.size(), "instrument"));
         }
@@ -259,11 +308,13 @@ void add_copy(Command& kit) {
     Command command = kit.command("copy", "Copy a kit with all that it needs, to change it or to pass it on");
     auto name = std::make_shared<std::string>(), out = std::make_shared<std::string>();
     command.required("KIT", *name, as::text("KIT"), "Kit: a file, or the name of a bundled one");
-    command.required(
-        "--out", *out, as::text("FILE"),
-        "Kit to write (TOML), replaced if there is one; what it needs comes to FILE-files beside it");
-    command.runs([name, out] {
+    auto force = std::make_shared<bool>(false);
+    command.required("--out", *out, as::text("FILE"),
+                     "Kit to write (TOML); what it needs comes to FILE-files beside it");
+    command.flag("--force", *force, "Replace a kit that is there");
+    command.runs([name, out, force] {
         const std::filesystem::path original = find_kit(*name);
+        require_new(*out, *force);
         (void)render::load_meshes(meshes_of(read_kit(original)));  // what is no mesh is not passed on
         copy_kit(original, *out);
     });
@@ -273,8 +324,10 @@ void add_new(Command& kit) {
     Command command = kit.command("new", "Write a small kit to start from");
     auto name = std::make_shared<std::string>(), out = std::make_shared<std::string>();
     command.required("NAME", *name, as::text("NAME"), "The kit's name");
-    command.required("--out", *out, as::text("FILE"), "Kit to write (TOML); replaced if there is one");
-    command.runs([name, out] { make_new(*name, *out); });
+    auto force = std::make_shared<bool>(false);
+    command.required("--out", *out, as::text("FILE"), "Kit to write (TOML)");
+    command.flag("--force", *force, "Replace a kit that is there");
+    command.runs([name, out, force] { make_new(*name, *out, *force); });
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <limits>
 #include <memory>
@@ -75,6 +76,21 @@ void print_if_apart(const PlayResult& result) {
         fmt::join(tips.max(), ", "), result.trace);
 }
 
+/// Says where the sound is not as loud as it was asked for, which its peaks forbid, and where samples clipped.
+void print_if_loud(const PlayResult& result, bool offline) {
+    const MixOptions& asked = result.options.mix;
+    const audio::Loudness& loudness = result.loudness;
+    const bool brought = offline && !asked.gain_db && !result.options.solo && loudness.integrated_lufs;
+    if (brought && std::abs(*loudness.integrated_lufs - asked.loudness_lufs) > 1)
+        fmt::print(
+            "the sound is at {:.1f} LUFS, not at {:g}, as its peaks reach {:.1f} dBTP; --gain shifts it all "
+            "the same\n",
+            *loudness.integrated_lufs, asked.loudness_lufs, loudness.true_peak_dbtp.value_or(0));
+    if (result.clipped_samples > 0)
+        fmt::print("{} of the sound clipped; less gain avoids it (--gain, or gain_db of the kit)\n",
+                   counted(result.clipped_samples, "sample"));
+}
+
 void play_offline(const PlayOptions& options) {
     const PlayResult result = play(options);
     const StrikeScore& s = result.score;
@@ -83,6 +99,7 @@ void play_offline(const PlayOptions& options) {
                                           : "unknown (nothing matched)",
                (result.t_end_s - result.t0_s) / result.wall_s);
     print_if_apart(result);
+    print_if_loud(result, true);
     print_places(result);
     throw_if_any(result.failures, options.out);
 }
@@ -94,6 +111,7 @@ void play_in_time(const RealtimeOptions& options) {
                counted(outcome.latency.frames.total, "frame"), outcome.latency.notes.missed,
                counted(outcome.latency.notes.total, "note"));
     print_if_apart(outcome.play);
+    print_if_loud(outcome.play, false);
     if (const OfflineComparison& offline = outcome.offline; offline.offline_strikes > 0)
         fmt::print("{} offline: {} here, {} unexplained ({})\n", counted(offline.offline_strikes, "strike"),
                    counted(offline.departures.size(), "departure"), offline.unexplained(),
@@ -270,7 +288,7 @@ void add_play_command(Command& program) {
         command.option("--solo", o->play.solo, as::whole(0, std::numeric_limits<std::int64_t>::max()),
                        "Render the sound of one note alone, by its id in events.csv");
     CLI::Option* no_frames = command.flag("--no-frames", o->play.frames, "Draw nothing", false);
-    CLI::Option* video = command.option("--video", o->play.video, as::text("FILE"),
+    CLI::Option* video = command.option("--video", o->play.video, as::text("FILE", check_video_name),
                                         "Make a video (MP4) of frames and sound, in place of the frames");
     video->excludes(no_frames);
     command.flag("--keep-frames", o->play.keep_frames, "Keep the frames beside the video, too")->needs(video);

@@ -109,7 +109,7 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
     command.option(
         "--camera", o->camera, camera_format(),
         "Where pictures are seen from; default: the scene's camera, else all bodies from the drummer's side");
-    command.option("--video", o->video, as::text("FILE"),
+    command.option("--video", o->video, as::text("FILE", check_video_name),
                    "Make a video (MP4); without --frames its frames are not kept");
     command.option("--checkpoint", o->checkpoint, as::whole(0, 1'000'000'000, "steps"),
                    "Save after every so many steps, in --out, what --resume goes on from; 0: never");

@@ -182,10 +182,16 @@ public:
         for (const auto& known : words)
             if (std::get<std::string>(word) == known.name) value = known.value;
     }
+    /// What parameters belong to: the value of a text key, or `otherwise` where it is not given.
+    struct Owner {
+        std::string_view key;
+        std::string otherwise;
+    };
     /// Numbers under names of their own, besides the keys declared so far: those of `known`, which a reader
-    /// must have.
+    /// must have. Those that a file gives for another owner, which a file above it replaced, do not count. The last
+    /// keys of a table.
     virtual void parameters(Parameters& values, const std::vector<ParameterRange>& known, Range any,
-                            std::string_view meaning) = 0;
+                            std::string_view meaning, const Owner& owner) = 0;
 
     // Tables. `take` is called with what was read and its place for complaints, never by a describer.
 
@@ -237,6 +243,8 @@ public:
                          const std::string& expected) const = 0;
     /// The file that gives a key its value; empty: none does (or a describer runs).
     [[nodiscard]] virtual std::string file_of(std::string_view key) const = 0;
+    /// Whether a key is given in the layer of files that gives `other`, or above it.
+    [[nodiscard]] virtual bool stands_over(std::string_view key, std::string_view other) const = 0;
     /// A vector that gives a direction is not zero.
     void require_direction(const Eigen::Vector3d& value, std::string_view key) const;
 

@@ -12,13 +12,14 @@ class Describer final : public Fields {
 public:
     Describer(FormatDescription& format, std::size_t table) : format_(format), table_(table) {}
 
-    void parameters(Parameters&, const std::vector<ParameterRange>&, Range any,
-                    std::string_view meaning) override {
+    void parameters(Parameters&, const std::vector<ParameterRange>&, Range any, std::string_view meaning,
+                    const Owner&) override {
         format_.tables[table_].parameters = meaning;
         format_.tables[table_].parameter_range = any;
     }
     void require(bool, std::string_view, const std::string&, const std::string&) const override {}
     [[nodiscard]] std::string file_of(std::string_view) const override { return {}; }
+    [[nodiscard]] bool stands_over(std::string_view, std::string_view) const override { return false; }
 
 protected:
     bool read(const Key& key, KeyValue& value) override {

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <cctype>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <string_view>
 
 #include "files/bad_input.h"
@@ -75,6 +77,13 @@ ValueFormat<Vector> vector_of(const std::string& placeholder, const ValueFormat<
 }
 
 }  // namespace
+
+void check_video_name(const std::string& file) {
+    std::string ending = std::filesystem::path(file).extension().string();
+    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (!ending.empty() && ending != ".mp4")
+        refuse_options("--video " + one_line(file), "a name that ends in .mp4");
+}
 
 void refuse_options(const std::string& found, const std::string& expected) {
     throw BadInput(fmt::format("error: found {}, expected {}", found, expected));

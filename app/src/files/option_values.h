@@ -16,6 +16,9 @@ namespace app {
 /// Throws BadInput "error: found NAME TEXT, expected EXPECTED".
 [[noreturn]] void refuse_value(const std::string& name, const std::string& text, const std::string& expected);
 
+/// Throws BadInput for a video's name that ends in something else than .mp4 (or nothing): an MP4 is what is made.
+void check_video_name(const std::string& file);
+
 /// How a value is written on the command line, or in a part of a longer text.
 template <class Value>
 struct ValueFormat {

@@ -90,7 +90,20 @@ public:
         : layers_(std::move(layers)), where_(std::move(where)), files_(files), own_layers_(own) {}
 
     void parameters(Parameters& values, const std::vector<ParameterRange>& known, Range any,
-                    std::string_view meaning) override {
+                    std::string_view meaning, const Owner& owner) override {
+        std::vector<std::string> owners;  // by layer: as its file, and those below it, have it
+        for (std::size_t i = 0; i < layers_.size(); ++i) {
+            const toml::node* node = nullptr;
+            for (std::size_t below = i; !node && below < layers_.size(); ++below)
+                node = layers_[below]->get(owner.key);
+            owners.push_back(node ? node->value_or(owner.otherwise) : owner.otherwise);
+        }
+        for (std::size_t i = layers_.size(); i-- > 1;) {
+            if (owners[i] == owners.front()) continue;
+            others_.push_back(layers_[i]);
+            layers_.erase(layers_.begin() + static_cast<std::ptrdiff_t>(i));
+            if (i < own_layers_) --own_layers_;
+        }
         for (const ParameterRange& p : known) {
             KeyValue value;
             const Range range{std::max(p.low, any.low), std::min(p.high, any.high)};
@@ -106,6 +119,15 @@ public:
         const toml::node* node = get(key);
         return node && node->source().path ? *node->source().path : "";
     }
+    [[nodiscard]] bool stands_over(std::string_view key, std::string_view other) const override {
+        for (const toml::table* layer : layers_)
+            if (layer->contains(key))
+                return std::ranges::any_of(layers_,
+                                           [&](const toml::table* at) { return at->contains(other); });
+            else if (layer->contains(other))
+                return false;
+        return false;
+    }
     /// Refuses keys that were not declared, if it has `all`, then what is missing: it may be misspelt.
     void done(bool all = true) const {
         const auto among = [](const std::vector<std::string>& keys, std::string_view key) {
@@ -114,6 +136,13 @@ public:
         for (std::size_t i = 0; all && i < layers_.size(); ++i)
             for (const auto& [key, node] : *layers_[i])
                 if (!among(known_, key.str()) || (i >= own_layers_ && among(own_, key.str())))
+                    throw fault_at(key.source(),
+                                   fmt::format("unknown key \"{}\" in {}", printable(key.str()), where_),
+                                   fmt::format("only {}{}", fmt::join(known_, ", "),
+                                               nearest_hint(std::string(key.str()), known_)));
+        for (const toml::table* layer : others_)
+            for (const auto& [key, node] : *layer)
+                if (all && !node.is_number() && !among(known_, key.str()))
                     throw fault_at(key.source(),
                                    fmt::format("unknown key \"{}\" in {}", printable(key.str()), where_),
                                    fmt::format("only {}{}", fmt::join(known_, ", "),
@@ -364,7 +393,7 @@ private:
         if (visit.take) visit.take(inner);
     }
 
-    Layers layers_;
+    Layers layers_, others_;  ///< others: with parameters of another owner
     std::string where_;
     const Files& files_;
     std::size_t own_layers_;

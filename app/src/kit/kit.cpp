@@ -12,6 +12,7 @@
 #include "files/bad_input.h"
 #include "files/format_description.h"
 #include "files/toml_reader.h"
+#include "kit/mesh_contact.h"
 #include "scene/shared_keys.h"
 
 namespace app {
@@ -140,6 +141,9 @@ struct InstrumentDraft {
     fs::path kit{};                                             ///< the kit's file
     fs::path samples{};                                         ///< empty: none
     std::vector<ParameterRange> parameters{};                   ///< of its sound
+    std::optional<int> keyswitch{};
+    std::vector<std::string> without_effect{};  ///< keys of the orchestra's sound beside samples
+    bool fitted = false;                        ///< the body's surface to the mesh
 };
 
 /// The sounds that there are, with those of an orchestra of one's own.
@@ -160,6 +164,7 @@ std::vector<audio::Instrument> with_own(const std::vector<audio::Instrument>& bu
 
 void sound_keys(Fields& keys, InstrumentDraft& written) {
     audio::Voice& voice = written.instrument.voice;
+    const std::string chosen_by_kind = voice.instrument;
     keys.text("instrument", voice.instrument, "Name of the instrument in the orchestra.",
               {.otherwise = "the kind", .example = "\"drum\""});
     keys.number("gain_db", voice.gain_db, {-60, 20, "dB"}, "Gain.");
@@ -174,6 +179,9 @@ void sound_keys(Fields& keys, InstrumentDraft& written) {
         "127 (v / 8 m/s)^0.7.",
         {.example = "\"snare.wav\""});
     if (!samples.empty()) written.samples = find_file(keys, "samples", samples, written.kit, nullptr);
+    keys.integer("keyswitch", written.keyswitch, {0, 127},
+                 "Of SFZ: the key that is held down to choose among its ways of playing (sw_last).",
+                 {.otherwise = "the file's", .example = "36"});
     keys.text("orchestra", own,
               "A Csound orchestra of your own, a file beside this one, in which `instrument` may be.",
               {.example = "\"mine.orc\""});
@@ -187,10 +195,26 @@ void sound_keys(Fields& keys, InstrumentDraft& written) {
         if (found - known.begin() >= static_cast<std::ptrdiff_t>(bundled)) voice.own_orchestra = file;
     }
     written.parameters = parameters_of(voice.instrument, keys, known);
+    if (!samples.empty()) {
+        const auto note = [&](const std::string& key) {
+            if (keys.stands_over(key, "samples")) written.without_effect.push_back(key);
+        };
+        for (const char* key : {"instrument", "orchestra"}) note(key);
+        for (const ParameterRange& parameter : written.parameters) note(parameter.name);
+    } else if (written.keyswitch) {
+        keys.require(false, "keyswitch", "a keyswitch without samples", "samples = \"FILE.sfz\"");
+    } else if (!own.empty()) {
+        keys.require(!voice.own_orchestra.empty() || !keys.stands_over("orchestra", "instrument"),
+                     "orchestra",
+                     fmt::format("an orchestra of one's own beside instrument = \"{}\", which is not in it",
+                                 voice.instrument),
+                     "instrument = \"NAME\", one of its instruments");
+    }
     keys.parameters(
         voice.parameters, written.parameters, {-1e9, 1e9},
         "A parameter of the orchestra's instrument. The header of assets/orchestra/musicworld.orc lists "
-        "them with their ranges.");
+        "them with their ranges.",
+        {"instrument", chosen_by_kind});
 }
 const TableKind<InstrumentDraft> kSound = {
     {"sound", "The orchestra's instrument and its parameters.", Below::nothing, "{ instrument = \"NAME\" }"},
@@ -229,8 +253,11 @@ const TableKind<InstrumentDraft> kPedal = {
 void body_keys(Fields& keys, InstrumentDraft& written) {
     Instrument& instrument = written.instrument;
     sim::BodyDefinition& body = instrument.body;
-    std::string shape = "superquadric";
-    keys.choice("shape", shape, {{"superquadric", "superquadric"}}, "Surface that is struck.");
+    keys.choice(
+        "shape", written.fitted, {{"superquadric", false}, {"mesh", true}},
+        "Surface that is struck: superquadric, of `size` and `exponents` about `position`; mesh, the "
+        "superquadric that comes nearest to the mesh as it is drawn, the mesh's origin at `position`. "
+        "`kit check` says how near.");
     Eigen::Vector3d size(0, 0, 0), position(0, 0, 0);
     Eigen::Vector2d exponents(1, 1);
     keys.vector(
@@ -362,6 +389,7 @@ struct KitDraft {
     Kit kit;
     std::vector<audio::Instrument> orchestra;
     std::set<std::string> names;  ///< of its instruments
+    audio::SampleLibrary* library = nullptr;
 };
 
 void stick_keys(Fields& keys, StickDefinition& stick) {
@@ -443,8 +471,37 @@ void defaults_keys(Fields& keys, KitDraft&) {
 const TableKind<KitDraft> kDefaults = {
     {"defaults", "What instruments of a kind have unless they say otherwise."}, defaults_keys};
 
+/// Places the mesh in the body's frame; with shape = "mesh" the body becomes what fits it.
+void place_mesh(const Fields& at, InstrumentDraft& read) {
+    Instrument& instrument = read.instrument;
+    sim::BodyDefinition& body = instrument.body;
+    instrument.body_from_mesh = Eigen::Affine3d(
+        instrument.mesh_scale_m ? Eigen::Scaling(Eigen::Vector3d::Constant(*instrument.mesh_scale_m).eval())
+                                : Eigen::Scaling(body.shape.semi_axes));
+    if (!read.fitted) return;
+    const std::vector<Eigen::Vector3d> points =
+        outer_surface(render::load_mesh(instrument.mesh), instrument.body_from_mesh).points;
+    const std::string mesh = fmt::format("the mesh {}", instrument.mesh.string());
+    sim::SuperquadricFit fit;
+    try {
+        fit = sim::fit_superquadric(points);
+    } catch (const std::invalid_argument&) {
+        at.require(false, "mesh", mesh + " without volume",
+                   "a body's surface, its triangles counter-clockwise seen from outside");
+    }
+    const Eigen::Vector3d size = 2 * fit.shape.semi_axes;
+    at.require(size.minCoeff() >= 0.001 && size.maxCoeff() <= 10, "mesh",
+               fmt::format("{} of {:.3g} x {:.3g} x {:.3g} m", mesh, size.x(), size.y(), size.z()),
+               "0.001 to 10 m; mesh_scale is the length of its unit, 0.001 for millimetres");
+    body.shape = fit.shape;
+    body.world_from_body.translation() += body.world_from_body.linear() * fit.centre;
+    body.stand.pivot_body -= fit.centre;
+    instrument.body_from_mesh.pretranslate(-fit.centre);
+    instrument.fitted = fit.error;
+}
+
 /// Reads the recorded sounds of an instrument for the MIDI notes of its zones.
-void take_samples(InstrumentDraft& read, Kit& kit) {
+void take_samples(InstrumentDraft& read, Kit& kit, audio::SampleLibrary& library) {
     audio::Voice& voice = read.instrument.voice;
     const auto note = [&](const fs::path& file) {
         if (std::ranges::find(kit.sound_files, file) == kit.sound_files.end())
@@ -457,9 +514,15 @@ void take_samples(InstrumentDraft& read, Kit& kit) {
     const Pedal& pedal = read.instrument.pedal;
     if (pedal.midi_note) notes.push_back(*pedal.midi_note);
     if (pedal.kind == Pedal::Kind::hi_hat) notes.push_back(pedal.foot_note);
-    voice.samples = read_sound([&] { return audio::read_samples(read.samples, notes); });
+    voice.samples =
+        read_sound([&] { return audio::read_samples(read.samples, notes, library, read.keyswitch); });
     if (voice.choke_group.empty()) voice.choke_group = voice.samples->choke_group;
     for (const fs::path& file : voice.samples->files) note(file);
+    if (read.without_effect.empty()) return;
+    audio::SampleSet told = *voice.samples;
+    for (const std::string& key : read.without_effect)
+        told.ignored.push_back(fmt::format("{} of \"{}\" in the kit", key, read.instrument.name));
+    voice.samples = std::make_shared<const audio::SampleSet>(std::move(told));
 }
 
 void kit_keys(Fields& keys, KitDraft& written) {
@@ -493,9 +556,10 @@ void kit_keys(Fields& keys, KitDraft& written) {
             instrument.body.stick_mass_kg = kit.stick.mass_kg;
             add_tip(instrument.voice, kit.stick, written.orchestra);
             instrument.mesh = find_file(at, "mesh", instrument.mesh, kit.file, "meshes");
+            place_mesh(at, read);
             at.require(written.names.insert(instrument.name).second, "",
                        fmt::format("a second instrument \"{}\"", instrument.name), "a name of its own");
-            take_samples(read, kit);
+            take_samples(read, kit, *written.library);
             mix_in(at, instrument, kit.buses);
             kit.instruments.push_back(instrument);
         });
@@ -536,7 +600,9 @@ void load(Kit& kit, std::vector<TomlFile>& documents, const fs::path& file,
 }  // namespace
 
 Kit read_kit(const fs::path& file) {
+    audio::SampleLibrary library;
     KitDraft written;
+    written.library = &library;
     Kit& kit = written.kit;
     kit.file = file;
     std::vector<TomlFile> documents;

@@ -2,6 +2,7 @@
 #include <audio/performance.h>
 #include <render/scene.h>
 #include <sim/modal_body.h>
+#include <sim/superquadric_fit.h>
 #include <tracking/trace.h>
 
 #include <Eigen/Geometry>
@@ -49,6 +50,9 @@ struct Instrument {
     std::filesystem::path
         mesh;  ///< unit mesh, scaled to the body's semi-axes, or one with a scale of its own
     std::optional<double> mesh_scale_m;  ///< length of one unit of the mesh [m]; empty: a unit mesh
+    Eigen::Affine3d body_from_mesh = Eigen::Affine3d::Identity();  ///< places the mesh in the body's frame
+    /// With shape = "mesh": how far the body's surface, fitted to the mesh, lies from it.
+    std::optional<sim::SurfaceError> fitted;
     render::Look look;
     audio::Voice voice;
     std::vector<ZoneSound> zones;  ///< as body.zones

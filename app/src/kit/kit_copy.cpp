@@ -75,6 +75,9 @@ public:
     Copier(const Kit& kit, const fs::path& out)
         : kit_(kit), out_(out), folder_(out.parent_path() / (out.stem().string() + "-files")) {}
 
+    /// For what the kit needs.
+    [[nodiscard]] const fs::path& folder() const { return folder_; }
+
     void run() {
         for (const fs::path& file : kit_.files)
             if (!is_defaults(file)) places_[file] = file == kit_.files.front() ? out_ : place_for(file);
@@ -174,6 +177,11 @@ void copy_kit(const fs::path& kit, const fs::path& out) {
         if (std::error_code error; fs::equivalent(file, out, error))
             throw BadInput(fmt::format(
                 "error: found --out {}, which the kit is read from, expected another file", out.string()));
+    const fs::path folder = Copier(original, out).folder();
+    if (output_place(folder).kind == OutputPlace::Kind::file)
+        throw BadInput(fmt::format(
+            "error: found {}, which is a file, expected a folder for what the kit needs", folder.string()));
+    (void)output_place(out);
     Copier(original, out).run();
     const Kit copy = read_kit(out);
     for (const fs::path& file : copy.sound_files)

@@ -49,19 +49,9 @@ render::Look chrome() {
     return look;
 }
 
-/// Of the body's surface, in units of its semi-axes.
-Eigen::Matrix4f matrix_of(const sim::BodyDefinition& body, const sim::ModalState& state) {
-    Eigen::Matrix4d matrix = sim::body_matrix(body, state);
-    matrix.leftCols<3>() *= body.shape.semi_axes.asDiagonal();
-    return matrix.cast<float>();
-}
-
-/// The same of an instrument's mesh, which may have a size of its own.
+/// Of an instrument's mesh, which may have a size of its own.
 Eigen::Matrix4f mesh_matrix(const Instrument& instrument, const sim::ModalState& state) {
-    if (!instrument.mesh_scale_m) return matrix_of(instrument.body, state);
-    Eigen::Matrix4d matrix = sim::body_matrix(instrument.body, state);
-    matrix.leftCols<3>() *= *instrument.mesh_scale_m;
-    return matrix.cast<float>();
+    return (sim::body_matrix(instrument.body, state) * instrument.body_from_mesh.matrix()).cast<float>();
 }
 
 /// Of boxes around the instruments at rest.

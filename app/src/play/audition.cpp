@@ -1,18 +1,23 @@
 #include "play/audition.h"
 
+#include <audio/own_orchestra.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <set>
+#include <stdexcept>
 
 #include "files/bad_input.h"
 #include "play/play_run.h"
 #include "report/plot.h"
 
 namespace app {
+namespace fs = std::filesystem;
 namespace {
 
-constexpr double kFirstS = 0.1, kLevelS = 0.1;
+constexpr double kFirstS = 0.1, kLevelS = 0.1, kCutFadeS = 0.02;
 
 /// A stroke in the middle of a zone, at the top.
 Strike stroke_at(const Instrument& instrument, std::uint32_t number, int zone) {
@@ -31,6 +36,27 @@ std::size_t sample_of(const AuditionRow& row, std::size_t speed) {
         std::lround((row.onset_s + static_cast<double>(speed) * kAuditionSpacingS) * audio::kSampleRate));
 }
 
+/// Both sides of a stroke alone, for `seconds`.
+std::vector<float> heard_alone(const Instrument& instrument, Strike strike, const audio::Mix& mix,
+                               double seconds) {
+    audio::Performance performance(orchestra_file(), {instrument.voice}, mix);
+    strike.id = 1;
+    audio::Note note = note_of(strike, instrument);
+    note.voice = 0;
+    performance.schedule(note);
+    std::vector<float> sound =
+        performance.finish(static_cast<std::int64_t>(std::lround(seconds * audio::kSampleRate)), 0);
+    sound.resize(2 * static_cast<std::size_t>(std::lround(seconds * audio::kSampleRate)));
+    return sound;
+}
+
+void fade_out(std::vector<float>& stereo) {
+    const auto length = static_cast<std::size_t>(kCutFadeS * audio::kSampleRate);
+    for (std::size_t i = 0; i < length; ++i)
+        for (const std::size_t side : {1, 2})
+            stereo[stereo.size() - 2 * i - side] *= static_cast<float>(i) / static_cast<float>(length);
+}
+
 }  // namespace
 
 Audition audition(const Kit& kit, const std::string& only, std::span<const double> speeds_mps) {
@@ -40,26 +66,44 @@ Audition audition(const Kit& kit, const std::string& only, std::span<const doubl
         throw BadInput(fmt::format("error: found --instrument {}, expected one of {}{}", one_line(only),
                                    fmt::join(names, ", "), nearest_hint(only, names)));
     Audition heard{{speeds_mps.begin(), speeds_mps.end()}, {}, {}};
-    audio::Performance performance(orchestra_file(), voices_of(kit), kit.mix);
+    heard.sound.resize(2 * static_cast<std::size_t>(kFirstS * audio::kSampleRate));
     double at_s = kFirstS;
-    std::uint64_t id = 0;
     for (std::uint32_t i = 0; i < kit.instruments.size(); ++i) {
         if (!only.empty() && names[i] != only) continue;
         for (int zone = 0; zone < std::ssize(kit.instruments[i].zones); ++zone) {
-            const AuditionRow& row = heard.rows.emplace_back(AuditionRow{i, zone, at_s});
-            Strike strike = stroke_at(kit.instruments[i], i, zone);
-            for (std::size_t speed = 0; speed < speeds_mps.size(); ++speed) {
-                strike.id = ++id;
-                strike.speed_mps = speeds_mps[speed];
-                strike.onset_sample = static_cast<std::int64_t>(sample_of(row, speed));
-                performance.schedule(note_of(strike, kit.instruments[i]));
+            heard.rows.push_back({i, zone, at_s});
+            for (const double speed_mps : speeds_mps) {
+                Strike strike = stroke_at(kit.instruments[i], i, zone);
+                strike.speed_mps = speed_mps;
+                std::vector<float> stroke =
+                    heard_alone(kit.instruments[i], strike, kit.mix, kAuditionSpacingS);
+                fade_out(stroke);
+                heard.sound.insert(heard.sound.end(), stroke.begin(), stroke.end());
+                at_s += kAuditionSpacingS;
             }
-            at_s += static_cast<double>(speeds_mps.size()) * kAuditionSpacingS;
         }
     }
-    const auto length = static_cast<std::int64_t>(std::ceil(at_s * audio::kSampleRate));
-    heard.sound = performance.finish(length, 10 * audio::kSampleRate);
     return heard;
+}
+
+void check_own_orchestras(const Kit& kit) {
+    std::set<fs::path> compiled;
+    for (std::uint32_t i = 0; i < kit.instruments.size(); ++i) {
+        const Instrument& instrument = kit.instruments[i];
+        const fs::path& own = instrument.voice.own_orchestra;
+        if (own.empty()) continue;
+        if (compiled.insert(own).second) audio::check_own_orchestra(orchestra_file(), own);
+        Strike strike = stroke_at(instrument, i, 0);
+        strike.speed_mps = 3;
+        try {
+            (void)heard_alone(instrument, strike, {}, kLevelS);
+        } catch (const std::runtime_error& wrong) {
+            throw BadInput(
+                fmt::format("{}:1:1: error: found that instr {} fails when it is struck ({}), "
+                            "expected one that sounds",
+                            own.string(), instrument.voice.instrument, one_line(wrong.what())));
+        }
+    }
 }
 
 StrokeLevel level_of(const Audition& heard, const AuditionRow& row, std::size_t speed) {

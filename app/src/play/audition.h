@@ -21,9 +21,14 @@ struct Audition {
     std::vector<float> sound;  ///< 48 kHz, interleaved stereo, from 0.1 s before the first stroke
 };
 
-/// Instrument by instrument, zone by zone. `only`: one instrument's name; empty: all. Throws BadInput for a name that
+/// Instrument by instrument, zone by zone; each stroke is played alone and cut, with a fade of 20 ms, where the next one
+/// begins, so that none is measured into another. `only`: one instrument's name; empty: all. Throws BadInput for a name that
 /// the kit does not have.
 [[nodiscard]] Audition audition(const Kit& kit, const std::string& only, std::span<const double> speeds_mps);
+
+/// Compiles a kit's own orchestras and strikes each instrument of theirs. Throws BadInput or audio::SampleError at the
+/// place in the orchestra's file.
+void check_own_orchestras(const Kit& kit);
 
 /// Greatest sample and root of the mean square of 100 ms from the onset, both sides, in dB of full scale; -200 for silence.
 struct StrokeLevel {

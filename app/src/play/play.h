@@ -60,6 +60,13 @@ struct Film {
     double frame_s = 1.0 / 30;                 ///< from one to the next
 };
 
+/// How far the surface that was fitted to an instrument's mesh lies from it.
+struct ContactShape {
+    std::string instrument;
+    sim::SurfaceError error;
+    double size_m = 0;  ///< its greatest extent
+};
+
 /// Everything that `play` found out, for the summary, the tables and the report.
 struct PlayResult {
     PlayOptions options;  ///< as asked for, the predictors as specifications
@@ -86,6 +93,7 @@ struct PlayResult {
     std::vector<std::pair<std::string, std::string>> inputs;  ///< file, SHA-256
     std::string fingerprint;
     std::vector<std::pair<std::string, std::string>> versions;
+    std::vector<ContactShape> contact_shapes;          ///< of instruments with shape = "mesh"
     std::vector<std::string> failures;                 ///< why plots or the video are missing
     std::vector<std::filesystem::path> report_frames;  ///< a few PNG files on disk that the report shows
     std::vector<Film> report_films;                    ///< strokes that it shows moving

@@ -235,6 +235,9 @@ PlayResult describe(const PlayOptions& options, const PlayedTrace& trace, const 
     for (const Instrument& instrument : kit.instruments) {
         result.instruments.push_back(instrument.name);
         result.middles.push_back(instrument.body.world_from_body.translation());
+        if (instrument.fitted)
+            result.contact_shapes.push_back(
+                {instrument.name, *instrument.fitted, 2 * instrument.body.shape.semi_axes.maxCoeff()});
     }
     if (!trace.sha256.empty()) result.inputs.emplace_back(options.trace.string(), trace.sha256);
     if (options.pedals) result.inputs.emplace_back(options.pedals->string(), sha256_of_file(*options.pedals));
@@ -362,6 +365,12 @@ std::string format_summary(const PlayResult& r, const std::string& realtime_json
              count([](const PedalNote& n) { return n.by != PedalMove::Kind::stroke && !n.note.choke; })},
             {"chokes", count([](const PedalNote& n) { return n.note.choke; })}};
     }
+    for (const auto& [instrument, error, size_m] : r.contact_shapes)
+        summary["contact_shapes"].push_back({{"instrument", instrument},
+                                             {"rms_mm", 1e3 * error.rms_m},
+                                             {"greatest_mm", 1e3 * error.greatest_m},
+                                             {"rms_share", error.rms_m / size_m},
+                                             {"greatest_share", error.greatest_m / size_m}});
     if (!realtime_json.empty()) summary["realtime"] = Json::parse(realtime_json);
     return json_document(summary);
 }

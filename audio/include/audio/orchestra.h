@@ -23,7 +23,7 @@ struct Instrument {
 };
 
 /// The instruments that an orchestra's text declares by lines `;@ instrument parameter default minimum
-/// maximum text`. Throws std::runtime_error "FILE:LINE: found ..., expected ..." for a line that is not of
+/// maximum text`. Throws std::runtime_error "FILE:LINE:1: error: found ..., expected ..." for a line that is not of
 /// that form.
 [[nodiscard]] std::vector<Instrument> parse_instruments(std::string_view orchestra, const std::string& file);
 

@@ -2,6 +2,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -23,10 +24,11 @@ public:
 };
 
 // Limits of what is read.
-inline constexpr std::size_t kMostRegions = 4096;              ///< of one file of regions
-inline constexpr double kLongestSampleS = 300;                 ///< of one sound file, at any rate
-inline constexpr std::size_t kMostSampleFrames = 100'000'000;  ///< of one instrument at 48 kHz, all channels
-inline constexpr std::size_t kLargestRegionFile = 4 << 20;     ///< text of SFZ and XML [bytes]
+inline constexpr std::size_t kMostRegions = 4096;  ///< of one file of regions
+inline constexpr double kLongestSampleS = 300;     ///< of one sound file, at any rate
+inline constexpr std::size_t kMostSampleFrames =
+    100'000'000;                                            ///< of a kit, as read and at 48 kHz, all channels
+inline constexpr std::size_t kLargestRegionFile = 4 << 20;  ///< text of SFZ and XML [bytes]
 
 /// A recorded sound and the strokes that it answers.
 struct SampleRegion {
@@ -42,7 +44,8 @@ struct SampleRegion {
 
 /// The sounds of one instrument.
 struct SampleSet {
-    std::vector<std::vector<float>> waves;  ///< 48 kHz, one channel each, ends with silence
+    /// 48 kHz, one channel each, end with silence; equal ones of a kit are one.
+    std::vector<std::shared_ptr<const std::vector<float>>> waves;
     std::vector<SampleRegion> regions;
     std::vector<std::filesystem::path>
         files;                         ///< all that were read; the one that was asked for is the first
@@ -52,13 +55,28 @@ struct SampleSet {
     std::string choke_group;  ///< of SFZ: a group that ends itself (off_by); empty: none
 };
 
+/// What the instruments of a kit share while their samples are read: each file is read once.
+class SampleLibrary {
+public:
+    SampleLibrary();
+    ~SampleLibrary();
+    SampleLibrary(const SampleLibrary&) = delete;
+    SampleLibrary& operator=(const SampleLibrary&) = delete;
+    class Contents;
+    [[nodiscard]] Contents& contents() { return *contents_; }
+
+private:
+    std::unique_ptr<Contents> contents_;
+};
+
 /// Reads the sounds that answer the MIDI notes `keys`, of which the first must have one and stands in for others that
 /// have none: a sound file (whatever libsndfile reads: WAV, FLAC, AIFF,
 /// Ogg; it answers all of them), a SoundFont (.sf2; the first preset, or drums, bank 128, where it has them), an SFZ
 /// file or a DrumGizmo kit or instrument (.xml). Other sampling rates and tunings are resampled by libsamplerate's best
-/// sinc. Throws SampleError: no file, not of its format, no sound for a key, more than the limits.
+/// sinc. `keyswitch`: the key of an SFZ file's sw_last that is down; else its default or the lowest. Throws SampleError: no file, not of its format, no sound for a key, more than the limits.
 [[nodiscard]] std::shared_ptr<const SampleSet> read_samples(const std::filesystem::path& file,
-                                                            std::span<const int> keys);
+                                                            std::span<const int> keys, SampleLibrary& library,
+                                                            std::optional<int> keyswitch = {});
 
 /// MIDI velocity of a stroke: 127 (v / 8 m/s)^0.7, held to 1..127.
 [[nodiscard]] int stroke_velocity(double speed_mps) noexcept;

@@ -1,0 +1,20 @@
+#pragma once
+#include <vector>
+
+#include "audio/performance.h"
+#include "region_text.h"
+
+namespace audio {
+
+inline constexpr std::size_t kWaveGuard = 96;  ///< samples of silence at a wave's end, 2 ms
+inline constexpr double kLongestLoopS = 60;    ///< that a looped sample sounds at most
+
+/// How much higher a region sounds at a key than it was recorded [cents].
+[[nodiscard]] double tuning_cents(const WrittenRegion& r, int key);
+
+/// What is heard of one channel at a key, at 48 kHz: cut, looped, tuned, shaped, then kWaveGuard of silence. Throws
+/// SampleError.
+[[nodiscard]] std::vector<float> make_wave(const WrittenRegion& r, const Recording& recording, int channel,
+                                           int key);
+
+}  // namespace audio
