@@ -70,7 +70,7 @@ struct RunParts {
 /// asked for, unless a gain was, by one gain for all of it. In play_sound.cpp, as the next.
 void set_loudness(PlayResult& result, const audio::Mix& mix, bool may_change);
 /// Writes stems/NN_NAME.wav, as long as result.audio, for each instrument that was sounded: they add up to it
-/// without its room. With bus_stems stems/bus_NN_NAME.wav likewise for each bus.
+/// without its room. With bus_stems stems/NN_bus_NAME.wav likewise for each bus.
 void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& folder);
 
 /// Ends the sound of a run that lasted `seconds`: result.audio, audio.wav, version and time of the thread.

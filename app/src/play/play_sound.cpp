@@ -68,7 +68,7 @@ void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& f
         std::vector<std::uint32_t> instruments;
         for (std::uint32_t i = 0; i < count; ++i)
             if (kit.instruments[i].bus == kit.buses[bus].name) instruments.push_back(i);
-        write("bus_" + file_name(bus, kit.buses[bus].name), instruments);
+        write(file_name(count + bus, "bus_" + kit.buses[bus].name), instruments);
     }
 }
 
