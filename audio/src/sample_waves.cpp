@@ -7,11 +7,7 @@
 #include <limits>
 
 namespace audio {
-namespace {
 
-constexpr double kMostLoopedFrames = 6e7;  // before tuning
-
-/// Resamples a channel so that `ratio` times as many samples last as long.
 std::vector<float> resampled(const std::vector<float>& samples, double ratio, const std::string& place) {
     if (ratio == 1) return samples;
     std::vector<float> result(
@@ -28,6 +24,10 @@ std::vector<float> resampled(const std::vector<float>& samples, double ratio, co
     result.resize(static_cast<std::size_t>(data.output_frames_gen));
     return result;
 }
+
+namespace {
+
+constexpr double kMostLoopedFrames = 6e7;  // before tuning
 
 /// The region's envelope n samples after its start, the delay behind it: attack linear, decay linear in dB to the
 /// sustain (which counts as -80 dB where it is 0), and once the key is let

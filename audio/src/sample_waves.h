@@ -1,4 +1,5 @@
 #pragma once
+#include <string>
 #include <vector>
 
 #include "audio/performance.h"
@@ -8,6 +9,10 @@ namespace audio {
 
 inline constexpr std::size_t kWaveGuard = 96;  ///< samples of silence at a wave's end, 2 ms
 inline constexpr double kLongestLoopS = 60;    ///< that a looped sample sounds at most
+
+/// Resamples a channel so that `ratio` times as many samples last as long. Throws SampleError, at `place`.
+[[nodiscard]] std::vector<float> resampled(const std::vector<float>& samples, double ratio,
+                                           const std::string& place);
 
 /// How much higher a region sounds at a key than it was recorded [cents].
 [[nodiscard]] double tuning_cents(const WrittenRegion& r, int key);
