@@ -384,7 +384,7 @@ TEST_F(Advances, WhereThereIsNothingToStrikeF1PrecisionAndRecallAreNone) {
         for (const char* key : {"precision", "recall", "f1", "median_ms", "p95_ms"})
             EXPECT_TRUE(row["hits"][key].is_null()) << key;
     }
-    EXPECT_NE(app::result_table(comparison).csv().find(",0,0,0,,,,,,0,0,0\n"), std::string::npos);
+    EXPECT_NE(app::result_table(comparison).csv().find(",0,0,0,,,,,,,,,,0,0,0\n"), std::string::npos);
     const app::Table strikes = app::strike_table(comparison, options_.leads_s[0]);
     const auto f1 = std::ranges::find(strikes.columns, "hits/f1", &app::Column::name);
     for (const auto& row : strikes.rows)

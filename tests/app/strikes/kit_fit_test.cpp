@@ -200,7 +200,8 @@ TEST(KitFit, BackswingsOverTheHandAreNoStrokes) {
     geometry.tip = {0, 0, -0.35};
     EXPECT_GT(find_lows(tip_tracks(trace, geometry)[0]).size(), 10u);
     const KitFit fit = fit_kit(std::span(&trace, 1), geometry);
-    for (const FittedInstrument& instrument : fit.instruments) EXPECT_LT(instrument.met.y(), 1.2);
+    // In front, where the tip comes down; behind the hand it turns over the top.
+    for (const FittedInstrument& instrument : fit.instruments) EXPECT_LT(instrument.met.z(), -0.1);
 }
 
 TEST(KitFit, TheWrittenKitIsValidAndItsHeadLiesTheTipsRadiusBelowTheMetSurface) {
