@@ -201,14 +201,6 @@ void sound_keys(Fields& keys, InstrumentDraft& written) {
         };
         for (const char* key : {"instrument", "orchestra"}) note(key);
         for (const ParameterRange& parameter : written.parameters) note(parameter.name);
-    } else if (written.keyswitch) {
-        keys.require(false, "keyswitch", "a keyswitch without samples", "samples = \"FILE.sfz\"");
-    } else if (!own.empty()) {
-        keys.require(!voice.own_orchestra.empty() || !keys.stands_over("orchestra", "instrument"),
-                     "orchestra",
-                     fmt::format("an orchestra of one's own beside instrument = \"{}\", which is not in it",
-                                 voice.instrument),
-                     "instrument = \"NAME\", one of its instruments");
     }
     keys.parameters(
         voice.parameters, written.parameters, {-1e9, 1e9},
@@ -224,7 +216,8 @@ void pedal_sound_keys(Fields& keys, InstrumentDraft& written) {
     keys.parameters(
         written.instrument.voice.pedal_parameters, written.parameters, {-1e9, 1e9},
         "A parameter of the instrument's sound as it is with the pedal away from its rest; on the way "
-        "there it goes evenly.");
+        "there it goes evenly.",
+        {"instrument", written.instrument.voice.instrument});
 }
 const TableKind<InstrumentDraft> kPedalSound = {
     {"pedal_sound", "What the pedal changes of the sound.", Below::nothing, "{ decay_s = 2 }"},
