@@ -33,7 +33,7 @@ PoseSample stroke(int i, double phase = 0) {
 }
 
 Learned learned(std::size_t hidden = 24, std::uint64_t seed = 5) {
-    return {std::make_shared<const PathModel>(model_of_random_weights(hidden, seed)), kShaft};
+    return {model_of_random_weights(hidden, seed), kShaft};
 }
 
 void feed_strokes(Learned& predictor, int count) {
@@ -71,17 +71,17 @@ TEST(LearnedPath, GoesThroughTheNetworksAnswersAndItsVelocityIsItsSlope) {
     frame.angular_velocity = frame.direction.cross(Vector3d(3, 1, -5));
     frame.cosine = 0.6, frame.sine = 0.8;
     frame.speed = 2.5;
-    PathOutputs outputs;
+    PathMeans outputs;
     for (Eigen::Index i = 0; i < outputs.size(); ++i)
         outputs[i] = 0.02F * static_cast<float>(std::sin(1.7 * i));
     const LearnedPath path(frame, outputs, Quaterniond::FromTwoVectors(kShaft, frame.direction));
     for (std::size_t l = 0; l < kNodes; ++l) {
         const auto at = static_cast<Eigen::Index>(6 * l);
-        const Vector3d added = frame.speed * frame.to_world(outputs.segment<3>(at));
+        const Vector3d added = frame.speed * frame.to_world(outputs.segment<3>(at).cast<double>());
         const PosePrediction pose = path.after(kPathLeads[l]);
         EXPECT_LT((pose.position - frame.faded_position(kPathLeads[l]) - added).norm(), 1e-14);
         const Vector3d shaft = frame.faded_direction(kPathLeads[l]) +
-                               frame.speed / 0.4 * frame.to_world(outputs.segment<3>(at + 3));
+                               frame.speed / 0.4 * frame.to_world(outputs.segment<3>(at + 3).cast<double>());
         EXPECT_LT((pose.orientation * kShaft - shaft.normalized()).norm(), 1e-12);
     }
     constexpr double kStep = 1e-6;  // a difference over it errs by its square times the third derivative
@@ -102,8 +102,12 @@ TEST(LearnedPath, EvaluatesTheNetworkThatItsModelStates) {
         const PathModel model = model_of_random_weights(hidden, hidden);
         StickHistory::Inputs inputs;
         for (float& x : inputs) x = random.uniform() < 0.3 ? 0.0F : static_cast<float>(random.normal());
-        PathOutputs outputs;
-        evaluate(model.layers, inputs, outputs);
+        if (hidden % 2 == 0) inputs.segment<43>(39).setZero();  // without a direction
+        const Network network(model);
+        Network::Hidden hidden_units;
+        network.find_hidden(inputs, hidden_units);
+        Eigen::VectorXf outputs(kPathOutputs);
+        outputs << network.means(hidden_units), network.spreads(hidden_units);
         Eigen::VectorXd h = inputs.cast<double>();
         for (std::size_t l = 0; l < model.layers.size(); ++l) {
             h = (model.layers[l].weights.cast<double>() * h + model.layers[l].bias.cast<double>()).eval();
@@ -115,7 +119,7 @@ TEST(LearnedPath, EvaluatesTheNetworkThatItsModelStates) {
 }
 
 TEST(LearnedPath, WithoutAnswersIsTheFadingVelocity) {
-    Learned zero(std::make_shared<const PathModel>(model_of_zeros()), kShaft);
+    Learned zero(model_of_zeros(), kShaft);
     const Vector3d v(1.5, -0.5, 0.25);
     const Quaterniond q(AngleAxisd(0.4, Vector3d::UnitZ()));
     for (int i = 0; i <= 40; ++i) (void)zero.correct(sample_at(i / 60.0, i / 60.0 * v, q));
@@ -127,9 +131,9 @@ TEST(LearnedPath, WithoutAnswersIsTheFadingVelocity) {
 }
 
 TEST(LearnedPath, StatesACovarianceThatGrowsAndIsThatOfItsWhitening) {
-    PathOutputs outputs = PathOutputs::Zero();
-    outputs.segment<kShapeNumbers>(kPathMeans) << -3, -2, -2.5F, 0.4F, -0.3F, 0.7F, -2;
-    const ErrorShape shape = shape_of(outputs, 0);
+    PathSpreads spreads = PathSpreads::Zero();
+    spreads.head<kShapeNumbers>() << -3, -2, -2.5F, 0.4F, -0.3F, 0.7F, -2;
+    const ErrorShape shape = shape_of(spreads, 0);
     const Eigen::Matrix3d inverse = shape.covariance().inverse();
     for (const Vector3d& e : {Vector3d(0.1, 0.02, -0.03), Vector3d(-0.01, 0.2, 0.05)})
         EXPECT_NEAR(e.dot(inverse * e), shape.whitened(e).squaredNorm(), 1e-10);
@@ -213,8 +217,7 @@ TEST(Learned, MeansTheSameAtAnyRateWhereTheMotionIsStraight) {
     PathModel model = model_of_random_weights(24, 5);
     constexpr auto kPeriods = static_cast<Eigen::Index>(StickHistory::kInputs - StickHistory::kPeriods - 1);
     model.layers[0].weights.middleCols(kPeriods, StickHistory::kPeriods).setZero();
-    const auto shared = std::make_shared<const PathModel>(model);
-    Learned slow(shared, kShaft), fast(shared, kShaft);
+    Learned slow(model, kShaft), fast(model, kShaft);
     const auto at = [](double t) { return PoseSample{t, Vector3d(1, 0.5, -0.3) * t}; };
     for (int i = 0; i <= 40; ++i) (void)slow.correct(at(i / 40.0));
     for (int i = 0; i <= 250; ++i) (void)fast.correct(at(i / 250.0));

@@ -14,12 +14,10 @@ constexpr double kSilentS = 0.25;
 constexpr double kClearlyBetter = 0.85;  // of the filter's RMS
 constexpr double kIndependentS = 0.15;   // errors closer together are much alike
 constexpr double kMostPendingHz = 500;   // predictions made more often are not all remembered
-constexpr double kSpreadStep = 0.02;
-constexpr double kSpreadOfWay = 0.3;  // of the filter, by the way at the recent speed
-constexpr double kMostLogScale = 10;
-/// Squared radii of the 50 and 95 % regions of a normal error in three dimensions.
-constexpr double kRadius50 = 2.3659738843753377, kRadius95 = 7.814727903251179;
-constexpr double kImportance95 = 2.5;  // of an error outside the 95 % region, beside one outside the other
+constexpr double kSpreadOfWay = 0.3;     // of the filter, by the way at the recent speed
+constexpr double kStep50 = 0.06, kStep95 = 0.2, kFirstSteps = 3, kSettlingErrors = 100;
+constexpr double kErrorsOfMean = 200;
+constexpr double kMostLog = 40;  // finite whatever comes
 constexpr double kLeastSpreadM = 1e-4;
 
 }  // namespace
@@ -42,20 +40,29 @@ void Arbiter::learn(const Eigen::Vector3d& filter, const Eigen::Vector3d& model,
     share_ = std::clamp(a - std::sqrt(left / (square_ * independent)), 0.0, 1.0);
 }
 
-void SpreadScale::learn(double square) noexcept {
-    const double in_units = square * std::exp(-log_);
-    const double outside =
-        (in_units > kRadius50 ? 0.5 : -0.5) + kImportance95 * (in_units > kRadius95 ? 0.95 : -0.05);
-    log_ = std::clamp(log_ + kSpreadStep * outside, -kMostLogScale, kMostLogScale);
+void RegionScale::learn(double square, const Radii& stated) noexcept {
+    errors_ += 1;
+    mean_ += (square - mean_) / std::min(errors_ + 1, kErrorsOfMean);
+    const double longer = 1 + (kFirstSteps - 1) * std::exp(-errors_ / kSettlingErrors);
+    const auto follow = [&](double Radii::*log, double step, double outside) {
+        const double miss = (square > std::exp(stated.*log) ? 1.0 : 0.0) - outside;
+        radii_.*log = std::clamp(radii_.*log + longer * step * miss, -kMostLog, kMostLog);
+    };
+    follow(&Radii::log_50, kStep50, 0.5);
+    follow(&Radii::log_95, kStep95, 0.05);
+    radii_.log_95 = std::max(radii_.log_50, radii_.log_95);
 }
 
-double SpreadScale::factor() const noexcept {
-    return std::exp(log_);
+void RegionScale::apply(PoseCovariance& covariance) const noexcept {
+    const double factor = std::max(mean_ / 3, std::exp(-kMostLog));
+    covariance.position *= factor;
+    covariance.radius_50 = std::exp(radii_.log_50) / factor;
+    covariance.radius_95 = std::exp(radii_.log_95) / factor;
 }
 
-Arbitrated::Arbitrated(std::unique_ptr<Predictor> filter, std::shared_ptr<const PathModel> model,
-                       const Eigen::Vector3d& shaft)
-    : filter_(std::move(filter)), learned_(std::move(model), shaft), shaft_(shaft) {
+Arbitrated::Arbitrated(std::unique_ptr<Predictor> filter, const PathModel& model,
+                       const Eigen::Vector3d& shaft, double memory_s)
+    : filter_(std::move(filter)), learned_(model, shaft, memory_s), shaft_(shaft) {
     for (std::size_t l = 0; l < kNodes; ++l)
         leads_[l].ring.resize(static_cast<std::size_t>(kPathLeads[l] * kMostPendingHz) + 2);
 }
@@ -96,8 +103,9 @@ void Arbitrated::judge(const PoseSample& sample) noexcept {
             lead.position.learn(p.filter, p.model, truth, dt_s);
             const Eigen::LLT<Eigen::Matrix3d> root(p.covariance);
             if (root.info() == Eigen::Success)
-                lead.spread.learn(
-                    root.matrixL().solve(p.filter + p.share * (p.model - p.filter) - truth).squaredNorm());
+                lead.regions.learn(
+                    root.matrixL().solve(p.filter + p.share * (p.model - p.filter) - truth).squaredNorm(),
+                    p.radii);
             if (!turned || p.filter_shaft.isZero(0)) continue;
             const Eigen::Vector3d before = newest_.orientation * shaft_,
                                   now = sample.orientation.normalized() * shaft_;
@@ -106,14 +114,21 @@ void Arbitrated::judge(const PoseSample& sample) noexcept {
 }
 
 void Arbitrated::remember() noexcept {
+    const PathSpreads spreads = learned_.spreads();
     for (std::size_t l = 0; l < kNodes; ++l) {
         Lead& lead = leads_[l];
         if (lead.count == lead.ring.size()) continue;
         const PosePrediction filter = filter_->predict(kPathLeads[l]),
                              model = learned_.predict(kPathLeads[l]);
         Pending& p = lead.ring[(lead.first + lead.count++) % lead.ring.size()];
-        p = {newest_.t_s + kPathLeads[l], lead.position.share(),   filter.position,        model.position,
-             Eigen::Vector3d::Zero(),     Eigen::Vector3d::Zero(), unscaled(kPathLeads[l])};
+        p = {newest_.t_s + kPathLeads[l],
+             lead.position.share(),
+             filter.position,
+             model.position,
+             Eigen::Vector3d::Zero(),
+             Eigen::Vector3d::Zero(),
+             unscaled(kPathLeads[l], spreads),
+             lead.regions.radii()};
         if (!oriented_) continue;
         p.filter_shaft = filter.orientation * shaft_;
         p.model_shaft = model.orientation * shaft_;
@@ -145,11 +160,11 @@ PosePrediction Arbitrated::predict(double lead_s) const noexcept {
     return pose;
 }
 
-Eigen::Matrix3d Arbitrated::unscaled(double lead_s) const noexcept {
+Eigen::Matrix3d Arbitrated::unscaled(double lead_s, const PathSpreads& spreads) const noexcept {
     const double a = share(lead_s, &Lead::position).value;
     const double spread = kLeastSpreadM + kSpreadOfWay * lead_s * learned_.path().frame().speed;
     Eigen::Matrix3d covariance = (1 - a) * (1 - a) * spread * spread * Eigen::Matrix3d::Identity();
-    if (a > 0) covariance += a * a * learned_.path().covariance(lead_s).position;
+    if (a > 0) covariance += a * a * learned_.path().covariance(lead_s, spreads).position;
     return covariance;
 }
 
@@ -158,8 +173,10 @@ std::optional<PoseCovariance> Arbitrated::covariance(double lead_s) const noexce
     while (l + 1 < kNodes && kPathLeads[l] < lead_s) ++l;
     const double share = this->share(lead_s, &Lead::shaft).value;
     PoseCovariance covariance = filter_->covariance(lead_s).value_or(PoseCovariance{});
-    const PoseCovariance of_model = learned_.path().covariance(lead_s);
-    covariance.position = leads_[l].spread.factor() * unscaled(lead_s);
+    const PathSpreads spreads = learned_.spreads();
+    const PoseCovariance of_model = learned_.path().covariance(lead_s, spreads);
+    covariance.position = unscaled(lead_s, spreads);
+    leads_[l].regions.apply(covariance);
     covariance.rotation += share * (of_model.rotation - covariance.rotation);
     return covariance;
 }

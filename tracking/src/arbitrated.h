@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -31,37 +32,48 @@ private:
            share_ = 0;
 };
 
-/// Scales a stated variance so that its regions of 50 and 95 % hold what they say: the logarithm of the factor
-/// moves by a small step after each error (Robbins and Monro 1951).
-class SpreadScale {
+/// What a stated covariance has to be multiplied by, and the squared radii of its regions of 50 and 95 %, learned
+/// from the errors that turned out: errors of strokes are often small and rarely large, so no factor makes
+/// the regions of a normal error hold both. The factor is the mean square, weighted by exp(-errors / 200); the logarithm
+/// of each radius moves by a small step after each error (Robbins and Monro 1951), by longer ones at first.
+class RegionScale {
 public:
-    /// `square`: an error's squared distance in units of the stated covariance, without this factor.
-    void learn(double square) noexcept;
-    [[nodiscard]] double factor() const noexcept;
+    /// Logarithms of squared radii in units of the covariance without this factor.
+    struct Radii {
+        double log_50 = std::log(kRadius50), log_95 = std::log(kRadius95);
+    };
+    /// `square`: an error's squared distance in units of the covariance without this factor; `stated`: the radii()
+    /// of the time when it was predicted, without which errors in a row would count as one.
+    void learn(double square, const Radii& stated) noexcept;
+    [[nodiscard]] const Radii& radii() const noexcept { return radii_; }
+    void apply(PoseCovariance& covariance) const noexcept;
 
 private:
-    double log_ = 0;
+    double errors_ = 0, mean_ = 3;
+    Radii radii_;
 };
 
-/// Predictor `arbitrated`: a filter and a network, weighed against each other for each lead, for the position
+/// Predictor `arbitrated`: a filter and a network that learns while the stick moves, weighed against each other for each lead, for the position
 /// and for the shaft's direction (Arbiter). Starts as the filter, and is the filter wherever the network is
 /// not clearly better. What it has learned of both outlasts gaps. Samples that the filter's gate refuses
 /// reach neither.
 ///
 /// Between the leads of the network shares are interpolated linearly; orientations are turned from the
 /// filter's towards the network's by the share. The stated covariance of positions is (1 - a)^2 r^2 + a^2 C
-/// with the covariance C that the network states and r 0.3 of the way at the recent speed, scaled for each lead by what
-/// the errors turned out to be (SpreadScale). Allocates when it is made only.
+/// with the covariance C that the network states and r 0.3 of the way at the recent speed; its scale and its regions are
+/// for each lead what the errors turned out to be (RegionScale). Allocates when it is made only.
 class Arbitrated final : public Predictor {
 public:
-    Arbitrated(std::unique_ptr<Predictor> filter, std::shared_ptr<const PathModel> model,
-               const Eigen::Vector3d& shaft);
+    /// `memory_s`: of the network (Learned).
+    Arbitrated(std::unique_ptr<Predictor> filter, const PathModel& model, const Eigen::Vector3d& shaft,
+               double memory_s);
 
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override;
     [[nodiscard]] double time_s() const noexcept override { return filter_->time_s(); }
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
     [[nodiscard]] bool heeds_orientation() const noexcept override { return true; }
+    [[nodiscard]] const Learned& learned() const noexcept { return learned_; }
 
 private:
     /// Two predictions for one time, until it comes.
@@ -69,6 +81,7 @@ private:
         double due_s = 0, share = 0;  // the share of the model in the position
         Eigen::Vector3d filter, model, filter_shaft, model_shaft;
         Eigen::Matrix3d covariance;
+        RegionScale::Radii radii;
     };
     /// Those of one lead, oldest first.
     struct Lead {
@@ -76,14 +89,14 @@ private:
         std::size_t first = 0, count = 0;
         double last_due_s = 0;
         Arbiter position, shaft;
-        SpreadScale spread;
+        RegionScale regions;
     };
     /// Of a lead, from the shares at the network's leads; with the slope over the lead.
     struct Share {
         double value = 0, slope = 0;
     };
     [[nodiscard]] Share share(double lead_s, Arbiter Lead::*of) const noexcept;
-    [[nodiscard]] Eigen::Matrix3d unscaled(double lead_s) const noexcept;
+    [[nodiscard]] Eigen::Matrix3d unscaled(double lead_s, const PathSpreads& spreads) const noexcept;
     void judge(const PoseSample& sample) noexcept;
     void remember() noexcept;
 

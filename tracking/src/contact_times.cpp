@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "contact_view.h"
-#include "learned_path.h"
+#include "network.h"
 
 namespace tracking {
 namespace {
@@ -17,6 +17,20 @@ static_assert(TipView::kInputs == StickHistory::kInputs);
 
 double distance_s(const TipView& view, const Plane& plane) {
     return plane.normal.dot(view.tip - plane.point) / view.speed;
+}
+
+/// The network's answer. Allocates nothing. One product after the other in a fixed order.
+void evaluate(const PathModel::Layers& layers, const ContactInputs& inputs, ContactOutputs& outputs) noexcept {
+    using Hidden = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, static_cast<int>(PathModel::kMostHidden), 1>;
+    const auto& [first, second, last] = layers;
+    Hidden h1 = first.bias;
+    h1.noalias() += first.weights * inputs;
+    h1 = h1.cwiseMax(kLeak * h1);
+    Hidden h2 = second.bias;
+    h2.noalias() += second.weights * h1;
+    h2 = h2.cwiseMax(kLeak * h2);
+    outputs = last.bias;
+    outputs.noalias() += last.weights * h2;
 }
 
 }  // namespace

@@ -34,70 +34,62 @@ Eigen::Matrix3d ErrorShape::covariance() const noexcept {
     return root * root.transpose();
 }
 
-ErrorShape shape_of(const Eigen::Ref<const Eigen::VectorXf>& outputs, std::size_t lead) noexcept {
+ErrorShape shape_of(const Eigen::Ref<const Eigen::VectorXf>& spreads, std::size_t lead) noexcept {
     const Eigen::Matrix<double, kShapeNumbers, 1> y =
-        outputs.segment<kShapeNumbers>(static_cast<Eigen::Index>(kPathMeans + kShapeNumbers * lead))
-            .cast<double>();
+        spreads.segment<kShapeNumbers>(static_cast<Eigen::Index>(kShapeNumbers * lead)).cast<double>();
     const auto logarithm = [](double x) { return std::clamp(x, kLeastLogSpread, kMostLogSpread); };
     return {y.head<3>().unaryExpr(logarithm),
             y.segment<3>(3).cwiseMin(kMostRegression).cwiseMax(-kMostRegression), logarithm(y[6])};
 }
 
-LearnedPath::LearnedPath(const PathFrame& frame, const PathOutputs& outputs,
-                         const Eigen::Quaterniond& orientation)
-    : frame_(frame), orientation_(orientation), outputs_(outputs) {
-    for (std::size_t l = 0; l < kNodes; ++l) {
-        const auto at = static_cast<Eigen::Index>(6 * l);
-        Eigen::Matrix<double, 6, 1>& value = nodes_[l + 1].value;
-        value.head<3>() = frame.speed * frame.to_world(outputs.segment<3>(at));
-        value.tail<3>() = frame.speed / kLever * frame.to_world(outputs.segment<3>(at + 3));
-    }
-    set_slopes();
-}
-
-void LearnedPath::set_slopes() noexcept {
-    for (std::size_t i = 0; i <= kNodes; ++i) {
-        const std::size_t middle = std::clamp<std::size_t>(i, 1, kNodes - 1);
-        const Node &a = nodes_[middle - 1], &b = nodes_[middle], &c = nodes_[middle + 1];
-        const double ab = lead_of(middle) - lead_of(middle - 1), bc = lead_of(middle + 1) - lead_of(middle);
-        const Eigen::Matrix<double, 6, 1> before = (b.value - a.value) / ab, after = (c.value - b.value) / bc;
-        const Eigen::Matrix<double, 6, 1> bend = (after - before) / (ab + bc);  // half the second derivative
-        nodes_[i].slope = before + bend * (2 * lead_of(i) - lead_of(middle - 1) - lead_of(middle));
-    }
-}
-
-LearnedPath::Node LearnedPath::added(double lead_s) const noexcept {
+LearnedPath::Added LearnedPath::added(double lead_s, Eigen::Index first) const noexcept {
+    const auto at = [&](std::size_t node) -> Eigen::Vector3d {
+        if (node == 0) return Eigen::Vector3d::Zero();
+        return means_.segment<3>(static_cast<Eigen::Index>(6 * (node - 1)) + first).cast<double>();
+    };
     std::size_t i = 0;
     while (i < kNodes && lead_of(i + 1) <= lead_s) ++i;
-    if (i == kNodes) return {nodes_[i].value, Eigen::Matrix<double, 6, 1>::Zero()};
-    const Node &a = nodes_[i], &b = nodes_[i + 1];
+    if (i == kNodes) return {at(i), Eigen::Vector3d::Zero()};
+    const auto slope_at = [&](std::size_t node) -> Eigen::Vector3d {
+        const std::size_t middle = std::clamp<std::size_t>(node, 1, kNodes - 1);
+        const Eigen::Vector3d a = at(middle - 1), b = at(middle), c = at(middle + 1);
+        const double ab = lead_of(middle) - lead_of(middle - 1), bc = lead_of(middle + 1) - lead_of(middle);
+        const Eigen::Vector3d before = (b - a) / ab, after = (c - b) / bc;
+        const Eigen::Vector3d bend = (after - before) / (ab + bc);  // half the second derivative
+        return before + bend * (2 * lead_of(node) - lead_of(middle - 1) - lead_of(middle));
+    };
+    const Eigen::Vector3d a = at(i), b = at(i + 1), of_a = slope_at(i), of_b = slope_at(i + 1);
     const double step = lead_of(i + 1) - lead_of(i), s = (lead_s - lead_of(i)) / step;
     const double from_b = s * s * (3 - 2 * s), va = s * (1 - s) * (1 - s), vb = s * s * (s - 1);
-    const double slope = 6 * s * (1 - s), wa = (1 - s) * (1 - 3 * s), wb = s * (3 * s - 2);
-    return {a.value + from_b * (b.value - a.value) + step * (va * a.slope + vb * b.slope),
-            slope / step * (b.value - a.value) + wa * a.slope + wb * b.slope};
+    const double inner = 6 * s * (1 - s), wa = (1 - s) * (1 - 3 * s), wb = s * (3 * s - 2);
+    return {a + from_b * (b - a) + step * (va * of_a + vb * of_b),
+            inner / step * (b - a) + wa * of_a + wb * of_b};
 }
 
 PosePrediction LearnedPath::after(double lead_s) const noexcept {
-    const Node add = added(lead_s);
+    const Added to_position = added(lead_s, 0);
     const double fading = 1 - kFadingRate * fading_way(lead_s);  // of a velocity, at that lead
     PosePrediction pose;
-    pose.position = frame_.faded_position(lead_s) + add.value.head<3>();
-    pose.velocity = fading * frame_.velocity + add.slope.head<3>();
+    pose.position = frame_.faded_position(lead_s) + frame_.speed * frame_.to_world(to_position.value);
+    pose.velocity = fading * frame_.velocity + frame_.speed * frame_.to_world(to_position.slope);
     pose.orientation = orientation_;
     if (!frame_.has_direction()) return pose;
-    const Eigen::Vector3d base = frame_.faded_direction(lead_s), sum = base + add.value.tail<3>();
+    const double of_shaft = frame_.speed / kLever;
+    const Added to_shaft = added(lead_s, 3);
+    const Eigen::Vector3d base = frame_.faded_direction(lead_s),
+                          sum = base + of_shaft * frame_.to_world(to_shaft.value);
     const double length = sum.norm();
     if (!(length > 1e-6)) return pose;
     const Eigen::Vector3d direction = sum / length;
-    const Eigen::Vector3d rate = fading * frame_.angular_velocity.cross(base) + add.slope.tail<3>();
+    const Eigen::Vector3d rate =
+        fading * frame_.angular_velocity.cross(base) + of_shaft * frame_.to_world(to_shaft.slope);
     pose.angular_velocity = direction.cross(rate / length);
     pose.orientation = (rotation_between(frame_.direction, direction) * orientation_).normalized();
     return pose;
 }
 
-PoseCovariance LearnedPath::covariance_at(std::size_t node) const noexcept {
-    const ErrorShape shape = shape_of(outputs_, node);
+PoseCovariance LearnedPath::covariance_at(std::size_t node, const PathSpreads& spreads) const noexcept {
+    const ErrorShape shape = shape_of(spreads, node);
     Eigen::Matrix3d axes;  // columns: forward, up, across
     axes << frame_.cosine, 0, -frame_.sine, 0, 1, 0, frame_.sine, 0, frame_.cosine;
     const double shaft = frame_.speed / kLever * std::exp(shape.log_shaft);
@@ -108,21 +100,30 @@ PoseCovariance LearnedPath::covariance_at(std::size_t node) const noexcept {
     return covariance;
 }
 
-PoseCovariance LearnedPath::covariance(double lead_s) const noexcept {
+PoseCovariance LearnedPath::covariance(double lead_s, const PathSpreads& spreads) const noexcept {
     std::size_t i = 0;
     while (i < kNodes && kPathLeads[i] <= lead_s) ++i;
     const auto sum = [](double share_a, const PoseCovariance& a, double share_b, const PoseCovariance& b) {
-        return PoseCovariance{share_a * a.position + share_b * b.position,
-                              share_a * a.velocity + share_b * b.velocity,
-                              share_a * a.rotation + share_b * b.rotation};
+        PoseCovariance both;
+        both.position = share_a * a.position + share_b * b.position;
+        both.velocity = share_a * a.velocity + share_b * b.velocity;
+        both.rotation = share_a * a.rotation + share_b * b.rotation;
+        return both;
     };
     if (i == 0 || i == kNodes) {
-        const PoseCovariance at = covariance_at(i == 0 ? 0 : kNodes - 1);
+        const PoseCovariance at = covariance_at(i == 0 ? 0 : kNodes - 1, spreads);
         const double share = std::max(kLeastShare, lead_s / kPathLeads[i == 0 ? 0 : kNodes - 1]);
         return sum(share * share, at, 0, at);
     }
     const double share = (lead_s - kPathLeads[i - 1]) / (kPathLeads[i] - kPathLeads[i - 1]);
-    return sum(1 - share, covariance_at(i - 1), share, covariance_at(i));
+    return sum(1 - share, covariance_at(i - 1, spreads), share, covariance_at(i, spreads));
+}
+
+Learned::Learned(const PathModel& model, const Eigen::Vector3d& shaft, double memory_s)
+    : network_(model), history_(shaft) {
+    if (!(memory_s > 0)) return;
+    online_.emplace(network_, memory_s);
+    examples_.resize(static_cast<std::size_t>(kPathLeads.back() / kExampleS) + 3);
 }
 
 SampleStatus Learned::correct(const PoseSample& sample) noexcept {
@@ -130,22 +131,67 @@ SampleStatus Learned::correct(const PoseSample& sample) noexcept {
     if (!is_taken(status)) return status;
     clock_.advance(sample.t_s);
     if (status == SampleStatus::reinitialised) {
-        history_.restart();
+        forget();
         orientation_.setIdentity();
     }
     history_.push(sample);
     if (sample.has_orientation) orientation_ = sample.orientation.normalized();
-    PathFrame frame;
-    PathOutputs outputs = PathOutputs::Zero();
-    if (history_.held() > 1) {
-        StickHistory::Inputs inputs;
-        frame = history_.look(inputs);
-        evaluate(model_->layers, inputs, outputs);
-    } else {
+    answered_ = history_.held() > 1;
+    if (!answered_) {
+        PathFrame frame;
         frame.position = sample.position;
+        path_ = LearnedPath(frame, PathMeans::Zero(), orientation_);
+        return status;
     }
-    path_ = LearnedPath(frame, outputs, orientation_);
+    if (online_) learn();
+    StickHistory::Inputs inputs;
+    const PathFrame frame = history_.look(inputs);
+    network_.find_hidden(inputs, hidden_);
+    path_ = LearnedPath(frame, network_.means(hidden_), orientation_);
+    if (online_) remember(frame);
     return status;
+}
+
+PathSpreads Learned::spreads() const noexcept {
+    return answered_ ? network_.spreads(hidden_) : PathSpreads(PathSpreads::Zero());
+}
+
+void Learned::forget() noexcept {
+    history_.restart();
+    count_ = 0;
+}
+
+void Learned::remember(const PathFrame& frame) noexcept {
+    const double now_s = clock_.time_s(), dt_s = now_s - last_example_s_;
+    if (dt_s < kExampleS || count_ == examples_.size()) return;
+    examples_[(first_ + count_++) % examples_.size()] = {now_s, std::min(dt_s, kGapS), frame, hidden_};
+    last_example_s_ = now_s;
+}
+
+/// The truth is the path between samples.
+void Learned::learn() noexcept {
+    for (; count_ > 0 && examples_[first_].t_s + kPathLeads.back() <= clock_.time_s();
+         first_ = (first_ + 1) % examples_.size(), --count_) {
+        const Example& e = examples_[first_];
+        PathMeans residuals;
+        bool known = true, known_shaft = e.frame.has_direction();
+        for (std::size_t l = 0; l < kNodes && known; ++l) {
+            const double lead_s = kPathLeads[l];
+            const auto at = static_cast<Eigen::Index>(6 * l);
+            Eigen::Vector3d position, direction;
+            known = history_.find(e.t_s + lead_s, position, direction);
+            if (!known) break;
+            residuals.segment<3>(at) =
+                e.frame.to_frame((position - e.frame.faded_position(lead_s)) / e.frame.speed);
+            residuals.segment<3>(at + 3).setZero();
+            if (known_shaft)
+                residuals.segment<3>(at + 3) =
+                    e.frame.to_frame(kLever / e.frame.speed * (direction - e.frame.faded_direction(lead_s)));
+        }
+        if (!known || !online_->learn(e.hidden, residuals, known_shaft, e.frame.speed, e.dt_s)) continue;
+        const Eigen::MatrixXf& weights = online_->weights();
+        network_.set_means(weights.leftCols(weights.cols() - 1), weights.rightCols<1>());
+    }
 }
 
 }  // namespace tracking

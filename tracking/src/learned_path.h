@@ -2,26 +2,15 @@
 #include <array>
 #include <memory>
 #include <optional>
-#include <utility>
+#include <vector>
 
+#include "network.h"
+#include "online_layer.h"
 #include "sample_clock.h"
-#include "stick_history.h"
 #include "tracking/path_model.h"
 #include "tracking/predictor.h"
 
 namespace tracking {
-
-/// The leads that a network answers [s]; between them its answers are interpolated.
-inline constexpr std::array<double, 5> kPathLeads = {1.0 / 60, 1.0 / 30, 1.0 / 15, 1.0 / 10, 0.15};
-inline constexpr std::size_t kNodes = kPathLeads.size();
-
-/// A network's outputs: for each lead first what is added to the fading position, and kLever times what is
-/// added to the fading direction, in the axes of the PathFrame and over speed 1 s; then for each lead the
-/// numbers of an ErrorShape.
-inline constexpr int kShapeNumbers = 7;
-inline constexpr std::size_t kPathMeans = 6 * kNodes, kPathSpreads = kShapeNumbers * kNodes,
-                             kPathOutputs = kPathMeans + kPathSpreads;
-using PathOutputs = Eigen::Matrix<float, static_cast<int>(kPathOutputs), 1>;
 
 /// What a network says of its errors at a lead: of a position error e (forward, up, across; over speed 1 s) the
 /// whitened one is
@@ -35,25 +24,8 @@ struct ErrorShape {
     [[nodiscard]] Eigen::Vector3d whitened(const Eigen::Vector3d& e) const noexcept;
     [[nodiscard]] Eigen::Matrix3d covariance() const noexcept;
 };
-[[nodiscard]] ErrorShape shape_of(const Eigen::Ref<const Eigen::VectorXf>& outputs,
+[[nodiscard]] ErrorShape shape_of(const Eigen::Ref<const Eigen::VectorXf>& spreads,
                                   std::size_t lead) noexcept;
-
-/// The slope of f left of zero.
-inline constexpr float kLeak = 0.1F;
-/// A network's answer. Allocates nothing. One product after the other in a fixed order.
-template <class Inputs, class Outputs>
-void evaluate(const PathModel::Layers& layers, const Inputs& inputs, Outputs& outputs) noexcept {
-    using Hidden = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, static_cast<int>(PathModel::kMostHidden), 1>;
-    const auto& [first, second, last] = layers;
-    Hidden h1 = first.bias;
-    h1.noalias() += first.weights * inputs;
-    h1 = h1.cwiseMax(kLeak * h1);
-    Hidden h2 = second.bias;
-    h2.noalias() += second.weights * h1;
-    h2 = h2.cwiseMax(kLeak * h2);
-    outputs = last.bias;
-    outputs.noalias() += last.weights * h2;
-}
 
 /// The path of one stick as a network answers it: position and direction of the shaft at any lead.
 ///
@@ -63,34 +35,35 @@ void evaluate(const PathModel::Layers& layers, const Inputs& inputs, Outputs& ou
 class LearnedPath {
 public:
     LearnedPath() = default;
-    LearnedPath(const PathFrame& frame, const PathOutputs& outputs, const Eigen::Quaterniond& orientation);
+    LearnedPath(const PathFrame& frame, const PathMeans& means, const Eigen::Quaterniond& orientation)
+        : frame_(frame), orientation_(orientation), means_(means) {}
 
     [[nodiscard]] PosePrediction after(double lead_s) const noexcept;
     /// Of the errors, as the network states it.
-    [[nodiscard]] PoseCovariance covariance(double lead_s) const noexcept;
+    [[nodiscard]] PoseCovariance covariance(double lead_s, const PathSpreads& spreads) const noexcept;
     [[nodiscard]] const PathFrame& frame() const noexcept { return frame_; }
 
 private:
-    /// Added to position and direction, with the slope over the lead.
-    struct Node {
-        Eigen::Matrix<double, 6, 1> value = Eigen::Matrix<double, 6, 1>::Zero(),
-                                    slope = Eigen::Matrix<double, 6, 1>::Zero();
+    /// What is added at a lead, with its slope over the lead; in the axes of the frame, over the speed.
+    struct Added {
+        Eigen::Vector3d value, slope;
     };
-    [[nodiscard]] Node added(double lead_s) const noexcept;
-    void set_slopes() noexcept;
-    [[nodiscard]] PoseCovariance covariance_at(std::size_t node) const noexcept;
+    /// To the position (`first` = 0) or to kLever times the direction (3).
+    [[nodiscard]] Added added(double lead_s, Eigen::Index first) const noexcept;
+    [[nodiscard]] PoseCovariance covariance_at(std::size_t node, const PathSpreads& spreads) const noexcept;
 
     PathFrame frame_;
     Eigen::Quaterniond orientation_ = Eigen::Quaterniond::Identity();
-    PathOutputs outputs_ = PathOutputs::Zero();
-    std::array<Node, kNodes + 1> nodes_;  // the first at lead 0
+    PathMeans means_ = PathMeans::Zero();
 };
 
-/// Predictor `learned`: a network alone. Starts anew after a gap; with one sample only it holds.
+/// Predictors `learned` and `online`: a network alone, whose last layer learns from what turns out if it has a memory.
+/// Starts anew after a gap, with what it has learned; with one sample only it holds. Examples are at least
+/// kExampleS apart. Allocates when it is made only.
 class Learned final : public Predictor {
 public:
-    Learned(std::shared_ptr<const PathModel> model, const Eigen::Vector3d& shaft)
-        : model_(std::move(model)), history_(shaft) {}
+    /// `memory_s`: of OnlineLayer; 0: learns nothing.
+    Learned(const PathModel& model, const Eigen::Vector3d& shaft, double memory_s = 0);
 
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override {
@@ -98,19 +71,39 @@ public:
     }
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override {
-        return path_.covariance(lead_s);
+        return path_.covariance(lead_s, spreads());
     }
     [[nodiscard]] bool heeds_orientation() const noexcept override { return true; }
     [[nodiscard]] const LearnedPath& path() const noexcept { return path_; }
+    /// What the network says of the errors of path().
+    [[nodiscard]] PathSpreads spreads() const noexcept;
     /// The next sample begins a motion that the ones before say nothing of.
-    void forget() noexcept { history_.restart(); }
+    void forget() noexcept;
+    [[nodiscard]] const OnlineLayer* online() const noexcept { return online_ ? &*online_ : nullptr; }
 
 private:
-    std::shared_ptr<const PathModel> model_;
+    static constexpr double kExampleS = 1.0 / 250;
+
+    /// What an example was seen as, until it is known what became of it.
+    struct Example {
+        double t_s = 0, dt_s = 0;
+        PathFrame frame;
+        Network::Hidden hidden;
+    };
+    void remember(const PathFrame& frame) noexcept;
+    void learn() noexcept;
+
+    Network network_;
     SampleClock clock_;
     StickHistory history_;
     LearnedPath path_;
+    Network::Hidden hidden_;  // of the newest sample
+    bool answered_ = false;   // by the network
     Eigen::Quaterniond orientation_ = Eigen::Quaterniond::Identity();
+    std::optional<OnlineLayer> online_;
+    std::vector<Example> examples_;  // a ring
+    std::size_t first_ = 0, count_ = 0;
+    double last_example_s_ = 0;
 };
 
 }  // namespace tracking

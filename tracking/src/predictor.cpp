@@ -146,10 +146,20 @@ std::unique_ptr<Predictor> make_imm(Specification& specification) {
     return std::make_unique<InteractingModels>(options);
 }
 
-using Model = std::shared_ptr<const PathModel>;
+using Model = const PathModel&;
+
+/// How slowly a network forgets what it learns while a stick moves [s].
+double memory(Specification& specification) {
+    return specification.number("memory", 100, 0, 1e6);
+}
 
 std::unique_ptr<Predictor> make_learned(Specification&, const Eigen::Vector3d& shaft, Model model) {
-    return std::make_unique<Learned>(std::move(model), shaft);
+    return std::make_unique<Learned>(model, shaft);
+}
+
+std::unique_ptr<Predictor> make_online(Specification& specification, const Eigen::Vector3d& shaft,
+                                       Model model) {
+    return std::make_unique<Learned>(model, shaft, memory(specification));
 }
 
 /// The filter is `cv`, whose velocity fades while its turning lasts.
@@ -164,8 +174,8 @@ std::unique_ptr<Predictor> make_arbitrated(Specification& specification, const E
     }
     const double sigmas = specification.has("gate") ? gate(specification) : 5;
     return std::make_unique<Arbitrated>(
-        std::make_unique<KalmanPredictor>(fading, KalmanOptions{sigmas, 0, lasting}), std::move(model),
-        shaft);
+        std::make_unique<KalmanPredictor>(fading, KalmanOptions{sigmas, 0, lasting}), model, shaft,
+        memory(specification));
 }
 
 /// One of the two makes it.
@@ -188,6 +198,7 @@ constexpr auto kPredictors = std::to_array<Entry>({{"hold", make_hold},
                                                    {"bank", make_bank},
                                                    {"imm", make_imm},
                                                    {"learned", nullptr, make_learned},
+                                                   {"online", nullptr, make_online},
                                                    {"arbitrated", nullptr, make_arbitrated}});
 
 std::vector<std::string> names_of(bool need_model) {
@@ -210,7 +221,7 @@ const std::vector<std::string>& model_predictor_names() {
 }
 
 std::unique_ptr<Predictor> make_predictor(const std::string& text, const Eigen::Vector3d& shaft,
-                                          std::shared_ptr<const PathModel> model) {
+                                          const std::shared_ptr<const PathModel>& model) {
     Specification specification(text);
     std::string known;
     for (const Entry& entry : kPredictors) {
@@ -218,9 +229,9 @@ std::unique_ptr<Predictor> make_predictor(const std::string& text, const Eigen::
         if (specification.name() != entry.name) continue;
         if (entry.make_of_model != nullptr && model == nullptr)
             specification.fail("no model", "one of `musicworld train`");
-        std::unique_ptr<Predictor> predictor =
-            entry.make_of_model != nullptr ? entry.make_of_model(specification, shaft, std::move(model))
-                                           : entry.make(specification);
+        std::unique_ptr<Predictor> predictor = entry.make_of_model != nullptr
+                                                   ? entry.make_of_model(specification, shaft, *model)
+                                                   : entry.make(specification);
         specification.require_no_others();
         return predictor;
     }

@@ -57,9 +57,8 @@ Eigen::Vector3f PathFrame::to_frame(const Eigen::Vector3d& v) const noexcept {
     return Eigen::Vector3d(cosine * v.x() + sine * v.z(), v.y(), cosine * v.z() - sine * v.x()).cast<float>();
 }
 
-Eigen::Vector3d PathFrame::to_world(const Eigen::Vector3f& v) const noexcept {
-    const Eigen::Vector3d d = v.cast<double>();
-    return {cosine * d.x() - sine * d.z(), d.y(), sine * d.x() + cosine * d.z()};
+Eigen::Vector3d PathFrame::to_world(const Eigen::Vector3d& v) const noexcept {
+    return {cosine * v.x() - sine * v.z(), v.y(), sine * v.x() + cosine * v.z()};
 }
 
 Eigen::Vector3d PathFrame::faded_position(double lead_s) const noexcept {
@@ -89,8 +88,21 @@ void StickHistory::push(const PoseSample& sample) noexcept {
         ring_[(newest_ + kCapacity - age) % kCapacity].direction = newest.direction;
 }
 
+bool StickHistory::find(double t_s, Eigen::Vector3d& position, Eigen::Vector3d& direction) const noexcept {
+    std::size_t age = 0;  // of the sample not later than t_s
+    while (age < held_ && back(age).t_s > t_s) ++age;
+    if (age == held_ || (age == 0 && back(0).t_s < t_s)) return false;
+    const Point &a = back(age), &b = back(age > 0 ? age - 1 : 0);
+    const double share = age > 0 ? (t_s - a.t_s) / (b.t_s - a.t_s) : 0;
+    position = a.position + share * (b.position - a.position);
+    direction = a.direction + share * (b.direction - a.direction);
+    return true;
+}
+
 void StickHistory::find_velocities(Spans& point, Spans& second) const noexcept {
     Point younger = back(0);
+    const bool directed = !younger.direction.isZero(0);
+    if (!directed) second.fill(Eigen::Vector3d::Zero());
     const double now_s = younger.t_s;
     std::size_t i = 0;  // the age lies between back(i + 1) and back(i)
     for (std::size_t k = 0; k < kSpans; ++k) {
@@ -98,11 +110,13 @@ void StickHistory::find_velocities(Spans& point, Spans& second) const noexcept {
         while (i + 2 < held_ && back(i + 1).t_s > t_s) ++i;
         const Point &b = back(i), &a = back(i + 1);
         const double share = std::clamp((t_s - a.t_s) / (b.t_s - a.t_s), 0.0, 1.0);
-        const Point older{t_s, a.position + share * (b.position - a.position),
-                          a.direction + share * (b.direction - a.direction)};
-        point[k] = (younger.position - older.position) / span_s(k);
-        second[k] = kLever / span_s(k) * (younger.direction - older.direction);
-        younger = older;
+        const Eigen::Vector3d position = a.position + share * (b.position - a.position);
+        point[k] = (younger.position - position) / span_s(k);
+        younger.position = position;
+        if (!directed) continue;
+        const Eigen::Vector3d direction = a.direction + share * (b.direction - a.direction);
+        second[k] = kLever / span_s(k) * (younger.direction - direction);
+        younger.direction = direction;
     }
 }
 
@@ -121,15 +135,23 @@ PathFrame StickHistory::look(Inputs& inputs) const noexcept {
     set_forward(frame, moments);
     const double past_s = span_s(0) + span_s(1);
     frame.velocity = (span_s(0) * point[0] + span_s(1) * point[1]) / past_s;
-    const Eigen::Vector3d way = (span_s(0) * second[0] + span_s(1) * second[1]) / kLever;
-    frame.angular_velocity = angular_velocity(frame.direction - way, frame.direction, past_s);
+    if (frame.has_direction()) {
+        const Eigen::Vector3d way = (span_s(0) * second[0] + span_s(1) * second[1]) / kLever;
+        frame.angular_velocity = angular_velocity(frame.direction - way, frame.direction, past_s);
+    }
 
     const double unit = 1 / frame.speed;
     Eigen::Index next = 0;
     const auto put = [&](const Eigen::Vector3f& v) { inputs.segment<3>(next) = v, next += 3; };
     for (const Eigen::Vector3d& v : point) put(frame.to_frame(unit * v));
-    for (const Eigen::Vector3d& v : second) put(frame.to_frame(unit * v));
-    put(frame.to_frame(frame.direction));
+    if (frame.has_direction()) {
+        for (const Eigen::Vector3d& v : second) put(frame.to_frame(unit * v));
+        put(frame.to_frame(frame.direction));
+    } else {
+        constexpr auto kOfShaft = static_cast<Eigen::Index>(3 * (kSpans + 1));
+        inputs.segment<kOfShaft>(next).setZero();
+        next += kOfShaft;
+    }
     inputs[next++] = frame.has_direction() ? 1.0F : 0.0F;
     inputs[next++] = static_cast<float>(std::log(frame.speed / kMeanSpeed));
     for (std::size_t k = 0; k < kPeriods; ++k)

@@ -21,7 +21,7 @@ struct PathFrame {
     [[nodiscard]] bool has_direction() const noexcept { return !direction.isZero(0); }
     /// A vector of the world in the axes (forward, up, across).
     [[nodiscard]] Eigen::Vector3f to_frame(const Eigen::Vector3d& v) const noexcept;
-    [[nodiscard]] Eigen::Vector3d to_world(const Eigen::Vector3f& v) const noexcept;
+    [[nodiscard]] Eigen::Vector3d to_world(const Eigen::Vector3d& v) const noexcept;
     /// Where the tracked point and the shaft's direction would be `lead_s` later if their velocities faded at
     /// kFadingRate: what a network's answer is added to.
     [[nodiscard]] Eigen::Vector3d faded_position(double lead_s) const noexcept;
@@ -64,6 +64,8 @@ public:
     /// A sample newer than the ones before; without orientation the shaft stays where it was.
     void push(const PoseSample& sample) noexcept;
     [[nodiscard]] std::size_t held() const noexcept { return held_; }
+    /// Where the stick was at a time between two samples held; false for others. Without orientation `direction` is zero.
+    [[nodiscard]] bool find(double t_s, Eigen::Vector3d& position, Eigen::Vector3d& direction) const noexcept;
     /// Writes the inputs; at least two samples must be held.
     [[nodiscard]] PathFrame look(Inputs& inputs) const noexcept;
 

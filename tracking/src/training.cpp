@@ -27,8 +27,6 @@ constexpr std::size_t kValidations = 24, kPatience = 3;  // parts of the steps
 constexpr double kSettlingS = 0.5;
 constexpr double kFirstLogSpread = -3;
 constexpr double kSpreadWeight = 0.05;  // of the errors' likelihood, beside the loss
-/// Squared radii of the 50 and 95 % regions of a normal error in three dimensions.
-constexpr double kRadius50 = 2.3659738843753377, kRadius95 = 7.814727903251179;
 
 /// The k-th way in which a stick is seen: a third of them by the usual sensor.
 Rendition rendition_of(std::size_t k, std::uint64_t seed, double share) {
@@ -197,13 +195,13 @@ double mean_loss(const Layers& layers, const Examples& e, const LossWeights& los
 /// ErrorShape says.
 Eigen::Vector3d whitened(const Eigen::Ref<const Eigen::VectorXf>& outputs, const Eigen::VectorXf& residual,
                          std::size_t lead) {
-    return shape_of(outputs, lead)
+    return shape_of(outputs.tail<kPathSpreads>(), lead)
         .whitened(residual.segment<3>(static_cast<Eigen::Index>(6 * lead)).cast<double>());
 }
 double whitened_shaft(const Eigen::Ref<const Eigen::VectorXf>& outputs, const Eigen::VectorXf& residual,
                       std::size_t lead) {
     return static_cast<double>(residual.segment<3>(static_cast<Eigen::Index>(6 * lead + 3)).norm()) *
-           std::exp(-shape_of(outputs, lead).log_shaft);
+           std::exp(-shape_of(outputs.tail<kPathSpreads>(), lead).log_shaft);
 }
 
 /// One training of one network.
@@ -270,7 +268,7 @@ private:
             const auto at = static_cast<Eigen::Index>(6 * lead);
             if (batch_.weights(at, b) > 0) {
                 const Eigen::Vector3d w = whitened(outputs, residual, lead).unaryExpr(within);
-                const ErrorShape shape = shape_of(outputs, lead);
+                const ErrorShape shape = shape_of(outputs.tail<kPathSpreads>(), lead);
                 const auto of_regression = [&](int i, int j) {
                     return w[i] *
                            within(std::exp(-shape.log_spread[i]) * static_cast<double>(residual[at + j]));

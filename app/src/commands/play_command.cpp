@@ -19,6 +19,7 @@
 #include "process/standard_streams.h"
 #include "sticks/predictors.h"
 #include "strikes/true_contacts.h"
+#include "training/learned_in_play.h"
 
 namespace app {
 namespace {
@@ -284,6 +285,8 @@ void add_play_command(Command& program) {
     auto o = std::make_shared<Options>();
     CLI::Option* trace = add_play_options(command, o->play);
     command.option("--out", o->play.out, as::text("DIR"), "Folder for the products");
+    command.option("--save-model", o->play.save_model, as::text("FILE"),
+                   "File for the network of the pictures' predictor as the sticks have taught it");
     CLI::Option* solo =
         command.option("--solo", o->play.solo, as::whole(0, std::numeric_limits<std::int64_t>::max()),
                        "Render the sound of one note alone, by its id in events.csv");
@@ -305,7 +308,10 @@ void add_play_command(Command& program) {
     realtime->excludes(solo)->excludes(show);
     add_mix_options(command, o->play.mix, realtime);
     for (CLI::Option* option : add_realtime_options(command, *o, trace)) option->needs(realtime);
-    command.checks([o] { check_video(o->play); });
+    command.checks([o] {
+        check_video(o->play);
+        if (o->play.save_model) check_learns(o->play.picture_predictor, *o->play.save_model);
+    });
     command.runs([o] { o->realtime ? play_in_time(*o) : play_offline(o->play); });
 }
 

@@ -16,12 +16,14 @@
 #include "traces/live_predict.h"
 #include "traces/predict.h"
 #include "traces/sensor_model.h"
+#include "training/learned_in_play.h"
 
 namespace app {
 namespace {
 
 struct PredictOptions {
     std::string trace, out, send;
+    std::optional<std::filesystem::path> save_model;
     LivePredictOptions live;
     tracking::SensorModel sensor;
 };
@@ -43,8 +45,12 @@ void print_to_errors(const LivePredictResult& r) {
 }
 
 void predict_file(const PredictOptions& o) {
-    const std::string table = predict_table(seen_by(tracking::read_trace(find_trace(o.trace)), o.sensor),
-                                            o.live.predictor, o.live.leads_s.front());
+    const std::string file = find_trace(o.trace).string();
+    std::vector<tracking::Experience> learned;
+    const std::string table = predict_table(seen_by(tracking::read_trace(file), o.sensor), o.live.predictor,
+                                            o.live.leads_s.front(), &learned);
+    if (o.save_model)
+        save_learned({*o.save_model, "predict", picture_specification(o.live.predictor), file}, learned);
     if (o.out.empty())
         fmt::print("{}", table);
     else
@@ -77,6 +83,7 @@ void check(const PredictOptions& o, const std::vector<std::string>& given, bool 
 void predict(PredictOptions o, const std::vector<std::string>& given) {
     const bool stream = o.trace == "-";
     check(o, given, stream);
+    if (o.save_model) check_learns(o.live.predictor, *o.save_model);
     if (stream) {
         o.live.source.source = "stdin";
         const std::unique_ptr<PredictionSink> rows = make_row_sink();
@@ -103,6 +110,8 @@ void add_predict_command(Command& program) {
     command.required("--lead", o->live.leads_s, as::list_of(as::number(0, 1, "s")),
                      "Time ahead of each sample; with --send also several, separated by commas");
     command.option("--out", o->out, as::text("FILE"), "File to write (CSV); standard output if left out");
+    command.option("--save-model", o->save_model, as::text("FILE"),
+                   "File for the network of the predictor as the sticks have taught it");
     Command live = command.under("Live sticks");
     live.option("--source", o->live.source.source, as::text("SOURCE"),
                 "In place of TRACE, as they come: osc:PORT, zmq:ENDPOINT, stdin or trace:FILE");

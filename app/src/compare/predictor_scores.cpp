@@ -18,9 +18,6 @@ namespace app {
 namespace {
 
 constexpr double kMm2 = 1e6, kDegrees = 180 / std::numbers::pi;
-/// Squared radii of the 50 and 95 % regions of a normal error in three dimensions (chi-square, 3 degrees of
-/// freedom).
-constexpr double kRadius50 = 2.3659738843753377, kRadius95 = 7.814727903251179;
 
 // Contacts are looked for this far beyond the lead at which they are committed: more than a sample's period,
 // so that each is seen, and re-timed, before.
@@ -229,8 +226,8 @@ void LeadScore::add(const tracking::PosePrediction& predicted, const Truth& trut
     const Eigen::Vector3d whitened = factor.matrixL().solve(predicted.position - truth.pose.position);
     const double square = whitened.squaredNorm();
     const double log_root = factor.matrixLLT().diagonal().array().log().sum();  // log sqrt(det)
-    sums.inside_50 += square <= kRadius50;
-    sums.inside_95 += square <= kRadius95;
+    sums.inside_50 += square <= covariance->radius_50;
+    sums.inside_95 += square <= covariance->radius_95;
     sums.negative_log_likelihood += 0.5 * square + log_root + 1.5 * std::log(2 * std::numbers::pi);
 }
 

@@ -17,6 +17,7 @@
 #include "process/progress_bar.h"
 #include "sticks/predictors.h"
 #include "sticks/stick.h"
+#include "training/learned_in_play.h"
 
 namespace app {
 namespace {
@@ -76,6 +77,13 @@ public:
     }
 
     [[nodiscard]] const std::vector<Strike>& strikes() const { return pipeline_->strikes(); }
+    [[nodiscard]] std::vector<tracking::Experience> experiences() const {
+        std::vector<tracking::Experience> all;
+        for (const StickFilters& filters : filters_)
+            if (std::optional<tracking::Experience> one = filters.experience())
+                all.push_back(std::move(*one));
+        return all;
+    }
     [[nodiscard]] std::size_t refused() const { return refused_; }
     [[nodiscard]] const LoopTimes& times() const { return pipeline_->times(); }
 
@@ -187,6 +195,9 @@ void play_through(const OfflineParts& parts, PlayResult& result) {
     result.strikes = run.strikes();
     check_solo(parts.options, result.strikes, result.pedals);
     result.samples_refused = run.refused();
+    if (parts.options.save_model)
+        save_learned({*parts.options.save_model, "play", result.options.picture_predictor, result.trace},
+                     run.experiences());
     const LoopTimes& times = run.times();
     result.stages_s.insert(result.stages_s.end(), {{"tracking", times.tracking},
                                                    {"simulation", times.simulation},

@@ -50,7 +50,9 @@ struct PlayOptions {
     std::optional<std::filesystem::path> pedals;  ///< a schedule or a MIDI file
     std::optional<std::filesystem::path> video;   ///< an MP4, by ffmpeg, in place of the frames
     bool keep_frames = false;                     ///< the frames beside the video, too
-    bool progress = false;                        ///< draw a progress bar on standard error
+    /// File that gets the model of the pictures' predictor as the sticks have taught it.
+    std::optional<std::filesystem::path> save_model;
+    bool progress = false;  ///< draw a progress bar on standard error
 };
 
 /// A stroke as the report shows it: frames that follow each other.

@@ -11,6 +11,7 @@
 #include "realtime/realtime_run.h"
 #include "report/json_document.h"
 #include "sticks/predictors.h"
+#include "training/learned_in_play.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -331,6 +332,10 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options, const Warn& warn) 
         check_samples(session, run, warn);
         collect(outcome, session, run, *folder);
     }
+    if (const auto& file = session.options.play.save_model)
+        save_learned({*file, "play --realtime", outcome.play.options.picture_predictor,
+                      session.live ? session.options.sensors.source : outcome.play.trace},
+                     session.sensors->end_and_take_learned());
     write_products(outcome.play,
                    {session.kit, session.stick, *session.simulation, session.frames.get(), wall}, *folder,
                    [&] {

@@ -120,6 +120,7 @@ void RealtimeSession::start_sensors() {
                                     options.play.sound_lead_s, stick.shaft);
     o.period_s = period_s();
     o.realtime = options.realtime_priority;
+    o.keep_learned = options.play.save_model.has_value();
     if (const ArtificialLoad::Part& stall = options.disturbance.stall; stall.amount > 0) {
         o.stall_at_s = stall.from_s;
         o.stall_s = stall.amount / 1e3;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 #include <sys/eventfd.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -16,6 +18,7 @@
 #include "process/clock.h"
 #include "sticks/external_predictor.h"
 #include "sticks/predictors.h"
+#include "training/learned_in_play.h"
 
 namespace app {
 namespace {
@@ -55,8 +58,12 @@ SensorHub::SensorHub(const SensorOptions& options)
     if (options_.program.empty()) options_.program = std::filesystem::read_symlink("/proc/self/exe").string();
     for (std::size_t i = 0; i < memory_.size(); ++i) {
         if (i == 0 || !serves_all_sticks(options_.source)) {
-            sensors_.push_back({{options_, {}, wake_.get(), life_.out.get()}, {}});
+            sensors_.push_back({{options_, {}, wake_.get(), life_.out.get()}, FileDescriptor(), {}});
             sensors_.back().task.sticks.clear();
+            if (options_.keep_learned) {
+                sensors_.back().learned = FileDescriptor(memfd_create("learned", MFD_CLOEXEC));
+                sensors_.back().task.learned_fd = sensors_.back().learned.get();
+            }
         }
         sensors_.back().sticks.push_back(i);
         sensors_.back().task.sticks.push_back(options_.sticks[i]);
@@ -78,6 +85,7 @@ void SensorHub::start(Sensor& sensor) const {
     child.own_group = options_.source != "stdin";  // a terminal lets only the foreground group read
     child.inherited = sensor.task.state_fds;
     child.inherited.insert(child.inherited.end(), {wake_.get(), life_.out.get()});
+    if (sensor.learned) child.inherited.push_back(sensor.learned.get());
     sensor.pid = start_child(child);
 }
 
@@ -266,6 +274,23 @@ void SensorHub::end_all() {
         (void)wait_for_child(sensor.pid);
         sensor.pid = -1;
     }
+}
+
+std::vector<tracking::Experience> SensorHub::end_and_take_learned() {
+    end_all();
+    std::vector<tracking::Experience> all;
+    for (const Sensor& sensor : sensors_) {
+        if (!sensor.learned) continue;
+        struct stat found {};
+        (void)fstat(sensor.learned.get(), &found);
+        std::string bytes(static_cast<std::size_t>(found.st_size), '\0');
+        if (bytes.empty() ||
+            pread(sensor.learned.get(), bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+            throw std::runtime_error(
+                "error: found a sensor that did not say what it learned, expected it to end");
+        for (tracking::Experience& one : experiences_of(bytes)) all.push_back(std::move(one));
+    }
+    return all;
 }
 
 void SensorHub::clear_wake() {

@@ -45,6 +45,9 @@ public:
     /// Every source has ended, and all that it gave has been published.
     [[nodiscard]] bool ended() const;
     [[nodiscard]] std::vector<ClockReport> clocks() const;  ///< one per stick
+    /// Ends the sensors and returns what the sticks have taught their predictors' networks; empty unless the options
+    /// want it (`keep_learned`). Throws std::runtime_error if a sensor did not say.
+    [[nodiscard]] std::vector<tracking::Experience> end_and_take_learned();
     /// How a live stream began.
     [[nodiscard]] SharedStreamHead stream_head() const {
         return memory_.front()->head.read().value_or(SharedStreamHead{});
@@ -54,6 +57,7 @@ public:
 private:
     struct Sensor {
         SensorTask task;
+        FileDescriptor learned{};
         std::vector<std::size_t> sticks;  ///< indices of the run
         int pid = -1;                     ///< -1: not running
         int status = 0;                   ///< of waitpid, once it has ended

@@ -22,6 +22,7 @@
 #include "process/bounded_queue.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
+#include "training/learned_in_play.h"
 
 namespace app {
 namespace {
@@ -89,6 +90,7 @@ public:
         report();
         add_one(task_.wake_fd);
         stop();
+        save_learned();
         report();
         interrupted_ = watched[2].revents != 0;
         return phase_ == SensorPhase::failed ? 1 : 0;
@@ -314,6 +316,18 @@ private:
         }
         reader_ = {};  // joins
         for (Stick& stick : sticks_) stick.thread = {};
+    }
+    /// After stop(). What cannot be written is not there for the hub, which says so.
+    void save_learned() {
+        if (task_.learned_fd < 0) return;
+        std::vector<tracking::Experience> experiences;
+        for (const Stick& stick : sticks_)
+            if (stick.filters)
+                if (std::optional<tracking::Experience> one = stick.filters->experience())
+                    experiences.push_back(std::move(*one));
+        const std::string bytes = bytes_of(experiences);
+        (void)!ftruncate(task_.learned_fd, 0);
+        (void)!pwrite(task_.learned_fd, bytes.data(), bytes.size(), 0);
     }
     void fail(const char* what) {
         {

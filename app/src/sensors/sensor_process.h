@@ -85,7 +85,8 @@ struct SensorOptions : SourceOptions {
     StickPredictors predictors;
     double stall_at_s = -1, stall_s = 0;  ///< --disturb: a pause of the reader, for tests; < 0: none
     bool realtime = true;                 ///< real-time scheduling where that is permitted
-    std::string program;                  ///< that has the command `sensor`; empty: this one
+    std::string program{};                ///< that has the command `sensor`; empty: this one
+    bool keep_learned = false;            ///< what was learned is wanted at the end
 };
 
 /// The sticks of one sensor process. Descriptors are inherited from the hub.
@@ -93,6 +94,7 @@ struct SensorTask : SensorOptions {
     std::vector<int> state_fds;  ///< shared memory, one for each stick
     int wake_fd = -1;            ///< eventfd that is written after each publication
     int life_fd = -1;            ///< a pipe that ends with the hub
+    int learned_fd = -1;  ///< memory that gets what the sticks taught, at the end (bytes_of); -1: not wanted
 };
 
 /// Calls field(name, member, help) for all that the command `sensor` is started with.
@@ -114,6 +116,7 @@ void for_each_sensor_option(auto& task, const auto& field) {
     field("--state-fd", task.state_fds, "Shared memory; once for each stick");
     field("--wake-fd", task.wake_fd, "eventfd");
     field("--life-fd", task.life_fd, "Pipe that ends with the application");
+    field("--learned-fd", task.learned_fd, "Memory for what was learned; none if left out");
     field("--realtime", task.realtime, "Real-time scheduling where that is permitted");
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <sim/simulation.h>
 #include <tracking/contact_times.h>
+#include <tracking/experience.h>
 #include <tracking/predictor.h>
 #include <tracking/stick_state.h>
 
@@ -44,6 +45,10 @@ public:
                                                  tracking::StickState& state);
     /// As before the first sample: times may begin again.
     void begin_anew();
+    /// What the stick has taught the network of the pictures' predictor, if that learns.
+    [[nodiscard]] std::optional<tracking::Experience> experience() const {
+        return tracking::experience_of(*picture_.predictor);
+    }
 
 private:
     void say_paths(tracking::StickState& state) const;

@@ -37,7 +37,8 @@ void predict_stick(const tracking::StickTrace& stick, std::size_t index, trackin
 
 }  // namespace
 
-std::string predict_table(const tracking::Trace& seen, const std::string& specification, double lead_s) {
+std::string predict_table(const tracking::Trace& seen, const std::string& specification, double lead_s,
+                          std::vector<tracking::Experience>* learned) {
     const std::vector<double> leads = {lead_s};
     std::vector<Row> rows;
     for (std::size_t i = 0; i < seen.sticks.size(); ++i) {
@@ -45,6 +46,9 @@ std::string predict_table(const tracking::Trace& seen, const std::string& specif
             make_any_predictor(picture_specification(specification), leads,
                                {seen.sticks[i].name, seen.shaft.value_or(-Eigen::Vector3d::UnitZ())});
         predict_stick(seen.sticks[i], i, *predictor, lead_s, rows);
+        if (learned == nullptr) continue;
+        if (std::optional<tracking::Experience> one = tracking::experience_of(*predictor))
+            learned->push_back(std::move(*one));
     }
     // A stick's times differ. (stable_sort's buffer is not aligned for what holds Eigen's types.)
     std::ranges::sort(rows, {}, [](const Row& row) { return std::tuple(row.sample_t_s, row.stick); });

@@ -1,7 +1,9 @@
 #pragma once
+#include <tracking/experience.h>
 #include <tracking/trace.h>
 
 #include <string>
+#include <vector>
 
 namespace app {
 
@@ -15,10 +17,11 @@ namespace app {
 ///   seen           samples of each stick in the order of arrival
 ///   specification  any of make_any_predictor; `auto` means the picture's
 ///   lead_s         >= 0
+///   learned        gets what each stick has taught the predictor, if that learns
 ///
 /// Throws BadInput for the specification, std::runtime_error when an external predictor fails.
 [[nodiscard]] std::string predict_table(const tracking::Trace& seen, const std::string& specification,
-                                        double lead_s);
+                                        double lead_s, std::vector<tracking::Experience>* learned = nullptr);
 
 /// A row of it, and what stands above the rows; `predicted.t_s` is the time predicted for.
 [[nodiscard]] std::string predicted_row(const std::string& stick, const tracking::PoseSample& predicted);

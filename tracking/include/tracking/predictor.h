@@ -13,12 +13,18 @@ namespace tracking {
 
 struct PathModel;
 
+/// Squared radii of the 50 and 95 % regions of a normal error in three dimensions, in standard deviations.
+inline constexpr double kRadius50 = 2.3659738843753377, kRadius95 = 7.814727903251179;
+
 /// Covariance of the errors of a prediction as the estimator itself states it. World frame.
 struct PoseCovariance {
     Eigen::Matrix3d position = Eigen::Matrix3d::Zero();  ///< [m^2]
     Eigen::Matrix3d velocity = Eigen::Matrix3d::Zero();  ///< [m^2/s^2]
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();  ///< of the small rotation from the predicted
                                                          ///< orientation to the true one [rad^2]
+    /// Of the position: half of the errors e are to have e^T C^-1 e <= radius_50, 95 % <= radius_95. Those of a
+    /// normal error, unless the estimator knows better.
+    double radius_50 = kRadius50, radius_95 = kRadius95;
 };
 
 /// What became of a sample. `outlier`: only with a gate (`gate=`); the sample was ignored, but the
@@ -97,20 +103,21 @@ inline constexpr double kGapS = 0.1;
 ///                           score=likelihood: most likely (3.27) instead of nearest
 ///   imm:alpha=200,q1=1e9,q2=3e10,q3=1e12,rate=10             interacting Singer models, switching at `rate`
 ///   learned                 a network, `model`, from the last 0.25 s: position, shaft, its own uncertainty
-///   arbitrated:q=1e7,decay=8,r=0.5,gate=5                    `cv` and that network, weighed by the errors that
-///                           they turned out to make; its turning lasts
+///   online:memory=100       that network, its last layer learning what turns out, forgotten over 100 s
+///   arbitrated:memory=100,q=1e7,decay=8,r=0.5,gate=5         `cv` and `online`, weighed by the errors that
+///                           they turned out to make; its turning lasts; with memory=0 `learned` in its place
 ///
 /// The numbers shown are the defaults. Orientation is filtered by the same model about its own quaternion.
 /// thesis, cv, ca, singer, bank and imm also take: `r=0.25`, the sensor's noise; `p0=10`, `v0=1000`,
 /// `a0=1e4`, standard deviations of the start; `gate=G`: samples beyond G standard deviations that a stick
 /// cannot have made (25 m/s, 3000 m/s^2, contacts excepted) are outliers. thesis, cv, ca and singer take
 /// `steady=HZ`: the steady gain of that rate. `shaft`, a unit vector from hand to tip in the tracked body's frame,
-/// is what learned and arbitrated follow; predictors share `model`, which nothing changes. Throws
+/// is what learned, online and arbitrated follow; `model` is copied. Throws
 /// std::invalid_argument with one line (found, expected) for an unknown name, key or value, and where there is
 /// no model for what needs one.
 [[nodiscard]] std::unique_ptr<Predictor> make_predictor(
     const std::string& specification, const Eigen::Vector3d& shaft = -Eigen::Vector3d::UnitZ(),
-    std::shared_ptr<const PathModel> model = {});
+    const std::shared_ptr<const PathModel>& model = {});
 
 /// The names make_predictor knows that need no model, and those that need one, in the order of the
 /// documentation.
