@@ -27,7 +27,8 @@ public:
         bool sound = false;        ///< ports out_l and out_r, connected to the first two physical outputs
         std::string midi_port;     ///< name of the MIDI port; empty: none
         std::string midi_connect;  ///< its peer, where that exists
-        std::string midi_input{};  ///< a port to listen to; empty: none; without a colon a port of ours, left open
+        std::string
+            midi_input{};  ///< a port to listen to; empty: none; without a colon a port of ours, left open
         double output_lead_s = 0;
     };
 

@@ -123,7 +123,8 @@ TEST(Learned, GetsBetterWhileItPlaysAtAnyRate) {
 }
 
 TEST(Learned, WhatSticksTaughtIsAModelThatGoesOnWhereTheyEnded) {
-    const PathModel model = model_of_random_weights(48, 7);
+    PathModel model = model_of_random_weights(48, 7);
+    model.contacts = model.layers;  // any weights: what is learned of paths leaves them as they are
     std::vector<Experience> experiences;
     for (int stick = 0; stick < 2; ++stick) {
         Learned online(model, Vector3d::UnitY(), 100);
@@ -136,9 +137,13 @@ TEST(Learned, WhatSticksTaughtIsAModelThatGoesOnWhereTheyEnded) {
     EXPECT_EQ(better.layers[0].weights, model.layers[0].weights);
     EXPECT_EQ(better.layers[2].weights.bottomRows(kPathSpreads),
               model.layers[2].weights.bottomRows(kPathSpreads));
+    ASSERT_TRUE(better.contacts.has_value());
+    EXPECT_EQ((*better.contacts)[1].weights, model.layers[1].weights);
     EXPECT_FALSE(experience_of(before).has_value());
     EXPECT_THROW((void)taught(model_of_random_weights(8, 1), experiences), std::invalid_argument);
-    EXPECT_EQ(parse_path_model(format_path_model(better), "b").layers[2].weights, better.layers[2].weights);
+    PathModel alone = better;
+    alone.contacts.reset();  // those above have not the size that files demand
+    EXPECT_EQ(parse_path_model(format_path_model(alone), "b").layers[2].weights, better.layers[2].weights);
 }
 
 }  // namespace

@@ -20,7 +20,8 @@ double distance_s(const TipView& view, const Plane& plane) {
 }
 
 /// The network's answer. Allocates nothing. One product after the other in a fixed order.
-void evaluate(const PathModel::Layers& layers, const ContactInputs& inputs, ContactOutputs& outputs) noexcept {
+void evaluate(const PathModel::Layers& layers, const ContactInputs& inputs,
+              ContactOutputs& outputs) noexcept {
     using Hidden = Eigen::Matrix<float, Eigen::Dynamic, 1, 0, static_cast<int>(PathModel::kMostHidden), 1>;
     const auto& [first, second, last] = layers;
     Hidden h1 = first.bias;

@@ -30,6 +30,7 @@ PathModel taught(const PathModel& model, std::span<const Experience> experiences
     layer.solve();
     PathModel result;
     result.layers = model.layers;
+    result.contacts = model.contacts;
     result.layers[2].weights.topRows<kPathMeans>() = layer.weights().leftCols(network.units());
     result.layers[2].bias.head<kPathMeans>() = layer.weights().rightCols<1>();
     return result;

@@ -12,6 +12,7 @@
 #include "files/bad_input.h"
 #include "files/format_description.h"
 #include "files/toml_reader.h"
+#include "kit/kit_mix.h"
 #include "kit/mesh_contact.h"
 #include "scene/shared_keys.h"
 
@@ -410,52 +411,6 @@ void stick_keys(Fields& keys, StickDefinition& stick) {
 }
 const TableKind<StickDefinition> kStick = {{"stick", "The sticks."}, stick_keys};
 
-struct MixDraft {
-    audio::Mix mix;
-    fs::path kit{}, impulse{};
-};
-void mix_keys(Fields& keys, MixDraft& written) {
-    audio::Mix& mix = written.mix;
-    keys.number("gain_db", mix.gain_db, {-60, 60, "dB"},
-                "Gain of the whole kit; offline, the sound is then brought to the loudness asked for.");
-    keys.number("room_t60_s", mix.room.t60_s, {0, 20, "s"},
-                "Time in which the room's echo falls by 60 dB; below 0.05: no room.");
-    keys.number("room_level_db", mix.room.level_db, {-60, 20, "dB"},
-                "Energy of the room's echo against the instruments' own.");
-    std::string impulse;
-    keys.text(
-        "room_impulse", impulse,
-        "A recorded room instead of room_t60_s: its impulse response, a sound file beside this one, of at "
-        "most "
-        "20 s; one channel, two (left, right) or four (left to left, left to right, right to left, right to "
-        "right).",
-        {.example = "\"hall.wav\""});
-    if (!impulse.empty()) written.impulse = find_file(keys, "room_impulse", impulse, written.kit, nullptr);
-}
-const TableKind<MixDraft> kMix = {{"mix", "What becomes of the instruments' sum."}, mix_keys};
-
-void bus_keys(Fields& keys, Bus& bus) {
-    keys.text("name", bus.name, "Name, as the instruments' `bus` gives it.",
-              {.need = Need::given, .example = "\"drums\""});
-    keys.number("gain_db", bus.gain_db, {-60, 20, "dB"}, "Gain of its instruments.");
-    keys.number("balance", bus.balance, {-1, 1}, "-1 their left sides alone ... 1 their right sides alone.");
-    keys.number("room_send_db", bus.room_send_db, {-60, 20, "dB"},
-                "Gain of what the room hears of them; -60: nothing.");
-}
-const TableKind<Bus> kBus = {{"bus", "Instruments that are mixed together."}, bus_keys};
-
-/// Puts the instrument on its bus.
-void mix_in(Fields& at, Instrument& instrument, const std::vector<Bus>& buses) {
-    if (instrument.bus.empty()) return;
-    const auto bus = std::ranges::find(buses, instrument.bus, &Bus::name);
-    at.require(bus != buses.end(), "bus", fmt::format("bus = \"{}\"", instrument.bus),
-               "the name of a [[bus]]");
-    if (bus == buses.end()) return;
-    instrument.voice.gain_db += bus->gain_db;
-    instrument.voice.balance = bus->balance;
-    instrument.voice.room_send_db = bus->room_send_db;
-}
-
 const TableKind<render::Room> kRoom = {{"room", "The room."}, room_keys};
 
 void defaults_keys(Fields& keys, KitDraft&) {
@@ -525,12 +480,13 @@ void kit_keys(Fields& keys, KitDraft& written) {
     keys.table("stick", kit.stick, kStick, [&](Fields& at, StickDefinition& stick) {
         stick.mesh = find_file(at, "mesh", stick.mesh, kit.file, "meshes");
     });
-    MixDraft mix{.mix = kit.mix, .kit = kit.file};
-    keys.table("mix", mix, kMix, [&](Fields&, MixDraft& read) {
+    KitMix mix{.mix = kit.mix};
+    keys.table("mix", mix, kMix, [&](Fields& at, KitMix& read) {
         kit.mix = read.mix;
-        if (read.impulse.empty()) return;
-        kit.mix.room.impulse = read_sound([&] { return audio::read_impulse_response(read.impulse); });
-        kit.sound_files.push_back(read.impulse);
+        if (read.room_impulse.empty()) return;
+        const fs::path impulse = find_file(at, "room_impulse", read.room_impulse, kit.file, nullptr);
+        kit.mix.room.impulse = read_sound([&] { return audio::read_impulse_response(impulse); });
+        kit.sound_files.push_back(impulse);
     });
     keys.tables("bus", Bus(), kBus, "Groups that instruments are mixed in.",
                 [&](Fields& at, const Bus& read) {
