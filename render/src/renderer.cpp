@@ -25,13 +25,13 @@ constexpr float kShadowShift = 2.5f;  // of a receiver along its normal, more th
 constexpr int kMostPixels = 8192;     // pixels
 
 bool looks_somewhere(const Camera& camera) {
-    return camera.eye.allFinite() && camera.target.allFinite() &&
-           (camera.target - camera.eye).norm() > 1e-6f && camera.vertical_fov_deg >= 1 &&
-           camera.vertical_fov_deg <= 150;
+    return camera.eye.allFinite() && camera.target.allFinite() && camera.up.allFinite() &&
+           camera.up.norm() > 1e-6f && (camera.target - camera.eye).norm() > 1e-6f &&
+           camera.vertical_fov_deg >= 1 && camera.vertical_fov_deg <= 150;
 }
 constexpr const char* kBadCamera =
-    "camera: error: found eye, target or field of view out of range, expected two places and 1 to 150 "
-    "degrees";
+    "camera: error: found eye, target, up or field of view out of range, expected two places, a "
+    "direction and 1 to 150 degrees";
 
 SceneDescription checked(const SceneDescription& scene) {
     if (scene.width < 1 || scene.height < 1 || scene.width > kMostPixels || scene.height > kMostPixels) {

@@ -11,10 +11,11 @@ constexpr float kNear = 0.05f, kLeastFar = 60;  // [m]
 constexpr float kShadowMargin = 1.25f;
 
 /// View space: x right, y up, looking along -z.
-Eigen::Matrix4f view_from_world(const Eigen::Vector3f& eye, const Eigen::Vector3f& forward) {
+Eigen::Matrix4f view_from_world(const Eigen::Vector3f& eye, const Eigen::Vector3f& forward,
+                                const Eigen::Vector3f& upwards = Eigen::Vector3f::UnitY()) {
     const Eigen::Vector3f back = -forward.normalized();
-    const bool vertical = std::abs(back.y()) > 0.9999f;
-    const Eigen::Vector3f up = vertical ? Eigen::Vector3f(0, 0, -1) : Eigen::Vector3f::UnitY();
+    const bool along = std::abs(back.dot(upwards.normalized())) > 0.9999f;
+    const Eigen::Vector3f up = along ? Eigen::Vector3f(0, 0, -1) : upwards;
     const Eigen::Vector3f right = up.cross(back).normalized();
     Eigen::Matrix3f rotation;
     rotation << right.transpose(), back.cross(right).transpose(), back.transpose();
@@ -40,7 +41,7 @@ Eigen::Matrix4f clip_from_world(const Camera& camera, float aspect) {
     projection(2, 2) = (far + kNear) / (kNear - far);
     projection(2, 3) = 2 * far * kNear / (kNear - far);
     projection(3, 2) = -1;
-    return projection * view_from_world(camera.eye, camera.target - camera.eye);
+    return projection * view_from_world(camera.eye, camera.target - camera.eye, camera.up);
 }
 
 float shadow_reach(const Camera& camera, float aspect) {

@@ -3,8 +3,7 @@
 
 namespace render {
 
-/// Clip space (OpenGL: x right, y up, z in [-1, 1]) from world, for a camera that keeps world +y up in the
-/// picture. When it looks straight up or down, world -z is up. Near plane 0.05 m, far plane 60 m.
+/// Clip space (OpenGL: x right, y up, z in [-1, 1]) from world, for a camera. Near plane 0.05 m, far plane 60 m.
 [[nodiscard]] Eigen::Matrix4f clip_from_world(const Camera& camera, float aspect);
 
 /// Half of the side of the square the shadow map covers, across the light: what the camera sees at its

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -16,7 +17,10 @@ namespace app {
 namespace {
 
 constexpr double kFittedFovDeg = 45, kEdge = 0.04;
-constexpr double kLeastDepthM = 0.2;  // of a point before the eye
+constexpr double kVertical =
+    0.9999;  // cosine of a view to the vertical from which on it has no up of its own
+const double kSteep = std::cos(std::numbers::pi / 12);  // that of a view near the vertical, 15 degrees
+constexpr double kLeastDepthM = 0.2;                    // of a point before the eye
 
 const std::vector<Word<CameraSide>> kSides = {{"drummer", CameraSide::drummer},
                                               {"front", CameraSide::front},
@@ -54,6 +58,41 @@ bool meets_its_target(const render::Camera& a, const render::Camera& b) {
     return (from + share * change).norm() < 1e-3f;
 }
 
+/// Towards the target.
+Eigen::Vector3d view_of(const render::Camera& camera) {
+    return (camera.target - camera.eye).cast<double>().normalized();
+}
+
+/// The top of its picture: of unit length and across the view, as the renderer takes it.
+Eigen::Vector3d up_of(const render::Camera& camera) {
+    const Eigen::Vector3d view = view_of(camera), up = camera.up.cast<double>().normalized();
+    const Eigen::Vector3d from = std::abs(view.dot(up)) > kVertical ? Eigen::Vector3d(0, 0, -1) : up;
+    return (from - from.dot(view) * view).normalized();
+}
+
+/// Whether the view on the way from a to b, which turns in a plane from a's to b's, comes near to the vertical: at an
+/// end, or where it is steepest in its plane if that lies between them.
+bool is_steep(const render::Camera& a, const render::Camera& b) {
+    const Eigen::Vector3d from = view_of(a), to = view_of(b), normal = from.cross(to);
+    if (std::max(std::abs(from.y()), std::abs(to.y())) > kSteep) return true;
+    if (normal.norm() < 1e-9) return false;
+    Eigen::Vector3d steepest = Eigen::Vector3d::UnitY() - normal * (normal.y() / normal.squaredNorm());
+    if (steepest.norm() < 1e-9) return false;  // level all the way
+    steepest.normalize();
+    const double before = from.cross(steepest).dot(normal), after = steepest.cross(to).dot(normal);
+    return before * after > 0 && std::abs(steepest.y()) > kSteep;
+}
+
+/// The up of a camera that came from `from`, its view turned the shortest way.
+Eigen::Vector3d carried_up(const render::Camera& from, const render::Camera& now) {
+    return Eigen::Quaterniond::FromTwoVectors(view_of(from), view_of(now)) * up_of(from);
+}
+
+/// A place that looks straight up or down has no up of its own: it keeps that of the place before.
+void keep_up(render::Camera& camera, const render::Camera& before) {
+    if (std::abs(view_of(camera).y()) > kVertical) camera.up = carried_up(before, camera).cast<float>();
+}
+
 CameraChoice read_places(const std::string& file) {
     CameraChoice choice;
     read_toml({TomlFile("a path of the camera", std::filesystem::path(file))}, "the camera's path",
@@ -68,6 +107,8 @@ CameraChoice read_places(const std::string& file) {
                                              "target", "a camera that meets its target on its way here",
                                              "a target apart from it all the way");
                                   choice.places.push_back(place);
+                                  if (choice.places.size() > 1)
+                                      keep_up(choice.places.back().camera, (choice.places.end() - 2)->camera);
                               });
               });
     if (choice.places.empty())
@@ -152,8 +193,15 @@ std::optional<render::Camera> moving_camera(const CameraChoice& choice, double t
     const auto between = [share]<class T>(const T& from, const T& to) -> T {
         return from + share * (to - from);
     };
-    return render::Camera{between(a.camera.eye, b.camera.eye), between(a.camera.target, b.camera.target),
-                          between(a.camera.vertical_fov_deg, b.camera.vertical_fov_deg)};
+    render::Camera now{between(a.camera.eye, b.camera.eye), between(a.camera.target, b.camera.target),
+                       between(a.camera.vertical_fov_deg, b.camera.vertical_fov_deg)};
+    if (is_steep(a.camera, b.camera)) {
+        const Eigen::Vector3d arrived = carried_up(a.camera, b.camera), wanted = up_of(b.camera);
+        const double roll = std::atan2(arrived.cross(wanted).dot(view_of(b.camera)), arrived.dot(wanted));
+        now.up =
+            (Eigen::AngleAxisd(double(share) * roll, view_of(now)) * carried_up(a.camera, now)).cast<float>();
+    }
+    return now;
 }
 
 }  // namespace app

@@ -47,7 +47,11 @@ struct CameraChoice {
                                              const std::optional<render::Camera>& own,
                                              std::span<const Eigen::Vector3f> points, float aspect);
 /// Where it is at t_s, straight on between two places and at rest before the first and after the last; none where
-/// it stands still.
+/// it stands still. World +y is up in the picture, but on a way whose view v comes within 15 degrees of the vertical,
+/// where that would turn the picture at once: there the up of the place before is carried along as v turns, by the
+/// smallest turn R from v_a to v, and the roll r by which it misses the up of the next place is spread over the way:
+/// up = rotation(v, share r) R up_a. Both ends are then as the ways beside them have them, and a place that looks
+/// straight up or down has the up that came there.
 [[nodiscard]] std::optional<render::Camera> moving_camera(const CameraChoice& choice, double t_s);
 
 }  // namespace app

@@ -55,6 +55,8 @@ struct Camera {
     Eigen::Vector3f eye = Eigen::Vector3f(0, 1.5f, 1.55f);  ///< [m], world
     Eigen::Vector3f target = Eigen::Vector3f(0, 0.68f, -0.25f);
     float vertical_fov_deg = 42;
+    /// Of any length: up in the picture as far as it is across the view. Along the view -z takes its place.
+    Eigen::Vector3f up = Eigen::Vector3f::UnitY();
 
     bool operator==(const Camera&) const = default;
 };

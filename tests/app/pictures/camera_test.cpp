@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <render/renderer.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "files/assets.h"
@@ -116,6 +118,65 @@ TEST(Camera, APathGoesStraightFromPlaceToPlaceAndRestsAtItsEnds) {
     EXPECT_EQ(moving_camera(path, 9)->eye, Eigen::Vector3f(2, 1, 2));
     folder.write("path.toml", place(1, "[0, 1, 2]"));
     EXPECT_FALSE(moving_camera(camera_format().parse(file, "--camera"), 2)) << "it stands still";
+}
+
+/// The picture's axes in the world, by the rule of render::Camera: right, up, back.
+Eigen::Matrix3d axes(const render::Camera& camera) {
+    const Eigen::Vector3d view = (camera.target - camera.eye).cast<double>().normalized();
+    Eigen::Vector3d up = camera.up.cast<double>().normalized();
+    if (std::abs(view.dot(up)) > 0.9999) up = Eigen::Vector3d(0, 0, -1);
+    Eigen::Matrix3d all;
+    all.col(0) = view.cross(up).normalized(), all.col(1) = all.col(0).cross(view), all.col(2) = -view;
+    return all;
+}
+
+double turn_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+    return Eigen::AngleAxisd(Eigen::Matrix3d(a.transpose() * b)).angle();
+}
+
+/// Over the top, through a place that looks straight down, on to a side and from below to straight up. In 1/1000 of a
+/// way of 1 s the view turns by less than |eye's speed| / |nearest to the target| / 1000 < 5 mrad, and the roll by at
+/// most pi / 1000; a flip would be 1 to pi.
+TEST(Camera, APathThroughTheVerticalTurnsThePictureWithoutAJump) {
+    const TemporaryFolder folder;
+    const std::vector<std::vector<std::string>> paths = {
+        {"[0, 3, 2]", "[0, 3, -2]"},                            // over it, no place there
+        {"[0.1, 3, 2]", "[0.1, 3, -2]"},                        // near to it
+        {"[0, 3, 2]", "[0, 3, 0]", "[0, 3, -2]"},               // a place there
+        {"[0, 3, 0]", "[0, 3, -2]", "[2, 2, 0]"},               // beginning there
+        {"[2, 2, 0]", "[0, 3, 0]", "[0, 4, 0]", "[0, 3, -2]"},  // resting in it
+        {"[1, -1, 1]", "[0, -1, 0]", "[-1, -1, 1]"},            // from below
+    };
+    for (const auto& eyes : paths) {
+        std::string text;
+        for (std::size_t i = 0; i < eyes.size(); ++i) text += place(0.5 * double(i) + 0.5, eyes[i]);
+        const CameraChoice path = camera_format().parse(folder.write("path.toml", text).string(), "--camera");
+        const int steps = 1000 * int(eyes.size());
+        Eigen::Matrix3d before = axes(*moving_camera(path, 0));
+        double most = 0;
+        for (int i = 1; i <= steps; ++i) {
+            const Eigen::Matrix3d now = axes(*moving_camera(path, 0.0005 * i + 0.5));
+            most = std::max(most, turn_between(before, now));
+            before = now;
+        }
+        EXPECT_LT(most, 0.012) << eyes.front() << " " << eyes.size();
+        // Each place that does not look up or down is upright.
+        for (std::size_t i = 0; i < eyes.size(); ++i) {
+            const Eigen::Matrix3d there = axes(*moving_camera(path, 0.5 * double(i) + 0.5));
+            if (std::abs(there(1, 2)) > 0.99) continue;
+            EXPECT_NEAR(there(1, 0), 0, 1e-6);
+            EXPECT_GT(there(1, 1), 0);
+        }
+    }
+}
+
+TEST(Camera, APathFarFromTheVerticalStaysUpright) {
+    const TemporaryFolder folder;
+    const std::string file =
+        folder.write("path.toml", place(0, "[0, 2.5, 2]") + place(1, "[2, 2, 0]") + place(2, "[0, 1, -2]"))
+            .string();
+    const CameraChoice path = camera_format().parse(file, "--camera");
+    for (int i = 0; i <= 100; ++i) EXPECT_EQ(moving_camera(path, 0.02 * i)->up, Eigen::Vector3f::UnitY());
 }
 
 TEST(Camera, WrongPathsAreRefusedWithTheirPlace) {
