@@ -123,6 +123,25 @@ TEST(Play, ACameraChangesThePicturesAndNothingElse) {
         << wrong.err;
 }
 
+TEST(Play, MotionBlurChangesMovingPicturesAndNothingElse) {
+    const Folder folder;
+    const auto trace = short_trace(folder, "roll", 0.6);
+    ASSERT_EQ(run(play(trace, folder / "sharp")).status, 0);
+    ASSERT_EQ(run(play(trace, folder / "none", {"--motion-blur", "0"})).status, 0);
+    ASSERT_EQ(run(play(trace, folder / "half", {"--motion-blur", "0.5"})).status, 0);
+    ASSERT_EQ(run(play(trace, folder / "again", {"--motion-blur", "0.5", "--workers", "0"})).status, 0);
+    expect_same_products(folder / "sharp", folder / "none");
+    expect_same_products(folder / "half", folder / "again");
+    for (const char* name : {"events.csv", "contacts.csv", "audio.wav", "hits.mid", "frames/000000.png"})
+        EXPECT_EQ(read(folder / "sharp" / name), read(folder / "half" / name))
+            << name << " (the first picture shows no sticks)";
+    EXPECT_NE(read(folder / "sharp/frames/000010.png"), read(folder / "half/frames/000010.png"));
+    for (const std::vector<std::string>& wrong : {std::vector<std::string>{"--motion-blur", "1.5"},
+                                                  {"--motion-blur", "0.5", "--no-frames"},
+                                                  {"--motion-blur", "0.5", "--realtime"}})
+        EXPECT_EQ(run(play(trace, folder / "wrong", wrong)).status, 2) << wrong.back();
+}
+
 TEST(Play, CuttingTheTraceLeavesEveryEarlierFrameAndSampleAsItWas) {
     const Folder folder;
     const double cut = 1.203;  // between samples, in the middle of strokes

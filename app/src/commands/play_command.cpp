@@ -303,9 +303,13 @@ void add_play_command(Command& program) {
             shown->marks = std::ranges::count(what, "marks") > 0;
         });
     show->excludes(no_frames);
+    CLI::Option* blur = command.option(
+        "--motion-blur", o->play.shutter, as::number(0, 1, "of the time between frames"),
+        "The shutter is open for this share of the time between frames, up to the frame's; 0: no blur");
+    blur->excludes(no_frames);
     CLI::Option* realtime = command.flag("--realtime", o->realtime,
                                          "Play against the wall clock, sensors in processes of their own");
-    realtime->excludes(solo)->excludes(show);
+    realtime->excludes(solo)->excludes(show)->excludes(blur);
     add_mix_options(command, o->play.mix, realtime);
     for (CLI::Option* option : add_realtime_options(command, *o, trace)) option->needs(realtime);
     command.checks([o] {

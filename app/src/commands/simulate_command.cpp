@@ -109,10 +109,15 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
     command.option(
         "--camera", o->camera, camera_format(),
         "Where pictures are seen from; default: the scene's camera, else all bodies from the drummer's side");
+    CLI::Option* blur = command.option(
+        "--motion-blur", o->shutter, as::number(0, 1, "of the time between frames"),
+        "The shutter is open for this share of the time between frames, up to the frame's; 0: no blur");
     command.option("--video", o->video, as::text("FILE", check_video_name),
                    "Make a video (MP4); without --frames its frames are not kept");
-    command.option("--checkpoint", o->checkpoint, as::whole(0, 1'000'000'000, "steps"),
-                   "Save after every so many steps, in --out, what --resume goes on from; 0: never");
+    command
+        .option("--checkpoint", o->checkpoint, as::whole(0, 1'000'000'000, "steps"),
+                "Save after every so many steps, in --out, what --resume goes on from; 0: never")
+        ->excludes(blur);
     command.option("--resume", o->resume, as::text("DIR"),
                    "Instead of SCENE: go on with the interrupted run in this folder, with its options");
     add_worker_options(command, o->workers);

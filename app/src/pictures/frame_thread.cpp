@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "files/output_file.h"
+#include "pictures/motion_blur.h"
 #include "process/child_process.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
@@ -32,6 +33,19 @@ render::Image enlarged(render::Image small, int width, int height) {
             to = std::copy_n(small.rgb.begin() + 3 * (row * small.width + column), 3, to);
         }
     return image;
+}
+
+render::DrawTimes draw_exposed(render::Renderer& renderer, const FrameJob& job, render::Image& image) {
+    LinearMean light;
+    for (const render::FrameState& state : job.earlier) {
+        renderer.draw(state, image);
+        light.add(image);
+    }
+    const render::DrawTimes times = renderer.draw(job.state, image);
+    if (job.earlier.empty()) return times;
+    light.add(image);
+    image = light.mean();
+    return times;
 }
 
 }  // namespace
@@ -123,7 +137,7 @@ bool FrameThread::draw_one(render::Renderer& renderer, FrameJob& job) {
     DrawnFrame drawn{job.index, monotonic_ns()};
     if (job.slower_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(job.slower_s));
     Picture picture{job.index, {}};
-    const render::DrawTimes times = renderer.draw(job.state, picture.image);
+    const render::DrawTimes times = draw_exposed(renderer, job, picture.image);
     drawn.drawn_ns = monotonic_ns(times.drawn);
     drawn.read_ns = monotonic_ns(times.read);
     drawn.in_time = drawn.read_ns <= job.shown_ns;

@@ -27,6 +27,8 @@ struct FrameJob {
     std::int64_t shown_ns = std::numeric_limits<std::int64_t>::max();
     double slower_s = 0;  ///< artificial load: wait this long before drawing [s]
     render::FrameState state;
+    /// States before it while the shutter is open: the picture is the mean of them and `state` in linear light.
+    std::vector<render::FrameState> earlier = {};
 };
 
 /// When a frame was drawn. Times of CLOCK_MONOTONIC [ns].

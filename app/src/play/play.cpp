@@ -10,6 +10,7 @@
 
 #include "files/bad_input.h"
 #include "pictures/kit_stage.h"
+#include "pictures/motion_blur.h"
 #include "play/play_run.h"
 #include "play/strike_marks.h"
 #include "play/strike_pipeline.h"
@@ -145,12 +146,30 @@ private:
             const double elapsed = static_cast<double>(next_frame_) / parts_.options.fps;
             const double T = t0_s_ + elapsed;
             if (!(elapsed < t_end_s_ - t0_s_) || T - parts_.options.render_lead_s + kSlackS >= next) return;
-            const FrameContents contents = std::isfinite(s) ? pipeline_->scene(s, T) : FrameContents();
+            std::vector<render::FrameState> states = exposed(s, elapsed);
+            FrameJob job{.index = next_frame_, .state = std::move(states.back())};
+            states.pop_back();
+            job.earlier = std::move(states);
             const Stopwatch watch(pipeline_->times().waiting_for_frames);
-            parts_.frames->push(
-                {.index = next_frame_,
-                 .state = parts_.stage->frame(contents.bodies, contents.poses(), elapsed, annotations(T))});
+            parts_.frames->push(std::move(job));
         }
+    }
+
+    /// What the frame shown at t0 + elapsed shows while the shutter is open, known at s; at all moments with the
+    /// ghosts and marks of the last.
+    [[nodiscard]] std::vector<render::FrameState> exposed(double s, double elapsed) {
+        const std::vector<double> since_t0 =
+            exposure_times(elapsed, parts_.options.shutter / parts_.options.fps);
+        std::vector<double> moments;
+        for (const double t : since_t0) moments.push_back(t0_s_ + t);
+        const std::vector<FrameContents> contents =
+            std::isfinite(s) ? pipeline_->scenes(s, moments) : std::vector<FrameContents>(moments.size());
+        const Annotations shown = annotations(moments.back());
+        std::vector<render::FrameState> states;
+        for (std::size_t i = 0; i < moments.size(); ++i)
+            states.push_back(
+                parts_.stage->frame(contents[i].bodies, contents[i].poses(), since_t0[i], shown));
+        return states;
     }
 
     [[nodiscard]] Annotations annotations(double T) const {

@@ -39,6 +39,8 @@ struct PlayOptions {
     int width = 640, height = 480;
     CameraChoice camera;
     Shown shown;
+    double shutter =
+        0;  ///< open for this share of the frame interval, up to the frame's time; 0: no motion blur
     std::string picture_predictor = "auto", sound_predictor = "auto";
     double render_lead_s = 1.0 / 30, sound_lead_s = 1.0 / 15, release_margin_s = 0.010;
     double false_cost = 1;  ///< of a false sound; that of a missed strike is 1 (StrikeDecision)

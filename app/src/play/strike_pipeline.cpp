@@ -254,12 +254,12 @@ const Strike* StrikePipeline::struck_by(std::uint32_t stick, double s, double T)
     return earliest;
 }
 
-DrawnStick StrikePipeline::drawn(std::uint32_t stick, double s, double T) {
+DrawnStick StrikePipeline::drawn(std::uint32_t stick, double s, double T, bool shows) {
     const Stick& known = sticks_[stick];
     DrawnStick result{known.pose_at(T), {}, false};
     result.tip = tracking::point_of(result.pose, known.geometry().tip);
     if (const Strike* strike = struck_by(stick, s, T)) {
-        touching_.insert(strike->id);
+        if (shows) touching_.insert(strike->id);
         const Eigen::Vector3d touch = strike->point_world + tip_radius_m_ * strike->normal_world;
         if (strike->contact_s > s) result.tip = known.sounding_tip_at(T);
         result.pose = known.pose_at(std::max(s, strike->contact_s));
@@ -278,18 +278,27 @@ DrawnStick StrikePipeline::drawn(std::uint32_t stick, double s, double T) {
 }
 
 FrameContents StrikePipeline::scene(double s, double T) {
+    return std::move(scenes(s, {&T, 1}).front());
+}
+
+std::vector<FrameContents> StrikePipeline::scenes(double s, std::span<const double> moments) {
     std::erase_if(touching_, [&](std::uint64_t id) {
         return scheduler_.strikes()[id - 1].scheduled_at_s <= s - kRecentS;
     });
-    FrameContents scene;
-    for (std::uint32_t i = 0; i < sticks_.size(); ++i)
-        scene.sticks.push_back(sticks_[i].started() ? std::optional(drawn(i, s, T)) : std::nullopt);
+    std::vector<FrameContents> scenes(moments.size());
     sim::StepRequest request;
     request.t_s = s;
     settle_impulses(s, request);
-    request.pictures.push_back({std::max(T, s), drawn_.frame(T, scheduler_.strikes())});
-    scene.bodies = std::move(step(request).pictures.front());
-    return scene;
+    for (std::size_t m = 0; m < moments.size(); ++m) {
+        const double T = moments[m];
+        for (std::uint32_t i = 0; i < sticks_.size(); ++i)
+            scenes[m].sticks.push_back(
+                sticks_[i].started() ? std::optional(drawn(i, s, T, m + 1 == moments.size())) : std::nullopt);
+        request.pictures.push_back({std::max(T, s), drawn_.frame(T, scheduler_.strikes())});
+    }
+    sim::StepReply reply = step(request);
+    for (std::size_t m = 0; m < moments.size(); ++m) scenes[m].bodies = std::move(reply.pictures[m]);
+    return scenes;
 }
 
 }  // namespace app

@@ -113,6 +113,9 @@ public:
     void finish();
     /// What the frame shown at T >= s shows, known at s. Frames come in order of T.
     [[nodiscard]] FrameContents scene(double s, double T);
+    /// What a frame shows at some moments, in order, of which the last is when it is shown; it is as scene() has it. At
+    /// a moment before s a body is as at s and a stick as in its newest sample.
+    [[nodiscard]] std::vector<FrameContents> scenes(double s, std::span<const double> moments);
 
     [[nodiscard]] const std::vector<Strike>& strikes() const { return scheduler_.strikes(); }
     /// The caller adds the times of its own part.
@@ -141,7 +144,8 @@ private:
     void settle_impulses(double s, sim::StepRequest& request);
     [[nodiscard]] std::vector<const Strike*> recent(std::uint32_t stick, double s) const;
     [[nodiscard]] const Strike* struck_by(std::uint32_t stick, double s, double T) const;
-    [[nodiscard]] DrawnStick drawn(std::uint32_t stick, double s, double T);
+    /// `shows`: by this the frame has shown the strike that holds the stick.
+    [[nodiscard]] DrawnStick drawn(std::uint32_t stick, double s, double T, bool shows);
 
     const Kit& kit_;
     bool cancelling_;

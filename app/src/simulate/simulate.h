@@ -41,6 +41,8 @@ struct SimulateOptions {
     double fps = 30;
     int width = 640, height = 480;
     CameraChoice camera;
+    double shutter =
+        0;  ///< open for this share of the frame interval, up to the frame's time; 0: no motion blur
     bool progress = false;
     std::optional<WorkerOptions> workers;  ///< none: all in this process
     std::uint64_t checkpoint = 0;          ///< steps after which one is saved in `out`; 0: none

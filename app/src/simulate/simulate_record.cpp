@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "files/bad_input.h"
 #include "files/output_file.h"
+#include "pictures/motion_blur.h"
 #include "process/standard_streams.h"
 #include "report/table.h"
 
@@ -14,6 +16,8 @@ namespace app {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kSlackS = 1e-9;  // of a frame's time
 
 // The header of each table. states.csv: a body per row at each frame's time; `modes`: its modal coordinates,
 // separated by blanks. energy.csv: the world before the first step and after each. times.csv: what each step
@@ -107,10 +111,30 @@ void SimulateRecord::at(std::uint64_t step, const sim::World& world) {
 
 void SimulateRecord::ready(std::uint64_t, const sim::World& world) {
     if (!folder_) return;
-    for (; double(next_frame_) / options_.fps <= world.time_s() + 1e-9; ++next_frame_) {
+    const double t_s = world.time_s();
+    std::optional<render::FrameState> now;
+    if (frames_ && options_.shutter > 0) now = stage_->frame(world);
+    for (;; ++next_frame_) {
+        if (now) expose(*now, t_s);
+        if (!(double(next_frame_) / options_.fps <= t_s + kSlackS)) break;
         for (int body = 0; body < world.bodies(); ++body)
             states_->add(state_row(scene_, world, body, next_frame_));
-        if (frames_) frames_->push({.index = next_frame_, .state = stage_->frame(world)});
+        if (frames_)
+            frames_->push({.index = next_frame_,
+                           .state = now ? *now : stage_->frame(world),
+                           .earlier = std::exchange(exposed_, {})});
+    }
+    reached_ = std::move(now), reached_s_ = t_s;
+}
+
+void SimulateRecord::expose(const render::FrameState& now, double t_s) {
+    const std::vector<double> moments =
+        exposure_times(double(next_frame_) / options_.fps, options_.shutter / options_.fps);
+    // The last moment is the frame's own state.
+    while (exposed_.size() + 1 < moments.size() && moments[exposed_.size()] <= t_s + kSlackS) {
+        const double share = (moments[exposed_.size()] - reached_s_) / (t_s - reached_s_);
+        const bool within = reached_ && share < 1;
+        exposed_.push_back(within ? between(*reached_, now, static_cast<float>(share)) : now);
     }
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 #include <memory>
+#include <optional>
+#include <vector>
 
 #include "files/output_folder.h"
 #include "pictures/frame_thread.h"
@@ -51,6 +53,8 @@ private:
     void find_frames();
     /// Has the outputs so far on the disk.
     [[nodiscard]] RecordState save_record();
+    /// Takes what of the next frame's exposure has come by t_s, when the scene is as `now`.
+    void expose(const render::FrameState& now, double t_s);
     void tell_spun(int body, std::uint64_t step);
     void watch_spin(std::uint64_t step, const sim::World& world);
     void describe(const sim::World& world);
@@ -67,6 +71,9 @@ private:
     std::unique_ptr<GrowingTable> states_, energy_, steps_;
     std::unique_ptr<SceneStage> stage_;
     std::unique_ptr<FrameThread> frames_;
+    std::vector<render::FrameState> exposed_;    // of the next frame, with motion blur
+    std::optional<render::FrameState> reached_;  // the state before,
+    double reached_s_ = 0;                       // and its time
     WorkerHistory history_;
     std::vector<bool> spun_;  // of each body, that it was told
     std::vector<std::pair<int, std::uint64_t>> told_spun_;

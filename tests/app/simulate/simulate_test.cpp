@@ -227,6 +227,29 @@ TEST(Simulate, TablesGoOnForEveryStepAndReadBackExactly) {
     EXPECT_EQ(json::parse(summary)["steps"], 12);
 }
 
+/// The step is as long as a frame: the moments of an exposure lie between two states.
+TEST(Simulate, MotionBlurDrawsTheWayOfWhatMovesAndChangesNoTable) {
+    const TemporaryFolder out;
+    const WrittenScene scene("[settings]\ndt = 0.03333333333333333\n" + kFalling);
+    const auto ran = [&](const char* name, double shutter) {
+        SimulateOptions options = steps_of(scene, 6);
+        options.out = out.path() / name;
+        options.frames = true, options.width = 64, options.height = 48, options.shutter = shutter;
+        EXPECT_EQ(simulate(options).frames, 7u);
+        return *options.out;
+    };
+    const auto bytes = [](const std::filesystem::path& file) {
+        std::ifstream in(file, std::ios::binary);
+        return std::string(std::istreambuf_iterator<char>(in), {});
+    };
+    const std::filesystem::path sharp = ran("sharp", 0), blurred = ran("blurred", 0.5);
+    for (const char* table : {"states.csv", "energy.csv"})
+        EXPECT_EQ(bytes(sharp / table), bytes(blurred / table));
+    EXPECT_EQ(bytes(sharp / "frames/000000.png"), bytes(blurred / "frames/000000.png"))
+        << "nothing was before";
+    EXPECT_NE(bytes(sharp / "frames/000006.png"), bytes(blurred / "frames/000006.png"));
+}
+
 /// Where the stage puts a vertex of a body's mesh, as the vertex shader does.
 Vector3d drawn(const render::Solid& solid, const render::FrameState& frame, std::size_t object,
                std::size_t vertex) {
