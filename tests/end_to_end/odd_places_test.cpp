@@ -359,13 +359,15 @@ TEST(OddPlaces, TooFewDescriptorsAreSaidAndNotDiedOf) {
 
 TEST(OddPlaces, AHangUpEndsARunInOrder) {
     const Folder folder;
-    const std::string start = "TMPDIR=" + (folder / ".").string() + " " + kProgram +
-                              " latency flourish --no-frames --seconds 600 & program=$!; "
-                              "until ls -d '" +
-                              (folder / ".").string() +
-                              "'/musicworld_latency_*/.unfinished; do sleep 0.1; done; sleep 1; "
-                              "kill -HUP $program; wait $program";
-    (void)shell(start);
+    const std::string start =
+        "TMPDIR=" + (folder / ".").string() + " " + kProgram +
+        " latency flourish --no-frames --seconds 600 & program=$!; "
+        "until ls -d '" +
+        (folder / ".").string() +
+        "'/musicworld_latency_*/.unfinished; do kill -0 $program && sleep 0.1 || exit 3; done; "
+        "sleep 1; "
+        "kill -HUP $program; wait $program";
+    EXPECT_NE(shell(start).status, 3) << "the program ended by itself";
     EXPECT_EQ(names_in(folder / "."), Names{});
 }
 

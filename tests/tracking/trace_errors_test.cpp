@@ -78,7 +78,7 @@ const BadTrace kBad[] = {
     {"lone carriage return", kPositions + "0,a,1,2,3\r1,a,1,2,3\n", "a.csv:2:10: error: found byte 0x0d"},
     {"not UTF-8", kPositions + "0,a\xFF,1,2,3\n", "a.csv:2:4: error: found byte 0xff"},
     {"binary", std::string("\x89PNG\r\n\x1a\n", 8), "a.csv:1:1: error: found byte 0x89"},
-    {"wrong unit", "# units: cm\n" + kPositions, "a.csv:1:10: error: found units 'cm'"},
+    {"wrong unit", "# units: ft\n" + kPositions, "a.csv:1:10: error: found units 'ft'"},
     {"wrong up", "# up: x\n" + kPositions, "a.csv:1:7: error: found up 'x'"},
     {"rate of zero", "# rate_hz: 0\n" + kPositions, "a.csv:1:12: error: found rate '0'"},
     {"rate that is no number", "# rate_hz: fast\n" + kPositions, "a.csv:1:12: error: found 'fast'"},

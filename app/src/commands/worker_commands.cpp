@@ -79,7 +79,8 @@ void add_sensor_command(Command& program) {
     auto task = std::make_shared<SensorTask>();
     for_each_sensor_option(*task, [&](const char* name, auto& value, const char* help) {
         using Value = std::decay_t<decltype(value)>;
-        const auto whole = as::whole(0, std::numeric_limits<std::int64_t>::max());
+        const auto whole =
+            as::whole(-1, std::numeric_limits<std::int64_t>::max());  // of a descriptor -1: none
         if constexpr (std::is_same_v<Value, std::vector<std::string>>)
             command.options(name, value, as::text("TEXT"), help)->required();
         else if constexpr (std::is_same_v<Value, std::vector<int>>)

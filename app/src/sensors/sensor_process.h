@@ -116,7 +116,7 @@ void for_each_sensor_option(auto& task, const auto& field) {
     field("--state-fd", task.state_fds, "Shared memory; once for each stick");
     field("--wake-fd", task.wake_fd, "eventfd");
     field("--life-fd", task.life_fd, "Pipe that ends with the application");
-    field("--learned-fd", task.learned_fd, "Memory for what was learned; none if left out");
+    field("--learned-fd", task.learned_fd, "Memory for what was learned; -1: none");
     field("--realtime", task.realtime, "Real-time scheduling where that is permitted");
 }
 

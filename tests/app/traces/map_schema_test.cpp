@@ -39,14 +39,14 @@ TEST(MapSchema, EveryKeyThatItNamesIsReadAtItsExample) {
 }
 
 TEST(MapSchema, EveryKeyIsDescribed) {
-    EXPECT_EQ(expect_every_key_is_described(map_case()), 20);
+    EXPECT_EQ(expect_every_key_is_described(map_case()), 21);
 }
 
 TEST(MapSchema, TheReaderKnowsExactlyTheSchemasKeysTypesAndRanges) {
     EXPECT_EQ(expect_unknown_keys_are_refused(map_case(), {}), 1);
     EXPECT_EQ(expect_ranges_are_the_readers(map_case()), 2);
-    EXPECT_EQ(expect_types_are_the_readers(map_case()), 20);
-    EXPECT_EQ(expect_required_keys_are_the_readers(map_case(), {}), 20);
+    EXPECT_EQ(expect_types_are_the_readers(map_case()), 21);
+    EXPECT_EQ(expect_required_keys_are_the_readers(map_case(), {}), 21);
 }
 
 }  // namespace
