@@ -17,6 +17,8 @@
 namespace tracking {
 namespace {
 
+constexpr double kMostContactLoss = 0.7;  // of the shares': a network that knows less would silence strokes
+
 constexpr std::size_t kRenditions = 12, kMostExamples = 300000, kMostValidation = 30000;
 constexpr double kUsualRateHz = 60, kLeastRateHz = 30, kMostRateHz = 150, kNoiseM = 0.25e-3;
 constexpr Eigen::Index kBatch = 256;
@@ -418,7 +420,8 @@ TrainingResult train_path_model(std::span<const TrainingStick> sticks, const Tra
     learning = {};
     held_out = {};
     if (std::optional<LearnedContacts> contacts = train_contacts(sticks, options)) {
-        result.model.contacts = std::move(contacts->layers);
+        if (contacts->loss < kMostContactLoss * contacts->loss_of_shares)
+            result.model.contacts = std::move(contacts->layers);
         result.contact_examples = contacts->examples;
         result.contact_steps = contacts->steps;
         result.contact_loss = contacts->loss;

@@ -17,9 +17,9 @@
 #include "kit/kit.h"
 #include "play/play.h"
 #include "process/standard_streams.h"
+#include "sticks/learned_in_play.h"
 #include "sticks/predictors.h"
 #include "strikes/true_contacts.h"
-#include "training/learned_in_play.h"
 
 namespace app {
 namespace {

@@ -12,11 +12,11 @@
 #include "files/bad_input.h"
 #include "files/output_file.h"
 #include "process/clock.h"
+#include "sticks/learned_in_play.h"
 #include "sticks/predictors.h"
 #include "traces/live_predict.h"
 #include "traces/predict.h"
 #include "traces/sensor_model.h"
-#include "training/learned_in_play.h"
 
 namespace app {
 namespace {

@@ -16,9 +16,9 @@
 #include "play/strike_pipeline.h"
 #include "process/clock.h"
 #include "process/progress_bar.h"
+#include "sticks/learned_in_play.h"
 #include "sticks/predictors.h"
 #include "sticks/stick.h"
-#include "training/learned_in_play.h"
 
 namespace app {
 namespace {

@@ -10,8 +10,8 @@
 #include "play/play_run.h"
 #include "realtime/realtime_run.h"
 #include "report/json_document.h"
+#include "sticks/learned_in_play.h"
 #include "sticks/predictors.h"
-#include "training/learned_in_play.h"
 
 namespace app {
 namespace fs = std::filesystem;

@@ -17,8 +17,8 @@
 #include "process/child_process.h"
 #include "process/clock.h"
 #include "sticks/external_predictor.h"
+#include "sticks/learned_in_play.h"
 #include "sticks/predictors.h"
-#include "training/learned_in_play.h"
 
 namespace app {
 namespace {

@@ -22,7 +22,7 @@
 #include "process/bounded_queue.h"
 #include "process/clock.h"
 #include "process/thread_priority.h"
-#include "training/learned_in_play.h"
+#include "sticks/learned_in_play.h"
 
 namespace app {
 namespace {

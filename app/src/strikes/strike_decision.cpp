@@ -16,20 +16,6 @@ constexpr double kSoonestS = 0.001;
 constexpr double kThroughS = 0.03;  // the path goes on beyond the contact
 constexpr int kPieces = 8;
 
-/// The plane that touches a surface where it is nearest to a path.
-tracking::Plane plane_near(const StrikeDecision::Nearest& nearest, std::size_t surface,
-                           const sim::TipPath& path) {
-    tracking::Plane plane;
-    double least = std::numeric_limits<double>::infinity();
-    for (const sim::PathNode& node : path.nodes) {
-        const sim::SurfacePoint at = nearest(surface, node.position);
-        if (!(at.distance < least)) continue;
-        least = at.distance;
-        plane = {node.position - at.distance * at.normal, at.normal};
-    }
-    return plane;
-}
-
 /// The position `t_s` of the path's clock, and the velocity; beyond its end as there.
 sim::PathNode node_at(const sim::TipPath& path, double t_s) {
     std::size_t i = 0;
@@ -38,6 +24,42 @@ sim::PathNode node_at(const sim::TipPath& path, double t_s) {
     const double within_s = std::min(t_s, path.nodes[i + 1].t_s);
     const Eigen::Vector3d velocity = piece.velocity(within_s);
     return {t_s, piece.position(within_s) + (t_s - within_s) * velocity, velocity};
+}
+
+/// An upper bound of the speed along a path [m/s]: of cubic pieces, whose velocity is a parabola between the nodes'.
+double greatest_speed(const sim::TipPath& path) {
+    double speed = 0;
+    for (std::size_t i = 1; i < path.nodes.size(); ++i) {
+        const sim::PathNode &a = path.nodes[i - 1], &b = path.nodes[i];
+        const double mean = (b.position - a.position).norm() / (b.t_s - a.t_s),
+                     ends = a.velocity.norm() + b.velocity.norm();
+        speed = std::max({speed, a.velocity.norm(), b.velocity.norm(), 1.5 * mean + 0.25 * ends});
+    }
+    return speed;
+}
+
+/// The plane that touches a surface where a path meets it from outside, or else where it is nearest to the path.
+///
+/// Goes along the path by steps that cannot reach the surface (conservative advancement, Mirtich 1996), so it passes
+/// through no body, however thin.
+tracking::Plane plane_met(const StrikeDecision::Nearest& nearest, std::size_t surface,
+                          const sim::TipPath& path) {
+    constexpr int kMostSteps = 64;
+    constexpr double kTouches = 1e-4, kShare = 0.8;  // [m]; distances are right to a tenth
+    const double speed = std::max(greatest_speed(path), 1e-3), end_s = path.nodes.back().t_s;
+    tracking::Plane plane;
+    double least = std::numeric_limits<double>::infinity(), t_s = path.nodes.front().t_s;
+    for (int step = 0; step < kMostSteps && t_s <= end_s; ++step) {
+        const Eigen::Vector3d position = node_at(path, t_s).position;
+        const sim::SurfacePoint at = nearest(surface, position);
+        if (at.distance < least) {
+            least = at.distance;
+            plane = {position - at.distance * at.normal, at.normal};
+        }
+        if (at.distance < kTouches) break;
+        t_s = t_s < end_s ? std::min(t_s + kShare * at.distance / speed, end_s) : end_s + 1;
+    }
+    return plane;
 }
 
 /// Along the plane as `predicted`, towards it from the tip so that it is met `in_s` after the sample.
@@ -77,7 +99,7 @@ std::optional<StrikeDecision::Path> StrikeDecision::after(const tracking::TipVie
     double probability = kWorthKeeping, in_s = 0;
     for (std::size_t surface = 0; surface < surfaces.count; ++surface) {
         if (surfaces.nearest(surface, tip.tip).distance <= 0) return std::nullopt;
-        const tracking::Plane plane = plane_near(surfaces.nearest, surface, predicted);
+        const tracking::Plane plane = plane_met(surfaces.nearest, surface, predicted);
         if (plane.normal.dot(tip.tip - plane.point) <= 0) continue;  // beside it
         const tracking::ContactTimes times = tracking::contact_times(*model_, tip, plane);
         const double median_s = std::max(times.median_s(), kSoonestS);

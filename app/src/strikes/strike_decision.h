@@ -12,8 +12,8 @@ namespace app {
 
 /// When a stick will strike, and whether its note is to sound, by the network of contacts of a model.
 ///
-/// Each surface that the path of the sound's predictor comes near is looked at as the plane that touches it where it
-/// is nearest to that path. The network says when the tip meets it (tracking::contact_times); the surface that is
+/// Each surface is looked at as the plane that touches it where the path of the sound's predictor meets it, or, if it
+/// does not, is nearest to it. The network says when the tip meets it (tracking::contact_times); the surface that is
 /// met with the greatest probability counts. The time of the strike is the median t; its probability P that of a
 /// contact within 30 ms of t, in which a note and a contact belong together.
 ///

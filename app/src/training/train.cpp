@@ -60,9 +60,10 @@ std::string format_training_text(const tracking::TrainingResult& result, const T
         text += fmt::format(
             "\nTime to contact: {} examples, {} steps; -ln(probability of what came) {:.3f}, of the shares "
             "alone "
-            "{:.3f}\n",
-            result.contact_examples, result.contact_steps, result.contact_loss,
-            result.contact_loss_of_shares);
+            "{:.3f}{}\n",
+            result.contact_examples, result.contact_steps, result.contact_loss, result.contact_loss_of_shares,
+            result.model.contacts ? ""
+                                  : "; too little: the model is without it, strikes are decided by paths");
     return text;
 }
 

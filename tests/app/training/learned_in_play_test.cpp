@@ -1,4 +1,4 @@
-#include "training/learned_in_play.h"
+#include "sticks/learned_in_play.h"
 
 #include <gtest/gtest.h>
 
