@@ -216,6 +216,24 @@ TEST(BadInput, ArgumentsAndPlacesThatCannotBeAreRefused) {
     }
 }
 
+TEST(BadInput, WhatIsReadIsNotReplaced) {
+    const Folder folder;
+    const fs::path take = folder / "take.csv";
+    fs::copy_file(bundled("traces/roll.csv"), take);
+    fs::create_hard_link(take, folder / "other.csv");
+    const std::string before = read(take);
+    const std::vector<std::vector<std::string>> commands = {
+        {"trace", "convert", take, "--out", folder / "other.csv"},
+        {"predict", take, "--lead", "1/30", "--out", take},
+        {"train", take, "--out", take},
+        {"record", "--source", "trace:" + take.string(), "--out", take},
+        {"play", take, "--no-frames", "--save-model", folder / "other.csv", "--out", folder / "out"}};
+    for (const std::vector<std::string>& command : commands) {
+        expect_refused(run(command), command.front(), "which is read, too");
+        EXPECT_EQ(read(take), before) << command.front();
+    }
+}
+
 TEST(BadInput, AFullDiskFailsWithOneLineAndLeavesNothingThatLooksFinished) {
     const Folder folder;
     fs::create_directory(folder / "small");

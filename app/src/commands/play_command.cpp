@@ -13,6 +13,7 @@
 
 #include "files/assets.h"
 #include "files/bad_input.h"
+#include "files/output_file.h"
 #include "files/output_folder.h"
 #include "kit/kit.h"
 #include "play/play.h"
@@ -314,7 +315,10 @@ void add_play_command(Command& program) {
     for (CLI::Option* option : add_realtime_options(command, *o, trace)) option->needs(realtime);
     command.checks([o] {
         check_video(o->play);
-        if (o->play.save_model) check_learns(o->play.picture_predictor, *o->play.save_model);
+        if (!o->play.save_model) return;
+        const std::filesystem::path inputs[] = {find_trace(o->play.trace)};
+        refuse_replacing(*o->play.save_model, inputs);
+        check_learns(o->play.picture_predictor, *o->play.save_model);
     });
     command.runs([o] { o->realtime ? play_in_time(*o) : play_offline(o->play); });
 }

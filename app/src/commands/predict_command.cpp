@@ -46,6 +46,9 @@ void print_to_errors(const LivePredictResult& r) {
 
 void predict_file(const PredictOptions& o) {
     const std::string file = find_trace(o.trace).string();
+    const std::filesystem::path inputs[] = {file};
+    refuse_replacing(o.out, inputs);
+    if (o.save_model) refuse_replacing(*o.save_model, inputs);
     std::vector<tracking::Experience> learned;
     const std::string table = predict_table(seen_by(tracking::read_trace(file), o.sensor), o.live.predictor,
                                             o.live.leads_s.front(), &learned);

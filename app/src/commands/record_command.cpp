@@ -5,7 +5,9 @@
 
 #include "commands/command.h"
 #include "commands/commands.h"
+#include "files/assets.h"
 #include "files/bad_input.h"
+#include "files/output_file.h"
 #include "process/clock.h"
 #include "sensors/record.h"
 
@@ -60,6 +62,10 @@ void add_record_command(Command& program) {
     command.option("--speed", o->source.speed, as::number_above(0, as::kAny), "Of a replay, for tests")
         ->group("");
     command.runs([o] {
+        if (constexpr std::string_view kTrace = "trace:"; o->source.source.starts_with(kTrace)) {
+            const std::filesystem::path inputs[] = {find_trace(o->source.source.substr(kTrace.size()))};
+            refuse_replacing(o->out, inputs);
+        }
         o->source.epoch_ns = monotonic_ns() + kHeadStartNs;
         print(record(*o), o->out.string());
     });

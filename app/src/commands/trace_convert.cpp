@@ -140,6 +140,10 @@ tracking::Trace read_inputs(const ConvertOptions& o) {
 }
 
 void convert(const ConvertOptions& o) {
+    std::vector<std::filesystem::path> inputs;
+    for (const std::string& name : o.in) inputs.push_back(find_trace(name));
+    refuse_replacing(o.out, inputs);
+    if (!o.save_map.empty()) refuse_replacing(o.save_map, inputs);
     tracking::Trace trace = read_inputs(o);
     if (o.tip) trace.tip = *o.tip;
     if (o.shaft) trace.shaft = *o.shaft;

@@ -22,6 +22,9 @@ struct TrainOptions : tracking::TrainingOptions {
 };
 
 void train(TrainOptions o) {
+    std::vector<std::filesystem::path> inputs;
+    for (const std::string& name : o.traces) inputs.push_back(find_trace(name));
+    refuse_replacing(o.out, inputs);
     OutputFile out(o.out);  // refused before minutes have passed
     std::vector<Recording> recordings;
     for (const std::string& name : o.traces)

@@ -171,6 +171,14 @@ void save_on_disk(const fs::path& path) {
 
 // The library gives up where a signal interrupts it.
 
+void refuse_replacing(const fs::path& output, std::span<const fs::path> inputs) {
+    for (const fs::path& input : inputs)
+        if (std::error_code none; fs::is_regular_file(output, none) && fs::equivalent(output, input, none))
+            throw BadInput(
+                fmt::format("error: found {} as an output, which is read, too; expected a file of its own",
+                            output.string()));
+}
+
 std::vector<fs::path> entries_of(const fs::path& folder) {
     for (;;) {
         std::vector<fs::path> entries;

@@ -28,6 +28,9 @@ struct OutputPlace {
 /// may not be looked at.
 [[nodiscard]] OutputPlace output_place(const std::filesystem::path& name);
 
+/// Throws BadInput when an output is a file that the command also reads (by whatever name).
+void refuse_replacing(const std::filesystem::path& output, std::span<const std::filesystem::path> inputs);
+
 /// What lies in a folder, by name. Throws std::filesystem::filesystem_error.
 [[nodiscard]] std::vector<std::filesystem::path> entries_of(const std::filesystem::path& folder);
 /// Has a file's bytes, or a folder's names, on the disk. Throws std::runtime_error.
