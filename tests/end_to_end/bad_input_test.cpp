@@ -224,7 +224,7 @@ TEST(BadInput, WhatIsReadIsNotReplaced) {
     const std::string before = read(take);
     const std::vector<std::vector<std::string>> commands = {
         {"trace", "convert", take, "--out", folder / "other.csv"},
-        {"predict", take, "--lead", "1/30", "--out", take},
+        {"predict", take, "--predictor", "hold", "--lead", "1/30", "--out", take},
         {"train", take, "--out", take},
         {"record", "--source", "trace:" + take.string(), "--out", take},
         {"play", take, "--no-frames", "--save-model", folder / "other.csv", "--out", folder / "out"}};
