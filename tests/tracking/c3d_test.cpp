@@ -184,6 +184,40 @@ TEST(C3d, MapsOfMarkersAreChecked) {
     EXPECT_THROW((void)read_markers(bytes, "a", frame), std::invalid_argument);
 }
 
+TEST(C3d, NumbersThatCountNothingAreRefused) {
+    for (const double number : {double{NAN}, double{INFINITY}, 0.5, 65536.0, -1.0}) {
+        C3dWriter file = two_markers();
+        file.points_said = number;
+        expect_refused(file.bytes(), {}, "points, expected 1 to 65535");
+    }
+    for (const double number : {double{NAN}, double{INFINITY}, -double{INFINITY}}) {
+        C3dWriter file = two_markers();
+        file.long_frames = number;
+        expect_refused(file.bytes(), {}, std::isnan(number) ? "nan frames" : "inf frames");
+        file = two_markers();
+        file.rate_hz = number;
+        expect_refused(file.bytes(), {}, "a rate of ");
+        file = two_markers();
+        file.scale = number;
+        expect_refused(file.bytes(), {}, "a scale of ");
+    }
+    C3dWriter file = two_markers();
+    file.data_start = INFINITY;
+    expect_refused(file.bytes(), {}, "data in block inf");
+    file.data_start = NAN;
+    EXPECT_EQ(parse_trace(file.bytes(), "a.c3d").sticks.size(), 2u) << "the header's block counts";
+}
+
+TEST(C3d, EachPointGetsANameOfItsOwn) {
+    C3dWriter file = two_markers();
+    file.labels = {"A", "point3", "A"};
+    for (auto& frame : file.frames) frame.push_back(at(1, 2, 3));
+    const Trace trace = parse_trace(file.bytes(), "a.c3d");
+    ASSERT_EQ(trace.sticks.size(), 3u);
+    EXPECT_EQ(trace.sticks[1].name, "point3");
+    EXPECT_EQ(trace.sticks[2].name, "point4");
+}
+
 TEST(C3d, DamagedFilesAreRefusedWithTheirPlace) {
     C3dWriter file = two_markers();
     const std::string whole = file.bytes();

@@ -22,6 +22,7 @@ struct C3dWriter {
     int analog = 3;                                                         ///< words a frame
     std::vector<std::vector<std::optional<std::array<double, 3>>>> frames;  ///< of points; none: not seen
     std::optional<double> frames_said, long_frames;
+    std::optional<double> points_said, data_start;  ///< as real numbers
     bool trial = false;
 
     [[nodiscard]] std::string bytes() const {
@@ -88,12 +89,15 @@ private:
     [[nodiscard]] std::string parameter_section() const {
         const auto count = static_cast<double>(frames.size());
         std::string out{0, 0, 0, static_cast<char>(processor)};
-        out += parameter("USED", 1, 2, "", word(static_cast<int>(labels.size())));  // before its group
+        const std::string points = word(static_cast<int>(labels.size()));
+        out += points_said ? parameter("USED", 1, 4, "", real(*points_said))
+                           : parameter("USED", 1, 2, "", points);  // before its group
         out += entry("POINT", -1, std::string(1, '\0')) + entry("TRIAL", -2, std::string(1, '\0'));
         out += parameter("SCALE", 1, 4, "", real(floating ? -scale : scale));
         out += parameter("RATE", 1, 4, "", real(rate_hz));
         out += parameter("FRAMES", 1, 2, "", word(static_cast<int>(frames_said.value_or(count))));
         if (long_frames) out += parameter("LONG_FRAMES", 1, 4, "", real(*long_frames));
+        if (data_start) out += parameter("DATA_START", 1, 4, "", real(*data_start));
         if (trial) {
             const int last = first_frame + static_cast<int>(frames.size()) - 1;
             out += parameter("ACTUAL_START_FIELD", 2, 2, std::string(1, 2), word(first_frame) + word(0));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdio>
 
 #include "binary_place.h"
 #include "text_cursor.h"
@@ -16,6 +17,14 @@ namespace {
 constexpr std::size_t kBlock = 512;
 constexpr unsigned kKey = 80;
 constexpr std::size_t kMostDimensions = 7;
+constexpr double kMostPoints = 65535, kMostBlocks = 65535;
+
+/// Whatever number a file may hold: "70001", "-1", "1e+30", "nan".
+std::string in_digits(double number) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.15g", number);
+    return text;
+}
 
 std::size_t parameters_at(std::string_view bytes) {
     const std::size_t block = static_cast<std::uint8_t>(bytes[0]);
@@ -139,6 +148,10 @@ std::optional<double> C3dFile::number(const std::string& name, std::size_t i) co
     return std::nullopt;
 }
 
+std::size_t C3dFile::place_of(const std::string& name, std::size_t header) const {
+    return number(name) ? find(name)->at : header;
+}
+
 std::string C3dFile::text(const std::string& name, std::size_t i) const {
     const Parameter* parameter = find(name);
     if (parameter == nullptr || parameter->type != -1 || i >= parameter->size[1]) return {};
@@ -159,26 +172,29 @@ double C3dFile::count_of_frames() const {
 }
 
 void C3dFile::read_points() {
-    points_ = static_cast<std::size_t>(std::clamp(number("POINT:USED").value_or(word(2)), 0.0, 65535.0));
+    const double used = number("POINT:USED").value_or(word(2));
+    if (!(used >= 1 && used <= kMostPoints))
+        fail_at_byte(name_, place_of("POINT:USED", 2), in_digits(used) + " points", "1 to 65535");
+    points_ = static_cast<std::size_t>(used);
     rate_hz_ = number("POINT:RATE").value_or(real(20));
     scale_ = number("POINT:SCALE").value_or(real(12));
     if (!(rate_hz_ > 0 && rate_hz_ <= 1e5))
-        fail_at_byte(name_, 20, "a rate of " + std::to_string(rate_hz_), "frames per second, up to 100000");
+        fail_at_byte(name_, place_of("POINT:RATE", 20), "a rate of " + in_digits(rate_hz_),
+                     "frames per second, up to 100000");
     if (!std::isfinite(scale_) || scale_ == 0)
-        fail_at_byte(name_, 12, "a scale of " + std::to_string(scale_), "a number that is not zero");
+        fail_at_byte(name_, place_of("POINT:SCALE", 12), "a scale of " + in_digits(scale_),
+                     "a number that is not zero");
     word_bytes_ = scale_ < 0 ? 4 : 2;
     frame_bytes_ = word_bytes_ * (4 * points_ + word(4));
     const double said = number("POINT:DATA_START").value_or(0), block = said >= 2 ? said : word(16);
-    data_at_ = block >= 1 && block <= 65535 ? (static_cast<std::size_t>(block) - 1) * kBlock : 0;
-    if (points_ == 0) fail_at_byte(name_, 2, "no points", "at least one");
+    data_at_ = block >= 1 && block <= kMostBlocks ? (static_cast<std::size_t>(block) - 1) * kBlock : 0;
     if (data_at_ < kBlock || data_at_ > bytes_.size())
-        fail_at_byte(name_, 16, "data in block " + std::to_string(std::llround(block)),
-                     "a block of the file");
+        fail_at_byte(name_, said >= 2 ? place_of("POINT:DATA_START", 16) : 16,
+                     "data in block " + in_digits(block), "a block of the file");
     const double frames = count_of_frames();
     const std::size_t room = (bytes_.size() - data_at_) / frame_bytes_;
     if (!(frames >= 0 && frames <= static_cast<double>(room)))
-        fail_at_byte(name_, data_at_,
-                     std::to_string(std::llround(std::clamp(frames, -1e15, 1e15))) + " frames",
+        fail_at_byte(name_, data_at_, in_digits(frames) + " frames",
                      "at most the " + std::to_string(room) + " that the file has room for");
     frames_ = static_cast<std::size_t>(frames);
 }

@@ -54,6 +54,8 @@ private:
     [[nodiscard]] const Parameter* find(const std::string& name) const;
     /// The i-th number of a parameter (integers unsigned).
     [[nodiscard]] std::optional<double> number(const std::string& name, std::size_t i = 0) const;
+    /// Where the first number of a parameter lies; `header` where there is none.
+    [[nodiscard]] std::size_t place_of(const std::string& name, std::size_t header) const;
     [[nodiscard]] std::string text(const std::string& name, std::size_t i = 0) const;
     void read_points();
     void read_labels();

@@ -101,11 +101,8 @@ private:
                          "name the sticks' markers, such as --map \"left.marker=" + label(0) +
                              ",left.marker2=" + label(1) + "\"");
         std::set<std::string> names;
-        for (std::size_t i = 0; i < file_.labels().size(); ++i) {
-            std::string stick = stick_word(file_.labels()[i]);
-            if (!names.insert(stick).second) stick = "point" + std::to_string(i + 1);
-            all.push_back({stick, {i}});
-        }
+        for (std::size_t i = 0; i < file_.labels().size(); ++i)
+            all.push_back({unique_name(label(i), "point", i + 1, names), {i}});
         return all;
     }
 

@@ -12,4 +12,10 @@ std::string stick_word(std::string_view name) {
     return out;
 }
 
+std::string unique_name(std::string name, const std::string& substitute, std::size_t number,
+                        std::set<std::string>& taken) {
+    while (name.empty() || !taken.insert(name).second) name = substitute + std::to_string(number++);
+    return name;
+}
+
 }  // namespace tracking
