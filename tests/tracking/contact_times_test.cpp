@@ -51,5 +51,25 @@ TEST(ContactTimes, SeePlanesAlikeWhereverTheyAre) {
     EXPECT_TRUE(here.isApprox(inputs_of(yaw, {30, 2, -7}), 1e-5F));  // floats
 }
 
+/// Sensors' quaternions are of length 1 within 1 %: the tip lies where their direction says.
+TEST(ContactTimes, SeeTheTipWhereTheShaftEndsWhateverTheQuaternionsLength) {
+    const auto tip_of = [](double length) {
+        TipHistory history(-Eigen::Vector3d::UnitZ(), {0, 0.1, -0.3});
+        for (int i = 0; i < 30; ++i) {
+            PoseSample sample;
+            sample.t_s = i / 60.0;
+            sample.position = {0.3 * sample.t_s, 1, 0};
+            sample.orientation = Eigen::AngleAxisd(sample.t_s, Eigen::Vector3d::UnitX());
+            sample.orientation.coeffs() *= length;
+            sample.has_orientation = true;
+            history.push(sample);
+        }
+        TipView view;
+        EXPECT_TRUE(history.look(view));
+        return view.tip;
+    };
+    EXPECT_LT((tip_of(1.01) - tip_of(1)).norm(), 1e-12);  // 1 m in doubles
+}
+
 }  // namespace
 }  // namespace tracking

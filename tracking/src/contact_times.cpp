@@ -65,7 +65,7 @@ void TipHistory::restart() noexcept {
 }
 
 void TipHistory::push(PoseSample sample) noexcept {
-    sample.position += sample.orientation * tip_;
+    sample.position += sample.orientation.normalized() * tip_;
     history_->push(sample);
 }
 
