@@ -1,8 +1,11 @@
 #include <bson/bson.h>
 #include <fpzip.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <cmath>
+#include <csignal>
+#include <fstream>
 #include <functional>
 
 #include "mutation.h"
@@ -145,6 +148,75 @@ TEST(Xror, WithoutHandsOtherDevicesBecomeSticksOfTheirNames) {
     EXPECT_EQ(trace.sticks[0].samples[0].position, Vector3d(1, 2, -3));
     EXPECT_FALSE(trace.sticks[0].samples[0].has_orientation);
 }
+
+TEST(Xror, EachDeviceGetsANameOfItsOwn) {
+    const std::vector<std::string> axes{"x", "y", "z"};
+    const std::vector<DeviceText> devices = {{"device2", "", "", axes}, {"", "", "", axes}};
+    std::vector<std::vector<float>> rows;
+    for (int k = 0; k < 4; ++k) rows.push_back({static_cast<float>(k), 1, 2, 3, 4, 5, 6});
+    const Trace trace = parse_trace(recording(devices, compressed(rows)), "a.xror");
+    ASSERT_EQ(trace.sticks.size(), 2u);
+    EXPECT_EQ(trace.sticks[0].name, "device2");
+    EXPECT_EQ(trace.sticks[1].name, "device3");
+}
+
+TEST(Xror, ABrokenMemberIsRefusedWithThePlaceOfItsValue) {
+    std::string bytes = recording(kPlayer, frames({0, 0.5F, 1}));
+    const std::size_t value = bytes.find("joint") + 6;  // of the first device: a document in documents
+    bytes[value + 3] = 0x7F;                            // the length of its text
+    expect_refused(bytes, ":byte " + std::to_string(value) + ": error: found a broken member");
+}
+
+TEST(Xror, TablesOfMoreValuesThanTheirBytesCanHoldAreRefused) {
+    const std::string block = compressed(std::vector<std::vector<float>>(3000, std::vector<float>(22, 1)));
+    ASSERT_LT(block.size(), 200u) << "equal rows: a table of few bytes may claim gigabytes";
+    expect_refused(recording(kPlayer, block),
+                   "a table of 3000 rows of 22 floats, expected a table of at most " +
+                       std::to_string(64 * block.size()) + " floats");
+}
+
+/// A few of these make fpzip loop for ever: the limit of time holds whatever the caller blocks.
+TEST(Xror, EndlessTablesAreGivenUpAlsoWhereTheirSignalIsBlocked) {
+    const std::string whole = frames({0, 0.5F, 1});
+    std::mt19937 random(1);
+    sigset_t blocked, before;
+    sigemptyset(&blocked);
+    sigaddset(&blocked, SIGPROF);
+    ASSERT_EQ(pthread_sigmask(SIG_BLOCK, &blocked, &before), 0);
+    for (int i = 0; i < 300; ++i) {
+        std::string damaged = whole;
+        for (int edits = 0; edits < 2; ++edits)
+            damaged[25 + random() % (damaged.size() - 25)] = static_cast<char>(random());
+        try {
+            expect_valid(parse_trace(recording(kPlayer, damaged), "fuzz.xror"));
+        } catch (const TraceError& error) {
+            expect_located(error.what());
+        }
+    }
+    ASSERT_EQ(pthread_sigmask(SIG_SETMASK, &before, nullptr), 0);
+}
+
+#ifndef MUSICWORLD_SANITIZED  // sanitizers need more memory than is left here
+TEST(Xror, TooLittleMemoryForATableIsAnErrorWithItsPlace) {
+    const std::string bytes = recording(kPlayer, std::string(100000, 'x'));  // up to 25.6 MB of floats
+    const auto run = [&bytes] {
+        std::size_t pages = 0;
+        std::ifstream("/proc/self/statm") >> pages;
+        const rlim_t memory = pages * 4096 + (rlim_t{8} << 20);
+        const rlimit limit{memory, memory};
+        (void)setrlimit(RLIMIT_AS, &limit);
+        try {
+            (void)parse_trace(bytes, "fuzz.xror");
+        } catch (const TraceError& error) {
+            std::fprintf(stderr, "%s\n", error.what());
+            std::_Exit(3);
+        }
+        std::_Exit(4);
+    };
+    EXPECT_EXIT(run(), testing::ExitedWithCode(3),
+                "fuzz.xror:byte [0-9]+: error: found no memory for the 6400000");
+}
+#endif
 
 TEST(Xror, WhatIsNoRecordingIsRefusedWithItsPlace) {
     const std::string whole = recording(kPlayer, frames({0, 0.5F, 1}));

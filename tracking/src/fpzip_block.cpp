@@ -12,6 +12,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <csignal>
@@ -25,48 +26,71 @@
 namespace tracking {
 namespace {
 
-constexpr std::size_t kMostValues = std::size_t{1} << 25;
+// Recordings in which nothing moves have 5 values a byte with 22 columns (the times differ), more with more columns.
+constexpr std::size_t kMostValues = std::size_t{1} << 25, kMostValuesOfByte = 64;
 // Of processor time: twenty times what fpzip takes (0.05 us a value), and what a process takes.
 constexpr double kStartS = 0.1, kValueS = 1e-6;
 
-/// What the child tells, in memory that both see.
+std::size_t most_values(std::string_view bytes) {
+    return std::min(bytes.size(), kMostValues / kMostValuesOfByte) * kMostValuesOfByte;
+}
+
+/// What the child tells, in memory that both see; the values follow.
 struct Answer {
     enum class State : int { unfinished, no_header, other_array, too_large, broken, whole };
     State state;
     int columns, rows;
-    float values[kMostValues];
+
+    float* values() { return reinterpret_cast<float*>(this + 1); }
 };
 
-/// Memory that parent and child share.
+/// Memory that parent and child share; none where there is none left.
 class SharedAnswer {
 public:
-    SharedAnswer() {
-        void* memory = mmap(nullptr, sizeof(Answer), PROT_READ | PROT_WRITE,
-                            MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-        if (memory == MAP_FAILED)
-            throw std::system_error(errno, std::generic_category(), "cannot map memory");
-        answer_ = static_cast<Answer*>(memory);
+    explicit SharedAnswer(std::size_t values)
+        : size_(sizeof(Answer) + values * sizeof(float)),
+          memory_(mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1,
+                       0)) {}
+    ~SharedAnswer() {
+        if (*this) munmap(memory_, size_);
     }
-    ~SharedAnswer() { munmap(answer_, sizeof(Answer)); }
     SharedAnswer(const SharedAnswer&) = delete;
     SharedAnswer& operator=(const SharedAnswer&) = delete;
-    Answer* operator->() const { return answer_; }
-    Answer& operator*() const { return *answer_; }
+    explicit operator bool() const { return memory_ != MAP_FAILED; }
+    Answer* operator->() const { return static_cast<Answer*>(memory_); }
+    Answer& operator*() const { return *static_cast<Answer*>(memory_); }
 
 private:
-    Answer* answer_;
+    std::size_t size_;
+    void* memory_;
 };
 
-/// The process ends (SIGPROF) when it has used so much more processor time: wrong bytes make fpzip loop for ever.
+/// Of what the process inherited, it keeps neither descriptors nor what its parent does about signals: blocked ones would
+/// survive a fork, and a handler would keep it from ending.
+void forget_the_parent() {
+    closefrom(0);
+    for (const int signal : {SIGINT, SIGTERM, SIGPROF, SIGXCPU}) (void)std::signal(signal, SIG_DFL);
+    sigset_t none;
+    sigemptyset(&none);
+    (void)sigprocmask(SIG_SETMASK, &none, nullptr);
+}
+
+/// The process ends (SIGPROF) when it has used so much more processor time: wrong bytes make fpzip loop for ever. Should it
+/// not, it ends a second or two later (SIGXCPU).
 void limit_time(double seconds) {
+    rlimit whole{};
+    if (getrlimit(RLIMIT_CPU, &whole) == 0) {
+        whole.rlim_cur = std::min(whole.rlim_max, static_cast<rlim_t>(std::ceil(seconds)) + 1);
+        (void)setrlimit(RLIMIT_CPU, &whole);
+    }
     itimerval limit{};
     limit.it_value.tv_sec = static_cast<time_t>(seconds);
     limit.it_value.tv_usec = static_cast<suseconds_t>(1e6 * (seconds - std::floor(seconds)));
-    (void)std::signal(SIGPROF, SIG_DFL);
     (void)setitimer(ITIMER_PROF, &limit, nullptr);
 }
 
-/// From here on the process may compute, ask for memory and end. (Sanitizers do more.)
+/// From here on the process may compute, ask for memory and end, and on processors other than x86-64 whatever needs neither
+/// files nor its parent's descriptors. (Sanitizers do more.)
 void allow_nothing_else() {
     const rlimit none{0, 0};
     (void)setrlimit(RLIMIT_CORE, &none);
@@ -91,7 +115,7 @@ void allow_nothing_else() {
 #endif
 }
 
-Answer::State decompress(FPZ* stream, Answer& answer) {
+Answer::State decompress(FPZ* stream, std::size_t most, Answer& answer) {
     if (fpzip_read_header(stream) == 0) return Answer::State::no_header;
     const auto positive = [](int extent) { return extent > 0; };
     if (stream->type != FPZIP_TYPE_FLOAT || stream->nz != 1 || stream->nf != 1 || !positive(stream->nx) ||
@@ -99,19 +123,20 @@ Answer::State decompress(FPZ* stream, Answer& answer) {
         return Answer::State::other_array;
     answer.columns = stream->nx;
     answer.rows = stream->ny;
-    if (static_cast<std::size_t>(stream->nx) * static_cast<std::size_t>(stream->ny) > kMostValues)
+    if (static_cast<std::size_t>(stream->nx) * static_cast<std::size_t>(stream->ny) > most)
         return Answer::State::too_large;
     limit_time(kStartS + kValueS * stream->nx * stream->ny);
     allow_nothing_else();
-    return fpzip_read(stream, answer.values) > 0 ? Answer::State::whole : Answer::State::broken;
+    return fpzip_read(stream, answer.values()) > 0 ? Answer::State::whole : Answer::State::broken;
 }
 
 /// The child. Reading the header takes arithmetic alone, whatever the bytes. A file in memory ends where the bytes end; a buffer, to libfpzip, never.
 [[noreturn]] void decompress_and_end(std::string_view bytes, Answer& answer) {
+    forget_the_parent();
     std::FILE* file = fmemopen(const_cast<char*>(bytes.data()), bytes.size(), "rb");
     limit_time(kStartS);
     if (FPZ* stream = file == nullptr ? nullptr : fpzip_read_from_file(file); stream != nullptr)
-        answer.state = decompress(stream, answer);
+        answer.state = decompress(stream, most_values(bytes), answer);
     _exit(0);
 }
 
@@ -134,7 +159,11 @@ std::string finding(const Answer& answer, bool ended_well) {
 
 FloatTable decompress_floats(std::string_view bytes, const std::string& file, std::size_t at) {
     if (bytes.empty()) fail_at_byte(file, at, "no floats", "a table of them, as fpzip compresses it");
-    SharedAnswer answer;
+    const std::size_t most = most_values(bytes);
+    SharedAnswer answer(most);
+    if (!answer)
+        fail_at_byte(file, at, "no memory for the " + std::to_string(most) + " floats that it may hold",
+                     "4 bytes each", "free some memory");
     const pid_t child = fork();
     if (child < 0) throw std::system_error(errno, std::generic_category(), "cannot start a process");
     if (child == 0) decompress_and_end(bytes, *answer);
@@ -145,11 +174,11 @@ FloatTable decompress_floats(std::string_view bytes, const std::string& file, st
     const Answer::State state = answer->state;
     const int columns = answer->columns, rows = answer->rows;
     if (!ended_well || state != Answer::State::whole || columns < 1 || rows < 1 ||
-        static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows) > kMostValues)
+        static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows) > most)
         fail_at_byte(file, at, finding(*answer, ended_well),
-                     "a table of at most 2^25 floats, as fpzip compresses it");
+                     "a table of at most " + std::to_string(most) + " floats, as fpzip compresses it");
     FloatTable table{static_cast<std::size_t>(columns), static_cast<std::size_t>(rows), {}};
-    table.values.assign(answer->values, answer->values + table.columns * table.rows);
+    table.values.assign(answer->values(), answer->values() + table.columns * table.rows);
     return table;
 }
 

@@ -46,8 +46,8 @@ public:
     void each(Take take) const {
         bson_iter_t at = begin_;
         while (bson_iter_next(&at)) take(std::string_view(bson_iter_key(&at)), at);
-        if (at.err_off != 0)
-            fail(std::min(place(at.raw) + at.err_off, file_.size()), "a broken member of a BSON document",
+        if (at.err_off != 0)  // at.raw is null then
+            fail(std::min(place(begin_.raw) + at.err_off, file_.size()), "a broken member of a BSON document",
                  "one with its type, key and value");
     }
 
@@ -162,12 +162,8 @@ std::vector<std::pair<std::string, Device>> choose_sticks(const std::vector<Devi
     for (const Device& device : devices) {
         if (!sticks.empty() && names.empty()) break;  // there are hands
         if (!device.has_position() || device.on_head() || sticks.size() == kMostSticks) continue;
-        std::string name = stick_word(device.name.empty() ? device.type : device.name);
-        if (name.empty() || !names.insert(name).second) {
-            name = "device" + std::to_string(names.size() + 1);
-            names.insert(name);
-        }
-        sticks.emplace_back(name, device);
+        const std::string name = stick_word(device.name.empty() ? device.type : device.name);
+        sticks.emplace_back(unique_name(name, "device", names.size() + 1, names), device);
     }
     if (devices.size() > sticks.size())
         remarks.push_back("left out " + std::to_string(devices.size() - sticks.size()) + " of " +

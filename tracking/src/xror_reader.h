@@ -18,8 +18,8 @@ namespace tracking {
 /// Left out and counted in Trace::remarks: frames that do not count (replay_frames.h), poses without an orientation
 /// (four zeros: not tracked), other devices, and events. Names of people are not kept.
 ///
-/// Throws TraceError: FILE:byte N: error: found ..., expected ...; what to do. Memory is bounded by the file's size
-/// and 2^25 floats.
+/// Throws TraceError: FILE:byte N: error: found ..., expected ...; what to do. Memory is bounded by the file's size:
+/// a table has at most 64 floats a byte, and 2^25.
 [[nodiscard]] Trace parse_xror(std::string_view bytes, const std::string& name);
 
 }  // namespace tracking
