@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "model_of_random_weights.h"
+#include "tracking/contact_times.h"
 #include "tracking/predictor.h"
 
 namespace {
@@ -95,6 +96,22 @@ TEST(Allocation, CorrectAndPredictOfEveryPredictorAllocateNothing) {
         EXPECT_EQ(allocations, before) << name;
         EXPECT_TRUE(std::isfinite(sum));
     }
+}
+
+TEST(Allocation, LookingAtPlanesAllocatesNothing) {
+    PathModel model;
+    model.contacts = model_of_random_contacts(PathModel::kMostHidden, 1);
+    TipHistory history(-Eigen::Vector3d::UnitZ(), {0, 0, -0.3});
+    TipView view;
+    double sum = 0;
+    const long before = allocations;
+    for (int i = 0; i < 500; ++i) {
+        if (i == 250) history.restart();
+        history.push({i * 0.008, {0, 1 + 0.1 * std::sin(i * 0.1), 0}});
+        if (history.look(view)) sum += contact_times(model, view, {{0, 0.95, 0}, {0, 1, 0}}).median_s();
+    }
+    EXPECT_EQ(allocations, before);
+    EXPECT_GT(sum, 0);
 }
 
 }  // namespace

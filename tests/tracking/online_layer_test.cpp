@@ -122,6 +122,29 @@ TEST(Learned, GetsBetterWhileItPlaysAtAnyRate) {
     }
 }
 
+/// A clock may begin anywhere, below zero, too.
+TEST(Learned, LearnsTheSameWheneverATraceBegins) {
+    const PathModel model = model_of_random_weights(48, 7);
+    const auto played_from = [&](double t0_s) {
+        Learned online(model, Vector3d::UnitY(), 100);
+        std::vector<Vector3d> predicted;
+        for (int i = 0; i < 1200; ++i) {
+            PoseSample sample = stroke(i / 57.0);  // no lead or age is a whole number of periods
+            sample.t_s += t0_s;
+            (void)online.correct(sample);
+            predicted.push_back(online.predict(1.0 / 15).position);
+        }
+        return predicted;
+    };
+    const std::vector<Vector3d> here = played_from(0), before = played_from(-100), after = played_from(100);
+    double farthest = 0;
+    for (std::size_t i = 0; i < here.size(); ++i)
+        farthest = std::max({farthest, (here[i] - before[i]).norm(), (here[i] - after[i]).norm()});
+    // Times of 100 s are rounded to 1.4e-14 s, the network's floats to 1e-7 of its answers of some 0.1 m;
+    // what the last layer learns of such differences is regularised. Nothing learned: centimetres.
+    EXPECT_LT(farthest, 1e-5);
+}
+
 TEST(Learned, WhatSticksTaughtIsAModelThatGoesOnWhereTheyEnded) {
     PathModel model = model_of_random_weights(48, 7);
     model.contacts = model.layers;  // any weights: what is learned of paths leaves them as they are

@@ -137,6 +137,9 @@ TEST(Training, IsBitIdenticalAndDependsOnTheSeed) {
     options.steps = 60;
     const std::string first = format_path_model(train_path_model(sticks, options).model);
     EXPECT_EQ(format_path_model(train_path_model(sticks, options).model), first);
+    options.contacts = false;
+    EXPECT_FALSE(train_path_model(sticks, options).model.contacts);
+    options.contacts = true;
     options.seed = 2;
     EXPECT_NE(format_path_model(train_path_model(sticks, options).model), first);
 }

@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -103,7 +104,7 @@ private:
     std::optional<OnlineLayer> online_;
     std::vector<Example> examples_;  // a ring
     std::size_t first_ = 0, count_ = 0;
-    double last_example_s_ = 0;
+    double last_example_s_ = -std::numeric_limits<double>::infinity();
 };
 
 }  // namespace tracking

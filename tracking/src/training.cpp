@@ -419,6 +419,7 @@ TrainingResult train_path_model(std::span<const TrainingStick> sticks, const Tra
     scaling.fold_into(result.model.layers[0]);
     learning = {};
     held_out = {};
+    if (!options.contacts) return result;
     if (std::optional<LearnedContacts> contacts = train_contacts(sticks, options)) {
         if (contacts->loss < kMostContactLoss * contacts->loss_of_shares)
             result.model.contacts = std::move(contacts->layers);

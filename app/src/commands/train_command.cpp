@@ -69,6 +69,8 @@ void add_train_command(Command& program) {
                    "Units of each hidden layer: 32 is fast, 64 usual, 128 errs least");
     command.option("--steps", o->steps, as::whole(1, 10000000), "Steps of 256 examples, at most");
     command.option("--seed", o->seed, as::whole(0, 1000000000), "Of all that is drawn at random");
+    command.flag("--no-contacts", o->contacts, "Learn paths alone: strikes are decided as without a model",
+                 false);
     command.runs([o] { train(*o); });
 }
 

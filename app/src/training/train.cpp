@@ -26,8 +26,9 @@ std::vector<std::pair<std::string, std::string>> provenance_of(std::span<const R
     lines.emplace_back("made_by", "musicworld " + version);
     std::string command = "musicworld train";
     for (const Recording& recording : recordings) command += " " + recording.trace.file;
-    lines.emplace_back("command", fmt::format("{} --hidden {} --steps {} --seed {}", command, options.hidden,
-                                              options.steps, options.seed));
+    lines.emplace_back("command",
+                       fmt::format("{} --hidden {} --steps {} --seed {}{}", command, options.hidden,
+                                   options.steps, options.seed, options.contacts ? "" : " --no-contacts"));
     for (const Recording& recording : recordings)
         lines.emplace_back("input", sha256_of_file(recording.trace.file) + " " + recording.trace.file);
     lines.emplace_back("held_out", field.held_out);
@@ -38,12 +39,13 @@ std::vector<std::pair<std::string, std::string>> provenance_of(std::span<const R
                                  "fading velocity {:.1f}; regions of 50 and 95 % hold {:.3f}, {:.3f}",
                                  s.lead_s, s.with_shaft_mm, s.position_only_mm, s.fading_mm, s.inside_50,
                                  s.inside_95));
-    lines.emplace_back(
-        "contact_times",
-        fmt::format("{} examples, {} steps; -ln(probability of what came) {:.3f} held out, {:.3f} "
-                    "of the shares alone",
-                    result.contact_examples, result.contact_steps, result.contact_loss,
-                    result.contact_loss_of_shares));
+    if (result.contact_examples > 0)
+        lines.emplace_back(
+            "contact_times",
+            fmt::format("{} examples, {} steps; -ln(probability of what came) {:.3f} held out, {:.3f} "
+                        "of the shares alone",
+                        result.contact_examples, result.contact_steps, result.contact_loss,
+                        result.contact_loss_of_shares));
     return lines;
 }
 

@@ -84,6 +84,8 @@ TEST(Provenance, SaysWhatAModelWasMadeOfAndWhetherThatWasSynthetic) {
     EXPECT_TRUE(
         value_of("input").starts_with("ed7002b439e9ac845f22357d822bac1444730fbdb6016d3ec9432297b9ec9f73 "));
     EXPECT_TRUE(value_of("error").starts_with("0.0333 s ahead: 8.0 mm RMS with the shaft, 10.0 without"));
+    EXPECT_EQ(std::ranges::count(lines, "contact_times", [](const auto& line) { return line.first; }), 0)
+        << "nothing was learned of contacts";
     all[1].trace.source = "a person";
     EXPECT_EQ(lines_of().front().second, "recordings");
 }

@@ -28,7 +28,7 @@ struct ContactTimes {
     [[nodiscard]] double median_s() const noexcept;
 };
 
-/// A tip as a network sees it: plain numbers, copied bit by bit between processes.
+/// A tip as a network sees it: plain numbers.
 struct TipView {
     static constexpr std::size_t kInputs = 88;
     Eigen::Vector3d tip = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();  ///< world, SI

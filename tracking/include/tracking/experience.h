@@ -1,5 +1,5 @@
 #pragma once
-#include <memory>
+#include <Eigen/Core>
 #include <optional>
 #include <span>
 
@@ -12,6 +12,13 @@ namespace tracking {
 /// OnlineLayer.
 struct Experience {
     Eigen::MatrixXd moments, against;  ///< n x n, n x 30
+
+    /// And what was learned elsewhere from the same model.
+    Experience& operator+=(const Experience& other) {
+        moments += other.moments;
+        against += other.against;
+        return *this;
+    }
 };
 
 /// None of a predictor that does not learn.

@@ -25,6 +25,7 @@ struct TrainingOptions {
     std::size_t hidden = 64;    ///< units of each of the two hidden layers
     std::size_t steps = 60000;  ///< at most
     std::uint64_t seed = 1;
+    bool contacts = true;  ///< also learn the network of contacts
     /// Gets the share done and the validation error; false stops. May be empty.
     std::function<bool(double, double)> progress;
 };
@@ -61,7 +62,7 @@ struct TrainingResult {
 /// ends when these have not got better for a third of the steps. Last, the covariances are scaled for each lead so
 /// that the regions of 50 and 95 % hold of the held-out errors what they say, as nearly as one factor can.
 ///
-/// Then the network of contacts (PathModel::contacts) is learned from the same recordings. It is left out of the model
+/// Then, if asked, the network of contacts (PathModel::contacts) is learned from the same recordings. It is left out of the model
 /// unless its held-out loss is below 0.7 of what the shares of the outcomes alone have.
 ///
 /// A pure function of its arguments, one thread; bit-identical for one build on one kind of processor (Eigen's
