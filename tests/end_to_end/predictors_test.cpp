@@ -65,6 +65,43 @@ TEST(Predictors, TheExampleInPythonPredictsAndPlaysLikeDifference) {
     EXPECT_TRUE(std::filesystem::exists(folder / "external/frames/000059.png"));
 }
 
+TEST(Predictors, WhatAPerformanceTaughtIsAModelToGoOnWith) {
+    const Folder folder;
+    const std::string trace = (folder / "trace.csv").string(),
+                      base = bundled("models/general.model").string();
+    write(trace, cut_trace(read(bundled("traces/flourish.csv")), 3));
+    const auto weights = [](const std::string& model) { return model.substr(model.find("\n\n")); };
+    for (const std::vector<std::string>& more :
+         {std::vector<std::string>{}, {"--realtime", "--seconds", "3"}}) {
+        const std::string model = (folder / ("mine" + std::to_string(more.size()))).string();
+        const std::string out = (folder / "played").string();
+        std::vector<std::string> words = {"play", trace, "--no-frames", "--out", out, "--save-model", model};
+        words.insert(words.end(), more.begin(), more.end());
+        const Ended played = run(words);
+        ASSERT_EQ(played.status, 0) << played.err;
+        EXPECT_TRUE(fs::exists(out + "/summary.json"));
+        EXPECT_NE(weights(read(model)), weights(read(base)));
+        EXPECT_NE(read(model).find("begun_with: "), std::string::npos);
+        const Ended predicted =
+            run({"predict", trace, "--predictor", "learned:model=" + model, "--lead", "1/30"});
+        EXPECT_EQ(predicted.status, 0) << predicted.err;
+        EXPECT_NE(predicted.out, run({"predict", trace, "--predictor", "learned", "--lead", "1/30"}).out);
+        fs::remove_all(out);
+    }
+}
+
+TEST(Predictors, AModelThatCannotBeSavedIsRefusedBeforeAnythingIsPlayed) {
+    const Folder folder;
+    const std::string trace = (folder / "two\nlines.csv").string(), out = (folder / "played").string();
+    write(trace, cut_trace(read(bundled("traces/flourish.csv")), 1));
+    expect_refused(run({"play", trace, "--no-frames", "--out", out, "--save-model", (folder / "m").string()}),
+                   "provenance");
+    expect_refused(run({"play", "flourish", "--no-frames", "--out", out, "--picture-predictor", "thesis",
+                        "--save-model", (folder / "m").string()}),
+                   "learns nothing");
+    EXPECT_FALSE(fs::exists(out));
+}
+
 TEST(Predictors, PredictWritesTheSameRowsToAFileAndToStandardOutput) {
     const Folder folder;
     const std::string trace = bundled("traces/roll.csv").string(), file = (folder / "rows.csv").string();

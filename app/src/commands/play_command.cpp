@@ -318,7 +318,6 @@ void add_play_command(Command& program) {
         if (!o->play.save_model) return;
         const std::filesystem::path inputs[] = {find_trace(o->play.trace)};
         refuse_replacing(*o->play.save_model, inputs);
-        check_learns(o->play.picture_predictor, *o->play.save_model);
     });
     command.runs([o] { o->realtime ? play_in_time(*o) : play_offline(o->play); });
 }

@@ -49,15 +49,17 @@ void predict_file(const PredictOptions& o) {
     const std::filesystem::path inputs[] = {file};
     refuse_replacing(o.out, inputs);
     if (o.save_model) refuse_replacing(*o.save_model, inputs);
+    std::optional<LearnedModel> model;
+    if (o.save_model)
+        model.emplace(LearnedInPlay{*o.save_model, "predict", picture_specification(o.live.predictor), file});
     std::vector<tracking::Experience> learned;
     const std::string table = predict_table(seen_by(tracking::read_trace(file), o.sensor), o.live.predictor,
                                             o.live.leads_s.front(), &learned);
-    if (o.save_model)
-        save_learned({*o.save_model, "predict", picture_specification(o.live.predictor), file}, learned);
     if (o.out.empty())
         fmt::print("{}", table);
     else
         write_finished_file(o.out, table);
+    if (model) model->save(learned);
 }
 
 /// What there may be of the options besides --predictor and --lead.
@@ -86,7 +88,6 @@ void check(const PredictOptions& o, const std::vector<std::string>& given, bool 
 void predict(PredictOptions o, const std::vector<std::string>& given) {
     const bool stream = o.trace == "-";
     check(o, given, stream);
-    if (o.save_model) check_learns(o.live.predictor, *o.save_model);
     if (stream) {
         o.live.source.source = "stdin";
         const std::unique_ptr<PredictionSink> rows = make_row_sink();

@@ -206,22 +206,20 @@ void check_solo(const PlayOptions& options, const std::vector<Strike>& strikes, 
                                    *options.solo));
 }
 
-/// The loop, from samples to strikes.
-void play_through(const OfflineParts& parts, PlayResult& result) {
+/// The loop, from samples to strikes; returns what the sticks have taught.
+std::vector<tracking::Experience> play_through(const OfflineParts& parts, PlayResult& result) {
     OfflineRun run(parts);
     ProgressBar bar(parts.options.progress);
     run.run(bar);
     result.strikes = run.strikes();
     check_solo(parts.options, result.strikes, result.pedals);
     result.samples_refused = run.refused();
-    if (parts.options.save_model)
-        save_learned({*parts.options.save_model, "play", result.options.picture_predictor, result.trace},
-                     run.experiences());
     const LoopTimes& times = run.times();
     result.stages_s.insert(result.stages_s.end(), {{"tracking", times.tracking},
                                                    {"simulation", times.simulation},
                                                    {"strikes", times.strikes},
                                                    {"waiting for frames", times.waiting_for_frames}});
+    return run.experiences();
 }
 
 }  // namespace
@@ -233,6 +231,10 @@ PlayResult play(const PlayOptions& options) {
     const Kit kit = read_kit(options.kit);
     const StickGeometry stick = stick_geometry(trace, kit.stick, options.tip, options.shaft);
     PlayResult result = describe(options, trace, kit);
+    std::optional<LearnedModel> learned;
+    if (options.save_model)
+        learned.emplace(
+            LearnedInPlay{*options.save_model, "play", result.options.picture_predictor, result.trace});
     result.tracks = tip_tracks(trace, stick);
     result.pedals = Pedals(kit, trace.t0_s());
     if (options.pedals)
@@ -251,13 +253,14 @@ PlayResult play(const PlayOptions& options) {
 
     for (const PedalNote& pedal : result.pedals.notes())
         if (sound && (!options.solo || *options.solo == pedal.note.id)) sound->schedule(pedal.note);
-    play_through({trace, kit, options, stick, *simulation, &stage, frames.get(), sound.get(), &result.pedals},
-                 result);
+    const std::vector<tracking::Experience> taught = play_through(
+        {trace, kit, options, stick, *simulation, &stage, frames.get(), sound.get(), &result.pedals}, result);
     const double sound_s = seconds_of([&] {
         if (sound) finish_sound(*sound, trace.t_end_s() - trace.t0_s(), result, kit, folder);
     });
     result.stages_s.emplace_back("sound (waiting and writing)", sound_s);
     write_products(result, {kit, stick, *simulation, frames.get(), wall}, folder);
+    if (learned) learned->save_or_say(taught, {}, result.failures);
     return result;
 }
 

@@ -322,6 +322,10 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options, const Warn& warn) 
     RealtimeOutcome outcome;             // outlives the session, which writes into it
     RealtimeSession session(options);
     outcome.play = describe(session.options.play, session.trace, session.kit);
+    std::optional<LearnedModel> learned;
+    if (const auto& file = session.options.play.save_model)
+        learned.emplace(LearnedInPlay{*file, "play --realtime", outcome.play.options.picture_predictor,
+                                      session.live ? session.options.sensors.source : outcome.play.trace});
     folder.emplace(options.play.out);
     outcome.play.audio = DiskLog<float>(folder->scratch());
     session.start(*folder, outcome.play.audio, warn);
@@ -332,16 +336,16 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options, const Warn& warn) 
         check_samples(session, run, warn);
         collect(outcome, session, run, *folder);
     }
-    if (const auto& file = session.options.play.save_model)
-        save_learned({*file, "play --realtime", outcome.play.options.picture_predictor,
-                      session.live ? session.options.sensors.source : outcome.play.trace},
-                     session.sensors->end_and_take_learned());
     write_products(outcome.play,
                    {session.kit, session.stick, *session.simulation, session.frames.get(), wall}, *folder,
                    [&] {
                        write_measurements(outcome, session, *folder);
                        return json_document(summary_of(outcome));
                    });
+    if (learned) {
+        const LearnedBySticks taught = session.sensors->end_and_take_learned();
+        learned->save_or_say(taught.experiences, taught.silent, outcome.play.failures);
+    }
     return outcome;
 }
 

@@ -55,9 +55,8 @@ struct RealtimeSession {
     bool live = false;  ///< there is no trace
     PlayedTrace trace;  ///< of a live source only the sticks' names
     Kit kit;
-    StickGeometry stick;
-    std::shared_ptr<const tracking::PathModel>
-        contacts;  ///< decides the strikes, where there is one  ///< also as a live source gives it
+    StickGeometry stick;                                  ///< also as a live source gives it
+    std::shared_ptr<const tracking::PathModel> contacts;  ///< decides the strikes, where there is one
     double seconds = 0;
     std::vector<PedalMove> moves;     ///< of the schedule of pedals, within a lap
     std::int64_t period_samples = 0;  ///< of a lap; a live source has one, longer than the run

@@ -62,6 +62,8 @@ SensorHub::SensorHub(const SensorOptions& options)
             sensors_.back().task.sticks.clear();
             if (options_.keep_learned) {
                 sensors_.back().learned = FileDescriptor(memfd_create("learned", MFD_CLOEXEC));
+                if (!sensors_.back().learned)
+                    throw std::runtime_error("error: " + cannot("make memory for what is learned"));
                 sensors_.back().task.learned_fd = sensors_.back().learned.get();
             }
         }
@@ -276,19 +278,25 @@ void SensorHub::end_all() {
     }
 }
 
-std::vector<tracking::Experience> SensorHub::end_and_take_learned() {
+LearnedBySticks SensorHub::end_and_take_learned() {
     end_all();
-    std::vector<tracking::Experience> all;
+    LearnedBySticks all;
     for (const Sensor& sensor : sensors_) {
         if (!sensor.learned) continue;
         struct stat found {};
         (void)fstat(sensor.learned.get(), &found);
         std::string bytes(static_cast<std::size_t>(found.st_size), '\0');
-        if (bytes.empty() ||
-            pread(sensor.learned.get(), bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
-            throw std::runtime_error(
-                "error: found a sensor that did not say what it learned, expected it to end");
-        for (tracking::Experience& one : experiences_of(bytes)) all.push_back(std::move(one));
+        bool whole = !bytes.empty() && pread(sensor.learned.get(), bytes.data(), bytes.size(), 0) ==
+                                           static_cast<ssize_t>(bytes.size());
+        try {
+            if (whole)
+                for (tracking::Experience& one : experiences_of(bytes))
+                    all.experiences.push_back(std::move(one));
+        } catch (const std::runtime_error&) {  // half of it
+            whole = false;
+        }
+        if (!whole)
+            for (const std::size_t stick : sensor.sticks) all.silent.push_back(options_.sticks[stick]);
     }
     return all;
 }

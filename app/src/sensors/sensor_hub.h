@@ -18,6 +18,13 @@ struct SensorEvent {
     std::string message;  ///< one line, complete
 };
 
+/// What the sticks of a run have taught their predictors' networks, and those of whom it is not known: their
+/// process was killed, or had no memory to say it in.
+struct LearnedBySticks {
+    std::vector<tracking::Experience> experiences;
+    std::vector<std::string> silent;  ///< by name
+};
+
 /// Starts and watches the sensor processes (one per stick of a trace; one for all sticks where a source
 /// delivers them together), each with a reader thread and a filter thread per stick, and keeps the shared memory that
 /// they publish into. The memory has no name, so nothing stays in /dev/shm however a process ends. A process
@@ -45,9 +52,9 @@ public:
     /// Every source has ended, and all that it gave has been published.
     [[nodiscard]] bool ended() const;
     [[nodiscard]] std::vector<ClockReport> clocks() const;  ///< one per stick
-    /// Ends the sensors and returns what the sticks have taught their predictors' networks; empty unless the options
-    /// want it (`keep_learned`). Throws std::runtime_error if a sensor did not say.
-    [[nodiscard]] std::vector<tracking::Experience> end_and_take_learned();
+    /// Ends the sensors and returns what the sticks have taught their predictors' networks; nothing unless the options
+    /// want it (`keep_learned`).
+    [[nodiscard]] LearnedBySticks end_and_take_learned();
     /// How a live stream began.
     [[nodiscard]] SharedStreamHead stream_head() const {
         return memory_.front()->head.read().value_or(SharedStreamHead{});

@@ -42,33 +42,60 @@ Eigen::MatrixXd take_matrix(std::string_view& bytes) {
 
 }  // namespace
 
-void check_learns(const std::string& predictor, const std::filesystem::path& file) {
-    const OutputFile can_be(file);
-    const std::string specification = picture_specification(predictor);
-    if (!is_external(specification) &&
-        tracking::experience_of(*make_any_predictor(specification, {})).has_value())
-        return;
-    throw BadInput(fmt::format(
-        "error: found --save-model with predictor {}, which learns nothing; expected auto, online or "
-        "arbitrated",
-        predictor));
+LearnedModel::LearnedModel(LearnedInPlay run) : run_(std::move(run)) {
+    const OutputFile can_be(run_.file);
+    if (is_external(run_.predictor) ||
+        !tracking::experience_of(*make_any_predictor(run_.predictor, {})).has_value())
+        throw BadInput(fmt::format(
+            "error: found --save-model with predictor {}, which learns nothing; expected auto, online or "
+            "arbitrated",
+            run_.predictor));
+    base_ = model_file(run_.predictor).value();
+    base_sha256_ = sha256_of_file(base_);
+    provenance_.emplace_back("trained_on", "what was played, from another model on");
+    provenance_.emplace_back("made_by", fmt::format("musicworld {}", MUSICWORLD_VERSION));
+    provenance_.emplace_back(
+        "command", fmt::format("musicworld {} {} with predictor {} --save-model {}", run_.command, run_.input,
+                               run_.predictor, run_.file.string()));
+    if (std::error_code none; std::filesystem::is_regular_file(run_.input, none))
+        provenance_.emplace_back("input", sha256_of_file(run_.input) + " " + run_.input);
+    provenance_.emplace_back("begun_with", base_sha256_ + " " + base_.string());
+    for (const auto& [key, value] : tracking::read_path_model(base_).provenance)
+        if (!key.starts_with("base_")) provenance_.emplace_back("base_" + key, value);
+    try {
+        tracking::check_provenance(provenance_);
+    } catch (const std::invalid_argument& wrong) {
+        throw BadInput(fmt::format("error: {}", wrong.what()));
+    }
 }
 
-void save_learned(const LearnedInPlay& run, std::span<const tracking::Experience> experiences) {
-    const std::filesystem::path file = model_file(run.predictor).value();
-    const tracking::PathModel base = tracking::read_path_model(file);
-    tracking::PathModel model = tracking::taught(base, experiences);
-    tracking::Provenance& lines = model.provenance;
-    lines.emplace_back("trained_on", "what was played, from another model on");
-    lines.emplace_back("made_by", fmt::format("musicworld {}", MUSICWORLD_VERSION));
-    lines.emplace_back("command", fmt::format("musicworld {} {} with predictor {} --save-model {}",
-                                              run.command, run.input, run.predictor, run.file.string()));
-    if (std::error_code none; std::filesystem::is_regular_file(run.input, none))
-        lines.emplace_back("input", sha256_of_file(run.input) + " " + run.input);
-    lines.emplace_back("begun_with", sha256_of_file(file) + " " + file.string());
-    for (const auto& [key, value] : base.provenance)
-        if (!key.starts_with("base_")) lines.emplace_back("base_" + key, value);
-    write_finished_file(run.file, tracking::format_path_model(model));
+void LearnedModel::save(std::span<const tracking::Experience> experiences) const {
+    if (const std::string now = sha256_of_file(base_); now != base_sha256_)
+        throw std::runtime_error(
+            fmt::format("error: found another model in {} than when the run began (SHA-256 {}), expected {}; "
+                        "{} was not written",
+                        base_.string(), now, base_sha256_, run_.file.string()));
+    tracking::PathModel model = tracking::taught(tracking::read_path_model(base_), experiences);
+    model.provenance = provenance_;
+    write_finished_file(run_.file, tracking::format_path_model(model));
+}
+
+void LearnedModel::save_or_say(std::span<const tracking::Experience> experiences,
+                               const std::vector<std::string>& silent,
+                               std::vector<std::string>& failures) const {
+    for (const std::string& stick : silent)
+        failures.push_back(fmt::format(
+            "error: found that the sensor of stick {} did not say what it learned, expected it at the end; "
+            "{}",
+            stick,
+            experiences.empty() ? fmt::format("{} was not written", run_.file.string())
+                                : fmt::format("{} is as the others taught it", run_.file.string())));
+    if (experiences.empty()) return;
+    try {
+        save(experiences);
+    } catch (const std::exception& wrong) {
+        failures.emplace_back(wrong.what());
+    }
 }
 
 std::string bytes_of(std::span<const tracking::Experience> experiences) {

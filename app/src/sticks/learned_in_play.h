@@ -9,10 +9,6 @@
 
 namespace app {
 
-/// Throws BadInput for a predictor (of pictures, `auto` being allowed) that learns nothing which --save-model could save,
-/// and for a file that cannot be made.
-void check_learns(const std::string& predictor, const std::filesystem::path& file);
-
 /// Where the model goes that sticks have taught, and what its provenance says of the run.
 struct LearnedInPlay {
     std::filesystem::path file;
@@ -20,9 +16,28 @@ struct LearnedInPlay {
     std::string predictor;  ///< with `auto` resolved
     std::string input;      ///< a trace's file, or a live source
 };
-/// Writes the model that the predictor began with, its last layer as the sticks have taught it, and where it comes from:
+
+/// --save-model: the model that a predictor begins with, its last layer as the sticks teach it, and where it comes from:
 /// the run, the model that it began with and that one's own lines, each key behind `base_`.
-void save_learned(const LearnedInPlay& run, std::span<const tracking::Experience> experiences);
+class LearnedModel {
+public:
+    /// Before anything is played. Throws BadInput for a predictor that learns nothing which could be saved, for a file
+    /// that cannot be made, and for names that a model's head cannot hold.
+    explicit LearnedModel(LearnedInPlay run);
+    /// Throws std::runtime_error when the model that the run began with is another by now, and when the file cannot be
+    /// written.
+    void save(std::span<const tracking::Experience> experiences) const;
+    /// For the end of a run, whose products stay whatever becomes of the model: save(), unless no stick has said what
+    /// it learned. Why not all is saved, of the sticks `silent`, too, goes into `failures`.
+    void save_or_say(std::span<const tracking::Experience> experiences,
+                     const std::vector<std::string>& silent, std::vector<std::string>& failures) const;
+
+private:
+    LearnedInPlay run_;
+    std::filesystem::path base_;
+    std::string base_sha256_;
+    tracking::Provenance provenance_;
+};
 
 /// Between processes of one program. Throws std::runtime_error for bytes that are not of it.
 [[nodiscard]] std::string bytes_of(std::span<const tracking::Experience> experiences);

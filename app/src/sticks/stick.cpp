@@ -66,9 +66,7 @@ void Stick::take(const tracking::StickState& state) {
     interval_s_ = started() && state.t_s > state_.t_s ? state.t_s - state_.t_s : 0;
     if (state.samples > state_.samples) {
         if (state.starts != state_.starts || interval_s_ == 0) history_.restart();
-        // A sensor of positions alone says the identity.
-        const bool oriented = state.orientation.coeffs() != Eigen::Quaterniond::Identity().coeffs();
-        history_.push({state.t_s, state.position, state.orientation, oriented});
+        history_.push({state.t_s, state.position, state.orientation, state.oriented != 0});
     }
     state_ = state;
     measured_tip_ = state.position + state.orientation * geometry_.tip;
@@ -139,6 +137,7 @@ tracking::SampleStatus StickFilters::correct(const tracking::PoseSample& sample,
     state.t_s = sample.t_s;
     state.position = sample.position;
     state.orientation = sample.orientation;
+    state.oriented = sample.has_orientation ? 1 : 0;
     return status;
 }
 
@@ -165,7 +164,14 @@ void StickFilters::Filter::begin_anew(const TrackedStick& stick) {
         predictor = maker.make({}, stick);
 }
 
+std::optional<tracking::Experience> StickFilters::experience() const {
+    std::optional<tracking::Experience> all = tracking::experience_of(*picture_.predictor);
+    if (all && earlier_) *all += *earlier_;
+    return all;
+}
+
 void StickFilters::begin_anew() {
+    earlier_ = experience();
     picture_.begin_anew(stick_);
     sound_.begin_anew(stick_);
     if (confirming_) confirming_->begin_anew(stick_);

@@ -43,12 +43,11 @@ public:
     /// predictor has failed.
     [[nodiscard]] tracking::SampleStatus correct(const tracking::PoseSample& sample,
                                                  tracking::StickState& state);
-    /// As before the first sample: times may begin again.
+    /// As before the first sample: times may begin again. Only experience() stays.
     void begin_anew();
-    /// What the stick has taught the network of the pictures' predictor, if that learns.
-    [[nodiscard]] std::optional<tracking::Experience> experience() const {
-        return tracking::experience_of(*picture_.predictor);
-    }
+    /// What the stick has taught the network of the pictures' predictor, if that learns: since it was made,
+    /// each time from the model on.
+    [[nodiscard]] std::optional<tracking::Experience> experience() const;
 
 private:
     void say_paths(tracking::StickState& state) const;
@@ -67,6 +66,7 @@ private:
     double sound_lead_s_;
     Filter picture_, sound_;
     std::optional<Filter> confirming_;
+    std::optional<tracking::Experience> earlier_;  // before begin_anew()
 };
 
 /// 0 to lead in eight equal pieces: the nodes of a predicted path.

@@ -201,6 +201,19 @@ TEST(SensorHub, GivesUpOnASensorThatDiesAgainAndAgain) {
     EXPECT_EQ(children(), std::vector<int>{});
 }
 
+TEST(SensorHub, TakesWhatWasLearnedOfTheSensorsThatSayIt) {
+    app::SensorOptions options = options_for("trace:flourish");
+    options.keep_learned = true;
+    SensorHub hub(options);
+    Watched seen;
+    watch_until(hub, 2, seen, [&] { return !seen.states[0].empty() && !seen.states[1].empty(); });
+    ASSERT_EQ(children().size(), 2u);
+    ASSERT_EQ(kill(children().back(), SIGKILL), 0);  // that of the right stick; none looks after it any more
+    const app::LearnedBySticks learned = hub.end_and_take_learned();
+    EXPECT_EQ(learned.experiences.size(), 1u);
+    EXPECT_EQ(learned.silent, std::vector<std::string>{"right"});
+}
+
 TEST(SensorHub, TellsOfAStallAndLosesNoSample) {
     const TemporaryFolder folder;
     const fs::path file = folder.write("short.csv", cut_of("roll", 0, 1.5));

@@ -93,6 +93,23 @@ TEST(StickFilters, BegunAnewTheyAreAsInTheBeginning) {
     }
 }
 
+TEST(StickFilters, KeepWhatEachLapTaughtThem) {
+    app::StickFilters filters(app::stick_predictors("auto", "auto", kSoundLeadS), "left");
+    const auto lap = [&] {
+        tracking::StickState state;
+        for (const tracking::PoseSample& sample : waving()) (void)filters.correct(sample, state);
+        return filters.experience().value();
+    };
+    const tracking::Experience first = lap();
+    ASSERT_GT(first.against.norm(), 0);
+    for (int laps = 2; laps <= 3; ++laps) {
+        filters.begin_anew();
+        const tracking::Experience all = lap();                          // the same samples each time
+        EXPECT_TRUE(all.moments.isApprox(laps * first.moments, 1e-14));  // rounding of the sum
+        EXPECT_TRUE(all.against.isApprox(laps * first.against, 1e-14));
+    }
+}
+
 TEST(StickFilters, AModelsFileIsReadOnce) {
     const TemporaryFolder folder;
     const std::filesystem::path file = folder.path() / "mine.model";

@@ -26,7 +26,7 @@ TEST(LearnedInPlay, IsAModelThatSaysWhereItComesFrom) {
     const TemporaryFolder folder;
     const std::filesystem::path file = folder.path() / "mine.model";
     const std::vector<Experience> experiences = {ten_seconds(), ten_seconds()};
-    app::save_learned({file, "play", app::picture_specification("auto"), "osc:9000"}, experiences);
+    app::LearnedModel({file, "play", app::picture_specification("auto"), "osc:9000"}).save(experiences);
     const tracking::PathModel model = tracking::read_path_model(file),
                               base = tracking::read_path_model(*app::model_file("learned"));
     EXPECT_NE(model.layers[2].weights, base.layers[2].weights);
@@ -35,8 +35,8 @@ TEST(LearnedInPlay, IsAModelThatSaysWhereItComesFrom) {
     for (const auto& [key, value] : model.provenance) keys += key + " ";
     EXPECT_TRUE(keys.starts_with("trained_on made_by command begun_with base_trained_on")) << keys;
     // Learning goes on from it, and the head does not grow by what was behind.
-    app::save_learned({folder.path() / "next.model", "play", "arbitrated:model=" + file.string(), "osc:9000"},
-                      experiences);
+    app::LearnedModel({folder.path() / "next.model", "play", "arbitrated:model=" + file.string(), "osc:9000"})
+        .save(experiences);
     EXPECT_EQ(tracking::read_path_model(folder.path() / "next.model").provenance.size(), 8u);
 }
 
@@ -52,13 +52,49 @@ TEST(LearnedInPlay, CrossesBetweenProcessesToTheBit) {
     EXPECT_THROW((void)app::experiences_of(std::string(16, '\xff')), std::runtime_error);
 }
 
-TEST(LearnedInPlay, IsRefusedOfPredictorsThatLearnNothing) {
+TEST(LearnedInPlay, IsRefusedBeforeAnythingIsPlayed) {
     const TemporaryFolder folder;
+    const auto begin = [&](const std::string& predictor, const std::string& file, const std::string& input) {
+        const app::LearnedModel model(
+            {folder.path() / file, "play", app::picture_specification(predictor), input});
+    };
     for (const char* learns : {"auto", "online", "arbitrated", "auto:model=general"})
-        EXPECT_NO_THROW(app::check_learns(learns, folder.path() / "m")) << learns;
+        EXPECT_NO_THROW(begin(learns, "m", "osc:9000")) << learns;
     for (const char* not_so : {"thesis", "learned", "arbitrated:memory=0", "exec:cat"})
-        EXPECT_THROW(app::check_learns(not_so, folder.path() / "m"), app::BadInput) << not_so;
-    EXPECT_THROW(app::check_learns("auto", folder.path() / "none" / "m"), app::BadInput);
+        EXPECT_THROW(begin(not_so, "m", "osc:9000"), app::BadInput) << not_so;
+    EXPECT_THROW(begin("auto", "none/m", "osc:9000"), app::BadInput);
+    // A model's head has no place for such names.
+    EXPECT_THROW(begin("auto", "m", "two\nlines.csv"), app::BadInput);
+    EXPECT_THROW(begin("auto", "two\nlines", "osc:9000"), app::BadInput);
+}
+
+TEST(LearnedInPlay, IsNotSavedOnAnotherModelThanThatOfTheBeginning) {
+    const TemporaryFolder folder;
+    const std::filesystem::path base = folder.path() / "base.model", file = folder.path() / "m";
+    std::filesystem::copy(*app::model_file("learned"), base);
+    const app::LearnedModel model({file, "play", "arbitrated:model=" + base.string(), "osc:9000"});
+    folder.write("base.model", tracking::format_path_model(tracking::taught(tracking::read_path_model(base),
+                                                                            std::vector{ten_seconds()})));
+    std::vector<std::string> failures;
+    model.save_or_say(std::vector{ten_seconds()}, {}, failures);
+    ASSERT_EQ(failures.size(), 1u);
+    EXPECT_NE(failures[0].find("base.model than when the run began"), std::string::npos) << failures[0];
+    EXPECT_FALSE(std::filesystem::exists(file));
+}
+
+TEST(LearnedInPlay, IsSavedWithoutTheSticksThatSaidNothing) {
+    const TemporaryFolder folder;
+    const std::filesystem::path file = folder.path() / "m";
+    const app::LearnedModel model({file, "play", app::picture_specification("auto"), "osc:9000"});
+    std::vector<std::string> failures;
+    model.save_or_say({}, {"left", "right"}, failures);
+    EXPECT_EQ(failures.size(), 2u);
+    EXPECT_FALSE(std::filesystem::exists(file));
+    failures.clear();
+    model.save_or_say(std::vector{ten_seconds()}, {"right"}, failures);
+    ASSERT_EQ(failures.size(), 1u);
+    EXPECT_NE(failures[0].find("stick right"), std::string::npos) << failures[0];
+    EXPECT_TRUE(std::filesystem::exists(file));
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace tracking {
 /// epoch for live sources), `_ns` on CLOCK_MONOTONIC, which all processes of a machine share, 0 offline.
 struct StickState {
     /// To be counted up with each change of this layout: processes that share it check that they agree.
-    static constexpr std::uint64_t kVersion = 3;
+    static constexpr std::uint64_t kVersion = 4;
     static constexpr std::size_t kMostModels = 3;
 
     std::uint64_t samples =
@@ -28,6 +28,7 @@ struct StickState {
     std::int64_t filtered_ns = 0;  ///< when the filters were done, just before publication
     Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< measured, of the tracked body [m]
     Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+    std::uint64_t oriented = 0;  ///< 1: the sample says the orientation
     PosePath picture, sound;     ///< of the filters for pictures and for sound
     Motion confirming;           ///< of the filter that confirms strikes, where there is one
     std::uint64_t confirms = 0;  ///< 1: there is one
