@@ -49,13 +49,13 @@ public:
           count_((end - begin + length - 1) / length),
           time_(buffer(2 * length)),
           spectrum_(buffer(2 * bins())),
-          sum_(buffer(2 * bins())) {
+          sums_{buffer(2 * bins()), buffer(2 * bins())} {
         const std::scoped_lock lock(planner());
         auto* complex = reinterpret_cast<fftwf_complex*>(spectrum_.get());
         forward_ = fftwf_plan_dft_r2c_1d(static_cast<int>(2 * length), time_.get(), complex, FFTW_ESTIMATE);
-        backward_ =
-            fftwf_plan_dft_c2r_1d(static_cast<int>(2 * length), reinterpret_cast<fftwf_complex*>(sum_.get()),
-                                  time_.get(), FFTW_ESTIMATE);
+        backward_ = fftwf_plan_dft_c2r_1d(static_cast<int>(2 * length),
+                                          reinterpret_cast<fftwf_complex*>(sums_[0].get()), time_.get(),
+                                          FFTW_ESTIMATE);
         if (forward_ == nullptr || backward_ == nullptr) throw std::bad_alloc();
         for (std::size_t from = 0; from < 2; ++from) {
             history_[from].assign(count_ * 2 * bins(), 0);
@@ -73,6 +73,15 @@ public:
     Partitions(const Partitions&) = delete;
     Partitions& operator=(const Partitions&) = delete;
 
+    /// The part `share` of `shares` of what earlier blocks give in the next one: all of them, before convolve.
+    void prepare(std::size_t share, std::size_t shares) noexcept {
+        const std::size_t earlier = count_ - 1, begin = 1 + earlier * share / shares,
+                          end = 1 + earlier * (share + 1) / shares;
+        for (std::size_t to = 0; to < 2; ++to)
+            for (std::size_t from = 0; from < 2; ++from)
+                for (std::size_t i = begin; i < end; ++i) add(from, to, i, (newest_ + i - 1) % count_);
+    }
+
     /// `in`, `out`: length samples of each side; out is overwritten.
     void convolve(const std::array<std::vector<float>, 2>& in,
                   std::array<std::vector<float>, 2>& out) noexcept {
@@ -85,18 +94,23 @@ public:
             std::copy_n(spectrum_.get(), 2 * bins(), &history_[from][newest_ * 2 * bins()]);
         }
         for (std::size_t to = 0; to < 2; ++to) {
-            std::fill_n(sum_.get(), 2 * bins(), 0.0F);
-            for (std::size_t from = 0; from < 2; ++from)
-                for (std::size_t i = 0; i < count_ && !filters_[from][to].empty(); ++i)
-                    add_product(sum_.get(), &history_[from][(newest_ + i) % count_ * 2 * bins()],
-                                &filters_[from][to][i * 2 * bins()], bins());
-            fftwf_execute(backward_);
+            for (std::size_t from = 0; from < 2; ++from) add(from, to, 0, newest_);
+            auto* sum = reinterpret_cast<fftwf_complex*>(sums_[to].get());
+            fftwf_execute_dft_c2r(backward_, sum, time_.get());
             std::copy_n(time_.get() + length_, length_, out[to].begin());
+            std::fill_n(sums_[to].get(), 2 * bins(), 0.0F);
         }
     }
 
 private:
     [[nodiscard]] std::size_t bins() const { return length_ + 1; }
+
+    /// What the block at `block` of the history gives by the filter's partition i.
+    void add(std::size_t from, std::size_t to, std::size_t i, std::size_t block) noexcept {
+        if (filters_[from][to].empty()) return;
+        add_product(sums_[to].get(), &history_[from][block * 2 * bins()], &filters_[from][to][i * 2 * bins()],
+                    bins());
+    }
 
     /// Spectra of a response's partitions, with the transforms' scale; none for silence.
     void transform(std::span<const float> response, double gain, std::vector<float>& spectra) {
@@ -113,7 +127,8 @@ private:
     }
 
     std::size_t length_, count_;
-    Buffer time_, spectrum_, sum_;
+    Buffer time_, spectrum_;
+    std::array<Buffer, 2> sums_;  // of products, by the side that they are heard on
     fftwf_plan forward_ = nullptr, backward_ = nullptr;
     std::array<std::array<std::vector<float>, 2>, 2> filters_;  // spectra, a partition after the other
     std::array<std::vector<float>, 2> history_;  // spectra of what came, a ring from newest_ on
@@ -137,7 +152,9 @@ void Convolution::add_answer(std::span<const float> input, std::span<float> outp
     for (std::size_t side = 0; side < 2; ++side)
         for (std::size_t n = 0; n < block_; ++n)
             gathered_[side][at_ + n] = in_[side][n] = input[2 * n + side];
+    first_->prepare(0, 1);
     first_->convolve(in_, out_);
+    if (rest_) rest_->prepare(at_ / block_, kLong / block_);
     for (std::size_t side = 0; side < 2; ++side)
         for (std::size_t n = 0; n < block_; ++n)
             output[2 * n + side] += out_[side][n] + waiting_[side][at_ + n];

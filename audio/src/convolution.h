@@ -12,7 +12,8 @@ namespace audio {
 /// A recorded room's answer, sample by sample without delay: convolution by overlap-save in partitions of equal length
 /// (Gardner, Efficient convolution without input-output delay, JAES 43, 1995). The first kLong samples of the response are
 /// convolved in partitions of a block, the rest in partitions of kLong, whose sum is ready when it is due: what came
-/// until a multiple of kLong is heard from there on. One block in kLong / block costs more than the others.
+/// until a multiple of kLong is heard from there on. Products of spectra that came before are spread over the blocks, so that
+/// the block which ends a kLong has no more to do than the newest's.
 ///
 /// Transforms by FFTW, planned by estimate, so that a plan depends on nothing but its length. Memory is taken at
 /// construction only; one thread at a time.

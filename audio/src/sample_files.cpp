@@ -150,14 +150,14 @@ WrittenRegions written_regions(const fs::path& file) {
 }
 
 /// Everything that makes two waves differ.
-using WaveKey = std::tuple<const Recording*, int, int, std::array<double, 14>>;
+using WaveKey = std::tuple<const Recording*, int, int, std::array<double, 12>>;
 WaveKey wave_key(const WrittenRegion& r, const Recording& recording, int channel, int key) {
     return {&recording,
             channel,
             static_cast<int>(r.loop_mode),
             {static_cast<double>(r.offset), static_cast<double>(r.end), static_cast<double>(r.loop_start),
              static_cast<double>(r.loop_end), tuning_cents(r, key), r.delay, r.ampeg_delay, r.ampeg_attack,
-             r.ampeg_hold, r.ampeg_decay, r.ampeg_sustain, r.ampeg_release, 0, 0}};
+             r.ampeg_hold, r.ampeg_decay, r.ampeg_sustain, r.ampeg_release}};
 }
 
 }  // namespace
@@ -178,8 +178,9 @@ public:
                                                    int channel, int key) {
         std::shared_ptr<const std::vector<float>>& known = waves_[wave_key(r, recording, channel, key)];
         if (known) return known;
-        known = std::make_shared<const std::vector<float>>(make_wave(r, recording, channel, key));
-        if ((made_ += known->size()) > kMostSampleFrames)
+        Wave made = make_wave(r, recording, channel, key);
+        known = std::make_shared<const std::vector<float>>(std::move(made.samples));
+        if ((made_ += std::max(made.cut_frames, known->size())) > kMostSampleFrames)
             fail_at(r.place,
                     "more than " + std::to_string(kMostSampleFrames) + " frames of samples in the kit",
                     "less sound");
@@ -364,6 +365,11 @@ std::shared_ptr<const ImpulseResponse> read_impulse_response(const fs::path& fil
     for (const auto& [from, to] : {std::pair(0, 1), std::pair(1, 0)})
         from_to[from][to] = channels == 4 ? channel(static_cast<std::size_t>(2 * from + to))
                                           : std::vector<float>(response->size(), 0.0F);
+    double energy = 0;
+    for (const auto& paths : from_to)
+        for (const std::vector<float>& path : paths)
+            for (const float x : path) energy += static_cast<double>(x) * x;
+    if (energy < 1e-12) fail_at(place, "no sound at 48 kHz", "an impulse response");
     return response;
 }
 

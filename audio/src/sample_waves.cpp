@@ -27,7 +27,7 @@ std::vector<float> resampled(const std::vector<float>& samples, double ratio, co
 
 namespace {
 
-constexpr double kMostLoopedFrames = 6e7;  // before tuning
+constexpr double kMostLoopedFrames = 1.2e7;  // before tuning
 
 /// The region's envelope n samples after its start, the delay behind it: attack linear, decay linear in dB to the
 /// sustain (which counts as -80 dB where it is 0), and once the key is let
@@ -122,7 +122,7 @@ double tuning_cents(const WrittenRegion& r, int key) {
     return r.tune + 100 * r.transpose + r.pitch_keytrack * (key - r.pitch_keycenter);
 }
 
-std::vector<float> make_wave(const WrittenRegion& r, const Recording& recording, int channel, int key) {
+Wave make_wave(const WrittenRegion& r, const Recording& recording, int channel, int key) {
     const double cents = tuning_cents(r, key);
     const double ratio = kSampleRate / recording.rate_hz / std::exp2(cents / 1200);
     if (!(ratio > 1.0 / 250 && ratio < 250))
@@ -136,7 +136,7 @@ std::vector<float> make_wave(const WrittenRegion& r, const Recording& recording,
     const auto delay = static_cast<std::size_t>(std::lround((r.delay + r.ampeg_delay) * kSampleRate));
     wave.insert(wave.begin(), delay, 0.0F);
     wave.resize(wave.size() + kWaveGuard);
-    return wave;
+    return {std::move(wave), sound.samples.size()};
 }
 
 }  // namespace audio

@@ -17,9 +17,13 @@ inline constexpr double kLongestLoopS = 60;    ///< that a looped sample sounds 
 /// How much higher a region sounds at a key than it was recorded [cents].
 [[nodiscard]] double tuning_cents(const WrittenRegion& r, int key);
 
+struct Wave {
+    std::vector<float> samples;
+    std::size_t cut_frames = 0;  ///< of the recording, loops as often as heard: what was resampled
+};
+
 /// What is heard of one channel at a key, at 48 kHz: cut, looped, tuned, shaped, then kWaveGuard of silence. Throws
 /// SampleError.
-[[nodiscard]] std::vector<float> make_wave(const WrittenRegion& r, const Recording& recording, int channel,
-                                           int key);
+[[nodiscard]] Wave make_wave(const WrittenRegion& r, const Recording& recording, int channel, int key);
 
 }  // namespace audio

@@ -11,6 +11,7 @@
 #include "audio/samples.h"
 #include "rendering.h"
 #include "room.h"
+#include "sample_folder.h"
 
 namespace {
 
@@ -88,10 +89,8 @@ TEST(Convolution, ARecordedRoomHasItsLevelAndLiveSoundsAsOffline) {
 
 class ImpulseFile : public testing::Test {
 protected:
-    void SetUp() override { std::filesystem::create_directories(folder_); }
-    void TearDown() override { std::filesystem::remove_all(folder_); }
     std::filesystem::path write(int channels, int rate, std::size_t frames, float value) {
-        const auto file = folder_ / "ir.wav";
+        const auto file = folder_.path() / "ir.wav";
         SF_INFO info{};
         info.samplerate = rate, info.channels = channels, info.format = SF_FORMAT_WAV | SF_FORMAT_FLOAT;
         SNDFILE* sound = sf_open(file.c_str(), SFM_WRITE, &info);
@@ -102,7 +101,7 @@ protected:
         sf_close(sound);
         return file;
     }
-    std::filesystem::path folder_ = std::filesystem::temp_directory_path() / "musicworld_impulse_test";
+    SampleFolder folder_;
 };
 
 TEST_F(ImpulseFile, OneTwoAndFourChannelsAreItsPathsAndOtherRatesAreResampled) {
@@ -134,9 +133,10 @@ TEST_F(ImpulseFile, WhatIsNoImpulseResponseIsRefusedWithItsPlace) {
     refused(write(3, 48000, 100, 0.5F), "3 channels");
     refused(write(2, 48000, 100, 0), "silence");
     refused(write(1, 8000, 8000 * 21, 0.5F), "21");
-    refused(folder_ / "none.wav", "sample");
-    std::ofstream(folder_ / "text.wav") << "no sound";
-    refused(folder_ / "text.wav", "\"");
+    refused(write(1, 96000, 1, 0.5F), "no sound at 48 kHz");
+    refused(folder_.path() / "none.wav", "sample");
+    std::ofstream(folder_.path() / "text.wav") << "no sound";
+    refused(folder_.path() / "text.wav", "\"");
     auto file = write(2, 48000, 10000, 0.5F);
     std::filesystem::resize_file(file, 30);
     refused(file, "\"");

@@ -1,10 +1,11 @@
 #pragma once
 #include <gtest/gtest.h>
 #include <sndfile.h>
-#include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -13,9 +14,10 @@
 /// A folder of sounds for as long as a test needs it.
 class SampleFolder {
 public:
-    SampleFolder() : path_(testing::TempDir() + "musicworld-samples-" + std::to_string(getpid())) {
-        std::filesystem::remove_all(path_);
-        std::filesystem::create_directories(path_);
+    SampleFolder() {
+        std::string name = testing::TempDir() + "musicworld-samples-XXXXXX";
+        if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
+        path_ = name;
     }
     ~SampleFolder() {
         std::error_code ignored;

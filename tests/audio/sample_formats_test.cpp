@@ -6,8 +6,10 @@
 #include "audio/own_orchestra.h"
 #include "audio/samples.h"
 #include "damaged_bytes.h"
+#include "region_text.h"
 #include "rendering.h"
 #include "sample_folder.h"
+#include "sample_waves.h"
 #include "written_sound_font.h"
 
 namespace {
@@ -146,6 +148,15 @@ TEST(DamagedSamples, LimitsAreKept) {
     EXPECT_NE(fault_of(folder / "long.wav").find("expected 1 to 300 s"), std::string::npos);
     folder.sound("loud.wav", {0.1F, std::nanf("")});
     EXPECT_NE(fault_of(folder / "loud.wav").find("samples that are no numbers"), std::string::npos);
+    // What counts of a tuned sample is its length before tuning, which takes the time.
+    audio::Recording recording;
+    recording.rate_hz = 48000;
+    recording.channels = {std::vector<float>(48000, 0.1F)};
+    audio::WrittenRegion region;
+    region.tune = 9500, region.pitch_keytrack = 0;
+    const audio::Wave wave = audio::make_wave(region, recording, 0, 38);
+    EXPECT_EQ(wave.cut_frames, 48000U);
+    EXPECT_LT(wave.samples.size(), 1000U);
     std::string regions = "<global> key=38 sample=a.wav\n";
     for (int i = 0; i < 4097; ++i) regions += "<region>\n";
     folder.sound("a.wav", {0.1F});
