@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kDefaultQuarterUs = 500000, kSecondUs = 1e6;
 constexpr int kMeta = 0xFF, kTempo = 0x51, kEndOfTrack = 0x2F, kExclusive = 0xF0, kEscape = 0xF7;
-constexpr std::size_t kDeltaBytes = 4;
+constexpr std::size_t kDeltaBytes = 4, kMostEvents = 1'000'000;
 
 /// The bytes from a place on, with that place for messages.
 class MidiBytes {
@@ -88,10 +88,21 @@ MidiMessage channel_message(MidiBytes& in, int status, int first) {
             static_cast<std::uint8_t>(data2)};
 }
 
+/// Whether anybody asks for such a message.
+bool is_kept(const MidiMessage& message) {
+    return message.kind() == kMidiNoteOn || message.kind() == kMidiAftertouch ||
+           message.kind() == kMidiController;
+}
+
 /// One track, whose end is the reader's.
 void read_track(MidiBytes& in, std::vector<FileEvent>& events) {
     std::int64_t tick = 0;
     int running = 0;
+    const auto keep = [&](const FileEvent& event) {
+        if (events.size() == kMostEvents)
+            in.fail("more than " + std::to_string(kMostEvents) + " notes, controllers and tempos", "fewer");
+        events.push_back(event);
+    };
     while (!in.ended()) {
         tick += in.quantity("a delta time");
         const int byte = in.byte("an event");
@@ -102,7 +113,7 @@ void read_track(MidiBytes& in, std::vector<FileEvent>& events) {
             if (type == kTempo && length == 3) {
                 const std::uint32_t quarter_us = in.number(3, "a tempo");
                 if (quarter_us == 0) in.fail("a tempo of 0", "microseconds a quarter");
-                events.push_back({tick, {}, static_cast<double>(quarter_us)});
+                keep({tick, {}, static_cast<double>(quarter_us)});
             } else {
                 in.skip(length, "a meta event");
             }
@@ -114,7 +125,8 @@ void read_track(MidiBytes& in, std::vector<FileEvent>& events) {
         } else {
             if (byte >= 0x80) running = byte;
             if (running == 0) in.fail("data byte " + std::to_string(byte), "a status byte first");
-            events.push_back({tick, channel_message(in, running, byte < 0x80 ? byte : -1)});
+            const MidiMessage message = channel_message(in, running, byte < 0x80 ? byte : -1);
+            if (is_kept(message)) keep({tick, message});
         }
     }
 }
