@@ -32,7 +32,8 @@ void AlsaOutput::Close::operator()(snd_pcm_t* pcm) const noexcept {
     snd_pcm_close(pcm);
 }
 
-AlsaOutput::AlsaOutput(const std::string& device, double output_lead_s) : device_(device) {
+AlsaOutput::AlsaOutput(const std::string& device, double output_lead_s, std::function<void()> on_thread_start)
+    : device_(device), on_thread_start_(std::move(on_thread_start)) {
     static std::once_flag quiet;
     std::call_once(quiet, [] { snd_lib_error_set_handler(&be_quiet); });
     snd_pcm_t* pcm = nullptr;
@@ -113,6 +114,7 @@ DeviceCounts AlsaOutput::counts() const noexcept {
 }
 
 void AlsaOutput::run(const std::stop_token& stop) noexcept {
+    if (on_thread_start_) on_thread_start_();
     given_since_ns_ = monotonic_ns();
     while (!stop.stop_requested())
         if (wait_for_room()) write_period();
@@ -190,9 +192,9 @@ void AlsaOutput::recover(int error) noexcept {
     if (sounding_.load(std::memory_order_relaxed)) underruns_.fetch_add(1, std::memory_order_relaxed);
     continuous_ = false;
     given_since_ns_ = monotonic_ns(), given_ = 0;
-    if (snd_pcm_recover(pcm_.get(), error, 1) >= 0) return;
-    lost_.store(true, std::memory_order_relaxed);
-    sleep_until_ns(monotonic_ns() + kAfterLossNs);
+    const bool lost = snd_pcm_recover(pcm_.get(), error, 1) < 0;
+    lost_.store(lost, std::memory_order_relaxed);
+    if (lost) sleep_until_ns(monotonic_ns() + kAfterLossNs);
 }
 
 }  // namespace audio

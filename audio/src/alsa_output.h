@@ -1,6 +1,7 @@
 #pragma once
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -22,8 +23,9 @@ namespace audio {
 /// Threads: the caller's; one of its own, which writes and reads the ring.
 class AlsaOutput : public SoundDevice {
 public:
-    /// Throws std::runtime_error: no such device, in use, not 48 kHz stereo.
-    AlsaOutput(const std::string& device, double output_lead_s);
+    /// on_thread_start is run first on the device's thread (its priority); it must not throw. Throws std::runtime_error: no
+    /// such device, in use, not 48 kHz stereo.
+    AlsaOutput(const std::string& device, double output_lead_s, std::function<void()> on_thread_start = {});
     ~AlsaOutput() override;
 
     void start(std::span<const float> ring, std::int64_t epoch_ns) noexcept override;
@@ -51,6 +53,7 @@ private:
     void put(std::int32_t frame, float left, float right) noexcept;
 
     std::string device_;
+    std::function<void()> on_thread_start_;
     std::unique_ptr<snd_pcm_t, Close> pcm_;
     Format format_ = Format::real;
     std::int32_t period_ = 128, buffer_ = 512;

@@ -68,7 +68,8 @@ LiveThread::LiveThread(const std::filesystem::path& orchestra, const std::vector
       notes_(kNotesAhead),
       taken_(reserved<TakenNote>(kNotesAhead)) {
     if (options.output == LiveOptions::Output::alsa)
-        devices_.push_back(std::make_unique<AlsaOutput>(options.alsa_device, options.output_lead_s));
+        devices_.push_back(std::make_unique<AlsaOutput>(options.alsa_device, options.output_lead_s,
+                                                        options.on_thread_start));
     if (std::unique_ptr<JackOutput> jack = open_jack(options)) {
         jack_ = jack.get();
         devices_.push_back(std::move(jack));

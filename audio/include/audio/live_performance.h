@@ -23,7 +23,8 @@ struct LiveOptions {
     std::string midi_port{};     ///< name of a MIDI output port of ours in JACK; empty: none
     std::string midi_connect{};  ///< connect that port to this one, when it is there; empty: leave it open
     std::string midi_input{};    ///< a JACK MIDI port to listen to; without a colon a port of ours, left open
-    std::function<void()> on_thread_start{};  ///< run first on the audio thread (its priority)
+    std::function<void()>
+        on_thread_start{};  ///< run first on the audio thread and on that of ALSA (priority)
     /// Gets the sound as it is made, interleaved stereo, on a thread of its own, which may wait for a disk: 20 s
     /// of sound have room. What it throws, finish() throws. Empty: nobody wants it.
     std::function<void(std::span<const float>)> take_sound{};
