@@ -248,18 +248,33 @@ void JackOutput::play(const Cycle& cycle) noexcept {
     in_cycle_.store(false, std::memory_order_seq_cst);
 }
 
-/// Messages of three bytes; others (clocks, system exclusive) are left out.
+/// Messages of three bytes, a status and data; others (clocks, system exclusive, what is damaged) are left out. Until
+/// somebody takes them the newest are held, as what matters is where a pedal is.
 void JackOutput::receive(const Cycle& cycle) noexcept {
     void* buffer = jack_port_get_buffer(midi_input_, static_cast<jack_nframes_t>(cycle.frames));
+    const bool taken = taken_.load(std::memory_order_relaxed);
+    if (taken) release_early();
     const std::uint32_t count = jack_midi_get_event_count(buffer);
     for (std::uint32_t i = 0; i < count; ++i) {
         jack_midi_event_t event{};
-        if (jack_midi_event_get(&event, buffer, i) != 0 || event.size != 3) continue;
+        if (jack_midi_event_get(&event, buffer, i) != 0) continue;
+        if (!is_message({event.buffer, event.size})) continue;
         const std::int64_t at_ns = cycle.begin_ns + samples_ns(event.time);
         const MidiMessage message{static_cast<double>(at_ns) * 1e-9, event.buffer[0], event.buffer[1],
                                   event.buffer[2]};
-        if (!received_.try_push(message)) lost_strokes_.fetch_add(1, std::memory_order_relaxed);
+        if (taken) {
+            (void)received_.try_push(message);
+        } else {
+            early_[early_count_++ % early_.size()] = message;
+        }
     }
+}
+
+void JackOutput::release_early() noexcept {
+    const std::size_t size = early_.size();
+    for (std::size_t i = early_count_ - std::min(early_count_, size); i < early_count_; ++i)
+        (void)received_.try_push(early_[i % size]);
+    early_count_ = 0;
 }
 
 void JackOutput::send_strokes(const Cycle& cycle) noexcept {

@@ -1,6 +1,7 @@
 #pragma once
 #include <jack/jack.h>
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -43,8 +44,12 @@ public:
     /// Waits until every note-off is sent (0.1 s after the last stroke). JACK's thread may still be in a cycle, and read the
     /// ring until this is destroyed.
     void stop() noexcept override;
-    /// A MIDI message that came, t_s on CLOCK_MONOTONIC; false: none. One thread at a time.
-    [[nodiscard]] bool take(MidiMessage& message) noexcept { return received_.try_pop(message); }
+    /// A MIDI message that came, t_s on CLOCK_MONOTONIC; false: none. Of those before the first call the newest 1024 come, from
+    /// the next cycle on; later what finds 1024 waiting is dropped. One thread at a time.
+    [[nodiscard]] bool take(MidiMessage& message) noexcept {
+        taken_.store(true, std::memory_order_relaxed);
+        return received_.try_pop(message);
+    }
 
     [[nodiscard]] bool has_midi() const noexcept { return midi_ != nullptr; }
     [[nodiscard]] std::string description() const override;
@@ -75,6 +80,7 @@ private:
     void play(const Cycle& cycle) noexcept;
     void leave_ring() noexcept;
     void receive(const Cycle& cycle) noexcept;
+    void release_early() noexcept;
     void send_strokes(const Cycle& cycle) noexcept;
 
     struct Close {
@@ -90,7 +96,7 @@ private:
     CommandQueue<MidiMessage> received_{MidiEvents::kCapacity};
     DeviceRing ring_;  // with epoch_ns_, written before sounding_
     std::int64_t epoch_ns_ = 0;
-    std::atomic<bool> sounding_{false}, in_cycle_{false}, ended_{false};
+    std::atomic<bool> sounding_{false}, in_cycle_{false}, ended_{false}, taken_{false};
     std::atomic<std::uint64_t> underruns_{0}, corrections_{0}, late_strokes_{0}, lost_strokes_{0};
 
     // The audio thread's.
@@ -102,6 +108,8 @@ private:
     jack_nframes_t expected_frame_ = 0;
     bool playing_ = false;
     MidiEvents events_;
+    std::array<MidiMessage, MidiEvents::kCapacity> early_{};  // a ring of what came before it was asked for
+    std::size_t early_count_ = 0;
 
     std::unique_ptr<jack_client_t, Close> client_;  // last: it is closed first
 };

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace audio {
 
@@ -18,6 +19,11 @@ struct MidiEvent {
     std::array<std::uint8_t, 3> bytes{};
     [[nodiscard]] bool is_note_on() const noexcept { return bytes[0] == 0x99; }
 };
+
+/// Whether these are a message's bytes: a status and two of data, which are below 128.
+[[nodiscard]] inline bool is_message(std::span<const std::uint8_t> bytes) noexcept {
+    return bytes.size() == 3 && bytes[0] >= 0x80 && bytes[1] < 0x80 && bytes[2] < 0x80;
+}
 
 /// Events to come, in order of time: a note-on each stroke and its note-off 0.1 s later, or just before the
 /// key's next note-on where that is sooner. Never allocates.

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "device_position.h"
 #include "midi_events.h"
@@ -80,6 +81,17 @@ TEST(MidiEvents, RollOnOneKeyEndsEachNoteBeforeTheNext) {
     for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(all[i].is_note_on(), i % 2 == 0) << i;
     EXPECT_EQ(all[1].due_ns, 100'000'000);
     EXPECT_EQ(all[5].due_ns, 250'000'000);
+}
+
+TEST(MidiEvents, AMessageIsAStatusAndTwoBytesOfData) {
+    const auto is = [](std::initializer_list<std::uint8_t> bytes) {
+        return audio::is_message(std::vector<std::uint8_t>(bytes));
+    };
+    EXPECT_TRUE(is({0x99, 38, 127}));
+    EXPECT_FALSE(is({0xB0, 4, 255}));
+    EXPECT_FALSE(is({0xB0, 200, 0}));
+    EXPECT_FALSE(is({0x10, 4, 0}));
+    EXPECT_FALSE(is({0xF8}));
 }
 
 TEST(MidiEvents, BeyondTheRoomAreRefused) {
