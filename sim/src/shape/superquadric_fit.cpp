@@ -95,6 +95,9 @@ SuperquadricFit fit_superquadric(std::span<const Eigen::Vector3d> points) {
         (void)search.minimize(x);
         if (x.allFinite() && search.fnorm < least) least = search.fnorm, best = x;
     }
+    if (best.size() == 0)
+        throw std::invalid_argument(
+            "fit_superquadric: found points that no search fits, expected a body's surface");
     const FittedShape fitted(best);
     SuperquadricFit fit;
     fit.shape = fitted.shape;
