@@ -32,15 +32,20 @@ std::string in_toml(const std::string& text) {
     return out + "\"";
 }
 
+/// A file's whole path as it is named: what links stand for is copied under their own names.
+fs::path whole(const fs::path& file) {
+    return fs::absolute(file).lexically_normal();
+}
+
 /// Whether a file lies in a folder.
 bool lies_in(const fs::path& file, const fs::path& folder) {
-    const fs::path relative = fs::weakly_canonical(file).lexically_relative(fs::weakly_canonical(folder));
+    const fs::path relative = whole(file).lexically_relative(whole(folder));
     return !relative.empty() && *relative.begin() != "..";
 }
 
 /// The folder that holds all of these files.
 fs::path common_folder(const std::vector<fs::path>& files) {
-    fs::path common = fs::weakly_canonical(files.front()).parent_path();
+    fs::path common = whole(files.front()).parent_path();
     for (const fs::path& file : files)
         while (!lies_in(file, common)) common = common.parent_path();
     return common;
@@ -117,8 +122,7 @@ private:
             return;
         }
         const fs::path from = common_folder(files), to = place_for(files.front().stem());
-        for (const fs::path& file : files)
-            copies_[file] = to / fs::weakly_canonical(file).lexically_relative(from);
+        for (const fs::path& file : files) copies_[file] = to / whole(file).lexically_relative(from);
     }
     /// The file that a name in a kit's file stands for; empty: a bundled mesh, or none.
     [[nodiscard]] fs::path meant(const fs::path& file, const NamedFile& named) const {

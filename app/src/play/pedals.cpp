@@ -13,8 +13,8 @@
 namespace app {
 namespace {
 
-constexpr double kClosed = 0.1, kStepS = 0.015,
-                 kTogetherS = 0.1;  // moves of one fall follow each other that soon
+constexpr double kClosed = 0.1, kOpen = 0.15;  // a foot that trembles between them opens and closes nothing
+constexpr double kStepS = 0.015, kTogetherS = 0.1;  // moves of one fall follow each other that soon
 constexpr double kOneSoundS = 0.05;
 constexpr double kTravelM = 0.03, kSlowestMps = 0.2, kFastestMps = 4;
 constexpr double kChokes = 0.5;  // of a hand's value, from 0 to 1
@@ -187,6 +187,7 @@ Pedals::Pedals(const Kit& kit, double t0_s) : t0_s_(t0_s) {
         Foot& foot = feet_.emplace_back();
         foot.pedal = instrument.pedal;
         foot.rest = foot.place = instrument.pedal.kind == Pedal::Kind::damper ? 1 : 0;
+        foot.closed = foot.rest <= kClosed;
         foot.stroke.voice = i;
         foot.stroke.midi_note = instrument.zones.front().midi_note;
     }
@@ -211,6 +212,10 @@ void Pedals::sound(Foot& foot, const PedalMove& move, std::int64_t sample, doubl
 }
 
 void Pedals::end(Foot& foot, const PedalMove& move, std::int64_t sample) {
+    // What tells of a closing a second time must not end the sound of the first.
+    if (move.kind != PedalMove::Kind::choke && foot.pedal.kind == Pedal::Kind::hi_hat &&
+        move.t_s - foot.sounded_s < kOneSoundS)
+        return;
     if (std::exchange(foot.ended, sample) == sample) return;
     audio::Note note = foot.stroke;
     note.onset_sample = sample;
@@ -218,6 +223,12 @@ void Pedals::end(Foot& foot, const PedalMove& move, std::int64_t sample) {
     note.midi_velocity = 1;
     note.choke = true;
     add(note, move);
+}
+
+/// A move that came late was put behind what a lap's end sets later.
+void Pedals::step(Foot& foot, std::int64_t sample) {
+    const auto later = std::ranges::upper_bound(foot.steps, sample, {}, &Step::sample);
+    foot.steps.insert(later, {sample, foot.place});
 }
 
 void Pedals::move_to(Foot& foot, const PedalMove& move, std::int64_t sample) {
@@ -229,8 +240,9 @@ void Pedals::move_to(Foot& foot, const PedalMove& move, std::int64_t sample) {
         foot.fell_from = before;
     }
     foot.last_s = move.t_s;
-    foot.steps.push_back({sample, foot.place});
-    if (before <= kClosed || foot.place > kClosed || sample < 0) return;
+    step(foot, sample);
+    const bool was_closed = std::exchange(foot.closed, foot.place <= (foot.closed ? kOpen : kClosed));
+    if (was_closed || !foot.closed || sample < 0) return;
     end(foot, move, sample);
     const double fall_s = std::max(move.t_s - foot.fall_began_s, kStepS / 3);
     const double speed = std::min(kTravelM * (foot.fell_from - foot.place) / fall_s, kFastestMps);
@@ -266,8 +278,14 @@ void Pedals::rest(std::int64_t sample) {
         if (foot.place == foot.rest) continue;
         foot.place = foot.rest;
         foot.falling = false;
-        foot.steps.push_back({sample, foot.rest});
+        foot.closed = foot.rest <= kClosed;
+        step(foot, sample);
     }
+}
+
+void Pedals::end_at(std::int64_t sample) {
+    for (Foot& foot : feet_)
+        foot.steps.erase(std::ranges::upper_bound(foot.steps, sample, {}, &Step::sample), foot.steps.end());
 }
 
 void Pedals::put_on(audio::Note& note) const {

@@ -69,6 +69,8 @@ public:
     void take(const PedalMove& move, std::int64_t earliest = 0);
     /// All pedals go back to rest at that sample, without a sound.
     void rest(std::int64_t sample);
+    /// The run ends at that sample: what the pedals did later is forgotten.
+    void end_at(std::int64_t sample);
     /// Gives the stroke of a stick the pedal's place, and the MIDI note that goes with it.
     void put_on(audio::Note& note) const;
 
@@ -86,12 +88,13 @@ private:
         Pedal pedal;
         double rest = 0, place = 0;
         double last_s = 0, fall_began_s = 0, fell_from = 0;
-        bool falling = false;
-        double sounded_s = -1e9;  ///< it closed last
-        std::int64_t ended = -1;  ///< sample at which it ended last
-        std::vector<Step> steps{};
-        audio::Note stroke{};  ///< what a note of its own begins as
+        bool falling = false, closed = false;
+        double sounded_s = -1e9;    ///< it closed last
+        std::int64_t ended = -1;    ///< sample at which it ended last
+        std::vector<Step> steps{};  ///< by sample
+        audio::Note stroke{};       ///< what a note of its own begins as
     };
+    static void step(Foot& foot, std::int64_t sample);
     void move_to(Foot& foot, const PedalMove& move, std::int64_t sample);
     void sound(Foot& foot, const PedalMove& move, std::int64_t sample, double speed_mps);
     void end(Foot& foot, const PedalMove& move, std::int64_t sample);

@@ -75,17 +75,20 @@ double RealtimeRun::fixed_s() const {
     return t0_s_ + static_cast<double>(sample) / audio::kSampleRate;
 }
 
+void RealtimeRun::end_lap() {
+    pipeline_->finish();
+    laps_.push_back({lap_, pipeline_->strikes(), first_id_});
+    first_id_ += pipeline_->strikes().size();
+}
+
 void RealtimeRun::begin_lap(std::uint64_t lap) {
-    if (pipeline_) {
-        pipeline_->finish();
-        laps_.push_back({lap_, pipeline_->strikes(), first_id_});
-        first_id_ += pipeline_->strikes().size();
-    }
+    if (pipeline_) end_lap();
     lap_ = lap;
     newest_s_ = -std::numeric_limits<double>::infinity();
     for (Stick& stick : sticks_) stick.forget();
     next_move_ = 0;
-    pedals_.rest(static_cast<std::int64_t>(lap) * session_.period_samples);
+    // A schedule begins anew; a foot that MIDI tells of stays where it is.
+    if (!session_.moves.empty()) pedals_.rest(static_cast<std::int64_t>(lap) * session_.period_samples);
     pipeline_ = std::make_unique<StrikePipeline>(
         session_.kit, options_.play, t0_s_, session_.stick.radius_m, sticks_, *session_.simulation,
         [this](const audio::Note& note, bool scheduled) { send(note, scheduled); }, session_.contacts);
@@ -450,9 +453,10 @@ void RealtimeRun::run(const Warn& warn) {
     }
     take_states();
     end_s_ = std::min(end_s_, to_s(now_ns()));
-    begin_lap(lap_ + 1);  // what is pending is played
+    end_lap();  // what is pending is played
+    pedals_.end_at(std::llround(end_s_ * audio::kSampleRate));
     result_.seconds = end_s_;
-    result_.laps = lap_;  // also those that no sample came from
+    result_.laps = lap_ + 1;  // also those that no sample came from
     bar.clear();
     leave_thread_priority();
 }

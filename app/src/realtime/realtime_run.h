@@ -57,6 +57,7 @@ private:
     void learn_geometry();
     void take(const std::vector<std::uint32_t>& moved, std::int64_t taken_ns, std::int64_t query_ns);
     void begin_lap(std::uint64_t lap);
+    void end_lap();
     void send(audio::Note note, bool scheduled);
     void take_pedals();
     /// When the next frame is to be begun: a render lead before it is shown, or up to 1 ms later while a

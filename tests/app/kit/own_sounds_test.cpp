@@ -212,6 +212,20 @@ TEST(KitCopy, ACopyNeedsNothingOfTheOriginalAndKeepsItsText) {
               "sound = { samples = \"mine-files/set/inner/set.sfz\", gain_db = -1 }\n");
 }
 
+TEST(KitCopy, SamplesThatAreLinksAreCopiedUnderTheirNames) {
+    const KitFolder folder;
+    std::filesystem::create_directories(folder / "set");
+    std::filesystem::create_symlink("../hit.wav", folder / "set/a.wav");
+    folder.text("set/set.sfz", "<region> sample=a.wav key=38\n");
+    const Kit kit =
+        folder.kit(kInclude + "[[instrument]]\nname = \"snare\"\nsound = { samples = \"set/set.sfz\" }\n");
+    std::filesystem::create_directories(folder / "there");
+    copy_kit(kit.file, folder / "there/mine.toml");
+    for (const char* name : {"kit.toml", "hit.wav", "inner", "set"})
+        std::filesystem::remove_all(folder / name);
+    EXPECT_TRUE(same_waves(read_kit(folder / "there/mine.toml").instruments[0], kit.instruments[0]));
+}
+
 TEST(KitCopy, ABundledKitAndWhatItIncludesBecomeOnesOwn) {
     const KitFolder folder;
     copy_kit(std::filesystem::path(MUSICWORLD_SOURCE_DIR) / "assets/kits/rock.toml", folder / "mine.toml");

@@ -64,6 +64,27 @@ TEST(Pedals, ASlowFallMakesASofterSoundAndAVerySlowOneNone) {
     EXPECT_EQ(chick(0.5), 0);
 }
 
+TEST(Pedals, AFootThatTremblesOnTheClosedHiHatClosesItOnce) {
+    std::string rows = "1,hi-hat,1\n2,hi-hat,0\n";
+    for (int i = 0; i < 20; ++i) rows += fmt::format("{},hi-hat,{}\n", 3 + 0.1 * i, i % 2 ? 0.09 : 0.12);
+    EXPECT_EQ(moved(rows).notes().size(), 2U);
+    EXPECT_EQ(moved(rows + "6,hi-hat,0.2\n7,hi-hat,0.05\n").notes().size(), 4U);
+}
+
+TEST(Pedals, ALapsEndAndTheRunsKeepStepsByTime) {
+    Pedals pedals(drums(), 0);
+    using Kind = PedalMove::Kind;
+    pedals.take({Kind::place, 1, instrument("hi-hat"), 1});
+    pedals.take({Kind::place, 2.05, instrument("hi-hat"), 0.5});
+    pedals.rest(96000);
+    pedals.take({Kind::place, 3, instrument("hi-hat"), 0.8});
+    pedals.take({Kind::place, 5, instrument("hi-hat"), 0.3});
+    pedals.end_at(4 * 48000);
+    std::vector<std::int64_t> samples;
+    for (const audio::MidiControl& control : pedals.controls()) samples.push_back(control.sample);
+    EXPECT_EQ(samples, (std::vector<std::int64_t>{48000, 96000, 98400, 144000}));
+}
+
 TEST(Pedals, AStrokeGetsThePlaceAtItsOnsetAndTheOpenNote) {
     const Pedals pedals = moved("1,hi-hat,0.5\n2,hi-hat,1\n3,hi-hat,0\n");
     const double expected[] = {0, 0.5, 0.5, 1, 0};
@@ -119,6 +140,8 @@ TEST(Pedals, MidiMovesThemAndWhatIsWrittenReadsBack) {
     both.take({Kind::place, 1, instrument("hi-hat"), 0});
     both.take({Kind::foot, 1.01, instrument("hi-hat"), 3});
     EXPECT_EQ(std::ranges::count_if(both.notes(), [](const PedalNote& n) { return !n.note.choke; }), 1);
+    for (const PedalNote& each : both.notes())
+        EXPECT_EQ(each.note.onset_sample, 48000) << "what comes later would end the sound of the closing";
 
     const Pedals written = moved("0.5,bass drum,0.8\n1,hi-hat,1\n2,hi-hat,0\n2.5,crash,1\n");
     std::vector<audio::Note> notes;
