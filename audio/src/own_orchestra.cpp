@@ -10,6 +10,7 @@ namespace audio {
 namespace {
 
 constexpr std::size_t kLongestOrchestra = 1 << 20;
+constexpr int kMostInstruments = 256;  // each is compiled alone where one is wrong
 
 /// All words that stand for something else than a number, a variable of its own or an instrument's name: a list of what may be,
 /// since Csound has some two thousand opcodes, of which new ones may reach files, processes, networks or clocks. No tables are made or
@@ -38,6 +39,19 @@ constexpr std::array<std::string_view, 128> kWords = {
 constexpr std::array<std::string_view, 21> kMoreWords = {
     "tan",   "sinh", "cosh", "tanh", "sininv", "cosinv", "taninv", "taninv2", "int",  "frac",  "round",
     "floor", "ceil", "min",  "max",  "pow",    "mod",    "ampdb",  "dbamp",   "cent", "octave"};
+
+/// Opcodes whose memory an argument sets, and that argument's range: a line of at most 10 s, or 64 filters.
+struct Bound {
+    std::string_view word;
+    int argument;  // from 0
+    std::string_view low, high;
+};
+constexpr Bound kBounds[] = {{"delay", 1, "0", "10"},    {"comb", 2, "0", "10"},     {"alpass", 2, "0", "10"},
+                             {"vcomb", 3, "0", "10"},    {"valpass", 3, "0", "10"},  {"vco", 5, "0", "10"},
+                             {"pluck", 2, "0.1", "1e6"}, {"wgbow", 7, "0.1", "1e6"}, {"tonex", 2, "1", "64"},
+                             {"atonex", 2, "1", "64"},   {"resonx", 3, "1", "64"}};
+constexpr int kMostBounded = 64;  // of them in an orchestra
+
 constexpr std::string_view kPlain =
     " ;@.,:+-=<>()[]/%^";  // beside words, of a line that declares a parameter
 constexpr std::string_view kSigns = "+-*/%^()[],=<>!&|?:'";
@@ -95,6 +109,7 @@ private:
         }
         previous_ = {};
         depth_ = 0, names_ = false;
+        bound_ = nullptr, argument_ = -1;
         for (std::size_t at = 0; at < line.size();) {
             const std::string_view rest = line.substr(at);
             if (comment_) {
@@ -116,6 +131,7 @@ private:
                 sign(rest[0], at++);
             }
         }
+        end_argument();
         if (depth_ != 0)
             refuse(line.size(), "the end of the line", "the closing parenthesis on the same line");
     }
@@ -126,6 +142,8 @@ private:
                 refuse(at, "instr " + printable(word), "a name that no other instrument has");
         } else if (word == "instr") {
             if (within_) refuse(at, "instr", "endin before it");
+            if (++instruments_ > kMostInstruments)
+                refuse(at, "more than " + std::to_string(kMostInstruments) + " instruments", "fewer");
             within_ = names_ = true;
         } else if (!within_) {
             refuse(at, printable(word), "instruments only: instr NAME ... endin");
@@ -140,12 +158,36 @@ private:
                 at, printable(word),
                 "an opcode that makes sound, or a variable: a, k or i and then a capital letter or a digit");
         }
+        begin_argument(word, at);
         previous_ = word;
         out_ += word == "$CLOSE" ? "$OWN_CLOSE" : word;  // which bounds the note's length
     }
 
+    /// Only `aOut delay aIn, iLength` can be bounded, as commas alone tell an argument's ends.
+    void begin_argument(std::string_view word, std::size_t at) {
+        if (bound_ != nullptr && argument_ < 0) argument_ = 0;
+        const auto* found = std::ranges::find(kBounds, word, &Bound::word);
+        if (found == std::end(kBounds)) return;
+        if (bound_ != nullptr || depth_ > 0 || !previous_.starts_with('a'))
+            refuse(at, std::string(word),
+                   "it after the variable that it sets: aOut " + std::string(word) + " ...");
+        if (++bounded_ > kMostBounded)
+            refuse(at, "more than " + std::to_string(kMostBounded) + " opcodes with memory", "fewer");
+        bound_ = found;
+    }
+
+    void end_argument() {
+        if (bound_ != nullptr && argument_ == bound_->argument)
+            out_ += ", " + std::string(bound_->low) + ", " + std::string(bound_->high) + ")";
+        bound_ = nullptr;
+    }
+
     void sign(char c, std::size_t at) {
         const bool blank = c == ' ' || c == '\t';
+        if (bound_ != nullptr && argument_ < 0 && !blank)
+            refuse(at, std::string(bound_->word) + " " + c,
+                   "a variable as what it hears: aOut " + std::string(bound_->word) + " aIn, ...");
+        if (bound_ != nullptr && c == ',' && depth_ == 0) return comma();
         if (!blank && (!within_ || kSigns.find(c) == std::string_view::npos))
             refuse(at, c > 0x20 && c < 0x7f ? std::string(1, c) : "a character that is not plain text",
                    "opcodes and numbers: no texts, labels, or lines of the preprocessor");
@@ -158,11 +200,23 @@ private:
         out_ += blank ? ' ' : c;
     }
 
+    void comma() {
+        const Bound* bound = bound_;
+        end_argument();
+        previous_ = {};
+        out_ += ',';
+        if (++argument_ > bound->argument) return;
+        bound_ = bound;
+        if (argument_ == bound->argument) out_ += " limit(";
+    }
+
     std::string_view text_, previous_;
     std::string file_, out_;
     std::span<const std::string> taken_;
     std::size_t at_ = 0, line_ = 1;
-    int depth_ = 0;
+    int depth_ = 0, instruments_ = 0, bounded_ = 0;
+    const Bound* bound_ = nullptr;  // of the opcode whose arguments are read
+    int argument_ = -1;             // -1: none has begun
     bool within_ = false, names_ = false, comment_ = false;
 };
 

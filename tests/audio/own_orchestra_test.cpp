@@ -68,6 +68,41 @@ TEST(CheckedOrchestra, WhatReachesBeyondTheSoundIsRefusedAtItsPlace) {
     }
 }
 
+/// 1e9 s of delay are 400 TB a note.
+TEST(CheckedOrchestra, WhatSetsAnOpcodesMemoryIsBounded) {
+    const auto checked = [](const std::string& line) {
+        return audio::checked_own_orchestra("instr gong\n" + line + "\nendin\n", "mine.orc", kTaken);
+    };
+    EXPECT_EQ(checked("aX delay aIn, 1e9"), "instr gong\naX delay aIn, limit( 1e9, 0, 10)\nendin\n");
+    EXPECT_EQ(checked("aX vcomb aIn, min(1, 2), kT, iMost, 1"),
+              "instr gong\naX vcomb aIn, min(1, 2), kT, limit( iMost, 0, 10), 1\nendin\n");
+    EXPECT_EQ(checked("aX pluck 1, 100, 1/1e9, 0, 1"),
+              "instr gong\naX pluck 1, 100, limit( 1/1e9, 0.1, 1e6), 0, 1\nendin\n");
+    for (const std::string line :
+         {"aX = delay(aIn, 1e9)", "aX = 1 + delay:a(aIn, 1e9)", "aX delay (aIn), 1e9", "aX delay(aIn), 1e9",
+          "aX delay -aIn, 1e9", "delay aIn, 1"})
+        EXPECT_EQ(fault("instr gong\n" + line + "\nendin\n").find("mine.orc:2:"), 0u) << line;
+    std::string many = "instr gong\n", instruments;
+    for (int i = 0; i < 65; ++i) many += "aX delay aIn, 1\n";
+    EXPECT_NE(fault(many + "endin\n").find("mine.orc:66:4: error: found more than 64"), std::string::npos);
+    for (int i = 0; i < 257; ++i) instruments += "instr i" + std::to_string(i) + "\nendin\n";
+    EXPECT_NE(fault(instruments).find("mine.orc:513:1: error: found more than 256"), std::string::npos);
+}
+
+TEST(CheckedOrchestra, WhatIsBoundedCompiles) {
+    const SampleFolder folder;
+    const auto file =
+        folder.text("mine.orc",
+                    "instr gong\n$STROKE(0.4'0'0.01'0.05'1e9)\niLong = 1e9\n"
+                    "aA delay aforce, iLong\naB comb aA, 1, 0.02\naC alpass aB, 1, iLong * 2, 0\n"
+                    "aD vcomb aC, 1, 0.01, (iLong > 2 ? 3 : 4)\naE valpass aD, 1, 0.01, 1\n"
+                    "aF vco 1, 100, 1, 0.5, 1, iLong\naG pluck 1, 100, 1 / iLong, 0, 1\n"
+                    "aH wgbow 1, 100, 3, 0.1, 0, 0, 1, 1e-9\naI tonex aE, 100, iLong\n"
+                    "aJ atonex aI, 100, 2\namid resonx aJ, 100, 10, iLong\n"
+                    "aside = 0\niwidth = 0\niduration = 1\n$CLOSE\nendin\n");
+    EXPECT_NO_THROW(audio::check_own_orchestra(rendering::kOrchestra, file));
+}
+
 TEST(CheckedOrchestra, WhatSoundsIsAllowedAndItsCommentsDoNotReachCsound) {
     EXPECT_EQ(audio::checked_own_orchestra(
                   ";@ gong frequency_hz 100 20 2000 pitch \xc3\xa9\r; system \"in a comment\" \xc3\xa9\xff\n"
