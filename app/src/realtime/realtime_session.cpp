@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 
 #include "files/assets.h"
 #include "files/option_values.h"
@@ -102,8 +103,10 @@ void RealtimeSession::start_sound(DiskLog<float>& recording) {
     o.longest_s = seconds + kSpareSoundS;
     o.mix = mix_of(options.play, kit);
     o.take_sound = [&recording](std::span<const float> samples) { recording.append(samples); };
-    o.on_thread_start = [this] {
-        sound_priority = set_thread_priority(ThreadRole::sound, options.realtime_priority);
+    // The audio thread and ALSA's get the same, and each says so.
+    o.on_thread_start = [this, said = std::make_shared<std::once_flag>()] {
+        const std::string priority = set_thread_priority(ThreadRole::sound, options.realtime_priority);
+        std::call_once(*said, [&] { sound_priority = priority; });
     };
     sound = std::make_unique<audio::LivePerformance>(orchestra_file(), voices_of(kit), o);
 }
