@@ -78,13 +78,7 @@ TEST(Convolution, ARecordedRoomHasItsLevelAndLiveSoundsAsOffline) {
         for (const float x : out) energy += static_cast<double>(x) * x;
     }
     EXPECT_NEAR(10 * std::log10(energy / 2), -6, 0.01);
-    const std::vector<audio::Voice> voices{voice("bell", {{"decay_s", 0.3}})};
-    Kept kept;
-    audio::LivePerformance live(kOrchestra, voices, kept.with({.take_sound = {}, .mix = mix}));
-    ASSERT_TRUE(live.schedule(note(1, 1000)));
-    audio::Performance offline(kOrchestra, voices, mix);
-    offline.schedule(note(1, 1000));
-    EXPECT_EQ(kept.finish(live, 48000, 96000), offline.finish(48000, 96000));
+    expect_live_as_offline(mix);
 }
 
 class ImpulseFile : public testing::Test {

@@ -1,4 +1,6 @@
 #pragma once
+#include <gtest/gtest.h>
+
 #include <cstdint>
 #include <span>
 #include <string>
@@ -50,6 +52,17 @@ struct Kept {
         return samples;
     }
 };
+
+/// A bell of 0.3 s sounds live as offline, to the bit.
+inline void expect_live_as_offline(const audio::Mix& mix) {
+    const std::vector<audio::Voice> voices{voice("bell", {{"decay_s", 0.3}})};
+    Kept kept;
+    audio::LivePerformance live(kOrchestra, voices, kept.with({.take_sound = {}, .mix = mix}));
+    ASSERT_TRUE(live.schedule(note(1, 1000)));
+    audio::Performance offline(kOrchestra, voices, mix);
+    offline.schedule(note(1, 1000));
+    EXPECT_EQ(kept.finish(live, 48000, 96000), offline.finish(48000, 96000));
+}
 
 /// Left channel.
 inline std::vector<double> left(const std::vector<float>& interleaved) {

@@ -92,13 +92,7 @@ TEST(Mix, AloneEachVoiceAddsUpToTheDryMixChokesIncluded) {
 
 TEST(Mix, LiveSoundsAsOfflineToTheSampleInARoom) {
     const audio::Mix mix{.gain_db = -2, .room = {0.7, -12}, .alone = {}};
-    const std::vector<audio::Voice> voices{voice("bell", {{"decay_s", 0.3}})};
-    Kept kept;
-    audio::LivePerformance live(kOrchestra, voices, kept.with({.take_sound = {}, .mix = mix}));
-    ASSERT_TRUE(live.schedule(note(1, 1000)));
-    audio::Performance offline(kOrchestra, voices, mix);
-    offline.schedule(note(1, 1000));
-    EXPECT_EQ(kept.finish(live, 48000, 96000), offline.finish(48000, 96000));
+    expect_live_as_offline(mix);
 }
 
 TEST(Mix, GainOrRoomOutOfRangeIsARuntimeError) {

@@ -273,27 +273,6 @@ double entropy_of_shares(const ContactExamples& e) {
     return entropy;
 }
 
-/// Means of 0 across, so that mirroring is a sign.
-struct ContactScaling {
-    Eigen::VectorXf mean, deviation;
-
-    explicit ContactScaling(const Eigen::MatrixXf& inputs) : mean(inputs.rowwise().mean()) {
-        for (std::size_t v = 0; v < StickHistory::kVectors; ++v)
-            mean[static_cast<Eigen::Index>(3 * v + 2)] = 0;
-        mean[kPlaneNormal + 2] = 0;
-        deviation = (inputs.colwise() - mean).rowwise().squaredNorm() / static_cast<float>(inputs.cols());
-        deviation = deviation.cwiseSqrt().array() + 1e-3F;
-    }
-    void apply(Eigen::MatrixXf& inputs) const {
-        inputs.colwise() -= mean;
-        inputs.array().colwise() /= deviation.array();
-    }
-    void fold_into(PathModel::Layer& layer) const {
-        layer.weights = layer.weights * deviation.cwiseInverse().asDiagonal();
-        layer.bias -= layer.weights * mean;
-    }
-};
-
 class ContactLearner {
 public:
     ContactLearner(const ContactExamples& learning, const ContactExamples& held_out,
@@ -369,7 +348,7 @@ std::optional<LearnedContacts> train_contacts(std::span<const TrainingStick> sti
                         options.seed),
                     held_out = collect_contacts(sticks, true, kMostContactsHeldOut, options.seed);
     if (learning.count() < kContactBatch || held_out.count() == 0) return std::nullopt;
-    const ContactScaling scaling(learning.inputs);
+    const InputScaling scaling(learning.inputs, {kPlaneNormal + 2});
     scaling.apply(learning.inputs);
     scaling.apply(held_out.inputs);
     LearnedContacts learned = ContactLearner(learning, held_out, options, steps).learn();

@@ -18,6 +18,24 @@ void through_leaky(Eigen::MatrixXf& gradient, const Eigen::MatrixXf& h) {
 
 }  // namespace
 
+InputScaling::InputScaling(const Eigen::MatrixXf& inputs, std::initializer_list<Eigen::Index> across)
+    : mean(inputs.rowwise().mean()) {
+    for (std::size_t v = 0; v < StickHistory::kVectors; ++v) mean[static_cast<Eigen::Index>(3 * v + 2)] = 0;
+    for (const Eigen::Index row : across) mean[row] = 0;
+    deviation = (inputs.colwise() - mean).rowwise().squaredNorm() / static_cast<float>(inputs.cols());
+    deviation = deviation.cwiseSqrt().array() + 1e-3F;
+}
+
+void InputScaling::apply(Eigen::MatrixXf& inputs) const {
+    inputs.colwise() -= mean;
+    inputs.array().colwise() /= deviation.array();
+}
+
+void InputScaling::fold_into(PathModel::Layer& layer) const {
+    layer.weights = layer.weights * deviation.cwiseInverse().asDiagonal();
+    layer.bias -= layer.weights * mean;
+}
+
 Layers initial_layers(std::size_t inputs, std::size_t hidden, std::size_t outputs, RandomStream& random) {
     Layers layers;
     const std::array<std::size_t, 4> sizes = {inputs, hidden, hidden, outputs};

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <initializer_list>
 
 #include "random_stream.h"
 #include "tracking/path_model.h"
@@ -22,6 +23,18 @@ void run_forward(const Layers& layers, const Eigen::MatrixXf& inputs, Activation
 /// `outputs_gradient`: of a loss by the outputs; writes the loss's gradient by weights and biases.
 void run_backward(const Layers& layers, const Eigen::MatrixXf& inputs, const Activations& activations,
                   const Eigen::MatrixXf& outputs_gradient, Layers& gradient);
+
+/// Inputs are learned from as (x - mean) / deviation. Across has no mean, so that mirroring is a sign: the third of each
+/// vector of a StickHistory, with which inputs begin, and `across`.
+struct InputScaling {
+    Eigen::VectorXf mean, deviation;
+
+    /// Columns are examples.
+    explicit InputScaling(const Eigen::MatrixXf& inputs, std::initializer_list<Eigen::Index> across = {});
+    void apply(Eigen::MatrixXf& inputs) const;
+    /// Into the first layer.
+    void fold_into(PathModel::Layer& layer) const;
+};
 
 /// Adam (Kingma and Ba 2015, algorithm 1) with decoupled weight decay (Loshchilov and Hutter 2019, algorithm
 /// 2; biases do not decay), of one layer.

@@ -84,27 +84,6 @@ Examples usual_examples(std::span<const TrainingStick> sticks, bool orientation)
     return std::move(collector).finish();
 }
 
-/// Inputs are learned from as (x - mean) / deviation; across has no mean, so that mirroring is a sign.
-struct Scaling {
-    Eigen::VectorXf mean, deviation;
-
-    explicit Scaling(const Eigen::MatrixXf& inputs) : mean(inputs.rowwise().mean()) {
-        for (std::size_t v = 0; v < StickHistory::kVectors; ++v)
-            mean[static_cast<Eigen::Index>(3 * v + 2)] = 0;
-        deviation = (inputs.colwise() - mean).rowwise().squaredNorm() / static_cast<float>(inputs.cols());
-        deviation = deviation.cwiseSqrt().array() + 1e-3F;
-    }
-    void apply(Eigen::MatrixXf& inputs) const {
-        inputs.colwise() -= mean;
-        inputs.array().colwise() /= deviation.array();
-    }
-    /// Into the first layer.
-    void fold_into(PathModel::Layer& layer) const {
-        layer.weights = layer.weights * deviation.cwiseInverse().asDiagonal();
-        layer.bias -= layer.weights * mean;
-    }
-};
-
 /// What each squared residual counts in the loss.
 struct LossWeights {
     Eigen::VectorXf of_output = Eigen::VectorXf::Zero(2 * kNodes);  ///< lead x (position, shaft)
@@ -405,7 +384,7 @@ TrainingResult train_path_model(std::span<const TrainingStick> sticks, const Tra
     Examples learning = learning_examples(sticks, options.seed);
     std::array<Examples, 2> held_out = {usual_examples(sticks, true), usual_examples(sticks, false)};
     check(options, learning, held_out);
-    const Scaling scaling(learning.inputs);
+    const InputScaling scaling(learning.inputs);
     scaling.apply(learning.inputs);
     for (Examples& e : held_out) scaling.apply(e.inputs);
 
