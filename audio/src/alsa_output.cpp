@@ -91,7 +91,7 @@ void AlsaOutput::set_up() {
     check(snd_pcm_prepare(pcm), "readiness");
 }
 
-void AlsaOutput::start(std::span<const float> ring, std::int64_t epoch_ns) noexcept {
+void AlsaOutput::start(std::span<float> ring, std::int64_t epoch_ns) noexcept {
     ring_.start(ring);
     epoch_ns_ = epoch_ns;
     sounding_.store(true, std::memory_order_seq_cst);

@@ -28,7 +28,7 @@ public:
     AlsaOutput(const std::string& device, double output_lead_s, std::function<void()> on_thread_start = {});
     ~AlsaOutput() override;
 
-    void start(std::span<const float> ring, std::int64_t epoch_ns) noexcept override;
+    void start(std::span<float> ring, std::int64_t epoch_ns) noexcept override;
     void publish(std::int64_t frames) noexcept override { ring_.publish(frames); }
     void stop() noexcept override;
     [[nodiscard]] std::string description() const override;

@@ -146,7 +146,7 @@ void JackOutput::connect_midi(const std::string& peer) {
                     jack_port_name(midi_) + "` stays open";
 }
 
-void JackOutput::start(std::span<const float> ring, std::int64_t epoch_ns) noexcept {
+void JackOutput::start(std::span<float> ring, std::int64_t epoch_ns) noexcept {
     ring_.start(ring);
     epoch_ns_ = epoch_ns;
     sounding_.store(true, std::memory_order_seq_cst);

@@ -37,7 +37,7 @@ public:
     explicit JackOutput(const Options& options);
     ~JackOutput() override;
 
-    void start(std::span<const float> ring, std::int64_t epoch_ns) noexcept override;
+    void start(std::span<float> ring, std::int64_t epoch_ns) noexcept override;
     void publish(std::int64_t frames) noexcept override { ring_.publish(frames); }
     /// Hands a stroke over; false where that cannot be. Wait-free.
     [[nodiscard]] bool send(const MidiStroke& stroke) noexcept;

@@ -196,7 +196,7 @@ void LiveThread::play_on_device(bool on) noexcept {
 void LiveThread::give_to_device(std::int64_t begin) noexcept {
     if (device_ring_.empty()) return;
     limiter_.limit(block_);
-    std::ranges::copy(block_, device_ring_.begin() + 2 * (begin % kDeviceRingSamples));
+    DeviceRing::write(device_ring_, begin, block_);
     devices_.front()->publish(renderer_->position());
 }
 

@@ -1,5 +1,4 @@
 #pragma once
-#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <span>
@@ -15,10 +14,16 @@ struct DeviceCounts {
     std::uint64_t lost_strokes = 0;  ///< MIDI notes for which there was no room; never sent
 };
 
-/// Interleaved stereo that one thread writes into a ring and a device's thread reads.
+/// Interleaved stereo that one thread writes into a ring and a device's thread reads. A device that is held up for longer than
+/// half of the ring lasts may read what is being written: such samples are wrong, each of them whole (atomic, relaxed).
 class DeviceRing {
 public:
-    void start(std::span<const float> ring) noexcept { ring_ = ring; }
+    void start(std::span<float> ring) noexcept { ring_ = ring; }
+    /// The writer's: a block into the ring from frame `first` on; it does not reach over the ring's end.
+    static void write(std::span<float> ring, std::int64_t first, std::span<const float> block) noexcept {
+        std::size_t at = 2 * static_cast<std::size_t>(first % static_cast<std::int64_t>(ring.size() / 2));
+        for (const float sample : block) std::atomic_ref(ring[at++]).store(sample, std::memory_order_relaxed);
+    }
     /// The writer's: so many frames lie ready.
     void publish(std::int64_t frames) noexcept { published_.store(frames, std::memory_order_release); }
     /// Calls put(i, left, right) for frames first, first + 1, ...; silence where there are none. False: some that are due
@@ -31,15 +36,19 @@ public:
             const std::int64_t sample = first + i;
             // Half of the ring is left to what is being written.
             const bool silent = sample < 0 || sample >= there || sample < there - room / 2;
-            const auto at = static_cast<std::size_t>(silent ? 0 : 2 * (sample % room));
-            put(i, silent ? 0.0F : ring_[at], silent ? 0.0F : ring_[at + 1]);
+            const auto at = [&](int channel) {
+                if (silent) return 0.0F;
+                float& kept = ring_[static_cast<std::size_t>(2 * (sample % room) + channel)];
+                return std::atomic_ref(kept).load(std::memory_order_relaxed);
+            };
+            put(i, at(0), at(1));
         }
         const std::int64_t end = first + frames;
         return !(end > 0 && end > there);
     }
 
 private:
-    std::span<const float> ring_;
+    std::span<float> ring_;
     std::atomic<std::int64_t> published_{0};
 };
 
@@ -53,7 +62,7 @@ public:
 
     /// From here on sound is played: interleaved stereo, in a ring that stays where it is and holds what was published
     /// last; sample 0 is due at epoch_ns.
-    virtual void start(std::span<const float> ring, std::int64_t epoch_ns) noexcept = 0;
+    virtual void start(std::span<float> ring, std::int64_t epoch_ns) noexcept = 0;
     virtual void publish(std::int64_t frames) noexcept = 0;
     /// Silence.
     virtual void stop() noexcept = 0;

@@ -54,11 +54,19 @@ bool Program::is_installed(const std::string& name) {
     return false;
 }
 
-Program::Program(std::vector<std::string> arguments) {
+Program::Program(std::vector<std::string> arguments) : arguments_(std::move(arguments)) {
     // Ends with this process too, however that ends.
-    arguments.insert(arguments.begin(), {"setpriv", "--pdeathsig", "KILL"});
+    arguments_.insert(arguments_.begin(), {"setpriv", "--pdeathsig", "KILL"});
+    start();
+}
+
+void Program::start_again_if_ended() {
+    if (pid_ >= 0 && waitpid(pid_, nullptr, WNOHANG) == pid_) start();
+}
+
+void Program::start() {
     std::vector<char*> pointers;
-    for (std::string& argument : arguments) pointers.push_back(argument.data());
+    for (std::string& argument : arguments_) pointers.push_back(argument.data());
     pointers.push_back(nullptr);
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
@@ -93,8 +101,10 @@ Server::Server(int period, int rate)
       jackd_({"jackd", "-r", "-m", "-n", own_name(), "-d", "dummy", "-r", std::to_string(rate), "-p",
               std::to_string(period)}) {
     setenv("JACK_DEFAULT_SERVER", own_name().c_str(), 1);
-    for (int attempt = 0; attempt < 100 && !up_; ++attempt) {
+    // A server does not start beside what one that was killed has left; the next one does.
+    for (int attempt = 0; attempt < 600 && !up_; ++attempt) {
         pause_ms(100);
+        jackd_.start_again_if_ended();
         jack_client_t* client = open_client("probe");
         up_ = client != nullptr;
         if (up_) jack_client_close(client);

@@ -18,11 +18,14 @@ public:
     ~Program();
     Program(const Program&) = delete;
     Program& operator=(const Program&) = delete;
+    void start_again_if_ended();
     void terminate();  ///< and waits
     void kill();
 
 private:
+    void start();
     void end(int signal);
+    std::vector<std::string> arguments_;
     pid_t pid_ = -1;
 };
 

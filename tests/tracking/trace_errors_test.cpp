@@ -27,6 +27,10 @@ struct BadTrace {
     const char* start;  ///< of the message: place and finding
 };
 
+void PrintTo(const BadTrace& bad, std::ostream* out) {
+    *out << bad.what;
+}
+
 class TraceErrors : public testing::TestWithParam<BadTrace> {};
 
 TEST_P(TraceErrors, AreOneLineWithPlaceFindingExpectationAndRemedy) {

@@ -57,12 +57,14 @@ public:
               while (!stop.stop_requested()) {
                   std::this_thread::sleep_for(std::chrono::milliseconds(100 + random() % 400));
                   const std::vector<pid_t> all = children_of(parent);
-                  if (all.empty()) continue;
-                  constexpr int kSignals[] = {SIGKILL, SIGKILL, SIGTERM, SIGTERM, SIGSTOP};
-                  ::kill(all[random() % all.size()], kSignals[random() % std::size(kSignals)]);
-                  ++blows_;
-                  if (all.size() < 6) others_.push_back(start_elsewhere(endpoint));
+                  if (!all.empty()) {
+                      constexpr int kSignals[] = {SIGKILL, SIGKILL, SIGTERM, SIGTERM, SIGSTOP};
+                      ::kill(all[random() % all.size()], kSignals[random() % std::size(kSignals)]);
+                      ++blows_;
+                  }
+                  // Also where none is left: a run without workers waits for one.
                   std::erase_if(others_, [](sim::WorkerProcess& other) { return other.has_ended(); });
+                  if (std::max(all.size(), others_.size()) < 6) others_.push_back(start_elsewhere(endpoint));
               }
           }) {}
     ~Fate() { thread_ = {}; }
