@@ -145,6 +145,7 @@ struct DistributedLaunch {
     double wait_s = 60;  ///< for them; then the run begins without those that have not come
     int verify =
         1;  ///< lockstep: so many workers compute the same bodies and check each other; 1: nobody does
+    double silence_s = 1;        ///< a worker silent for so long is lost
     double longest_step_s = 30;  ///< a worker for which all have waited for so long is given up
     std::filesystem::path keys;  ///< folder made by make_keys; needed unless ipc or loopback
     std::function<void(const std::string& endpoint)> listening;  ///< called once, with the bound endpoint

@@ -106,6 +106,7 @@ private:
     static WorkerGate::Settings gate_settings(const WorldScene& scene, const DistributedSettings& run,
                                               const DistributedLaunch& launch) {
         WorkerGate::Settings settings;
+        settings.silence_s = launch.silence_s;
         settings.listen = launch.listen;
         // Workers remove the folder of an application that was killed: without any there is none.
         settings.in_folder =

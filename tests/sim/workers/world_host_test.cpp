@@ -209,6 +209,7 @@ TEST(SharedWorldRun, OfThreeWhoComputeTheSameALiarIsGivenUpByNameAndTheBitsStay)
         std::optional<HostileMember> hostile;
         sim::DistributedLaunch launch = processes(honest);
         launch.listen = "tcp://127.0.0.1:*", launch.expect = honest + 1, launch.verify = honest + 1;
+        launch.silence_s = 30;  // a busy machine may hold up an honest one
         launch.listening = [&](const std::string& endpoint) {
             hostile.emplace(endpoint, HostileMember::Habit::lies, 3);
         };
