@@ -33,7 +33,7 @@ Changes::Changes(const Views& views, std::vector<ObjectBounds> bounds)
       picture_(views.width, views.height) {
     const float shift = views.shadow_shift * views.light_from_world.row(0).head<3>().norm();
     const float texel = 2 / static_cast<float>(std::max(views.shadow_size, 1));
-    pad_ = shift + texel * views.shadow_filter;
+    pad_ = shift + texel * (views.shadow_filter + views.shadow_beyond);
     beyond_ = texel * views.shadow_beyond;
     depth_pad_ = views.shadow_shift * views.light_from_world.row(2).head<3>().norm() +
                  texel * views.shadow_beyond + 1e-5f;
@@ -157,7 +157,7 @@ void Changes::add_receivers(const ShadowChange& change) {
         for (int k = 0; k < 8; ++k)
             corners.push_back(transformed(world_from_light_,
                                           common.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k))));
-        objects_.add_common(in_picture(corners), seen_[i].hull);
+        picture_.add_common(in_picture(corners), seen_[i].hull);
     }
 }
 

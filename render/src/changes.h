@@ -34,7 +34,8 @@ struct Views {
 };
 
 /// What of a picture has to be drawn again for the next frame, all of it safely wide:
-/// - tiles that an object touches which moves, now or in the frame before;
+/// - tiles that an object touches which moves, now or in the frame before: there surfaces are drawn again, and elsewhere put in
+///   another light at most;
 /// - of the shadow map, boxes around what has moved. What has changed in them is known when they are drawn again:
 ///   a comparison with a texel has another outcome only at depths between its values now and before. From these:
 /// - tiles in which another object may be looked up there: the prism of a block of texels and its depths, where
@@ -56,8 +57,8 @@ public:
     /// The next picture is drawn whole, from elsewhere; the shadow map stays.
     void look_from(const Eigen::Matrix4f& clip_from_world);
 
-    [[nodiscard]] const TileMask& objects() const { return objects_; }  ///< where objects are drawn again
-    [[nodiscard]] const TileMask& picture() const { return picture_; }  ///< these, and the floor's shadow
+    [[nodiscard]] const TileMask& objects() const { return objects_; }  ///< where surfaces are drawn again
+    [[nodiscard]] const TileMask& picture() const { return picture_; }  ///< these, and shadows that change
     /// Of the shadow map; none meets another.
     [[nodiscard]] const std::vector<PixelBox>& shadow() const { return shadow_; }
     /// Where in the picture an object has to be drawn again; none: nowhere.

@@ -22,7 +22,6 @@ namespace render {
     X(PFNGLCLEARPROC, Clear)                                                   \
     X(PFNGLCLEARCOLORPROC, ClearColor)                                         \
     X(PFNGLCLEARDEPTHPROC, ClearDepth)                                         \
-    X(PFNGLCOLORMASKPROC, ColorMask)                                           \
     X(PFNGLCOMPILESHADERPROC, CompileShader)                                   \
     X(PFNGLCREATEPROGRAMPROC, CreateProgram)                                   \
     X(PFNGLCREATESHADERPROC, CreateShader)                                     \
@@ -31,6 +30,7 @@ namespace render {
     X(PFNGLDISABLEPROC, Disable)                                               \
     X(PFNGLDRAWARRAYSPROC, DrawArrays)                                         \
     X(PFNGLDRAWBUFFERPROC, DrawBuffer)                                         \
+    X(PFNGLDRAWBUFFERSPROC, DrawBuffers)                                       \
     X(PFNGLDRAWELEMENTSPROC, DrawElements)                                     \
     X(PFNGLENABLEPROC, Enable)                                                 \
     X(PFNGLENABLEVERTEXATTRIBARRAYPROC, EnableVertexAttribArray)               \
@@ -45,6 +45,7 @@ namespace render {
     X(PFNGLGENVERTEXARRAYSPROC, GenVertexArrays)                               \
     X(PFNGLGETERRORPROC, GetError)                                             \
     X(PFNGLGETINTEGERVPROC, GetIntegerv)                                       \
+    X(PFNGLGETMULTISAMPLEFVPROC, GetMultisamplefv)                             \
     X(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)                           \
     X(PFNGLGETPROGRAMIVPROC, GetProgramiv)                                     \
     X(PFNGLGETSHADERINFOLOGPROC, GetShaderInfoLog)                             \
@@ -65,6 +66,7 @@ namespace render {
     X(PFNGLTEXPARAMETERIPROC, TexParameteri)                                   \
     X(PFNGLUNIFORM1FPROC, Uniform1f)                                           \
     X(PFNGLUNIFORM1IPROC, Uniform1i)                                           \
+    X(PFNGLUNIFORM2FVPROC, Uniform2fv)                                         \
     X(PFNGLUNIFORM3FVPROC, Uniform3fv)                                         \
     X(PFNGLUNIFORM4FVPROC, Uniform4fv)                                         \
     X(PFNGLUNIFORMMATRIX4FVPROC, UniformMatrix4fv)                             \

@@ -46,6 +46,10 @@ void GlProgram::set(const char* name, float value) const {
     gl_.Uniform1f(gl_.GetUniformLocation(program_, name), value);
 }
 
+void GlProgram::set(const char* name, const Eigen::Vector2f& value) const {
+    gl_.Uniform2fv(gl_.GetUniformLocation(program_, name), 1, value.data());
+}
+
 void GlProgram::set(const char* name, const Eigen::Vector3f& value) const {
     gl_.Uniform3fv(gl_.GetUniformLocation(program_, name), 1, value.data());
 }

@@ -17,6 +17,7 @@ public:
     // The program must be in use. Unknown names are ignored: the compiler drops uniforms without effect.
     void set(const char* name, int value) const;
     void set(const char* name, float value) const;
+    void set(const char* name, const Eigen::Vector2f& value) const;
     void set(const char* name, const Eigen::Vector3f& value) const;
     void set(const char* name, const Eigen::Matrix4f& value) const;
     void set(const char* name, const std::vector<Eigen::Vector4f>& values) const;

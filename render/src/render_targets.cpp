@@ -28,12 +28,15 @@ GLuint make_framebuffer(const GlFunctions& gl) {
 }
 
 GLuint make_texture(const GlFunctions& gl, GLenum format, int width, int height) {
+    const bool depth = format == GL_DEPTH_COMPONENT32F, one = depth || format == GL_R32F;
     GLuint texture = 0;
     gl.GenTextures(1, &texture);
     gl.BindTexture(GL_TEXTURE_2D, texture);
     gl.TexImage2D(GL_TEXTURE_2D, 0, static_cast<GLint>(format), width, height, 0,
-                  format == GL_R32F ? GL_RED : GL_RGBA, format == GL_R32F ? GL_FLOAT : GL_UNSIGNED_BYTE,
-                  nullptr);
+                  depth ? GL_DEPTH_COMPONENT
+                  : one ? GL_RED
+                        : GL_RGBA,
+                  one ? GL_FLOAT : GL_UNSIGNED_BYTE, nullptr);
     gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
     gl.TexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     return texture;
@@ -45,59 +48,66 @@ PictureTarget::PictureTarget(const GlFunctions& gl, int width, int height, bool 
       height_(height),
       tile_program_(gl, shaders::tile_vertex(), shaders::tile_fragment()),
       quads_(gl),
-      objects_kind_(multisampling ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D),
+      kind_(multisampling ? GL_TEXTURE_2D_MULTISAMPLE : GL_TEXTURE_2D),
       rgb_(std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
-    const auto attach_buffer = [&](GLenum point, GLenum format, GLsizei samples) {
-        GLuint buffer = 0;
-        gl_.GenRenderbuffers(1, &buffer);
-        gl_.BindRenderbuffer(GL_RENDERBUFFER, buffer);
-        gl_.RenderbufferStorageMultisample(GL_RENDERBUFFER, samples, format, width_, height_);
-        gl_.FramebufferRenderbuffer(GL_FRAMEBUFFER, point, GL_RENDERBUFFER, buffer);
-    };
     picture_ = make_framebuffer(gl_);
-    attach_buffer(GL_COLOR_ATTACHMENT0, GL_RGBA8, 0);
+    GLuint buffer = 0;
+    gl_.GenRenderbuffers(1, &buffer);
+    gl_.BindRenderbuffer(GL_RENDERBUFFER, buffer);
+    gl_.RenderbufferStorageMultisample(GL_RENDERBUFFER, 0, GL_RGBA8, width_, height_);
+    gl_.FramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, buffer);
     require_complete(gl_, "picture", width, height);
-    if (multisampling) {
-        gl_.GenTextures(1, &objects_texture_);
-        gl_.BindTexture(objects_kind_, objects_texture_);
-        gl_.TexImage2DMultisample(objects_kind_, shaders::kSamples, GL_RGBA8, width, height, GL_TRUE);
-    } else {
-        objects_texture_ = make_texture(gl_, GL_RGBA8, width, height);
-    }
     objects_ = make_framebuffer(gl_);
-    gl_.FramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, objects_kind_, objects_texture_, 0);
-    attach_buffer(GL_DEPTH_ATTACHMENT, GL_DEPTH_COMPONENT32F, multisampling ? shaders::kSamples : 0);
+    normals_ = attach_texture(GL_COLOR_ATTACHMENT0, GL_RG16);
+    surfaces_ = attach_texture(GL_COLOR_ATTACHMENT1, GL_RG16);
+    depths_ = attach_texture(GL_DEPTH_ATTACHMENT, GL_DEPTH_COMPONENT32F);
+    const GLenum both[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
+    gl_.DrawBuffers(2, both);
     require_complete(gl_, "picture", width, height);
-    gl_.Disable(GL_SCISSOR_TEST);
-    gl_.ClearDepth(0);
-    gl_.Clear(GL_DEPTH_BUFFER_BIT);
-    gl_.ClearDepth(1);
+    if (!multisampling) return;
+    for (GLuint i = 0; i < shaders::kSamples; i += 2) {
+        Eigen::Vector4f pair;
+        gl_.GetMultisamplefv(GL_SAMPLE_POSITION, i, pair.data());
+        gl_.GetMultisamplefv(GL_SAMPLE_POSITION, i + 1, pair.data() + 2);
+        sample_places_.push_back(pair);
+    }
 }
 
-void PictureTarget::set_depth(float depth) const {
-    tile_program_.use();
-    tile_program_.set("depth", depth);
-    gl_.DepthFunc(GL_ALWAYS);
-    quads_.draw();
-    gl_.DepthFunc(GL_LESS);
+/// To the bound framebuffer.
+GLuint PictureTarget::attach_texture(GLenum point, GLenum format) {
+    GLuint texture = 0;
+    if (kind_ == GL_TEXTURE_2D) {
+        texture = make_texture(gl_, format, width_, height_);
+    } else {
+        gl_.GenTextures(1, &texture);
+        gl_.BindTexture(kind_, texture);
+        gl_.TexImage2DMultisample(kind_, shaders::kSamples, format, width_, height_, GL_TRUE);
+    }
+    gl_.FramebufferTexture2D(GL_FRAMEBUFFER, point, kind_, texture, 0);
+    return texture;
 }
 
 void PictureTarget::begin_objects(const TileMask& mask) {
     gl_.BindFramebuffer(GL_FRAMEBUFFER, objects_);
     gl_.Viewport(0, 0, width_, height_);
     quads_.take(mask);
-    set_depth(1);
+    tile_program_.use();
+    tile_program_.set("depth", 1.0f);
+    gl_.DepthFunc(GL_ALWAYS);
+    quads_.draw();
+    gl_.DepthFunc(GL_LESS);
 }
 
-void PictureTarget::end_objects() const {
-    gl_.ColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_FALSE);
-    set_depth(0);
-    gl_.ColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+void PictureTarget::bind(GLuint normals_unit, GLuint surfaces_unit, GLuint depths_unit) const {
+    gl_.ActiveTexture(GL_TEXTURE0 + normals_unit);
+    gl_.BindTexture(kind_, normals_);
+    gl_.ActiveTexture(GL_TEXTURE0 + surfaces_unit);
+    gl_.BindTexture(kind_, surfaces_);
+    gl_.ActiveTexture(GL_TEXTURE0 + depths_unit);
+    gl_.BindTexture(kind_, depths_);
 }
 
-const TileQuads& PictureTarget::begin_picture(const TileMask& mask, GLuint objects_unit) {
-    gl_.ActiveTexture(GL_TEXTURE0 + objects_unit);
-    gl_.BindTexture(objects_kind_, objects_texture_);
+const TileQuads& PictureTarget::begin_picture(const TileMask& mask) {
     gl_.BindFramebuffer(GL_FRAMEBUFFER, picture_);
     gl_.Viewport(0, 0, width_, height_);
     quads_.take(mask);

@@ -8,19 +8,16 @@
 
 namespace render {
 
-/// A texture read texel by texel: GL_RGBA8 for display colours, GL_R32F.
+/// A texture read texel by texel: GL_RGBA8 for display colours, GL_RG16, GL_R32F, GL_DEPTH_COMPONENT32F.
 [[nodiscard]] GLuint make_texture(const GlFunctions& gl, GLenum format, int width, int height);
 /// Bound.
 [[nodiscard]] GLuint make_framebuffer(const GlFunctions& gl);
 /// Throws std::runtime_error unless the bound framebuffer is complete.
 void require_complete(const GlFunctions& gl, const char* what, int width, int height);
 
-/// The framebuffers of one picture, which is drawn tile by tile. The objects are drawn with several samples
-/// per pixel over nothing (all 0); a second pass with one sample per pixel takes their mean and puts it before
-/// the background: the background costs no samples. Tiles that are not drawn keep samples and pixels.
-///
-/// Tiles are told apart by depth: it is 0, nearer than any object, except in those being drawn. End with their
-/// context.
+/// The framebuffers of one picture, which is drawn tile by tile. What the objects' surfaces are is drawn with several
+/// samples per pixel over nothing (all 0), and kept with its depths; a second pass, once per pixel, puts them in their
+/// light before the background. Tiles that are not drawn keep samples and pixels. End with their context.
 class PictureTarget {
 public:
     /// Throws std::runtime_error when the framebuffer cannot be made.
@@ -28,25 +25,30 @@ public:
 
     /// For the uniforms that the renderer sets in all shaders.
     [[nodiscard]] const GlProgram& program() const { return tile_program_; }
+    /// Of the samples in a pixel, (x, y) of two in each [pixels].
+    [[nodiscard]] const std::vector<Eigen::Vector4f>& sample_places() const { return sample_places_; }
 
-    /// Empties the mask's tiles; objects are drawn from now on, in these tiles only.
+    /// Empties the mask's tiles; objects are drawn from now on. Where one reaches beyond these tiles, it must be as it
+    /// was when it was drawn there: nothing changes then, as only what is nearer is drawn.
     void begin_objects(const TileMask& mask);
-    void end_objects() const;
-    /// Binds the objects' samples to the texture unit; from now on pixels are drawn (no depth), by the tiles'
-    /// rectangles.
-    [[nodiscard]] const TileQuads& begin_picture(const TileMask& mask, GLuint objects_unit);
+    /// Binds what the objects' surfaces are (folded normals; direction of the grooves and part) and their depths to the
+    /// texture units.
+    void bind(GLuint normals_unit, GLuint surfaces_unit, GLuint depths_unit) const;
+    /// From now on pixels are drawn (no depth), by the tiles' rectangles.
+    [[nodiscard]] const TileQuads& begin_picture(const TileMask& mask);
     /// The picture, top row first; what has changed lies within the box.
     void read(const PixelBox& box, Image& image);
 
 private:
-    void set_depth(float depth) const;
+    [[nodiscard]] GLuint attach_texture(GLenum point, GLenum format);
 
     const GlFunctions& gl_;
     int width_, height_;
     GlProgram tile_program_;
     TileQuads quads_;
-    GLenum objects_kind_;  ///< of texture
-    GLuint objects_ = 0, picture_ = 0, objects_texture_ = 0;
+    GLenum kind_;  ///< of the textures
+    GLuint objects_ = 0, picture_ = 0, normals_ = 0, surfaces_ = 0, depths_ = 0;
+    std::vector<Eigen::Vector4f> sample_places_;
     std::vector<std::uint8_t> rgba_;  ///< of the box, bottom row first
     std::vector<std::uint8_t> rgb_;   ///< of the picture, top row first
 };

@@ -16,8 +16,8 @@
 namespace render {
 namespace {
 
-constexpr GLuint kMatrixUnit = 0, kShadowUnit = 1, kObjectsUnit = 2, kLitUnit = 3, kDarkUnit = 4,
-                 kModesUnit = 5, kOpenUnit = 6;
+constexpr GLuint kMatrixUnit = 0, kShadowUnit = 1, kSurfacesUnit = 2, kLitUnit = 3, kDarkUnit = 4,
+                 kModesUnit = 5, kOpenUnit = 6, kDepthsUnit = 7, kPartsUnit = 8, kNormalsUnit = 9;
 /// Balls of a radius below this share of the distance from the eye to the target do not darken the floor beneath
 /// them: it would be little, unless they lie on it.
 constexpr float kLeastBall = 0.02f;
@@ -104,9 +104,8 @@ Renderer::Implementation::Implementation(const SceneDescription& description)
       shadow(gl, scene.shadow_size),
       geometry(gl, scene),
       shadow_program(gl, shaders::shadow_vertex(geometry.bends()), shaders::shadow_fragment()),
-      object_program(gl, shaders::object_vertex(geometry.bends()),
-                     shaders::object_fragment(!scene.solids.empty())),
-      stage(gl, scene, multisampling),
+      object_program(gl, shaders::object_vertex(geometry.bends()), shaders::object_fragment()),
+      stage(gl, scene, picture.sample_places()),
       changes(views(), geometry.bounds()) {
     gl.Enable(GL_CULL_FACE);
     gl.DepthFunc(GL_LESS);
@@ -118,6 +117,8 @@ Renderer::Implementation::Implementation(const SceneDescription& description)
     shadow_program.set("modes", static_cast<int>(kModesUnit));
     shadow_program.set("clip_from_light_world", light);
     shadow.bind(kShadowUnit);
+    geometry.bind_parts(kPartsUnit);
+    picture.bind(kNormalsUnit, kSurfacesUnit, kDepthsUnit);
 }
 
 Views Renderer::Implementation::views() const {
@@ -129,7 +130,7 @@ Views Renderer::Implementation::views() const {
             scene.room.floor_height,
             shaders::kShadowFilter,
             kShadowShift * texel,
-            shaders::kBeyondObject};
+            shaders::kPlaceError};
 }
 
 /// Of what was drawn from elsewhere the shadow map is kept.
@@ -157,7 +158,10 @@ void Renderer::Implementation::set_uniforms(const GlProgram& program) const {
     program.set("shadow_offset", kShadowShift * texel);
     program.set("matrices", static_cast<int>(kMatrixUnit));
     program.set("modes", static_cast<int>(kModesUnit));
-    program.set("objects", static_cast<int>(kObjectsUnit));
+    program.set("normals", static_cast<int>(kNormalsUnit));
+    program.set("surfaces", static_cast<int>(kSurfacesUnit));
+    program.set("depths", static_cast<int>(kDepthsUnit));
+    program.set("parts", static_cast<int>(kPartsUnit));
     program.set("lit_floor", static_cast<int>(kLitUnit));
     program.set("dark_floor", static_cast<int>(kDarkUnit));
     program.set("open_floor", static_cast<int>(kOpenUnit));
@@ -202,7 +206,6 @@ void Renderer::Implementation::draw_objects() {
     geometry.draw(kMatrixUnit, kModesUnit, [this](std::size_t object) { return changes.boxes(object); });
     gl.Disable(GL_CLIP_DISTANCE0);
     gl.Disable(GL_SCISSOR_TEST);
-    picture.end_objects();
     gl.Disable(GL_DEPTH_TEST);
 }
 
@@ -210,8 +213,7 @@ DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) 
     context.make_current();
     const Camera& from = frame.camera ? *frame.camera : scene.camera;
     if (!looks_somewhere(from)) throw std::invalid_argument(std::string("Renderer::draw: ") + kBadCamera);
-    const float map_texel = scene.shadow_size > 0 ? 1 / static_cast<float>(scene.shadow_size) : 0.0f;
-    geometry.update(frame, from.eye, on_map, shaders::kBeyondObject * map_texel);
+    geometry.update(frame, from.eye);
     if (from != camera) look_from(from);
     changes.update(frame);
     if (!changes.all()) shadow.keep();
@@ -222,7 +224,7 @@ DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) 
     const float least = kLeastBall * (scene.camera.target - scene.camera.eye).norm();
     TileMask drawn = changes.picture();
     if (stage.darken(geometry.volume_balls(shaders::kMaxBalls, least))) drawn.fill();
-    if (!drawn.empty()) stage.draw(picture.begin_picture(drawn, kObjectsUnit));
+    if (!drawn.empty()) stage.draw(picture.begin_picture(drawn));
     DrawTimes times;
     gl.Finish();
     times.drawn = std::chrono::steady_clock::now();

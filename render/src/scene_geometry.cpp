@@ -1,6 +1,7 @@
 #include "scene_geometry.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <map>
@@ -8,11 +9,13 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "shaders.h"
+
 namespace render {
 namespace {
 
 struct Vertex {
-    float position[3], normal[3], color_metallic[4], roughness_lathed_object[3];
+    float position[3], normal[3], part_object[2];
     GLint first_mode_texel;
 };
 
@@ -22,6 +25,30 @@ const Appearance& appearance_of(const Look& look, const std::string& material) {
     }
     return look.body;
 }
+
+/// Looks of parts, each once, numbered from 1.
+class PartTable {
+public:
+    std::size_t number_of(const Appearance& a) {
+        const std::array<float, 6> key = {a.color.x(), a.color.y(), a.color.z(),
+                                          a.metallic,  a.roughness, a.lathed};
+        const auto [place, is_new] = numbers_.try_emplace(key, numbers_.size() + 1);
+        if (is_new) {
+            texels_.emplace_back(a.color.x(), a.color.y(), a.color.z(), a.metallic);
+            texels_.emplace_back(a.roughness, a.lathed, 0, 0);
+        }
+        if (numbers_.size() > shaders::kMostParts)
+            throw std::runtime_error("picture: error: found more than " +
+                                     std::to_string(shaders::kMostParts) +
+                                     " different looks of parts, expected fewer");
+        return place->second;
+    }
+    [[nodiscard]] const std::vector<Eigen::Vector4f>& texels() const { return texels_; }
+
+private:
+    std::map<std::array<float, 6>, std::size_t> numbers_;
+    std::vector<Eigen::Vector4f> texels_;
+};
 
 /// Volume by signed tetrahedra; of an open mesh, of its closure towards the bounds' centre.
 float volume_of(const Mesh& mesh, const Eigen::Vector3f& center) {
@@ -39,18 +66,15 @@ float volume_of(const Mesh& mesh, const Eigen::Vector3f& center) {
 
 /// `first_texel`: of the mesh's first vertex in the texture of modes, `texels` a vertex.
 void append_object(const Mesh& mesh, const Look& look, std::size_t object, GLint first_texel, GLint texels,
-                   std::vector<Vertex>& vertices, std::vector<GLuint>& indices) {
+                   PartTable& parts, std::vector<Vertex>& vertices, std::vector<GLuint>& indices) {
     GLint texel = first_texel;
     for (const MeshPart& part : mesh.parts) {
-        const Appearance& a = appearance_of(look, part.material);
+        const auto number = static_cast<float>(parts.number_of(appearance_of(look, part.material)));
         const auto base = static_cast<GLuint>(vertices.size());
         for (std::size_t i = 0; i < part.positions.size(); ++i) {
             const Eigen::Vector3f &p = part.positions[i], &n = part.normals[i];
-            vertices.push_back({{p.x(), p.y(), p.z()},
-                                {n.x(), n.y(), n.z()},
-                                {a.color.x(), a.color.y(), a.color.z(), a.metallic},
-                                {a.roughness, a.lathed, static_cast<float>(object)},
-                                texel});
+            vertices.push_back(
+                {{p.x(), p.y(), p.z()}, {n.x(), n.y(), n.z()}, {number, static_cast<float>(object)}, texel});
             texel += texels;
         }
         for (const std::uint32_t index : part.indices) indices.push_back(base + index);
@@ -115,6 +139,7 @@ void SceneGeometry::make_buffers(const SceneDescription& scene, const std::vecto
     const std::vector<SceneObject>& objects = scene.objects;
     std::vector<Vertex> vertices;
     std::vector<GLuint> indices;
+    PartTable parts;
     for (std::size_t i = 0; i < objects.size(); ++i) {
         const Mesh& mesh = *meshes[i];
         const Eigen::AlignedBox3f box = mesh.bounds();
@@ -127,12 +152,12 @@ void SceneGeometry::make_buffers(const SceneDescription& scene, const std::vecto
              modes_.count(solid),
              objects[i].stands});
         append_object(mesh, objects[i].look, i, modes_.first_texel(objects[i].solid),
-                      modes_.texels_a_vertex(objects[i].solid), vertices, indices);
+                      modes_.texels_a_vertex(objects[i].solid), parts, vertices, indices);
     }
     gl_.GenVertexArrays(1, &vertex_array_);
     gl_.BindVertexArray(vertex_array_);
-    GLuint buffers[3];
-    gl_.GenBuffers(3, buffers);
+    GLuint buffers[4];
+    gl_.GenBuffers(4, buffers);
     gl_.BindBuffer(GL_ARRAY_BUFFER, buffers[0]);
     gl_.BufferData(GL_ARRAY_BUFFER, static_cast<GLsizeiptr>(vertices.size() * sizeof(Vertex)),
                    vertices.data(), GL_STATIC_DRAW);
@@ -145,36 +170,34 @@ void SceneGeometry::make_buffers(const SceneDescription& scene, const std::vecto
     };
     attribute(kPosition, 3, offsetof(Vertex, position));
     attribute(kNormal, 3, offsetof(Vertex, normal));
-    attribute(kColorMetallic, 4, offsetof(Vertex, color_metallic));
-    attribute(kRoughnessLathedObject, 3, offsetof(Vertex, roughness_lathed_object));
+    attribute(kPartObject, 2, offsetof(Vertex, part_object));
     gl_.EnableVertexAttribArray(kFirstModeTexel);
     gl_.VertexAttribIPointer(kFirstModeTexel, 1, GL_INT, sizeof(Vertex),
                              offset(offsetof(Vertex, first_mode_texel)));
     matrix_buffer_ = buffers[2];
     gl_.GenTextures(1, &matrix_texture_);
+    part_buffer_ = buffers[3];
+    gl_.BindBuffer(GL_TEXTURE_BUFFER, part_buffer_);
+    gl_.BufferData(GL_TEXTURE_BUFFER,
+                   static_cast<GLsizeiptr>(parts.texels().size() * sizeof(Eigen::Vector4f)),
+                   parts.texels().data(), GL_STATIC_DRAW);
+    gl_.GenTextures(1, &part_texture_);
 }
 
-/// Where the object lies in the shadow map, a little more: what of it a pixel may look up.
-void SceneGeometry::add_box(const FrameState& frame, std::size_t object,
-                            const Eigen::Matrix4f& shadow_from_world, float beyond) {
-    const Eigen::AlignedBox3f box = objects_[object].bounds.grown(frame, object);
-    const Eigen::Matrix4f matrix = shadow_from_world * frame.world_from_object[object];
-    const Eigen::Vector3f center = (matrix * box.center().homogeneous()).head<3>();
-    const Eigen::Vector3f half =
-        0.5f * (matrix.topLeftCorner<3, 3>().cwiseAbs() * box.sizes()) + Eigen::Vector3f::Constant(beyond);
-    matrix_rows_[8 * object + 6].head<3>() = center - half;
-    matrix_rows_[8 * object + 7].head<3>() = center + half;
+void SceneGeometry::bind_parts(GLuint unit) const {
+    gl_.ActiveTexture(GL_TEXTURE0 + unit);
+    gl_.BindTexture(GL_TEXTURE_BUFFER, part_texture_);
+    gl_.TexBuffer(GL_TEXTURE_BUFFER, GL_RGBA32F, part_buffer_);
 }
 
-void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye,
-                           const Eigen::Matrix4f& shadow_from_world, float beyond) {
+void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye) {
     if (frame.world_from_object.size() != objects_.size() || frame.visible.size() != objects_.size()) {
         throw std::invalid_argument("Renderer::draw: found a frame of " +
                                     std::to_string(frame.world_from_object.size()) + " matrices, expected " +
                                     std::to_string(objects_.size()));
     }
     drawn_.clear();
-    matrix_rows_.assign(8 * objects_.size(), Eigen::Vector4f::Zero());
+    matrix_rows_.assign(6 * objects_.size(), Eigen::Vector4f::Zero());
     for (std::size_t i = 0; i < objects_.size(); ++i) {
         if (!frame.visible[i]) continue;
         const Eigen::Matrix4f& world_from_object = frame.world_from_object[i];
@@ -187,11 +210,10 @@ void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye,
         const Eigen::Matrix3f normals =
             determinant < 0 ? Eigen::Matrix3f(-cofactors(linear)) : cofactors(linear);
         for (int row = 0; row < 3; ++row) {
-            matrix_rows_[8 * i + static_cast<std::size_t>(row)] = world_from_object.row(row).transpose();
-            matrix_rows_[8 * i + 3 + static_cast<std::size_t>(row)].head<3>() = normals.row(row).transpose();
+            matrix_rows_[6 * i + static_cast<std::size_t>(row)] = world_from_object.row(row).transpose();
+            matrix_rows_[6 * i + 3 + static_cast<std::size_t>(row)].head<3>() = normals.row(row).transpose();
         }
         add_modal(frame, i);
-        add_box(frame, i, shadow_from_world, beyond);
         const Eigen::Vector3f center =
             linear * objects_[i].bounds.box.center() + world_from_object.topRightCorner<3, 1>();
         drawn_.push_back({i, (center - eye).norm(), determinant < 0, world_from_object});
@@ -213,8 +235,8 @@ void SceneGeometry::add_modal(const FrameState& frame, std::size_t object) {
                                     std::to_string(object) + ", expected " + std::to_string(count) +
                                     " finite ones");
     }
-    matrix_rows_[8 * object + 3].w() = static_cast<float>(matrix_rows_.size());
-    matrix_rows_[8 * object + 4].w() = static_cast<float>(count);
+    matrix_rows_[6 * object + 3].w() = static_cast<float>(matrix_rows_.size());
+    matrix_rows_[6 * object + 4].w() = static_cast<float>(count);
     for (int k = 0; k < count; ++k) {
         if (k % 4 == 0) matrix_rows_.push_back(Eigen::Vector4f::Zero());
         matrix_rows_.back()[k % 4] = frame.modal[object][k];

@@ -11,8 +11,8 @@
 
 namespace render {
 
-/// All objects of a scene in one vertex buffer (each object's copy of its mesh carries its colours and its
-/// number) and, a frame, one small buffer of matrices that the vertex shader reads by that number: a draw
+/// All objects of a scene in one vertex buffer (each object's copy of its mesh carries its number and its parts'),
+/// the parts' looks in another and, a frame, one small buffer of matrices that the vertex shader reads by that number: a draw
 /// changes no state. Ends with its context.
 class SceneGeometry {
 public:
@@ -21,11 +21,11 @@ public:
     SceneGeometry(const GlFunctions& gl, const SceneDescription& scene);
 
     /// Takes the frame's matrices, drops hidden objects and sorts the rest by distance from the eye, nearest
-    /// first. `shadow_from_world`: to texture coordinates and depth, all in [0, 1]; `beyond`: how far from its box
-    /// there an object may be looked up. Throws std::invalid_argument for a frame that does not fit the scene or a
+    /// first. Throws std::invalid_argument for a frame that does not fit the scene or a
     /// visible object's matrix that is not finite.
-    void update(const FrameState& frame, const Eigen::Vector3f& eye, const Eigen::Matrix4f& shadow_from_world,
-                float beyond);
+    void update(const FrameState& frame, const Eigen::Vector3f& eye);
+    /// The parts' looks, by the numbers that surfaces have, to the texture unit: colour and metallic, then roughness and lathed.
+    void bind_parts(GLuint unit) const;
 
     /// Where an object, by its number, is drawn.
     using BoxesOf = std::function<std::vector<PixelBox>(std::size_t)>;
@@ -42,8 +42,7 @@ public:
     [[nodiscard]] std::size_t triangles() const;
 
     // Vertex attributes, as the shaders number them.
-    static constexpr GLuint kPosition = 0, kNormal = 1, kColorMetallic = 2, kRoughnessLathedObject = 3,
-                            kFirstModeTexel = 4;
+    static constexpr GLuint kPosition = 0, kNormal = 1, kPartObject = 2, kFirstModeTexel = 3;
 
 private:
     struct Object {
@@ -62,18 +61,15 @@ private:
 
     void make_buffers(const SceneDescription& scene, const std::vector<const Mesh*>& meshes);
     void add_modal(const FrameState& frame, std::size_t object);
-    void add_box(const FrameState& frame, std::size_t object, const Eigen::Matrix4f& shadow_from_world,
-                 float beyond);
 
     const GlFunctions& gl_;
     std::vector<Object> objects_;
     std::vector<Drawn> drawn_;
     std::vector<Eigen::Vector4f>
-        matrix_rows_;  ///< eight an object: three of world_from_object, three of the normals' matrix (their
-    ///< last places: where its modal coordinates begin, how many there are), the corners of
-    ///< its box in the shadow map; then the modal coordinates
+        matrix_rows_;  ///< six an object: three of world_from_object, three of the normals' matrix (their
+    ///< last places: where its modal coordinates begin, how many there are); then the modal coordinates
     ModeTexture modes_;
-    GLuint vertex_array_ = 0, matrix_buffer_ = 0, matrix_texture_ = 0;
+    GLuint vertex_array_ = 0, matrix_buffer_ = 0, matrix_texture_ = 0, part_buffer_ = 0, part_texture_ = 0;
 };
 
 }  // namespace render

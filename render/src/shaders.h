@@ -5,24 +5,24 @@ namespace render::shaders {
 
 /// Samples a pixel with multisampling.
 inline constexpr int kSamples = 4;
-/// Where the place of a pixel on a triangle moves faster through the shadow map, from one pixel to the next, the
-/// triangle is seen from its edge. [texels]
-inline constexpr float kMostChange = 100;
 /// How far from its place a look-up reads the shadow map: 2 by the filter, half a texel as a texel is covered by its
-/// middle, and as the place itself is known to 1/256 pixel, in which it changes by at most kMostChange / 256. [texels]
-inline constexpr float kShadowFilter = 3.0f;
-/// How far beyond an object's box in the shadow map a pixel's place may lie on it: the middle of a pixel that the
-/// object covers in part lies outside it. [texels]
-inline constexpr float kBeyondObject = 4.0f;
+/// middle. [texels]
+inline constexpr float kShadowFilter = 2.5f;
+/// How far from where it is a surface's place lies at most that is computed from its depth: with a depth of 32 bits and
+/// cameras up to a kilometre away. [texels of the shadow map]
+inline constexpr float kPlaceError = 1.0f;
+/// Different looks of parts, as 16 bits tell them apart; 0 is no part.
+inline constexpr int kMostParts = 65535;
 /// The number of balls that darken the floor under the objects; larger ones first.
 inline constexpr int kMaxBalls = 32;
 
-// GLSL 3.30. Attribute numbers: SceneGeometry. The objects' and the baking shaders compute in linear light
-// and write display values (sRGB); the picture's puts display values together.
+// GLSL 3.30. Attribute numbers: SceneGeometry. The objects' shaders write what is seen (normals, parts, depths); the
+// picture's lights that, in linear light, and puts display values (sRGB) together. The baking shaders write display
+// values.
 [[nodiscard]] std::string shadow_vertex(bool bending);
 [[nodiscard]] std::string shadow_fragment();
 [[nodiscard]] std::string object_vertex(bool bending);
-[[nodiscard]] std::string object_fragment(bool coarse);
+[[nodiscard]] std::string object_fragment();
 [[nodiscard]] std::string floor_vertex();
 [[nodiscard]] std::string floor_bake_fragment();
 [[nodiscard]] std::string floor_open_fragment();
@@ -30,6 +30,6 @@ inline constexpr int kMaxBalls = 32;
 [[nodiscard]] std::string backdrop_bake_fragment();
 [[nodiscard]] std::string tile_vertex();
 [[nodiscard]] std::string tile_fragment();
-[[nodiscard]] std::string picture_fragment(bool multisampling);
+[[nodiscard]] std::string picture_fragment(bool multisampling, bool coarse);
 
 }  // namespace render::shaders

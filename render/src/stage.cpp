@@ -46,14 +46,16 @@ std::vector<GLuint> floor_triangles() {
 
 }  // namespace
 
-Stage::Stage(const GlFunctions& gl, const SceneDescription& scene, bool multisampling)
+Stage::Stage(const GlFunctions& gl, const SceneDescription& scene,
+             const std::vector<Eigen::Vector4f>& sample_places)
     : gl_(gl),
       width_(scene.width),
       height_(scene.height),
       floor_bake_(gl, shaders::floor_vertex(), shaders::floor_bake_fragment()),
       backdrop_bake_(gl, shaders::backdrop_vertex(), shaders::backdrop_bake_fragment()),
       open_(gl, shaders::floor_vertex(), shaders::floor_open_fragment()),
-      picture_(gl, shaders::tile_vertex(), shaders::picture_fragment(multisampling)),
+      picture_(gl, shaders::tile_vertex(),
+               shaders::picture_fragment(!sample_places.empty(), !scene.solids.empty())),
       lit_texture_(make_texture(gl, GL_RGBA8, width_, height_)),
       dark_texture_(make_texture(gl, GL_RGBA8, width_, height_)),
       open_texture_(make_texture(gl, GL_R32F, width_, height_)),
@@ -64,6 +66,8 @@ Stage::Stage(const GlFunctions& gl, const SceneDescription& scene, bool multisam
     make_floor(center);
     floor_bake_.use();
     floor_bake_.set("center", center);
+    picture_.use();
+    picture_.set("sample_xy", sample_places);
 }
 
 void Stage::make_floor(const Eigen::Vector3f& center) {
@@ -124,6 +128,13 @@ void Stage::bake(const Eigen::Matrix4f& clip_from_world, GLuint lit_unit, GLuint
     picture_.set("ray_x", Eigen::Vector3f((world_from_clip.col(0) * 2 / width_).cast<float>()));
     picture_.set("ray_y", Eigen::Vector3f((world_from_clip.col(1) * 2 / height_).cast<float>()));
     picture_.set("depth", 0.5f);
+    // The third row of the matrix is -a times the fourth and, in its last place, b more: at a distance d along the view
+    // the window's depth is w = (1 - a + b / d) / 2.
+    const Eigen::RowVector4d third = clip_from_world.row(2).cast<double>(),
+                             fourth = clip_from_world.row(3).cast<double>();
+    const double a = -third.head<3>().dot(fourth.head<3>()) / fourth.head<3>().squaredNorm();
+    picture_.set("depth_from_window",
+                 Eigen::Vector2f(static_cast<float>(1 - a), static_cast<float>(third[3] + a * fourth[3])));
 }
 
 void Stage::bake_one(GLuint framebuffer, float key_part) const {

@@ -12,10 +12,11 @@ namespace render {
 /// The floor (planks that fade into the wall with distance) and the wall behind. While the camera stands still,
 /// both are shaded once: one picture in the key light, one in its shadow; and how far objects darken the floor
 /// under them is drawn when these move. A frame's tiles blend the two by the shadow map and
-/// lay the objects' picture over them. Ends with its context.
+/// lay the objects over them, whose surfaces they put in their light. Ends with its context.
 class Stage {
 public:
-    Stage(const GlFunctions& gl, const SceneDescription& scene, bool multisampling);
+    Stage(const GlFunctions& gl, const SceneDescription& scene,
+          const std::vector<Eigen::Vector4f>& sample_places);
 
     /// All programs, for the uniforms that the renderer sets in all shaders. Then bake(), for each camera anew.
     [[nodiscard]] std::vector<const GlProgram*> programs() const;
@@ -23,8 +24,8 @@ public:
 
     /// Darkens the floor under the balls (centre, radius [m]). True: these have changed, so the floor has.
     bool darken(const std::vector<Eigen::Vector4f>& balls);
-    /// Every pixel of the tiles. The objects' picture and the shadow map are bound to the units that the
-    /// uniforms name.
+    /// Every pixel of the tiles. The objects' surfaces, their depths, the parts and the shadow map are bound to the units
+    /// that the uniforms name.
     void draw(const TileQuads& tiles) const;
 
 private:
