@@ -32,6 +32,20 @@ TEST(Png, TheSamePixelsGiveTheSameBytesWithThePngSignature) {
     EXPECT_TRUE(std::equal(signature.begin(), signature.end(), bytes.begin()));
 }
 
+TEST(Png, ImagesThatFollowEachOtherHaveTheBytesThatTheyHaveAlone) {
+    std::mt19937 random(3);
+    render::PngEncoder encoder;
+    render::Image image = noise(33, 50, 4);
+    for (int k = 0; k < 60; ++k) {
+        if (k == 30) image = noise(50, 33, 5);  // another size, as many pixels
+        const std::vector<std::uint8_t> bytes = encoder.encode(image);
+        ASSERT_EQ(bytes, render::encode_png(image)) << k;
+        ASSERT_EQ(render::decode_png(bytes).rgb, image.rgb) << k;
+        for (unsigned changes = random() % 3; changes > 0; --changes)
+            ++image.rgb[random() % image.rgb.size()];
+    }
+}
+
 TEST(Png, AnImageWithoutPixelsOrWithTooFewBytesIsRefused) {
     EXPECT_THROW((void)render::encode_png({}), std::invalid_argument);
     EXPECT_THROW((void)render::encode_png({2, 2, {1, 2, 3}}), std::invalid_argument);

@@ -18,6 +18,15 @@ namespace {
 
 constexpr int kTrialFrames = 8, kWarmFrames = 2;
 constexpr double kLongestTrialS = 0.5;
+constexpr std::size_t kStateBytes = std::size_t{1} << 26, kLeastJobs = 16, kMostJobs = 4096;  // waiting
+
+/// How many frames may wait to be drawn whose states, as many as a blurred one has, are as large as this one.
+std::size_t job_limit(const render::FrameState& state) {
+    std::size_t bytes = sizeof(FrameJob) + state.world_from_object.size() * sizeof(Eigen::Matrix4f);
+    for (const Eigen::VectorXf& modal : state.modal)
+        bytes += sizeof modal + static_cast<std::size_t>(modal.size()) * sizeof(float);
+    return std::clamp(kStateBytes / (bytes * kBlurMoments), kLeastJobs, kMostJobs);
+}
 
 /// Every pixel as wide and high as it takes, cut or padded to the size shown.
 render::Image enlarged(render::Image small, int width, int height) {
@@ -52,7 +61,7 @@ render::DrawTimes draw_exposed(render::Renderer& renderer, const FrameJob& job, 
 
 FrameThread::FrameThread(std::vector<render::SceneDescription> scenes, const render::FrameState& rest,
                          FrameThreadOptions options)
-    : options_(std::move(options)) {
+    : options_(std::move(options)), jobs_(job_limit(rest)) {
     drawing_ =
         std::thread([this, scenes = std::move(scenes), rest] { run([&] { draw_all(scenes, rest); }); });
     writing_ = std::thread([this] { run([&] { write_all(); }); });
@@ -152,11 +161,12 @@ bool FrameThread::draw_one(render::Renderer& renderer, FrameJob& job) {
 void FrameThread::write_all() {
     if (options_.policy == FramePolicy::refuse)
         set_thread_priority(ThreadRole::writing, options_.realtime_priority);
+    render::PngEncoder encoder;
     Picture picture;
     while (pictures_.pop(picture)) {
         const Stopwatch watch(report_.write_s);
         write_file(options_.folder / fmt::format("{:06}.png", picture.index),
-                   render::encode_png(enlarged(std::move(picture.image), options_.width, options_.height)));
+                   encoder.encode(enlarged(std::move(picture.image), options_.width, options_.height)));
         report_.written.emplace_back(picture.index, monotonic_ns());
         // Not beyond the largest, which says that a thread has failed.
         std::uint64_t before = written_;

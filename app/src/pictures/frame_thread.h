@@ -40,7 +40,7 @@ struct DrawnFrame {
 
 /// What happens to a frame that is asked for while others are being drawn or written.
 enum class FramePolicy {
-    wait,    ///< offline: every frame is drawn and written; push() waits for room
+    wait,    ///< offline: every frame is drawn and written; push() waits for room (64 MB of states)
     refuse,  ///< real time: one frame at a time, push() never waits, late frames are dropped
 };
 
@@ -116,7 +116,7 @@ private:
     void join();
 
     FrameThreadOptions options_;
-    BoundedQueue<FrameJob> jobs_{16};
+    BoundedQueue<FrameJob> jobs_;  // long: what comes after the frames is computed while they are drawn
     BoundedQueue<Picture> pictures_{8};
     std::atomic<bool> ready_ = false;
     std::uint64_t pushed_ = 0;                // of the pushing thread

@@ -96,14 +96,18 @@ std::string films_section(const PlayResult& result) {
         kSlowness, films);
 }
 
-/// What can be heard and seen: the sound lies within the page while it is short, the video beside it.
+/// What can be seen beside the page.
+std::string video_section(const PlayResult& result) {
+    if (result.report_video.empty()) return {};
+    return fmt::format(
+        "<h2>Video</h2>\n<video controls preload=metadata src=\"{}\"></video>\n"
+        "<p class=note>{}, which the page shows while it lies where it was made.</p>\n",
+        html(result.report_video), html(result.options.video->filename().string()));
+}
+
+/// What can be heard: the sound lies within the page while it is short.
 std::string listen_section(const PlayResult& result) {
     std::string text;
-    if (!result.report_video.empty())
-        fmt::format_to(std::back_inserter(text),
-                       "<h2>Video</h2>\n<video controls preload=metadata src=\"{}\"></video>\n"
-                       "<p class=note>{}, which the page shows while it lies where it was made.</p>\n",
-                       html(result.report_video), html(result.options.video->filename().string()));
     if (result.audio.empty()) return text;
     const double length_s = static_cast<double>(result.audio.size() / 2) / audio::kSampleRate;
     const bool within = length_s <= kLongestSoundWithinS;
@@ -272,11 +276,16 @@ std::string plot_sections(const PlayResult& result, Plotter& plotter) {
 
 }  // namespace
 
-std::string format_report(const PlayResult& result, Plotter& plotter) {
+ReportSections report_sections(const PlayResult& result, Plotter& plotter) {
+    return {listen_section(result), plot_sections(result, plotter)};
+}
+
+std::string format_report(const PlayResult& result, const ReportSections& sections) {
     const std::string name = fs::path(result.trace).filename().string();
     return report_page(fmt::format("{} on {}", name, result.kit_name),
-                       heading(result) + figures(result) + listen_section(result) + films_section(result) +
-                           frames_section(result) + plot_sections(result, plotter) + provenance(result));
+                       heading(result) + figures(result) + video_section(result) + sections.listen +
+                           films_section(result) + frames_section(result) + sections.plots +
+                           provenance(result));
 }
 
 }  // namespace app

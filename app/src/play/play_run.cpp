@@ -261,6 +261,9 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     if ((options.mix.stems || options.mix.bus_stems) && options.audio)
         stage("stems", [&] { write_stems(result, parts.kit, folder); });
     stage("scoring", [&] { score(result, parts.kit, parts.stick); });
+    Plotter plotter(folder.scratch());
+    std::optional<ReportSections> sections;  // made while frames are still drawn
+    folder.adorn("", [&] { stage("report", [&] { sections = report_sections(result, plotter); }); });
     if (parts.frames) take_frames(result, *parts.frames, folder.path("frames"));
     result.fingerprint =
         fingerprint(parts.frames ? parts.frames->report().rest_image.rgb : std::vector<std::uint8_t>{});
@@ -283,9 +286,13 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     const std::string realtime_json = realtime_part ? realtime_part() : std::string();
     write_file(folder.path("events.csv"), format_events(result));
     write_file(folder.path("contacts.csv"), format_contacts(result));
-    stage("report", [&] {
-        write_page(folder, "report.html", [&](Plotter& plotter) { return format_report(result, plotter); });
-    });
+    if (sections)
+        stage("pictures of the report", [&] {
+            folder.adorn("report.html", [&] {
+                write_file(folder.path("report.html"), format_report(result, *sections));
+                if (!plotter.failure().empty()) throw std::runtime_error(plotter.failure());
+            });
+        });
     result.wall_s = parts.wall.seconds();
     write_file(folder.path("summary.json"), format_summary(result, realtime_json));
     folder.finish();

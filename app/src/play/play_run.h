@@ -120,11 +120,17 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
 /// px,py,pz the centre of the tip [m]; matched_id the note that sounded it, 0 for a missed one.
 [[nodiscard]] std::string format_contacts(const PlayResult& result);
 
+/// What of report.html needs no frame.
+struct ReportSections {
+    std::string listen, plots;
+};
+[[nodiscard]] ReportSections report_sections(const PlayResult& result, Plotter& plotter);
+
 /// Text of report.html: what was played, key figures, pictures, plots and tables on one page that needs
 /// nothing beside it: no script, no font, no address; pictures and plots lie within. Light and dark follow
 /// the reader's system. All names are escaped. The frames of `report_frames` are read from disk. A pure function
 /// of the result without its times and workers, of the frames and of gnuplot's version. Throws
 /// std::runtime_error without a frame. In play_report.cpp.
-[[nodiscard]] std::string format_report(const PlayResult& result, Plotter& plotter);
+[[nodiscard]] std::string format_report(const PlayResult& result, const ReportSections& sections);
 
 }  // namespace app

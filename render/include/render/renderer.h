@@ -36,8 +36,25 @@ private:
     std::unique_ptr<Implementation> implementation_;
 };
 
-/// PNG file bytes of an image: SUB filter, deflate by ISA-L at level 1 (fast; the bytes, not the pixels,
-/// depend on the processor's kind).
+/// PNG files of images that follow each other: SUB filter, deflate by ISA-L at level 1 (fast; the bytes, not the pixels,
+/// depend on the processor's kind). Bands of rows are compressed apart, so that those equal to the image before are
+/// taken from it; the bytes do not depend on that image.
+class PngEncoder {
+public:
+    [[nodiscard]] std::vector<std::uint8_t> encode(Image image);
+
+private:
+    static constexpr std::size_t kBandRows = 16;
+    struct Band {
+        std::vector<std::uint8_t> deflated;
+        std::uint32_t adler = 1;  ///< of its bytes before compression
+    };
+    Image before_;
+    std::vector<Band> bands_;
+    std::vector<std::uint8_t> lines_, work_;
+};
+
+/// Of one image.
 [[nodiscard]] std::vector<std::uint8_t> encode_png(const Image& image);
 /// The inverse, for tests and reports; throws std::runtime_error.
 [[nodiscard]] Image decode_png(const std::vector<std::uint8_t>& bytes);

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 std::string report_of(const app::PlayResult& result) {
     const TemporaryFolder scratch;
     app::Plotter plotter(scratch.path());
-    std::string page = app::format_report(result, plotter);
+    std::string page = app::format_report(result, app::report_sections(result, plotter));
     EXPECT_EQ(plotter.failure(), "");
     return page;
 }
@@ -221,7 +221,8 @@ TEST(Report, WithoutGnuplotIsAPageWithoutPlotsAndBeforeARunSaysWhatToInstall) {
     const TemporaryFolder empty;
     const Variable path("PATH", empty.path().string());
     app::Plotter plotter(empty.path());
-    const std::string page = app::format_report(sample_play_result(), plotter);
+    const app::PlayResult result = sample_play_result();
+    const std::string page = app::format_report(result, app::report_sections(result, plotter));
     EXPECT_TRUE(holds(plotter.failure(), "gnuplot")) << plotter.failure();
     EXPECT_TRUE(holds(page, "could not be drawn"));
     EXPECT_TRUE(page.ends_with("</html>\n"));
