@@ -16,15 +16,6 @@ Eigen::Vector3f transformed(const Eigen::Matrix4f& matrix, const Eigen::Vector3f
 
 }  // namespace
 
-Eigen::AlignedBox3f ObjectBounds::grown(const FrameState& frame, std::size_t object) const {
-    Eigen::AlignedBox3f all = box;
-    for (std::size_t k = 0; k < reach.size(); ++k) {
-        const Eigen::Vector3f grown = std::abs(frame.modal[object][static_cast<Eigen::Index>(k)]) * reach[k];
-        all.min() -= grown, all.max() += grown;
-    }
-    return all;
-}
-
 Changes::Changes(const Views& views, std::vector<ObjectBounds> bounds)
     : views_(views),
       world_from_light_(views.light_from_world.inverse()),
@@ -60,14 +51,12 @@ Changes::Hull Changes::in_picture(const Points& world) const {
 Changes::Seen Changes::see(const FrameState& frame, std::size_t object) const {
     Seen seen;
     if (!frame.visible[object]) return seen;
-    if (bounds_[object].box.isEmpty()) return seen;
-    const Eigen::AlignedBox3f box = bounds_[object].grown(frame, object);
     Points world;
-    for (int i = 0; i < 8; ++i) {
-        const auto corner = box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(i));
+    for (const Eigen::Vector3f& corner : bounds_[object].corners_now(frame, object)) {
         world.push_back(transformed(frame.world_from_object[object], corner));
         seen.from_light.push_back(transformed(views_.light_from_world, world.back()));
     }
+    if (world.empty()) return seen;
     for (const Eigen::Vector3f& corner : seen.from_light) seen.box.extend(corner);
     const Eigen::Vector3f more(beyond_, beyond_, depth_pad_);
     seen.box.min() -= more, seen.box.max() += more;

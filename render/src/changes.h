@@ -3,19 +3,11 @@
 #include <span>
 #include <vector>
 
+#include "object_bounds.h"
 #include "render/scene.h"
 #include "tile_mask.h"
 
 namespace render {
-
-/// What an object's vertices lie within, in its own frame: a box, grown by |q_k| times `reach[k]` when mode k
-/// has the coordinate q_k.
-struct ObjectBounds {
-    Eigen::AlignedBox3f box;
-    std::vector<Eigen::Vector3f> reach;
-
-    [[nodiscard]] Eigen::AlignedBox3f grown(const FrameState& frame, std::size_t object) const;
-};
 
 /// Where in the shadow map texels have changed, and between which depths, in the light's z.
 struct ShadowChange {
@@ -41,7 +33,7 @@ struct Views {
 /// - tiles in which another object may be looked up there: the prism of a block of texels and its depths, where
 ///   that is seen within the object's bounds;
 /// - of the floor, the tiles that look up there.
-/// All else is as it was, since a pixel depends on nothing else. Bounds are boxes of eight corners.
+/// All else is as it was, since a pixel depends on nothing else. Bounds are hulls of few corners.
 class Changes {
 public:
     Changes(const Views& views, std::vector<ObjectBounds> bounds);
@@ -72,7 +64,7 @@ private:
     /// Where an object is seen, by the camera [pixels] and by the light.
     struct Seen {
         Hull hull;
-        Points from_light;        ///< eight corners; none: not visible
+        Points from_light;        ///< corners; none: not visible
         Eigen::AlignedBox3f box;  ///< around them, a little more
     };
 

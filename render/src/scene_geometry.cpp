@@ -140,6 +140,12 @@ void SceneGeometry::make_buffers(const SceneDescription& scene, const std::vecto
     std::vector<Vertex> vertices;
     std::vector<GLuint> indices;
     PartTable parts;
+    std::map<const Mesh*, std::vector<Eigen::Vector3f>> known_corners;
+    const auto corners_of = [&](const Mesh* mesh) {
+        const auto [place, is_new] = known_corners.try_emplace(mesh);
+        if (is_new) place->second = corners_around(*mesh);
+        return place->second;
+    };
     for (std::size_t i = 0; i < objects.size(); ++i) {
         const Mesh& mesh = *meshes[i];
         const Eigen::AlignedBox3f box = mesh.bounds();
@@ -147,7 +153,8 @@ void SceneGeometry::make_buffers(const SceneDescription& scene, const std::vecto
         objects_.push_back(
             {static_cast<GLsizei>(indices.size()),
              static_cast<GLsizei>(3 * mesh.triangles()),
-             {box, solid < 0 ? Reach{} : reach_of(scene.solids[static_cast<std::size_t>(solid)].modes)},
+             {box, solid < 0 ? Reach{} : reach_of(scene.solids[static_cast<std::size_t>(solid)].modes),
+              corners_of(meshes[i])},
              volume_of(mesh, box.center()),
              modes_.count(solid),
              objects[i].stands});

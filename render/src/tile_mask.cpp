@@ -79,28 +79,52 @@ std::pair<int, int> TileMask::rows(std::span<const Eigen::Vector2f> hull) const 
     return {std::max(row(lowest->y() - kGrown) - 1, 0), std::min(row(highest->y() + kGrown) + 1, rows_ - 1)};
 }
 
-/// Columns of tiles that the polygon touches in a row of tiles: the range of x of its part in the row's band.
-TileMask::Columns TileMask::columns(std::span<const Eigen::Vector2f> hull, int row) const {
-    const float low = static_cast<float>(row * kTile) - kGrown,
-                high = static_cast<float>((row + 1) * kTile) + kGrown;
-    float least = std::numeric_limits<float>::infinity(), most = -least;
+/// Columns of tiles that the polygon touches in rows of tiles: the range of x of its part in each row's band.
+std::vector<TileMask::Columns> TileMask::columns(std::span<const Eigen::Vector2f> hull, int first_row,
+                                                 int last_row) const {
+    struct Range {
+        float least = std::numeric_limits<float>::infinity(), most = -least;
+    };
+    std::vector<Range> ranges(static_cast<std::size_t>(std::max(last_row - first_row + 1, 0)));
+    const auto row_of = [&](float y) {
+        return static_cast<int>(std::clamp(std::floor(y / kTile), static_cast<float>(first_row - 1),
+                                           static_cast<float>(last_row + 1)));
+    };
     for (std::size_t i = 0; i < hull.size(); ++i) {
-        const Eigen::Vector2f &a = hull[i], &b = hull[(i + 1) % hull.size()];
-        if (std::max(a.y(), b.y()) < low || std::min(a.y(), b.y()) > high) continue;
-        const auto x_at = [&](float y) {
-            const float rise = b.y() - a.y();
-            return rise == 0 ? a.x() : a.x() + (b.x() - a.x()) * std::clamp((y - a.y()) / rise, 0.0f, 1.0f);
-        };
-        for (const float x : {x_at(std::clamp(a.y(), low, high)), x_at(std::clamp(b.y(), low, high))}) {
-            least = std::min(least, x);
-            most = std::max(most, x);
+        const Eigen::Vector2f &a = hull[i], &b = hull[i + 1 < hull.size() ? i + 1 : 0];
+        const float rise = b.y() - a.y(), slope = rise == 0 ? 0 : (b.x() - a.x()) / rise;
+        const float lowest = std::min(a.y(), b.y()), highest = std::max(a.y(), b.y());
+        const float left = std::min(a.x(), b.x()), right = std::max(a.x(), b.x());
+        const int from = std::max(first_row, row_of(lowest - kGrown) - 1),
+                  to = std::min(last_row, row_of(highest + kGrown) + 1);
+        for (int row = from; row <= to; ++row) {
+            const float low = static_cast<float>(row * kTile) - kGrown,
+                        high = static_cast<float>((row + 1) * kTile) + kGrown;
+            if (highest < low || lowest > high) continue;
+            Range& range = ranges[static_cast<std::size_t>(row - first_row)];
+            if (rise == 0) {
+                range = {std::min(range.least, left), std::max(range.most, right)};
+                continue;
+            }
+            for (const float y : {std::max(low, lowest), std::min(high, highest)}) {
+                const float x = std::clamp(a.x() + (y - a.y()) * slope, left, right);
+                range = {std::min(range.least, x), std::max(range.most, x)};
+            }
         }
     }
-    if (!(least <= most)) return {0, -1};
     const auto column = [&](float x) {
         return static_cast<int>(std::clamp(std::floor(x / kTile), -1.0f, static_cast<float>(columns_)));
     };
-    return {std::max(column(least - kGrown), 0), std::min(column(most + kGrown), columns_ - 1)};
+    std::vector<Columns> found;
+    found.reserve(ranges.size());
+    for (const Range& range : ranges) {
+        if (range.least <= range.most)
+            found.push_back({std::max(column(range.least - kGrown), 0),
+                             std::min(column(range.most + kGrown), columns_ - 1)});
+        else
+            found.push_back({0, -1});
+    }
+    return found;
 }
 
 void TileMask::add(std::span<const Eigen::Vector2f> hull) {
@@ -108,11 +132,16 @@ void TileMask::add(std::span<const Eigen::Vector2f> hull) {
 }
 
 void TileMask::add_common(std::span<const Eigen::Vector2f> hull, std::span<const Eigen::Vector2f> other) {
-    const auto [first_row, last_row] = rows(hull);
+    const auto [first, last] = rows(hull);
+    const auto [first_other, last_other] = rows(other);
+    const int first_row = std::max(first, first_other), last_row = std::min(last, last_other);
+    if (first_row > last_row) return;
+    const std::vector<Columns> a = columns(hull, first_row, last_row),
+                               b = columns(other, first_row, last_row);
     for (int row = first_row; row <= last_row; ++row) {
-        const Columns a = columns(hull, row), b = columns(other, row);
-        const int first = std::max(a.first, b.first), last = std::min(a.last, b.last);
-        if (first <= last) std::fill_n(marked_.begin() + row * columns_ + first, last - first + 1, 1);
+        const auto at = static_cast<std::size_t>(row - first_row);
+        const int left = std::max(a[at].first, b[at].first), right = std::min(a[at].last, b[at].last);
+        if (left <= right) std::fill_n(marked_.begin() + row * columns_ + left, right - left + 1, 1);
     }
 }
 
@@ -140,9 +169,10 @@ void TileMask::add_runs(int row, Columns within, std::vector<PixelBox>& found) c
 std::vector<PixelBox> TileMask::touched(std::span<const Eigen::Vector2f> hull) const {
     std::vector<PixelBox> boxes, runs;
     const auto [first_row, last_row] = rows(hull);
+    const std::vector<Columns> within = columns(hull, first_row, last_row);
     for (int row = first_row; row <= last_row; ++row) {
         runs.clear();
-        add_runs(row, columns(hull, row), runs);
+        add_runs(row, within[static_cast<std::size_t>(row - first_row)], runs);
         for (const PixelBox& run : runs) {
             PixelBox* best = nullptr;
             int least = kMostWaste + 1;

@@ -51,7 +51,8 @@ private:
     };
     void add_runs(int row, Columns within, std::vector<PixelBox>& found) const;
     [[nodiscard]] std::pair<int, int> rows(std::span<const Eigen::Vector2f> hull) const;
-    [[nodiscard]] Columns columns(std::span<const Eigen::Vector2f> hull, int row) const;
+    [[nodiscard]] std::vector<Columns> columns(std::span<const Eigen::Vector2f> hull, int first_row,
+                                               int last_row) const;
     [[nodiscard]] PixelBox box(int first, int last, int row) const;
 
     int width_, height_, columns_, rows_;

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <random>
 
+#include "object_bounds.h"
 #include "render/renderer.h"
 #include "tile_mask.h"
 
@@ -177,6 +178,34 @@ TEST(Redraw, AFrameThatIsRefusedChangesNothing) {
 
 /// Every point of the polygon lies in a marked tile; no tile is marked that lies farther from it than the
 /// growth and a tile's diagonal.
+/// In every direction the corners reach as far as the mesh.
+TEST(ObjectBounds, CornersReachFartherThanTheMeshInEveryDirectionAndNotMuch) {
+    std::mt19937 engine(6);
+    for (const char* name : {"drum", "cymbal", "bell", "stand", "string_frame", "stick", "mallet"}) {
+        const render::Mesh mesh = render::load_mesh(kMeshes + name + ".obj");
+        const std::vector<Vector3f> corners = render::corners_around(mesh);
+        EXPECT_GE(corners.size(), 8U);
+        const Vector3f half = mesh.bounds().sizes() / 2, center = mesh.bounds().center();
+        for (int k = 0; k < 200; ++k) {
+            // Of the box scaled to a cube, so that flat and long meshes count as round ones.
+            const Vector3f direction =
+                Vector3f(random(engine, -1, 1), random(engine, -1, 1), random(engine, -1, 1))
+                    .cwiseQuotient(half);
+            float reach = -INFINITY, farthest = -INFINITY;
+            for (const Vector3f& corner : corners) reach = std::max(reach, direction.dot(corner - center));
+            for (const render::MeshPart& part : mesh.parts)
+                for (const Vector3f& vertex : part.positions)
+                    farthest = std::max(farthest, direction.dot(vertex - center));
+            ASSERT_GE(reach, farthest) << name;
+            ASSERT_LE(reach, 1.6f * farthest) << name;  // a box about a ball: 1.73
+        }
+    }
+}
+
+TEST(ObjectBounds, OfAFlatMeshAreItsBox) {
+    EXPECT_EQ(render::corners_around(bending_plate().mesh).size(), 8U);
+}
+
 TEST(TileMask, MarksTheTilesOfATriangleAndNoneFarFromIt) {
     std::mt19937 engine(6);
     for (int k = 0; k < 200; ++k) {
