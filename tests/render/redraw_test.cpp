@@ -197,7 +197,7 @@ TEST(ObjectBounds, CornersReachFartherThanTheMeshInEveryDirectionAndNotMuch) {
                 for (const Vector3f& vertex : part.positions)
                     farthest = std::max(farthest, direction.dot(vertex - center));
             ASSERT_GE(reach, farthest) << name;
-            ASSERT_LE(reach, 1.6f * farthest) << name;  // a box about a ball: 1.73
+            ASSERT_LE(reach, 1.73f * farthest) << name;  // as a box about a ball
         }
     }
 }
