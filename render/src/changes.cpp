@@ -21,7 +21,8 @@ Changes::Changes(const Views& views, std::vector<ObjectBounds> bounds)
       world_from_light_(views.light_from_world.inverse()),
       bounds_(std::move(bounds)),
       objects_(views.width, views.height),
-      picture_(views.width, views.height) {
+      picture_(views.width, views.height),
+      occupied_(views.width, views.height) {
     const float shift = views.shadow_shift * views.light_from_world.row(0).head<3>().norm();
     const float texel = 2 / static_cast<float>(std::max(views.shadow_size, 1));
     pad_ = shift + texel * (views.shadow_filter + views.shadow_beyond);
@@ -101,6 +102,8 @@ void Changes::update(const FrameState& frame) {
             add_moved(seen_[i]);
         }
     }
+    occupied_.clear();
+    for (const Seen& now : seen_) occupied_.add(now.hull);
     before_ = frame;
     known_ = true;
 }

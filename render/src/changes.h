@@ -51,6 +51,8 @@ public:
 
     [[nodiscard]] const TileMask& objects() const { return objects_; }  ///< where surfaces are drawn again
     [[nodiscard]] const TileMask& picture() const { return picture_; }  ///< these, and shadows that change
+    /// Where objects may be seen, whatever is drawn again.
+    [[nodiscard]] const TileMask& occupied() const { return occupied_; }
     /// Of the shadow map; none meets another.
     [[nodiscard]] const std::vector<PixelBox>& shadow() const { return shadow_; }
     /// Where in the picture an object has to be drawn again; none: nowhere.
@@ -88,7 +90,7 @@ private:
     FrameState before_;
     std::vector<Seen> seen_;
     std::vector<bool> moved_;
-    TileMask objects_, picture_;
+    TileMask objects_, picture_, occupied_;
     std::vector<PixelBox> shadow_;
 };
 

@@ -59,6 +59,7 @@ struct Renderer::Implementation {
     void look_from(const Camera& from);
     void draw_shadow();
     void draw_objects();
+    void draw_picture(const TileMask& tiles);
     void set_uniforms(const GlProgram& program) const;
 
     SceneDescription scene;
@@ -209,6 +210,16 @@ void Renderer::Implementation::draw_objects() {
     gl.Disable(GL_DEPTH_TEST);
 }
 
+/// An object that comes to a tile or leaves it has moved, and the tile is drawn again: so a tile that is kept would be
+/// drawn by the same shader now.
+void Renderer::Implementation::draw_picture(const TileMask& tiles) {
+    TileMask objects = tiles, background = tiles;
+    objects.keep(changes.occupied(), true);
+    background.keep(changes.occupied(), false);
+    if (!objects.empty()) stage.draw(picture.begin_picture(objects));
+    if (!background.empty()) stage.draw_background(picture.begin_picture(background));
+}
+
 DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) {
     context.make_current();
     const Camera& from = frame.camera ? *frame.camera : scene.camera;
@@ -224,7 +235,7 @@ DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) 
     const float least = kLeastBall * (scene.camera.target - scene.camera.eye).norm();
     TileMask drawn = changes.picture();
     if (stage.darken(geometry.volume_balls(shaders::kMaxBalls, least))) drawn.fill();
-    if (!drawn.empty()) stage.draw(picture.begin_picture(drawn));
+    draw_picture(drawn);
     DrawTimes times;
     gl.Finish();
     times.drawn = std::chrono::steady_clock::now();

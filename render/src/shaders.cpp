@@ -361,8 +361,41 @@ vec3 surface_light(vec3 world, vec3 normal, vec2 groove_part, vec3 key_here) {
 
 }  // namespace
 
-/// The objects' surfaces in their light, over the baked floor, which the shadow map and the
-/// sky's openness darken. Above the floor's edge both bakes are the wall and the sky is open.
+namespace {
+
+/// The baked floor, which the shadow map and the sky's openness darken. Above the floor's edge both bakes are the wall
+/// and the sky is open.
+const char* const kBackground = R"(
+uniform sampler2D lit_floor, dark_floor, open_floor;
+uniform mat4 shadow_from_world;
+uniform vec3 eye, ray, ray_x, ray_y;  // through the place (x, y): ray + x ray_x + y ray_y, of depth 1
+uniform float floor_height;
+vec3 through(vec2 at) { return ray + at.x * ray_x + at.y * ray_y; }
+// 0: above the horizon.
+float distance_of_floor(vec3 along) { return clamp((floor_height - eye.y) / along.y, 0.0, 1e4); }
+vec3 background(ivec2 at, float distance, float key) {
+    float open = texelFetch(open_floor, at, 0).r;
+    vec3 lit = texelFetch(lit_floor, at, 0).rgb * (0.7 + 0.3 * open);
+    vec3 dark = texelFetch(dark_floor, at, 0).rgb * open;
+    return mix(dark, lit, distance > 0.0 ? key : 1.0);  // the wall has no shadows
+}
+)";
+
+}  // namespace
+
+std::string background_fragment() {
+    return std::string(kVersion) + kBackground + kShadow + R"(
+out vec4 fragment;
+void main() {
+    vec3 along = through(gl_FragCoord.xy);
+    float distance = distance_of_floor(along);
+    float key = shadow_light((shadow_from_world * vec4(eye + distance * along, 1.0)).xyz);
+    fragment = vec4(background(ivec2(gl_FragCoord.xy), distance, key), 1.0);
+}
+)";
+}
+
+/// The objects' surfaces in their light, over the background.
 /// Of a pixel's samples those that show one surface are shaded once, at the first one's place; what no object
 /// covers is the floor, last. The rasteriser runs all lanes of a block as often as one needs, and a loop that tests at its
 /// head once more.
@@ -393,19 +426,15 @@ vec2 place_of_sample(int i) { return vec2(0.5); }
     const std::string all_parts =
         multisampling ? "vec4(s0.y, s1.y, s2.y, s3.y)" : "vec4(s0.y, 0.0, 0.0, 0.0)";
     return std::string(kVersion) + R"(
-uniform sampler2D lit_floor, dark_floor, open_floor;
-uniform mat4 shadow_from_world;
-uniform vec3 eye, ray, ray_x, ray_y;  // through the place (x, y): ray + x ray_x + y ray_y, of depth 1
 uniform vec2 depth_from_window;
-uniform float floor_height, shadow_offset;  // shadow_offset: along the normal [m]
+uniform float shadow_offset;  // along the normal [m]
 uniform vec3 key_light;
 )" + kPicture +
-           kSpot + kShadow + kNormals + surface_light(coarse) + samples + R"(
+           kSpot + kShadow + kBackground + kNormals + surface_light(coarse) + samples + R"(
 int same(float part, float other, vec2 normal, vec2 normal_of_other) {
     vec2 apart = abs(normal - normal_of_other);
     return part == other && max(apart.x, apart.y) < 0.05 ? 1 : 0;
 }
-vec3 through(vec2 at) { return ray + at.x * ray_x + at.y * ray_y; }
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
 )" + fetch("s", "surfaces") +
@@ -424,19 +453,14 @@ void main() {
         bool of_object = count > 0;
         vec3 along = through(of_object ? vec2(at) + place_of_sample(i) : gl_FragCoord.xy);
         float depth = depth_from_window.y / (2.0 * texelFetch(depths, at, i).r - depth_from_window.x);
-        float distance = clamp((floor_height - eye.y) / along.y, 0.0, 1e4);
+        float distance = distance_of_floor(along);
         vec3 world = eye + (of_object ? depth : distance) * along, normal = unfolded_normal(n);
         vec3 on_map = (shadow_from_world * vec4(world, 1.0)).xyz;
         vec3 off_surface = on_map + mat3(shadow_from_world) * (shadow_offset * normal);
         float key = shadow_light(of_object ? off_surface : on_map);
-
-        float open = texelFetch(open_floor, at, 0).r;
-        vec3 lit = texelFetch(lit_floor, at, 0).rgb * (0.7 + 0.3 * open);
-        vec3 dark = texelFetch(dark_floor, at, 0).rgb * open;
-        vec3 background = mix(dark, lit, distance > 0.0 ? key : 1.0);  // the wall has no shadows
         vec3 light = surface_light(world, normal, s, key * spot(on_map) * key_light);
         count = of_object ? count : still;
-        sum += float(count) * (of_object ? display(light) : background);
+        sum += float(count) * (of_object ? display(light) : background(at, distance, key));
         left -= shown;
         still -= count;
     } while (still > 0);

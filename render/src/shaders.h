@@ -30,6 +30,7 @@ inline constexpr int kMaxBalls = 32;
 [[nodiscard]] std::string backdrop_bake_fragment();
 [[nodiscard]] std::string tile_vertex();
 [[nodiscard]] std::string tile_fragment();
+[[nodiscard]] std::string background_fragment();
 [[nodiscard]] std::string picture_fragment(bool multisampling, bool coarse);
 
 }  // namespace render::shaders

@@ -54,6 +54,7 @@ Stage::Stage(const GlFunctions& gl, const SceneDescription& scene,
       floor_bake_(gl, shaders::floor_vertex(), shaders::floor_bake_fragment()),
       backdrop_bake_(gl, shaders::backdrop_vertex(), shaders::backdrop_bake_fragment()),
       open_(gl, shaders::floor_vertex(), shaders::floor_open_fragment()),
+      background_(gl, shaders::tile_vertex(), shaders::background_fragment()),
       picture_(gl, shaders::tile_vertex(),
                shaders::picture_fragment(!sample_places.empty(), !scene.solids.empty())),
       lit_texture_(make_texture(gl, GL_RGBA8, width_, height_)),
@@ -90,7 +91,7 @@ void Stage::make_floor(const Eigen::Vector3f& center) {
 }
 
 std::vector<const GlProgram*> Stage::programs() const {
-    return {&floor_bake_, &backdrop_bake_, &open_, &picture_};
+    return {&floor_bake_, &backdrop_bake_, &open_, &background_, &picture_};
 }
 
 GLuint Stage::framebuffer_of(GLuint texture) const {
@@ -117,17 +118,8 @@ void Stage::bake(const Eigen::Matrix4f& clip_from_world, GLuint lit_unit, GLuint
     bind(lit_unit, lit_texture_);
     bind(dark_unit, dark_texture_);
     bind(open_unit, open_texture_);
-    // The ray of a pixel is where it meets the plane at distance 1 (w = 1), from the eye.
-    const Eigen::Matrix3d world_from_clip =
-        (Eigen::Matrix3d() << clip_from_world.block<2, 3>(0, 0).cast<double>(),
-         clip_from_world.block<1, 3>(3, 0).cast<double>())
-            .finished()
-            .inverse();
-    picture_.use();
-    picture_.set("ray", Eigen::Vector3f((world_from_clip * Eigen::Vector3d(-1, -1, 1)).cast<float>()));
-    picture_.set("ray_x", Eigen::Vector3f((world_from_clip.col(0) * 2 / width_).cast<float>()));
-    picture_.set("ray_y", Eigen::Vector3f((world_from_clip.col(1) * 2 / height_).cast<float>()));
-    picture_.set("depth", 0.5f);
+    set_rays(background_, clip_from_world);
+    set_rays(picture_, clip_from_world);
     // The third row of the matrix is -a times the fourth and, in its last place, b more: at a distance d along the view
     // the window's depth is w = (1 - a + b / d) / 2.
     const Eigen::RowVector4d third = clip_from_world.row(2).cast<double>(),
@@ -135,6 +127,20 @@ void Stage::bake(const Eigen::Matrix4f& clip_from_world, GLuint lit_unit, GLuint
     const double a = -third.head<3>().dot(fourth.head<3>()) / fourth.head<3>().squaredNorm();
     picture_.set("depth_from_window",
                  Eigen::Vector2f(static_cast<float>(1 - a), static_cast<float>(third[3] + a * fourth[3])));
+}
+
+void Stage::set_rays(const GlProgram& program, const Eigen::Matrix4f& clip_from_world) const {
+    // The ray of a pixel is where it meets the plane at distance 1 (w = 1), from the eye.
+    const Eigen::Matrix3d world_from_clip =
+        (Eigen::Matrix3d() << clip_from_world.block<2, 3>(0, 0).cast<double>(),
+         clip_from_world.block<1, 3>(3, 0).cast<double>())
+            .finished()
+            .inverse();
+    program.use();
+    program.set("ray", Eigen::Vector3f((world_from_clip * Eigen::Vector3d(-1, -1, 1)).cast<float>()));
+    program.set("ray_x", Eigen::Vector3f((world_from_clip.col(0) * 2 / width_).cast<float>()));
+    program.set("ray_y", Eigen::Vector3f((world_from_clip.col(1) * 2 / height_).cast<float>()));
+    program.set("depth", 0.5f);
 }
 
 void Stage::bake_one(GLuint framebuffer, float key_part) const {
@@ -162,6 +168,11 @@ bool Stage::darken(const std::vector<Eigen::Vector4f>& balls) {
 
 void Stage::draw(const TileQuads& tiles) const {
     picture_.use();
+    tiles.draw();
+}
+
+void Stage::draw_background(const TileQuads& tiles) const {
+    background_.use();
     tiles.draw();
 }
 

@@ -27,17 +27,20 @@ public:
     /// Every pixel of the tiles. The objects' surfaces, their depths, the parts and the shadow map are bound to the units
     /// that the uniforms name.
     void draw(const TileQuads& tiles) const;
+    /// The same for tiles that no object reaches.
+    void draw_background(const TileQuads& tiles) const;
 
 private:
     void make_floor(const Eigen::Vector3f& center);
     void begin(GLuint framebuffer) const;
+    void set_rays(const GlProgram& program, const Eigen::Matrix4f& clip_from_world) const;
     [[nodiscard]] GLuint framebuffer_of(GLuint texture) const;
     void bake_one(GLuint framebuffer, float key_part) const;
     void draw_floor() const;
 
     const GlFunctions& gl_;
     int width_, height_;
-    GlProgram floor_bake_, backdrop_bake_, open_, picture_;
+    GlProgram floor_bake_, backdrop_bake_, open_, background_, picture_;
     GLuint floor_array_ = 0, empty_array_ = 0;
     GLsizei floor_indices_ = 0;
     GLuint lit_texture_, dark_texture_, open_texture_;

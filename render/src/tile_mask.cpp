@@ -149,6 +149,12 @@ void TileMask::add(const TileMask& other) {
     for (std::size_t i = 0; i < marked_.size(); ++i) marked_[i] |= other.marked_[i];
 }
 
+void TileMask::keep(const TileMask& other, bool marked) {
+    const std::uint8_t kept = marked ? 1 : 0;
+    for (std::size_t i = 0; i < marked_.size(); ++i)
+        marked_[i] = static_cast<std::uint8_t>(marked_[i] & (other.marked_[i] == kept ? 1 : 0));
+}
+
 PixelBox TileMask::box(int first, int last, int row) const {
     return {first * kTile, row * kTile, std::min((last + 1) * kTile, width_),
             std::min((row + 1) * kTile, height_)};

@@ -35,6 +35,8 @@ public:
     /// Adds what both convex polygons touch.
     void add_common(std::span<const Eigen::Vector2f> hull, std::span<const Eigen::Vector2f> other);
     void add(const TileMask& other);
+    /// Keeps the tiles that the other mask has (or, with false, has not).
+    void keep(const TileMask& other, bool marked);
 
     /// Boxes, few and not much too large, around the mask's tiles that the polygon touches.
     [[nodiscard]] std::vector<PixelBox> touched(std::span<const Eigen::Vector2f> hull) const;

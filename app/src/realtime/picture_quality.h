@@ -27,8 +27,8 @@ struct QualityLevel {
 ///   raise   when for 8 s nothing was late and the next better level would fit; after a rise that had to be
 ///           taken back, the wait doubles (up to 64 s)
 ///   fits    what the level took in its trial, times how much slower drawing is now than in the trial of the
-///           level at hand, is less than 0.6 of the time between two frames. Before anything was drawn 0.7: a
-///           frame draws less than half of the whole pictures of the trial again, but the trial runs alone
+///           level at hand, is less than 0.6 of the time between two frames. Before anything was drawn 0.5: a
+///           frame draws about a third of the whole pictures of the trial again, but the trial runs alone
 ///
 /// Begins at the best level that fits. Pure: times come from the caller.
 class QualityRule {
@@ -56,7 +56,7 @@ private:
 
     double frame_s_;
     std::vector<double> trial_s_;  // by level
-    double slowdown_ = 0.7;        // a running mean
+    double slowdown_ = 0.5;        // a running mean
     std::size_t level_ = 0;
     std::deque<bool> late_;  // of the last frames
     std::deque<std::pair<std::size_t, std::size_t>> blocks_;

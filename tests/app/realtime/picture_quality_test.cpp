@@ -21,10 +21,10 @@ std::vector<std::string> frames(app::QualityRule& rule, double from_s, int count
 }
 
 TEST(PictureQuality, BeginsAtTheBestLevelThatFits) {
-    // 0.7 times the trial against 0.6 of a frame.
-    EXPECT_EQ(rule(0.85 * kFrameS).level(), 0u);
-    EXPECT_EQ(rule(0.87 * kFrameS).level(), 1u);
-    EXPECT_EQ(rule(2 * kFrameS).level(), 3u);  // a fifth of that
+    // Half the trial against 0.6 of a frame.
+    EXPECT_EQ(rule(1.19 * kFrameS).level(), 0u);
+    EXPECT_EQ(rule(1.21 * kFrameS).level(), 1u);
+    EXPECT_EQ(rule(2.8 * kFrameS).level(), 3u);  // a fifth of that
     EXPECT_EQ(rule(100 * kFrameS).level(), app::quality_levels().size() - 1);
 }
 
