@@ -10,8 +10,9 @@
 ;   p12 and on: the instrument's parameters, in the order of the lines below.
 ; Tables shared with the host:
 ;   901 one entry a voice: onset [samples] of what has choked it last, written before that one's block
-;   902 entry 0: the sample by which every note so far has ended, written by the notes
+;   902 entry 0: the sample by which every note so far has ended, written by close_note
 ;   903 one entry a voice: gain of what the room hears of it beyond the voice itself (0: the room hears it as it is)
+;   904 two entries a voice that a pedal makes ring longer or shorter: its decay_s as the pedal is now, and the longest (0: no such pedal)
 ; Opcodes of the host (audio/src/opcodes.h): contact_force, noise_burst, modal_bank, close_note, bessel.
 ;
 ; Each line `;@ instrument parameter default minimum maximum text` declares a parameter; the host reads these lines.
@@ -81,6 +82,7 @@ nchnls = 4
 giChokes ftgen 901, 0, -256, -2, 0
 giEnds   ftgen 902, 0, -1, -2, 0
 giSends  ftgen 903, 0, -256, -2, 0
+giDecays ftgen 904, 0, -512, -2, 0
 
 ; Membrane modes (m, n) by frequency: nodal diameters m, nodal circles n and the root of the Bessel function J_m (Abramowitz and Stegun, table 9.5),
 ; and a kettledrum's ratios to its (1,1) mode: 1, 1.50, 1.98, 2.44, 2.90 for one nodal circle and 1 to 5 diameters, drawn
@@ -182,13 +184,19 @@ endop
   asilence = 0
 #
 
+; How much longer the note rings, as its pedal is now, than with its own decay DECAY [s]: kring, at most ilongest.
+#define RING(DECAY) #
+  ilongest tab_i 2 * p10 + 1, giDecays
+  ilongest = max(ilongest / ($DECAY), 1)
+  kdecay tab 2 * p10, giDecays
+  kring = (kdecay > 0 ? kdecay / ($DECAY) : 1)
+#
+
 ; Ends a note's amid and aside (at level 1; ilevel, iduration, iwidth): close_note fades to 0 over its last 50 ms, choked, within 15 ms
 ; from the very sample, and pans, the partials up to iwidth to both sides; table 902 gets the note's end.
-#define CLOSE #
-  p3 = iduration
-  ilast tab_i 0, giEnds
-  tabw_i max(ilast, p4 + iduration * sr + 2 * ksmps), 0, giEnds
-  aleft, aright, kover close_note amid, aside, ilevel * p5, ilevel * p6, iwidth, iduration, p4, p10, p11, giChokes
+#define CLOSE_RINGING(RING'LONGEST) #
+  p3 = iduration * $LONGEST
+  aleft, aright, kover close_note amid, aside, ilevel * p5, ilevel * p6, iwidth, iduration, p4, p10, p11, giChokes, giEnds, $RING
   outs aleft, aright
   isend tab_i p10, giSends
   if isend != 0 then
@@ -197,6 +205,10 @@ endop
   if kover == 1 then
     turnoff
   endif
+#
+
+#define CLOSE #
+  $CLOSE_RINGING(1'1)
 #
 
 ; The same in orchestras of one's own, where $CLOSE means it: a note lasts at most a minute.
@@ -260,6 +272,7 @@ endop
 ; Zone 0: head. Zone 1: rim shot (the head near its edge, less of it, with rim and shell).
 instr drum
   $STROKE(p15'p25'p26'p27'p28)
+  $RING(p13)
   irim = (p9 >= 1 ? 1 : 0)
   isnare = p20
   iwidth = 0
@@ -285,7 +298,7 @@ instr drum
     adrive = 0
     ahead = 0
   endif
-  amid, aside modal_bank ahead, adrive, kbend, giModes, icount, 1e-6 / ilevel
+  amid, aside modal_bank ahead, adrive, kbend, giModes, icount, 1e-6 / ilevel, kring
   if ktime < 0.15 * kr then
     amid = amid + acontact * p19 * 1.7
   endif
@@ -309,7 +322,7 @@ instr drum
     amid = amid + arim
   endif
   iduration = $DURATION(ilevel'max(p13, (isnare > 0 ? p21 : 0), 0.1))
-  $CLOSE
+  $CLOSE_RINGING(kring'ilongest)
 endin
 
 ; Puts the partials of set iset; place 1 brings out the high ones. With iwarble each is two modes that far apart.
@@ -345,17 +358,18 @@ endop
 ; Zone 0: body. Zone 1: shoulder (brighter, as place 1, and half as loud).
 instr bell
   $STROKE(p16'p20'p21'p22'p23)
+  $RING(p13)
   ishoulder = (p9 >= 1 ? 1 : 0)
   iplace = (ishoulder == 1 ? 1 : iplace)
   iwidth = p19
   icount, inorm Put_partials int(p14 + 0.5), p12, p13, p15, icontact, iplace, p17, iseed, p20
   iscale = 0.48 / (inorm * iarea) * (ishoulder == 1 ? 0.6 : 1)
-  amid, aside modal_bank aforce * iscale, asilence, 1, giModes, icount, 1e-6 / ilevel
+  amid, aside modal_bank aforce * iscale, asilence, 1, giModes, icount, 1e-6 / ilevel, kring
   if ktime < 0.15 * kr then
     amid = amid + acontact * p18
   endif
   iduration = $DURATION(ilevel'max(p13, 0.05))
-  $CLOSE
+  $CLOSE_RINGING(kring'ilongest)
 endin
 
 ; Puts icount partials of a stiff string struck at ipoint of its length: weight sin(n pi ipoint), the comb of the struck
@@ -379,16 +393,17 @@ endop
 ; place 1 strikes a fifth as far from the bridge as place 0. All zones sound alike.
 instr string
   $STROKE(p15'p21'p22'p23'p24)
+  $RING(p13)
   iwidth = p20
   icount = limit(int(12000 / p12), 1, 32)
   inorm Put_string icount, p12, p13, p14, icontact, p16, p17 * (1 - 0.8 * iplace), p18, iseed, p21
   iscale = 0.355 / (inorm * iarea)
-  amid, aside modal_bank aforce * iscale, asilence, 1, giModes, icount, 1e-6 / ilevel
+  amid, aside modal_bank aforce * iscale, asilence, 1, giModes, icount, 1e-6 / ilevel, kring
   if ktime < 0.15 * kr then
     amid = amid + acontact * p19
   endif
   iduration = $DURATION(ilevel'max(p13, 0.05))
-  $CLOSE
+  $CLOSE_RINGING(kring'ilongest)
 endin
 
 ; Puts 448 plate modes: a thin plate has as many modes in one band of a given width as in another (Weyl's law for plates; Fletcher and
@@ -429,6 +444,7 @@ endop
 ; plates, JSV 344, 2015). Here the high modes are driven by noise that rises in build_s, and answer as the resonators that they are.
 instr cymbal
   $STROKE(p15'p21'p22'p23'p24)
+  $RING(p13)
   icup = (p9 >= 1 ? 1 : 0)
   it60 = p13
   idamping = p14
@@ -448,10 +464,10 @@ instr cymbal
   else
     adrive = 0
   endif
-  amid, aside modal_bank aforce * iforce, adrive, 1, giModes, 448, 1e-6 / ilevel
+  amid, aside modal_bank aforce * iforce, adrive, 1, giModes, 448, 1e-6 / ilevel, kring
   if ktime < 0.15 * kr then
     amid = amid + acontact * p19
   endif
   iduration = $DURATION(ilevel'max(it60 * (1000 / limit(p12, 60, 1000))^idamping, 0.05))
-  $CLOSE
+  $CLOSE_RINGING(kring'ilongest)
 endin

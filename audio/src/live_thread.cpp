@@ -308,7 +308,7 @@ void LiveThread::start_notes_before(std::int64_t end) {
 
 /// When it was handed over; 0: it was not.
 std::int64_t LiveThread::send_stroke(const Note& note) noexcept {
-    if (!on_device_ || jack_ == nullptr || !jack_->has_midi() || note.choke) return 0;
+    if (!on_device_ || jack_ == nullptr || !jack_->has_midi() || note.kind != Note::Kind::stroke) return 0;
     const MidiStroke stroke{
         .due_ns = epoch_ns_ + samples_ns(note.onset_sample) + std::llround(device_delay_s_ * 1e9),
         .key = static_cast<std::uint8_t>(std::clamp(note.midi_note, 0, 127)),

@@ -66,6 +66,7 @@ std::vector<Message> messages_of(const std::vector<Note>& notes, const std::vect
     };
     std::vector<Message> messages;
     for (const Note& note : notes) {
+        if (note.kind == Note::Kind::pedal) continue;
         const std::int64_t at = tick_of(note.onset_sample);
         if (!is_data(note.midi_note) || !is_data(note.midi_velocity) || note.midi_velocity == 0 ||
             note.onset_sample < 0 || at > kLastTick - kNoteTicks) {
@@ -75,7 +76,7 @@ std::vector<Message> messages_of(const std::vector<Note>& notes, const std::vect
                 std::to_string(note.onset_sample) + ", expected key 0-127, velocity 1-127, onset >= 0");
         }
         const int tick = static_cast<int>(at);
-        if (note.choke) {
+        if (note.kind == Note::Kind::choke) {
             messages.push_back({tick, bytes_of(kAftertouch, note.midi_note, 127)});
             continue;
         }

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kHighestHz = 20000;
 constexpr float kHeardBend = 3e-6F;  // 0.005 cents: a smaller change of the bend is left out
+constexpr float kHeardRing = 1e-3F;  // a share of the decay time, likewise
 constexpr std::size_t kLanes = ModalBank::kLanes;
 static_assert(kLanes == 8);
 
@@ -68,14 +69,16 @@ void ModalBank::set(std::span<const ModeParameters> modes, double sample_rate, d
         weight_[i] = static_cast<float>(mode.weight);
         drive_[i] = static_cast<float>(mode.drive);
     }
-    for (std::size_t i = 0; i < filled; ++i) rotate(i, 1);
+    bend_ = ring_ = 1;
+    for (std::size_t i = 0; i < filled; ++i) rotate(i);
     std::fill_n(sounds_.begin(), groups_, true);
     rest_below_ = static_cast<float>(rest_below);
-    ratio_ = 1;
 }
 
-void ModalBank::rotate(std::size_t mode, double ratio) noexcept {
-    const double angle = std::min(static_cast<double>(angle_[mode]) * ratio, 3.0), radius = radius_[mode];
+void ModalBank::rotate(std::size_t mode) noexcept {
+    const double angle = std::min(static_cast<double>(angle_[mode]) * static_cast<double>(bend_), 3.0),
+                 own = radius_[mode],
+                 radius = ring_ == 1 ? own : std::pow(own, 1 / static_cast<double>(ring_));
     const std::complex<double> once = std::polar(radius, angle);
     std::complex<double> power = 1;
     float* of_group = &powers_[2 * kAhead * (mode - mode % kTogether)] + mode % kTogether;
@@ -87,11 +90,12 @@ void ModalBank::rotate(std::size_t mode, double ratio) noexcept {
     }
 }
 
-void ModalBank::bend(double ratio) noexcept {
-    if (std::abs(static_cast<float>(ratio) - ratio_) < kHeardBend) return;
-    ratio_ = static_cast<float>(ratio);
+void ModalBank::tune(double bend, double ring) noexcept {
+    const auto new_bend = static_cast<float>(bend), new_ring = static_cast<float>(ring);
+    if (std::abs(new_bend - bend_) < kHeardBend && std::abs(new_ring - ring_) < kHeardRing * ring_) return;
+    bend_ = new_bend, ring_ = new_ring;
     for (std::size_t i = 0; i < groups_ * kTogether; ++i)
-        if (sounds_[i / kTogether]) rotate(i, ratio);
+        if (sounds_[i / kTogether]) rotate(i);
 }
 
 /// From sample `begin` on.

@@ -34,8 +34,8 @@ public:
     /// A new start from rest with at most kMostModes; others are left out, as are modes from 20 kHz on.
     /// `rest_below`: amplitude from which a group rests while nothing comes in.
     void set(std::span<const ModeParameters> modes, double sample_rate, double rest_below) noexcept;
-    /// Multiplies all frequencies, from the next sample on; the states go on.
-    void bend(double ratio) noexcept;
+    /// Multiplies all frequencies by `bend` and all decay times by `ring`, from the next sample on; the states go on.
+    void tune(double bend, double ring) noexcept;
     /// At most kMostSamples. mid: the sum of all modes; side: the same with every second pair of modes
     /// inverted, which stands for the body's directions of radiation.
     void render(std::span<const float> force, std::span<const float> drive, std::span<float> mid,
@@ -47,16 +47,16 @@ private:
     void drive_group(std::size_t first, std::size_t begin, const Inputs& inputs, float* sums) noexcept;
     void ring_group(std::size_t first, std::size_t samples, float* sums) noexcept;
     [[nodiscard]] float largest_square(std::size_t first) const noexcept;
-    void rotate(std::size_t mode, double ratio) noexcept;
+    void rotate(std::size_t mode) noexcept;
 
     Column real_, imaginary_;  ///< z
     /// Real and imaginary parts of p, p^2, ... of each group: kTogether of both, power by power.
     std::array<float, kMostModes * 2 * kAhead> powers_;
     Column weight_, drive_;  ///< gains of the inputs
-    Column angle_, radius_;  ///< theta, r; unbent
+    Column angle_, radius_;  ///< theta, r; untuned
     std::array<bool, kMostModes / kTogether> sounds_;
     std::size_t groups_;
-    float rest_below_, ratio_;
+    float rest_below_, bend_, ring_;
 };
 
 }  // namespace audio

@@ -100,7 +100,7 @@ struct NoiseBurst {
 
 struct Bank {
     OPDS h;
-    MYFLT *mid, *side, *force, *drive, *ratio, *modes, *count, *rest;
+    MYFLT *mid, *side, *force, *drive, *bend, *modes, *count, *rest, *ring;
     ModalBank bank;
 
     static int start(CSOUND* csound, void* memory) {
@@ -123,7 +123,7 @@ struct Bank {
         std::array<float, ModalBank::kMostSamples> force, drive, mid, side;
         std::copy_n(self.force, size, force.begin());
         std::copy_n(self.drive, size, drive.begin());
-        self.bank.bend(*self.ratio);
+        self.bank.tune(*self.bend, *self.ring);
         self.bank.render(std::span(force).first(size), std::span(drive).first(size),
                          std::span(mid).first(size), std::span(side).first(size));
         std::copy_n(mid.begin(), size, self.mid);
@@ -136,26 +136,35 @@ struct CloseNote {
     OPDS h;
     MYFLT *left, *right, *over;
     MYFLT *mid, *side, *left_gain, *right_gain, *width, *duration_s, *onset, *voice, *choke_onset,
-        *chokes_table;
-    const MYFLT* latest_choke;  // of its voice
-    double choke, end, sample;  // samples from the onset; choke below 0: none yet
+        *chokes_table, *ends_table, *rings;
+    const MYFLT* latest_choke;        // of its voice
+    MYFLT* latest_end;                // of all notes
+    double choke, sample, remaining;  // samples from the onset, and up to its end; choke below 0: none yet
 
     static constexpr double kChokedS = 0.015, kFadeS = 0.05;
 
     static int start(CSOUND* csound, void* memory) {
         auto& self = *static_cast<CloseNote*>(memory);
-        MYFLT* chokes = nullptr;
+        MYFLT *chokes = nullptr, *ends = nullptr;
         const int length = csound->GetTable(csound, &chokes, static_cast<int>(*self.chokes_table));
         const auto voice = static_cast<int>(*self.voice);
         if (voice < 0 || voice >= length) return csound->InitError(csound, "close_note: found no such voice");
+        if (csound->GetTable(csound, &ends, static_cast<int>(*self.ends_table)) < 1)
+            return csound->InitError(csound, "close_note: found no table of ends");
         self.latest_choke = chokes + voice;
+        self.latest_end = ends;
         self.choke = *self.choke_onset < 0 ? -1 : *self.choke_onset - *self.onset;
-        self.end = *self.duration_s * csound->GetSr(csound);
         self.sample = 0;
+        self.remaining = *self.duration_s * csound->GetSr(csound);
+        self.tell_end(1);
         return OK;
     }
-    [[nodiscard]] double gain(double at, double rate) const {
-        double gain = std::clamp((end - at) / (kFadeS * rate), 0.0, 1.0);
+    void tell_end(double ring) {
+        const double blocks = 2.0 * h.insdshead->ksmps;
+        *latest_end = std::max(*latest_end, *onset + sample + remaining * ring + blocks);
+    }
+    [[nodiscard]] double gain(double at, double remains, double rate) const {
+        double gain = std::clamp(remains / (kFadeS * rate), 0.0, 1.0);
         if (choke >= 0) {
             const double rest = std::clamp(1 - (at - choke) / (kChokedS * rate), 0.0, 1.0);
             gain *= rest * rest * (3 - 2 * rest);
@@ -168,19 +177,23 @@ struct CloseNote {
         clear_around(self.right, self.h);
         if (self.choke < 0 && *self.latest_choke > *self.onset) self.choke = *self.latest_choke - *self.onset;
         const double rate = csound->GetSr(csound), width = *self.width, left = *self.left_gain,
-                     right = *self.right_gain, block = self.h.insdshead->ksmps;
-        const bool steady = self.choke < 0 && self.sample + block < self.end - kFadeS * rate;
+                     right = *self.right_gain, block = self.h.insdshead->ksmps,
+                     ring = std::max(1.0, *self.rings);
+        const bool steady = self.choke < 0 && block < self.remaining - kFadeS * rate;
         const Part part = part_of(self.h);
-        double at = self.sample;
+        double at = self.sample, remains = self.remaining;
         for (std::size_t n = part.begin; n < part.end; ++n) {
-            const double gain = steady ? 1 : self.gain(at, rate);
+            const double gain = steady ? 1 : self.gain(at, remains, rate);
             const double mid = gain * self.mid[n], side = gain * width * self.side[n];
             self.left[n] = left * (mid + side);
             self.right[n] = right * (mid - side);
             at += 1;
+            remains -= 1 / ring;
         }
         self.sample = at;
-        *self.over = self.choke >= 0 && at > self.choke + kChokedS * rate ? 1 : 0;
+        self.remaining = remains;
+        if (ring > 1) self.tell_end(ring);
+        *self.over = remains <= 0 || (self.choke >= 0 && at > self.choke + kChokedS * rate) ? 1 : 0;
         return OK;
     }
 };
@@ -213,8 +226,8 @@ void add(CSOUND* csound, const char* name, const char* out, const char* in) {
 void add_opcodes(CSOUND_* csound) {
     add<ContactForce>(csound, "contact_force", "a", "i");
     add<NoiseBurst>(csound, "noise_burst", "a", "iii");
-    add<Bank>(csound, "modal_bank", "aa", "aakiii");
-    add<CloseNote>(csound, "close_note", "aak", "aaiiiiiiii");
+    add<Bank>(csound, "modal_bank", "aa", "aakiiiP");
+    add<CloseNote>(csound, "close_note", "aak", "aaiiiiiiiiik");
     add<Bessel>(csound, "bessel", "i", "ii");
 }
 

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "audio/orchestra.h"
 #include "audio/own_orchestra.h"
@@ -17,6 +18,7 @@ namespace {
 constexpr int kChokeTable = 901;
 constexpr int kEndTable = 902;
 constexpr int kSendTable = 903;
+constexpr int kDecayTable = 904;
 constexpr int kFirstSampleTable = 10000;
 constexpr const char* kSampleInstrument = "sample";
 constexpr float kSilence = 1e-4F;                                 // -80 dBFS
@@ -120,8 +122,17 @@ std::vector<RenderedVoice> resolve_voices(CsoundEngine& engine, const std::vecto
                 pressed.end())
                 pressed.push_back(own);
         made.pedal_parameters = resolve_parameters(instrument, pressed, "voice " + voice.name + ", pedal");
+        const auto decay = std::ranges::find(instrument.parameters, "decay_s", &Parameter::name);
+        if (voice.own_orchestra.empty() && decay != instrument.parameters.end())
+            made.decay = static_cast<std::size_t>(decay - instrument.parameters.begin());
     }
     return rendered;
+}
+
+/// A parameter on its pedal's way, from its value at rest to that at the far end.
+double on_the_way(double rest, double far, double place) {
+    if (place == 0) return rest;
+    return rest * far > 0 ? rest * std::pow(far / rest, place) : std::lerp(rest, far, place);
 }
 
 }  // namespace
@@ -164,6 +175,14 @@ Renderer::Renderer(const std::string& text, const std::string& source, const std
                                  std::to_string(chokes_.size()));
     voices_ = resolve_voices(engine_, parse_instruments(text, source), voices);
     pressed_.reserve(kRoomForFields);
+    coming_.assign(voices.size(), -1);
+    for (std::uint32_t voice = 0; voice < voices_.size(); ++voice) {
+        const RenderedVoice& made = voices_[voice];
+        if (!made.decay) continue;
+        decays_ = engine_.table(kDecayTable);
+        decays_[2 * voice + 1] = std::max(made.parameters[*made.decay], made.pedal_parameters[*made.decay]);
+        set_pedal(voice, 0);
+    }
     sounds_.assign(voices.size(), mix.alone.empty());
     for (const std::uint32_t voice : mix.alone) sounds_.at(voice) = true;
     dry_.resize(2 * static_cast<std::size_t>(block_size()));
@@ -242,6 +261,7 @@ void Renderer::start_due_notes() {
     const std::size_t first = next_due_;
     while (next_due_ < due_.size() && due_[next_due_].onset_sample < position_ + block_size()) ++next_due_;
     const std::span<const Note> notes = std::span(due_).subspan(first, next_due_ - first);
+    mark_pedals(notes);
     mark_chokes(notes);
     for (const Note& note : notes) start(note, notes);
     if (next_due_ < due_.size()) return;
@@ -250,9 +270,28 @@ void Renderer::start_due_notes() {
 }
 
 bool Renderer::chokes(const Note& note, std::uint32_t voice) const {
-    if (note.choke) return note.voice == voice;
+    if (note.kind != Note::Kind::stroke) return note.kind == Note::Kind::choke && note.voice == voice;
     const int group = voices_[note.voice].choke_group;
     return group >= 0 && voices_[voice].choke_group == group;
+}
+
+void Renderer::set_pedal(std::uint32_t voice, double place) {
+    const RenderedVoice& moved = voices_[voice];
+    if (moved.decay)
+        decays_[2 * voice] =
+            on_the_way(moved.parameters[*moved.decay], moved.pedal_parameters[*moved.decay], place);
+}
+
+void Renderer::mark_pedals(std::span<const Note> notes) {
+    for (std::uint32_t voice = 0; voice < voices_.size(); ++voice)
+        if (const double place = std::exchange(coming_[voice], -1); place >= 0) set_pedal(voice, place);
+    for (const Note& note : notes) {
+        if (note.kind == Note::Kind::choke) continue;
+        if (note.kind == Note::Kind::stroke || note.onset_sample <= position_)
+            set_pedal(note.voice, note.pedal);
+        else
+            coming_[note.voice] = note.pedal;
+    }
 }
 
 void Renderer::mark_chokes(std::span<const Note> notes) {
@@ -264,7 +303,7 @@ void Renderer::mark_chokes(std::span<const Note> notes) {
 }
 
 void Renderer::start(const Note& note, std::span<const Note> block_notes) {
-    if (note.choke || !sounds_[note.voice]) return;
+    if (note.kind != Note::Kind::stroke || !sounds_[note.voice]) return;
     const auto choking = std::ranges::find_if(block_notes, [&](const Note& other) {
         return other.onset_sample > note.onset_sample && chokes(other, note.voice);
     });
@@ -275,11 +314,8 @@ std::span<const double> Renderer::parameters_of(const Note& note) {
     const RenderedVoice& voice = voices_[note.voice];
     if (note.pedal == 0 || voice.pedal_parameters.empty()) return voice.parameters;
     pressed_.clear();
-    for (std::size_t i = 0; i < voice.parameters.size(); ++i) {
-        const double rest = voice.parameters[i], far = voice.pedal_parameters[i];
-        pressed_.push_back(rest * far > 0 ? rest * std::pow(far / rest, note.pedal)
-                                          : std::lerp(rest, far, note.pedal));
-    }
+    for (std::size_t i = 0; i < voice.parameters.size(); ++i)
+        pressed_.push_back(on_the_way(voice.parameters[i], voice.pedal_parameters[i], note.pedal));
     return pressed_;
 }
 

@@ -21,7 +21,9 @@ struct RenderedVoice {
     int choke_group = -1;
     std::vector<double> parameters;          ///< in the declared order, p12 on
     std::vector<double> pedal_parameters{};  ///< the same at the far end of its pedal's way
-    std::optional<SampleVoice> samples{};    ///< recorded sounds instead
+    std::optional<std::size_t>
+        decay{};  ///< which of them is decay_s, with which what rings follows the pedal
+    std::optional<SampleVoice> samples{};  ///< recorded sounds instead
 };
 
 /// Constant power: left^2 + right^2 = gain^2, pan 0 left ... 1 right.
@@ -37,6 +39,9 @@ struct PanGains {
 /// it of what chokes that voice (a note of its group, or a choke of its own); every older note of the voice fades from that
 /// very sample; a note started in the same block gets the next later one there as p11. Equal onsets do not choke each
 /// other.
+///
+/// Pedals: before a block table 904 gets, for each voice, the decay time of its pedal's place as the last move before
+/// the block or a stroke within it says, and the longest.
 class Renderer {
 public:
     /// Throws std::runtime_error: orchestra, instrument, parameter, pan, gain or room that is not valid.
@@ -72,6 +77,8 @@ private:
                      std::span<const double> parameters);
     void start_due_notes();
     void mark_chokes(std::span<const Note> notes);
+    void mark_pedals(std::span<const Note> notes);
+    void set_pedal(std::uint32_t voice, double place);
     void start(const Note& note, std::span<const Note> block_notes);
     void start_choked(const Note& note, std::int64_t choke_sample);  ///< p11; -1: none
     [[nodiscard]] bool chokes(const Note& note, std::uint32_t voice) const;
@@ -85,9 +92,11 @@ private:
     std::vector<RenderedVoice> voices_;
     std::span<double> chokes_;  ///< table 901
     std::span<double> ends_;    ///< table 902
+    std::span<double> decays_;  ///< table 904; empty without such a pedal
     std::vector<Note> due_;     ///< from next_due_ on still to be started
     std::size_t next_due_ = 0;
     std::vector<double> p_fields_, pressed_;  ///< pressed_: a note's parameters by its pedal
+    std::vector<double> coming_;              ///< places of pedals from the next block on; below 0: as before
     std::vector<bool> sounds_;                ///< of the voices: those that the mix has
     std::vector<float> dry_, send_;           ///< of a block
     std::int64_t position_ = 0, loud_ = 0;    ///< loud_: up to the last sample that is not silent

@@ -142,8 +142,8 @@ std::unique_ptr<GlContext::BackEnd> chosen_back_end() {
     const std::string_view name = chosen == nullptr ? "" : chosen;
     if (name.empty() || name == "osmesa") return std::make_unique<Osmesa>();
     if (name == "egl") return std::make_unique<Egl>();
-    throw std::runtime_error("MUSICWORLD_GL: error: found \"" + std::string(name) +
-                             "\", expected osmesa or egl");
+    throw std::invalid_argument("MUSICWORLD_GL: error: found \"" + std::string(name) +
+                                "\", expected osmesa or egl");
 }
 
 }  // namespace

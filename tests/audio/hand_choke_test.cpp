@@ -13,7 +13,7 @@ using namespace rendering;
 
 audio::Note choke(std::uint64_t id, std::int64_t onset, std::uint32_t voice = 0) {
     audio::Note made = note(id, onset, 0, voice);
-    made.choke = true;
+    made.kind = audio::Note::Kind::choke;
     return made;
 }
 
@@ -100,6 +100,63 @@ TEST(Pedal, ItsPlaceLeadsFromOneSoundToTheOtherEvenly) {
     EXPECT_EQ(render({hat}, {pressed(1, 0, 1)}, 48000, 0), render({plain}, {note(1, 0, 5)}, 48000, 0));
     hat.pedal_parameters = {{"no_such", 1}};
     EXPECT_THROW(audio::Performance(kOrchestra, {hat}), std::runtime_error);
+}
+
+audio::Note moved(std::uint64_t id, std::int64_t at, double pedal) {
+    audio::Note made = note(id, at, 0);
+    made.kind = audio::Note::Kind::pedal;
+    made.pedal = pedal;
+    return made;
+}
+
+/// Level of samples [begin, begin + 2400) in dB.
+double level_db(const std::vector<double>& x, std::size_t begin) {
+    double sum = 0;
+    for (std::size_t i = begin; i < begin + 2400; ++i) sum += x[i] * x[i];
+    return 10 * std::log10(sum + 1e-30);
+}
+
+TEST(Pedal, WhatRingsFollowsItBothWaysAtTheDecayOfItsPlace) {
+    // One mode: T60 says exactly how much is left. At rest 2 s, at the far end 8 s, half-way 4 s.
+    audio::Voice bar =
+        voice("bell", {{"frequency_hz", 400}, {"partials", 2}, {"decay_s", 2}, {"variation", 0}}, 0);
+    bar.pedal_parameters = {{"decay_s", 8}};
+    const auto fall_db =
+        [&](const std::vector<audio::Note>& notes) {  // over 0.3 s, once the other partials are gone
+            const auto sound = left(render({bar}, notes, 96000, 0));
+            return level_db(sound, 24000) - level_db(sound, 24000 + 14400);
+        };
+    EXPECT_NEAR(fall_db({pressed(1, 0, 0)}), 60 * 0.3 / 2, 0.3);
+    EXPECT_NEAR(fall_db({pressed(1, 0, 0), moved(2, 20000, 1)}), 60 * 0.3 / 8, 0.3)
+        << "opened while it rings";
+    EXPECT_NEAR(fall_db({pressed(1, 0, 1), moved(2, 20000, 0.5)}), 60 * 0.3 / 4, 0.3) << "half closed";
+    EXPECT_NEAR(fall_db({pressed(1, 0, 1), moved(2, 20000, 0), moved(3, 24000, 1)}), 60 * 0.3 / 8, 0.3);
+    // It rings on beyond the end that the note had at its beginning, until it falls below -80 dBFS: from the amplitude at
+    // 0.5 s, which is the square root of twice the mean square, at 60 dB in 8 s.
+    const auto opened = left(render({bar}, {pressed(1, 0, 0), moved(2, 9600, 1)}, 48000, 480000));
+    const double amplitude_db = level_db(opened, 24000) + 10 * std::log10(2.0 / 2400);
+    EXPECT_NEAR(static_cast<double>(opened.size()) / 48000, 0.525 + (80 + amplitude_db) * 8 / 60, 0.1);
+}
+
+TEST(Pedal, AMoveMakesNoStepAndLiveSoundsAsOffline) {
+    audio::Voice tone =
+        voice("bell",
+              {{"frequency_hz", 100}, {"partials", 2}, {"decay_s", 0.5}, {"attack", 0}, {"variation", 0}}, 0);
+    tone.pedal_parameters = {{"decay_s", 8}};
+    for (const double to : {0.0, 0.3}) {
+        const std::vector<audio::Note> notes{pressed(1, 0, 1), moved(2, 24050, to)};
+        const auto sound = left(render({tone}, notes, 48000, 0));
+        // A decaying sine's envelope bends where its rate changes: by 6.9 (1 / 0.5 s - 1 / 8 s) / sr of the amplitude,
+        // in the second difference, beside the tone's own.
+        double amplitude = 0;
+        for (std::size_t i = 21600; i < 24000; ++i) amplitude = std::max(amplitude, std::abs(sound[i]));
+        EXPECT_LE(roughness(sound, 24000, 24800),
+                  roughness(sound, 21600, 24000) + amplitude * 6.9 * (1 / 0.5 - 1 / 8.0) / 48000);
+        Kept kept;
+        audio::LivePerformance live(kOrchestra, {tone}, kept.with({}));
+        for (const audio::Note& each : notes) ASSERT_TRUE(live.schedule(each));
+        EXPECT_EQ(kept.finish(live, 48000, 0), render({tone}, notes, 48000, 0));
+    }
 }
 
 TEST(Bus, BalanceAndRoomSendActOnTheirVoicesAlone) {

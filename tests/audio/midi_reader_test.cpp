@@ -36,7 +36,7 @@ TEST(MidiReader, ReadsBackWhatIsWritten) {
     std::vector<audio::Note> notes;
     for (std::uint64_t i = 0; i < 20; ++i)
         notes.push_back({.id = i + 1, .onset_sample = static_cast<std::int64_t>(i) * 7777});
-    notes[3].choke = true;
+    notes[3].kind = audio::Note::Kind::choke;
     const std::vector<std::uint8_t> file = audio::encode_midi(notes, {.tempo_bpm = 93}, {{4800, 4, 100}});
     const auto messages =
         audio::parse_midi({reinterpret_cast<const char*>(file.data()), file.size()}, "FILE.mid");

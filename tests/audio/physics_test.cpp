@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "rendering.h"
+#include "spectra.h"
 
 // What the built-in sounds owe to the literature that the orchestra cites, measured in their samples.
 
@@ -48,52 +49,6 @@ double t60_s(const std::vector<double>& samples, double frequency_hz) {
     const double early = amplitude(samples, 2400, 9600, frequency_hz),
                  late = amplitude(samples, 7200, 9600, frequency_hz);
     return 60 * 0.1 / (20 * std::log10(early / late));
-}
-
-/// Centre of the power spectrum of 85 ms, in Hz, under a window that falls from the onset on: the stroke itself is in it.
-double centroid_hz(const std::vector<double>& samples) {
-    constexpr std::size_t kLength = 4096;
-    std::vector<double> windowed(kLength);
-    for (std::size_t i = 0; i < kLength; ++i)
-        windowed[i] =
-            samples[i] * (0.5 + 0.5 * std::cos(std::numbers::pi * static_cast<double>(i) / kLength));
-    double weighted = 0, total = 0;
-    for (double frequency = 40; frequency < 16000; frequency += 20) {
-        // Goertzel's recurrence: the power of one frequency.
-        const double turn = 2 * std::cos(2 * std::numbers::pi * frequency / audio::kSampleRate);
-        double before = 0, last = 0;
-        for (const double x : windowed) {
-            const double next = x + turn * last - before;
-            before = last, last = next;
-        }
-        const double power = last * last + before * before - turn * last * before;
-        weighted += frequency * power;
-        total += power;
-    }
-    return weighted / total;
-}
-
-/// Power of the band above `frequency_hz`, every 64 samples over 256 of them: a Butterworth high-pass of
-/// fourth order (two biquads, the bilinear transform).
-std::vector<double> high_band(std::vector<double> samples, double frequency_hz) {
-    const double k = std::tan(std::numbers::pi * frequency_hz / audio::kSampleRate);
-    for (const double q : {0.54119610, 1.3065630}) {
-        const double norm = 1 / (1 + k / q + k * k), a1 = 2 * (k * k - 1) * norm,
-                     a2 = (1 - k / q + k * k) * norm;
-        double x1 = 0, x2 = 0, y1 = 0, y2 = 0;
-        for (double& x : samples) {
-            const double y = norm * (x - 2 * x1 + x2) - a1 * y1 - a2 * y2;
-            x2 = x1, x1 = x, y2 = y1, y1 = y;
-            x = y;
-        }
-    }
-    std::vector<double> power;
-    for (std::size_t begin = 0; begin + 256 <= samples.size(); begin += 64) {
-        double sum = 0;
-        for (std::size_t i = begin; i < begin + 256; ++i) sum += samples[i] * samples[i];
-        power.push_back(sum);
-    }
-    return power;
 }
 
 class Physics : public testing::TestWithParam<std::string> {};

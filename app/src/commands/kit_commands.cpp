@@ -98,6 +98,11 @@ void tell_contact(const Kit& kit) {
         const sim::SurfaceError error =
             instrument.fitted.value_or(sim::surface_error(shape, Eigen::Vector3d::Zero(), outer.points));
         const bool is_far = error.greatest_m > 2 * kFar * shape.semi_axes.maxCoeff();
+        if (outer.inside_out)
+            fmt::print(
+                "{}: \"{}\": the faces of {} look inwards, so it is drawn inside out; turn its normals where "
+                "it was made (what is struck is right)\n",
+                kit.file.string(), instrument.name, instrument.mesh.filename().string());
         fmt::print("{}: \"{}\" is struck as a superquadric of {}{}{}\n", kit.file.string(), instrument.name,
                    contact_text(shape, error),
                    outer.hollow_m > 0

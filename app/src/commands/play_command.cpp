@@ -93,6 +93,13 @@ void print_if_loud(const PlayResult& result, bool offline) {
                    counted(result.clipped_samples, "sample"));
 }
 
+void print_left_out(const PlayResult& result) {
+    if (result.pedal_moves_left_out > 0)
+        fmt::print("{} of {} {} outside the trace ({:g} to {:g} s) and not played\n",
+                   counted(result.pedal_moves_left_out, "move"), result.options.pedals->string(),
+                   result.pedal_moves_left_out == 1 ? "is" : "are", result.t0_s, result.t_end_s);
+}
+
 void play_offline(const PlayOptions& options) {
     const PlayResult result = play(options);
     const StrikeScore& s = result.score;
@@ -102,6 +109,7 @@ void play_offline(const PlayOptions& options) {
                (result.t_end_s - result.t0_s) / result.wall_s);
     print_if_apart(result);
     print_if_loud(result, true);
+    print_left_out(result);
     print_places(result);
     throw_if_any(result.failures, options.out);
 }
@@ -114,6 +122,7 @@ void play_in_time(const RealtimeOptions& options) {
                counted(outcome.latency.notes.total, "note"));
     print_if_apart(outcome.play);
     print_if_loud(outcome.play, false);
+    print_left_out(outcome.play);
     if (const OfflineComparison& offline = outcome.offline; offline.offline_strikes > 0)
         fmt::print("{} offline: {} here, {} unexplained ({})\n", counted(offline.offline_strikes, "strike"),
                    counted(offline.departures.size(), "departure"), offline.unexplained(),

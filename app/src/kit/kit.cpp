@@ -335,6 +335,8 @@ void instrument_keys(Fields& keys, InstrumentDraft& written) {
     keys.table("sound", written, kSound);
     keys.text("choke_group", voice.choke_group,
               "Instruments of one group silence each other (an open and a closed hi-hat); empty: none.");
+    keys.number("tip_choke_s", instrument.tip_choke_s, {0, 10, "s"},
+                "A stick's tip that rests on it for so long ends what it rings, as a hand does; 0: never.");
     keys.table("pedal", written, kPedal);
     keys.text("bus", instrument.bus, "Name of the [[bus]] that it is mixed in; empty: none.",
               {.example = "\"drums\""});

@@ -57,6 +57,7 @@ struct Instrument {
     audio::Voice voice;
     std::vector<ZoneSound> zones;  ///< as body.zones
     double velocity_gamma = 1;     ///< loudness speed = 5 (speed / 5)^gamma [m/s]
+    double tip_choke_s = 0;        ///< a stick's tip that rests on it so long ends what it rings; 0: never
     bool drawn_stand = true;       ///< a stand is drawn from the body down to the floor
     Pedal pedal{};
     std::string bus{};  ///< empty: none

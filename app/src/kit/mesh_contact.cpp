@@ -113,20 +113,30 @@ std::vector<double> depths(const std::vector<Eigen::Vector3d>& points) {
     return depths;
 }
 
+/// Six times the volume that the faces enclose; negative: they look inwards.
+double enclosed(const std::vector<Facet>& facets, const Eigen::Vector3d& middle) {
+    double sum = 0;
+    for (const Facet& facet : facets) sum += (facet.corners[0] - middle).dot(facet.normal);
+    return sum;
+}
+
 }  // namespace
 
 OuterSurface outer_surface(const render::Mesh& mesh, const Eigen::Affine3d& body_from_mesh) {
-    const std::vector<Facet> facets = facets_of(mesh, body_from_mesh);
+    std::vector<Facet> facets = facets_of(mesh, body_from_mesh);
     Eigen::AlignedBox3d box;
     for (const Facet& facet : facets)
         for (const Eigen::Vector3d& corner : facet.corners) box.extend(corner);
+    OuterSurface outer;
+    outer.inside_out = enclosed(facets, box.center()) < -1e-6 * std::pow(box.sizes().maxCoeff(), 3);
+    if (outer.inside_out)
+        for (Facet& facet : facets) facet.normal = -facet.normal;
     OuterShell shell(box);
     for (const Facet& facet : facets)
         for (const Eigen::Vector3d& corner : facet.corners) shell.take(corner, facet.normal);
     take_surface(facets, shell);
     const std::vector<Eigen::Vector3d> all = shell.points();
     const std::vector<double> below = depths(all);
-    OuterSurface outer;
     for (std::size_t i = 0; i < all.size(); ++i) {
         if (below[i] <= kDeepest * box.sizes().maxCoeff())
             outer.points.push_back(all[i]);

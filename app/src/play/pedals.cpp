@@ -58,6 +58,7 @@ public:
     Schedule(const std::string& file, const Kit& kit) : file_(file), kit_(kit) {}
 
     std::vector<PedalMove> read(std::string_view text) {
+        if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
         while (!text.empty()) {
             const std::size_t end = std::min(text.find('\n'), text.size());
             std::string_view line = text.substr(0, end);
@@ -156,6 +157,13 @@ std::vector<PedalMove> read_pedals(const std::filesystem::path& file, const Kit&
     return moves;
 }
 
+std::size_t leave_out(std::vector<PedalMove>& moves, double t0_s, double t_end_s) {
+    return std::erase_if(moves, [&](const PedalMove& move) {
+        const bool only_sets = move.kind == PedalMove::Kind::place;
+        return move.t_s > t_end_s || (move.t_s < t0_s && !only_sets);
+    });
+}
+
 std::vector<PedalMove> moves_of(const audio::MidiMessage& message, const Kit& kit) {
     using Kind = PedalMove::Kind;
     std::vector<PedalMove> moves;
@@ -194,7 +202,7 @@ Pedals::Pedals(const Kit& kit, double t0_s) : t0_s_(t0_s) {
 }
 
 void Pedals::add(const audio::Note& note, const PedalMove& move) {
-    notes_.push_back({note, move.kind, move.t_s});
+    notes_.push_back({note, move.kind, move.t_s, move.stick});
     notes_.back().note.id = kFirstPedalId + notes_.size() - 1;
 }
 
@@ -213,15 +221,14 @@ void Pedals::sound(Foot& foot, const PedalMove& move, std::int64_t sample, doubl
 
 void Pedals::end(Foot& foot, const PedalMove& move, std::int64_t sample) {
     // What tells of a closing a second time must not end the sound of the first.
-    if (move.kind != PedalMove::Kind::choke && foot.pedal.kind == Pedal::Kind::hi_hat &&
-        move.t_s - foot.sounded_s < kOneSoundS)
-        return;
+    const bool by_foot = move.kind == PedalMove::Kind::place || move.kind == PedalMove::Kind::foot;
+    if (by_foot && foot.pedal.kind == Pedal::Kind::hi_hat && move.t_s - foot.sounded_s < kOneSoundS) return;
     if (std::exchange(foot.ended, sample) == sample) return;
     audio::Note note = foot.stroke;
     note.onset_sample = sample;
     note.speed_mps = 0;
     note.midi_velocity = 1;
-    note.choke = true;
+    note.kind = audio::Note::Kind::choke;
     add(note, move);
 }
 
@@ -229,6 +236,12 @@ void Pedals::end(Foot& foot, const PedalMove& move, std::int64_t sample) {
 void Pedals::step(Foot& foot, std::int64_t sample) {
     const auto later = std::ranges::upper_bound(foot.steps, sample, {}, &Step::sample);
     foot.steps.insert(later, {sample, foot.place});
+    audio::Note place = foot.stroke;
+    place.id = kFirstPlaceId + places_.size();
+    place.kind = audio::Note::Kind::pedal;
+    place.onset_sample = std::max<std::int64_t>(sample, 0);
+    place.pedal = std::abs(foot.place - foot.rest);
+    places_.push_back(place);
 }
 
 void Pedals::move_to(Foot& foot, const PedalMove& move, std::int64_t sample) {
@@ -251,7 +264,7 @@ void Pedals::move_to(Foot& foot, const PedalMove& move, std::int64_t sample) {
 
 void Pedals::take(const PedalMove& move, std::int64_t earliest) {
     Foot& foot = feet_.at(move.instrument);
-    ++moves_;
+    if (move.kind != PedalMove::Kind::tip) ++moves_;
     const std::int64_t at = std::llround((move.t_s - t0_s_) * audio::kSampleRate),
                        sample = std::max(at, earliest);
     const bool before_all = at < 0;
@@ -268,6 +281,7 @@ void Pedals::take(const PedalMove& move, std::int64_t earliest) {
             if (move.value >= kSlowestMps) sound(foot, move, sample, move.value);
             break;
         case PedalMove::Kind::choke:
+        case PedalMove::Kind::tip:
             if (!before_all) end(foot, move, sample);
             break;
     }
@@ -286,6 +300,7 @@ void Pedals::rest(std::int64_t sample) {
 void Pedals::end_at(std::int64_t sample) {
     for (Foot& foot : feet_)
         foot.steps.erase(std::ranges::upper_bound(foot.steps, sample, {}, &Step::sample), foot.steps.end());
+    std::erase_if(places_, [&](const audio::Note& place) { return place.onset_sample > sample; });
 }
 
 void Pedals::put_on(audio::Note& note) const {

@@ -21,10 +21,12 @@ struct PedalMove {
         stroke,  ///< a beater strikes at `value` m/s
         foot,    ///< a hi-hat is closed by the foot with a sound of `value` m/s, and opened again as it was
         choke,   ///< a hand ends what rings
+        tip,     ///< the tip of a stick, likewise
     } kind = Kind::place;
     double t_s = 0;
     std::uint32_t instrument = 0;
     double value = 0;
+    std::uint32_t stick = 0;  ///< whose tip it is
 };
 
 inline constexpr std::size_t kMostPedalMoves = 1'000'000;
@@ -36,6 +38,8 @@ inline constexpr std::size_t kMostPedalMoves = 1'000'000;
 /// The same of a schedule's text. (Fuzzed.)
 [[nodiscard]] std::vector<PedalMove> parse_pedals(std::string_view text, const std::string& file,
                                                   const Kit& kit);
+/// Removes what cannot be heard between t0_s and t_end_s, and says how much that was; places before t0_s stay.
+[[nodiscard]] std::size_t leave_out(std::vector<PedalMove>& moves, double t0_s, double t_end_s);
 /// What a MIDI message, of any channel, does to a kit at its own time:
 ///   controller 4 (foot)       every hi-hat: openness 1 - value / 127
 ///   controller 64 (sustain)   every damper: value / 127
@@ -48,23 +52,30 @@ inline constexpr std::size_t kMostPedalMoves = 1'000'000;
 struct PedalNote {
     audio::Note note;
     PedalMove::Kind by = PedalMove::Kind::stroke;
-    double t_s = 0;  ///< of the move
+    double t_s = 0;           ///< of the move
+    std::uint32_t stick = 0;  ///< of a tip
 };
+[[nodiscard]] inline bool is_choke(const PedalNote& note) {
+    return note.note.kind == audio::Note::Kind::choke;
+}
 inline constexpr std::uint64_t kFirstPedalId = 1'000'000'000;
+/// Of the notes that only say where a pedal is.
+inline constexpr std::uint64_t kFirstPlaceId = 2'000'000'000;
 
 /// Where the pedals of a kit are, and what they sound.
 ///
 /// A hi-hat or damper that comes to 0.1 or below ends what its instrument rings, within 15 ms from that sample on. A
 /// hi-hat sounds then, if it closes fast: its plates have 30 mm to go, and the sound is that of a stroke at their mean speed
 /// since the pedal began to fall, a single step being a fall of 15 ms; below 0.2 m/s there is none. Drum modules say both
-/// where the pedal is and that it closed: within 50 ms that is one sound. A stroke gets the place of the pedal at its onset.
+/// where the pedal is and that it closed: within 50 ms that is one sound. A stroke gets the place of the pedal at its onset,
+/// and places() tell the sound where pedals are, for what rings.
 class Pedals {
 public:
     Pedals() = default;
     /// t0_s: time of sample 0.
     Pedals(const Kit& kit, double t0_s);
 
-    /// Moves come in order of time. Those before sample 0 only set places. What it sounds is added to notes(); its
+    /// Moves of pedals come in order of time. Those before sample 0 only set places. What it sounds is added to notes(); its
     /// onset is the move's time, or `earliest` where that is later.
     void take(const PedalMove& move, std::int64_t earliest = 0);
     /// All pedals go back to rest at that sample, without a sound.
@@ -75,8 +86,11 @@ public:
     void put_on(audio::Note& note) const;
 
     [[nodiscard]] const std::vector<PedalNote>& notes() const { return notes_; }
+    /// Notes of the kind `pedal`, in the order of the moves.
+    [[nodiscard]] const std::vector<audio::Note>& places() const { return places_; }
     /// Controller 4 as the hi-hats moved.
     [[nodiscard]] std::vector<audio::MidiControl> controls() const;
+    /// Taken of pedals and hands.
     [[nodiscard]] std::size_t moves() const { return moves_; }
 
 private:
@@ -94,7 +108,7 @@ private:
         std::vector<Step> steps{};  ///< by sample
         audio::Note stroke{};       ///< what a note of its own begins as
     };
-    static void step(Foot& foot, std::int64_t sample);
+    void step(Foot& foot, std::int64_t sample);
     void move_to(Foot& foot, const PedalMove& move, std::int64_t sample);
     void sound(Foot& foot, const PedalMove& move, std::int64_t sample, double speed_mps);
     void end(Foot& foot, const PedalMove& move, std::int64_t sample);
@@ -103,6 +117,7 @@ private:
     double t0_s_ = 0;
     std::vector<Foot> feet_;  // by instrument
     std::vector<PedalNote> notes_;
+    std::vector<audio::Note> places_;
     std::size_t moves_ = 0;
 };
 

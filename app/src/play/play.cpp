@@ -36,7 +36,7 @@ struct OfflineParts {
     const KitStage* stage = nullptr;
     FrameThread* frames = nullptr;
     audio::Performance* sound = nullptr;
-    const Pedals* pedals = nullptr;
+    Pedals* pedals = nullptr;
 };
 
 /// The loop of an offline run: every sample of the trace in order of time through filters, contacts and
@@ -112,6 +112,17 @@ private:
             parts_.sound->advance_to(static_cast<std::int64_t>(std::floor(fixed)));
         }
         pipeline_->take(s, feed(samples));
+        for (const TipRest& rest : pipeline_->take_tip_rests()) choke(rest);
+    }
+
+    /// At the first sample that is not fixed yet.
+    void choke(const TipRest& rest) {
+        if (!parts_.pedals) return;
+        const double fixed = (rest.s + parts_.options.release_margin_s - t0_s_) * audio::kSampleRate;
+        const std::size_t known = parts_.pedals->notes().size();
+        parts_.pedals->take({PedalMove::Kind::tip, rest.s, rest.instrument, 0, rest.stick},
+                            static_cast<std::int64_t>(std::ceil(fixed)));
+        for (const PedalNote& choke : std::span(parts_.pedals->notes()).subspan(known)) sound(choke.note);
     }
 
     std::vector<std::uint32_t> feed(std::span<const Sample> samples) {
@@ -131,12 +142,15 @@ private:
     }
 
     void send(audio::Note note, bool scheduled) {
-        if (!parts_.sound || (parts_.options.solo && *parts_.options.solo != note.id)) return;
         if (parts_.pedals) parts_.pedals->put_on(note);
         if (scheduled)
-            parts_.sound->schedule(note);
-        else
+            sound(note);
+        else if (parts_.sound && is_sounded(note, parts_.options))
             parts_.sound->cancel(note.id);
+    }
+
+    void sound(const audio::Note& note) {
+        if (parts_.sound && is_sounded(note, parts_.options)) parts_.sound->schedule(note);
     }
 
     /// Draws the frames that may use samples up to s but not the next one, at `next`.
@@ -237,9 +251,11 @@ PlayResult play(const PlayOptions& options) {
             LearnedInPlay{*options.save_model, "play", result.options.picture_predictor, result.trace});
     result.tracks = tip_tracks(trace, stick);
     result.pedals = Pedals(kit, trace.t0_s());
-    if (options.pedals)
-        for (const PedalMove& move : read_pedals(*options.pedals, kit, trace.t0_s()))
-            if (move.t_s <= trace.t_end_s()) result.pedals.take(move);
+    if (options.pedals) {
+        std::vector<PedalMove> moves = read_pedals(*options.pedals, kit, trace.t0_s());
+        result.pedal_moves_left_out = leave_out(moves, trace.t0_s(), trace.t_end_s());
+        for (const PedalMove& move : moves) result.pedals.take(move);
+    }
     OutputFolder folder(options.out);
 
     const KitStage stage(kit, trace.sticks.size(), stick, options.camera, options.shown);
@@ -251,8 +267,11 @@ PlayResult play(const PlayOptions& options) {
     const std::unique_ptr<sim::Simulation> simulation = make_simulation(kit, options.workers);
     result.stages_s.emplace_back("start", wall.seconds());
 
-    for (const PedalNote& pedal : result.pedals.notes())
-        if (sound && (!options.solo || *options.solo == pedal.note.id)) sound->schedule(pedal.note);
+    const auto schedule = [&](const audio::Note& note) {
+        if (sound && is_sounded(note, options)) sound->schedule(note);
+    };
+    for (const PedalNote& pedal : result.pedals.notes()) schedule(pedal.note);
+    for (const audio::Note& place : result.pedals.places()) schedule(place);
     const std::vector<tracking::Experience> taught = play_through(
         {trace, kit, options, stick, *simulation, &stage, frames.get(), sound.get(), &result.pedals}, result);
     const double sound_s = seconds_of([&] {

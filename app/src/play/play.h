@@ -83,6 +83,7 @@ struct PlayResult {
     std::vector<Eigen::Vector3d> middles;  ///< of the instruments [m], world
     std::vector<Strike> strikes;           ///< by id
     Pedals pedals;                         ///< what feet and hands played beside the sticks
+    std::size_t pedal_moves_left_out = 0;  ///< of a schedule: those before or after the trace
     std::vector<TrueContact> contacts;     ///< by time
     StrikeScore score;
     std::vector<TipTrack> tracks;

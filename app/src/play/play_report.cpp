@@ -4,12 +4,14 @@
 #include <tracking/input.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "files/bad_input.h"
 #include "play/film.h"
 #include "play/play_plots.h"
 #include "play/play_run.h"
@@ -214,6 +216,30 @@ std::string instruments_section(const PlayResult& result) {
     return text;
 }
 
+/// What feet, hands and resting tips did, by instrument.
+std::string pedals_section(const PlayResult& result) {
+    if (result.pedals.notes().empty() && result.pedal_moves_left_out == 0) return {};
+    enum : std::size_t { strokes, closed, by_hand, by_tip, kinds };
+    std::vector<std::array<int, kinds>> counts(result.instruments.size());
+    for (const PedalNote& note : result.pedals.notes()) {
+        const std::size_t what = note.by == PedalMove::Kind::tip      ? by_tip
+                                 : is_choke(note)                     ? by_hand
+                                 : note.by == PedalMove::Kind::stroke ? strokes
+                                                                      : closed;
+        ++counts.at(note.note.voice).at(what);
+    }
+    Table table =
+        Table::of({"instrument", "strokes:d", "closings heard:d", "ended by pedal or hand:d", "by a tip:d"});
+    for (std::size_t i = 0; i < counts.size(); ++i)
+        if (const auto& c = counts[i]; c != std::array<int, kinds>{})
+            table.add({result.instruments[i], c[strokes], c[closed], c[by_hand], c[by_tip]});
+    std::string text = "<h2>Pedals and chokes</h2>\n" + table.html();
+    if (result.pedal_moves_left_out > 0)
+        text += fmt::format("<p class=note>{} outside the trace, not played.</p>\n",
+                            counted(result.pedal_moves_left_out, "move"));
+    return text;
+}
+
 /// Inputs and versions.
 std::string provenance(const PlayResult& r) {
     Table inputs = Table::of({"file", "SHA-256"}), versions = Table::of({"part", "version"});
@@ -264,7 +290,7 @@ std::string plot_sections(const PlayResult& result, Plotter& plotter) {
         "<h2>Timing</h2>\n<p class=note>How far each note lies from the contact that it belongs to.</p>\n"
         "<div class=pair>{}{}</div>\n",
         plots.timing, plots.instruments);
-    text += instruments_section(result);
+    text += instruments_section(result) + pedals_section(result);
     text += fmt::format(
         "<h2>When notes were decided</h2>\n<p class=note>From its first prediction (ring) to its release "
         "(disc) or cancellation (cross); 0 is the onset. Dashed: the sound lead of {:.1f} ms and the "

@@ -189,6 +189,7 @@ std::vector<audio::Note> notes_of(const PlayResult& result, const Kit& kit) {
         result.pedals.put_on(notes.emplace_back(note_of(strike, kit.instruments[strike.instrument])));
     }
     for (const PedalNote& pedal : result.pedals.notes()) notes.push_back(pedal.note);
+    notes.insert(notes.end(), result.pedals.places().begin(), result.pedals.places().end());
     std::ranges::stable_sort(notes, {}, &audio::Note::onset_sample);
     return notes;
 }
@@ -220,6 +221,11 @@ void require_tools(const PlayOptions& options) {
 }
 
 PlayResult describe(const PlayOptions& options, const PlayedTrace& trace, const Kit& kit) {
+    if (options.mix.bus_stems && kit.buses.empty())
+        throw BadInput(
+            fmt::format("error: found --bus-stems with the kit {}, which has no [[bus]], expected one; "
+                        "--stems writes a file each instrument",
+                        options.kit.string()));
     PlayResult result;
     result.options = options;
     result.options.picture_predictor = picture_specification(options.picture_predictor);
@@ -363,14 +369,16 @@ std::string format_summary(const PlayResult& r, const std::string& realtime_json
           {"gain_db", r.gain_db}}},
         {"wall_s", r.wall_s},
     };
-    if (r.pedals.moves() > 0) {
+    if (r.pedals.moves() + r.pedal_moves_left_out > 0 || !r.pedals.notes().empty()) {
+        using Kind = PedalMove::Kind;
         const auto count = [&](auto has) { return std::ranges::count_if(r.pedals.notes(), has); };
         summary["pedals"] = {
             {"moves", r.pedals.moves()},
-            {"strokes", count([](const PedalNote& n) { return n.by == PedalMove::Kind::stroke; })},
-            {"closed",
-             count([](const PedalNote& n) { return n.by != PedalMove::Kind::stroke && !n.note.choke; })},
-            {"chokes", count([](const PedalNote& n) { return n.note.choke; })}};
+            {"left_out", r.pedal_moves_left_out},
+            {"strokes", count([](const PedalNote& n) { return n.by == Kind::stroke; })},
+            {"closed", count([](const PedalNote& n) { return n.by != Kind::stroke && !is_choke(n); })},
+            {"chokes", count([](const PedalNote& n) { return is_choke(n); })},
+            {"chokes_by_tips", count([](const PedalNote& n) { return n.by == Kind::tip; })}};
     }
     for (const auto& [instrument, error, size_m] : r.contact_shapes)
         summary["contact_shapes"].push_back({{"instrument", instrument},
@@ -398,9 +406,14 @@ std::string format_events(const PlayResult& result) {
         const audio::Note& note = pedal.note;
         const Eigen::Vector3d& middle = result.middles.at(note.voice);
         const double onset_s = result.t0_s + static_cast<double>(note.onset_sample) / audio::kSampleRate;
-        const char* by = note.choke ? "choke" : pedal.by == PedalMove::Kind::stroke ? "pedal" : "foot";
-        table.add({note.id, "", result.instruments.at(note.voice), onset_s, note.speed_mps, middle.x(),
-                   middle.y(), middle.z(), pedal.t_s, "released", 0, onset_s, by});
+        const bool by_tip = pedal.by == PedalMove::Kind::tip;
+        const char* by = by_tip                                ? "tip"
+                         : is_choke(pedal)                     ? "choke"
+                         : pedal.by == PedalMove::Kind::stroke ? "pedal"
+                                                               : "foot";
+        table.add({note.id, by_tip ? result.sticks.at(pedal.stick) : "", result.instruments.at(note.voice),
+                   onset_s, note.speed_mps, middle.x(), middle.y(), middle.z(), pedal.t_s, "released", 0,
+                   onset_s, by});
     }
     return table.csv();
 }

@@ -44,6 +44,10 @@ void require_tools(const PlayOptions& options);
 [[nodiscard]] audio::Note note_of(const Strike& strike, const Instrument& instrument);
 /// All notes that a run sounded, those of pedals included, by onset.
 [[nodiscard]] std::vector<audio::Note> notes_of(const PlayResult& result, const Kit& kit);
+/// Whether the run sounds it: of --solo that note alone, with where its pedal is.
+[[nodiscard]] inline bool is_sounded(const audio::Note& note, const PlayOptions& options) {
+    return !options.solo || *options.solo == note.id || note.kind == audio::Note::Kind::pedal;
+}
 [[nodiscard]] std::filesystem::path orchestra_file();
 [[nodiscard]] std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers);
 /// The thread that draws into the run's folder `frames`; null with --no-frames. `scenes`: one for each level
@@ -111,7 +115,7 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
 ///   id,stick,instrument,onset_s,speed_mps,px,py,pz,scheduled_at_s,outcome,moves,decided_at_s,model
 /// stick and instrument by name; onset_s, scheduled_at_s and decided_at_s on the trace's clock [s]; px,py,pz
 /// the struck point on the surface [m], world; outcome released|cancelled; model the predictor that played
-/// it. Behind them what pedals and hands played: no stick, the middle of the instrument, model pedal, foot or choke.
+/// it. Behind them what pedals and hands played: no stick (a tip's choke: its own), the middle of the instrument, model pedal, foot, choke or tip.
 /// Throws std::logic_error for a strike that is still pending: every note of a finished run was decided.
 [[nodiscard]] std::string format_events(const PlayResult& result);
 

@@ -25,7 +25,7 @@ std::vector<float> stem(const PlayResult& result, const Kit& kit, std::vector<st
     audio::Mix mix{.gain_db = result.gain_db, .room = {}, .alone = std::move(instruments)};
     audio::Performance performance(orchestra_file(), voices_of(kit), mix);
     for (const audio::Note& note : notes_of(result, kit))
-        if (!result.options.solo || *result.options.solo == note.id) performance.schedule(note);
+        if (is_sounded(note, result.options)) performance.schedule(note);
     return performance.finish(static_cast<std::int64_t>(result.audio.size() / 2), 0);
 }
 
@@ -56,7 +56,8 @@ void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& f
     const std::vector<audio::Note> notes = notes_of(result, kit);
     const auto write = [&](const std::string& name, const std::vector<std::uint32_t>& instruments) {
         const auto sounds = [&](const audio::Note& note) {
-            return !note.choke && std::ranges::find(instruments, note.voice) != instruments.end();
+            return note.kind == audio::Note::Kind::stroke &&
+                   std::ranges::find(instruments, note.voice) != instruments.end();
         };
         if (std::ranges::any_of(notes, sounds))
             (void)audio::write_wav(folder.path("stems/" + name), stem(result, kit, instruments));

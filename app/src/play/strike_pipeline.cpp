@@ -20,6 +20,12 @@ double toward(double value, double target, double step) {
     return value < target ? std::min(target, value + step) : std::max(target, value - step);
 }
 
+std::vector<double> tip_holds(const Kit& kit) {
+    std::vector<double> holds;
+    for (const Instrument& instrument : kit.instruments) holds.push_back(instrument.tip_choke_s);
+    return holds;
+}
+
 constexpr double kRecentS = 1;
 constexpr double kReboundS = 0.05;  // a filter has seen a rebound by then
 
@@ -93,7 +99,8 @@ StrikePipeline::StrikePipeline(const Kit& kit, const PlayOptions& options, doubl
                   .release_margin_s = options.release_margin_s,
                   .commit_lead_s = options.release_margin_s,
                   .cancelling = options.cancelling},
-                 sticks_.size(), kit.instruments.size()) {
+                 sticks_.size(), kit.instruments.size()),
+      rests_(tip_holds(kit), sticks_.size()) {
     if (contacts) decision_.emplace(contacts, options.false_cost);
 }
 
@@ -153,7 +160,11 @@ StrikeDecision::Path StrikePipeline::decided_path(const Stick& stick) const {
 }
 
 void StrikePipeline::settle_impulses(double s, sim::StepRequest& request) {
-    for (const std::uint64_t id : scheduler_.take_released()) unfolded_.push_back(id);
+    for (const std::uint64_t id : scheduler_.take_released()) {
+        unfolded_.push_back(id);
+        const Strike& released = scheduler_.strikes()[id - 1];
+        rests_.struck(released.instrument, released.onset_s);
+    }
     std::vector<std::uint64_t> ahead;
     for (const std::uint64_t id : unfolded_) {
         const sim::Impulse impulse = impulse_of(scheduler_.strikes()[id - 1]);
@@ -217,8 +228,10 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
         expected.push_back(
             {contacts[model],
              std::span(reply.clearance_m).subspan((paths.predicted + model) * bodies, bodies)});
-    scheduler_.sample(paths.stick, s, expected, sticks_[paths.stick].state().model,
-                      measured_clearance(paths, reply));
+    const std::vector<double> measured = measured_clearance(paths, reply);
+    const Stick& stick = sticks_[paths.stick];
+    scheduler_.sample(paths.stick, s, expected, stick.state().model, measured);
+    rests_.sample(paths.stick, s, stick.measured_tip(), measured);
 }
 
 void StrikePipeline::send_notes() {

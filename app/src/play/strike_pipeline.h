@@ -17,6 +17,7 @@
 #include "strikes/strike.h"
 #include "strikes/strike_decision.h"
 #include "strikes/strike_scheduler.h"
+#include "strikes/tip_rests.h"
 
 namespace app {
 
@@ -106,9 +107,15 @@ public:
     /// Before the samples at s (StrikeScheduler::advance_to).
     void advance_to(double s, double fixed_s = -std::numeric_limits<double>::infinity());
     /// The filter of a stick has started anew.
-    void restart(std::uint32_t stick) { scheduler_.restart(stick); }
+    void restart(std::uint32_t stick) {
+        scheduler_.restart(stick);
+        rests_.restart(stick);
+    }
     /// New samples of these sticks at s: contacts, strikes, notes.
     void take(double s, std::span<const std::uint32_t> moved);
+    /// Tips that choke what they lie on, found since the last call, in order; what rings ends a release margin
+    /// after the sample.
+    [[nodiscard]] std::vector<TipRest> take_tip_rests() { return rests_.take(); }
     /// After the last sample.
     void finish();
     /// What the frame shown at T >= s shows, known at s. Frames come in order of T.
@@ -155,6 +162,7 @@ private:
     Notify notify_;
     std::optional<StrikeDecision> decision_;
     StrikeScheduler scheduler_;
+    TipRests rests_;
     DrawnStrikes drawn_;
     std::vector<std::uint64_t> unfolded_;  // released strikes whose impulses lie ahead
     std::set<std::uint64_t> touching_;     // recent strikes that a frame has shown the stick at

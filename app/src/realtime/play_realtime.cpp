@@ -227,6 +227,7 @@ void collect(RealtimeOutcome& outcome, const RealtimeSession& session, RealtimeR
     outcome.failure = failure_of(outcome.realtime.events);
     result.samples_refused = run.refused();
     result.pedals = run.pedals();
+    result.pedal_moves_left_out = session.moves_left_out;
     result.frames = outcome.realtime.frames.size();
     result.t_end_s = result.t0_s + run.end_s();
     result.tracks = tracks_of(session, run);

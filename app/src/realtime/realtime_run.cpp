@@ -105,7 +105,6 @@ void RealtimeRun::send(audio::Note note, bool scheduled) {
 /// Moves of the schedule that are due soon, and those that have come by MIDI.
 void RealtimeRun::take_pedals() {
     if (!session_.sound) return;
-    const std::size_t known = pedals_.notes().size();
     const std::int64_t earliest = session_.sound->fixed_sample() + session_.sound->block_size();
     const double lap_s = static_cast<double>(lap_) * result_.period_s, now_s = t0_s_ + to_s(now_ns());
     for (; next_move_ < session_.moves.size(); ++next_move_) {
@@ -118,8 +117,25 @@ void RealtimeRun::take_pedals() {
         message.t_s += t0_s_;
         for (const PedalMove& move : moves_of(message, session_.kit)) pedals_.take(move, earliest);
     }
-    for (std::size_t i = known; i < pedals_.notes().size(); ++i)
-        (void)session_.sound->schedule(pedals_.notes()[i].note);
+    send_pedals();
+}
+
+void RealtimeRun::choke(const TipRest& rest) {
+    if (!session_.sound) return;
+    const double lap_s = static_cast<double>(lap_) * result_.period_s;
+    const auto due = static_cast<std::int64_t>(
+        std::ceil((rest.s + options_.play.release_margin_s - t0_s_) * audio::kSampleRate));
+    pedals_.take({PedalMove::Kind::tip, rest.s + lap_s, rest.instrument, 0, rest.stick},
+                 std::max(due + static_cast<std::int64_t>(lap_) * session_.period_samples,
+                          session_.sound->fixed_sample() + session_.sound->block_size()));
+    send_pedals();
+}
+
+void RealtimeRun::send_pedals() {
+    for (; notes_sent_ < pedals_.notes().size(); ++notes_sent_)
+        (void)session_.sound->schedule(pedals_.notes()[notes_sent_].note);
+    for (; places_sent_ < pedals_.places().size(); ++places_sent_)
+        (void)session_.sound->schedule(pedals_.places()[places_sent_]);
 }
 
 void RealtimeRun::wait(std::int64_t until_ns) {
@@ -198,6 +214,7 @@ void RealtimeRun::take(const std::vector<std::uint32_t>& moved, std::int64_t tak
     }
     const double simulated = pipeline_->times().simulation;
     pipeline_->take(s, moved);
+    for (const TipRest& rest : pipeline_->take_tip_rests()) choke(rest);
     const std::int64_t handed_ns = now_ns();
     const auto contact_ns = taken_ns + to_ns(pipeline_->times().simulation - simulated);
     for (const std::uint32_t stick : moved) {

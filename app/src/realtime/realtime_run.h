@@ -60,6 +60,9 @@ private:
     void end_lap();
     void send(audio::Note note, bool scheduled);
     void take_pedals();
+    void choke(const TipRest& rest);
+    /// To the sound: what pedals, hands and tips play.
+    void send_pedals();
     /// When the next frame is to be begun: a render lead before it is shown, or up to 1 ms later while a
     /// sample of before then is on its way.
     [[nodiscard]] double next_frame_at_s() const;
@@ -88,7 +91,8 @@ private:
     const RealtimeOptions& options_;
     double t0_s_;
     Pedals pedals_;
-    std::size_t next_move_ = 0;  // of the session's, in this lap
+    std::size_t next_move_ = 0;                     // of the session's, in this lap
+    std::size_t notes_sent_ = 0, places_sent_ = 0;  // of the pedals
     std::vector<Stick> sticks_;
     std::unique_ptr<StrikePipeline> pipeline_;
     std::uint64_t lap_ = 0, first_id_ = 0;

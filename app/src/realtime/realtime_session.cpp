@@ -75,9 +75,8 @@ RealtimeSession::RealtimeSession(const RealtimeOptions& asked) : options(asked),
     stick = stick_geometry(trace, kit.stick, asked.play.tip, asked.play.shaft);
     contacts = contact_model(asked.play.sound_predictor);
     const double once_s = trace.t_end_s() - trace.t0_s();
-    if (asked.play.pedals)
-        for (const PedalMove& move : read_pedals(*asked.play.pedals, kit, trace.t0_s()))
-            if (live || move.t_s <= trace.t_end_s()) moves.push_back(move);
+    if (asked.play.pedals) moves = read_pedals(*asked.play.pedals, kit, trace.t0_s());
+    if (!live) moves_left_out = leave_out(moves, trace.t0_s(), trace.t_end_s());
     if (seconds == 0) seconds = live ? kLongestLiveS : once_s;
     const double period_s = live ? seconds + kLiveSpareS : once_s + kBetweenLapsS;
     period_samples = static_cast<std::int64_t>(std::ceil(period_s * audio::kSampleRate));

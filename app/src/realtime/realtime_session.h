@@ -59,6 +59,7 @@ struct RealtimeSession {
     std::shared_ptr<const tracking::PathModel> contacts;  ///< decides the strikes, where there is one
     double seconds = 0;
     std::vector<PedalMove> moves;     ///< of the schedule of pedals, within a lap
+    std::size_t moves_left_out = 0;   ///< those before or after it
     std::int64_t period_samples = 0;  ///< of a lap; a live source has one, longer than the run
 
     // Since start():

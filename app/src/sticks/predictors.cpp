@@ -110,7 +110,13 @@ bool is_auto(const std::string& specification) {
 
 std::optional<std::filesystem::path> model_file(const std::string& specification) {
     if (!needs_model(specification)) return std::nullopt;
-    return find_bundled(part_model(specification).model.value_or(kBundledModel), "models", ".model");
+    const std::string model = part_model(specification).model.value_or(kBundledModel);
+    if (model.empty())
+        throw BadInput(
+            fmt::format("error: found no file behind model= in predictor \"{}\", expected "
+                        "model=FILE; without it the bundled one is used",
+                        specification));
+    return find_bundled(model, "models", ".model");
 }
 
 std::shared_ptr<const tracking::PathModel> contact_model(const std::string& specification) {

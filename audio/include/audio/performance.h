@@ -33,14 +33,20 @@ struct Voice {
     /// Empty: an instrument of the performance's orchestra.
     std::filesystem::path own_orchestra{};
     /// What these parameters are at the far end of its pedal's way (Note::pedal 1), by name. In between they go
-    /// evenly, those of a sign in ratios.
+    /// evenly, those of a sign in ratios. With decay_s among them, what rings follows the pedal to within a block:
+    /// all its modes' decay times change by the ratio of the decay_s there and where the note began.
     std::vector<std::pair<std::string, double>> pedal_parameters{};
     double balance = 0;       ///< of its bus: -1 left alone ... 1 right alone
     double room_send_db = 0;  ///< gain of what the room hears of it; -60 and below: nothing
 };
 
-/// One strike as the audio hears it.
+/// One strike as the audio hears it, or what a hand or a foot does to a voice.
 struct Note {
+    enum class Kind : std::uint8_t {
+        stroke,
+        choke,  ///< sounds nothing, but fades what the voice sounds, as a note of its choke group does
+        pedal,  ///< sounds nothing: the voice's pedal comes to `pedal`, and what rings decays as there
+    };
     std::uint64_t id = 0;           ///< unique, positive
     std::uint32_t voice = 0;        ///< index into the voices
     std::int64_t onset_sample = 0;  ///< first sample, counted from the start of the performance; >= 0
@@ -50,8 +56,7 @@ struct Note {
     int midi_note = 38;
     int midi_velocity = 64;  ///< 1-127
     double pedal = 0;        ///< 0: the voice's pedal is at rest ... 1: at the far end of its way
-    /// Sounds nothing, but fades what the voice sounds, as a note of its choke group does: a hand, a pedal.
-    bool choke = false;
+    Kind kind = Kind::stroke;
 };
 
 /// How a room answers, recorded: at 48 kHz, from each of two sides (first index) to each of two ears.
@@ -146,7 +151,7 @@ struct MidiControl {
 };
 
 /// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, at any tempo nearly 1920 ticks a second), channel 10,
-/// one note-on per note and its note-off 0.1 s later, a polyphonic aftertouch of 127 for a choke: the file's bytes. Times are right whatever the tempo. Throws
+/// one note-on per note and its note-off 0.1 s later, a polyphonic aftertouch of 127 for a choke; `controls` say where pedals are: the file's bytes. Times are right whatever the tempo. Throws
 /// std::runtime_error for a key, velocity or onset that MIDI has not, and std::logic_error for such a tempo or time signature.
 [[nodiscard]] std::vector<std::uint8_t> encode_midi(const std::vector<Note>& notes, const MidiTime& time = {},
                                                     const std::vector<MidiControl>& controls = {});

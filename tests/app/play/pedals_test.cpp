@@ -39,8 +39,8 @@ TEST(Pedals, AHiHatThatClosesAtOnceEndsWhatRingsAndSoundsInThatSample) {
     const Pedals pedals = moved("1,hi-hat,1\n2.00001,hi-hat,0\n", 0.5);
     ASSERT_EQ(pedals.notes().size(), 2U);
     const audio::Note &end = pedals.notes()[0].note, &chick = pedals.notes()[1].note;
-    EXPECT_TRUE(end.choke);
-    EXPECT_FALSE(chick.choke);
+    EXPECT_TRUE(is_choke(pedals.notes()[0]));
+    EXPECT_FALSE(is_choke(pedals.notes()[1]));
     for (const audio::Note& note : {end, chick}) {
         EXPECT_EQ(note.onset_sample, std::llround(1.50001 * 48000));
         EXPECT_EQ(note.voice, instrument("hi-hat"));
@@ -56,7 +56,7 @@ TEST(Pedals, ASlowFallMakesASofterSoundAndAVerySlowOneNone) {
             rows += fmt::format("{},hi-hat,{}\n", 1 + seconds * i / 20, 1 - i / 20.0);
         const Pedals pedals = moved(rows);
         for (const PedalNote& each : pedals.notes())
-            if (!each.note.choke) return each.note.speed_mps;
+            if (!is_choke(each)) return each.note.speed_mps;
         return 0.0;
     };
     EXPECT_NEAR(chick(0.06), 0.03 / 0.06, 0.1);  // its beginning is known to a step
@@ -108,7 +108,7 @@ TEST(Pedals, ABeaterStrikesAndAHandChokesWhatHasNoPedal) {
     EXPECT_NEAR(pedals.notes()[0].note.speed_mps, 8, 1e-9);
     EXPECT_EQ(pedals.notes()[0].note.midi_velocity, 127);
     EXPECT_EQ(pedals.notes()[0].note.midi_note, 36);
-    EXPECT_TRUE(pedals.notes()[1].note.choke);
+    EXPECT_TRUE(is_choke(pedals.notes()[1]));
     EXPECT_EQ(pedals.notes()[1].note.voice, instrument("crash"));
     EXPECT_EQ(pedals.notes()[0].note.id, kFirstPedalId);
 }
@@ -139,7 +139,7 @@ TEST(Pedals, MidiMovesThemAndWhatIsWrittenReadsBack) {
     both.take({Kind::place, 0.5, instrument("hi-hat"), 1});
     both.take({Kind::place, 1, instrument("hi-hat"), 0});
     both.take({Kind::foot, 1.01, instrument("hi-hat"), 3});
-    EXPECT_EQ(std::ranges::count_if(both.notes(), [](const PedalNote& n) { return !n.note.choke; }), 1);
+    EXPECT_EQ(std::ranges::count_if(both.notes(), [](const PedalNote& n) { return !is_choke(n); }), 1);
     for (const PedalNote& each : both.notes())
         EXPECT_EQ(each.note.onset_sample, 48000) << "what comes later would end the sound of the closing";
 
@@ -155,11 +155,40 @@ TEST(Pedals, MidiMovesThemAndWhatIsWrittenReadsBack) {
     for (std::size_t i = 0; i < again.notes().size(); ++i) {
         const audio::Note &a = again.notes()[i].note, &b = written.notes()[i].note;
         EXPECT_EQ(a.voice, b.voice);
-        EXPECT_EQ(a.choke, b.choke);
+        EXPECT_EQ(a.kind, b.kind);
         EXPECT_NEAR(static_cast<double>(a.onset_sample), static_cast<double>(b.onset_sample),
                     26);                             // half a tick
         EXPECT_NEAR(a.speed_mps, b.speed_mps, 0.1);  // a step of velocity
     }
+}
+
+TEST(Pedals, WhatLiesOutsideTheTraceIsCountedAndPlacesBeforeItStay) {
+    std::vector<PedalMove> moves =
+        parse_pedals("\xEF\xBB\xBFt,pedal,value\n0,hi-hat,1\n0.5,bass drum,1\n1,bass drum,1\n9,hi-hat,0\n",
+                     "FILE.csv", drums());
+    EXPECT_EQ(leave_out(moves, 1, 8), 2U) << "a stroke before it and a move after it";
+    ASSERT_EQ(moves.size(), 2U);
+    EXPECT_EQ(moves[0].kind, PedalMove::Kind::place);
+    EXPECT_EQ(moves[1].t_s, 1);
+}
+
+TEST(Pedals, ATipEndsWhatRingsAndPlacesSayWhereThePedalIs) {
+    Pedals pedals = moved("1,hi-hat,1\n2,hi-hat,0.4\n");
+    const auto hat = instrument("hi-hat");
+    pedals.take({PedalMove::Kind::tip, 1.5, hat, 0, 1}, 72010);
+    ASSERT_EQ(pedals.notes().size(), 1U);
+    const PedalNote& choke = pedals.notes()[0];
+    EXPECT_TRUE(is_choke(choke));
+    EXPECT_EQ(choke.stick, 1U);
+    EXPECT_EQ(choke.note.onset_sample, 72010);
+    EXPECT_EQ(pedals.moves(), 2U) << "a stick is no pedal";
+    ASSERT_EQ(pedals.places().size(), 2U);
+    for (const audio::Note& place : pedals.places()) EXPECT_EQ(place.kind, audio::Note::Kind::pedal);
+    EXPECT_EQ(pedals.places()[0].pedal, 1);
+    EXPECT_NEAR(pedals.places()[1].pedal, 0.4, 1e-12);
+    EXPECT_EQ(pedals.places()[1].onset_sample, 96000);
+    pedals.end_at(90000);
+    EXPECT_EQ(pedals.places().size(), 1U);
 }
 
 TEST(Pedals, WhatIsNoScheduleIsRefusedWithItsPlace) {
