@@ -13,7 +13,7 @@
 ;   902 entry 0: the sample by which every note so far has ended, written by close_note
 ;   903 one entry a voice: gain of what the room hears of it beyond the voice itself (0: the room hears it as it is)
 ;   904 two entries a voice that a pedal makes ring longer or shorter: its decay_s as the pedal is now, and the longest (0: no such pedal)
-; Opcodes of the host (audio/src/opcodes.h): contact_force, noise_burst, modal_bank, close_note, bessel.
+; Opcodes of the host (audio/src/opcodes.h): contact_force, noise_burst, modal_bank, pedal_ring, close_note, bessel.
 ;
 ; Each line `;@ instrument parameter default minimum maximum text` declares a parameter; the host reads these lines.
 ;
@@ -181,15 +181,7 @@ endop
     aforce = 0
     acontact = 0
   endif
-  asilence = 0
-#
-
-; How much longer the note rings, as its pedal is now, than with its own decay DECAY [s]: kring, at most ilongest.
-#define RING(DECAY) #
-  ilongest tab_i 2 * p10 + 1, giDecays
-  ilongest = max(ilongest / ($DECAY), 1)
-  kdecay tab 2 * p10, giDecays
-  kring = (kdecay > 0 ? kdecay / ($DECAY) : 1)
+  asilence init 0
 #
 
 ; Ends a note's amid and aside (at level 1; ilevel, iduration, iwidth): close_note fades to 0 over its last 50 ms, choked, within 15 ms
@@ -272,7 +264,7 @@ endop
 ; Zone 0: head. Zone 1: rim shot (the head near its edge, less of it, with rim and shell).
 instr drum
   $STROKE(p15'p25'p26'p27'p28)
-  $RING(p13)
+  kring, ilongest pedal_ring p10, p13, giDecays
   irim = (p9 >= 1 ? 1 : 0)
   isnare = p20
   iwidth = 0
@@ -358,7 +350,7 @@ endop
 ; Zone 0: body. Zone 1: shoulder (brighter, as place 1, and half as loud).
 instr bell
   $STROKE(p16'p20'p21'p22'p23)
-  $RING(p13)
+  kring, ilongest pedal_ring p10, p13, giDecays
   ishoulder = (p9 >= 1 ? 1 : 0)
   iplace = (ishoulder == 1 ? 1 : iplace)
   iwidth = p19
@@ -393,7 +385,7 @@ endop
 ; place 1 strikes a fifth as far from the bridge as place 0. All zones sound alike.
 instr string
   $STROKE(p15'p21'p22'p23'p24)
-  $RING(p13)
+  kring, ilongest pedal_ring p10, p13, giDecays
   iwidth = p20
   icount = limit(int(12000 / p12), 1, 32)
   inorm Put_string icount, p12, p13, p14, icontact, p16, p17 * (1 - 0.8 * iplace), p18, iseed, p21
@@ -444,7 +436,7 @@ endop
 ; plates, JSV 344, 2015). Here the high modes are driven by noise that rises in build_s, and answer as the resonators that they are.
 instr cymbal
   $STROKE(p15'p21'p22'p23'p24)
-  $RING(p13)
+  kring, ilongest pedal_ring p10, p13, giDecays
   icup = (p9 >= 1 ? 1 : 0)
   it60 = p13
   idamping = p14

@@ -1,7 +1,7 @@
 // Lateness of live sound: some seconds of notes on the wall clock; how much later than planned blocks began
 // and were done. `musicworld_audio_bench [SECONDS] [--realtime] [--benchmark_format=json]`; with --realtime
 // the audio thread asks for SCHED_FIFO 70; the last prints JSON as Google Benchmark does. `musicworld_audio_bench
-// --mix`: how many times faster than real time sixteen sounding voices in a room are rendered.
+// --mix [INSTRUMENT]`: how many times faster than real time sixteen sounding voices in a room are rendered.
 #include <pthread.h>
 #include <sched.h>
 
@@ -135,6 +135,10 @@ void report_mix(const std::string& instrument) {
 }  // namespace
 
 int main(int count, char** arguments) {
+    if (count > 2 && std::strcmp(arguments[1], "--mix") == 0) {
+        report_mix(arguments[2]);
+        return 0;
+    }
     if (count > 1 && std::strcmp(arguments[1], "--mix") == 0) {
         for (const char* instrument : {"", "drum", "bell", "string", "cymbal"}) report_mix(instrument);
         return 0;

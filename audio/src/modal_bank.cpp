@@ -1,5 +1,7 @@
 #include "modal_bank.h"
 
+#include <immintrin.h>
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -15,15 +17,27 @@ constexpr float kHeardRing = 1e-3F;  // a share of the decay time, likewise
 constexpr std::size_t kLanes = ModalBank::kLanes;
 static_assert(kLanes == 8);
 
-// Sixteen lanes' worth of registers: GCC and Clang make AVX of it, or pairs of SSE, with the same results.
+// Registers of lanes: GCC and Clang make AVX of it, or pairs of SSE.
 using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
 
+// In memory, at any address: copied in one piece, since halves that are read back as a whole wait for each other.
+using LanesAnywhere = float __attribute__((vector_size(kLanes * sizeof(float)), aligned(4), may_alias));
+
 inline void load(Lanes& lanes, const float* from) noexcept {
-    std::memcpy(&lanes, from, sizeof lanes);
+    lanes = *reinterpret_cast<const LanesAnywhere*>(from);
 }
 
 inline void store(float* to, const Lanes& lanes) noexcept {
-    std::memcpy(to, &lanes, sizeof lanes);
+    *reinterpret_cast<LanesAnywhere*>(to) = lanes;
+}
+
+/// a b + c, rounded once where the processor can; without FMA (the plain baseline) a little otherwise.
+inline Lanes multiply_add(const Lanes& a, const Lanes& b, const Lanes& c) noexcept {
+#ifdef __FMA__
+    return _mm256_fmadd_ps(a, b, c);
+#else
+    return a * b + c;
+#endif
 }
 
 bool is_silent(std::span<const float> samples) noexcept {
@@ -81,12 +95,14 @@ void ModalBank::rotate(std::size_t mode) noexcept {
                  radius = ring_ == 1 ? own : std::pow(own, 1 / static_cast<double>(ring_));
     const std::complex<double> once = std::polar(radius, angle);
     std::complex<double> power = 1;
-    float* of_group = &powers_[2 * kAhead * (mode - mode % kTogether)] + mode % kTogether;
-    for (std::size_t k = 0; k < kAhead; ++k, of_group += 2 * kTogether) {
+    float* of_group = &powers_[4 * (mode - mode % kTogether)] + mode % kTogether;
+    for (std::size_t k = 1; k <= kAhead; ++k) {
         power = {power.real() * once.real() - power.imag() * once.imag(),
                  power.real() * once.imag() + power.imag() * once.real()};
+        if (k != 1 && k != kAhead) continue;
         of_group[0] = static_cast<float>(power.real());
         of_group[kTogether] = static_cast<float>(power.imag());
+        of_group += 2 * kTogether;
     }
 }
 
@@ -104,17 +120,18 @@ void ModalBank::drive_group(std::size_t first, std::size_t begin, const Inputs& 
     Lanes x0, x1, y0, y1, c0, c1, s0, s1, w0, w1, d0, d1;
     load(x0, &real_[first]), load(x1, &real_[first + kLanes]);
     load(y0, &imaginary_[first]), load(y1, &imaginary_[first + kLanes]);
-    const float* power = &powers_[2 * kAhead * first];
+    const float* power = &powers_[4 * first];
     load(c0, power), load(c1, power + kLanes);
     load(s0, power + kTogether), load(s1, power + kTogether + kLanes);
     load(w0, &weight_[first]), load(w1, &weight_[first + kLanes]);
     load(d0, &drive_[first]), load(d1, &drive_[first + kLanes]);
     for (std::size_t n = begin; n < inputs.force.size(); ++n) {
-        x0 += w0 * inputs.force[n] + d0 * inputs.drive[n];
-        x1 += w1 * inputs.force[n] + d1 * inputs.drive[n];
-        const Lanes turned0 = c0 * x0 - s0 * y0, turned1 = c1 * x1 - s1 * y1;
-        y0 = s0 * x0 + c0 * y0;
-        y1 = s1 * x1 + c1 * y1;
+        const Lanes force = Lanes{} + inputs.force[n], drive = Lanes{} + inputs.drive[n];
+        x0 = multiply_add(d0, drive, multiply_add(w0, force, x0));
+        x1 = multiply_add(d1, drive, multiply_add(w1, force, x1));
+        const Lanes turned0 = multiply_add(c0, x0, -(s0 * y0)), turned1 = multiply_add(c1, x1, -(s1 * y1));
+        y0 = multiply_add(s0, x0, c0 * y0);
+        y1 = multiply_add(s1, x1, c1 * y1);
         x0 = turned0;
         x1 = turned1;
         Lanes sum;
@@ -125,29 +142,44 @@ void ModalBank::drive_group(std::size_t first, std::size_t begin, const Inputs& 
     store(&imaginary_[first], y0), store(&imaginary_[first + kLanes], y1);
 }
 
-/// A multiple of kAhead samples without input.
+/// A multiple of 2 kAhead samples without input.
 void ModalBank::ring_group(std::size_t first, std::size_t samples, float* sums) noexcept {
-    Lanes x0, x1, y0, y1;
-    load(x0, &real_[first]), load(x1, &real_[first + kLanes]);
-    load(y0, &imaginary_[first]), load(y1, &imaginary_[first + kLanes]);
-    for (std::size_t n = 0; n < samples; n += kAhead) {
-        Lanes c0, c1, s0, s1;
-        const float* power = &powers_[2 * kAhead * first];
-        for (std::size_t k = 0; k < kAhead; ++k, power += 2 * kTogether) {
-            load(c0, power), load(c1, power + kLanes);
-            load(s0, power + kTogether), load(s1, power + kTogether + kLanes);
-            Lanes sum;
-            load(sum, sums + (n + k) * kLanes);
-            store(sums + (n + k) * kLanes, sum + (s0 * x0 + c0 * y0) + (s1 * x1 + c1 * y1));
+    // p and p^4 are kept, as they say pitch and decay; p^2 and p^3 are made here, which is less than to fetch them.
+    Lanes c[kAhead][2], s[kAhead][2], x[2], y[2];
+#pragma GCC unroll 2
+    for (std::size_t half = 0; half < 2; ++half) {
+        const float* power = &powers_[4 * first] + half * kLanes;
+        load(c[0][half], power), load(s[0][half], power + kTogether);
+        load(c[3][half], power + 2 * kTogether), load(s[3][half], power + 3 * kTogether);
+#pragma GCC unroll 2
+        for (std::size_t k = 1; k < 3; ++k) {
+            c[k][half] = multiply_add(c[k - 1][half], c[0][half], -(s[k - 1][half] * s[0][half]));
+            s[k][half] = multiply_add(s[k - 1][half], c[0][half], c[k - 1][half] * s[0][half]);
         }
-        const Lanes turned0 = c0 * x0 - s0 * y0, turned1 = c1 * x1 - s1 * y1;
-        y0 = s0 * x0 + c0 * y0;
-        y1 = s1 * x1 + c1 * y1;
-        x0 = turned0;
-        x1 = turned1;
+        load(x[half], &real_[first + half * kLanes]), load(y[half], &imaginary_[first + half * kLanes]);
     }
-    store(&real_[first], x0), store(&real_[first + kLanes], x1);
-    store(&imaginary_[first], y0), store(&imaginary_[first + kLanes], y1);
+    for (std::size_t n = 0; n < samples; n += 2 * kAhead) {
+        Lanes u[2], v[2];  // four samples later
+        for (std::size_t half = 0; half < 2; ++half) {
+            u[half] = multiply_add(c[3][half], x[half], -(s[3][half] * y[half]));
+            v[half] = multiply_add(s[3][half], x[half], c[3][half] * y[half]);
+        }
+        for (std::size_t k = 0; k < kAhead; ++k) {
+            Lanes now, later;
+            load(now, sums + (n + k) * kLanes), load(later, sums + (n + kAhead + k) * kLanes);
+            for (std::size_t half = 0; half < 2; ++half) {
+                now = multiply_add(c[k][half], y[half], multiply_add(s[k][half], x[half], now));
+                later = multiply_add(c[k][half], v[half], multiply_add(s[k][half], u[half], later));
+            }
+            store(sums + (n + k) * kLanes, now), store(sums + (n + kAhead + k) * kLanes, later);
+        }
+        for (std::size_t half = 0; half < 2; ++half) {
+            x[half] = multiply_add(c[3][half], u[half], -(s[3][half] * v[half]));
+            y[half] = multiply_add(s[3][half], u[half], c[3][half] * v[half]);
+        }
+    }
+    for (std::size_t half = 0; half < 2; ++half)
+        store(&real_[first + half * kLanes], x[half]), store(&imaginary_[first + half * kLanes], y[half]);
 }
 
 /// Of a group's amplitudes.
@@ -168,7 +200,7 @@ void ModalBank::render(std::span<const float> force, std::span<const float> driv
     std::array<float, kMostSamples * kLanes> sums;
     std::fill_n(sums.begin(), force.size() * kLanes, 0.0F);
     const bool driven = !is_silent(force) || !is_silent(drive);
-    const std::size_t rung = driven ? 0 : force.size() - force.size() % kAhead;
+    const std::size_t rung = driven ? 0 : force.size() - force.size() % (2 * kAhead);
     const Inputs inputs{force, drive};
     for (std::size_t group = 0; group < groups_; ++group) {
         if (!sounds_[group]) continue;

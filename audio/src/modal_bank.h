@@ -21,7 +21,8 @@ struct ModeParameters {
 /// keep their relative precision at low frequencies, where those of a biquad do not.
 ///
 /// Where nothing comes in, samples n + 1 to n + 4 are Im(p z), ..., Im(p^4 z) of the same z[n], p = r e^(i theta):
-/// two products each, of which none waits for another, and one rotation by p^4.
+/// two products each, of which none waits for another, and one rotation by p^4; so are the four samples behind, of the
+/// turned z. Many notes together do not fit into the processor's cache: a mode keeps no more than p and p^4.
 ///
 /// A trivial type without alignment of its own, which lies in memory that Csound clears and gives out again.
 /// Sixteen modes go together; once they are quiet they rest for good. No allocation.
@@ -29,7 +30,7 @@ class ModalBank {
 public:
     static constexpr std::size_t kMostModes = 512, kMostSamples = 64;
     static constexpr std::size_t kLanes = 8, kTogether = 2 * kLanes;  ///< modes in a vector, in a group
-    static constexpr std::size_t kAhead = 4;                          ///< powers of p that are kept
+    static constexpr std::size_t kAhead = 4;                          ///< powers of p that are used
 
     /// A new start from rest with at most kMostModes; others are left out, as are modes from 20 kHz on.
     /// `rest_below`: amplitude from which a group rests while nothing comes in.
@@ -50,8 +51,8 @@ private:
     void rotate(std::size_t mode) noexcept;
 
     Column real_, imaginary_;  ///< z
-    /// Real and imaginary parts of p, p^2, ... of each group: kTogether of both, power by power.
-    std::array<float, kMostModes * 2 * kAhead> powers_;
+    /// Of each group the real and imaginary parts of p, then of p^4: kTogether of each.
+    std::array<float, kMostModes * 4> powers_;
     Column weight_, drive_;  ///< gains of the inputs
     Column angle_, radius_;  ///< theta, r; untuned
     std::array<bool, kMostModes / kTogether> sounds_;

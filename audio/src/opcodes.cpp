@@ -182,8 +182,18 @@ struct CloseNote {
         const bool steady = self.choke < 0 && block < self.remaining - kFadeS * rate;
         const Part part = part_of(self.h);
         double at = self.sample, remains = self.remaining;
-        for (std::size_t n = part.begin; n < part.end; ++n) {
-            const double gain = steady ? 1 : self.gain(at, remains, rate);
+        if (steady) {
+            for (std::size_t n = part.begin; n < part.end; ++n) {
+                const double mid = self.mid[n], side = width * self.side[n];
+                self.left[n] = left * (mid + side);
+                self.right[n] = right * (mid - side);
+            }
+            const auto played = static_cast<double>(part.end - part.begin);
+            at += played;
+            remains -= played / ring;
+        }
+        for (std::size_t n = steady ? part.end : part.begin; n < part.end; ++n) {
+            const double gain = self.gain(at, remains, rate);
             const double mid = gain * self.mid[n], side = gain * width * self.side[n];
             self.left[n] = left * (mid + side);
             self.right[n] = right * (mid - side);
@@ -194,6 +204,30 @@ struct CloseNote {
         self.remaining = remains;
         if (ring > 1) self.tell_end(ring);
         *self.over = remains <= 0 || (self.choke >= 0 && at > self.choke + kChokedS * rate) ? 1 : 0;
+        return OK;
+    }
+};
+
+struct PedalRing {
+    OPDS h;
+    MYFLT *ring, *longest;
+    MYFLT *voice, *decay_s, *decays_table;
+    const MYFLT* decay_now;  // of its voice
+
+    static int start(CSOUND* csound, void* memory) {
+        auto& self = *static_cast<PedalRing*>(memory);
+        MYFLT* decays = nullptr;
+        const int length = csound->GetTable(csound, &decays, static_cast<int>(*self.decays_table));
+        const auto voice = static_cast<int>(*self.voice);
+        if (voice < 0 || 2 * voice + 1 >= length)
+            return csound->InitError(csound, "pedal_ring: found no such voice");
+        self.decay_now = decays + 2 * voice;
+        *self.longest = std::max(self.decay_now[1] / *self.decay_s, 1.0);
+        return run(csound, memory);
+    }
+    static int run(CSOUND*, void* memory) {
+        auto& self = *static_cast<PedalRing*>(memory);
+        *self.ring = *self.decay_now > 0 ? *self.decay_now / *self.decay_s : 1;
         return OK;
     }
 };
@@ -228,6 +262,7 @@ void add_opcodes(CSOUND_* csound) {
     add<NoiseBurst>(csound, "noise_burst", "a", "iii");
     add<Bank>(csound, "modal_bank", "aa", "aakiiiP");
     add<CloseNote>(csound, "close_note", "aak", "aaiiiiiiiiik");
+    add<PedalRing>(csound, "pedal_ring", "ki", "iii");
     add<Bessel>(csound, "bessel", "i", "ii");
 }
 

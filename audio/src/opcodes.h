@@ -16,6 +16,9 @@ namespace audio {
 ///                                                               once it is over. Where it rings kring times as long
 ///                                                               as when it began (above 1), its end waits, as entry 0
 ///                                                               of the table iends tells
+///   kring, ilongest  pedal_ring ivoice, idecay_s, idecays       how much longer a note rings, as its voice's pedal
+///                                                               is now, than with its own decay_s (1 without such a
+///                                                               pedal), and at most (1 or more)
 ///   ivalue       bessel iorder, ix                              J_n(x)
 /// All begin at the note's own sample, and all memory lies in the instrument's own. At most 64 samples a
 /// block and 512 modes; more are left out. Throws std::runtime_error where Csound refuses one.
