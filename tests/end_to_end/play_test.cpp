@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
@@ -172,6 +173,61 @@ TEST(Play, CuttingTheTraceLeavesEveryEarlierFrameAndSampleAsItWas) {
         same = same && a[i] == b[i], sounding = sounding || a[i] != 0;
     EXPECT_TRUE(same);
     EXPECT_TRUE(sounding) << "silence would prove nothing";
+}
+
+/// A stick that strikes the drums' crash twice and then comes to rest on it at 1.35 s, at 120 Hz.
+std::string resting_stick() {
+    std::string text = "t,stick,px,py,pz\n";
+    for (int k = 0; k < 300; ++k) {
+        const double t = k / 120.0, pi = 3.14159265358979;
+        const double height = t < 1.1 ? 0.12 * std::abs(std::sin(pi * (t - 0.3) / 0.4))
+                                      : 0.12 * std::max(0.0, 1 - (t - 1.1) / 0.25);
+        char row[80];
+        std::snprintf(row, sizeof row, "%.6f,a,-0.5,%.6f,-0.92\n", t, 1.0724 + height);
+        text += row;
+    }
+    return text;
+}
+
+TEST(Play, ATipThatRestsOnACymbalChokesItAndWhatComesLaterChangesNothingBefore) {
+    const Folder folder;
+    write(folder / "rest.csv", resting_stick());
+    write(folder / "part.csv", cut_trace(resting_stick(), 1.43));  // before it has rested long enough
+    write(folder / "free.toml",
+          "include = [\"drums.toml\"]\n[mix]\nroom_t60_s = 0\n[[instrument]]\nname = \"crash\"\ntip_choke_s "
+          "= 0\n");
+    write(folder / "dry.toml", "include = [\"drums.toml\"]\n[mix]\nroom_t60_s = 0\n");
+    const auto sound = [&](const char* trace, const char* kit) {
+        const std::filesystem::path out = folder / (std::string(trace) + kit);
+        EXPECT_EQ(run(play(folder / (std::string(trace) + ".csv"), out,
+                           {"--no-frames", "--gain", "0", "--kit",
+                            (folder / (std::string(kit) + ".toml")).string()}))
+                      .status,
+                  0);
+        int channels = 0;
+        return read_wav(out / "audio.wav", channels);
+    };
+    const std::vector<int> choked = sound("rest", "dry"), free = sound("rest", "free"),
+                           part = sound("part", "dry");
+    std::size_t onset = 0, tips = 0;
+    for (const auto& row : read_csv(folder / "restdry/events.csv"))
+        if (row.at("model") == "tip") {
+            onset = static_cast<std::size_t>(std::llround(std::stod(row.at("onset_s")) * 48000));
+            EXPECT_EQ(row.at("stick"), "a");
+            EXPECT_EQ(row.at("instrument"), "crash");
+            ++tips;
+        }
+    ASSERT_EQ(tips, 1U);
+    EXPECT_NEAR(static_cast<double>(onset) / 48000, 1.35 + 0.1 + 0.01, 0.02);
+    ASSERT_GT(free.size(), 2 * (onset + 4800));
+    EXPECT_TRUE(
+        std::equal(free.begin(), free.begin() + static_cast<std::ptrdiff_t>(2 * onset), choked.begin()));
+    for (std::size_t i = 2 * (onset + 720); i < choked.size(); ++i) ASSERT_EQ(choked[i], 0) << i;
+    EXPECT_TRUE(std::any_of(free.begin() + static_cast<std::ptrdiff_t>(2 * (onset + 720)), free.end(),
+                            [](int x) { return x != 0; }));
+    // The part ends at a sample of 1.425 s: sound is fixed up to 10 ms after it.
+    EXPECT_TRUE(std::equal(part.begin(), part.begin() + static_cast<std::ptrdiff_t>(2 * 1.435 * 48000),
+                           choked.begin()));
 }
 
 TEST(Play, EachInstrumentsFirstNoteSoundsAtItsPlannedSample) {
