@@ -95,9 +95,8 @@ void print_if_loud(const PlayResult& result, bool offline) {
 
 void print_left_out(const PlayResult& result) {
     if (result.pedal_moves_left_out > 0)
-        fmt::print("{} of {} {} outside the trace ({:g} to {:g} s) and not played\n",
-                   counted(result.pedal_moves_left_out, "move"), result.options.pedals->string(),
-                   result.pedal_moves_left_out == 1 ? "is" : "are", result.t0_s, result.t_end_s);
+        fmt::print("{} of {} before or after the trace: not played\n",
+                   counted(result.pedal_moves_left_out, "move"), result.options.pedals->string());
 }
 
 void play_offline(const PlayOptions& options) {
