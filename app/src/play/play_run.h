@@ -115,7 +115,8 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
 ///   id,stick,instrument,onset_s,speed_mps,px,py,pz,scheduled_at_s,outcome,moves,decided_at_s,model
 /// stick and instrument by name; onset_s, scheduled_at_s and decided_at_s on the trace's clock [s]; px,py,pz
 /// the struck point on the surface [m], world; outcome released|cancelled; model the predictor that played
-/// it. Behind them what pedals and hands played: no stick (a tip's choke: its own), the middle of the instrument, model pedal, foot, choke or tip.
+/// it. Behind them what pedals, hands and tips played: no stick (a tip's choke: its own), the middle of the instrument,
+/// model pedal, foot, choke or tip.
 /// Throws std::logic_error for a strike that is still pending: every note of a finished run was decided.
 [[nodiscard]] std::string format_events(const PlayResult& result);
 

@@ -150,9 +150,10 @@ struct MidiControl {
     int controller = 4, value = 0;  ///< 0-127
 };
 
-/// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, at any tempo nearly 1920 ticks a second), channel 10,
-/// one note-on per note and its note-off 0.1 s later, a polyphonic aftertouch of 127 for a choke; `controls` say where pedals are: the file's bytes. Times are right whatever the tempo. Throws
-/// std::runtime_error for a key, velocity or onset that MIDI has not, and std::logic_error for such a tempo or time signature.
+/// Standard MIDI file (format 0, 960 ticks a quarter at 120 per minute, at any tempo nearly 1920 ticks a second),
+/// channel 10, one note-on per note and its note-off 0.1 s later, a polyphonic aftertouch of 127 for a choke; `controls`
+/// say where pedals are: the file's bytes. Times are right whatever the tempo. Throws std::runtime_error for a key,
+/// velocity or onset that MIDI has not, and std::logic_error for such a tempo or time signature.
 [[nodiscard]] std::vector<std::uint8_t> encode_midi(const std::vector<Note>& notes, const MidiTime& time = {},
                                                     const std::vector<MidiControl>& controls = {});
 
