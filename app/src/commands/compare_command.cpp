@@ -88,9 +88,8 @@ std::shared_ptr<ComparisonOptions> declare_comparison(Command& command) {
                 o->surface_text = "plane " + text;
             })
         ->excludes(kit);
-    command.option(
-        "--false-cost", o->false_cost, as::number(0.01, 100),
-        "What a false sound costs where a missed strike costs 1 (auto with a network of contacts)");
+    command.option("--false-cost", o->false_cost, as::number(0.01, 100),
+                   "What a false sound costs where a missed strike costs 1");
     CLI::Option* tune = command.options(
         "--tune", o->tune_traces, trace,
         "Tune, and learn the advance of auto's strikes, on these traces (without the one scored) "

@@ -180,9 +180,8 @@ CLI::Option* add_play_options(Command& command, PlayOptions& o) {
     command.option("--sound-lead", o.sound_lead_s, as::number(0.001, 1, "s"), "Lead of sound");
     command.option("--release-margin", o.release_margin_s, as::number(0, 1, "s"),
                    "A note is fixed this long before its onset, at most the sound lead");
-    command.option(
-        "--false-cost", o.false_cost, as::number(0.01, 100),
-        "What a false sound costs where a missed strike costs 1 (auto with a network of contacts)");
+    command.option("--false-cost", o.false_cost, as::number(0.01, 100),
+                   "What a false sound costs where a missed strike costs 1");
     command.option("--workers", o.workers, as::whole(0, 64), "Worker processes of the simulation");
     command.option("--tip", o.tip, as::vector_of_3(as::number(-1000, 1000, "m")),
                    "Tip in the tracked body's frame");

@@ -69,10 +69,10 @@ constexpr const char* kParabola = "least-squares:degree=2,n=4";
 std::string description_of(const std::string& specification) {
     if (is_auto(specification))
         return fmt::format(
-            "{}{} draws (errors), {} strikes, {}", specification == "auto" ? "the program's default: " : "",
-            picture_specification(specification), sound_specification(specification),
-            contact_model(specification) ? "a network of contacts decides"
-                                         : confirming_specification(specification) + " confirms");
+            "{}{} draws (errors), {} strikes, {} confirms{}",
+            specification == "auto" ? "the program's default: " : "", picture_specification(specification),
+            sound_specification(specification), confirming_specification(specification),
+            contact_model(specification) ? ", a network of contacts is heard" : "");
     if (is_external(specification)) return "a child process; its cost is not measured";
     if (specification == "naive") return "baseline: the moving average of 1992, 67 ms";
     if (specification == kParabola) return "baseline: the parabola through four samples";
@@ -335,10 +335,10 @@ HitScore strikes_of(const Entrant& entrant, const Field& field, const SensedStic
     if (!entrant.confirmed_by.empty())
         confirming =
             make_any_predictor(entrant.confirmed_by, path_leads(kConfirmingLeadS), {stick.name, stick.shaft});
-    std::optional<StrikeDecision> decision;
-    if (entrant.contacts) decision.emplace(entrant.contacts, options.false_cost);
+    std::optional<ContactForecast> network;
+    if (entrant.contacts) network.emplace(entrant.contacts);
     return evaluate_strikes(recording.tracks[stick.stick], stick.samples,
-                            {*predictor, confirming.get(), decision ? &*decision : nullptr},
+                            {*predictor, confirming.get(), network ? &*network : nullptr, options.false_cost},
                             recording.geometry, options.surface, timing);
 }
 

@@ -28,7 +28,7 @@ struct Surface {
     std::size_t parts;
     std::function<std::vector<sim::Contact>(const sim::TipPath&)> sweep;    ///< contacts of a path by time
     std::function<std::vector<double>(const Eigen::Vector3d&)> clearances;  ///< of a tip, signed [m]
-    StrikeDecision::Nearest nearest;                                        ///< of a part, at rest
+    ContactForecast::Nearest nearest;                                       ///< of a part, at rest
     std::function<std::vector<TrueContact>(const TipTrack&)> true_contacts;
 };
 
@@ -139,52 +139,40 @@ Expected expected_of(const tracking::Predictor& predictor, std::size_t model, co
     return expected;
 }
 
-/// What a decision makes of a sample: contacts that are kept in mind, and those that sound.
-struct Decided {
-    Expected all, sounding;
-};
-
-/// Follows the tip for a decision.
-class DecidedStrikes {
+/// Follows the tip for a network of contacts.
+class ForecastContacts {
 public:
-    DecidedStrikes(const StrikeDecision& decision, const Surface& surface, const StickGeometry& geometry,
-                   const StrikeTiming& timing)
-        : decision_(decision),
+    ForecastContacts(const ContactForecast& forecast, const Surface& surface, const StickGeometry& geometry,
+                     const StrikeTiming& timing)
+        : forecast_(forecast),
           surface_(surface),
           geometry_(geometry),
           timing_(timing),
           history_(geometry.shaft, geometry.tip) {}
 
-    /// After a sample that `predictor` took.
-    [[nodiscard]] Decided after(const tracking::PoseSample& sample, bool anew,
-                                const tracking::Predictor& predictor, std::span<const double> measured) {
+    /// After a sample that `predictor` took: fills in what the network expects.
+    void look(const tracking::PoseSample& sample, bool anew, const tracking::Predictor& predictor,
+              ExpectedStrikes& expected) {
         if (anew) history_.restart();
-        const double interval_s = anew ? 0 : sample.t_s - newest_s_;
-        newest_s_ = sample.t_s;
         history_.push(sample);
-        Decided decided{{{}, {measured.begin(), measured.end()}}, {{}, {measured.begin(), measured.end()}}};
         const auto path = predicted_path([&](double lead_s) { return predictor.predict(lead_s); },
                                          predictor.time_s(), geometry_, 0, strike_leads(timing_));
-        if (!path || !history_.look(view_)) return decided;
-        const auto expected = decision_.after(view_, *path, {surface_.parts, surface_.nearest},
-                                              std::max(timing_.lead_s, kReleaseMarginS) + kBeyondLeadS,
-                                              interval_s, kReleaseMarginS);
-        if (!expected) return decided;
-        decided.all.contacts = surface_.sweep(expected->path);
-        for (sim::Contact& contact : decided.all.contacts)
+        if (!path || !history_.look(view_)) return;
+        const auto met = forecast_.after(view_, *path, {surface_.parts, surface_.nearest},
+                                         std::max(timing_.lead_s, kReleaseMarginS) + kBeyondLeadS);
+        if (!met) return;
+        expected.network = surface_.sweep(met->path);
+        for (sim::Contact& contact : expected.network)
             contact.t_s = std::max(sample.t_s, contact.t_s - timing_.advance_s);
-        if (expected->sounds) decided.sounding = decided.all;
-        return decided;
     }
 
 private:
-    const StrikeDecision& decision_;
+    const ContactForecast& forecast_;
     const Surface& surface_;
     const StickGeometry& geometry_;
     const StrikeTiming& timing_;
     tracking::TipHistory history_;
     tracking::TipView view_;
-    double newest_s_ = 0;
 };
 
 }  // namespace
@@ -354,8 +342,11 @@ HitScore evaluate_strikes(const TipTrack& recorded, std::span<const tracking::Po
     tracking::Predictor* const other = predictors.confirming;
     StrikeScheduler played(rules_at(timing, true, recorded.t_s.front()), 1, surface->parts);
     StrikeScheduler uncancelled(rules_at(timing, false, recorded.t_s.front()), 1, surface->parts);
-    std::optional<DecidedStrikes> deciding;
-    if (predictors.decision) deciding.emplace(*predictors.decision, *surface, geometry, timing);
+    std::optional<ForecastContacts> network;
+    if (predictors.network) network.emplace(*predictors.network, *surface, geometry, timing);
+    std::vector<StrikeDecision> decisions(
+        predictor.models(), StrikeDecision(surface->parts, predictors.false_cost, kReleaseMarginS));
+    double newest_s = 0;
     for (const tracking::PoseSample& sample : samples) {
         const tracking::SampleStatus status = predictors.timing.correct(sample);
         if (other) (void)other->correct(sample);
@@ -363,29 +354,32 @@ HitScore evaluate_strikes(const TipTrack& recorded, std::span<const tracking::Po
             predictor.require_working();
             continue;
         }
+        const bool anew = status == tracking::SampleStatus::reinitialised;
         const std::vector<double> measured =
             surface->clearances(sample.position + sample.orientation * geometry.tip);
-        std::vector<Expected> all, confirmed;
-        if (deciding) {
-            Decided decided =
-                deciding->after(sample, status == tracking::SampleStatus::reinitialised, predictor, measured);
-            all.push_back(std::move(decided.all));
-            confirmed.push_back(std::move(decided.sounding));
+        ExpectedStrikes expected{sample.t_s, anew ? 0 : sample.t_s - newest_s, measured};
+        newest_s = sample.t_s;
+        if (network) network->look(sample, anew, predictor, expected);
+        std::vector<sim::Contact> confirming;
+        if (other)
+            confirming = swept(
+                *surface, [&](double lead_s) { return other->predict(lead_s); }, other->time_s(), geometry,
+                path_leads(kConfirmingLeadS));
+        std::vector<Expected> all, sounding;
+        for (std::size_t model = 0; model < predictor.models(); ++model) {
+            Expected own = expected_of(predictor, model, *surface, geometry, timing);
+            expected.filtered_m = own.clearance_m;
+            expected.path = expected.confirmed = std::move(own.contacts);
+            if (other) keep_confirmed(expected.confirmed, confirming, predictor.time_s());
+            if (anew) decisions[model].restart();
+            DecidedStrikes decided = decisions[model].after(expected);
+            all.push_back({std::move(decided.kept), own.clearance_m});
+            sounding.push_back({std::move(decided.sounding), std::move(own.clearance_m)});
         }
-        for (std::size_t model = 0; !deciding && model < predictor.models(); ++model)
-            all.push_back(expected_of(predictor, model, *surface, geometry, timing));
-        if (!deciding) confirmed = all;
-        if (other && !deciding) {
-            const PoseAfter pose = [&](double lead_s) { return other->predict(lead_s); };
-            const std::vector<sim::Contact> confirming =
-                swept(*surface, pose, other->time_s(), geometry, path_leads(kConfirmingLeadS));
-            for (Expected& expected : confirmed)
-                keep_confirmed(expected.contacts, confirming, predictor.time_s());
-        }
-        for (const auto& [strikes, expected] : {std::pair(&played, &confirmed), {&uncancelled, &all}}) {
+        for (const auto& [strikes, contacts] : {std::pair(&played, &sounding), {&uncancelled, &all}}) {
             strikes->advance_to(sample.t_s);
-            if (status == tracking::SampleStatus::reinitialised) strikes->restart(0);
-            const std::vector<ModelContacts> views(expected->begin(), expected->end());
+            if (anew) strikes->restart(0);
+            const std::vector<ModelContacts> views(contacts->begin(), contacts->end());
             strikes->sample(0, sample.t_s, views, predictor.selected(), measured);
         }
     }

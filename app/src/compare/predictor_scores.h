@@ -13,6 +13,7 @@
 #include "statistics/statistics.h"
 #include "sticks/predictors.h"
 #include "sticks/stick.h"
+#include "strikes/contact_forecast.h"
 #include "strikes/strike_decision.h"
 #include "strikes/true_contacts.h"
 
@@ -116,8 +117,8 @@ private:
 struct StrikePredictors {
     tracking::Predictor& timing;                ///< whose path is swept
     tracking::Predictor* confirming = nullptr;  ///< must confirm near contacts (keep_confirmed); may be none
-    /// Decides in place of the confirming one; may be none.
-    const StrikeDecision* decision = nullptr;
+    const ContactForecast* network = nullptr;   ///< says, too, when the tip meets a surface; may be none
+    double false_cost = 1;                      ///< of a false sound (StrikeDecision)
 };
 
 /// A strike is cancelled until this long before its time.

@@ -100,8 +100,17 @@ StrikePipeline::StrikePipeline(const Kit& kit, const PlayOptions& options, doubl
                   .commit_lead_s = options.release_margin_s,
                   .cancelling = options.cancelling},
                  sticks_.size(), kit.instruments.size()),
-      rests_(tip_holds(kit), sticks_.size()) {
-    if (contacts) decision_.emplace(contacts, options.false_cost);
+      rests_(tip_holds(kit), sticks_.size()),
+      decisions_(sticks_.size() * tracking::StickState::kMostModels,
+                 StrikeDecision(kit.instruments.size(), options.false_cost, options.release_margin_s)) {
+    if (contacts) network_.emplace(contacts);
+}
+
+void StrikePipeline::restart(std::uint32_t stick) {
+    scheduler_.restart(stick);
+    rests_.restart(stick);
+    for (std::size_t model = 0; model < tracking::StickState::kMostModels; ++model)
+        decisions_[stick * tracking::StickState::kMostModels + model].restart();
 }
 
 void StrikePipeline::advance_to(double s, double fixed_s) {
@@ -129,34 +138,27 @@ std::vector<StrikePipeline::StickPaths> StrikePipeline::add_paths(std::span<cons
     std::vector<StickPaths> all;
     for (const std::uint32_t stick : moved) {
         const Stick& known = sticks_[stick];
-        StickPaths own{stick, paths.size(), 0, std::nullopt};
-        if (decision_) {
-            StrikeDecision::Path decided = decided_path(known);
-            own.sounds = decided.sounds;
-            add(std::move(decided.path));
-        } else {
-            for (std::size_t model = 0; model < known.state().models; ++model)
-                add(known.predicted_path(model));
-        }
+        StickPaths own{.stick = stick, .predicted = paths.size()};
+        for (std::size_t model = 0; model < known.state().models; ++model) add(known.predicted_path(model));
         own.measured = add(known.measured_path());
-        if (std::optional<sim::TipPath> confirming = known.confirming_path(); confirming && !decision_)
+        if (std::optional<sim::TipPath> confirming = known.confirming_path())
             own.confirming = add(std::move(*confirming));
+        if (std::optional<ContactForecast::Path> expected = network_ ? forecast_path(known) : std::nullopt) {
+            own.network = add(std::move(expected->path));
+        }
         all.push_back(own);
     }
     return all;
 }
 
-StrikeDecision::Path StrikePipeline::decided_path(const Stick& stick) const {
-    const StrikeDecision::Surfaces surfaces{
+std::optional<ContactForecast::Path> StrikePipeline::forecast_path(const Stick& stick) const {
+    const ContactForecast::Surfaces surfaces{
         kit_.instruments.size(), [this](std::size_t instrument, const Eigen::Vector3d& tip) {
             return sim::rest_distance(kit_.instruments[instrument].body, tip, tip_radius_m_);
         }};
     tracking::TipView view;
-    std::optional<StrikeDecision::Path> decided;
-    if (stick.look(view))
-        decided = decision_->after(view, stick.predicted_path(0), surfaces, stick.sound_lead_s(),
-                                   stick.interval_s(), release_margin_s_);
-    return decided.value_or(StrikeDecision::Path{stick.measured_path(), true});
+    if (!stick.look(view)) return std::nullopt;
+    return network_->after(view, stick.predicted_path(0), surfaces, stick.sound_lead_s());
 }
 
 void StrikePipeline::settle_impulses(double s, sim::StepRequest& request) {
@@ -216,22 +218,26 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
                              [&](const sim::Contact& contact) { return contact.stick == path; });
         return own;
     };
-    std::vector<std::vector<sim::Contact>> contacts;
-    for (std::size_t path = paths.predicted; path < paths.measured; ++path) {
-        contacts.push_back(contacts_of(path));
-        if (paths.confirming && cancelling_)
-            keep_confirmed(contacts.back(), contacts_of(*paths.confirming), s);
-        if (!paths.sounds && cancelling_) contacts.back().clear();
-    }
-    std::vector<ModelContacts> expected;
-    for (std::size_t model = 0; model < contacts.size(); ++model)
-        expected.push_back(
-            {contacts[model],
-             std::span(reply.clearance_m).subspan((paths.predicted + model) * bodies, bodies)});
     const std::vector<double> measured = measured_clearance(paths, reply);
-    const Stick& stick = sticks_[paths.stick];
-    scheduler_.sample(paths.stick, s, expected, stick.state().model, measured);
-    rests_.sample(paths.stick, s, stick.measured_tip(), measured);
+    const Stick& known = sticks_[paths.stick];
+    ExpectedStrikes expected{s, known.interval_s(), measured};
+    if (paths.network) expected.network = contacts_of(*paths.network);
+    std::vector<std::vector<sim::Contact>> contacts;
+    std::vector<ModelContacts> views;
+    for (std::size_t model = 0; paths.predicted + model < paths.measured; ++model) {
+        const std::size_t path = paths.predicted + model;
+        expected.filtered_m = std::span(reply.clearance_m).subspan(path * bodies, bodies);
+        expected.path = expected.confirmed = contacts_of(path);
+        if (paths.confirming && cancelling_)
+            keep_confirmed(expected.confirmed, contacts_of(*paths.confirming), s);
+        DecidedStrikes decided =
+            decisions_[paths.stick * tracking::StickState::kMostModels + model].after(expected);
+        contacts.push_back(std::move(cancelling_ ? decided.sounding : decided.kept));
+        views.push_back({{}, expected.filtered_m});
+    }
+    for (std::size_t model = 0; model < views.size(); ++model) views[model].contacts = contacts[model];
+    scheduler_.sample(paths.stick, s, views, known.state().model, measured);
+    rests_.sample(paths.stick, s, known.measured_tip(), measured);
 }
 
 void StrikePipeline::send_notes() {

@@ -14,6 +14,7 @@
 #include "play/play.h"
 #include "process/clock.h"
 #include "sticks/stick.h"
+#include "strikes/contact_forecast.h"
 #include "strikes/strike.h"
 #include "strikes/strike_decision.h"
 #include "strikes/strike_scheduler.h"
@@ -98,8 +99,8 @@ public:
     using Notify = std::function<void(const audio::Note& note, bool scheduled)>;
 
     /// The strikes follow the margin and the cancelling of the options; t0_s is audio sample 0. `simulation`
-    /// begins anew with the first step; `sticks` are kept up to date by the caller. `contacts`: the model that
-    /// decides the strikes (contact_model()); may be none.
+    /// begins anew with the first step; `sticks` are kept up to date by the caller. `contacts`: a model whose
+    /// network of contacts is heard (contact_model()); may be none.
     StrikePipeline(const Kit& kit, const PlayOptions& options, double t0_s, double tip_radius_m,
                    const std::vector<Stick>& sticks, sim::Simulation& simulation, Notify notify,
                    const std::shared_ptr<const tracking::PathModel>& contacts = {});
@@ -107,10 +108,7 @@ public:
     /// Before the samples at s (StrikeScheduler::advance_to).
     void advance_to(double s, double fixed_s = -std::numeric_limits<double>::infinity());
     /// The filter of a stick has started anew.
-    void restart(std::uint32_t stick) {
-        scheduler_.restart(stick);
-        rests_.restart(stick);
-    }
+    void restart(std::uint32_t stick);
     /// New samples of these sticks at s: contacts, strikes, notes.
     void take(double s, std::span<const std::uint32_t> moved);
     /// Tips that choke what they lie on, found since the last call, in order; what rings ends a release margin
@@ -134,16 +132,16 @@ private:
     /// Where the paths of a stick stand in a request; each path's `stick` is its own place there, so that its
     /// contacts can be assigned to it.
     struct StickPaths {
-        std::uint32_t stick;
-        std::size_t predicted;                  ///< the first of the models' paths, which follow each other
-        std::size_t measured;                   ///< stands still: makes no contact but by starting inside
-        std::optional<std::size_t> confirming;  ///< where a second filter confirms
-        bool sounds = true;                     ///< the contacts of the predicted paths
+        std::uint32_t stick = 0;
+        std::size_t predicted = 0;  ///< the first of the models' paths, which follow each other
+        std::size_t measured = 0;   ///< stands still: makes no contact but by starting inside
+        std::optional<std::size_t> confirming = {};  ///< where a second filter confirms
+        std::optional<std::size_t> network = {};     ///< what a network of contacts expects, if anything
     };
     [[nodiscard]] std::vector<StickPaths> add_paths(std::span<const std::uint32_t> moved,
                                                     std::vector<sim::TipPath>& paths) const;
-    /// The path of a stick whose strikes are decided by a network; it stands still where none is expected.
-    [[nodiscard]] StrikeDecision::Path decided_path(const Stick& stick) const;
+    /// What the network of contacts expects of a stick.
+    [[nodiscard]] std::optional<ContactForecast::Path> forecast_path(const Stick& stick) const;
     void take_contacts(double s, const StickPaths& paths, const sim::StepReply& reply);
     [[nodiscard]] std::vector<double> measured_clearance(const StickPaths& paths,
                                                          const sim::StepReply& reply) const;
@@ -160,9 +158,10 @@ private:
     const std::vector<Stick>& sticks_;
     sim::Simulation& simulation_;
     Notify notify_;
-    std::optional<StrikeDecision> decision_;
+    std::optional<ContactForecast> network_;
     StrikeScheduler scheduler_;
     TipRests rests_;
+    std::vector<StrikeDecision> decisions_;  // of each stick, of each model
     DrawnStrikes drawn_;
     std::vector<std::uint64_t> unfolded_;  // released strikes whose impulses lie ahead
     std::set<std::uint64_t> touching_;     // recent strikes that a frame has shown the stick at

@@ -1,116 +1,126 @@
 #include "strikes/strike_decision.h"
 
-#include <sim/hermite_piece.h>
-
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "strikes/true_contacts.h"
 
 namespace app {
 namespace {
 
-constexpr double kWorthKeeping = 0.05;
-constexpr double kSoonestS = 0.001;
-constexpr double kThroughS = 0.03;  // the path goes on beyond the contact
-constexpr int kPieces = 8;
+constexpr double kRemembered = 20;    // strikes
+constexpr double kErrorsKept = 0.98;  // of the sums of errors, a sample
+constexpr double kSeenS = 0.02;       // an entry is known, at the latest, so long after it
 
-/// The position `t_s` of the path's clock, and the velocity; beyond its end as there.
-sim::PathNode node_at(const sim::TipPath& path, double t_s) {
-    std::size_t i = 0;
-    while (i + 2 < path.nodes.size() && path.nodes[i + 1].t_s < t_s) ++i;
-    const sim::HermitePiece piece(path.nodes[i], path.nodes[i + 1]);
-    const double within_s = std::min(t_s, path.nodes[i + 1].t_s);
-    const Eigen::Vector3d velocity = piece.velocity(within_s);
-    return {t_s, piece.position(within_s) + (t_s - within_s) * velocity, velocity};
+using Contacts = std::vector<sim::Contact>;
+
+/// The first contact with a body from outside.
+Contacts::const_iterator first_with(const Contacts& contacts, std::size_t body) {
+    return std::ranges::find_if(contacts, [&](const sim::Contact& contact) { return contact.body == body; });
 }
 
-/// An upper bound of the speed along a path [m/s]: of cubic pieces, whose velocity is a parabola between the nodes'.
-double greatest_speed(const sim::TipPath& path) {
-    double speed = 0;
-    for (std::size_t i = 1; i < path.nodes.size(); ++i) {
-        const sim::PathNode &a = path.nodes[i - 1], &b = path.nodes[i];
-        const double mean = (b.position - a.position).norm() / (b.t_s - a.t_s),
-                     ends = a.velocity.norm() + b.velocity.norm();
-        speed = std::max({speed, a.velocity.norm(), b.velocity.norm(), 1.5 * mean + 0.25 * ends});
-    }
-    return speed;
-}
-
-/// The plane that touches a surface where a path meets it from outside, or else where it is nearest to the path.
-///
-/// Goes along the path by steps that cannot reach the surface (conservative advancement, Mirtich 1996), so it passes
-/// through no body, however thin.
-tracking::Plane plane_met(const StrikeDecision::Nearest& nearest, std::size_t surface,
-                          const sim::TipPath& path) {
-    constexpr int kMostSteps = 64;
-    constexpr double kTouches = 1e-4, kShare = 0.8;  // [m]; distances are right to a tenth
-    const double speed = std::max(greatest_speed(path), 1e-3), end_s = path.nodes.back().t_s;
-    tracking::Plane plane;
-    double least = std::numeric_limits<double>::infinity(), t_s = path.nodes.front().t_s;
-    for (int step = 0; step < kMostSteps && t_s <= end_s; ++step) {
-        const Eigen::Vector3d position = node_at(path, t_s).position;
-        const sim::SurfacePoint at = nearest(surface, position);
-        if (at.distance < least) {
-            least = at.distance;
-            plane = {position - at.distance * at.normal, at.normal};
-        }
-        if (at.distance < kTouches) break;
-        t_s = t_s < end_s ? std::min(t_s + kShare * at.distance / speed, end_s) : end_s + 1;
-    }
-    return plane;
-}
-
-/// Along the plane as `predicted`, towards it from the tip so that it is met `in_s` after the sample.
-sim::TipPath path_to(const tracking::Plane& plane, double in_s, const tracking::TipView& tip,
-                     const sim::TipPath& predicted) {
-    const Eigen::Vector3d& n = plane.normal;
-    const double start_s = predicted.nodes.front().t_s, height = n.dot(tip.tip - plane.point);
-    const double mean = height / in_s, first = std::clamp(-n.dot(tip.velocity), 0.0, 2 * mean);
-    const double last = 2 * mean - first, acceleration = (last - first) / in_s;
-    const Eigen::Vector3d off = tip.tip - predicted.nodes.front().position;
-    sim::TipPath path = predicted;
-    path.nodes.clear();
-    const auto add = [&](double after_s) {
-        const double falling_s = std::min(after_s, in_s);
-        const double fallen = falling_s * (first + 0.5 * acceleration * falling_s) +
-                              (after_s - falling_s) * std::max(last, mean);
-        const double falling = after_s < in_s ? first + acceleration * after_s : std::max(last, mean);
-        const sim::PathNode own = node_at(predicted, start_s + after_s);
-        const Eigen::Vector3d position = own.position + off, velocity = own.velocity;
-        path.nodes.push_back({start_s + after_s,
-                              position + (height - fallen - n.dot(position - plane.point)) * n,
-                              velocity - (falling + n.dot(velocity)) * n});
-    };
-    for (int i = 0; i < kPieces; ++i) add(in_s * i / kPieces);
-    add(in_s);
-    add(in_s + kThroughS);
-    return path;
+/// In place of the first contact with its body, or added to it.
+void put(Contacts& contacts, const sim::Contact& contact) {
+    if (const auto first = first_with(contacts, contact.body); first != contacts.end()) contacts.erase(first);
+    contacts.insert(std::ranges::upper_bound(contacts, contact.t_s, {}, &sim::Contact::t_s), contact);
 }
 
 }  // namespace
 
-std::optional<StrikeDecision::Path> StrikeDecision::after(const tracking::TipView& tip,
-                                                          const sim::TipPath& predicted,
-                                                          const Surfaces& surfaces, double reach_s,
-                                                          double interval_s, double margin_s) const {
-    tracking::Plane struck;
-    double probability = kWorthKeeping, in_s = 0;
-    for (std::size_t surface = 0; surface < surfaces.count; ++surface) {
-        if (surfaces.nearest(surface, tip.tip).distance <= 0) return std::nullopt;
-        const tracking::Plane plane = plane_met(surfaces.nearest, surface, predicted);
-        if (plane.normal.dot(tip.tip - plane.point) <= 0) continue;  // beside it
-        const tracking::ContactTimes times = tracking::contact_times(*model_, tip, plane);
-        const double median_s = std::max(times.median_s(), kSoonestS);
-        const double likely = times.probability_between(median_s - kMatchWindow_s, median_s + kMatchWindow_s);
-        if (median_s > reach_s || likely <= probability) continue;
-        probability = likely, in_s = median_s, struck = plane;
+void StrikeDecision::Share::add(bool it_came) {
+    const double kept = std::min(1.0, (kRemembered - 1) / std::max(of, 1.0));
+    came = kept * came + (it_came ? 1 : 0);
+    of = kept * of + 1;
+}
+
+void StrikeDecision::restart() {
+    std::ranges::fill(surfaces_, Surface{});
+    forecasts_.clear();
+}
+
+void StrikeDecision::observe(const ExpectedStrikes& expected) {
+    for (std::size_t i = 0; i < surfaces_.size(); ++i) {
+        Surface& surface = surfaces_[i];
+        const double now = expected.measured_m[i], filtered = expected.filtered_m[i];
+        if (!surface.known) {
+            surface.known = true;
+            surface.armed = now > 0 && filtered > 0;
+        } else if (!surface.armed) {
+            surface.lowest_measured_m = std::min(surface.lowest_measured_m, now);
+            surface.lowest_filtered_m = std::min(surface.lowest_filtered_m, filtered);
+            surface.armed = now >= std::max(kRearm_m, surface.lowest_measured_m + kRearm_m) &&
+                            filtered >= std::max(kRearm_m, surface.lowest_filtered_m + kRearm_m);
+        }
+        if (now > 0) {
+            surface.entered_s.reset();
+        } else if (surface.armed && !surface.entered_s) {
+            const double fall = surface.last_m - now;
+            surface.entered_s =
+                surface.last_m > 0 ? std::lerp(last_s_, expected.s, surface.last_m / fall) : expected.s;
+        }
+        if (surface.armed && surface.entered_s && now <= -kContactDepth_m) {
+            strike(i, *surface.entered_s);
+            surface = {true};
+        }
+        surface.last_m = now;
     }
-    if (!(in_s > 0)) return std::nullopt;
-    const bool is_last = std::max(in_s, margin_s) - margin_s <= interval_s;
-    return Path{path_to(struck, in_s, tip, predicted),
-                !is_last || probability > false_cost_ * (1 - probability)};
+    last_s_ = expected.s;
+}
+
+void StrikeDecision::strike(std::size_t surface, double t_s) {
+    for (Forecast& forecast : forecasts_) {
+        if (forecast.surface != surface || forecast.came) continue;
+        const auto near = [&](const std::optional<double>& at_s) {
+            return at_s && std::abs(*at_s - t_s) <= kMatchWindow_s;
+        };
+        forecast.came = near(forecast.path_s) || near(forecast.network_s);
+        if (!forecast.came || !forecast.path_s || !forecast.network_s) continue;
+        path_errors_s_ = kErrorsKept * path_errors_s_ + std::abs(*forecast.path_s - t_s);
+        network_errors_s_ = kErrorsKept * network_errors_s_ + std::abs(*forecast.network_s - t_s);
+    }
+}
+
+void StrikeDecision::settle(double s) {
+    std::erase_if(forecasts_, [&](const Forecast& forecast) {
+        const double latest_s =
+            std::max(forecast.path_s.value_or(-kNever), forecast.network_s.value_or(-kNever));
+        if (latest_s + kMatchWindow_s + kSeenS > s) return false;
+        if (forecast.counts) shares_[forecast.kind].add(forecast.came);
+        return true;
+    });
+}
+
+void StrikeDecision::decide(std::size_t surface, const ExpectedStrikes& expected, DecidedStrikes& decided) {
+    const auto of_path = first_with(expected.confirmed, surface),
+               of_network = first_with(expected.network, surface);
+    const bool by_path = of_path != expected.confirmed.end(),
+               by_network = of_network != expected.network.end();
+    if ((!by_path && !by_network) || (by_path && of_path->starts_inside)) return;
+    Forecast forecast{surface, !by_network ? path_alone : by_path ? both : network_alone};
+    if (by_path) forecast.path_s = of_path->t_s;
+    if (by_network) forecast.network_s = of_network->t_s;
+    const double p = shares_[forecast.kind].value();
+    const bool sounds = p > false_cost_ * (1 - p);
+    if (forecast.kind == both ? network_errors_s_ < path_errors_s_
+                              : forecast.kind == network_alone && sounds) {
+        put(decided.kept, *of_network);
+        put(decided.sounding, *of_network);
+    }
+    const auto first = first_with(decided.sounding, surface);
+    const bool is_last =
+        first != decided.sounding.end() && first->t_s <= expected.s + expected.interval_s + margin_s_;
+    if (is_last && !sounds) decided.sounding.erase(first);
+    forecast.counts = is_last || forecast.kind == network_alone;
+    forecasts_.push_back(forecast);
+}
+
+DecidedStrikes StrikeDecision::after(const ExpectedStrikes& expected) {
+    observe(expected);
+    settle(expected.s);
+    DecidedStrikes decided{expected.path, expected.confirmed};
+    for (std::size_t i = 0; i < surfaces_.size(); ++i)
+        if (surfaces_[i].armed && expected.measured_m[i] > 0) decide(i, expected, decided);
+    return decided;
 }
 
 }  // namespace app

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "strikes/true_contacts.h"
+
 namespace app {
 namespace {
 
@@ -10,8 +12,7 @@ constexpr double kDeepest = 4;
 constexpr double kLearningRate = 2;  // [1/s]
 constexpr double kLeastSlope = 0.1;
 constexpr double kLongestWeightS = 0.05;
-constexpr double kLeastDepthM = 3e-3;  // of a contact, as scores have it
-constexpr double kUnstatedM = 1e-3;    // standard deviation where none is stated
+constexpr double kUnstatedM = 1e-3;  // standard deviation where none is stated
 
 }  // namespace
 
@@ -101,7 +102,7 @@ std::optional<NextStrike> StrikeForecast::after(const tracking::Predictor& predi
     for (std::size_t body = 0; body < bodies_.size(); ++body) {
         const double distance =
             sim::rest_distance(bodies_[body], tips[0].position, geometry_.radius_m).distance;
-        if (outside_[body] && distance <= -kLeastDepthM) {
+        if (outside_[body] && distance <= -kContactDepth_m) {
             outside_[body] = false;
             for (Forecast& forecast : forecasts_)
                 forecast.came = forecast.came || (forecast.body == body && forecast.due_s >= t_s);

@@ -18,8 +18,6 @@
 namespace app {
 namespace {
 
-constexpr double kDepthM = 0.003;
-constexpr double kRearmM = 0.003;
 constexpr double kTurnEarlyS = 0.025;
 
 /// What a tip's centre meets: a body at rest, grown by the tip's radius, or a horizontal plane.
@@ -64,12 +62,12 @@ private:
             if (armed_ && step.enters())
                 enter(to, entry_between(step.from, step.to, surface_.entry_tolerance_m, distance) / length);
             if (step.now > 0) entry_.reset();
-            if (armed_ && entry_ && step.now <= -kDepthM) {
+            if (armed_ && entry_ && step.now <= -kContactDepth_m) {
                 if (surface_.sounds(entry_->point_world)) found_.push_back(*entry_);
                 armed_ = false;
                 entry_.reset();
             }
-            if (!armed_ && step.now >= kRearmM) armed_ = true;
+            if (!armed_ && step.now >= kRearm_m) armed_ = true;
         });
     }
 
@@ -188,7 +186,8 @@ std::vector<sim::Contact> plane_contacts(const sim::TipPath& path, double height
     double height = path.nodes.front().position.y() - height_m;
     double depth = 0;  // since the last contact
     const auto leave = [&] {
-        if (!contacts.empty() && !contacts.back().starts_inside && depth < kDepthM) contacts.pop_back();
+        if (!contacts.empty() && !contacts.back().starts_inside && depth < kContactDepth_m)
+            contacts.pop_back();
         depth = 0;
     };
     for (std::size_t i = 0; i + 1 < path.nodes.size(); ++i) {

@@ -15,6 +15,8 @@ namespace app {
 /// A note and a true contact of the same stick and instrument belong together when they lie within this time
 /// [s] of each other.
 inline constexpr double kMatchWindow_s = 0.030;
+/// A contact goes at least so deep; the next can come once the tip has been so far outside.
+inline constexpr double kContactDepth_m = 0.003, kRearm_m = 0.003;
 
 /// How far a note's strike is from the contact that it belongs to, beside its time.
 struct StrikeDynamics {

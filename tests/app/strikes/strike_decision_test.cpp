@@ -1,96 +1,126 @@
-// Decisions by a network whose answer is written by hand: the same whatever it sees.
+// Decisions between a path and a network that are told what to expect of a tip that swings over a floor.
 #include "strikes/strike_decision.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
+#include <numbers>
 
 namespace {
 
 using app::StrikeDecision;
-using Eigen::Vector3d;
-using tracking::ContactTimes;
 
-constexpr int kBin = 6;  // in which the contact comes, if there is one
-constexpr double kContactS = (kBin + 0.5) * ContactTimes::kBinS;
-constexpr double kReachS = 1.0 / 15, kMarginS = 0.01;
-constexpr double kWaits = 1.0 / 60,
-                 kLast = 0.05;  // intervals: another sample comes before the note is fixed, or not
+constexpr double kSwingS = 0.25, kReachS = 1.0 / 15, kMarginS = 0.01, kRateHz = 60;
+constexpr double kSwingM = 0.05, kLowM = 0.02;  // the lowest point is so far below or over the floor
 
-/// Says: a contact in that bin with probability `p`, else none.
-std::shared_ptr<const tracking::PathModel> saying(double p) {
-    constexpr int kInputs = tracking::TipView::kInputs + 3 + 2 + 13, kHidden = 4,
-                  kOutputs = ContactTimes::kBins + 1;
-    tracking::PathModel model;
-    model.contacts.emplace();
-    const int sizes[] = {kInputs, kHidden, kHidden, kOutputs};
-    for (std::size_t i = 0; i < 3; ++i) {
-        (*model.contacts)[i].weights.setZero(sizes[i + 1], sizes[i]);
-        (*model.contacts)[i].bias.setZero(sizes[i + 1]);
+/// What one of the two expects of a swing: how far off in time, or nothing.
+using Expects = std::function<std::optional<double>(int swing)>;
+std::optional<double> nothing(int /*swing*/) {
+    return std::nullopt;
+}
+
+/// Swings each of which strikes or not.
+struct Player {
+    std::function<bool(int)> strikes = [](int) { return true; };
+    Expects path = nothing, network = nothing;
+    double false_cost = 1;
+    int swings = 40;
+    int silence_after = -1;  ///< the samples begin anew after this swing
+
+    [[nodiscard]] double height(double t_s) const {
+        const int swing = static_cast<int>(t_s / kSwingS);
+        const double middle = strikes(swing) ? kSwingM - kLowM : kSwingM + kLowM;
+        return middle + kSwingM * std::cos(2 * std::numbers::pi * (t_s / kSwingS - swing));
     }
-    Eigen::VectorXf& odds = (*model.contacts)[2].bias;
-    odds.setConstant(-1000);
-    odds[kBin] = static_cast<float>(std::log(p));
-    odds[kOutputs - 1] = static_cast<float>(std::log(1 - p));
-    return std::make_shared<const tracking::PathModel>(model);
-}
+    /// When a swing meets the floor, or would.
+    [[nodiscard]] static double meets_s(int swing) {
+        return kSwingS * (swing + std::acos(-(kSwingM - kLowM) / kSwingM) / (2 * std::numbers::pi));
+    }
 
-/// A tip at `height_m` over the floor, which sinks at 1 m/s and moves along it at 0.5 m/s.
-std::optional<StrikeDecision::Path> decided(double p, double false_cost, double interval_s,
-                                            double height_m = 0.1, double reach_s = kReachS) {
-    tracking::TipView tip;
-    tip.tip = {0, height_m, 0};
-    tip.velocity = {0.5, -1, 0};
-    sim::TipPath predicted;
-    predicted.nodes = {{2, tip.tip, tip.velocity}, {2.1, tip.tip + 0.1 * tip.velocity, tip.velocity}};
-    const StrikeDecision::Surfaces floor{1, [](std::size_t, const Vector3d& x) {
-                                             return sim::SurfacePoint{x.y(), Vector3d::UnitY()};
-                                         }};
-    return StrikeDecision(saying(p), false_cost).after(tip, predicted, floor, reach_s, interval_s, kMarginS);
-}
-
-TEST(StrikeDecision, SaysNothingWhereNothingIsLikelyToBeStruck) {
-    EXPECT_FALSE(decided(0, 1, kLast));
-    EXPECT_FALSE(decided(0.9, 1, kLast, -0.01)) << "the tip is in the surface";
-    EXPECT_FALSE(decided(0.9, 1, kLast, 0.3)) << "0.3 s of its speed away";
-    EXPECT_FALSE(decided(0.9, 1, kLast, 0.1, 0.9 * kContactS)) << "later than is looked for";
-    EXPECT_TRUE(decided(0.9, 1, kLast));
-}
-
-TEST(StrikeDecision, ItsPathMeetsThePlaneWhenTheNetworkSays) {
-    const auto strike = decided(0.9, 1, kLast);
-    ASSERT_TRUE(strike);
-    int at_contact = 0;
-    for (const sim::PathNode& node : strike->path.nodes) {
-        const double before_s = 2 + kContactS - node.t_s;
-        if (std::abs(before_s) < 1e-6) {  // the median of float probabilities
-            ++at_contact;
-            EXPECT_NEAR(node.position.y(), 0, 1e-12);
-        } else {
-            EXPECT_EQ(node.position.y() > 0, before_s > 0) << before_s;
+    /// What sounds of each swing, when the note is fixed: its time less meets_s(); and what is kept.
+    struct Heard {
+        std::optional<double> late_s;
+        bool kept = false;
+    };
+    [[nodiscard]] std::vector<Heard> play() const {
+        StrikeDecision decision(1, false_cost, kMarginS);
+        std::vector<Heard> heard(static_cast<std::size_t>(swings));
+        for (int i = 0; i / kRateHz < swings * kSwingS; ++i) {
+            const double s = i / kRateHz, height_m = height(s);
+            const int swing = static_cast<int>(s / kSwingS);
+            if (swing == silence_after + 1 && static_cast<int>((s - 1 / kRateHz) / kSwingS) == silence_after)
+                decision.restart();
+            app::ExpectedStrikes expected{s, 1 / kRateHz, {&height_m, 1}, {&height_m, 1}};
+            const auto contacts = [&](const Expects& by) {
+                std::vector<sim::Contact> all;
+                const std::optional<double> off_s = by(swing);
+                if (!off_s || height_m <= 0 || meets_s(swing) < s) return all;
+                if (const double t_s = std::max(s, meets_s(swing) + *off_s); t_s < s + kReachS)
+                    all.emplace_back().t_s = t_s;
+                return all;
+            };
+            expected.path = expected.confirmed = contacts(path);
+            expected.network = contacts(network);
+            const app::DecidedStrikes decided = decision.after(expected);
+            if (height_m <= 0 || meets_s(swing) < s || meets_s(swing) > s + kMarginS + 1 / kRateHz) continue;
+            Heard& of = heard[static_cast<std::size_t>(swing)];
+            of.kept = !decided.kept.empty();
+            of.late_s.reset();
+            if (!decided.sounding.empty()) of.late_s = decided.sounding.front().t_s - meets_s(swing);
         }
-        EXPECT_LT(node.velocity.y(), 0) << "it falls all the way";
-        EXPECT_NEAR(node.position.x(), 0.5 * (node.t_s - 2), 1e-12) << "along the plane as predicted";
+        return heard;
     }
-    EXPECT_EQ(at_contact, 1);
+};
+
+Expects always(double off_s) {
+    return [off_s](int) { return std::optional(off_s); };
 }
 
-TEST(StrikeDecision, ANoteSoundsWhereItCostsLessThanItsAbsence) {
-    for (const auto& [p, false_cost, sounds] :
-         {std::tuple(0.6, 1.0, true), std::tuple(0.6, 2.0, false), std::tuple(0.4, 1.0, false),
-          std::tuple(0.4, 0.5, true)}) {  // against P / (1 - P): 1.5 and 0.67
-        const auto strike = decided(p, false_cost, kLast);
-        ASSERT_TRUE(strike);
-        EXPECT_EQ(strike->sounds, sounds) << p << " " << false_cost;
-    }
+TEST(StrikeDecision, ANetworkThatSeesNothingSilencesNothing) {
+    for (const Player::Heard& heard : Player{.path = always(0)}.play()) EXPECT_TRUE(heard.late_s);
 }
 
-TEST(StrikeDecision, WhileAnotherSampleComesFivePercentKeepANote) {
-    const auto strike = decided(0.06, 2, kWaits);
-    ASSERT_TRUE(strike);
-    EXPECT_TRUE(strike->sounds);
-    EXPECT_FALSE(decided(0.04, 2, kWaits));
-    EXPECT_FALSE(decided(0.06, 2, kLast)->sounds);
+TEST(StrikeDecision, TimesAreThePathsUntilTheNetworksHaveTurnedOutBetter) {
+    const auto better = Player{.path = always(0.008), .network = always(0.002)}.play();
+    EXPECT_NEAR(*better.front().late_s, 0.008, 1e-9) << "one begins with the path";
+    EXPECT_NEAR(*better.back().late_s, 0.002, 1e-9);
+    for (const auto& heard : Player{.path = always(0.002), .network = always(0.008)}.play())
+        EXPECT_NEAR(heard.late_s.value_or(1), 0.002, 1e-9);
+}
+
+TEST(StrikeDecision, WhatTheNetworkAloneExpectsSoundsOnceItHasComeOften) {
+    const auto right = Player{.network = always(0)}.play();
+    EXPECT_FALSE(right.front().late_s);
+    EXPECT_TRUE(right.back().late_s);
+    const auto wrong = Player{.strikes = [](int) { return false; }, .network = always(0)}.play();
+    for (const Player::Heard& heard : wrong) EXPECT_FALSE(heard.late_s || heard.kept);
+}
+
+TEST(StrikeDecision, ACostOfFalseSoundsSilencesWhatComesTooSeldom) {
+    const auto half = [](double false_cost) {
+        const Player player{
+            .strikes = [](int swing) { return swing % 2 == 0; }, .path = always(0), .false_cost = false_cost};
+        return player.play();
+    };
+    for (const Player::Heard& heard : half(1)) EXPECT_TRUE(heard.late_s);
+    const auto dear = half(5);  // a share over 5/6 sounds; of all strikes half come
+    EXPECT_TRUE(dear.front().late_s);
+    EXPECT_FALSE(dear.back().late_s);
+    EXPECT_TRUE(dear.back().kept);
+}
+
+TEST(StrikeDecision, SilenceEndsWhenStrikesComeAgain) {
+    const Player player{
+        .strikes = [](int swing) { return swing >= 40; }, .path = always(0), .false_cost = 2, .swings = 70};
+    const auto heard = player.play();
+    EXPECT_FALSE(heard[39].late_s);
+    EXPECT_TRUE(heard[69].late_s);
+}
+
+TEST(StrikeDecision, WhatItHasLearnedOutlastsGaps) {
+    const auto heard = Player{.path = always(0.008), .network = always(0.002), .silence_after = 20}.play();
+    EXPECT_NEAR(*heard[22].late_s, 0.002, 1e-9);
 }
 
 }  // namespace
