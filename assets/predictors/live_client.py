@@ -38,6 +38,8 @@ for i in range(count):
     try:
         for address, values in messages(link.recv(4096)):
             print(address, *values)
+            if len(values) == 17:  # with yy of the covariance, and radius_50
+                print("the 50 % region reaches", (values[12] * values[15]) ** 0.5, "m up and down")
     except socket.timeout:  # the first pose has no answer
         continue
     time.sleep(0.01)

@@ -60,7 +60,8 @@ public:
                 lo_message_add_float(message, static_cast<float>(number));
             if (at.covariance) {
                 const Eigen::Matrix3d& c = at.covariance->position;
-                for (const double number : {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2)})
+                for (const double number : {c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2), c(2, 2),
+                                            at.covariance->radius_50, at.covariance->radius_95})
                     lo_message_add_float(message, static_cast<float>(number));
             }
             lo_bundle_add_message(bundle.get(), ("/musicworld/predicted/" + p.stick).c_str(), message);
@@ -122,8 +123,8 @@ public:
                            x.y(), x.z(), q.w(), q.x(), q.y(), q.z());
             if (at.covariance) {
                 const Eigen::Matrix3d& c = at.covariance->position;
-                fmt::format_to(out, ",{},{},{},{},{},{}", c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2),
-                               c(2, 2));
+                fmt::format_to(out, ",{},{},{},{},{},{},{},{}", c(0, 0), c(0, 1), c(0, 2), c(1, 1), c(1, 2),
+                               c(2, 2), at.covariance->radius_50, at.covariance->radius_95);
             }
             text_ += '\n';
         }

@@ -25,6 +25,7 @@ TEST(PredictionSinks, OverZeroMQASampleIsAMessageOfRows) {
     pose.lead_s = 0.25;
     pose.covariance.emplace();
     pose.covariance->position << 1, 2, 3, 2, 5, 6, 3, 6, 9;
+    pose.covariance->radius_50 = 1.5, pose.covariance->radius_95 = 11;
     prediction.poses.push_back(pose);
 
     zmq::context_t context;
@@ -40,7 +41,7 @@ TEST(PredictionSinks, OverZeroMQASampleIsAMessageOfRows) {
     }
     EXPECT_EQ(message.to_string(),
               "predicted,12.5,left,0.125,1,2,3,0,1,0,0\n"
-              "predicted,12.5,left,0.25,1,2,3,0,1,0,0,1,2,3,5,6,9\n"
+              "predicted,12.5,left,0.25,1,2,3,0,1,0,0,1,2,3,5,6,9,1.5,11\n"
               "next_strike,12.5,left,0.0625,0.75,hi-hat\n");
     EXPECT_THROW((void)app::open_prediction_sink("zmq:" + endpoint + "/no/such/folder"), std::runtime_error);
 }
