@@ -10,6 +10,7 @@
 #include "learned_path.h"
 #include "least_squares.h"
 #include "model_bank.h"
+#include "rebounding.h"
 #include "smoothers.h"
 #include "specification.h"
 #include "text_cursor.h"
@@ -162,7 +163,7 @@ std::unique_ptr<Predictor> make_online(Specification& specification, const Eigen
     return std::make_unique<Learned>(model, shaft, memory(specification));
 }
 
-/// The filter is `cv`, whose velocity fades while its turning lasts.
+/// The filter is `cv`, whose velocity fades while its turning lasts, and which rebounds where strokes turn.
 std::unique_ptr<Predictor> make_arbitrated(Specification& specification, const Eigen::Vector3d& shaft,
                                            Model model) {
     const double q = density(specification, "q", 1e7);
@@ -173,9 +174,9 @@ std::unique_ptr<Predictor> make_arbitrated(Specification& specification, const E
         if (!specification.has("r")) motion->measurement_variance = square(0.5 * kMetres);
     }
     const double sigmas = specification.has("gate") ? gate(specification) : 5;
-    return std::make_unique<Arbitrated>(
-        std::make_unique<KalmanPredictor>(fading, KalmanOptions{sigmas, 0, lasting}), model, shaft,
-        memory(specification));
+    return std::make_unique<Arbitrated>(std::make_unique<Rebounding>(std::make_unique<KalmanPredictor>(
+                                            fading, KalmanOptions{sigmas, 0, lasting})),
+                                        model, shaft, memory(specification));
 }
 
 /// One of the two makes it.

@@ -68,11 +68,11 @@ constexpr const char* kParabola = "least-squares:degree=2,n=4";
 
 std::string description_of(const std::string& specification) {
     if (is_auto(specification))
-        return fmt::format(
-            "{}{} draws (errors), {} strikes, {} confirms{}",
-            specification == "auto" ? "the program's default: " : "", picture_specification(specification),
-            sound_specification(specification), confirming_specification(specification),
-            contact_model(specification) ? ", a network of contacts is heard" : "");
+        return fmt::format("{}{} draws (errors), {} strikes, {} confirms{}",
+                           specification == "auto" ? "the program's default: " : "",
+                           picture_specification(specification), sound_specification(specification),
+                           confirming_specification(specification),
+                           contact_model(specification) ? ", a network of contacts is heard" : "");
     if (is_external(specification)) return "a child process; its cost is not measured";
     if (specification == "naive") return "baseline: the moving average of 1992, 67 ms";
     if (specification == kParabola) return "baseline: the parabola through four samples";

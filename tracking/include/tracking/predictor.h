@@ -104,8 +104,9 @@ inline constexpr double kGapS = 0.1;
 ///   imm:alpha=200,q1=1e9,q2=3e10,q3=1e12,rate=10             interacting Singer models, switching at `rate`
 ///   learned                 a network, `model`, from the last 0.25 s: position, shaft, its own uncertainty
 ///   online:memory=100       that network, its last layer learning what turns out, forgotten over 100 s
-///   arbitrated:memory=100,q=1e7,decay=8,r=0.5,gate=5         `cv` and `online`, weighed by the errors that
-///                           they turned out to make; its turning lasts; with memory=0 `learned` in its place
+///   arbitrated:memory=100,q=1e7,decay=8,r=0.5,gate=5         `cv`, which rebounds where strokes turn, and `online`,
+///                           weighed by the errors that they turned out to make; its turning lasts; with
+///                           memory=0 `learned` in its place
 ///
 /// The numbers shown are the defaults. Orientation is filtered by the same model about its own quaternion.
 /// thesis, cv, ca, singer, bank and imm also take: `r=0.25`, the sensor's noise; `p0=10`, `v0=1000`,
