@@ -6,9 +6,13 @@
 
 #include <Eigen/Core>
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
+#include <memory>
+#include <string>
 #include <vector>
 
+#include "tracking/path_model.h"
 #include "tracking/predictor.h"
 #ifdef MUSICWORLD_OPENCV
 #include <opencv2/core/version.hpp>
@@ -54,8 +58,27 @@ void run(benchmark::State& state, const std::vector<PoseSample>& samples, const 
     state.SetItemsProcessed(state.iterations());
 }
 
-void predictor(benchmark::State& state, const char* specification, bool with_orientation) {
-    const auto tested = tracking::make_predictor(specification);
+/// A network of that many units; what it answers is noise, what it costs is not. None of 0.
+std::shared_ptr<const tracking::PathModel> network(Eigen::Index hidden) {
+    if (hidden == 0) return {};
+    constexpr Eigen::Index kInputs = 88, kOutputs = 65;  // others are refused
+    tracking::PathModel model;
+    const std::array<Eigen::Index, 4> sizes = {kInputs, hidden, hidden, kOutputs};
+    std::uint32_t random = 1;
+    for (std::size_t i = 0; i < model.layers.size(); ++i) {
+        model.layers[i].weights.resize(sizes[i + 1], sizes[i]);
+        model.layers[i].bias.setZero(sizes[i + 1]);
+        for (float& weight : model.layers[i].weights.reshaped())
+            weight = static_cast<float>((random = random * 1664525U + 1013904223U) / 4294967296.0 - 0.5) /
+                     std::sqrt(static_cast<float>(sizes[i]));
+    }
+    return std::make_shared<const tracking::PathModel>(
+        tracking::parse_path_model(tracking::format_path_model(model), "network"));
+}
+
+void predictor(benchmark::State& state, const std::string& specification, Eigen::Index hidden,
+               bool with_orientation) {
+    const auto tested = tracking::make_predictor(specification, -Eigen::Vector3d::UnitZ(), network(hidden));
     run(state, strokes(with_orientation), [&](const PoseSample& sample) {
         benchmark::DoNotOptimize(tested->correct(sample));
         PosePrediction picture = tested->predict(kPictureLead), sound = tested->predict(kSoundLead);
@@ -151,16 +174,24 @@ void opencv_nine_states(benchmark::State& state) {
 }
 #endif
 
+void add(const std::string& name, const std::string& specification, Eigen::Index hidden) {
+    for (const bool with_orientation : {false, true})
+        benchmark::RegisterBenchmark((name + (with_orientation ? "/pose" : "/position")).c_str(), predictor,
+                                     specification, hidden, with_orientation);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
     for (const std::string& name : tracking::predictor_names()) {
         if (name == "auto") continue;
-        benchmark::RegisterBenchmark((name + "/position").c_str(), predictor, name.c_str(), false);
-        benchmark::RegisterBenchmark((name + "/pose").c_str(), predictor, name.c_str(), true);
+        add(name, name, 0);
     }
-    benchmark::RegisterBenchmark("ca:gate=5/position", predictor, "ca:gate=5", false);
-    benchmark::RegisterBenchmark("ca:steady=60/position", predictor, "ca:steady=60", false);
+    for (const std::string& name : tracking::model_predictor_names())
+        for (const Eigen::Index hidden : {32, 64, 128})
+            add(name + "/" + std::to_string(hidden) + "_units", name, hidden);
+    add("ca:gate=5", "ca:gate=5", 0);
+    add("ca:steady=60", "ca:steady=60", 0);
     benchmark::RegisterBenchmark("peer_eigen_nine_states/position", eigen_nine_states);
     benchmark::AddCustomContext("eigen", std::to_string(EIGEN_WORLD_VERSION) + "." +
                                              std::to_string(EIGEN_MAJOR_VERSION) + "." +
