@@ -209,6 +209,7 @@ TEST(BadInput, ArgumentsAndPlacesThatCannotBeAreRefused) {
         {{"play", trace, "--out", out, "--tip", "1,2"}, "--tip"},
         {{"play", trace, "--out", out, "--frobnicate"}, "frobnicate"},
         {{"play", trace, "--out", out, "--solo", "999999", "--no-frames"}, "--solo"},
+        {{"train", trace, trace, "--steps", "1", "--out", out}, "samples of"},
         {{"kit", "draw", "drums", "--out", (folder / "kit.jpg").string()}, "kit.jpg"},
         {{"dance"}, "dance"},
         {{}, "usage"},

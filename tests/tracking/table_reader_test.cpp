@@ -85,6 +85,20 @@ TEST(Tables, BlanksSemicolonsDecimalCommasCommentsAndLostRowsAreRead) {
     EXPECT_NE(trace.remarks[0].find("2 rows"), std::string::npos);
 }
 
+TEST(Tables, DecimalCommasThatNobodySpokeOfNameTheOption) {
+    ColumnMap map;
+    map.separator = ';';
+    map.columns = {{"t", "#1"}, {"px", "#2"}, {"py", "#3"}, {"pz", "#4"}};
+    try {
+        (void)read("t;x;y;z\n0;1,25;2;3\n", map);
+        FAIL() << "read";
+    } catch (const TraceError& wrong) {
+        EXPECT_NE(std::string(wrong.what()).find(":2:3: error: found '1,25'"), std::string::npos)
+            << wrong.what();
+        EXPECT_NE(std::string(wrong.what()).find("--decimal comma"), std::string::npos);
+    }
+}
+
 TEST(Tables, EulerAnglesOfEveryOrderAreIntrinsicTurns) {
     const double a = 0.3, b = -0.7, c = 1.1;
     const auto turn = [&](char axis) {

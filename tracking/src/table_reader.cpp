@@ -120,8 +120,11 @@ private:
     double number(const Line& line, std::size_t column, const char* what, double limit,
                   const char* limit_text) {
         const Field& cell = cells_[column];
-        if (!map_.decimal_comma || cell.text.find(',') == std::string_view::npos)
-            return line.number_in(cell, what, limit, limit_text);
+        const std::size_t comma = cell.text.find(',');
+        if (comma != std::string_view::npos && !map_.decimal_comma)
+            line.fail(cell.offset, in_quotes(cell.text), std::string(what) + " with a decimal point",
+                      "say that its sign is a comma (--decimal comma)");
+        if (comma == std::string_view::npos) return line.number_in(cell, what, limit, limit_text);
         std::string text(cell.text);
         std::replace(text.begin(), text.end(), ',', '.');
         return line.number_in({text, cell.offset}, what, limit, limit_text);
