@@ -21,6 +21,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kMostThreads = 256;
+
 void print_workers(const SimulateResult& r) {
     const WorkerOptions& o = *r.worker_options;
     fmt::print("{}, {}, {}: {:.1f} bytes per body and step, {} between workers, {} traded\n",
@@ -120,6 +122,9 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
         ->excludes(blur);
     command.option("--resume", o->resume, as::text("DIR"),
                    "Instead of SCENE: go on with the interrupted run in this folder, with its options");
+    command.option("--threads", o->threads, as::whole(1, kMostThreads),
+                   "Threads that share out each step, without workers; default: one a processor core. No "
+                   "result depends on how many");
     add_worker_options(command, o->workers);
     command.flag(
         "--allow-quarantine", o->allow_quarantine,
@@ -130,9 +135,9 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
 
 /// Of a run that goes on: how it is done and told may be another than it was, what comes out may not.
 bool may_change(const std::string& name) {
-    constexpr std::array<std::string_view, 9> kHow = {"--checkpoint", "--workers", "--balance",
-                                                      "--listen",     "--keys",    "--expect",
-                                                      "--verify",     "--json",    "--allow-quarantine"};
+    constexpr std::array<std::string_view, 10> kHow = {
+        "--checkpoint", "--threads", "--workers", "--balance", "--listen",
+        "--keys",       "--expect",  "--verify",  "--json",    "--allow-quarantine"};
     return std::ranges::count(kHow, name) > 0;
 }
 

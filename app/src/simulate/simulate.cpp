@@ -14,6 +14,7 @@
 #include "files/output_folder.h"
 #include "pictures/frame_thread.h"
 #include "process/clock.h"
+#include "process/parallel.h"
 #include "process/progress_bar.h"
 #include "process/standard_streams.h"
 #include "report/json_document.h"
@@ -80,7 +81,9 @@ sim::DistributedLaunch launch_of(const WorkerOptions& workers) {
 sim::DistributedResult run(const Scene& scene, const SimulateOptions& options,
                            const sim::DistributedSettings& settings, sim::DistributedObserver& observer,
                            const sim::RunState* from) {
-    if (!options.workers) return sim::run_alone(scene, settings, observer, from);
+    if (!options.workers)
+        return sim::run_alone(scene, settings, observer, from,
+                              options.threads.value_or(int(worthwhile_threads())));
     if (options.workers->simulated)
         return sim::simulate_processors(scene, settings, *options.workers->simulated, observer);
     return sim::run_distributed(scene, settings, launch_of(*options.workers), observer, from);
@@ -99,6 +102,10 @@ KeptAccuracy keep(double accuracy, const SimulateOptions& options, std::uint64_t
 }
 
 void check(const SimulateOptions& options, const Scene& scene) {
+    if (options.threads && options.workers)
+        throw BadInput(fmt::format(
+            "error: found --threads {} with workers, expected one of both; a worker computes with one thread",
+            *options.threads));
     if (options.until_rest && !scene.world.settings.sleeping)
         throw BadInput(fmt::format(
             "{}: error: found sleeping = false, expected true for --until rest; change one of them",

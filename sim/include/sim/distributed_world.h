@@ -131,9 +131,10 @@ public:
 
 /// Runs a scene in this process, without workers: pace, bound and market of `settings` do not count, nor does
 /// who is to be slower. elapsed_s and cpu_s are of the steps alone; each is told as worker 0's. `from`: goes on from
-/// there, after at(0), to the same bits as without the interruption. Throws InputError for a scene that is refused.
+/// there, after at(0), to the same bits as without the interruption. So many `threads` share out each step
+/// (World::use_threads); cpu_s is of the calling one, which takes part in all. Throws InputError for a scene that is refused.
 DistributedResult run_alone(const WorldScene& scene, const DistributedSettings& settings,
-                            DistributedObserver& observer, const RunState* from = nullptr);
+                            DistributedObserver& observer, const RunState* from = nullptr, int threads = 1);
 
 /// Where workers come from.
 struct DistributedLaunch {

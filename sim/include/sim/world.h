@@ -258,7 +258,7 @@ struct WorldPast {
 };
 
 /// Many modal bodies that fall, touch, deform and hang together (thesis 2.2, 2.3.1, 2.6). See world.cpp and
-/// the folder's README for the method. One thread at a time. A step's result is a pure function of the
+/// the folder's README for the method. Called by one thread at a time. A step's result is a pure function of the
 /// definition and the calls before it.
 class World {
 public:
@@ -269,6 +269,9 @@ public:
     World& operator=(World&&) noexcept;
 
     void step();  ///< by settings().dt; allocates nothing once its buffers have grown
+    /// So many threads share out the steps of a world that is not shared, at first one: this one and helpers that sleep between
+    /// steps. No result depends on how many. Throws std::invalid_argument below 1.
+    void use_threads(int threads);
 
     /// Ids are indices, never used again.
     int add_body(const WorldBody& body);

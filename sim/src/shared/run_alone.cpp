@@ -50,8 +50,9 @@ void go_to(const RunState& from, World& world, SceneClock& clock) {
 }  // namespace
 
 DistributedResult run_alone(const WorldScene& scene, const DistributedSettings& settings,
-                            DistributedObserver& observer, const RunState* from) {
+                            DistributedObserver& observer, const RunState* from, int threads) {
     World world(scene.world);
+    world.use_threads(threads);
     SceneClock clock(scene);
     DistributedResult result;
     WorkerStep told;

@@ -40,6 +40,18 @@ void BlockCholesky::each_neighbour(std::size_t node, Visitor visit) const {
             visit(w * 64 + static_cast<std::size_t>(std::countr_zero(left)));
 }
 
+double BlockCholesky::least_cost() const {
+    double cost = 0;
+    for (std::size_t i = 0; i < sizes_.size(); ++i) {
+        const double n = sizes_[i];
+        cost += n * n * n / 6;
+        each_neighbour(i, [&](std::size_t other) {
+            if (other > i) cost += n * sizes_[other] * (n + sizes_[other]) / 2;
+        });
+    }
+    return cost;
+}
+
 double BlockCholesky::analyse(double most) {
     const std::size_t nodes = sizes_.size();
     heights_.resize(nodes);

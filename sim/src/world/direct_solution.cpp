@@ -51,7 +51,7 @@ bool IslandSolver::begin_direct(double most, bool must) {
         for (const SpringRows& s : springs_) factor_.couple(s.side[0].body, s.side[1].body);
     };
     couple(true);
-    with_contacts_ = std::isfinite(factor_.analyse(most));
+    with_contacts_ = factor_.least_cost() <= most && std::isfinite(factor_.analyse(most));
     if (!with_contacts_) {
         if (!must && springs_are_soft()) return false;
         couple(false);
@@ -335,7 +335,7 @@ void IslandSolver::move_directly() {
         c.largest = std::max(c.largest, c.at_move[0]);
         note_work(c, c.at_move[0]);
         const Eigen::Vector3d kept(c.at_move[0], c.at_move[1], c.at_move[2]);
-        if (!kept.isZero(0)) apply(c, in_world(c, kept), place_now(c));
+        if (!kept.isZero(0)) apply(c, in_world(c, kept), place_now(c), outside_);
         give(c, p, gradient_);
     }
     auto along = [](const Eigen::Vector3d& p) {
@@ -345,7 +345,7 @@ void IslandSolver::move_directly() {
         const auto p = along(s.moved);
         const Eigen::Vector3d moved = in_world(s, s.moved);
         if (s.told) tell(s, -1, moved, moved, {p[0], p[1], p[2]}, s.place);
-        apply(s, moved, s.place);
+        apply(s, moved, s.place, outside_);
         give(s, s.moved, gradient_);
     }
     for (std::size_t i = 0; i < rows_of_.size(); ++i) {
@@ -389,19 +389,20 @@ void IslandSolver::finish_directly(bool last) {
         c.largest = std::max(c.largest, c.impulse[0]);
     }
     for (ContactRows& c : contacts_) note_work(c, c.impulse[0] - c.at_move[0]);
-    if (last) restitute();
+    for (ContactRows& c : contacts_)
+        if (last) restitute(c);
     ring_on();
     for (const ContactRows& c : contacts_) {
         const Eigen::Vector3d p(c.impulse[0], c.impulse[1], c.impulse[2]),
             at_move(c.at_move[0], c.at_move[1], c.at_move[2]);
         if (p.isZero(0) && at_move.isZero(0)) continue;
         if (c.told) tell(c, c.pair, in_world(c, p), in_world(c, at_move), c.impulse, place_now(c));
-        apply(c, in_world(c, p - at_move), place_now(c));
+        apply(c, in_world(c, p - at_move), place_now(c), outside_);
     }
     for (SpringRows& s : springs_) {
         const float p[3] = {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])};
         if (s.told) tell(s, -1, in_world(s, s.impulse), Eigen::Vector3d::Zero(), p, s.place);
-        apply(s, in_world(s, s.impulse), s.place);
+        apply(s, in_world(s, s.impulse), s.place, outside_);
     }
     for (const BodyRows& rows : rows_of_) {
         MovingBody& body = *rows.body;
@@ -409,7 +410,7 @@ void IslandSolver::finish_directly(bool last) {
         body.state.velocity *= of_substep(*body.kind).drag;
         body.state.angular_momentum *= of_substep(*body.kind).drag;
         if (body.own) outside_ += body.kind->mass.mass * (body.state.velocity - entered);
-        step_modes(rows);
+        limited_ += step_modes(rows);
     }
 }
 
@@ -438,7 +439,7 @@ void IslandSolver::pull_springs() {
         push_by(s, p);
         const Eigen::Vector3d impulse = in_world(s, s.impulse);
         if (s.told) tell(s, -1, impulse, impulse, p, s.place);
-        apply(s, impulse, s.place);
+        apply(s, impulse, s.place, outside_);
     }
 }
 

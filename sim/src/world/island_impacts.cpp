@@ -288,7 +288,7 @@ void IslandSolver::reflect() {
     for (const std::size_t i : striking_) {
         ContactRows& c = contacts_[i];
         for (float& p : c.impulse) p *= scale;
-        apply(c, c.impulse, c.impulse);
+        apply(c, c.impulse, c.impulse, outside_);
         std::fill_n(c.impulse, 3, 0.f);
     }
     for (const std::size_t i : holding_) {
@@ -296,7 +296,7 @@ void IslandSolver::reflect() {
         for (float& p : s.strike) p *= scale;
         const Eigen::Vector3d p = in_world(s, {s.strike[0], s.strike[1], s.strike[2]});
         if (s.told) tell(s, -1, p, p, s.strike, s.place);
-        apply(s, p, s.place);
+        apply(s, p, s.place, outside_);
     }
 }
 
@@ -426,22 +426,23 @@ void IslandSolver::stretch_gaps() {
 // Frames follow bodies that turned, with what is written in them: rows, and the way so far. Rows of contacts that rebound
 // follow the place where they act, too.
 void IslandSolver::turn_frames() {
-    turned_.assign(rows_of_.size(), false);
-    bool any = false;
-    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
-        BodyRows& rows = rows_of_[i];
+    turned_.assign(rows_of_.size(), 0);
+    std::atomic<bool> any = false;
+    each_body([&](BodyRows& rows) {
         const Eigen::Vector3d& root = rows.body->kind->root_inertia;
-        if (root.maxCoeff() - root.minCoeff() < 1e-6 * root.maxCoeff()) continue;  // alike in all frames
+        if (root.maxCoeff() - root.minCoeff() < 1e-6 * root.maxCoeff()) return;  // alike in all frames
         const Eigen::Matrix3d now = rows.body->state.orientation.toRotationMatrix();
-        if ((now - rows.frame).squaredNorm() < 2 * kFrameTurn * kFrameTurn) continue;
-        any = turned_[i] = true;
+        if ((now - rows.frame).squaredNorm() < 2 * kFrameTurn * kFrameTurn) return;
+        turned_[static_cast<std::size_t>(&rows - rows_of_.data())] = 1;
+        any.store(true, std::memory_order_relaxed);
         turn_frame(rows, now);
-    }
+    });
     auto has_turned = [this](const Side& side) {
-        return side.body >= 0 && turned_[static_cast<std::size_t>(side.body)];
+        return side.body >= 0 && turned_[static_cast<std::size_t>(side.body)] != 0;
     };
-    for (ContactRows& c : contacts_)
+    each_contact([&](ContactRows& c) {
         if (follows(c) || (any && (has_turned(c.side[0]) || has_turned(c.side[1])))) write_contact(c);
+    });
 }
 
 void IslandSolver::turn_frame(BodyRows& rows, const Eigen::Matrix3d& frame) {

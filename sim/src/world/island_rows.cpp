@@ -35,26 +35,15 @@ void IslandSolver::begin(const Island& island) {
     impulse_share_ = static_cast<float>(1 / (1 + a2));
 
     local_.resize(bodies_->size(), -1);
-    rows_of_.clear();
+    rows_of_.resize(island.bodies.size());
     std::uint32_t offset = 0;
-    for (const int id : island.bodies) {
-        MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
-        local_[static_cast<std::size_t>(id)] = static_cast<int>(rows_of_.size());
-        BodyRows& rows = rows_of_.emplace_back();
-        rows.body = &body, rows.offset = offset, rows.width = body.kind->width;
-        rows.place = body.state.position, rows.frame = body.posed.rotation;
-        rows.body_from_world = body.posed.rotation.transpose().cast<float>();
-        rows.rotation = body.substep_rotation;
-        rows.inverse_mass = 1 / body.kind->mass.mass;
-        if (paths_) {
-            BodyPath& path = (*paths_)[static_cast<std::size_t>(id)];
-            path.legs.clear();
-            path.legs.reserve(4 * static_cast<std::size_t>(settings_->substeps));
-            path.end = settings_->dt;
-            path.inertia = body.kind->mass.inertia;
-        }
+    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
+        MovingBody& body = (*bodies_)[static_cast<std::size_t>(island.bodies[i])];
+        local_[static_cast<std::size_t>(island.bodies[i])] = static_cast<int>(i);
+        rows_of_[i].body = &body, rows_of_[i].offset = offset;
         offset += static_cast<std::uint32_t>(body.kind->width);
     }
+    each_body([this](BodyRows& rows) { begin_body(rows); });
     y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
     std::fill_n(moved_.data(), offset, 0.f);
 
@@ -88,8 +77,10 @@ void IslandSolver::begin(const Island& island) {
     hits_.reserve(triples), contacts_of_.reserve(2 * triples);
     first_contact_.reserve(rows_of_.size() + 1), hit_bodies_.reserve(rows_of_.size());
     stiffen(island);
-    for (const Turn& turn : in_turns(island))
-        add_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
+    divide(island);
+    for (const Turn& turn : by_turn_)
+        (void)reserve_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
+    each_contact([this](ContactRows& c) { fill_contact(c); });
     for (const int c : island.constraints) {
         HeldConstraint& held = (*constraints_)[static_cast<std::size_t>(c)];
         for (int i = 0; i < held.count; ++i) add_spring(held, held.points[static_cast<std::size_t>(i)]);
@@ -97,6 +88,38 @@ void IslandSolver::begin(const Island& island) {
     pushed_.clear();
     for (std::size_t i = 0; i < rows_of_.size() && !forces_->empty(); ++i) begin_forces(static_cast<int>(i));
     if (!springs_.empty() || contacts_.empty()) (void)begin_direct(most_with_springs(), springs_.empty());
+}
+
+void IslandSolver::begin_body(BodyRows& rows) {
+    MovingBody& body = *rows.body;
+    rows.width = body.kind->width;
+    rows.place = body.state.position, rows.time = 0, rows.frame = body.posed.rotation;
+    rows.body_from_world = body.posed.rotation.transpose().cast<float>();
+    rows.rotation = body.substep_rotation;
+    rows.inverse_mass = 1 / body.kind->mass.mass;
+    rows.struck = rows.stiff = false;
+    if (!paths_) return;
+    BodyPath& path = (*paths_)[static_cast<std::size_t>(&body - bodies_->data())];
+    path.legs.clear();
+    path.legs.reserve(4 * static_cast<std::size_t>(settings_->substeps));
+    path.end = settings_->dt;
+    path.inertia = body.kind->mass.inertia;
+}
+
+// The order of the contacts' rows.
+void IslandSolver::divide(const Island& island) {
+    places_.clear();
+    for (const BodyRows& rows : rows_of_)
+        places_.push_back({rows.place, 2 * rows.body->kind->half_box.maxCoeff()});
+    blocks_.divide(places_, island.manifolds, *manifolds_, local_);
+    by_turn_.clear();
+    next_turn_.assign(rows_of_.size(), 0);
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+        const std::size_t first = by_turn_.size();
+        in_turns(blocks_.manifolds_of(b));
+        blocks_.set_contacts(b, first, by_turn_.size());
+    }
+    sums_.assign(blocks_.slabs(), {});
 }
 
 // A body that meets another so fast that its modes would yield beyond what they describe carries as if it were rigid in this step:
@@ -123,10 +146,9 @@ void IslandSolver::stiffen(const Island& island) {
     }
 }
 
-const std::vector<IslandSolver::Turn>& IslandSolver::in_turns(const Island& island) {
-    by_turn_.clear(), window_.clear();
-    next_turn_.assign(rows_of_.size(), 0);
-    for (const int m : island.manifolds) {
+void IslandSolver::in_turns(std::span<const int> manifolds) {
+    window_.clear();
+    for (const int m : manifolds) {
         Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
         for (int i = 0; i < manifold.count; ++i) {
             if (window_.size() == kWindow) flush_window();
@@ -141,7 +163,6 @@ const std::vector<IslandSolver::Turn>& IslandSolver::in_turns(const Island& isla
         }
     }
     flush_window();
-    return by_turn_;
 }
 
 // Appends the window's contacts by turn, each turn's in order of ids, and begins anew.
@@ -256,34 +277,43 @@ void IslandSolver::finish_rows(Rows& rows) {
 }
 
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
+    fill_contact(reserve_contact(manifold, point));
+}
+
+// Its place, and what the island has to know of it.
+IslandSolver::ContactRows& IslandSolver::reserve_contact(Manifold& manifold, ManifoldPoint& point) {
     auto moving = [this](int id) { return id < kFirstPlane ? local(id) : -1; };
-    ContactRows c{};
+    ContactRows& c = contacts_.emplace_back();
     c.manifold = &manifold;
     c.point = &point;
     c.side[0] = reserve_rows(moving(manifold.a));
     c.side[1] = reserve_rows(moving(manifold.b));
     c.starts = static_cast<double>(point.begins);
+    // Only what comes together rebounds, not what rests and rings.
+    c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
+    c.firm = c.starts >= 0;
+    c.pair = note_pair(manifold);
+    c.told = note_told(c, true) || c.pair >= 0;
+    if (c.firm) impacts_.push_back(contacts_.size() - 1);
+    any_bounce_ = any_bounce_ || (c.restitution > 0 && is_rigid(c));
+    return c;
+}
+
+void IslandSolver::fill_contact(ContactRows& c) {
+    const Manifold& manifold = *c.manifold;
+    const ManifoldPoint& point = *c.point;
     set_tangents(point.normal, c.tangent);
     write_contact(c);
     c.separation = c.now = point.separation;
     c.friction = manifold.friction;
-    // Only what comes together rebounds, not what rests and rings.
-    c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
     c.emerging = manifold.emerging;
-    c.firm = c.starts >= 0;
-    c.pair = note_pair(manifold);
-    c.told = note_told(c, true) || c.pair >= 0;
     c.impulse[0] = point.normal_impulse;
     c.impulse[1] = point.friction_impulse.dot(c.tangent[0]);
     c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
-    if (c.firm) {
-        impacts_.push_back(contacts_.size());
-        c.begins = static_cast<int>(
-            std::min(c.starts * settings_->substeps / settings_->dt, settings_->substeps - 1.));
-        c.over = std::isinf(c.starts);
-    }
-    any_bounce_ = any_bounce_ || (c.restitution > 0 && is_rigid(c));
-    contacts_.push_back(c);
+    if (!c.firm) return;
+    c.begins =
+        static_cast<int>(std::min(c.starts * settings_->substeps / settings_->dt, settings_->substeps - 1.));
+    c.over = std::isinf(c.starts);
 }
 
 // The rows of a contact, in the bodies' frames as they are now, at the one point at which its impulses act, once it has

@@ -35,6 +35,7 @@ float length(float x, float y) {
 
 void IslandSolver::solve(const Island& island, const ContactScene& scene, bool follow) {
     scene_ = &scene, island_ = &island, follow_ = follow;
+    carried_ = is_carried(island);
     begin(island);
     note_start();
     if (follow) start_following();
@@ -73,8 +74,7 @@ void IslandSolver::advance() {
 }
 
 bool IslandSolver::may_gain() const {
-    return is_carried(*island_) ||
-           std::ranges::any_of(rows_of_, [](const BodyRows& rows) { return rows.body->pushed; });
+    return carried_ || std::ranges::any_of(rows_of_, [](const BodyRows& rows) { return rows.body->pushed; });
 }
 
 bool IslandSolver::is_far_from_solved() const {
@@ -96,25 +96,32 @@ bool IslandSolver::is_uneven() const {
 // By how much speeds miss what contacts demand, at most [m/s]: the change of the impulses that would satisfy a
 // contact alone, as a speed.
 double IslandSolver::residual() const {
-    float worst = 0;
-    for (const ContactRows& c : contacts_) {
-        float v[3];
-        speeds(c, v);
-        if (c.restitution > 0 && c.largest > 0) continue;
-        const float bias = c.now > 0 ? c.now * inverse_h_ : 0;
-        const float normal = std::max(c.impulse[0] - c.inverse_normal * (v[0] + bias), 0.f);
-        float t[2] = {c.impulse[1] - c.slide_mass * v[1], c.impulse[2] - c.slide_mass * v[2]};
-        const float along = length(t[0], t[1]), most = c.friction * c.impulse[0];
-        if (along > most) t[0] *= most / along, t[1] *= most / along;
-        worst = std::max({worst, std::abs(normal - c.impulse[0]) * c.k[0][0],
-                          length(t[0] - c.impulse[1], t[1] - c.impulse[2]) / c.slide_mass});
-    }
+    std::atomic<float> worst = 0;
+    crew().each(contacts_.size(), 64, [&](int, std::size_t first, std::size_t last) {
+        float most = 0;
+        for (std::size_t i = first; i < last; ++i) most = std::max(most, residual(contacts_[i]));
+        for (float now = worst; now < most && !worst.compare_exchange_weak(now, most);) {
+        }
+    });
     return worst;
+}
+
+float IslandSolver::residual(const ContactRows& c) const {
+    float v[3];
+    speeds(c, v);
+    if (c.restitution > 0 && c.largest > 0) return 0;
+    const float bias = c.now > 0 ? c.now * inverse_h_ : 0;
+    const float normal = std::max(c.impulse[0] - c.inverse_normal * (v[0] + bias), 0.f);
+    float t[2] = {c.impulse[1] - c.slide_mass * v[1], c.impulse[2] - c.slide_mass * v[2]};
+    const float along = length(t[0], t[1]), most = c.friction * c.impulse[0];
+    if (along > most) t[0] *= most / along, t[1] *= most / along;
+    return std::max(std::abs(normal - c.impulse[0]) * c.k[0][0],
+                    length(t[0] - c.impulse[1], t[1] - c.impulse[2]) / c.slide_mass);
 }
 
 void IslandSolver::substep(bool first, bool last) {
     begin_times(substep_ * h_);
-    for (ContactRows& c : contacts_) see_driven(c);
+    if (carried_) each_contact([this](ContactRows& c) { see_driven(c); });
     set_forces();
     if (!first && !contacts_.empty()) turn_frames();
     load_velocities();
@@ -124,16 +131,17 @@ void IslandSolver::substep(bool first, bool last) {
     warm_start(first);
     sweep(Push::soft);
     push_out();
-    for (ContactRows& c : contacts_)
+    each_contact([this](ContactRows& c) {
         if (follows(c)) write_contact(c);
-    for (int i = 0; i < 2; ++i) sweep(Push::none);
+    });
+    sweep(Push::none, 2);
     note_work();
     if (last) restitute();
     finish();
 }
 
 void IslandSolver::load_velocities() {
-    for (BodyRows& rows : rows_of_) {
+    each_body([this](BodyRows& rows) {
         const MovingBody& body = *rows.body;
         const BodyKind& kind = *body.kind;
         const WorldBodyState& s = body.state;
@@ -162,49 +170,56 @@ void IslandSolver::load_velocities() {
         if (body.pushed) mean += (step.root_compliance * h_ * body.modal_force.array()).cast<float>();
         for (int k = kind.modes; k < kind.mode_width; ++k) y[8 + k] = 0;
         std::copy_n(y, rows.width, y_.data() + rows.offset);
-    }
+    });
 }
 
+// The first sweep.
 void IslandSolver::warm_start(bool first) {
-    // Approach speeds first, before any impulse: gravity's share of this substep included, as it is real.
-    for (ContactRows& c : contacts_) {
-        float speed = 0, moved = 0;
-        for (const Side& side : c.side) {
-            if (side.body < 0) continue;
-            const float* d = jacobians_.data() + side.rows;
-            if (c.restitution > 0 && c.largest == 0) speed += dot(d, start_.data() + side.y, side.width);
-            if (!first || any_struck_) moved += dot(d, moved_.data() + side.y, side.width);
-        }
-        if (c.restitution > 0 && c.largest == 0) speed += c.drift[0];
-        if (c.largest == 0) c.approach = speed;
-        c.now = c.separation + moved + c.drifted;
-        if (c.impulse[0] != 0) push_by(c, c.impulse);
-    }
+    blocks_.sweep(crew(), 1, [&](std::uint32_t, const IslandBlocks::Block& block) {
+        each_in_block(block, [&](ContactRows& c) { warm_start(c, first); });
+    });
     if (any_struck_) stretch_gaps();
+}
+
+void IslandSolver::warm_start(ContactRows& c, bool first) {
+    // Approach speeds first, before any impulse: gravity's share of this substep included, as it is real.
+    float speed = 0, moved = 0;
+    for (const Side& side : c.side) {
+        if (side.body < 0) continue;
+        const float* d = jacobians_.data() + side.rows;
+        if (c.restitution > 0 && c.largest == 0) speed += dot(d, start_.data() + side.y, side.width);
+        if (!first || any_struck_) moved += dot(d, moved_.data() + side.y, side.width);
+    }
+    if (c.restitution > 0 && c.largest == 0) speed += c.drift[0];
+    if (c.largest == 0) c.approach = speed;
+    c.now = c.separation + moved + c.drifted;
+    if (c.impulse[0] != 0) push_by(c, c.impulse);
 }
 
 // Positions move with velocities that also push emerging bodies out; the velocities themselves never see it.
 void IslandSolver::push_out() {
-    const bool emerging = std::any_of(contacts_.begin(), contacts_.end(),
-                                      [](const ContactRows& c) { return c.emerging && c.now < 0; });
+    std::atomic<bool> emerging = false;
+    each_contact([&](const ContactRows& c) {
+        if (c.emerging && c.now < 0) emerging.store(true, std::memory_order_relaxed);
+    });
     if (!emerging) return move();
-    auto save = [](auto& rows) {
-        for (auto& row : rows) std::copy_n(row.impulse, 3, row.kept);
-    };
-    auto restore = [](auto& rows) {
-        for (auto& row : rows) std::copy_n(row.kept, 3, row.impulse);
-    };
     std::copy_n(y_.data(), y_.size(), kept_.data());
-    save(contacts_);
+    each_contact([](ContactRows& c) { std::copy_n(c.impulse, 3, c.kept); });
     sweep(Push::all);
     move();
     std::copy_n(kept_.data(), y_.size(), y_.data());
-    restore(contacts_);
+    each_contact([](ContactRows& c) { std::copy_n(c.kept, 3, c.impulse); });
 }
 
-void IslandSolver::sweep(Push push) {
-    for (ContactRows& contact : contacts_)
+void IslandSolver::sweep(Push push, std::uint32_t times) {
+    blocks_.sweep(crew(), times,
+                  [&](std::uint32_t, const IslandBlocks::Block& block) { sweep(block, push); });
+}
+
+void IslandSolver::sweep(const IslandBlocks::Block& block, Push push) {
+    each_in_block(block, [&](ContactRows& contact) {
         if (contact.begins < substep_ && !contact.over) solve_contact(contact, push);
+    });
 }
 
 // What the rows see of the velocities.
@@ -257,7 +272,7 @@ void IslandSolver::solve_contact(ContactRows& c, Push push) {
 // Energy that a contact's normal impulse takes out in this substep, where it may have to give some back: held
 // over the substep, it does p (v0 + v1) / 2 on the rigid part and p G on the modes.
 void IslandSolver::note_work() {
-    for (ContactRows& c : contacts_) note_work(c, c.impulse[0]);
+    each_contact([this](ContactRows& c) { note_work(c, c.impulse[0]); });
 }
 
 void IslandSolver::note_work(ContactRows& c, float impulse) {
@@ -276,7 +291,9 @@ void IslandSolver::note_work(ContactRows& c, float impulse) {
 // A rebound to e times the approach, by an impulse p whose work p v + p^2 (K_rigid / 2 + K_modes) is at most
 // e^2 of the energy that the contact has taken. For rigid bodies both say the same.
 void IslandSolver::restitute() {
-    for (ContactRows& c : contacts_) restitute(c);
+    blocks_.sweep(crew(), 1, [this](std::uint32_t, const IslandBlocks::Block& block) {
+        each_in_block(block, [this](ContactRows& c) { restitute(c); });
+    });
 }
 
 void IslandSolver::restitute(ContactRows& c) {
@@ -304,27 +321,39 @@ void IslandSolver::restitute(ContactRows& c) {
 }
 
 void IslandSolver::move() {
-    for (ContactRows& c : contacts_) {
-        std::copy_n(c.impulse, 3, c.at_move);
-        c.drifted += static_cast<float>(h_) * c.drift[0];
-        apply(c, c.at_move, c.at_move);
-    }
-    const float h = static_cast<float>(h_);
-    for (BodyRows& rows : rows_of_) {
-        MovingBody& body = *rows.body;
-        const BodyKind& kind = *body.kind;
-        const float* y = y_.data() + rows.offset;
-        float* moved = moved_.data() + rows.offset;
-        const double left = h_ - rows.time;
-        const float rigid = static_cast<float>(left);
-        for (int i = 0; i < rows.width; ++i) moved[i] += (i < 8 ? rigid : h) * y[i];
-        WorldBodyState& s = body.state;
-        const Eigen::Vector3d velocity = s.velocity + velocity_given(body, h_),
-                              momentum = s.angular_momentum + momentum_given(body, h_);
-        if (paths_) write_leg(rows, velocity, momentum);
-        s.position = rows.place += left * velocity;
-        s.orientation = rows.time > 0 ? rotate_freely(s.orientation, momentum, kind.mass.inertia, left)
-                                      : body.substep_rotation.advance(s.orientation, momentum);
+    blocks_.sweep(crew(), 1, [this](std::uint32_t, const IslandBlocks::Block& block) {
+        each_in_block(block, [&](ContactRows& c) {
+            std::copy_n(c.impulse, 3, c.at_move);
+            c.drifted += static_cast<float>(h_) * c.drift[0];
+            apply(c, c.at_move, c.at_move, sums_[block.slab].outside);
+        });
+    });
+    take_sums();
+    each_body([this](BodyRows& rows) { move(rows); });
+}
+
+void IslandSolver::move(BodyRows& rows) {
+    MovingBody& body = *rows.body;
+    const BodyKind& kind = *body.kind;
+    const float* y = y_.data() + rows.offset;
+    float* moved = moved_.data() + rows.offset;
+    const double left = h_ - rows.time;
+    const float h = static_cast<float>(h_), rigid = static_cast<float>(left);
+    for (int i = 0; i < rows.width; ++i) moved[i] += (i < 8 ? rigid : h) * y[i];
+    WorldBodyState& s = body.state;
+    const Eigen::Vector3d velocity = s.velocity + velocity_given(body, h_),
+                          momentum = s.angular_momentum + momentum_given(body, h_);
+    if (paths_) write_leg(rows, velocity, momentum);
+    s.position = rows.place += left * velocity;
+    s.orientation = rows.time > 0 ? rotate_freely(s.orientation, momentum, kind.mass.inertia, left)
+                                  : body.substep_rotation.advance(s.orientation, momentum);
+}
+
+// In the order of slabs.
+void IslandSolver::take_sums() {
+    for (Sums& sums : sums_) {
+        outside_ += std::exchange(sums.outside, Eigen::Vector3d::Zero());
+        limited_ += std::exchange(sums.limited, 0);
     }
 }
 
@@ -345,10 +374,11 @@ Eigen::Vector3d IslandSolver::place_now(const ContactRows& c) const {
 
 // In double precision and at one point of space a pair, so that linear and angular momentum are kept to
 // rounding.
-void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point) {
+void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point,
+                         Eigen::Vector3d& outside) {
     const Side &a = rows.side[0], &b = rows.side[1];
-    if (b.body < 0 && rows_of_[static_cast<std::size_t>(a.body)].body->own) outside_ += impulse;
-    if (a.body < 0 && rows_of_[static_cast<std::size_t>(b.body)].body->own) outside_ -= impulse;
+    if (b.body < 0 && rows_of_[static_cast<std::size_t>(a.body)].body->own) outside += impulse;
+    if (a.body < 0 && rows_of_[static_cast<std::size_t>(b.body)].body->own) outside -= impulse;
     for (const Side& side : rows.side) {
         if (side.body < 0) continue;
         const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
@@ -437,41 +467,50 @@ void IslandSolver::settle_given() {
 
 // A contact's impulse (of it what moves its bodies), at the place where it is now.
 [[gnu::flatten]] void IslandSolver::apply(const ContactRows& c, const float (&impulse)[3],
-                                          const float (&at_move)[3]) {
+                                          const float (&at_move)[3], Eigen::Vector3d& outside) {
     if (impulse[0] == 0 && impulse[1] == 0 && impulse[2] == 0) return;
     auto world = [&c](const float(&p)[3]) -> Eigen::Vector3d {
         return (p[0] * c.point->normal + p[1] * c.tangent[0] + p[2] * c.tangent[1]).cast<double>();
     };
     const Eigen::Vector3d p = world(impulse), place = place_now(c);
     if (c.told) tell(c, c.pair, p, world(at_move), impulse, place);
-    apply(c, p, place);
+    apply(c, p, place, outside);
 }
 
 void IslandSolver::finish() {
-    for (const ContactRows& c : contacts_) {
-        const float after[3] = {c.impulse[0] - c.at_move[0], c.impulse[1] - c.at_move[1],
-                                c.impulse[2] - c.at_move[2]};
-        apply(c, after, {0, 0, 0});
-    }
+    blocks_.sweep(crew(), 1, [this](std::uint32_t, const IslandBlocks::Block& block) {
+        each_in_block(block, [&](const ContactRows& c) {
+            const float after[3] = {c.impulse[0] - c.at_move[0], c.impulse[1] - c.at_move[1],
+                                    c.impulse[2] - c.at_move[2]};
+            apply(c, after, {0, 0, 0}, sums_[block.slab].outside);
+        });
+    });
+    take_sums();
     count_forces(1);
-    for (const BodyRows& rows : rows_of_) {
-        MovingBody& body = *rows.body;
-        const BodyKind& kind = *body.kind;
-        WorldBodyState& s = body.state;
-        const Eigen::Vector3d entered = s.velocity;
-        s.velocity += h_ * body.gravity_scale * settings_->gravity;
-        s.velocity *= of_substep(kind).drag, s.angular_momentum *= of_substep(kind).drag;
-        if (body.own) outside_ += kind.mass.mass * (s.velocity - entered);
-        if (body.pushed) {
-            s.velocity += h_ / kind.mass.mass * body.force;
-            s.angular_momentum += h_ * body.torque;
-        }
-        step_modes(rows);
+    crew().each(blocks_.slabs(), 1, [this](int, std::size_t first, std::size_t last) {
+        for (std::size_t slab = first; slab < last; ++slab)
+            for (const std::uint32_t body : blocks_.bodies_of(slab)) finish(rows_of_[body], sums_[slab]);
+    });
+    take_sums();
+}
+
+void IslandSolver::finish(const BodyRows& rows, Sums& sums) {
+    MovingBody& body = *rows.body;
+    const BodyKind& kind = *body.kind;
+    WorldBodyState& s = body.state;
+    const Eigen::Vector3d entered = s.velocity;
+    s.velocity += h_ * body.gravity_scale * settings_->gravity;
+    s.velocity *= of_substep(kind).drag, s.angular_momentum *= of_substep(kind).drag;
+    if (body.own) sums.outside += kind.mass.mass * (s.velocity - entered);
+    if (body.pushed) {
+        s.velocity += h_ / kind.mass.mass * body.force;
+        s.angular_momentum += h_ * body.torque;
     }
+    sums.limited += step_modes(rows);
 }
 
 // The modes under what the rows gave them, held over the substep.
-void IslandSolver::step_modes(const BodyRows& rows) {
+bool IslandSolver::step_modes(const BodyRows& rows) {
     MovingBody& body = *rows.body;
     const HeldSteps& step = of_substep(*body.kind).held;
     WorldBodyState& s = body.state;
@@ -483,7 +522,7 @@ void IslandSolver::step_modes(const BodyRows& rows) {
         step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array() + step.compliance * held;
     s.q_dot.array() = step.c * s.q.array() + step.d * s.q_dot.array() + step.rate * held;
     s.q.array() += h_ * mean;
-    if (limit_deformation(body)) ++limited_;
+    return limit_deformation(body);
 }
 
 void IslandSolver::keep_impulse(const ContactRows& c, ManifoldPoint& point) {
@@ -492,7 +531,7 @@ void IslandSolver::keep_impulse(const ContactRows& c, ManifoldPoint& point) {
 }
 
 void IslandSolver::keep_impulses() {
-    for (const ContactRows& c : contacts_) keep_impulse(c, *c.point);
+    each_contact([](const ContactRows& c) { keep_impulse(c, *c.point); });
     for (const SpringRows& s : springs_) {
         s.point->impulse = (s.moved + s.impulse).cast<float>();
         const double force = s.point->impulse.norm() / h_;

@@ -7,6 +7,7 @@
 
 #include "shape/lanes.h"
 #include "world/block_cholesky.h"
+#include "world/island_blocks.h"
 #include "world/island_contacts.h"
 
 namespace sim {
@@ -98,8 +99,9 @@ struct Island {
 /// are soft (springs_are_soft) they are forces, held over each substep of the sweeps (symplectic Euler).
 /// Islands without either, where a timed force acts, go directly, too: a constant force then moves a body exactly.
 ///
-/// Deterministic: sweeps go over springs, then contacts, in the order of ids (see in_turns). No allocation
-/// once the buffers have grown.
+/// Deterministic: sweeps go over springs, then contacts, in an order that is a function of the bodies and their places alone
+/// (IslandBlocks; within a block by ids, see in_turns), however many threads share them out. No allocation once the buffers
+/// have grown.
 class IslandSolver {
 public:
     IslandSolver(const WorldSettings& settings, std::vector<MovingBody>& bodies,
@@ -232,6 +234,7 @@ private:
     };
 
     void begin(const Island& island);
+    void begin_body(BodyRows& rows);
     void stiffen(const Island& island);
     void start_following();
     [[nodiscard]] bool moves_little() const;
@@ -260,8 +263,36 @@ private:
     /// several at once; windows keep the bodies they use in its cache.
     static constexpr std::size_t kWindow = 64;
     void flush_window();
-    const std::vector<Turn>& in_turns(const Island& island);
+    void in_turns(std::span<const int> manifolds);  // appended to by_turn_
+    void divide(const Island& island);
     void add_contact(Manifold& manifold, ManifoldPoint& point);
+    ContactRows& reserve_contact(Manifold& manifold, ManifoldPoint& point);
+    void fill_contact(ContactRows& contact);
+    // Sharing out: what is written of one body or contact alone, by any thread; what contacts do to bodies, in the order of
+    // blocks_; what is summed, slab by slab.
+    [[nodiscard]] Crew& crew() const noexcept { return scene_->crew; }
+    template <typename Visit>
+    void each_contact(Visit visit) {
+        crew().each(contacts_.size(), 64, [&](int, std::size_t first, std::size_t last) {
+            for (std::size_t i = first; i < last; ++i) visit(contacts_[i]);
+        });
+    }
+    template <typename Visit>
+    void each_body(Visit visit) {
+        crew().each(rows_of_.size(), 16, [&](int, std::size_t first, std::size_t last) {
+            for (std::size_t i = first; i < last; ++i) visit(rows_of_[i]);
+        });
+    }
+    template <typename Visit>
+    void each_in_block(const IslandBlocks::Block& block, Visit visit) {
+        for (std::size_t i = block.first; i < block.last; ++i) visit(contacts_[i]);
+    }
+    /// What a slab's bodies add to sums, in the order of sweeps.
+    struct Sums {
+        Eigen::Vector3d outside = Eigen::Vector3d::Zero();
+        std::uint64_t limited = 0;
+    };
+    void take_sums();
     void write_contact(ContactRows& contact);
     // Impacts, island_impacts.cpp.
     /// A contact that meets, at a time of the substep [s].
@@ -329,6 +360,7 @@ private:
     [[nodiscard]] bool turns_little() const;
     [[nodiscard]] bool falls_little() const;
     [[nodiscard]] double residual() const;
+    [[nodiscard]] float residual(const ContactRows& contact) const;
     void direct_substep(int level, bool last);
     bool try_substep(bool last);
     void write_legs();
@@ -383,8 +415,10 @@ private:
     void substep(bool first, bool last);
     void load_velocities();
     void warm_start(bool first);
+    void warm_start(ContactRows& contact, bool first);
     enum class Push { none, soft, all };
-    void sweep(Push push);
+    void sweep(Push push, std::uint32_t times = 1);
+    void sweep(const IslandBlocks::Block& block, Push push);
     void push_out();
     void speeds(const Rows& rows, float (&v)[3]) const;
     void push_by(const Rows& rows, const float (&impulse)[3]);
@@ -395,18 +429,22 @@ private:
     void restitute(ContactRows& contact);
     void move();
     [[nodiscard]] Eigen::Vector3d place_now(const ContactRows& contact) const;
-    void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point);
+    void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point,
+               Eigen::Vector3d& outside);
     void tell(const Rows& rows, int pair, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
               const float (&along)[3], const Eigen::Vector3d& point);
     void tell_side(const Rows& rows, int side, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
                    const float (&along)[3], const Eigen::Vector3d& point, StepImpulse& given) const;
-    void apply(const ContactRows& contact, const float (&impulse)[3], const float (&at_move)[3]);
+    void apply(const ContactRows& contact, const float (&impulse)[3], const float (&at_move)[3],
+               Eigen::Vector3d& outside);
     [[nodiscard]] Eigen::Vector3d in_world(const ContactRows& contact, const Eigen::Vector3d& impulse) const;
     [[nodiscard]] static Eigen::Vector3d in_world(const SpringRows& spring, const Eigen::Vector3d& impulse) {
         return spring.axes.transpose() * impulse;
     }
     void finish();
-    void step_modes(const BodyRows& rows);
+    void move(BodyRows& rows);
+    void finish(const BodyRows& rows, Sums& sums);
+    [[nodiscard]] bool step_modes(const BodyRows& rows);  // whether a deformation was held
     void keep_impulses();
     void ring_on();
     void settle_given();
@@ -450,6 +488,9 @@ private:
 
     std::vector<BodyRows> rows_of_;  // per island body
     std::vector<int> local_;         // world body -> island body or -1
+    IslandBlocks blocks_;
+    std::vector<IslandBlocks::Body> places_;  // of the bodies, to divide them
+    std::vector<Sums> sums_;                  // of each slab
     std::vector<Turn> window_, by_turn_;
     std::vector<int> next_turn_;  // per island body
     std::vector<ContactRows> contacts_;
@@ -461,7 +502,7 @@ private:
     std::vector<std::size_t> holding_;                      // springs
     std::vector<std::size_t> contacts_of_, first_contact_;  // body by body, and where each begins
     bool any_bounce_ = false, any_struck_ = false;          // contacts that may; in this step
-    std::vector<bool> turned_;                              // per island body: its frame was
+    std::vector<std::uint8_t> turned_;                      // per island body: its frame was
     LaneArray y_, kept_, start_, moved_, jacobians_;
     std::size_t jacobians_used_ = 0;
     double h_ = 0;       // of the substep
@@ -477,6 +518,7 @@ private:
 
     // Of direct solutions, in double precision: body by body velocity, spin, modes, without lanes' padding.
     bool direct_ = false;         // this island is solved directly
+    bool carried_ = false;        // see is_carried
     bool follow_ = false;         // and followed
     bool with_contacts_ = false;  // they are factorised, too; else swept over
     struct Before {

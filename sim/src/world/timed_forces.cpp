@@ -35,7 +35,7 @@ void World::Implementation::find_forces() {
         active.push_back(now);
         if (body.asleep && (body.own || sharing != Sharing::pairs)) wake_group(bodies, force.body);
     }
-    solver->begin_step(counts.steps - 1, active);
+    for (const auto& solver : solvers) solver->begin_step(counts.steps - 1, active);
 }
 
 bool World::Implementation::is_forced(int body) const {

@@ -1,10 +1,10 @@
-#include <pmmintrin.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <memory>
 #include <numeric>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "world/world_check.h"
@@ -14,19 +14,6 @@ namespace sim {
 namespace {
 
 constexpr double kStillTime = 0.5;  // [s]
-
-// Numbers below 1e-308 (1e-38 in single precision) count as zero within a step: they slow the processor down
-// and mean nothing. Also makes the result independent of how the thread was set up.
-class FlushDenormals {
-public:
-    FlushDenormals() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040); }
-    ~FlushDenormals() { _mm_setcsr(before_); }
-    FlushDenormals(const FlushDenormals&) = delete;
-    FlushDenormals& operator=(const FlushDenormals&) = delete;
-
-private:
-    unsigned before_;
-};
 
 constexpr double kWorkOfPair = 0.5, kWorkOfPoint = 0.75;  // of a body that touches nothing
 
@@ -301,9 +288,18 @@ bool World::Implementation::any_awake() const {
                        [&](int i) { return awake(bodies[static_cast<std::size_t>(i)]); });
 }
 
+void World::Implementation::set_threads(int threads) {
+    all = std::make_unique<Crew>(threads);
+    while (solvers.size() < static_cast<std::size_t>(threads)) {
+        solvers.push_back(
+            std::make_unique<IslandSolver>(settings, bodies, contacts.manifolds(), constraints));
+        solvers.back()->record(&contacts.paths());
+    }
+}
+
 void World::Implementation::step() {
     const FlushDenormals flush;
-    solver->cross(sharing == Sharing::pairs);
+    solver().cross(sharing == Sharing::pairs);
     outside_before = outside;
     ++counts.steps;
     begin_motions();
@@ -318,13 +314,15 @@ void World::Implementation::step() {
         end_motions();
         return dismiss_ghosts();
     }
-    for (const int i : here) {
-        MovingBody& body = bodies[static_cast<std::size_t>(i)];
-        if (body.moves() && (!body.asleep || body.unposed)) pose(body);
-        body.was_given = false;
-    }
+    crew().each(here.size(), 16, [this](int, std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i) {
+            MovingBody& body = bodies[static_cast<std::size_t>(here[i])];
+            if (body.moves() && (!body.asleep || body.unposed)) pose(body);
+            body.was_given = false;
+        }
+    });
     const auto [fallbacks_before, impacts_before] = std::pair(contacts.fallbacks(), contacts.impacts());
-    contacts.find(contact_scene());
+    contacts.find(contact_scene(crew()));
     find_islands();
     held_before.resize(constraints.size());
     for (std::size_t c = 0; c < constraints.size(); ++c) held_before[c] = constraints[c].holds;
@@ -351,12 +349,17 @@ World::World(const WorldDefinition& definition) : implementation_(std::make_uniq
     Implementation& w = *implementation_;
     w.settings = definition.settings;
     w.planes = definition.planes;
-    w.solver = std::make_unique<IslandSolver>(w.settings, w.bodies, w.contacts.manifolds(), w.constraints);
-    w.solver->record(&w.contacts.paths());
+    w.set_threads(1);
     w.forces = definition.forces;
     std::ranges::stable_sort(w.forces, {}, &TimedForce::body);
     for (const WorldBody& body : definition.bodies) w.add(body);
     for (const PointConstraint& constraint : definition.constraints) add_constraint(constraint);
+}
+
+void World::use_threads(int threads) {
+    if (threads < 1)
+        throw std::invalid_argument("threads: found " + std::to_string(threads) + ", expected 1 or more");
+    implementation_->set_threads(threads);
 }
 
 World::~World() = default;

@@ -10,6 +10,8 @@ namespace {
 // several samples, whose normals differ by more.
 constexpr double kNormalTurn = 0.004, kBentNormalTurn = 0.05;  // [rad]
 
+constexpr std::size_t kLeastPart = 16;  // bodies whose contacts a thread finds at once
+
 double smallest_half(const MovingBody& body) {
     return sim::smallest_half(body.posed);
 }
@@ -92,9 +94,17 @@ void WorldContacts::find(const ContactScene& scene) {
     reach_.resize(scene.bodies.size());
     paths_.resize(scene.bodies.size());
     first_.resize(scene.bodies.size());
+    while (narrow_.size() < static_cast<std::size_t>(scene.crew.size()))
+        narrow_.push_back(std::make_unique<NarrowPhase>());
     known_.clear();
     while (find_once(scene)) {
     }
+}
+
+std::uint64_t WorldContacts::fallbacks() const noexcept {
+    std::uint64_t sum = 0;
+    for (const auto& narrow : narrow_) sum += narrow->fallbacks();
+    return sum;
 }
 
 void WorldContacts::set_reach(const ContactScene& scene, int id) {
@@ -119,35 +129,79 @@ void WorldContacts::set_reach(const ContactScene& scene, int id) {
     reach.rung = dt * ringing_speed(body);
 }
 
+void WorldContacts::set_box(const ContactScene& scene, std::size_t i) {
+    const int id = scene.here[i];
+    const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
+    set_reach(scene, id);
+    const Reach& reach = reach_[static_cast<std::size_t>(id)];
+    const Eigen::Vector3d half =
+        body.posed.half_aabb.array() + reach.turned + reach.rung + kSlop * smallest_half(body);
+    const Eigen::Vector3d &from = body.posed.position, to = from + reach.moved;
+    broad_.boxes()[i] = {from.cwiseMin(to) - half, from.cwiseMax(to) + half, id,
+                         body.travels || (body.moves() && !body.asleep)};
+}
+
 bool WorldContacts::find_once(const ContactScene& scene) {
-    manifolds_.clear(), meetings_.clear();
-    followed_.assign(scene.bodies.size(), false);
-    watched_.assign(scene.bodies.size(), false);
-    pairs_ = 0;
-    next_before_ = 0;
-    woke_ = false;
-    auto& boxes = broad_.boxes();
-    boxes.clear();
-    for (const int id : scene.here) {
-        const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
-        set_reach(scene, id);
-        const Reach& reach = reach_[static_cast<std::size_t>(id)];
-        const Eigen::Vector3d half =
-            body.posed.half_aabb.array() + reach.turned + reach.rung + kSlop * smallest_half(body);
-        const Eigen::Vector3d &from = body.posed.position, to = from + reach.moved;
-        boxes.push_back({from.cwiseMin(to) - half, from.cwiseMax(to) + half, id,
-                         body.travels || (body.moves() && !body.asleep)});
-    }
-    // By bodies, each with later bodies and then with planes: in the order of the manifolds' keys.
-    const auto& pairs = broad_.find();
-    auto pair = pairs.begin();
-    for (const int i : scene.here) {
+    meetings_.clear();
+    followed_.assign(scene.bodies.size(), kNotFollowed);
+    watched_.assign(scene.bodies.size(), 0);
+    const std::size_t count = scene.here.size();
+    broad_.boxes().resize(count);
+    scene.crew.each(count, 64, [&](int, std::size_t first, std::size_t last) {
+        for (std::size_t i = first; i < last; ++i) set_box(scene, i);
+    });
+    const auto& pairs = broad_.find(scene.crew);
+    const std::size_t most = scene.crew.size() == 1 ? 1 : 16 * static_cast<std::size_t>(scene.crew.size());
+    const std::size_t parts = std::clamp(count / kLeastPart, std::size_t{1}, most);
+    found_.resize(std::max(parts, found_.size()));
+    scene.crew.each(parts, 1, [&](int thread, std::size_t first, std::size_t last) {
+        for (std::size_t p = first; p < last; ++p) {
+            found_[p].first = p * count / parts, found_[p].last = (p + 1) * count / parts;
+            found_[p].narrow = narrow_[static_cast<std::size_t>(thread)].get();
+            find(scene, pairs, found_[p]);
+        }
+    });
+    gather(scene, parts);
+    bool woke = false;
+    for (std::size_t p = 0; p < parts; ++p)
+        for (const int id : found_[p].woken) wake_group(scene.bodies, id), woke = true;
+    if (!woke && !meetings_.empty()) accept_impacts(scene);
+    return woke;
+}
+
+void WorldContacts::find(const ContactScene& scene, const std::vector<std::pair<int, int>>& pairs,
+                         Found& found) {
+    found.manifolds.clear(), found.meetings.clear(), found.woken.clear();
+    found.pairs = 0;
+    if (found.first == found.last) return;
+    const int first = scene.here[found.first];
+    const auto first_before = std::ranges::lower_bound(before_, first, {}, &Manifold::a);
+    found.next_before = static_cast<std::size_t>(first_before - before_.begin());
+    auto pair = std::ranges::lower_bound(pairs, first, {}, &std::pair<int, int>::first);
+    for (std::size_t k = found.first; k < found.last; ++k) {
+        const int i = scene.here[k];
         for (; pair != pairs.end() && pair->first == i; ++pair)
-            if (scene.may_meet(*pair)) meet_pair(scene, i, pair->second);
-        if (!woke_) meet_planes(scene, i);
+            if (scene.may_meet(*pair)) meet_pair(scene, i, pair->second, found);
+        meet_planes(scene, i, found);
     }
-    if (!woke_ && !meetings_.empty()) accept_impacts(scene);
-    return woke_;
+}
+
+// What all threads found, in the order of keys.
+void WorldContacts::gather(const ContactScene& scene, std::size_t parts) {
+    pairs_ = 0;
+    std::size_t sum = 0;
+    for (std::size_t p = 0; p < parts; ++p) {
+        pairs_ += found_[p].pairs;
+        meetings_.insert(meetings_.end(), found_[p].meetings.begin(), found_[p].meetings.end());
+        found_[p].next_before = std::exchange(sum, sum + found_[p].manifolds.size());  // where they go
+    }
+    if (parts == 1) return std::swap(manifolds_, found_[0].manifolds);
+    manifolds_.resize(sum);
+    scene.crew.each(parts, 1, [this](int, std::size_t first, std::size_t last) {
+        for (std::size_t p = first; p < last; ++p)
+            std::ranges::copy(found_[p].manifolds,
+                              manifolds_.begin() + static_cast<std::ptrdiff_t>(found_[p].next_before));
+    });
 }
 
 // Among ghosts: of an own and a ghost body, those whose lower number is own; a ghost's with what is fixed.
@@ -171,10 +225,10 @@ void ContactScene::set_surface(Manifold& manifold) const {
 }
 
 // Keys must ascend from call to call.
-const Manifold* WorldContacts::last(std::uint64_t key) {
-    while (next_before_ < before_.size() && before_[next_before_].key() < key) ++next_before_;
-    return next_before_ < before_.size() && before_[next_before_].key() == key ? &before_[next_before_]
-                                                                               : nullptr;
+const Manifold* WorldContacts::last(std::uint64_t key, Found& found) const {
+    std::size_t& next = found.next_before;
+    while (next < before_.size() && before_[next].key() < key) ++next;
+    return next < before_.size() && before_[next].key() == key ? &before_[next] : nullptr;
 }
 
 // Whether the balls that hold two bodies pass each other. Paths under gravity bend by g dt^2 / 8.
@@ -191,8 +245,8 @@ bool WorldContacts::pass_by(const ContactScene& scene, int i, int j) const {
     return (apart + at * moved).squaredNorm() > reach * reach;
 }
 
-void WorldContacts::meet_pair(const ContactScene& scene, int i, int j) {
-    ++pairs_;
+void WorldContacts::meet_pair(const ContactScene& scene, int i, int j, Found& found) {
+    ++found.pairs;
     if (pass_by(scene, i, j)) return;
     const MovingBody &a = scene.bodies[static_cast<std::size_t>(i)],
                      &b = scene.bodies[static_cast<std::size_t>(j)];
@@ -200,76 +254,76 @@ void WorldContacts::meet_pair(const ContactScene& scene, int i, int j) {
     const double size = std::min(smallest_half(a), smallest_half(b));
     const Eigen::Vector3d moved = ra.moved - rb.moved;
     const double motion = moved.norm() + ra.turned + rb.turned;
-    const Manifold* before = last(static_cast<std::uint64_t>(i) << 32 | static_cast<std::uint32_t>(j));
-    if (motion > kSlow * size) return meet_fast(scene, i, j, before);
-    const std::size_t count = manifolds_.size();
-    meet_near(scene, i, j, kSlop * size + motion + ra.rung + rb.rung, before);
-    if (manifolds_.size() == count) return;
-    if (static_cast<double>(manifolds_.back().points[0].separation) > kTouching * size) {
-        const double after = separation_after(manifolds_.back(), a, b, moved, scene.settings.dt);
-        if (after > kSlop * size + ra.rung + rb.rung) return manifolds_.pop_back();
+    const Manifold* before = last(static_cast<std::uint64_t>(i) << 32 | static_cast<std::uint32_t>(j), found);
+    if (motion > kSlow * size) return meet_fast(scene, i, j, before, found);
+    std::vector<Manifold>& manifolds = found.manifolds;
+    const std::size_t count = manifolds.size();
+    meet_near(scene, i, j, kSlop * size + motion + ra.rung + rb.rung, before, found);
+    if (manifolds.size() == count) return;
+    if (static_cast<double>(manifolds.back().points[0].separation) > kTouching * size) {
+        const double after = separation_after(manifolds.back(), a, b, moved, scene.settings.dt);
+        if (after > kSlop * size + ra.rung + rb.rung) return manifolds.pop_back();
         // What would be stopped: where and whether it meets, the paths tell better.
-        if (after < 0 && !keeps_normal(manifolds_.back(), a, b, moved, ra.turned + rb.turned)) {
+        if (after < 0 && !keeps_normal(manifolds.back(), a, b, moved, ra.turned + rb.turned)) {
             const Impact impact = foresee(scene, i, j);
             const bool nearest = is_round(a.posed) || is_round(b.posed);
-            if (!impact.meets || (nearest && !impact.at_once)) manifolds_.pop_back();
+            if (!impact.meets || (nearest && !impact.at_once)) manifolds.pop_back();
             if (!impact.meets) return;
-            if (nearest && !impact.at_once) meetings_.push_back({i, j, impact.time, false});
+            if (nearest && !impact.at_once) found.meetings.push_back({i, j, impact.time, false});
         }
     }
-    wake(scene, i, j);
+    wake(scene, i, j, found);
 }
 
-void WorldContacts::meet_near(const ContactScene& scene, int i, int j, double margin,
-                              const Manifold* before) {
+void WorldContacts::meet_near(const ContactScene& scene, int i, int j, double margin, const Manifold* before,
+                              Found& found) const {
     const MovingBody &a = scene.bodies[static_cast<std::size_t>(i)],
                      &b = scene.bodies[static_cast<std::size_t>(j)];
-    Manifold& manifold = manifolds_.emplace_back();
+    Manifold& manifold = found.manifolds.emplace_back();
     manifold.a = i, manifold.b = j;
-    narrow_.pair(a.posed, b.posed, {static_cast<float>(margin), before, scene.among_ghosts}, manifold);
+    found.narrow->pair(a.posed, b.posed, {static_cast<float>(margin), before, scene.among_ghosts}, manifold);
     if (manifold.count == 0) {
-        manifolds_.pop_back();
+        found.manifolds.pop_back();
         return;
     }
     scene.set_surface(manifold);
 }
 
 // What carried load a step ago mostly touches still.
-void WorldContacts::meet_fast(const ContactScene& scene, int i, int j, const Manifold* before) {
+void WorldContacts::meet_fast(const ContactScene& scene, int i, int j, const Manifold* before, Found& found) {
     const MovingBody &a = scene.bodies[static_cast<std::size_t>(i)],
                      &b = scene.bodies[static_cast<std::size_t>(j)];
     const double size = std::min(smallest_half(a), smallest_half(b)), margin = (kSlop + kSlow) * size;
-    const std::size_t count = manifolds_.size();
+    std::vector<Manifold>& manifolds = found.manifolds;
+    const std::size_t count = manifolds.size();
     bool touches = false;
     if (before && carries(*before)) {
-        meet_near(scene, i, j, margin, before);
-        touches = manifolds_.size() > count;
+        meet_near(scene, i, j, margin, before, found);
+        touches = manifolds.size() > count;
     }
     if (!touches) {
         const Impact impact = foresee(scene, i, j);
         if (!impact.meets) return;
-        meetings_.push_back({i, j, impact.time, false});
-        return wake(scene, i, j);
+        found.meetings.push_back({i, j, impact.time, false});
+        return wake(scene, i, j, found);
     }
-    wake(scene, i, j);
+    wake(scene, i, j, found);
     watch_turning(i, j, kSlow * size);
 }
 
 // Turning on, other places of a pair that touches may meet, even if this one holds nothing up.
 void WorldContacts::watch_turning(int i, int j, double least) {
     if (reach_[static_cast<std::size_t>(i)].turned + reach_[static_cast<std::size_t>(j)].turned > least)
-        watched_[static_cast<std::size_t>(i)] = watched_[static_cast<std::size_t>(j)] = true;
+        for (const int id : {i, j})
+            std::atomic_ref(watched_[static_cast<std::size_t>(id)]).store(1, std::memory_order_relaxed);
 }
 
-void WorldContacts::wake(const ContactScene& scene, int i, int j) {
-    for (const int id : {i, j}) {
-        if (!scene.bodies[static_cast<std::size_t>(id)].asleep) continue;
-        wake_group(scene.bodies, id);
-        woke_ = true;
-    }
+void WorldContacts::wake(const ContactScene& scene, int i, int j, Found& found) {
+    for (const int id : {i, j})
+        if (scene.bodies[static_cast<std::size_t>(id)].asleep) found.woken.push_back(id);
 }
 
-void WorldContacts::meet_planes(const ContactScene& scene, int i) {
+void WorldContacts::meet_planes(const ContactScene& scene, int i, Found& found) const {
     const MovingBody& body = scene.bodies[static_cast<std::size_t>(i)];
     if (!body.moves() || body.asleep) return;
     const Reach& reach = reach_[static_cast<std::size_t>(i)];
@@ -279,13 +333,13 @@ void WorldContacts::meet_planes(const ContactScene& scene, int i) {
         const double margin = kSlop * smallest_half(body) + reach.turned + reach.rung +
                               std::max(0.0, -plane.normal.dot(reach.moved));
         if (height > plane.normal.cwiseAbs().dot(body.posed.half_aabb) + margin) continue;
-        ++pairs_;
-        Manifold& manifold = manifolds_.emplace_back();
+        ++found.pairs;
+        Manifold& manifold = found.manifolds.emplace_back();
         manifold.a = i, manifold.b = kFirstPlane + static_cast<int>(p);
-        narrow_.plane(body.posed, plane.normal, static_cast<float>(height), static_cast<float>(margin),
-                      last(manifold.key()), manifold);
+        found.narrow->plane(body.posed, plane.normal, static_cast<float>(height), static_cast<float>(margin),
+                            last(manifold.key(), found), manifold);
         if (manifold.count == 0) {
-            manifolds_.pop_back();
+            found.manifolds.pop_back();
             continue;
         }
         scene.set_surface(manifold);

@@ -1,6 +1,9 @@
 #pragma once
+#include <memory>
+
 #include "world/body_path.h"
 #include "world/broad_phase.h"
+#include "world/crew.h"
 #include "world/narrow_phase.h"
 #include "world/time_of_impact.h"
 
@@ -15,6 +18,7 @@ struct ContactScene {
     const std::vector<int>& here;  ///< ids of those that take part, ascending
     /// Of an own and a foreign body only the pairs of which the lower number is own, and no two foreign ones.
     bool among_ghosts;
+    Crew& crew;  ///< shares the work
 
     [[nodiscard]] bool may_meet(const std::pair<int, int>& pair) const;  ///< a < b
     void set_surface(Manifold& manifold) const;                          ///< friction and restitution
@@ -47,7 +51,8 @@ public:
         double time;    ///< since the step's start [s]
         bool touching;  ///< had a contact already, and still went on inside
     };
-    const std::vector<Meeting>& unforeseen(const ContactScene& scene, const std::vector<bool>& solved);
+    const std::vector<Meeting>& unforeseen(const ContactScene& scene,
+                                           const std::vector<std::uint8_t>& solved);
     /// Of several impacts of a pair within the step only the last is one of its past in the next.
     void keep_last();
     /// The pair's manifold in this step, if it has one; the first of several.
@@ -65,7 +70,7 @@ public:
     std::vector<Manifold>& manifolds() noexcept { return manifolds_; }  ///< of the last step
     [[nodiscard]] const std::vector<Manifold>& manifolds() const noexcept { return manifolds_; }
     [[nodiscard]] int pairs() const noexcept { return pairs_; }  ///< tested in the last step
-    [[nodiscard]] std::uint64_t fallbacks() const noexcept { return narrow_.fallbacks(); }
+    [[nodiscard]] std::uint64_t fallbacks() const noexcept;
     [[nodiscard]] std::uint64_t impacts() const noexcept {
         return impacts_;
     }  ///< of fast pairs, since the start
@@ -78,15 +83,30 @@ private:
         double rung = 0;                                  // its surface, by modes [m]
     };
     void set_reach(const ContactScene& scene, int id);
+    /// What a thread finds: of consecutive bodies, each with later bodies and then with planes, so in the order of the
+    /// manifolds' keys.
+    struct Found {
+        std::size_t first = 0, last = 0;  // of scene.here
+        std::size_t next_before = 0;      // first of before_ whose key has not been passed
+        NarrowPhase* narrow = nullptr;
+        std::vector<Manifold> manifolds;
+        std::vector<Meeting> meetings;
+        std::vector<int> woken;
+        int pairs = 0;
+    };
     bool find_once(const ContactScene& scene);
-    void meet_pair(const ContactScene& scene, int i, int j);
+    void set_box(const ContactScene& scene, std::size_t i);
+    void find(const ContactScene& scene, const std::vector<std::pair<int, int>>& pairs, Found& found);
+    void gather(const ContactScene& scene, std::size_t parts);
+    void meet_pair(const ContactScene& scene, int i, int j, Found& found);
     [[nodiscard]] bool pass_by(const ContactScene& scene, int i, int j) const;
-    void meet_near(const ContactScene& scene, int i, int j, double margin, const Manifold* before);
-    void meet_fast(const ContactScene& scene, int i, int j, const Manifold* before);
+    void meet_near(const ContactScene& scene, int i, int j, double margin, const Manifold* before,
+                   Found& found) const;
+    void meet_fast(const ContactScene& scene, int i, int j, const Manifold* before, Found& found);
     void watch_turning(int i, int j, double least);
-    void wake(const ContactScene& scene, int i, int j);
-    void meet_planes(const ContactScene& scene, int i);
-    const Manifold* last(std::uint64_t key);
+    static void wake(const ContactScene& scene, int i, int j, Found& found);
+    void meet_planes(const ContactScene& scene, int i, Found& found) const;
+    const Manifold* last(std::uint64_t key, Found& found) const;
     [[nodiscard]] const Manifold* find_last(std::uint64_t key) const;
     [[nodiscard]] Manifold* find_now(std::uint64_t key);
     [[nodiscard]] int impacts_of(int i, int j) const;  // of a pair in this step
@@ -100,19 +120,19 @@ private:
     void meet_unforeseen(const ContactScene& scene, int i, int j);
 
     BroadPhase broad_;
-    NarrowPhase narrow_;
+    std::vector<std::unique_ptr<NarrowPhase>> narrow_;  // of each thread
+    std::vector<Found> found_;
     std::vector<Reach> reach_;                  // of each body
     std::vector<Manifold> manifolds_, before_;  // by ascending keys
-    std::size_t next_before_ = 0;               // first of before_ whose key has not been passed
     std::vector<BodyPath> paths_;               // of each body
-    std::vector<bool> followed_;                // paths_ holds the free motion of this step
-    std::vector<bool> watched_;                 // has a contact that turns on: see unforeseen
-    std::vector<double> first_;                 // of each body: time of its first impact
+    enum : std::uint8_t { kNotFollowed, kBeingFollowed, kFollowed };
+    std::vector<std::uint8_t> followed_;  // paths_ holds the free motion of this step; by any thread
+    std::vector<std::uint8_t> watched_;   // has a contact that turns on: see unforeseen; by any thread
+    std::vector<double> first_;           // of each body: time of its first impact
     std::vector<Meeting> meetings_;
     std::vector<std::uint64_t> known_;  // pairs
     PosedBody at_[2];                   // where an impact is
     int pairs_ = 0;
-    bool woke_ = false;
     std::uint64_t impacts_ = 0;
 };
 

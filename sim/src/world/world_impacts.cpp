@@ -61,9 +61,15 @@ void WorldContacts::rewarm(Manifold& manifold) const {
 
 void WorldContacts::follow(const ContactScene& scene, int i) {
     const auto at = static_cast<std::size_t>(i);
-    if (followed_[at] || scene.bodies[at].travels) return;
-    follow_freely(scene.bodies[at], scene.settings, paths_[at]);
-    followed_[at] = true;
+    if (scene.bodies[at].travels) return;
+    // Once, whichever thread asks first.
+    const std::atomic_ref<std::uint8_t> state(followed_[at]);
+    std::uint8_t now = kNotFollowed;
+    if (state.compare_exchange_strong(now, kBeingFollowed)) {
+        follow_freely(scene.bodies[at], scene.settings, paths_[at]);
+        state.store(kFollowed);
+    }
+    for (ShortWait wait; state != kFollowed;) (void)wait.again();
 }
 
 Impact WorldContacts::foresee(const ContactScene& scene, int i, int j) {
@@ -110,7 +116,8 @@ bool WorldContacts::add_impact(const ContactScene& scene, const Meeting& meeting
     Manifold manifold;
     manifold.a = meeting.a, manifold.b = meeting.b;
     const float margin = static_cast<float>(kSlow * size_of(a, b));
-    narrow_.pair(at_[0], at_[1], {margin, find_last(manifold.key()), scene.among_ghosts, true}, manifold);
+    narrow_.front()->pair(at_[0], at_[1], {margin, find_last(manifold.key()), scene.among_ghosts, true},
+                          manifold);
     if (manifold.count == 0) return false;
     for (std::size_t i = 0; i < static_cast<std::size_t>(manifold.count); ++i) {
         ManifoldPoint& p = manifold.points[i];
@@ -153,7 +160,7 @@ void WorldContacts::keep_last() {
 
 // Whether the solved motion differs from the free one by more than slow pairs may move.
 bool WorldContacts::left_path(const ContactScene& scene, int i) const {
-    if (watched_[static_cast<std::size_t>(i)]) return true;
+    if (watched_[static_cast<std::size_t>(i)] != 0) return true;
     const MovingBody& body = scene.bodies[static_cast<std::size_t>(i)];
     const Reach& reach = reach_[static_cast<std::size_t>(i)];
     const double least = kSlow * smallest_half(body.posed);
@@ -163,22 +170,22 @@ bool WorldContacts::left_path(const ContactScene& scene, int i) const {
 }
 
 // Bodies that left their free paths, against all that their paths come near.
-const std::vector<WorldContacts::Meeting>& WorldContacts::unforeseen(const ContactScene& scene,
-                                                                     const std::vector<bool>& solved) {
+const std::vector<WorldContacts::Meeting>& WorldContacts::unforeseen(
+    const ContactScene& scene, const std::vector<std::uint8_t>& solved) {
     meetings_.clear();
     bool any = false;
     auto& boxes = broad_.boxes();
     boxes.clear();
     for (const int id : scene.here) {
         const auto at = static_cast<std::size_t>(id);
-        if (solved[at] && left_path(scene, id)) any = true;
+        if (solved[at] != 0 && left_path(scene, id)) any = true;
     }
     if (!any) return meetings_;
     for (const int id : scene.here) {
         const auto at = static_cast<std::size_t>(id);
         const MovingBody& body = scene.bodies[at];
-        const bool left = solved[at] && left_path(scene, id);
-        if (!solved[at]) {
+        const bool left = solved[at] != 0 && left_path(scene, id);
+        if (solved[at] == 0) {
             follow(scene, id);
         } else {
             set_spins(body, paths_[at]);
@@ -192,7 +199,7 @@ const std::vector<WorldContacts::Meeting>& WorldContacts::unforeseen(const Conta
         const double radius = static_cast<double>(body.posed.radius);
         boxes.push_back({low.array() - radius, high.array() + radius, id, left});
     }
-    for (const auto& pair : broad_.find())
+    for (const auto& pair : broad_.find(scene.crew))
         if (scene.may_meet(pair)) meet_unforeseen(scene, pair.first, pair.second);
     if (meetings_.empty()) return meetings_;
     accept_impacts(scene);

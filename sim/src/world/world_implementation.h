@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "sim/world.h"
+#include "world/crew.h"
 #include "world/island_solver.h"
 #include "world/world_contacts.h"
 
@@ -20,7 +21,13 @@ struct World::Implementation {
     std::vector<ActiveForce> active;          // of them in the step, ascending by bodies
     std::vector<std::pair<int, int>> joined;  // pairs that a constraint joins and that do not collide
     WorldContacts contacts;
-    std::unique_ptr<IslandSolver> solver;
+    std::vector<std::unique_ptr<IslandSolver>> solvers;  // one a thread
+    std::unique_ptr<Crew> all = std::make_unique<Crew>();
+    Crew alone;
+    /// Who shares the work of a step: of a shared world one thread.
+    [[nodiscard]] Crew& crew() noexcept { return sharing == Sharing::alone ? *all : alone; }
+    [[nodiscard]] IslandSolver& solver() const noexcept { return *solvers.front(); }
+    void set_threads(int threads);
     std::vector<Island> islands;
     std::vector<int> parent, place;  // union-find; a root's island
     std::size_t islands_used = 0;
@@ -33,10 +40,10 @@ struct World::Implementation {
         std::vector<Manifold> manifolds;  // those
     };
     std::vector<Outcome> outcomes;
-    std::vector<WorldBodyState> started;       // of bodies that are solved, when the step began
-    std::vector<bool> at_limit_before;         // at_limit of bodies, then
-    std::vector<SpringRecord> springs_before;  // then
-    std::vector<bool> solved,
+    std::vector<WorldBodyState> started;        // of bodies that are solved, when the step began
+    std::vector<std::uint8_t> at_limit_before;  // at_limit of bodies, then
+    std::vector<SpringRecord> springs_before;   // then
+    std::vector<std::uint8_t> solved,
         again;  // of each body: its island went through the solver, and has to once more
     WorldCounts counts;
     std::vector<QuarantinedBody> quarantined;
@@ -96,13 +103,18 @@ struct World::Implementation {
     void solve_islands();   ///< in order of ids, again where something unforeseen meets
     void start_solving();   ///< notes what solve_again goes back to
     [[nodiscard]] bool is_solved(const Island& island) const;
-    void solve_island(const Island& island, bool follow);  ///< over the step
-    void move_alone(int body);                             ///< over the step
-    void solve_again();  ///< islands of bodies in `again`, from the step's start
+    void solve_island(const Island& island, bool follow, IslandSolver& by, const ContactScene& scene);
+    template <typename Solve>
+    void share_islands(Solve solve);  ///< calls solve(island, solver, scene) for those in `to_solve`
+    void begin_again(const Island& island);
+    std::vector<const Island*> to_solve;
+    void note_found();          ///< contacts, by the islands that have just been solved
+    void move_alone(int body);  ///< over the step
+    void solve_again();         ///< islands of bodies in `again`, from the step's start
     void hold_apart(const WorldContacts::Meeting& meeting);
     std::vector<WorldContacts::Meeting> last;  ///< what meets after all rounds
     void sum_outcomes();                       ///< of all islands
-    [[nodiscard]] ContactScene contact_scene();
+    [[nodiscard]] ContactScene contact_scene(Crew& crew);
     void put_to_sleep();                              ///< islands that are still
     void count_work();                                ///< see World::work
     void step();                                      ///< see World::step

@@ -39,8 +39,8 @@ Eigen::Vector3d stop_approach(MovingBody& a, MovingBody& b, const ManifoldPoint&
 
 }  // namespace
 
-ContactScene World::Implementation::contact_scene() {
-    return {settings, planes, joined, bodies, here, sharing == Sharing::pairs};
+ContactScene World::Implementation::contact_scene(Crew& by) {
+    return {settings, planes, joined, bodies, here, sharing == Sharing::pairs, by};
 }
 
 // islands: others' bodies, too, as own ones may meet them unforeseen.
@@ -52,8 +52,8 @@ void World::Implementation::start_solving() {
     started.resize(bodies.size());
     at_limit_before.resize(bodies.size());
     outcomes.resize(bodies.size());
-    solved.assign(bodies.size(), false);
-    again.assign(bodies.size(), false);
+    solved.assign(bodies.size(), 0);
+    again.assign(bodies.size(), 0);
     for (std::size_t i = 0; i < islands_used; ++i) {
         if (!is_solved(islands[i])) continue;
         for (const int id : islands[i].bodies) {
@@ -76,48 +76,79 @@ void World::Implementation::move_alone(int id) {
     if (body.pushed && sharing == Sharing::pairs) outcome.outside -= settings.dt * body.force;
 }
 
-void World::Implementation::solve_island(const Island& island, bool follow) {
+void World::Implementation::solve_island(const Island& island, bool follow, IslandSolver& by,
+                                         const ContactScene& scene) {
     Outcome& outcome = outcomes[static_cast<std::size_t>(island.bodies.front())];
     outcome.outside.setZero(), outcome.limited = outcome.broken = 0, outcome.found = false;
-    outcome.carried = solver->is_carried(island);
+    outcome.carried = by.is_carried(island);
     if (island.manifolds.empty() && island.constraints.empty() && !is_forced(island.bodies.front()))
         return move_alone(island.bodies.front());
-    const std::uint64_t limits = solver->deformations_limited(), breaks = solver->constraints_broken();
-    solver->solve(island, contact_scene(), follow && solver->may_follow(island));
-    if (const std::vector<Manifold>* found = solver->found()) {
-        outcome.found = true, outcome.manifolds = *found;
-        for (const Manifold& m : *found) contacts.note_known(m.key());
-    }
-    outcome.limited = solver->deformations_limited() - limits;
-    outcome.broken = solver->constraints_broken() - breaks;
-    outcome.outside = solver->take_outside_impulse();
+    const std::uint64_t limits = by.deformations_limited(), breaks = by.constraints_broken();
+    by.solve(island, scene, follow && by.may_follow(island));
+    if (const std::vector<Manifold>* found = by.found()) outcome.found = true, outcome.manifolds = *found;
+    outcome.limited = by.deformations_limited() - limits;
+    outcome.broken = by.constraints_broken() - breaks;
+    outcome.outside = by.take_outside_impulse();
     for (const int id : island.bodies) {
         const MovingBody& body = bodies[static_cast<std::size_t>(id)];
-        solved[static_cast<std::size_t>(id)] = true;
+        solved[static_cast<std::size_t>(id)] = 1;
         if (sharing != Sharing::pairs && body.pushed && body.own) outcome.outside += settings.dt * body.force;
     }
 }
 
+// Large islands are shared out, one after the other; of small ones every thread solves its own.
+template <typename Solve>
+void World::Implementation::share_islands(Solve solve) {
+    Crew& by = crew();
+    const ContactScene shared = contact_scene(by), single = contact_scene(alone);
+    if (by.size() == 1) {
+        for (const Island* island : to_solve) solve(*island, solver(), single);
+        return;
+    }
+    for (const Island* island : to_solve)
+        if (island->bodies.size() >= kLeastDivided) solve(*island, solver(), shared);
+    by.each(to_solve.size(), 4, [&](int thread, std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i)
+            if (to_solve[i]->bodies.size() < kLeastDivided)
+                solve(*to_solve[i], *solvers[static_cast<std::size_t>(thread)], single);
+    });
+}
+
+void World::Implementation::note_found() {
+    for (const Island* island : to_solve) {
+        const Outcome& outcome = outcomes[static_cast<std::size_t>(island->bodies.front())];
+        if (!outcome.found) continue;
+        for (const Manifold& m : outcome.manifolds) contacts.note_known(m.key());
+    }
+}
+
+// Takes an island back to the step's start.
+void World::Implementation::begin_again(const Island& island) {
+    for (const int id : island.bodies) {
+        MovingBody& body = bodies[static_cast<std::size_t>(id)];
+        body.state = started[static_cast<std::size_t>(id)];
+        body.at_limit = at_limit_before[static_cast<std::size_t>(id)] != 0, body.limited_now = false;
+        body.was_given = false;
+    }
+    for (const int m : island.manifolds) contacts.rewarm(contacts.manifolds()[static_cast<std::size_t>(m)]);
+    for (const int c : island.constraints) (void)restore_spring(springs_before[static_cast<std::size_t>(c)]);
+}
+
 void World::Implementation::solve_again() {
     find_islands();
+    to_solve.clear();
     for (std::size_t i = 0; i < islands_used; ++i) {
-        const Island& island = islands[i];
-        const bool any = std::any_of(island.bodies.begin(), island.bodies.end(),
-                                     [this](int id) { return again[static_cast<std::size_t>(id)]; });
-        if (!any || !is_solved(island)) continue;
-        for (const int id : island.bodies) {
-            MovingBody& body = bodies[static_cast<std::size_t>(id)];
-            body.state = started[static_cast<std::size_t>(id)];
-            body.at_limit = at_limit_before[static_cast<std::size_t>(id)], body.limited_now = false;
-            body.was_given = false;
-            solver->forget_crossed(id);
-        }
-        for (const int m : island.manifolds)
-            contacts.rewarm(contacts.manifolds()[static_cast<std::size_t>(m)]);
-        for (const int c : island.constraints)
-            (void)restore_spring(springs_before[static_cast<std::size_t>(c)]);
-        solve_island(island, true);
+        const bool any = std::any_of(islands[i].bodies.begin(), islands[i].bodies.end(),
+                                     [this](int id) { return again[static_cast<std::size_t>(id)] != 0; });
+        if (!any || !is_solved(islands[i])) continue;
+        to_solve.push_back(&islands[i]);
+        for (const int id : islands[i].bodies) solver().forget_crossed(id);
     }
+    share_islands([this](const Island& island, IslandSolver& by, const ContactScene& scene) {
+        begin_again(island);
+        solve_island(island, true, by, scene);
+    });
+    note_found();
     ++counts.solved_again;
 }
 
@@ -178,13 +209,18 @@ void World::Implementation::sum_outcomes() {
 void World::Implementation::solve_islands() {
     start_solving();
     int awake = 0;
+    to_solve.clear();
     for (std::size_t i = 0; i < islands_used; ++i) {
         if (!is_solved(islands[i])) continue;
         awake += is_own(islands[i]);
-        solve_island(islands[i], false);
+        to_solve.push_back(&islands[i]);
     }
+    share_islands([this](const Island& island, IslandSolver& by, const ContactScene& scene) {
+        solve_island(island, false, by, scene);
+    });
+    note_found();
     for (int round = 0; round <= kRounds; ++round) {
-        const auto& meetings = contacts.unforeseen(contact_scene(), solved);
+        const auto& meetings = contacts.unforeseen(contact_scene(crew()), solved);
         if (meetings.empty()) break;
         if (round == kRounds) {
             last = meetings;
@@ -193,9 +229,9 @@ void World::Implementation::solve_islands() {
             for (const WorldContacts::Meeting& meeting : last) hold_apart(meeting);
             break;
         }
-        again.assign(bodies.size(), false);
+        again.assign(bodies.size(), 0);
         for (const WorldContacts::Meeting& meeting : meetings)
-            again[static_cast<std::size_t>(meeting.a)] = again[static_cast<std::size_t>(meeting.b)] = true;
+            again[static_cast<std::size_t>(meeting.a)] = again[static_cast<std::size_t>(meeting.b)] = 1;
         solve_again();
     }
     for (std::size_t i = 0; i < islands_used; ++i) {

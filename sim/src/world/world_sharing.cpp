@@ -99,7 +99,7 @@ void World::Implementation::join_neighbours(const std::vector<double>& reach) {
         boxes.push_back({body.state.position.array() - half, body.state.position.array() + half,
                          static_cast<int>(i), !body.asleep});
     }
-    for (const auto& [a, b] : neighbours.find()) join(a, b);
+    for (const auto& [a, b] : neighbours.find(crew())) join(a, b);
 }
 
 // Bodies that may be in an island with an own body: joined by overlapping loose boxes, constraints, or having
@@ -439,7 +439,7 @@ void World::watch(int body, bool watched) {
 }
 
 const std::vector<CrossImpulse>& World::cross_impulses() const noexcept {
-    return implementation_->solver->crossed();
+    return implementation_->solver().crossed();
 }
 
 const StepImpulse* World::impulse(int body) const {

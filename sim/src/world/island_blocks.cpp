@@ -1,0 +1,120 @@
+#include "world/island_blocks.h"
+
+#include <cmath>
+
+namespace sim {
+namespace {
+
+constexpr double kThickness = 2;  // of a slab, mean diameters
+constexpr double kLonger = 1.1;   // than the axis before it, so much an axis has to be
+
+}  // namespace
+
+void IslandBlocks::set_slabs(std::span<const Body> bodies) {
+    slab_of_.assign(bodies.size(), 0);
+    std::size_t slabs = 1;
+    if (bodies.size() >= kLeastDivided) {
+        Eigen::Vector3d low = bodies.front().place, high = low;
+        double sum = 0;
+        for (const Body& body : bodies) {
+            low = low.cwiseMin(body.place), high = high.cwiseMax(body.place);
+            sum += body.diameter;
+        }
+        const Eigen::Vector3d length = high - low;
+        int axis = 0;
+        for (int k = 1; k < 3; ++k)
+            if (length[k] > kLonger * length[axis]) axis = k;
+        const double thickness = std::max(kThickness * sum / static_cast<double>(bodies.size()),
+                                          length[axis] / static_cast<double>(kMostSlabs - 1));
+        const double first = std::floor(low[axis] / thickness);
+        for (std::size_t i = 0; i < bodies.size(); ++i) {
+            const double at = std::floor(bodies[i].place[axis] / thickness) - first;
+            slab_of_[i] =
+                static_cast<std::uint32_t>(std::clamp(at, 0.0, static_cast<double>(kMostSlabs - 1)));
+            slabs = std::max(slabs, std::size_t{slab_of_[i]} + 1);
+        }
+    }
+    first_body_.assign(slabs + 1, 0);
+    for (const std::uint32_t slab : slab_of_) ++first_body_[slab + 1];
+    for (std::size_t s = 0; s < slabs; ++s) first_body_[s + 1] += first_body_[s];
+    bodies_.resize(bodies.size());
+    std::array<std::uint32_t, kMostSlabs> next{};
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        const std::uint32_t slab = slab_of_[i];
+        bodies_[first_body_[slab] + next[slab]++] = static_cast<std::uint32_t>(i);
+    }
+}
+
+void IslandBlocks::add_block(std::uint32_t slab, std::uint32_t slabs) {
+    Block block;
+    block.slab = slab, block.slabs = slabs;
+    block.before = blocks_of_[slab]++;
+    if (slabs == 2) block.before_next = blocks_of_[slab + 1]++;
+    blocks_.push_back(block);
+}
+
+void IslandBlocks::divide(std::span<const Body> bodies, std::span<const int> manifolds,
+                          const std::vector<Manifold>& all, const std::vector<int>& local) {
+    set_slabs(bodies);
+    const auto count = static_cast<std::uint32_t>(slabs());
+    blocks_.clear();
+    blocks_of_.fill(0);
+    for (std::uint32_t s = 0; s < count; ++s) add_block(s, 1);
+    for (const std::uint32_t odd : {0u, 1u})
+        for (std::uint32_t s = odd; s + 1 < count; s += 2) add_block(s, 2);
+    if (count > 2) {
+        // Every slab's last, whatever it touches.
+        blocks_.emplace_back().slabs = count;
+        for (std::uint32_t s = 0; s < count; ++s) ++blocks_of_[s];
+    }
+    const std::uint32_t interfaces = count, even = count / 2;
+    const auto block_of = [&](const Manifold& m) -> std::uint32_t {
+        const auto slab = [&](int id) {
+            const int at = id < kFirstPlane ? local[static_cast<std::size_t>(id)] : -1;
+            return at < 0 ? -1 : static_cast<int>(slab_of_[static_cast<std::size_t>(at)]);
+        };
+        const int a = slab(m.a), b = slab(m.b);
+        const int low = a < 0 ? b : b < 0 ? a : std::min(a, b), high = std::max(a, b);
+        const auto from = static_cast<std::uint32_t>(std::max(low, 0));
+        if (low == high) return from;
+        if (high > low + 1) return static_cast<std::uint32_t>(blocks_.size()) - 1;
+        return interfaces + (from % 2 == 0 ? from / 2 : even + from / 2);
+    };
+    first_manifold_.assign(blocks_.size() + 1, 0);
+    block_of_.resize(manifolds.size());
+    for (std::size_t i = 0; i < manifolds.size(); ++i) {
+        block_of_[i] = block_of(all[static_cast<std::size_t>(manifolds[i])]);
+        ++first_manifold_[block_of_[i] + 1];
+    }
+    if (count > 2 && first_manifold_.back() == 0) {
+        blocks_.pop_back(), first_manifold_.pop_back();
+        for (std::uint32_t s = 0; s < count; ++s) --blocks_of_[s];
+    }
+    for (std::size_t b = 0; b < blocks_.size(); ++b) first_manifold_[b + 1] += first_manifold_[b];
+    manifolds_.resize(manifolds.size());
+    std::array<std::uint32_t, 2 * kMostSlabs> next{};
+    for (std::size_t i = 0; i < manifolds.size(); ++i)
+        manifolds_[first_manifold_[block_of_[i]] + next[block_of_[i]]++] = manifolds[i];
+}
+
+// Blocks of a slab that are done when this one's turn comes.
+std::uint32_t IslandBlocks::turn_of(const Block& block, std::uint32_t slab, std::uint32_t sweep) const {
+    const std::uint32_t in_all = blocks_of_[slab];
+    const std::uint32_t before = block.slabs > 2      ? in_all - 1
+                                 : slab == block.slab ? block.before
+                                                      : block.before_next;
+    return sweep * in_all + before;
+}
+
+void IslandBlocks::begin(const Block& block, std::uint32_t sweep) const {
+    for (std::uint32_t s = block.slab; s < block.slab + block.slabs; ++s)
+        for (ShortWait wait; done_[s].value.load(std::memory_order_acquire) != turn_of(block, s, sweep);)
+            (void)wait.again();
+}
+
+void IslandBlocks::end(const Block& block, std::uint32_t sweep) {
+    for (std::uint32_t s = block.slab; s < block.slab + block.slabs; ++s)
+        done_[s].value.store(turn_of(block, s, sweep) + 1, std::memory_order_release);
+}
+
+}  // namespace sim

@@ -1,0 +1,98 @@
+#pragma once
+#include <array>
+#include <span>
+
+#include "world/crew.h"
+#include "world/manifold.h"
+
+namespace sim {
+
+constexpr std::size_t kLeastDivided = 100;  ///< bodies of an island that is divided
+constexpr std::size_t kMostSlabs = 64;
+
+/// The order in which the contacts of an island are swept, in blocks that several threads may sweep at once: Gauss-Seidel
+/// with the domain decomposed (as Preclik and Ruede 2015 part theirs, but without splitting bodies: every contact sees the
+/// newest velocities).
+///
+/// Space is cut square to the axis along which the island is longest, into slabs two mean diameters of its bodies thick, at
+/// multiples of that from the world's origin, so that what rests keeps its slab. Contacts of bodies in one slab are its
+/// interior, those of bodies in neighbouring slabs an interface. Swept are, each by ids: all interiors, interfaces after
+/// even slabs, those after odd ones, and what reaches further (long bodies among small ones). Blocks without a slab in common
+/// commute; those with one keep this order, so the result is to the bit that of one thread which does block after block,
+/// for any number of threads. An island of less than kLeastDivided bodies, or in one slab, is one block, swept by ids.
+class IslandBlocks {
+public:
+    struct Block {
+        std::uint32_t first = 0, last = 0;  ///< of the island's contacts, in the order of sweeps
+        std::uint32_t slab = 0, slabs = 1;  ///< whose bodies it touches: so many from the first
+        std::uint32_t before = 0;           ///< blocks of its first slab that come before it in a sweep ...
+        std::uint32_t before_next = 0;      ///< ... and of the next slab
+    };
+    struct Body {
+        Eigen::Vector3d place;  ///< of its centre [m]
+        double diameter;        ///< [m]
+    };
+
+    /// Divides an island of the given bodies and manifolds (ascending by key; indices into `all`). local: each body's place
+    /// among `bodies`, or -1 if it does not move.
+    void divide(std::span<const Body> bodies, std::span<const int> manifolds,
+                const std::vector<Manifold>& all, const std::vector<int>& local);
+
+    [[nodiscard]] std::size_t size() const noexcept { return blocks_.size(); }
+    [[nodiscard]] std::size_t slabs() const noexcept { return first_body_.size() - 1; }
+    /// Bodies (places in `bodies`) of a slab, ascending.
+    [[nodiscard]] std::span<const std::uint32_t> bodies_of(std::size_t slab) const {
+        return std::span(bodies_).subspan(first_body_[slab], first_body_[slab + 1] - first_body_[slab]);
+    }
+    [[nodiscard]] std::size_t slab_of(std::size_t body) const { return slab_of_[body]; }
+    /// Manifolds of a block, ascending.
+    [[nodiscard]] std::span<const int> manifolds_of(std::size_t block) const {
+        return std::span(manifolds_)
+            .subspan(first_manifold_[block], first_manifold_[block + 1] - first_manifold_[block]);
+    }
+    void set_contacts(std::size_t block, std::size_t first, std::size_t last) {
+        blocks_[block].first = static_cast<std::uint32_t>(first);
+        blocks_[block].last = static_cast<std::uint32_t>(last);
+    }
+
+    /// Calls visit(sweep, block) for so many sweeps, so that what it does to the bodies of slabs has the order above.
+    template <typename Visit>
+    void sweep(Crew& crew, std::uint32_t sweeps, Visit visit) {
+        if (crew.size() == 1 || blocks_.size() == 1) {
+            for (std::uint32_t s = 0; s < sweeps; ++s)
+                for (const Block& block : blocks_) visit(s, block);
+            return;
+        }
+        for (std::size_t s = 0; s < slabs(); ++s) done_[s].value.store(0, std::memory_order_relaxed);
+        const auto count = static_cast<std::uint32_t>(blocks_.size());
+        std::atomic<std::uint32_t> next = 0;
+        // Taken in order: what a taken block waits for has been taken, too.
+        crew.work([&](int) {
+            for (std::uint32_t at; (at = next.fetch_add(1, std::memory_order_relaxed)) < sweeps * count;) {
+                const Block& block = blocks_[at % count];
+                begin(block, at / count);
+                visit(at / count, block);
+                end(block, at / count);
+            }
+        });
+    }
+
+private:
+    struct alignas(64) Done {
+        std::atomic<std::uint32_t> value = 0;  // blocks of a slab, all sweeps counted
+    };
+    [[nodiscard]] std::uint32_t turn_of(const Block& block, std::uint32_t slab, std::uint32_t sweep) const;
+    void begin(const Block& block, std::uint32_t sweep) const;
+    void end(const Block& block, std::uint32_t sweep);
+    void set_slabs(std::span<const Body> bodies);
+    void add_block(std::uint32_t slab, std::uint32_t slabs);
+
+    std::vector<Block> blocks_;
+    std::vector<std::uint32_t> slab_of_, bodies_, first_body_;
+    std::vector<int> manifolds_;
+    std::vector<std::uint32_t> first_manifold_, block_of_;
+    std::array<Done, kMostSlabs> done_;
+    std::array<std::uint32_t, kMostSlabs> blocks_of_{};  // of each slab, in a sweep
+};
+
+}  // namespace sim

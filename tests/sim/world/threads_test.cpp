@@ -1,0 +1,203 @@
+// Steps that threads share out have the bits of one thread's, however many there are.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <numeric>
+#include <stdexcept>
+
+#include "world/island_blocks.h"
+#include "world_bodies.h"
+
+using namespace world_test;
+
+namespace {
+
+constexpr int kCounts[] = {2, 3, 4, 7};
+
+std::vector<std::uint64_t> hashes(const sim::WorldDefinition& definition, int steps, int threads) {
+    sim::World world(definition);
+    world.use_threads(threads);
+    std::vector<std::uint64_t> all;
+    for (int i = 0; i < steps; ++i) {
+        world.step();
+        all.push_back(world.state_hash());
+    }
+    const Eigen::Vector3d outside = world.outside_impulse();
+    for (int k = 0; k < 3; ++k) all.push_back(std::bit_cast<std::uint64_t>(outside[k]));
+    const sim::WorldCounts& n = world.counts();
+    for (const std::uint64_t count :
+         {std::uint64_t(n.contacts), std::uint64_t(n.pairs), std::uint64_t(n.asleep), n.deformations_limited,
+          n.inverse_fallbacks, n.impacts, n.solved_again})
+        all.push_back(count);
+    return all;
+}
+
+void expect_same_bits(const sim::WorldDefinition& definition, int steps) {
+    const std::vector<std::uint64_t> one = hashes(definition, steps, 1);
+    for (const int threads : kCounts)
+        ASSERT_EQ(hashes(definition, steps, threads), one) << threads << " threads";
+}
+
+/// A box full of balls that touch from the first steps on: one island, in several slabs.
+sim::WorldDefinition pile() {
+    sim::WorldDefinition world = on_floor();
+    for (const double side : {-1.0, 1.0}) {
+        world.planes.push_back({Eigen::Vector3d(side, 0, 0), -6.2});
+        world.planes.push_back({Eigen::Vector3d(0, 0, side), -2.2});
+    }
+    Draw draw(3);
+    for (int i = 0; i < 200; ++i) {
+        const sim::Fidelity fidelity = i % 3 == 0   ? sim::Fidelity::rigid
+                                       : i % 3 == 1 ? sim::Fidelity::linear
+                                                    : sim::Fidelity::modal;
+        world.bodies.push_back(
+            ball({-5.6 + 1.01 * (i % 12), 0.5 + 0.99 * (i / 48), -1.5 + 1.01 * (i / 12 % 4)}, fidelity));
+        world.bodies.back().restitution = i % 5 == 0 ? 0.5 : 0;
+        world.bodies.back().velocity = draw.direction();
+    }
+    world.bodies[1].motion = {{0, world.bodies[1].world_from_body.translation()},
+                              {1, world.bodies[1].world_from_body.translation() + Eigen::Vector3d::UnitX()}};
+    return world;
+}
+
+sim::WorldDefinition random_scene(unsigned seed) {
+    Draw draw(seed);
+    sim::WorldDefinition world = on_floor();
+    world.settings.substeps = 1 + draw.below(6);
+    const int bodies = 20 + draw.below(130), across = 3 + draw.below(5);
+    for (int i = 0; i < bodies; ++i) {
+        const Eigen::Vector3d at(1.05 * (i % across), 0.6 + 1.05 * (i / across / across),
+                                 1.05 * (i / across % across));
+        const double size = draw.between(0.3, 0.52);
+        const bool round = draw.below(2) == 0;
+        sim::WorldBody body =
+            round ? ball(at, draw.below(2) == 0 ? sim::Fidelity::rigid : sim::Fidelity::linear, size,
+                         draw.scale(100, 400))
+                  : box(at, {size, draw.between(0.3, 0.5), 0.3}, draw.scale(100, 400));
+        body.velocity = draw.between(0, 8) * draw.direction();
+        body.angular_velocity = draw.between(0, 3) * draw.direction();
+        body.restitution = draw.below(3) == 0 ? draw.between(0, 1) : 0;
+        body.fixed = draw.below(30) == 0;
+        world.bodies.push_back(body);
+    }
+    for (int i = bodies < 50 ? draw.below(6) : 0; i > 0; --i) {
+        sim::PointConstraint link;
+        link.name = "link";
+        link.body_a = draw.below(bodies), link.body_b = -1;
+        link.point_b = world.bodies[std::size_t(link.body_a)].world_from_body.translation();
+        link.stiffness = draw.scale(100, 1e5);
+        if (!world.bodies[std::size_t(link.body_a)].fixed) world.constraints.push_back(link);
+    }
+    return world;
+}
+
+TEST(Threads, APileOfOneIslandHasTheBitsOfOneThread) {
+    expect_same_bits(pile(), 60);
+}
+
+TEST(Threads, TwentyRandomScenesHaveTheBitsOfOneThread) {
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+        SCOPED_TRACE(seed);
+        expect_same_bits(random_scene(seed), 12);
+        if (HasFatalFailure()) return;
+    }
+}
+
+TEST(Threads, TheirNumberMayChangeInMidRun) {
+    const sim::WorldDefinition definition = pile();
+    sim::World world(definition);
+    for (const int threads : {1, 4, 2, 1, 3}) {
+        world.use_threads(threads);
+        run(world, 6);
+    }
+    EXPECT_EQ(world.state_hash(), hashes(definition, 30, 1)[29]);
+    EXPECT_THROW(world.use_threads(0), std::invalid_argument);
+    EXPECT_THROW(world.use_threads(-3), std::invalid_argument);
+}
+
+TEST(Crew, EachPieceIsDoneOnceByAnyNumberOfThreads) {
+    for (const int threads : {1, 2, 5}) {
+        sim::Crew crew(threads);
+        EXPECT_EQ(crew.size(), threads);
+        for (std::size_t count = 0; count < 400; ++count) {
+            std::vector<int> done(count, 0);
+            std::atomic<int> worst = 0;
+            crew.each(count, 3, [&](int thread, std::size_t first, std::size_t last) {
+                if (thread < 0 || thread >= threads) worst = 1;
+                for (std::size_t i = first; i < last; ++i) ++done[i];
+            });
+            ASSERT_EQ(std::accumulate(done.begin(), done.end(), 0), int(count));
+            ASSERT_TRUE(std::ranges::all_of(done, [](int n) { return n == 1; }));
+            ASSERT_EQ(worst, 0);
+        }
+    }
+}
+
+/// A row of bodies along x, each in contact with the next few; `far`: and one with all.
+struct Row {
+    std::vector<sim::IslandBlocks::Body> bodies;
+    std::vector<sim::Manifold> manifolds;
+    std::vector<int> indices, local;
+
+    Row(int count, bool far) {
+        for (int i = 0; i < count; ++i) bodies.push_back({Eigen::Vector3d(0.11 * i, 0, 0), 0.5});
+        for (int a = 0; a < count; ++a)
+            for (int b = a + 1; b < count; ++b)
+                if (b - a < 5 || (far && a == 0 && b % 10 == 0)) {
+                    sim::Manifold& m = manifolds.emplace_back();
+                    m.a = a, m.b = b;
+                }
+        indices.resize(manifolds.size()), local.resize(bodies.size());
+        std::iota(indices.begin(), indices.end(), 0), std::iota(local.begin(), local.end(), 0);
+    }
+};
+
+TEST(IslandBlocks, HoldEveryContactOnceWithTheBodiesOfTheirSlabs) {
+    for (const int count : {99, 100, 150, 900}) {
+        const Row row(count, true);
+        sim::IslandBlocks blocks;
+        blocks.divide(row.bodies, row.indices, row.manifolds, row.local);
+        if (count < 100) {
+            EXPECT_EQ(blocks.size(), 1u);
+        } else {
+            EXPECT_GT(blocks.slabs(), 5u);
+        }
+        std::vector<int> seen(row.manifolds.size(), 0);
+        std::size_t b = 0;
+        blocks.sweep(*std::make_unique<sim::Crew>(), 1,
+                     [&](std::uint32_t, const sim::IslandBlocks::Block& block) {
+                         for (const int m : blocks.manifolds_of(b++)) {
+                             ++seen[std::size_t(m)];
+                             for (const int body :
+                                  {row.manifolds[std::size_t(m)].a, row.manifolds[std::size_t(m)].b}) {
+                                 EXPECT_GE(blocks.slab_of(std::size_t(body)), block.slab);
+                                 EXPECT_LT(blocks.slab_of(std::size_t(body)), block.slab + block.slabs);
+                             }
+                         }
+                     });
+        EXPECT_TRUE(std::ranges::all_of(seen, [](int n) { return n == 1; }));
+    }
+}
+
+TEST(IslandBlocks, VisitEachBodysBlocksInOneOrderOnAnyNumberOfThreads) {
+    for (const bool far : {false, true}) {
+        const Row row(300, far);
+        sim::IslandBlocks blocks;
+        blocks.divide(row.bodies, row.indices, row.manifolds, row.local);
+        const auto logged = [&](int threads) {
+            sim::Crew crew(threads);
+            std::vector<std::vector<std::size_t>> log(blocks.slabs());
+            const auto visit = [&](std::uint32_t sweep, const sim::IslandBlocks::Block& block) {
+                // Written without a lock: blocks of one slab are never visited at once.
+                for (std::uint32_t s = block.slab; s < block.slab + block.slabs; ++s)
+                    log[s].push_back(sweep * 1000 + block.slab * 10 + block.slabs);
+            };
+            blocks.sweep(crew, 50, visit);
+            return log;
+        };
+        const auto one = logged(1);
+        for (const int threads : kCounts) EXPECT_EQ(logged(threads), one) << threads;
+    }
+}
+
+}  // namespace
