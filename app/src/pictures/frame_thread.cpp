@@ -189,8 +189,9 @@ bool FrameThread::push(FrameJob job) {
     return true;
 }
 
-void FrameThread::drain() {
-    for (std::uint64_t now = written_; now < pushed_; now = written_) written_.wait(now);
+void FrameThread::wait_for(std::uint64_t count) {
+    if (options_.policy == FramePolicy::wait)
+        for (std::uint64_t now = written_; now < count && now < pushed_; now = written_) written_.wait(now);
     rethrow();
 }
 

@@ -90,8 +90,10 @@ public:
     bool push(FrameJob job);
     /// With the policy `refuse`: frames drawn since the last call, in time or late.
     [[nodiscard]] std::vector<DrawnFrame> take_done();
-    /// With the policy `wait`: returns when the frames at hand are drawn and written.
-    void drain();
+    [[nodiscard]] std::size_t pushed() const { return pushed_; }
+    /// With the policy `wait`: returns when the first `count` frames, or all at hand, are drawn and written.
+    void wait_for(std::uint64_t count);
+    void drain() { wait_for(pushed_); }
     /// Lets the frames at hand be drawn and written. Then take_done() has the rest.
     void finish();
 

@@ -51,17 +51,21 @@ std::string nearest_note(const PlayResult& result, double shown_s) {
 }
 
 /// Frames are named by their number: frame k is shown at t0 + k / fps.
+std::uint64_t frame_number(const fs::path& file) {
+    return std::stoull(file.stem().string());
+}
+
 std::string frame_caption(const PlayResult& result, const fs::path& file) {
-    const double shown_s =
-        result.t0_s + static_cast<double>(std::stoll(file.stem().string())) / result.options.fps;
+    const double shown_s = result.t0_s + static_cast<double>(frame_number(file)) / result.options.fps;
     const std::string note = nearest_note(result, shown_s);
     return fmt::format("{:.3f} s{}{}", shown_s, note.empty() ? "" : ": ", note);
 }
 
-std::string frames_section(const PlayResult& result) {
+std::string frames_section(const PlayResult& result, const WaitForFrame& wait_for) {
     if (result.report_frames.empty()) return {};
     std::string text = "<h2>Frames</h2>\n<div class=frames>\n";
     for (const fs::path& file : result.report_frames) {
+        wait_for(frame_number(file));
         const std::string caption = html(frame_caption(result, file));
         fmt::format_to(
             std::back_inserter(text),
@@ -74,9 +78,10 @@ std::string frames_section(const PlayResult& result) {
 }
 
 /// The loudest strokes in slow motion: pictures side by side of which the page shows one after the other.
-std::string films_section(const PlayResult& result) {
+std::string films_section(const PlayResult& result, const WaitForFrame& wait_for) {
     std::string films;
     for (const Film& film : result.report_films) {
+        wait_for(frame_number(film.files.back()));
         const render::Image strip = film_strip(film, kFilmWidth);
         if (strip.rgb.empty()) continue;
         const std::vector<std::uint8_t> png = render::encode_png(strip);
@@ -302,15 +307,19 @@ std::string plot_sections(const PlayResult& result, Plotter& plotter) {
 
 }  // namespace
 
-ReportSections report_sections(const PlayResult& result, Plotter& plotter) {
-    return {listen_section(result), plot_sections(result, plotter)};
+ReportSections report_sections(const PlayResult& result, Plotter& plotter, const WaitForFrame& wait_for) {
+    ReportSections sections{listen_section(result), plot_sections(result, plotter), {}, {}};
+    sections.films = films_section(result, wait_for);
+    sections.frames = frames_section(result, wait_for);
+    return sections;
 }
 
 std::string format_report(const PlayResult& result, const ReportSections& sections) {
     const std::string name = fs::path(result.trace).filename().string();
+    const std::string video = video_section(result);  // which shows all that films show
     return report_page(fmt::format("{} on {}", name, result.kit_name),
-                       heading(result) + figures(result) + video_section(result) + sections.listen +
-                           films_section(result) + frames_section(result) + sections.plots +
+                       heading(result) + figures(result) + video + sections.listen +
+                           (video.empty() ? sections.films : "") + sections.frames + sections.plots +
                            provenance(result));
 }
 

@@ -99,16 +99,20 @@ std::vector<Film> films_to_show(const PlayResult& result, const fs::path& folder
     return films;
 }
 
-/// Waits for the last frames; their measurements, and what the report shows of them.
-void take_frames(PlayResult& result, FrameThread& frames, const fs::path& folder) {
+/// What the report shows of the frames, some of which may still be drawn.
+void choose_frames(PlayResult& result, const FrameThread& frames, const fs::path& folder) {
+    if (result.frames == 0) result.frames = frames.pushed();
+    result.report_frames = frames_to_show(result, folder);
+    result.report_films = films_to_show(result, folder);
+}
+
+/// Waits for the last frames; their measurements.
+void take_frames(PlayResult& result, FrameThread& frames) {
     const double waited_s = seconds_of([&] { frames.finish(); });
-    if (result.frames == 0) result.frames = frames.report().written.size();
     result.stages_s.emplace_back("drawing (own thread)", frames.report().draw_s);
     result.stages_s.emplace_back("writing frames (own thread)", frames.report().write_s);
     result.stages_s.emplace_back("frames (waiting at the end)", waited_s);
     result.versions.emplace_back("renderer", frames.report().version);
-    result.report_frames = frames_to_show(result, folder);
-    result.report_films = films_to_show(result, folder);
 }
 
 /// A file as a page in a folder refers to it: a relative address (RFC 3986).
@@ -267,10 +271,13 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     if ((options.mix.stems || options.mix.bus_stems) && options.audio)
         stage("stems", [&] { write_stems(result, parts.kit, folder); });
     stage("scoring", [&] { score(result, parts.kit, parts.stick); });
+    if (parts.frames) choose_frames(result, *parts.frames, folder.path("frames"));
     Plotter plotter(folder.scratch());
     std::optional<ReportSections> sections;  // made while frames are still drawn
-    folder.adorn("", [&] { stage("report", [&] { sections = report_sections(result, plotter); }); });
-    if (parts.frames) take_frames(result, *parts.frames, folder.path("frames"));
+    const auto wait_for = [&](std::uint64_t k) { parts.frames->wait_for(k + 1); };
+    folder.adorn("",
+                 [&] { stage("report", [&] { sections = report_sections(result, plotter, wait_for); }); });
+    if (parts.frames) take_frames(result, *parts.frames);
     result.fingerprint =
         fingerprint(parts.frames ? parts.frames->report().rest_image.rgb : std::vector<std::uint8_t>{});
     const sim::WorkerReport workers = parts.simulation.report();
@@ -285,19 +292,14 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
                                    folder.path("."));
             });
         });
-    if (video) {
-        result.report_video = link_to(*options.video, options.out);
-        result.report_films.clear();  // the video shows all
-    }
+    if (video) result.report_video = link_to(*options.video, options.out);
     const std::string realtime_json = realtime_part ? realtime_part() : std::string();
     write_file(folder.path("events.csv"), format_events(result));
     write_file(folder.path("contacts.csv"), format_contacts(result));
     if (sections)
-        stage("pictures of the report", [&] {
-            folder.adorn("report.html", [&] {
-                write_file(folder.path("report.html"), format_report(result, *sections));
-                if (!plotter.failure().empty()) throw std::runtime_error(plotter.failure());
-            });
+        folder.adorn("report.html", [&] {
+            write_file(folder.path("report.html"), format_report(result, *sections));
+            if (!plotter.failure().empty()) throw std::runtime_error(plotter.failure());
         });
     result.wall_s = parts.wall.seconds();
     write_file(folder.path("summary.json"), format_summary(result, realtime_json));

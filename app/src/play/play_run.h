@@ -125,11 +125,14 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
 /// px,py,pz the centre of the tip [m]; matched_id the note that sounded it, 0 for a missed one.
 [[nodiscard]] std::string format_contacts(const PlayResult& result);
 
-/// What of report.html needs no frame.
+/// Returns when frame k is on disk.
+using WaitForFrame = std::function<void(std::uint64_t k)>;
+/// The parts of report.html that take time.
 struct ReportSections {
-    std::string listen, plots;
+    std::string listen, plots, films, frames;
 };
-[[nodiscard]] ReportSections report_sections(const PlayResult& result, Plotter& plotter);
+[[nodiscard]] ReportSections report_sections(const PlayResult& result, Plotter& plotter,
+                                             const WaitForFrame& wait_for);
 
 /// Text of report.html: what was played, key figures, pictures, plots and tables on one page that needs
 /// nothing beside it: no script, no font, no address; pictures and plots lie within. Light and dark follow

@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 std::string report_of(const app::PlayResult& result) {
     const TemporaryFolder scratch;
     app::Plotter plotter(scratch.path());
-    std::string page = app::format_report(result, app::report_sections(result, plotter));
+    std::string page =
+        app::format_report(result, app::report_sections(result, plotter, [](std::uint64_t) {}));
     EXPECT_EQ(plotter.failure(), "");
     return page;
 }
@@ -222,7 +223,8 @@ TEST(Report, WithoutGnuplotIsAPageWithoutPlotsAndBeforeARunSaysWhatToInstall) {
     const Variable path("PATH", empty.path().string());
     app::Plotter plotter(empty.path());
     const app::PlayResult result = sample_play_result();
-    const std::string page = app::format_report(result, app::report_sections(result, plotter));
+    const std::string page =
+        app::format_report(result, app::report_sections(result, plotter, [](std::uint64_t) {}));
     EXPECT_TRUE(holds(plotter.failure(), "gnuplot")) << plotter.failure();
     EXPECT_TRUE(holds(page, "could not be drawn"));
     EXPECT_TRUE(page.ends_with("</html>\n"));
