@@ -67,7 +67,7 @@ struct Entrant {
     /// Of `auto`, else empty: the specification that is scored on strikes, at an advance that is learned from
     /// other recordings, and the one that confirms them.
     std::string strikes_by = {}, confirmed_by = {};
-    std::shared_ptr<const tracking::PathModel> contacts = {};  ///< decides the strikes, where there is one
+    std::shared_ptr<const tracking::PathModel> contacts = {};  ///< heard about strikes, where there is one
     /// Recording x lead: the specification that runs, or the file that answers; empty: does not take part.
     std::vector<std::vector<std::string>> used = {};
     std::map<std::pair<std::size_t, std::size_t>, StickPredictions> replays =

@@ -56,7 +56,7 @@ struct RealtimeSession {
     PlayedTrace trace;  ///< of a live source only the sticks' names
     Kit kit;
     StickGeometry stick;                                  ///< also as a live source gives it
-    std::shared_ptr<const tracking::PathModel> contacts;  ///< decides the strikes, where there is one
+    std::shared_ptr<const tracking::PathModel> contacts;  ///< heard about strikes, where there is one
     double seconds = 0;
     std::vector<PedalMove> moves;     ///< of the schedule of pedals, within a lap
     std::size_t moves_left_out = 0;   ///< those before or after it

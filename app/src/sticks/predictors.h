@@ -48,7 +48,7 @@ private:
 [[nodiscard]] std::string sound_specification(const std::string& specification);
 /// The file of the network that a resolved specification names; none without one. Throws BadInput.
 [[nodiscard]] std::optional<std::filesystem::path> model_file(const std::string& specification);
-/// The model of `auto` if it has a network of contacts, which then decides the strikes (StrikeDecision); else none.
+/// The model of `auto` if it has a network of contacts, which is heard about strikes (ContactForecast); else none.
 [[nodiscard]] std::shared_ptr<const tracking::PathModel> contact_model(
     const std::string& sound_specification);
 /// The filter that confirms the strikes of a sound predictor's specification; empty for none. With `auto`,
