@@ -68,12 +68,12 @@ sim::WorldDefinition random_scene(unsigned seed) {
     for (int i = 0; i < bodies; ++i) {
         const Eigen::Vector3d at(1.05 * (i % across), 0.6 + 1.05 * (i / across / across),
                                  1.05 * (i / across % across));
-        const double size = draw.between(0.3, 0.52);
+        // Few kinds: each takes milliseconds to make.
+        const double size = 0.3 + 0.1 * draw.below(3), density = 100 << draw.below(3);
         const bool round = draw.below(2) == 0;
         sim::WorldBody body =
-            round ? ball(at, draw.below(2) == 0 ? sim::Fidelity::rigid : sim::Fidelity::linear, size,
-                         draw.scale(100, 400))
-                  : box(at, {size, draw.between(0.3, 0.5), 0.3}, draw.scale(100, 400));
+            round ? ball(at, draw.below(2) == 0 ? sim::Fidelity::rigid : sim::Fidelity::linear, size, density)
+                  : box(at, {size, 0.4, 0.3}, density);
         body.velocity = draw.between(0, 8) * draw.direction();
         body.angular_velocity = draw.between(0, 3) * draw.direction();
         body.restitution = draw.below(3) == 0 ? draw.between(0, 1) : 0;
