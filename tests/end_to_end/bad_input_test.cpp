@@ -203,7 +203,6 @@ TEST(BadInput, ArgumentsAndPlacesThatCannotBeAreRefused) {
         {{"play", trace, "--out", out, "--predictor", "ca:q=much"}, "much"},
         {{"play", trace, "--out", out, "--predictor", "auto:model="}, "model="},
         {{"play", trace, "--out", out, "--no-frames", "--bus-stems"}, "--bus-stems"},
-        {{"train", trace, trace, "--out", out}, "twice"},
         {{"play", trace, "--out", out, "--workers", "-1"}, "workers"},
         {{"play", trace, "--out", out, "--workers", "many"}, "workers"},
         {{"play", trace, "--out", out, "--tip", "1,2"}, "--tip"},
