@@ -9,6 +9,7 @@
 
 #include "model_of_random_weights.h"
 #include "tracking/contact_times.h"
+#include "tracking/known_motion.h"
 #include "tracking/predictor.h"
 
 namespace {
@@ -112,6 +113,14 @@ TEST(Allocation, LookingAtPlanesAllocatesNothing) {
     }
     EXPECT_EQ(allocations, before);
     EXPECT_GT(sum, 0);
+}
+
+TEST(Allocation, ComparingMotionsAllocatesNothing) {
+    KnownMotion motion(model_of_random_weights(PathModel::kMostHidden, 1), -Eigen::Vector3d::UnitZ());
+    const long before = allocations;
+    for (int i = 0; i < 500; ++i)
+        motion.push({i * (i < 250 ? 0.008 : 0.001), {0, 1 + 0.1 * std::sin(i * 0.1), 0}});
+    EXPECT_EQ(allocations, before);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "compare/predictor_scores.h"
 
 #include <sim/simulation.h>
+#include <tracking/known_motion.h>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -148,13 +149,16 @@ public:
           surface_(surface),
           geometry_(geometry),
           timing_(timing),
-          history_(geometry.shaft, geometry.tip) {}
+          history_(geometry.shaft, geometry.tip),
+          motion_(forecast.model(), geometry.shaft) {}
 
     /// After a sample that `predictor` took: fills in what the network expects.
     void look(const tracking::PoseSample& sample, bool anew, const tracking::Predictor& predictor,
               ExpectedStrikes& expected) {
         if (anew) history_.restart();
         history_.push(sample);
+        motion_.push(sample);
+        expected.known = motion_.is_known();
         const auto path = predicted_path([&](double lead_s) { return predictor.predict(lead_s); },
                                          predictor.time_s(), geometry_, 0, strike_leads(timing_));
         if (!path || !history_.look(view_)) return;
@@ -172,6 +176,7 @@ private:
     const StickGeometry& geometry_;
     const StrikeTiming& timing_;
     tracking::TipHistory history_;
+    tracking::KnownMotion motion_;
     tracking::TipView view_;
 };
 

@@ -103,7 +103,9 @@ StrikePipeline::StrikePipeline(const Kit& kit, const PlayOptions& options, doubl
       rests_(tip_holds(kit), sticks_.size()),
       decisions_(sticks_.size() * tracking::StickState::kMostModels,
                  StrikeDecision(kit.instruments.size(), options.false_cost, options.release_margin_s)) {
-    if (contacts) network_.emplace(contacts);
+    if (!contacts) return;
+    network_.emplace(contacts);
+    for (const Stick& stick : sticks_) motions_.emplace_back(*contacts, stick.geometry().shaft);
 }
 
 void StrikePipeline::restart(std::uint32_t stick) {
@@ -161,6 +163,14 @@ std::optional<ContactForecast::Path> StrikePipeline::forecast_path(const Stick& 
     return network_->after(view, stick.predicted_path(0), surfaces, stick.sound_lead_s());
 }
 
+void StrikePipeline::follow_motion(std::span<const std::uint32_t> moved) {
+    if (!network_) return;
+    for (const std::uint32_t stick : moved) {
+        const tracking::StickState& state = sticks_[stick].state();
+        motions_[stick].push({state.t_s, state.position, state.orientation, state.oriented != 0});
+    }
+}
+
 void StrikePipeline::settle_impulses(double s, sim::StepRequest& request) {
     for (const std::uint64_t id : scheduler_.take_released()) {
         unfolded_.push_back(id);
@@ -187,6 +197,7 @@ void StrikePipeline::take(double s, std::span<const std::uint32_t> moved) {
     std::vector<StickPaths> paths;
     {
         const Stopwatch watch(times_.tracking);
+        follow_motion(moved);
         paths = add_paths(moved, request.paths);
     }
     settle_impulses(s, request);
@@ -222,6 +233,7 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
     const Stick& known = sticks_[paths.stick];
     ExpectedStrikes expected{s, known.interval_s(), measured};
     if (paths.network) expected.network = contacts_of(*paths.network);
+    expected.known = network_ && motions_[paths.stick].is_known();
     std::vector<std::vector<sim::Contact>> contacts;
     std::vector<ModelContacts> views;
     for (std::size_t model = 0; paths.predicted + model < paths.measured; ++model) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <audio/performance.h>
 #include <sim/simulation.h>
+#include <tracking/known_motion.h>
 
 #include <functional>
 #include <limits>
@@ -142,6 +143,8 @@ private:
                                                     std::vector<sim::TipPath>& paths) const;
     /// What the network of contacts expects of a stick.
     [[nodiscard]] std::optional<ContactForecast::Path> forecast_path(const Stick& stick) const;
+    /// Compares the sticks with those that the network was learned from.
+    void follow_motion(std::span<const std::uint32_t> moved);
     void take_contacts(double s, const StickPaths& paths, const sim::StepReply& reply);
     [[nodiscard]] std::vector<double> measured_clearance(const StickPaths& paths,
                                                          const sim::StepReply& reply) const;
@@ -159,6 +162,7 @@ private:
     sim::Simulation& simulation_;
     Notify notify_;
     std::optional<ContactForecast> network_;
+    std::vector<tracking::KnownMotion> motions_;  // of each stick, where there is a network
     StrikeScheduler scheduler_;
     TipRests rests_;
     std::vector<StrikeDecision> decisions_;  // of each stick, of each model

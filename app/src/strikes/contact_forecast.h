@@ -38,6 +38,7 @@ public:
 
     /// `model` has a network of contacts.
     explicit ContactForecast(std::shared_ptr<const tracking::PathModel> model) : model_(std::move(model)) {}
+    [[nodiscard]] const tracking::PathModel& model() const { return *model_; }
 
     /// After a sample: `predicted` is the path of the sound's predictor; strikes are looked for `reach_s` ahead. None
     /// where nothing is likely to be struck, or where the tip is in a surface.

@@ -33,6 +33,15 @@ void StrikeDecision::Share::add(bool it_came) {
     of = kept * of + 1;
 }
 
+double StrikeDecision::probability(Kind kind, bool known) const {
+    const double prior = kind != network_alone ? 0.95
+                         : known               ? 0.8
+                                               : 0.05,
+                 weight = kind != network_alone ? kRemembered : 4;
+    const Share& share = shares_[kind];
+    return (prior * weight + share.came) / (weight + share.of);
+}
+
 void StrikeDecision::restart() {
     std::ranges::fill(surfaces_, Surface{});
     forecasts_.clear();
@@ -77,6 +86,7 @@ void StrikeDecision::strike(std::size_t surface, double t_s) {
         if (!forecast.came || !forecast.path_s || !forecast.network_s) continue;
         path_errors_s_ = kErrorsKept * path_errors_s_ + std::abs(*forecast.path_s - t_s);
         network_errors_s_ = kErrorsKept * network_errors_s_ + std::abs(*forecast.network_s - t_s);
+        head_start_s_ *= kErrorsKept;
     }
 }
 
@@ -99,9 +109,10 @@ void StrikeDecision::decide(std::size_t surface, const ExpectedStrikes& expected
     Forecast forecast{surface, !by_network ? path_alone : by_path ? both : network_alone};
     if (by_path) forecast.path_s = of_path->t_s;
     if (by_network) forecast.network_s = of_network->t_s;
-    const double p = shares_[forecast.kind].value();
+    const double p = probability(forecast.kind, expected.known);
     const bool sounds = p > false_cost_ * (1 - p);
-    if (forecast.kind == both ? network_errors_s_ < path_errors_s_
+    const double ahead_s = expected.known ? head_start_s_ : -head_start_s_;
+    if (forecast.kind == both ? network_errors_s_ < path_errors_s_ + ahead_s
                               : forecast.kind == network_alone && sounds) {
         put(decided.kept, *of_network);
         put(decided.sounding, *of_network);

@@ -21,6 +21,8 @@ struct ExpectedStrikes {
     std::vector<sim::Contact> path = {}, confirmed = {};
     std::vector<sim::Contact> network =
         {};  ///< of the path that a network of contacts expects (ContactForecast)
+    bool known =
+        false;  ///< the stick moves as those that the network was learned from (tracking::KnownMotion)
 };
 
 /// Contacts that are kept in mind, and those that sound.
@@ -32,12 +34,14 @@ struct DecidedStrikes {
 /// with a model that has one, the network of contacts. Each is heard by what it turned out to be worth:
 ///
 /// - A missed strike costs 1, a false sound `false_cost`: a note sounds where false_cost (1 - P) < P, with P the share
-///   that came of the last 20 strikes expected by the same: by the path alone, by the network alone, or by both; together with
-///   20 strikes of which 0.95 came, for the network alone with 4 of which 0.05 came. So one begins with the path, and
-///   what it expects falls silent, at a cost of 1, only where hardly anything comes of it. The question is put at the last
-///   sample before the note is fixed, as until then it costs nothing to wait; to the network alone at each sample.
+///   that came of the last 20 strikes expected by the same: by the path alone, by the network alone, or by both;
+///   together with 20 strikes of which 0.95 came, for the network alone with 4 of which 0.05 came, or, where the motion is
+///   known (tracking::KnownMotion), 0.8. So what the path expects falls silent, at a cost of 1, only where hardly
+///   anything comes of it. The question is put at the last sample before the note is fixed, as until then it costs
+///   nothing to wait; to the network alone at each sample.
 /// - A strike's time and speed are the network's where its errors of time have turned out smaller: by their sum over all
-///   samples at which both expected the strike, each weighing 0.98 of the next, and 10 ms, so that one begins with the path.
+///   samples at which both expected the strike, each weighing 0.98 of the next, and 10 ms at first, which are the
+///   network's, or, where the motion is known, the path's. So one begins with the path unless the motion is known.
 ///
 /// A strike came if the measured tip entered the surface, 3 mm deep, within 30 ms of when it was expected.
 ///
@@ -78,18 +82,17 @@ private:
 
     /// Of the strikes that were expected, how many came.
     struct Share {
-        double prior, weight;     ///< what it is at first, as of so many strikes
         double came = 0, of = 0;  ///< of the last ones
-        [[nodiscard]] double value() const { return (prior * weight + came) / (weight + of); }
         void add(bool it_came);
     };
+    [[nodiscard]] double probability(Kind kind, bool known) const;
 
     double false_cost_, margin_s_;
     std::vector<Surface> surfaces_;
     double last_s_ = 0;
     std::deque<Forecast> forecasts_;
-    std::array<Share, 3> shares_ = {Share{0.95, 20}, {0.05, 4}, {0.95, 20}};  // by Kind
-    double path_errors_s_ = 0, network_errors_s_ = 0.01;
+    std::array<Share, 3> shares_;  // by Kind
+    double path_errors_s_ = 0, network_errors_s_ = 0, head_start_s_ = 0.01;
 };
 
 }  // namespace app

@@ -27,6 +27,7 @@ struct Player {
     double false_cost = 1;
     int swings = 40;
     int silence_after = -1;  ///< the samples begin anew after this swing
+    bool known = false;      ///< the motion
 
     [[nodiscard]] double height(double t_s) const {
         const int swing = static_cast<int>(t_s / kSwingS);
@@ -60,6 +61,7 @@ struct Player {
                     all.emplace_back().t_s = t_s;
                 return all;
             };
+            expected.known = known;
             expected.path = expected.confirmed = contacts(path);
             expected.network = contacts(network);
             const app::DecidedStrikes decided = decision.after(expected);
@@ -121,6 +123,19 @@ TEST(StrikeDecision, SilenceEndsWhenStrikesComeAgain) {
 TEST(StrikeDecision, WhatItHasLearnedOutlastsGaps) {
     const auto heard = Player{.path = always(0.008), .network = always(0.002), .silence_after = 20}.play();
     EXPECT_NEAR(*heard[22].late_s, 0.002, 1e-9);
+}
+
+TEST(StrikeDecision, OfAKnownMotionTheNetworkIsHeardFromTheFirstStrike) {
+    const auto better = Player{.path = always(0.008), .network = always(0.002), .known = true}.play();
+    EXPECT_NEAR(better.front().late_s.value_or(1), 0.002, 1e-9);
+    const auto alone = Player{.network = always(0), .known = true}.play();
+    EXPECT_TRUE(alone.front().late_s);
+    // Where it turns out wrong it is heard no longer: by its times, and by what does not come.
+    const auto worse = Player{.path = always(0.002), .network = always(0.008), .known = true}.play();
+    EXPECT_NEAR(worse.back().late_s.value_or(1), 0.002, 1e-9);
+    const auto wrong =
+        Player{.strikes = [](int) { return false; }, .network = always(0), .known = true}.play();
+    EXPECT_FALSE(wrong.back().late_s);
 }
 
 }  // namespace
