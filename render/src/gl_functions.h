@@ -17,16 +17,13 @@ namespace render {
     X(PFNGLBINDTEXTUREPROC, BindTexture)                                       \
     X(PFNGLBINDVERTEXARRAYPROC, BindVertexArray)                               \
     X(PFNGLBUFFERDATAPROC, BufferData)                                         \
-    X(PFNGLBUFFERSUBDATAPROC, BufferSubData)                                   \
     X(PFNGLCHECKFRAMEBUFFERSTATUSPROC, CheckFramebufferStatus)                 \
     X(PFNGLCLEARPROC, Clear)                                                   \
     X(PFNGLCLEARCOLORPROC, ClearColor)                                         \
-    X(PFNGLCLEARDEPTHPROC, ClearDepth)                                         \
     X(PFNGLCOMPILESHADERPROC, CompileShader)                                   \
     X(PFNGLCREATEPROGRAMPROC, CreateProgram)                                   \
     X(PFNGLCREATESHADERPROC, CreateShader)                                     \
     X(PFNGLDEPTHFUNCPROC, DepthFunc)                                           \
-    X(PFNGLDEPTHMASKPROC, DepthMask)                                           \
     X(PFNGLDISABLEPROC, Disable)                                               \
     X(PFNGLDRAWARRAYSPROC, DrawArrays)                                         \
     X(PFNGLDRAWBUFFERPROC, DrawBuffer)                                         \
@@ -43,7 +40,6 @@ namespace render {
     X(PFNGLGENRENDERBUFFERSPROC, GenRenderbuffers)                             \
     X(PFNGLGENTEXTURESPROC, GenTextures)                                       \
     X(PFNGLGENVERTEXARRAYSPROC, GenVertexArrays)                               \
-    X(PFNGLGETERRORPROC, GetError)                                             \
     X(PFNGLGETINTEGERVPROC, GetIntegerv)                                       \
     X(PFNGLGETMULTISAMPLEFVPROC, GetMultisamplefv)                             \
     X(PFNGLGETPROGRAMINFOLOGPROC, GetProgramInfoLog)                           \
@@ -53,7 +49,6 @@ namespace render {
     X(PFNGLGETSTRINGPROC, GetString)                                           \
     X(PFNGLGETUNIFORMLOCATIONPROC, GetUniformLocation)                         \
     X(PFNGLLINKPROGRAMPROC, LinkProgram)                                       \
-    X(PFNGLPIXELSTOREIPROC, PixelStorei)                                       \
     X(PFNGLPOLYGONOFFSETPROC, PolygonOffset)                                   \
     X(PFNGLREADBUFFERPROC, ReadBuffer)                                         \
     X(PFNGLREADPIXELSPROC, ReadPixels)                                         \

@@ -7,7 +7,8 @@
 namespace render {
 namespace {
 
-constexpr float kNear = 0.05f, kLeastFar = 60;  // [m]
+constexpr float kLeastNear = 0.05f, kLeastFar = 60;  // [m]
+constexpr float kNearShare = 0.01f;                  // of the distance of what is looked at
 constexpr float kShadowMargin = 1.25f;
 
 /// View space: x right, y up, looking along -z.
@@ -33,13 +34,15 @@ float half_height_per_distance(const Camera& camera) {
 
 Eigen::Matrix4f clip_from_world(const Camera& camera, float aspect) {
     const float scale = 1 / half_height_per_distance(camera);
-    const float far =
-        std::max(kLeastFar, 3 * (camera.eye - camera.target).norm());  // as wide as what it looks at
+    // Both go with the distance, so that the step of a depth of 32 bits there, 6e-8 distance^2 / near, is at most
+    // 6e-6 of it.
+    const float distance = (camera.eye - camera.target).norm();
+    const float near = std::max(kLeastNear, kNearShare * distance), far = std::max(kLeastFar, 3 * distance);
     Eigen::Matrix4f projection = Eigen::Matrix4f::Zero();
     projection(0, 0) = scale / aspect;
     projection(1, 1) = scale;
-    projection(2, 2) = (far + kNear) / (kNear - far);
-    projection(2, 3) = 2 * far * kNear / (kNear - far);
+    projection(2, 2) = (far + near) / (near - far);
+    projection(2, 3) = 2 * far * near / (near - far);
     projection(3, 2) = -1;
     return projection * view_from_world(camera.eye, camera.target - camera.eye, camera.up);
 }

@@ -161,9 +161,9 @@ TEST_F(JackOutput, SoundThatArrivesIsTheRecordingAtItsDueTime) {
     // and is printed (at rest 2 samples); that a device which loses time is followed is asserted on a clock of the tests' own
     // (DevicePosition). find_cycle() finds a cycle within 1000 frames of where it belongs, or not at all.
     // A machine that is held up most of the time plays silence most of the time; then nothing is there to be found.
-    if (live.device_underruns() < 100) {
-        EXPECT_GT(shifts.size(), 0U);
-    }
+    if (live.device_underruns() >= 100)
+        GTEST_SKIP() << live.device_underruns() << " underruns in two seconds";
+    EXPECT_GT(shifts.size(), 0U);
     if (live.device_underruns() == 0 && without_gap(listener.cycles(), 128) &&
         live.device_corrections() == 0 && listener.xruns() == 0) {
         EXPECT_EQ(missing, 0) << "without a gap, an xrun, an underrun or a correction all is as recorded";

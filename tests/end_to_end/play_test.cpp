@@ -90,10 +90,14 @@ TEST(Play, AVideoLastsAsLongAsItsSoundIsNamedAtTheEndAndStandsInPlaceOfTheFrames
     EXPECT_GT(sound_s, t_end - t0 + 0.49) << "it rings out";
     EXPECT_GE(picture_s, sound_s - 1e-3);
     EXPECT_LT(picture_s, sound_s + 0.1 + 1e-3) << "to the next frame";
-    ASSERT_EQ(
-        run(play(trace, folder / "out", {"--video", video.string(), "--fps", "10", "--keep-frames"})).status,
-        0);
+    EXPECT_NE(read(folder / "out/report.html").find("src=\"../take.mp4\""), std::string::npos);
+    std::vector<std::string> in_folder = {"env", "-C", (folder / "").string(), MUSICWORLD_PROGRAM};
+    std::ranges::copy(play(trace, "out", {"--video", "named.mp4", "--fps", "10", "--keep-frames"}),
+                      std::back_inserter(in_folder));
+    ASSERT_EQ(run_command(in_folder).status, 0);
     EXPECT_TRUE(std::filesystem::exists(folder / "out/frames/000010.png"));
+    EXPECT_NE(read(folder / "out/report.html").find("src=\"../named.mp4\""), std::string::npos)
+        << "a name in the working folder";
     EXPECT_EQ(run(play(trace, folder / "out", {"--keep-frames"})).status, 2)
         << "they are kept without a video";
 }

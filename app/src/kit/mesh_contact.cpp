@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <optional>
 
@@ -113,7 +114,23 @@ std::vector<double> depths(const std::vector<Eigen::Vector3d>& points) {
     return depths;
 }
 
-/// Six times the volume that the faces enclose; negative: they look inwards.
+/// Whether the faces enclose a volume: each of their edges is met once each way. Corners at one place are one.
+bool is_closed(const std::vector<Facet>& facets) {
+    std::map<std::array<double, 3>, std::size_t> places;
+    std::map<std::pair<std::size_t, std::size_t>, int>
+        edges;  // times met in their own direction, less the other
+    const auto place_of = [&](const Eigen::Vector3d& p) {
+        return places.try_emplace({p.x(), p.y(), p.z()}, places.size()).first->second;
+    };
+    for (const Facet& facet : facets)
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::size_t a = place_of(facet.corners[k]), b = place_of(facet.corners[(k + 1) % 3]);
+            if (a != b) edges[std::minmax(a, b)] += a < b ? 1 : -1;
+        }
+    return std::ranges::all_of(edges, [](const auto& edge) { return edge.second == 0; });
+}
+
+/// Six times the volume that closed faces enclose; negative: they look inwards.
 double enclosed(const std::vector<Facet>& facets, const Eigen::Vector3d& middle) {
     double sum = 0;
     for (const Facet& facet : facets) sum += (facet.corners[0] - middle).dot(facet.normal);
@@ -128,9 +145,13 @@ OuterSurface outer_surface(const render::Mesh& mesh, const Eigen::Affine3d& body
     for (const Facet& facet : facets)
         for (const Eigen::Vector3d& corner : facet.corners) box.extend(corner);
     OuterSurface outer;
-    outer.inside_out = enclosed(facets, box.center()) < -1e-6 * std::pow(box.sizes().maxCoeff(), 3);
+    outer.inside_out =
+        is_closed(facets) && enclosed(facets, box.center()) < -1e-6 * std::pow(box.sizes().maxCoeff(), 3);
     if (outer.inside_out)
-        for (Facet& facet : facets) facet.normal = -facet.normal;
+        for (Facet& facet : facets) {
+            std::swap(facet.corners[1], facet.corners[2]);
+            facet.normal = -facet.normal;
+        }
     OuterShell shell(box);
     for (const Facet& facet : facets)
         for (const Eigen::Vector3d& corner : facet.corners) shell.take(corner, facet.normal);

@@ -11,7 +11,7 @@ namespace app {
 struct OuterSurface {
     std::vector<Eigen::Vector3d> points;
     double hollow_m = 0;  ///< depth, below the convex hull, of the deepest point that is left out; 0: none
-    bool inside_out = false;  ///< the faces look inwards: they were turned
+    bool inside_out = false;  ///< closed, but its faces look inwards: they were turned
 };
 /// At most 1536: in each direction from the middle of its box (a cell of a cube's face, 16 x 16) the outermost one of
 /// those whose surface faces outwards. So the inner side of a hollow body is left out, and so is what lies deeper than

@@ -101,7 +101,7 @@ struct PlayResult {
     std::vector<ContactShape> contact_shapes;          ///< of instruments with shape = "mesh"
     std::vector<std::string> failures;                 ///< why plots, the video or the model are missing
     std::vector<std::filesystem::path> report_frames;  ///< a few PNG files on disk that the report shows
-    std::vector<Film> report_films;                    ///< strokes that it shows moving
+    std::vector<Film> report_films;                    ///< strokes that it shows moving; none with a video
     std::string report_video;                          ///< the video as the report refers to it; empty: none
 };
 

@@ -316,11 +316,9 @@ ReportSections report_sections(const PlayResult& result, Plotter& plotter, const
 
 std::string format_report(const PlayResult& result, const ReportSections& sections) {
     const std::string name = fs::path(result.trace).filename().string();
-    const std::string video = video_section(result);  // which shows all that films show
     return report_page(fmt::format("{} on {}", name, result.kit_name),
-                       heading(result) + figures(result) + video + sections.listen +
-                           (video.empty() ? sections.films : "") + sections.frames + sections.plots +
-                           provenance(result));
+                       heading(result) + figures(result) + video_section(result) + sections.listen +
+                           sections.films + sections.frames + sections.plots + provenance(result));
 }
 
 }  // namespace app

@@ -103,7 +103,7 @@ std::vector<Film> films_to_show(const PlayResult& result, const fs::path& folder
 void choose_frames(PlayResult& result, const FrameThread& frames, const fs::path& folder) {
     if (result.frames == 0) result.frames = frames.pushed();
     result.report_frames = frames_to_show(result, folder);
-    result.report_films = films_to_show(result, folder);
+    if (!result.options.video) result.report_films = films_to_show(result, folder);
 }
 
 /// Waits for the last frames; their measurements.
@@ -117,7 +117,9 @@ void take_frames(PlayResult& result, FrameThread& frames) {
 
 /// A file as a page in a folder refers to it: a relative address (RFC 3986).
 std::string link_to(const fs::path& file, const fs::path& folder) {
-    const fs::path relative = fs::weakly_canonical(file).lexically_relative(fs::weakly_canonical(folder));
+    // Absolute first: of a relative name of which nothing exists weakly_canonical() makes no absolute one.
+    const auto whole = [](const fs::path& path) { return fs::weakly_canonical(fs::absolute(path)); };
+    const fs::path relative = whole(file).lexically_relative(whole(folder));
     std::string link;
     for (const char c : relative.generic_string()) {
         const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 ||

@@ -44,9 +44,9 @@ void require_tools(const PlayOptions& options);
 [[nodiscard]] audio::Note note_of(const Strike& strike, const Instrument& instrument);
 /// All notes that a run sounded, those of pedals included, by onset.
 [[nodiscard]] std::vector<audio::Note> notes_of(const PlayResult& result, const Kit& kit);
-/// Whether the run sounds it: of --solo that note alone, with where its pedal is.
+/// Whether the run sounds it: of --solo that stroke alone, with where its pedal is and what chokes it.
 [[nodiscard]] inline bool is_sounded(const audio::Note& note, const PlayOptions& options) {
-    return !options.solo || *options.solo == note.id || note.kind == audio::Note::Kind::pedal;
+    return !options.solo || *options.solo == note.id || note.kind != audio::Note::Kind::stroke;
 }
 [[nodiscard]] std::filesystem::path orchestra_file();
 [[nodiscard]] std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers);

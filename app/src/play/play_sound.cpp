@@ -41,7 +41,7 @@ void set_loudness(PlayResult& result, const audio::Mix& mix, bool may_change) {
     const MixOptions& asked = result.options.mix;
     result.gain_db = mix.gain_db;
     result.loudness = audio::measure_loudness({result.audio.data(), result.audio.size()});
-    // One note of a run keeps the level that it has among the others.
+    // One note of a run keeps the level that it has in the kit.
     if (!may_change || asked.gain_db || result.options.solo) return;
     const double gain_db = audio::gain_towards(result.loudness, asked.loudness_lufs, kHighestPeakDbtp);
     const auto gain = static_cast<float>(std::pow(10.0, gain_db / 20));

@@ -25,7 +25,7 @@ std::optional<tracking::PosePrediction> pose(std::mt19937& engine) {
 /// Sticks anywhere among instruments of which some have just been struck: what the renderer keeps of a picture
 /// and a whole one are the same to the bit.
 TEST(KitStage, TwoHundredFramesOfEachKitAreTheSameDrawnWholeOrWhereTheyChange) {
-    for (const char* name : {"strings", "drums", "bells"}) {
+    for (const char* name : {"strings", "drums", "bells", "rock", "timpani", "marimba", "harp", "pads"}) {
         const app::Kit kit = app::read_kit(app::find_kit(name));
         const app::KitStage stage(kit, 2, app::StickGeometry{});
         const render::SceneDescription scene = stage.scene(165, 123);
