@@ -174,9 +174,10 @@ bool comes_true(const Condition& condition) {
 TEST(Predictors, ChildrenEndWithTheProgramHoweverItEnds) {
     for (const int signal : {SIGTERM, SIGINT, SIGKILL}) {
         const Folder folder;
-        // The shell and a process that it has started; neither reads its input's end.
-        const std::string child = "exec:sleep 1000 & echo $! $$ > '" + (folder / "new").string() + "'; mv '" +
-                                  (folder / "new").string() + "' '" + (folder / "pids").string() +
+        // The shell and a process that it has started; neither reads its input's end. Its first line comes once the
+        // program has arranged for their end.
+        const std::string child = "exec:read line; sleep 1000 & echo $! $$ > '" + (folder / "new").string() +
+                                  "'; mv '" + (folder / "new").string() + "' '" + (folder / "pids").string() +
                                   "'; sleep 1000";
         Started program(
             {"predict", bundled("traces/roll.csv").string(), "--predictor", child, "--lead", "1/30"},

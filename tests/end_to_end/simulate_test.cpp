@@ -250,5 +250,21 @@ TEST(Simulate, TheLinesThatItPrintsForWorkersElsewhereMakeThemJoin) {
     EXPECT_NE(read(folder / "lines").find("--key keys/left.key"), std::string::npos);
 }
 
+TEST(Simulate, GoesOnWithFewerThreadsWhereTheSystemStartsNoMore) {
+#ifdef MUSICWORLD_SANITIZED
+    GTEST_SKIP() << "sanitizers need more memory than is left here";
+#endif
+    const Folder folder;
+    write(folder / "scene.toml", kScene);
+    const Ended ended =
+        run_command({"bash", "-c",
+                     "ulimit -v 1500000; exec " MUSICWORLD_PROGRAM " simulate " +
+                         (folder / "scene.toml").string() + " --steps 5 --threads 256 --json"});
+    ASSERT_EQ(ended.status, 0) << ended.err;
+    EXPECT_EQ(
+        json::parse(ended.out)["state_hash"],
+        json::parse(run({"simulate", folder / "scene.toml", "--steps", "5", "--json"}).out)["state_hash"]);
+}
+
 }  // namespace
 }  // namespace end_to_end

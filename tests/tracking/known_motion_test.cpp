@@ -71,6 +71,19 @@ TEST(KnownMotion, IsNotThatOfAModelThatKnowsNothing) {
     EXPECT_GE(known_after_s(model_of_random_weights(16, 3), bundled("roll.csv")), 4.9);
 }
 
+TEST(KnownMotion, SamplesThatComeTwiceMakeNothingKnown) {
+    auto samples = moving([](double t) { return Vector3d(0.4 * std::sin(2 * t), 1, 0.2 * std::cos(2 * t)); });
+    std::vector<PoseSample> twice;
+    for (const PoseSample& sample : samples) {
+        twice.push_back(sample);
+        PoseSample again = sample;
+        again.t_s += 1e-6;
+        again.position.y() += 0.00025;
+        twice.push_back(again);
+    }
+    EXPECT_GE(known_after_s(general(), twice), 4.9);
+}
+
 TEST(KnownMotion, OutlastsAGap) {
     KnownMotion motion(general(), kShaft);
     auto samples = bundled("roll.csv");

@@ -10,8 +10,9 @@ namespace tracking {
 namespace {
 
 constexpr double kLeadS = 1.0 / 15, kMemoryS = 10, kLeastS = 0.4, kRatio = 0.65;
-constexpr double kSlowest_mps = 0.3;    // below it errors are the sensor's
-constexpr double kMostPendingHz = 500;  // of predictions made more often not all are remembered
+constexpr double kSlowest_mps = 0.3;  // below it errors are the sensor's
+// Predictions are so far apart, and the velocity is over so much: between closer samples it is the sensor's noise.
+constexpr double kApartS = 1.0 / 150;
 
 }  // namespace
 
@@ -24,7 +25,7 @@ struct KnownMotion::State {
     };
 
     State(const PathModel& model, const Eigen::Vector3d& shaft)
-        : learned(model, shaft), ring(static_cast<std::size_t>(kLeadS * kMostPendingHz) + 2) {}
+        : learned(model, shaft), ring(static_cast<std::size_t>(kLeadS / kApartS) + 2) {}
 
     void judge(const PoseSample& sample) noexcept;
     void expect(const PoseSample& sample) noexcept;
@@ -32,6 +33,8 @@ struct KnownMotion::State {
     Learned learned;
     double newest_s = 0, last_due_s = 0;
     Eigen::Vector3d newest = Eigen::Vector3d::Zero();
+    double from_s = 0;  // of the last prediction's sample, from which the velocity is
+    Eigen::Vector3d from = Eigen::Vector3d::Zero();
     std::vector<Expected> ring;
     std::size_t first = 0, count = 0;
     double judged_s = 0, model_square = 0, velocity_square = 0;  // [s], [m^2 s]
@@ -54,8 +57,10 @@ void KnownMotion::State::judge(const PoseSample& sample) noexcept {
 }
 
 void KnownMotion::State::expect(const PoseSample& sample) noexcept {
-    if (count == ring.size()) return;
-    const Eigen::Vector3d velocity = (sample.position - newest) / (sample.t_s - newest_s);
+    if (sample.t_s - from_s < kApartS || count == ring.size()) return;
+    const Eigen::Vector3d velocity = (sample.position - from) / (sample.t_s - from_s);
+    from_s = sample.t_s;
+    from = sample.position;
     ring[(first + count++) % ring.size()] = {sample.t_s + kLeadS, learned.predict(kLeadS).position,
                                              sample.position + kLeadS * velocity,
                                              learned.path().frame().speed > kSlowest_mps};
@@ -74,6 +79,8 @@ void KnownMotion::push(const PoseSample& sample) noexcept {
     if (status == SampleStatus::reinitialised) {
         s.count = 0;
         s.last_due_s = sample.t_s + kLeadS;
+        s.from_s = sample.t_s;
+        s.from = sample.position;
     } else {
         s.judge(sample);
         s.expect(sample);

@@ -92,6 +92,7 @@ void predict(PredictOptions o, const std::vector<std::string>& given) {
         o.live.source.source = "stdin";
         const std::unique_ptr<PredictionSink> rows = make_row_sink();
         const LivePredictResult result = predict_live(o.live, *rows);
+        if (result.answers == 0) fmt::print("{}", predicted_row_header());  // a table without rows
         if (result.faults.malformed > 0 || result.left_out > 0) print_to_errors(result);
     } else if (!o.live.source.source.empty()) {
         o.live.source.epoch_ns = monotonic_ns() + kHeadStartNs;

@@ -123,8 +123,8 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
     command.option("--resume", o->resume, as::text("DIR"),
                    "Instead of SCENE: go on with the interrupted run in this folder, with its options");
     command.option("--threads", o->threads, as::whole(1, kMostThreads),
-                   "Threads that share out each step, without workers; default: one a processor core. No "
-                   "result depends on how many");
+                   "Threads that share out each step, without workers; default: one a processor core, 8 at "
+                   "most. No result depends on how many");
     add_worker_options(command, o->workers);
     command.flag(
         "--allow-quarantine", o->allow_quarantine,

@@ -21,17 +21,6 @@ struct TrainOptions : tracking::TrainingOptions {
     std::string out;
 };
 
-/// One given twice may be both learned from and held out.
-void require_each_once(std::span<const Recording> recordings) {
-    for (std::size_t a = 0; a < recordings.size(); ++a)
-        for (std::size_t b = 0; b < a; ++b)
-            if (same_samples(recordings[a], recordings[b]))
-                throw BadInput(
-                    fmt::format("{}: error: found the samples of {} again, expected each recording once; "
-                                "leave one of them out",
-                                recordings[a].trace.file, recordings[b].trace.file));
-}
-
 void train(TrainOptions o) {
     std::vector<std::filesystem::path> inputs;
     for (const std::string& name : o.traces) inputs.push_back(find_trace(name));
@@ -44,7 +33,7 @@ void train(TrainOptions o) {
     if (recordings.empty())
         throw BadInput(
             "error: found no trace among the files, expected at least one recording to learn from");
-    require_each_once(recordings);
+    require_distinct(recordings);  // one given twice may be both learned from and held out
     const TrainingField field = training_field(recordings);
     auto provenance = [&](const tracking::TrainingResult& result) {
         return provenance_of(recordings, field, o, result, MUSICWORLD_VERSION);

@@ -55,16 +55,6 @@ void add_marks(Recording& recording, const fs::path& file, const std::string& he
             std::ranges::sort(*times);
 }
 
-void require_distinct(std::span<const Recording> recordings) {
-    for (std::size_t i = 0; i < recordings.size(); ++i)
-        for (std::size_t before = 0; before < i; ++before)
-            if (same_samples(recordings[i], recordings[before]))
-                throw BadInput(
-                    fmt::format("{}: error: found the samples of {} again, expected every recording once; "
-                                "leave one of them out",
-                                recordings[i].trace.file, recordings[before].trace.file));
-}
-
 double median_rate(const std::vector<tracking::PoseSample>& samples) {
     std::vector<double> dt;
     for (std::size_t i = 1; i < samples.size(); ++i) dt.push_back(samples[i].t_s - samples[i - 1].t_s);
@@ -140,6 +130,16 @@ bool same_samples(const Recording& a, const Recording& b) {
                               [&](const tracking::StickTrace& x, const tracking::StickTrace& y) {
                                   return std::ranges::equal(x.samples, y.samples, same_pose);
                               });
+}
+
+void require_distinct(std::span<const Recording> recordings) {
+    for (std::size_t i = 0; i < recordings.size(); ++i)
+        for (std::size_t before = 0; before < i; ++before)
+            if (same_samples(recordings[i], recordings[before]))
+                throw BadInput(
+                    fmt::format("{}: error: found the samples of {} again, expected each recording once; "
+                                "leave one of them out",
+                                recordings[i].trace.file, recordings[before].trace.file));
 }
 
 bool near_any(const std::vector<double>& times, double t_s) {

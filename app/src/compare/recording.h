@@ -47,6 +47,8 @@ using PersonNames = std::vector<std::pair<std::string, std::string>>;
 
 /// Whether both hold the same samples, whatever their files and sticks are called.
 [[nodiscard]] bool same_samples(const Recording& a, const Recording& b);
+/// Throws BadInput where two do.
+void require_distinct(std::span<const Recording> recordings);
 
 /// The pose that a prediction is held against, from the noiseless recording.
 struct Truth {

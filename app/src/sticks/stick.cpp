@@ -63,9 +63,10 @@ void keep_confirmed(std::vector<sim::Contact>& contacts, std::span<const sim::Co
 }
 
 void Stick::take(const tracking::StickState& state) {
-    interval_s_ = started() && state.t_s > state_.t_s ? state.t_s - state_.t_s : 0;
+    const bool goes_on = started() && state.starts == state_.starts && state.t_s > state_.t_s;
+    interval_s_ = goes_on ? state.t_s - state_.t_s : 0;
     if (state.samples > state_.samples) {
-        if (state.starts != state_.starts || interval_s_ == 0) history_.restart();
+        if (!goes_on) history_.restart();
         history_.push({state.t_s, state.position, state.orientation, state.oriented != 0});
     }
     state_ = state;

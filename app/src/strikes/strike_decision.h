@@ -38,7 +38,8 @@ struct DecidedStrikes {
 ///   together with 20 strikes of which 0.95 came, for the network alone with 4 of which 0.05 came, or, where the motion is
 ///   known (tracking::KnownMotion), 0.8. So what the path expects falls silent, at a cost of 1, only where hardly
 ///   anything comes of it. The question is put at the last sample before the note is fixed, as until then it costs
-///   nothing to wait; to the network alone at each sample.
+///   nothing to wait; to the network alone at each sample. A strike that fell silent and comes all the same sounds late:
+///   what the path still expects when the tip is seen in the surface is not asked about.
 /// - A strike's time and speed are the network's where its errors of time have turned out smaller: by their sum over all
 ///   samples at which both expected the strike, each weighing 0.98 of the next, and 10 ms at first, which are the
 ///   network's, or, where the motion is known, the path's. So one begins with the path unless the motion is known.

@@ -2,6 +2,8 @@
 
 #include <pmmintrin.h>
 
+#include <system_error>
+
 namespace sim {
 namespace {
 
@@ -18,7 +20,7 @@ FlushDenormals::~FlushDenormals() {
 }
 
 bool ShortWait::again() noexcept {
-    ++rounds_;
+    rounds_ = std::min(rounds_ + 1, kAwake + kLetting);
     if (rounds_ < kAwake) {
         _mm_pause();
     } else {
@@ -28,7 +30,12 @@ bool ShortWait::again() noexcept {
 }
 
 Crew::Crew(int threads) {
-    for (int i = 1; i < threads; ++i) helpers_.emplace_back([this, i] { help(i); });
+    helpers_.reserve(static_cast<std::size_t>(std::max(0, threads - 1)));
+    try {
+        for (int i = 1; i < threads; ++i) helpers_.emplace_back([this, i] { help(i); });
+    } catch (const std::system_error&) {
+        // The system gives no more: results do not depend on how many there are.
+    }
 }
 
 Crew::~Crew() {

@@ -36,7 +36,8 @@ private:
 /// No allocation but in the constructor. Jobs must not throw.
 class Crew {
 public:
-    explicit Crew(int threads = 1);  ///< with the owner's
+    /// With the owner's; fewer where the system does not start so many.
+    explicit Crew(int threads = 1);
     ~Crew();
     Crew(const Crew&) = delete;
     Crew& operator=(const Crew&) = delete;

@@ -26,6 +26,7 @@ bool IslandSolver::moved_on() const {
 }
 
 bool IslandSolver::may_follow(const Island& island) const {
+    if (island.bodies.size() > kMostFollowed) return false;
     const double dt = settings_->dt, shortest = dt / settings_->substeps / (1 << kMostFollowLevel);
     bool thin = false;
     for (const int id : island.bodies) {

@@ -15,6 +15,8 @@ namespace sim {
 /// Multiply-adds of a factorisation per body up to which an island is solved directly: one of contacts alone, which sweeps
 /// solve, too, and one with springs.
 constexpr double kMostWithContacts = 500, kMostWithSprings = 1e4;
+constexpr std::size_t kMostFollowed =
+    64;                              ///< bodies of an island that is followed: all are solved in each halving
 constexpr int kMostFollowLevel = 8;  ///< so often at most a substep is halved for bodies that are followed
 constexpr float kPushSpeed = 3;      ///< at which bodies inside each other are moved apart [m/s]
 

@@ -138,4 +138,17 @@ TEST(StrikeDecision, OfAKnownMotionTheNetworkIsHeardFromTheFirstStrike) {
     EXPECT_FALSE(wrong.back().late_s);
 }
 
+TEST(StrikeDecision, AStrikeThatFellSilentAndComesSoundsLateOnceTheTipIsSeenInTheSurface) {
+    StrikeDecision decision(1, 100, kMarginS);
+    const auto after = [&](double s, double height_m) {
+        app::ExpectedStrikes expected{s, 1 / kRateHz, {&height_m, 1}, {&height_m, 1}};
+        expected.path.emplace_back().t_s = std::max(s, 0.095);
+        expected.confirmed = expected.path;
+        return decision.after(expected).sounding.size();
+    };
+    for (int i = 0; i < 4; ++i) EXPECT_EQ(after(i / kRateHz, 0.1), 1U) << "there is time to wait";
+    EXPECT_EQ(after(5 / kRateHz, 0.02), 0U) << "99 of 100 would have to come";
+    EXPECT_EQ(after(6 / kRateHz, -0.002), 1U) << "here it is";
+}
+
 }  // namespace

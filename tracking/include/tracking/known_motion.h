@@ -10,7 +10,7 @@ namespace tracking {
 /// Whether a stick moves as those that a model was learned from.
 ///
 /// The model's path (PathModel), which stays as it is, predicts the tracked point 1/15 s ahead; so does the velocity
-/// between the newest two samples. With the errors e that turned out while the stick moved, the newest weighing most
+/// between the newest sample and the one before it that is 1/150 s older or more. With the errors e that turned out while the stick moved, the newest weighing most
 /// (exp(-age / 10 s)), the motion is known once they cover 0.4 s and
 ///   sum |e_model|^2 < r^2 sum |e_velocity|^2,  r = 0.65.
 ///
