@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace render {
 namespace {
@@ -16,10 +17,23 @@ Eigen::Vector3f transformed(const Eigen::Matrix4f& matrix, const Eigen::Vector3f
 
 }  // namespace
 
+/// Takes off the box's z what no place with its x and y has within the slab; all of it where there is none.
+void Changes::cut(Eigen::AlignedBox3f& box, const Slab& slab) {
+    constexpr float kSteep = 0.02f;  // less: rounding would count
+    const Eigen::Vector2f across = slab.normal.head<2>(), middle = box.center().head<2>();
+    const float beside = across.dot(middle), reach = across.cwiseAbs().dot(0.5f * box.sizes().head<2>());
+    const float least = slab.least - beside - reach, most = slab.most - beside + reach, z = slab.normal.z();
+    if (std::abs(z) < kSteep) return;
+    box.min().z() = std::max(box.min().z(), std::min(least / z, most / z));
+    box.max().z() = std::min(box.max().z(), std::max(least / z, most / z));
+}
+
 Changes::Changes(const Views& views, std::vector<ObjectBounds> bounds)
     : views_(views),
       world_from_light_(views.light_from_world.inverse()),
       bounds_(std::move(bounds)),
+      seen_(bounds_.size()),
+      moved_(bounds_.size(), true),
       objects_(views.width, views.height),
       picture_(views.width, views.height),
       occupied_(views.width, views.height) {
@@ -34,8 +48,10 @@ Changes::Changes(const Views& views, std::vector<ObjectBounds> bounds)
 /// The part before the camera of the hull of points.
 Changes::Hull Changes::in_picture(const Points& world) const {
     std::vector<Eigen::Vector4f> clip;
+    clip.reserve(world.size());
     for (const Eigen::Vector3f& point : world) clip.push_back(views_.clip_from_world * point.homogeneous());
     Hull seen;
+    seen.reserve(clip.size());
     const auto add = [&](const Eigen::Vector4f& p) {
         seen.emplace_back(0.5f * static_cast<float>(views_.width) * (1 + p.x() / p.w()),
                           0.5f * static_cast<float>(views_.height) * (1 + p.y() / p.w()));
@@ -53,7 +69,8 @@ Changes::Seen Changes::see(const FrameState& frame, std::size_t object) const {
     Seen seen;
     if (!frame.visible[object]) return seen;
     Points world;
-    for (const Eigen::Vector3f& corner : bounds_[object].corners_now(frame, object)) {
+    const Points corners = bounds_[object].corners_now(frame, object);
+    for (const Eigen::Vector3f& corner : corners) {
         world.push_back(transformed(frame.world_from_object[object], corner));
         seen.from_light.push_back(transformed(views_.light_from_world, world.back()));
     }
@@ -61,8 +78,31 @@ Changes::Seen Changes::see(const FrameState& frame, std::size_t object) const {
     for (const Eigen::Vector3f& corner : seen.from_light) seen.box.extend(corner);
     const Eigen::Vector3f more(beyond_, beyond_, depth_pad_);
     seen.box.min() -= more, seen.box.max() += more;
-    seen.hull = in_picture(world);
+    seen.slabs = slabs_around(corners, views_.light_from_world * frame.world_from_object[object]);
+    seen.cover = picture_.cover(in_picture(world));
     return seen;
+}
+
+/// A body without a thickness has none that hold anything back.
+std::array<Changes::Slab, 3> Changes::slabs_around(const Points& corners,
+                                                   const Eigen::Matrix4f& light_from_object) const {
+    std::array<Slab, 3> slabs;
+    const Eigen::Matrix3d object_from_light =
+        light_from_object.topLeftCorner<3, 3>().cast<double>().inverse();
+    if (!object_from_light.allFinite()) return slabs;
+    Eigen::AlignedBox3f box;
+    for (const Eigen::Vector3f& corner : corners) box.extend(corner);
+    const Eigen::Vector3d middle = light_from_object.topRightCorner<3, 1>().cast<double>();
+    const Eigen::Vector3d more(beyond_, beyond_, depth_pad_);
+    for (int i = 0; i < 3; ++i) {
+        const Eigen::Vector3d normal = object_from_light.row(i).normalized();
+        const double length = object_from_light.row(i).norm(), at = normal.dot(middle);
+        const double grown = normal.cwiseAbs().dot(more);
+        slabs[static_cast<std::size_t>(i)] = {normal.cast<float>(),
+                                              static_cast<float>(at + box.min()[i] / length - grown),
+                                              static_cast<float>(at + box.max()[i] / length + grown)};
+    }
+    return slabs;
 }
 
 bool Changes::moved(const FrameState& frame, std::size_t object) const {
@@ -75,42 +115,37 @@ bool Changes::moved(const FrameState& frame, std::size_t object) const {
 void Changes::look_from(const Eigen::Matrix4f& clip_from_world) {
     views_.clip_from_world = clip_from_world;
     turned_ = true;
+    if (!known_) return;
     for (std::size_t i = 0; i < seen_.size(); ++i) seen_[i] = see(before_, i);
 }
 
 void Changes::update(const FrameState& frame) {
-    moved_.assign(bounds_.size(), true);
-    std::vector<Seen> seen;
-    std::size_t moving = 0;
+    std::vector<Seen> before;  // of what has moved
     for (std::size_t i = 0; i < bounds_.size(); ++i) {
         moved_[i] = !known_ || moved(frame, i);
-        moving += moved_[i];
-        seen.push_back(moved_[i] ? see(frame, i) : seen_[i]);
+        if (moved_[i]) before.push_back(std::exchange(seen_[i], see(frame, i)));
     }
-    const bool map_too = !known_ || moving > kMostMoved;
+    const bool map_too = !known_ || before.size() > kMostMoved;
     all_ = map_too || turned_;
     turned_ = false;
-    std::swap(seen, seen_);  // from here on `seen` is where things were
     objects_.clear(), picture_.clear(), shadow_.clear();
     if (all_) objects_.fill(), picture_.fill();
     if (map_too) {
         if (views_.shadow_size > 0) shadow_ = {{0, 0, views_.shadow_size, views_.shadow_size}};
     } else {
-        for (std::size_t i = 0; i < bounds_.size(); ++i) {
-            if (!moved_[i]) continue;
-            add_moved(seen[i]);
-            add_moved(seen_[i]);
-        }
+        for (const Seen& was : before) add_moved(was);
+        for (std::size_t i = 0; i < bounds_.size(); ++i)
+            if (moved_[i]) add_moved(seen_[i]);
     }
     occupied_.clear();
-    for (const Seen& now : seen_) occupied_.add(now.hull);
+    for (const Seen& now : seen_) occupied_.add(now.cover);
     before_ = frame;
     known_ = true;
 }
 
 void Changes::add_moved(const Seen& seen) {
     if (seen.from_light.empty()) return;
-    objects_.add(seen.hull);
+    objects_.add(seen.cover);
     if (views_.shadow_size == 0) return;
     add_to_shadow_map(in_shadow_map(seen));
 }
@@ -141,15 +176,15 @@ void Changes::add_receivers(const ShadowChange& change) {
     prism.max() << outline.max(), change.farthest + depth_pad_;
     for (std::size_t i = 0; i < seen_.size(); ++i) {
         if (moved_[i] || seen_[i].from_light.empty() || !prism.intersects(seen_[i].box)) continue;
-        const Eigen::AlignedBox3f common(Eigen::Vector3f(outline.min().x(), outline.min().y(),
-                                                         std::max(prism.min().z(), seen_[i].box.min().z())),
-                                         Eigen::Vector3f(outline.max().x(), outline.max().y(),
-                                                         std::min(prism.max().z(), seen_[i].box.max().z())));
+        Eigen::AlignedBox3f common = prism.intersection(seen_[i].box);
+        for (const Slab& slab : seen_[i].slabs) cut(common, slab);
+        if (common.isEmpty()) continue;
         Points corners;
+        corners.reserve(8);
         for (int k = 0; k < 8; ++k)
             corners.push_back(transformed(world_from_light_,
                                           common.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k))));
-        picture_.add_common(in_picture(corners), seen_[i].hull);
+        picture_.add_common(in_picture(corners), seen_[i].cover);
     }
 }
 
@@ -202,7 +237,7 @@ void Changes::add_to_shadow_map(PixelBox box) {
 }
 
 std::vector<PixelBox> Changes::boxes(std::size_t object) const {
-    return objects_.touched(seen_[object].hull);
+    return objects_.touched(seen_[object].cover);
 }
 
 PixelBox Changes::shadow_box(std::size_t object) const {

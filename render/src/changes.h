@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -26,12 +27,13 @@ struct Views {
 };
 
 /// What of a picture has to be drawn again for the next frame, all of it safely wide:
-/// - tiles that an object touches which moves, now or in the frame before: there surfaces are drawn again, and elsewhere put in
-///   another light at most;
-/// - of the shadow map, boxes around what has moved. What has changed in them is known when they are drawn again:
-///   a comparison with a texel has another outcome only at depths between its values now and before. From these:
-/// - tiles in which another object may be looked up there: the prism of a block of texels and its depths, where
-///   that is seen within the object's bounds;
+/// - tiles that an object touches which moves, now or in the frame before: there surfaces are drawn again,
+///   and elsewhere put in another light at most;
+/// - of the shadow map, boxes around what has moved. What has changed in them is known when they are drawn
+///   again: a comparison with a texel has another outcome only at depths between its values now and before.
+///   From these:
+/// - tiles in which another object may be looked up there: the prism of a block of texels and its depths,
+///   where that is seen within the object's bounds;
 /// - of the floor, the tiles that look up there.
 /// All else is as it was, since a pixel depends on nothing else. Bounds are hulls of few corners.
 class Changes {
@@ -63,17 +65,26 @@ public:
 private:
     using Points = std::vector<Eigen::Vector3f>;
     using Hull = std::vector<Eigen::Vector2f>;
-    /// Where an object is seen, by the camera [pixels] and by the light.
+    /// Places p with least <= normal p <= most.
+    struct Slab {
+        Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+        float least = -1, most = 1;
+    };
+    /// Where an object is seen, by the camera and by the light.
     struct Seen {
-        Hull hull;
-        Points from_light;        ///< corners; none: not visible
-        Eigen::AlignedBox3f box;  ///< around them, a little more
+        TileMask::Cover cover;
+        Points from_light;          ///< corners; none: not visible
+        Eigen::AlignedBox3f box;    ///< around them, a little more
+        std::array<Slab, 3> slabs;  ///< all between them, likewise: around the box in the object's frame
     };
 
     [[nodiscard]] Seen see(const FrameState& frame, std::size_t object) const;
     [[nodiscard]] bool moved(const FrameState& frame, std::size_t object) const;
     [[nodiscard]] Hull in_picture(const Points& world) const;
     [[nodiscard]] PixelBox in_shadow_map(const Seen& seen) const;
+    [[nodiscard]] std::array<Slab, 3> slabs_around(const Points& corners,
+                                                   const Eigen::Matrix4f& light_from_object) const;
+    static void cut(Eigen::AlignedBox3f& box, const Slab& slab);
     void add_moved(const Seen& seen);
     void add_receivers(const ShadowChange& change);
     void add_floor(const ShadowChange& change);

@@ -6,8 +6,8 @@
 namespace render {
 
 /// The OpenGL functions the renderer calls, with the names of the specification less their gl prefix. No
-/// OpenGL library is linked (libGL beside OSMesa would answer with functions of another context): the context is
-/// asked for each.
+/// OpenGL library is linked (libGL beside OSMesa would answer with functions of another context): the context
+/// is asked for each.
 #define RENDER_GL_FUNCTIONS(X)                                                 \
     X(PFNGLACTIVETEXTUREPROC, ActiveTexture)                                   \
     X(PFNGLATTACHSHADERPROC, AttachShader)                                     \
@@ -32,6 +32,7 @@ namespace render {
     X(PFNGLENABLEPROC, Enable)                                                 \
     X(PFNGLENABLEVERTEXATTRIBARRAYPROC, EnableVertexAttribArray)               \
     X(PFNGLFINISHPROC, Finish)                                                 \
+    X(PFNGLFLUSHPROC, Flush)                                                   \
     X(PFNGLFRAMEBUFFERRENDERBUFFERPROC, FramebufferRenderbuffer)               \
     X(PFNGLFRAMEBUFFERTEXTURE2DPROC, FramebufferTexture2D)                     \
     X(PFNGLFRONTFACEPROC, FrontFace)                                           \

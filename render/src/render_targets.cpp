@@ -9,8 +9,9 @@
 namespace render {
 namespace {
 
-// Sides of the blocks in which changes of the shadow map are told: at least so many texels, at most so many a side.
-constexpr int kLeastBlock = 8, kMostBlocks = 128;
+// Sides of the blocks in which changes of the shadow map are told: at least so many texels, at most so many a
+// side.
+constexpr int kLeastBlock = 4, kMostBlocks = 256;
 
 }  // namespace
 
@@ -114,23 +115,27 @@ const TileQuads& PictureTarget::begin_picture(const TileMask& mask) {
     return quads_;
 }
 
-void PictureTarget::read(const PixelBox& box, Image& image) {
-    if (!box.empty()) {
-        const auto width = static_cast<std::size_t>(box.right - box.left);
-        rgba_.resize(4 * width * static_cast<std::size_t>(box.top - box.bottom));
-        gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, picture_);
-        gl_.ReadPixels(box.left, box.bottom, box.right - box.left, box.top - box.bottom, GL_RGBA,
-                       GL_UNSIGNED_BYTE, rgba_.data());
-        for (int y = box.bottom; y < box.top; ++y) {
-            const std::uint8_t* from = rgba_.data() + 4 * width * static_cast<std::size_t>(y - box.bottom);
-            std::uint8_t* to =
-                rgb_.data() + 3 * (static_cast<std::ptrdiff_t>(height_ - 1 - y) * width_ + box.left);
-            // Four bytes at a time, the fourth overwritten by the next pixel; the last pixel of a row has room
-            // for three.
-            for (std::size_t x = 0; x + 1 < width; ++x, from += 4, to += 3) std::copy_n(from, 4, to);
-            std::copy_n(from, 3, to);
-        }
+void PictureTarget::read(const PixelBox& box) {
+    box_ = box;
+    if (box.empty()) return;
+    rgba_.resize(4 * static_cast<std::size_t>(box.area()));
+    gl_.BindFramebuffer(GL_READ_FRAMEBUFFER, picture_);
+    gl_.ReadPixels(box.left, box.bottom, box.right - box.left, box.top - box.bottom, GL_RGBA,
+                   GL_UNSIGNED_BYTE, rgba_.data());
+}
+
+void PictureTarget::give(Image& image) {
+    const auto width = static_cast<std::size_t>(box_.right - box_.left);
+    for (int y = box_.bottom; y < box_.top && width > 0; ++y) {
+        const std::uint8_t* from = rgba_.data() + 4 * width * static_cast<std::size_t>(y - box_.bottom);
+        std::uint8_t* to =
+            rgb_.data() + 3 * (static_cast<std::ptrdiff_t>(height_ - 1 - y) * width_ + box_.left);
+        // Four bytes at a time, the fourth overwritten by the next pixel; the last pixel of a row has room
+        // for three.
+        for (std::size_t x = 0; x + 1 < width; ++x, from += 4, to += 3) std::copy_n(from, 4, to);
+        std::copy_n(from, 3, to);
     }
+    box_ = {};
     image.width = width_;
     image.height = height_;
     image.rgb = rgb_;
@@ -183,12 +188,22 @@ void ShadowTarget::keep() {
     read({0, 0, size_, size_}, kept_.data());
 }
 
-std::vector<ShadowChange> ShadowTarget::changed(const std::vector<PixelBox>& boxes) {
+void ShadowTarget::read(const std::vector<PixelBox>& boxes) {
+    boxes_ = boxes;
+    std::size_t texels = 0, at = 0;
+    for (const PixelBox& box : boxes) texels += static_cast<std::size_t>(box.area());
+    drawn_.resize(texels);
+    for (const PixelBox& box : boxes) {
+        read(box, drawn_.data() + at);
+        at += static_cast<std::size_t>(box.area());
+    }
+}
+
+std::vector<ShadowChange> ShadowTarget::changed() {
     const int block = std::max(kLeastBlock, size_ / kMostBlocks);
     std::vector<ShadowChange> changes;
-    for (const PixelBox& box : boxes) {
-        drawn_.resize(static_cast<std::size_t>(box.area()));
-        read(box, drawn_.data());
+    const float* of_box = drawn_.data();
+    for (const PixelBox& box : boxes_) {
         for (int bottom = box.bottom; bottom < box.top; bottom += block)
             for (int left = box.left; left < box.right; left += block) {
                 const PixelBox part{left, bottom, std::min(left + block, box.right),
@@ -197,7 +212,7 @@ std::vector<ShadowChange> ShadowTarget::changed(const std::vector<PixelBox>& box
                 for (int y = part.bottom; y < part.top; ++y) {
                     float* kept = kept_.data() + static_cast<std::ptrdiff_t>(y) * size_;
                     const float* drawn =
-                        drawn_.data() + static_cast<std::ptrdiff_t>(y - box.bottom) * (box.right - box.left) -
+                        of_box + static_cast<std::ptrdiff_t>(y - box.bottom) * (box.right - box.left) -
                         box.left;
                     for (int x = part.left; x < part.right; ++x) {
                         if (kept[x] == drawn[x]) continue;
@@ -208,6 +223,7 @@ std::vector<ShadowChange> ShadowTarget::changed(const std::vector<PixelBox>& box
                 }
                 if (nearest <= farthest) changes.push_back({part, 2 * nearest - 1, 2 * farthest - 1});
             }
+        of_box += box.area();
     }
     return changes;
 }

@@ -1,5 +1,6 @@
 #include "render/renderer.h"
 
+#include <optional>
 #include <stdexcept>
 
 #include "changes.h"
@@ -18,8 +19,8 @@ namespace {
 
 constexpr GLuint kMatrixUnit = 0, kShadowUnit = 1, kSurfacesUnit = 2, kLitUnit = 3, kDarkUnit = 4,
                  kModesUnit = 5, kOpenUnit = 6, kDepthsUnit = 7, kPartsUnit = 8, kNormalsUnit = 9;
-/// Balls of a radius below this share of the distance from the eye to the target do not darken the floor beneath
-/// them: it would be little, unless they lie on it.
+/// Balls of a radius below this share of the distance from the eye to the target do not darken the floor
+/// beneath them: it would be little, unless they lie on it.
 constexpr float kLeastBall = 0.02f;
 constexpr float kShadowShift = 2.5f;  // of a receiver along its normal, more than the filter reaches [texels]
 constexpr int kMostPixels = 8192;     // pixels
@@ -54,7 +55,11 @@ SceneDescription checked(const SceneDescription& scene) {
 struct Renderer::Implementation {
     explicit Implementation(const SceneDescription& description);
 
+    void begin(const FrameState& frame);
+    void shade();
     DrawTimes draw(const FrameState& frame, Image& image);
+    bool draw_next(const FrameState& frame, Image& before);
+    bool finish(Image& image);
     [[nodiscard]] Views views() const;
     void look_from(const Camera& from);
     void draw_shadow();
@@ -76,6 +81,7 @@ struct Renderer::Implementation {
     GlProgram shadow_program, object_program;
     Stage stage;
     Changes changes;
+    std::optional<PixelBox> shaded;  ///< of the picture: where it was drawn since it was read
 };
 
 namespace {
@@ -210,17 +216,18 @@ void Renderer::Implementation::draw_objects() {
     gl.Disable(GL_DEPTH_TEST);
 }
 
-/// An object that comes to a tile or leaves it has moved, and the tile is drawn again: so a tile that is kept would be
-/// drawn by the same shader now.
+/// An object that comes to a tile or leaves it has moved, and the tile is drawn again: so a tile that is kept
+/// would be drawn by the same shader now.
 void Renderer::Implementation::draw_picture(const TileMask& tiles) {
     TileMask objects = tiles, background = tiles;
     objects.keep(changes.occupied(), true);
     background.keep(changes.occupied(), false);
-    if (!objects.empty()) stage.draw(picture.begin_picture(objects));
     if (!background.empty()) stage.draw_background(picture.begin_picture(background));
+    if (!objects.empty()) stage.draw(picture.begin_picture(objects));
 }
 
-DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) {
+/// Draws the shadow map and the objects' surfaces, which do not ask what has changed in the map.
+void Renderer::Implementation::begin(const FrameState& frame) {
     context.make_current();
     const Camera& from = frame.camera ? *frame.camera : scene.camera;
     if (!looks_somewhere(from)) throw std::invalid_argument(std::string("Renderer::draw: ") + kBadCamera);
@@ -229,19 +236,57 @@ DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) 
     changes.update(frame);
     if (!changes.all()) shadow.keep();
     if (!changes.shadow().empty()) draw_shadow();
-    changes.take(changes.all() ? std::vector<ShadowChange>() : shadow.changed(changes.shadow()));
-    if (changes.all()) shadow.forget();
     if (!changes.objects().empty()) draw_objects();
+}
+
+/// Puts what begin() has drawn in its light: first the tiles where surfaces have been drawn again, and while
+/// the rasteriser does so, what else the shadow map's changes ask for is found.
+void Renderer::Implementation::shade() {
     const float least = kLeastBall * (scene.camera.target - scene.camera.eye).norm();
-    TileMask drawn = changes.picture();
-    if (stage.darken(geometry.volume_balls(shaders::kMaxBalls, least))) drawn.fill();
-    draw_picture(drawn);
+    const bool floor_changed = stage.darken(geometry.volume_balls(shaders::kMaxBalls, least));
+    shadow.read(changes.all() ? std::vector<PixelBox>() : changes.shadow());
+    draw_picture(changes.objects());
+    gl.Flush();
+    changes.take(shadow.changed());
+    if (changes.all()) shadow.forget();
+    TileMask rest = changes.picture();
+    if (floor_changed) rest.fill();
+    shaded = rest.bounds();
+    rest.keep(changes.objects(), false);
+    draw_picture(rest);
+    gl.Flush();
+}
+
+DrawTimes Renderer::Implementation::draw(const FrameState& frame, Image& image) {
+    finish(image);  // of frames drawn before
+    begin(frame);
+    shade();
     DrawTimes times;
     gl.Finish();
     times.drawn = std::chrono::steady_clock::now();
-    picture.read(drawn.bounds(), image);
+    finish(image);
     times.read = std::chrono::steady_clock::now();
     return times;
+}
+
+/// The processor works on the new frame's vertices while the rasteriser shades the one before, and converts
+/// that one's pixels while it shades the new one.
+bool Renderer::Implementation::draw_next(const FrameState& frame, Image& before) {
+    begin(frame);
+    const bool is_one_before = shaded.has_value();
+    if (shaded) picture.read(*shaded);
+    shade();
+    if (is_one_before) picture.give(before);
+    return is_one_before;
+}
+
+bool Renderer::Implementation::finish(Image& image) {
+    if (!shaded) return false;
+    context.make_current();
+    picture.read(*shaded);
+    shaded.reset();
+    picture.give(image);
+    return true;
 }
 
 Renderer::Renderer(const SceneDescription& scene)
@@ -251,6 +296,14 @@ Renderer::~Renderer() = default;
 
 DrawTimes Renderer::draw(const FrameState& frame, Image& image) {
     return implementation_->draw(frame, image);
+}
+
+bool Renderer::draw_next(const FrameState& frame, Image& before) {
+    return implementation_->draw_next(frame, before);
+}
+
+bool Renderer::finish(Image& image) {
+    return implementation_->finish(image);
 }
 
 void Renderer::forget() {

@@ -7,8 +7,8 @@
 namespace render {
 namespace {
 
-/// A box may take in this much more for a run of tiles [pixels]: drawing it costs as much as one more pass over
-/// an object's triangles.
+/// A box may take in this much more for a run of tiles [pixels]: drawing it costs as much as one more pass
+/// over an object's triangles.
 constexpr int kMostWaste = 2048;
 
 float cross(const Eigen::Vector2f& o, const Eigen::Vector2f& a, const Eigen::Vector2f& b) {
@@ -127,22 +127,31 @@ std::vector<TileMask::Columns> TileMask::columns(std::span<const Eigen::Vector2f
     return found;
 }
 
-void TileMask::add(std::span<const Eigen::Vector2f> hull) {
-    add_common(hull, hull);
+TileMask::Cover TileMask::cover(std::span<const Eigen::Vector2f> hull) const {
+    const auto [first, last] = rows(hull);
+    return {first, columns(hull, first, last)};
 }
 
-void TileMask::add_common(std::span<const Eigen::Vector2f> hull, std::span<const Eigen::Vector2f> other) {
-    const auto [first, last] = rows(hull);
-    const auto [first_other, last_other] = rows(other);
-    const int first_row = std::max(first, first_other), last_row = std::min(last, last_other);
-    if (first_row > last_row) return;
-    const std::vector<Columns> a = columns(hull, first_row, last_row),
-                               b = columns(other, first_row, last_row);
-    for (int row = first_row; row <= last_row; ++row) {
-        const auto at = static_cast<std::size_t>(row - first_row);
-        const int left = std::max(a[at].first, b[at].first), right = std::min(a[at].last, b[at].last);
-        if (left <= right) std::fill_n(marked_.begin() + row * columns_ + left, right - left + 1, 1);
+void TileMask::add(const Cover& cover) {
+    for (std::size_t row = 0; row < cover.rows.size(); ++row) {
+        const auto [first, last] = cover.rows[row];
+        const int start = (cover.first_row + static_cast<int>(row)) * columns_ + first;
+        if (first <= last) std::fill_n(marked_.begin() + start, last - first + 1, 1);
     }
+}
+
+void TileMask::add_common(std::span<const Eigen::Vector2f> hull, const Cover& cover) {
+    const auto [first, last] = rows(hull);
+    const int first_row = std::max(first, cover.first_row),
+              last_row = std::min(last, cover.first_row + static_cast<int>(cover.rows.size()) - 1);
+    if (first_row > last_row) return;
+    Cover common{first_row, columns(hull, first_row, last_row)};
+    for (std::size_t row = 0; row < common.rows.size(); ++row) {
+        const Columns& other = cover.rows[row + static_cast<std::size_t>(first_row - cover.first_row)];
+        common.rows[row] = {std::max(common.rows[row].first, other.first),
+                            std::min(common.rows[row].last, other.last)};
+    }
+    add(common);
 }
 
 void TileMask::add(const TileMask& other) {
@@ -172,13 +181,11 @@ void TileMask::add_runs(int row, Columns within, std::vector<PixelBox>& found) c
     }
 }
 
-std::vector<PixelBox> TileMask::touched(std::span<const Eigen::Vector2f> hull) const {
+std::vector<PixelBox> TileMask::touched(const Cover& cover) const {
     std::vector<PixelBox> boxes, runs;
-    const auto [first_row, last_row] = rows(hull);
-    const std::vector<Columns> within = columns(hull, first_row, last_row);
-    for (int row = first_row; row <= last_row; ++row) {
+    for (std::size_t row = 0; row < cover.rows.size(); ++row) {
         runs.clear();
-        add_runs(row, within[static_cast<std::size_t>(row - first_row)], runs);
+        add_runs(cover.first_row + static_cast<int>(row), cover.rows[row], runs);
         for (const PixelBox& run : runs) {
             PixelBox* best = nullptr;
             int least = kMostWaste + 1;

@@ -133,7 +133,8 @@ TEST(Redraw, WhatIsKeptEqualsAWholePictureToTheBitSeenFromWithinTheKitInALowLigh
     expect_that_kept_pictures_equal_whole_ones(scene, 4, 100);
 }
 
-/// Frames from cameras of their own among frames from the scene's: what was kept from elsewhere shows nowhere.
+/// Frames from cameras of their own among frames from the scene's: what was kept from elsewhere shows
+/// nowhere.
 TEST(Redraw, WhatIsKeptEqualsAWholePictureToTheBitFromACameraThatMoves) {
     const render::SceneDescription scene = stage(140, 100, 4, 256);
     render::Renderer keeping(scene), whole(scene);
@@ -155,6 +156,36 @@ TEST(Redraw, WhatIsKeptEqualsAWholePictureToTheBitFromACameraThatMoves) {
             ASSERT_TRUE(kept.rgb == fresh.rgb)
                 << "frame " << k << " of a renderer that has drawn nothing else";
         }
+        change(frame, engine);
+    }
+}
+
+/// From cameras that change, too; now and then pictures are asked for at once.
+TEST(Redraw, FramesDrawnWhileTheOneBeforeIsFinishedEqualWholePicturesToTheBit) {
+    const render::SceneDescription scene = stage(140, 100, 4, 256);
+    render::Renderer ahead(scene), whole(scene);
+    std::mt19937 engine(9);
+    render::FrameState frame = first_frame(engine, scene.objects.size());
+    render::Image before, last, drawn;
+    EXPECT_FALSE(ahead.finish(before)) << "nothing was begun";
+    bool begun = false;
+    for (int k = 0; k < 120; ++k) {
+        if (k % 7 == 0) frame.camera = {{random(engine, -1, 1), 1.4f, 1.5f}, {0, 0.7f, -0.2f}, 50};
+        if (k % 14 == 0) frame.camera.reset();
+        ASSERT_EQ(ahead.draw_next(frame, before), begun) << "frame " << k;
+        if (begun) {
+            ASSERT_TRUE(before.rgb == drawn.rgb) << "frame " << k - 1;
+        }
+        whole.forget();
+        whole.draw(frame, drawn);
+        change(frame, engine);
+        begun = k % 10 != 4;
+        if (begun) continue;
+        ASSERT_TRUE(ahead.finish(last));
+        ASSERT_TRUE(last.rgb == drawn.rgb) << "frame " << k;
+        ahead.draw(frame, last);
+        whole.draw(frame, drawn);
+        ASSERT_TRUE(last.rgb == drawn.rgb) << "after frame " << k;
         change(frame, engine);
     }
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 
 #include "files/output_file.h"
 #include "pictures/motion_blur.h"
@@ -42,19 +43,6 @@ render::Image enlarged(render::Image small, int width, int height) {
             to = std::copy_n(small.rgb.begin() + 3 * (row * small.width + column), 3, to);
         }
     return image;
-}
-
-render::DrawTimes draw_exposed(render::Renderer& renderer, const FrameJob& job, render::Image& image) {
-    LinearMean light;
-    for (const render::FrameState& state : job.earlier) {
-        renderer.draw(state, image);
-        light.add(image);
-    }
-    const render::DrawTimes times = renderer.draw(job.state, image);
-    if (job.earlier.empty()) return times;
-    light.add(image);
-    image = light.mean();
-    return times;
 }
 
 }  // namespace
@@ -120,9 +108,45 @@ void FrameThread::draw_all(const std::vector<render::SceneDescription>& scenes,
     report_.version = renderers.front()->version();
     ready_ = true;
     ready_.notify_one();
+    if (!refuses) return draw_in_turn(*renderers.front());
     FrameJob job;
-    while (jobs_.pop(job))
-        if (!draw_one(*renderers[std::min(job.level, renderers.size() - 1)], job)) return;
+    while (jobs_.pop(job)) draw_one(*renderers[std::min(job.level, renderers.size() - 1)], job);
+}
+
+/// A moment is begun before the picture of the one before it is taken, so that both are drawn at once; unless
+/// nothing is at hand.
+void FrameThread::draw_in_turn(render::Renderer& renderer) {
+    std::optional<Moment> begun;
+    LinearMean light;
+    render::Image image;
+    const auto take = [&] {
+        Picture picture{begun->index, {}};
+        if (begun->exposed) light.add(image);
+        if (!begun->last) return true;
+        picture.image = begun->exposed ? std::exchange(light, {}).mean() : std::exchange(image, {});
+        return pictures_.push(std::move(picture));
+    };
+    const auto draw = [&](const render::FrameState& state) {
+        const Stopwatch watch(report_.draw_s);
+        return renderer.draw_next(state, image);
+    };
+    const auto finish = [&] {
+        const Stopwatch watch(report_.draw_s);
+        return renderer.finish(image);
+    };
+    for (FrameJob job;;) {
+        if (!jobs_.try_pop(job)) {
+            if (finish() && !take()) return;
+            if (!jobs_.pop(job)) return;
+        }
+        const bool exposed = !job.earlier.empty();
+        std::vector<render::FrameState> states = std::move(job.earlier);
+        states.push_back(std::move(job.state));
+        for (std::size_t i = 0; i < states.size(); ++i) {
+            if (draw(states[i]) && !take()) return;  // the pictures are not wanted any more
+            begun = {job.index, exposed, i + 1 == states.size()};
+        }
+    }
 }
 
 void FrameThread::try_out(render::Renderer& renderer, const render::FrameState& rest) {
@@ -141,21 +165,18 @@ void FrameThread::try_out(render::Renderer& renderer, const render::FrameState& 
     if (report_.rest_image.rgb.empty()) report_.rest_image = std::move(image);
 }
 
-/// False: the pictures are not wanted any more.
-bool FrameThread::draw_one(render::Renderer& renderer, FrameJob& job) {
+void FrameThread::draw_one(render::Renderer& renderer, const FrameJob& job) {
     DrawnFrame drawn{job.index, monotonic_ns()};
     if (job.slower_s > 0) std::this_thread::sleep_for(std::chrono::duration<double>(job.slower_s));
     Picture picture{job.index, {}};
-    const render::DrawTimes times = draw_exposed(renderer, job, picture.image);
+    const render::DrawTimes times = renderer.draw(job.state, picture.image);
     drawn.drawn_ns = monotonic_ns(times.drawn);
     drawn.read_ns = monotonic_ns(times.read);
     drawn.in_time = drawn.read_ns <= job.shown_ns;
     report_.draw_s += to_s(drawn.read_ns - drawn.started_ns);
-    if (options_.policy == FramePolicy::wait) return pictures_.push(std::move(picture));
     if (drawn.in_time && !pictures_.try_push(std::move(picture))) ++report_.not_written;
     drawn_ = drawn;
     turn_ = Turn::done;
-    return true;
 }
 
 void FrameThread::write_all() {

@@ -22,12 +22,14 @@ namespace app {
 /// A frame to be drawn.
 struct FrameJob {
     std::uint64_t index = 0;  ///< written as FOLDER/000000.png
-    std::size_t level = 0;    ///< of picture quality: which of the scenes is drawn
+    /// Policy `refuse`: of picture quality, which of the scenes is drawn; else the first is.
+    std::size_t level = 0;
     /// CLOCK_MONOTONIC when it is shown: one that is drawn later is not written.
     std::int64_t shown_ns = std::numeric_limits<std::int64_t>::max();
-    double slower_s = 0;  ///< artificial load: wait this long before drawing [s]
+    double slower_s = 0;  ///< policy `refuse`, artificial load: wait this long before drawing [s]
     render::FrameState state;
-    /// States before it while the shutter is open: the picture is the mean of them and `state` in linear light.
+    /// Policy `wait`: states before it while the shutter is open; the picture is the mean of them and `state`
+    /// in linear light.
     std::vector<render::FrameState> earlier = {};
 };
 
@@ -66,8 +68,9 @@ struct FrameReport {
 
 /// Throws std::runtime_error where ffmpeg cannot be started: before a run that ends with a video.
 void require_ffmpeg();
-/// Encodes the frames, and audio.wav if `sound`, of a staging folder into a file that OutputFile::finish() puts in
-/// place as `video`. The last frame stays for `held` more. Throws std::runtime_error; nothing of it is left then.
+/// Encodes the frames, and audio.wav if `sound`, of a staging folder into a file that OutputFile::finish()
+/// puts in place as `video`. The last frame stays for `held` more. Throws std::runtime_error; nothing of it
+/// is left then.
 [[nodiscard]] std::unique_ptr<OutputFile> make_video(const std::filesystem::path& video, double fps,
                                                      std::size_t held, bool sound,
                                                      const std::filesystem::path& staging);
@@ -105,13 +108,19 @@ private:
         std::uint64_t index = 0;
         render::Image image;
     };
+    /// Of a frame: what is drawn at once.
+    struct Moment {
+        std::uint64_t index = 0;
+        bool exposed = false, last = true;  ///< one of several; of these the last
+    };
     /// Of the one frame at a time of the policy `refuse`: who may touch drawn_.
     enum class Turn : std::uint8_t { free, drawing, done };
 
     void run(const std::function<void()>& work);
     void draw_all(const std::vector<render::SceneDescription>& scenes, const render::FrameState& rest);
     void try_out(render::Renderer& renderer, const render::FrameState& rest);
-    bool draw_one(render::Renderer& renderer, FrameJob& job);
+    void draw_in_turn(render::Renderer& renderer);
+    void draw_one(render::Renderer& renderer, const FrameJob& job);
     void write_all();
     void collect();
     void rethrow();

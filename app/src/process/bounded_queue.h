@@ -34,6 +34,12 @@ public:
         room_.release();
         return true;
     }
+    /// Takes the oldest item if there is one.
+    [[nodiscard]] bool try_pop(Item& item) {
+        if (!filled_.try_acquire()) return false;
+        filled_.release();
+        return pop(item);
+    }
     /// Nothing is added any more; what is there can still be taken. Wakes threads that wait.
     void close() {
         closed_.store(true, std::memory_order_release);
