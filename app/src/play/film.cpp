@@ -54,12 +54,14 @@ render::Image scaled_down(const render::Image& image, int width, int height) {
     return small;
 }
 
-render::Image film_strip(const Film& film, int width) {
+render::Image film_strip(const Film& film, int width, const BeforeFrame& before) {
     render::Image strip;
     render::Image shown;
     const int count = static_cast<int>(film.files.size());
     for (int i = 0; i < count; ++i) {
-        if (const std::optional<render::Image> frame = frame_of(film.files[static_cast<std::size_t>(i)])) {
+        const fs::path& file = film.files[static_cast<std::size_t>(i)];
+        if (before) before(file);
+        if (const std::optional<render::Image> frame = frame_of(file)) {
             const int shown_width = std::min(width, frame->width);
             shown = scaled_down(*frame, shown_width, std::max(1, frame->height * shown_width / frame->width));
         }

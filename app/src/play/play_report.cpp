@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -77,17 +78,21 @@ std::string frames_section(const PlayResult& result, const WaitForFrame& wait_fo
     return text + "</div>\n";
 }
 
-/// The loudest strokes in slow motion: pictures side by side of which the page shows one after the other.
+/// The loudest strokes in slow motion: pictures side by side of which the page shows one after the other. By
+/// time, and each frame as soon as it is written: when the last is, little is left to do.
 std::string films_section(const PlayResult& result, const WaitForFrame& wait_for) {
-    std::string films;
-    for (const Film& film : result.report_films) {
-        wait_for(frame_number(film.files.back()));
-        const render::Image strip = film_strip(film, kFilmWidth);
+    std::multimap<std::uint64_t, std::size_t> by_time;  // of the films, whose order is that of their loudness
+    for (std::size_t i = 0; i < result.report_films.size(); ++i)
+        by_time.emplace(frame_number(result.report_films[i].files.front()), i);
+    std::vector<std::string> figures(result.report_films.size());
+    for (const auto& [start, i] : by_time) {
+        const Film& film = result.report_films[i];
+        const render::Image strip =
+            film_strip(film, kFilmWidth, [&](const fs::path& file) { wait_for(frame_number(file)); });
         if (strip.rgb.empty()) continue;
         const std::vector<std::uint8_t> png = render::encode_png(strip);
         const std::size_t count = film.files.size();
-        fmt::format_to(
-            std::back_inserter(films),
+        figures[i] = fmt::format(
             "<figure><div class=film style=\"--n:{};--s:{:.2f}s;aspect-ratio:{}/{}\"><img alt=\"{} "
             "frames\" src=\"data:image/png;base64,{}\"></div><figcaption>{}</figcaption></figure>\n",
             count, kSlowness * static_cast<double>(count) * film.frame_s,
@@ -95,6 +100,8 @@ std::string films_section(const PlayResult& result, const WaitForFrame& wait_for
             base64({reinterpret_cast<const char*>(png.data()), png.size()}),
             html(frame_caption(result, film.files[film.struck])));
     }
+    std::string films;
+    for (const std::string& figure : figures) films += figure;
     if (films.empty()) return {};
     return fmt::format(
         "<h2>Strokes</h2>\n<p class=note>The loudest ones that lie apart, {} times slower than they were "
