@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <optional>
 
 #include "files/output_file.h"
 #include "pictures/motion_blur.h"
@@ -186,8 +185,14 @@ void FrameThread::write_all() {
     Picture picture;
     while (pictures_.pop(picture)) {
         const Stopwatch watch(report_.write_s);
+        picture.image = enlarged(std::move(picture.image), options_.width, options_.height);
+        {
+            const std::scoped_lock lock(kept_mutex_);
+            if (const auto wanted = kept_.find(picture.index); wanted != kept_.end())
+                wanted->second = picture.image;
+        }
         write_file(options_.folder / fmt::format("{:06}.png", picture.index),
-                   encoder.encode(enlarged(std::move(picture.image), options_.width, options_.height)));
+                   encoder.encode(std::move(picture.image)));
         report_.written.emplace_back(picture.index, monotonic_ns());
         // Not beyond the largest, which says that a thread has failed.
         std::uint64_t before = written_;
@@ -214,6 +219,18 @@ void FrameThread::wait_for(std::uint64_t count) {
     if (options_.policy == FramePolicy::wait)
         for (std::uint64_t now = written_; now < count && now < pushed_; now = written_) written_.wait(now);
     rethrow();
+}
+
+void FrameThread::keep_pictures(const std::vector<std::uint64_t>& frames) {
+    const std::scoped_lock lock(kept_mutex_);
+    for (const std::uint64_t frame : frames) kept_.try_emplace(frame);
+}
+
+std::optional<render::Image> FrameThread::take_picture(std::uint64_t frame) {
+    wait_for(frame + 1);
+    const std::scoped_lock lock(kept_mutex_);
+    const auto kept = kept_.extract(frame);
+    return kept.empty() ? std::nullopt : std::move(kept.mapped());
 }
 
 /// The timing of the frame that was drawn last, unless it was taken already.

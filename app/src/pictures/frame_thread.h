@@ -7,8 +7,10 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -97,6 +99,11 @@ public:
     /// With the policy `wait`: returns when the first `count` frames, or all at hand, are drawn and written.
     void wait_for(std::uint64_t count);
     void drain() { wait_for(pushed_); }
+    /// With the policy `wait`: of these frames, the pictures of those that are not written yet are kept for
+    /// take_picture().
+    void keep_pictures(const std::vector<std::uint64_t>& frames);
+    /// With the policy `wait`: returns when the frame is written, with its picture where that was kept; once.
+    [[nodiscard]] std::optional<render::Image> take_picture(std::uint64_t frame);
     /// Lets the frames at hand be drawn and written. Then take_done() has the rest.
     void finish();
 
@@ -141,6 +148,8 @@ private:
     std::mutex error_mutex_;
     std::exception_ptr error_;
 
+    std::mutex kept_mutex_;
+    std::map<std::uint64_t, std::optional<render::Image>> kept_;  // by frame, where it is wanted
     FrameReport report_;
     std::thread drawing_, writing_;
 };

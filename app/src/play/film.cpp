@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 
 namespace app {
 namespace fs = std::filesystem;
@@ -29,6 +28,10 @@ std::optional<render::Image> frame_of(const fs::path& file) {
 }
 
 }  // namespace
+
+std::uint64_t frame_number(const fs::path& file) {
+    return std::stoull(file.stem().string());
+}
 
 render::Image scaled_down(const render::Image& image, int width, int height) {
     render::Image small{width, height, {}};
@@ -54,14 +57,15 @@ render::Image scaled_down(const render::Image& image, int width, int height) {
     return small;
 }
 
-render::Image film_strip(const Film& film, int width, const BeforeFrame& before) {
+render::Image film_strip(const Film& film, int width, const PictureOf& picture_of) {
     render::Image strip;
     render::Image shown;
     const int count = static_cast<int>(film.files.size());
     for (int i = 0; i < count; ++i) {
         const fs::path& file = film.files[static_cast<std::size_t>(i)];
-        if (before) before(file);
-        if (const std::optional<render::Image> frame = frame_of(file)) {
+        std::optional<render::Image> frame = picture_of(file);
+        if (!frame) frame = frame_of(file);
+        if (frame) {
             const int shown_width = std::min(width, frame->width);
             shown = scaled_down(*frame, shown_width, std::max(1, frame->height * shown_width / frame->width));
         }

@@ -52,21 +52,17 @@ std::string nearest_note(const PlayResult& result, double shown_s) {
 }
 
 /// Frames are named by their number: frame k is shown at t0 + k / fps.
-std::uint64_t frame_number(const fs::path& file) {
-    return std::stoull(file.stem().string());
-}
-
 std::string frame_caption(const PlayResult& result, const fs::path& file) {
     const double shown_s = result.t0_s + static_cast<double>(frame_number(file)) / result.options.fps;
     const std::string note = nearest_note(result, shown_s);
     return fmt::format("{:.3f} s{}{}", shown_s, note.empty() ? "" : ": ", note);
 }
 
-std::string frames_section(const PlayResult& result, const WaitForFrame& wait_for) {
+std::string frames_section(const PlayResult& result, const FrameAtHand& frame_at_hand) {
     if (result.report_frames.empty()) return {};
     std::string text = "<h2>Frames</h2>\n<div class=frames>\n";
     for (const fs::path& file : result.report_frames) {
-        wait_for(frame_number(file));
+        (void)frame_at_hand(frame_number(file));
         const std::string caption = html(frame_caption(result, file));
         fmt::format_to(
             std::back_inserter(text),
@@ -80,15 +76,15 @@ std::string frames_section(const PlayResult& result, const WaitForFrame& wait_fo
 
 /// The loudest strokes in slow motion: pictures side by side of which the page shows one after the other. By
 /// time, and each frame as soon as it is written: when the last is, little is left to do.
-std::string films_section(const PlayResult& result, const WaitForFrame& wait_for) {
+std::string films_section(const PlayResult& result, const FrameAtHand& frame_at_hand) {
     std::multimap<std::uint64_t, std::size_t> by_time;  // of the films, whose order is that of their loudness
     for (std::size_t i = 0; i < result.report_films.size(); ++i)
         by_time.emplace(frame_number(result.report_films[i].files.front()), i);
     std::vector<std::string> figures(result.report_films.size());
     for (const auto& [start, i] : by_time) {
         const Film& film = result.report_films[i];
-        const render::Image strip =
-            film_strip(film, kFilmWidth, [&](const fs::path& file) { wait_for(frame_number(file)); });
+        const render::Image strip = film_strip(
+            film, kFilmWidth, [&](const fs::path& file) { return frame_at_hand(frame_number(file)); });
         if (strip.rgb.empty()) continue;
         const std::vector<std::uint8_t> png = render::encode_png(strip);
         const std::size_t count = film.files.size();
@@ -314,10 +310,10 @@ std::string plot_sections(const PlayResult& result, Plotter& plotter) {
 
 }  // namespace
 
-ReportSections report_sections(const PlayResult& result, Plotter& plotter, const WaitForFrame& wait_for) {
+ReportSections report_sections(const PlayResult& result, Plotter& plotter, const FrameAtHand& frame_at_hand) {
     ReportSections sections{listen_section(result), plot_sections(result, plotter), {}, {}};
-    sections.films = films_section(result, wait_for);
-    sections.frames = frames_section(result, wait_for);
+    sections.films = films_section(result, frame_at_hand);
+    sections.frames = frames_section(result, frame_at_hand);
     return sections;
 }
 

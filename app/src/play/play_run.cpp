@@ -14,6 +14,7 @@
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/checksum.h"
+#include "play/film.h"
 #include "report/json_document.h"
 #include "report/table.h"
 #include "sticks/predictors.h"
@@ -100,10 +101,14 @@ std::vector<Film> films_to_show(const PlayResult& result, const fs::path& folder
 }
 
 /// What the report shows of the frames, some of which may still be drawn.
-void choose_frames(PlayResult& result, const FrameThread& frames, const fs::path& folder) {
+void choose_frames(PlayResult& result, FrameThread& frames, const fs::path& folder) {
     if (result.frames == 0) result.frames = frames.pushed();
     result.report_frames = frames_to_show(result, folder);
     if (!result.options.video) result.report_films = films_to_show(result, folder);
+    std::vector<std::uint64_t> shown;
+    for (const Film& film : result.report_films)
+        for (const fs::path& file : film.files) shown.push_back(frame_number(file));
+    frames.keep_pictures(shown);
 }
 
 /// Waits for the last frames; their measurements.
@@ -276,9 +281,9 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     if (parts.frames) choose_frames(result, *parts.frames, folder.path("frames"));
     Plotter plotter(folder.scratch());
     std::optional<ReportSections> sections;  // made while frames are still drawn
-    const auto wait_for = [&](std::uint64_t k) { parts.frames->wait_for(k + 1); };
-    folder.adorn("",
-                 [&] { stage("report", [&] { sections = report_sections(result, plotter, wait_for); }); });
+    const auto frame_at_hand = [&](std::uint64_t k) { return parts.frames->take_picture(k); };
+    folder.adorn(
+        "", [&] { stage("report", [&] { sections = report_sections(result, plotter, frame_at_hand); }); });
     if (parts.frames) take_frames(result, *parts.frames);
     result.fingerprint =
         fingerprint(parts.frames ? parts.frames->report().rest_image.rgb : std::vector<std::uint8_t>{});

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -125,14 +126,14 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
 /// px,py,pz the centre of the tip [m]; matched_id the note that sounded it, 0 for a missed one.
 [[nodiscard]] std::string format_contacts(const PlayResult& result);
 
-/// Returns when frame k is on disk.
-using WaitForFrame = std::function<void(std::uint64_t k)>;
+/// Returns when frame k is on disk, with its picture if that is at hand.
+using FrameAtHand = std::function<std::optional<render::Image>(std::uint64_t k)>;
 /// The parts of report.html that take time.
 struct ReportSections {
     std::string listen, plots, films, frames;
 };
 [[nodiscard]] ReportSections report_sections(const PlayResult& result, Plotter& plotter,
-                                             const WaitForFrame& wait_for);
+                                             const FrameAtHand& frame_at_hand);
 
 /// Text of report.html: what was played, key figures, pictures, plots and tables on one page that needs
 /// nothing beside it: no script, no font, no address; pictures and plots lie within. Light and dark follow

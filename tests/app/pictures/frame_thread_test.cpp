@@ -42,6 +42,25 @@ TEST(FrameThread, OfflineEveryFrameIsDrawnAndWritten) {
     EXPECT_TRUE(frames.take_done().empty());
 }
 
+/// Frames 0 and 1 are written before.
+TEST(FrameThread, OfflinePicturesThatAreWantedBeforeTheyAreWrittenAreKeptOnce) {
+    const TemporaryFolder folder;
+    FrameThread frames({empty_room(64)}, {}, into(folder, FramePolicy::wait));
+    for (std::uint64_t k = 0; k < 2; ++k) frames.push({.index = k, .state = {}});
+    frames.drain();
+    EXPECT_TRUE(fs::exists(folder.path() / "000001.png")) << "the last one, too, though none follows";
+    frames.keep_pictures({1, 2, 4});
+    for (std::uint64_t k = 2; k < 6; ++k) frames.push({.index = k, .state = {}});
+    EXPECT_FALSE(frames.take_picture(1));
+    const std::optional<render::Image> second = frames.take_picture(2);
+    ASSERT_TRUE(second);
+    EXPECT_EQ(second->rgb, picture(folder.path() / "000002.png").rgb);
+    EXPECT_FALSE(frames.take_picture(2));
+    EXPECT_FALSE(frames.take_picture(3)) << "it was not wanted";
+    EXPECT_TRUE(frames.take_picture(4));
+    frames.finish();
+}
+
 /// The first frame is held up until the second has been asked for.
 TEST(FrameThread, InRealTimeABusyThreadRefusesAndALateFrameIsDropped) {
     const TemporaryFolder folder;

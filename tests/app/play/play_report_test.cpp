@@ -20,8 +20,8 @@ namespace fs = std::filesystem;
 std::string report_of(const app::PlayResult& result) {
     const TemporaryFolder scratch;
     app::Plotter plotter(scratch.path());
-    std::string page =
-        app::format_report(result, app::report_sections(result, plotter, [](std::uint64_t) {}));
+    std::string page = app::format_report(
+        result, app::report_sections(result, plotter, [](std::uint64_t) { return std::nullopt; }));
     EXPECT_EQ(plotter.failure(), "");
     return page;
 }
@@ -93,7 +93,8 @@ TEST(Report, AFilmIsItsFramesSideBySideWithABarBelow) {
         const std::vector<std::uint8_t> png = render::encode_png(frame);
         if (i != 1) app::write_file(film.files.back(), png);
     }
-    const render::Image strip = app::film_strip(film, 4);
+    const auto none = [](const std::filesystem::path&) { return std::nullopt; };
+    const render::Image strip = app::film_strip(film, 4, none);
     ASSERT_EQ(strip.width, 16);
     ASSERT_EQ(strip.height, 2 + 4);
     const auto pixel = [&](int x, int y) {
@@ -223,8 +224,8 @@ TEST(Report, WithoutGnuplotIsAPageWithoutPlotsAndBeforeARunSaysWhatToInstall) {
     const Variable path("PATH", empty.path().string());
     app::Plotter plotter(empty.path());
     const app::PlayResult result = sample_play_result();
-    const std::string page =
-        app::format_report(result, app::report_sections(result, plotter, [](std::uint64_t) {}));
+    const std::string page = app::format_report(
+        result, app::report_sections(result, plotter, [](std::uint64_t) { return std::nullopt; }));
     EXPECT_TRUE(holds(plotter.failure(), "gnuplot")) << plotter.failure();
     EXPECT_TRUE(holds(page, "could not be drawn"));
     EXPECT_TRUE(page.ends_with("</html>\n"));
