@@ -107,6 +107,13 @@ TEST(Report, AFilmIsItsFramesSideBySideWithABarBelow) {
     EXPECT_EQ(pixel(15, 1), 170);
     EXPECT_NE(pixel(0, 2), pixel(1, 2)) << "where the first frame is in the film";
     EXPECT_EQ(pixel(8 + 2, 2), 43) << "the frame that is struck, in the colour of notes";
+    const render::Image kept = app::film_strip(film, 4, [](const std::filesystem::path& file) {
+        const bool second = app::frame_number(file) == 1;
+        return second ? std::optional(render::Image{8, 4, std::vector<std::uint8_t>(8 * 4 * 3, 99)})
+                      : std::nullopt;
+    });
+    EXPECT_EQ(kept.rgb[3 * 4], 99) << "a picture that is at hand is not read";
+    EXPECT_EQ(kept.rgb[3 * 8], 121);
     app::PlayResult result = sample_play_result();
     result.report_films = {film};
     EXPECT_TRUE(holds(report_of(result), "<div class=film style=\"--n:4;--s:0.80s;aspect-ratio:8/8\">"));

@@ -33,8 +33,11 @@ TEST(BoundedQueue, RefusesWhatThereIsNoRoomFor) {
     EXPECT_TRUE(queue.try_push(4));
     EXPECT_TRUE(queue.pop(item));
     EXPECT_EQ(item, 2);
-    EXPECT_TRUE(queue.pop(item));
+    EXPECT_TRUE(queue.try_pop(item));
     EXPECT_EQ(item, 4);
+    EXPECT_FALSE(queue.try_pop(item)) << "it is empty";
+    queue.close();
+    EXPECT_FALSE(queue.try_pop(item)) << "and closed";
 }
 
 TEST(BoundedQueue, ClosedItGivesWhatItHasAndTakesNoMore) {
