@@ -80,7 +80,8 @@ std::vector<fs::path> frames_to_show(const PlayResult& result, const fs::path& f
     return files;
 }
 
-/// The loudest strokes: about 30 frames a second from a sixth of a second before the note to a third after it.
+/// The loudest strokes: about 30 frames a second from a sixth of a second before the note to a third after
+/// it.
 std::vector<Film> films_to_show(const PlayResult& result, const fs::path& folder) {
     constexpr std::size_t kFilms = 3;
     constexpr long kBefore = 5, kAfter = 10;

@@ -116,9 +116,9 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
 ///   id,stick,instrument,onset_s,speed_mps,px,py,pz,scheduled_at_s,outcome,moves,decided_at_s,model
 /// stick and instrument by name; onset_s, scheduled_at_s and decided_at_s on the trace's clock [s]; px,py,pz
 /// the struck point on the surface [m], world; outcome released|cancelled; model the predictor that played
-/// it. Behind them what pedals, hands and tips played: no stick (a tip's choke: its own), the middle of the instrument,
-/// model pedal, foot, choke or tip.
-/// Throws std::logic_error for a strike that is still pending: every note of a finished run was decided.
+/// it. Behind them what pedals, hands and tips played: no stick (a tip's choke: its own), the middle of the
+/// instrument, model pedal, foot, choke or tip. Throws std::logic_error for a strike that is still pending:
+/// every note of a finished run was decided.
 [[nodiscard]] std::string format_events(const PlayResult& result);
 
 /// Text of contacts.csv: a row for every true contact, by time. Columns
@@ -137,8 +137,8 @@ struct ReportSections {
 
 /// Text of report.html: what was played, key figures, pictures, plots and tables on one page that needs
 /// nothing beside it: no script, no font, no address; pictures and plots lie within. Light and dark follow
-/// the reader's system. All names are escaped. The frames of `report_frames` are read from disk. A pure function
-/// of the result without its times and workers, of the frames and of gnuplot's version. Throws
+/// the reader's system. All names are escaped. The frames of `report_frames` are read from disk. A pure
+/// function of the result without its times and workers, of the frames and of gnuplot's version. Throws
 /// std::runtime_error without a frame. In play_report.cpp.
 [[nodiscard]] std::string format_report(const PlayResult& result, const ReportSections& sections);
 

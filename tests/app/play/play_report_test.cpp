@@ -81,7 +81,8 @@ TEST(Report, ShowsTheVideoWhereItLies) {
     EXPECT_TRUE(holds(report_of(result), "<video controls preload=metadata src=\"../my%20take.mp4\">"));
 }
 
-/// Frames of 8 x 4 pixels, the second one missing: four pictures side by side, each half as wide, with a bar of four rows.
+/// Frames of 8 x 4 pixels, the second one missing: four pictures side by side, each half as wide, with a bar
+/// of four rows.
 TEST(Report, AFilmIsItsFramesSideBySideWithABarBelow) {
     const TemporaryFolder here;
     app::Film film{{}, 2, 1.0 / 30};
@@ -120,8 +121,8 @@ TEST(Report, AFilmIsItsFramesSideBySideWithABarBelow) {
 }
 TEST(Report, EveryPlotIsAWholeSvgWithALabelAndFollowsThePagesColours) {
     const std::string page = report_of(sample_play_result());
-    // One row of timeline, two of timing, the leads, the sound and its spectrogram; every mark in the legend and the symbols
-    // are more.
+    // One row of timeline, two of timing, the leads, the sound and its spectrogram; every mark in the legend
+    // and the symbols are more.
     EXPECT_EQ(count(page, "<svg role=\"img\" aria-label=\""), 6U);
     EXPECT_EQ(count(page, "<svg"), count(page, "</svg>"));
     EXPECT_EQ(count(page, "<g>") + count(page, "<g "), count(page, "</g>"));
