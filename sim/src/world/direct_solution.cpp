@@ -37,6 +37,7 @@ Eigen::Vector3d IslandSolver::in_world(const ContactRows& c, const Eigen::Vector
 // Prepares a direct solution; false: a factorisation takes more than so many multiply-adds. Stiff springs are solved directly
 // all the same, with sweeps over the contacts.
 bool IslandSolver::begin_direct(double most, bool must) {
+    if (!must && is_too_dear(most) && springs_are_soft()) return false;
     sizes_.clear();
     std::uint32_t at = 0, wide = 0;
     for (BodyRows& rows : rows_of_) {
@@ -73,6 +74,23 @@ bool IslandSolver::begin_direct(double most, bool must) {
     wide_rows_.resize(wide);
     direct_contacts_.assign(contacts_.size(), {});
     return true;
+}
+
+// Whether a factorisation with the contacts certainly takes more, see BlockCholesky::least_cost: told early.
+bool IslandSolver::is_too_dear(double most) const {
+    const std::vector<int>& of_island = island_->manifolds;
+    if (found_again_ || of_island.size() < kLeastDivided) return false;
+    double cost = 0;
+    std::uint64_t last = ~std::uint64_t{0};
+    for (std::size_t i = 0; i < of_island.size() && cost <= 2 * most; ++i) {
+        const Manifold& m = (*manifolds_)[static_cast<std::size_t>(of_island[i])];
+        if (m.b >= kFirstPlane || local(m.a) < 0 || local(m.b) < 0 || std::exchange(last, m.key()) == m.key())
+            continue;
+        const double a = 6 + rows_of_[static_cast<std::size_t>(local(m.a))].body->kind->modes,
+                     b = 6 + rows_of_[static_cast<std::size_t>(local(m.b))].body->kind->modes;
+        cost += a * b * (a + b) / 2;
+    }
+    return cost > 2 * most;
 }
 
 // The rows in double precision, without padding. Over the first half of a substep's impulses modes yield as they will to

@@ -53,7 +53,7 @@ void IslandBlocks::add_block(std::uint32_t slab, std::uint32_t slabs) {
     blocks_.push_back(block);
 }
 
-void IslandBlocks::divide(std::span<const Body> bodies, std::span<const int> manifolds,
+void IslandBlocks::divide(Crew& crew, std::span<const Body> bodies, std::span<const int> manifolds,
                           const std::vector<Manifold>& all, const std::vector<int>& local) {
     set_slabs(bodies);
     const auto count = static_cast<std::uint32_t>(slabs());
@@ -82,10 +82,11 @@ void IslandBlocks::divide(std::span<const Body> bodies, std::span<const int> man
     };
     first_manifold_.assign(blocks_.size() + 1, 0);
     block_of_.resize(manifolds.size());
-    for (std::size_t i = 0; i < manifolds.size(); ++i) {
-        block_of_[i] = block_of(all[static_cast<std::size_t>(manifolds[i])]);
-        ++first_manifold_[block_of_[i] + 1];
-    }
+    crew.each(manifolds.size(), 128, [&](int, std::size_t first, std::size_t last) {
+        for (std::size_t i = first; i < last; ++i)
+            block_of_[i] = block_of(all[static_cast<std::size_t>(manifolds[i])]);
+    });
+    for (const std::uint32_t block : block_of_) ++first_manifold_[block + 1];
     if (count > 2 && first_manifold_.back() == 0) {
         blocks_.pop_back(), first_manifold_.pop_back();
         for (std::uint32_t s = 0; s < count; ++s) --blocks_of_[s];
@@ -98,23 +99,26 @@ void IslandBlocks::divide(std::span<const Body> bodies, std::span<const int> man
 }
 
 // Blocks of a slab that are done when this one's turn comes.
-std::uint32_t IslandBlocks::turn_of(const Block& block, std::uint32_t slab, std::uint32_t sweep) const {
+std::uint32_t IslandBlocks::turn_of(const Block& block, std::uint32_t slab, const Phase& phase,
+                                    bool of_bodies) const {
     const std::uint32_t in_all = blocks_of_[slab];
-    const std::uint32_t before = block.slabs > 2      ? in_all - 1
+    const std::uint32_t before = of_bodies            ? 0
+                                 : block.slabs > 2    ? in_all - 1
                                  : slab == block.slab ? block.before
                                                       : block.before_next;
-    return sweep * in_all + before;
+    return phase.of_contacts * in_all + phase.of_bodies + before;
 }
 
-void IslandBlocks::begin(const Block& block, std::uint32_t sweep) const {
+void IslandBlocks::begin(const Block& block, const Phase& phase, bool of_bodies) const {
     for (std::uint32_t s = block.slab; s < block.slab + block.slabs; ++s)
-        for (ShortWait wait; done_[s].value.load(std::memory_order_acquire) != turn_of(block, s, sweep);)
+        for (ShortWait wait;
+             done_[s].value.load(std::memory_order_acquire) != turn_of(block, s, phase, of_bodies);)
             (void)wait.again();
 }
 
-void IslandBlocks::end(const Block& block, std::uint32_t sweep) {
+void IslandBlocks::end(const Block& block, const Phase& phase, bool of_bodies) {
     for (std::uint32_t s = block.slab; s < block.slab + block.slabs; ++s)
-        done_[s].value.store(turn_of(block, s, sweep) + 1, std::memory_order_release);
+        done_[s].value.store(turn_of(block, s, phase, of_bodies) + 1, std::memory_order_release);
 }
 
 }  // namespace sim

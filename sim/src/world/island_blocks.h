@@ -35,7 +35,7 @@ public:
 
     /// Divides an island of the given bodies and manifolds (ascending by key; indices into `all`). local: each body's place
     /// among `bodies`, or -1 if it does not move.
-    void divide(std::span<const Body> bodies, std::span<const int> manifolds,
+    void divide(Crew& crew, std::span<const Body> bodies, std::span<const int> manifolds,
                 const std::vector<Manifold>& all, const std::vector<int>& local);
 
     [[nodiscard]] std::size_t size() const noexcept { return blocks_.size(); }
@@ -55,35 +55,55 @@ public:
         blocks_[block].last = static_cast<std::uint32_t>(last);
     }
 
-    /// Calls visit(sweep, block) for so many sweeps, so that what it does to the bodies of slabs has the order above.
-    template <typename Visit>
-    void sweep(Crew& crew, std::uint32_t sweeps, Visit visit) {
+    /// Calls visit(phase, block) for phases 0 to count: for every block in the order above, or, where of_bodies(phase), for
+    /// every slab, as a block of that slab alone. To the bodies of a slab all of that is done in this order, so the result is
+    /// that of one thread; no thread waits for the end of a phase, only for what shares a slab with its block.
+    template <typename OfBodies, typename Visit>
+    void run(Crew& crew, std::uint32_t count, OfBodies of_bodies, Visit visit) {
         if (crew.size() == 1 || blocks_.size() == 1) {
-            for (std::uint32_t s = 0; s < sweeps; ++s)
-                for (const Block& block : blocks_) visit(s, block);
+            for (std::uint32_t p = 0; p < count; ++p)
+                for (std::size_t b = 0; b < blocks_in(of_bodies(p)); ++b) visit(p, blocks_[b]);
             return;
         }
         for (std::size_t s = 0; s < slabs(); ++s) done_[s].value.store(0, std::memory_order_relaxed);
-        const auto count = static_cast<std::uint32_t>(blocks_.size());
-        std::atomic<std::uint32_t> next = 0;
+        std::size_t sum = 0;
+        for (std::uint32_t p = 0; p < count; ++p) sum += blocks_in(of_bodies(p));
+        std::atomic<std::size_t> next = 0;
         // Taken in order: what a taken block waits for has been taken, too.
         crew.work([&](int) {
-            for (std::uint32_t at; (at = next.fetch_add(1, std::memory_order_relaxed)) < sweeps * count;) {
-                const Block& block = blocks_[at % count];
-                begin(block, at / count);
-                visit(at / count, block);
-                end(block, at / count);
+            Phase phase;
+            for (std::size_t at; (at = next.fetch_add(1, std::memory_order_relaxed)) < sum;) {
+                while (at >= phase.first + blocks_in(of_bodies(phase.number)))
+                    pass(phase, of_bodies(phase.number));
+                const Block& block = blocks_[at - phase.first];
+                const bool bodies = of_bodies(phase.number);
+                begin(block, phase, bodies);
+                visit(phase.number, block);
+                end(block, phase, bodies);
             }
         });
     }
 
 private:
     struct alignas(64) Done {
-        std::atomic<std::uint32_t> value = 0;  // blocks of a slab, all sweeps counted
+        std::atomic<std::uint32_t> value = 0;  // blocks of a slab, in all phases
     };
-    [[nodiscard]] std::uint32_t turn_of(const Block& block, std::uint32_t slab, std::uint32_t sweep) const;
-    void begin(const Block& block, std::uint32_t sweep) const;
-    void end(const Block& block, std::uint32_t sweep);
+    struct Phase {
+        std::uint32_t number = 0, of_contacts = 0, of_bodies = 0;  // phases before it
+        std::size_t first = 0;                                     // blocks in these
+    };
+    // The interiors come first: one a slab.
+    [[nodiscard]] std::size_t blocks_in(bool of_bodies) const noexcept {
+        return of_bodies ? slabs() : blocks_.size();
+    }
+    void pass(Phase& phase, bool of_bodies) const noexcept {
+        phase.first += blocks_in(of_bodies);
+        ++phase.number, ++(of_bodies ? phase.of_bodies : phase.of_contacts);
+    }
+    [[nodiscard]] std::uint32_t turn_of(const Block& block, std::uint32_t slab, const Phase& phase,
+                                        bool of_bodies) const;
+    void begin(const Block& block, const Phase& phase, bool of_bodies) const;
+    void end(const Block& block, const Phase& phase, bool of_bodies);
     void set_slabs(std::span<const Body> bodies);
     void add_block(std::uint32_t slab, std::uint32_t slabs);
 

@@ -13,19 +13,24 @@ constexpr double kMostGained = 1e-7;  // energy in a step, of the motion's and o
 
 // What a solution is measured by, and taken back to.
 void IslandSolver::note_start() {
-    before_.resize(bodies_->size());
+    before_.resize(bodies_->size()), measures_.resize(rows_of_.size());
     outside_before_ = outside_, limited_before_ = limited_;
-    energy_before_ = energy();
-    fastest_ = scale_ = 0, smallest_ = 1;
-    for (const int id : island_->bodies) {
-        const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
-        Before& before = before_[static_cast<std::size_t>(id)];
+    each_body([this](BodyRows& rows) {
+        const MovingBody& body = *rows.body;
+        Before& before = before_[static_cast<std::size_t>(&body - bodies_->data())];
         before.state = body.state, before.at_limit = body.at_limit;
-        fastest_ = std::max(fastest_, body.state.velocity.norm());
-        smallest_ = std::min(smallest_, 2 * body.kind->half_box.minCoeff());
-        scale_ += body.kind->mass.mass * (body.state.velocity.squaredNorm() / 2 +
-                                          settings_->gravity.norm() * body.kind->half_box.minCoeff());
+        const double size = body.kind->half_box.minCoeff();
+        measures_[static_cast<std::size_t>(&rows - rows_of_.data())] = {
+            energy_of(body),
+            body.kind->mass.mass * (body.state.velocity.squaredNorm() / 2 + settings_->gravity.norm() * size),
+            body.state.velocity.norm(), 2 * size};
+    });
+    energy_before_ = fastest_ = scale_ = 0, smallest_ = 1;
+    for (const Measure& m : measures_) {
+        energy_before_ += m.energy, scale_ += m.scale;
+        fastest_ = std::max(fastest_, m.speed), smallest_ = std::min(smallest_, m.size);
     }
+    energy_before_ = with_springs(energy_before_);
 }
 
 void IslandSolver::go_back() {
@@ -103,19 +108,28 @@ void IslandSolver::calm() {
     }
 }
 
-// Kinetic and potential, with that of modes and of springs [J].
-double IslandSolver::energy() const {
+// Kinetic and potential, with that of modes [J].
+double IslandSolver::energy_of(const MovingBody& body) const {
+    const WorldBodyState& s = body.state;
+    const Eigen::Vector3d own = s.orientation.conjugate() * s.angular_momentum;
+    const double mass = body.kind->mass.mass;
+    return mass / 2 * s.velocity.squaredNorm() +
+           own.cwiseAbs2().cwiseQuotient(body.kind->mass.inertia).sum() / 2 -
+           mass * body.gravity_scale * settings_->gravity.dot(s.position) +
+           (s.q_dot.squaredNorm() + s.q.cwiseProduct(body.kind->basis.omega).squaredNorm()) / 2;
+}
+
+// With that of springs [J]; summed in the order of ids.
+double IslandSolver::energy() {
+    each_body([this](BodyRows& rows) {
+        measures_[static_cast<std::size_t>(&rows - rows_of_.data())].energy = energy_of(*rows.body);
+    });
     double sum = 0;
-    for (const int id : island_->bodies) {
-        const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
-        const WorldBodyState& s = body.state;
-        const Eigen::Vector3d own = s.orientation.conjugate() * s.angular_momentum;
-        const double mass = body.kind->mass.mass;
-        sum += mass / 2 * s.velocity.squaredNorm() +
-               own.cwiseAbs2().cwiseQuotient(body.kind->mass.inertia).sum() / 2 -
-               mass * body.gravity_scale * settings_->gravity.dot(s.position) +
-               (s.q_dot.squaredNorm() + s.q.cwiseProduct(body.kind->basis.omega).squaredNorm()) / 2;
-    }
+    for (const Measure& m : measures_) sum += m.energy;
+    return with_springs(sum);
+}
+
+double IslandSolver::with_springs(double sum) const {
     auto end = [this](int id, const Eigen::Vector3d& rest) -> Eigen::Vector3d {
         if (id < 0) return rest;
         const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];

@@ -42,7 +42,7 @@ void IslandSolver::strike() {
 bool IslandSolver::strike_at_start() {
     if (!any_bounce_) return true;
     set_forces();
-    load_velocities();
+    each_body([this](BodyRows& rows) { load_velocities(rows); });
     const double soon = settings_->dt / settings_->substeps / (1 << kStrikeLevel);
     for (int pass = 0; pass < kPasses && find_hits(); ++pass) {
         if (level_ < kStrikeLevel && hits_.back().time > soon) return false;
@@ -105,9 +105,9 @@ void IslandSolver::list_contacts() {
     each([this](std::size_t body, std::size_t) { ++first_contact_[body + 1]; });
     for (std::size_t i = 1; i < first_contact_.size(); ++i) first_contact_[i] += first_contact_[i - 1];
     contacts_of_.resize(first_contact_.back());
-    next_turn_.assign(rows_of_.size(), 0);
+    next_of_.assign(rows_of_.size(), 0);
     each([this](std::size_t body, std::size_t i) {
-        contacts_of_[first_contact_[body] + static_cast<std::size_t>(next_turn_[body]++)] = i;
+        contacts_of_[first_contact_[body] + static_cast<std::size_t>(next_of_[body]++)] = i;
     });
 }
 
@@ -413,36 +413,35 @@ void IslandSolver::write_leg(const BodyRows& rows, const Eigen::Vector3d& veloci
 }
 
 // Gaps of bodies that impacts took on close in what is left of the substep.
-void IslandSolver::stretch_gaps() {
-    for (ContactRows& c : contacts_) {
-        double gone = 0;
-        for (const Side& side : c.side)
-            if (side.body >= 0) gone = std::max(gone, rows_of_[static_cast<std::size_t>(side.body)].time);
-        c.now += static_cast<float>(gone) * c.drift[0];
-        if (gone > 0 && c.now > 0) c.now *= static_cast<float>(h_ / std::max(h_ - gone, 1e-6 * h_));
-    }
+void IslandSolver::stretch_gap(ContactRows& c) const {
+    double gone = 0;
+    for (const Side& side : c.side)
+        if (side.body >= 0) gone = std::max(gone, rows_of_[static_cast<std::size_t>(side.body)].time);
+    c.now += static_cast<float>(gone) * c.drift[0];
+    if (gone > 0 && c.now > 0) c.now *= static_cast<float>(h_ / std::max(h_ - gone, 1e-6 * h_));
 }
 
 // Frames follow bodies that turned, with what is written in them: rows, and the way so far. Rows of contacts that rebound
 // follow the place where they act, too.
-void IslandSolver::turn_frames() {
-    turned_.assign(rows_of_.size(), 0);
-    std::atomic<bool> any = false;
-    each_body([&](BodyRows& rows) {
+void IslandSolver::turn_frames(const IslandBlocks::Block& slab) {
+    for (const std::uint32_t body : blocks_.bodies_of(slab.slab)) {
+        BodyRows& rows = rows_of_[body];
+        rows.turned = false;
         const Eigen::Vector3d& root = rows.body->kind->root_inertia;
-        if (root.maxCoeff() - root.minCoeff() < 1e-6 * root.maxCoeff()) return;  // alike in all frames
+        if (root.maxCoeff() - root.minCoeff() < 1e-6 * root.maxCoeff()) continue;  // alike in all frames
         const Eigen::Matrix3d now = rows.body->state.orientation.toRotationMatrix();
-        if ((now - rows.frame).squaredNorm() < 2 * kFrameTurn * kFrameTurn) return;
-        turned_[static_cast<std::size_t>(&rows - rows_of_.data())] = 1;
-        any.store(true, std::memory_order_relaxed);
+        if ((now - rows.frame).squaredNorm() < 2 * kFrameTurn * kFrameTurn) continue;
+        rows.turned = true;
         turn_frame(rows, now);
-    });
+    }
+}
+
+void IslandSolver::turn_rows(const IslandBlocks::Block& block) {
     auto has_turned = [this](const Side& side) {
-        return side.body >= 0 && turned_[static_cast<std::size_t>(side.body)] != 0;
+        return side.body >= 0 && rows_of_[static_cast<std::size_t>(side.body)].turned;
     };
-    each_contact([&](ContactRows& c) {
-        if (follows(c) || (any && (has_turned(c.side[0]) || has_turned(c.side[1])))) write_contact(c);
-    });
+    for (ContactRows& c : contacts_in(block))
+        if (follows(c) || has_turned(c.side[0]) || has_turned(c.side[1])) write_contact(c);
 }
 
 void IslandSolver::turn_frame(BodyRows& rows, const Eigen::Matrix3d& frame) {

@@ -43,44 +43,18 @@ void IslandSolver::begin(const Island& island) {
         rows_of_[i].body = &body, rows_of_[i].offset = offset;
         offset += static_cast<std::uint32_t>(body.kind->width);
     }
-    each_body([this](BodyRows& rows) { begin_body(rows); });
+    places_.resize(rows_of_.size());
+    each_body([this](BodyRows& rows) {
+        begin_body(rows);
+        places_[static_cast<std::size_t>(&rows - rows_of_.data())] = {
+            rows.place, 2 * rows.body->kind->half_box.maxCoeff()};
+    });
     y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
     std::fill_n(moved_.data(), offset, 0.f);
 
     found_again_ = false, fresh_ = true;
     note_places();
-    std::size_t triples = 0, floats = 0;
-    auto width_of = [this](int id) {
-        return id >= 0 && id < kFirstPlane && local(id) >= 0
-                   ? static_cast<std::size_t>((*bodies_)[static_cast<std::size_t>(id)].kind->width)
-                   : 0;
-    };
-    for (const int m : island.manifolds) {
-        const Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
-        triples += static_cast<std::size_t>(manifold.count);
-        floats +=
-            static_cast<std::size_t>(manifold.count) * 3 * (width_of(manifold.a) + width_of(manifold.b));
-    }
-    for (const int c : island.constraints) {
-        const PointConstraint& held = (*constraints_)[static_cast<std::size_t>(c)].definition;
-        floats += static_cast<std::size_t>((*constraints_)[static_cast<std::size_t>(c)].count) * 3 *
-                  (width_of(held.body_a) + width_of(held.body_b));
-    }
-    jacobians_.resize(floats);
-    jacobians_used_ = 0;
-    contacts_.clear(), springs_.clear(), impacts_.clear();
-    any_told_ = direct_ = any_bounce_ = any_struck_ = false;
-    first_contact_.clear();
-    first_crossed_ = crossed_.size();
-    contacts_.reserve(triples);
-    for (auto* list : {&striking_, &struck_}) list->reserve(triples);
-    hits_.reserve(triples), contacts_of_.reserve(2 * triples);
-    first_contact_.reserve(rows_of_.size() + 1), hit_bodies_.reserve(rows_of_.size());
-    stiffen(island);
-    divide(island);
-    for (const Turn& turn : by_turn_)
-        (void)reserve_contact(*turn.manifold, turn.manifold->points[static_cast<std::size_t>(turn.point)]);
-    each_contact([this](ContactRows& c) { fill_contact(c); });
+    add_contacts(island);
     for (const int c : island.constraints) {
         HeldConstraint& held = (*constraints_)[static_cast<std::size_t>(c)];
         for (int i = 0; i < held.count; ++i) add_spring(held, held.points[static_cast<std::size_t>(i)]);
@@ -106,20 +80,71 @@ void IslandSolver::begin_body(BodyRows& rows) {
     path.inertia = body.kind->mass.inertia;
 }
 
-// The order of the contacts' rows.
-void IslandSolver::divide(const Island& island) {
-    places_.clear();
-    for (const BodyRows& rows : rows_of_)
-        places_.push_back({rows.place, 2 * rows.body->kind->half_box.maxCoeff()});
-    blocks_.divide(places_, island.manifolds, *manifolds_, local_);
-    by_turn_.clear();
-    next_turn_.assign(rows_of_.size(), 0);
-    for (std::size_t b = 0; b < blocks_.size(); ++b) {
-        const std::size_t first = by_turn_.size();
-        in_turns(blocks_.manifolds_of(b));
-        blocks_.set_contacts(b, first, by_turn_.size());
+// What a block's contacts need.
+IslandSolver::Part IslandSolver::part_of(std::span<const int> manifolds) const {
+    Part part;
+    for (const int m : manifolds) {
+        const Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        std::size_t width = 0;
+        for (const int id : {manifold.a, manifold.b})
+            if (id < kFirstPlane && local(id) >= 0)
+                width += static_cast<std::size_t>(rows_of_[static_cast<std::size_t>(local(id))].width);
+        const auto count = static_cast<std::size_t>(manifold.count);
+        part.contacts += count, part.floats += 3 * count * width;
+        part.impacts = part.impacts || manifold.points[0].begins >= 0;
     }
+    return part;
+}
+
+// The contacts' rows, in the order of blocks.
+void IslandSolver::add_contacts(const Island& island) {
+    blocks_.divide(crew(), places_, island.manifolds, *manifolds_, local_);
     sums_.assign(blocks_.slabs(), {});
+    parts_.resize(blocks_.size());
+    crew().each(parts_.size(), 1, [this](int, std::size_t first, std::size_t last) {
+        for (std::size_t b = first; b < last; ++b) parts_[b] = part_of(blocks_.manifolds_of(b));
+    });
+    Part all;
+    for (std::size_t b = 0; b < parts_.size(); ++b) {
+        Part& part = parts_[b];
+        part.contacts = std::exchange(all.contacts, all.contacts + part.contacts);
+        part.floats = std::exchange(all.floats, all.floats + part.floats);
+        all.impacts = all.impacts || part.impacts;
+        blocks_.set_contacts(b, part.contacts, all.contacts);
+    }
+    std::size_t floats = all.floats;
+    for (const int c : island.constraints) {
+        const HeldConstraint& held = (*constraints_)[static_cast<std::size_t>(c)];
+        for (const int id : {held.definition.body_a, held.definition.body_b})
+            if (id >= 0 && local(id) >= 0)
+                floats += 3 * static_cast<std::size_t>(held.count *
+                                                       rows_of_[static_cast<std::size_t>(local(id))].width);
+    }
+    jacobians_.resize(floats);
+    jacobians_used_ = all.floats;
+    springs_.clear(), impacts_.clear(), first_contact_.clear();
+    any_told_ = direct_ = any_bounce_ = any_struck_ = any_rebound_ = any_emerging_ = false;
+    first_crossed_ = crossed_.size();
+    contacts_.resize(all.contacts);
+    for (auto* list : {&striking_, &struck_}) list->reserve(all.contacts);
+    hits_.reserve(all.contacts), contacts_of_.reserve(2 * all.contacts);
+    first_contact_.reserve(rows_of_.size() + 1), hit_bodies_.reserve(rows_of_.size());
+    if (all.impacts) stiffen(island);
+    windows_.resize(static_cast<std::size_t>(crew().size()));
+    for (Window& window : windows_) window.next_turn.assign(rows_of_.size(), 0);
+    crew().each(parts_.size(), 1, [this](int thread, std::size_t first, std::size_t last) {
+        for (std::size_t b = first; b < last; ++b)
+            fill_part(blocks_.manifolds_of(b), windows_[static_cast<std::size_t>(thread)], parts_[b]);
+    });
+    for (const Part& part : parts_) note(part);
+    for (std::size_t i = 0; all.impacts && i < contacts_.size(); ++i)
+        if (contacts_[i].firm) impacts_.push_back(i);
+}
+
+void IslandSolver::note(const Part& part) noexcept {
+    any_bounce_ = any_bounce_ || part.bounces;
+    any_rebound_ = any_rebound_ || part.rebounds;
+    any_emerging_ = any_emerging_ || part.emerging;
 }
 
 // A body that meets another so fast that its modes would yield beyond what they describe carries as if it were rigid in this step:
@@ -146,38 +171,43 @@ void IslandSolver::stiffen(const Island& island) {
     }
 }
 
-void IslandSolver::in_turns(std::span<const int> manifolds) {
-    window_.clear();
+// A block's contacts, by turns within windows.
+void IslandSolver::fill_part(std::span<const int> manifolds, Window& window, Part& part) {
+    auto turns_of = [&](int id) -> int* {
+        if (id >= kFirstPlane || local(id) < 0) return nullptr;
+        return &window.next_turn[static_cast<std::size_t>(local(id))];
+    };
     for (const int m : manifolds) {
         Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        int* const next[] = {turns_of(manifold.a), turns_of(manifold.b)};
         for (int i = 0; i < manifold.count; ++i) {
-            if (window_.size() == kWindow) flush_window();
+            if (window.contacts.size() == kWindow) flush(window, part);
             int turn = 0;
-            for (const int id : {manifold.a, manifold.b})
-                if (id < kFirstPlane && local(id) >= 0)
-                    turn = std::max(turn, next_turn_[static_cast<std::size_t>(local(id))]);
-            for (const int id : {manifold.a, manifold.b})
-                if (id < kFirstPlane && local(id) >= 0)
-                    next_turn_[static_cast<std::size_t>(local(id))] = turn + 1;
-            window_.push_back({&manifold, i, turn});
+            for (const int* of : next)
+                if (of) turn = std::max(turn, *of);
+            for (int* of : next)
+                if (of) *of = turn + 1;
+            window.contacts.push_back({&manifold, i, turn});
         }
     }
-    flush_window();
+    flush(window, part);
 }
 
-// Appends the window's contacts by turn, each turn's in order of ids, and begins anew.
-void IslandSolver::flush_window() {
+// Adds the window's contacts by turn, each turn's in order of ids, and begins anew.
+void IslandSolver::flush(Window& window, Part& part) {
     std::array<int, kWindow + 1> first{};
-    for (const Turn& t : window_) ++first[static_cast<std::size_t>(t.turn) + 1];
+    std::array<const Turn*, kWindow> by_turn;
+    for (const Turn& t : window.contacts) ++first[static_cast<std::size_t>(t.turn) + 1];
     for (std::size_t t = 1; t < first.size(); ++t) first[t] += first[t - 1];
-    const std::size_t base = by_turn_.size();
-    by_turn_.resize(base + window_.size());
-    for (const Turn& t : window_)
-        by_turn_[base + static_cast<std::size_t>(first[static_cast<std::size_t>(t.turn)]++)] = t;
-    for (const Turn& t : window_)
+    for (const Turn& t : window.contacts)
+        by_turn[static_cast<std::size_t>(first[static_cast<std::size_t>(t.turn)]++)] = &t;
+    for (std::size_t i = 0; i < window.contacts.size(); ++i)
+        fill_contact(contacts_[part.contacts++], *by_turn[i]->manifold,
+                     by_turn[i]->manifold->points[static_cast<std::size_t>(by_turn[i]->point)], part);
+    for (const Turn& t : window.contacts)
         for (const int id : {t.manifold->a, t.manifold->b})
-            if (id < kFirstPlane && local(id) >= 0) next_turn_[static_cast<std::size_t>(local(id))] = 0;
-    window_.clear();
+            if (id < kFirstPlane && local(id) >= 0) window.next_turn[static_cast<std::size_t>(local(id))] = 0;
+    window.contacts.clear();
 }
 
 IslandSolver::Place IslandSolver::place(int body, const Eigen::Vector3f& arm, int sample,
@@ -193,11 +223,11 @@ IslandSolver::Place IslandSolver::place(int body, const Eigen::Vector3f& arm, in
     return {local(body), arm, scratch};
 }
 
-IslandSolver::Side IslandSolver::reserve_rows(int body) {
+IslandSolver::Side IslandSolver::reserve_rows(int body, std::size_t& used) const {
     if (body < 0) return {};
     const BodyRows& rows = rows_of_[static_cast<std::size_t>(body)];
-    const Side side{body, rows.width, static_cast<std::uint32_t>(jacobians_used_), rows.offset};
-    jacobians_used_ += 3 * static_cast<std::size_t>(rows.width);
+    const Side side{body, rows.width, static_cast<std::uint32_t>(used), rows.offset};
+    used += 3 * static_cast<std::size_t>(rows.width);
     return side;
 }
 
@@ -259,7 +289,7 @@ bool IslandSolver::note_told(const Rows& rows, bool contact) {
         watched = watched || (side.body >= 0 && rows_of_[static_cast<std::size_t>(side.body)].body->watched);
     }
     const bool told = watched && (both || !contact);
-    any_told_ = any_told_ || told;
+    if (told) any_told_ = true;
     return told;
 }
 
@@ -277,36 +307,36 @@ void IslandSolver::finish_rows(Rows& rows) {
 }
 
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
-    fill_contact(reserve_contact(manifold, point));
+    Part part;
+    part.floats = jacobians_used_;
+    fill_contact(contacts_.emplace_back(), manifold, point, part);
+    jacobians_used_ = part.floats;
+    note(part);
+    if (contacts_.back().firm) impacts_.push_back(contacts_.size() - 1);
 }
 
-// Its place, and what the island has to know of it.
-IslandSolver::ContactRows& IslandSolver::reserve_contact(Manifold& manifold, ManifoldPoint& point) {
+// part: where its rows begin among jacobians_, and what it is then noted in.
+void IslandSolver::fill_contact(ContactRows& c, Manifold& manifold, ManifoldPoint& point, Part& part) {
     auto moving = [this](int id) { return id < kFirstPlane ? local(id) : -1; };
-    ContactRows& c = contacts_.emplace_back();
+    c = {};
     c.manifold = &manifold;
     c.point = &point;
-    c.side[0] = reserve_rows(moving(manifold.a));
-    c.side[1] = reserve_rows(moving(manifold.b));
+    c.side[0] = reserve_rows(moving(manifold.a), part.floats);
+    c.side[1] = reserve_rows(moving(manifold.b), part.floats);
     c.starts = static_cast<double>(point.begins);
     // Only what comes together rebounds, not what rests and rings.
     c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
     c.firm = c.starts >= 0;
     c.pair = note_pair(manifold);
     c.told = note_told(c, true) || c.pair >= 0;
-    if (c.firm) impacts_.push_back(contacts_.size() - 1);
-    any_bounce_ = any_bounce_ || (c.restitution > 0 && is_rigid(c));
-    return c;
-}
-
-void IslandSolver::fill_contact(ContactRows& c) {
-    const Manifold& manifold = *c.manifold;
-    const ManifoldPoint& point = *c.point;
     set_tangents(point.normal, c.tangent);
     write_contact(c);
     c.separation = c.now = point.separation;
     c.friction = manifold.friction;
     c.emerging = manifold.emerging;
+    part.bounces = part.bounces || (c.restitution > 0 && is_rigid(c));
+    part.rebounds = part.rebounds || c.restitution > 0;
+    part.emerging = part.emerging || c.emerging;
     c.impulse[0] = point.normal_impulse;
     c.impulse[1] = point.friction_impulse.dot(c.tangent[0]);
     c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
@@ -349,8 +379,8 @@ void IslandSolver::add_spring(HeldConstraint& constraint, HeldPoint& point) {
     s.impulse = point.impulse.cast<double>() / 2;  // each half, at rest
     s.place.setZero(), s.moved.setZero(), s.offset.setZero(), s.gap.setZero();
     auto local_of = [this](int body) { return body >= 0 ? local(body) : -1; };
-    s.side[0] = reserve_rows(local_of(held.body_a));
-    s.side[1] = reserve_rows(local_of(held.body_b));
+    s.side[0] = reserve_rows(local_of(held.body_a), jacobians_used_);
+    s.side[1] = reserve_rows(local_of(held.body_b), jacobians_used_);
     s.constraint = &constraint;
     s.told = note_told(s, false);
     springs_.push_back(s);

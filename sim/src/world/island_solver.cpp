@@ -64,12 +64,8 @@ void IslandSolver::advance() {
     for (int i = 0; i < settings_->substeps; ++i) {
         remaining_ = h_ * (settings_->substeps - 1 - i);
         substep_ = i, gone_ = 0;
-        const bool first = i == 0, last = i + 1 == settings_->substeps;
-        if (!direct_) {
-            substep(first, last);
-            continue;
-        }
-        direct_substep(0, last);
+        const bool last = i + 1 == settings_->substeps;
+        direct_ ? direct_substep(0, last) : substep(last);
     }
 }
 
@@ -84,13 +80,19 @@ bool IslandSolver::is_far_from_solved() const {
 
 // Whether bodies touch much lighter ones, nothing else.
 bool IslandSolver::is_uneven() const {
-    return impacts_.empty() && !any_struck_ && std::ranges::any_of(contacts_, [this](const ContactRows& c) {
-               if (c.side[0].body < 0 || c.side[1].body < 0) return false;
-               auto mass = [&](int side) {
-                   return rows_of_[static_cast<std::size_t>(c.side[side].body)].body->kind->mass.mass;
-               };
-               return std::max(mass(0) / mass(1), mass(1) / mass(0)) > kUneven;
-           });
+    if (!impacts_.empty() || any_struck_) return false;
+    std::atomic<bool> uneven = false;
+    crew().each(contacts_.size(), 64, [&](int, std::size_t first, std::size_t last) {
+        for (const ContactRows& c : std::span(contacts_).subspan(first, last - first)) {
+            if (c.side[0].body < 0 || c.side[1].body < 0) continue;
+            auto mass = [&](int side) {
+                return rows_of_[static_cast<std::size_t>(c.side[side].body)].body->kind->mass.mass;
+            };
+            if (std::max(mass(0) / mass(1), mass(1) / mass(0)) > kUneven)
+                uneven.store(true, std::memory_order_relaxed);
+        }
+    });
+    return uneven;
 }
 
 // By how much speeds miss what contacts demand, at most [m/s]: the change of the impulses that would satisfy a
@@ -119,76 +121,101 @@ float IslandSolver::residual(const ContactRows& c) const {
                     length(t[0] - c.impulse[1], t[1] - c.impulse[2]) / c.slide_mass);
 }
 
-void IslandSolver::substep(bool first, bool last) {
-    begin_times(substep_ * h_);
-    if (carried_) each_contact([this](ContactRows& c) { see_driven(c); });
-    set_forces();
-    if (!first && !contacts_.empty()) turn_frames();
-    load_velocities();
-    ring_on();
-    if (any_bounce_ || !impacts_.empty()) strike();
-    pull_springs();
-    warm_start(first);
-    sweep(Push::soft);
-    push_out();
-    each_contact([this](ContactRows& c) {
-        if (follows(c)) write_contact(c);
-    });
-    sweep(Push::none, 2);
-    note_work();
-    if (last) restitute();
-    finish();
+// Does what was put together.
+void IslandSolver::run() {
+    blocks_.run(
+        crew(), static_cast<std::uint32_t>(phases_.size()),
+        [this](std::uint32_t p) { return phases_[p].of_bodies; },
+        [this](std::uint32_t p, const IslandBlocks::Block& block) { (this->*phases_[p].act)(block); });
+    phases_.clear();
 }
 
-void IslandSolver::load_velocities() {
-    each_body([this](BodyRows& rows) {
-        const MovingBody& body = *rows.body;
-        const BodyKind& kind = *body.kind;
-        const WorldBodyState& s = body.state;
-        rows.place = s.position, rows.time = 0;
-        if (contacts_.empty()) {
-            rows.frame = s.orientation.toRotationMatrix();
-            rows.body_from_world = rows.frame.transpose().cast<float>();
-        }
-        const Eigen::Matrix3d& frame = rows.frame;
-        const Eigen::Vector3d velocity = s.velocity + velocity_given(body, h_),
-                              momentum = s.angular_momentum + momentum_given(body, h_);
-        const Eigen::Matrix3d turned = s.orientation.toRotationMatrix();
-        const Eigen::Vector3d spin =
-            frame.transpose() * (turned * (turned.transpose() * momentum).cwiseQuotient(kind.mass.inertia));
-        const double root_mass = kind.root_mass;
-        float* y = start_.data() + rows.offset;
-        for (int i = 0; i < 3; ++i) {
-            y[i] = static_cast<float>(root_mass * velocity[i]);
-            y[3 + i] = static_cast<float>(kind.root_inertia[i] * spin[i]);
-        }
-        y[6] = y[7] = 0;
-        const HeldSteps& step = of_substep(kind).held;
-        Eigen::Map<Eigen::ArrayXf> mean(y + 8, kind.modes);
-        mean = ((step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array()) / step.root_compliance)
-                   .cast<float>();
-        if (body.pushed) mean += (step.root_compliance * h_ * body.modal_force.array()).cast<float>();
-        for (int k = kind.modes; k < kind.mode_width; ++k) y[8 + k] = 0;
-        std::copy_n(y, rows.width, y_.data() + rows.offset);
-    });
+void IslandSolver::substep(bool last) {
+    using Solver = IslandSolver;
+    begin_times(substep_ * h_);
+    set_forces();
+    ring_on();
+    if (carried_) contacts(&Solver::see_driven);
+    if (substep_ > 0 && !contacts_.empty()) bodies(&Solver::turn_frames), contacts(&Solver::turn_rows);
+    bodies(&Solver::load_velocities);
+    if (any_bounce_ || !impacts_.empty() || !springs_.empty()) {
+        run();
+        if (any_bounce_ || !impacts_.empty()) strike();
+        pull_springs();
+    }
+    contacts(&Solver::warm_start);
+    contacts(&Solver::sweep<Push::soft>);
+    pushes_out_ = false;
+    if (any_emerging_) run(), pushes_out_ = may_push_out();
+    if (pushes_out_) bodies(&Solver::keep), contacts(&Solver::sweep<Push::all>);
+    contacts(&Solver::give_to_move);
+    bodies(&Solver::move);
+    if (pushes_out_ || any_rebound_ || !impacts_.empty()) contacts(&Solver::follow_rows);
+    for (int i = 0; i < 2; ++i) contacts(&Solver::sweep<Push::none>);
+    if (any_rebound_) contacts(&Solver::note_work);
+    if (any_rebound_ && last) contacts(&Solver::restitute);
+    contacts(&Solver::give_the_rest);
+    bodies(&Solver::finish);
+    run();
+    count_forces(1);
+    take_sums();
+}
+
+void IslandSolver::see_driven(const IslandBlocks::Block& block) {
+    for (ContactRows& c : contacts_in(block)) see_driven(c);
+}
+
+void IslandSolver::load_velocities(const IslandBlocks::Block& slab) {
+    for (const std::uint32_t body : blocks_.bodies_of(slab.slab)) load_velocities(rows_of_[body]);
+}
+
+void IslandSolver::load_velocities(BodyRows& rows) {
+    const MovingBody& body = *rows.body;
+    const BodyKind& kind = *body.kind;
+    const WorldBodyState& s = body.state;
+    rows.place = s.position, rows.time = 0;
+    if (contacts_.empty()) {
+        rows.frame = s.orientation.toRotationMatrix();
+        rows.body_from_world = rows.frame.transpose().cast<float>();
+    }
+    const Eigen::Matrix3d& frame = rows.frame;
+    const Eigen::Vector3d velocity = s.velocity + velocity_given(body, h_),
+                          momentum = s.angular_momentum + momentum_given(body, h_);
+    const Eigen::Matrix3d turned = s.orientation.toRotationMatrix();
+    const Eigen::Vector3d spin =
+        frame.transpose() * (turned * (turned.transpose() * momentum).cwiseQuotient(kind.mass.inertia));
+    const double root_mass = kind.root_mass;
+    float* y = start_.data() + rows.offset;
+    for (int i = 0; i < 3; ++i) {
+        y[i] = static_cast<float>(root_mass * velocity[i]);
+        y[3 + i] = static_cast<float>(kind.root_inertia[i] * spin[i]);
+    }
+    y[6] = y[7] = 0;
+    const HeldSteps& step = of_substep(kind).held;
+    Eigen::Map<Eigen::ArrayXf> mean(y + 8, kind.modes);
+    mean =
+        ((step.mean_z * s.q.array() + step.mean_rate * s.q_dot.array()) / step.root_compliance).cast<float>();
+    if (body.pushed) mean += (step.root_compliance * h_ * body.modal_force.array()).cast<float>();
+    for (int k = kind.modes; k < kind.mode_width; ++k) y[8 + k] = 0;
+    std::copy_n(y, rows.width, y_.data() + rows.offset);
 }
 
 // The first sweep.
-void IslandSolver::warm_start(bool first) {
-    blocks_.sweep(crew(), 1, [&](std::uint32_t, const IslandBlocks::Block& block) {
-        each_in_block(block, [&](ContactRows& c) { warm_start(c, first); });
-    });
-    if (any_struck_) stretch_gaps();
+void IslandSolver::warm_start(const IslandBlocks::Block& block) {
+    for (ContactRows& c : contacts_in(block)) {
+        warm_start(c);
+        if (any_struck_) stretch_gap(c);
+    }
 }
 
-void IslandSolver::warm_start(ContactRows& c, bool first) {
+void IslandSolver::warm_start(ContactRows& c) {
     // Approach speeds first, before any impulse: gravity's share of this substep included, as it is real.
     float speed = 0, moved = 0;
     for (const Side& side : c.side) {
         if (side.body < 0) continue;
         const float* d = jacobians_.data() + side.rows;
         if (c.restitution > 0 && c.largest == 0) speed += dot(d, start_.data() + side.y, side.width);
-        if (!first || any_struck_) moved += dot(d, moved_.data() + side.y, side.width);
+        if (substep_ > 0 || any_struck_) moved += dot(d, moved_.data() + side.y, side.width);
     }
     if (c.restitution > 0 && c.largest == 0) speed += c.drift[0];
     if (c.largest == 0) c.approach = speed;
@@ -197,29 +224,23 @@ void IslandSolver::warm_start(ContactRows& c, bool first) {
 }
 
 // Positions move with velocities that also push emerging bodies out; the velocities themselves never see it.
-void IslandSolver::push_out() {
-    std::atomic<bool> emerging = false;
-    each_contact([&](const ContactRows& c) {
-        if (c.emerging && c.now < 0) emerging.store(true, std::memory_order_relaxed);
-    });
-    if (!emerging) return move();
-    std::copy_n(y_.data(), y_.size(), kept_.data());
-    each_contact([](ContactRows& c) { std::copy_n(c.impulse, 3, c.kept); });
-    sweep(Push::all);
-    move();
-    std::copy_n(kept_.data(), y_.size(), y_.data());
-    each_contact([](ContactRows& c) { std::copy_n(c.kept, 3, c.impulse); });
+bool IslandSolver::may_push_out() const {
+    return std::ranges::any_of(contacts_, [](const ContactRows& c) { return c.emerging && c.now < 0; });
 }
 
-void IslandSolver::sweep(Push push, std::uint32_t times) {
-    blocks_.sweep(crew(), times,
-                  [&](std::uint32_t, const IslandBlocks::Block& block) { sweep(block, push); });
+void IslandSolver::keep(const IslandBlocks::Block& slab) {
+    for (const std::uint32_t body : blocks_.bodies_of(slab.slab)) {
+        const BodyRows& rows = rows_of_[body];
+        std::copy_n(y_.data() + rows.offset, rows.width, kept_.data() + rows.offset);
+    }
 }
 
-void IslandSolver::sweep(const IslandBlocks::Block& block, Push push) {
-    each_in_block(block, [&](ContactRows& contact) {
-        if (contact.begins < substep_ && !contact.over) solve_contact(contact, push);
-    });
+template <IslandSolver::Push kPush>
+void IslandSolver::sweep(const IslandBlocks::Block& block) {
+    for (ContactRows& c : contacts_in(block)) {
+        if (kPush == Push::all) std::copy_n(c.impulse, 3, c.kept);
+        if (c.begins < substep_ && !c.over) solve_contact(c, kPush);
+    }
 }
 
 // What the rows see of the velocities.
@@ -271,8 +292,8 @@ void IslandSolver::solve_contact(ContactRows& c, Push push) {
 
 // Energy that a contact's normal impulse takes out in this substep, where it may have to give some back: held
 // over the substep, it does p (v0 + v1) / 2 on the rigid part and p G on the modes.
-void IslandSolver::note_work() {
-    each_contact([this](ContactRows& c) { note_work(c, c.impulse[0]); });
+void IslandSolver::note_work(const IslandBlocks::Block& block) {
+    for (ContactRows& c : contacts_in(block)) note_work(c, c.impulse[0]);
 }
 
 void IslandSolver::note_work(ContactRows& c, float impulse) {
@@ -290,10 +311,8 @@ void IslandSolver::note_work(ContactRows& c, float impulse) {
 
 // A rebound to e times the approach, by an impulse p whose work p v + p^2 (K_rigid / 2 + K_modes) is at most
 // e^2 of the energy that the contact has taken. For rigid bodies both say the same.
-void IslandSolver::restitute() {
-    blocks_.sweep(crew(), 1, [this](std::uint32_t, const IslandBlocks::Block& block) {
-        each_in_block(block, [this](ContactRows& c) { restitute(c); });
-    });
+void IslandSolver::restitute(const IslandBlocks::Block& block) {
+    for (ContactRows& c : contacts_in(block)) restitute(c);
 }
 
 void IslandSolver::restitute(ContactRows& c) {
@@ -320,16 +339,27 @@ void IslandSolver::restitute(ContactRows& c) {
     push_by(c, p);
 }
 
-void IslandSolver::move() {
-    blocks_.sweep(crew(), 1, [this](std::uint32_t, const IslandBlocks::Block& block) {
-        each_in_block(block, [&](ContactRows& c) {
-            std::copy_n(c.impulse, 3, c.at_move);
-            c.drifted += static_cast<float>(h_) * c.drift[0];
-            apply(c, c.at_move, c.at_move, sums_[block.slab].outside);
-        });
-    });
-    take_sums();
-    each_body([this](BodyRows& rows) { move(rows); });
+void IslandSolver::give_to_move(const IslandBlocks::Block& block) {
+    for (ContactRows& c : contacts_in(block)) {
+        std::copy_n(c.impulse, 3, c.at_move);
+        c.drifted += static_cast<float>(h_) * c.drift[0];
+        apply(c, c.at_move, c.at_move, sums_[block.slab].outside);
+    }
+}
+
+void IslandSolver::move(const IslandBlocks::Block& slab) {
+    for (const std::uint32_t body : blocks_.bodies_of(slab.slab)) {
+        const BodyRows& rows = rows_of_[body];
+        move(rows_of_[body]);
+        if (pushes_out_) std::copy_n(kept_.data() + rows.offset, rows.width, y_.data() + rows.offset);
+    }
+}
+
+void IslandSolver::follow_rows(const IslandBlocks::Block& block) {
+    for (ContactRows& c : contacts_in(block)) {
+        if (pushes_out_) std::copy_n(c.kept, 3, c.impulse);
+        if (follows(c)) write_contact(c);
+    }
 }
 
 void IslandSolver::move(BodyRows& rows) {
@@ -477,21 +507,16 @@ void IslandSolver::settle_given() {
     apply(c, p, place, outside);
 }
 
-void IslandSolver::finish() {
-    blocks_.sweep(crew(), 1, [this](std::uint32_t, const IslandBlocks::Block& block) {
-        each_in_block(block, [&](const ContactRows& c) {
-            const float after[3] = {c.impulse[0] - c.at_move[0], c.impulse[1] - c.at_move[1],
-                                    c.impulse[2] - c.at_move[2]};
-            apply(c, after, {0, 0, 0}, sums_[block.slab].outside);
-        });
-    });
-    take_sums();
-    count_forces(1);
-    crew().each(blocks_.slabs(), 1, [this](int, std::size_t first, std::size_t last) {
-        for (std::size_t slab = first; slab < last; ++slab)
-            for (const std::uint32_t body : blocks_.bodies_of(slab)) finish(rows_of_[body], sums_[slab]);
-    });
-    take_sums();
+void IslandSolver::give_the_rest(const IslandBlocks::Block& block) {
+    for (const ContactRows& c : contacts_in(block)) {
+        const float after[3] = {c.impulse[0] - c.at_move[0], c.impulse[1] - c.at_move[1],
+                                c.impulse[2] - c.at_move[2]};
+        apply(c, after, {0, 0, 0}, sums_[block.slab].outside);
+    }
+}
+
+void IslandSolver::finish(const IslandBlocks::Block& slab) {
+    for (const std::uint32_t body : blocks_.bodies_of(slab.slab)) finish(rows_of_[body], sums_[slab.slab]);
 }
 
 void IslandSolver::finish(const BodyRows& rows, Sums& sums) {

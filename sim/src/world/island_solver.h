@@ -153,6 +153,7 @@ private:
         Eigen::Vector3d place;  // of the centre: where impulses act
         double time = 0;        // of that, since the substep's start [s]
         bool struck = false;    // takes part in the impact that is being solved
+        bool turned = false;    // its frame was, as the substep began
         Eigen::Matrix3d frame;  // body to world, in which angular rows are written
         Eigen::Matrix3f body_from_world;
         std::uint32_t at;                                   // of wide_y_
@@ -243,7 +244,9 @@ private:
     void note_start();
     void go_back();  ///< to it
     void calm();
-    [[nodiscard]] double energy() const;
+    [[nodiscard]] double energy();
+    [[nodiscard]] double energy_of(const MovingBody& body) const;
+    [[nodiscard]] double with_springs(double sum) const;
     [[nodiscard]] bool is_far_from_solved() const;
     [[nodiscard]] bool is_uneven() const;
     [[nodiscard]] bool may_gain() const;  // energy, from without
@@ -264,12 +267,23 @@ private:
     /// no body, so sweeping in this order gives the bits of the order by ids, but the processor can work on
     /// several at once; windows keep the bodies they use in its cache.
     static constexpr std::size_t kWindow = 64;
-    void flush_window();
-    void in_turns(std::span<const int> manifolds);  // appended to by_turn_
-    void divide(const Island& island);
+    /// What a block's contacts need, and have among them.
+    struct Part {
+        std::size_t contacts = 0, floats = 0;  // of it; then where they begin
+        bool impacts = false, bounces = false, rebounds = false, emerging = false;
+    };
+    /// In which a thread orders contacts.
+    struct Window {
+        std::vector<Turn> contacts;
+        std::vector<int> next_turn;  // per island body, 0 between windows
+    };
+    [[nodiscard]] Part part_of(std::span<const int> manifolds) const;
+    void add_contacts(const Island& island);
+    void fill_part(std::span<const int> manifolds, Window& window, Part& part);
+    void flush(Window& window, Part& part);
     void add_contact(Manifold& manifold, ManifoldPoint& point);
-    ContactRows& reserve_contact(Manifold& manifold, ManifoldPoint& point);
-    void fill_contact(ContactRows& contact);
+    void fill_contact(ContactRows& contact, Manifold& manifold, ManifoldPoint& point, Part& part);
+    void note(const Part& part) noexcept;
     // Sharing out: what is written of one body or contact alone, by any thread; what contacts do to bodies, in the order of
     // blocks_; what is summed, slab by slab.
     [[nodiscard]] Crew& crew() const noexcept { return scene_->crew; }
@@ -285,10 +299,18 @@ private:
             for (std::size_t i = first; i < last; ++i) visit(rows_of_[i]);
         });
     }
-    template <typename Visit>
-    void each_in_block(const IslandBlocks::Block& block, Visit visit) {
-        for (std::size_t i = block.first; i < block.last; ++i) visit(contacts_[i]);
+    [[nodiscard]] std::span<ContactRows> contacts_in(const IslandBlocks::Block& block) noexcept {
+        return std::span(contacts_).subspan(block.first, block.last - block.first);
     }
+    /// A part of a substep: of the contacts of a block, or of the bodies of its slab. Parts are put together and then
+    /// done in one hand-out, see IslandBlocks::run.
+    struct Phase {
+        void (IslandSolver::*act)(const IslandBlocks::Block& block);
+        bool of_bodies;
+    };
+    void contacts(void (IslandSolver::*act)(const IslandBlocks::Block&)) { phases_.push_back({act, false}); }
+    void bodies(void (IslandSolver::*act)(const IslandBlocks::Block&)) { phases_.push_back({act, true}); }
+    void run();
     /// What a slab's bodies add to sums, in the order of sweeps.
     struct Sums {
         Eigen::Vector3d outside = Eigen::Vector3d::Zero();
@@ -323,8 +345,9 @@ private:
     [[nodiscard]] double share_of_impact() const;
     void go_to(BodyRows& rows, double time);
     void load_rigid(BodyRows& rows, double gone);
-    void stretch_gaps();
-    void turn_frames();
+    void stretch_gap(ContactRows& contact) const;
+    void turn_frames(const IslandBlocks::Block& slab);
+    void turn_rows(const IslandBlocks::Block& block);
     /// Whether a contact's rows follow the place where it acts: of those that may rebound, for the balance of energy.
     [[nodiscard]] static bool follows(const ContactRows& contact) noexcept {
         return contact.firm || contact.restitution > 0;
@@ -353,6 +376,7 @@ private:
 
     // Directly; direct_solution.cpp.
     bool begin_direct(double most, bool must = false);
+    [[nodiscard]] bool is_too_dear(double most) const;
     [[nodiscard]] double most_with_springs() const noexcept {
         return kMostWithSprings * static_cast<double>(rows_of_.size());
     }
@@ -404,7 +428,7 @@ private:
     void finish_directly(bool last);
     [[nodiscard]] Place place(int body, const Eigen::Vector3f& arm, int sample, const Eigen::Vector3f& rest,
                               float* scratch);
-    [[nodiscard]] Side reserve_rows(int body);
+    [[nodiscard]] Side reserve_rows(int body, std::size_t& used) const;  // of jacobians_
     void write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign, const Side& side);
     void finish_rows(Rows& rows);
     bool note_told(const Rows& rows, bool contact);  // notes it in any_told_, too
@@ -414,22 +438,27 @@ private:
     [[nodiscard]] int local(int body) const noexcept { return local_[static_cast<std::size_t>(body)]; }
 
     void advance();
-    void substep(bool first, bool last);
-    void load_velocities();
-    void warm_start(bool first);
-    void warm_start(ContactRows& contact, bool first);
+    void substep(bool last);
+    void see_driven(const IslandBlocks::Block& block);
+    void load_velocities(const IslandBlocks::Block& slab);
+    void load_velocities(BodyRows& rows);
+    void warm_start(const IslandBlocks::Block& block);
+    void warm_start(ContactRows& contact);
     enum class Push { none, soft, all };
-    void sweep(Push push, std::uint32_t times = 1);
-    void sweep(const IslandBlocks::Block& block, Push push);
-    void push_out();
+    template <Push kPush>
+    void sweep(const IslandBlocks::Block& block);
+    [[nodiscard]] bool may_push_out() const;
+    void keep(const IslandBlocks::Block& slab);
     void speeds(const Rows& rows, float (&v)[3]) const;
     void push_by(const Rows& rows, const float (&impulse)[3]);
     void solve_contact(ContactRows& contact, Push push);
-    void note_work();
+    void follow_rows(const IslandBlocks::Block& block);
+    void note_work(const IslandBlocks::Block& block);
     void note_work(ContactRows& contact, float impulse);
-    void restitute();
+    void restitute(const IslandBlocks::Block& block);
     void restitute(ContactRows& contact);
-    void move();
+    void give_to_move(const IslandBlocks::Block& block);
+    void move(const IslandBlocks::Block& slab);
     [[nodiscard]] Eigen::Vector3d place_now(const ContactRows& contact) const;
     void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point,
                Eigen::Vector3d& outside);
@@ -443,7 +472,8 @@ private:
     [[nodiscard]] static Eigen::Vector3d in_world(const SpringRows& spring, const Eigen::Vector3d& impulse) {
         return spring.axes.transpose() * impulse;
     }
-    void finish();
+    void give_the_rest(const IslandBlocks::Block& block);
+    void finish(const IslandBlocks::Block& slab);
     void move(BodyRows& rows);
     void finish(const BodyRows& rows, Sums& sums);
     [[nodiscard]] bool step_modes(const BodyRows& rows);  // whether a deformation was held
@@ -493,8 +523,10 @@ private:
     IslandBlocks blocks_;
     std::vector<IslandBlocks::Body> places_;  // of the bodies, to divide them
     std::vector<Sums> sums_;                  // of each slab
-    std::vector<Turn> window_, by_turn_;
-    std::vector<int> next_turn_;  // per island body
+    std::vector<Part> parts_;                 // of each block
+    std::vector<Window> windows_;             // of each thread
+    std::vector<Phase> phases_;               // that run() will do
+    std::vector<int> next_of_;                // per island body
     std::vector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
     std::vector<std::size_t> impacts_;                      // contacts, of fast pairs
@@ -504,7 +536,8 @@ private:
     std::vector<std::size_t> holding_;                      // springs
     std::vector<std::size_t> contacts_of_, first_contact_;  // body by body, and where each begins
     bool any_bounce_ = false, any_struck_ = false;          // contacts that may; in this step
-    std::vector<std::uint8_t> turned_;                      // per island body: its frame was
+    bool any_rebound_ = false, any_emerging_ = false;       // contacts that may; that are
+    bool pushes_out_ = false;                               // in this substep: see may_push_out
     LaneArray y_, kept_, start_, moved_, jacobians_;
     std::size_t jacobians_used_ = 0;
     double h_ = 0;       // of the substep
@@ -528,6 +561,10 @@ private:
         bool at_limit;
     };
     double energy_before_ = 0, fastest_ = 0, smallest_ = 0, scale_ = 0;  // see note_start
+    struct Measure {
+        double energy, scale, speed, size;
+    };
+    std::vector<Measure> measures_;  // per island body, of energy() and note_start()
     Eigen::Vector3d outside_before_ = Eigen::Vector3d::Zero();
     std::uint64_t limited_before_ = 0;
     std::vector<Before> before_;  // per world body, the last island's when the step began

@@ -156,7 +156,8 @@ TEST(IslandBlocks, HoldEveryContactOnceWithTheBodiesOfTheirSlabs) {
     for (const int count : {99, 100, 150, 900}) {
         const Row row(count, true);
         sim::IslandBlocks blocks;
-        blocks.divide(row.bodies, row.indices, row.manifolds, row.local);
+        sim::Crew alone;
+        blocks.divide(alone, row.bodies, row.indices, row.manifolds, row.local);
         if (count < 100) {
             EXPECT_EQ(blocks.size(), 1u);
         } else {
@@ -164,17 +165,18 @@ TEST(IslandBlocks, HoldEveryContactOnceWithTheBodiesOfTheirSlabs) {
         }
         std::vector<int> seen(row.manifolds.size(), 0);
         std::size_t b = 0;
-        blocks.sweep(*std::make_unique<sim::Crew>(), 1,
-                     [&](std::uint32_t, const sim::IslandBlocks::Block& block) {
-                         for (const int m : blocks.manifolds_of(b++)) {
-                             ++seen[std::size_t(m)];
-                             for (const int body :
-                                  {row.manifolds[std::size_t(m)].a, row.manifolds[std::size_t(m)].b}) {
-                                 EXPECT_GE(blocks.slab_of(std::size_t(body)), block.slab);
-                                 EXPECT_LT(blocks.slab_of(std::size_t(body)), block.slab + block.slabs);
-                             }
-                         }
-                     });
+        blocks.run(
+            alone, 1, [](std::uint32_t) { return false; },
+            [&](std::uint32_t, const sim::IslandBlocks::Block& block) {
+                for (const int m : blocks.manifolds_of(b++)) {
+                    ++seen[std::size_t(m)];
+                    for (const int body :
+                         {row.manifolds[std::size_t(m)].a, row.manifolds[std::size_t(m)].b}) {
+                        EXPECT_GE(blocks.slab_of(std::size_t(body)), block.slab);
+                        EXPECT_LT(blocks.slab_of(std::size_t(body)), block.slab + block.slabs);
+                    }
+                }
+            });
         EXPECT_TRUE(std::ranges::all_of(seen, [](int n) { return n == 1; }));
     }
 }
@@ -183,19 +185,28 @@ TEST(IslandBlocks, VisitEachBodysBlocksInOneOrderOnAnyNumberOfThreads) {
     for (const bool far : {false, true}) {
         const Row row(300, far);
         sim::IslandBlocks blocks;
-        blocks.divide(row.bodies, row.indices, row.manifolds, row.local);
+        sim::Crew alone;
+        blocks.divide(alone, row.bodies, row.indices, row.manifolds, row.local);
         const auto logged = [&](int threads) {
             sim::Crew crew(threads);
             std::vector<std::vector<std::size_t>> log(blocks.slabs());
-            const auto visit = [&](std::uint32_t sweep, const sim::IslandBlocks::Block& block) {
+            const auto visit = [&](std::uint32_t phase, const sim::IslandBlocks::Block& block) {
                 // Written without a lock: blocks of one slab are never visited at once.
                 for (std::uint32_t s = block.slab; s < block.slab + block.slabs; ++s)
-                    log[s].push_back(sweep * 1000 + block.slab * 10 + block.slabs);
+                    log[s].push_back(phase * 1000 + block.slab * 10 + block.slabs);
             };
-            blocks.sweep(crew, 50, visit);
+            blocks.run(
+                crew, 50, [](std::uint32_t phase) { return phase % 3 == 1; }, visit);
             return log;
         };
         const auto one = logged(1);
+        for (std::size_t s = 0; s < one.size(); ++s) {
+            EXPECT_TRUE(std::ranges::is_sorted(one[s], {}, [](std::size_t at) { return at / 1000; }));
+            // Of a phase of bodies the slab alone, once.
+            for (const std::size_t phase : {1u, 4u, 49u})
+                EXPECT_EQ(std::ranges::count(one[s], phase, [](std::size_t at) { return at / 1000; }), 1);
+            EXPECT_EQ(std::ranges::count(one[s], 4000 + s * 10 + 1), 1);
+        }
         for (const int threads : kCounts) EXPECT_EQ(logged(threads), one) << threads;
     }
 }
