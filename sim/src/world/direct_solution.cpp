@@ -82,7 +82,7 @@ bool IslandSolver::is_too_dear(double most) const {
     if (found_again_ || of_island.size() < kLeastDivided) return false;
     double cost = 0;
     std::uint64_t last = ~std::uint64_t{0};
-    for (std::size_t i = 0; i < of_island.size() && cost <= 2 * most; ++i) {
+    for (std::size_t i = 0; i < of_island.size() && cost <= 1.001 * most; ++i) {
         const Manifold& m = (*manifolds_)[static_cast<std::size_t>(of_island[i])];
         if (m.b >= kFirstPlane || local(m.a) < 0 || local(m.b) < 0 || std::exchange(last, m.key()) == m.key())
             continue;
@@ -90,7 +90,7 @@ bool IslandSolver::is_too_dear(double most) const {
                      b = 6 + rows_of_[static_cast<std::size_t>(local(m.b))].body->kind->modes;
         cost += a * b * (a + b) / 2;
     }
-    return cost > 2 * most;
+    return cost > 1.001 * most;
 }
 
 // The rows in double precision, without padding. Over the first half of a substep's impulses modes yield as they will to

@@ -136,9 +136,12 @@ void IslandSolver::add_contacts(const Island& island) {
         for (std::size_t b = first; b < last; ++b)
             fill_part(blocks_.manifolds_of(b), windows_[static_cast<std::size_t>(thread)], parts_[b]);
     });
-    for (const Part& part : parts_) note(part);
-    for (std::size_t i = 0; all.impacts && i < contacts_.size(); ++i)
-        if (contacts_[i].firm) impacts_.push_back(i);
+    std::size_t next = 0;
+    for (const Part& part : parts_) {  // `contacts`: their end by now
+        note(part);
+        for (; next < part.contacts; ++next)
+            if (part.impacts && contacts_[next].firm) impacts_.push_back(next);
+    }
 }
 
 void IslandSolver::note(const Part& part) noexcept {

@@ -225,7 +225,12 @@ void IslandSolver::warm_start(ContactRows& c) {
 
 // Positions move with velocities that also push emerging bodies out; the velocities themselves never see it.
 bool IslandSolver::may_push_out() const {
-    return std::ranges::any_of(contacts_, [](const ContactRows& c) { return c.emerging && c.now < 0; });
+    std::atomic<bool> any = false;
+    crew().each(contacts_.size(), 64, [&](int, std::size_t first, std::size_t last) {
+        for (const ContactRows& c : std::span(contacts_).subspan(first, last - first))
+            if (c.emerging && c.now < 0) any.store(true, std::memory_order_relaxed);
+    });
+    return any;
 }
 
 void IslandSolver::keep(const IslandBlocks::Block& slab) {

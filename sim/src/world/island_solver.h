@@ -102,7 +102,7 @@ struct Island {
 /// Islands without either, where a timed force acts, go directly, too: a constant force then moves a body exactly.
 ///
 /// Deterministic: sweeps go over springs, then contacts, in an order that is a function of the bodies and their places alone
-/// (IslandBlocks; within a block by ids, see in_turns), however many threads share them out. No allocation once the buffers
+/// (IslandBlocks; within a block by ids, see kWindow), however many threads share them out. No allocation once the buffers
 /// have grown.
 class IslandSolver {
 public:

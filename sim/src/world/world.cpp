@@ -103,6 +103,7 @@ void World::Implementation::drop_constraints(int body) {
 // Bodies whose state or forces are not finite, or absurd, take no further part. Before anything else in a
 // step, before they can touch another body.
 void World::Implementation::quarantine_broken() {
+    if (!any_broken([](const MovingBody& body) { return body.moves() && body.own; })) return;
     for (const int i : here) {
         const MovingBody& body = bodies[static_cast<std::size_t>(i)];
         if (!body.moves() || !body.own) continue;
@@ -112,14 +113,28 @@ void World::Implementation::quarantine_broken() {
     std::erase_if(here, [this](int i) { return bodies[static_cast<std::size_t>(i)].quarantined; });
 }
 
+template <typename Concerned>
+bool World::Implementation::any_broken(Concerned concerned) {
+    std::atomic<bool> any = false;
+    crew().each(here.size(), kBodiesAPiece, [&](int, std::size_t first, std::size_t end) {
+        for (std::size_t i = first; i < end; ++i)
+            if (const MovingBody& body = bodies[static_cast<std::size_t>(here[i])];
+                concerned(body) && !what_is_broken(body).empty())
+                any.store(true, std::memory_order_relaxed);
+    });
+    return any;
+}
+
 // After a step: bodies that it broke, before any reader sees them.
 void World::Implementation::quarantine_results() {
+    // Asleep: not of an island that was solved.
+    const bool any = any_broken([](const MovingBody& body) { return body.moves(); });
     for (std::size_t i = 0; i < islands_used; ++i) {
         if (!is_own(islands[i])) continue;
         for (const int id : islands[i].bodies) {
             MovingBody& body = bodies[static_cast<std::size_t>(id)];
             body.pushed = false;
-            if (sharing == Sharing::pairs && !body.own) continue;  // its owner's affair
+            if (!any || (sharing == Sharing::pairs && !body.own)) continue;  // its owner's affair
             const std::string what = what_is_broken(body);
             if (!what.empty()) quarantine(id, what);
         }
@@ -171,8 +186,15 @@ void World::Implementation::find_islands() {
     auto is_here = [this](int id) {
         return sharing == Sharing::alone || std::binary_search(here.begin(), here.end(), id);
     };
-    for (const Manifold& m : contacts.manifolds())
-        if (moves(m.a) && moves(m.b)) join(m.a, m.b);
+    const auto& manifolds = contacts.manifolds();
+    touching.resize(manifolds.size());
+    crew().each(touching.size(), 4 * kBodiesAPiece, [&](int, std::size_t first, std::size_t end) {
+        for (std::size_t m = first; m < end; ++m)
+            touching[m] = {moves(manifolds[m].a) ? manifolds[m].a : -1,
+                           moves(manifolds[m].b) ? manifolds[m].b : -1};
+    });
+    for (const auto& [a, b] : touching)
+        if (a >= 0 && b >= 0) join(a, b);
     for (const HeldConstraint& c : constraints)
         if (held_here(c) && moves(c.definition.body_a) && moves(c.definition.body_b))
             join(c.definition.body_a, c.definition.body_b);
@@ -192,11 +214,9 @@ void World::Implementation::find_islands() {
     for (const int i : here)
         if (const MovingBody& body = bodies[static_cast<std::size_t>(i)]; body.moves() && !body.asleep)
             island_of(i).bodies.push_back(i);
-    auto& manifolds = contacts.manifolds();
-    for (std::size_t m = 0; m < manifolds.size(); ++m) {
-        const int id = moves(manifolds[m].a) ? manifolds[m].a : manifolds[m].b;
-        island_of(id).manifolds.push_back(static_cast<int>(m));
-    }
+    for (std::size_t m = 0; m < touching.size(); ++m)
+        island_of(touching[m].first >= 0 ? touching[m].first : touching[m].second)
+            .manifolds.push_back(static_cast<int>(m));
     for (std::size_t c = 0; c < constraints.size(); ++c) {
         const PointConstraint& held = constraints[c].definition;
         const int id = moves(held.body_a) ? held.body_a : moves(held.body_b) ? held.body_b : -1;

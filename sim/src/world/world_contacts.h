@@ -124,6 +124,7 @@ private:
     std::vector<Found> found_;
     std::vector<Reach> reach_;                  // of each body
     std::vector<Manifold> manifolds_, before_;  // by ascending keys
+    std::vector<Manifold> added_;               // to them
     std::vector<BodyPath> paths_;               // of each body
     enum : std::uint8_t { kNotFollowed, kBeingFollowed, kFollowed };
     std::vector<std::uint8_t> followed_;  // paths_ holds the free motion of this step; by any thread

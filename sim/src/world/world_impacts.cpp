@@ -84,6 +84,7 @@ Impact WorldContacts::foresee(const ContactScene& scene, int i, int j) {
 // of these those that are contacts.
 void WorldContacts::accept_impacts(const ContactScene& scene) {
     const double substep = scene.settings.dt / scene.settings.substeps;
+    const auto sorted = static_cast<std::ptrdiff_t>(manifolds_.size());
     for (const Meeting& m : meetings_)
         for (const int id : {m.a, m.b}) first_[static_cast<std::size_t>(id)] = 1e300;
     for (const Meeting& m : meetings_)
@@ -96,7 +97,15 @@ void WorldContacts::accept_impacts(const ContactScene& scene) {
                                            first_[static_cast<std::size_t>(m.b)]) ||
                !add_impact(scene, m);
     });
-    std::sort(manifolds_.begin(), manifolds_.end(), by_key);
+    // Those that were added, into their places.
+    added_.assign(manifolds_.begin() + sorted, manifolds_.end());
+    std::sort(added_.begin(), added_.end(), by_key);
+    auto to = manifolds_.end(), from = manifolds_.begin() + sorted;
+    for (; !added_.empty(); --to) {
+        const bool old = from != manifolds_.begin() && by_key(added_.back(), *std::prev(from));
+        *std::prev(to) = old ? *--from : added_.back();
+        if (!old) added_.pop_back();
+    }
 }
 
 // The contact of a pair where its paths bring it at a time. Its separation now is what its rows, which stand
@@ -153,7 +162,8 @@ void WorldContacts::keep_last() {
     auto kept = manifolds_.begin();
     for (auto next = manifolds_.begin(); next != manifolds_.end(); ++next) {
         if (kept != manifolds_.begin() && again(*std::prev(kept), *next)) --kept;
-        *kept++ = *next;
+        if (kept != next) *kept = *next;
+        ++kept;
     }
     manifolds_.erase(kept, manifolds_.end());
 }

@@ -9,6 +9,8 @@
 
 namespace sim {
 
+constexpr std::size_t kBodiesAPiece = 32;  ///< of what threads take at once
+
 /// What world.cpp (one world's step) and world_sharing.cpp (several worlds of the same bodies) work on.
 struct World::Implementation {
     WorldSettings settings;
@@ -29,7 +31,8 @@ struct World::Implementation {
     [[nodiscard]] IslandSolver& solver() const noexcept { return *solvers.front(); }
     void set_threads(int threads);
     std::vector<Island> islands;
-    std::vector<int> parent, place;  // union-find; a root's island
+    std::vector<int> parent, place;             // union-find; a root's island
+    std::vector<std::pair<int, int>> touching;  // of each contact: bodies that move, or -1
     std::size_t islands_used = 0;
     /// What a solve changed besides the bodies' states, kept of every island at its first body.
     struct Outcome {
@@ -74,9 +77,11 @@ struct World::Implementation {
     void set_joined();                ///< by constraints
     void drop_constraints(int body);  ///< of a body that is taken out
     [[nodiscard]] SpringRecord spring_record(std::size_t constraint) const;
-    bool restore_spring(const SpringRecord& record);        ///< whether it held otherwise
-    void pose(MovingBody& body);                            ///< for contact tests
-    void quarantine(int body, const std::string& what);     ///< takes it out of the world
+    bool restore_spring(const SpringRecord& record);     ///< whether it held otherwise
+    void pose(MovingBody& body);                         ///< for contact tests
+    void quarantine(int body, const std::string& what);  ///< takes it out of the world
+    template <typename Concerned>
+    [[nodiscard]] bool any_broken(Concerned concerned);     ///< of those here
     void quarantine_broken();                               ///< before the step
     void quarantine_results();                              ///< after the step
     [[nodiscard]] bool is_own(const Island& island) const;  ///< has an own body
@@ -107,10 +112,10 @@ struct World::Implementation {
     template <typename Solve>
     void share_islands(Solve solve);  ///< calls solve(island, solver, scene) for those in `to_solve`
     void begin_again(const Island& island);
-    std::vector<const Island*> to_solve;
-    void note_found();          ///< contacts, by the islands that have just been solved
-    void move_alone(int body);  ///< over the step
-    void solve_again();         ///< islands of bodies in `again`, from the step's start
+    std::vector<const Island*> to_solve, small;  // small: of them, for one thread each
+    void note_found();                           ///< contacts, by the islands that have just been solved
+    void move_alone(int body);                   ///< over the step
+    void solve_again();                          ///< islands of bodies in `again`, from the step's start
     void hold_apart(const WorldContacts::Meeting& meeting);
     std::vector<WorldContacts::Meeting> last;  ///< what meets after all rounds
     void sum_outcomes();                       ///< of all islands

@@ -56,11 +56,14 @@ void World::Implementation::start_solving() {
     again.assign(bodies.size(), 0);
     for (std::size_t i = 0; i < islands_used; ++i) {
         if (!is_solved(islands[i])) continue;
-        for (const int id : islands[i].bodies) {
-            const auto at = static_cast<std::size_t>(id);
-            started[at] = bodies[at].state;
-            at_limit_before[at] = bodies[at].at_limit;
-        }
+        const std::vector<int>& of_island = islands[i].bodies;
+        crew().each(of_island.size(), kBodiesAPiece, [&](int, std::size_t first, std::size_t end) {
+            for (std::size_t k = first; k < end; ++k) {
+                const auto at = static_cast<std::size_t>(of_island[k]);
+                started[at] = bodies[at].state;
+                at_limit_before[at] = bodies[at].at_limit;
+            }
+        });
     }
     springs_before.clear();
     for (std::size_t c = 0; c < constraints.size(); ++c) springs_before.push_back(spring_record(c));
@@ -107,10 +110,19 @@ void World::Implementation::share_islands(Solve solve) {
     }
     for (const Island* island : to_solve)
         if (island->bodies.size() >= kLeastDivided) solve(*island, solver(), shared);
-    by.each(to_solve.size(), 4, [&](int thread, std::size_t first, std::size_t end) {
+    small.clear();
+    std::ranges::copy_if(to_solve, std::back_inserter(small),
+                         [](const Island* island) { return island->bodies.size() < kLeastDivided; });
+    // The longest first, so that none is left to one thread at the end: those with constraints are solved directly.
+    const auto size = [](const Island* island) {
+        return (island->constraints.empty() ? 1 : 100) * island->bodies.size() + island->manifolds.size();
+    };
+    std::ranges::sort(small, [&](const Island* a, const Island* b) {
+        return std::pair(size(a), a->bodies.front()) > std::pair(size(b), b->bodies.front());
+    });
+    by.each(small.size(), 1, [&](int thread, std::size_t first, std::size_t end) {
         for (std::size_t i = first; i < end; ++i)
-            if (to_solve[i]->bodies.size() < kLeastDivided)
-                solve(*to_solve[i], *solvers[static_cast<std::size_t>(thread)], single);
+            solve(*small[i], *solvers[static_cast<std::size_t>(thread)], single);
     });
 }
 
