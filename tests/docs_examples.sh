@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Runs every ```sh block of README.md and docs/*.md, a line at a time, with `./run` replaced by the program ($MUSICWORLD_PROGRAM); fails
-# on a status other than 0. Each page has a folder of its own that goes away; the first ```toml block of the page lies there as example.toml.
+# on a status other than 0. Each page has a folder of its own that goes away; the first ```toml block of the page lies there by the name that the
+# page saves it as, or else as example.toml.
 # Arguments: pages, all if left out.
 set -uo pipefail
 top=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -13,7 +14,8 @@ for page in "$@"; do
     page=$(realpath "$page")
     folder=$(mktemp -d)
     ln -s "$top/assets" "$folder/assets"
-    awk '/^```toml$/ { on = 1; next } /^```/ { if (on) exit } on' "$page" >"$folder/example.toml"
+    name=$(sed -n 's/.*Save this as `\([^`]*[.]toml\)`.*/\1/p' "$page" | head -n 1)
+    awk '/^```toml$/ { on = 1; next } /^```/ { if (on) exit } on' "$page" >"$folder/${name:-example.toml}"
     while IFS= read -r line; do
         [ -z "$line" ] && continue
         command=${line//.\/run/\"\$MUSICWORLD_EXAMPLE_PROGRAM\"}

@@ -7,6 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <tuple>
 
 #include "files/bad_input.h"
 #include "report/json_document.h"
@@ -358,7 +359,9 @@ std::vector<const ComparisonSummary*> ranked_by_f1(const Comparison& comparison,
         if (summary.lead_s == lead_s && summary.hits && summary.hits->true_contacts > 0)
             ranked.push_back(&summary);
     std::ranges::stable_sort(ranked, std::greater(), [](const ComparisonSummary* summary) {
-        return std::pair(summary->hits->f1(), summary->baseline);  // a tie is no win over a baseline
+        // The nearer in time of equal ones; a tie in both is no win over a baseline.
+        return std::tuple(summary->hits->f1(), summary->hits->matched > 0 ? -summary->hits->median_ms() : 0.0,
+                          summary->baseline);
     });
     return ranked;
 }

@@ -84,9 +84,13 @@ void check_name(const std::string& specification) {
     const std::string name = specification.substr(0, specification.find(':'));
     const std::vector<std::string>&names = tracking::predictor_names(),
           &of_model = tracking::model_predictor_names();
-    if (std::ranges::count(names, name) == 0 && std::ranges::count(of_model, name) == 0)
-        throw BadInput(fmt::format("error: found predictor \"{}\", expected auto, exec:CMD or one of {}, {}",
-                                   name, fmt::join(names, ", "), fmt::join(of_model, ", ")));
+    if (std::ranges::count(names, name) > 0 || std::ranges::count(of_model, name) > 0) return;
+    std::vector<std::string> all = {"auto"};
+    all.insert(all.end(), names.begin(), names.end());
+    all.insert(all.end(), of_model.begin(), of_model.end());
+    throw BadInput(fmt::format("error: found predictor \"{}\", expected auto, exec:CMD or one of {}, {}{}",
+                               name, fmt::join(names, ", "), fmt::join(of_model, ", "),
+                               nearest_hint(name, all)));
 }
 
 /// The end of the part that begins at `begin`: its comma, or the list's end.
