@@ -255,7 +255,7 @@ BenchReport bench_sim(const SimBenchOptions& options,
             rounds.push_back(run_round(definition, peers, beside && sim_bench::bullet_is_there(), options));
         }
         for (std::size_t i = 0; i < peers.size(); ++i) {
-            const sim_bench::PeerLibrary& library = peers[i].library;
+            const sim_bench::PeerLibrary& library = peers[i].peer;
             report.results.push_back(
                 against(fmt::format("{}_vs_{}_at_equal_overlap", prefix, lower(library.name)),
                         library.name + " " + peers[i].words(), library.name + " " + library.version, rounds,

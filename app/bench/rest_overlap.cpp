@@ -84,7 +84,7 @@ double mean_overlap(const sim::WorldDefinition& definition, const std::vector<Ri
 }
 
 std::unique_ptr<RigidPeer> EqualPeer::start(const sim::WorldDefinition& world) const {
-    return std::make_unique<Divided>(library.make(world, settings), 1 << halvings);
+    return std::make_unique<Divided>(peer.make(world, settings), 1 << halvings);
 }
 
 std::string EqualPeer::words() const {

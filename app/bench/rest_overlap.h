@@ -21,7 +21,7 @@ inline constexpr int kRestSteps = 60;
 
 /// A library's cheapest setting whose balls overlap at rest no more than they may.
 struct EqualPeer {
-    sim_bench::PeerLibrary library;
+    sim_bench::PeerLibrary peer;
     sim_bench::PeerSettings settings;
     int halvings = 0;    ///< of the step
     double overlap = 0;  ///< mean at rest

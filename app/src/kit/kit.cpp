@@ -385,7 +385,7 @@ struct KitDraft {
     Kit kit;
     std::vector<audio::Instrument> orchestra;
     std::set<std::string> names;  ///< of its instruments
-    audio::SampleLibrary* library = nullptr;
+    audio::SampleLibrary* sample_library = nullptr;
 };
 
 void stick_keys(Fields& keys, StickDefinition& stick) {
@@ -510,7 +510,7 @@ void kit_keys(Fields& keys, KitDraft& written) {
             place_mesh(at, read);
             at.require(written.names.insert(instrument.name).second, "",
                        fmt::format("a second instrument \"{}\"", instrument.name), "a name of its own");
-            take_samples(read, kit, *written.library);
+            take_samples(read, kit, *written.sample_library);
             mix_in(at, instrument, kit.buses);
             kit.instruments.push_back(instrument);
         });
@@ -553,7 +553,7 @@ void load(Kit& kit, std::vector<TomlFile>& documents, const fs::path& file,
 Kit read_kit(const fs::path& file) {
     audio::SampleLibrary library;
     KitDraft written;
-    written.library = &library;
+    written.sample_library = &library;
     Kit& kit = written.kit;
     kit.file = file;
     std::vector<TomlFile> documents;
