@@ -72,6 +72,9 @@ bool is_number(std::string_view word) {
     return is_digit(word[0]) &&
            std::ranges::all_of(word, [](char c) { return is_digit(c) || c == '.' || c == 'e' || c == 'E'; });
 }
+std::string shown(char c) {
+    return c > 0x20 && c < 0x7f ? std::string(1, c) : "a character that is not plain text";
+}
 bool is_p_field(std::string_view word) {
     return word.size() > 1 && word[0] == 'p' && std::ranges::all_of(word.substr(1), is_digit);
 }
@@ -185,12 +188,11 @@ private:
     void sign(char c, std::size_t at) {
         const bool blank = c == ' ' || c == '\t';
         if (bound_ != nullptr && argument_ < 0 && !blank)
-            refuse(at, std::string(bound_->word) + " " + c,
+            refuse(at, std::string(bound_->word) + " " + shown(c),
                    "a variable as what it hears: aOut " + std::string(bound_->word) + " aIn, ...");
         if (bound_ != nullptr && c == ',' && depth_ == 0) return comma();
         if (!blank && (!within_ || kSigns.find(c) == std::string_view::npos))
-            refuse(at, c > 0x20 && c < 0x7f ? std::string(1, c) : "a character that is not plain text",
-                   "opcodes and numbers: no texts, labels, or lines of the preprocessor");
+            refuse(at, shown(c), "opcodes and numbers: no texts, labels, or lines of the preprocessor");
         if (c == '=' && (previous_ == "sr" || previous_ == "kr" || previous_ == "ksmps"))
             refuse(at, std::string(previous_) + " =", "the header's values as they are");
         if (c == '(' || c == '[') ++depth_;

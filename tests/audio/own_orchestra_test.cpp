@@ -68,6 +68,22 @@ TEST(CheckedOrchestra, WhatReachesBeyondTheSoundIsRefusedAtItsPlace) {
     }
 }
 
+TEST(CheckedOrchestra, FaultsAreOneLineOfPlainTextWhateverByteStandsWhere) {
+    const std::string line = "aX vcomb aIn, (p4 + 1), 1, 0.1, 1";
+    for (std::size_t at = 0; at <= line.size(); ++at)
+        for (int byte = 0; byte < 256; ++byte) {
+            std::string text = "instr gong\n" + line + "\nendin\n";
+            text.insert(11 + at, 1, static_cast<char>(byte));
+            try {
+                (void)audio::checked_own_orchestra(text, "mine.orc", kTaken);
+            } catch (const audio::SampleError& fault) {
+                EXPECT_TRUE(std::ranges::all_of(std::string_view(fault.what()),
+                                                [](char c) { return c >= 0x20 && c < 0x7f; }))
+                    << "byte " << byte << " at " << at << ": " << fault.what();
+            }
+        }
+}
+
 /// 1e9 s of delay are 400 TB a note.
 TEST(CheckedOrchestra, WhatSetsAnOpcodesMemoryIsBounded) {
     const auto checked = [](const std::string& line) {
