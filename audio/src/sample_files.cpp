@@ -12,6 +12,7 @@
 #include <set>
 #include <sstream>
 #include <tuple>
+#include <utility>
 
 #include "audio/performance.h"
 #include "region_text.h"
@@ -27,6 +28,12 @@ constexpr int kMostChannels = 64;
 bool is_file(const fs::path& file) {
     std::error_code error;
     return fs::is_regular_file(file, error);
+}
+
+std::string without_controls(std::string text) {
+    for (char& c : text)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+    return text;
 }
 
 std::string bytes_of(const fs::path& file, std::size_t most, const std::string& place) {
@@ -278,11 +285,11 @@ std::string keys_text(const WrittenRegions& written) {
 
 }  // namespace
 
+SampleError::SampleError(std::string text) : std::runtime_error(without_controls(std::move(text))) {}
+
 std::string printable(std::string_view text) {
     constexpr std::size_t kLongest = 80;
-    std::string result(text.substr(0, kLongest));
-    for (char& c : result)
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+    const std::string result = without_controls(std::string(text.substr(0, kLongest)));
     return text.size() > kLongest ? result + "..." : result;
 }
 

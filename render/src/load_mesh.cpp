@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include "import_process.h"
 #include "mesh_stream.h"
@@ -46,6 +47,12 @@ std::optional<Mesh> read_here(const std::filesystem::path& file, const std::stri
     return read_plain_obj(file, text);
 }
 
+std::string without_controls(std::string text) {
+    for (char& c : text)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+    return text;
+}
+
 /// Runs one stage of one file's import and puts the file's name before what went wrong.
 template <typename Stage>
 auto naming_file(const std::filesystem::path& file, Stage stage) {
@@ -59,6 +66,8 @@ auto naming_file(const std::filesystem::path& file, Stage stage) {
 }
 
 }  // namespace
+
+MeshError::MeshError(std::string text) : std::runtime_error(without_controls(std::move(text))) {}
 
 std::vector<Mesh> load_meshes(const std::vector<std::filesystem::path>& files) {
     std::vector<Mesh> meshes(files.size());

@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "text_cursor.h"
+#include "tracking/trace.h"
 
 namespace tracking {
 namespace {
@@ -79,6 +80,8 @@ private:
 };
 
 }  // namespace
+
+TraceError::TraceError(std::string_view text) : std::runtime_error(printable(text)) {}
 
 std::string printable(std::string_view text) {
     std::string out;

@@ -32,6 +32,8 @@ std::string one_line(std::string_view text, std::size_t longest) {
     return line.size() < text.size() ? line + "..." : line;
 }
 
+BadInput::BadInput(std::string_view text) : std::runtime_error(one_line(text, text.size())) {}
+
 std::string counted(std::uint64_t count, std::string_view one) {
     const std::string number = std::to_string(count) + " ";
     if (count == 1) return number + std::string(one);

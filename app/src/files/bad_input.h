@@ -9,10 +9,11 @@
 namespace app {
 
 /// Bad usage or bad input: the program prints what() as its one line on standard error and ends with
-/// status 2. The text: [FILE[:LINE:COLUMN]: ]error: found ..., expected ...; what to do.
+/// status 2. The text: [FILE[:LINE:COLUMN]: ]error: found ..., expected ...; what to do. Control characters in it, of what was
+/// found, become spaces.
 class BadInput : public std::runtime_error {
 public:
-    using std::runtime_error::runtime_error;
+    explicit BadInput(std::string_view text);
 };
 
 /// Whether a character may stand in no one-line message.

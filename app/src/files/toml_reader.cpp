@@ -414,10 +414,9 @@ toml::table parsed(const std::string& file, const auto& parse) {
     try {
         return parse();
     } catch (const toml::parse_error& wrong) {
-        std::string what(wrong.description());
-        std::replace(what.begin(), what.end(), '\n', ' ');
         throw BadInput(fmt::format("{}:{}:{}: error: found a syntax error ({}), expected TOML", file,
-                                   wrong.source().begin.line, wrong.source().begin.column, what));
+                                   wrong.source().begin.line, wrong.source().begin.column,
+                                   wrong.description()));
     }
 }
 

@@ -17,10 +17,11 @@ namespace audio {
 // table, sample by sample, so its first sample is the note's onset and its sound does not depend on where in a block
 // that lies.
 
-/// Bad samples: "FILE[:LINE:COLUMN]: error: found ..., expected ...", one line.
+/// Bad samples: "FILE[:LINE:COLUMN]: error: found ..., expected ...", one line: control characters in it,
+/// of what was found, become spaces.
 class SampleError : public std::runtime_error {
 public:
-    using std::runtime_error::runtime_error;
+    explicit SampleError(std::string text);
 };
 
 // Limits of what is read.

@@ -21,9 +21,10 @@ struct Mesh {
 };
 
 /// A file that is no mesh, or cannot be one here: one line, FILE[:LINE]: error: found ..., expected ...
+/// Control characters in it, of what was found, become spaces.
 class MeshError : public std::runtime_error {
 public:
-    using std::runtime_error::runtime_error;
+    explicit MeshError(std::string text);
 };
 
 /// Loads OBJ, GLB/glTF or STL. Plain OBJ, as assets/meshes holds, is read in this process; other files through

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "files/bad_input.h"
 
 namespace app {
@@ -55,6 +57,25 @@ TEST(TomlReader, TheFirstLayerThatHasAKeyGivesItsValue) {
     EXPECT_EQ(b, 3);
     EXPECT_EQ(inner.x, 10);
     EXPECT_EQ(inner.y, 30);
+}
+
+// Faults of the parser quote what they found.
+TEST(TomlReader, RefusalsAreOneLineWithoutControlCharactersWhateverByteStandsWhere) {
+    const std::string text = "a = true\n[\"b\"]\nc = 1979-05-27\n";
+    for (std::size_t at = 0; at <= text.size(); ++at)
+        for (int byte = 0; byte < 256; ++byte) {
+            std::string damaged = text;
+            damaged.insert(at, 1, static_cast<char>(byte));
+            try {
+                read({damaged}, [](Fields& keys) {
+                    bool a = false;
+                    keys.flag("a", a, "");
+                });
+            } catch (const BadInput& wrong) {
+                EXPECT_TRUE(std::ranges::none_of(std::string_view(wrong.what()), is_control))
+                    << "byte " << byte << " at " << at << ": " << wrong.what();
+            }
+        }
 }
 
 TEST(TomlReader, RangesAreClosedAndNumbersMustBeFinite) {

@@ -39,10 +39,10 @@ struct Trace {
 };
 
 /// Bad input. what() is one line: FILE:LINE:COLUMN (FILE:byte N in binary files): error: found ..., expected
-/// ...; what to do.
+/// ...; what to do. What in it cannot be printed becomes '?'.
 class TraceError : public std::runtime_error {
 public:
-    using std::runtime_error::runtime_error;
+    explicit TraceError(std::string_view text);
 };
 
 /// Reads the native CSV format: optional `# key: value` lines, then the header t,stick,px,py,pz and, if the
