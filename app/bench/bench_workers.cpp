@@ -2,73 +2,49 @@
 
 #include <falling_bodies.h>
 #include <fmt/format.h>
+#include <shared_run.h>
+#include <struck_speed.h>
+#include <thread_speed.h>
 #include <update_throughput.h>
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <map>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <thread>
 #include <utility>
 
+#include "files/assets.h"
 #include "report/plot.h"
 #include "report/table.h"
 #include "scene/scene.h"
+#include "statistics/statistics.h"
 
 namespace app {
 namespace {
 
-/// Keeps what is told, the momentum and the mean height.
-class BodiesWatch : public sim::DistributedObserver {
+/// Of a whole run.
+class MomentumObserver : public sim::DistributedObserver {
 public:
-    BodiesWatch(MeasuredRun& run, const sim::WorldScene& scene, const sim::DistributedSettings& settings)
-        : run_(run),
-          scene_(scene),
-          last_(settings.steps),
-          second_(std::uint64_t(std::lround(1 / scene.world.settings.dt))) {}
+    MomentumObserver(const sim::WorldScene& scene, std::uint64_t steps) : scene_(scene), last_(steps) {}
 
     void at(std::uint64_t step, const sim::World& world) override {
-        if (step > 0) run_.body_steps += std::uint64_t(world.bodies());
         if (step == 0) momentum_.emplace(scene_, world);
         if (step % 10 == 0 || step == last_) momentum_->look(world);
-        for (int body = 0; body < world.bodies(); ++body) {
-            const Eigen::Vector3d centre = world.state(body).position;
-            if (step == std::min(second_, last_)) run_.after_a_second.push_back(centre);
-            if (step == last_) run_.mean_height += centre.y() / world.bodies();
-        }
     }
-    void worked(const sim::WorkerStep& step) override {
-        run_.steps.push_back(step);
-        run_.history.add(step);
-    }
-    void moved(std::uint64_t step, int bodies, int from, int to) override {
-        run_.trades.push_back({step, bodies, from, to});
-    }
-    /// The drift of the momentum; `outside`: the impulse of what is no body.
-    [[nodiscard]] MomentumDrift drift(const std::optional<Eigen::Vector3d>& outside) const {
-        return momentum_->drift(outside).value();
+    /// `outside`: the impulse of what is no body.
+    [[nodiscard]] double drift(const Eigen::Vector3d& outside) const {
+        return momentum_->drift(outside).value().share();
     }
 
 private:
-    MeasuredRun& run_;
     const sim::WorldScene& scene_;
-    std::uint64_t last_, second_;
+    std::uint64_t last_;
     std::optional<MomentumWatch> momentum_;
 };
 
-template <typename Start>
-MeasuredRun measure(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
-                    const Start& start) {
-    MeasuredRun run;
-    BodiesWatch watch(run, scene, settings);
-    run.result = start(watch);
-    run.momentum_drift = watch.drift(run.result.outside_impulse).share();
-    return run;
-}
-
+using sim_bench::SharedRun;
 using Progress = std::function<void(const std::string&)>;
 using Factor = std::function<double(int, std::uint64_t)>;
 
@@ -77,26 +53,14 @@ constexpr int kModes = 12;
 /// The bundled benchmark of so many bodies, or as many balls in a box. Nothing sleeps: every step is work.
 sim::WorldScene scene_of(int bodies) {
     sim::WorldScene scene;
-    const std::filesystem::path file = find_scene(fmt::format("benchmark{}", bodies));
-    if (std::filesystem::is_regular_file(file))
-        scene = static_cast<const sim::WorldScene&>(read_scene(file));
+    const std::string name = fmt::format("benchmark{}", bodies);
+    const std::vector<std::string> bundled = bundled_names("scenes");
+    if (std::ranges::find(bundled, name) != bundled.end())
+        scene = static_cast<const sim::WorldScene&>(read_scene(find_scene(name)));
     else
         scene.world = sim_bench::falling_balls(bodies, kModes);
     scene.world.settings.sleeping = false;
     return scene;
-}
-
-/// A number in [0, 1) for a worker's step, the same in every run.
-double drawn(std::uint64_t a, std::uint64_t b) {
-    std::uint64_t x = a * 0x9e3779b97f4a7c15u + b * 0xbf58476d1ce4e5b9u + 1992;  // splitmix64
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-    return static_cast<double>((x ^ (x >> 31)) >> 11) * 0x1p-53;
-}
-
-/// Every step of every worker twice as long with probability 0.2.
-double unsteady(int worker, std::uint64_t step) {
-    return drawn(std::uint64_t(worker), step) < 0.2 ? 2 : 1;
 }
 
 sim::DistributedSettings settings_of(int steps, int bound, bool balance) {
@@ -108,44 +72,45 @@ sim::DistributedSettings settings_of(int steps, int bound, bool balance) {
     return settings;
 }
 
-double apart(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::Vector3d>& b) {
-    double sum = 0;
-    for (std::size_t k = 0; k < a.size(); ++k) sum += (a[k] - b[k]).squaredNorm();
-    return a.empty() ? 0 : std::sqrt(sum / static_cast<double>(a.size()));
-}
-
 class WorkersBenchRun {
 public:
     WorkersBenchRun(const WorkersBenchOptions& options, const Progress& progress)
         : options_(options),
           progress_(progress),
           most_workers_(std::ranges::max(options.workers)),
-          most_bodies_(std::ranges::max(options.bodies)) {}
+          most_bodies_(std::ranges::max(bodies_or({25, 400}))) {}
 
     void speed_ups() {
-        for (const int bodies : options_.bodies) speed_up(bodies);
+        for (const int bodies : bodies_or({25, 400})) speed_up(bodies);
+        if (!options_.processors.modelled)
+            note(
+                "speedup: workers that take turns in one thread find their caches cold. So each did its "
+                "work once more without the others; cold_caches: how many times as long it took in turns, "
+                "which the elapsed times and speed-ups leave out (the other parts do not). "
+                "busiest_speed_up: if nobody waited, as by the work of the worker that had most, alone; "
+                "other load makes steps uneven, so that workers wait.");
     }
 
     /// Lockstep solves a pile that crosses workers at each of them; a barrier's cost alone is that of the
-    /// asynchronous run's own steps with one (`with_barrier_s`).
+    /// asynchronous run's own steps with one (critical_path_s).
     void stragglers() {
         const int workers = most_workers_;
         const sim::WorldScene scene = scene_of(most_bodies_);
         const Factor permanent = [](int worker, std::uint64_t) { return worker == 0 ? 2.0 : 1.0; };
         const Factor wandering = [workers](int worker, std::uint64_t step) {
-            return worker == static_cast<int>(drawn(step / 20, 7) * workers) ? 2.0 : 1.0;
+            return sim_bench::wandering(workers, worker, step);
         };
         const auto compare = [&](const std::string& name, const Factor& factor, int bound) {
             progress_("stragglers: " + name);
-            const MeasuredRun lockstep = measure(scene, workers, {0, false, factor}),
-                              async = measure(scene, workers, {bound, false, factor});
+            const SharedRun lockstep = measure(scene, workers, {0, false, factor}),
+                            async = measure(scene, workers, {bound, false, factor});
             add(name + "_lockstep_elapsed", lockstep.result.elapsed_s, "s");
             add(name + "_async_elapsed", async.result.elapsed_s, "s");
             add(name + "_async_over_lockstep", lockstep.result.elapsed_s / async.result.elapsed_s,
                 "times as fast");
-            add(name + "_async_over_barrier", async.with_barrier_s() / async.result.elapsed_s,
+            add(name + "_async_over_barrier", async.critical_path_s() / async.result.elapsed_s,
                 "times as fast");
-            return std::pair{lockstep.result.elapsed_s, async.with_barrier_s()};
+            return std::pair{lockstep.result.elapsed_s, async.critical_path_s()};
         };
         const auto [lockstep, barrier] = compare("straggler_permanent_unbalanced", permanent, options_.bound);
         progress_("stragglers: permanent, balanced");
@@ -158,27 +123,28 @@ public:
         add(async_name + "over_lockstep", lockstep / balanced, "times as fast");
         add(async_name + "over_barrier", barrier / balanced, "times as fast");
         add(lockstep_name + "over_lockstep", lockstep / balanced_lockstep, "times as fast");
-        compare("straggler_unsteady_b4", unsteady, 4);
+        compare("straggler_unsteady_b4", sim_bench::unsteady, 4);
         compare("straggler_wandering_b16", wandering, 16);
-        bench_.report.notes.push_back(
+        note(
             "A permanent straggler without balancing gains nothing by asynchrony: once the others are B "
-            "steps "
-            "ahead they wait for it at every step, so all go at its pace. Only less work helps it: "
+            "steps ahead they wait for it at every step, so all go at its pace. Only less work helps it: "
             "balancing.");
     }
 
     void bounds() {
         const int workers = most_workers_;
         const sim::WorldScene scene = scene_of(most_bodies_);
-        MeasuredRun lockstep;
+        SharedRun lockstep;
         for (const int bound : {0, 1, 2, 4, 8, 16, 32}) {
             progress_(fmt::format("bound {}", bound));
-            MeasuredRun run = measure(scene, workers, {bound, false});
+            MomentumObserver momentum(scene, std::uint64_t(options_.steps));
+            SharedRun run = measure(scene, workers, {bound, false}, &momentum);
             if (bound == 0) lockstep = run;
-            const MeasuredRun slow = measure(scene, workers, {bound, false, unsteady});
-            bench_.bounds.push_back({bound, run.result.elapsed_s, slow.result.elapsed_s, run.momentum_drift,
-                                     apart(run.after_a_second, lockstep.after_a_second),
-                                     run.mean_height / lockstep.mean_height, run.result.largest_ghost_age});
+            const SharedRun slow = measure(scene, workers, {bound, false, sim_bench::unsteady});
+            bench_.bounds.push_back({bound, run.result.elapsed_s, slow.result.elapsed_s,
+                                     momentum.drift(run.result.outside_impulse),
+                                     sim_bench::apart(run, lockstep), run.mean_height / lockstep.mean_height,
+                                     run.result.largest_ghost_age});
             const BoundRow& row = bench_.bounds.back();
             const std::string name = fmt::format("bound{}", bound);
             add(name + "_elapsed", row.elapsed_s, "s");
@@ -197,39 +163,77 @@ public:
         settings.market.from_step = scene.workers.balance_from;
         sim::SimulatedProcessors processors = options_.processors;
         processors.count = 3;
-        const MeasuredRun run = measure_run(scene, settings, processors);
+        const SharedRun run = sim_bench::measure_run(scene, settings, processors);
         const std::uint64_t from = scene.workers.balance_from, load = scene.events.at(0).step;
-        add("migration_unevenness_10_steps_after_start", unevenness_at(run, from + 10), "allowed: 1");
-        add("migration_unevenness_10_steps_after_load", unevenness_at(run, load + 10), "allowed: 1");
-        add("migration_most_trades_in_20_steps_before_load", most_trades(run, from + 10, load, 20), "trades");
-        add("migration_most_trades_in_20_steps_after_load", most_trades(run, load + 10, settings.steps, 20),
+        add("migration_unevenness_10_steps_after_start", sim_bench::unevenness_at(run, from + 10),
+            "allowed: 1");
+        add("migration_unevenness_10_steps_after_load", sim_bench::unevenness_at(run, load + 10),
+            "allowed: 1");
+        add("migration_most_trades_in_20_steps_before_load", sim_bench::most_trades(run, from + 10, load, 20),
             "trades");
+        add("migration_most_trades_in_20_steps_after_load",
+            sim_bench::most_trades(run, load + 10, settings.steps, 20), "trades");
         add("migration_bodies_traded", double(run.result.migrations), "bodies");
-        bench_.migration = run.history;
+        for (const sim::WorkerStep& step : run.steps) bench_.migration.add(step);
     }
 
-    /// Real processes, as many as there are cores for them beside the application.
-    void processes() {
-        const sim::WorldScene scene = scene_of(most_bodies_);
-        const int cores = static_cast<int>(std::thread::hardware_concurrency());
-        double alone = 0;
-        for (const int workers : options_.workers) {
-            if (workers > std::max(1, cores)) continue;
-            progress_(fmt::format("{} worker processes", workers));
-            sim::DistributedLaunch launch;
-            launch.processes = {options_.program, {"worker"}, workers};
-            for (const int bound : {0, options_.bound}) {
-                const double elapsed =
-                    measure_run(scene, settings_of(options_.steps, bound, true), launch).result.elapsed_s;
-                if (alone == 0) alone = elapsed;
-                const std::string name = fmt::format("processes_bodies{}_workers{}_{}", most_bodies_, workers,
-                                                     bound > 0 ? "async" : "lockstep");
-                add(name + "_elapsed", elapsed, "s");
-                add(name + "_speed_up", alone / elapsed, "times one");
+    /// This machine's cores shared by threads of one process.
+    void threads() {
+        std::vector<int> counts;
+        for (int threads = 1; threads < cores(); threads *= 2) counts.push_back(threads);
+        counts.push_back(cores());
+        for (const int bodies : bodies_or({400, 1600})) {
+            progress_(fmt::format("threads: {} bodies", bodies));
+            const auto all =
+                sim_bench::measure_threads(scene_of(bodies).world, counts, options_.steps, options_.rounds);
+            for (const sim_bench::ThreadsSpeed& speed : all) {
+                const std::string name = fmt::format("threads_bodies{}_threads{}", bodies, speed.threads);
+                add_times(name, {speed.elapsed_s, speed.critical_path_s},
+                          {all.front().elapsed_s, all.front().critical_path_s});
+                add(name + "_cpu", speed.cpu_s, "s, all threads");
             }
         }
-        bench_.report.notes.push_back(
-            fmt::format("processes: real ones by the wall clock, at most {}, this machine's cores.", cores));
+        note(fmt::format(
+            "threads: {} steps, medians of {}, in turns of 25 steps, times one thread. Critical path: by "
+            "one thread that times every piece that threads would share out and gives it to the one that "
+            "would be free first; processor time, so other load does not count.",
+            options_.steps, options_.rounds));
+    }
+
+    /// Real processes, as many as there are cores for them.
+    void processes() {
+        for (const int bodies : bodies_or({400, 1600})) processes_of(bodies);
+        note(fmt::format(
+            "processes: {} steps, medians of {} runs in turns, times one process without workers; at most "
+            "{} workers, this machine's cores, which the application shares. Critical path: by "
+            "processor time of the workers' stepping threads, with their messages, if each step waited for "
+            "all others' step before it (async: for the one before that).",
+            options_.steps, options_.rounds, cores()));
+    }
+
+    /// Struck bodies, as in `play --workers`.
+    void kit() {
+        std::vector<int> counts = {0};
+        for (const int workers : options_.workers)
+            if (workers <= cores()) counts.push_back(workers);
+        const sim::WorkerLaunch launch = {options_.program, {"worker"}};
+        for (const int bodies : {10, 100}) {
+            progress_(fmt::format("kit of {} drums", bodies));
+            const auto all = sim_bench::measure_struck(bodies, counts, launch, 4 * options_.steps);
+            for (const sim_bench::StruckSpeed& speed : all) {
+                const std::string name = fmt::format("kit_bodies{}_workers{}", bodies, speed.workers);
+                add(name + "_step", 1e6 * speed.step_s, "us of two strokes");
+                add(name + "_speed_up", all.front().step_s / speed.step_s, "times one process");
+                add(name + "_critical_path", 1e6 * speed.critical_path_s, "us of two strokes");
+                add(name + "_critical_path_speed_up", all.front().critical_path_s / speed.critical_path_s,
+                    "times one process");
+            }
+        }
+        note(fmt::format(
+            "kit: {} steps of 1/60 s, in each two strokes on drums and two pictures; 0 workers: in this "
+            "process. Step: median by the wall clock. Critical path: processor time of the application's "
+            "thread and of the worker that used most.",
+            4 * options_.steps));
     }
 
     /// Messages of all bodies, as many as pass in two seconds.
@@ -254,20 +258,18 @@ public:
             add(name + "_encode", t.encode_ns, "ns a body");
             add(name + "_decode", t.decode_ns, "ns a body");
         }
-        bench_.report.notes.push_back(
-            fmt::format("throughput: quantised states of {} modes over tcp on this machine, {} bodies a "
-                        "message, encoded by "
-                        "one thread, checked and decoded by another; CURVE encrypts and authenticates.",
-                        kModes, most_bodies_));
+        note(fmt::format(
+            "throughput: quantised states of {} modes over tcp on this machine, {} bodies a message, "
+            "encoded by one thread, checked and decoded by another; CURVE encrypts and authenticates.",
+            kModes, most_bodies_));
     }
 
     void note_clock() {
         const sim::SimulatedProcessors& p = options_.processors;
-        bench_.report.notes.push_back(fmt::format(
-            "Clock: simulated processors; costs {}, {} times slower than here; {:g} s from worker to worker; "
-            "events in simulated order in one thread. {} steps, async at most {} ahead. Ceiling: as many "
-            "worlds "
-            "as workers, each with its part of the bodies between walls, no messages.",
+        note(fmt::format(
+            "Clock of speedup, stragglers, bound and migration: simulated processors; costs {}, {} times "
+            "slower than here; {:g} s from worker to worker; events in simulated order in one thread. {} "
+            "steps, async at most {} ahead.",
             p.modelled ? "counted, not measured" : "this thread's processor time", p.slowdown, p.latency_s,
             options_.steps, options_.bound));
     }
@@ -279,53 +281,102 @@ private:
         int bound = 0;  ///< 0: lockstep
         bool balance = false;
         Factor factor = {};
+        bool warm = false;
     };
-    MeasuredRun measure(const sim::WorldScene& scene, int workers, const Way& way) {
+    SharedRun measure(const sim::WorldScene& scene, int workers, const Way& way,
+                      sim::DistributedObserver* also = nullptr) {
         sim::SimulatedProcessors processors = options_.processors;
         processors.count = workers;
         processors.factor = way.factor;
-        return measure_run(scene, settings_of(options_.steps, way.bound, way.balance), processors);
-    }
-
-    /// The longest of as many worlds as there are workers, each with its part of the bodies and no others.
-    double ceiling(const sim::WorldScene& scene, int workers) {
-        double longest = 0;
-        for (int k = 0; k < workers; ++k) {
-            sim::WorldScene strip;
-            strip.world = strip_of(scene.world, k, workers);
-            longest = std::max(longest, measure(strip, 1, {}).result.elapsed_s);
-        }
-        return longest;
+        processors.repeat_alone = way.warm && !processors.modelled;
+        return sim_bench::measure_run(scene, settings_of(options_.steps, way.bound, way.balance), processors,
+                                      also);
     }
 
     void speed_up(int bodies) {
         const sim::WorldScene scene = scene_of(bodies);
+        const auto run_of = [](const SharedRun& run) {
+            const sim::DistributedResult& r = run.result;
+            return SpeedUp::Run{r.elapsed_s / r.cold_caches, r.cold_caches, r.busiest_s};
+        };
         SpeedUp speed_up;
         speed_up.bodies = bodies;
-        speed_up.alone_s = measure(scene, 1, {}).result.elapsed_s;
+        const SpeedUp::Run alone = run_of(measure(scene, 1, {.warm = true}));
+        speed_up.alone_s = alone.elapsed_s;
         for (const int workers : options_.workers) {
             progress_(fmt::format("speed-up: {} bodies, {} workers", bodies, workers));
-            SpeedUp::Row row{workers, speed_up.alone_s, speed_up.alone_s, speed_up.alone_s, 0};
+            SpeedUp::Row row{workers, alone, alone};
             if (workers > 1) {
-                const MeasuredRun async = measure(scene, workers, {options_.bound, true});
-                row.async_s = async.result.elapsed_s;
+                const SharedRun async = measure(scene, workers, {options_.bound, true, {}, true});
+                row.async = run_of(async);
+                row.lockstep = run_of(measure(scene, workers, {0, true, {}, true}));
                 row.bytes = double(async.result.bytes) / double(std::max<std::uint64_t>(1, async.body_steps));
-                row.lockstep_s = measure(scene, workers, {0, true}).result.elapsed_s;
-                row.ceiling_s = ceiling(scene, workers);
             }
             speed_up.rows.push_back(row);
             const std::string name = fmt::format("bodies{}_workers{}_", bodies, workers);
-            add(name + "async_elapsed", row.async_s, "s");
-            add(name + "async_speed_up", speed_up.alone_s / row.async_s, "times one");
-            add(name + "lockstep_speed_up", speed_up.alone_s / row.lockstep_s, "times one");
-            add(name + "ceiling_speed_up", speed_up.alone_s / row.ceiling_s, "times one");
-            add(name + "async_of_ceiling", row.ceiling_s / row.async_s, "share");
+            for (const auto& [pace, run] : {std::pair("async", row.async), {"lockstep", row.lockstep}}) {
+                add(name + pace + "_elapsed", run.elapsed_s, "s");
+                add(name + pace + "_speed_up", alone.elapsed_s / run.elapsed_s, "times one");
+                if (run.busiest_s > 0)
+                    add(name + pace + "_busiest_speed_up", alone.elapsed_s / run.busiest_s, "times one");
+                add(name + pace + "_cold_caches", run.cold_caches, "times as long");
+            }
             add(name + "bytes_per_body_step", row.bytes, "bytes");
         }
         bench_.speed_ups.push_back(speed_up);
     }
+
+    struct Times {
+        double elapsed_s, critical_path_s;
+    };
+    /// Both, and how many times as fast as `one`.
+    void add_times(const std::string& name, const Times& times, const Times& one) {
+        add(name + "_elapsed", times.elapsed_s, "s");
+        add(name + "_critical_path", times.critical_path_s, "s");
+        add(name + "_speed_up", one.elapsed_s / times.elapsed_s, "times one");
+        add(name + "_critical_path_speed_up", one.critical_path_s / times.critical_path_s, "times one");
+    }
+
+    void processes_of(int bodies) {
+        const sim::WorldScene scene = scene_of(bodies);
+        std::map<std::string, std::pair<std::vector<double>, std::vector<double>>> seconds;  // of each round
+        std::vector<std::string> names;
+        const auto take = [&](const std::string& name, const SharedRun& run, int lead) {
+            auto& [elapsed, path] = seconds[name];
+            if (elapsed.empty()) names.push_back(name);
+            elapsed.push_back(run.result.elapsed_s);
+            path.push_back(run.critical_path_s(lead));
+        };
+        const std::string prefix = fmt::format("processes_bodies{}_", bodies);
+        for (int round = 0; round < options_.rounds; ++round) {
+            progress_(fmt::format("processes: {} bodies, round {}", bodies, round + 1));
+            take(prefix + "alone", sim_bench::measure_alone(scene, settings_of(options_.steps, 0, false)), 0);
+            for (const int workers : options_.workers)
+                for (const int bound : {0, options_.bound}) {
+                    if (workers > cores()) continue;
+                    sim::DistributedLaunch launch;
+                    launch.processes = {options_.program, {"worker"}, workers};
+                    take(fmt::format("{}workers{}_{}", prefix, workers, bound > 0 ? "async" : "lockstep"),
+                         sim_bench::measure_run(scene, settings_of(options_.steps, bound, true), launch),
+                         std::min(bound, 1));
+                }
+        }
+        const auto times_of = [&](const std::string& name) {
+            const auto& [elapsed, path] = seconds.at(name);
+            return Times{median(elapsed), median(path)};
+        };
+        for (const std::string& name : names) add_times(name, times_of(name), times_of(names.front()));
+    }
+
+    void note(const std::string& line) { bench_.report.notes.push_back(line); }
     void add(const std::string& name, double value, const std::string& unit) {
         bench_.report.results.push_back({name, value, unit});
+    }
+    [[nodiscard]] std::vector<int> bodies_or(const std::vector<int>& bodies) const {
+        return options_.bodies.empty() ? bodies : options_.bodies;
+    }
+    [[nodiscard]] static int cores() {
+        return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
     }
 
     const WorkersBenchOptions& options_;
@@ -335,9 +386,10 @@ private:
 };
 
 const std::vector<std::pair<std::string, void (WorkersBenchRun::*)()>> kParts = {
-    {"speedup", &WorkersBenchRun::speed_ups},   {"stragglers", &WorkersBenchRun::stragglers},
-    {"bound", &WorkersBenchRun::bounds},        {"migration", &WorkersBenchRun::migration},
-    {"processes", &WorkersBenchRun::processes}, {"throughput", &WorkersBenchRun::throughput}};
+    {"speedup", &WorkersBenchRun::speed_ups}, {"stragglers", &WorkersBenchRun::stragglers},
+    {"bound", &WorkersBenchRun::bounds},      {"migration", &WorkersBenchRun::migration},
+    {"threads", &WorkersBenchRun::threads},   {"processes", &WorkersBenchRun::processes},
+    {"kit", &WorkersBenchRun::kit},           {"throughput", &WorkersBenchRun::throughput}};
 
 constexpr int kWidth = 960, kHeight = 380;
 
@@ -353,9 +405,8 @@ std::string panel(const SpeedUp& s, const Shown& of) {
                                       dash, colour, title));
     };
     add("#8c8c8c", "ideal", 1, [&](const SpeedUp::Row& row) { return s.alone_s / row.workers; });
-    add("#2b9a48", "ceiling", 3, [](const SpeedUp::Row& row) { return row.ceiling_s; });
-    add("#2468b4", "asynchronous", 1, [](const SpeedUp::Row& row) { return row.async_s; });
-    add("#e03131", "lockstep", 2, [](const SpeedUp::Row& row) { return row.lockstep_s; });
+    add("#2468b4", "asynchronous", 1, [](const SpeedUp::Row& row) { return row.async.elapsed_s; });
+    add("#e03131", "lockstep", 2, [](const SpeedUp::Row& row) { return row.lockstep.elapsed_s; });
     return panel.text();
 }
 
@@ -376,14 +427,13 @@ Table table_of(std::span<const SpeedUp> speed_ups) {
             table.add_figures({{"bodies:d", s.bodies},
                                {"workers:d", r.workers},
                                {"ideal_s:.3g", s.alone_s / r.workers},
-                               {"ceiling_s:.3g", r.ceiling_s},
-                               {"async_s:.3g", r.async_s},
-                               {"lockstep_s:.3g", r.lockstep_s},
+                               {"async_s:.3g", r.async.elapsed_s},
+                               {"lockstep_s:.3g", r.lockstep.elapsed_s},
                                {"bytes_per_body_step:.0f", r.bytes},
-                               {"async_speed_up:.2f", s.alone_s / r.async_s, false},
-                               {"ceiling_speed_up:.2f", s.alone_s / r.ceiling_s, false},
-                               {"lockstep_speed_up:.2f", s.alone_s / r.lockstep_s, false},
-                               {"async_of_ceiling:.2f", r.ceiling_s / r.async_s, false}});
+                               {"async_speed_up:.2f", s.alone_s / r.async.elapsed_s, false},
+                               {"lockstep_speed_up:.2f", s.alone_s / r.lockstep.elapsed_s, false},
+                               {"async_cold_caches:.2f", r.async.cold_caches, false},
+                               {"lockstep_cold_caches:.2f", r.lockstep.cold_caches, false}});
     return table;
 }
 
@@ -397,94 +447,6 @@ Table table_of(const std::vector<BoundRow>& rows) {
 }
 
 }  // namespace
-
-double MeasuredRun::with_barrier_s() const {
-    std::map<std::uint64_t, double> longest;
-    for (const sim::WorkerStep& s : steps) longest[s.step] = std::max(longest[s.step], s.seconds);
-    return std::accumulate(longest.begin(), longest.end(), 0.0,
-                           [](double sum, const auto& step) { return sum + step.second; });
-}
-
-MeasuredRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
-                        const sim::SimulatedProcessors& processors) {
-    return measure(scene, settings, [&](sim::DistributedObserver& observer) {
-        return sim::simulate_processors(scene, settings, processors, observer);
-    });
-}
-
-MeasuredRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
-                        const sim::DistributedLaunch& launch) {
-    return measure(scene, settings, [&](sim::DistributedObserver& observer) {
-        return sim::run_distributed(scene, settings, launch, observer);
-    });
-}
-
-sim::WorldDefinition strip_of(const sim::WorldDefinition& world, int number, int of) {
-    std::vector<std::size_t> order(world.bodies.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    const auto x = [&](std::size_t body) { return world.bodies[body].world_from_body.translation().x(); };
-    std::sort(order.begin(), order.end(),
-              [&](std::size_t a, std::size_t b) { return x(a) != x(b) ? x(a) < x(b) : a < b; });
-    const auto border = [&](int k) { return order.size() * std::size_t(k) / std::size_t(of); };
-    const std::size_t first = border(number), end = border(number + 1);
-
-    sim::WorldDefinition strip;
-    strip.settings = world.settings;
-    strip.planes = world.planes;
-    std::map<int, int> number_of;
-    for (std::size_t k = first; k < end; ++k) {
-        number_of[static_cast<int>(order[k])] = static_cast<int>(strip.bodies.size());
-        strip.bodies.push_back(world.bodies[order[k]]);
-    }
-    // Half-way to the neighbour, but not through the strip's own bodies.
-    const auto wall = [&](std::size_t at, double side) {
-        double offset = side * 0.5 * (x(order[at - 1]) + x(order[at]));
-        for (const sim::WorldBody& body : strip.bodies)
-            offset = std::min(
-                offset, side * body.world_from_body.translation().x() - body.shape.base.semi_axes.maxCoeff());
-        strip.planes.push_back({side * Eigen::Vector3d::UnitX(), offset});
-    };
-    if (number > 0) wall(first, 1);
-    if (number + 1 < of) wall(end, -1);
-    for (sim::PointConstraint c : world.constraints) {
-        if (!number_of.contains(c.body_a) || (c.body_b >= 0 && !number_of.contains(c.body_b))) continue;
-        c.body_a = number_of[c.body_a];
-        if (c.body_b >= 0) c.body_b = number_of[c.body_b];
-        strip.constraints.push_back(c);
-    }
-    return strip;
-}
-
-double unevenness_at(const MeasuredRun& run, std::uint64_t step) {
-    std::map<int, sim::WorkerStep> now;
-    for (const auto& [worker, points] : run.history.workers()) now[worker] = {};
-    for (const sim::WorkerStep& done : run.steps) {
-        now[done.worker] = done;
-        if (std::ranges::all_of(now, [&](const auto& n) { return n.second.step >= step; })) break;
-    }
-    double sum = 0, per_body = 0, worst = 0;
-    for (const auto& [worker, last] : now) {
-        sum += last.smoothed_s;
-        if (last.bodies > 0) per_body = std::max(per_body, last.smoothed_s / last.bodies);
-    }
-    const double average = sum / static_cast<double>(now.size());
-    for (const auto& [worker, last] : now) worst = std::max(worst, std::abs(last.smoothed_s - average));
-    const double allowed = std::max(0.15 * average, per_body);
-    return allowed > 0 ? worst / allowed : 0;
-}
-
-int most_trades(const MeasuredRun& run, std::uint64_t from, std::uint64_t to, std::uint64_t window) {
-    const auto in_window = [&](std::uint64_t first) {
-        return std::ranges::count_if(run.trades, [&](const MeasuredRun::Trade& trade) {
-            return trade.step >= first && trade.step < std::min(first + window, to);
-        });
-    };
-    int most = 0;
-    for (const MeasuredRun::Trade& first : run.trades)
-        if (first.step >= from && first.step < to)
-            most = std::max(most, static_cast<int>(in_window(first.step)));
-    return most;
-}
 
 WorkersBench bench_workers(const WorkersBenchOptions& options, const Progress& progress) {
     WorkersBenchRun run(options, progress);
@@ -500,8 +462,8 @@ Figures figures_of(const WorkersBench& bench) {
     for (const SpeedUp& s : bench.speed_ups) {
         text += fmt::format("{} bodies: {:.3g} s on one processor\n{}\n", s.bodies, s.alone_s,
                             table_of(std::span(&s, 1))
-                                .part({"workers", "async_speed_up", "ceiling_speed_up", "lockstep_speed_up",
-                                       "async_of_ceiling", "bytes_per_body_step"})
+                                .part({"workers", "async_speed_up", "lockstep_speed_up", "async_cold_caches",
+                                       "lockstep_cold_caches", "bytes_per_body_step"})
                                 .text());
         figures.plots[fmt::format("speed_up/bodies{}.svg", s.bodies)] = speed_up_plot(s);
     }

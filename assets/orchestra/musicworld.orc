@@ -13,7 +13,7 @@
 ;   902 entry 0: the sample by which every note so far has ended, written by close_note
 ;   903 one entry a voice: gain of what the room hears of it beyond the voice itself (0: the room hears it as it is)
 ;   904 two entries a voice that a pedal makes ring longer or shorter: its decay_s as the pedal is now, and the longest (0: no such pedal)
-; Opcodes of the host (audio/src/opcodes.h): contact_force, noise_burst, modal_bank, pedal_ring, close_note, bessel.
+; Opcodes of the host (audio/src/opcodes.h): contact_force, noise_burst, modal_bank, pedal_ring, pedal_gain, close_note, bessel.
 ;
 ; Each line `;@ instrument parameter default minimum maximum text` declares a parameter; the host reads these lines.
 ;
@@ -184,11 +184,11 @@ endop
   asilence init 0
 #
 
-; Ends a note's amid and aside (at level 1; ilevel, iduration, iwidth): close_note fades to 0 over its last 50 ms, choked, within 15 ms
+; Ends a note of these two sounds, mid and side (at level 1; ilevel, iduration, iwidth): close_note fades to 0 over its last 50 ms, choked, within 15 ms
 ; from the very sample, and pans, the partials up to iwidth to both sides; table 902 gets the note's end.
-#define CLOSE_RINGING(RING'LONGEST) #
+#define CLOSE_RINGING(MID'SIDE'RING'LONGEST) #
   p3 = iduration * $LONGEST
-  aleft, aright, kover close_note amid, aside, ilevel * p5, ilevel * p6, iwidth, iduration, p4, p10, p11, giChokes, giEnds, $RING
+  aleft, aright, kover close_note $MID, $SIDE, ilevel * p5, ilevel * p6, iwidth, iduration, p4, p10, p11, giChokes, giEnds, $RING
   outs aleft, aright
   isend tab_i p10, giSends
   if isend != 0 then
@@ -199,8 +199,12 @@ endop
   endif
 #
 
+; The same for sounds whose decay is their own: a pedal damps them here, outside the instrument.
 #define CLOSE #
-  $CLOSE_RINGING(1'1)
+  adamped pedal_gain p10, giDecays
+  adampedmid = amid * adamped
+  adampedside = aside * adamped
+  $CLOSE_RINGING(adampedmid'adampedside'1'1)
 #
 
 ; The same in orchestras of one's own, where $CLOSE means it: a note lasts at most a minute.
@@ -314,7 +318,7 @@ instr drum
     amid = amid + arim
   endif
   iduration = $DURATION(ilevel'max(p13, (isnare > 0 ? p21 : 0), 0.1))
-  $CLOSE_RINGING(kring'ilongest)
+  $CLOSE_RINGING(amid'aside'kring'ilongest)
 endin
 
 ; Puts the partials of set iset; place 1 brings out the high ones. With iwarble each is two modes that far apart.
@@ -361,7 +365,7 @@ instr bell
     amid = amid + acontact * p18
   endif
   iduration = $DURATION(ilevel'max(p13, 0.05))
-  $CLOSE_RINGING(kring'ilongest)
+  $CLOSE_RINGING(amid'aside'kring'ilongest)
 endin
 
 ; Puts icount partials of a stiff string struck at ipoint of its length: weight sin(n pi ipoint), the comb of the struck
@@ -395,7 +399,7 @@ instr string
     amid = amid + acontact * p19
   endif
   iduration = $DURATION(ilevel'max(p13, 0.05))
-  $CLOSE_RINGING(kring'ilongest)
+  $CLOSE_RINGING(amid'aside'kring'ilongest)
 endin
 
 ; Puts 448 plate modes: a thin plate has as many modes in one band of a given width as in another (Weyl's law for plates; Fletcher and
@@ -461,5 +465,5 @@ instr cymbal
     amid = amid + acontact * p19
   endif
   iduration = $DURATION(ilevel'max(it60 * (1000 / limit(p12, 60, 1000))^idamping, 0.05))
-  $CLOSE_RINGING(kring'ilongest)
+  $CLOSE_RINGING(amid'aside'kring'ilongest)
 endin

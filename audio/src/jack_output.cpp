@@ -1,6 +1,7 @@
 #include "jack_output.h"
 
 #include <jack/midiport.h>
+#include <pthread.h>
 
 #include <algorithm>
 #include <array>
@@ -192,8 +193,12 @@ void JackOutput::server_ended(void* self) {
     static_cast<JackOutput*>(self)->ended_.store(true, std::memory_order_relaxed);
 }
 
+// JACK ends its thread by cancelling it, at any instruction. Unwound through a cycle, that would end the program.
 int JackOutput::process(jack_nframes_t frames, void* self) {
+    int before = PTHREAD_CANCEL_ENABLE;
+    pthread_setcancelstate(PTHREAD_CANCEL_DISABLE, &before);
     static_cast<JackOutput*>(self)->run_cycle(frames);
+    pthread_setcancelstate(before, nullptr);
     return 0;
 }
 

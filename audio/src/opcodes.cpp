@@ -208,6 +208,14 @@ struct CloseNote {
     }
 };
 
+/// Of a voice in the table of decays: decay_s now, and the longest; nullptr where there is none.
+const MYFLT* decays_of_voice(CSOUND* csound, const MYFLT* table, const MYFLT* voice) {
+    MYFLT* decays = nullptr;
+    const int length = csound->GetTable(csound, &decays, static_cast<int>(*table));
+    const auto place = static_cast<int>(*voice);
+    return place < 0 || 2 * place + 1 >= length ? nullptr : decays + 2 * place;
+}
+
 struct PedalRing {
     OPDS h;
     MYFLT *ring, *longest;
@@ -216,18 +224,42 @@ struct PedalRing {
 
     static int start(CSOUND* csound, void* memory) {
         auto& self = *static_cast<PedalRing*>(memory);
-        MYFLT* decays = nullptr;
-        const int length = csound->GetTable(csound, &decays, static_cast<int>(*self.decays_table));
-        const auto voice = static_cast<int>(*self.voice);
-        if (voice < 0 || 2 * voice + 1 >= length)
-            return csound->InitError(csound, "pedal_ring: found no such voice");
-        self.decay_now = decays + 2 * voice;
+        self.decay_now = decays_of_voice(csound, self.decays_table, self.voice);
+        if (self.decay_now == nullptr) return csound->InitError(csound, "pedal_ring: found no such voice");
         *self.longest = std::max(self.decay_now[1] / *self.decay_s, 1.0);
         return run(csound, memory);
     }
     static int run(CSOUND*, void* memory) {
         auto& self = *static_cast<PedalRing*>(memory);
         *self.ring = *self.decay_now > 0 ? *self.decay_now / *self.decay_s : 1;
+        return OK;
+    }
+};
+
+struct PedalGain {
+    OPDS h;
+    MYFLT *gain, *voice, *decays_table;
+    const MYFLT* decay_now;      // of its voice
+    double begun_with, reached;  // decay_s at the onset; the gain
+
+    static int start(CSOUND* csound, void* memory) {
+        auto& self = *static_cast<PedalGain*>(memory);
+        self.decay_now = decays_of_voice(csound, self.decays_table, self.voice);
+        if (self.decay_now == nullptr) return csound->InitError(csound, "pedal_gain: found no such voice");
+        self.begun_with = *self.decay_now;
+        self.reached = 1;
+        return OK;
+    }
+    static int run(CSOUND* csound, void* memory) {
+        auto& self = *static_cast<PedalGain*>(memory);
+        clear_around(self.gain, self.h);
+        const bool moved = *self.decay_now > 0 && *self.decay_now != self.begun_with;
+        const double each = moved ? std::exp(std::log(0.001) * (1 / *self.decay_now - 1 / self.begun_with) /
+                                             csound->GetSr(csound))
+                                  : 1;
+        const Part part = part_of(self.h);
+        for (std::size_t n = part.begin; n < part.end; ++n)
+            self.gain[n] = self.reached = std::min(self.reached * each, 1.0);
         return OK;
     }
 };
@@ -263,6 +295,7 @@ void add_opcodes(CSOUND_* csound) {
     add<Bank>(csound, "modal_bank", "aa", "aakiiiP");
     add<CloseNote>(csound, "close_note", "aak", "aaiiiiiiiiik");
     add<PedalRing>(csound, "pedal_ring", "ki", "iii");
+    add<PedalGain>(csound, "pedal_gain", "a", "ii");
     add<Bessel>(csound, "bessel", "i", "ii");
 }
 

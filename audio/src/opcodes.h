@@ -19,6 +19,10 @@ namespace audio {
 ///   kring, ilongest  pedal_ring ivoice, idecay_s, idecays       how much longer a note rings, as its voice's pedal
 ///                                                               is now, than with its own decay_s (1 without such a
 ///                                                               pedal), and at most (1 or more)
+///   again        pedal_gain ivoice, idecays                     for a sound with a decay of its own: what makes it
+///                                                               fall as with the decay_s of its voice's pedal now
+///                                                               instead of that at its onset; at most 1, as nothing
+///                                                               is left of it that could ring longer
 ///   ivalue       bessel iorder, ix                              J_n(x)
 /// All begin at the note's own sample, and all memory lies in the instrument's own. At most 64 samples a
 /// block and 512 modes; more are left out. Throws std::runtime_error where Csound refuses one.

@@ -110,10 +110,10 @@ std::vector<RenderedVoice> resolve_voices(CsoundEngine& engine, const std::vecto
         if (voice.samples) {
             made.instrument = engine.instrument_number(kSampleInstrument);
             made.samples.emplace(engine, voice.samples, tables);
-            continue;
+            if (voice.pedal_parameters.empty()) continue;
         }
         const Instrument& instrument = find_instrument(instruments, voice);
-        made.instrument = engine.instrument_number(instrument.name);
+        if (!voice.samples) made.instrument = engine.instrument_number(instrument.name);
         made.parameters = resolve_parameters(instrument, voice.parameters, "voice " + voice.name);
         if (voice.pedal_parameters.empty()) continue;
         std::vector<std::pair<std::string, double>> pressed = voice.pedal_parameters;
@@ -123,7 +123,7 @@ std::vector<RenderedVoice> resolve_voices(CsoundEngine& engine, const std::vecto
                 pressed.push_back(own);
         made.pedal_parameters = resolve_parameters(instrument, pressed, "voice " + voice.name + ", pedal");
         const auto decay = std::ranges::find(instrument.parameters, "decay_s", &Parameter::name);
-        if (voice.own_orchestra.empty() && decay != instrument.parameters.end())
+        if (decay != instrument.parameters.end())
             made.decay = static_cast<std::size_t>(decay - instrument.parameters.begin());
     }
     return rendered;
@@ -303,7 +303,11 @@ void Renderer::mark_chokes(std::span<const Note> notes) {
 }
 
 void Renderer::start(const Note& note, std::span<const Note> block_notes) {
-    if (note.kind != Note::Kind::stroke || !sounds_[note.voice]) return;
+    if (note.kind != Note::Kind::stroke) return;
+    if (!sounds_[note.voice] || mix_.alone_note.value_or(note.id) != note.id) {
+        if (std::optional<SampleVoice>& samples = voices_[note.voice].samples) (void)samples->strike(note);
+        return;
+    }
     const auto choking = std::ranges::find_if(block_notes, [&](const Note& other) {
         return other.onset_sample > note.onset_sample && chokes(other, note.voice);
     });

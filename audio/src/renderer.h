@@ -23,7 +23,7 @@ struct RenderedVoice {
     std::vector<double> pedal_parameters{};  ///< the same at the far end of its pedal's way
     std::optional<std::size_t>
         decay{};  ///< which of them is decay_s, with which what rings follows the pedal
-    std::optional<SampleVoice> samples{};  ///< recorded sounds instead
+    std::optional<SampleVoice> samples{};  ///< recorded sounds instead, of all parameters only with that
 };
 
 /// Constant power: left^2 + right^2 = gain^2, pan 0 left ... 1 right.
@@ -41,7 +41,8 @@ struct PanGains {
 /// other.
 ///
 /// Pedals: before a block table 904 gets, for each voice, the decay time of its pedal's place as the last move before
-/// the block or a stroke within it says, and the longest.
+/// the block or a stroke within it says, and the longest. The bundled instruments take their modes' decay from it; recorded
+/// sounds and orchestras of one's own are damped as a whole (PedalGain in opcodes.cpp).
 class Renderer {
 public:
     /// Throws std::runtime_error: orchestra, instrument, parameter, pan, gain or room that is not valid.

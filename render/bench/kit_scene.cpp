@@ -65,7 +65,10 @@ render::SceneDescription kit_scene(const std::string& meshes) {
         scene.objects.push_back({piece.name, meshes + "/" + piece.mesh + ".obj", look_of(piece.mesh)});
     }
     for (const char* hand : {"left", "right"})
-        scene.objects.push_back({hand, meshes + "/stick.obj", look_of("stick")});
+        scene.objects.push_back({.name = hand,
+                                 .mesh = meshes + "/stick.obj",
+                                 .look = look_of("stick"),
+                                 .shadow = render::Shadow::widened});
     return scene;
 }
 

@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "crease_normals.h"
 #include "mesh_stream.h"
 
 namespace render {
@@ -62,17 +63,26 @@ Eigen::Vector3f unit_or_up(const aiVector3D& v) {
                                                     : Eigen::Vector3f::UnitY();
 }
 
-void append_mesh(const aiMesh& mesh, MeshPart& part) {
-    const auto base = static_cast<std::uint32_t>(part.positions.size());
+MeshPart part_of(const aiMesh& mesh) {
+    MeshPart part;
     for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
         part.positions.emplace_back(mesh.mVertices[i].x, mesh.mVertices[i].y, mesh.mVertices[i].z);
-        part.normals.push_back(mesh.HasNormals() ? unit_or_up(mesh.mNormals[i]) : Eigen::Vector3f::UnitY());
+        if (mesh.HasNormals()) part.normals.push_back(unit_or_up(mesh.mNormals[i]));
     }
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
         const aiFace& face = mesh.mFaces[f];
         if (face.mNumIndices != 3) continue;
-        for (unsigned k = 0; k < 3; ++k) part.indices.push_back(base + face.mIndices[k]);
+        for (unsigned k = 0; k < 3; ++k) part.indices.push_back(face.mIndices[k]);
     }
+    if (!mesh.HasNormals()) make_normals(part);
+    return part;
+}
+
+void append(const MeshPart& more, MeshPart& part) {
+    const auto base = static_cast<std::uint32_t>(part.positions.size());
+    part.positions.insert(part.positions.end(), more.positions.begin(), more.positions.end());
+    part.normals.insert(part.normals.end(), more.normals.begin(), more.normals.end());
+    for (const std::uint32_t index : more.indices) part.indices.push_back(base + index);
 }
 
 std::string material_name(const aiScene& scene, const aiMesh& mesh) {
@@ -97,12 +107,12 @@ Mesh import_with_assimp(const std::filesystem::path& file) {
     for (unsigned m = 0; m < raw->mNumMeshes; ++m) check_raw(*raw->mMeshes[m], faces);
 
     importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-    const aiScene* scene = require(importer.ApplyPostProcessing(
-        aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_GenSmoothNormals |
-        aiProcess_PreTransformVertices | aiProcess_JoinIdenticalVertices));
+    const aiScene* scene = require(
+        importer.ApplyPostProcessing(aiProcess_Triangulate | aiProcess_SortByPType |
+                                     aiProcess_PreTransformVertices | aiProcess_JoinIdenticalVertices));
     std::map<std::string, MeshPart> parts;  // one a name, in the names' order
     for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
-        append_mesh(*scene->mMeshes[m], parts[material_name(*scene, *scene->mMeshes[m])]);
+        append(part_of(*scene->mMeshes[m]), parts[material_name(*scene, *scene->mMeshes[m])]);
     }
     Mesh mesh;
     for (auto& [name, part] : parts) {

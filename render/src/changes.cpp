@@ -80,6 +80,7 @@ Changes::Seen Changes::see(const FrameState& frame, std::size_t object) const {
     seen.box.min() -= more, seen.box.max() += more;
     seen.slabs = slabs_around(corners, views_.light_from_world * frame.world_from_object[object]);
     seen.cover = picture_.cover(in_picture(world));
+    seen.shadow = bounds_[object].shadow;
     return seen;
 }
 
@@ -209,9 +210,14 @@ void Changes::add_floor(const ShadowChange& change) {
 }
 
 PixelBox Changes::in_shadow_map(const Seen& seen) const {
-    if (seen.from_light.empty()) return {};
+    if (seen.from_light.empty() || seen.shadow == Shadow::none) return {};
     Eigen::AlignedBox2f box;
     for (const Eigen::Vector3f& corner : seen.from_light) box.extend(corner.head<2>());
+    if (seen.shadow == Shadow::widened) {
+        const Eigen::Vector2f wider =
+            Eigen::Vector2f::Constant(2 * views_.shadow_widening / static_cast<float>(views_.shadow_size));
+        box.min() -= wider, box.max() += wider;
+    }
     const auto size = static_cast<float>(views_.shadow_size);
     const auto texel = [&](float x) {
         return static_cast<int>(std::clamp(std::floor(0.5f * (x + 1) * size), -2.0f, size + 2));

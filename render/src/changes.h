@@ -24,6 +24,7 @@ struct Views {
     float shadow_filter;                                ///< its reach in the map, all counted [texels]
     float shadow_shift;                                 ///< a receiver looks up this far from where it is [m]
     float shadow_beyond;                                ///< or from its bounds, in all directions [texels]
+    float shadow_widening;                              ///< of an object whose shadow is widened [texels]
 };
 
 /// What of a picture has to be drawn again for the next frame, all of it safely wide:
@@ -73,7 +74,8 @@ private:
     /// Where an object is seen, by the camera and by the light.
     struct Seen {
         TileMask::Cover cover;
-        Points from_light;          ///< corners; none: not visible
+        Points from_light;  ///< corners; none: not visible
+        Shadow shadow = Shadow::cast;
         Eigen::AlignedBox3f box;    ///< around them, a little more
         std::array<Slab, 3> slabs;  ///< all between them, likewise: around the box in the object's frame
     };

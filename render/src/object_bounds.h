@@ -18,6 +18,7 @@ struct ObjectBounds {
     Eigen::AlignedBox3f box;
     std::vector<Eigen::Vector3f> reach;
     std::vector<Eigen::Vector3f> corners;
+    Shadow shadow = Shadow::cast;
 
     [[nodiscard]] std::vector<Eigen::Vector3f> corners_now(const FrameState& frame, std::size_t object) const;
 };

@@ -109,7 +109,7 @@ Renderer::Implementation::Implementation(const SceneDescription& description)
       multisampling(scene.samples > 1),
       picture(gl, scene.width, scene.height, multisampling),
       shadow(gl, scene.shadow_size),
-      geometry(gl, scene),
+      geometry(gl, scene, shaders::kShadowWidening * texel),
       shadow_program(gl, shaders::shadow_vertex(geometry.bends()), shaders::shadow_fragment()),
       object_program(gl, shaders::object_vertex(geometry.bends()), shaders::object_fragment()),
       stage(gl, scene, picture.sample_places()),
@@ -137,7 +137,8 @@ Views Renderer::Implementation::views() const {
             scene.room.floor_height,
             shaders::kShadowFilter,
             kShadowShift * texel,
-            shaders::kPlaceError};
+            shaders::kPlaceError,
+            shaders::kShadowWidening};
 }
 
 /// Of what was drawn from elsewhere the shadow map is kept.

@@ -107,8 +107,8 @@ const void* offset(std::size_t bytes) {
 
 }  // namespace
 
-SceneGeometry::SceneGeometry(const GlFunctions& gl, const SceneDescription& scene)
-    : gl_(gl), modes_(gl, scene.solids) {
+SceneGeometry::SceneGeometry(const GlFunctions& gl, const SceneDescription& scene, float widening_m)
+    : gl_(gl), widening_m_(widening_m), modes_(gl, scene.solids) {
     std::vector<std::filesystem::path> files;
     std::map<std::filesystem::path, std::size_t> number_of_file;
     std::vector<std::size_t> mesh_of_object;
@@ -154,7 +154,7 @@ void SceneGeometry::make_buffers(const SceneDescription& scene, const std::vecto
             {static_cast<GLsizei>(indices.size()),
              static_cast<GLsizei>(3 * mesh.triangles()),
              {box, solid < 0 ? Reach{} : reach_of(scene.solids[static_cast<std::size_t>(solid)].modes),
-              corners_of(meshes[i])},
+              corners_of(meshes[i]), objects[i].shadow},
              volume_of(mesh, box.center()),
              modes_.count(solid),
              objects[i].stands});
@@ -220,6 +220,7 @@ void SceneGeometry::update(const FrameState& frame, const Eigen::Vector3f& eye) 
             matrix_rows_[6 * i + static_cast<std::size_t>(row)] = world_from_object.row(row).transpose();
             matrix_rows_[6 * i + 3 + static_cast<std::size_t>(row)].head<3>() = normals.row(row).transpose();
         }
+        if (objects_[i].bounds.shadow == Shadow::widened) matrix_rows_[6 * i + 5].w() = widening_m_;
         add_modal(frame, i);
         const Eigen::Vector3f center =
             linear * objects_[i].bounds.box.center() + world_from_object.topRightCorner<3, 1>();

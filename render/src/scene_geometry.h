@@ -17,8 +17,8 @@ namespace render {
 class SceneGeometry {
 public:
     /// Loads the meshes, each file once. Throws std::runtime_error as load_mesh does, or for a solid that is
-    /// out of range.
-    SceneGeometry(const GlFunctions& gl, const SceneDescription& scene);
+    /// out of range. `widening_m`: of the shadows that are widened.
+    SceneGeometry(const GlFunctions& gl, const SceneDescription& scene, float widening_m);
 
     /// Takes the frame's matrices, drops hidden objects and sorts the rest by distance from the eye, nearest
     /// first. Throws std::invalid_argument for a frame that does not fit the scene or a
@@ -63,11 +63,12 @@ private:
     void add_modal(const FrameState& frame, std::size_t object);
 
     const GlFunctions& gl_;
+    float widening_m_;
     std::vector<Object> objects_;
     std::vector<Drawn> drawn_;
     std::vector<Eigen::Vector4f>
         matrix_rows_;  ///< six an object: three of world_from_object, three of the normals' matrix (their
-    ///< last places: where its modal coordinates begin, how many there are); then the modal coordinates
+    ///< last places: where its modal coordinates begin, how many there are, its shadow's widening [m]); then the modal coordinates
     ModeTexture modes_;
     GLuint vertex_array_ = 0, matrix_buffer_ = 0, matrix_texture_ = 0, part_buffer_ = 0, part_texture_ = 0;
 };

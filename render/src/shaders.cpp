@@ -123,23 +123,32 @@ float shadow_light(vec3 at) {
 
 }  // namespace
 
+/// The last place of a normals' matrix, which rotate() leaves out too, holds by how much an object's shadow is widened [m].
 std::string shadow_vertex(bool bending) {
     return std::string(kVersion) + R"(
 layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 rest_normal;
 layout(location = 2) in vec2 part_object;
 uniform mat4 clip_from_light_world;
 )" + kObjectMatrices +
            (bending ? std::string(kBend) + R"(
-void main() {
-    int object = 6 * int(part_object.y);
-    vec3 bent = position, normal = vec3(0.0), groove = vec3(0.0);
-    bend(bent, normal, groove, object);
-    gl_Position = clip_from_light_world * vec4(to_world(bent, object), 1.0);
+void deform(inout vec3 at, inout vec3 normal, int object) {
+    vec3 groove = vec3(0.0);
+    bend(at, normal, groove, object);
 }
 )"
-                    : R"(
-void main() { gl_Position = clip_from_light_world * vec4(to_world(position, 6 * int(part_object.y)), 1.0); }
-)");
+                    : "void deform(inout vec3 at, inout vec3 normal, int object) {}\n") +
+           R"(
+void main() {
+    int object = 6 * int(part_object.y);
+    vec3 at = position, normal = rest_normal;
+    deform(at, normal, object);
+    vec3 world = to_world(at, object);
+    float widening = texelFetch(matrices, object + 5).w;
+    if (widening > 0.0) world += widening * normalize(rotate(normal, object + 3));
+    gl_Position = clip_from_light_world * vec4(world, 1.0);
+}
+)";
 }
 
 std::string shadow_fragment() {

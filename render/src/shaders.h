@@ -8,6 +8,9 @@ inline constexpr int kSamples = 4;
 /// How far from its place a look-up reads the shadow map: 2 by the filter, half a texel as a texel is covered by its
 /// middle. [texels]
 inline constexpr float kShadowFilter = 2.5f;
+/// By how much an object's shadow is widened (Shadow::widened): nearly the filter's reach, and less than the shift of
+/// what looks up. [texels]
+inline constexpr float kShadowWidening = 1.25f;
 /// How far from where it is a surface's place lies at most that is computed from its depth: with a depth of 32 bits and
 /// cameras up to a kilometre away. [texels of the shadow map]
 inline constexpr float kPlaceError = 1.0f;

@@ -5,11 +5,11 @@
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <optional>
 #include <thread>
 
+#include "bench_clock.h"
 #include "workers/heartbeat.h"
 #include "workers/worker_gate.h"
 
@@ -23,12 +23,6 @@ constexpr std::uint32_t kSender = 0, kReceiver = 1;
 
 double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-double process_cpu_s() {
-    timespec t{};
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
 }
 
 sim::UpdateMessage updates(const ThroughputSettings& settings) {

@@ -74,6 +74,46 @@ double after_nearest(const std::vector<std::int64_t>& planned_ns, std::int64_t n
     return 1e-6 * static_cast<double>(ns - *nearest);
 }
 
+/// What came of 20 strokes and as many cancelled ones.
+struct Performance {
+    std::size_t planned = 0;
+    std::vector<double> offsets_ms;  ///< of the clicks heard, after the nearest planned onset; ascending
+    bool disturbed = false;          ///< a stroke came late, or the server did not finish a cycle
+};
+
+Performance perform() {
+    Performance performance;
+    Listener listener;
+    if (!listener.connect("DrumGizmo:0-Left", "listener:in_l")) return performance;
+    audio::LivePerformance live(
+        rendering::kOrchestra, {rendering::voice("drum")},
+        {.longest_s = 5, .midi_port = "strokes", .midi_connect = "DrumGizmo:drumgizmo_midiin"});
+    EXPECT_NE(live.device().find("-> DrumGizmo:drumgizmo_midiin"), std::string::npos) << live.device();
+    const std::int64_t epoch = audio::monotonic_ns() + 300 * kMs;
+    live.start(epoch);
+    std::vector<std::int64_t> planned;
+    for (std::uint64_t id = 1; id <= 20; ++id) {
+        Note each = note(id, static_cast<std::int64_t>(4801 * id), 5);
+        each.midi_note = kKey;
+        each.midi_velocity = 127;
+        EXPECT_TRUE(live.schedule(each));
+        planned.push_back(epoch + audio::samples_ns(each.onset_sample));
+        each.id += 1000;
+        each.onset_sample += 9600;
+        EXPECT_TRUE(live.schedule(each));
+        performance.disturbed |= !live.cancel(each.id);
+    }
+    audio::sleep_until_ns(planned.back() + 200 * kMs);
+    (void)live.finish(0, 0);
+    listener.stop();
+    performance.planned = planned.size();
+    performance.disturbed |= live.late_strokes() > 0 || live.lost_strokes() > 0 || listener.xruns() > 0;
+    for (const std::int64_t click : heard_clicks(listener))
+        performance.offsets_ms.push_back(after_nearest(planned, click));
+    std::ranges::sort(performance.offsets_ms);
+    return performance;
+}
+
 TEST(DrumGizmo, SoundsEveryStrokeAtItsOnsetPlusItsOwnConstantLatencyAndNoCancelledOne) {
     for (const char* program : {"jackd", "drumgizmo"}) {
         if (!Program::is_installed(program)) GTEST_SKIP() << program << " is not installed";
@@ -85,53 +125,29 @@ TEST(DrumGizmo, SoundsEveryStrokeAtItsOnsetPlusItsOwnConstantLatencyAndNoCancell
     ASSERT_TRUE(server.is_up());
     Program drumgizmo({"drumgizmo", "-i", "jackmidi", "-I", "midimap=" + (kit / "map.xml").string(), "-o",
                        "jackaudio", kit / "kit.xml"});
-    Listener listener;
-    ASSERT_TRUE(listener.connect("DrumGizmo:0-Left", "listener:in_l"));
-    audio::LivePerformance live(
-        rendering::kOrchestra, {rendering::voice("drum")},
-        {.longest_s = 5, .midi_port = "strokes", .midi_connect = "DrumGizmo:drumgizmo_midiin"});
-    ASSERT_NE(live.device().find("-> DrumGizmo:drumgizmo_midiin"), std::string::npos) << live.device();
-    const std::int64_t epoch = audio::monotonic_ns() + 300 * kMs;
-    live.start(epoch);
-    std::vector<std::int64_t> planned;
-    for (std::uint64_t id = 1; id <= 20; ++id) {
-        Note each = note(id, static_cast<std::int64_t>(4801 * id), 5);
-        each.midi_note = kKey;
-        each.midi_velocity = 127;
-        ASSERT_TRUE(live.schedule(each));
-        planned.push_back(epoch + audio::samples_ns(each.onset_sample));
-        each.id += 1000;
-        each.onset_sample += 9600;
-        ASSERT_TRUE(live.schedule(each) && live.cancel(each.id));
+    // Where the server was held up, strokes are lost, sound together or come twice, and its count of frames moves against the
+    // clock by milliseconds: that says nothing of us, so they are struck again.
+    Performance performance;
+    for (int attempt = 0; attempt < 5; ++attempt) {
+        performance = perform();
+        if (!performance.disturbed) break;
     }
-    audio::sleep_until_ns(planned.back() + 200 * kMs);
-    (void)live.finish(0, 0);
-    listener.stop();
     drumgizmo.kill();  // it takes seconds to end of its own accord
-
-    const std::vector<std::int64_t> clicks = heard_clicks(listener);
-    EXPECT_LE(clicks.size(), planned.size());
-    ASSERT_FALSE(clicks.empty());
-    std::vector<double> offsets_ms;
-    for (const std::int64_t click : clicks) offsets_ms.push_back(after_nearest(planned, click));
-    std::ranges::sort(offsets_ms);
-    std::printf(
-        "DrumGizmo: %zu of 20 strokes heard, %.3f ms after their onset (smallest %.3f, largest %.3f); %lu "
-        "late\n",
-        clicks.size(), offsets_ms[offsets_ms.size() / 2], offsets_ms.front(), offsets_ms.back(),
-        live.late_strokes());
-    // Its sound comes a fixed number of periods of 2.7 ms later. Where the server was held up (strokes came
-    // late), strokes sound together or not at all, and the dummy driver's count of frames has moved against
-    // the clock by milliseconds: only the median says something. Else all are heard, half where they belong.
+    const std::vector<double>& offsets_ms = performance.offsets_ms;
+    if (performance.disturbed) GTEST_SKIP() << "the server was held up in each of five performances";
+    ASSERT_EQ(performance.planned, 20U);
+    ASSERT_FALSE(offsets_ms.empty());
     const double median = offsets_ms[offsets_ms.size() / 2];
+    std::printf(
+        "DrumGizmo: %zu of 20 strokes heard, %.3f ms after their onset (smallest %.3f, largest %.3f)\n",
+        offsets_ms.size(), median, offsets_ms.front(), offsets_ms.back());
+    // Its sound comes a fixed number of periods of 2.7 ms later.
     EXPECT_GE(median, -0.1);
     EXPECT_LE(median, 20);
-    const auto belong =
-        std::ranges::count_if(offsets_ms, [&](double each) { return std::abs(each - median) < 1; });
-    if (live.late_strokes() == 0) {
-        EXPECT_EQ(clicks.size(), planned.size());
-        EXPECT_GE(belong, 10);
-    }
+    EXPECT_EQ(offsets_ms.size(), performance.planned);
+    // JACK guesses the time of a cycle from those before it, so on a busy machine single ones may be off.
+    EXPECT_GE(std::ranges::count_if(offsets_ms, [&](double each) { return std::abs(each - median) < 1; }),
+              10);
 }
 
 }  // namespace

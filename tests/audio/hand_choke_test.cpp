@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "rendering.h"
+#include "sample_folder.h"
 
 // What ends a sound by hand or pedal, and what a pedal makes of one.
 
@@ -156,6 +157,49 @@ TEST(Pedal, AMoveMakesNoStepAndLiveSoundsAsOffline) {
         audio::LivePerformance live(kOrchestra, {tone}, kept.with({}));
         for (const audio::Note& each : notes) ASSERT_TRUE(live.schedule(each));
         EXPECT_EQ(kept.finish(live, 48000, 0), render({tone}, notes, 48000, 0));
+    }
+}
+
+/// Voices of a sound that stays at 0.5: a recording, and an instrument of one's own. At rest they fall by 60 dB in 0.5 s, at
+/// the far end of their pedal's way in 2 s, half-way in 1 s.
+std::vector<audio::Voice> steady_sounds(const SampleFolder& folder) {
+    audio::Voice recorded = voice("cymbal", {{"decay_s", 0.5}}, 0),
+                 own = voice("gong", {{"decay_s", 0.5}}, 0);
+    recorded.samples = samples_of(folder.sound("steady.wav", std::vector<float>(96000, 0.5F)));
+    own.own_orchestra =
+        folder.text("own.orc",
+                    ";@ gong decay_s 1 0.1 10 time in which it falls by 60 dB [s]\ninstr gong\n"
+                    "ilevel = 1\namid init 0.5\naside init 0\niwidth = 0\niduration = 2\n$CLOSE\nendin\n");
+    for (audio::Voice* each : {&recorded, &own}) each->pedal_parameters = {{"decay_s", 2}};
+    return {recorded, own};
+}
+
+TEST(Pedal, RecordedSoundsAndOwnInstrumentsAreDampedAsItsPlaceSaysWithoutAStep) {
+    const SampleFolder folder;
+    for (const audio::Voice& steady : steady_sounds(folder)) {
+        const auto sound = [&](double struck_at, const std::vector<audio::Note>& moves) {
+            std::vector<audio::Note> notes{pressed(1, 100, struck_at)};
+            notes[0].speed_mps = 8;  // the recording's gain is 1
+            notes.insert(notes.end(), moves.begin(), moves.end());
+            return left(render({steady}, notes, 48000, 0));
+        };
+        // From 19968 on, a block's first sample, it falls by 60 dB in 0.5 s less what it falls by itself in 2 s; from 30080 on it
+        // is as at the onset. Floats of Csound's table and of the sound round to 2^-25.
+        const auto damped = sound(1, {moved(2, 19968, 0), moved(3, 30080, 1)});
+        for (std::size_t i = 100; i < 48000; ++i) {
+            const auto samples = static_cast<double>(std::clamp<std::size_t>(i + 1, 19968, 30080) - 19968);
+            ASSERT_NEAR(damped[i], 0.5 * std::pow(0.001, samples / 48000 * (1 / 0.5 - 1 / 2.0)), 1e-7)
+                << steady.name << " " << i;
+        }
+        EXPECT_EQ(sound(1, {moved(2, 20000, 1)}), sound(1, {})) << "where it is";
+        EXPECT_EQ(sound(0, {moved(2, 20000, 1)}), sound(0, {}))
+            << "opened: nothing is left that could ring on";
+        EXPECT_EQ(sound(0, {}), sound(1, {})) << "the pedal's place alone is no damping";
+        Kept kept;
+        audio::LivePerformance live(kOrchestra, {steady}, kept.with({}));
+        const std::vector<audio::Note> notes{pressed(1, 100, 1), moved(2, 20000, 0.3)};
+        for (const audio::Note& each : notes) ASSERT_TRUE(live.schedule(each));
+        EXPECT_EQ(kept.finish(live, 48000, 0), render({steady}, notes, 48000, 0));
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <jack/midiport.h>
+#include <pthread.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/file.h>
@@ -156,8 +157,12 @@ bool Listener::connect(const std::string& from, const std::string& to) {
     return false;
 }
 
+// As in JackOutput: JACK cancels its thread at any instruction.
 int Listener::process(jack_nframes_t frames, void* self) {
+    int before = PTHREAD_CANCEL_ENABLE;
+    pthread_setcancelstate(PTHREAD_CANCEL_DISABLE, &before);
     static_cast<Listener*>(self)->listen(frames);
+    pthread_setcancelstate(before, nullptr);
     return 0;
 }
 

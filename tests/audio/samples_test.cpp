@@ -135,6 +135,35 @@ TEST(Samples, AChokedSampleFadesWithoutAClickAndEndsAtZero) {
     EXPECT_EQ(sound.at(20011 + 720 + 64), 0);
 }
 
+TEST(Mix, AloneEachNoteAddsUpToTheMixInTheRoomWithChokesAndTurns) {
+    const SampleFolder folder;
+    for (const auto& [name, value] : {std::pair("one.wav", 0.2F), {"two.wav", 0.3F}})
+        folder.sound(name, std::vector<float>(4800, value));
+    const std::vector<audio::Voice> voices{
+        sampled(folder.text("turns.sfz",
+                            "<region> sample=one.wav seq_length=2 seq_position=1\n"
+                            "<region> sample=two.wav seq_length=2 seq_position=2\n"),
+                0.3, "hat"),
+        voice("bell", {{"decay_s", 1}}, 0.7, "hat")};
+    const std::vector<audio::Note> notes{note(1, 100), note(2, 2000, 5, 1), note(3, 2030), note(4, 9000, 2)};
+    audio::Mix mix{.gain_db = 3, .room = {.t60_s = 0.4, .level_db = -10}};
+    const auto played = [&](std::optional<std::uint64_t> alone) {
+        mix.alone_note = alone;
+        audio::Performance performance(kOrchestra, voices, mix);
+        for (const audio::Note& each : notes) performance.schedule(each);
+        return performance.finish(24000, 0);
+    };
+    const std::vector<float> all = played({});
+    std::vector<double> sum(all.size(), 0.0);
+    for (const audio::Note& each : notes) {
+        const std::vector<float> alone = played(each.id);
+        EXPECT_TRUE(std::ranges::any_of(alone, [](float x) { return x != 0; })) << each.id;
+        for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += alone[i];
+    }
+    // Roundings to float of some ten values below 1, of the notes and of the room's lines.
+    for (std::size_t i = 0; i < all.size(); ++i) ASSERT_NEAR(all[i], sum[i], 1e-6) << i;
+}
+
 TEST(Samples, LiveSoundsAsOffline) {
     const SampleFolder folder;
     folder.sound("one.wav", ramp(3000, 0.2F), 1, 44100);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "program.h"
@@ -32,6 +33,42 @@ TEST(Commands, AMisspeltNameIsRefusedWithTheNearest) {
     const Ended far = run({"xylophone"});
     expect_refused(far, "found `musicworld xylophone`");
     EXPECT_FALSE(contains(far.err, "nearest"));
+}
+
+TEST(Commands, UnitsThatCannotBeAreTold) {
+    const Folder folder;
+    std::string trace = "t,stick,px,py,pz\n";  // mm without saying so
+    for (int i = 0; i < 200; ++i)
+        trace += std::to_string(0.01 * i) + ",right,0," + std::to_string(700 + 200 * std::sin(0.2 * i)) +
+                 ",-400\n";
+    write(folder / "mm.csv", trace);
+    const Ended played =
+        run({"play", folder / "mm.csv", "--no-frames", "--no-audio", "--out", folder / "out"});
+    EXPECT_EQ(played.status, 0) << played.err;
+    const std::string told = run({"trace", "check", folder / "mm.csv"}).err;
+    EXPECT_NE(told.find("warning: "), std::string::npos);
+    EXPECT_NE(told.find("are the units"), std::string::npos);
+    EXPECT_EQ(played.err.substr(0, played.err.find('\n') + 1), told) << "the same line";
+    EXPECT_EQ(
+        run({"play", "flourish", "--no-frames", "--no-audio", "--out", folder / "out"}).err.find("warning"),
+        std::string::npos);
+
+    std::string box = "usemtl body\n";  // of 200 mm
+    for (int i = 0; i < 8; ++i)
+        box += std::string("v ") + (i & 1 ? "100 " : "-100 ") + (i & 2 ? "100 " : "-100 ") +
+               (i & 4 ? "100\n" : "-100\n");
+    write(folder / "box.obj", box + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n");
+    for (const char* scale : {"0.01", "0.001"}) {
+        write(folder / "kit.toml", std::string("[[instrument]]\nname = \"box\"\nkind = \"bell\"\nsize = "
+                                               "[0.2, 0.2, 0.2]\nposition = [0, 1, -0.5]\n"
+                                               "mesh = \"box.obj\"\nshape = \"mesh\"\nmesh_scale = ") +
+                                       scale + "\n");
+        const Ended checked = run({"kit", "check", folder / "kit.toml"});
+        EXPECT_EQ(checked.status, 0) << checked.err;
+        EXPECT_EQ(checked.out.find("mesh_scale = 0.001 if it is in millimetres") != std::string::npos,
+                  scale == std::string("0.01"))
+            << scale << ": " << checked.out;
+    }
 }
 
 TEST(Commands, VersionTellsBuildAndLibraries) {

@@ -101,6 +101,50 @@ TEST(MeshFiles, BinaryStlAndGlbLoadAndTheNodesTransformIsApplied) {
     EXPECT_EQ(meshes[1].bounds().min(), Eigen::Vector3f(10, 0, 0));
 }
 
+/// A cube whose eight corners its faces share, and a ball of 24 x 12 faces, without normals.
+std::string cube_obj() {
+    std::string text = "usemtl body\n";
+    for (int i = 0; i < 8; ++i)
+        text += "v " + std::to_string(i % 2) + " " + std::to_string(i / 2 % 2) + " " + std::to_string(i / 4) +
+                "\n";
+    return text + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+}
+std::string ball_obj() {
+    constexpr int kRound = 24, kDown = 12;
+    std::string text = "usemtl body\n";
+    for (int j = 0; j <= kDown; ++j)
+        for (int i = 0; i < kRound; ++i) {
+            const double down = M_PI * j / kDown, around = 2 * M_PI * i / kRound;
+            text += "v " + std::to_string(std::sin(down) * std::cos(around)) + " " +
+                    std::to_string(std::cos(down)) + " " + std::to_string(std::sin(down) * std::sin(around)) +
+                    "\n";
+        }
+    const auto at = [](int j, int i) { return " " + std::to_string(j * kRound + i % kRound + 1); };
+    for (int j = 0; j < kDown; ++j)
+        for (int i = 0; i < kRound; ++i)
+            text += "f" + at(j, i) + at(j, i + 1) + at(j + 1, i + 1) + at(j + 1, i) + "\n";
+    return text;
+}
+
+TEST(MeshFiles, WithoutNormalsEdgesStaySharpAndRoundSurfacesAreSmooth) {
+    const TemporaryFolder folder;
+    const render::Mesh cube = render::load_mesh(folder.write("cube.obj", cube_obj()));
+    ASSERT_EQ(cube.parts.size(), 1u);
+    EXPECT_EQ(cube.parts[0].positions.size(), 24u) << "each corner once a face";
+    for (std::size_t i = 0; i < cube.parts[0].indices.size(); i += 3) {
+        const auto at = [&](std::size_t k) { return cube.parts[0].positions[cube.parts[0].indices[i + k]]; };
+        const Eigen::Vector3f flat = (at(1) - at(0)).cross(at(2) - at(0)).normalized();
+        for (std::size_t k = 0; k < 3; ++k)
+            EXPECT_LT((cube.parts[0].normals[cube.parts[0].indices[i + k]] - flat).norm(), 1e-5f);
+    }
+    const render::Mesh ball = render::load_mesh(folder.write("ball.obj", ball_obj()));
+    const render::MeshPart& part = ball.parts.at(0);
+    // Facets are 15 degrees across: a flat one's normal is 7.5 degrees and more off at its corners; the mean of those around
+    // is off by what they are uneven.
+    for (std::size_t i = 0; i < part.positions.size(); ++i)
+        EXPECT_GT(part.normals[i].dot(part.positions[i].normalized()), std::cos(2 * M_PI / 180)) << i;
+}
+
 TEST(MeshFiles, SeveralFilesKeepTheirOrderAndTheFirstBadOneIsNamed) {
     const TemporaryFolder folder;
     std::vector<std::filesystem::path> files;

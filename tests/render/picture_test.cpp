@@ -220,6 +220,96 @@ TEST(Picture, TheShadowLiesOnTheFloorWhereTheRaysThroughTheBoxEnd) {
     }
 }
 
+std::string rod_obj() {
+    meshgen::ObjMesh mesh{"rod", {}};
+    meshgen::tube(mesh.part("rod"), {0, 0, -0.2}, {0, 0, 0.2}, {1, 1}, 16);
+    return mesh.text();
+}
+
+/// Rods over a floor, at the size and the distance of sticks over a wide kit. A place in the middle of a shadow is as dark
+/// as the floor without the key light.
+TEST(Picture, TheShadowsOfThinRodsAreSolidAlongTheirWholeMiddle) {
+    const TemporaryFolder folder;
+    render::SceneDescription scene;
+    scene.objects.push_back({.name = "rod",
+                             .mesh = folder.write("rod.obj", rod_obj()),
+                             .look = {},
+                             .shadow = render::Shadow::widened});
+    scene.camera = {{0, 2.4f, 2.4f}, {0, 0, 0}, 45};
+    const Vector3f light = scene.key_light.towards_light.normalized();
+    const auto render_it = [&](const Matrix4f& matrix, bool visible, float strength) {
+        scene.key_light.strength = strength;
+        render::Renderer renderer(scene);
+        return picture(renderer, {matrix}, {visible});
+    };
+    const render::Image lit = render_it(Matrix4f::Identity(), false, 1),
+                        dark = render_it(Matrix4f::Identity(), false, 0);
+    const Vector3f back = scene.camera.eye.normalized(), up = back.cross(Vector3f::UnitX());
+    const auto pixel = [&](const Vector3f& world) {
+        const Vector3f from_eye = world - scene.camera.eye;
+        const float scale = 240 / std::tan(22.5f * std::numbers::pi_v<float> / 180) / -from_eye.dot(back);
+        return std::pair(static_cast<int>(320 + scale * from_eye.x()),
+                         static_cast<int>(240 - scale * from_eye.dot(up)));
+    };
+    // The smallest share of the key light that the shadow takes along its middle, where the rod does not hide it.
+    const auto palest = [&](float radius, float turn, render::Shadow shadow) {
+        scene.objects[0].shadow = shadow;
+        const Affine3f rod =
+            Eigen::Translation3f(0.1f, 0.3f, -0.2f) * Eigen::AngleAxisf(turn, Vector3f::UnitY()) *
+            Eigen::AngleAxisf(0.15f, Vector3f::UnitX()) * Eigen::Scaling(radius, radius, 1.0f);
+        const render::Image image = render_it(rod.matrix(), true, 1);
+        const auto hidden = [&](int x, int y) {
+            for (float along = -0.21f; along < 0.21f; along += 0.005f) {
+                const auto [rod_x, rod_y] = pixel(rod * Vector3f(0, 0, along));
+                if (std::hypot(x - rod_x, y - rod_y) < 200 * radius + 4) return true;
+            }
+            return false;
+        };
+        double least = 1;
+        int seen = 0;
+        for (float along = -0.17f; along < 0.17f; along += 0.004f) {
+            const Vector3f axis = rod * Vector3f(0, 0, along);
+            const auto [x, y] = pixel(axis - light * (axis.y() / light.y()));
+            if (hidden(x, y)) continue;
+            ++seen;
+            const double from = brightness(lit, x, y), to = brightness(dark, x, y);
+            least = std::min(least, (from - brightness(image, x, y)) / (from - to));
+        }
+        EXPECT_GT(seen, 30) << radius << " m, turned by " << turn;
+        return least;
+    };
+    for (const float turn : {0.1f, 0.5f, 1.0f, 1.7f, 2.9f}) {
+        // The widened shadow of a rod of a texel's radius is 4.5 texels wide, the filter reaches 4: a few per cent of light
+        // are left where its edge is rounded to texels.
+        for (const float radius : {0.005f, 0.006f, 0.01f, 0.02f})
+            EXPECT_GT(palest(radius, turn, render::Shadow::widened), 0.85)
+                << radius << " m, turned by " << turn;
+        EXPECT_LT(palest(0.005f, turn, render::Shadow::cast), 0.85) << "without it, turned by " << turn;
+    }
+}
+
+TEST(Picture, WhatCastsNoShadowIsSeenAndLeavesTheFloorLit) {
+    const TemporaryFolder folder;
+    render::SceneDescription scene = silhouette_scene({folder.write("box.obj", box_obj())});
+    scene.objects[0].shadow = render::Shadow::none;
+    scene.camera = {{0, 3, 0}, {0, 0, 0}, 50};
+    scene.room = {{0.5f, 0.5f, 0.5f}, {0.2f, 0.2f, 0.2f}, 0};
+    scene.key_light = {{1, 1, 0}, {1, 1, 1}, 1};
+    const Matrix4f box = (Eigen::Translation3f(0, 0.6f, 0) * Eigen::Scaling(0.04f)).matrix();
+    render::Renderer renderer(scene);
+    const render::Image with = picture(renderer, {box}), without = picture(renderer, {box}, {false});
+    int changed = 0;
+    for (int y = 0; y < kHeight; ++y)
+        for (int x = 0; x < kWidth; ++x) {
+            const bool same = brightness(with, x, y) == brightness(without, x, y);
+            changed += !same;
+            // The box is 8 cm at 2.4 m, 9 pixels to each side; its shadow would lie 60 cm to the left.
+            EXPECT_TRUE(same || (std::abs(x - kWidth / 2) < 6 && std::abs(y - kHeight / 2) < 6))
+                << x << " " << y;
+        }
+    EXPECT_GT(changed, 20);
+}
+
 TEST(Picture, TheNearerObjectHidesTheFartherInEitherOrder) {
     const TemporaryFolder folder;
     const std::filesystem::path mesh = folder.write("box.obj", box_obj());

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <deque>
 #include <functional>
 
@@ -87,12 +88,15 @@ TEST(Arbiter, FindsTheShareOfLeastSquares) {
 
 TEST(Arbiter, FollowsOnlyAsFarAsLeastSquaresIsSure) {
     // The model takes one component of the error away; the other, as large as `left`, stays: a = 1, and the variance
-    // of a is left^2 over the number of independent errors.
-    for (const double left : {0.1, 0.5}) {
+    // of a is left^2 over the number of independent errors. It counts the less the further the model's mean square is
+    // below 0.85^2 of the filter's, and below 0.7^2 not at all.
+    for (const double left : {0.5, 1.2, 1.5}) {
         Arbiter arbiter;
         for (int i = 0; i < 6000; ++i)
             arbiter.learn(Vector3d(1, left, 0), Vector3d(0, left, 0), Vector3d::Zero(), 1 / 60.0);
-        EXPECT_NEAR(arbiter.share(), 1 - left * std::sqrt(0.15 / 2), 1e-9) << left;
+        const double ratio = left * left / (1 + left * left);
+        const double doubt = std::max(0.0, (ratio - 0.49) / (0.7225 - 0.49));
+        EXPECT_NEAR(arbiter.share(), 1 - doubt * left * std::sqrt(0.15 / 2), 1e-9) << left;
     }
 }
 
@@ -248,6 +252,49 @@ TEST(Arbitrated, KeepsWhatItLearnedOverGapsAndFollowsTheFiltersGate) {
         }
         EXPECT_TRUE(both.covariance(0.1)->position.allFinite());
     }
+}
+
+TEST(Arbitrated, BeginsWithTheTrustThatAnotherPerformanceEndedWith) {
+    PathModel model = lasting_velocity();
+    Arbitrated earlier = arbitrated(model);
+    for (int i = 0; i < 400; ++i) (void)earlier.correct(upwards(i));
+    model.trust.push_back(earlier.trust());
+    model.trust[0].stick = "left";
+
+    Arbitrated left = arbitrated(model), right = arbitrated(model);
+    begin_with_trust(left, model, "left");
+    begin_with_trust(right, model, "right");
+    const auto filter = make_predictor(kFilter);
+    const auto error = [](const Predictor& of, int i) {
+        return (of.predict(0.1).position - upwards(i + 6).position).norm();
+    };
+    for (int i = 0; i < 15; ++i) {
+        for (Predictor* one : std::initializer_list<Predictor*>{&left, &right, filter.get()})
+            (void)one->correct(upwards(i));
+        if (i < 2) continue;                                      // no velocity is known
+        EXPECT_LT(error(left, i), 0.3 * error(*filter, i)) << i;  // as within a performance, after a gap
+        EXPECT_EQ(right.predict(0.1).position, filter->predict(0.1).position)
+            << "a stick that was not there: the filter for 0.25 s";
+    }
+}
+
+TEST(Arbitrated, ItsTrustComesBackToTheBitAndItsRegionsWithIt) {
+    const PathModel model = lasting_velocity();
+    Arbitrated earlier = arbitrated(model);
+    for (int i = 0; i < 900; ++i) (void)earlier.correct(motion(0, i));
+    const Trust trust = earlier.trust();
+    Arbitrated later = arbitrated(model);
+    later.begin_with(trust);
+    const Trust kept = later.trust();
+    EXPECT_EQ(std::memcmp(&kept.leads, &trust.leads, sizeof trust.leads), 0);
+    for (std::size_t l = 0; l < kNodes; ++l)
+        EXPECT_NE(trust.leads[l].regions.radii.log_50, Trust::Radii().log_50) << l;
+    // Regions are stated from the first prediction on as they were learned.
+    (void)later.correct(motion(0, 0));
+    const PoseCovariance stated = later.covariance(1.0 / 15).value(),
+                         learned = earlier.covariance(1.0 / 15).value();
+    EXPECT_DOUBLE_EQ(stated.radius_50, learned.radius_50);
+    EXPECT_DOUBLE_EQ(stated.radius_95, learned.radius_95);
 }
 
 TEST(Arbitrated, ItsVelocityIsTheSlopeOfItsPath) {

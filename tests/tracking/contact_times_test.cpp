@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "contact_view.h"
 
@@ -22,8 +23,24 @@ TEST(ContactTimes, StateTheirProbabilityAndMedian) {
     EXPECT_DOUBLE_EQ(times.probability(), 0.8);
     EXPECT_NEAR(times.median_s(), 6 * ContactTimes::kBinS, 1e-12);  // the middle of 4 to 8
     EXPECT_NEAR(times.probability_between(5 * ContactTimes::kBinS, 6.5 * ContactTimes::kBinS), 0.3, 1e-12);
+    EXPECT_NEAR(times.reached_s(0.6), 7 * ContactTimes::kBinS, 1e-12);
+    EXPECT_EQ(times.reached_s(0.9), std::numeric_limits<double>::infinity());
     EXPECT_DOUBLE_EQ(times.probability_between(-1, 1), 0.8);
     EXPECT_DOUBLE_EQ(ContactTimes().probability(), 0);
+}
+
+/// A plane that the tip is beneath is not looked at, nor one further than 0.25 s of its speed.
+TEST(ContactTimes, PlanesAreInReachFromAboveWithinAQuarterOfASecond) {
+    TipView tip;
+    tip.speed = 2;
+    const auto at = [&](double height_m) {
+        tip.tip.y() = height_m;
+        return in_reach(tip, Plane{});
+    };
+    EXPECT_TRUE(at(0.001));
+    EXPECT_TRUE(at(0.49));
+    EXPECT_FALSE(at(0.51));
+    EXPECT_FALSE(at(-0.001));
 }
 
 /// What a network sees of a plane does not depend on where the kit stands and which way it faces.

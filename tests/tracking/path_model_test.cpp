@@ -66,6 +66,67 @@ TEST(PathModel, ComesBackWithItsNetworkOfContacts) {
     EXPECT_NE(message_of(other).find("expected sizes 106 N N 19"), std::string::npos) << message_of(other);
 }
 
+/// With the trust of two sticks, every number another.
+PathModel with_trust() {
+    PathModel model = with_contacts(8);
+    double next = 0.125;
+    for (const char* stick : {"left", "r\xc3\xa9-2"}) {
+        Trust& trust = model.trust.emplace_back();
+        trust.stick = stick;
+        for (Trust::Lead& lead : trust.leads) {
+            for (Trust::Sums* sums : {&lead.position, &lead.shaft})
+                *sums = {next, -next / 2, next * 3, next * 5, next * 7, next * 11};
+            lead.regions = {next * 13, next * 17, {-next, next}};
+            next += 0.25;
+        }
+    }
+    return model;
+}
+
+TEST(PathModel, ComesBackWithTheTrustOfItsSticks) {
+    const PathModel model = with_trust();
+    const std::string bytes = format_path_model(model);
+    EXPECT_NE(bytes.find("\ntrust: left\ntrust: r\xc3\xa9-2\nchecksum: "), std::string::npos);
+    const PathModel back = parse_path_model(bytes, "m.model");
+    EXPECT_EQ(format_path_model(back), bytes);
+    ASSERT_EQ(back.trust.size(), 2U);
+    EXPECT_EQ(back.trust[1].stick, "r\xc3\xa9-2");
+    EXPECT_EQ(std::memcmp(&back.trust[1].leads, &model.trust[1].leads, sizeof model.trust[1].leads), 0);
+    // Without it the file is what it was before there was any.
+    PathModel plain = model;
+    plain.trust.clear();
+    EXPECT_EQ(format_path_model(plain).find("trust: "), std::string::npos);
+    EXPECT_EQ(bytes.size() - format_path_model(plain).size(),
+              2 * 80 * sizeof(double) + std::string_view("trust: left\ntrust: r\xc3\xa9-2\n").size());
+}
+
+TEST(PathModel, DamagedTrustIsRefusedWithItsPlace) {
+    const PathModel model = with_trust();
+    const std::string bytes = format_path_model(model);
+    for (std::size_t at = bytes.size() - 2 * 80 * sizeof(double); at < bytes.size(); at += 13) {
+        std::string changed = bytes;
+        changed[at] = static_cast<char>(changed[at] ^ 0x20);
+        EXPECT_TRUE(message_of(changed).starts_with("m.model:")) << at;
+        EXPECT_TRUE(message_of(bytes.substr(0, at)).starts_with("m.model:")) << at;
+    }
+    for (const double wrong : {std::numeric_limits<double>::quiet_NaN(), -1.0, 1e13}) {
+        PathModel bad = model;
+        bad.trust[1].leads[4].shaft.model_square = wrong;
+        const std::string message = message_of(format_path_model(bad));
+        EXPECT_NE(message.find("a number of trust of"), std::string::npos) << message;
+        EXPECT_TRUE(message.starts_with("m.model:byte ")) << message;
+    }
+    PathModel twice = model;
+    twice.trust[1].stick = "left";
+    EXPECT_NE(message_of(format_path_model(twice)).find("found 'left', expected the name of another stick"),
+              std::string::npos);
+    for (const char* no_word : {"", "two words", "two\nlines"}) {
+        PathModel bad = model;
+        bad.trust[0].stick = no_word;
+        EXPECT_THROW((void)format_path_model(bad), std::invalid_argument) << no_word;
+    }
+}
+
 TEST(PathModel, OfTheGreatestSizeTakesLessThan200kB) {
     EXPECT_LT(format_path_model(model_of_random_weights(PathModel::kMostHidden, 1)).size(), 200000U);
 }

@@ -11,14 +11,16 @@ namespace {
 
 constexpr double kRecentS = 2, kLongS = 10;
 constexpr double kSilentS = 0.25;
-constexpr double kClearlyBetter = 0.85;  // of the filter's RMS
-constexpr double kIndependentS = 0.15;   // errors closer together are much alike
-constexpr double kMostPendingHz = 500;   // predictions made more often are not all remembered
-constexpr double kSpreadOfWay = 0.3;     // of the filter, by the way at the recent speed
+constexpr double kClearlyBetter = 0.85, kSurelyBetter = 0.7;  // of the filter's RMS
+constexpr double kIndependentS = 0.15;                        // errors closer together are much alike
+constexpr double kMostPendingHz = 500;  // predictions made more often are not all remembered
+constexpr double kSpreadOfWay = 0.3;    // of the filter, by the way at the recent speed
 constexpr double kStep50 = 0.06, kStep95 = 0.2, kFirstSteps = 3, kSettlingErrors = 100;
 constexpr double kErrorsOfMean = 200;
-constexpr double kMostLog = 40;  // finite whatever comes
+constexpr double kMostLog = Trust::kMostLog;
 constexpr double kLeastSpreadM = 1e-4;
+
+static_assert(kNodes == Trust::kLeads);
 
 }  // namespace
 
@@ -26,38 +28,52 @@ void Arbiter::learn(const Eigen::Vector3d& filter, const Eigen::Vector3d& model,
                     double dt_s) noexcept {
     const Eigen::Vector3d way = model - filter, error = filter - truth;
     const double recent = std::exp(-dt_s / kRecentS), long_past = std::exp(-dt_s / kLongS);
-    against_ = recent * against_ - dt_s * error.dot(way);
-    square_ = recent * square_ + dt_s * way.squaredNorm();
-    filter_recent_ = recent * filter_recent_ + dt_s * error.squaredNorm();
-    filter_square_ = long_past * filter_square_ + dt_s * error.squaredNorm();
-    model_square_ = long_past * model_square_ + dt_s * (model - truth).squaredNorm();
-    known_s_ += dt_s;
+    sums_.against = recent * sums_.against - dt_s * error.dot(way);
+    sums_.square = recent * sums_.square + dt_s * way.squaredNorm();
+    sums_.filter_recent = recent * sums_.filter_recent + dt_s * error.squaredNorm();
+    sums_.filter_square = long_past * sums_.filter_square + dt_s * error.squaredNorm();
+    sums_.model_square = long_past * sums_.model_square + dt_s * (model - truth).squaredNorm();
+    sums_.known_s += dt_s;
+    weigh();
+}
+
+void Arbiter::begin_with(const Trust::Sums& sums) noexcept {
+    sums_ = sums;
+    weigh();
+}
+
+void Arbiter::weigh() noexcept {
     share_ = 0;
-    const bool better = model_square_ < kClearlyBetter * kClearlyBetter * filter_square_;
-    if (known_s_ < kSilentS || !better || !(square_ > 0)) return;
-    const double a = against_ / square_, left = std::max(0.0, filter_recent_ - a * against_);
-    const double independent = std::max(1.0, std::min(known_s_, kRecentS) / kIndependentS);
-    share_ = std::clamp(a - std::sqrt(left / (square_ * independent)), 0.0, 1.0);
+    constexpr double kClearly = kClearlyBetter * kClearlyBetter, kSurely = kSurelyBetter * kSurelyBetter;
+    const bool better = sums_.model_square < kClearly * sums_.filter_square;
+    if (sums_.known_s < kSilentS || !better || !(sums_.square > 0)) return;
+    const double a = sums_.against / sums_.square,
+                 left = std::max(0.0, sums_.filter_recent - a * sums_.against);
+    const double independent = std::max(1.0, std::min(sums_.known_s, kRecentS) / kIndependentS);
+    const double doubt =
+        std::clamp((sums_.model_square / sums_.filter_square - kSurely) / (kClearly - kSurely), 0.0, 1.0);
+    share_ = std::clamp(a - doubt * std::sqrt(left / (sums_.square * independent)), 0.0, 1.0);
 }
 
 void RegionScale::learn(double square, const Radii& stated) noexcept {
-    errors_ += 1;
-    mean_ += (square - mean_) / std::min(errors_ + 1, kErrorsOfMean);
-    const double longer = 1 + (kFirstSteps - 1) * std::exp(-errors_ / kSettlingErrors);
+    scale_.errors += 1;
+    scale_.mean += (square - scale_.mean) / std::min(scale_.errors + 1, kErrorsOfMean);
+    const double longer = 1 + (kFirstSteps - 1) * std::exp(-scale_.errors / kSettlingErrors);
+    Radii& radii = scale_.radii;
     const auto follow = [&](double Radii::*log, double step, double outside) {
         const double miss = (square > std::exp(stated.*log) ? 1.0 : 0.0) - outside;
-        radii_.*log = std::clamp(radii_.*log + longer * step * miss, -kMostLog, kMostLog);
+        radii.*log = std::clamp(radii.*log + longer * step * miss, -kMostLog, kMostLog);
     };
     follow(&Radii::log_50, kStep50, 0.5);
     follow(&Radii::log_95, kStep95, 0.05);
-    radii_.log_95 = std::max(radii_.log_50, radii_.log_95);
+    radii.log_95 = std::max(radii.log_50, radii.log_95);
 }
 
 void RegionScale::apply(PoseCovariance& covariance) const noexcept {
-    const double factor = std::max(mean_ / 3, std::exp(-kMostLog));
+    const double factor = std::max(scale_.mean / 3, std::exp(-kMostLog));
     covariance.position *= factor;
-    covariance.radius_50 = std::exp(radii_.log_50) / factor;
-    covariance.radius_95 = std::exp(radii_.log_95) / factor;
+    covariance.radius_50 = std::exp(scale_.radii.log_50) / factor;
+    covariance.radius_95 = std::exp(scale_.radii.log_95) / factor;
 }
 
 Arbitrated::Arbitrated(std::unique_ptr<Predictor> filter, const PathModel& model,
@@ -65,6 +81,21 @@ Arbitrated::Arbitrated(std::unique_ptr<Predictor> filter, const PathModel& model
     : filter_(std::move(filter)), learned_(model, shaft, memory_s), shaft_(shaft) {
     for (std::size_t l = 0; l < kNodes; ++l)
         leads_[l].ring.resize(static_cast<std::size_t>(kPathLeads[l] * kMostPendingHz) + 2);
+}
+
+Trust Arbitrated::trust() const {
+    Trust trust;
+    for (std::size_t l = 0; l < kNodes; ++l)
+        trust.leads[l] = {leads_[l].position.sums(), leads_[l].shaft.sums(), leads_[l].regions.scale()};
+    return trust;
+}
+
+void Arbitrated::begin_with(const Trust& trust) noexcept {
+    for (std::size_t l = 0; l < kNodes; ++l) {
+        leads_[l].position.begin_with(trust.leads[l].position);
+        leads_[l].shaft.begin_with(trust.leads[l].shaft);
+        leads_[l].regions.begin_with(trust.leads[l].regions);
+    }
 }
 
 SampleStatus Arbitrated::correct(const PoseSample& sample) noexcept {

@@ -1,25 +1,25 @@
 #pragma once
 #include <array>
-#include <cmath>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "kalman_predictor.h"
 #include "learned_path.h"
+#include "tracking/trust.h"
 
 namespace tracking {
 
 /// Which of two predictions of a vector to trust, from the errors that they turned out to make.
 ///
-///   p = F + a (M - F),  a = a* - s,  0 <= a <= 1
+///   p = F + a (M - F),  a = a* - u s,  0 <= a <= 1
 ///   a* = -sum w e_F.(M - F) / D,  D = sum w |M - F|^2,  w = exp(-age / 2 s)      (least squares)
 ///   s^2 = (sum w |e_F|^2 - a*^2 D) / (D n)                                       (its variance)
 ///
 /// with n = 2 s / 0.15 s independent errors, fewer at the beginning: the share is what least squares is sure of, so
 /// a model that helps by chance is not followed. a = 0 until errors of 0.25 s are known, and unless the RMS of e_M
-/// over 10 s (weights exp(-age / 10 s)) is below 0.85 of that of e_F. Friedmann's choice of the model that was
-/// right (3.28), made continuous.
+/// over 10 s (weights exp(-age / 10 s)) is below 0.85 of that of e_F; u falls from 1 there to 0 where it is below 0.7: what has
+/// long been right by far is not doubted for its last 2 s. Friedmann's choice of the model that was right (3.28), made continuous.
 class Arbiter {
 public:
     /// The predictions F and M of `truth`, which came `dt_s` after the truth before.
@@ -27,9 +27,15 @@ public:
                double dt_s) noexcept;
     [[nodiscard]] double share() const noexcept { return share_; }
 
+    /// What it has learned, and to go on from there.
+    [[nodiscard]] const Trust::Sums& sums() const noexcept { return sums_; }
+    void begin_with(const Trust::Sums& sums) noexcept;
+
 private:
-    double known_s_ = 0, filter_recent_ = 0, against_ = 0, square_ = 0, filter_square_ = 0, model_square_ = 0,
-           share_ = 0;
+    void weigh() noexcept;
+
+    Trust::Sums sums_;
+    double share_ = 0;
 };
 
 /// What a stated covariance has to be multiplied by, and the squared radii of its regions of 50 and 95 %, learned
@@ -38,19 +44,19 @@ private:
 /// of each radius moves by a small step after each error (Robbins and Monro 1951), by longer ones at first.
 class RegionScale {
 public:
-    /// Logarithms of squared radii in units of the covariance without this factor.
-    struct Radii {
-        double log_50 = std::log(kRadius50), log_95 = std::log(kRadius95);
-    };
+    using Radii = Trust::Radii;
     /// `square`: an error's squared distance in units of the covariance without this factor; `stated`: the radii()
     /// of the time when it was predicted, without which errors in a row would count as one.
     void learn(double square, const Radii& stated) noexcept;
-    [[nodiscard]] const Radii& radii() const noexcept { return radii_; }
+    [[nodiscard]] const Radii& radii() const noexcept { return scale_.radii; }
     void apply(PoseCovariance& covariance) const noexcept;
 
+    /// What it has learned, and to go on from there.
+    [[nodiscard]] const Trust::Scale& scale() const noexcept { return scale_; }
+    void begin_with(const Trust::Scale& scale) noexcept { scale_ = scale; }
+
 private:
-    double errors_ = 0, mean_ = 3;
-    Radii radii_;
+    Trust::Scale scale_;
 };
 
 /// Predictor `arbitrated`: a filter and a network that learns while the stick moves, weighed against each other for each lead, for the position
@@ -74,6 +80,11 @@ public:
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
     [[nodiscard]] bool heeds_orientation() const noexcept override { return true; }
     [[nodiscard]] const Learned& learned() const noexcept { return learned_; }
+
+    /// Of all leads; without the stick's name.
+    [[nodiscard]] Trust trust() const;
+    /// Before the first sample.
+    void begin_with(const Trust& trust) noexcept;
 
 private:
     /// Two predictions for one time, until it comes.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "contact_view.h"
 #include "network.h"
@@ -9,9 +10,9 @@
 namespace tracking {
 namespace {
 
-constexpr double kFarthestS = 0.25, kDeepestS = -0.1;  // distance over speed
-constexpr double kNearS = 0.005;                       // where the logarithm of the distance begins
-constexpr std::size_t kFewest = 3;                     // samples
+constexpr double kFarthestS = 0.25;  // distance over speed
+constexpr double kNearS = 0.005;     // where the logarithm of the distance begins
+constexpr std::size_t kFewest = 3;   // samples
 
 static_assert(TipView::kInputs == StickHistory::kInputs);
 
@@ -45,13 +46,16 @@ double ContactTimes::probability_between(double from_s, double to_s) const noexc
     return until(to_s) - until(from_s);
 }
 
-double ContactTimes::median_s() const noexcept {
-    const double half = 0.5 * probability();
+double ContactTimes::reached_s(double probability) const noexcept {
     for (std::size_t bin = 0; bin < kBins; ++bin)
-        if (before[bin + 1] >= half && before[bin + 1] > before[bin])
+        if (before[bin + 1] >= probability && before[bin + 1] > before[bin])
             return kBinS *
-                   (static_cast<double>(bin) + (half - before[bin]) / (before[bin + 1] - before[bin]));
-    return kHorizonS;
+                   (static_cast<double>(bin) + (probability - before[bin]) / (before[bin + 1] - before[bin]));
+    return std::numeric_limits<double>::infinity();
+}
+
+double ContactTimes::median_s() const noexcept {
+    return std::min(reached_s(0.5 * probability()), kHorizonS);
 }
 
 TipHistory::TipHistory(const Eigen::Vector3d& shaft, const Eigen::Vector3d& tip)
@@ -84,7 +88,7 @@ bool TipHistory::look(TipView& view) const noexcept {
 
 bool in_reach(const TipView& view, const Plane& plane) noexcept {
     const double d = distance_s(view, plane);
-    return d < kFarthestS && d > kDeepestS;
+    return d < kFarthestS && d > 0;
 }
 
 void look_at(const TipView& view, const Plane& plane, ContactInputs& inputs) noexcept {
@@ -97,7 +101,7 @@ void look_at(const TipView& view, const Plane& plane, ContactInputs& inputs) noe
     inputs.segment<3>(kPlaneNormal) = normal;
     const double d = distance_s(view, plane);
     Eigen::Index next = kPlaneNormal + 3;
-    inputs[next++] = static_cast<float>(std::clamp(d, kDeepestS, kFarthestS));
+    inputs[next++] = static_cast<float>(std::clamp(d, 0.0, kFarthestS));
     inputs[next++] = static_cast<float>(std::asinh(d / kNearS));
     for (std::size_t k = 0; k < StickHistory::kSpans; ++k)
         inputs[next++] = normal.dot(inputs.segment<3>(static_cast<Eigen::Index>(3 * k)));

@@ -10,7 +10,7 @@
 #include "network_training.h"
 #include "random_stream.h"
 #include "sample_clock.h"
-#include "tracking/sensor.h"
+#include "sighting.h"
 
 namespace tracking {
 namespace {
@@ -18,12 +18,10 @@ namespace {
 constexpr std::size_t kSightings = 40, kHeldOutSightings = 2, kPlanesAtOnce = 6;
 constexpr std::size_t kMostContactExamples = 300000, kMostContactsHeldOut = 30000;
 constexpr double kContactDepthM = 0.003, kTurnM = 0.025;
-constexpr double kPlainShare = 0.4;  // of the sightings: by the usual sensor
 constexpr Eigen::Index kContactBatch = 256;
 constexpr std::size_t kExamplesOfStep = 32, kFewestContactExamples = 8192;  // short trainings need fewer
 constexpr std::size_t kMostContactSteps = 20000, kContactChecks = 24;
 constexpr std::size_t kMostContactHidden = 64;  // so that a model stays under 200 kB
-constexpr std::size_t kStepsOfPath = 3;         // steps of the path's network to one of this
 constexpr double kContactRate = 2e-3, kContactWarmUp = 500;
 constexpr float kContactDecay = 0.1F;
 constexpr auto kNone = static_cast<int>(ContactTimes::kBins);
@@ -106,46 +104,6 @@ Plane random_plane(const TipPoints& path, RandomStream& random) {
     plane.point = height * plane.normal;
     return plane;
 }
-
-/// How a stick is seen once.
-struct Sighting {
-    SensorModel sensor;
-    bool orientation = true;
-    double slower = 1, greater = 1, taller = 1;
-    Eigen::Quaterniond tilt = Eigen::Quaterniond::Identity();
-
-    Sighting(std::uint64_t seed, bool plain) {
-        constexpr double kUsualHz = 60, kLeastHz = 30, kMostHz = 150, kTiltRad = 0.15;
-        RandomStream random(seed);
-        const auto factor = [&](double range) { return std::exp(range * (random.uniform() - 0.5)); };
-        sensor.seed = seed;
-        sensor.noise_m = 0.25e-3;
-        sensor.rate_hz = kUsualHz * factor(0.06);  // any phase of the recording
-        orientation = random.uniform() > 0.3;
-        if (plain) return;
-        if (random.uniform() > kPlainShare) {
-            sensor.rate_hz = kLeastHz * std::exp(random.uniform() * std::log(kMostHz / kLeastHz));
-            if (random.uniform() < 0.5) sensor.jitter_s = 0.004 * random.uniform();
-            if (random.uniform() < 0.5) sensor.drop_out = 0.15 * random.uniform();
-        }
-        slower = factor(1.2);
-        greater = factor(0.8);
-        taller = factor(0.4);
-        const Eigen::Vector3d turn = kTiltRad * Eigen::Vector3d(random.normal(), 0, random.normal());
-        tilt = Eigen::Quaterniond(
-            Eigen::AngleAxisd(turn.norm(), (turn + 1e-12 * Eigen::Vector3d::UnitX()).normalized()));
-    }
-    [[nodiscard]] StickTrace seen(StickTrace stick) const {
-        const Eigen::Vector3d origin = stick.samples.front().position,
-                              size(greater, greater * taller, greater);
-        for (PoseSample& sample : stick.samples) {
-            sample.t_s *= slower;
-            sample.position = origin + tilt * size.cwiseProduct(sample.position - origin);
-            sample.orientation = tilt * sample.orientation;
-        }
-        return stick;
-    }
-};
 
 struct ContactExamples {
     Eigen::MatrixXf inputs;      ///< kContactInputs x examples
@@ -231,7 +189,7 @@ ContactExamples collect_contacts(std::span<const TrainingStick> sticks, bool hel
     for (std::size_t k = 0; k < sightings; ++k)
         for (std::size_t i = 0; i < sticks.size(); ++i) {
             if (sticks[i].held_out != held_out || sticks[i].stick.samples.empty()) continue;
-            const Sighting sighting(mixed_seed(seed, 100 + k, i), held_out);
+            const Sighting sighting = random_sighting(mixed_seed(seed, 100 + k, i), held_out);
             add_examples(examples, sticks[i], sighting,
                          std::min(1.0, static_cast<double>(most) / expected) *
                              std::min(1.0, kUsualHz / sighting.sensor.rate_hz));
@@ -341,7 +299,7 @@ private:
 
 std::optional<LearnedContacts> train_contacts(std::span<const TrainingStick> sticks,
                                               const TrainingOptions& options) {
-    const std::size_t steps = std::clamp<std::size_t>(options.steps / kStepsOfPath, 1, kMostContactSteps);
+    const std::size_t steps = std::min(options.steps, kMostContactSteps);
     ContactExamples learning = collect_contacts(
                         sticks, false,
                         std::clamp(kExamplesOfStep * steps, kFewestContactExamples, kMostContactExamples),

@@ -1,5 +1,6 @@
 #include "tracking/experience.h"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "arbitrated.h"
@@ -7,12 +8,22 @@
 
 namespace tracking {
 
-std::optional<Experience> experience_of(const Predictor& predictor) {
+std::optional<Experience> experience_of(const Predictor& predictor, const std::string& stick) {
     const auto* learned = dynamic_cast<const Learned*>(&predictor);
-    if (const auto* arbitrated = dynamic_cast<const Arbitrated*>(&predictor))
-        learned = &arbitrated->learned();
+    const auto* arbitrated = dynamic_cast<const Arbitrated*>(&predictor);
+    if (arbitrated != nullptr) learned = &arbitrated->learned();
     if (learned == nullptr || learned->online() == nullptr) return std::nullopt;
-    return learned->online()->experience();
+    Experience experience = learned->online()->experience();
+    if (arbitrated == nullptr) return experience;
+    experience.trust = arbitrated->trust();
+    experience.trust->stick = stick;
+    return experience;
+}
+
+void begin_with_trust(Predictor& predictor, const PathModel& model, std::string_view stick) {
+    auto* arbitrated = dynamic_cast<Arbitrated*>(&predictor);
+    const auto trust = std::ranges::find(model.trust, stick, &Trust::stick);
+    if (arbitrated != nullptr && trust != model.trust.end()) arbitrated->begin_with(*trust);
 }
 
 PathModel taught(const PathModel& model, std::span<const Experience> experiences) {
@@ -29,6 +40,8 @@ PathModel taught(const PathModel& model, std::span<const Experience> experiences
     }
     layer.solve();
     PathModel result;
+    for (const Experience& experience : experiences)
+        if (experience.trust) result.trust.push_back(*experience.trust);
     result.layers = model.layers;
     result.contacts = model.contacts;
     result.layers[2].weights.topRows<kPathMeans>() = layer.weights().leftCols(network.units());

@@ -19,11 +19,11 @@ namespace tracking {
 ///             nothing new, forgetting ends at the model
 ///
 /// All leads are learned when the longest has come, so that they share A. A + d I is positive definite whatever
-/// comes: d is some 1e8 times the rounding of A. n (n + 60) / 2 multiplications per example; every kEvery
+/// comes: d is some 1e7 times the rounding of A. n (n + 60) / 2 multiplications per example; every kEvery
 /// examples, counted and not timed, n^3 / 6 + 30 n^2 for the solution. Allocates when it is made only.
 class OnlineLayer {
 public:
-    static constexpr double kDraw = 10;
+    static constexpr double kDraw = 2;
     static constexpr int kEvery = 32;
 
     /// `memory_s`: T.
@@ -35,7 +35,7 @@ public:
     [[nodiscard]] const Eigen::MatrixXf& weights() const noexcept { return weights_; }  ///< 30 x n, bias last
     /// What another stick has learned from the same model; solve() then finds the W of both.
     void add(const Experience& other);
-    [[nodiscard]] Experience experience() const { return {moments_, against_}; }
+    [[nodiscard]] Experience experience() const { return {moments_, against_, {}}; }
     void solve() noexcept;
 
 private:

@@ -1,5 +1,6 @@
 #include "tracking/path_model.h"
 
+#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -20,7 +21,8 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "the file's floats are copied");
 
 constexpr std::string_view kTitle = "MusicWorld path model ";
-constexpr std::string_view kSizes = "sizes: ", kContacts = "contacts: ", kChecksum = "checksum: ";
+constexpr std::string_view kSizes = "sizes: ", kContacts = "contacts: ", kTrust = "trust: ",
+                           kChecksum = "checksum: ";
 constexpr std::size_t kLongestHead = 1 << 20;
 constexpr float kGreatestWeight = 1e6F;
 constexpr const char* kRemedy = "make it again with `musicworld train`";
@@ -54,6 +56,26 @@ void for_each_block(Model& model, const Take& take) {
     if (model.contacts) take_layers(*model.contacts);
 }
 
+/// Calls take(number, least, greatest) for the numbers of all sticks' trust, in the file's order.
+template <class Model, class Take>
+void for_each_number(Model& model, const Take& take) {
+    constexpr double kMost = 1e12, kMostLog = Trust::kMostLog;
+    for (auto& trust : model.trust)
+        for (auto& lead : trust.leads) {
+            for (auto* sums : {&lead.position, &lead.shaft}) {
+                take(sums->known_s, 0, kMost);
+                take(sums->against, -kMost, kMost);
+                for (auto* sum :
+                     {&sums->square, &sums->filter_recent, &sums->filter_square, &sums->model_square})
+                    take(*sum, 0, kMost);
+            }
+            take(lead.regions.errors, 0, kMost);
+            take(lead.regions.mean, 0, kMost);
+            take(lead.regions.radii.log_50, -kMostLog, kMostLog);
+            take(lead.regions.radii.log_95, -kMostLog, kMostLog);
+        }
+}
+
 std::string sizes_of(const PathModel::Layers& layers) {
     std::string text = std::to_string(layers[0].weights.cols());
     for (const PathModel::Layer& layer : layers)
@@ -63,6 +85,10 @@ std::string sizes_of(const PathModel::Layers& layers) {
 
 bool is_word(std::string_view text) {
     return !text.empty() && text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") == text.npos;
+}
+
+bool is_stick(std::string_view name) {
+    return !name.empty() && name.find(' ') == name.npos && first_unprintable(name) == name.npos;
 }
 
 /// INPUTS HIDDEN1 HIDDEN2 OUTPUTS behind a key: layers of these sizes, still without weights.
@@ -126,9 +152,18 @@ std::string format_path_model(const PathModel& model) {
     std::string head = head_of(model.provenance);
     head += std::string(kSizes) + sizes_of(model.layers) + "\n";
     if (model.contacts) head += std::string(kContacts) + sizes_of(*model.contacts) + "\n";
+    for (const Trust& trust : model.trust) {
+        if (!is_stick(trust.stick))
+            throw std::invalid_argument("path model: found stick name " + in_quotes(trust.stick) +
+                                        ", expected a word");
+        head.append(kTrust).append(trust.stick).append("\n");
+    }
     std::string weights;
     for_each_block(model, [&](std::span<const float> block) {
         weights.append(reinterpret_cast<const char*>(block.data()), block.size_bytes());
+    });
+    for_each_number(model, [&](double number, double /*least*/, double /*greatest*/) {
+        weights.append(reinterpret_cast<const char*>(&number), sizeof number);
     });
     return head.append(checksum_line(hash(weights, hash(head)))).append("\n\n").append(weights);
 }
@@ -169,8 +204,19 @@ PathModel parse_path_model(std::string_view bytes, const std::string& name) {
         sum.reset();
         if (!lines.at_end()) sum = lines.next();
     }
+    while (sum && sum->text().starts_with(kTrust)) {
+        sum->require_text();
+        const std::string_view stick = sum->text().substr(kTrust.size());
+        if (!is_stick(stick) || std::ranges::count(model.trust, stick, &Trust::stick) > 0)
+            sum->fail(kTrust.size(), in_quotes(stick), "the name of another stick", kRemedy);
+        model.trust.emplace_back().stick = stick;
+        sum.reset();
+        if (!lines.at_end()) sum = lines.next();
+    }
     std::size_t expected = 0;
     for_each_block(model, [&](std::span<float> block) { expected += block.size_bytes(); });
+    for_each_number(model,
+                    [&](double number, double /*least*/, double /*greatest*/) { expected += sizeof number; });
     if (weights.size() != expected)
         fail_at(name, end + 2, std::to_string(weights.size()) + " bytes of weights",
                 std::to_string(expected) + " for these sizes");
@@ -190,6 +236,13 @@ PathModel parse_path_model(std::string_view bytes, const std::string& name) {
                 fail_at(name, end + 2 + at + i * sizeof(float), "a weight of " + std::to_string(block[i]),
                         "a finite one of at most 1e6");
         at += block.size_bytes();
+    });
+    for_each_number(model, [&](double& number, double least, double greatest) {
+        std::memcpy(&number, weights.data() + at, sizeof number);
+        if (!(number >= least && number <= greatest))
+            fail_at(name, end + 2 + at, "a number of trust of " + std::to_string(number),
+                    "one from " + std::to_string(least) + " to " + std::to_string(greatest));
+        at += sizeof number;
     });
     return model;
 }

@@ -63,7 +63,9 @@ double speed_of(const StickTrace& stick) {
     return quantile(speeds, 0.99);
 }
 
-void judge_units(const Trace& trace, std::vector<std::string>& lines) {
+}  // namespace
+
+std::optional<std::string> implausible_units(const Trace& trace) {
     double range = 0, speed = 0;
     for (const StickTrace& stick : trace.sticks) {
         range = std::max(range, range_of(stick));
@@ -72,10 +74,13 @@ void judge_units(const Trace& trace, std::vector<std::string>& lines) {
     const std::string evidence = "positions range over " + number(range) +
                                  " m, the fastest per cent of steps over " + number(speed) + " m/s: ";
     if (range > kLargeRange || speed > kFast)
-        lines.push_back(evidence + "more than hands do; are the units (m, cm, mm, s, ms) right?");
-    else if (range < kSmallRange && speed < kSlow)
-        lines.push_back(evidence + "less than hands that drum; are the units (m, cm, mm, s, ms) right?");
+        return evidence + "more than hands do; are the units (m, cm, mm, s, ms) right?";
+    if (range < kSmallRange && speed < kSlow)
+        return evidence + "less than hands that drum; are the units (m, cm, mm, s, ms) right?";
+    return std::nullopt;
 }
+
+namespace {
 
 Vector3d tip_of(const PoseSample& sample, const Trace& trace) {
     return sample.position + sample.orientation * trace.tip.value_or(Vector3d::Zero());
@@ -289,7 +294,7 @@ void judge_sides(const Trace& trace, std::vector<std::string>& lines) {
 
 std::vector<std::string> implausible(const Trace& trace) {
     std::vector<std::string> lines;
-    judge_units(trace, lines);
+    if (std::optional<std::string> units = implausible_units(trace)) lines.push_back(*std::move(units));
     judge_gravity(trace, lines);
     judge_orientation(trace, lines);
     judge_sides(trace, lines);

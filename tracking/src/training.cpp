@@ -19,36 +19,18 @@ namespace {
 
 constexpr double kMostContactLoss = 0.7;  // of the shares': a network that knows less would silence strokes
 
-constexpr std::size_t kRenditions = 12, kMostExamples = 300000, kMostValidation = 30000;
-constexpr double kUsualRateHz = 60, kLeastRateHz = 30, kMostRateHz = 150, kNoiseM = 0.25e-3;
+constexpr std::size_t kSightings = 30, kMostExamples = 300000, kMostValidation = 30000;
+constexpr double kUsualRateHz = 60, kNoiseM = 0.25e-3;
 constexpr Eigen::Index kBatch = 256;
 constexpr double kRate = 2e-3, kWarmUpSteps = 500;
 constexpr float kDecay = 0.1F;
-constexpr double kShaftWeight = 0.5;                     // of the shaft in the loss, beside the position
-constexpr std::size_t kValidations = 24, kPatience = 3;  // parts of the steps
+constexpr double kShaftWeight = 0.5;  // of the shaft in the loss, beside the position
+constexpr std::size_t kReports = 24;  // of the progress
 constexpr double kSettlingS = 0.5;
 constexpr double kFirstLogSpread = -3;
 constexpr double kSpreadWeight = 0.05;  // of the errors' likelihood, beside the loss
 
-/// The k-th way in which a stick is seen: a third of them by the usual sensor.
-Rendition rendition_of(std::size_t k, std::uint64_t seed, double share) {
-    RandomStream random(seed);
-    Rendition r;
-    r.sensor.seed = seed;
-    r.sensor.noise_m = kNoiseM;
-    r.sensor.rate_hz =
-        kUsualRateHz * std::exp(0.06 * (random.uniform() - 0.5));  // any phase of the recording
-    r.orientation = random.uniform() > 0.3;
-    if (k % 3 != 0) {
-        r.sensor.rate_hz = kLeastRateHz * std::exp(random.uniform() * std::log(kMostRateHz / kLeastRateHz));
-        if (random.uniform() < 0.5) r.sensor.jitter_s = 0.004 * random.uniform();
-        if (random.uniform() < 0.5) r.sensor.drop_out = 0.15 * random.uniform();
-    }
-    if (k % 2 == 1) r.slower = std::exp(0.6 * (random.uniform() - 0.5));
-    r.share = share * std::min(1.0, kUsualRateHz / r.sensor.rate_hz);
-    return r;
-}
-
+/// Of the sticks held out, or of the others [s].
 double duration_of(std::span<const TrainingStick> sticks, bool held_out) {
     double sum = 0;
     for (const TrainingStick& s : sticks)
@@ -57,30 +39,33 @@ double duration_of(std::span<const TrainingStick> sticks, bool held_out) {
     return sum;
 }
 
-Examples learning_examples(std::span<const TrainingStick> sticks, std::uint64_t seed) {
-    const double expected = duration_of(sticks, false) * kRenditions * kUsualRateHz;
+/// `all`: also of the sticks held out.
+Examples learning_examples(std::span<const TrainingStick> sticks, std::uint64_t seed, bool all) {
+    const double expected =
+        (duration_of(sticks, false) + (all ? duration_of(sticks, true) : 0)) * kSightings * kUsualRateHz;
     const double share = std::min(1.0, static_cast<double>(kMostExamples) / (1.1 * expected));
     ExampleCollector collector(kMostExamples);
-    for (std::size_t k = 0; k < kRenditions; ++k)
-        for (std::size_t i = 0; i < sticks.size(); ++i)
-            if (!sticks[i].held_out) collector.add(sticks[i], rendition_of(k, mixed_seed(seed, k, i), share));
+    for (std::size_t k = 0; k < kSightings; ++k)
+        for (std::size_t i = 0; i < sticks.size(); ++i) {
+            if (sticks[i].held_out && !all) continue;
+            const Sighting sighting = random_sighting(mixed_seed(seed, k, i), false);
+            collector.add(sticks[i], sighting, share * std::min(1.0, kUsualRateHz / sighting.sensor.rate_hz));
+        }
     return std::move(collector).finish();
 }
 
 /// What the sticks held out look like to the sensor that scores are stated for.
 Examples usual_examples(std::span<const TrainingStick> sticks, bool orientation) {
     const double expected = duration_of(sticks, true) * kUsualRateHz;
+    Sighting usual;
+    usual.sensor.rate_hz = kUsualRateHz;
+    usual.sensor.noise_m = kNoiseM;
+    usual.orientation = orientation;
     ExampleCollector collector(kMostValidation);
-    for (const TrainingStick& stick : sticks) {
-        if (!stick.held_out) continue;
-        Rendition r;
-        r.sensor.rate_hz = kUsualRateHz;
-        r.sensor.noise_m = kNoiseM;
-        r.orientation = orientation;
-        r.share = std::min(1.0, static_cast<double>(kMostValidation) / (1.1 * expected));
-        r.from_s = kSettlingS;
-        collector.add(stick, r);
-    }
+    for (const TrainingStick& stick : sticks)
+        if (stick.held_out)
+            collector.add(stick, usual,
+                          std::min(1.0, static_cast<double>(kMostValidation) / (1.1 * expected)), kSettlingS);
     return std::move(collector).finish();
 }
 
@@ -90,6 +75,7 @@ struct LossWeights {
     std::vector<float> of_example;
 
     explicit LossWeights(const Examples& e) : of_example(e.speed) {
+        for (float& weight : of_example) weight *= weight;
         scale(e);
         std::map<std::size_t, std::pair<double, double>> recordings;  // loss of the fading velocity, count
         for (Eigen::Index i = 0; i < e.count(); ++i) {
@@ -162,16 +148,6 @@ double rate_at(std::size_t step, std::size_t steps) {
            (1 + std::cos(std::numbers::pi * share));
 }
 
-double mean_loss(const Layers& layers, const Examples& e, const LossWeights& loss) {
-    Activations a;
-    run_forward(layers, e.inputs, a);
-    double sum = 0;
-    for (Eigen::Index i = 0; i < e.count(); ++i)
-        sum += static_cast<double>(
-            (a.outputs.col(i).head<kPathMeans>() - e.means.col(i)).cwiseAbs2().dot(weights_of(e, loss, i)));
-    return sum / static_cast<double>(e.count());
-}
-
 /// A residual of position in units of what the network says of it, and of the shaft, at a lead: whitened as
 /// ErrorShape says.
 Eigen::Vector3d whitened(const Eigen::Ref<const Eigen::VectorXf>& outputs, const Eigen::VectorXf& residual,
@@ -188,9 +164,8 @@ double whitened_shaft(const Eigen::Ref<const Eigen::VectorXf>& outputs, const Ei
 /// One training of one network.
 class Learner {
 public:
-    Learner(const Examples& learning, const std::array<Examples, 2>& held_out, const TrainingOptions& options)
+    Learner(const Examples& learning, const TrainingOptions& options)
         : learning_(learning),
-          held_out_(held_out),
           options_(options),
           random_(mixed_seed(options.seed, 2, 0)),
           layers_(initial_layers(StickHistory::kInputs, options.hidden, kPathOutputs, random_)) {
@@ -201,28 +176,17 @@ public:
         }
     }
 
-    /// Returns the steps taken.
-    std::size_t learn() {
+    /// Returns the steps taken: all, unless `goes_on` says no. It gets the share of them that is done.
+    std::size_t learn(const std::function<bool(double)>& goes_on) {
         const LossWeights loss(learning_);
-        const std::array<LossWeights, 2> validation = {LossWeights(held_out_[0]), LossWeights(held_out_[1])};
-        const std::size_t every = std::max<std::size_t>(1, options_.steps / kValidations);
-        Layers best = layers_;
-        double least = std::numeric_limits<double>::infinity();
-        std::size_t best_at = 0, step = 0;
-        while (step < options_.steps && step - best_at <= options_.steps / kPatience) {
-            ++step;
+        const std::size_t steps = options_.steps, every = std::max<std::size_t>(1, steps / kReports);
+        for (std::size_t step = 1; step <= steps; ++step) {
             batch_.draw(learning_, loss, random_);
-            improve(static_cast<float>(rate_at(step, options_.steps)));
-            if (step % every != 0 && step != options_.steps) continue;
-            const double now = 0.5 * (mean_loss(layers_, held_out_[0], validation[0]) +
-                                      mean_loss(layers_, held_out_[1], validation[1]));
-            if (now < least) least = now, best = layers_, best_at = step;
-            if (options_.progress &&
-                !options_.progress(static_cast<double>(step) / static_cast<double>(options_.steps), now))
-                break;
+            improve(static_cast<float>(rate_at(step, steps)));
+            const bool reports = step % every == 0 || step == steps;
+            if (reports && !goes_on(static_cast<double>(step) / static_cast<double>(steps))) return step;
         }
-        layers_ = std::move(best);
-        return step;
+        return steps;
     }
     [[nodiscard]] const Layers& layers() const { return layers_; }
 
@@ -268,7 +232,6 @@ private:
     }
 
     const Examples& learning_;
-    const std::array<Examples, 2>& held_out_;
     const TrainingOptions& options_;
     RandomStream random_;
     Layers layers_, gradient_ = layers_;
@@ -318,15 +281,18 @@ double calibrating_factor(const std::vector<double>& squares) {
     return best;
 }
 
-void calibrate(Layers& layers, const std::array<Examples, 2>& held_out) {
+/// What is to be added to the biases of the last layer, so that regions of the held-out errors hold what they say.
+Eigen::VectorXf calibration(const Layers& layers, const std::array<Examples, 2>& held_out) {
+    Eigen::VectorXf shifts = Eigen::VectorXf::Zero(kPathOutputs);
     for (std::size_t lead = 0; lead < kNodes; ++lead)
         for (const std::size_t k : {0, 3}) {
             const std::vector<double> squares = normalised_squares(layers, held_out, lead, k);
             if (squares.empty()) continue;
-            const auto shift = static_cast<float>(0.5 * std::log(calibrating_factor(squares)));
             const auto first = static_cast<Eigen::Index>(kPathMeans + kShapeNumbers * lead);
-            layers[2].bias.segment(k == 3 ? first + 6 : first, k == 3 ? 1 : 3).array() += shift;
+            shifts.segment(k == 3 ? first + 6 : first, k == 3 ? 1 : 3)
+                .setConstant(static_cast<float>(0.5 * std::log(calibrating_factor(squares))));
         }
+    return shifts;
 }
 
 /// RMS in mm of the tracked point's residuals, and of what the network has to predict, at a lead.
@@ -378,26 +344,40 @@ void check(const TrainingOptions& options, const Examples& learning,
                     "more than 0.5 s of another recording, not all of it flagged");
 }
 
+/// A network of inputs as they are, and the steps that it took.
+std::pair<Layers, std::size_t> learned_from(Examples examples, const TrainingOptions& options,
+                                            const std::function<bool(double)>& goes_on) {
+    const InputScaling scaling(examples.inputs);
+    scaling.apply(examples.inputs);
+    Learner learner(examples, options);
+    const std::size_t steps = learner.learn(goes_on);
+    Layers layers = learner.layers();
+    scaling.fold_into(layers[0]);
+    return {std::move(layers), steps};
+}
+
 }  // namespace
 
 TrainingResult train_path_model(std::span<const TrainingStick> sticks, const TrainingOptions& options) {
-    Examples learning = learning_examples(sticks, options.seed);
-    std::array<Examples, 2> held_out = {usual_examples(sticks, true), usual_examples(sticks, false)};
-    check(options, learning, held_out);
-    const InputScaling scaling(learning.inputs);
-    scaling.apply(learning.inputs);
-    for (Examples& e : held_out) scaling.apply(e.inputs);
-
+    const auto goes_on = [&](double share) { return !options.progress || options.progress(share); };
     TrainingResult result;
+    Layers& layers = result.model.layers;
+    Examples learning = learning_examples(sticks, options.seed, false);
     result.examples = static_cast<std::size_t>(learning.count());
-    Learner learner(learning, held_out, options);
-    result.steps = learner.learn();
-    result.model.layers = learner.layers();
-    calibrate(result.model.layers, held_out);
-    result.scores = scores_of(result.model.layers, held_out);
-    scaling.fold_into(result.model.layers[0]);
-    learning = {};
-    held_out = {};
+    const std::array<Examples, 2> held_out = {usual_examples(sticks, true), usual_examples(sticks, false)};
+    check(options, learning, held_out);
+    std::tie(layers, result.steps) =
+        learned_from(std::move(learning), options, [&](double share) { return goes_on(0.5 * share); });
+    const Eigen::VectorXf shifts = calibration(layers, held_out);
+    layers[2].bias += shifts;
+    result.scores = scores_of(layers, held_out);
+    if (result.steps < options.steps) return result;
+
+    learning = learning_examples(sticks, options.seed, true);
+    result.examples = static_cast<std::size_t>(learning.count());
+    std::tie(layers, result.steps) =
+        learned_from(std::move(learning), options, [&](double share) { return goes_on(0.5 + 0.5 * share); });
+    layers[2].bias += shifts;
     if (!options.contacts) return result;
     if (std::optional<LearnedContacts> contacts = train_contacts(sticks, options)) {
         if (contacts->loss < kMostContactLoss * contacts->loss_of_shares)

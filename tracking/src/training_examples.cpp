@@ -14,11 +14,6 @@ bool near_any(const std::vector<double>& times, double t_s) {
     return next != times.end() && *next <= t_s + kNearFlagS;
 }
 
-StickTrace played_slower(StickTrace stick, double factor) {
-    for (PoseSample& sample : stick.samples) sample.t_s *= factor;
-    return stick;
-}
-
 }  // namespace
 
 ExampleCollector::ExampleCollector(std::size_t reserve) {
@@ -30,25 +25,26 @@ ExampleCollector::ExampleCollector(std::size_t reserve) {
     examples_.recording.reserve(reserve);
 }
 
-void ExampleCollector::add(const TrainingStick& source, const Rendition& rendition) {
+void ExampleCollector::add(const TrainingStick& source, const Sighting& sighting, double share,
+                           double from_s) {
     if (source.stick.samples.empty()) return;
-    const StickTrace truth = played_slower(source.stick, rendition.slower);
-    const double first_s = truth.samples.front().t_s + rendition.from_s;
+    const StickTrace truth = sighting.seen(source.stick);
+    const double first_s = truth.samples.front().t_s + from_s;
     const auto flagged = [&](const std::vector<double>& times, double t_s, double lead_s) {
-        return near_any(times, t_s / rendition.slower) || near_any(times, (t_s + lead_s) / rendition.slower);
+        return near_any(times, t_s / sighting.slower) || near_any(times, (t_s + lead_s) / sighting.slower);
     };
-    RandomStream random(mixed_seed(rendition.sensor.seed, 1, source.recording));
+    RandomStream random(mixed_seed(sighting.sensor.seed, 1, source.recording));
     StickHistory history(source.shaft);
     StickHistory::Inputs inputs;
     SampleClock clock;
-    for (PoseSample sample : sense(truth, rendition.sensor)) {
-        sample.has_orientation = sample.has_orientation && rendition.orientation;
+    for (PoseSample sample : sense(truth, sighting.sensor)) {
+        sample.has_orientation = sample.has_orientation && sighting.orientation;
         const SampleStatus status = clock.judge(sample);
         if (!is_taken(status)) continue;
         if (status == SampleStatus::reinitialised) history.restart();
         clock.advance(sample.t_s);
         history.push(sample);
-        const bool chosen = random.uniform() <= rendition.share;
+        const bool chosen = random.uniform() <= share;
         if (!chosen || history.held() < 2 || sample.t_s < first_s ||
             count_ == static_cast<std::size_t>(examples_.inputs.cols()))
             continue;

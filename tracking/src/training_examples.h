@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "learned_path.h"
-#include "tracking/sensor.h"
+#include "sighting.h"
 #include "tracking/training.h"
 
 namespace tracking {
@@ -21,20 +21,12 @@ struct Examples {
     [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(speed.size()); }
 };
 
-/// How one stick is seen once.
-struct Rendition {
-    SensorModel sensor;
-    double slower = 1;  ///< times are multiplied by this
-    bool orientation = true;
-    double share = 1;   ///< of the samples that become examples, drawn at random
-    double from_s = 0;  ///< after the first sample
-};
-
 /// Collects examples; `reserve` of them at most.
 class ExampleCollector {
 public:
     explicit ExampleCollector(std::size_t reserve);
-    void add(const TrainingStick& stick, const Rendition& rendition);
+    /// A `share` of the samples, drawn at random, of those later than `from_s` after the first.
+    void add(const TrainingStick& stick, const Sighting& sighting, double share, double from_s = 0);
     [[nodiscard]] Examples finish() &&;
 
 private:

@@ -47,7 +47,7 @@ void add_bench_options(Command& program, BenchOptions& o) {
             o.sim.bodies.assign(bodies.begin(), bodies.end());
             o.workers.bodies = o.sim.bodies;
         },
-        "25,100,400,1600 of sim, 25,400 of workers");
+        "25,100,400,1600 of sim, 25,400 of workers, 400,1600 of its threads and processes");
     program.option<Counts>(
         "--workers", counts, "workers: how many, in turn",
         [&o](const Counts& workers) { o.workers.workers.assign(workers.begin(), workers.end()); },
@@ -70,8 +70,14 @@ void add_bench_options(Command& program, BenchOptions& o) {
         [&o](std::vector<std::string> some) { o.hard.scenes = std::move(some); }, "all");
     program.option("--halvings", o.hard.halvings, as::whole(0, 10),
                    "hard: of the step, at most, for peers to be as near as we are");
-    program.option("--rounds", o.sim.rounds, as::whole(0, 1000),
-                   "sim: how often each; 0: five, three for 100, one for more");
+    program.option<std::int64_t>(
+        "--rounds", as::whole(0, 1000),
+        "sim, workers: how often each; 0: five, three for 100 bodies, one for more; three of workers",
+        [&o](std::int64_t rounds) {
+            o.sim.rounds = static_cast<int>(rounds);
+            if (rounds > 0) o.workers.rounds = static_cast<int>(rounds);
+        },
+        "0");
     program.option("--modes", o.sim.modes, as::whole(0, 75), "sim: of each ball; 0: rigid ones");
     program.option("--scene", o.scene, as::text("SCENE"),
                    "sim: balls of a scene, e.g. benchmark25, instead of the piles");

@@ -14,8 +14,8 @@ class Command;
 /// What `bench` measures, the parts of `bench workers` and the scenes of `bench hard`.
 inline const std::vector<std::string> kBenchNames = {"tracking", "sim",   "hard",    "workers",
                                                      "render",   "audio", "tradeoff"},
-                                      kWorkersBenchParts = {"speedup",   "stragglers", "bound",
-                                                            "migration", "processes",  "throughput"},
+                                      kWorkersBenchParts = {"speedup", "stragglers", "bound", "migration",
+                                                            "threads", "processes",  "kit",   "throughput"},
                                       kHardSceneNames = {
                                           "table",        "ghost",   "card_through_wall", "boxes_1cm",
                                           "stack10_10cm", "stack15", "ratio1000",         "modal_ball_rolls",
@@ -35,10 +35,11 @@ struct SimBenchOptions {
 };
 
 struct WorkersBenchOptions {
-    std::vector<int> bodies = {25, 400};
+    std::vector<int> bodies = {};  ///< none: 25 and 400; threads, processes: 400 and 1600
     std::vector<int> workers = {1, 2, 3, 5, 10};
     int steps = 500;
     int bound = 4;                        ///< of speed-ups
+    int rounds = 3;                       ///< of threads and processes
     sim::SimulatedProcessors processors;  ///< the clock
     std::set<std::string> only;           ///< of kWorkersBenchParts; empty: all
     std::string program;                  ///< musicworld, for worker processes

@@ -116,12 +116,11 @@ void tell_contact(const Kit& kit) {
     }
 }
 
-/// A line for each mesh whose size is not its body's, with the scale that would make it so.
+/// A line for each mesh whose size is not its instrument's, with the scale that would make it so.
 void tell_sizes(const Kit& kit) {
     for (const Instrument& instrument : kit.instruments) {
         const Eigen::AlignedBox3f bounds = render::load_mesh(instrument.mesh).bounds();
-        const double extent = bounds.sizes().cast<double>().maxCoeff(),
-                     size = 2 * instrument.body.shape.semi_axes.maxCoeff(),
+        const double extent = bounds.sizes().cast<double>().maxCoeff(), size = instrument.given_size_m,
                      drawn = (instrument.body_from_mesh.linear() * bounds.sizes().cast<double>()).maxCoeff();
         if (!(extent > 0) || (drawn < 2 * size && drawn > size / 2)) continue;
         constexpr std::pair<double, const char*> kUnits[] = {

@@ -11,6 +11,7 @@
 #include "files/output_file.h"
 #include "kit/drum_score.h"
 #include "kit/kit.h"
+#include "sticks/trace_warnings.h"
 #include "traces/trace_info.h"
 
 namespace app {

@@ -13,9 +13,9 @@
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/output_file.h"
+#include "sticks/trace_warnings.h"
 #include "traces/map_file.h"
 #include "traces/sensor_model.h"
-#include "traces/trace_info.h"
 
 namespace app {
 namespace {

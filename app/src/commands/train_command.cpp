@@ -11,6 +11,7 @@
 #include "files/bad_input.h"
 #include "files/output_file.h"
 #include "process/progress_bar.h"
+#include "sticks/trace_warnings.h"
 #include "training/train.h"
 
 namespace app {
@@ -29,7 +30,7 @@ void train(TrainOptions o) {
     std::vector<Recording> recordings;
     for (const std::string& name : o.traces)
         if (!name.ends_with(".hits.csv") && !name.ends_with(".flags.csv"))
-            recordings.push_back(read_recording(find_trace(name).string()));
+            warn_of_units(recordings.emplace_back(read_recording(find_trace(name).string())).trace);
     if (recordings.empty())
         throw BadInput(
             "error: found no trace among the files, expected at least one recording to learn from");
@@ -39,7 +40,7 @@ void train(TrainOptions o) {
         return provenance_of(recordings, field, o, result, MUSICWORLD_VERSION);
     };
     ProgressBar bar(true);
-    o.progress = [&bar](double share, double) {
+    o.progress = [&bar](double share) {
         bar.show(share);
         return true;
     };
@@ -68,7 +69,8 @@ void add_train_command(Command& program) {
     command.option("--hidden", o->hidden,
                    as::whole(tracking::PathModel::kLeastHidden, tracking::PathModel::kMostHidden),
                    "Units of each hidden layer: 32 is fast, 64 usual, 128 errs least");
-    command.option("--steps", o->steps, as::whole(1, 10000000), "Steps of 256 examples, at most");
+    command.option("--steps", o->steps, as::whole(1, 10000000),
+                   "Steps of 256 examples, of each of two trainings");
     command.option("--seed", o->seed, as::whole(0, 1000000000), "Of all that is drawn at random");
     command.flag("--no-contacts", o->contacts, "Learn paths alone: strikes are decided as without a model",
                  false);

@@ -100,7 +100,7 @@ void add_worker_options(Command& command, std::optional<WorkerOptions>& options)
     command.option("--bound", typed->bound, as::whole(0, kMostBound, "steps"),
                    "async: how far a worker may be ahead of the slowest, default 4; 0 is lockstep");
     command.option("--balance", o.balance, as::choice<bool>({{"on", true}, {"off", false}}),
-                   "on: workers trade bodies to be equally fast");
+                   "on: workers trade columns of bodies to be equally fast");
     command.option("--listen", o.listen, as::text("ENDPOINT"),
                    "Endpoint for workers of other hosts, such as tcp://0.0.0.0:5860");
     command.option("--keys", o.keys, as::text("DIR"),

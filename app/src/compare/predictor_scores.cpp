@@ -115,8 +115,10 @@ std::vector<double> absolute(std::vector<double> values) {
 /// What a model predicts at a sample.
 struct Expected {
     std::vector<sim::Contact> contacts;
-    std::vector<double> clearance_m;
-    operator ModelContacts() const { return {contacts, clearance_m}; }  // NOLINT(google-explicit-constructor)
+    std::vector<double> clearance_m, silent_until_s = {};
+    operator ModelContacts() const {  // NOLINT(google-explicit-constructor)
+        return {contacts, clearance_m, silent_until_s};
+    }
 };
 
 using PoseAfter = std::function<tracking::PosePrediction(double)>;
@@ -162,10 +164,11 @@ public:
         const auto path = predicted_path([&](double lead_s) { return predictor.predict(lead_s); },
                                          predictor.time_s(), geometry_, 0, strike_leads(timing_));
         if (!path || !history_.look(view_)) return;
-        const auto met = forecast_.after(view_, *path, {surface_.parts, surface_.nearest},
-                                         std::max(timing_.lead_s, kReleaseMarginS) + kBeyondLeadS);
-        if (!met) return;
-        expected.network = surface_.sweep(met->path);
+        forecast_now_ = forecast_.after(view_, *path, {surface_.parts, surface_.nearest},
+                                        std::max(timing_.lead_s, kReleaseMarginS) + kBeyondLeadS);
+        expected.times = forecast_now_.times;
+        if (!forecast_now_.strike) return;
+        expected.network = surface_.sweep(forecast_now_.strike->path);
         for (sim::Contact& contact : expected.network)
             contact.t_s = std::max(sample.t_s, contact.t_s - timing_.advance_s);
     }
@@ -178,6 +181,7 @@ private:
     tracking::TipHistory history_;
     tracking::KnownMotion motion_;
     tracking::TipView view_;
+    ContactForecast::Forecast forecast_now_;
 };
 
 }  // namespace
@@ -352,6 +356,7 @@ HitScore evaluate_strikes(const TipTrack& recorded, std::span<const tracking::Po
     std::vector<StrikeDecision> decisions(
         predictor.models(), StrikeDecision(surface->parts, predictors.false_cost, kReleaseMarginS));
     double newest_s = 0;
+    Eigen::Vector3d tip_before = Eigen::Vector3d::Zero();
     for (const tracking::PoseSample& sample : samples) {
         const tracking::SampleStatus status = predictors.timing.correct(sample);
         if (other) (void)other->correct(sample);
@@ -360,10 +365,15 @@ HitScore evaluate_strikes(const TipTrack& recorded, std::span<const tracking::Po
             continue;
         }
         const bool anew = status == tracking::SampleStatus::reinitialised;
-        const std::vector<double> measured =
-            surface->clearances(sample.position + sample.orientation * geometry.tip);
+        const Eigen::Vector3d tip = sample.position + sample.orientation * geometry.tip;
+        const std::vector<double> measured = surface->clearances(tip);
         ExpectedStrikes expected{sample.t_s, anew ? 0 : sample.t_s - newest_s, measured};
+        if (const double interval_s = expected.interval_s; interval_s > 0)
+            expected.passed = passed_through(
+                surface->sweep(measured_way(tip_before, tip, sample.t_s, interval_s, geometry.radius_m)),
+                interval_s, measured);
         newest_s = sample.t_s;
+        tip_before = tip;
         if (network) network->look(sample, anew, predictor, expected);
         std::vector<sim::Contact> confirming;
         if (other)
@@ -379,13 +389,14 @@ HitScore evaluate_strikes(const TipTrack& recorded, std::span<const tracking::Po
             if (anew) decisions[model].restart();
             DecidedStrikes decided = decisions[model].after(expected);
             all.push_back({std::move(decided.kept), own.clearance_m});
-            sounding.push_back({std::move(decided.sounding), std::move(own.clearance_m)});
+            sounding.push_back(
+                {std::move(decided.sounding), std::move(own.clearance_m), std::move(decided.silent_until_s)});
         }
         for (const auto& [strikes, contacts] : {std::pair(&played, &sounding), {&uncancelled, &all}}) {
             strikes->advance_to(sample.t_s);
             if (anew) strikes->restart(0);
             const std::vector<ModelContacts> views(contacts->begin(), contacts->end());
-            strikes->sample(0, sample.t_s, views, predictor.selected(), measured);
+            strikes->sample(0, sample.t_s, views, predictor.selected(), {measured, expected.passed});
         }
     }
     std::vector<TrueContact> contacts = surface->true_contacts(recorded);

@@ -46,7 +46,7 @@ std::vector<Entrant> trained_entrants(const ComparisonOptions& options, const Fi
                                 "recording to be scored that is not trained on; leave one of them out",
                                 recording.trace.file, other.trace.file));
     tracking::TrainingOptions training = options.training;
-    training.progress = [&](double share, double) {
+    training.progress = [&](double share) {
         if (options.progress) options.progress(share);
         return true;
     };

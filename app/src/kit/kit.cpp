@@ -268,6 +268,7 @@ void body_keys(Fields& keys, InstrumentDraft& written) {
                 "Centre of the body, world: y up, the player at the origin looks along -z.",
                 {.need = Need::given, .example = "[0, 0.7, -0.45]"});
     body.shape.semi_axes = 0.5 * size;
+    instrument.given_size_m = size.maxCoeff();
     body.shape.e1 = exponents[0], body.shape.e2 = exponents[1];
     body.world_from_body.translation() = position;
     Eigen::Quaterniond orientation;
@@ -468,6 +469,8 @@ void take_samples(InstrumentDraft& read, Kit& kit, audio::SampleLibrary& library
         read_sound([&] { return audio::read_samples(read.samples, notes, library, read.keyswitch); });
     if (voice.choke_group.empty()) voice.choke_group = voice.samples->choke_group;
     for (const fs::path& file : voice.samples->files) note(file);
+    const auto is_decay = [](const auto& parameter) { return parameter.first == "decay_s"; };
+    if (std::ranges::any_of(voice.pedal_parameters, is_decay)) std::erase(read.without_effect, "decay_s");
     if (read.without_effect.empty()) return;
     audio::SampleSet told = *voice.samples;
     for (const std::string& key : read.without_effect)

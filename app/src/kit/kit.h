@@ -51,6 +51,7 @@ struct Instrument {
         mesh;  ///< unit mesh, scaled to the body's semi-axes, or one with a scale of its own
     std::optional<double> mesh_scale_m;  ///< length of one unit of the mesh [m]; empty: a unit mesh
     Eigen::Affine3d body_from_mesh = Eigen::Affine3d::Identity();  ///< places the mesh in the body's frame
+    double given_size_m = 0;  ///< largest full extent in the kit; that of the body, unless it is fitted
     /// With shape = "mesh": how far the body's surface, fitted to the mesh, lies from it.
     std::optional<sim::SurfaceError> fitted;
     render::Look look;

@@ -164,8 +164,10 @@ render::SceneDescription KitStage::scene(int width, int height) const {
         scene.objects.back().stands = prop.matrix;
     }
     for (std::size_t i = 0; i < sticks_; ++i)
-        scene.objects.push_back(
-            {fmt::format("stick {}", i), kit_.stick.mesh, wood(0.62f, 0.40f, 0.20f, 0.38f)});
+        scene.objects.push_back({.name = fmt::format("stick {}", i),
+                                 .mesh = kit_.stick.mesh,
+                                 .look = wood(0.62f, 0.40f, 0.20f, 0.38f),
+                                 .shadow = render::Shadow::widened});
     describe_annotations(scene);
     scene.camera = standing_camera(camera_, kit_.camera, corners_of(kit_, bounds_),
                                    static_cast<float>(width) / static_cast<float>(height));
@@ -182,7 +184,10 @@ void KitStage::describe_annotations(render::SceneDescription& scene) const {
     if (shown_.ghosts)
         for (std::size_t i = 0; i < sticks_; ++i)
             for (const Eigen::Vector3f& color : kGhostColors)
-                scene.objects.push_back({fmt::format("ghost of stick {}", i), kit_.stick.mesh, plain(color)});
+                scene.objects.push_back({.name = fmt::format("ghost of stick {}", i),
+                                         .mesh = kit_.stick.mesh,
+                                         .look = plain(color),
+                                         .shadow = render::Shadow::none});
     if (shown_.marks)
         for (const Eigen::Vector3f& color : kMarkColors)
             for (std::size_t i = 0; i < kMostMarks; ++i)

@@ -18,6 +18,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kFirstS = 0.1, kLevelS = 0.1, kCutFadeS = 0.02;
+constexpr int kBeginningSamples = 240;  // 5 ms
 
 /// A stroke in the middle of a zone, at the top.
 Strike stroke_at(const Instrument& instrument, std::uint32_t number, int zone) {
@@ -120,15 +121,32 @@ StrokeLevel level_of(const Audition& heard, const AuditionRow& row, std::size_t 
     return {decibel(peak), decibel(std::sqrt(squares / static_cast<double>(level)))};
 }
 
+namespace {
+
+/// The first 5 ms of a stroke: ms and the mean of both sides, a line a sample.
+std::string beginning(const Audition& heard, std::size_t first) {
+    std::string data;
+    for (std::size_t i = 0; i <= kBeginningSamples; ++i) {
+        const std::size_t at = 2 * (first + i);
+        const float left = at < heard.sound.size() ? heard.sound[at] : 0,
+                    right = at < heard.sound.size() ? heard.sound[at + 1] : 0;
+        data += fmt::format("{:.4f} {}\n", 1e3 * static_cast<double>(i) / audio::kSampleRate,
+                            0.5F * (left + right));
+    }
+    return data;
+}
+
+}  // namespace
+
 std::string audition_sheet(const Kit& kit, const Audition& heard, const std::string& file) {
-    constexpr int kWidth = 340, kHeight = 120, kColumns = 300;
+    constexpr int kWidth = 560, kHeight = 120, kColumns = 300;
     const std::size_t rows = heard.rows.size(), columns = heard.speeds_mps.size();
     std::string text = fmt::format(
         "reset\nset terminal pngcairo size {},{} noenhanced font 'sans-serif,8'\nset output {}\n"
-        "set multiplot layout {},{} title {}\nunset key\nunset ytics\nset xtics 0.5\nset xrange [0:{}]\n",
-        kWidth * columns, kHeight * rows + 30, gnuplot_string(file), rows, columns,
-        gnuplot_string(fmt::format("{}: {} s from each onset", kit.name, kAuditionSpacingS)),
-        kAuditionSpacingS);
+        "set multiplot layout {},{} title {}\nunset key\nunset ytics\n",
+        kWidth * columns, kHeight * rows + 30, gnuplot_string(file), rows, 2 * columns,
+        gnuplot_string(
+            fmt::format("{}: {} s and 5 ms from each onset [s, ms]", kit.name, kAuditionSpacingS)));
     for (const AuditionRow& row : heard.rows) {
         const Instrument& instrument = kit.instruments[row.instrument];
         double loudest = -80;
@@ -141,12 +159,17 @@ std::string audition_sheet(const Kit& kit, const Audition& heard, const std::str
             std::string data = sound_envelope(heard.sound, -from, 0, kAuditionSpacingS, kColumns);
             if (data.empty()) data = "0 0 0\n";
             text += fmt::format(
-                "set yrange [{}:{}]\nset title {}\n", -scale, scale,
+                "set xrange [0:{}]\nset xtics 0.5\nset yrange [{}:{}]\nset title {}\n", kAuditionSpacingS,
+                -scale, scale,
                 gnuplot_string(fmt::format("{}, {}, {:g} m/s: {:.1f} dBFS, RMS {:.1f}", instrument.name,
                                            instrument.zones[static_cast<std::size_t>(row.zone)].name,
                                            heard.speeds_mps[i], level.peak_db, level.rms_db)));
             text += fmt::format("plot '-' using 1:2:(0):($3-$2) with vectors nohead lc rgb '#1f77b4'\n{}e\n",
                                 data);
+            text += fmt::format(
+                "set xrange [0:5]\nset xtics 1\nset yrange [*:*]\nset title 'its first 5 ms'\n"
+                "plot '-' with lines lc rgb '#1f77b4'\n{}e\n",
+                beginning(heard, sample_of(row, i)));
         }
     }
     return text + "unset multiplot\nset output\n";

@@ -36,8 +36,8 @@ struct StrokeLevel {
 };
 [[nodiscard]] StrokeLevel level_of(const Audition& heard, const AuditionRow& row, std::size_t speed);
 
-/// gnuplot's commands of its picture, a PNG file: a row for each zone, a panel for each speed, all of one row at one
-/// scale.
+/// gnuplot's commands of its picture, a PNG file: a row for each zone, two panels for each speed: the whole stroke, all of one
+/// row at one scale, and the mean of both sides in its first 5 ms, where the contact is heard, at a scale of its own.
 [[nodiscard]] std::string audition_sheet(const Kit& kit, const Audition& heard, const std::string& file);
 
 }  // namespace app

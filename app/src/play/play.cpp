@@ -59,6 +59,8 @@ public:
             parts.kit, o, t0_s_, parts.stick.radius_m, sticks_, parts.simulation,
             [this](const audio::Note& note, bool scheduled) { send(note, scheduled); },
             contact_model(o.sound_predictor));
+        if (parts.pedals)
+            for (const PedalNote& pedal : parts.pedals->notes()) pipeline_->choke(pedal.note);
     }
 
     void run(ProgressBar& bar) {
@@ -145,12 +147,12 @@ private:
         if (parts_.pedals) parts_.pedals->put_on(note);
         if (scheduled)
             sound(note);
-        else if (parts_.sound && is_sounded(note, parts_.options))
+        else if (parts_.sound)
             parts_.sound->cancel(note.id);
     }
 
     void sound(const audio::Note& note) {
-        if (parts_.sound && is_sounded(note, parts_.options)) parts_.sound->schedule(note);
+        if (parts_.sound) parts_.sound->schedule(note);
     }
 
     /// Draws the frames that may use samples up to s but not the next one, at `next`.
@@ -268,7 +270,7 @@ PlayResult play(const PlayOptions& options) {
     result.stages_s.emplace_back("start", wall.seconds());
 
     const auto schedule = [&](const audio::Note& note) {
-        if (sound && is_sounded(note, options)) sound->schedule(note);
+        if (sound) sound->schedule(note);
     };
     for (const PedalNote& pedal : result.pedals.notes()) schedule(pedal.note);
     for (const audio::Note& place : result.pedals.places()) schedule(place);
@@ -284,9 +286,16 @@ PlayResult play(const PlayOptions& options) {
 }
 
 std::vector<Strike> offline_strikes(const tracking::Trace& trace, const Kit& kit, const PlayOptions& options,
-                                    const StickGeometry& stick) {
+                                    const StickGeometry& stick, const std::vector<PedalMove>& moves) {
     const std::unique_ptr<sim::Simulation> simulation = make_simulation(kit, 0);
-    OfflineRun run({trace, kit, options, stick, *simulation});
+    Pedals pedals(kit, trace.t0_s());
+    for (const PedalMove& move : moves) pedals.take(move);
+    OfflineRun run({.trace = trace,
+                    .kit = kit,
+                    .options = options,
+                    .stick = stick,
+                    .simulation = *simulation,
+                    .pedals = &pedals});
     ProgressBar none(false);
     run.run(none);
     return run.strikes();

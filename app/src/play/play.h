@@ -46,7 +46,7 @@ struct PlayOptions {
     double false_cost = 1;  ///< of a false sound; that of a missed strike is 1 (StrikeDecision)
     int workers = 1;
     bool cancelling = true, frames = true, audio = true;
-    std::optional<std::uint64_t> solo;  ///< render the sound of this strike alone
+    std::optional<std::uint64_t> solo;  ///< render the sound of this note alone, as it is in the mix
     std::optional<Eigen::Vector3d> tip, shaft;
     MixOptions mix;
     std::optional<std::filesystem::path> pedals;  ///< a schedule or a MIDI file
@@ -111,8 +111,9 @@ struct PlayResult {
 /// looks finished is left in `out`.
 PlayResult play(const PlayOptions& options);
 
-/// The strikes of play(), by id, without frames and sound and in this process.
+/// The strikes of play(), by id, without frames and sound and in this process; `moves`: of pedals, by time.
 [[nodiscard]] std::vector<Strike> offline_strikes(const tracking::Trace& trace, const Kit& kit,
-                                                  const PlayOptions& options, const StickGeometry& stick);
+                                                  const PlayOptions& options, const StickGeometry& stick,
+                                                  const std::vector<PedalMove>& moves);
 
 }  // namespace app

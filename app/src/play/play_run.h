@@ -45,10 +45,6 @@ void require_tools(const PlayOptions& options);
 [[nodiscard]] audio::Note note_of(const Strike& strike, const Instrument& instrument);
 /// All notes that a run sounded, those of pedals included, by onset.
 [[nodiscard]] std::vector<audio::Note> notes_of(const PlayResult& result, const Kit& kit);
-/// Whether the run sounds it: of --solo that stroke alone, with where its pedal is and what chokes it.
-[[nodiscard]] inline bool is_sounded(const audio::Note& note, const PlayOptions& options) {
-    return !options.solo || *options.solo == note.id || note.kind != audio::Note::Kind::stroke;
-}
 [[nodiscard]] std::filesystem::path orchestra_file();
 [[nodiscard]] std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers);
 /// The thread that draws into the run's folder `frames`; null with --no-frames. `scenes`: one for each level
@@ -74,6 +70,9 @@ struct RunParts {
 /// Measures result.audio, which was mixed with `mix`; with `may_change` brings it to the loudness that was
 /// asked for, unless a gain was, by one gain for all of it. In play_sound.cpp, as the next.
 void set_loudness(PlayResult& result, const audio::Mix& mix, bool may_change);
+/// Puts the sound of the note of --solo in place of that of all, which `mix` and the result's gain made: what it is of it,
+/// choked by the others, and as long.
+void keep_solo(PlayResult& result, const Kit& kit, const audio::Mix& mix);
 /// Writes stems/NN_NAME.wav, as long as result.audio, for each instrument that was sounded: they add up to it
 /// without its room. With bus_stems stems/NN_bus_NAME.wav likewise for each bus.
 void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& folder);
@@ -90,7 +89,9 @@ void finish_sound(Sound& sound, double seconds, PlayResult& result, const Kit& k
         result.audio.cut(2 * static_cast<std::size_t>(sound.finish(length, tail)));  // which has taken it
     else
         result.audio.append(sound.finish(length, tail));
-    set_loudness(result, mix_of(result.options, kit), !is_live);
+    const audio::Mix mix = mix_of(result.options, kit);
+    set_loudness(result, mix, !is_live);
+    if (result.options.solo) keep_solo(result, kit, mix);
     result.clipped_samples = audio::write_wav(folder.path("audio.wav"), result.audio);
     result.stages_s.emplace_back("sound (own thread)", sound.busy_s());
     result.versions.emplace_back("csound", sound.version());

@@ -20,12 +20,10 @@ std::string file_name(std::size_t number, std::string name) {
     return fmt::format("{:02}_{}.wav", number + 1, name);
 }
 
-/// These instruments' notes among all, by the samples that audio.wav has.
-std::vector<float> stem(const PlayResult& result, const Kit& kit, std::vector<std::uint32_t> instruments) {
-    audio::Mix mix{.gain_db = result.gain_db, .room = {}, .alone = std::move(instruments)};
+/// The run's notes mixed otherwise, by the samples that audio.wav has.
+std::vector<float> mixed(const PlayResult& result, const Kit& kit, const audio::Mix& mix) {
     audio::Performance performance(orchestra_file(), voices_of(kit), mix);
-    for (const audio::Note& note : notes_of(result, kit))
-        if (is_sounded(note, result.options)) performance.schedule(note);
+    for (const audio::Note& note : notes_of(result, kit)) performance.schedule(note);
     return performance.finish(static_cast<std::int64_t>(result.audio.size() / 2), 0);
 }
 
@@ -41,14 +39,22 @@ void set_loudness(PlayResult& result, const audio::Mix& mix, bool may_change) {
     const MixOptions& asked = result.options.mix;
     result.gain_db = mix.gain_db;
     result.loudness = audio::measure_loudness({result.audio.data(), result.audio.size()});
-    // One note of a run keeps the level that it has in the kit.
-    if (!may_change || asked.gain_db || result.options.solo) return;
+    if (!may_change || asked.gain_db) return;
     const double gain_db = audio::gain_towards(result.loudness, asked.loudness_lufs, kHighestPeakDbtp);
     const auto gain = static_cast<float>(std::pow(10.0, gain_db / 20));
     for (float& sample : result.audio) sample *= gain;
     result.gain_db += gain_db;
     for (std::optional<double>* level : {&result.loudness.integrated_lufs, &result.loudness.true_peak_dbtp})
         if (*level) **level += gain_db;  // both are levels: what shifts the sound shifts them
+}
+
+void keep_solo(PlayResult& result, const Kit& kit, const audio::Mix& mix) {
+    audio::Mix alone = mix;
+    alone.alone_note = result.options.solo;
+    const auto gain = static_cast<float>(std::pow(10.0, (result.gain_db - mix.gain_db) / 20));
+    const std::vector<float> sound = mixed(result, kit, alone);
+    std::ranges::transform(sound, result.audio.begin(), [gain](float sample) { return sample * gain; });
+    result.loudness = audio::measure_loudness({result.audio.data(), result.audio.size()});
 }
 
 void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& folder) {
@@ -59,8 +65,11 @@ void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& f
             return note.kind == audio::Note::Kind::stroke &&
                    std::ranges::find(instruments, note.voice) != instruments.end();
         };
-        if (std::ranges::any_of(notes, sounds))
-            (void)audio::write_wav(folder.path("stems/" + name), stem(result, kit, instruments));
+        if (std::ranges::none_of(notes, sounds)) return;
+        audio::Mix mix;
+        mix.gain_db = result.gain_db;
+        mix.alone = instruments;
+        (void)audio::write_wav(folder.path("stems/" + name), mixed(result, kit, mix));
     };
     const auto count = static_cast<std::uint32_t>(kit.instruments.size());
     for (std::uint32_t i = 0; i < count && result.options.mix.stems; ++i)

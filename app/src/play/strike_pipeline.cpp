@@ -45,12 +45,13 @@ void DrawnStrikes::start(double T, std::span<const Strike> strikes) {
     for (std::size_t i = first_open_; i < strikes.size(); ++i) {
         const Strike& strike = strikes[i];
         if (strike.outcome == Outcome::cancelled || strike.contact_s > T || mark_of(strike.id).seen) continue;
-        mark(strike.id).seen = true;
+        mark(strike.id).seen = mark(strike.id).drawn = true;
         drawn_.push_back({strike.id, impulse_of(strike)});
     }
 }
 
-std::vector<sim::WeightedImpulse> DrawnStrikes::frame(double T, std::span<const Strike> strikes) {
+std::vector<sim::WeightedImpulse> DrawnStrikes::frame(double T, std::span<const Strike> strikes,
+                                                      const ChokedBodies& choked) {
     const double step = (T - last_s_) / kFadeS;
     last_s_ = T;
     const auto is_replaced = [&](const Drawn& d) {
@@ -67,20 +68,29 @@ std::vector<sim::WeightedImpulse> DrawnStrikes::frame(double T, std::span<const 
     start(T, strikes);
 
     std::vector<sim::WeightedImpulse> result;
+    const auto add = [&](const sim::Impulse& impulse, double weight, bool is_folded) {
+        const double excess = weight * choked.weight(impulse, T) - (is_folded ? 1 : 0);
+        if (excess != 0) result.push_back({impulse, excess});
+    };
     for (const Drawn& d : drawn_) {
-        const bool is_folded = mark_of(d.id).folded, replaced = is_replaced(d);
-        const double first_excess = d.first_weight - (is_folded && !replaced ? 1 : 0);
-        const double final_excess = d.final_weight - (is_folded && replaced ? 1 : 0);
-        if (first_excess != 0) result.push_back({d.first, first_excess});
-        if (final_excess != 0) result.push_back({impulse_of(strikes[d.id - 1]), final_excess});
+        const Mark mark = mark_of(d.id);
+        if (mark.stopped) continue;
+        const bool replaced = is_replaced(d);
+        add(d.first, d.first_weight, mark.folded && !replaced);
+        add(impulse_of(strikes[d.id - 1]), d.final_weight, mark.folded && replaced);
     }
+    for (const ChokedBodies::Folded& moving : choked.moving())
+        if (!mark_of(moving.id).drawn) add(moving.impulse, 1, true);
     std::erase_if(drawn_, [&](const Drawn& d) {
         const bool faded = d.first_weight == 0 && strikes[d.id - 1].outcome == Outcome::cancelled;
         if (faded) mark(d.id).seen = false;
         const bool replaced_settled = d.final_weight == 1 && d.first_weight == 0;
         const bool first_settled =
             d.first_weight == 1 && d.final_weight == 0 && same(d.first, impulse_of(strikes[d.id - 1]));
-        return faded || (mark_of(d.id).folded && (replaced_settled || first_settled));
+        const Mark known = mark_of(d.id);
+        const bool over = faded || known.stopped || (known.folded && (replaced_settled || first_settled));
+        mark(d.id).drawn = !over;
+        return over;
     });
     return result;
 }
@@ -102,7 +112,8 @@ StrikePipeline::StrikePipeline(const Kit& kit, const PlayOptions& options, doubl
                  sticks_.size(), kit.instruments.size()),
       rests_(tip_holds(kit), sticks_.size()),
       decisions_(sticks_.size() * tracking::StickState::kMostModels,
-                 StrikeDecision(kit.instruments.size(), options.false_cost, options.release_margin_s)) {
+                 StrikeDecision(kit.instruments.size(), options.false_cost, options.release_margin_s)),
+      choked_(kit, t0_s, options.render_lead_s) {
     if (!contacts) return;
     network_.emplace(contacts);
     for (const Stick& stick : sticks_) motions_.emplace_back(*contacts, stick.geometry().shaft);
@@ -143,23 +154,26 @@ std::vector<StrikePipeline::StickPaths> StrikePipeline::add_paths(std::span<cons
         StickPaths own{.stick = stick, .predicted = paths.size()};
         for (std::size_t model = 0; model < known.state().models; ++model) add(known.predicted_path(model));
         own.measured = add(known.measured_path());
+        if (std::optional<sim::TipPath> way = known.way()) own.way = add(std::move(*way));
         if (std::optional<sim::TipPath> confirming = known.confirming_path())
             own.confirming = add(std::move(*confirming));
-        if (std::optional<ContactForecast::Path> expected = network_ ? forecast_path(known) : std::nullopt) {
-            own.network = add(std::move(expected->path));
+        if (network_) {
+            ContactForecast::Forecast expected = forecast(known);
+            own.times = std::move(expected.times);
+            if (expected.strike) own.network = add(std::move(expected.strike->path));
         }
-        all.push_back(own);
+        all.push_back(std::move(own));
     }
     return all;
 }
 
-std::optional<ContactForecast::Path> StrikePipeline::forecast_path(const Stick& stick) const {
+ContactForecast::Forecast StrikePipeline::forecast(const Stick& stick) const {
     const ContactForecast::Surfaces surfaces{
         kit_.instruments.size(), [this](std::size_t instrument, const Eigen::Vector3d& tip) {
             return sim::rest_distance(kit_.instruments[instrument].body, tip, tip_radius_m_);
         }};
     tracking::TipView view;
-    if (!stick.look(view)) return std::nullopt;
+    if (!stick.look(view)) return {};
     return network_->after(view, stick.predicted_path(0), surfaces, stick.sound_lead_s());
 }
 
@@ -176,6 +190,7 @@ void StrikePipeline::settle_impulses(double s, sim::StepRequest& request) {
         unfolded_.push_back(id);
         const Strike& released = scheduler_.strikes()[id - 1];
         rests_.struck(released.instrument, released.onset_s);
+        choked_.take(note_of(released, kit_.instruments[released.instrument]), s);
     }
     std::vector<std::uint64_t> ahead;
     for (const std::uint64_t id : unfolded_) {
@@ -183,12 +198,18 @@ void StrikePipeline::settle_impulses(double s, sim::StepRequest& request) {
         if (impulse.t_s <= s) {
             request.folded.push_back(impulse);
             drawn_.folded(id);
+            choked_.folded({id, impulse});
         } else {
             request.confirmed.push_back(impulse);
             ahead.push_back(id);
         }
     }
     unfolded_ = std::move(ahead);
+    for (ChokedBodies::Folded& strike : choked_.take_stopped(s)) {
+        strike.impulse.impulse_body *= -1;
+        request.folded.push_back(strike.impulse);
+        drawn_.stopped(strike.id);
+    }
 }
 
 void StrikePipeline::take(double s, std::span<const std::uint32_t> moved) {
@@ -232,9 +253,12 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
     const std::vector<double> measured = measured_clearance(paths, reply);
     const Stick& known = sticks_[paths.stick];
     ExpectedStrikes expected{s, known.interval_s(), measured};
+    if (paths.way) expected.passed = passed_through(contacts_of(*paths.way), known.interval_s(), measured);
     if (paths.network) expected.network = contacts_of(*paths.network);
+    expected.times = paths.times;
     expected.known = network_ && motions_[paths.stick].is_known();
     std::vector<std::vector<sim::Contact>> contacts;
+    std::vector<std::vector<double>> silent_until_s;
     std::vector<ModelContacts> views;
     for (std::size_t model = 0; paths.predicted + model < paths.measured; ++model) {
         const std::size_t path = paths.predicted + model;
@@ -245,11 +269,21 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
         DecidedStrikes decided =
             decisions_[paths.stick * tracking::StickState::kMostModels + model].after(expected);
         contacts.push_back(std::move(cancelling_ ? decided.sounding : decided.kept));
+        silent_until_s.push_back(std::move(decided.silent_until_s));
         views.push_back({{}, expected.filtered_m});
     }
-    for (std::size_t model = 0; model < views.size(); ++model) views[model].contacts = contacts[model];
-    scheduler_.sample(paths.stick, s, views, known.state().model, measured);
+    for (std::size_t model = 0; model < views.size(); ++model) {
+        views[model].contacts = contacts[model];
+        views[model].silent_until_s = silent_until_s[model];
+    }
+    scheduler_.sample(paths.stick, s, views, known.state().model, {measured, expected.passed});
     rests_.sample(paths.stick, s, known.measured_tip(), measured);
+}
+
+std::vector<TipRest> StrikePipeline::take_tip_rests() {
+    std::vector<TipRest> rests = rests_.take();
+    for (const TipRest& rest : rests) choked_.end(rest.instrument, rest.s + release_margin_s_, rest.s);
+    return rests;
 }
 
 void StrikePipeline::send_notes() {
@@ -325,7 +359,7 @@ std::vector<FrameContents> StrikePipeline::scenes(double s, std::span<const doub
         for (std::uint32_t i = 0; i < sticks_.size(); ++i)
             scenes[m].sticks.push_back(
                 sticks_[i].started() ? std::optional(drawn(i, s, T, m + 1 == moments.size())) : std::nullopt);
-        request.pictures.push_back({std::max(T, s), drawn_.frame(T, scheduler_.strikes())});
+        request.pictures.push_back({std::max(T, s), drawn_.frame(T, scheduler_.strikes(), choked_)});
     }
     sim::StepReply reply = step(request);
     for (std::size_t m = 0; m < moments.size(); ++m) scenes[m].bodies = std::move(reply.pictures[m]);

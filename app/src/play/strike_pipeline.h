@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "kit/kit.h"
+#include "play/choked_bodies.h"
 #include "play/play.h"
 #include "process/clock.h"
 #include "sticks/stick.h"
@@ -25,15 +26,18 @@ namespace app {
 
 /// The strikes as pictures show them. A contact is drawn, with the impulse known then, by the first frame
 /// that is shown after it; if it is cancelled later its response fades within 100 ms, and if it moves before
-/// its release the response passes over to the final one in the same time: never a jump. Frames must come in
-/// order. One thread.
+/// its release the response passes over to the final one in the same time: never a jump. What is choked weighs what
+/// ChokedBodies says. Frames must come in order. One thread.
 class DrawnStrikes {
 public:
     /// A released strike's impulse has become part of the bodies' exact states.
     void folded(std::uint64_t id) { mark(id).folded = true; }
+    /// It was taken out of them again, choked.
+    void stopped(std::uint64_t id) { mark(id).stopped = true; }
     /// What the frame shown at T adds to the exact states, given the strikes as known from the samples that
     /// this frame may use.
-    [[nodiscard]] std::vector<sim::WeightedImpulse> frame(double T, std::span<const Strike> strikes);
+    [[nodiscard]] std::vector<sim::WeightedImpulse> frame(double T, std::span<const Strike> strikes,
+                                                          const ChokedBodies& choked);
 
 private:
     struct Drawn {
@@ -43,8 +47,9 @@ private:
         double final_weight = 0;  ///< of the released impulse, where it differs from the first
     };
     struct Mark {
-        bool seen = false;  ///< drawn or settled, until cancelled and faded
-        bool folded = false;
+        bool seen : 1 = false;   ///< drawn or settled, until cancelled and faded
+        bool drawn : 1 = false;  ///< among drawn_
+        bool folded : 1 = false, stopped : 1 = false;
     };
     Mark& mark(std::uint64_t id) {
         if (id > marks_.size()) marks_.resize(id);
@@ -114,7 +119,11 @@ public:
     void take(double s, std::span<const std::uint32_t> moved);
     /// Tips that choke what they lie on, found since the last call, in order; what rings ends a release margin
     /// after the sample.
-    [[nodiscard]] std::vector<TipRest> take_tip_rests() { return rests_.take(); }
+    [[nodiscard]] std::vector<TipRest> take_tip_rests();
+    /// What pedals and hands sound, known at s: what it chokes comes to rest.
+    void choke(const audio::Note& note, double s = -std::numeric_limits<double>::infinity()) {
+        choked_.take(note, s);
+    }
     /// After the last sample.
     void finish();
     /// What the frame shown at T >= s shows, known at s. Frames come in order of T.
@@ -134,15 +143,18 @@ private:
     /// contacts can be assigned to it.
     struct StickPaths {
         std::uint32_t stick = 0;
-        std::size_t predicted = 0;  ///< the first of the models' paths, which follow each other
-        std::size_t measured = 0;   ///< stands still: makes no contact but by starting inside
+        std::size_t predicted = 0;            ///< the first of the models' paths, which follow each other
+        std::size_t measured = 0;             ///< stands still: makes no contact but by starting inside
+        std::optional<std::size_t> way = {};  ///< of the measured tip since the sample before
         std::optional<std::size_t> confirming = {};  ///< where a second filter confirms
         std::optional<std::size_t> network = {};     ///< what a network of contacts expects, if anything
+        std::vector<std::optional<tracking::ContactTimes>> times =
+            {};  ///< and when (ContactForecast::Forecast)
     };
     [[nodiscard]] std::vector<StickPaths> add_paths(std::span<const std::uint32_t> moved,
                                                     std::vector<sim::TipPath>& paths) const;
     /// What the network of contacts expects of a stick.
-    [[nodiscard]] std::optional<ContactForecast::Path> forecast_path(const Stick& stick) const;
+    [[nodiscard]] ContactForecast::Forecast forecast(const Stick& stick) const;
     /// Compares the sticks with those that the network was learned from.
     void follow_motion(std::span<const std::uint32_t> moved);
     void take_contacts(double s, const StickPaths& paths, const sim::StepReply& reply);
@@ -166,6 +178,7 @@ private:
     StrikeScheduler scheduler_;
     TipRests rests_;
     std::vector<StrikeDecision> decisions_;  // of each stick, of each model
+    ChokedBodies choked_;
     DrawnStrikes drawn_;
     std::vector<std::uint64_t> unfolded_;  // released strikes whose impulses lie ahead
     std::set<std::uint64_t> touching_;     // recent strikes that a frame has shown the stick at

@@ -182,7 +182,7 @@ void explain(Divergence& divergence, const Strike& strike, const RealtimeResult&
 OfflineComparison compare_with_offline(const std::vector<LapStrikes>& laps, const RealtimeResult& realtime,
                                        const RealtimeSession& session) {
     const std::vector<Strike> offline =
-        offline_strikes(session.trace, session.kit, session.options.play, session.stick);
+        offline_strikes(session.trace, session.kit, session.options.play, session.stick, session.moves);
     OfflineComparison result;
     for (std::uint64_t lap = 0; lap < realtime.laps; ++lap) {
         const double end_s =

@@ -132,8 +132,14 @@ void RealtimeRun::choke(const TipRest& rest) {
 }
 
 void RealtimeRun::send_pedals() {
-    for (; notes_sent_ < pedals_.notes().size(); ++notes_sent_)
-        (void)session_.sound->schedule(pedals_.notes()[notes_sent_].note);
+    for (; notes_sent_ < pedals_.notes().size(); ++notes_sent_) {
+        const PedalNote& sent = pedals_.notes()[notes_sent_];
+        (void)session_.sound->schedule(sent.note);
+        if (sent.by == PedalMove::Kind::tip) continue;  // the pipeline found it
+        audio::Note in_lap = sent.note;
+        in_lap.onset_sample -= static_cast<std::int64_t>(lap_) * session_.period_samples;
+        pipeline_->choke(in_lap, newest_s_);
+    }
     for (; places_sent_ < pedals_.places().size(); ++places_sent_)
         (void)session_.sound->schedule(pedals_.places()[places_sent_]);
 }

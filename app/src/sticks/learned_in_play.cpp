@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 
 #include "files/bad_input.h"
@@ -24,20 +26,42 @@ void append(std::string& bytes, const Eigen::MatrixXd& matrix) {
                  static_cast<std::size_t>(matrix.size()) * sizeof(double));
 }
 
+/// The length of the stick's name, 0 for none, the name and the numbers.
+void append(std::string& bytes, const std::optional<tracking::Trust>& trust) {
+    static_assert(std::is_trivially_copyable_v<decltype(trust->leads)>);
+    const std::uint64_t length = trust ? trust->stick.size() : 0;
+    bytes.append(reinterpret_cast<const char*>(&length), sizeof length);
+    if (length == 0) return;
+    bytes.append(trust->stick);
+    bytes.append(reinterpret_cast<const char*>(&trust->leads), sizeof trust->leads);
+}
+
+void take(std::string_view& bytes, void* to, std::size_t size) {
+    if (bytes.size() < size)
+        throw std::runtime_error("error: found half of what a sensor learned, expected all");
+    std::memcpy(to, bytes.data(), size);
+    bytes.remove_prefix(size);
+}
+
 Eigen::MatrixXd take_matrix(std::string_view& bytes) {
-    const auto take = [&](void* to, std::size_t size) {
-        if (bytes.size() < size)
-            throw std::runtime_error("error: found half of what a sensor learned, expected all");
-        std::memcpy(to, bytes.data(), size);
-        bytes.remove_prefix(size);
-    };
     std::uint64_t sizes[2];
-    take(sizes, sizeof sizes);
+    take(bytes, sizes, sizeof sizes);
     if (sizes[0] > kMostUnits || sizes[1] > kMostUnits)
         throw std::runtime_error("error: found what no sensor learns, expected a layer's sums");
     Eigen::MatrixXd matrix(static_cast<Eigen::Index>(sizes[0]), static_cast<Eigen::Index>(sizes[1]));
-    take(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(double));
+    take(bytes, matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(double));
     return matrix;
+}
+
+std::optional<tracking::Trust> take_trust(std::string_view& bytes) {
+    std::uint64_t length = 0;
+    take(bytes, &length, sizeof length);
+    if (length == 0) return std::nullopt;
+    tracking::Trust trust;
+    trust.stick.resize(std::min<std::uint64_t>(length, bytes.size()));
+    take(bytes, trust.stick.data(), length);
+    take(bytes, &trust.leads, sizeof trust.leads);
+    return trust;
 }
 
 }  // namespace
@@ -103,6 +127,7 @@ std::string bytes_of(std::span<const tracking::Experience> experiences) {
     for (const tracking::Experience& experience : experiences) {
         append(bytes, experience.moments);
         append(bytes, experience.against);
+        append(bytes, experience.trust);
     }
     return bytes;
 }
@@ -111,7 +136,7 @@ std::vector<tracking::Experience> experiences_of(std::string_view bytes) {
     std::vector<tracking::Experience> experiences;
     while (!bytes.empty()) {
         Eigen::MatrixXd moments = take_matrix(bytes), against = take_matrix(bytes);
-        experiences.push_back({std::move(moments), std::move(against)});
+        experiences.push_back({std::move(moments), std::move(against), take_trust(bytes)});
     }
     return experiences;
 }

@@ -160,8 +160,11 @@ PredictorMaker::PredictorMaker(const std::string& specification,
 
 std::unique_ptr<tracking::Predictor> PredictorMaker::make(std::span<const double> leads_s,
                                                           const TrackedStick& stick) const {
-    if (!is_external(specification_)) return make_internal(specification_, stick.shaft, model_);
-    return std::make_unique<ExternalPredictor>(command_of(specification_), leads_s, stick.name);
+    if (is_external(specification_))
+        return std::make_unique<ExternalPredictor>(command_of(specification_), leads_s, stick.name);
+    std::unique_ptr<tracking::Predictor> predictor = make_internal(specification_, stick.shaft, model_);
+    if (model_) tracking::begin_with_trust(*predictor, *model_, stick.name);
+    return predictor;
 }
 
 std::unique_ptr<tracking::Predictor> make_any_predictor(const std::string& specification,

@@ -62,9 +62,25 @@ void keep_confirmed(std::vector<sim::Contact>& contacts, std::span<const sim::Co
     });
 }
 
+sim::TipPath measured_way(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double t_s,
+                          double interval_s, double tip_radius_m) {
+    const Eigen::Vector3d velocity = (to - from) / interval_s;
+    return {0, tip_radius_m, {{t_s, from, velocity}, {t_s + interval_s, to, velocity}}};
+}
+
+std::vector<sim::Contact> passed_through(std::vector<sim::Contact> contacts, double interval_s,
+                                         std::span<const double> measured_m) {
+    std::erase_if(contacts, [&](const sim::Contact& contact) {
+        return contact.starts_inside || contact.zone < 0 || measured_m[contact.body] <= 0;
+    });
+    for (sim::Contact& contact : contacts) contact.t_s -= interval_s;
+    return contacts;
+}
+
 void Stick::take(const tracking::StickState& state) {
     const bool goes_on = started() && state.starts == state_.starts && state.t_s > state_.t_s;
     interval_s_ = goes_on ? state.t_s - state_.t_s : 0;
+    tip_before_ = measured_tip_;
     if (state.samples > state_.samples) {
         if (!goes_on) history_.restart();
         history_.push({state.t_s, state.position, state.orientation, state.oriented != 0});
@@ -104,6 +120,11 @@ sim::TipPath Stick::measured_path() const {
     path.nodes = {{state_.t_s, measured_tip_, Eigen::Vector3d::Zero()},
                   {state_.t_s + kStandstillS, measured_tip_, Eigen::Vector3d::Zero()}};
     return path;
+}
+
+std::optional<sim::TipPath> Stick::way() const {
+    if (!(interval_s_ > 0)) return std::nullopt;
+    return measured_way(tip_before_, measured_tip_, state_.t_s, interval_s_, geometry_.radius_m);
 }
 
 StickPredictors stick_predictors(const std::string& picture, const std::string& sound, double sound_lead_s,
@@ -166,7 +187,7 @@ void StickFilters::Filter::begin_anew(const TrackedStick& stick) {
 }
 
 std::optional<tracking::Experience> StickFilters::experience() const {
-    std::optional<tracking::Experience> all = tracking::experience_of(*picture_.predictor);
+    std::optional<tracking::Experience> all = tracking::experience_of(*picture_.predictor, stick_.name);
     if (all && earlier_) *all += *earlier_;
     return all;
 }

@@ -85,6 +85,17 @@ private:
 /// later.
 void keep_confirmed(std::vector<sim::Contact>& contacts, std::span<const sim::Contact> confirming, double s);
 
+/// The straight way of a tip from one sample to the next, `interval_s` later, as if it began at the later one's time
+/// `t_s`: bodies are known from then on.
+[[nodiscard]] sim::TipPath measured_way(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double t_s,
+                                        double interval_s, double tip_radius_m);
+
+/// Of `contacts`, those that a measured way of `interval_s` makes, the ones with bodies that the tip went right through:
+/// in at a place that sounds, and out again by the newest sample, as its clearances `measured_m` say. Their times are
+/// those at which the tip was there.
+[[nodiscard]] std::vector<sim::Contact> passed_through(std::vector<sim::Contact> contacts, double interval_s,
+                                                       std::span<const double> measured_m);
+
 /// Pieces of a predicted path, cubic Hermite ones of 8.3 ms: exact for the filters' parabolas; for a stick that
 /// turns at 20 rad/s within 1 um.
 inline constexpr std::size_t kPathPieces = 8;
@@ -136,6 +147,8 @@ public:
     [[nodiscard]] bool look(tracking::TipView& view) const { return history_.look(view); }
     [[nodiscard]] double sound_lead_s() const { return sound_lead_s_; }
     [[nodiscard]] sim::TipPath measured_path() const;
+    /// The measured tip's way since the sample before; none at a start.
+    [[nodiscard]] std::optional<sim::TipPath> way() const;
 
 private:
     std::uint32_t index_;
@@ -143,7 +156,7 @@ private:
     double sound_lead_s_, interval_s_ = 0;
     tracking::StickState state_;
     tracking::TipHistory history_;
-    Eigen::Vector3d measured_tip_ = Eigen::Vector3d::Zero();
+    Eigen::Vector3d measured_tip_ = Eigen::Vector3d::Zero(), tip_before_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace app

@@ -91,25 +91,29 @@ sim::TipPath path_to(const tracking::Plane& plane, double in_s, const tracking::
 
 }  // namespace
 
-std::optional<ContactForecast::Path> ContactForecast::after(const tracking::TipView& tip,
-                                                            const sim::TipPath& predicted,
-                                                            const Surfaces& surfaces, double reach_s) const {
+ContactForecast::Forecast ContactForecast::after(const tracking::TipView& tip, const sim::TipPath& predicted,
+                                                 const Surfaces& surfaces, double reach_s) const {
     tracking::Plane struck;
     Path expected;
     expected.probability = kWorthKeeping;
+    Forecast forecast;
     for (std::size_t surface = 0; surface < surfaces.count; ++surface) {
-        if (surfaces.nearest(surface, tip.tip).distance <= 0) return std::nullopt;
+        if (surfaces.nearest(surface, tip.tip).distance <= 0) return {};
         const tracking::Plane plane = plane_met(surfaces.nearest, surface, predicted);
+        forecast.times.emplace_back();
         if (plane.normal.dot(tip.tip - plane.point) <= 0) continue;  // beside it
         const tracking::ContactTimes times = tracking::contact_times(*model_, tip, plane);
+        if (!(times.probability() > 0)) continue;  // out of reach
+        forecast.times.back() = times;
         const double median_s = std::max(times.median_s(), kSoonestS);
         const double likely = times.probability_between(median_s - kMatchWindow_s, median_s + kMatchWindow_s);
         if (median_s > reach_s || likely <= expected.probability) continue;
         expected.probability = likely, expected.in_s = median_s, expected.surface = surface, struck = plane;
     }
-    if (!(expected.in_s > 0)) return std::nullopt;
+    if (!(expected.in_s > 0)) return forecast;
     expected.path = path_to(struck, expected.in_s, tip, predicted);
-    return expected;
+    forecast.strike = std::move(expected);
+    return forecast;
 }
 
 }  // namespace app

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 namespace app {
 
@@ -36,14 +37,20 @@ public:
         double in_s = 0, probability = 0;
     };
 
+    struct Forecast {
+        /// By surface, of the time to it; none of one out of reach (tracking::contact_times) or that the tip is
+        /// beside. Empty where the tip is in a surface.
+        std::vector<std::optional<tracking::ContactTimes>> times;
+        std::optional<Path> strike;  ///< none where nothing is likely to be struck
+    };
+
     /// `model` has a network of contacts.
     explicit ContactForecast(std::shared_ptr<const tracking::PathModel> model) : model_(std::move(model)) {}
     [[nodiscard]] const tracking::PathModel& model() const { return *model_; }
 
-    /// After a sample: `predicted` is the path of the sound's predictor; strikes are looked for `reach_s` ahead. None
-    /// where nothing is likely to be struck, or where the tip is in a surface.
-    [[nodiscard]] std::optional<Path> after(const tracking::TipView& tip, const sim::TipPath& predicted,
-                                            const Surfaces& surfaces, double reach_s) const;
+    /// After a sample: `predicted` is the path of the sound's predictor; strikes are looked for `reach_s` ahead.
+    [[nodiscard]] Forecast after(const tracking::TipView& tip, const sim::TipPath& predicted,
+                                 const Surfaces& surfaces, double reach_s) const;
 
 private:
     std::shared_ptr<const tracking::PathModel> model_;

@@ -16,8 +16,7 @@
 namespace app {
 namespace {
 
-constexpr double kKernelM = 0.20;       // of the mean shift
-constexpr double kSeparateM = 0.20;     // nearer clusters are one
+constexpr double kKernelM = 0.20;       // of the mean shift; nearer clusters are one
 constexpr std::size_t kSeeds = 1000;    // of the mean shift
 constexpr std::size_t kFewestLows = 3;  // of a cluster
 constexpr std::size_t kMostInstruments = 16;
@@ -25,13 +24,16 @@ constexpr double kStruckShare =
     0.15;  // a tenth of a swinging saber's lows can lie near its lowest, a third of a mallet's do
 constexpr double kStruckSpreadM = 0.030;   // inter-quartile range
 constexpr double kStruckTurningS = 0.020;  // mallets 7-14 ms, sabers 20-120 ms
-constexpr double kOverHandM = 0.10;
+constexpr double kOverHandM = 0.10, kBehindHandM = 0.05;
 constexpr double kAboveContactM = 0.025;
 constexpr double kEnterM = 0.003;
 constexpr double kHeadShare = 0.9;  // of the radius: the rest is rim
-constexpr double kMarginM = 0.02, kSmallestRadiusM = 0.10, kLargestRadiusM = 0.30, kGapBetweenM = 0.02;
+constexpr double kMarginM = 0.02, kSmallestRadiusM = 0.10, kGapBetweenM = 0.02;
+constexpr double kLargestRadius = 1.5;  // kernels
 
 using Lows = std::vector<Low>;
+/// What of a stroke is clustered: its lowest or its fastest point.
+using Point = Eigen::Vector3d Low::*;
 
 Eigen::Vector2d plan(const Eigen::Vector3d& p) {
     return {p.x(), p.z()};
@@ -43,15 +45,15 @@ struct Mode {
 };
 
 /// Climbs from a place to the middle of the densest disc about it.
-Mode climb(const Eigen::Vector2d& place, const Lows& lows) {
+Mode climb(const Eigen::Vector2d& place, const Lows& lows, Point point, double kernel_m) {
     constexpr int kMostSteps = 100;
     Mode mode{place, 0};
     for (int step = 0; step < kMostSteps; ++step) {
         Eigen::Vector2d sum = Eigen::Vector2d::Zero();
         mode.support = 0;
         for (const Low& low : lows) {
-            if ((plan(low.tip) - mode.place).norm() > kKernelM) continue;
-            sum += plan(low.tip);
+            if ((plan(low.*point) - mode.place).norm() > kernel_m) continue;
+            sum += plan(low.*point);
             ++mode.support;
         }
         const Eigen::Vector2d middle = sum / static_cast<double>(mode.support);
@@ -63,26 +65,32 @@ Mode climb(const Eigen::Vector2d& place, const Lows& lows) {
 }
 
 /// The clusters' middles, the best supported first.
-std::vector<Eigen::Vector2d> find_places(const Lows& lows) {
+std::vector<Eigen::Vector2d> find_places(const Lows& lows, Point point, double kernel_m) {
     std::vector<Mode> modes;
     const std::size_t stride = 1 + (lows.size() - 1) / kSeeds;
-    for (std::size_t i = 0; i < lows.size(); i += stride) modes.push_back(climb(plan(lows[i].tip), lows));
+    for (std::size_t i = 0; i < lows.size(); i += stride)
+        modes.push_back(climb(plan(lows[i].*point), lows, point, kernel_m));
     std::ranges::stable_sort(modes, std::greater(), &Mode::support);
     std::vector<Eigen::Vector2d> places;
     for (const Mode& mode : modes)
         if (std::ranges::all_of(
-                places, [&](const Eigen::Vector2d& p) { return (p - mode.place).norm() >= kSeparateM; }))
+                places, [&](const Eigen::Vector2d& p) { return (p - mode.place).norm() >= kernel_m; }))
             places.push_back(mode.place);
     return places;
 }
 
-std::vector<Lows> assign(const Lows& lows, const std::vector<Eigen::Vector2d>& places) {
+/// Clusters about the densest places, the largest first; none of fewer than three, unless there are no others.
+std::vector<Lows> clusters_of(const Lows& lows, Point point, double kernel_m) {
+    const std::vector<Eigen::Vector2d> places = find_places(lows, point, kernel_m);
     std::vector<Lows> clusters(places.size());
     for (const Low& low : lows) {
-        const auto distance = [&](const Eigen::Vector2d& place) { return (place - plan(low.tip)).norm(); };
+        const auto distance = [&](const Eigen::Vector2d& place) { return (place - plan(low.*point)).norm(); };
         const auto nearest = std::ranges::min_element(places, {}, distance);
         clusters[static_cast<std::size_t>(nearest - places.begin())].push_back(low);
     }
+    std::ranges::stable_sort(clusters, std::greater(), [](const Lows& cluster) { return cluster.size(); });
+    const std::size_t fewest = std::min(kFewestLows, clusters.front().size());
+    std::erase_if(clusters, [&](const Lows& cluster) { return cluster.size() < fewest; });
     return clusters;
 }
 
@@ -134,7 +142,7 @@ Eigen::Vector3d passing(const Low& low, double height_m) {
     return low.tip + share * way;
 }
 
-FittedInstrument place_instrument(const Lows& lows) {
+FittedInstrument place_instrument(const Lows& lows, double kernel_m) {
     FittedInstrument instrument;
     const Lows stopped = stopped_lows(lows);
     instrument.struck = !stopped.empty();
@@ -148,7 +156,7 @@ FittedInstrument place_instrument(const Lows& lows) {
     std::vector<double> reach;
     for (const Low& low : strokes) reach.push_back((plan(met(low)) - plan(instrument.met)).norm());
     const double needed = (quantile(reach, instrument.struck ? 1.0 : 0.9) + kMarginM) / kHeadShare;
-    instrument.radius_m = std::clamp(needed, kSmallestRadiusM, kLargestRadiusM);
+    instrument.radius_m = std::clamp(needed, kSmallestRadiusM, kLargestRadius * kernel_m);
     instrument.lows = static_cast<int>(lows.size());
     instrument.strokes = static_cast<int>(strokes.size());
     for (const Low& low : strokes) instrument.entering += low.tip.y() <= instrument.met.y() - kEnterM;
@@ -156,10 +164,11 @@ FittedInstrument place_instrument(const Lows& lows) {
 }
 
 /// Joins two clusters whose instruments would stand too near to each other; false when there are none.
-bool join_nearest(std::vector<Lows>& clusters, const std::vector<FittedInstrument>& instruments) {
+bool join_nearest(std::vector<Lows>& clusters, const std::vector<FittedInstrument>& instruments,
+                  double kernel_m) {
     for (std::size_t i = 0; i < instruments.size(); ++i)
         for (std::size_t k = i + 1; k < instruments.size(); ++k) {
-            if ((plan(instruments[i].met) - plan(instruments[k].met)).norm() >= kSeparateM) continue;
+            if ((plan(instruments[i].met) - plan(instruments[k].met)).norm() >= kernel_m) continue;
             clusters[i].insert(clusters[i].end(), clusters[k].begin(), clusters[k].end());
             clusters.erase(clusters.begin() + static_cast<std::ptrdiff_t>(k));
             return true;
@@ -167,12 +176,12 @@ bool join_nearest(std::vector<Lows>& clusters, const std::vector<FittedInstrumen
     return false;
 }
 
-std::vector<FittedInstrument> place_instruments(std::vector<Lows> clusters) {
+std::vector<FittedInstrument> place_instruments(std::vector<Lows> clusters, double kernel_m) {
     std::vector<FittedInstrument> instruments;
     do {
         instruments.clear();
-        for (const Lows& lows : clusters) instruments.push_back(place_instrument(lows));
-    } while (join_nearest(clusters, instruments));
+        for (const Lows& lows : clusters) instruments.push_back(place_instrument(lows, kernel_m));
+    } while (join_nearest(clusters, instruments, kernel_m));
     return instruments;
 }
 
@@ -185,20 +194,6 @@ void make_room(std::vector<FittedInstrument>& instruments) {
             a.radius_m *= share;
             b.radius_m *= share;
         }
-}
-
-/// The lows of all sticks, but for those with the tip over the hand: there a stick swings back overhead, it
-/// does not strike.
-Lows find_strokes(std::span<const tracking::Trace> traces, const StickGeometry& geometry) {
-    Lows strokes;
-    for (const tracking::Trace& trace : traces)
-        for (const tracking::StickTrace& stick : trace.sticks)
-            for (const Low& low : find_lows(tip_track(stick, geometry))) {
-                const auto hand =
-                    std::ranges::lower_bound(stick.samples, low.t_s, {}, &tracking::PoseSample::t_s);
-                if (low.tip.y() <= hand->position.y() + kOverHandM) strokes.push_back(low);
-            }
-    return strokes;
 }
 
 Eigen::Vector3d mean_place(const tracking::StickTrace& stick) {
@@ -244,6 +239,59 @@ Eigen::Vector3d direction_to_player(std::span<const tracking::Trace> traces, con
                                          : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
 }
 
+/// How many of the strokes pass beside an instrument, so near that 6 ms before nobody can tell.
+double share_beside(const Lows& strokes, const std::vector<FittedInstrument>& instruments) {
+    constexpr double kUntoldS = 0.006;
+    const auto is_beside = [&](const Low& low) {
+        return std::ranges::any_of(instruments, [&](const FittedInstrument& instrument) {
+            const Eigen::Vector3d passed = passing(low, instrument.met.y());
+            const double off = (plan(passed) - plan(instrument.met)).norm() - instrument.radius_m;
+            return off > 0 && off < kUntoldS * low.descent_mps;
+        });
+    };
+    return static_cast<double>(std::ranges::count_if(strokes, is_beside)) /
+           static_cast<double>(strokes.size());
+}
+
+/// Instruments that strokes pass through, of the strokes that nothing stops: of the hard ones, for between strokes a stick
+/// sways, where they are fastest, and only where many of them pass. As many as strokes can be told apart by.
+std::vector<FittedInstrument> place_passed(Lows strokes) {
+    constexpr double kHardShare = 0.5, kManyShare = 0.1, kMostBeside = 0.1;
+    if (strokes.empty()) return {};
+    std::vector<double> descents;
+    for (const Low& low : strokes) descents.push_back(low.descent_mps);
+    const double hard_mps = kHardShare * quantile(std::move(descents), 0.9);
+    std::erase_if(strokes, [&](const Low& low) { return low.descent_mps < hard_mps; });
+    std::vector<FittedInstrument> instruments;
+    for (const double kernel_m : {kKernelM, 0.3, 0.45, 0.7}) {
+        std::vector<Lows> clusters = clusters_of(strokes, &Low::fastest, kernel_m);
+        const auto many = static_cast<std::size_t>(kManyShare * static_cast<double>(clusters.front().size()));
+        std::erase_if(clusters, [&](const Lows& cluster) { return cluster.size() < many; });
+        instruments = place_instruments(std::move(clusters), kernel_m);
+        make_room(instruments);
+        if (share_beside(strokes, instruments) <= kMostBeside) break;
+    }
+    return instruments;
+}
+
+/// The lows of all sticks, but for those where a stick swings back: with the tip over the hand at the end, or behind it
+/// where it falls fastest.
+Lows find_strokes(std::span<const tracking::Trace> traces, const StickGeometry& geometry,
+                  const Eigen::Vector3d& towards_player) {
+    Lows strokes;
+    for (const tracking::Trace& trace : traces)
+        for (const tracking::StickTrace& stick : trace.sticks) {
+            const auto hand_at = [&](double t_s) {
+                return std::ranges::lower_bound(stick.samples, t_s, {}, &tracking::PoseSample::t_s)->position;
+            };
+            for (const Low& low : find_lows(tip_track(stick, geometry)))
+                if (low.tip.y() <= hand_at(low.t_s).y() + kOverHandM &&
+                    (low.fastest - hand_at(low.fastest_s)).dot(towards_player) <= kBehindHandM)
+                    strokes.push_back(low);
+        }
+    return strokes;
+}
+
 /// What a kind of instrument looks and sounds like in a fitted kit.
 struct Form {
     std::string kind;
@@ -268,13 +316,15 @@ std::string instrument_text(const FittedInstrument& fitted, const Form& form, st
     constexpr double kDiscM = 0.03;  // a side hardly to be met: strokes that pass come from everywhere
     const double diameter = 2 * fitted.radius_m,
                  height_m = fitted.struck ? form.height_m : std::min(form.height_m, kDiscM);
+    // What strokes of 30 m/s would visibly bend by more than its thickness would meet them again.
+    const char* const stiff = fitted.struck ? "" : "visual = { displacement = 0.001 }\n";
     const Eigen::Vector3d& met = fitted.met;
     return fmt::format(
         "\n# {}\n[[instrument]]\nname = \"{} {}\"\nkind = \"{}\"\nsize = [{:.3f}, {:.3f}, {:.3f}]\n"
-        "position = [{:.4f}, {:.4f}, {:.4f}]\nmidi_note = {}\nsound = {{ frequency_hz = {:.1f} }}\n{}",
+        "position = [{:.4f}, {:.4f}, {:.4f}]\nmidi_note = {}\nsound = {{ frequency_hz = {:.1f} }}\n{}{}",
         describe(fitted), form.kind, index + 1, form.kind, diameter, height_m, diameter, met.x(),
         met.y() - tip_radius_m - height_m / 2, met.z(), form.notes[index % form.notes.size()], pitch_hz,
-        form.extra);
+        form.extra, stiff);
 }
 
 /// Looks from behind the hands and from above at a ball that holds every instrument.
@@ -313,21 +363,29 @@ std::string plain(std::string name) {
 }  // namespace
 
 KitFit fit_kit(std::span<const tracking::Trace> traces, const StickGeometry& geometry) {
-    const Lows lows = find_strokes(traces, geometry);
+    KitFit fit;
+    fit.towards_player = direction_to_player(traces, geometry.shaft);
+    const Lows lows = find_strokes(traces, geometry, fit.towards_player);
     if (lows.empty())
         throw BadInput(
             fmt::format("{}: error: found no stroke (the tip never falls and rises by 25 mm), expected "
                         "strokes to fit a kit to",
                         traces.empty() ? "the trace" : traces.front().file));
-    std::vector<Lows> clusters = assign(lows, find_places(lows));
-    std::ranges::stable_sort(clusters, std::greater(), [](const Lows& cluster) { return cluster.size(); });
-    const std::size_t fewest = std::min(kFewestLows, clusters.front().size());
-    std::erase_if(clusters, [&](const Lows& cluster) { return cluster.size() < fewest; });
-    if (clusters.size() > kMostInstruments) clusters.resize(kMostInstruments);
-
-    KitFit fit;
-    fit.towards_player = direction_to_player(traces, geometry.shaft);
-    fit.instruments = place_instruments(std::move(clusters));
+    std::vector<Lows> struck = clusters_of(lows, &Low::tip, kKernelM);
+    Lows passing;
+    std::erase_if(struck, [&](const Lows& cluster) {
+        const bool none = stopped_lows(cluster).empty();
+        if (none) passing.insert(passing.end(), cluster.begin(), cluster.end());
+        return none;
+    });
+    fit.instruments = place_instruments(std::move(struck), kKernelM);
+    for (const FittedInstrument& other : place_passed(std::move(passing))) {
+        const auto near = [&](const FittedInstrument& one) {
+            return (plan(one.met) - plan(other.met)).norm() < kKernelM;
+        };
+        if (std::ranges::none_of(fit.instruments, near)) fit.instruments.push_back(other);
+    }
+    if (fit.instruments.size() > kMostInstruments) fit.instruments.resize(kMostInstruments);
     make_room(fit.instruments);
     const Eigen::Vector3d right = Eigen::Vector3d::UnitY().cross(fit.towards_player);
     std::ranges::stable_sort(fit.instruments, {},

@@ -27,16 +27,19 @@ struct KitFit {
     Eigen::Vector3d towards_player = Eigen::Vector3d::UnitZ();  ///< unit, horizontal, from the instruments
 };
 
-/// Places flat, round instruments where the traces' sticks strike. Lows of all sticks (without those with the
-/// tip 0.1 m and more above the tracked point, where a stick swings back overhead) are clustered in the
-/// horizontal plane by mean shift (flat kernel, 0.2 m); clusters nearer than 0.2 m are one, clusters of fewer
-/// than three lows are dropped unless there are no others, and the 16 largest are kept.
+/// Places flat, round instruments where the traces' sticks strike. Lows of all sticks (without those of a stick that
+/// swings back: with the tip 0.1 m and more above the tracked point, or falling fastest 50 mm and more behind it) are
+/// clustered in the horizontal plane by mean shift (flat kernel, 0.2 m); clusters nearer than 0.2 m are one, clusters of
+/// fewer than three lows are dropped unless there are no others. At most 16 instruments are made.
 ///   struck     at least 15 % of a cluster's lows (and three) lie within 50 mm of its lowest, their
 ///              inter-quartile range is at most 30 mm and the median of their turning times at most 20 ms.
 ///              The surface is then 25 mm above contact_height.
-///   otherwise  the surface is at the median height of the strokes' fastest points, or 50 mm above the 95th
+///   otherwise  nothing stops the sticks. Of all such strokes those count that fall at least half as fast as the 90th
+///              percentile. They are clustered anew, by where they are fastest; clusters of less than a tenth of the
+///              largest are dropped. The surface is at the median height of the fastest points, or 50 mm above the 95th
 ///              percentile of the lows where that is higher; it stands where the strokes pass that height, and is a
-///              disc of 30 mm.
+///              disc of 30 mm. The kernel is the first of 0.2, 0.3, 0.45 and 0.7 m with which at most a tenth of the
+///              strokes passes beside a disc, within 6 ms of its edge: so near that a prediction cannot tell.
 /// The surface is what the tip's centre meets: the body's head lies the tip's radius below. Deterministic.
 /// O(n) for n samples and at most 1000 m for m lows. Throws BadInput when no stick makes a stroke.
 [[nodiscard]] KitFit fit_kit(std::span<const tracking::Trace> traces, const StickGeometry& geometry);

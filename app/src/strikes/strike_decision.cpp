@@ -33,13 +33,22 @@ void StrikeDecision::Share::add(bool it_came) {
     of = kept * of + 1;
 }
 
+double StrikeDecision::prior(Kind kind, bool known) {
+    return kind != network_alone ? 0.95 : known ? 0.8 : 0.05;
+}
+
 double StrikeDecision::probability(Kind kind, bool known) const {
-    const double prior = kind != network_alone ? 0.95
-                         : known               ? 0.8
-                                               : 0.05,
-                 weight = kind != network_alone ? kRemembered : 4;
+    const double weight = kind != network_alone ? kRemembered : 4;
     const Share& share = shares_[kind];
-    return (prior * weight + share.came) / (weight + share.of);
+    return (prior(kind, known) * weight + share.came) / (weight + share.of);
+}
+
+double StrikeDecision::silent_until_s(std::size_t surface, Kind kind, const ExpectedStrikes& expected) const {
+    const double p = probability(kind, expected.known);
+    if (p <= false_cost_ * (1 - p)) return kNever;
+    if (!expected.known || expected.times.empty() || !expected.times[surface]) return -kNever;
+    const double before = prior(kind, true), least = false_cost_ * (1 - before);
+    return expected.s + expected.times[surface]->reached_s(least / (least + before)) - kMatchWindow_s;
 }
 
 void StrikeDecision::restart() {
@@ -51,6 +60,8 @@ void StrikeDecision::observe(const ExpectedStrikes& expected) {
     for (std::size_t i = 0; i < surfaces_.size(); ++i) {
         Surface& surface = surfaces_[i];
         const double now = expected.measured_m[i], filtered = expected.filtered_m[i];
+        const auto passed = first_with(expected.passed, i);
+        const bool went_through = surface.armed && passed != expected.passed.end();
         if (!surface.known) {
             surface.known = true;
             surface.armed = now > 0 && filtered > 0;
@@ -60,7 +71,10 @@ void StrikeDecision::observe(const ExpectedStrikes& expected) {
             surface.armed = now >= std::max(kRearm_m, surface.lowest_measured_m + kRearm_m) &&
                             filtered >= std::max(kRearm_m, surface.lowest_filtered_m + kRearm_m);
         }
-        if (now > 0) {
+        if (went_through) {
+            strike(i, passed->t_s);
+            surface = {true};
+        } else if (now > 0) {
             surface.entered_s.reset();
         } else if (surface.armed && !surface.entered_s) {
             const double fall = surface.last_m - now;
@@ -109,18 +123,17 @@ void StrikeDecision::decide(std::size_t surface, const ExpectedStrikes& expected
     Forecast forecast{surface, !by_network ? path_alone : by_path ? both : network_alone};
     if (by_path) forecast.path_s = of_path->t_s;
     if (by_network) forecast.network_s = of_network->t_s;
-    const double p = probability(forecast.kind, expected.known);
-    const bool sounds = p > false_cost_ * (1 - p);
+    const double silent_until_s = this->silent_until_s(surface, forecast.kind, expected);
     const double ahead_s = expected.known ? head_start_s_ : -head_start_s_;
     if (forecast.kind == both ? network_errors_s_ < path_errors_s_ + ahead_s
-                              : forecast.kind == network_alone && sounds) {
+                              : forecast.kind == network_alone && silent_until_s < kNever) {
         put(decided.kept, *of_network);
         put(decided.sounding, *of_network);
     }
+    decided.silent_until_s[surface] = silent_until_s;
     const auto first = first_with(decided.sounding, surface);
     const bool is_last =
         first != decided.sounding.end() && first->t_s <= expected.s + expected.interval_s + margin_s_;
-    if (is_last && !sounds) decided.sounding.erase(first);
     forecast.counts = is_last || forecast.kind == network_alone;
     forecasts_.push_back(forecast);
 }
@@ -128,7 +141,7 @@ void StrikeDecision::decide(std::size_t surface, const ExpectedStrikes& expected
 DecidedStrikes StrikeDecision::after(const ExpectedStrikes& expected) {
     observe(expected);
     settle(expected.s);
-    DecidedStrikes decided{expected.path, expected.confirmed};
+    DecidedStrikes decided{expected.path, expected.confirmed, std::vector(surfaces_.size(), -kNever)};
     for (std::size_t i = 0; i < surfaces_.size(); ++i)
         if (surfaces_[i].armed && expected.measured_m[i] > 0) decide(i, expected, decided);
     return decided;

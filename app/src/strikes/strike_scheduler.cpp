@@ -11,6 +11,7 @@ namespace app {
 namespace {
 
 constexpr std::size_t kRememberedCancellations = 8;
+constexpr double kSameSide = 0.5;  // cosine of the angle between normals
 
 void copy_contact(Strike& strike, const sim::Contact& contact) {
     strike.contact_s = contact.t_s;
@@ -52,23 +53,30 @@ void StrikeScheduler::restart(std::uint32_t stick) {
 }
 
 void StrikeScheduler::sample(std::uint32_t stick, double s, std::span<const ModelContacts> expected,
-                             std::size_t selected, std::span<const double> measured_clearance) {
+                             std::size_t selected, const MeasuredTip& tip) {
     const int number = samples_since_start_[stick]++;
     std::vector<sim::Contact> own;
     for (std::uint32_t instrument = 0; instrument < instruments_; ++instrument) {
         Pair& pair = pairs_[stick * instruments_ + instrument];
-        const double measured = measured_clearance[instrument];
+        const double measured = tip.clearance_m[instrument];
+        const auto with_it = [&](const sim::Contact& contact) { return contact.body == instrument; };
         pair.approaches.resize(expected.size());
         for (std::uint32_t model = 0; model < expected.size(); ++model) {
             Approach& a = pair.approaches[model];
             a.stick = stick;
             a.model = model;
             own.clear();
-            if (number >= rules_.settling_samples)
-                std::ranges::copy_if(expected[model].contacts, std::back_inserter(own),
-                                     [&](const sim::Contact& contact) { return contact.body == instrument; });
+            // Only a tip that was armed when it passed through: else it was the stroke that was released.
+            if (a.armed) std::ranges::copy_if(tip.passed, std::back_inserter(own), with_it);
             update_arming(a, s, measured, expected[model].clearance_m[instrument], number == 0);
+            if (!own.empty() && !a.entered_s) a.entered_s = own.front().t_s;
+            if (number >= rules_.settling_samples)
+                std::ranges::copy_if(expected[model].contacts, std::back_inserter(own), with_it);
+            else
+                own.clear();
             follow_path(a, s, own);
+            if (!expected[model].silent_until_s.empty())
+                silence(a, s, expected[model].silent_until_s[instrument]);
             // A stroke that was not found in time is missed; the stick lies in the head until it rises again.
             if (a.entered_s && a.pending.empty() && s + rules_.commit_lead_s - *a.entered_s > rules_.late_s)
                 disarm(a);
@@ -104,6 +112,7 @@ void StrikeScheduler::update_arming(Approach& a, double s, double measured, doub
             fall > 0 && a.last_clearance > 0 ? a.last_s + (s - a.last_s) * a.last_clearance / fall : s;
     }
     a.last_clearance = measured;
+    a.interval_s = first ? 0 : s - a.last_s;
     a.last_s = s;
 }
 
@@ -113,8 +122,9 @@ std::vector<StrikeScheduler::Candidate> StrikeScheduler::candidates(
     for (std::size_t i = 0; i < contacts.size(); ++i) {
         const sim::Contact& contact = contacts[i];
         if (i == 0 && !a.armed) continue;  // still the stroke that was released
-        // A path that goes right through a thin body and turns back into it from behind is no second stroke.
-        if (i > 0 && contact.normal_world.dot(contacts[0].normal_world) <= 0) continue;
+        // A path that goes right through a thin body and turns back into it from behind or from the side is no second
+        // stroke.
+        if (i > 0 && contact.normal_world.dot(contacts[0].normal_world) < kSameSide) continue;
         if (contact.zone < 0 || contact.speed_mps < rules_.minimum_speed_mps) continue;
         const double onset = std::max(contact.t_s, earliest_onset(s));
         const double happened = i == 0 && a.entered_s ? std::min(*a.entered_s, contact.t_s) : contact.t_s;
@@ -153,7 +163,7 @@ void StrikeScheduler::follow_path(Approach& a, double s, std::span<const sim::Co
     for (const std::size_t p : waiting) keep_or_cancel(a, s, a.pending[p], std::exchange(may_keep, false));
     std::erase_if(a.pending, [](const Strike& pending) { return pending.outcome == Outcome::cancelled; });
     for (const Candidate& candidate : found)
-        if (!candidate.late) a.pending.push_back(new_contact(a, s, *candidate.contact));
+        if (const auto fresh = new_contact(a, s, candidate)) a.pending.push_back(*fresh);
 }
 
 void StrikeScheduler::place_onset(Strike& pending, double s) const {
@@ -173,7 +183,8 @@ bool StrikeScheduler::may_be(const Strike& pending, const Candidate& candidate, 
     return candidate.happens_s - pending.onset_s <= rules_.late_s;
 }
 
-Strike StrikeScheduler::new_contact(Approach& a, double s, const sim::Contact& contact) const {
+std::optional<Strike> StrikeScheduler::new_contact(Approach& a, double s, const Candidate& candidate) const {
+    const sim::Contact& contact = *candidate.contact;
     Strike fresh;
     fresh.stick = a.stick;
     fresh.instrument = contact.body;
@@ -183,9 +194,12 @@ Strike StrikeScheduler::new_contact(Approach& a, double s, const sim::Contact& c
     const auto again = std::find_if(a.cancelled.rbegin(), a.cancelled.rend(), [&](const Strike& old) {
         return std::abs(old.onset_s - contact.t_s) <= rules_.revive_s;
     });
-    if (again == a.cancelled.rend()) return fresh;
-    // A time that stood when it was cancelled stands again, as long as it can be met.
-    if (is_committed(*again, s) && again->onset_s >= s + rules_.release_margin_s) {
+    const bool is_back = again != a.cancelled.rend();
+    // A time that stood when it was cancelled stands again, as long as it can be met: it is not too late for that.
+    const bool stands = is_back && is_committed(*again, s) && again->onset_s >= s + rules_.release_margin_s;
+    if (candidate.late && !stands) return std::nullopt;
+    if (!is_back) return fresh;
+    if (stands) {
         fresh.contact_s = again->contact_s;
         fresh.onset_sample = again->onset_sample;
         fresh.onset_s = again->onset_s;
@@ -213,6 +227,16 @@ void StrikeScheduler::keep_or_cancel(Approach& a, double s, Strike& pending, boo
     } else if (rules_.cancelling || pending.onset_s >= s + rules_.sent_lead_s) {
         cancel(a, pending);
     }
+}
+
+void StrikeScheduler::silence(Approach& a, double s, double until_s) const {
+    if (!rules_.cancelling) return;
+    const auto is_silent = [&](const Strike& pending) {
+        return pending.onset_s < until_s && pending.onset_s <= s + a.interval_s + rules_.release_margin_s;
+    };
+    for (Strike& pending : a.pending)
+        if (is_silent(pending)) cancel(a, pending);
+    std::erase_if(a.pending, [](const Strike& pending) { return pending.outcome == Outcome::cancelled; });
 }
 
 void StrikeScheduler::cancel(Approach& a, Strike& pending) {

@@ -34,6 +34,17 @@ struct ModelContacts {
     std::span<const sim::Contact> contacts;  ///< of its predicted path, by time
     /// [m] signed, of its tip at lead 0 from each instrument's surface grown by the tip's radius
     std::span<const double> clearance_m;
+    /// By instrument: notes that will be fixed before the next sample, and whose onset lies before this, are
+    /// cancelled (DecidedStrikes); empty: none.
+    std::span<const double> silent_until_s = {};
+};
+
+/// What the measured tip did by a sample.
+struct MeasuredTip {
+    std::span<const double>
+        clearance_m;  ///< [m] signed, from each instrument's surface grown by the tip's radius
+    std::span<const sim::Contact> passed =
+        {};  ///< with instruments that it went right through since the sample before
 };
 
 /// Turns predicted contacts into strikes.
@@ -62,11 +73,10 @@ public:
     void advance_to(double s, double fixed_s = -std::numeric_limits<double>::infinity());
     /// The filter of `stick` starts anew: its next sample is a first sample.
     void restart(std::uint32_t stick);
-    /// The sample of `stick` at time s: what each model expects (as many at every sample), the model that is
-    /// selected, and the distance of the measured tip from each instrument's surface grown by the tip's radius
-    /// [m, signed].
+    /// The sample of `stick` at time s: what each model expects (as many at every sample), and the model that is
+    /// selected.
     void sample(std::uint32_t stick, double s, std::span<const ModelContacts> expected, std::size_t selected,
-                std::span<const double> measured_clearance);
+                const MeasuredTip& tip);
     /// After the last sample: what is pending is released, as when a sensor falls silent.
     void finish();
 
@@ -87,6 +97,7 @@ private:
         double lowest_filtered = std::numeric_limits<double>::infinity();
         std::optional<double> entered_s;  ///< the measured tip entered the surface since it was armed
         double last_clearance = 0, last_s = 0;
+        double interval_s = 0;          ///< between its newest samples
         std::vector<Strike> pending;    ///< in order of first prediction
         std::vector<Strike> cancelled;  ///< newest last; a few
         /// Onset of its contact that was released last while another model was selected.
@@ -122,7 +133,8 @@ private:
     static void disarm(Approach& a);
     [[nodiscard]] std::vector<Candidate> candidates(const Approach& a, double s,
                                                     std::span<const sim::Contact> contacts) const;
-    [[nodiscard]] Strike new_contact(Approach& a, double s, const sim::Contact& contact) const;
+    /// None where it is too late for a note.
+    [[nodiscard]] std::optional<Strike> new_contact(Approach& a, double s, const Candidate& candidate) const;
     /// Earliest onset that the sample at s may ask for.
     [[nodiscard]] double earliest_onset(double s) const {
         return std::max(s + rules_.commit_lead_s, fixed_s_);
@@ -134,6 +146,9 @@ private:
     [[nodiscard]] bool may_be(const Strike& pending, const Candidate& candidate, double s) const;
     /// Of a pending contact that the path no longer shows.
     void keep_or_cancel(Approach& a, double s, Strike& pending, bool may_keep) const;
+    /// Cancels what will be fixed before the next sample, as long after this as this is after the one before, and
+    /// sounds before `until_s`.
+    void silence(Approach& a, double s, double until_s) const;
     static void cancel(Approach& a, Strike& pending);
 
     /// Makes the strikes of a pair those that are to be played of its pending contacts.

@@ -20,10 +20,11 @@ double slope(const TipTrack& track, std::size_t from, std::size_t to) {
 
 /// The low at sample `at`, of the piece [first, last] without gaps; first < at < last.
 Low low_at(const TipTrack& track, std::size_t at, std::size_t first, std::size_t last) {
-    Low low{track.t_s[at], track.tip[at], 0, track.tip[at], 0};
+    Low low{track.t_s[at], track.tip[at], 0, track.t_s[at], track.tip[at], 0};
     for (std::size_t i = at; i > first && track.tip[i - 1].y() >= track.tip[i].y() - kSameLevelM; --i)
         if (const double fall = -slope(track, i - 1, i); fall > low.descent_mps) {
             low.descent_mps = fall;
+            low.fastest_s = 0.5 * (track.t_s[i - 1] + track.t_s[i]);
             low.fastest = 0.5 * (track.tip[i - 1] + track.tip[i]);
         }
     std::size_t before = at - 1, after = at + 1;

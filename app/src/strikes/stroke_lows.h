@@ -12,6 +12,7 @@ struct Low {
     double t_s = 0;
     Eigen::Vector3d tip = Eigen::Vector3d::Zero();      ///< [m], world
     double descent_mps = 0;                             ///< fastest fall on the way down
+    double fastest_s = 0;                               ///< when
     Eigen::Vector3d fastest = Eigen::Vector3d::Zero();  ///< the tip there
     double turning_s = 0;  ///< descent_mps over the upward acceleration at the low (across +-9 ms): how long
                            ///< that acceleration takes to stop the fall. About 10 ms on a head, 20-100 ms

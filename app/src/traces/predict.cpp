@@ -47,7 +47,8 @@ std::string predict_table(const tracking::Trace& seen, const std::string& specif
                                {seen.sticks[i].name, seen.shaft.value_or(-Eigen::Vector3d::UnitZ())});
         predict_stick(seen.sticks[i], i, *predictor, lead_s, rows);
         if (learned == nullptr) continue;
-        if (std::optional<tracking::Experience> one = tracking::experience_of(*predictor))
+        if (std::optional<tracking::Experience> one =
+                tracking::experience_of(*predictor, seen.sticks[i].name))
             learned->push_back(std::move(*one));
     }
     // A stick's times differ. (stable_sort's buffer is not aligned for what holds Eigen's types.)

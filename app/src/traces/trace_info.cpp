@@ -11,7 +11,6 @@
 
 #include "files/bad_input.h"
 #include "kit/kit.h"
-#include "process/standard_streams.h"
 #include "report/json_document.h"
 #include "statistics/statistics.h"
 #include "strikes/stroke_lows.h"
@@ -104,11 +103,6 @@ std::vector<StickInfo> sticks_of(const tracking::Trace& trace) {
 }
 
 }  // namespace
-
-void warn_of_implausible(const tracking::Trace& trace) {
-    for (const std::string& line : tracking::implausible(trace))
-        tell(fmt::format("{}: warning: {}", trace.file, line));
-}
 
 std::string format_info(const tracking::Trace& trace) {
     const std::vector<StickInfo> sticks = sticks_of(trace);

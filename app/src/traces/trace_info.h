@@ -10,8 +10,4 @@ namespace app {
 [[nodiscard]] std::string format_info(const tracking::Trace& trace);
 [[nodiscard]] std::string format_info_json(const tracking::Trace& trace);
 
-/// Prints to standard error, a line each, what a trace holds that recordings of drummers do not
-/// (tracking::implausible).
-void warn_of_implausible(const tracking::Trace& trace);
-
 }  // namespace app

@@ -34,7 +34,9 @@ struct Voice {
     std::filesystem::path own_orchestra{};
     /// What these parameters are at the far end of its pedal's way (Note::pedal 1), by name. In between they go
     /// evenly, those of a sign in ratios. With decay_s among them, what rings follows the pedal to within a block:
-    /// all its modes' decay times change by the ratio of the decay_s there and where the note began.
+    /// all its modes' decay times change by the ratio of the decay_s there and where the note began. Recorded sounds, of
+    /// whose parameters nothing else is used, and orchestras of one's own are damped as a whole, as if decay_s were the
+    /// time in which they fall by 60 dB; they never ring longer than by themselves.
     std::vector<std::pair<std::string, double>> pedal_parameters{};
     double balance = 0;       ///< of its bus: -1 left alone ... 1 right alone
     double room_send_db = 0;  ///< gain of what the room hears of it; -60 and below: nothing
@@ -86,6 +88,9 @@ struct Mix {
     /// Sounds these voices alone, as they sound among the others (which still choke them), without the room. Empty:
     /// all.
     std::vector<std::uint32_t> alone{};
+    /// Sounds the note of this id alone, as it sounds among the others (which still choke it and take their turns in a round
+    /// robin), in the room. Empty: all.
+    std::optional<std::uint64_t> alone_note{};
 };
 
 /// An offline performance: notes are scheduled, moved and cancelled ahead of the sample up to which audio has

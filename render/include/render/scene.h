@@ -40,6 +40,15 @@ struct Solid {
     ModeShapes modes;
 };
 
+/// What an object does to the key light.
+enum class Shadow : std::uint8_t {
+    cast,
+    /// Casts a shadow widened by what the shadow map's filter blurs (1.25 texels), for rods: where they are thinner than
+    /// that, their shadow would be pale and broken.
+    widened,
+    none,  ///< lets it through; the others' shadows lie on it
+};
+
 /// One drawn object: a mesh, drawn with one 4x4 matrix per frame.
 struct SceneObject {
     std::string name;
@@ -49,6 +58,7 @@ struct SceneObject {
     /// Where an object stands that stays in its place: world_from_object at rest. The floor under it is
     /// darkened from there, whatever its motion; else from where it is in the frame.
     std::optional<Eigen::Matrix4f> stands = std::nullopt;
+    Shadow shadow = Shadow::cast;
 };
 
 struct Camera {

@@ -45,8 +45,8 @@ enum class Pace {
 struct MarketSettings {  ///< of the load balancing, thesis 2.4
     bool trade = true;
     std::uint64_t from_step = 0;  ///< no offers before the seller's step
-    double smoothing_steps = 3;   ///< time constant of the smoothed seconds per step
-    double dead_band = 0.08;      ///< share of the average by which a worker must be slower to offer
+    double smoothing_steps = 20;  ///< time constant of the smoothed seconds per work [steps]
+    double dead_band = 0.1;       ///< share of the average by which a worker must be slower to offer
 };
 
 struct DistributedSettings {  ///< of a run; refused settings throw std::invalid_argument
@@ -64,20 +64,23 @@ struct DistributedSettings {  ///< of a run; refused settings throw std::invalid
 struct WorkerStep {
     int worker = 0;          ///< number in order of joining, never used again
     std::uint64_t step = 0;  ///< number of the step that ended
-    double seconds = 0;      ///< worked, without waiting
+    double seconds = 0;      ///< worked, without waiting, by the clock that the run uses
     double smoothed_s = 0;   ///< the same, as smoothed for load balancing
     double waited_s = 0;     ///< waited before it, for other workers
-    int bodies = 0;          ///< own
+    /// Processor time of the thread that steps, with what it did for other workers since the step before; on
+    /// simulated processors theirs.
+    double processor_s = 0;
+    int bodies = 0;     ///< own
     int lead = 0;       ///< steps ahead of the slowest that owned a body, as this worker knew at the start
     int ghost_age = 0;  ///< of the oldest used [steps]
     std::uint64_t bytes = 0;  ///< sent for this step
-    int cross_contacts = 0;   ///< points between bodies of different owners that it resolved
+    int cross_contacts = 0;  ///< points between bodies of different owners that it resolved; bounded: both do
 };
 
 struct DistributedResult {    ///< of a whole run
     std::uint64_t steps = 0;  ///< done by every body
     double elapsed_s = 0;  ///< from the first step's start to the last one's end, of the clock that was used
-    double cpu_s = 0;      ///< of all workers' steps
+    double cpu_s = 0;      ///< processor time of all workers' steps, see WorkerStep
     int workers = 0;       ///< the largest number at a time
     int lost = 0, left = 0;                       ///< workers that died; that handed over and left
     int bodies_reowned = 0;                       ///< bodies of those, given to other workers
@@ -93,6 +96,10 @@ struct DistributedResult {    ///< of a whole run
     std::vector<QuarantinedBody> quarantined;                   ///< in order of steps; so are the next two
     std::vector<FirstStep> limited, broken;                     ///< see World::limited and World::broken
     bool rest_reached = false;                                  ///< until_rest: every body came to rest
+    /// SimulatedProcessors::repeat_alone: the workers' processor time in turns over that of the same work one worker
+    /// after the other: elapsed_s, as far as it is work, is too long by this factor.
+    double cold_caches = 1;
+    double busiest_s = 0;  ///< likewise: the time of the worker that then takes longest, by the run's clock
 };
 
 /// Where a run in lockstep or in one process is at the end of a step: all that its next steps and its result
@@ -160,7 +167,8 @@ DistributedResult run_distributed(const WorldScene& scene, const DistributedSett
                                   const RunState* from = nullptr);
 
 /// Simulated processors: workers in this process, each with a clock of its own that advances by the cost of
-/// its work. Messages arrive `latency_s` after they were sent; events happen in the order of simulated time.
+/// its work, once it has the scene. Messages arrive `latency_s` after they were sent; events happen in the order
+/// of simulated time.
 struct SimulatedProcessors {
     int count = 1;
     double latency_s = 2e-4;  ///< from worker to worker
@@ -168,6 +176,10 @@ struct SimulatedProcessors {
     bool modelled =
         false;  ///< costs are counted (World::work), not measured: results are a pure function of the input
     double seconds_per_work = 2e-6;  ///< modelled: of one unit of work
+    /// In turns in one thread workers find their caches cold, which a processor of its own does not. So afterwards
+    /// each worker does all that it did once more, without the others, and DistributedResult::cold_caches tells
+    /// how much faster that is. That is measured, also if costs are modelled. Every message is kept for it.
+    bool repeat_alone = false;
     /// A further factor of a worker's step, such as a straggler's; empty: none.
     std::function<double(int worker, std::uint64_t step)> factor;
     /// Failures at simulated times, for tests.

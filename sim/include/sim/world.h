@@ -194,18 +194,19 @@ struct WorldSnapshot {
 struct StepImpulse {
     Eigen::Vector3d linear = Eigen::Vector3d::Zero();   ///< [N s]
     Eigen::Vector3d angular = Eigen::Vector3d::Zero();  ///< about its centre, world axes [N m s]
-    Eigen::Vector3d displacement =
-        Eigen::Vector3d::Zero();                     ///< by pushing overlaps out, beyond the impulses' [m]
-    Eigen::Vector3d turn = Eigen::Vector3d::Zero();  ///< likewise, rotation vector, world axes [rad]
-    /// Of the modal coordinates: an impulse spread over the step [N s kg^-1/2] or, if these are not empty,
-    /// its effect at the step's end: modal_q [m kg^1/2] and modal_rate.
-    Eigen::VectorXd modal, modal_q, modal_rate;
+    Eigen::VectorXd modal;  ///< of the modal coordinates, spread over the step [N s kg^-1/2]
+
+    void set_zero() { linear.setZero(), angular.setZero(), modal.setZero(); }
+    [[nodiscard]] bool is_zero() const { return linear.isZero(0) && angular.isZero(0) && modal.isZero(0); }
 };
 
 /// Impulses that an own body and a ghost gave each other in one step.
 struct CrossImpulse {
     int own, ghost;
-    StepImpulse on_own, on_ghost;
+    bool blow = false;                                 ///< they struck each other: an impact, or a rebound
+    Eigen::Vector3d linear = Eigen::Vector3d::Zero();  ///< on the own body; the ghost's is opposite [N s]
+    Eigen::Vector3d angular_own = Eigen::Vector3d::Zero();    ///< about its centre, world axes [N m s]
+    Eigen::Vector3d angular_ghost = Eigen::Vector3d::Zero();  ///< likewise of the ghost
 };
 
 /// A ball that holds a foreign body over the next step.
@@ -219,8 +220,7 @@ struct ForeignBall {
 enum class Sharing {
     alone,    ///< not at all
     islands,  ///< every island with an own body is solved whole; other bodies' records are restored
-    pairs  ///< only own bodies are stepped, among ghosts that are placed for each step; of an own and a ghost
-           ///< body that touch, the world that owns the one with the lower number resolves the contact
+    pairs     ///< only own bodies are stepped, among ghosts that are placed for each step and move with them
 };
 
 struct QuarantinedBody {  ///< taken out of the world
@@ -272,6 +272,11 @@ public:
     /// So many threads share out the steps of a world that is not shared, at first one: this one and helpers that sleep between
     /// steps. No result depends on how many. Throws std::invalid_argument below 1.
     void use_threads(int threads);
+    /// Instead, for benchmarks: this thread does alone what so many would share out, and times each piece of it. The
+    /// processor time of steps less what saved_by_threads_s() grows by is then their critical path among so many
+    /// threads, whatever else the machine does. Throws std::invalid_argument below 1.
+    void plan_threads(int threads);
+    [[nodiscard]] double saved_by_threads_s() const;  ///< since plan_threads [s]
 
     /// Ids are indices, never used again.
     int add_body(const WorldBody& body);
@@ -317,6 +322,7 @@ public:
     void set_own(int body, bool own);
     [[nodiscard]] bool own(int body) const;
     [[nodiscard]] WorldRecord record(int body) const;  ///< at the end of the last step
+    void record(int body, WorldRecord& out) const;     ///< the same, into storage that is there
     void restore(const WorldRecord& record);           ///< sets a body's state; wakes no other body
     /// Of the last step: contacts whose first body that moves is own,
     /// constraints likewise.
@@ -331,26 +337,17 @@ public:
     void set_step(std::uint64_t step);           ///< time_s and counts().steps continue from here
 
     // pairs.
-    /// Those of `foreign` that have to be placed for the next step, because they may touch an own body of a
-    /// lower number.
+    /// Those of `foreign` that have to be placed for the next step, because they may touch an own body.
     void near_own(const std::vector<ForeignBall>& foreign, std::vector<int>& near);
     /// The same for one of them whose state is known better, after near_own.
     [[nodiscard]] bool is_near_own(int body, const WorldBodyState& state) const;
     /// Places a ghost for the next step only; it moves under gravity and `held`.
     void place_ghost(int body, const WorldBodyState& state, const StepImpulse* held, bool asleep = false);
-    /// Gives an own body an impulse spread over the next step (its displacement and turn at once).
-    void hold(int body, const StepImpulse& impulse);
-    /// Applies an impulse that an own body should have received in the step that ended `steps_ago` steps ago,
-    /// by the change that it makes to a free body.
-    void correct(int body, const StepImpulse& impulse, int steps_ago, double factor = 1);
-    /// The same for a given state of the body.
-    void correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago,
-                 double factor = 1) const;
-    /// Sets `modal` to the steady impulse whose effect is nearest to modal_q and modal_rate.
-    void spread_modes(int body, StepImpulse& impulse) const;
+    /// Gives an own body, as rigid, an impulse [N s, N m s].
+    void kick(int body, const Eigen::Vector3d& linear, const Eigen::Vector3d& angular);
     /// One step of a body that touches nothing but planes, which stop it, under gravity and `held`.
     void extrapolate(int body, WorldBodyState& state, const StepImpulse* held);
-    /// Records an own body's impulses from other moving bodies and constraints (without hold and correct).
+    /// Records what other own bodies that move and constraints give an own body.
     void watch(int body, bool watched);
     /// Every pair of an own body and a ghost that gave each other an impulse in the last step.
     [[nodiscard]] const std::vector<CrossImpulse>& cross_impulses() const noexcept;

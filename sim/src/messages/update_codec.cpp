@@ -14,7 +14,7 @@ namespace sim {
 namespace {
 
 constexpr std::uint8_t kUpdateAsleep = 1, kUpdateStill = 2, kUpdateQuarantined = 4, kUpdateHeld = 8;
-constexpr std::size_t kSmallestUpdate = 36, kSmallestPush = 76, kUsualUpdate = 120;
+constexpr std::size_t kSmallestUpdate = 36, kCrossed = 45, kUsualUpdate = 120;
 constexpr std::int16_t kUpdateBroken = std::numeric_limits<std::int16_t>::min();
 
 /// Room for one update: what ByteWriter does, without growing by each number.
@@ -200,8 +200,7 @@ void write(ByteWriter& all, const Update& u) {
     all.append(out.bytes());
 }
 
-Update read_update(ByteReader& all) {
-    Update u;
+void read_update(ByteReader& all, Update& u) {
     const BodyAndModes which = read_body_and_modes(all);
     u.body = which.body;
     const auto flags = all.number<std::uint8_t>();
@@ -221,28 +220,20 @@ Update read_update(ByteReader& all) {
     read_halves(in, s.q_dot);
     if (is_broken(s)) throw DecodeError("an update out of range");
     if (!whole) s.position.setConstant(std::numeric_limits<double>::quiet_NaN());
-    if (!u.held) return u;
     u.impulse.modal.resize(which.modes);
+    if (!u.held) {
+        u.impulse.set_zero();
+        return;
+    }
     read_halves(in, u.impulse.linear);
     read_halves(in, u.impulse.angular);
     read_halves(in, u.impulse.modal);
-    return u;
 }
 
-Push read_push(ByteReader& in) {
-    Push p;
-    const BodyAndModes which = read_body_and_modes(in);
-    p.body = which.body;
-    in.matrix(p.impulse.linear);
-    in.matrix(p.impulse.angular);
-    read_floats(in, p.impulse.displacement);
-    read_floats(in, p.impulse.turn);
-    p.impulse.modal_q.resize(which.modes), p.impulse.modal_rate.resize(which.modes);
-    read_floats(in, p.impulse.modal_q);
-    read_floats(in, p.impulse.modal_rate);
-    if (!p.impulse.linear.allFinite() || !p.impulse.angular.allFinite())
-        throw DecodeError("a push that is not finite");
-    return p;
+int read_body_number(ByteReader& in) {
+    const auto body = in.number<std::uint32_t>();
+    if (body >= kMostWorldBodies) throw DecodeError("a body's number beyond the largest");
+    return static_cast<int>(body);
 }
 
 }  // namespace
@@ -253,75 +244,55 @@ void write(ByteWriter& out, const std::vector<Update>& updates) {
     for (const Update& u : updates) write(out, u);
 }
 
-void write(ByteWriter& out, const std::vector<Push>& pushes) {
-    out.count(pushes.size());
-    for (const Push& p : pushes) {
-        out.number(body_and_modes(p.body, p.impulse.modal_q.size()));
-        out.matrix(p.impulse.linear);
-        out.matrix(p.impulse.angular);
-        write_floats(out, p.impulse.displacement);
-        write_floats(out, p.impulse.turn);
-        write_floats(out, p.impulse.modal_q);
-        write_floats(out, p.impulse.modal_rate);
+void write(ByteWriter& out, const std::vector<CrossImpulse>& crossed) {
+    out.count(crossed.size());
+    for (const CrossImpulse& c : crossed) {
+        out.number(static_cast<std::uint32_t>(c.own));
+        out.number(static_cast<std::uint32_t>(c.ghost));
+        out.number(static_cast<std::uint8_t>(c.blow));
+        write_floats(out, c.linear);
+        write_floats(out, c.angular_own);
+        write_floats(out, c.angular_ghost);
     }
 }
 
 std::vector<Update> read_updates(ByteReader& in) {
     std::vector<Update> updates(in.count(kSmallestUpdate));
-    for (Update& u : updates) u = read_update(in);
+    for (Update& u : updates) read_update(in, u);
     return updates;
 }
 
-std::vector<Push> read_pushes(ByteReader& in) {
-    std::vector<Push> pushes(in.count(kSmallestPush));
-    for (Push& p : pushes) p = read_push(in);
-    return pushes;
+std::vector<CrossImpulse> read_crossed(ByteReader& in) {
+    std::vector<CrossImpulse> crossed(in.count(kCrossed));
+    for (CrossImpulse& c : crossed) {
+        c.own = read_body_number(in), c.ghost = read_body_number(in);
+        const auto blow = in.number<std::uint8_t>();
+        if (blow > 1 || c.own == c.ghost) throw DecodeError("an impulse between bodies that is none");
+        c.blow = blow == 1;
+        read_floats(in, c.linear);
+        read_floats(in, c.angular_own);
+        read_floats(in, c.angular_ghost);
+    }
+    return crossed;
 }
 
-namespace {
-
-// Steps over records of `fixed` + `each` m bytes; extra(flags, m) more.
-template <typename Extra>
-void find(ByteReader& in, std::span<const std::uint8_t> all, std::size_t smallest, Extra&& length,
-          std::vector<PackedUpdates::Place>& places) {
-    const std::uint32_t count = in.count(smallest);
-    places.resize(count);
+// Steps over them; each has its own length.
+void find_updates(ByteReader& in, std::span<const std::uint8_t> all,
+                  std::vector<PackedUpdates::Place>& places) {
+    places.resize(in.count(kSmallestUpdate));
     for (PackedUpdates::Place& place : places) {
         place.offset = static_cast<std::uint32_t>(all.size() - in.left());
         const BodyAndModes which = read_body_and_modes(in);
         place.body = which.body;
-        (void)in.take(length(in, static_cast<std::size_t>(which.modes)));
+        const auto modes = static_cast<std::size_t>(which.modes);
+        const bool held = in.number<std::uint8_t>() & kUpdateHeld;
+        (void)in.take(kSmallestUpdate - 5 + 4 * modes + (held ? 12 + 2 * modes : 0));
     }
 }
 
-}  // namespace
-
-void find_updates(ByteReader& in, std::span<const std::uint8_t> all,
-                  std::vector<PackedUpdates::Place>& places) {
-    find(
-        in, all, kSmallestUpdate,
-        [](ByteReader& at, std::size_t modes) {
-            const bool held = at.number<std::uint8_t>() & kUpdateHeld;
-            return kSmallestUpdate - 5 + 4 * modes + (held ? 12 + 2 * modes : 0);
-        },
-        places);
-}
-
-void find_pushes(ByteReader& in, std::span<const std::uint8_t> all,
-                 std::vector<PackedUpdates::Place>& places) {
-    find(
-        in, all, kSmallestPush, [](ByteReader&, std::size_t modes) { return kSmallestPush - 4 + 8 * modes; },
-        places);
-}
-
-Update PackedUpdates::update(std::uint32_t offset) const {
+void PackedUpdates::update(std::uint32_t offset, Update& into) const {
     ByteReader in(std::span<const std::uint8_t>(bytes).subspan(offset));
-    return read_update(in);
-}
-
-Push PackedUpdates::push(std::uint32_t offset) const {
-    ByteReader in(std::span<const std::uint8_t>(bytes).subspan(offset));
-    return read_push(in);
+    read_update(in, into);
 }
 
 PackedUpdates::Glance PackedUpdates::glance(std::uint32_t offset) const {

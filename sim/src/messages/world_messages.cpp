@@ -20,7 +20,7 @@ constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64, kLongestHost =
 // What several messages hold.
 
 void write(ByteWriter& out, const StepReport& r) {
-    for (const float x : {r.seconds, r.smoothed_s, r.waited_s}) out.number(x);
+    for (const float x : {r.seconds, r.smoothed_s, r.waited_s, r.processor_s}) out.number(x);
     for (const std::uint32_t n : {r.lead, r.ghost_age, r.cross_contacts, r.own}) out.number(n);
     out.matrix(r.outside_impulse);
     out.count(r.mishaps.size());
@@ -52,7 +52,7 @@ Mishap read_mishap(ByteReader& in) {
 
 StepReport read_report(ByteReader& in) {
     StepReport r;
-    for (float* x : {&r.seconds, &r.smoothed_s, &r.waited_s}) {
+    for (float* x : {&r.seconds, &r.smoothed_s, &r.waited_s, &r.processor_s}) {
         *x = in.number<float>();
         if (!(*x >= 0 && *x <= 1e9f)) throw DecodeError("a report of a time out of range");
     }
@@ -143,9 +143,8 @@ void write_body(ByteWriter& out, const StateMessage& m) {
 }
 void write_body(ByteWriter& out, const UpdateMessage& m) {
     write(out, m.report);
-    write_applied(out, m.sources, m.applied);
     write(out, m.bodies);
-    write(out, m.pushes);
+    write(out, m.crossed);
     write_numbers(out, m.broken);
 }
 void write_body(ByteWriter&, const PackedUpdates&) {
@@ -216,9 +215,8 @@ void read_body(ByteReader& in, StateMessage& m) {
 }
 void read_body(ByteReader& in, UpdateMessage& m) {
     m.report = read_report(in);
-    read_applied(in, m.sources, m.applied);
     m.bodies = read_updates(in);
-    m.pushes = read_pushes(in);
+    m.crossed = read_crossed(in);
     read_numbers(in, m.broken);
 }
 void read_body(ByteReader&, PackedUpdates&) {
@@ -309,9 +307,8 @@ DecodedWorldMessage decode_for_worker(std::vector<std::uint8_t> bytes) {
     const std::span<const std::uint8_t> all = std::span(bytes).first(bytes.size() - kChecksumBytes);
     ByteReader in(all.subspan(kHeaderBytes));
     packed.report = read_report(in);
-    read_applied(in, packed.sources, packed.applied);
     find_updates(in, all, packed.bodies);
-    find_pushes(in, all, packed.pushes);
+    packed.crossed = read_crossed(in);
     read_numbers(in, packed.broken);
     in.expect_end();
     packed.bytes = std::move(bytes);

@@ -15,7 +15,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 5
+//   4       2      version, 6
 //   6       2      type
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
@@ -39,13 +39,13 @@ namespace sim {
 //    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of applied
 //   10 snapshot   app     u64 step, list of record, list of contact, list of spring, v3 outside impulse
 //   11 state      worker  report, list of record, list of contact, list of spring
-//   12 update     worker  report, lists of applied, update, push, u32 (constraints that broke)
+//   12 update     worker  report, lists of update, crossed, u32 (constraints that broke)
 //   13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds}
 //   14 answer     worker  u32 to, u32 number, flag accepted
 //   15 handover   worker  u32 to, u32 number, list of record, list of applied
 //
-//   report      56 bytes and its mishaps: f32 seconds, smoothed, waited; u32 lead, ghost age, cross contacts,
-//               own; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
+//   report      60 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
+//               cross contacts, own; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
 //   applied     12 bytes: u32 worker, u64 step
 //   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8 broken),
 //               u16 still steps, i32 sleep group, v3 position, f64 orientation w x y z, v3 velocity,
@@ -57,8 +57,7 @@ namespace sim {
 //               b/m, u8 (1 asleep, 2 still, 4 quarantined, 8 held, and 16 times E), w3 position,
 //               7 bytes orientation, 3 f16 velocity, 3 i16 angular momentum in units of
 //               2^(4 E - 44) kg m^2/s, f16 q[m], f16 q'[m]; held: 3 f16 linear, 3 f16 angular, f16 modal[m]
-//   push        76 + 8 m bytes: b/m, v3 linear, v3 angular, w3 displacement, w3 turn, f32 q[m] and q'[m] at
-//               the end of the step
+//   crossed     45 bytes: u32 own, u32 other, flag blow, w3 linear on own, w3 angular on own, w3 angular on other
 //   scene, settings: see world_scene_codec.cpp
 //
 // The 7 bytes of an orientation: 56 bits, lowest first: which of x, y, z, w is largest in size (2 bits; it is
@@ -77,7 +76,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kWorldProtocol = 5;  ///< version
+constexpr std::uint16_t kWorldProtocol = 6;  ///< version
 
 struct WorldHeader {
     std::uint32_t worker = kApplication;
@@ -95,7 +94,7 @@ struct Mishap {
 
 /// A worker's report of its last step, in every state and update message.
 struct StepReport {
-    float seconds = 0, smoothed_s = 0, waited_s = 0;
+    float seconds = 0, smoothed_s = 0, waited_s = 0, processor_s = 0;  ///< see WorkerStep
     std::uint32_t lead = 0, ghost_age = 0, cross_contacts = 0;
     std::uint32_t own = 0;
     Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< since this worker's start
@@ -137,11 +136,12 @@ struct Members {
 struct Ownership {
     std::uint32_t owner = 0;
     std::uint32_t from = kApplication;  ///< the owner before; kApplication: none
-    bool traded = false;                ///< by handover; else at the start or after a loss
+    bool traded = false;                ///< to a buyer; else at the start, after a loss, or as one drains
     std::uint64_t step = 0;
-    std::vector<WorldRecord> bodies;     ///< exact; without a handover in bounded pace as last published
-    std::vector<std::uint64_t> applied;  ///< bounded: see UpdateMessage; one for each entry of `sources`
+    std::vector<WorldRecord> bodies;  ///< exact; without a handover in bounded pace as last published
+    /// Bounded, of what was handed over: the states include what came of these workers' messages up to these steps.
     std::vector<std::uint32_t> sources;
+    std::vector<std::uint64_t> applied;
 };
 /// Everything at the end of a step that all have done, for a worker that joins late, or a run that goes on from there.
 struct SnapshotMessage {
@@ -158,45 +158,35 @@ struct StateMessage {
     std::vector<SpringRecord> springs;
 };
 
-/// Bounded. A push: the impulse that the sender's bodies gave to another worker's body in the last step.
-struct Push {
-    std::uint32_t body = 0;
-    StepImpulse impulse;  ///< linear and angular exact, the rest as floats
-};
-/// One body's state, quantised: at most 120 bytes with 12 modes.
+/// Bounded. One body's state, quantised: at most 120 bytes with 12 modes.
 struct Update {
     std::uint32_t body = 0;
     bool asleep = false, still = false, quarantined = false;
     WorldBodyState state;
     bool held = false;    ///< whether `impulse` is there
-    StepImpulse impulse;  ///< from the owner's other bodies, lasting; linear, angular, modal
+    StepImpulse impulse;  ///< from the owner's other bodies, the mean of a step; linear, angular, modal
 };
 struct UpdateMessage {
     StepReport report;
-    /// Pushes that the states include: for each source worker all of its messages up to this step.
-    std::vector<std::uint32_t> sources;
-    std::vector<std::uint64_t> applied;
-    std::vector<Update> bodies;
-    std::vector<Push> pushes;
+    std::vector<Update> bodies;         ///< own, ascending
+    std::vector<CrossImpulse> crossed;  ///< of own bodies with others' in the last step, as floats
     std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
 };
 
-/// An UpdateMessage as a worker gets it: of hundreds of bodies it needs the few that are near, so states and
-/// pushes are read one by one when they are needed.
+/// An UpdateMessage as a worker gets it: of hundreds of bodies it needs the few that are near, so states are
+/// read one by one when they are needed.
 struct PackedUpdates {
     struct Place {
         std::uint32_t body, offset;
     };
     StepReport report;
-    std::vector<std::uint32_t> sources;
-    std::vector<std::uint64_t> applied;
     std::vector<std::uint32_t> broken;
+    std::vector<CrossImpulse> crossed;
     std::vector<std::uint8_t> bytes;
-    std::vector<Place> bodies, pushes;  ///< in bytes
+    std::vector<Place> bodies;  ///< in bytes; ascending
 
     /// Throw DecodeError.
-    [[nodiscard]] Update update(std::uint32_t offset) const;
-    [[nodiscard]] Push push(std::uint32_t offset) const;
+    void update(std::uint32_t offset, Update& into) const;
     /// The part of an update that is needed to find near bodies.
     struct Glance {
         Eigen::Vector3d position, velocity;  ///< [m], [m/s]
@@ -220,7 +210,7 @@ struct OfferAnswer {
 struct Handover {
     std::uint32_t to = 0, number = 0;
     std::vector<WorldRecord> bodies;
-    std::vector<std::uint32_t> sources;
+    std::vector<std::uint32_t> sources;  ///< see Ownership
     std::vector<std::uint64_t> applied;
 };
 

@@ -1,25 +1,22 @@
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <set>
+#include <utility>
 
+#include "messages/update_codec.h"
 #include "shared/body_costs.h"
-#include "shared/ghosts.h"
 #include "shared/replica.h"
 #include "shared/replica_protocol.h"
+#include "shared/shared_contacts.h"
 
 namespace sim {
 namespace {
 
 // Every worker is at a step of its own. Its world holds its bodies; of the others' bodies those that may come
-// near are put in as ghosts for each step.
+// near are put in as ghosts for each step, and move with them.
 //
-// A contact between an own body and a ghost is resolved by the owner of the lower number: one owner, so one
-// resolver. The impulse on the ghost is published as a push, in the same message as the states that result
-// from it: either both arrive or neither. The ghost's owner holds the push over the same step if it arrives
-// in time; otherwise it holds the lasting part of the two steps before (ImpulseLog), and corrects by the
-// difference when the push arrives. So every impulse arrives exactly once and momentum is kept. `applied`
-// says which pushes a state includes; every reader of a ghost corrects it by the pushes that it
-// knows.
+// A contact between bodies of two owners is resolved by both (SharedContacts), and workers whose bodies touch keep closer to
+// each other (touching_lead).
 class BoundedExchange final : public ReplicaProtocol {
 public:
     explicit BoundedExchange(const SceneMessage& scene);
@@ -33,9 +30,9 @@ public:
     void step() override;
     [[nodiscard]] std::vector<std::uint8_t> publish(std::uint32_t epoch, const StepReport& report) override;
     void follow() override;
-    [[nodiscard]] std::vector<Lot> lots(std::uint32_t towards) const override;
+    [[nodiscard]] Holdings holdings() override;
     [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies) override;
-    void cost(double seconds) override { costs_.share(seconds, world_, owned_); }
+    void weigh() override { costs_.add(world_, owned_); }
     [[nodiscard]] std::uint64_t steps_done() const override { return step_; }
     [[nodiscard]] bool at_end() const override { return step_ >= settings_.steps; }
     [[nodiscard]] bool done() const override { return at_end() && settled_; }
@@ -45,88 +42,90 @@ public:
     [[nodiscard]] const World& world() const override { return world_; }
 
 private:
-    struct Felt {  // what other bodies of this worker did to an own one in the last two steps
-        StepImpulse last, before;
+    struct Felt {                   // what other bodies of this worker do to an own one
+        StepImpulse mean;           // of a step
+        int steps = 0;              // that it is of
+        std::uint64_t held = 0;     // step in which they last did anything
+        std::uint64_t touched = 0;  // step in which it last touched another worker's
+        bool watched = false;       // in the step
     };
     void come_to(std::uint64_t step);
     void list();
     void set_own(int body, bool own);
     void take_over(const Ownership& ownership);
     void take_due();
-    void put_right();
-    void hold_pushes();
     void place_ghosts();
-    void keep_pushes();
-    void give_push(int ghost, const StepImpulse& impulse);
-    [[nodiscard]] int resolvers(int own, int ghost) const;
+    void keep_crossed();
     void feel();
     void settle();
+    [[nodiscard]] std::uint64_t known(std::uint32_t worker) const {
+        const auto found = known_.find(worker);
+        return found == known_.end() ? 0 : found->second;
+    }
     [[nodiscard]] std::uint64_t slowest() const;
     [[nodiscard]] bool owns_any(std::uint32_t worker) const;
-    void applied(std::vector<std::uint32_t>& sources, std::vector<std::uint64_t>& steps) const;
-    [[nodiscard]] Update update_of(int body) const;
+    void tell(int body, Update& update);
 
     std::uint32_t self_;
     DistributedSettings settings_;
     World world_;
     SceneClock clock_;
     BodyCosts costs_;
-    ImpulseLog pushes_;
-    Ghosts foreign_;
+    ColumnWatch columns_;
+    ForeignBodies foreign_;
     std::uint64_t step_ = 0;
-    std::vector<int> lot_;              // of each body: lowest number of those that constraints tie it to
     std::vector<std::uint32_t> owner_;  // as registered
+    std::set<std::uint32_t> owners_;    // who has any
     std::vector<std::uint8_t> own_;
     std::vector<int> owned_, others_;  // there, ascending; moving ones of others
     std::vector<std::uint32_t> members_;
-    std::map<std::uint32_t, std::uint64_t> applied_;  // pushes that own states include
+    SharedContacts contacts_;
+    std::map<std::uint32_t, std::uint64_t> known_;  // workers: step that they have done
+    std::map<std::uint32_t, std::uint64_t> told_;   // workers: step of their last message
     std::vector<Ownership> later_;
     std::vector<ForeignBall> balls_;
     std::vector<int> near_;
-    std::vector<int> leant_on_;                      // ghosts of this step that others hold, too
-    std::vector<Push> given_;                        // in the last step
+    std::vector<CrossImpulse> crossed_;              // in the last step
+    WorldRecord record_;                             // of the body that is being told of
+    WorldMessage outgoing_ = UpdateMessage{};        // kept for its storage
     std::vector<std::uint32_t> breakable_, broken_;  // constraints; those that broke in the last step
-    std::map<std::pair<int, int>, CrossImpulse> crossed_;
-    std::map<int, Felt> felt_;
+    std::map<int, Felt> felt_;                       // of own bodies that touch others'
     std::vector<std::uint8_t> told_asleep_;
-    std::map<std::uint32_t, std::uint64_t>
-        touched_;  // workers: step of the last push between their bodies and own ones
+    struct Touch {
+        std::uint64_t step = 0;  // in which their bodies and own ones last touched
+        int pairs = 0;           // of bodies, then
+    };
+    std::map<std::uint32_t, Touch> touched_;  // workers
     int ghost_age_ = 0;
     bool settled_ = false;
 };
 
-constexpr int kMostBound = 64;
-constexpr std::uint64_t kTouchingLead = 1, kTouchingSteps = 4;
+constexpr std::uint64_t kTouchingSteps = 4;
 
-// From what was towards what is, by a share; displacement and turn are pushes out of overlaps, which do not
-// last.
-void blend(const StepImpulse& before, double share, StepImpulse& now) {
-    const Eigen::Vector3d displacement = share * now.displacement, turn = share * now.turn;
-    add_impulse(now, now, share - 1);
-    add_impulse(now, before, 1 - share);
-    now.displacement = displacement, now.turn = turn;
-}
+constexpr std::uint64_t kForever = ~std::uint64_t{0};
 
 int keep_steps(int bound) {
-    return 4 * std::min(bound, kMostBound) + 16;
+    return 2 * blow_window(bound);
 }
 
-// Bodies that constraints tie together, now or later: the lowest number of each such group.
-std::vector<int> tied(const WorldScene& scene, int bodies) {
-    std::vector<int> root(static_cast<std::size_t>(bodies));
-    std::iota(root.begin(), root.end(), 0);
-    auto find = [&root](int i) {
-        while (root[static_cast<std::size_t>(i)] != i) i = root[static_cast<std::size_t>(i)];
-        return i;
+// Steps that workers whose bodies touch may be apart: bodies hold each other up by what was, and the older that is, the less
+// steady they stand. Where few touch it matters less than waiting does.
+std::uint64_t touching_lead(int bound, int pairs) {
+    constexpr int kFewPairs = 8;
+    return static_cast<std::uint64_t>(std::max(1, bound / 4)) * (pairs <= kFewPairs ? 2 : 1);
+}
+
+// A running mean, by a step's impulse (nullptr: none) with this weight.
+void average(StepImpulse& mean, const StepImpulse* now, double weight) {
+    const auto pull = [&](auto& to, const auto& from) {
+        if (to.size() != from.size()) to.setZero(from.size());
+        to += weight * (from - to);
     };
-    auto fixed = [&scene](int i) { return !scene.world.bodies[static_cast<std::size_t>(i)].moves(); };
-    for (const PointConstraint& c : scene.world.constraints) {
-        if (c.body_b < 0 || fixed(c.body_a) || fixed(c.body_b)) continue;
-        const int a = find(c.body_a), b = find(c.body_b);
-        root[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+    if (!now) {
+        mean.linear *= 1 - weight, mean.angular *= 1 - weight, mean.modal *= 1 - weight;
+    } else if (now->linear.allFinite() && now->angular.allFinite() && now->modal.allFinite()) {
+        pull(mean.linear, now->linear), pull(mean.angular, now->angular), pull(mean.modal, now->modal);
     }
-    for (int i = 0; i < bodies; ++i) root[static_cast<std::size_t>(i)] = find(i);
-    return root;
 }
 
 BoundedExchange::BoundedExchange(const SceneMessage& scene)
@@ -134,10 +133,11 @@ BoundedExchange::BoundedExchange(const SceneMessage& scene)
       settings_(scene.settings),
       world_(scene.scene.world),
       clock_(scene.scene),
-      costs_(clock_.bodies(), scene.settings.market.smoothing_steps),
-      pushes_(world_, clock_.bodies(), keep_steps(scene.settings.bound)),
-      foreign_(world_, pushes_, self_, clock_.bodies(), settings_.bound),
-      lot_(tied(scene.scene, clock_.bodies())) {
+      costs_(clock_.bodies()),
+      columns_(scene.scene),
+      foreign_(world_, self_, clock_.bodies(), keep_steps(scene.settings.bound)),
+      contacts_(world_, foreign_, self_, {own_, owner_}, keep_steps(scene.settings.bound),
+                blow_window(scene.settings.bound)) {
     const auto n = static_cast<std::size_t>(clock_.bodies());
     owner_.assign(n, kApplication), own_.assign(n, 0), told_asleep_.assign(n, 0);
     for (std::size_t c = 0; c < scene.scene.world.constraints.size(); ++c)
@@ -147,7 +147,7 @@ BoundedExchange::BoundedExchange(const SceneMessage& scene)
     for (int i = 0; i < world_.bodies(); ++i) {
         if (!clock_.moves(i)) continue;
         world_.set_own(i, false);
-        foreign_.take_own(i, 0, {}, {});
+        foreign_.set(world_.record(i), 0);
     }
     list();
 }
@@ -175,21 +175,26 @@ void BoundedExchange::come_to(std::uint64_t step) {
     for (int i = before; i < world_.bodies(); ++i) {
         const bool own = own_[static_cast<std::size_t>(i)] != 0;
         world_.set_own(i, own);
-        if (clock_.moves(i) && !own && !foreign_.known(i)) foreign_.take_own(i, step, {}, {});
+        if (clock_.moves(i) && !own && !foreign_.known(i)) foreign_.set(world_.record(i), step);
     }
     if (world_.bodies() != before) list();
 }
 
 void BoundedExchange::take(const WorldHeader& header, PackedUpdates&& message) {
-    const auto shared = std::make_shared<const PackedUpdates>(std::move(message));
-    pushes_.add(header.worker, header.step, shared);
-    pushes_.heard(header.worker, header.step);
-    foreign_.take(header.step, shared);
-    for (const PackedUpdates::Place& push : shared->pushes)
-        if (push.body < own_.size() && own_[push.body] != 0)
-            touched_[header.worker] = std::max(step_, header.step);
-    for (const std::uint32_t constraint : shared->broken)
+    std::uint64_t &known = known_[header.worker], &told = told_[header.worker];
+    if (header.step <= told || known == kForever) return;  // what was told stands
+    told = header.step, known = std::max(known, told);
+    for (const std::uint32_t constraint : message.broken)
         world_.remove_constraint(static_cast<int>(constraint));
+    int pairs = 0;
+    for (const CrossImpulse& c : message.crossed) {
+        if (std::max(c.own, c.ghost) >= clock_.bodies())
+            throw DecodeError("found an impulse between bodies that are none");
+        pairs += own_[static_cast<std::size_t>(c.ghost)] != 0;
+    }
+    if (pairs > 0) touched_[header.worker] = {std::max(step_, header.step), pairs};
+    foreign_.take(header.worker, header.step, std::move(message));
+    if (header.step <= step_) contacts_.compare(header.worker, header.step, step_);
 }
 
 // Bodies follow with their owners.
@@ -200,31 +205,24 @@ void BoundedExchange::take(SnapshotMessage&& message) {
 
 void BoundedExchange::members(const std::vector<std::uint32_t>& workers) {
     for (const std::uint32_t was : members_)
-        if (std::find(workers.begin(), workers.end(), was) == workers.end())
-            pushes_.heard(was, ImpulseLog::kForever);
+        if (std::find(workers.begin(), workers.end(), was) == workers.end()) known_[was] = kForever;
     members_ = workers;
 }
 
 void BoundedExchange::own(const Ownership& ownership) {
     const std::uint32_t owner = ownership.owner;
-    const bool first = std::find(owner_.begin(), owner_.end(), owner) == owner_.end();
-    UpdateMessage message;
-    message.sources = ownership.sources, message.applied = ownership.applied;
+    const bool first = !owners_.contains(owner);
+    // A worker that owned nothing begins here.
+    if (first && owner != self_) known_[owner] = std::max(known_[owner], ownership.step);
     for (const WorldRecord& record : ownership.bodies) {
         owner_[static_cast<std::size_t>(record.body)] = owner;
-        Update& update = message.bodies.emplace_back();
-        update.body = static_cast<std::uint32_t>(record.body);
-        update.asleep = record.asleep, update.quarantined = record.quarantined;
-        update.state = record.state;
+        if (ownership.from != kApplication) contacts_.sold(record.body, ownership.from, ownership.step);
         if (owner != self_ && own_[static_cast<std::size_t>(record.body)] != 0) set_own(record.body, false);
+        // As last published: members already have that message, with the forces that held the bodies.
+        if (ownership.traded || foreign_.newest(record.body) < ownership.step)
+            foreign_.set(record, ownership.step);
     }
-    // A worker that owned nothing begins here.
-    if (first && owner != self_) pushes_.heard(owner, ownership.step);
-    // State as last published: members already have that message, with the forces that held the bodies.
-    std::erase_if(message.bodies, [&](const Update& u) {
-        return !ownership.traded && foreign_.newest(static_cast<int>(u.body)) >= ownership.step;
-    });
-    foreign_.take(ownership.step, message);
+    owners_ = {owner_.begin(), owner_.end()};
     if (owner == self_) {
         later_.push_back(ownership);
         follow();
@@ -260,17 +258,22 @@ void BoundedExchange::take_due() {
 // The bodies as they are at this worker's step.
 void BoundedExchange::take_over(const Ownership& ownership) {
     settled_ = false;
-    put_right();
+    std::map<std::uint32_t, std::uint64_t> compared;
+    for (std::size_t i = 0; i < ownership.sources.size(); ++i)
+        compared[ownership.sources[i]] = ownership.applied[i];
     for (const WorldRecord& record : ownership.bodies) {
         const int body = record.body;
         if (owner_[static_cast<std::size_t>(body)] != self_) continue;  // gone again
         if (body < world_.bodies()) {
             WorldRecord now = record;
-            const Ghosts::Ghost ghost = foreign_.at(body, step_);
-            now.state = ghost.state;
-            now.asleep = now.asleep && ghost.asleep;
+            if (step_ > ownership.step) {
+                const ForeignBodies::Ghost& ghost = foreign_.at(body, step_);
+                now.state = ghost.state;
+                now.asleep = now.asleep && ghost.asleep;
+            }
             set_own(body, true);
             world_.restore(now);
+            if (!compared.empty()) contacts_.took(body, compared);
         } else {
             set_own(body, true);
         }
@@ -279,15 +282,14 @@ void BoundedExchange::take_over(const Ownership& ownership) {
 }
 
 bool BoundedExchange::owns_any(std::uint32_t worker) const {
-    return std::find(members_.begin(), members_.end(), worker) != members_.end() &&
-           std::find(owner_.begin(), owner_.end(), worker) != owner_.end();
+    return std::find(members_.begin(), members_.end(), worker) != members_.end() && owners_.contains(worker);
 }
 
 std::uint64_t BoundedExchange::slowest() const {
-    std::uint64_t slowest = ImpulseLog::kForever;
+    std::uint64_t slowest = kForever;
     for (const std::uint32_t worker : members_) {
         if (worker == self_ || !owns_any(worker)) continue;
-        slowest = std::min(slowest, pushes_.known(worker));
+        slowest = std::min(slowest, known(worker));
     }
     return slowest;
 }
@@ -301,46 +303,11 @@ bool BoundedExchange::ready() const {
     if (owned_.empty()) return false;
     if (at_end()) return !settled_ && slowest() >= settings_.steps;
     if (lead() > settings_.bound) return false;
-    // Bodies that touch across workers hold each other up by what was: the older, the less steady.
-    return std::all_of(touched_.begin(), touched_.end(), [this](const auto& t) {
-        return t.second + kTouchingSteps < step_ || !owns_any(t.first) ||
-               pushes_.known(t.first) + kTouchingLead >= step_;
+    return std::all_of(touched_.begin(), touched_.end(), [&](const auto& t) {
+        const auto& [worker, touch] = t;
+        return touch.step + kTouchingSteps < step_ || !owns_any(worker) ||
+               known(worker) + touching_lead(settings_.bound, touch.pairs) >= step_;
     });
-}
-
-// Pushes that came since: what was assumed of steps that are over is put right.
-void BoundedExchange::put_right() {
-    StepImpulse scratch;
-    for (const auto& [source, known] : pushes_.sources()) {
-        std::uint64_t& then = applied_[source];
-        if (source == self_ || known <= then) continue;
-        for (const int body : owned_) {
-            if (pushes_.quiet(body) || then >= step_) continue;
-            for (std::uint64_t step = pushes_.first_kept(then + 1, step_); step <= step_; ++step) {
-                const int ago = static_cast<int>(step_ - step);
-                if (const StepImpulse* right = pushes_.seen(body, source, step, known, scratch))
-                    world_.correct(body, *right, ago);
-                if (const StepImpulse* wrong = pushes_.seen(body, source, step, then, scratch))
-                    world_.correct(body, *wrong, ago, -1);
-            }
-        }
-        then = known;
-    }
-}
-
-void BoundedExchange::hold_pushes() {
-    StepImpulse scratch;
-    for (const int body : owned_) {
-        if (pushes_.quiet(body)) continue;
-        StepImpulse held;
-        bool any = false;
-        for (const std::uint32_t source : pushes_.sources_of(body))
-            if (source != self_)
-                if (const StepImpulse* push =
-                        pushes_.seen(body, source, step_ + 1, applied_[source], scratch))
-                    add_steady(held, *push), any = true;
-        if (any) world_.hold(body, held);
-    }
 }
 
 void BoundedExchange::place_ghosts() {
@@ -349,85 +316,59 @@ void BoundedExchange::place_ghosts() {
         if (foreign_.known(body) && !foreign_.quarantined(body)) balls_.push_back(foreign_.ball(body, step_));
     world_.near_own(balls_, near_);
     ghost_age_ = 0;
-    leant_on_.clear();
     for (const int body : near_) {
-        const Ghosts::Ghost ghost = foreign_.at(body, step_);
+        const ForeignBodies::Ghost& ghost = foreign_.at(body, step_);
         if (!world_.is_near_own(body, ghost.state)) continue;
         ghost_age_ = std::max(ghost_age_, ghost.age);
-        if (ghost.leant_on) leant_on_.push_back(body);
-        world_.place_ghost(body, ghost.state, is_zero(ghost.held) ? nullptr : &ghost.held, ghost.asleep);
+        world_.place_ghost(body, ghost.state, ghost.held.is_zero() ? nullptr : &ghost.held, ghost.asleep);
     }
 }
 
-// What is given to ghosts. Several workers may resolve contacts of one body in the same step, each against
-// what the others did before; all together would overdo it and swing. So a contact that lasts changes by its
-// share only: one in as many as work on either body.
-void BoundedExchange::keep_pushes() {
-    given_.clear();
-    std::map<std::pair<int, int>, CrossImpulse> now;
-    for (CrossImpulse cross : world_.cross_impulses()) {
-        if (!is_finite(cross.on_ghost) || !is_finite(cross.on_own)) continue;  // of a body that is broken
-        const auto before = crossed_.find({cross.own, cross.ghost});
-        const double share = 1.0 / resolvers(cross.own, cross.ghost);
-        if (before != crossed_.end() && share < 1) {
-            world_.correct(cross.own, cross.on_own, 0, -1);
-            blend(before->second.on_own, share, cross.on_own);
-            blend(before->second.on_ghost, share, cross.on_ghost);
-            world_.correct(cross.own, cross.on_own, 0);
-        }
-        give_push(cross.ghost, cross.on_ghost);
-        touched_[owner_[static_cast<std::size_t>(cross.ghost)]] = step_;
-        now.emplace(std::pair(cross.own, cross.ghost), std::move(cross));
+// Impulses between own bodies and ghosts, as they travel: own bodies get what is lost by rounding.
+void BoundedExchange::keep_crossed() {
+    crossed_.clear();
+    for (CrossImpulse c : world_.cross_impulses()) {
+        if (!c.linear.allFinite() || !c.angular_own.allFinite() || !c.angular_ghost.allFinite())
+            continue;  // of a body that is broken
+        const Eigen::Vector3d linear = as_sent(c.linear), angular = as_sent(c.angular_own);
+        world_.kick(c.own, linear - c.linear, angular - c.angular_own);
+        c.linear = linear, c.angular_own = angular;
+        c.angular_ghost = as_sent(c.angular_ghost);
+        felt_[c.own].touched = step_;
+        crossed_.push_back(c);
     }
-    crossed_ = std::move(now);
-    // As they travel: all but linear and angular as floats.
-    for (Push& push : given_) {
-        StepImpulse& sent = push.impulse;
-        sent.modal_q = sent.modal_q.cast<float>().cast<double>();
-        sent.modal_rate = sent.modal_rate.cast<float>().cast<double>();
-        world_.spread_modes(static_cast<int>(push.body), sent);
-        sent.displacement = sent.displacement.cast<float>().cast<double>();
-        sent.turn = sent.turn.cast<float>().cast<double>();
-        pushes_.add(static_cast<int>(push.body), self_, step_, sent);
-    }
-    pushes_.heard(self_, step_);
+    const auto touches = [this](const CrossImpulse& c) -> Touch& {
+        return touched_[owner_[static_cast<std::size_t>(c.ghost)]];
+    };
+    for (const CrossImpulse& c : crossed_) touches(c) = {step_, 0};
+    for (const CrossImpulse& c : crossed_) ++touches(c).pairs;
+    touched_.erase(self_);  // what was bought is not own before its step
+    foreign_.keep_own(step_, crossed_);
+    for (const auto& [worker, known] : known_)
+        if (known >= step_) contacts_.compare(worker, step_, step_);
 }
 
-void BoundedExchange::give_push(int ghost, const StepImpulse& impulse) {
-    for (Push& push : given_)
-        if (push.body == static_cast<std::uint32_t>(ghost)) return add_impulse(push.impulse, impulse);
-    given_.push_back({static_cast<std::uint32_t>(ghost), impulse});
-}
-
-int BoundedExchange::resolvers(int own, int ghost) const {
-    const auto recent = static_cast<std::uint64_t>(settings_.bound) + 3;
-    const std::uint64_t since = step_ > recent ? step_ - recent : 0;
-    const bool leant_on = std::find(leant_on_.begin(), leant_on_.end(), ghost) != leant_on_.end();
-    return 1 + std::max(pushes_.count_since(own, since, self_),
-                        pushes_.count_since(ghost, since, self_) + (leant_on ? 1 : 0));
-}
-
-// Of bodies that others push, what own ones do to them: others want to know what holds the ghost.
+// What holds bodies that touch others': those who have them as ghosts want to know.
 void BoundedExchange::feel() {
-    for (const int body : owned_) {
-        const bool pushed = !pushes_.quiet(body);
-        world_.watch(body, pushed);
-        if (!pushed) {
-            felt_.erase(body);
-            continue;
+    for (auto entry = felt_.begin(); entry != felt_.end();) {
+        auto& [body, felt] = *entry;
+        const bool touches =
+            felt.touched + kTouchingSteps >= step_ && own_[static_cast<std::size_t>(body)] != 0;
+        if (felt.watched) {
+            const StepImpulse* now = world_.impulse(body);
+            if (now) felt.held = step_;
+            felt.steps = std::min(felt.steps + 1, kHeldSteps);
+            average(felt.mean, now, 1.0 / felt.steps);
+            if (felt.held + kTouchingSteps < step_) felt.mean.set_zero(), felt.steps = 0;  // it is free
         }
-        Felt& felt = felt_[body];
-        std::swap(felt.before, felt.last);
-        if (const StepImpulse* now = world_.impulse(body))
-            felt.last = *now;
-        else
-            felt.last = {};
+        felt.watched = touches;
+        world_.watch(body, touches);
+        entry = touches ? std::next(entry) : felt_.erase(entry);
     }
 }
 
-// After the last step: pushes that came late. Nobody will hear of these states but the application.
+// After the last step: states that what came late has put right. Nobody will hear of them but the application.
 void BoundedExchange::settle() {
-    put_right();
     std::fill(told_asleep_.begin(), told_asleep_.end(), std::uint8_t{0});
     settled_ = true;
 }
@@ -435,8 +376,6 @@ void BoundedExchange::settle() {
 void BoundedExchange::step() {
     if (at_end()) return settle();
     come_to(step_);
-    put_right();
-    hold_pushes();
     place_ghosts();
     std::vector<std::uint32_t> breakable;
     for (const std::uint32_t c : breakable_)
@@ -445,82 +384,56 @@ void BoundedExchange::step() {
     ++step_;
     for (const std::uint32_t c : breakable)
         if (!world_.constraint_holds(static_cast<int>(c))) broken_.push_back(c);
-    keep_pushes();
+    keep_crossed();
     feel();
-    pushes_.prune(step_);
     take_due();
 }
 
-void BoundedExchange::applied(std::vector<std::uint32_t>& sources, std::vector<std::uint64_t>& steps) const {
-    for (const auto& [source, known] : applied_) {
-        if (source == self_) continue;
-        sources.push_back(source), steps.push_back(known);
-    }
-    sources.push_back(self_), steps.push_back(step_);
-}
-
-Update BoundedExchange::update_of(int body) const {
-    const WorldRecord record = world_.record(body);
-    Update update;
+void BoundedExchange::tell(int body, Update& update) {
+    world_.record(body, record_);
     update.body = static_cast<std::uint32_t>(body);
-    update.asleep = record.asleep, update.quarantined = record.quarantined;
-    update.still = record.asleep || record.still_steps * world_.settings().dt >= 0.5 - 1e-9;
-    update.state = record.state;
-    if (const auto felt = felt_.find(body); felt != felt_.end()) {
-        lasting(felt->second.last, felt->second.before, update.impulse);
-        update.held = !is_zero(update.impulse);
-    }
-    return update;
+    update.asleep = record_.asleep, update.quarantined = record_.quarantined;
+    update.still = record_.asleep || record_.still_steps * world_.settings().dt >= 0.5 - 1e-9;
+    std::swap(update.state, record_.state);
+    const auto felt = felt_.find(body);
+    if (felt != felt_.end()) update.impulse = felt->second.mean;
+    update.held = felt != felt_.end() && !update.impulse.is_zero();
 }
 
 std::vector<std::uint8_t> BoundedExchange::publish(std::uint32_t epoch, const StepReport& report) {
-    UpdateMessage message;
+    auto& message = std::get<UpdateMessage>(outgoing_);
     message.report = report;
-    applied(message.sources, message.applied);
+    std::size_t count = 0;
     for (const int body : owned_) {
         std::uint8_t& told = told_asleep_[static_cast<std::size_t>(body)];
         const bool asleep = world_.asleep(body);
         if (asleep && told != 0) continue;
         told = asleep;
-        message.bodies.push_back(update_of(body));
+        if (count == message.bodies.size()) message.bodies.emplace_back();
+        tell(body, message.bodies[count++]);
     }
-    message.pushes = std::move(given_);
-    given_.clear();
-    message.broken = std::move(broken_);
-    broken_.clear();
-    return encode({self_, epoch, step_}, message);
+    message.bodies.resize(count);
+    message.crossed.swap(crossed_), crossed_.clear();
+    message.broken.swap(broken_), broken_.clear();
+    return encode({self_, epoch, step_}, outgoing_);
 }
 
-std::vector<ReplicaProtocol::Lot> BoundedExchange::lots(std::uint32_t towards) const {
-    std::vector<int> others;
-    for (const int i : others_)
-        if (owner_[static_cast<std::size_t>(i)] == towards) others.push_back(i);
-    Eigen::Vector3d theirs = Eigen::Vector3d::Zero();
-    for (const int i : others) theirs += foreign_.last_position(i) / static_cast<double>(others.size());
-    const std::vector<double> pull = pulls(world_, owned_, others);
-    std::map<int, Lot> lots;
-    for (std::size_t i = 0; i < owned_.size(); ++i) {
-        const int body = owned_[i];
-        Lot& lot = lots.try_emplace(lot_[static_cast<std::size_t>(body)], Lot{{}, 0, -1e300}).first->second;
-        lot.bodies.push_back(static_cast<std::uint32_t>(body));
-        const bool known = costs_.of(body) >= 0 && lot.cost_s >= 0;
-        lot.cost_s = known ? lot.cost_s + costs_.of(body) : -1;
-        lot.pull = std::max(lot.pull, pull[i]);
-    }
-    std::vector<Lot> all;
-    for (auto& [first, lot] : lots)
-        if (lot.cost_s > 0) all.push_back(std::move(lot));
-    return all;
+Holdings BoundedExchange::holdings() {
+    return columns_.holdings(self_, world_, owner_, costs_, [this](int body) {
+        const bool told = !world_.own(body) && foreign_.known(body);
+        return told ? foreign_.last_position(body) : world_.state(body).position;
+    });
 }
 
 Handover BoundedExchange::give(const std::vector<std::uint32_t>& bodies) {
-    put_right();
     Handover handover;
-    applied(handover.sources, handover.applied);
+    handover.sources = {self_}, handover.applied = {step_};
+    for (const auto& [worker, told] : told_)
+        handover.sources.push_back(worker), handover.applied.push_back(std::min(told, step_));
     for (const std::uint32_t id : bodies) {
         const int body = static_cast<int>(id);
         handover.bodies.push_back(world_.record(body));
-        foreign_.take_own(body, step_, handover.sources, handover.applied);
+        foreign_.set(handover.bodies.back(), step_);
         set_own(body, false);
     }
     list();

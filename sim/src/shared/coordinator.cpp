@@ -46,11 +46,14 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
       settings_(settings),
       observer_(&observer),
       view_(scene, settings.pace),
+      columns_(scene),
       lots_(joined_lots(scene)) {
     for (WorldRecord& record : first_records(scene, view_.world())) {
         const std::uint64_t born = view_.clock().born(static_cast<int>(bodies_.size()));
-        bodies_.push_back({kApplication, born, std::move(record), none_, 0});
+        bodies_.push_back({kApplication, born, std::move(record), 0});
     }
+    // A run that goes on shares out as from its start.
+    first_places_ = places();
     if (from) go_to(*from);
 }
 
@@ -158,17 +161,18 @@ void Coordinator::start() {
     if (members_.empty()) {  // all lost before: the next to join gets everything
         std::vector<int> all;
         for (const std::vector<int>& lot : lots_) all.insert(all.end(), lot.begin(), lot.end());
+        std::ranges::sort(all);
         orphans_.emplace_back(kApplication, std::move(all));
     } else {
         const int workers = settings_.all_to_first ? 1 : static_cast<int>(members_.size());
-        const std::vector<int> first = first_owners(scene_, lots_, workers);
+        const std::vector<int> first = first_owners(columns_, lots_, first_places_, workers);
         std::vector<std::vector<int>> bodies(members_.size());
         for (std::size_t i = 0; i < lots_.size(); ++i) {
             auto& mine = bodies[static_cast<std::size_t>(first[i])];
             mine.insert(mine.end(), lots_[i].begin(), lots_[i].end());
         }
         for (std::size_t i = 0; i < members_.size(); ++i)
-            register_owner(bodies[i], members_[i], kApplication, false);
+            register_owner(bodies[i], members_[i], kApplication);
     }
     advance();
 }
@@ -179,12 +183,10 @@ std::vector<Coordinator::Group> Coordinator::groups(const std::vector<int>& bodi
     std::vector<Group> groups;
     for (const int body : bodies) {
         const Body& b = bodies_[static_cast<std::size_t>(body)];
-        auto same = [&b](const Group& g) {
-            return g.owner == b.owner && g.step == b.step && g.applied == b.applied;
-        };
+        auto same = [&b](const Group& g) { return g.owner == b.owner && g.step == b.step; };
         const auto found = std::find_if(groups.begin(), groups.end(), same);
         if (found == groups.end()) {
-            groups.push_back({b.owner, b.step, b.applied, {body}});
+            groups.push_back({b.owner, b.step, {body}});
         } else {
             found->bodies.push_back(body);
         }
@@ -200,50 +202,66 @@ Ownership Coordinator::ownership(const Group& group) const {
     Ownership message;
     message.owner = group.owner;
     message.step = group.step;
-    message.sources = group.applied->sources;
-    message.applied = group.applied->steps;
     for (const int body : group.bodies)
         message.bodies.push_back(bodies_[static_cast<std::size_t>(body)].record);
     return message;
 }
 
 void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t owner, std::uint32_t from,
-                                 bool traded) {
+                                 const Handover* handed) {
     for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = owner;
     for (const Group& group : groups(bodies)) {
         ++epoch_;
         for (const int body : group.bodies) bodies_[static_cast<std::size_t>(body)].epoch = epoch_;
         Ownership message = ownership(group);
         message.from = from;
-        message.traded = traded;
+        message.traded = handed && handed->to == owner;
+        if (handed) message.sources = handed->sources, message.applied = handed->applied;
         send(members_, message);
         observer_->moved(group.step, static_cast<int>(group.bodies.size()),
                          from == kApplication ? -1 : static_cast<int>(from), static_cast<int>(owner));
     }
 }
 
-// Each group of joined bodies goes to the worker with the fewest bodies.
-void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from) {
+// Of each lot.
+std::vector<Eigen::Vector3d> Coordinator::places() const {
+    std::vector<Eigen::Vector3d> places;
+    for (const std::vector<int>& lot : lots_) {
+        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+        for (const int body : lot) sum += bodies_[static_cast<std::size_t>(body)].record.state.position;
+        places.emplace_back(sum / static_cast<double>(lot.size()));
+    }
+    return places;
+}
+
+// Neighbouring columns go to one worker, the one with the fewest bodies, until it has its share.
+void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from, const Handover* handed) {
     for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = kApplication;
     if (members_.empty()) {
         if (!bodies.empty()) orphans_.emplace_back(from, bodies);
         return;
     }
     std::map<std::uint32_t, std::size_t> count;
-    for (const std::uint32_t worker : members_) count[worker] = owned_by(worker).size();
+    std::size_t all = bodies.size();
+    for (const std::uint32_t worker : members_) all += count[worker] = owned_by(worker).size();
+    const std::vector<Eigen::Vector3d> all_places = places();
+    const std::vector<std::optional<Eigen::Vector3d>> where(all_places.begin(), all_places.end());
+    std::vector<std::optional<Column>> column(lots_.size());
+    columns_.assign(where, column);
+    std::map<Column, std::vector<int>> stands;
+    for (std::size_t i = 0; i < lots_.size(); ++i)
+        for (const int body : lots_[i])
+            if (std::binary_search(bodies.begin(), bodies.end(), body)) stands[*column[i]].push_back(body);
     std::map<std::uint32_t, std::vector<int>> shares;
-    for (const std::vector<int>& lot : lots_) {
-        std::vector<int> some;
-        for (const int body : lot)
-            if (std::binary_search(bodies.begin(), bodies.end(), body)) some.push_back(body);
-        if (some.empty()) continue;
-        const auto least = std::min_element(count.begin(), count.end(),
-                                            [](const auto& a, const auto& b) { return a.second < b.second; });
-        least->second += some.size();
-        auto& share = shares[least->first];
+    auto to = count.end();
+    for (const auto& [at, some] : stands) {
+        if (to == count.end() || to->second * members_.size() >= all)
+            to = std::ranges::min_element(count, {}, [](const auto& c) { return c.second; });
+        to->second += some.size();
+        auto& share = shares[to->first];
         share.insert(share.end(), some.begin(), some.end());
     }
-    for (const auto& [worker, share] : shares) register_owner(share, worker, from, false);
+    for (const auto& [worker, share] : shares) register_owner(share, worker, from, handed);
 }
 
 void Coordinator::remove(std::uint32_t worker) {
@@ -387,12 +405,10 @@ bool Coordinator::own_contacts(std::uint32_t worker, const StateMessage& message
                        [&](const SpringRecord& s) { return owns_constraint(worker, s.constraint); });
 }
 
-void Coordinator::publish(Body& body, WorldRecord&& record, std::uint64_t step,
-                          std::shared_ptr<const Applied> applied) {
+void Coordinator::publish(Body& body, WorldRecord&& record, std::uint64_t step) {
     if (step < body.step) return;
     body.record = std::move(record);
     body.step = step;
-    body.applied = std::move(applied);
 }
 
 void Coordinator::take_state(const WorldHeader& header, std::span<const std::uint8_t> bytes,
@@ -403,7 +419,7 @@ void Coordinator::take_state(const WorldHeader& header, std::span<const std::uin
     if (!own_contacts(header.worker, message))
         return expel(header.worker, "found contacts that are not its to publish");
     for (const WorldRecord& record : message.bodies)
-        publish(bodies_[static_cast<std::size_t>(record.body)], WorldRecord(record), header.step, none_);
+        publish(bodies_[static_cast<std::size_t>(record.body)], WorldRecord(record), header.step);
     report(header, message.report, message.bodies.size(), bytes.size());
     pass_on(header, bytes);
     view_.take(header.step, std::move(message));
@@ -414,32 +430,31 @@ void Coordinator::take_update(const WorldHeader& header, std::span<const std::ui
                               UpdateMessage&& message) {
     Sender& sender = senders_[header.worker];
     // Of the last step there are two: as done, for the others, and with what came late, for the view.
-    const bool last = header.step == settings_.steps;
-    const bool settled = last && sender.step == header.step;
+    const bool last = header.step == settings_.steps, settled = last && sender.step == header.step;
     const bool own = std::all_of(message.bodies.begin(), message.bodies.end(), [&](const Update& u) {
         return owns(header.worker, u.body) && fits(u.body, u.state.q.size()) &&
                (!u.held || fits(u.body, u.impulse.modal.size()));
     });
-    const bool pushes = std::all_of(message.pushes.begin(), message.pushes.end(),
-                                    [&](const Push& p) { return fits(p.body, p.impulse.modal_q.size()); });
-    const bool constraints = std::all_of(message.broken.begin(), message.broken.end(), [&](std::uint32_t c) {
-        return owns_constraint(header.worker, static_cast<int>(c));
+    const bool crossed = std::ranges::all_of(message.crossed, [&](const CrossImpulse& c) {
+        return owns(header.worker, static_cast<std::uint32_t>(c.own)) &&
+               c.ghost < static_cast<int>(bodies_.size()) && view_.clock().moves_at(c.ghost, header.step);
     });
-    if (settings_.pace != Pace::bounded || !own || !pushes || !constraints || !fits(message.report.mishaps) ||
-        header.step < sender.step || (header.step == sender.step && header.step != settings_.steps))
+    const bool constraints = std::ranges::all_of(
+        message.broken, [&](std::uint32_t c) { return owns_constraint(header.worker, static_cast<int>(c)); });
+    if (settings_.pace != Pace::bounded || !own || !crossed || !constraints ||
+        !fits(message.report.mishaps) || header.step < sender.step ||
+        (header.step == sender.step && header.step != settings_.steps))
         return expel(header.worker, "found states that are not its to publish");
     sender.settled = settled;
-    for (const std::uint32_t constraint : message.broken)
-        view_.break_constraint(static_cast<int>(constraint));
-    const auto applied = std::make_shared<const Applied>(Applied{message.sources, message.applied});
+    for (const std::uint32_t c : message.broken) view_.break_constraint(static_cast<int>(c));
     for (const Update& update : message.bodies) {
         WorldRecord record;
         record.body = static_cast<int>(update.body);
         record.state = update.state;
         record.asleep = update.asleep, record.quarantined = update.quarantined;
-        publish(bodies_[update.body], std::move(record), header.step, applied);
+        publish(bodies_[update.body], std::move(record), header.step);
     }
-    if (!last || sender.settled) extend_sleep(header, applied);
+    if (!last || sender.settled) extend_sleep(header);
     report(header, message.report, message.bodies.size(), bytes.size());
     if (!sender.settled) pass_on(header, bytes);
     if (!last || sender.settled) view_.take(header.step, message.bodies);
@@ -448,21 +463,21 @@ void Coordinator::take_update(const WorldHeader& header, std::span<const std::ui
 
 // What sleeps is not published again until it wakes. (Bodies that the sender did not know to be its own when
 // it wrote this are left out.)
-void Coordinator::extend_sleep(const WorldHeader& header, const std::shared_ptr<const Applied>& applied) {
+void Coordinator::extend_sleep(const WorldHeader& header) {
     std::vector<WorldRecord> asleep;
     for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
         Body& body = bodies_[static_cast<std::size_t>(i)];
         if (body.owner != header.worker || body.epoch > header.epoch || body.step >= header.step) continue;
         if (!body.record.asleep || !view_.clock().moves_at(i, header.step)) continue;
         body.step = header.step;
-        body.applied = applied;
         asleep.push_back(body.record);
     }
     view_.take(header.step, asleep);
 }
 
 void Coordinator::take_handover(const WorldHeader& header, Handover&& message) {
-    if (!fits(header.worker, message.bodies))
+    const auto later = [&](std::uint64_t step) { return step > header.step; };
+    if (!fits(header.worker, message.bodies) || std::ranges::any_of(message.applied, later))
         return refuse(header.worker, "found bodies that are not its to hand over");
     std::vector<int> bodies;
     for (const WorldRecord& record : message.bodies) {
@@ -476,25 +491,21 @@ void Coordinator::take_handover(const WorldHeader& header, Handover&& message) {
     if (std::adjacent_find(bodies.begin(), bodies.end()) != bodies.end())
         return refuse(header.worker, "found a body twice");
     view_.take(header.step, message.bodies);
-    const auto applied = std::make_shared<const Applied>(Applied{message.sources, message.applied});
-    for (WorldRecord& record : message.bodies) {
-        Body& body = bodies_[static_cast<std::size_t>(record.body)];
-        publish(body, std::move(record), header.step,
-                settings_.pace == Pace::lockstep ? body.applied : applied);
-    }
+    for (WorldRecord& record : message.bodies)
+        publish(bodies_[static_cast<std::size_t>(record.body)], std::move(record), header.step);
     const bool traded = is_member(message.to) && message.to != header.worker;
     if (traded) {
         ++result_.trades;
         result_.migrations += bodies.size();
-        register_owner(bodies, message.to, header.worker, true);
+        register_owner(bodies, message.to, header.worker, &message);
     } else if (message.to == kApplication && members_.size() > 1) {
         // Of one who leaves: not back to it.
         const std::vector<std::uint32_t> all = members_;
         std::erase(members_, header.worker);
-        share_out(bodies, header.worker);
+        share_out(bodies, header.worker, &message);
         members_ = all;
     } else {
-        register_owner(bodies, header.worker, header.worker, false);
+        register_owner(bodies, header.worker, header.worker, &message);
     }
     advance();
 }
@@ -515,11 +526,12 @@ void Coordinator::report(const WorldHeader& header, const StepReport& report, st
     step.worker = static_cast<int>(header.worker);
     step.step = header.step;
     step.seconds = report.seconds, step.smoothed_s = report.smoothed_s, step.waited_s = report.waited_s;
+    step.processor_s = report.processor_s;
     step.bodies = static_cast<int>(report.own);
     step.lead = static_cast<int>(report.lead), step.ghost_age = static_cast<int>(report.ghost_age);
     step.bytes = std::exchange(sender.bytes, 0);
     step.cross_contacts = static_cast<int>(report.cross_contacts);
-    result_.cpu_s += report.seconds;
+    result_.cpu_s += report.processor_s;
     result_.cross_contacts += report.cross_contacts;
     result_.bytes_states += bytes;
     result_.records += records;
@@ -548,7 +560,7 @@ void Coordinator::advance() {
         if (settings_.pace == Pace::lockstep) observer_->done(view_.step(), [this] { return state(); });
         observer_->at(view_.step(), world);
         observer_->ready(view_.step(), world);
-        std::erase_if(kept_, [this](const auto& kept) { return kept.first <= view_.step(); });
+        std::erase_if(kept_, [this](const auto& kept) { return kept.first + kept_steps_ <= view_.step(); });
     }
 }
 

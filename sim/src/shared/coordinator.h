@@ -3,6 +3,8 @@
 #include <map>
 #include <memory>
 
+#include "shared/columns.h"
+#include "shared/shared_contacts.h"
 #include "shared/world_view.h"
 
 namespace sim {
@@ -50,16 +52,10 @@ public:
     }
 
 private:
-    /// Impulses that published states include, see UpdateMessage.
-    struct Applied {
-        std::vector<std::uint32_t> sources;
-        std::vector<std::uint64_t> steps;
-    };
     struct Body {
         std::uint32_t owner = kApplication;
-        std::uint64_t step = 0;  ///< of the record
-        WorldRecord record;      ///< last published
-        std::shared_ptr<const Applied> applied;
+        std::uint64_t step = 0;   ///< of the record
+        WorldRecord record;       ///< last published
         std::uint32_t epoch = 0;  ///< of its owner
     };
     struct Sender {
@@ -72,14 +68,13 @@ private:
     struct Group {
         std::uint32_t owner;
         std::uint64_t step;
-        std::shared_ptr<const Applied> applied;
         std::vector<int> bodies;
     };
 
     void take_message(const WorldHeader& header, std::span<const std::uint8_t> bytes, WorldMessage&& message);
     void take_state(const WorldHeader& header, std::span<const std::uint8_t> bytes, StateMessage&& message);
     void take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes, UpdateMessage&& message);
-    void extend_sleep(const WorldHeader& header, const std::shared_ptr<const Applied>& applied);
+    void extend_sleep(const WorldHeader& header);
     void take_handover(const WorldHeader& header, Handover&& message);
     void take_dealing(const WorldHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
     void report(const WorldHeader& header, const StepReport& report, std::size_t records, std::size_t bytes);
@@ -94,14 +89,16 @@ private:
     [[nodiscard]] bool fits(const std::vector<Mishap>& mishaps) const;
     [[nodiscard]] bool owns_constraint(std::uint32_t worker, int constraint) const;
     [[nodiscard]] bool own_contacts(std::uint32_t worker, const StateMessage& message) const;
-    void publish(Body& body, WorldRecord&& record, std::uint64_t step,
-                 std::shared_ptr<const Applied> applied);
+    static void publish(Body& body, WorldRecord&& record, std::uint64_t step);
 
     void remove(std::uint32_t worker);
-    void share_out(const std::vector<int>& bodies, std::uint32_t from);
+    void share_out(const std::vector<int>& bodies, std::uint32_t from, const Handover* handed = nullptr);
     [[nodiscard]] std::vector<int> owned_by(std::uint32_t worker) const;
+    [[nodiscard]] std::vector<Eigen::Vector3d> places() const;
     [[nodiscard]] std::vector<Group> groups(const std::vector<int>& bodies) const;
-    void register_owner(const std::vector<int>& bodies, std::uint32_t owner, std::uint32_t from, bool traded);
+    /// sold: by this handover.
+    void register_owner(const std::vector<int>& bodies, std::uint32_t owner, std::uint32_t from,
+                        const Handover* handed = nullptr);
     [[nodiscard]] Ownership ownership(const Group& group) const;
     void catch_up(std::uint32_t worker);
     void advance();
@@ -113,19 +110,23 @@ private:
 
     void send(std::vector<std::uint32_t> to, const WorldMessage& message);
 
-    const std::shared_ptr<const Applied> none_ = std::make_shared<const Applied>();
     WorldScene scene_;
     DistributedSettings settings_;
     DistributedObserver* observer_;
     WorldView view_;
-    std::vector<std::vector<int>> lots_;
+    Columns columns_;
+    std::vector<std::vector<int>> lots_;         // tied together
+    std::vector<Eigen::Vector3d> first_places_;  // of each
     std::vector<Body> bodies_;
     std::vector<std::uint32_t> members_;
     std::map<std::uint32_t, Sender> senders_;
     std::uint32_t next_worker_ = 0, epoch_ = 0;
     bool started_ = false, finished_ = false, goes_on_ = false;
     std::vector<Outgoing> queue_;
-    /// State and update messages of steps that the view has not reached, for workers that join later.
+    /// State and update messages for workers that join later: of steps that the view has not reached and, in bounded pace, of
+    /// `kept_steps_` before it.
+    const std::uint64_t kept_steps_ =
+        settings_.pace == Pace::bounded ? static_cast<std::uint64_t>(blow_window(settings_.bound)) : 0;
     std::deque<std::pair<std::uint64_t, std::shared_ptr<const std::vector<std::uint8_t>>>> kept_;
     /// Mishaps as workers told them first, by body or constraint.
     std::map<int, QuarantinedBody> quarantined_;

@@ -1,9 +1,9 @@
 #include "shared/initial_partition.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <span>
+#include <utility>
 
 namespace sim {
 namespace {
@@ -13,44 +13,47 @@ const WorldBody& body_of(const WorldScene& scene, int body) {
     return id < first ? scene.world.bodies[id] : scene.later[id - first];
 }
 
-struct Lots {
-    std::vector<Eigen::Vector3d> centre;
-    std::vector<int> size;
+struct Site {
+    Column column;
+    int bodies = 0;
+    [[nodiscard]] std::pair<int, int> along(bool y) const {
+        return y ? std::pair(column.y, column.x) : std::pair(column.x, column.y);
+    }
 };
 
-Eigen::Index longest_axis(const Lots& lots, std::span<const int> some) {
-    Eigen::AlignedBox3d box;
-    for (const int lot : some) box.extend(lots.centre[static_cast<std::size_t>(lot)]);
-    Eigen::Index axis = 0;
-    box.sizes().maxCoeff(&axis);
-    return axis;
+// Whether a region is longer across the second direction.
+bool is_deep(std::span<const Site> some) {
+    const auto extent = [&](int Column::*axis) {
+        const auto [least, most] =
+            std::ranges::minmax(some, {}, [axis](const Site& site) { return site.column.*axis; });
+        return most.column.*axis - least.column.*axis;
+    };
+    return extent(&Column::y) > extent(&Column::x);
 }
 
 // Where to cut so that the first part has about `share` of the bodies.
-std::size_t cut(const Lots& lots, std::span<const int> some, double share) {
+std::size_t cut(std::span<const Site> some, double share) {
     double all = 0, sum = 0;
-    for (const int lot : some) all += lots.size[static_cast<std::size_t>(lot)];
+    for (const Site& site : some) all += site.bodies;
     for (std::size_t i = 0; i < some.size(); ++i) {
-        const double size = lots.size[static_cast<std::size_t>(some[i])];
-        if (sum + size / 2 >= share * all) return i;
-        sum += size;
+        if (sum + some[i].bodies / 2.0 >= share * all) return i;
+        sum += some[i].bodies;
     }
     return some.size();
 }
 
-void bisect(const Lots& lots, std::span<int> some, int first, int workers, std::vector<int>& owner) {
+void bisect(std::span<Site> some, int first, int workers, std::map<Column, int>& owner) {
     if (some.empty()) return;
     if (workers == 1) {
-        for (const int lot : some) owner[static_cast<std::size_t>(lot)] = first;
+        for (const Site& site : some) owner[site.column] = first;
         return;
     }
-    const Eigen::Index axis = longest_axis(lots, some);
-    auto key = [&](int lot) { return std::pair(lots.centre[static_cast<std::size_t>(lot)][axis], lot); };
-    std::sort(some.begin(), some.end(), [&](int a, int b) { return key(a) < key(b); });
+    const bool deep = is_deep(some);
+    std::ranges::sort(some, {}, [deep](const Site& site) { return site.along(deep); });
     const int half = workers / 2;
-    const std::size_t at = cut(lots, some, static_cast<double>(half) / workers);
-    bisect(lots, some.first(at), first, half, owner);
-    bisect(lots, some.subspan(at), first + half, workers - half, owner);
+    const std::size_t at = cut(some, static_cast<double>(half) / workers);
+    bisect(some.first(at), first, half, owner);
+    bisect(some.subspan(at), first + half, workers - half, owner);
 }
 
 }  // namespace
@@ -80,19 +83,19 @@ std::vector<std::vector<int>> joined_lots(const WorldScene& scene) {
     return lots;
 }
 
-std::vector<int> first_owners(const WorldScene& scene, const std::vector<std::vector<int>>& lots,
-                              int workers) {
-    Lots some;
-    for (const std::vector<int>& lot : lots) {
-        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-        for (const int body : lot) sum += body_of(scene, body).world_from_body.translation();
-        some.centre.push_back(sum / static_cast<double>(lot.size()));
-        some.size.push_back(static_cast<int>(lot.size()));
-    }
-    std::vector<int> order(lots.size()), owner(lots.size(), 0);
-    std::iota(order.begin(), order.end(), 0);
-    bisect(some, order, 0, workers, owner);
-    return owner;
+std::vector<int> first_owners(const Columns& columns, const std::vector<std::vector<int>>& lots,
+                              const std::vector<Eigen::Vector3d>& places, int workers) {
+    const std::vector<std::optional<Eigen::Vector3d>> there(places.begin(), places.end());
+    std::vector<std::optional<Column>> column(lots.size());
+    columns.assign(there, column);
+    std::map<Column, int> bodies, owner;
+    for (std::size_t i = 0; i < lots.size(); ++i) bodies[*column[i]] += static_cast<int>(lots[i].size());
+    std::vector<Site> sites;
+    for (const auto& [where, count] : bodies) sites.push_back({where, count});
+    bisect(sites, 0, workers, owner);
+    std::vector<int> result;
+    for (const std::optional<Column>& where : column) result.push_back(owner.at(*where));
+    return result;
 }
 
 }  // namespace sim

@@ -30,9 +30,9 @@ public:
     void step() override;
     [[nodiscard]] std::vector<std::uint8_t> publish(std::uint32_t epoch, const StepReport& report) override;
     void follow() override;
-    [[nodiscard]] std::vector<Lot> lots(std::uint32_t towards) const override;
+    [[nodiscard]] Holdings holdings() override;
     [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies) override;
-    void cost(double seconds) override { costs_.share(seconds, replica_.world(), owned_); }
+    void weigh() override { costs_.add(replica_.world(), owned_); }
     [[nodiscard]] std::uint64_t steps_done() const override { return replica_.step(); }
     [[nodiscard]] bool at_end() const override { return replica_.step() >= steps_; }
     [[nodiscard]] bool done() const override { return at_end(); }
@@ -51,6 +51,7 @@ private:
     std::uint64_t steps_;
     Replica replica_;
     BodyCosts costs_;
+    ColumnWatch columns_;
     std::vector<std::uint32_t> owner_;     // as registered
     std::vector<std::uint8_t> own_;        // now; with bodies that come in the next step
     std::vector<int> owned_;               // that are there, ascending
@@ -65,7 +66,8 @@ LockstepExchange::LockstepExchange(const SceneMessage& scene)
     : self_(scene.worker),
       steps_(scene.settings.steps),
       replica_(scene.scene),
-      costs_(replica_.clock().bodies(), scene.settings.market.smoothing_steps) {
+      costs_(replica_.clock().bodies()),
+      columns_(scene.scene) {
     owner_.assign(static_cast<std::size_t>(replica_.clock().bodies()), kApplication);
     own_.assign(owner_.size(), 0);
     published_ = own_;
@@ -168,16 +170,10 @@ std::vector<std::uint8_t> LockstepExchange::publish(std::uint32_t epoch, const S
     return bytes;
 }
 
-std::vector<ReplicaProtocol::Lot> LockstepExchange::lots(std::uint32_t towards) const {
-    std::vector<int> others;
-    for (int i = 0; i < replica_.world().bodies(); ++i)
-        if (owner_[static_cast<std::size_t>(i)] == towards) others.push_back(i);
-    const std::vector<double> pull = pulls(replica_.world(), owned_, others);
-    std::vector<Lot> lots;
-    for (std::size_t i = 0; i < owned_.size(); ++i)
-        if (const double cost = costs_.of(owned_[i]); cost > 0)
-            lots.push_back({{static_cast<std::uint32_t>(owned_[i])}, cost, pull[i]});
-    return lots;
+Holdings LockstepExchange::holdings() {
+    const World& world = replica_.world();
+    return columns_.holdings(self_, world, owner_, costs_,
+                             [&](int body) { return world.state(body).position; });
 }
 
 Handover LockstepExchange::give(const std::vector<std::uint32_t>& bodies) {

@@ -1,36 +1,43 @@
 #include "shared/market.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
+#include <set>
+#include <tuple>
 #include <utility>
 
 namespace sim {
 namespace {
 
-constexpr double kLevel = 0.15;  // of the average
-// Once level: what is not any more. Bodies that meet cost more, which comes and goes; a processor that
-// became slower stays so.
-constexpr double kLastingLevel = 0.5;  // of the average, for so many steps in a row
-constexpr int kLastingSteps = 5;
-constexpr int kLevelSteps = 4;       // after which it counts as level
-constexpr double kOtherRate = 0.25;  // change of the seconds a unit of work, for so many steps in a row
-constexpr int kOtherRateSteps = 2;
-constexpr std::uint64_t kTuningSteps = 20;  // once level, at least so many between trades
+// Above the average of the others, as a share of it, for so many steps in a row. Bodies that meet cost more, and
+// a processor may be unsteady, which comes and goes; one that became slower stays so.
+constexpr double kFar = 0.5;
+constexpr int kFarSteps = 5;
+constexpr double kNear = 0.03;      // until then, as a share of the average of all
+constexpr double kFarBodies = 1.5;  // by at least so many bodies' cost
+// From turn to turn. A sale is registered within some five steps of its turn's first, so two sales are ten steps apart or
+// more.
+constexpr int kTurnSteps = 16;
+constexpr std::uint64_t kHomeTurns = 4;  // of so many turns one is for bodies that go home, at least
+constexpr int kAmong = 3;                // sides a body by which the border becomes shorter, at least
+constexpr std::uint64_t kDeclinedSteps = 3, kNothingSteps = 5;  // to the next offer
+// So much of own work is sold at most before it shows whether that helps: what a body costs may lie in what it
+// touches, and stay.
+constexpr double kGo = 0.3, kGoLeast = 0.05;
+constexpr std::uint64_t kJudgeSteps = 10, kPatience = 80;
+constexpr double kWorthwhile = 0.25;  // of the mean lot's cost: sold for less it helps nobody
 
 }  // namespace
 
-double exchange_rate(double seller_body_cost, double buyer_body_cost) {
-    if (seller_body_cost <= 0 || buyer_body_cost <= 0) return 1;
-    return std::clamp(buyer_body_cost / seller_body_cost, 0.1, 10.0);
-}
-
-Market::Market(std::uint32_t self, const MarketSettings& settings, bool near_only)
+Market::Market(std::uint32_t self, const MarketSettings& settings, int bound)
     : self_(self),
       settings_(settings),
-      near_only_(near_only),
-      weight_(1 - std::exp(-1 / std::max(settings.smoothing_steps, 1e-3))) {
+      turn_steps_(static_cast<std::uint64_t>(std::max(kTurnSteps, bound + 1))),
+      patience_(kPatience) {
     workers_[self];
 }
 
@@ -45,68 +52,73 @@ void Market::members(const std::vector<std::uint32_t>& workers) {
     if (!there(offer_.to)) sale_ = Sale::none;
 }
 
-void Market::heard(std::uint32_t worker, std::uint32_t epoch, const StepReport& report) {
+void Market::heard(std::uint32_t worker, std::uint64_t step, std::uint32_t epoch, const StepReport& report) {
     const auto found = workers_.find(worker);
-    if (found == workers_.end() || worker == self_ || epoch < found->second.epoch) return;
+    if (found == workers_.end() || worker == self_) return;
+    mark(found->second, step, report.smoothed_s);
+    if (epoch < found->second.epoch) return;
     found->second.smoothed = report.smoothed_s;
     found->second.own = static_cast<int>(report.own);
 }
 
 void Market::credit(Worker& worker, int bodies, double cost) {
     worker.own = std::max(0, worker.own + bodies);
+    const double before = worker.smoothed;
     worker.smoothed = worker.own == 0 ? 0 : std::max(0.0, worker.smoothed + cost);
+    if (&worker == &workers_[self_] && before > 0) work_ *= worker.smoothed / before;
 }
 
 void Market::registered(std::uint32_t epoch, const Ownership& ownership) {
-    if (ownership.traded) traded_ = true, last_trade_ = std::max(last_trade_, ownership.step);
     const auto from = workers_.find(ownership.from), to = workers_.find(ownership.owner);
     const int bodies = static_cast<int>(ownership.bodies.size());
-    // Seconds a step, at the seller and at the buyer.
-    double sold = from == workers_.end() ? 0 : bodies * from->second.body_cost();
-    const bool own_sale = ownership.from == self_ && handed_over_ > 0;
-    if (own_sale) sold = std::exchange(handed_over_, 0);
-    double bought = to == workers_.end() ? 0 : bodies * to->second.body_cost();
-    if (from != workers_.end() && to != workers_.end())
-        bought = sold * exchange_rate(from->second.body_cost(), to->second.body_cost());
+    double cost = 0;  // [s]
+    if (from != workers_.end() && from->second.own > 0)
+        cost = bodies * from->second.smoothed / from->second.own;
+    const bool own_sale = ownership.from == self_ && handed_over_;
+    if (own_sale) cost = *std::exchange(handed_over_, std::nullopt);
     if (const auto promise = promises_.find(ownership.from);
         ownership.owner == self_ && promise != promises_.end()) {
-        bought = promise->second;
+        cost = promise->second;
         promises_.erase(promise);
     }
     if (from != workers_.end()) {
         from->second.epoch = epoch;
-        if (ownership.from != self_) credit(from->second, -bodies, -sold);
+        if (ownership.from != self_) credit(from->second, -bodies, -cost);
     }
     if (to != workers_.end()) {
         to->second.epoch = epoch;
-        if (!own_sale || ownership.owner == self_) credit(to->second, bodies, bought);
+        if (!own_sale || ownership.owner == self_) credit(to->second, bodies, cost);
     }
-    if (ownership.owner == self_ && bought > 0) known_ = true;
+    if (ownership.owner == self_) go_.hoped += cost;
 }
 
 void Market::worked(std::uint64_t step, double seconds, double work, int own) {
-    if (step <= step_) return;  // repeated, with more bodies: not what a step takes
-    step_ = step;
     Worker& self = workers_[self_];
+    if (step <= step_) {  // repeated, with more bodies: not what a step takes
+        if (step == step_) mark(self, step, static_cast<float>(self.smoothed));
+        return;
+    }
+    step_ = step;
     self.own = own;
-    self.smoothed = known_ ? self.smoothed + weight_ * (seconds - self.smoothed) : seconds;
-    known_ = own > 0;
-    if (own == 0) self.smoothed = 0;
-    const double rate = work > 0 ? seconds / work : 0;
-    if (changed_speed(rate)) self.smoothed = seconds;
+    work = std::max(work, 1.0);  // bodies that sleep are looked after
+    if (own == 0) {
+        steps_known_ = self.smoothed = work_ = 0;
+    } else if (steps_known_ == 0) {
+        // What was bought costs as was told, as if for some steps.
+        const bool told = self.smoothed > 0;
+        many_seconds_ = told ? self.smoothed : seconds;
+        work_ = many_work_ = work;
+        steps_known_ = told ? settings_.smoothing_steps / 4 : 1;
+    } else {
+        steps_known_ = std::min(steps_known_ + 1, settings_.smoothing_steps);
+        many_seconds_ += (seconds - many_seconds_) / steps_known_;
+        many_work_ += (work - many_work_) / steps_known_;
+        work_ += (work - work_) / std::min(steps_known_, BodyCosts::kSmoothing);
+    }
+    if (own > 0) self.smoothed = work_ * many_seconds_ / many_work_;
+    mark(self, step_, static_cast<float>(self.smoothed));  // as the others hear it
     watch_level();
-}
-
-bool Market::changed_speed(double rate) {
-    const bool other = usual_rate_ > 0 && std::abs(rate - usual_rate_) > kOtherRate * usual_rate_;
-    other_rate_steps_ = other ? other_rate_steps_ + 1 : 0;
-    if (!other && calm_ && rate > 0)
-        usual_rate_ = usual_rate_ > 0 ? usual_rate_ + weight_ * (rate - usual_rate_) : rate;
-    if (other_rate_steps_ < kOtherRateSteps) return false;
-    calm_ = false;
-    level_steps_ = 0;
-    usual_rate_ = 0;
-    return true;
+    take_turn();
 }
 
 double Market::average() const {
@@ -115,89 +127,203 @@ double Market::average() const {
     return sum / static_cast<double>(workers_.size());
 }
 
-double Market::allowance(const Worker& worker) const {
-    return std::max(kLevel * average(), worker.body_cost());
+bool Market::above(const Worker& worker) const {
+    return worker.smoothed > (1 + settings_.dead_band) * average();
 }
 
-bool Market::level() const {
-    const double mean = average();
-    return std::all_of(workers_.begin(), workers_.end(), [&](const auto& w) {
-        return std::abs(w.second.smoothed - mean) <=
-               std::max(allowance(w.second), allowance(workers_.at(self_)));
-    });
+void Market::mark(Worker& worker, std::uint64_t step, double smoothed) const {
+    if (step % turn_steps_ == 0) worker.marks[step / turn_steps_ % 2] = {step, smoothed};
 }
 
-bool Market::slowest() const {
-    return std::all_of(workers_.begin(), workers_.end(),
-                       [this](const auto& w) { return w.first == self_ || w.second.smoothed < smoothed(); });
+// By what all reported when the turn before began, so that all agree on whose it is.
+void Market::take_turn() {
+    turn_ = Turn::none;
+    const std::uint64_t turn = step_ / turn_steps_;
+    if (step_ % turn_steps_ != 0 || turn < 2) return;
+    std::vector<std::uint32_t> all;
+    std::vector<std::pair<double, std::uint32_t>> sellers;  // seconds, number
+    double sum = 0;
+    for (const auto& [number, worker] : workers_) {
+        const Worker::Mark& then = worker.marks[(turn - 1) % 2];
+        if (then.step != step_ - turn_steps_) continue;  // owned nothing
+        all.push_back(number);
+        sellers.emplace_back(then.smoothed, number);
+        sum += then.smoothed;
+    }
+    if (all.empty()) return;
+    const double most = (1 + settings_.dead_band) * sum / static_cast<double>(workers_.size());
+    std::erase_if(sellers, [most](const auto& seller) { return seller.first <= most; });
+    std::ranges::sort(sellers, std::greater());
+    if (!sellers.empty() && turn % kHomeTurns != 0) {
+        const std::size_t others = sellers.size() - 1;
+        const std::size_t place = turn % 2 == 1 || others == 0 ? 0 : 1 + turn / kHomeTurns % others;
+        if (sellers[place].second == self_) turn_ = Turn::sale;
+    } else if (all[(sellers.empty() ? turn : turn / kHomeTurns) % all.size()] == self_) {
+        turn_ = Turn::home;
+    }
+}
+
+// If own time has come back by more than half of what was sold, as far as smoothing shows it.
+void Market::judge() {
+    if (go_.judged_at == 0 || step_ < go_.judged_at) return;
+    const double shown = 1 - std::exp(-static_cast<double>(kJudgeSteps) / settings_.smoothing_steps);
+    const bool helped = go_.sold < kGoLeast * smoothed() || smoothed() - go_.hoped < 0.5 * shown * go_.sold;
+    if (!helped) not_before_ = step_ + patience_;
+    patience_ = helped ? kPatience : 4 * patience_;
+    go_ = {};
 }
 
 void Market::watch_level() {
+    judge();
     const Worker& self = workers_.at(self_);
-    const double excess = self.smoothed - average();
-    const bool far = excess > std::max(kLastingLevel * average(), 1.5 * self.body_cost());
+    const bool idle =
+        std::any_of(workers_.begin(), workers_.end(), [](const auto& w) { return w.second.own == 0; });
+    const auto others = std::max(1.0, static_cast<double>(workers_.size()) - 1);
+    const double theirs = (average() * static_cast<double>(workers_.size()) - self.smoothed) / others;
+    const double body = self.own > 0 ? self.smoothed / self.own : 0;
+    const bool far = self.smoothed - theirs > std::max(kFar * theirs, kFarBodies * body);
     far_steps_ = far ? far_steps_ + 1 : 0;
-    if (far_steps_ >= kLastingSteps) calm_ = false, level_steps_ = 0;
-    level_steps_ = level() ? level_steps_ + 1 : 0;
-    if (level_steps_ >= kLevelSteps) calm_ = true;
+    if (self.smoothed <= (1 + kNear) * average()) free_ = spreads_ = false;
+    if (far && idle) spreads_ = true;
+    if (far_steps_ >= kFarSteps || spreads_) free_ = true;
 }
 
-bool Market::tuning() const {
-    return calm_ || level();
-}
-
-// Seconds to be sold now.
-double Market::wanted() const {
-    const double mean = average(), excess = smoothed() - mean;
-    if (excess <= settings_.dead_band * mean) return 0;
-    if (!tuning()) return excess / std::max(1.0, static_cast<double>(workers_.size()) - 2);
-    const bool due = !traded_ || step_ >= last_trade_ + kTuningSteps;
-    return due && slowest() ? workers_.at(self_).body_cost() : 0;
+bool Market::wants_less() const {
+    if (spreads_) return true;
+    if (steps_known_ < settings_.smoothing_steps / 2) return false;
+    return free_ || (turn_ == Turn::sale && above(workers_.at(self_)));
 }
 
 bool Market::wants_to_sell() const {
     return settings_.trade && step_ >= settings_.from_step && step_ >= not_before_ && sale_ == Sale::none &&
-           workers_.size() > 1 && known_ && wanted() > 0;
+           workers_.size() > 1 && steps_known_ > 0 && (wants_less() || turn_ == Turn::home);
 }
 
-std::uint32_t Market::fastest() const {
+// The fastest neighbour; self: none is faster.
+std::uint32_t Market::buyer(const Neighbours& neighbours) const {
+    std::set<std::uint32_t> near{self_};
+    if (const auto own = neighbours.find(self_); own != neighbours.end())
+        near.insert(own->second.begin(), own->second.end());
+    std::set<std::uint32_t> reached = near;
+    for (std::size_t before = 0; before != reached.size();) {
+        before = reached.size();
+        for (const auto& [worker, others] : neighbours)
+            if (reached.count(worker) > 0) reached.insert(others.begin(), others.end());
+    }
+    const double mean = average();
+    const bool apart = std::none_of(reached.begin(), reached.end(), [&](std::uint32_t worker) {
+        const auto found = workers_.find(worker);
+        return found != workers_.end() && found->second.smoothed < mean;
+    });
     std::uint32_t best = self_;
     for (const auto& [number, worker] : workers_)
-        if (number != self_ && (best == self_ || worker.smoothed < workers_.at(best).smoothed)) best = number;
+        if ((apart || worker.own == 0 || near.count(number) > 0) &&
+            worker.smoothed < workers_.at(best).smoothed)
+            best = number;
     return best;
 }
 
-std::optional<Offer> Market::make_offer(std::vector<ReplicaProtocol::Lot> lots) {
-    const Worker& self = workers_.at(self_);
-    const std::uint32_t to = fastest();
-    const Worker& buyer = workers_.at(to);
-    const double rate = exchange_rate(self.body_cost(), buyer.body_cost());
-    const double most = (self.smoothed - buyer.smoothed) / (1 + rate);  // then both take as long
-    // What makes the buyer as slow as the average, or one lot.
-    const double room = std::max((average() - buyer.smoothed) / rate, self.body_cost());
-    const double due = tuning() ? 1.5 * wanted() : wanted() + carried_;
-    // Their costs are smoothed, too; all together they are what a step takes.
-    const double sum = std::accumulate(lots.begin(), lots.end(), 0.0,
-                                       [](double s, const auto& lot) { return s + lot.cost_s; });
-    for (ReplicaProtocol::Lot& lot : lots) lot.cost_s *= sum > 0 ? self.smoothed / sum : 1;
-    std::sort(lots.begin(), lots.end(), [](const auto& a, const auto& b) {
-        return std::pair(-a.pull, a.bodies) < std::pair(-b.pull, b.bodies);
-    });
-    offer_ = {to, next_number_, {}, {}};
-    offer_cost_ = 0;
-    const bool level = self.smoothed - average() <= allowance(self);
-    for (const ReplicaProtocol::Lot& lot : lots) {
-        // Far from the buyer's bodies it costs both more: only where times differ too much.
-        if (near_only_ && level && lot.pull < 0) break;
-        if (offer_cost_ + lot.cost_s > std::min({due, most, room}) * (1 + 1e-9)) continue;
-        offer_cost_ += lot.cost_s;
-        for (const std::uint32_t body : lot.bodies) {
-            offer_.bodies.push_back(body);
-            offer_.cost_s.push_back(static_cast<float>(lot.cost_s / static_cast<double>(lot.bodies.size())));
-        }
-        if (tuning()) break;
+// Whether a worker has a faster neighbour.
+bool Market::passes_on(std::uint32_t worker, const Neighbours& neighbours) const {
+    const auto near = neighbours.find(worker);
+    return near != neighbours.end() && std::ranges::any_of(near->second, [&](std::uint32_t other) {
+               const auto found = workers_.find(other);
+               return found != workers_.end() && found->second.smoothed < workers_.at(worker).smoothed;
+           });
+}
+
+int Market::sellers(std::uint32_t buyer, const Neighbours& neighbours) const {
+    const auto near = neighbours.find(buyer);
+    const double mean = average();
+    const auto may_sell = [&](const auto& w) {
+        const bool next = near == neighbours.end() || near->second.count(w.first) > 0;
+        return w.first != self_ && next && w.second.smoothed - mean >= (smoothed() - mean) / 2;
+    };
+    return 1 + static_cast<int>(std::count_if(workers_.begin(), workers_.end(), may_sell));
+}
+
+void Market::put_in(Holdings& holdings, std::size_t number) {
+    Holdings::Lot& lot = holdings.lots()[number];
+    offer_cost_ += lot.cost;
+    for (const std::uint32_t body : lot.bodies) {
+        offer_.bodies.push_back(body);
+        offer_.cost_s.push_back(static_cast<float>(lot.cost / static_cast<double>(lot.bodies.size())));
     }
-    carried_ = tuning() ? 0 : std::clamp(due - offer_cost_, 0.0, self.body_cost());
+    holdings.move(lot, offer_.to);
+    lot.cost = -1;
+}
+
+void Market::sell(Holdings& holdings, const Neighbours& neighbours) {
+    offer_.to = buyer(neighbours);
+    if (offer_.to == self_) return;
+    const double theirs = workers_.at(offer_.to).smoothed, mean = average();
+    const double lot_cost = smoothed() / static_cast<double>(holdings.lots().size());
+    const double due = (smoothed() - mean) / sellers(offer_.to, neighbours) + carried_;
+    // Then both take as long; or the buyer as long as this one before, if it can pass work on.
+    const double most = (smoothed() - theirs) / (!free_ && passes_on(offer_.to, neighbours) ? 1 : 2);
+    double limit = most;
+    // What makes the buyer as slow as the average, or one lot; from there on work flows through it.
+    if (free_ && theirs < mean) limit = std::min(limit, std::max(mean - theirs + carried_, lot_cost));
+    if (free_) limit = std::min(limit, due);
+    if (spreads_) limit = std::max(limit, lot_cost);
+    if (free_ && !spreads_) {
+        if (go_.judged_at == 0) go_ = {step_ + kJudgeSteps, kGo * smoothed(), 0, smoothed()};
+        limit = std::min(limit, go_.most - go_.sold);
+    }
+    for (bool more = true; more;) {
+        using Order = std::tuple<int, double, double>;
+        std::optional<std::pair<Order, std::size_t>> best;
+        for (std::size_t i = 0; i < holdings.lots().size(); ++i) {
+            const Holdings::Lot& lot = holdings.lots()[i];
+            if (lot.cost < kWorthwhile * lot_cost || offer_cost_ + lot.cost > limit * (1 + 1e-9)) continue;
+            const Order order{holdings.shortens(lot, offer_.to), -holdings.distance2(lot.column, offer_.to),
+                              holdings.distance2(lot.column, self_)};
+            if (!best || order > best->first) best = {order, i};
+        }
+        if (best) put_in(holdings, best->second);
+        more = best && free_;
+    }
+    carried_ = free_ ? std::clamp(limit - offer_cost_, 0.0, lot_cost) : 0;
+}
+
+void Market::send_home(Holdings& holdings, const Neighbours& neighbours) {
+    const auto near = neighbours.find(self_);
+    if (near == neighbours.end()) return;
+    for (bool more = true; more;) {
+        std::optional<std::tuple<int, std::uint32_t, std::size_t>> best;
+        for (const std::uint32_t other : near->second) {
+            const auto worker = workers_.find(other);
+            if (worker == workers_.end() || (!offer_.bodies.empty() && other != offer_.to)) continue;
+            const double room = (1 + settings_.dead_band) * average() - worker->second.smoothed;
+            for (std::size_t i = 0; i < holdings.lots().size(); ++i) {
+                const Holdings::Lot& lot = holdings.lots()[i];
+                if (!lot.lies || lot.cost < 0 || offer_cost_ + lot.cost > room) continue;
+                const int shortens = holdings.shortens(lot, other);
+                if (shortens >= kAmong * static_cast<int>(lot.bodies.size()) &&
+                    (!best || shortens > std::get<0>(*best)))
+                    best = {shortens, other, i};
+            }
+        }
+        if (best) offer_.to = std::get<1>(*best), put_in(holdings, std::get<2>(*best));
+        more = best.has_value();
+    }
+}
+
+std::optional<Offer> Market::make_offer(Holdings holdings) {
+    // Lots' costs are smoothed, too; all together they are what a step takes.
+    double sum = 0;
+    for (const Holdings::Lot& lot : holdings.lots()) sum += std::max(0.0, lot.cost);
+    for (Holdings::Lot& lot : holdings.lots()) lot.cost *= sum > 0 ? smoothed() / sum : 1;
+    offer_ = {self_, next_number_, {}, {}};
+    offer_cost_ = 0;
+    const Neighbours neighbours = holdings.neighbours();
+    if (wants_less()) {
+        sell(holdings, neighbours);
+        if (offer_.bodies.empty()) free_ = spreads_ = false, far_steps_ = 0;
+    }
+    if (offer_.bodies.empty() && turn_ == Turn::home) send_home(holdings, neighbours);
+    turn_ = Turn::none;
+    if (offer_.bodies.empty()) not_before_ = std::max(not_before_, step_ + kNothingSteps);
     if (offer_.bodies.empty()) return std::nullopt;
     ++next_number_;
     sale_ = Sale::offered;
@@ -207,19 +333,18 @@ std::optional<Offer> Market::make_offer(std::vector<ReplicaProtocol::Lot> lots) 
 void Market::answered(std::uint32_t worker, const OfferAnswer& answer) {
     if (sale_ != Sale::offered || worker != offer_.to || answer.number != offer_.number) return;
     sale_ = answer.accepted ? Sale::accepted : Sale::none;
-    if (!answer.accepted) carried_ = 0, not_before_ = step_ + 2;
+    if (!answer.accepted) carried_ = 0, not_before_ = std::max(not_before_, step_ + kDeclinedSteps);
 }
 
 std::optional<Offer> Market::hand_over() {
-    if (sale_ != Sale::accepted || handed_over_ > 0) return std::nullopt;
+    if (sale_ != Sale::accepted || handed_over_) return std::nullopt;
     sale_ = Sale::none;
-    traded_ = true, last_trade_ = step_;
+    go_.sold += offer_cost_, go_.hoped -= offer_cost_;
     handed_over_ = offer_cost_;
     Worker &self = workers_[self_], &buyer = workers_[offer_.to];
     const int bodies = static_cast<int>(offer_.bodies.size());
-    const double bought = offer_cost_ * exchange_rate(self.body_cost(), buyer.body_cost());
     credit(self, -bodies, -offer_cost_);
-    credit(buyer, bodies, bought);
+    credit(buyer, bodies, offer_cost_);
     buyer.epoch = std::numeric_limits<std::uint32_t>::max();  // until it is registered
     return offer_;
 }
@@ -228,14 +353,13 @@ OfferAnswer Market::answer(std::uint32_t seller, const Offer& offer) {
     promises_.erase(seller);  // it has one offer at a time
     OfferAnswer answer{seller, offer.number, false};
     const auto found = workers_.find(seller);
-    if (found == workers_.end() || (calm_ && !promises_.empty())) return answer;
-    const Worker& self = workers_.at(self_);
+    if (found == workers_.end()) return answer;
     const double cost = std::accumulate(offer.cost_s.begin(), offer.cost_s.end(), 0.0);
-    const double here = cost * exchange_rate(found->second.body_cost(), self.body_cost());
-    double after = self.smoothed + here;
+    double after = smoothed() + cost;
     for (const auto& promise : promises_) after += promise.second;
-    answer.accepted = after <= (1 + settings_.dead_band) * (found->second.smoothed - cost);
-    if (answer.accepted) promises_[seller] = here;
+    answer.accepted =
+        after <= (1 + settings_.dead_band) * std::max(found->second.smoothed - cost, average()) * (1 + 1e-6);
+    if (answer.accepted) promises_[seller] = cost;
     return answer;
 }
 

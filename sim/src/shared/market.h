@@ -1,43 +1,56 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <vector>
 
-#include "shared/replica_protocol.h"
+#include "messages/world_messages.h"
+#include "shared/columns.h"
 
 namespace sim {
 
 /// One worker's load-balancing policy, a market without a planner (thesis 2.4): a worker that needs more time
-/// per step than the average offers some of its work to the fastest, by the workers' own reports.
+/// per step than the average offers border columns to its fastest neighbour, by the workers' own reports.
 ///
-///   W^i T^i = (T^i - T^avg) / max(1, N - 2)     (2.32)
-///   T^i  smoothed seconds that worker i works per step (not waits), N workers
-///   W^i T^i  seconds offered; what is less than a whole body is carried to the next offer
+///   W^i T^i = (T^i - T^avg) / S     (2.32)
+///   T^i  seconds that worker i works per step (does not wait): its work, by World::work, smoothed over few
+///        steps, times its seconds per work, smoothed over many
+///   S    sellers: workers above the average that may sell to the same buyer; N - 2 at most in the thesis,
+///        which knows no neighbours
+///   W^i T^i  seconds offered; what is less than a whole column is carried to the next offer
+///
+/// Neighbours have bodies in the same or touching columns; who owns nothing is everybody's neighbour. Where no
+/// neighbour of neighbours is below the average, everybody is one. Of the columns those are sold that make the
+/// border to the buyer shorter, or longer by the least.
 ///
 /// Departures: an offer never makes the buyer slower than the seller or than the average; a buyer that would
-/// become slower than the seller declines; sold work counts for the buyer at once, and reports written before
-/// the registration (older epoch) are ignored, otherwise stale figures would sell the same work twice. While
-/// any worker is above the average by more than 15 % and one body, trade is free. Once level, only a lasting
-/// difference frees it again; otherwise the slowest worker sells one body at a time, beyond the dead band,
-/// and not within 20 steps of the last trade of any worker.
+/// become slower than both declines; sold work counts for the buyer at once, and reports written before the
+/// registration (older epoch) are ignored, otherwise stale figures would sell the same work twice. Trade is
+/// free while somebody owns nothing, or once a worker has been far above the average for some steps, until it
+/// is near it. Else those above the average take turns, the slowest first, every 16 steps (more only for bounds above
+/// 15), and sell one column. Whose turn it is follows from what all reported of the step in which the turn before
+/// began, which everybody has heard by then.
+///
+/// Bodies that have come to lie among another worker's go home to it: lots that make the border shorter are
+/// given away although times are level, if the other stays level. For this all take turns, too: every fourth turn, and
+/// those in which nobody has to sell.
 class Market {
 public:
-    /// near_only: once level, a body is sold only to the owner of bodies near it.
-    Market(std::uint32_t self, const MarketSettings& settings, bool near_only);
+    /// bound: of the run, how many steps others may be ahead or behind.
+    Market(std::uint32_t self, const MarketSettings& settings, int bound);
 
     void members(const std::vector<std::uint32_t>& workers);  ///< sets the members
-    /// Takes another worker's report, written when it knew ownership up to `epoch`.
-    void heard(std::uint32_t worker, std::uint32_t epoch, const StepReport& report);
+    /// Takes another worker's report of its step `step`, written when it knew ownership up to `epoch`.
+    void heard(std::uint32_t worker, std::uint64_t step, std::uint32_t epoch, const StepReport& report);
     void registered(std::uint32_t epoch, const Ownership& ownership);
     /// Takes own step `step`: its seconds, its work (World::work), the number of own bodies.
     void worked(std::uint64_t step, double seconds, double work, int own);
 
     // Selling: one offer at a time, until it is declined or handed over.
     [[nodiscard]] bool wants_to_sell() const;
-    [[nodiscard]] std::uint32_t fastest() const;
-    /// An offer of some of these lots; none if no lot fits.
-    [[nodiscard]] std::optional<Offer> make_offer(std::vector<ReplicaProtocol::Lot> lots);
+    /// An offer of some of own lots, which are all that this worker has; none if no lot fits.
+    [[nodiscard]] std::optional<Offer> make_offer(Holdings holdings);
     void answered(std::uint32_t worker, const OfferAnswer& answer);
     /// The offer that was accepted, if one was; counts as handed over.
     [[nodiscard]] std::optional<Offer> hand_over();
@@ -52,41 +65,58 @@ private:
         double smoothed = 0;      // [s]
         int own = 0;              // bodies
         std::uint32_t epoch = 0;  // reports from before do not count
-        [[nodiscard]] double body_cost() const { return own > 0 ? smoothed / own : 0; }
+        struct Mark {
+            std::uint64_t step = 0;
+            double smoothed = 0;
+        };
+        std::array<Mark, 2> marks = {};  // of its reports, where the last two turns began
     };
+    enum class Turn { none, sale, home };
     enum class Sale { none, offered, accepted };
+    using Neighbours = std::map<std::uint32_t, std::set<std::uint32_t>>;
 
     [[nodiscard]] double average() const;
-    [[nodiscard]] double allowance(const Worker& worker) const;
-    [[nodiscard]] bool level() const;
-    [[nodiscard]] bool slowest() const;
-    [[nodiscard]] bool tuning() const;
-    [[nodiscard]] double wanted() const;
+    [[nodiscard]] bool above(const Worker& worker) const;
+    void mark(Worker& worker, std::uint64_t step, double smoothed) const;
+    void take_turn();
+    [[nodiscard]] bool wants_less() const;
     void watch_level();
-    [[nodiscard]] bool changed_speed(double rate);
+    void judge();
+    [[nodiscard]] std::uint32_t buyer(const Neighbours& neighbours) const;
+    [[nodiscard]] bool passes_on(std::uint32_t worker, const Neighbours& neighbours) const;
+    [[nodiscard]] int sellers(std::uint32_t buyer, const Neighbours& neighbours) const;
+    void sell(Holdings& holdings, const Neighbours& neighbours);
+    void send_home(Holdings& holdings, const Neighbours& neighbours);
+    void put_in(Holdings& holdings, std::size_t lot);
     void credit(Worker& worker, int bodies, double cost);
 
     std::uint32_t self_;
     MarketSettings settings_;
-    bool near_only_;
-    double weight_;
     std::map<std::uint32_t, Worker> workers_;  // members, with this one
-    std::uint64_t step_ = 0, last_trade_ = 0, not_before_ = 0;
-    bool traded_ = false;
-    bool known_ = false;                                          // own time
-    bool calm_ = false;                                           // has been level, and nothing lasting since
-    int far_steps_ = 0, other_rate_steps_ = 0, level_steps_ = 0;  // in a row
-    double usual_rate_ = 0;                                       // seconds per unit of work, while calm
-    double carried_ = 0;                                          // [s] to be sold with a later offer
+    std::uint64_t turn_steps_;                 // from turn to turn
+    std::uint64_t step_ = 0, not_before_ = 0;
+    Turn turn_ = Turn::none;                   // this worker's in this step
+    double work_ = 0;                          // own, of a step; smoothed over few steps
+    double many_seconds_ = 0, many_work_ = 0;  // of a step; smoothed over many
+    double steps_known_ = 0;                   // of these
+    bool free_ = false;                        // to sell more than a column
+    bool spreads_ = false;                     // free, because somebody owned nothing
+    int far_steps_ = 0;                        // in a row
+    // What was sold since a worker began to sell more than a column, and whether it helps.
+    struct Go {
+        std::uint64_t judged_at = 0;  // 0: none
+        double most = 0, sold = 0;    // [s]
+        double hoped = 0;             // own time after it [s]
+    };
+    Go go_;
+    std::uint64_t patience_ = 0;  // steps without sale after the next that does not help
+    double carried_ = 0;          // [s] to be sold with a later offer
     Sale sale_ = Sale::none;
     Offer offer_;
-    double offer_cost_ = 0;   // [s] here
-    double handed_over_ = 0;  // of bodies whose registration has not come [s]
+    double offer_cost_ = 0;              // [s] here
+    std::optional<double> handed_over_;  // of bodies whose registration has not come [s]
     std::uint32_t next_number_ = 0;
     std::map<std::uint32_t, double> promises_;  // by seller: what it will cost here [s]
 };
-
-/// Seconds that the seller's bodies take at the buyer, per second at the seller.
-[[nodiscard]] double exchange_rate(double seller_body_cost, double buyer_body_cost);
 
 }  // namespace sim

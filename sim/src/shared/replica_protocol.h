@@ -1,8 +1,8 @@
 #pragma once
 #include <memory>
-#include <optional>
 
 #include "messages/world_messages.h"
+#include "shared/columns.h"
 
 namespace sim {
 
@@ -36,19 +36,13 @@ public:
     /// Without own bodies: advances as far as the others' messages allow.
     virtual void follow() = 0;
 
-    /// Own bodies that move, for load balancing; bodies that must stay together (joined by constraints, in
-    /// bounded pace) form one lot.
-    struct Lot {
-        std::vector<std::uint32_t> bodies;
-        double cost_s;  ///< smoothed seconds per step
-        double pull;    ///< larger if nearer to the bodies of the worker `towards` than to own ones
-    };
-    [[nodiscard]] virtual std::vector<Lot> lots(std::uint32_t towards) const = 0;
+    /// Who has what where, for load balancing.
+    [[nodiscard]] virtual Holdings holdings() = 0;
     /// Stops owning: their exact records at the end of this worker's last step. The caller sends the
     /// Handover.
     [[nodiscard]] virtual Handover give(const std::vector<std::uint32_t>& bodies) = 0;
-    /// Seconds that the last step took; distributed to the own bodies by World::work.
-    virtual void cost(double seconds) = 0;
+    /// After a step: notes what each own body costs, for load balancing.
+    virtual void weigh() = 0;
 
     [[nodiscard]] virtual std::uint64_t steps_done() const = 0;  ///< by this worker
     [[nodiscard]] virtual bool at_end() const = 0;               ///< settings.steps reached

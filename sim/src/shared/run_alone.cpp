@@ -1,25 +1,25 @@
-#include <ctime>
+#include <chrono>
 #include <utility>
 
 #include "shared/replica.h"
 #include "sim/distributed_world.h"
+#include "world/processor_time.h"
 
 namespace sim {
 namespace {
 
-double clock_s(clockid_t clock) {
-    timespec now{};
-    clock_gettime(clock, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+double wall_s() {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
 /// One step, timed by the wall and by this thread's processor time.
 void timed_step(World& world, DistributedResult& result, WorkerStep& told) {
-    const double wall = clock_s(CLOCK_MONOTONIC), cpu = clock_s(CLOCK_THREAD_CPUTIME_ID);
+    const double wall = wall_s(), cpu = thread_processor_s();
     world.step();
-    told.seconds = clock_s(CLOCK_MONOTONIC) - wall;
+    told.seconds = wall_s() - wall;
+    told.processor_s = thread_processor_s() - cpu;
     result.elapsed_s += told.seconds;
-    result.cpu_s += clock_s(CLOCK_THREAD_CPUTIME_ID) - cpu;
+    result.cpu_s += told.processor_s;
     told.step = ++result.steps;
     told.bodies = world.bodies();
 }

@@ -25,7 +25,7 @@ SharedWorldWorker::SharedWorldWorker(const SceneMessage& scene)
     : self_(scene.worker),
       exchange_(scene.settings.pace == Pace::lockstep ? make_lockstep_exchange(scene)
                                                       : make_bounded_exchange(scene)),
-      market_(scene.worker, scene.settings.market, scene.settings.pace == Pace::bounded),
+      market_(scene.worker, scene.settings.market, scene.settings.bound),
       bounded_(scene.settings.pace == Pace::bounded) {
     for (const WorldEvent& event : scene.scene.events)
         if (!event.slowing.empty()) events_.push_back(event);
@@ -36,14 +36,15 @@ void SharedWorldWorker::take(const WorldHeader& header, WorldMessage&& message) 
     std::visit([&](auto&& m) { take_message(header, std::forward<decltype(m)>(m)); }, std::move(message));
     if (left_ || ended_) return;
     exchange_->follow();
-    if (bounded_) hand_over();  // the next step may have to wait for the buyer
+    if (!stepping_) trade();  // the next step may have to wait for the buyer
 }
 
 void SharedWorldWorker::take_message(const WorldHeader& header, Members&& message) {
     (void)header;
     exchange_->members(message.workers);
-    std::erase_if(sellers_, [&message](std::uint32_t seller) {
-        return std::find(message.workers.begin(), message.workers.end(), seller) == message.workers.end();
+    std::erase_if(sellers_, [&message](const auto& seller) {
+        return std::find(message.workers.begin(), message.workers.end(), seller.first) ==
+               message.workers.end();
     });
     market_.members(message.workers);
 }
@@ -52,11 +53,11 @@ void SharedWorldWorker::take_message(const WorldHeader& header, Ownership&& mess
     epoch_ = header.epoch;
     exchange_->own(message);
     market_.registered(header.epoch, message);
-    if (message.traded) std::erase(sellers_, message.from);
+    if (message.traded) sellers_.erase(message.from);
     // Who came to the last step by taking bodies over has to say so, once.
     if (exchange_->at_end() && exchange_->own_bodies() > 0 && published_ < exchange_->steps_done() &&
         !stepping_ && bounded_)
-        publish(0, 0);
+        publish({});
 }
 
 void SharedWorldWorker::take_message(const WorldHeader& header, SnapshotMessage&& message) {
@@ -65,25 +66,25 @@ void SharedWorldWorker::take_message(const WorldHeader& header, SnapshotMessage&
 }
 
 void SharedWorldWorker::take_message(const WorldHeader& header, StateMessage&& message) {
-    market_.heard(header.worker, header.epoch, message.report);
+    market_.heard(header.worker, header.step, header.epoch, message.report);
     exchange_->take(header, std::move(message));
 }
 
 void SharedWorldWorker::take_message(const WorldHeader& header, PackedUpdates&& message) {
-    market_.heard(header.worker, header.epoch, message.report);
+    market_.heard(header.worker, header.step, header.epoch, message.report);
     exchange_->take(header, std::move(message));
 }
 
 void SharedWorldWorker::take_message(const WorldHeader& header, Offer&& message) {
     OfferAnswer answer = {header.worker, message.number, false};
     if (!draining_ && !exchange_->at_end()) answer = market_.answer(header.worker, message);
-    if (answer.accepted && bounded_) sellers_.push_back(header.worker);
+    if (answer.accepted && bounded_) sellers_[header.worker] = exchange_->steps_done() + 1;
     send(answer);
 }
 
 void SharedWorldWorker::take_message(const WorldHeader& header, OfferAnswer&& message) {
     market_.answered(header.worker, message);
-    handover_step_ = header.step;
+    handover_step_ = header.step + 1;
 }
 
 void SharedWorldWorker::take_message(const WorldHeader& header, EndOfRun&& message) {
@@ -107,7 +108,9 @@ void SharedWorldWorker::take_message(const WorldHeader& header, Other&& message)
 }
 
 bool SharedWorldWorker::ready() const {
-    return !left_ && !ended_ && !stepping_ && sellers_.empty() && exchange_->ready();
+    const bool bodies_are_due = std::ranges::any_of(
+        sellers_, [this](const auto& seller) { return seller.second <= exchange_->steps_done(); });
+    return !left_ && !ended_ && !stepping_ && !bodies_are_due && exchange_->ready();
 }
 
 std::string SharedWorldWorker::waits_for() const {
@@ -116,7 +119,7 @@ std::string SharedWorldWorker::waits_for() const {
     if (exchange_->own_bodies() == 0) return "bodies";
     if (sellers_.empty()) return std::to_string(exchange_->lead()).append(" steps for the slowest");
     std::string who = "bodies from";
-    for (const std::uint32_t seller : sellers_) who.append(" ").append(std::to_string(seller));
+    for (const auto& [seller, step] : sellers_) who.append(" ").append(std::to_string(seller));
     return who;
 }
 
@@ -134,22 +137,23 @@ double SharedWorldWorker::work() const {
     return sum;
 }
 
-void SharedWorldWorker::worked(double seconds, double waited_s) {
-    exchange_->cost(seconds);
-    market_.worked(exchange_->steps_done(), seconds, work(), exchange_->own_bodies());
+void SharedWorldWorker::worked(const Times& times) {
+    exchange_->weigh();
+    market_.worked(exchange_->steps_done(), times.seconds, work(), exchange_->own_bodies());
     stepping_ = false;
-    publish(seconds, waited_s);
+    publish(times);
     if (draining_) return leave();
     trade();
     exchange_->follow();
 }
 
-void SharedWorldWorker::publish(double seconds, double waited_s) {
+void SharedWorldWorker::publish(const Times& times) {
     const World& world = exchange_->world();
     StepReport report;
-    report.seconds = static_cast<float>(seconds);
+    report.seconds = static_cast<float>(times.seconds);
     report.smoothed_s = static_cast<float>(market_.smoothed());
-    report.waited_s = static_cast<float>(waited_s);
+    report.waited_s = static_cast<float>(times.waited_s);
+    report.processor_s = static_cast<float>(times.processor_s);
     report.lead = static_cast<std::uint32_t>(std::max(0, lead_));
     report.ghost_age = static_cast<std::uint32_t>(std::max(0, exchange_->ghost_age()));
     report.cross_contacts = static_cast<std::uint32_t>(world.cross_contacts());
@@ -160,21 +164,23 @@ void SharedWorldWorker::publish(double seconds, double waited_s) {
     queue_.push_back(exchange_->publish(epoch_, report));
 }
 
-// At the end of a step, after its states are on their way.
+// Between steps, after states are on their way: one offer a step, and another when bodies are handed over.
 void SharedWorldWorker::trade() {
-    hand_over();
-    if (exchange_->at_end() || !market_.wants_to_sell()) return;
-    if (const std::optional<Offer> offer = market_.make_offer(exchange_->lots(market_.fastest())))
-        send(*offer);
+    const bool sold = hand_over();
+    if (!sold && offered_at_ == exchange_->steps_done()) return;
+    offered_at_ = exchange_->steps_done();
+    if (draining_ || exchange_->at_end() || !market_.wants_to_sell()) return;
+    if (const std::optional<Offer> offer = market_.make_offer(exchange_->holdings())) send(*offer);
 }
 
-void SharedWorldWorker::hand_over() {
-    if (stepping_ || (bounded_ && exchange_->steps_done() < handover_step_)) return;
+bool SharedWorldWorker::hand_over() {
+    if (bounded_ && exchange_->steps_done() < handover_step_) return false;
     const std::optional<Offer> sold = market_.hand_over();
-    if (!sold) return;
+    if (!sold) return false;
     Handover handover = exchange_->give(sold->bodies);
     handover.to = sold->to, handover.number = sold->number;
     send(handover);
+    return true;
 }
 
 void SharedWorldWorker::drain() {

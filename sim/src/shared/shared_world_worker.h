@@ -7,7 +7,7 @@ namespace sim {
 /// One worker, without clock or transport: the same code runs behind ZeroMQ and on simulated processors.
 ///
 ///   take() ... whenever a message comes, but not between step() and worked()
-///   if (ready()) { step(); worked(seconds, waited); }
+///   if (ready()) { step(); worked(times); }
 ///   outgoing() after each of these
 class SharedWorldWorker {
 public:
@@ -17,9 +17,11 @@ public:
     void take(const WorldHeader& header, WorldMessage&& message);
     [[nodiscard]] bool ready() const;
     void step();
-    /// After step(): the seconds it took, and those the worker had waited before it. Queues the message to
-    /// publish, then balances the load.
-    void worked(double seconds, double waited_s);
+    struct Times {  ///< of a step, see WorkerStep
+        double seconds = 0, waited_s = 0, processor_s = 0;
+    };
+    /// After step(). Queues the message to publish, then balances the load.
+    void worked(const Times& times);
     /// Encoded messages to the application, in order; empties the queue.
     [[nodiscard]] std::vector<std::vector<std::uint8_t>> outgoing();
     /// Hands all bodies over, after the step if one is under way; then left() becomes true.
@@ -47,9 +49,9 @@ private:
     void take_message(const WorldHeader& header, Other&& message);
 
     void send(const WorldMessage& message);
-    void publish(double seconds, double waited_s);
+    void publish(const Times& times);
     void trade();
-    void hand_over();
+    [[nodiscard]] bool hand_over();
     void leave();
 
     std::uint32_t self_;
@@ -62,9 +64,11 @@ private:
     std::uint64_t published_ = 0;  // step
     int lead_ = 0;                 // at the start of the step
     // Bounded pace: sold bodies change owners at a step that neither side has passed, so no body skips a
-    // step. The buyer waits there; the seller goes on to it.
+    // step: the one after the buyer's. The buyer waits there; the seller goes on to it.
     std::uint64_t handover_step_ = 0;
-    std::vector<std::uint32_t> sellers_;  // whose offers were accepted, and whose bodies have not come
+    std::optional<std::uint64_t> offered_at_;  // step
+    // Whose offers were accepted and whose bodies have not come; the step up to which this worker goes on.
+    std::map<std::uint32_t, std::uint64_t> sellers_;
     bool stepping_ = false, draining_ = false, left_ = false, ended_ = false;
 };
 

@@ -1,8 +1,7 @@
-#include <time.h>
-
 #include <algorithm>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -11,22 +10,45 @@
 #include "shared/shared_world_worker.h"
 #include "sim/distributed_world.h"
 #include "sim/errors.h"
+#include "world/processor_time.h"
 
 namespace sim {
 namespace {
 
 using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
 
-double thread_seconds() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 struct Arrival {
     double time;
     Bytes bytes;
 };
+
+/// What a worker does in one go. The same turns make the same of a worker, wherever it runs.
+struct Turn {
+    std::optional<SharedWorldWorker::Times> ended;  // the step under way ends
+    std::vector<Bytes> messages;
+    bool drain = false;
+    bool step = false;  // at last
+};
+
+double cost_of(const std::function<void()>& work) {
+    const double start = thread_processor_s();
+    work();
+    return thread_processor_s() - start;
+}
+
+// All but the step. The first message makes the worker.
+void handle(std::unique_ptr<SharedWorldWorker>& worker, const Turn& turn) {
+    if (turn.ended) worker->worked(*turn.ended);
+    for (const Bytes& bytes : turn.messages) {
+        DecodedWorldMessage decoded = decode_for_worker(*bytes);
+        if (const auto* scene = std::get_if<SceneMessage>(&decoded.message)) {
+            worker = std::make_unique<SharedWorldWorker>(*scene);
+        } else if (worker) {
+            worker->take(decoded.header, std::move(decoded.message));
+        }
+    }
+    if (turn.drain && worker) worker->drain();
+}
 
 /// One worker and the processor it runs on.
 struct Processor {
@@ -40,6 +62,10 @@ struct Processor {
     double step_cost = 0;
     bool killed = false, stopped = false, cut = false;
     double silent_since = 0;  // when one of these began
+    // Repeated alone:
+    std::vector<Turn> turns;
+    double spent_s = 0;    // this thread's, once the worker was there
+    std::size_t sent = 0;  // bytes
     [[nodiscard]] bool silent() const { return killed || stopped || cut; }
     [[nodiscard]] bool runs() const { return !killed && !stopped; }
 };
@@ -70,9 +96,10 @@ private:
     void happen(const Event& event);
     void fail(const SimulatedProcessors::Failure& failure);
     void run_worker(std::size_t number);
-    void end_step(Processor& p);
-    void take_messages(Processor& p);
+    [[nodiscard]] Turn turn_of(Processor& p);
     void start_step(std::size_t number);
+    [[nodiscard]] double repeat_alone(const Processor& p) const;
+    void repeat_alone(DistributedResult& result) const;
     void send(Processor& p);
     [[nodiscard]] double factor(std::size_t number) const;
     [[nodiscard]] std::string stuck() const;
@@ -171,46 +198,43 @@ double Machine::factor(std::size_t number) const {
 
 void Machine::run_worker(std::size_t number) {
     Processor& p = processors_[number];
+    Turn turn = turn_of(p);
+    const bool there = p.worker != nullptr;
+    const double spent = cost_of([&] { handle(p.worker, turn); });
+    if (there) p.spent_s += spent;
+    if (!how_.modelled && there) {  // that a worker reads its scene is no part of the run
+        p.handled += spent * how_.slowdown;
+        p.free_at = now_ + spent * how_.slowdown;
+    }
+    if (p.worker) p.drain = false;
+    send(p);
+    turn.step = p.worker && p.worker->ready();
+    if (turn.step) start_step(number);
+    if (how_.repeat_alone) p.turns.push_back(std::move(turn));
+}
+
+Turn Machine::turn_of(Processor& p) {
+    Turn turn;
     if (!p.stepping) p.waited += now_ - p.free_at;
     p.free_at = now_;
-    const double start = thread_seconds();
-    if (p.stepping) end_step(p);
-    take_messages(p);
-    if (p.drain && p.worker) p.drain = false, p.worker->drain();
-    if (!how_.modelled) {
-        const double cost = (thread_seconds() - start) * how_.slowdown;
-        p.handled += cost;
-        p.free_at = now_ + cost;
+    if (std::exchange(p.stepping, false)) {
+        const double seconds = p.step_cost + std::exchange(p.handled, 0);
+        turn.ended = {seconds, std::exchange(p.waited, 0), seconds};
+        ended_ = now_;
     }
-    send(p);
-    if (p.worker && p.worker->ready()) start_step(number);
-}
-
-void Machine::end_step(Processor& p) {
-    p.stepping = false;
-    p.worker->worked(p.step_cost + std::exchange(p.handled, 0), std::exchange(p.waited, 0));
-    ended_ = now_;
-}
-
-void Machine::take_messages(Processor& p) {
-    while (!p.inbox.empty() && p.inbox.front().time <= now_) {
-        DecodedWorldMessage decoded = decode_for_worker(*p.inbox.front().bytes);
-        p.inbox.pop_front();
-        if (const auto* scene = std::get_if<SceneMessage>(&decoded.message)) {
-            p.worker = std::make_unique<SharedWorldWorker>(*scene);
-        } else if (p.worker) {
-            p.worker->take(decoded.header, std::move(decoded.message));
-        }
-    }
+    for (; !p.inbox.empty() && p.inbox.front().time <= now_; p.inbox.pop_front())
+        turn.messages.push_back(std::move(p.inbox.front().bytes));
+    turn.drain = p.drain;
+    return turn;
 }
 
 void Machine::start_step(std::size_t number) {
     Processor& p = processors_[number];
-    const double slow = factor(number), start = thread_seconds();
+    const double slow = factor(number);
     if (started_ < 0) started_ = p.free_at;
-    p.worker->step();
-    p.step_cost =
-        how_.modelled ? how_.seconds_per_work * p.worker->work() : (thread_seconds() - start) * how_.slowdown;
+    const double spent = cost_of([&] { p.worker->step(); });
+    p.spent_s += spent;
+    p.step_cost = how_.modelled ? how_.seconds_per_work * p.worker->work() : spent * how_.slowdown;
     p.step_cost *= slow;
     p.free_at += p.step_cost;
     p.stepping = true;
@@ -218,10 +242,41 @@ void Machine::start_step(std::size_t number) {
 
 void Machine::send(Processor& p) {
     if (!p.worker) return;
-    for (std::vector<std::uint8_t>& bytes : p.worker->outgoing())
+    for (std::vector<std::uint8_t>& bytes : p.worker->outgoing()) {
+        p.sent += bytes.size();
         if (!p.cut)
             p.outbox.push_back({p.free_at + how_.latency_s / 2,
                                 std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))});
+    }
+}
+
+// Processor time, as Processor::spent_s. Beside the worker that did it first: memory as of a process of its own.
+double Machine::repeat_alone(const Processor& p) const {
+    std::unique_ptr<SharedWorldWorker> worker;
+    double spent = 0;
+    std::size_t sent = 0;
+    for (const Turn& turn : p.turns) {
+        const bool there = worker != nullptr;
+        const double handled = cost_of([&] { handle(worker, turn); });
+        if (there) spent += handled;
+        if (worker)
+            for (const std::vector<std::uint8_t>& bytes : worker->outgoing()) sent += bytes.size();
+        if (turn.step) spent += cost_of([&] { worker->step(); });
+    }
+    if (sent != p.sent)
+        throw std::logic_error("simulated processors: a worker did otherwise when it was alone");
+    return spent;
+}
+
+void Machine::repeat_alone(DistributedResult& result) const {
+    double in_turns = 0, sum = 0, longest = 0;
+    for (const Processor& p : processors_) {
+        const double alone = repeat_alone(p);
+        in_turns += p.spent_s, sum += alone;
+        longest = std::max(longest, alone);
+    }
+    if (sum > 0) result.cold_caches = in_turns / sum;
+    result.busiest_s = how_.slowdown * longest;
 }
 
 // That nothing is left to happen before the end is our own mistake.
@@ -251,6 +306,7 @@ DistributedResult Machine::run() {
     }
     DistributedResult result = meeting_.result();
     result.elapsed_s = std::max(0.0, ended_ - std::max(0.0, started_));
+    if (how_.repeat_alone) repeat_alone(result);
     return result;
 }
 

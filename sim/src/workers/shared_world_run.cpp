@@ -13,6 +13,7 @@
 #include "workers/teams.h"
 #include "workers/worker_gate.h"
 #include "workers/worker_process.h"
+#include "world/processor_time.h"
 
 namespace sim {
 namespace {
@@ -35,18 +36,22 @@ public:
     [[nodiscard]] std::uint32_t number() const { return number_; }
 
     void take(const std::vector<std::uint8_t>& bytes) {
+        const double processor = thread_processor_s();
         DecodedWorldMessage m = decode_for_worker(bytes);
         if (const auto* scene = std::get_if<SceneMessage>(&m.message))
             worker_.emplace(*scene);
         else if (worker_)
             worker_->take(m.header, std::move(m.message));
+        messages_s_ += thread_processor_s() - processor;
     }
     /// A step if one can be done; true if it was.
     bool work() {
         if (!worker_ || worker_->ended() || !worker_->ready()) return false;
         const Clock::time_point start = Clock::now();
+        const double processor = thread_processor_s();
         worker_->step();
-        worker_->worked(seconds_since(start), 0);
+        const double spent = std::exchange(messages_s_, 0) + thread_processor_s() - processor;
+        worker_->worked({seconds_since(start), 0, spent});
         return true;
     }
     [[nodiscard]] std::vector<std::vector<std::uint8_t>> outgoing() {
@@ -56,6 +61,7 @@ public:
 private:
     std::uint32_t number_;
     std::optional<SharedWorldWorker> worker_;
+    double messages_s_ = 0;  ///< processor time that they took since the last step
 };
 
 class SharedWorldRun {

@@ -12,6 +12,7 @@
 #include "shared/shared_world_worker.h"
 #include "sim/errors.h"
 #include "workers/elapsed.h"
+#include "world/processor_time.h"
 
 namespace sim {
 namespace {
@@ -84,7 +85,8 @@ private:
         const Clock::time_point start = Clock::now();
         worker_.step();
         if (factor > 1) sleep_for((factor - 1) * seconds_since(start));
-        worker_.worked(seconds_since(start), waited);
+        const double processor = thread_processor_s();
+        worker_.worked({seconds_since(start), waited, processor - std::exchange(told_processor_, processor)});
         idle_since_ = Clock::now();
     }
     void send_all() {
@@ -111,6 +113,7 @@ private:
     WorldHeader header_;
     bool draining_ = false, refused_ = false;
     Clock::time_point idle_since_ = Clock::now();
+    double told_processor_ = thread_processor_s();
 };
 
 int serve_scene(zmq::socket_t& socket, Pulse& pulse, const SceneMessage& scene) {

@@ -362,7 +362,7 @@ void IslandSolver::move_directly() {
     for (SpringRows& s : springs_) {
         const auto p = along(s.moved);
         const Eigen::Vector3d moved = in_world(s, s.moved);
-        if (s.told) tell(s, -1, moved, moved, {p[0], p[1], p[2]}, s.place);
+        if (s.told) tell(s, -1, moved, {p[0], p[1], p[2]}, s.place);
         apply(s, moved, s.place, outside_);
         give(s, s.moved, gradient_);
     }
@@ -409,17 +409,16 @@ void IslandSolver::finish_directly(bool last) {
     for (ContactRows& c : contacts_) note_work(c, c.impulse[0] - c.at_move[0]);
     for (ContactRows& c : contacts_)
         if (last) restitute(c);
-    ring_on();
     for (const ContactRows& c : contacts_) {
         const Eigen::Vector3d p(c.impulse[0], c.impulse[1], c.impulse[2]),
             at_move(c.at_move[0], c.at_move[1], c.at_move[2]);
         if (p.isZero(0) && at_move.isZero(0)) continue;
-        if (c.told) tell(c, c.pair, in_world(c, p), in_world(c, at_move), c.impulse, place_now(c));
+        if (c.told) tell(c, c.pair, in_world(c, p), c.impulse, place_now(c));
         apply(c, in_world(c, p - at_move), place_now(c), outside_);
     }
     for (SpringRows& s : springs_) {
         const float p[3] = {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])};
-        if (s.told) tell(s, -1, in_world(s, s.impulse), Eigen::Vector3d::Zero(), p, s.place);
+        if (s.told) tell(s, -1, in_world(s, s.impulse), p, s.place);
         apply(s, in_world(s, s.impulse), s.place, outside_);
     }
     for (const BodyRows& rows : rows_of_) {
@@ -456,7 +455,7 @@ void IslandSolver::pull_springs() {
         const float p[3] = {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])};
         push_by(s, p);
         const Eigen::Vector3d impulse = in_world(s, s.impulse);
-        if (s.told) tell(s, -1, impulse, impulse, p, s.place);
+        if (s.told) tell(s, -1, impulse, p, s.place);
         apply(s, impulse, s.place, outside_);
     }
 }

@@ -65,6 +65,7 @@ public:
                 for (std::size_t b = 0; b < blocks_in(of_bodies(p)); ++b) visit(p, blocks_[b]);
             return;
         }
+        if (ThreadPlan* plan = crew.plan()) return plan_run(*plan, count, of_bodies, visit);
         for (std::size_t s = 0; s < slabs(); ++s) done_[s].value.store(0, std::memory_order_relaxed);
         std::size_t sum = 0;
         for (std::uint32_t p = 0; p < count; ++p) sum += blocks_in(of_bodies(p));
@@ -85,6 +86,20 @@ public:
     }
 
 private:
+    // By one thread, in order; what a block waits for is planned, too.
+    template <typename OfBodies, typename Visit>
+    void plan_run(ThreadPlan& plan, std::uint32_t count, OfBodies of_bodies, Visit visit) {
+        std::array<double, kMostSlabs> ready{};
+        plan.begin();
+        for (std::uint32_t p = 0; p < count; ++p)
+            for (std::size_t b = 0; b < blocks_in(of_bodies(p)); ++b) {
+                const auto mine = std::span(ready).subspan(blocks_[b].slab, blocks_[b].slabs);
+                const int thread = plan.next();
+                visit(p, blocks_[b]);
+                std::ranges::fill(mine, plan.done(thread, std::ranges::max(mine)));
+            }
+        plan.end();
+    }
     struct alignas(64) Done {
         std::atomic<std::uint32_t> value = 0;  // blocks of a slab, in all phases
     };

@@ -288,14 +288,15 @@ void IslandSolver::reflect() {
     for (const std::size_t i : striking_) {
         ContactRows& c = contacts_[i];
         for (float& p : c.impulse) p *= scale;
-        apply(c, c.impulse, c.impulse, outside_);
+        apply(c, c.impulse, outside_);
+        if (c.pair >= 0 && c.impulse[0] != 0) crossed_[static_cast<std::size_t>(c.pair)].blow = true;
         std::fill_n(c.impulse, 3, 0.f);
     }
     for (const std::size_t i : holding_) {
         SpringRows& s = springs_[i];
         for (float& p : s.strike) p *= scale;
         const Eigen::Vector3d p = in_world(s, {s.strike[0], s.strike[1], s.strike[2]});
-        if (s.told) tell(s, -1, p, p, s.strike, s.place);
+        if (s.told) tell(s, -1, p, s.strike, s.place);
         apply(s, p, s.place, outside_);
     }
 }

@@ -61,7 +61,8 @@ void IslandSolver::begin(const Island& island) {
     }
     pushed_.clear();
     for (std::size_t i = 0; i < rows_of_.size() && !forces_->empty(); ++i) begin_forces(static_cast<int>(i));
-    if (!springs_.empty() || contacts_.empty()) (void)begin_direct(most_with_springs(), springs_.empty());
+    if (!springs_.empty() || contacts_.empty())
+        (void)begin_direct(among_ghosts() ? 0 : most_with_springs(), springs_.empty());
 }
 
 void IslandSolver::begin_body(BodyRows& rows) {
@@ -275,12 +276,7 @@ int IslandSolver::note_pair(const Manifold& manifold) {
     const int own = a.own ? manifold.a : manifold.b, ghost = a.own ? manifold.b : manifold.a;
     for (std::size_t i = first_crossed_; i < crossed_.size(); ++i)
         if (crossed_[i].own == own && crossed_[i].ghost == ghost) return static_cast<int>(i);
-    CrossImpulse& cross = crossed_.emplace_back();
-    cross.own = own, cross.ghost = ghost;
-    for (StepImpulse* given : {&cross.on_own, &cross.on_ghost}) {
-        const int modes = (a.own == (given == &cross.on_own) ? a : b).kind->modes;
-        given->modal = given->modal_q = given->modal_rate = Eigen::VectorXd::Zero(modes);
-    }
+    crossed_.emplace_back(own, ghost);
     return static_cast<int>(crossed_.size()) - 1;
 }
 

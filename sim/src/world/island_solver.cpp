@@ -17,11 +17,6 @@ constexpr double kUneven =
 // Energy in a step, of the motion's and of weight times size, beyond which a direct solution is worse than sweeps.
 constexpr double kWorse = 3e-3;
 
-void clear(StepImpulse& impulse) {
-    impulse.linear.setZero(), impulse.angular.setZero(), impulse.displacement.setZero();
-    impulse.turn.setZero(), impulse.modal.setZero();
-}
-
 // Without the library's check for negative arguments.
 float root(float x) {
     return _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(x)));
@@ -55,7 +50,6 @@ void IslandSolver::solve(const Island& island, const ContactScene& scene, bool f
     // Joints alone give back what they take, within a step or over several.
     if (!may_gain() && !any_told_ && (springs_.empty() || !island.manifolds.empty())) calm();
     end_forces();
-    if (any_told_) settle_given();
     keep_impulses();
     for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
 }
@@ -74,13 +68,13 @@ bool IslandSolver::may_gain() const {
 }
 
 bool IslandSolver::is_far_from_solved() const {
-    return impacts_.empty() && !any_struck_ &&
+    return impacts_.empty() && !any_struck_ && !among_ghosts() &&
            residual() > kMissedAtRest * smallest_ + kMissedShare * fastest_;
 }
 
 // Whether bodies touch much lighter ones, nothing else.
 bool IslandSolver::is_uneven() const {
-    if (!impacts_.empty() || any_struck_) return false;
+    if (!impacts_.empty() || any_struck_ || among_ghosts()) return false;
     std::atomic<bool> uneven = false;
     crew().each(contacts_.size(), 64, [&](int, std::size_t first, std::size_t last) {
         for (const ContactRows& c : std::span(contacts_).subspan(first, last - first)) {
@@ -134,7 +128,6 @@ void IslandSolver::substep(bool last) {
     using Solver = IslandSolver;
     begin_times(substep_ * h_);
     set_forces();
-    ring_on();
     if (carried_) contacts(&Solver::see_driven);
     if (substep_ > 0 && !contacts_.empty()) bodies(&Solver::turn_frames), contacts(&Solver::turn_rows);
     bodies(&Solver::load_velocities);
@@ -323,6 +316,7 @@ void IslandSolver::restitute(const IslandBlocks::Block& block) {
 void IslandSolver::restitute(ContactRows& c) {
     if (c.restitution == 0 || c.largest == 0 || c.approach >= -least_bounce(c)) return;
     if (!direct_ && is_rigid(c)) return;  // impacts did
+    if (c.pair >= 0) crossed_[static_cast<std::size_t>(c.pair)].blow = true;
     float v[3];
     speeds(c, v);
     float rigid = 0, slope = v[0];
@@ -348,7 +342,7 @@ void IslandSolver::give_to_move(const IslandBlocks::Block& block) {
     for (ContactRows& c : contacts_in(block)) {
         std::copy_n(c.impulse, 3, c.at_move);
         c.drifted += static_cast<float>(h_) * c.drift[0];
-        apply(c, c.at_move, c.at_move, sums_[block.slab].outside);
+        apply(c, c.at_move, sums_[block.slab].outside);
     }
 }
 
@@ -396,6 +390,15 @@ void IslandSolver::forget_crossed(int body) {
     std::erase_if(crossed_, [body](const CrossImpulse& c) { return c.own == body || c.ghost == body; });
 }
 
+void IslandSolver::add_crossed(const CrossImpulse& more) {
+    const auto found = std::ranges::find_if(
+        crossed_, [&](const CrossImpulse& c) { return c.own == more.own && c.ghost == more.ghost; });
+    if (found == crossed_.end()) return crossed_.push_back(more);
+    found->blow = found->blow || more.blow;
+    found->linear += more.linear;
+    found->angular_own += more.angular_own, found->angular_ghost += more.angular_ghost;
+}
+
 // Half-way between where the contact would be if it moved with either centre.
 Eigen::Vector3d IslandSolver::place_now(const ContactRows& c) const {
     const Side &a = c.side[0], &b = c.side[1];
@@ -424,91 +427,43 @@ void IslandSolver::apply(const Rows& rows, const Eigen::Vector3d& impulse, const
     }
 }
 
-// Adds what a row triple did in this substep; see settle for what the sums stand for.
-void IslandSolver::tell_side(const Rows& rows, int which, const Eigen::Vector3d& impulse,
-                             const Eigen::Vector3d& at_move, const float (&along)[3],
-                             const Eigen::Vector3d& point, StepImpulse& given) const {
-    const Side& side = rows.side[which];
-    const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
-    const double sign = which == 0 ? 1 : -1;
-    const Eigen::Vector3d arm = point - at.place, moved = (h_ - at.time) * at_move + remaining_ * impulse;
-    given.linear += sign * impulse;
-    given.angular += sign * arm.cross(impulse);
-    given.displacement += sign * moved;
-    given.turn += sign * arm.cross(moved);
-    const float* d = jacobians_.data() + side.rows + 8;
-    const HeldSteps& step = of_substep(*at.body->kind).held;
-    for (int k = 0; k < at.body->kind->modes; ++k) {
-        const double held = static_cast<double>(along[0] * d[k] + along[1] * d[side.width + k] +
-                                                along[2] * d[2 * side.width + k]) /
-                            step.root_compliance[k];
-        given.modal[k] += held;
-        if (given.modal_q.size() == 0) continue;
-        given.modal_q[k] += h_ * step.compliance[k] * held;
-        given.modal_rate[k] += step.rate[k] * held;
-    }
-}
-
-// What earlier substeps did to the modes of ghosts rings on.
-void IslandSolver::ring_on() {
-    auto ring = [this](int body, StepImpulse& given) {
-        const HeldSteps& step = of_substep(*(*bodies_)[static_cast<std::size_t>(body)].kind).held;
-        for (int k = 0; k < given.modal_q.size(); ++k) {
-            const double z = given.modal_q[k], rate = given.modal_rate[k];
-            given.modal_q[k] = z + h_ * (step.mean_z[k] * z + step.mean_rate[k] * rate);
-            given.modal_rate[k] = step.c[k] * z + step.d[k] * rate;
-        }
-    };
-    for (std::size_t i = first_crossed_; i < crossed_.size(); ++i) {
-        ring(crossed_[i].own, crossed_[i].on_own);
-        ring(crossed_[i].ghost, crossed_[i].on_ghost);
-    }
-}
-
-void IslandSolver::tell(const Rows& rows, int pair, const Eigen::Vector3d& impulse,
-                        const Eigen::Vector3d& at_move, const float (&along)[3],
+// Adds what a row triple gave: to what the worlds of both bodies tell each other, or to what the owner of one tells.
+void IslandSolver::tell(const Rows& rows, int pair, const Eigen::Vector3d& impulse, const float (&along)[3],
                         const Eigen::Vector3d& point) {
-    for (int side = 0; side < 2; ++side) {
-        if (rows.side[side].body < 0) continue;
-        MovingBody& body = *rows_of_[static_cast<std::size_t>(rows.side[side].body)].body;
+    for (int which = 0; which < 2; ++which) {
+        const Side& side = rows.side[which];
+        if (side.body < 0) continue;
+        const BodyRows& at = rows_of_[static_cast<std::size_t>(side.body)];
+        MovingBody& body = *at.body;
+        const Eigen::Vector3d p = which == 0 ? impulse : Eigen::Vector3d(-impulse);
+        const Eigen::Vector3d turn = (point - at.place).cross(p);
         if (pair >= 0) {
             CrossImpulse& cross = crossed_[static_cast<std::size_t>(pair)];
-            tell_side(rows, side, impulse, at_move, along, point, body.own ? cross.on_own : cross.on_ghost);
+            if (body.own) cross.linear += p;
+            (body.own ? cross.angular_own : cross.angular_ghost) += turn;
+            continue;
         }
         if (!body.watched) continue;
-        if (!std::exchange(body.was_given, true)) clear(body.given);
-        tell_side(rows, side, impulse, at_move, along, point, body.given);
-    }
-}
-
-// From sums over the substeps to the recorded impulse: displacement and turn beyond those of an impulse that
-// acts half-way through the step; rows are scaled by the root of the compliance.
-void IslandSolver::settle(const BodyRows& rows, StepImpulse& given) const {
-    const BodyKind& kind = *rows.body->kind;
-    given.displacement = (given.displacement - settings_->dt / 2 * given.linear) / kind.mass.mass;
-    given.turn -= settings_->dt / 2 * given.angular;
-    given.turn = rows.frame * (rows.frame.transpose() * given.turn).cwiseQuotient(kind.mass.inertia);
-}
-
-void IslandSolver::settle_given() {
-    for (const BodyRows& rows : rows_of_)
-        if (rows.body->was_given) settle(rows, rows.body->given);
-    for (std::size_t i = first_crossed_; i < crossed_.size(); ++i) {
-        CrossImpulse& cross = crossed_[i];
-        settle(rows_of_[static_cast<std::size_t>(local(cross.own))], cross.on_own);
-        settle(rows_of_[static_cast<std::size_t>(local(cross.ghost))], cross.on_ghost);
+        if (!std::exchange(body.was_given, true)) body.given.set_zero();
+        body.given.linear += p;
+        body.given.angular += turn;
+        const float* d = jacobians_.data() + side.rows + 8;
+        const HeldSteps& step = of_substep(*body.kind).held;
+        for (int k = 0; k < body.kind->modes; ++k)
+            body.given.modal[k] += static_cast<double>(along[0] * d[k] + along[1] * d[side.width + k] +
+                                                       along[2] * d[2 * side.width + k]) /
+                                   step.root_compliance[k];
     }
 }
 
 // A contact's impulse (of it what moves its bodies), at the place where it is now.
 [[gnu::flatten]] void IslandSolver::apply(const ContactRows& c, const float (&impulse)[3],
-                                          const float (&at_move)[3], Eigen::Vector3d& outside) {
+                                          Eigen::Vector3d& outside) {
     if (impulse[0] == 0 && impulse[1] == 0 && impulse[2] == 0) return;
-    auto world = [&c](const float(&p)[3]) -> Eigen::Vector3d {
-        return (p[0] * c.point->normal + p[1] * c.tangent[0] + p[2] * c.tangent[1]).cast<double>();
-    };
-    const Eigen::Vector3d p = world(impulse), place = place_now(c);
-    if (c.told) tell(c, c.pair, p, world(at_move), impulse, place);
+    const Eigen::Vector3d p =
+        (impulse[0] * c.point->normal + impulse[1] * c.tangent[0] + impulse[2] * c.tangent[1]).cast<double>();
+    const Eigen::Vector3d place = place_now(c);
+    if (c.told) tell(c, c.pair, p, impulse, place);
     apply(c, p, place, outside);
 }
 
@@ -516,7 +471,7 @@ void IslandSolver::give_the_rest(const IslandBlocks::Block& block) {
     for (const ContactRows& c : contacts_in(block)) {
         const float after[3] = {c.impulse[0] - c.at_move[0], c.impulse[1] - c.at_move[1],
                                 c.impulse[2] - c.at_move[2]};
-        apply(c, after, {0, 0, 0}, sums_[block.slab].outside);
+        apply(c, after, sums_[block.slab].outside);
     }
 }
 

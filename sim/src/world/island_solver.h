@@ -139,6 +139,8 @@ public:
         crossed_.clear();
         told_crossed_ = told;
     }
+    /// Adds what an own body and a ghost gave each other besides.
+    void add_crossed(const CrossImpulse& more);
     /// Forgets the crossed impulses of a body whose island is solved once more.
     void forget_crossed(int body);
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
@@ -462,12 +464,9 @@ private:
     [[nodiscard]] Eigen::Vector3d place_now(const ContactRows& contact) const;
     void apply(const Rows& rows, const Eigen::Vector3d& impulse, const Eigen::Vector3d& point,
                Eigen::Vector3d& outside);
-    void tell(const Rows& rows, int pair, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
-              const float (&along)[3], const Eigen::Vector3d& point);
-    void tell_side(const Rows& rows, int side, const Eigen::Vector3d& impulse, const Eigen::Vector3d& at_move,
-                   const float (&along)[3], const Eigen::Vector3d& point, StepImpulse& given) const;
-    void apply(const ContactRows& contact, const float (&impulse)[3], const float (&at_move)[3],
-               Eigen::Vector3d& outside);
+    void tell(const Rows& rows, int pair, const Eigen::Vector3d& impulse, const float (&along)[3],
+              const Eigen::Vector3d& point);
+    void apply(const ContactRows& contact, const float (&impulse)[3], Eigen::Vector3d& outside);
     [[nodiscard]] Eigen::Vector3d in_world(const ContactRows& contact, const Eigen::Vector3d& impulse) const;
     [[nodiscard]] static Eigen::Vector3d in_world(const SpringRows& spring, const Eigen::Vector3d& impulse) {
         return spring.axes.transpose() * impulse;
@@ -478,10 +477,9 @@ private:
     void finish(const BodyRows& rows, Sums& sums);
     [[nodiscard]] bool step_modes(const BodyRows& rows);  // whether a deformation was held
     void keep_impulses();
-    void ring_on();
-    void settle_given();
-    void settle(const BodyRows& rows, StepImpulse& given) const;
     int note_pair(const Manifold& manifold);
+    /// Whether the island goes on at other workers: it is swept, as all of it would be.
+    [[nodiscard]] bool among_ghosts() const noexcept { return crossed_.size() > first_crossed_; }
 
     /// What gravity and forces give in a time [s]: velocity, angular momentum.
     [[nodiscard]] Eigen::Vector3d velocity_given(const MovingBody& body, double time) const {

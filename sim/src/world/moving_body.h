@@ -26,7 +26,7 @@ struct MovingBody {
 
     bool own = true;       ///< stepped here; else a copy of another world's body
     bool unposed = false;  ///< `posed` is older than `state`
-    bool watched = false;  ///< impulses of other moving bodies in a step are summed in `given`
+    bool watched = false;  ///< impulses of other own bodies that move are summed in `given`
     bool was_given = false;
     StepImpulse given;
     double work = 0;  ///< see World::work

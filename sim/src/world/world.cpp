@@ -308,9 +308,9 @@ bool World::Implementation::any_awake() const {
                        [&](int i) { return awake(bodies[static_cast<std::size_t>(i)]); });
 }
 
-void World::Implementation::set_threads(int threads) {
-    all = std::make_unique<Crew>(threads);
-    while (solvers.size() < static_cast<std::size_t>(threads)) {
+void World::Implementation::set_threads(std::unique_ptr<Crew> crew) {
+    all = std::move(crew);
+    while (solvers.size() < static_cast<std::size_t>(all->size())) {
         solvers.push_back(
             std::make_unique<IslandSolver>(settings, bodies, contacts.manifolds(), constraints));
         solvers.back()->record(&contacts.paths());
@@ -369,7 +369,7 @@ World::World(const WorldDefinition& definition) : implementation_(std::make_uniq
     Implementation& w = *implementation_;
     w.settings = definition.settings;
     w.planes = definition.planes;
-    w.set_threads(1);
+    w.set_threads(std::make_unique<Crew>());
     w.forces = definition.forces;
     std::ranges::stable_sort(w.forces, {}, &TimedForce::body);
     for (const WorldBody& body : definition.bodies) w.add(body);
@@ -379,7 +379,18 @@ World::World(const WorldDefinition& definition) : implementation_(std::make_uniq
 void World::use_threads(int threads) {
     if (threads < 1)
         throw std::invalid_argument("threads: found " + std::to_string(threads) + ", expected 1 or more");
-    implementation_->set_threads(threads);
+    implementation_->set_threads(std::make_unique<Crew>(threads));
+}
+
+void World::plan_threads(int threads) {
+    if (threads < 1)
+        throw std::invalid_argument("threads: found " + std::to_string(threads) + ", expected 1 or more");
+    implementation_->set_threads(std::make_unique<Crew>(ThreadPlan(threads)));
+}
+
+double World::saved_by_threads_s() const {
+    const ThreadPlan* plan = implementation_->all->plan();
+    return plan ? plan->saved_s() : 0;
 }
 
 World::~World() = default;

@@ -204,14 +204,14 @@ void WorldContacts::gather(const ContactScene& scene, std::size_t parts) {
     });
 }
 
-// Among ghosts: of an own and a ghost body, those whose lower number is own; a ghost's with what is fixed.
+// Among ghosts: of an own body with any; a ghost's with what is fixed.
 bool ContactScene::may_meet(const std::pair<int, int>& pair) const {
     if (!joined.empty() && std::binary_search(joined.begin(), joined.end(), pair)) return false;
     const MovingBody &a = bodies[static_cast<std::size_t>(pair.first)],
                      &b = bodies[static_cast<std::size_t>(pair.second)];
     if (!a.moves() && !b.moves()) return false;
     if (!among_ghosts) return true;
-    return a.own || !a.moves() || !b.moves();
+    return a.own || b.own || !a.moves() || !b.moves();
 }
 
 void ContactScene::set_surface(Manifold& manifold) const {

@@ -16,7 +16,7 @@ struct ContactScene {
     const std::vector<std::pair<int, int>>& joined;  ///< pairs (a < b, ascending) that do not collide
     std::vector<MovingBody>& bodies;
     const std::vector<int>& here;  ///< ids of those that take part, ascending
-    /// Of an own and a foreign body only the pairs of which the lower number is own, and no two foreign ones.
+    /// No pairs of two foreign bodies that move.
     bool among_ghosts;
     Crew& crew;  ///< shares the work
 

@@ -29,7 +29,7 @@ struct World::Implementation {
     /// Who shares the work of a step: of a shared world one thread.
     [[nodiscard]] Crew& crew() noexcept { return sharing == Sharing::alone ? *all : alone; }
     [[nodiscard]] IslandSolver& solver() const noexcept { return *solvers.front(); }
-    void set_threads(int threads);
+    void set_threads(std::unique_ptr<Crew> crew);
     std::vector<Island> islands;
     std::vector<int> parent, place;             // union-find; a root's island
     std::vector<std::pair<int, int>> touching;  // of each contact: bodies that move, or -1
@@ -67,10 +67,9 @@ struct World::Implementation {
     struct LooseBall {
         Eigen::Vector3d center;
         double radius;
-        int body;
     };
     std::vector<LooseBall> own_balls;  // pairs: of the next step
-    [[nodiscard]] bool near_own(const Eigen::Vector3d& center, double radius, int body) const;
+    [[nodiscard]] bool near_own(const Eigen::Vector3d& center, double radius) const;
 
     const BodyKind* kind_of(const WorldBody& body);
     int add(const WorldBody& body);   ///< returns its id

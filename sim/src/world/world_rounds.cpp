@@ -9,9 +9,13 @@ namespace {
 
 constexpr int kRounds = 24;  // then what still meets is held apart
 
+struct Kick {
+    Eigen::Vector3d impulse, place;
+};
+
 // The impulse on a, and the opposite on b, half-way between the places that their arms reach, after which they
 // do not approach each other at the point. Applied, and returned.
-Eigen::Vector3d stop_approach(MovingBody& a, MovingBody& b, const ManifoldPoint& point) {
+Kick stop_approach(MovingBody& a, MovingBody& b, const ManifoldPoint& point) {
     const Eigen::Vector3d n = point.normal.cast<double>();
     const bool both = a.moves() && b.moves();
     const Eigen::Vector3d on_a = a.state.position + point.arm_a.cast<double>(),
@@ -34,7 +38,7 @@ Eigen::Vector3d stop_approach(MovingBody& a, MovingBody& b, const ManifoldPoint&
         body->state.velocity += p / body->kind->mass.mass;
         body->state.angular_momentum += (place - body->state.position).cross(p);
     }
-    return impulse;
+    return {impulse, place};
 }
 
 }  // namespace
@@ -54,8 +58,8 @@ void World::Implementation::start_solving() {
     outcomes.resize(bodies.size());
     solved.assign(bodies.size(), 0);
     again.assign(bodies.size(), 0);
+    // Of others' bodies alone, too: own ones may meet them unforeseen.
     for (std::size_t i = 0; i < islands_used; ++i) {
-        if (!is_solved(islands[i])) continue;
         const std::vector<int>& of_island = islands[i].bodies;
         crew().each(of_island.size(), kBodiesAPiece, [&](int, std::size_t first, std::size_t end) {
             for (std::size_t k = first; k < end; ++k) {
@@ -76,7 +80,6 @@ void World::Implementation::move_alone(int id) {
     move_freely(body, settings);
     if (limit_deformation(body)) ++outcome.limited;
     if (body.own) outcome.outside += body.kind->mass.mass * (body.state.velocity - before);
-    if (body.pushed && sharing == Sharing::pairs) outcome.outside -= settings.dt * body.force;
 }
 
 void World::Implementation::solve_island(const Island& island, bool follow, IslandSolver& by,
@@ -95,7 +98,7 @@ void World::Implementation::solve_island(const Island& island, bool follow, Isla
     for (const int id : island.bodies) {
         const MovingBody& body = bodies[static_cast<std::size_t>(id)];
         solved[static_cast<std::size_t>(id)] = 1;
-        if (sharing != Sharing::pairs && body.pushed && body.own) outcome.outside += settings.dt * body.force;
+        if (body.pushed && body.own) outcome.outside += settings.dt * body.force;
     }
 }
 
@@ -192,12 +195,17 @@ void World::Implementation::hold_apart(const WorldContacts::Meeting& meeting) {
     }
     const Manifold* manifold = contacts.find_now(meeting.a, meeting.b);
     if (manifold) {
-        const Eigen::Vector3d kick = stop_approach(at(meeting.a), at(meeting.b), manifold->points[0]);
+        const Kick kick = stop_approach(at(meeting.a), at(meeting.b), manifold->points[0]);
         for (const int id : {meeting.a, meeting.b}) {
             const int other = id == meeting.a ? meeting.b : meeting.a;
-            if (at(id).moves() && at(id).own && !at(other).moves())
-                outcomes[static_cast<std::size_t>(island_of(id).bodies.front())].outside +=
-                    id == meeting.a ? kick : Eigen::Vector3d(-kick);
+            if (!at(id).moves() || !at(id).own) continue;
+            const Eigen::Vector3d on_it = id == meeting.a ? kick.impulse : Eigen::Vector3d(-kick.impulse);
+            if (!at(other).moves())
+                outcomes[static_cast<std::size_t>(island_of(id).bodies.front())].outside += on_it;
+            else if (!at(other).own)
+                solver().add_crossed({id, other, true, on_it,
+                                      (kick.place - at(id).state.position).cross(on_it),
+                                      (kick.place - at(other).state.position).cross(-on_it)});
         }
     }
     ++counts.held_apart;

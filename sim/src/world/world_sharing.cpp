@@ -19,39 +19,6 @@ double loose_radius(const BodyKind& kind, const Eigen::VectorXd& q) {
     return radius + bent;
 }
 
-Eigen::Vector3d turned(const MovingBody& body, const Eigen::Quaterniond& orientation,
-                       const Eigen::Vector3d& angular) {
-    return orientation * (orientation.conjugate() * angular).cwiseQuotient(body.kind->mass.inertia);
-}
-
-void rotate(Eigen::Quaterniond& orientation, const Eigen::Vector3d& by) {
-    const double angle = by.norm();
-    if (angle > 1e-12)
-        orientation = (Eigen::Quaterniond(Eigen::AngleAxisd(angle, by / angle)) * orientation).normalized();
-}
-
-// The change that an impulse, spread over the step that ended `steps_ago` steps ago, makes to a free body.
-void respond(const MovingBody& body, double dt, const StepImpulse& impulse, int steps_ago, double factor,
-             WorldBodyState& s) {
-    const double time = (steps_ago + 0.5) * dt;
-    s.velocity += factor / body.kind->mass.mass * impulse.linear;
-    s.position += factor * (time / body.kind->mass.mass * impulse.linear + impulse.displacement);
-    rotate(s.orientation, factor * (time * turned(body, s.orientation, impulse.angular) + impulse.turn));
-    s.angular_momentum += factor * impulse.angular;
-    const HeldSteps& h = body.kind->whole;
-    const bool told = impulse.modal_q.size() > 0;
-    for (int k = 0; k < (told ? impulse.modal_q.size() : impulse.modal.size()); ++k) {
-        double z = told ? impulse.modal_q[k] : dt * h.compliance[k] * impulse.modal[k];
-        double rate = told ? impulse.modal_rate[k] : h.rate[k] * impulse.modal[k];
-        for (int i = 0; i < steps_ago; ++i) {
-            const double next = z + dt * (h.mean_z[k] * z + h.mean_rate[k] * rate);
-            rate = h.c[k] * z + h.d[k] * rate;
-            z = next;
-        }
-        s.q[k] += factor * z, s.q_dot[k] += factor * rate;
-    }
-}
-
 void push(MovingBody& body, double dt, const StepImpulse& impulse) {
     if (!std::exchange(body.pushed, true))
         body.force.setZero(), body.torque.setZero(), body.modal_force.setZero();
@@ -197,11 +164,17 @@ bool World::own(int body) const {
     return implementation_->bodies.at(static_cast<std::size_t>(body)).own;
 }
 
-WorldRecord World::record(int body) const {
+void World::record(int body, WorldRecord& out) const {
     const MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
-    return {body,          b.state,    b.asleep,
-            b.quarantined, b.at_limit, static_cast<std::uint16_t>(b.still_steps),
-            b.sleep_group};
+    out.body = body, out.state = b.state;
+    out.asleep = b.asleep, out.quarantined = b.quarantined, out.at_limit = b.at_limit;
+    out.still_steps = static_cast<std::uint16_t>(b.still_steps), out.sleep_group = b.sleep_group;
+}
+
+WorldRecord World::record(int body) const {
+    WorldRecord record;
+    this->record(body, record);
+    return record;
 }
 
 void World::restore(const WorldRecord& record) {
@@ -324,10 +297,10 @@ double World::most_radius(int body) const {
     return kind.surface.bounding_radius() * (kind.modes > 0 ? 1 + kGradientLimit : 1);
 }
 
-bool World::Implementation::near_own(const Eigen::Vector3d& center, double radius, int body) const {
+bool World::Implementation::near_own(const Eigen::Vector3d& center, double radius) const {
     return std::any_of(own_balls.begin(), own_balls.end(), [&](const LooseBall& ball) {
         const double reach = ball.radius + radius;
-        return ball.body < body && (ball.center - center).squaredNorm() <= reach * reach;
+        return (ball.center - center).squaredNorm() <= reach * reach;
     });
 }
 
@@ -339,14 +312,14 @@ void World::near_own(const std::vector<ForeignBall>& foreign, std::vector<int>& 
         const MovingBody& body = w.bodies[static_cast<std::size_t>(i)];
         if (!body.moves()) continue;
         const double radius = loose_radius(*body.kind, body.state.q) + contact_reach(body, w.settings);
-        w.own_balls.push_back({body.state.position, radius, i});
+        w.own_balls.push_back({body.state.position, radius});
         all.extend((body.state.position.array() - radius).matrix());
         all.extend((body.state.position.array() + radius).matrix());
     }
     near.clear();
     for (const ForeignBall& ball : foreign)
         if (all.squaredExteriorDistance(ball.center) <= ball.radius * ball.radius &&
-            w.near_own(ball.center, ball.radius, ball.body))
+            w.near_own(ball.center, ball.radius))
             near.push_back(ball.body);
 }
 
@@ -358,7 +331,7 @@ bool World::is_near_own(int body, const WorldBodyState& state) const {
         state.angular_momentum.norm() / b.kind->mass.inertia.minCoeff() * b.kind->surface.bounding_radius();
     if (b.kind->modes > 0) speed += b.kind->shape_bound.dot(state.q_dot.cwiseAbs());
     return implementation_->near_own(state.position,
-                                     loose_radius(*b.kind, state.q) * 1.01 + settings.dt * speed, body);
+                                     loose_radius(*b.kind, state.q) * 1.01 + settings.dt * speed);
 }
 
 void World::place_ghost(int body, const WorldBodyState& state, const StepImpulse* held, bool asleep) {
@@ -372,37 +345,11 @@ void World::place_ghost(int body, const WorldBodyState& state, const StepImpulse
     implementation_->placed.push_back(body);
 }
 
-void World::hold(int body, const StepImpulse& impulse) {
+void World::kick(int body, const Eigen::Vector3d& linear, const Eigen::Vector3d& angular) {
     MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
-    b.state.position += impulse.displacement;
-    rotate(b.state.orientation, impulse.turn);
-    push(b, implementation_->settings.dt, impulse);
-}
-
-void World::correct(int body, const StepImpulse& impulse, int steps_ago, double factor) {
-    MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    if (!b.moves()) return;
     if (b.asleep) wake(body);
-    correct(body, b.state, impulse, steps_ago, factor);
-}
-
-void World::correct(int body, WorldBodyState& state, const StepImpulse& impulse, int steps_ago,
-                    double factor) const {
-    respond(implementation_->bodies.at(static_cast<std::size_t>(body)), implementation_->settings.dt, impulse,
-            steps_ago, factor, state);
-}
-
-void World::spread_modes(int body, StepImpulse& impulse) const {
-    const BodyKind& kind = *implementation_->bodies.at(static_cast<std::size_t>(body)).kind;
-    if (impulse.modal_q.size() != kind.modes) return;
-    const double dt = implementation_->settings.dt;
-    impulse.modal.resize(kind.modes);
-    for (int k = 0; k < kind.modes; ++k) {
-        // Least squares of omega q and q'.
-        const double omega = kind.basis.omega[k];
-        const double place = omega * dt * kind.whole.compliance[k], rate = kind.whole.rate[k];
-        impulse.modal[k] = (place * omega * impulse.modal_q[k] + rate * impulse.modal_rate[k]) /
-                           (place * place + rate * rate);
-    }
+    b.state.velocity += linear / b.kind->mass.mass, b.state.angular_momentum += angular;
 }
 
 // What would go on into a plane stops there: a guess of what its owner finds.
@@ -423,7 +370,7 @@ void World::extrapolate(int body, WorldBodyState& state, const StepImpulse* held
     MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
     std::swap(b.state, state);
     const bool pushed = std::exchange(b.pushed, false);
-    if (held) hold(body, *held);
+    if (held) push(b, implementation_->settings.dt, *held);
     const Eigen::Vector3d before = b.state.position;
     move_freely(b, implementation_->settings);
     implementation_->stop_at_planes(b, before);

@@ -246,6 +246,18 @@ TEST(KitAudition, EveryZoneIsHeardAtEverySpeedAtItsOnset) {
         EXPECT_NEAR(level_of(heard, row, 1).peak_db - level_of(heard, row, 0).peak_db,
                     40 * std::log10(127.0 / 30), 0.01);
     EXPECT_EQ(audition(kit, "tom", speeds).rows.size(), 2u);
+    const std::string sheet = audition_sheet(kit, heard, "sheet.png");
+    std::size_t beginnings = 0;
+    for (std::size_t at = sheet.find("its first 5 ms"); at != std::string::npos;
+         at = sheet.find("its first 5 ms", at + 1), ++beginnings) {
+        const std::size_t first = sheet.find("\n0.0000 ", at), last = sheet.find("\n5.0000 ", at);
+        ASSERT_LT(last, sheet.find("\ne\n", at));
+        EXPECT_EQ(std::count(sheet.begin() + static_cast<std::ptrdiff_t>(first),
+                             sheet.begin() + static_cast<std::ptrdiff_t>(last), '\n'),
+                  240)
+            << "a sample each";
+    }
+    EXPECT_EQ(beginnings, 8u) << "of each stroke";
     EXPECT_THROW((void)audition(kit, "tim", speeds), BadInput);
 }
 
@@ -284,6 +296,10 @@ TEST(IncludedKits, ParametersOfASoundThatAnotherOneReplacedDoNotCount) {
     EXPECT_EQ(told.instruments[0].voice.samples->ignored,
               std::vector<std::string>{"decay_s of \"tom\" in the kit"})
         << "which kit check tells";
+    const Kit with_pedal = folder.kit(kInclude +
+                                      "[[instrument]]\nname = \"tom\"\nsound = { decay_s = 2 }\n"
+                                      "pedal = { kind = \"damper\", sound = { decay_s = 0.2 } }\n");
+    EXPECT_TRUE(with_pedal.instruments[0].voice.samples->ignored.empty()) << "what rings follows the pedal";
 }
 
 /// Two drums of one file: its wave is in memory once.

@@ -27,7 +27,7 @@ std::optional<tracking::PosePrediction> pose(std::mt19937& engine) {
 TEST(KitStage, TwoHundredFramesOfEachKitAreTheSameDrawnWholeOrWhereTheyChange) {
     for (const char* name : {"strings", "drums", "bells", "rock", "timpani", "marimba", "harp", "pads"}) {
         const app::Kit kit = app::read_kit(app::find_kit(name));
-        const app::KitStage stage(kit, 2, app::StickGeometry{});
+        const app::KitStage stage(kit, 2, app::StickGeometry{}, {}, {.ghosts = true});
         const render::SceneDescription scene = stage.scene(165, 123);
         render::Renderer keeping(scene), whole(scene);
         std::mt19937 engine(7);
@@ -35,7 +35,10 @@ TEST(KitStage, TwoHundredFramesOfEachKitAreTheSameDrawnWholeOrWhereTheyChange) {
         const render::FrameState rest = struck;
         render::Image kept, drawn;
         for (int k = 0; k < 200; ++k) {
-            render::FrameState frame = stage.frame({}, std::vector{pose(engine), pose(engine)});
+            app::Annotations shown;
+            shown.ghosts.resize(2);
+            shown.ghosts[0].truth = pose(engine);
+            render::FrameState frame = stage.frame({}, std::vector{pose(engine), pose(engine)}, 0, shown);
             for (std::size_t i = 0; i < kit.instruments.size(); ++i) {
                 if (engine() % 10 == 0) struck.world_from_object[i] = rest.world_from_object[i];
                 if (engine() % 10 == 0)

@@ -205,4 +205,27 @@ TEST(KeepConfirmed, EachContactIsJudgedByItself) {
     EXPECT_EQ(contacts[1].body, 2U);
 }
 
+TEST(PassedThrough, IsWhatTheTipEnteredWhereItSoundsAndLeftAgain) {
+    std::vector<sim::Contact> contacts(5);
+    for (std::uint32_t i = 0; i < 5; ++i) {
+        contacts[i].body = i;
+        contacts[i].t_s = 2 + 0.001 * i;
+        contacts[i].zone = 0;
+    }
+    contacts[1].starts_inside = true;
+    contacts[2].zone = -1;                                             // the shell
+    const std::vector<double> measured = {0.1, 0.1, 0.1, -0.01, 0.1};  // still in the fourth
+    const std::vector<sim::Contact> passed = app::passed_through(contacts, 0.011, measured);
+    ASSERT_EQ(passed.size(), 2u);
+    EXPECT_EQ(passed[0].body, 0u);
+    EXPECT_EQ(passed[1].body, 4u);
+    EXPECT_DOUBLE_EQ(passed[1].t_s, 2.004 - 0.011) << "when the tip was there";
+    // The way begins when bodies are known, at the newest sample.
+    const sim::TipPath way = app::measured_way({0, 1, 0}, {0, 0.8, 0}, 2, 0.01, 0.006);
+    ASSERT_EQ(way.nodes.size(), 2u);
+    EXPECT_EQ(way.nodes[0].t_s, 2);
+    EXPECT_DOUBLE_EQ(way.nodes[1].t_s, 2.01);
+    EXPECT_NEAR(way.nodes[0].velocity.y(), -20, 1e-9);
+}
+
 }  // namespace

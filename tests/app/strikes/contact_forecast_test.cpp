@@ -34,7 +34,7 @@ std::shared_ptr<const tracking::PathModel> saying(double p) {
 }
 
 /// A tip at `height_m` over the floor, which sinks at 1 m/s and moves along it at 0.5 m/s.
-std::optional<ContactForecast::Path> expected(double p, double height_m = 0.1, double reach_s = kReachS) {
+ContactForecast::Forecast forecast(double p, double height_m = 0.1, double reach_s = kReachS) {
     tracking::TipView tip;
     tip.tip = {0, height_m, 0};
     tip.velocity = {0.5, -1, 0};
@@ -46,6 +46,10 @@ std::optional<ContactForecast::Path> expected(double p, double height_m = 0.1, d
     return ContactForecast(saying(p)).after(tip, predicted, floor, reach_s);
 }
 
+std::optional<ContactForecast::Path> expected(double p, double height_m = 0.1, double reach_s = kReachS) {
+    return forecast(p, height_m, reach_s).strike;
+}
+
 TEST(ContactForecast, SaysNothingWhereNothingIsLikelyToBeStruck) {
     EXPECT_FALSE(expected(0));
     EXPECT_FALSE(expected(0.04)) << "less than 5 %";
@@ -54,6 +58,15 @@ TEST(ContactForecast, SaysNothingWhereNothingIsLikelyToBeStruck) {
     EXPECT_FALSE(expected(0.9, 0.3)) << "0.3 s of its speed away";
     EXPECT_FALSE(expected(0.9, 0.1, 0.9 * kContactS)) << "later than is looked for";
     EXPECT_TRUE(expected(0.9));
+}
+
+TEST(ContactForecast, SaysOfEverySurfaceInReachWhenItIsMet) {
+    const ContactForecast::Forecast unlikely = forecast(0.04);
+    ASSERT_EQ(unlikely.times.size(), 1U);
+    ASSERT_TRUE(unlikely.times[0]);
+    EXPECT_NEAR(unlikely.times[0]->probability(), 0.04, 1e-6);  // floats
+    EXPECT_FALSE(forecast(0.9, 0.3).times[0]) << "0.3 s of its speed away";
+    EXPECT_TRUE(forecast(0.9, -0.01).times.empty()) << "the tip is in the surface";
 }
 
 TEST(ContactForecast, ItsPathMeetsThePlaneWhenTheNetworkSays) {

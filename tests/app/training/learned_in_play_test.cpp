@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 
 #include "files/bad_input.h"
 #include "sticks/predictors.h"
@@ -13,19 +14,19 @@ namespace {
 using tracking::Experience;
 
 /// What 10 s of strokes teach `auto`.
-Experience ten_seconds() {
+Experience ten_seconds(const std::string& stick = "left") {
     const auto predictor = app::make_any_predictor(app::picture_specification("auto"), {});
     for (int i = 0; i < 600; ++i) {
         const double t = i / 60.0;
         (void)predictor->correct({t, {0.1 * std::sin(5 * t), 0.4 * std::abs(std::sin(8 * t)), 0.2}});
     }
-    return tracking::experience_of(*predictor).value();
+    return tracking::experience_of(*predictor, stick).value();
 }
 
 TEST(LearnedInPlay, IsAModelThatSaysWhereItComesFrom) {
     const TemporaryFolder folder;
     const std::filesystem::path file = folder.path() / "mine.model";
-    const std::vector<Experience> experiences = {ten_seconds(), ten_seconds()};
+    const std::vector<Experience> experiences = {ten_seconds("left"), ten_seconds("right")};
     app::LearnedModel({file, "play", app::picture_specification("auto"), "osc:9000"}).save(experiences);
     const tracking::PathModel model = tracking::read_path_model(file),
                               base = tracking::read_path_model(*app::model_file("learned"));
@@ -40,15 +41,39 @@ TEST(LearnedInPlay, IsAModelThatSaysWhereItComesFrom) {
     EXPECT_EQ(tracking::read_path_model(folder.path() / "next.model").provenance.size(), 8u);
 }
 
+TEST(LearnedInPlay, TheNextPerformanceBeginsWithTheTrustThatTheLastOneEndedWith) {
+    const TemporaryFolder folder;
+    const std::filesystem::path file = folder.path() / "mine.model";
+    const std::vector<Experience> experiences = {ten_seconds("left"), ten_seconds("right")};
+    app::LearnedModel({file, "play", app::picture_specification("auto"), "osc:9000"}).save(experiences);
+    const auto trust_of = [&](const char* stick) {
+        const auto predictor =
+            app::make_any_predictor("arbitrated:model=" + file.string(), {}, {.name = stick});
+        return tracking::experience_of(*predictor, stick).value().trust.value();
+    };
+    const auto equal = [](const tracking::Trust& a, const tracking::Trust& b) {
+        return a.stick == b.stick && std::memcmp(&a.leads, &b.leads, sizeof a.leads) == 0;
+    };
+    EXPECT_TRUE(equal(trust_of("left"), *experiences[0].trust));
+    EXPECT_TRUE(equal(trust_of("right"), *experiences[1].trust));
+    EXPECT_GT(trust_of("left").leads[0].position.known_s, 5);
+    EXPECT_EQ(trust_of("third").leads[0].position.known_s, 0) << "a stick that was not there";
+}
+
 TEST(LearnedInPlay, CrossesBetweenProcessesToTheBit) {
-    const std::vector<Experience> experiences = {ten_seconds(), ten_seconds()};
+    const std::vector<Experience> experiences = {ten_seconds("left"), ten_seconds("right")};
     const std::string bytes = app::bytes_of(experiences);
     const std::vector<Experience> back = app::experiences_of(bytes);
     ASSERT_EQ(back.size(), 2u);
     EXPECT_EQ(back[1].moments, experiences[1].moments);
     EXPECT_EQ(back[1].against, experiences[1].against);
+    ASSERT_TRUE(back[1].trust && experiences[1].trust);
+    EXPECT_EQ(back[1].trust->stick, "right");
+    EXPECT_EQ(std::memcmp(&back[1].trust->leads, &experiences[1].trust->leads, sizeof back[1].trust->leads),
+              0);
     EXPECT_TRUE(app::experiences_of("").empty());
-    EXPECT_THROW((void)app::experiences_of(bytes.substr(0, bytes.size() - 1)), std::runtime_error);
+    for (const std::size_t less : {1UL, 641UL, 646UL})  // in the numbers, the name, its length
+        EXPECT_THROW((void)app::experiences_of(bytes.substr(0, bytes.size() - less)), std::runtime_error);
     EXPECT_THROW((void)app::experiences_of(std::string(16, '\xff')), std::runtime_error);
 }
 

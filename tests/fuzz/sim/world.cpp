@@ -20,11 +20,11 @@ void seal(std::vector<std::uint8_t>& bytes) {
 
 /// A worker reads the updates that it needs later.
 void read_later(const sim::PackedUpdates& packed) {
+    sim::Update update;
     for (const sim::PackedUpdates::Place& place : packed.bodies) {
         (void)packed.glance(place.offset);
-        (void)packed.update(place.offset);
+        packed.update(place.offset, update);
     }
-    for (const sim::PackedUpdates::Place& place : packed.pushes) (void)packed.push(place.offset);
 }
 
 }  // namespace

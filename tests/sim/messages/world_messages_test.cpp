@@ -7,6 +7,7 @@
 
 #include "damaged_bytes.h"
 #include "messages/crc32c.h"
+#include "messages/update_codec.h"
 #include "world/manifold.h"
 #include "world_bodies.h"
 
@@ -44,9 +45,13 @@ sim::WorldBodyState state(Rng& rng, int modes) {
 sim::StepImpulse impulse(Rng& rng, int modes) {
     sim::StepImpulse i;
     i.linear = vector(rng, 3), i.angular = vector(rng, 1);
-    i.displacement = vector(rng, 0.01), i.turn = vector(rng, 0.01);
-    i.modal = i.modal_q = i.modal_rate = coordinates(rng, modes, 2);
+    i.modal = coordinates(rng, modes, 2);
     return i;
+}
+
+sim::CrossImpulse crossed(Rng& rng, int own, int other, bool blow) {
+    const auto floats = [&] { return sim::as_sent(vector(rng, 3)); };
+    return {own, other, blow, floats(), floats(), floats()};
 }
 
 sim::WorldRecord record(Rng& rng, int body, int modes) {
@@ -95,10 +100,11 @@ sim::WorldScene scene() {
 
 sim::StepReport report() {
     using enum sim::Mishap::Kind;
-    return {
-        0.001f, 0.002f,     0.0003f,
-        3,      2,          17,
-        25,     {1, -2, 3}, {{quarantined, 2, 77, "velocity"}, {limited, 1, 77, {}}, {broken, 0, 76, {}}}};
+    return {0.001f,     0.002f,
+            0.0003f,    0.0011f,
+            3,          2,
+            17,         25,
+            {1, -2, 3}, {{quarantined, 2, 77, "velocity"}, {limited, 1, 77, {}}, {broken, 0, 76, {}}}};
 }
 
 std::vector<sim::WorldMessage> samples() {
@@ -118,14 +124,12 @@ std::vector<sim::WorldMessage> samples() {
             sim::Refusal{"another processor"},
             sim::EndOfRun{},
             sim::Members{{0, 1, 5}},
-            sim::Ownership{1, 0, true, 77, records, {70, 71}, {2, 3}},
+            sim::Ownership{1, 0, true, 77, records, {2, 3}, {70, 71}},
             sim::SnapshotMessage{{99, records, contacts, springs}},
             sim::StateMessage{report(), records, contacts, springs},
             sim::UpdateMessage{report(),
-                               {0, 2},
-                               {11, 12},
                                {update(rng, 12, true), update(rng, 12, false), update(rng, 0, true)},
-                               {{4, impulse(rng, 12)}, {5, impulse(rng, 0)}},
+                               {crossed(rng, 4, 7, false), crossed(rng, 5, 2, true)},
                                {7}},
             sim::Offer{2, 9, {1, 2}, {0.001f, 0.002f}},
             sim::OfferAnswer{1, 9, true},
@@ -140,7 +144,7 @@ std::size_t size_of(const Message& message) {
 }
 
 sim::Update there_and_back(const sim::Update& u) {
-    const auto bytes = sim::encode(kHeader, sim::UpdateMessage{{}, {}, {}, {u}, {}, {}});
+    const auto bytes = sim::encode(kHeader, sim::UpdateMessage{{}, {u}, {}, {}});
     return std::get<sim::UpdateMessage>(sim::decode_world(bytes).message).bodies.at(0);
 }
 
@@ -291,11 +295,11 @@ void read_as_worker(const std::vector<std::uint8_t>& bytes) {
         const sim::DecodedWorldMessage message = sim::decode_for_worker(bytes);
         const auto* packed = std::get_if<sim::PackedUpdates>(&message.message);
         if (!packed) return;
+        sim::Update update;
         for (const auto& place : packed->bodies) {
             (void)packed->glance(place.offset);
-            (void)packed->update(place.offset);
+            packed->update(place.offset, update);
         }
-        for (const auto& place : packed->pushes) (void)packed->push(place.offset);
     } catch (const sim::DecodeError&) {
     }
 }

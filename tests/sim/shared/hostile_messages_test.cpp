@@ -56,7 +56,7 @@ void run_with_a_liar(Pace pace, unsigned seed, int messages, int& sent) {
         for (auto& [number, worker] : workers) {
             if (worker->ready()) {
                 worker->step();
-                worker->worked(1e-3 * (number + 1), 0);
+                worker->worked({.seconds = 1e-3 * (number + 1)});
                 idle = 0;
             }
             for (std::vector<std::uint8_t>& bytes : worker->outgoing()) {

@@ -78,7 +78,7 @@ private:
     void serve(zmq::socket_t& socket) {
         if (worker_->ready()) {
             worker_->step();
-            worker_->worked(1e-3, 0);
+            worker_->worked({.seconds = 1e-3});
             ++steps_;
         }
         for (const std::vector<std::uint8_t>& bytes : worker_->outgoing()) {

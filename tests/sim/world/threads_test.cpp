@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "world/island_blocks.h"
+#include "world/processor_time.h"
 #include "world_bodies.h"
 
 using namespace world_test;
@@ -14,9 +15,10 @@ namespace {
 
 constexpr int kCounts[] = {2, 3, 4, 7};
 
-std::vector<std::uint64_t> hashes(const sim::WorldDefinition& definition, int steps, int threads) {
+std::vector<std::uint64_t> hashes(const sim::WorldDefinition& definition, int steps, int threads,
+                                  bool planned = false) {
     sim::World world(definition);
-    world.use_threads(threads);
+    planned ? world.plan_threads(threads) : world.use_threads(threads);
     std::vector<std::uint64_t> all;
     for (int i = 0; i < steps; ++i) {
         world.step();
@@ -113,6 +115,50 @@ TEST(Threads, TheirNumberMayChangeInMidRun) {
     EXPECT_EQ(world.state_hash(), hashes(definition, 30, 1)[29]);
     EXPECT_THROW(world.use_threads(0), std::invalid_argument);
     EXPECT_THROW(world.use_threads(-3), std::invalid_argument);
+}
+
+TEST(Threads, ThatAreOnlyPlannedHaveTheBitsOfOneThreadAndSaveTimeWhereThereIsWorkForSeveral) {
+    const sim::WorldDefinition definition = pile();
+    EXPECT_EQ(hashes(definition, 20, 3, true), hashes(definition, 20, 1));
+    sim::World world(definition);
+    world.plan_threads(1);
+    run(world, 5);
+    EXPECT_EQ(world.saved_by_threads_s(), 0);
+    world.plan_threads(2);
+    const double start = sim::thread_processor_s();
+    run(world, 40);
+    const double took = sim::thread_processor_s() - start;
+    EXPECT_GT(world.saved_by_threads_s(), 0.1 * took);  // of at most a half; and the clock's own time
+    EXPECT_LT(world.saved_by_threads_s(), 0.9 * took);
+    EXPECT_THROW(world.plan_threads(0), std::invalid_argument);
+}
+
+/// Until this thread has used so much processor time.
+void work_for(double seconds) {
+    for (const double start = sim::thread_processor_s(); sim::thread_processor_s() - start < seconds;)
+        continue;
+}
+
+TEST(ThreadPlan, GivesEachPieceToWhomIsFreeFirst) {
+    sim::Crew crew(sim::ThreadPlan(2));
+    const double start = sim::thread_processor_s();
+    // 4 ms for one, 1 ms each of three for the other: of 7 ms 4 remain.
+    crew.each(4, 1, [](int, std::size_t at, std::size_t) { work_for(at == 0 ? 4e-3 : 1e-3); });
+    const double took = sim::thread_processor_s() - start;
+    EXPECT_NEAR(crew.plan()->saved_s(), 3e-3, 0.2e-3 + (took - 7e-3));  // interrupts lengthen pieces
+}
+
+TEST(ThreadPlan, WaitsForWhatAPieceNeeds) {
+    sim::ThreadPlan plan(2);
+    plan.begin();
+    EXPECT_EQ(plan.next(), 0);
+    work_for(1e-3);
+    EXPECT_LT(plan.done(0), 0.5);
+    EXPECT_EQ(plan.next(), 1);
+    EXPECT_GE(plan.done(1, 2), 2);
+    EXPECT_EQ(plan.next(), 0);
+    plan.end();
+    EXPECT_LT(plan.saved_s(), -1.9);  // the job lasts 2 s, one thread had done it at once
 }
 
 TEST(Crew, EachPieceIsDoneOnceByAnyNumberOfThreads) {

@@ -24,6 +24,8 @@ struct ContactTimes {
 
     [[nodiscard]] double probability() const noexcept { return before.back(); }
     [[nodiscard]] double probability_between(double from_s, double to_s) const noexcept;
+    /// The time before which there is a contact with that probability [s]; infinite where it is never so great.
+    [[nodiscard]] double reached_s(double probability) const noexcept;
     /// Half of the probability that there is a contact lies before this time [s].
     [[nodiscard]] double median_s() const noexcept;
 };
@@ -60,10 +62,10 @@ private:
 };
 
 /// What the network of `model.contacts`, which must be there, says of a plane; no probability where the tip is
-/// 0.1 s of its mean speed beneath it or 0.25 s over it, which is not learned from. Allocates nothing.
+/// beneath it or 0.25 s of its mean speed over it, which is not learned from. Allocates nothing.
 ///
 ///   x  what PathModel's network gets, of the tip in place of the tracked point; the plane's normal (forward, up,
-///      across); the distance d over the speed v, within -0.1 and 0.25 s; asinh(d / v / 5 ms); the 13 mean velocities
+///      across); the distance d over the speed v, within 0 and 0.25 s; asinh(d / v / 5 ms); the 13 mean velocities
 ///      of the tip along the normal, over v
 ///   y  18 bins of 1/120 s and "none": their logarithms of odds
 [[nodiscard]] ContactTimes contact_times(const PathModel& model, const TipView& view,

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "tracking/trust.h"
+
 namespace tracking {
 
 /// Where a model comes from: words and lines of text.
@@ -43,6 +45,8 @@ struct PathModel {
     Layers layers;
     /// The network that says when a tip meets a plane (contact_times()); none where it was not learned.
     std::optional<Layers> contacts;
+    /// What it was saved with after a performance; none of a model that was trained. Each stick once.
+    std::vector<Trust> trust = {};
     /// Where it comes from: (key, value), each on one line; keys are words.
     Provenance provenance;
 };
@@ -53,17 +57,21 @@ struct PathModel {
 ///   KEY: VALUE                      the provenance, any number of lines
 ///   sizes: INPUTS HIDDEN1 HIDDEN2 OUTPUTS
 ///   contacts: INPUTS HIDDEN1 HIDDEN2 OUTPUTS     of the network of contacts, if there is one
+///   trust: STICK                    for each stick that it was saved with, by the name
 ///   checksum: 16 hex digits         FNV-1a 64 of all bytes before this line and of the weights
 ///   (empty)
 ///   W1, b1, W2, b2, W3, b3 (and of the network of contacts likewise)   IEEE floats of 4 bytes, little-endian, matrices by columns
+///   for each trust the numbers of Trust::leads in their order           IEEE floats of 8 bytes
 ///
 /// `head -n 20 FILE` shows where a model comes from. parse_path_model(format_path_model(m)) is m to the bit.
-/// Throws std::invalid_argument for provenance that the format cannot hold, as check_provenance does.
+/// Throws std::invalid_argument for provenance that the format cannot hold, as check_provenance does, and for a stick's
+/// name that is no word.
 [[nodiscard]] std::string format_path_model(const PathModel& model);
 void check_provenance(const Provenance& provenance);
 
 /// Throws TraceError with FILE:LINE or FILE:byte N, what was found and expected, for anything else than a whole
-/// and finite model of this version and these sizes; `name` stands for the file. (Fuzzed.)
+/// and finite model of this version and these sizes, with numbers of trust that can have been learned; `name` stands for
+/// the file. (Fuzzed.)
 [[nodiscard]] PathModel parse_path_model(std::string_view bytes, const std::string& name);
 [[nodiscard]] PathModel read_path_model(const std::filesystem::path& file);
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,5 +32,7 @@ namespace tracking {
 /// Data that are left-handed throughout obey the laws of right-handed ones: `sides` alone tells them apart, so one
 /// stick, sticks of other names, and positions alone do not show it.
 [[nodiscard]] std::vector<std::string> implausible(const Trace& trace);
+/// The line about units alone.
+[[nodiscard]] std::optional<std::string> implausible_units(const Trace& trace);
 
 }  // namespace tracking

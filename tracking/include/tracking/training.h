@@ -18,19 +18,19 @@ struct TrainingStick {
     /// Times that nothing is learned from, within 50 ms: of untrusted positions and orientations [s], ascending.
     std::vector<double> flagged_s, flagged_rotations_s;
     std::size_t recording = 0;  ///< that it is of: each counts by the root of its length, whatever its speed
-    bool held_out = false;      ///< for validation: nothing is learned from it
+    bool held_out = false;      ///< nothing that is scored was learned from it
 };
 
 struct TrainingOptions {
     std::size_t hidden = 64;    ///< units of each of the two hidden layers
-    std::size_t steps = 60000;  ///< at most
+    std::size_t steps = 20000;  ///< of each of the two trainings
     std::uint64_t seed = 1;
     bool contacts = true;  ///< also learn the network of contacts
-    /// Gets the share done and the validation error; false stops. May be empty.
-    std::function<bool(double, double)> progress;
+    /// Gets the share done; false stops, with what was learned so far. May be empty.
+    std::function<bool(double)> progress;
 };
 
-/// RMS errors on the sticks held out, 60 Hz with 0.25 mm of noise, without flagged times.
+/// RMS errors on the sticks held out, of a network that has not learned from them, 60 Hz with 0.25 mm of noise, without flagged times.
 struct TrainingScore {
     double lead_s = 0;
     double with_shaft_mm = 0, position_only_mm = 0;  ///< of the tracked point
@@ -50,19 +50,23 @@ struct TrainingResult {
 
 /// Learns to predict the path of a stick from its last 0.25 s.
 ///
-/// Each recording is seen several times, by sensors of 30 to 150 Hz, with and without jitter, drop-outs and
-/// orientation, played faster or slower (by up to 30 %) and mirrored; the truth is the noiseless recording.
+/// Each recording is seen 30 times: by sensors of 30 to 150 Hz, with and without jitter, drop-outs and
+/// orientation, slower and faster, greater and smaller, tilted (random_sighting()) and mirrored; the truth is what a
+/// noiseless sensor would have seen. Without that a network knows the few strokes of a recording by heart, and errs more on others.
 /// What is learned, at five leads to 0.15 s at once, is the residual of the fading velocity in the frame and unit
 /// of the recent motion (StickHistory). The loss is the squared residual over the fading velocity's mean square at
 /// that lead, summed over leads for position and, by half, for the shaft; examples count in proportion to
-/// their speed, over what the fading velocity has on average in their recording. To it comes, with a weight of 0.05,
-/// the negative logarithm of the likelihood of normal errors of the covariance that the network states, by
-/// which the residual itself is not moved. Adam (Kingma and Ba 2015) with decoupled weight decay (Loshchilov and
-/// Hutter 2019), its rate falling as a cosine. The weights that did best on the sticks held out are kept; training
-/// ends when these have not got better for a third of the steps. Last, the covariances are scaled for each lead so
-/// that the regions of 50 and 95 % hold of the held-out errors what they say, as nearly as one factor can.
+/// their squared speed, so that errors count in metres, over what the fading velocity has on average in their recording. To it
+/// comes, with a weight of 0.05, the negative logarithm of the likelihood of normal errors of the covariance that the network
+/// states, by which the residual itself is not moved. Adam (Kingma and Ba 2015) with decoupled weight decay (Loshchilov and
+/// Hutter 2019), its rate falling as a cosine; the last weights are kept.
 ///
-/// Then, if asked, the network of contacts (PathModel::contacts) is learned from the same recordings. It is left out of the model
+/// That is done twice, with the same settings: first without the sticks held out, on which this network is scored, and by which
+/// the covariances are scaled for each lead so that the regions of 50 and 95 % hold of the held-out errors what they say, as
+/// nearly as one factor can; then, for the model, from all sticks. So the scores are of what was not learned from, and nothing
+/// recorded is wasted.
+///
+/// Last, if asked, the network of contacts (PathModel::contacts) is learned from the sticks that are not held out. It is left out of the model
 /// unless its held-out loss is below 0.7 of what the shares of the outcomes alone have.
 ///
 /// A pure function of its arguments, one thread; bit-identical for one build on one kind of processor (Eigen's

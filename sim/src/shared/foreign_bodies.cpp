@@ -1,0 +1,175 @@
+#include "shared/foreign_bodies.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace sim {
+namespace {
+
+// On with the same velocity.
+void coast(WorldBodyState& s, const Eigen::Vector3d& inertia, double time) {
+    const Eigen::Vector3d turn =
+        time * (s.orientation * (s.orientation.conjugate() * s.angular_momentum).cwiseQuotient(inertia));
+    s.position += time * s.velocity;
+    const double angle = turn.norm();
+    if (angle > 1e-12)
+        s.orientation =
+            (Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn / angle)) * s.orientation).normalized();
+}
+
+}  // namespace
+
+ForeignBodies::ForeignBodies(World& world, std::uint32_t self, int bodies, int keep_steps)
+    : world_(&world),
+      self_(self),
+      dt_(world.settings().dt),
+      gravity_(world.settings().gravity.norm()),
+      keep_(static_cast<std::size_t>(keep_steps)),
+      newest_(static_cast<std::size_t>(bodies)) {}
+
+ForeignBodies::Heard& ForeignBodies::slot(std::uint32_t worker, std::uint64_t step) {
+    std::vector<Heard>& slots = heard_[worker];
+    slots.resize(keep_);
+    Heard& slot = slots[step % keep_];
+    slot.step = step;
+    slot.message.reset();
+    return slot;
+}
+
+const ForeignBodies::Heard* ForeignBodies::heard(std::uint32_t worker, std::uint64_t step) const {
+    const auto found = heard_.find(worker);
+    if (found == heard_.end()) return nullptr;
+    const Heard& slot = found->second[step % keep_];
+    return slot.step == step ? &slot : nullptr;
+}
+
+void ForeignBodies::keep_own(std::uint64_t step, const std::vector<CrossImpulse>& crossed) {
+    slot(self_, step).crossed = crossed;
+}
+
+void ForeignBodies::take(std::uint32_t worker, std::uint64_t step, PackedUpdates&& message) {
+    Heard& heard = slot(worker, step);
+    heard.crossed = std::move(message.crossed);
+    for (std::size_t i = 0; i < message.bodies.size(); ++i) {
+        const PackedUpdates::Place& place = message.bodies[i];
+        if (place.body >= newest_.size()) continue;
+        const PackedUpdates::Glance glance = message.glance(place.offset);
+        tell(static_cast<int>(place.body), step, worker, glance, i);
+        // It is not told again before it wakes.
+        if (!glance.asleep) continue;
+        Told& rest = rest_[static_cast<int>(place.body)];
+        rest.step = step;
+        message.update(place.offset, rest.update);
+    }
+    heard.message = std::make_shared<const PackedUpdates>(std::move(message));
+}
+
+void ForeignBodies::set(const WorldRecord& record, std::uint64_t step) {
+    Told& told = rest_[record.body];
+    told.step = step;
+    told.update = {};
+    told.update.body = static_cast<std::uint32_t>(record.body);
+    told.update.asleep = record.asleep, told.update.quarantined = record.quarantined;
+    told.update.state = record.state;
+    tell(record.body, step, kApplication,
+         {record.state.position, record.state.velocity, record.asleep, record.quarantined}, 0);
+}
+
+void ForeignBodies::tell(int body, std::uint64_t step, std::uint32_t worker,
+                         const PackedUpdates::Glance& glance, std::size_t index) {
+    Newest& newest = newest_[static_cast<std::size_t>(body)];
+    const bool other = newest.worker != kApplication && newest.worker != worker;
+    newest = {step,
+              worker,
+              true,
+              glance,
+              index,
+              other ? newest.worker : newest.worker_before,
+              other ? newest.step : newest.step_before};
+}
+
+// Of a worker's messages from step `from` backwards without a gap the first that is not later than `now`, or the earliest.
+ForeignBodies::Message ForeignBodies::last_until(int body, std::uint32_t worker, std::uint64_t from,
+                                                 std::uint64_t now, std::size_t index) const {
+    Message best;
+    const auto slots = heard_.find(worker);
+    for (std::uint64_t step = from, left = keep_; slots != heard_.end() && left > 0; --left, --step) {
+        const Heard& slot = slots->second[step % keep_];
+        if (slot.step != step || !slot.message) break;
+        const auto& places = slot.message->bodies;
+        if (index >= places.size() || places[index].body != static_cast<std::uint32_t>(body)) {
+            const auto place = std::ranges::lower_bound(places, static_cast<std::uint32_t>(body), {},
+                                                        &PackedUpdates::Place::body);
+            if (place == places.end() || place->body != static_cast<std::uint32_t>(body)) break;
+            index = static_cast<std::size_t>(place - places.begin());
+        }
+        best = {&slot, index};
+        if (step <= now || step == 0) break;
+    }
+    return best;
+}
+
+// Into told_. Of a body that was sold a worker that is behind needs what its owner before told.
+void ForeignBodies::find_told(int body, std::uint64_t now) {
+    const Newest& newest = newest_[static_cast<std::size_t>(body)];
+    Message best = last_until(body, newest.worker, newest.step, now, newest.index);
+    const auto rest = rest_.find(body);
+    const bool registered = rest != rest_.end();
+    if ((!best.heard || best.heard->step > now) && !(registered && rest->second.step <= now)) {
+        const Message before = last_until(body, newest.worker_before, newest.step_before, now, 0);
+        if (before.heard && (!best.heard || before.heard->step < best.heard->step)) best = before;
+    }
+    const bool later = best.heard && best.heard->step > now;
+    if (registered &&
+        (!best.heard || (rest->second.step <= now && (later || rest->second.step > best.heard->step)))) {
+        told_ = rest->second;
+    } else if (best.heard) {
+        told_.step = best.heard->step;
+        best.heard->message->update(best.heard->message->bodies[best.index].offset, told_.update);
+    } else {
+        told_ = {};
+    }
+}
+
+const ForeignBodies::Ghost& ForeignBodies::at(int body, std::uint64_t now) {
+    find_told(body, now);
+    extrapolate(body, now);
+    return ghost_;
+}
+
+void ForeignBodies::extrapolate(int body, std::uint64_t now) {
+    Ghost& ghost = ghost_;
+    const Update& told = told_.update;
+    ghost.state = told.state, ghost.held = told.impulse;
+    ghost.age = 0;
+    // Who sleeps stays where it is until it is touched: then its owner tells.
+    ghost.asleep = told.asleep;
+    if (ghost.asleep || told.quarantined) return;
+    ghost.age = now > told_.step ? static_cast<int>(now - told_.step) : 0;
+    StepImpulse& held = ghost.held;
+    for (std::uint64_t step = told_.step + 1; step <= now; ++step) {
+        // What others hold goes on as it was told: the forces on it balance better than anybody knows them here.
+        if (told.held) {
+            coast(ghost.state, world_->rigid_mass(body).inertia, dt_);
+            continue;
+        }
+        const Eigen::Vector3d linear = held.linear, angular = held.angular;
+        if (const Heard* own = heard(self_, step))
+            for (const CrossImpulse& c : own->crossed)
+                if (c.ghost == body) held.linear -= c.linear, held.angular += c.angular_ghost;
+        world_->extrapolate(body, ghost.state, &held);
+        held.linear = linear, held.angular = angular;
+    }
+}
+
+ForeignBall ForeignBodies::ball(int body, std::uint64_t now) const {
+    const Newest& newest = newest_[static_cast<std::size_t>(body)];
+    const PackedUpdates::Glance& s = newest.glance;
+    const double age = s.asleep ? 0 : (static_cast<double>(now) - static_cast<double>(newest.step)) * dt_;
+    const double speed = s.velocity.norm(), fall = gravity_ * (std::abs(age) + dt_);
+    return {body, s.position + age * s.velocity,
+            1.02 * world_->most_radius(body) + dt_ * (speed + fall) + fall * std::abs(age)};
+}
+
+}  // namespace sim

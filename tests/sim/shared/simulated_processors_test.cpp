@@ -1,0 +1,50 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "shared_scenes.h"
+
+using namespace world_test;
+
+namespace {
+
+using Failure = sim::SimulatedProcessors::Failure;
+
+}  // namespace
+
+// It throws if a worker did otherwise the second time.
+TEST(SimulatedProcessors, ThatRepeatTheirWorkAloneLeaveTheBitsAlsoThroughDrainsJoinsAndKills) {
+    const sim::WorldScene scene = busy_scene(12);
+    for (const int bound : {0, 3}) {
+        sim::DistributedSettings settings = lockstep(120);
+        if (bound > 0) settings.pace = sim::Pace::bounded, settings.bound = bound;
+        sim::SimulatedProcessors how = processors(3);
+        how.silence_s = 0.01;
+        how.failures = {{0.002, 1, Failure::Kind::drain},
+                        {0.004, 0, Failure::Kind::join},
+                        {0.006, 2, Failure::Kind::kill}};
+        Record once, twice;
+        const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, once);
+        EXPECT_EQ(result.cold_caches, 1);
+        EXPECT_EQ(result.left + result.lost, 2) << once.notes;
+        how.repeat_alone = true;
+        const sim::DistributedResult repeated = sim::simulate_processors(scene, settings, how, twice);
+        EXPECT_EQ(twice.hashes, once.hashes);
+        EXPECT_EQ(repeated.elapsed_s, result.elapsed_s);
+        EXPECT_GT(repeated.cold_caches, 0);
+        EXPECT_TRUE(std::isfinite(repeated.cold_caches));
+    }
+}
+
+TEST(SimulatedProcessors, TellTheirOwnTimeAsProcessorTime) {
+    Record record;
+    const sim::DistributedResult result =
+        sim::simulate_processors(busy_scene(8), lockstep(10), processors(2), record);
+    double sum = 0;
+    for (const sim::WorkerStep& step : record.steps) {
+        EXPECT_EQ(step.processor_s, step.seconds);
+        sum += step.processor_s;
+    }
+    EXPECT_GT(sum, 0);
+    EXPECT_NEAR(result.cpu_s, sum, 1e-12);
+}
