@@ -66,6 +66,20 @@ TEST(Rebounding, ItsVelocityIsTheSlopeOfItsPath) {
     }
 }
 
+TEST(Rebounding, SurfaceIsAFadingVelocityThatRebounds) {
+    const auto surface = make_predictor("surface"), path = make_predictor("cv:q=1e7,decay=8,r=0.5,gate=5");
+    double of_surface = 0, of_path = 0;
+    for (int i = 0; i < 12 * (kDown + kUp); ++i) {
+        (void)surface->correct(bouncing(i)), (void)path->correct(bouncing(i));
+        if (i < 8 * (kDown + kUp)) continue;
+        const double truth = bouncing(i + 4).position.y();
+        of_surface += std::pow(surface->predict(4 / kHz).position.y() - truth, 2);
+        of_path += std::pow(path->predict(4 / kHz).position.y() - truth, 2);
+    }
+    // Half of the predictions 4 samples ahead of these strokes cross a turn, which the path alone carries on through.
+    EXPECT_LT(of_surface, 0.5 * of_path);
+}
+
 TEST(Rebounding, LeavesAloneWhatPassesTheLows) {
     // Every other low is 0.3 m deeper: of predictions under the mean low about as much passes as rebounds.
     const auto at = [](int i) {

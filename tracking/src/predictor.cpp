@@ -163,9 +163,8 @@ std::unique_ptr<Predictor> make_online(Specification& specification, const Eigen
     return std::make_unique<Learned>(model, shaft, memory(specification));
 }
 
-/// The filter is `cv`, whose velocity fades while its turning lasts, and which rebounds where strokes turn.
-std::unique_ptr<Predictor> make_arbitrated(Specification& specification, const Eigen::Vector3d& shaft,
-                                           Model model) {
+/// `cv`, whose velocity fades while its turning lasts, and which rebounds where strokes turn.
+std::unique_ptr<Predictor> make_surface(Specification& specification) {
     const double q = density(specification, "q", 1e7);
     MotionModel fading = constant_velocity(q, specification.number("decay", 8, 1e-3, 1000)),
                 lasting = constant_velocity(q);
@@ -174,9 +173,14 @@ std::unique_ptr<Predictor> make_arbitrated(Specification& specification, const E
         if (!specification.has("r")) motion->measurement_variance = square(0.5 * kMetres);
     }
     const double sigmas = specification.has("gate") ? gate(specification) : 5;
-    return std::make_unique<Arbitrated>(std::make_unique<Rebounding>(std::make_unique<KalmanPredictor>(
-                                            fading, KalmanOptions{sigmas, 0, lasting})),
-                                        model, shaft, memory(specification));
+    return std::make_unique<Rebounding>(
+        std::make_unique<KalmanPredictor>(fading, KalmanOptions{sigmas, 0, lasting}));
+}
+
+std::unique_ptr<Predictor> make_arbitrated(Specification& specification, const Eigen::Vector3d& shaft,
+                                           Model model) {
+    std::unique_ptr<Predictor> filter = make_surface(specification);
+    return std::make_unique<Arbitrated>(std::move(filter), model, shaft, memory(specification));
 }
 
 /// One of the two makes it.
@@ -198,6 +202,7 @@ constexpr auto kPredictors = std::to_array<Entry>({{"hold", make_hold},
                                                    {"singer", make_singer},
                                                    {"bank", make_bank},
                                                    {"imm", make_imm},
+                                                   {"surface", make_surface},
                                                    {"learned", nullptr, make_learned},
                                                    {"online", nullptr, make_online},
                                                    {"arbitrated", nullptr, make_arbitrated}});

@@ -43,7 +43,8 @@ const std::vector<Grid> kGrids = {
     {"bank", true, {"cv= 1e7 1e8 1e9", "alpha= 10 30 100", "singer= 1e10 1e11 1e12"}},
     {"imm",
      true,
-     {"alpha= 10 30 100 300", "q1=1e8,q2=3e9,q3=1e11 q1=1e9,q2=3e10,q3=1e12 q1=1e10,q2=3e11,q3=1e13"}}};
+     {"alpha= 10 30 100 300", "q1=1e8,q2=3e9,q3=1e11 q1=1e9,q2=3e10,q3=1e12 q1=1e10,q2=3e11,q3=1e13"}},
+    {"surface", true, {"q= 1e6 3e6 1e7 3e7 1e8", "decay= 4 8 16"}}};
 
 /// Each specification with each parameter of an axis.
 std::vector<std::string> crossed(const std::vector<std::string>& specifications, const std::string& axis) {

@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(
     Specifications, EveryPredictor,
     testing::Values("hold", "difference", "naive", "least-squares", "least-squares:degree=3,n=8",
                     "double-exponential", "one-euro", "thesis", "cv:decay=8", "ca", "singer", "bank", "imm",
-                    "learned", "arbitrated",
+                    "surface", "learned", "arbitrated",
                     "exec:read h; set -- $h; shift 3; n=$#; echo position velocity; while read t x y z r; do "
                     "[ $t = restart ] && continue; a=; i=0; while [ $i -lt $n ]; do "
                     "a=\"$a $x 0.$i $z 1 $y 0\"; i=$((i+1)); done; echo $a; done"));

@@ -102,14 +102,14 @@ inline constexpr double kGapS = 0.1;
 ///   bank:cv=1e7,ca=3e8,alpha=30,singer=1e11,lead=0.0667   the model that was right a lead ago (3.28);
 ///                           score=likelihood: most likely (3.27) instead of nearest
 ///   imm:alpha=200,q1=1e9,q2=3e10,q3=1e12,rate=10             interacting Singer models, switching at `rate`
+///   surface:q=1e7,decay=8,r=0.5,gate=5    `cv`, which rebounds where strokes turn, its restitution learned; its turning lasts
 ///   learned                 a network, `model`, from the last 0.25 s: position, shaft, its own uncertainty
 ///   online:memory=100       that network, its last layer learning what turns out, forgotten over 100 s
-///   arbitrated:memory=100,q=1e7,decay=8,r=0.5,gate=5         `cv`, which rebounds where strokes turn, and `online`,
-///                           weighed by the errors that they turned out to make; its turning lasts; with
-///                           memory=0 `learned` in its place
+///   arbitrated:memory=100,q=1e7,decay=8,r=0.5,gate=5         `surface` and `online`, weighed by the errors that they
+///                           turned out to make; with memory=0 `learned` in place of `online`
 ///
 /// The numbers shown are the defaults. Orientation is filtered by the same model about its own quaternion.
-/// thesis, cv, ca, singer, bank and imm also take: `r=0.25`, the sensor's noise; `p0=10`, `v0=1000`,
+/// thesis, cv, ca, singer, bank, imm, surface and arbitrated also take: `r=0.25`, the sensor's noise; `p0=10`, `v0=1000`,
 /// `a0=1e4`, standard deviations of the start; `gate=G`: samples beyond G standard deviations that a stick
 /// cannot have made (25 m/s, 3000 m/s^2, contacts excepted) are outliers. thesis, cv, ca and singer take
 /// `steady=HZ`: the steady gain of that rate. `shaft`, a unit vector from hand to tip in the tracked body's frame,
