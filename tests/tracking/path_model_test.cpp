@@ -109,18 +109,24 @@ TEST(PathModel, DamagedTrustIsRefusedWithItsPlace) {
         EXPECT_TRUE(message_of(changed).starts_with("m.model:")) << at;
         EXPECT_TRUE(message_of(bytes.substr(0, at)).starts_with("m.model:")) << at;
     }
-    for (const double wrong : {std::numeric_limits<double>::quiet_NaN(), -1.0, 1e13}) {
+    for (const double wrong : {std::numeric_limits<double>::quiet_NaN(), -1e-9, 1e13}) {
         PathModel bad = model;
         bad.trust[1].leads[4].shaft.model_square = wrong;
         const std::string message = message_of(format_path_model(bad));
         EXPECT_NE(message.find("a number of trust of"), std::string::npos) << message;
+        EXPECT_NE(message.find("expected one from 0 to 1e+12; "), std::string::npos) << message;
+        EXPECT_EQ(message.find("-0.0"), std::string::npos) << message;
         EXPECT_TRUE(message.starts_with("m.model:byte ")) << message;
     }
+    const std::string no_text =
+        message_of(std::string(bytes).replace(bytes.find("\ntrust: left") + 8, 1, "\xff"));
+    EXPECT_NE(no_text.find(": error: found byte 0xff, expected UTF-8"), std::string::npos) << no_text;
+    EXPECT_NE(no_text.find("; make it again with `musicworld train`"), std::string::npos) << no_text;
     PathModel twice = model;
     twice.trust[1].stick = "left";
     EXPECT_NE(message_of(format_path_model(twice)).find("found 'left', expected the name of another stick"),
               std::string::npos);
-    for (const char* no_word : {"", "two words", "two\nlines"}) {
+    for (const char* no_word : {"", "two words", "two\twords", "two\nlines"}) {
         PathModel bad = model;
         bad.trust[0].stick = no_word;
         EXPECT_THROW((void)format_path_model(bad), std::invalid_argument) << no_word;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <set>
 #include <span>
 #include <stdexcept>
 
@@ -88,7 +89,12 @@ bool is_word(std::string_view text) {
 }
 
 bool is_stick(std::string_view name) {
-    return !name.empty() && name.find(' ') == name.npos && first_unprintable(name) == name.npos;
+    return !name.empty() && name.find_first_of(" \t") == name.npos && first_unprintable(name) == name.npos;
+}
+
+std::string shortest(double number) {
+    char text[32];
+    return {text, std::to_chars(std::begin(text), std::end(text), number).ptr};
 }
 
 /// INPUTS HIDDEN1 HIDDEN2 OUTPUTS behind a key: layers of these sizes, still without weights.
@@ -182,7 +188,7 @@ PathModel parse_path_model(std::string_view bytes, const std::string& name) {
     while (true) {
         if (lines.at_end()) fail_at(name, end, "the end of the head", "the line \"sizes: ...\"");
         const Line line = lines.next();
-        line.require_text();
+        line.require_text(kRemedy);
         if (line.text().starts_with(kSizes)) {
             model.layers = parse_sizes(line, kSizes, StickHistory::kInputs, kPathOutputs);
             break;
@@ -199,15 +205,16 @@ PathModel parse_path_model(std::string_view bytes, const std::string& name) {
     std::optional<Line> sum;
     if (!lines.at_end()) sum = lines.next();
     if (sum && sum->text().starts_with(kContacts)) {
-        sum->require_text();
+        sum->require_text(kRemedy);
         model.contacts = parse_sizes(*sum, kContacts, kContactInputs, kContactOutputs);
         sum.reset();
         if (!lines.at_end()) sum = lines.next();
     }
+    std::set<std::string_view> sticks;
     while (sum && sum->text().starts_with(kTrust)) {
-        sum->require_text();
+        sum->require_text(kRemedy);
         const std::string_view stick = sum->text().substr(kTrust.size());
-        if (!is_stick(stick) || std::ranges::count(model.trust, stick, &Trust::stick) > 0)
+        if (!is_stick(stick) || !sticks.insert(stick).second)
             sum->fail(kTrust.size(), in_quotes(stick), "the name of another stick", kRemedy);
         model.trust.emplace_back().stick = stick;
         sum.reset();
@@ -240,8 +247,8 @@ PathModel parse_path_model(std::string_view bytes, const std::string& name) {
     for_each_number(model, [&](double& number, double least, double greatest) {
         std::memcpy(&number, weights.data() + at, sizeof number);
         if (!(number >= least && number <= greatest))
-            fail_at(name, end + 2 + at, "a number of trust of " + std::to_string(number),
-                    "one from " + std::to_string(least) + " to " + std::to_string(greatest));
+            fail_at(name, end + 2 + at, "a number of trust of " + shortest(number),
+                    "one from " + shortest(least) + " to " + shortest(greatest));
         at += sizeof number;
     });
     return model;

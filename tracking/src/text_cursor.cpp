@@ -79,11 +79,10 @@ void Line::fail(std::size_t offset, const std::string& found, const std::string&
                      ": error: found " + found + ", expected " + expected + "; " + remedy);
 }
 
-void Line::require_text() const {
+void Line::require_text(const char* remedy) const {
     const std::size_t bad = first_unprintable(text_);
     if (bad == std::string_view::npos) return;
-    fail(bad, byte_name(text_[bad]), "UTF-8 text without control characters",
-         "save the trace as plain CSV text in UTF-8");
+    fail(bad, byte_name(text_[bad]), "UTF-8 text without control characters", remedy);
 }
 
 Field Line::next_field(std::size_t& offset) const {

@@ -31,8 +31,8 @@ public:
     [[noreturn]] void fail(std::size_t offset, const std::string& found, const std::string& expected,
                            const std::string& remedy) const;
 
-    /// Throws for control characters, DEL and what is not UTF-8.
-    void require_text() const;
+    /// Throws for control characters, DEL and what is not UTF-8; `remedy` ends the message.
+    void require_text(const char* remedy = "save the trace as plain CSV text in UTF-8") const;
 
     /// The field that starts at byte `offset` and ends at the next comma; `offset` moves behind that comma,
     /// or to npos at the line's end.
