@@ -52,6 +52,12 @@ TEST(Commands, UnitsThatCannotBeAreTold) {
     EXPECT_EQ(
         run({"play", "flourish", "--no-frames", "--no-audio", "--out", folder / "out"}).err.find("warning"),
         std::string::npos);
+    // What is refused is said in one line, as ever.
+    expect_refused(run({"play", folder / "mm.csv", "--kit", "nowhere", "--out", folder / "none"}), "nowhere");
+    expect_refused(run({"play", folder / "mm.csv", "--no-frames", "--solo", "7", "--out", folder / "none"}),
+                   "--solo 7");
+    expect_refused(run({"train", folder / "mm.csv", folder / "mm.csv", "--out", folder / "none.model"}),
+                   "mm.csv again");
 
     std::string box = "usemtl body\n";  // of 200 mm
     for (int i = 0; i < 8; ++i)

@@ -30,7 +30,7 @@ void train(TrainOptions o) {
     std::vector<Recording> recordings;
     for (const std::string& name : o.traces)
         if (!name.ends_with(".hits.csv") && !name.ends_with(".flags.csv"))
-            warn_of_units(recordings.emplace_back(read_recording(find_trace(name).string())).trace);
+            recordings.push_back(read_recording(find_trace(name).string()));
     if (recordings.empty())
         throw BadInput(
             "error: found no trace among the files, expected at least one recording to learn from");
@@ -48,6 +48,7 @@ void train(TrainOptions o) {
         tracking::check_provenance(provenance({}));
         tracking::TrainingResult result = tracking::train_path_model(field.sticks, o);
         bar.clear();
+        for (const Recording& recording : recordings) warn_of_units(recording.trace);
         result.model.provenance = provenance(result);
         write_file(out.partial(), tracking::format_path_model(result.model));
         out.finish();

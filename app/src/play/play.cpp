@@ -19,6 +19,7 @@
 #include "sticks/learned_in_play.h"
 #include "sticks/predictors.h"
 #include "sticks/stick.h"
+#include "sticks/trace_warnings.h"
 
 namespace app {
 namespace {
@@ -276,6 +277,7 @@ PlayResult play(const PlayOptions& options) {
     for (const audio::Note& place : result.pedals.places()) schedule(place);
     const std::vector<tracking::Experience> taught = play_through(
         {trace, kit, options, stick, *simulation, &stage, frames.get(), sound.get(), &result.pedals}, result);
+    warn_of_units(trace);  // now that nothing is left to be refused, which is said in one line
     const double sound_s = seconds_of([&] {
         if (sound) finish_sound(*sound, trace.t_end_s() - trace.t0_s(), result, kit, folder);
     });

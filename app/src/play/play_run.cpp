@@ -18,7 +18,6 @@
 #include "report/json_document.h"
 #include "report/table.h"
 #include "sticks/predictors.h"
-#include "sticks/trace_warnings.h"
 #include "strikes/true_contacts.h"
 
 namespace app {
@@ -173,7 +172,6 @@ PlayedTrace read_played_trace(const fs::path& file) {
             "{}: error: found {:.3g} hours between the first sample and the last, expected at most {}; "
             "are there two clocks in it?",
             file.string(), hours, kLongestHours));
-    warn_of_units(trace);
     return trace;
 }
 

@@ -12,6 +12,7 @@
 #include "report/json_document.h"
 #include "sticks/learned_in_play.h"
 #include "sticks/predictors.h"
+#include "sticks/trace_warnings.h"
 
 namespace app {
 namespace fs = std::filesystem;
@@ -330,6 +331,7 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options, const Warn& warn) 
     folder.emplace(options.play.out);
     outcome.play.audio = DiskLog<float>(folder->scratch());
     session.start(*folder, outcome.play.audio, warn);
+    if (!session.live) warn_of_units(session.trace);  // now that nothing is left to be refused
     outcome.play.stages_s.emplace_back("start", wall.seconds());
     {
         RealtimeRun run(session);
