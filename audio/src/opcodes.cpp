@@ -253,13 +253,12 @@ struct PedalGain {
     static int run(CSOUND* csound, void* memory) {
         auto& self = *static_cast<PedalGain*>(memory);
         clear_around(self.gain, self.h);
-        const bool moved = *self.decay_now > 0 && *self.decay_now != self.begun_with;
-        const double each = moved ? std::exp(std::log(0.001) * (1 / *self.decay_now - 1 / self.begun_with) /
-                                             csound->GetSr(csound))
-                                  : 1;
+        const bool damped = *self.decay_now > 0 && *self.decay_now < self.begun_with;
+        const double each = damped ? std::exp(std::log(0.001) * (1 / *self.decay_now - 1 / self.begun_with) /
+                                              csound->GetSr(csound))
+                                   : 1;
         const Part part = part_of(self.h);
-        for (std::size_t n = part.begin; n < part.end; ++n)
-            self.gain[n] = self.reached = std::min(self.reached * each, 1.0);
+        for (std::size_t n = part.begin; n < part.end; ++n) self.gain[n] = self.reached *= each;
         return OK;
     }
 };

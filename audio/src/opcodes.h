@@ -21,8 +21,9 @@ namespace audio {
 ///                                                               pedal), and at most (1 or more)
 ///   again        pedal_gain ivoice, idecays                     for a sound with a decay of its own: what makes it
 ///                                                               fall as with the decay_s of its voice's pedal now
-///                                                               instead of that at its onset; at most 1, as nothing
-///                                                               is left of it that could ring longer
+///                                                               instead of that at its onset, where that is longer;
+///                                                               it never rises, as nothing is left of the sound
+///                                                               that could ring longer, or come back
 ///   ivalue       bessel iorder, ix                              J_n(x)
 /// All begin at the note's own sample, and all memory lies in the instrument's own. At most 64 samples a
 /// block and 512 modes; more are left out. Throws std::runtime_error where Csound refuses one.

@@ -191,6 +191,11 @@ TEST(Pedal, RecordedSoundsAndOwnInstrumentsAreDampedAsItsPlaceSaysWithoutAStep) 
             ASSERT_NEAR(damped[i], 0.5 * std::pow(0.001, samples / 48000 * (1 / 0.5 - 1 / 2.0)), 1e-7)
                 << steady.name << " " << i;
         }
+        // Struck half-way, damped, then opened farther: what is gone does not come back.
+        const auto opened = sound(0.5, {moved(2, 19968, 0), moved(3, 30080, 1)});
+        for (std::size_t i = 100; i + 1 < 48000; ++i) ASSERT_LE(opened[i + 1], opened[i]) << i;
+        EXPECT_NEAR(opened.back(), 0.5 * std::pow(0.001, (30080 - 19968) / 48000.0 * (1 / 0.5 - 1 / 1.0)),
+                    1e-6);
         EXPECT_EQ(sound(1, {moved(2, 20000, 1)}), sound(1, {})) << "where it is";
         EXPECT_EQ(sound(0, {moved(2, 20000, 1)}), sound(0, {}))
             << "opened: nothing is left that could ring on";
