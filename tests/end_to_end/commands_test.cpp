@@ -49,6 +49,7 @@ TEST(Commands, UnitsThatCannotBeAreTold) {
     EXPECT_NE(told.find("warning: "), std::string::npos);
     EXPECT_NE(told.find("are the units"), std::string::npos);
     EXPECT_EQ(played.err.substr(0, played.err.find('\n') + 1), told) << "the same line";
+    EXPECT_EQ(run({"kit", "fit", folder / "mm.csv"}).err, told);
     EXPECT_EQ(
         run({"play", "flourish", "--no-frames", "--no-audio", "--out", folder / "out"}).err.find("warning"),
         std::string::npos);

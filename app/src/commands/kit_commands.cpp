@@ -21,6 +21,7 @@
 #include "pictures/kit_stage.h"
 #include "play/audition.h"
 #include "report/plot.h"
+#include "sticks/trace_warnings.h"
 #include "strikes/kit_fit.h"
 
 namespace app {
@@ -194,11 +195,12 @@ void fit(const FitOptions& o) {
     const std::string text = format_fitted_kit(fitted, o.kind, name, geometry, o.tip.has_value());
     if (o.out.empty()) {
         fmt::print("{}", text);
-        return;
+    } else {
+        write_finished_file(o.out, text);
+        for (std::size_t i = 0; i < fitted.instruments.size(); ++i)
+            fmt::print("{} {}: {}\n", o.kind, i + 1, describe(fitted.instruments[i]));
     }
-    write_finished_file(o.out, text);
-    for (std::size_t i = 0; i < fitted.instruments.size(); ++i)
-        fmt::print("{} {}: {}\n", o.kind, i + 1, describe(fitted.instruments[i]));
+    for (const tracking::Trace& trace : traces) warn_of_units(trace);
 }
 
 void make_new(const std::string& name, const std::string& out, bool force) {
