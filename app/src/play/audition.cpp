@@ -139,12 +139,14 @@ std::string beginning(const Audition& heard, std::size_t first) {
 }  // namespace
 
 std::string audition_sheet(const Kit& kit, const Audition& heard, const std::string& file) {
-    constexpr int kWidth = 560, kHeight = 120, kColumns = 300;
+    constexpr std::size_t kWidth = 560, kHeight = 120, kMostPixels = 32000;  // cairo draws up to 32767
+    constexpr int kColumns = 300;
     const std::size_t rows = heard.rows.size(), columns = heard.speeds_mps.size();
     std::string text = fmt::format(
         "reset\nset terminal pngcairo size {},{} noenhanced font 'sans-serif,8'\nset output {}\n"
         "set multiplot layout {},{} title {}\nunset key\nunset ytics\n",
-        kWidth * columns, kHeight * rows + 30, gnuplot_string(file), rows, 2 * columns,
+        std::min(kWidth * columns, kMostPixels), std::min(kHeight * rows + 30, kMostPixels),
+        gnuplot_string(file), rows, 2 * columns,
         gnuplot_string(
             fmt::format("{}: {} s and 5 ms from each onset [s, ms]", kit.name, kAuditionSpacingS)));
     for (const AuditionRow& row : heard.rows) {

@@ -258,6 +258,11 @@ TEST(KitAudition, EveryZoneIsHeardAtEverySpeedAtItsOnset) {
             << "a sample each";
     }
     EXPECT_EQ(beginnings, 8u) << "of each stroke";
+    EXPECT_NE(sheet.find(" size 1120,510 "), std::string::npos);
+    Audition wide = heard;
+    wide.speeds_mps.assign(100, 3);
+    EXPECT_NE(audition_sheet(kit, wide, "sheet.png").find(" size 32000,510 "), std::string::npos)
+        << "no wider than can be drawn";
     EXPECT_THROW((void)audition(kit, "tim", speeds), BadInput);
 }
 
