@@ -266,6 +266,17 @@ TEST(MakePredictor, RefusesWhatItDoesNotKnowInOneLine) {
     }
 }
 
+TEST(MakePredictor, NamesEveryParameterWhereOneIsUnknown) {
+    try {
+        (void)make_predictor("surface:colour=1");
+        ADD_FAILURE();
+    } catch (const std::invalid_argument& error) {
+        EXPECT_STREQ(error.what(),
+                     "predictor 'surface:colour=1': found parameter 'colour', expected only decay, gate, p0, "
+                     "q, r, v0");
+    }
+}
+
 TEST(MakePredictor, KnowsTheDocumentedSpecifications) {
     for (const char* text : {"naive", "naive:n=4", "thesis", "thesis:q=outer", "ca:q=1e9", "cv:q=1e8",
                              "singer:alpha=3,q=1e10", "hold", "difference", "ca:gate=5"})

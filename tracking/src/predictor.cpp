@@ -27,8 +27,9 @@ double square(double x) {
     return x * x;
 }
 
-double gate(Specification& specification) {
-    return specification.number("gate", 0, 1, 1000);
+/// 0: no sample is refused.
+double gate(Specification& specification, double otherwise = 0) {
+    return specification.number("gate", otherwise, 1, 1000);
 }
 
 /// `r`: the sensor's noise; `p0`, `v0`, `a0`: what is not known at the start; standard deviations in mm and
@@ -172,7 +173,7 @@ std::unique_ptr<Predictor> make_surface(Specification& specification) {
         set_noise(specification, *motion);
         if (!specification.has("r")) motion->measurement_variance = square(0.5 * kMetres);
     }
-    const double sigmas = specification.has("gate") ? gate(specification) : 5;
+    const double sigmas = gate(specification, 5);
     return std::make_unique<Rebounding>(
         std::make_unique<KalmanPredictor>(fading, KalmanOptions{sigmas, 0, lasting}));
 }
