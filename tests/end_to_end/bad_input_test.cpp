@@ -181,8 +181,10 @@ TEST(BadInput, GreedyFilesOfKitsAreRefusedInTime) {
 
 TEST(BadInput, ArgumentsAndPlacesThatCannotBeAreRefused) {
     const Folder folder;
-    const std::string trace = bundled("traces/flourish.csv").string(), out = (folder / "out").string();
+    const std::string trace = bundled("traces/flourish.csv").string(), out = (folder / "out").string(),
+                      hand = (folder / "hand.csv").string();
     write(folder / "file", "x");
+    write(hand, "t,pedal,value\n1,crash,1\n");
     fs::create_directory(folder / "dir");
     const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
         {{"play", (folder / "none.csv").string(), "--out", out}, "none.csv"},
@@ -208,6 +210,7 @@ TEST(BadInput, ArgumentsAndPlacesThatCannotBeAreRefused) {
         {{"play", trace, "--out", out, "--tip", "1,2"}, "--tip"},
         {{"play", trace, "--out", out, "--frobnicate"}, "frobnicate"},
         {{"play", trace, "--out", out, "--solo", "999999", "--no-frames"}, "--solo"},
+        {{"play", trace, "--out", out, "--solo", "1000000000", "--pedals", hand, "--no-frames"}, "no choke"},
         {{"train", trace, trace, "--steps", "1", "--out", out}, "samples of"},
         {{"kit", "draw", "drums", "--out", (folder / "kit.jpg").string()}, "kit.jpg"},
         {{"dance"}, "dance"},

@@ -214,13 +214,16 @@ private:
 
 void check_solo(const PlayOptions& options, const std::vector<Strike>& strikes, const Pedals& pedals) {
     if (!options.solo) return;
-    const auto is = [&](const PedalNote& pedal) { return pedal.note.id == *options.solo; };
+    const auto is = [&](const PedalNote& pedal) {
+        return pedal.note.id == *options.solo && !is_choke(pedal);
+    };
     if (std::ranges::any_of(pedals.notes(), is)) return;
     const bool released = *options.solo >= 1 && *options.solo <= strikes.size() &&
                           strikes[*options.solo - 1].outcome == Outcome::released;
     if (!released)
-        throw BadInput(fmt::format("error: found --solo {}, expected the id of a released note of events.csv",
-                                   *options.solo));
+        throw BadInput(fmt::format(
+            "error: found --solo {}, expected the id of a released note of events.csv that is no choke",
+            *options.solo));
 }
 
 /// The loop, from samples to strikes; returns what the sticks have taught.
