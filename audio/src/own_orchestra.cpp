@@ -10,7 +10,9 @@ namespace audio {
 namespace {
 
 constexpr std::size_t kLongestOrchestra = 1 << 20;
-constexpr int kMostInstruments = 256;  // each is compiled alone where one is wrong
+constexpr int kMostInstruments = 256;       // each is compiled alone where one is wrong
+constexpr std::size_t kLongestLine = 4096;  // Csound goes down a sum term by term, and up to its stack's end
+constexpr int kMostElseifs = 1000;          // it takes a time that grows with their square
 
 /// All words that stand for something else than a number, a variable of its own or an instrument's name: a list of what may be,
 /// since Csound has some two thousand opcodes, of which new ones may reach files, processes, networks or clocks. No tables are made or
@@ -55,6 +57,9 @@ constexpr int kMostBounded = 64;  // of them in an orchestra
 constexpr std::string_view kPlain =
     " ;@.,:+-=<>()[]/%^";  // beside words, of a line that declares a parameter
 constexpr std::string_view kSigns = "+-*/%^()[],=<>!&|?:'";
+/// Behind these a number may be one of two that Csound would compute when it compiles. 1/0 would become the word inf there, which it
+/// takes for a variable that nobody made, and crashes. So numbers are given to abs() there, which it computes when a note begins.
+constexpr std::string_view kBeforeComputed = "+-*/%^!(['";
 
 bool contains(const auto& words, std::string_view word) {
     return std::ranges::find(words, word) != words.end();
@@ -69,8 +74,7 @@ bool is_variable(std::string_view word) {
            (is_digit(word[1]) || word[1] == '_' || (word[1] >= 'A' && word[1] <= 'Z'));
 }
 bool is_number(std::string_view word) {
-    return is_digit(word[0]) &&
-           std::ranges::all_of(word, [](char c) { return is_digit(c) || c == '.' || c == 'e' || c == 'E'; });
+    return is_digit(word[0]) && word.find_first_not_of("0123456789.eE+-") == word.npos;
 }
 std::string shown(char c) {
     return c > 0x20 && c < 0x7f ? std::string(1, c) : "a character that is not plain text";
@@ -110,8 +114,11 @@ private:
                 out_ += is_word(c) || kPlain.find(c) != std::string_view::npos ? c : ' ';
             return;
         }
+        if (line.size() > kLongestLine)
+            refuse(kLongestLine, "more than " + std::to_string(kLongestLine) + " characters in a line",
+                   "fewer: several lines, each with a part");
         previous_ = {};
-        depth_ = 0, names_ = false;
+        depth_ = 0, names_ = false, computed_ = false;
         bound_ = nullptr, argument_ = -1;
         for (std::size_t at = 0; at < line.size();) {
             const std::string_view rest = line.substr(at);
@@ -126,7 +133,7 @@ private:
                 break;
             } else if (is_word(rest[0]) || rest[0] == '$') {
                 std::size_t end = at + 1;
-                while (end < line.size() && (is_word(line[end]) || (line[end] == '.' && is_digit(rest[0]))))
+                while (end < line.size() && (is_word(line[end]) || (is_digit(rest[0]) && goes_on(line, end))))
                     ++end;
                 word(line.substr(at, end - at), at);
                 at = end;
@@ -137,6 +144,12 @@ private:
         end_argument();
         if (depth_ != 0)
             refuse(line.size(), "the end of the line", "the closing parenthesis on the same line");
+    }
+
+    /// Of a number that began before it: a point, or the sign of an exponent.
+    static bool goes_on(std::string_view line, std::size_t at) {
+        const bool exponent = line[at - 1] == 'e' || line[at - 1] == 'E';
+        return line[at] == '.' || (exponent && (line[at] == '-' || line[at] == '+'));
     }
 
     void word(std::string_view word, std::size_t at) {
@@ -161,9 +174,16 @@ private:
                 at, printable(word),
                 "an opcode that makes sound, or a variable: a, k or i and then a capital letter or a digit");
         }
+        if (word == "elseif" && ++elseifs_ > kMostElseifs)
+            refuse(at, "more than " + std::to_string(kMostElseifs) + " elseif", "fewer");
         begin_argument(word, at);
         previous_ = word;
-        out_ += word == "$CLOSE" ? "$OWN_CLOSE" : word;  // which bounds the note's length
+        const bool constant = is_number(word) || word == "$M_PI";
+        if (computed_ && constant)
+            out_.append("abs(").append(word) += ')';
+        else
+            out_ += word == "$CLOSE" ? "$OWN_CLOSE" : word;  // which bounds the note's length
+        computed_ = false;
     }
 
     /// Only `aOut delay aIn, iLength` can be bounded, as commas alone tell an argument's ends.
@@ -198,7 +218,12 @@ private:
         if (c == '(' || c == '[') ++depth_;
         if (c == ')' || c == ']') --depth_;
         if (depth_ < 0) refuse(at, std::string(1, c), "an opening parenthesis before it");
-        if (!blank) previous_ = {};
+        if (!blank) {
+            const bool call =
+                c == '(' && !previous_.empty() && previous_[0] != '$' && !is_digit(previous_[0]);
+            computed_ = !call && kBeforeComputed.find(c) != std::string_view::npos;
+            previous_ = {};
+        }
         out_ += blank ? ' ' : c;
     }
 
@@ -206,6 +231,7 @@ private:
         const Bound* bound = bound_;
         end_argument();
         previous_ = {};
+        computed_ = false;
         out_ += ',';
         if (++argument_ > bound->argument) return;
         bound_ = bound;
@@ -216,7 +242,8 @@ private:
     std::string file_, out_;
     std::span<const std::string> taken_;
     std::size_t at_ = 0, line_ = 1;
-    int depth_ = 0, instruments_ = 0, bounded_ = 0;
+    int depth_ = 0, instruments_ = 0, bounded_ = 0, elseifs_ = 0;
+    bool computed_ = false;         // a number here may be computed with
     const Bound* bound_ = nullptr;  // of the opcode whose arguments are read
     int argument_ = -1;             // -1: none has begun
     bool within_ = false, names_ = false, comment_ = false;

@@ -93,7 +93,7 @@ TEST(CheckedOrchestra, WhatSetsAnOpcodesMemoryIsBounded) {
     EXPECT_EQ(checked("aX vcomb aIn, min(1, 2), kT, iMost, 1"),
               "instr gong\naX vcomb aIn, min(1, 2), kT, limit( iMost, 0, 10), 1\nendin\n");
     EXPECT_EQ(checked("aX pluck 1, 100, 1/1e9, 0, 1"),
-              "instr gong\naX pluck 1, 100, limit( 1/1e9, 0.1, 1e6), 0, 1\nendin\n");
+              "instr gong\naX pluck 1, 100, limit( 1/abs(1e9), 0.1, 1e6), 0, 1\nendin\n");
     for (const std::string line :
          {"aX = delay(aIn, 1e9)", "aX = 1 + delay:a(aIn, 1e9)", "aX delay (aIn), 1e9", "aX delay(aIn), 1e9",
           "aX delay -aIn, 1e9", "delay aIn, 1"})
@@ -119,6 +119,37 @@ TEST(CheckedOrchestra, WhatIsBoundedCompiles) {
     EXPECT_NO_THROW(audio::check_own_orchestra(rendering::kOrchestra, file));
 }
 
+/// Csound crashes where it computes an infinite number when it compiles, and where a line is endless.
+TEST(CheckedOrchestra, NumbersThatCannotBeAndEndlessLinesDoNotReachCsound) {
+    EXPECT_EQ(audio::checked_own_orchestra("instr gong\niA = 1/0 + (2) - exp(3) ^ $M_PI/1e-9\niB = -4 > 5 ? "
+                                           "p12 * 6 : limit(7, 8, 9)\nendin\n",
+                                           "mine.orc", kTaken),
+              "instr gong\niA = 1/abs(0) + (abs(2)) - exp(3) ^ abs($M_PI)/abs(1e-9)\n"
+              "iB = -abs(4) > 5 ? p12 * abs(6) : limit(7, 8, 9)\nendin\n");
+    const SampleFolder folder;
+    for (const std::string value :
+         {"1/0", "(1)/(0)", "0^(-1)", "1e308*10", "1e308+1e308", "2^9999", "-(0/0)", "1 / (1 - 1)",
+          "-(1e309-1e309)", "1/!1", "exp(1/0)", "abs(0/0)", "$M_PI / 0"}) {
+        const auto file = folder.text(
+            "mine.orc",
+            "instr gong\n$STROKE(0.4'0'0.01'0.05'1e9)\niA = " + value +
+                "\namid mode 0.02 * aforce, 440, 400\naside = 0\niwidth = 0\niduration = 1\n$CLOSE\nendin\n");
+        try {
+            audio::check_own_orchestra(rendering::kOrchestra, file);
+        } catch (const audio::SampleError& refused) {
+            EXPECT_NE(std::string(refused.what()).find("mine.orc:3:"), std::string::npos) << refused.what();
+        }
+    }
+    std::string sum = "iA = 1";
+    for (int i = 0; i < 3000; ++i) sum += "+1";
+    EXPECT_EQ(fault("instr gong\n" + sum + "\nendin\n").find("mine.orc:2:4097: error: found more than 4096"),
+              0u);
+    std::string chain = "instr gong\nif p12 > 1 then\n";
+    for (int i = 0; i < 1001; ++i) chain += "elseif p12 > 2 then\n";
+    EXPECT_EQ(fault(chain + "endif\nendin\n").find("mine.orc:1003:1: error: found more than 1000 elseif"),
+              0u);
+}
+
 TEST(CheckedOrchestra, WhatSoundsIsAllowedAndItsCommentsDoNotReachCsound) {
     EXPECT_EQ(audio::checked_own_orchestra(
                   ";@ gong frequency_hz 100 20 2000 pitch \xc3\xa9\r; system \"in a comment\" \xc3\xa9\xff\n"
@@ -128,7 +159,7 @@ TEST(CheckedOrchestra, WhatSoundsIsAllowedAndItsCommentsDoNotReachCsound) {
                   "mine.orc", kTaken),
               ";@ gong frequency_hz 100 20 2000 pitch    ; system  in a comment     \n"
               " \n \ninstr gong \n"
-              "$STROKE(0'0'0'0' 1e10)\n\n"
+              "$STROKE(abs(0)'abs(0)'abs(0)'abs(0)' abs(1e10))\n\n"
               "amid reson aforce, p12, 5\naside = 0\niduration = (p12 > 2 ? p12 : 2.5)\n$OWN_CLOSE\nendin\n");
 }
 
