@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "region_text.h"
@@ -97,7 +98,13 @@ public:
             out_ += '\n';
             at_ = end + 1, ++line_;
         }
+        if (comment_) refuse(0, "the end of the file", "*/");
         if (within_) refuse(0, "the end of the file", "endin");
+        for (const auto& [name, line] : declared_)
+            if (!contains(made_, name) && !contains(taken_, name)) {
+                line_ = line;
+                refuse(0, "parameters of " + printable(name), "instr " + printable(name) + " in the file");
+            }
         return std::move(out_);
     }
 
@@ -110,6 +117,9 @@ private:
     void line_of(std::string_view line) {
         if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
         if (!comment_ && !within_ && line.starts_with(";@")) {
+            const std::size_t name = line.find_first_not_of(" \t", 2);
+            if (name != line.npos)
+                declared_.emplace_back(line.substr(name, line.find_first_of(" \t", name) - name), line_);
             for (const char c : line)
                 out_ += is_word(c) || kPlain.find(c) != std::string_view::npos ? c : ' ';
             return;
@@ -156,6 +166,7 @@ private:
         if (names_) {
             if (contains(taken_, word) || is_digit(word[0]) || word[0] == '$')
                 refuse(at, "instr " + printable(word), "a name that no other instrument has");
+            made_.push_back(word);
         } else if (word == "instr") {
             if (within_) refuse(at, "instr", "endin before it");
             if (++instruments_ > kMostInstruments)
@@ -241,6 +252,8 @@ private:
     std::string_view text_, previous_;
     std::string file_, out_;
     std::span<const std::string> taken_;
+    std::vector<std::string_view> made_;                              // instruments
+    std::vector<std::pair<std::string_view, std::size_t>> declared_;  // of parameters, and their lines
     std::size_t at_ = 0, line_ = 1;
     int depth_ = 0, instruments_ = 0, bounded_ = 0, elseifs_ = 0;
     bool computed_ = false;         // a number here may be computed with

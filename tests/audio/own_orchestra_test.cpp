@@ -150,6 +150,14 @@ TEST(CheckedOrchestra, NumbersThatCannotBeAndEndlessLinesDoNotReachCsound) {
               0u);
 }
 
+TEST(CheckedOrchestra, WhatIsDeclaredOrBegunIsThereOrEnds) {
+    EXPECT_EQ(fault("instr gong\nendin\n;@ gong f 1 0 2 pitch\n\n;@ tam f 1 0 2 pitch\n"),
+              "mine.orc:5:1: error: found parameters of tam, expected instr tam in the file");
+    EXPECT_EQ(fault("instr gong\nendin\n/* instr tam\nendin\n"),
+              "mine.orc:5:1: error: found the end of the file, expected */");
+    EXPECT_EQ(fault("instr gong\nendin\n;@\n;@ drum f 1 0 2 of the bundled one\n"), "");
+}
+
 TEST(CheckedOrchestra, WhatSoundsIsAllowedAndItsCommentsDoNotReachCsound) {
     EXPECT_EQ(audio::checked_own_orchestra(
                   ";@ gong frequency_hz 100 20 2000 pitch \xc3\xa9\r; system \"in a comment\" \xc3\xa9\xff\n"

@@ -29,7 +29,7 @@ void write_named_files() {
     put("snare.wav");
     (void)audio::write_wav(folder / own, std::vector<float>(64, 0.5F));
     put("hall.wav");
-    std::ofstream(folder / own) << ";@ gong frequency_hz 100 20 2000 pitch [Hz]\n";
+    std::ofstream(folder / own) << ";@ gong frequency_hz 100 20 2000 pitch [Hz]\ninstr gong\nendin\n";
     put("mine.orc");
     std::ofstream(folder / own) << "[[instrument]]\nname = \"C5\"\nkind = \"bell\"\n";
     put("removed.toml");
