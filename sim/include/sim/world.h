@@ -216,6 +216,8 @@ struct ForeignBall {
     double radius;  ///< of the body, plus the distance it may travel [m]
 };
 
+class Partners;
+
 /// How a world is shared with worlds of other processes that hold the same bodies.
 enum class Sharing {
     alone,    ///< not at all
@@ -269,6 +271,9 @@ public:
     World& operator=(World&&) noexcept;
 
     void step();  ///< by settings().dt; allocates nothing once its buffers have grown
+    /// step() of a world that is shared by islands, by several who each have it whole, with the same bits. Throws NotTogether or
+    /// DecodeError where it comes to no end so: the world has to go back to the step's start (rewind) then.
+    void step_together(Partners& with);
     /// So many threads share out the steps of a world that is not shared, at first one: this one and helpers that sleep between
     /// steps. No result depends on how many. Throws std::invalid_argument below 1.
     void use_threads(int threads);

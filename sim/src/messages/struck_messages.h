@@ -5,7 +5,7 @@
 #include <variant>
 #include <vector>
 
-#include "messages/byte_codec.h"
+#include "bytes/byte_codec.h"
 #include "messages/secret.h"
 #include "struck/stepped_body.h"
 

@@ -31,18 +31,18 @@ void set_spins(const MovingBody& body, BodyPath& path) {
     for (BodyPath::Leg& leg : path.legs) leg.spin = spin_of(body, leg.orientation, leg.momentum);
 }
 
-void follow_freely(const MovingBody& body, const WorldSettings& settings, BodyPath& path) {
+void follow_freely(const MovingBody& body, const WorldBodyState& from, const WorldSettings& settings,
+                   BodyPath& path) {
     path.legs.resize(static_cast<std::size_t>(settings.substeps));
     path.end = settings.dt;
     path.inertia = body.kind->mass.inertia;
     double start = 0;
     const bool still = !body.moves() || body.asleep;
     const double h = settings.dt / settings.substeps;
-    Eigen::Vector3d position = body.state.position, velocity = body.state.velocity,
-                    momentum = body.state.angular_momentum;
+    Eigen::Vector3d position = from.position, velocity = from.velocity, momentum = from.angular_momentum;
     Eigen::Vector3d acceleration = body.gravity_scale * settings.gravity;
     if (body.pushed) acceleration += body.force / body.kind->mass.mass;
-    Eigen::Quaterniond orientation = body.state.orientation;
+    Eigen::Quaterniond orientation = from.orientation;
     for (BodyPath::Leg& leg : path.legs) {
         leg = {.start = start, .position = position, .orientation = orientation};
         start += h;

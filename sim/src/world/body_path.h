@@ -69,8 +69,9 @@ void set_spins(const MovingBody& body, BodyPath& path);
 /// The path of a prescribed motion over a step that begins at a time since the start, a leg for every part between keys.
 void follow_motion(const std::vector<MotionKey>& motion, double begins_s, double dt, BodyPath& path);
 
-/// The path of a body that nothing touches; of one that is fixed or sleeps: that it stays. Allocates only
+/// The path of a body that nothing touches, from a state on; of one that is fixed or sleeps: that it stays. Allocates only
 /// while `path` grows.
-void follow_freely(const MovingBody& body, const WorldSettings& settings, BodyPath& path);
+void follow_freely(const MovingBody& body, const WorldBodyState& from, const WorldSettings& settings,
+                   BodyPath& path);
 
 }  // namespace sim

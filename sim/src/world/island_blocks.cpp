@@ -67,7 +67,6 @@ void IslandBlocks::divide(Crew& crew, std::span<const Body> bodies, std::span<co
         blocks_.emplace_back().slabs = count;
         for (std::uint32_t s = 0; s < count; ++s) ++blocks_of_[s];
     }
-    const std::uint32_t interfaces = count, even = count / 2;
     const auto block_of = [&](const Manifold& m) -> std::uint32_t {
         const auto slab = [&](int id) {
             const int at = id < kFirstPlane ? local[static_cast<std::size_t>(id)] : -1;
@@ -78,7 +77,7 @@ void IslandBlocks::divide(Crew& crew, std::span<const Body> bodies, std::span<co
         const auto from = static_cast<std::uint32_t>(std::max(low, 0));
         if (low == high) return from;
         if (high > low + 1) return static_cast<std::uint32_t>(blocks_.size()) - 1;
-        return interfaces + (from % 2 == 0 ? from / 2 : even + from / 2);
+        return static_cast<std::uint32_t>(interface_after(from));
     };
     first_manifold_.assign(blocks_.size() + 1, 0);
     block_of_.resize(manifolds.size());

@@ -39,6 +39,7 @@ public:
                 const std::vector<Manifold>& all, const std::vector<int>& local);
 
     [[nodiscard]] std::size_t size() const noexcept { return blocks_.size(); }
+    [[nodiscard]] const Block& operator[](std::size_t block) const { return blocks_[block]; }
     [[nodiscard]] std::size_t slabs() const noexcept { return first_body_.size() - 1; }
     /// Bodies (places in `bodies`) of a slab, ascending.
     [[nodiscard]] std::span<const std::uint32_t> bodies_of(std::size_t slab) const {
@@ -50,6 +51,12 @@ public:
         return std::span(manifolds_)
             .subspan(first_manifold_[block], first_manifold_[block + 1] - first_manifold_[block]);
     }
+    /// Block of the contacts between a slab and the next.
+    [[nodiscard]] std::size_t interface_after(std::size_t slab) const noexcept {
+        return slabs() + (slab % 2 == 0 ? slab / 2 : slabs() / 2 + slab / 2);
+    }
+    /// Whether contacts reach beyond neighbouring slabs.
+    [[nodiscard]] bool reaches_further() const noexcept { return blocks_.size() > 2 * slabs() - 1; }
     void set_contacts(std::size_t block, std::size_t first, std::size_t last) {
         blocks_[block].first = static_cast<std::uint32_t>(first);
         blocks_[block].last = static_cast<std::uint32_t>(last);

@@ -425,16 +425,17 @@ void IslandSolver::stretch_gap(ContactRows& c) const {
 // Frames follow bodies that turned, with what is written in them: rows, and the way so far. Rows of contacts that rebound
 // follow the place where they act, too.
 void IslandSolver::turn_frames(const IslandBlocks::Block& slab) {
-    for (const std::uint32_t body : blocks_.bodies_of(slab.slab)) {
-        BodyRows& rows = rows_of_[body];
-        rows.turned = false;
-        const Eigen::Vector3d& root = rows.body->kind->root_inertia;
-        if (root.maxCoeff() - root.minCoeff() < 1e-6 * root.maxCoeff()) continue;  // alike in all frames
-        const Eigen::Matrix3d now = rows.body->state.orientation.toRotationMatrix();
-        if ((now - rows.frame).squaredNorm() < 2 * kFrameTurn * kFrameTurn) continue;
-        rows.turned = true;
-        turn_frame(rows, now);
-    }
+    for (const std::uint32_t body : blocks_.bodies_of(slab.slab)) turn_frame_on(rows_of_[body]);
+}
+
+void IslandSolver::turn_frame_on(BodyRows& rows) {
+    rows.turned = false;
+    const Eigen::Vector3d& root = rows.body->kind->root_inertia;
+    if (root.maxCoeff() - root.minCoeff() < 1e-6 * root.maxCoeff()) return;  // alike in all frames
+    const Eigen::Matrix3d now = rows.body->state.orientation.toRotationMatrix();
+    if ((now - rows.frame).squaredNorm() < 2 * kFrameTurn * kFrameTurn) return;
+    rows.turned = true;
+    turn_frame(rows, now);
 }
 
 void IslandSolver::turn_rows(const IslandBlocks::Block& block) {

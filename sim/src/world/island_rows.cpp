@@ -61,7 +61,7 @@ void IslandSolver::begin(const Island& island) {
     }
     pushed_.clear();
     for (std::size_t i = 0; i < rows_of_.size() && !forces_->empty(); ++i) begin_forces(static_cast<int>(i));
-    if (!springs_.empty() || contacts_.empty())
+    if (!with_ && (!springs_.empty() || contacts_.empty()))
         (void)begin_direct(among_ghosts() ? 0 : most_with_springs(), springs_.empty());
 }
 
@@ -100,6 +100,7 @@ IslandSolver::Part IslandSolver::part_of(std::span<const int> manifolds) const {
 // The contacts' rows, in the order of blocks.
 void IslandSolver::add_contacts(const Island& island) {
     blocks_.divide(crew(), places_, island.manifolds, *manifolds_, local_);
+    if (with_) cut();
     sums_.assign(blocks_.slabs(), {});
     parts_.resize(blocks_.size());
     crew().each(parts_.size(), 1, [this](int, std::size_t first, std::size_t last) {
@@ -135,7 +136,10 @@ void IslandSolver::add_contacts(const Island& island) {
     for (Window& window : windows_) window.next_turn.assign(rows_of_.size(), 0);
     crew().each(parts_.size(), 1, [this](int thread, std::size_t first, std::size_t last) {
         for (std::size_t b = first; b < last; ++b)
-            fill_part(blocks_.manifolds_of(b), windows_[static_cast<std::size_t>(thread)], parts_[b]);
+            if (with_ && !sweeps(blocks_[b]))
+                parts_[b].contacts = blocks_[b].last;  // another partner's
+            else
+                fill_part(blocks_.manifolds_of(b), windows_[static_cast<std::size_t>(thread)], parts_[b]);
     });
     std::size_t next = 0;
     for (const Part& part : parts_) {  // `contacts`: their end by now

@@ -10,10 +10,6 @@ namespace {
 
 using ModeArray = Eigen::Array<double, Eigen::Dynamic, 1, 0, kMostModes, 1>;  // on the stack
 
-// Speeds by which swept contacts may miss: at rest, of the smallest body's size a second, and as a share of the fastest body's.
-constexpr double kMissedAtRest = 1e-3, kMissedShare = 0.03;
-constexpr double kUneven =
-    30;  // masses that touch: sweeps let the heavier press the lighter away within a step
 // Energy in a step, of the motion's and of weight times size, beyond which a direct solution is worse than sweeps.
 constexpr double kWorse = 3e-3;
 
@@ -51,7 +47,12 @@ void IslandSolver::solve(const Island& island, const ContactScene& scene, bool f
     if (!may_gain() && !any_told_ && (springs_.empty() || !island.manifolds.empty())) calm();
     end_forces();
     keep_impulses();
-    for (const int id : island.bodies) local_[static_cast<std::size_t>(id)] = -1;
+    forget_island();
+}
+
+void IslandSolver::forget_island() {
+    with_ = nullptr;
+    for (const int id : island_->bodies) local_[static_cast<std::size_t>(id)] = -1;
 }
 
 void IslandSolver::advance() {
@@ -117,6 +118,7 @@ float IslandSolver::residual(const ContactRows& c) const {
 
 // Does what was put together.
 void IslandSolver::run() {
+    if (with_) return run_together();
     blocks_.run(
         crew(), static_cast<std::uint32_t>(phases_.size()),
         [this](std::uint32_t p) { return phases_[p].of_bodies; },
@@ -129,22 +131,25 @@ void IslandSolver::substep(bool last) {
     begin_times(substep_ * h_);
     set_forces();
     if (carried_) contacts(&Solver::see_driven);
-    if (substep_ > 0 && !contacts_.empty()) bodies(&Solver::turn_frames), contacts(&Solver::turn_rows);
+    if (substep_ > 0 && !contacts_.empty())
+        bodies(&Solver::turn_frames), contacts(&Solver::turn_rows, Told::skipped);
     bodies(&Solver::load_velocities);
     if (any_bounce_ || !impacts_.empty() || !springs_.empty()) {
         run();
         if (any_bounce_ || !impacts_.empty()) strike();
+        if (with_) meet_springs();
         pull_springs();
     }
-    contacts(&Solver::warm_start);
-    contacts(&Solver::sweep<Push::soft>);
+    contacts(&Solver::warm_start, Told::states);
+    contacts(&Solver::sweep<Push::soft>, Told::velocities);
     pushes_out_ = false;
     if (any_emerging_) run(), pushes_out_ = may_push_out();
     if (pushes_out_) bodies(&Solver::keep), contacts(&Solver::sweep<Push::all>);
     contacts(&Solver::give_to_move);
     bodies(&Solver::move);
     if (pushes_out_ || any_rebound_ || !impacts_.empty()) contacts(&Solver::follow_rows);
-    for (int i = 0; i < 2; ++i) contacts(&Solver::sweep<Push::none>);
+    contacts(&Solver::sweep<Push::none>, Told::places);
+    contacts(&Solver::sweep<Push::none>, Told::velocities);
     if (any_rebound_) contacts(&Solver::note_work);
     if (any_rebound_ && last) contacts(&Solver::restitute);
     contacts(&Solver::give_the_rest);
@@ -517,6 +522,10 @@ void IslandSolver::keep_impulse(const ContactRows& c, ManifoldPoint& point) {
 
 void IslandSolver::keep_impulses() {
     each_contact([](const ContactRows& c) { keep_impulse(c, *c.point); });
+    keep_spring_impulses();
+}
+
+void IslandSolver::keep_spring_impulses() {
     for (const SpringRows& s : springs_) {
         s.point->impulse = (s.moved + s.impulse).cast<float>();
         const double force = s.point->impulse.norm() / h_;

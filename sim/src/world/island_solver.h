@@ -5,10 +5,12 @@
 #include <span>
 #include <vector>
 
+#include "bytes/byte_codec.h"
 #include "shape/lanes.h"
 #include "world/block_cholesky.h"
 #include "world/island_blocks.h"
 #include "world/island_contacts.h"
+#include "world/partners.h"
 
 namespace sim {
 
@@ -19,6 +21,11 @@ constexpr std::size_t kMostFollowed =
     64;                              ///< bodies of an island that is followed: all are solved in each halving
 constexpr int kMostFollowLevel = 8;  ///< so often at most a substep is halved for bodies that are followed
 constexpr float kPushSpeed = 3;      ///< at which bodies inside each other are moved apart [m/s]
+
+/// Speeds by which swept contacts may miss: at rest, of the smallest body's size a second, and as a share of the fastest body's.
+constexpr double kMissedAtRest = 1e-3, kMissedShare = 0.03;
+constexpr double kUneven =
+    30;  ///< masses that touch: sweeps let the heavier press the lighter away within a step
 
 /// A timed force in a step. Times in substeps since the start.
 struct ActiveForce {
@@ -116,6 +123,18 @@ public:
     /// bodies moves by more than kSlow of its size, contacts found again in each. Islands of bodies so small or thin that
     /// weight alone takes one further than that in a step, unless they are too fast.
     [[nodiscard]] bool may_follow(const Island& island) const;
+    // One island by several partners, island_partners.cpp.
+    /// Begins it and sweeps the part that is this partner's. false, and nothing done: it is not one that is shared out. The
+    /// same at all.
+    [[nodiscard]] bool begin_together(const Island& island, const ContactScene& scene, Partners& with);
+    void write_part(ByteWriter& out) const;       ///< what came of this part
+    void read_part(ByteReader& in, int partner);  ///< of another's
+    /// Once all parts are there. false: the island has to be solved otherwise.
+    [[nodiscard]] bool end_together();
+    void give_up() noexcept;  ///< what was begun together
+    /// Writes the paths of the bodies of this part; takes those of another's.
+    void write_paths(ByteWriter& out) const;
+    void read_paths(ByteReader& in, int partner);
     /// Before a step: its number, from 0, and the forces that act within it, ascending by bodies; must stay.
     void begin_step(std::uint64_t step, const std::vector<ActiveForce>& forces) noexcept {
         first_substep_ = static_cast<double>(step) * settings_->substeps;
@@ -144,6 +163,9 @@ public:
     /// Forgets the crossed impulses of a body whose island is solved once more.
     void forget_crossed(int body);
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
+    [[nodiscard]] std::uint64_t limited_before() const noexcept {
+        return limited_before_;
+    }                                                                                    ///< the last island
     [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }  ///< since the start
 
 private:
@@ -304,13 +326,24 @@ private:
     [[nodiscard]] std::span<ContactRows> contacts_in(const IslandBlocks::Block& block) noexcept {
         return std::span(contacts_).subspan(block.first, block.last - block.first);
     }
+    /// What partners tell each other of the bodies on both sides of a border before they sweep it, each for itself.
+    enum class Told : std::uint8_t {
+        nothing,
+        states,      ///< and speeds; the rows are turned then
+        velocities,  ///< y
+        places,      ///< y, and where the bodies are by now
+        skipped      ///< done with the states
+    };
     /// A part of a substep: of the contacts of a block, or of the bodies of its slab. Parts are put together and then
     /// done in one hand-out, see IslandBlocks::run.
     struct Phase {
         void (IslandSolver::*act)(const IslandBlocks::Block& block);
         bool of_bodies;
+        Told told = Told::nothing;
     };
-    void contacts(void (IslandSolver::*act)(const IslandBlocks::Block&)) { phases_.push_back({act, false}); }
+    void contacts(void (IslandSolver::*act)(const IslandBlocks::Block&), Told told = Told::nothing) {
+        phases_.push_back({act, false, told});
+    }
     void bodies(void (IslandSolver::*act)(const IslandBlocks::Block&)) { phases_.push_back({act, true}); }
     void run();
     /// What a slab's bodies add to sums, in the order of sweeps.
@@ -489,6 +522,44 @@ private:
     [[nodiscard]] static Eigen::Vector3d momentum_given(const MovingBody& body, double time) {
         return body.pushed ? Eigen::Vector3d(time * body.torque) : Eigen::Vector3d::Zero();
     }
+
+    // Together.
+    struct Border {
+        int partner = -1;                        // none
+        std::size_t block = 0;                   // of blocks_
+        std::vector<std::uint32_t> own, theirs;  // bodies in its contacts, ascending
+    };
+    [[nodiscard]] bool is_plain(const Island& island) const;
+    [[nodiscard]] bool may_be_direct(double most);
+    void cut();
+    void find_border(Border& border, std::size_t own_slab);
+    [[nodiscard]] bool sweeps(const IslandBlocks::Block& block) const noexcept {
+        return first_slab_ < last_slab_ && block.slab < last_slab_ && block.slab + block.slabs > first_slab_;
+    }
+    [[nodiscard]] bool is_own_body(std::size_t body) const {
+        return blocks_.slab_of(body) >= first_slab_ && blocks_.slab_of(body) < last_slab_;
+    }
+    void run_together();
+    void meet(const Border& border, Told told);
+    void meet_springs();
+    void write_motion(ByteWriter& out, std::uint32_t body) const;
+    void read_motion(ByteReader& in, std::uint32_t body);
+    void turn_frame_on(BodyRows& rows);
+    template <typename Body>
+    void each_body_of(int partner, Body visit) const;
+    template <typename Block>
+    void each_block_of(int partner, Block visit) const;
+    [[nodiscard]] bool is_uneven_island() const;
+    void keep_spring_impulses();
+    void forget_island();
+
+    Partners* with_ = nullptr;                    // this island is solved together
+    std::vector<std::size_t> cuts_;               // first slab of each partner, and their number
+    int part_ = 0;                                // this partner's number
+    std::size_t first_slab_ = 0, last_slab_ = 0;  // own ones
+    std::array<Border, 2> borders_;               // below, above
+    std::vector<std::uint32_t> spring_bodies_;
+    float missed_ = 0;  // most of residual() in all parts
 
     const WorldSettings* settings_;
     std::vector<MovingBody>* bodies_;

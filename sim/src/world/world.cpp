@@ -342,13 +342,14 @@ void World::Implementation::step() {
         }
     });
     const auto [fallbacks_before, impacts_before] = std::pair(contacts.fallbacks(), contacts.impacts());
-    contacts.find(contact_scene(crew()));
+    contacts.find(contact_scene(crew()), with);
     find_islands();
     held_before.resize(constraints.size());
     for (std::size_t c = 0; c < constraints.size(); ++c) held_before[c] = constraints[c].holds;
     const auto [limited_before, broken_before] =
         std::pair(counts.deformations_limited, counts.constraints_broken);
     solve_islands();
+    if (with) end_together();
     tell_broken(broken_before);
     tell_limited(limited_before);
     put_to_sleep();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "world/step_records.h"
+
 namespace sim {
 namespace {
 
@@ -89,7 +91,7 @@ void wake_group(std::vector<MovingBody>& bodies, int body) {
     }
 }
 
-void WorldContacts::find(const ContactScene& scene) {
+void WorldContacts::find(const ContactScene& scene, Partners* with) {
     std::swap(before_, manifolds_);
     reach_.resize(scene.bodies.size());
     paths_.resize(scene.bodies.size());
@@ -97,7 +99,7 @@ void WorldContacts::find(const ContactScene& scene) {
     while (narrow_.size() < static_cast<std::size_t>(scene.crew.size()))
         narrow_.push_back(std::make_unique<NarrowPhase>());
     known_.clear();
-    while (find_once(scene)) {
+    while (find_once(scene, with)) {
     }
 }
 
@@ -141,7 +143,7 @@ void WorldContacts::set_box(const ContactScene& scene, std::size_t i) {
                          body.travels || (body.moves() && !body.asleep)};
 }
 
-bool WorldContacts::find_once(const ContactScene& scene) {
+bool WorldContacts::find_once(const ContactScene& scene, Partners* with) {
     meetings_.clear();
     followed_.assign(scene.bodies.size(), kNotFollowed);
     watched_.assign(scene.bodies.size(), 0);
@@ -152,15 +154,16 @@ bool WorldContacts::find_once(const ContactScene& scene) {
     });
     const auto& pairs = broad_.find(scene.crew);
     const std::size_t most = scene.crew.size() == 1 ? 1 : 16 * static_cast<std::size_t>(scene.crew.size());
-    const std::size_t parts = std::clamp(count / kLeastPart, std::size_t{1}, most);
+    const std::size_t parts = with ? 1 : std::clamp(count / kLeastPart, std::size_t{1}, most);
     found_.resize(std::max(parts, found_.size()));
     scene.crew.each(parts, 1, [&](int thread, std::size_t first, std::size_t last) {
         for (std::size_t p = first; p < last; ++p) {
             found_[p].first = p * count / parts, found_[p].last = (p + 1) * count / parts;
             found_[p].narrow = narrow_[static_cast<std::size_t>(thread)].get();
-            find(scene, pairs, found_[p]);
+            find(scene, pairs, found_[p], with);
         }
     });
+    if (with) share(scene, *with);
     gather(scene, parts);
     bool woke = false;
     for (std::size_t p = 0; p < parts; ++p)
@@ -170,7 +173,7 @@ bool WorldContacts::find_once(const ContactScene& scene) {
 }
 
 void WorldContacts::find(const ContactScene& scene, const std::vector<std::pair<int, int>>& pairs,
-                         Found& found) {
+                         Found& found, const Partners* with) {
     found.manifolds.clear(), found.meetings.clear(), found.woken.clear();
     found.pairs = 0;
     if (found.first == found.last) return;
@@ -180,10 +183,65 @@ void WorldContacts::find(const ContactScene& scene, const std::vector<std::pair<
     auto pair = std::ranges::lower_bound(pairs, first, {}, &std::pair<int, int>::first);
     for (std::size_t k = found.first; k < found.last; ++k) {
         const int i = scene.here[k];
+        const bool moves = scene.bodies[static_cast<std::size_t>(i)].moves();
         for (; pair != pairs.end() && pair->first == i; ++pair)
-            if (scene.may_meet(*pair)) meet_pair(scene, i, pair->second, found);
-        meet_planes(scene, i, found);
+            if ((!with || with->of(moves ? i : pair->second) == with->self()) && scene.may_meet(*pair))
+                meet_pair(scene, i, pair->second, found);
+        if (!with || with->of(i) == with->self()) meet_planes(scene, i, found);
     }
+}
+
+// What all partners found, in the order of keys, as if one thread had.
+void WorldContacts::share(const ContactScene& scene, Partners& with) {
+    Found& found = found_.front();
+    ByteWriter out;
+    out.bytes().reserve(160 * found.manifolds.size() + 64);
+    out.count(found.manifolds.size());
+    for (const Manifold& m : found.manifolds) write(out, m);
+    out.count(found.meetings.size());
+    for (const Meeting& m : found.meetings) out.number(m.a), out.number(m.b), out.number(m.time);
+    out.count(found.woken.size());
+    for (const int id : found.woken) out.number(id);
+    const auto watched = static_cast<std::size_t>(std::ranges::count(watched_, 1));
+    out.count(watched);
+    for (std::size_t i = 0; i < watched_.size() && watched > 0; ++i)
+        if (watched_[i] != 0) out.number(static_cast<std::uint32_t>(i));
+    out.number(found.pairs);
+    with.tell_all(std::move(out.bytes()));
+    heard_.clear();
+    std::swap(heard_, found.manifolds);
+    for (int p = 0; p < with.count(); ++p)
+        if (p != with.self()) hear(scene, with.hear(p));
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+    order.reserve(heard_.size());
+    for (const Manifold& m : heard_) order.emplace_back(m.key(), static_cast<std::uint32_t>(order.size()));
+    std::ranges::sort(order);
+    found.manifolds.clear();
+    for (const auto& [key, at] : order) found.manifolds.push_back(heard_[at]);
+    std::ranges::sort(found.meetings, {}, [](const Meeting& m) { return std::pair(m.a, m.b); });
+    for (const Meeting& m : found.meetings)
+        for (const int id : {m.a, m.b}) follow(scene, id, scene.bodies[static_cast<std::size_t>(id)].state);
+}
+
+void WorldContacts::hear(const ContactScene& scene, const Partners::Bytes& bytes) {
+    Found& found = found_.front();
+    ByteReader in(bytes);
+    const std::uint32_t count = static_cast<std::uint32_t>(scene.bodies.size());
+    auto body = [&] {
+        const auto id = in.number<std::uint32_t>();
+        if (id >= count) throw DecodeError("body " + std::to_string(id) + " of " + std::to_string(count));
+        return static_cast<int>(id);
+    };
+    for (std::uint32_t n = in.count(22); n > 0; --n)
+        read(in, heard_.emplace_back(), scene.bodies, scene.planes.size());
+    for (std::uint32_t n = in.count(16); n > 0; --n) {
+        const int a = body(), b = body();
+        found.meetings.push_back({a, b, in.number<double>(), false});
+    }
+    for (std::uint32_t n = in.count(4); n > 0; --n) found.woken.push_back(body());
+    for (std::uint32_t n = in.count(4); n > 0; --n) watched_[static_cast<std::size_t>(body())] = 1;
+    found.pairs += in.number<std::int32_t>();
+    in.expect_end();
 }
 
 // What all threads found, in the order of keys.

@@ -5,6 +5,7 @@
 #include "world/broad_phase.h"
 #include "world/crew.h"
 #include "world/narrow_phase.h"
+#include "world/partners.h"
 #include "world/time_of_impact.h"
 
 namespace sim {
@@ -42,17 +43,21 @@ struct ContactScene {
 /// already meets again where it is kInside deep in each other, a little deeper every time.
 class WorldContacts {
 public:
-    void find(const ContactScene& scene);
+    /// with: partners, each of whom finds those of its bodies and tells the others.
+    void find(const ContactScene& scene, Partners* with = nullptr);
 
-    /// After a solve: contacts for what the paths really taken lead to. Adds at most one impact a body and
+    /// After a solve (`solved`: the bodies that went through it; `started`: the states of all that move, before): contacts for what the paths really taken lead to. Adds at most one impact a body and
     /// lists it; the worlds' islands then are solved again. Empty: nothing unforeseen.
     struct Meeting {
         int a, b;
         double time;    ///< since the step's start [s]
         bool touching;  ///< had a contact already, and still went on inside
     };
-    const std::vector<Meeting>& unforeseen(const ContactScene& scene,
-                                           const std::vector<std::uint8_t>& solved);
+    const std::vector<Meeting>& unforeseen(const ContactScene& scene, const std::vector<std::uint8_t>& solved,
+                                           const std::vector<WorldBodyState>& started);
+    /// Whether unforeseen() looks at any path: of all bodies near.
+    [[nodiscard]] bool any_left_path(const ContactScene& scene,
+                                     const std::vector<std::uint8_t>& solved) const;
     /// Of several impacts of a pair within the step only the last is one of its past in the next.
     void keep_last();
     /// The pair's manifold in this step, if it has one; the first of several.
@@ -94,9 +99,12 @@ private:
         std::vector<int> woken;
         int pairs = 0;
     };
-    bool find_once(const ContactScene& scene);
+    bool find_once(const ContactScene& scene, Partners* with);
     void set_box(const ContactScene& scene, std::size_t i);
-    void find(const ContactScene& scene, const std::vector<std::pair<int, int>>& pairs, Found& found);
+    void find(const ContactScene& scene, const std::vector<std::pair<int, int>>& pairs, Found& found,
+              const Partners* with);
+    void share(const ContactScene& scene, Partners& with);
+    void hear(const ContactScene& scene, const Partners::Bytes& bytes);
     void gather(const ContactScene& scene, std::size_t parts);
     void meet_pair(const ContactScene& scene, int i, int j, Found& found);
     [[nodiscard]] bool pass_by(const ContactScene& scene, int i, int j) const;
@@ -113,7 +121,7 @@ private:
 
     // Fast pairs, world_impacts.cpp.
     [[nodiscard]] Impact foresee(const ContactScene& scene, int i, int j);
-    void follow(const ContactScene& scene, int i);
+    void follow(const ContactScene& scene, int i, const WorldBodyState& from);
     void accept_impacts(const ContactScene& scene);
     bool add_impact(const ContactScene& scene, const Meeting& meeting);
     [[nodiscard]] bool left_path(const ContactScene& scene, int i) const;
@@ -125,6 +133,7 @@ private:
     std::vector<Reach> reach_;                  // of each body
     std::vector<Manifold> manifolds_, before_;  // by ascending keys
     std::vector<Manifold> added_;               // to them
+    std::vector<Manifold> heard_;               // of partners
     std::vector<BodyPath> paths_;               // of each body
     enum : std::uint8_t { kNotFollowed, kBeingFollowed, kFollowed };
     std::vector<std::uint8_t> followed_;  // paths_ holds the free motion of this step; by any thread

@@ -59,23 +59,23 @@ void WorldContacts::rewarm(Manifold& manifold) const {
     if (before && manifold.points[0].begins < 0) take_impulses(*before, manifold.impulse_reach, manifold);
 }
 
-void WorldContacts::follow(const ContactScene& scene, int i) {
+void WorldContacts::follow(const ContactScene& scene, int i, const WorldBodyState& from) {
     const auto at = static_cast<std::size_t>(i);
     if (scene.bodies[at].travels) return;
     // Once, whichever thread asks first.
     const std::atomic_ref<std::uint8_t> state(followed_[at]);
     std::uint8_t now = kNotFollowed;
     if (state.compare_exchange_strong(now, kBeingFollowed)) {
-        follow_freely(scene.bodies[at], scene.settings, paths_[at]);
+        follow_freely(scene.bodies[at], from, scene.settings, paths_[at]);
         state.store(kFollowed);
     }
     for (ShortWait wait; state != kFollowed;) (void)wait.again();
 }
 
 Impact WorldContacts::foresee(const ContactScene& scene, int i, int j) {
-    follow(scene, i), follow(scene, j);
     const MovingBody &a = scene.bodies[static_cast<std::size_t>(i)],
                      &b = scene.bodies[static_cast<std::size_t>(j)];
+    follow(scene, i, a.state), follow(scene, j, b.state);
     return time_of_impact(ConvexBody(a.posed), paths_[static_cast<std::size_t>(i)], ConvexBody(b.posed),
                           paths_[static_cast<std::size_t>(j)], kTouching * size_of(a, b));
 }
@@ -179,24 +179,26 @@ bool WorldContacts::left_path(const ContactScene& scene, int i) const {
     return scene.settings.dt * turning_speed(body) > reach.turned + least;
 }
 
+bool WorldContacts::any_left_path(const ContactScene& scene, const std::vector<std::uint8_t>& solved) const {
+    return std::ranges::any_of(scene.here, [&](int id) {
+        return solved[static_cast<std::size_t>(id)] != 0 && left_path(scene, id);
+    });
+}
+
 // Bodies that left their free paths, against all that their paths come near.
 const std::vector<WorldContacts::Meeting>& WorldContacts::unforeseen(
-    const ContactScene& scene, const std::vector<std::uint8_t>& solved) {
+    const ContactScene& scene, const std::vector<std::uint8_t>& solved,
+    const std::vector<WorldBodyState>& started) {
     meetings_.clear();
-    bool any = false;
+    if (!any_left_path(scene, solved)) return meetings_;
     auto& boxes = broad_.boxes();
     boxes.clear();
-    for (const int id : scene.here) {
-        const auto at = static_cast<std::size_t>(id);
-        if (solved[at] != 0 && left_path(scene, id)) any = true;
-    }
-    if (!any) return meetings_;
     for (const int id : scene.here) {
         const auto at = static_cast<std::size_t>(id);
         const MovingBody& body = scene.bodies[at];
         const bool left = solved[at] != 0 && left_path(scene, id);
         if (solved[at] == 0) {
-            follow(scene, id);
+            follow(scene, id, body.moves() && !body.asleep ? started[at] : body.state);
         } else {
             set_spins(body, paths_[at]);
         }

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -38,6 +39,7 @@ struct World::Implementation {
     struct Outcome {
         Eigen::Vector3d outside = Eigen::Vector3d::Zero();
         std::uint64_t limited = 0, broken = 0;
+        bool counts = true;               // `outside` here: of partners who know it all one does
         bool carried = false;             // IslandSolver::is_carried
         bool found = false;               // contacts, within the step
         std::vector<Manifold> manifolds;  // those
@@ -56,6 +58,19 @@ struct World::Implementation {
     Eigen::Vector3d outside_before = Eigen::Vector3d::Zero();  // when the last step began
 
     std::vector<int> here;  // bodies that take part in the step, ascending
+
+    // Together, world_together.cpp.
+    Partners* with = nullptr;             ///< of this step
+    std::vector<std::uint8_t> own_alone;  ///< own of each body, outside of such steps
+    const Island* divided = nullptr;      ///< island that all sweep a part of
+    void step_together(Partners& with);
+    void end_together() noexcept;
+    using Solve = std::function<void(const Island&, IslandSolver&, const ContactScene&)>;
+    void solve_together(const Solve& solve, bool first);
+    [[nodiscard]] bool is_by_one(const Island& island) const;
+    void write_result(ByteWriter& out, const Island& island) const;
+    void read_result(ByteReader& in, const Island& island);
+    void share_paths();
 
     // Sharing.
     Sharing sharing = Sharing::alone;
@@ -108,8 +123,8 @@ struct World::Implementation {
     void start_solving();   ///< notes what solve_again goes back to
     [[nodiscard]] bool is_solved(const Island& island) const;
     void solve_island(const Island& island, bool follow, IslandSolver& by, const ContactScene& scene);
-    template <typename Solve>
-    void share_islands(Solve solve);  ///< calls solve(island, solver, scene) for those in `to_solve`
+    /// Calls solve(island, solver, scene) for those in `to_solve`. first: of the step's rounds.
+    void share_islands(const Solve& solve, bool first);
     void begin_again(const Island& island);
     std::vector<const Island*> to_solve, small;  // small: of them, for one thread each
     void note_found();                           ///< contacts, by the islands that have just been solved

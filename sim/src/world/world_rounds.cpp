@@ -86,6 +86,7 @@ void World::Implementation::solve_island(const Island& island, bool follow, Isla
                                          const ContactScene& scene) {
     Outcome& outcome = outcomes[static_cast<std::size_t>(island.bodies.front())];
     outcome.outside.setZero(), outcome.limited = outcome.broken = 0, outcome.found = false;
+    outcome.counts = !with || with->of(island.bodies.front()) == with->self();
     outcome.carried = by.is_carried(island);
     if (island.manifolds.empty() && island.constraints.empty() && !is_forced(island.bodies.front()))
         return move_alone(island.bodies.front());
@@ -103,8 +104,8 @@ void World::Implementation::solve_island(const Island& island, bool follow, Isla
 }
 
 // Large islands are shared out, one after the other; of small ones every thread solves its own.
-template <typename Solve>
-void World::Implementation::share_islands(Solve solve) {
+void World::Implementation::share_islands(const Solve& solve, bool first_round) {
+    if (with) return solve_together(solve, first_round);
     Crew& by = crew();
     const ContactScene shared = contact_scene(by), single = contact_scene(alone);
     if (by.size() == 1) {
@@ -159,10 +160,12 @@ void World::Implementation::solve_again() {
         to_solve.push_back(&islands[i]);
         for (const int id : islands[i].bodies) solver().forget_crossed(id);
     }
-    share_islands([this](const Island& island, IslandSolver& by, const ContactScene& scene) {
-        begin_again(island);
-        solve_island(island, true, by, scene);
-    });
+    share_islands(
+        [this](const Island& island, IslandSolver& by, const ContactScene& scene) {
+            begin_again(island);
+            solve_island(island, true, by, scene);
+        },
+        false);
     note_found();
     ++counts.solved_again;
 }
@@ -218,7 +221,7 @@ void World::Implementation::sum_outcomes() {
         const Outcome& outcome = outcomes[static_cast<std::size_t>(islands[i].bodies.front())];
         breaks = breaks || outcome.broken > 0;
         if (!is_own(islands[i])) continue;
-        outside += outcome.outside;
+        if (outcome.counts) outside += outcome.outside;
         counts.deformations_limited += outcome.limited;
         counts.constraints_broken += outcome.broken;
     }
@@ -235,12 +238,13 @@ void World::Implementation::solve_islands() {
         awake += is_own(islands[i]);
         to_solve.push_back(&islands[i]);
     }
-    share_islands([this](const Island& island, IslandSolver& by, const ContactScene& scene) {
-        solve_island(island, false, by, scene);
-    });
+    share_islands([this](const Island& island, IslandSolver& by,
+                         const ContactScene& scene) { solve_island(island, false, by, scene); },
+                  true);
     note_found();
     for (int round = 0; round <= kRounds; ++round) {
-        const auto& meetings = contacts.unforeseen(contact_scene(crew()), solved);
+        if (with && contacts.any_left_path(contact_scene(crew()), solved)) share_paths();
+        const auto& meetings = contacts.unforeseen(contact_scene(crew()), solved, started);
         if (meetings.empty()) break;
         if (round == kRounds) {
             last = meetings;

@@ -1,0 +1,190 @@
+// A step by several partners has the bits of one world's, however bodies are shared out.
+#include "world/partners.h"
+
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+
+#include "large_scenes.h"
+
+using namespace world_test;
+
+namespace {
+
+/// What partners in threads tell each other.
+class Mail {
+public:
+    explicit Mail(int count) : boxes_(std::size_t(count * count)), count_(count) {}
+    void put(int from, int to, sim::Partners::Bytes bytes) {
+        const std::lock_guard lock(mutex_);
+        boxes_[std::size_t(from * count_ + to)].push_back(std::move(bytes));
+        come_.notify_all();
+    }
+    sim::Partners::Bytes take(int from, int to) {
+        std::unique_lock lock(mutex_);
+        auto& box = boxes_[std::size_t(from * count_ + to)];
+        come_.wait(lock, [&] { return !box.empty() || given_up_; });
+        if (given_up_) throw sim::NotTogether("given up");
+        sim::Partners::Bytes bytes = std::move(box.front());
+        box.pop_front();
+        return bytes;
+    }
+    void give_up() {
+        const std::lock_guard lock(mutex_);
+        given_up_ = true;
+        come_.notify_all();
+    }
+    [[nodiscard]] int count() const { return count_; }
+
+private:
+    std::mutex mutex_;
+    std::condition_variable come_;
+    std::vector<std::deque<sim::Partners::Bytes>> boxes_;
+    int count_;
+    bool given_up_ = false;
+};
+
+class ThreadPartner final : public sim::Partners {
+public:
+    ThreadPartner(Mail& mail, int self, std::vector<int> of, int silent_after)
+        : Partners(self, mail.count(), std::move(of)), mail_(mail), left_(silent_after) {}
+    void tell(int partner, Bytes&& bytes) override {
+        if (left_ >= 0 && left_-- == 0) {
+            mail_.give_up();
+            throw sim::NotTogether("it is killed");
+        }
+        mail_.put(self(), partner, std::move(bytes));
+    }
+    void tell_all(Bytes&& bytes) override {
+        for (int p = 0; p < count(); ++p)
+            if (p != self()) tell(p, Bytes(bytes));
+    }
+    Bytes hear(int partner) override { return mail_.take(partner, self()); }
+
+private:
+    Mail& mail_;
+    int left_;  // messages until it falls silent; negative: never
+};
+
+struct Steps {
+    std::vector<std::uint64_t> hashes;
+    std::vector<sim::WorldCounts> counts;
+    Eigen::Vector3d outside = Eigen::Vector3d::Zero();
+    int alone = 0;  ///< steps that were not finished together
+};
+
+Steps alone(const sim::WorldDefinition& definition, int steps) {
+    Steps run;
+    sim::World world(definition);
+    for (int i = 0; i < steps; ++i) {
+        world.step();
+        run.hashes.push_back(world.state_hash());
+        run.counts.push_back(world.counts());
+    }
+    run.outside = world.outside_impulse();
+    return run;
+}
+
+/// of(step, body): whose it is then. silent(step, partner): messages after which that one gives up in the step, or -1.
+template <typename Of, typename Silent>
+Steps together(const sim::WorldDefinition& definition, int steps, int partners, Of of, Silent silent) {
+    std::vector<sim::World> worlds;
+    for (int p = 0; p < partners; ++p) {
+        worlds.emplace_back(definition);
+        worlds.back().share(sim::Sharing::islands);
+    }
+    Steps run;
+    for (int i = 0; i < steps; ++i) {
+        Mail mail(partners);
+        std::vector<int> whose;
+        for (int body = 0; body < worlds[0].bodies(); ++body) whose.push_back(of(i, body));
+        std::vector<std::thread> threads;
+        std::atomic<int> gave_up = 0;
+        for (int p = 0; p < partners; ++p)
+            threads.emplace_back([&, p] {
+                sim::World& world = worlds[std::size_t(p)];
+                for (int body = 0; body < world.bodies(); ++body)
+                    world.set_own(body, whose[std::size_t(body)] == p);
+                const sim::WorldSnapshot before = world.snapshot();
+                ThreadPartner partner(mail, p, whose, silent(i, p));
+                try {
+                    world.step_together(partner);
+                } catch (const sim::NotTogether&) {
+                    ++gave_up;
+                    mail.give_up();
+                    world.rewind(before);
+                    world.share(sim::Sharing::alone);
+                    world.step();
+                    world.share(sim::Sharing::islands);
+                }
+            });
+        for (std::thread& thread : threads) thread.join();
+        run.alone += gave_up > 0;
+        run.hashes.push_back(worlds[0].state_hash());
+        run.counts.push_back(worlds[0].counts());
+        for (const sim::World& world : worlds)
+            EXPECT_EQ(world.state_hash(), run.hashes.back()) << "step " << i;
+        if (testing::Test::HasFailure()) break;
+    }
+    for (const sim::World& world : worlds) run.outside += world.outside_impulse();
+    return run;
+}
+
+const auto kNeverSilent = [](int, int) { return -1; };
+
+void expect_same_bits(const sim::WorldDefinition& definition, int steps, bool all_together) {
+    const Steps one = alone(definition, steps);
+    for (const int partners : {2, 3, 5}) {
+        SCOPED_TRACE(partners);
+        const Steps several = together(
+            definition, steps, partners,
+            [&](int step, int body) { return (body * 7 + step / 10) % partners; }, kNeverSilent);
+        for (std::size_t i = 0; i < one.hashes.size() && i < several.hashes.size(); ++i)
+            ASSERT_EQ(several.hashes[i], one.hashes[i]) << "step " << i;
+        EXPECT_EQ(several.counts.back().pairs, one.counts.back().pairs);
+        EXPECT_EQ(several.counts.back().asleep, one.counts.back().asleep);
+        EXPECT_EQ(several.counts.back().solved_again, one.counts.back().solved_again);
+        EXPECT_EQ(several.counts.back().deformations_limited, one.counts.back().deformations_limited);
+        // Sums in another order.
+        EXPECT_LT((several.outside - one.outside).norm(), 1e-9 * (1 + one.outside.norm()));
+        if (all_together) { EXPECT_EQ(several.alone, 0); }
+    }
+}
+
+TEST(Partners, APileOfOneIslandHasTheBitsOfOneWorld) {
+    expect_same_bits(pile(), 60, false);
+}
+
+TEST(Partners, APileThatRestsIsSolvedTogetherAtEveryStep) {
+    sim::WorldDefinition definition = pile();
+    for (sim::WorldBody& body : definition.bodies) {
+        body.restitution = 0;
+        body.velocity.setZero();
+        body.motion.clear();
+    }
+    expect_same_bits(definition, 120, true);
+}
+
+TEST(Partners, TwentyRandomScenesHaveTheBitsOfOneWorld) {
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+        SCOPED_TRACE(seed);
+        expect_same_bits(random_scene(seed), 12, false);
+        if (HasFatalFailure()) return;
+    }
+}
+
+TEST(Partners, AStepInWhichOneFallsSilentIsDoneAlone) {
+    sim::WorldDefinition definition = pile();
+    const int steps = 40;
+    const Steps one = alone(definition, steps),
+              several = together(
+                  definition, steps, 3, [](int, int body) { return body % 3; },
+                  [](int step, int partner) { return partner == step % 3 ? step / 2 : -1; });
+    EXPECT_EQ(several.hashes, one.hashes);
+    EXPECT_GT(several.alone, 5);
+}
+
+}  // namespace
