@@ -57,6 +57,8 @@ struct DistributedSettings {  ///< of a run; refused settings throw std::invalid
         false;  ///< stop before when every body has been still for half a second and no event is left
     bool all_to_first =
         false;  ///< at first one worker owns every body; else each gets neighbours, in equal numbers
+    bool together =
+        true;  ///< lockstep: workers share out the contacts and large islands of a step; else each solves whole islands
     MarketSettings market;
 };
 

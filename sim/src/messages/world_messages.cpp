@@ -12,7 +12,7 @@ namespace sim {
 namespace {
 
 constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'W'};
-constexpr std::uint16_t kUpdateType = 12;
+constexpr std::uint16_t kStateType = 11, kUpdateType = 12;
 constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kChecksumBytes = 4, kAppliedBytes = 12;
 constexpr std::size_t kMishapBytes = 17;  // at least
 constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64, kLongestHost = 255;
@@ -172,6 +172,16 @@ void write_body(ByteWriter& out, const Handover& m) {
     write_applied(out, m.sources, m.applied);
 }
 
+void write_body(ByteWriter& out, const PartMessage& m) {
+    out.number(m.to);
+    out.number<std::uint8_t>(m.gave_up);
+    out.count(m.bytes.size());
+    out.append(m.bytes);
+}
+void write_body(ByteWriter&, const PackedStates&) {
+    throw std::invalid_argument("a state message that is packed already");
+}
+
 void read_body(ByteReader& in, JoinRequest& m) {
     m.fingerprint = in.number<std::uint64_t>();
     m.secret = in.bytes<16>();
@@ -218,6 +228,15 @@ void read_body(ByteReader& in, UpdateMessage& m) {
     m.bodies = read_updates(in);
     m.crossed = read_crossed(in);
     read_numbers(in, m.broken);
+}
+void read_body(ByteReader& in, PartMessage& m) {
+    m.to = in.number<std::uint32_t>();
+    m.gave_up = in.flag();
+    const std::span<const std::uint8_t> bytes = in.take(in.count(1));
+    m.bytes.assign(bytes.begin(), bytes.end());
+}
+void read_body(ByteReader&, PackedStates&) {
+    throw DecodeError("a message of no known type");
 }
 void read_body(ByteReader&, PackedUpdates&) {
     throw DecodeError("a message of no known type");
@@ -299,9 +318,25 @@ std::vector<std::uint8_t> encode(const WorldHeader& header, const WorldMessage& 
     return std::move(out.bytes());
 }
 
+namespace {
+
+// Whose they are; all else is checked where they are read.
+PackedStates packed_states(std::vector<std::uint8_t>&& bytes) {
+    PackedStates packed;
+    ByteReader in(std::span<const std::uint8_t>(bytes).subspan(kHeaderBytes,
+                                                               bytes.size() - kHeaderBytes - kChecksumBytes));
+    packed.report = read_report(in);
+    find_records(in, packed.bodies);
+    packed.bytes = std::move(bytes);
+    return packed;
+}
+
+}  // namespace
+
 DecodedWorldMessage decode_for_worker(std::vector<std::uint8_t> bytes) {
     WorldHeader header;
     const std::uint16_t type = read_header(bytes, header);
+    if (type == kStateType) return {header, packed_states(std::move(bytes))};
     if (type != kUpdateType) return decode_world(bytes);
     PackedUpdates packed;
     const std::span<const std::uint8_t> all = std::span(bytes).first(bytes.size() - kChecksumBytes);

@@ -15,7 +15,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 6
+//   4       2      version, 7
 //   6       2      type
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
@@ -43,6 +43,7 @@ namespace sim {
 //   13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds}
 //   14 answer     worker  u32 to, u32 number, flag accepted
 //   15 handover   worker  u32 to, u32 number, list of record, list of applied
+//   16 part       worker  u32 to, flag gave up, list of u8
 //
 //   report      60 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
 //               cross contacts, own; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
@@ -76,7 +77,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kWorldProtocol = 6;  ///< version
+constexpr std::uint16_t kWorldProtocol = 7;  ///< version
 
 struct WorldHeader {
     std::uint32_t worker = kApplication;
@@ -173,6 +174,13 @@ struct UpdateMessage {
     std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
 };
 
+/// A StateMessage as a worker gets it: of a step that it has done together with the sender it needs no more than whose they are.
+struct PackedStates {
+    StepReport report;
+    std::vector<std::uint32_t> bodies;
+    std::vector<std::uint8_t> bytes;  ///< the whole message
+};
+
 /// An UpdateMessage as a worker gets it: of hundreds of bodies it needs the few that are near, so states are
 /// read one by one when they are needed.
 struct PackedUpdates {
@@ -214,16 +222,24 @@ struct Handover {
     std::vector<std::uint64_t> applied;
 };
 
+/// Lockstep, within the step that begins at the header's: what a worker tells one other, or all (to: kApplication), with whom it
+/// does the step together (world/partners.h). gave_up: nothing more of this step comes from it.
+struct PartMessage {
+    std::uint32_t to = kApplication;
+    bool gave_up = false;
+    std::vector<std::uint8_t> bytes;
+};
+
 using WorldMessage = std::variant<JoinRequest, WorldBeat, Drained, WorkerFailure, SceneMessage, Refusal,
                                   EndOfRun, Members, Ownership, SnapshotMessage, StateMessage, UpdateMessage,
-                                  Offer, OfferAnswer, Handover, PackedUpdates>;
+                                  Offer, OfferAnswer, Handover, PartMessage, PackedStates, PackedUpdates>;
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const WorldHeader& header, const WorldMessage& message);
 struct DecodedWorldMessage {
     WorldHeader header;
     WorldMessage message;
 };
-/// The same, for workers: update messages as PackedUpdates (encode does not take these).
+/// The same, for workers: state and update messages as PackedStates and PackedUpdates (encode does not take these).
 [[nodiscard]] DecodedWorldMessage decode_for_worker(std::vector<std::uint8_t> bytes);
 /// Throws DecodeError for anything that encode cannot have written.
 [[nodiscard]] DecodedWorldMessage decode_world(std::span<const std::uint8_t> bytes);

@@ -328,7 +328,8 @@ WorldScene read_scene(ByteReader& in) {
 void write(ByteWriter& out, const DistributedSettings& s) {
     out.number(static_cast<std::uint8_t>(s.pace));
     write_all(out, std::int32_t{s.bound}, s.steps, std::uint8_t{s.until_rest}, std::uint8_t{s.all_to_first},
-              std::uint8_t{s.market.trade}, s.market.from_step, s.market.smoothing_steps, s.market.dead_band);
+              std::uint8_t{s.together}, std::uint8_t{s.market.trade}, s.market.from_step,
+              s.market.smoothing_steps, s.market.dead_band);
 }
 
 DistributedSettings read_settings(ByteReader& in) {
@@ -337,6 +338,7 @@ DistributedSettings read_settings(ByteReader& in) {
     read_all(in, s.bound, s.steps);
     s.until_rest = in.flag();
     s.all_to_first = in.flag();
+    s.together = in.flag();
     s.market.trade = in.flag();
     read_all(in, s.market.from_step, s.market.smoothing_steps, s.market.dead_band);
     check_settings(s);

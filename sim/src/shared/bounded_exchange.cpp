@@ -27,7 +27,7 @@ public:
     void members(const std::vector<std::uint32_t>& workers) override;
     void own(const Ownership& ownership) override;
     [[nodiscard]] bool ready() const override;
-    void step() override;
+    void step(const StepChannel& channel) override;
     [[nodiscard]] std::vector<std::uint8_t> publish(std::uint32_t epoch, const StepReport& report) override;
     void follow() override;
     [[nodiscard]] Holdings holdings() override;
@@ -373,7 +373,7 @@ void BoundedExchange::settle() {
     settled_ = true;
 }
 
-void BoundedExchange::step() {
+void BoundedExchange::step(const StepChannel&) {
     if (at_end()) return settle();
     come_to(step_);
     place_ghosts();

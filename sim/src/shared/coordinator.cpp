@@ -314,7 +314,9 @@ bool Coordinator::is_too_much(Sender& sender, std::size_t bytes) const {
     if (std::exchange(sender.messages_at, view_.step()) != view_.step())
         sender.messages = sender.message_bytes = 0;
     sender.message_bytes += bytes;
-    return ++sender.messages > kMessages + 8 * steps * members_.size() ||
+    const std::size_t parts =
+        settings_.pace == Pace::lockstep ? 32 * static_cast<std::size_t>(scene_.world.settings.substeps) : 0;
+    return ++sender.messages > kMessages + parts + 8 * steps * members_.size() ||
            sender.message_bytes > kRepeated * steps * static_cast<std::size_t>(largest_message(scene_));
 }
 
@@ -347,6 +349,7 @@ void Coordinator::take_message(const WorldHeader& header, std::span<const std::u
     if (const auto* offer = std::get_if<Offer>(&message)) return take_dealing(header, bytes, offer->to);
     if (const auto* answer = std::get_if<OfferAnswer>(&message))
         return take_dealing(header, bytes, answer->to);
+    if (const auto* part = std::get_if<PartMessage>(&message)) return take_part(header, bytes, part->to);
     if (std::holds_alternative<WorldBeat>(message)) return;
     if (const auto* failure = std::get_if<WorkerFailure>(&message)) return lose(worker, failure->what);
     if (std::holds_alternative<Drained>(message)) {
@@ -355,6 +358,16 @@ void Coordinator::take_message(const WorldHeader& header, std::span<const std::u
         return remove(worker);
     }
     refuse(worker, "found a message that no worker sends, expected one of a worker");
+}
+
+void Coordinator::take_part(const WorldHeader& header, std::span<const std::uint8_t> bytes,
+                            std::uint32_t to) {
+    if (settings_.pace != Pace::lockstep || to == header.worker)
+        return refuse(header.worker, "found a part of a step that nobody waits for");
+    if (to != kApplication) return take_dealing(header, bytes, to);
+    std::vector<std::uint32_t> others = members_;
+    std::erase(others, header.worker);
+    if (!others.empty()) queue_.push_back({std::move(others), shared(bytes)});
 }
 
 void Coordinator::take_dealing(const WorldHeader& header, std::span<const std::uint8_t> bytes,

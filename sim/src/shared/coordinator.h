@@ -76,6 +76,7 @@ private:
     void take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes, UpdateMessage&& message);
     void extend_sleep(const WorldHeader& header);
     void take_handover(const WorldHeader& header, Handover&& message);
+    void take_part(const WorldHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
     void take_dealing(const WorldHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
     void report(const WorldHeader& header, const StepReport& report, std::size_t records, std::size_t bytes);
     void pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes);

@@ -1,16 +1,22 @@
 #include <algorithm>
 #include <deque>
+#include <map>
+#include <optional>
 
 #include "shared/body_costs.h"
 #include "shared/replica.h"
 #include "shared/replica_protocol.h"
+#include "world/partners.h"
 
 namespace sim {
 namespace {
 
-// Every worker has a whole replica. A step from t to t + 1 needs every body's exact record at t. The worker
-// solves each island with an own body, publishes own records at t + 1, and is at t + 1 when the others' are
-// there.
+constexpr std::size_t kMostParts = 4096;  // of one worker that wait here; a step needs 4 a substep
+
+// Every worker has a whole replica. A step from t to t + 1 needs every body's exact record at t. Those who published the
+// records of t do it together (world/partners.h): they all know who they are. Who cannot, or finds that another cannot, tells the
+// others so and does it alone: it solves each island with an own body. Either way a worker publishes own records at t + 1, with the
+// same bits, and is at t + 1 when the others' are there.
 //
 // Ownership comes with a record at some step s, the last that was published. Nobody can be further than
 // s + 1, and a worker that is already there waits for these bodies:
@@ -22,12 +28,14 @@ public:
     explicit LockstepExchange(const SceneMessage& scene);
 
     using ReplicaProtocol::take;
-    void take(const WorldHeader& header, StateMessage&& message) override;
+    void take(const WorldHeader& header, PackedStates&& message) override;
+    void take(const WorldHeader& header, PartMessage&& message) override;
     void take(SnapshotMessage&& message) override;
-    void members(const std::vector<std::uint32_t>& workers) override { (void)workers; }
+    void members(const std::vector<std::uint32_t>& workers) override { members_ = workers; }
+    void members_within(const std::vector<std::uint32_t>& workers) override;
     void own(const Ownership& ownership) override;
     [[nodiscard]] bool ready() const override;
-    void step() override;
+    void step(const StepChannel& channel) override;
     [[nodiscard]] std::vector<std::uint8_t> publish(std::uint32_t epoch, const StepReport& report) override;
     void follow() override;
     [[nodiscard]] Holdings holdings() override;
@@ -42,6 +50,18 @@ public:
     [[nodiscard]] const World& world() const override { return replica_.world(); }
 
 private:
+    class Together;
+    struct Part {
+        std::uint64_t step;
+        bool gave_up;
+        std::vector<std::uint8_t> bytes;
+    };
+
+    void note_publisher(std::uint64_t step, std::uint32_t worker, std::uint32_t body);
+    [[nodiscard]] std::vector<std::uint32_t> publishers(std::uint64_t step) const;
+    [[nodiscard]] bool step_together(const StepChannel& channel);
+    void tell(const StepChannel& channel, std::uint32_t to, bool gave_up, std::vector<std::uint8_t>&& bytes);
+    [[nodiscard]] std::vector<std::uint8_t> hear(const StepChannel& channel, std::uint32_t from);
     void set_own(int body, bool own);
     void take_over(const Ownership& ownership);
     void settle();
@@ -60,6 +80,35 @@ private:
     WorldSnapshot before_;                 // of the last step, after its events
     std::vector<std::uint8_t> published_;  // what was own in the last step
     std::vector<SpringRecord> springs_;    // published of the last step
+    // Together.
+    const bool may_together_;
+    std::vector<std::uint32_t> members_;
+    std::map<std::uint64_t, std::vector<std::uint32_t>>
+        publisher_;                        // of each body's record, by steps; kApplication: none
+    std::vector<std::uint32_t> partners_;  // of the step under way
+    bool partner_lost_ = false;
+    std::map<std::uint32_t, std::deque<Part>> parts_;  // that others told, by them
+    std::optional<std::uint64_t> repeated_;            // a step that only this worker does again
+};
+
+class LockstepExchange::Together final : public Partners {
+public:
+    Together(LockstepExchange& exchange, const StepChannel& channel, int self, std::vector<int> of)
+        : Partners(self, static_cast<int>(exchange.partners_.size()), std::move(of)),
+          exchange_(exchange),
+          channel_(channel) {}
+    void tell(int partner, Bytes&& bytes) override {
+        exchange_.tell(channel_, worker(partner), false, std::move(bytes));
+    }
+    void tell_all(Bytes&& bytes) override { exchange_.tell(channel_, kApplication, false, std::move(bytes)); }
+    [[nodiscard]] Bytes hear(int partner) override { return exchange_.hear(channel_, worker(partner)); }
+
+private:
+    [[nodiscard]] std::uint32_t worker(int partner) const {
+        return exchange_.partners_[static_cast<std::size_t>(partner)];
+    }
+    LockstepExchange& exchange_;
+    const StepChannel& channel_;
 };
 
 LockstepExchange::LockstepExchange(const SceneMessage& scene)
@@ -67,7 +116,8 @@ LockstepExchange::LockstepExchange(const SceneMessage& scene)
       steps_(scene.settings.steps),
       replica_(scene.scene),
       costs_(replica_.clock().bodies()),
-      columns_(scene.scene) {
+      columns_(scene.scene),
+      may_together_(scene.settings.together) {
     owner_.assign(static_cast<std::size_t>(replica_.clock().bodies()), kApplication);
     own_.assign(owner_.size(), 0);
     published_ = own_;
@@ -85,10 +135,103 @@ void LockstepExchange::set_own(int body, bool own) {
     if (own) costs_.forget(body);
 }
 
-void LockstepExchange::take(const WorldHeader& header, StateMessage&& message) {
-    replica_.note(header.step, std::move(message.bodies), std::move(message.contacts),
-                  std::move(message.springs));
+void LockstepExchange::take(const WorldHeader& header, PackedStates&& message) {
+    for (const std::uint32_t body : message.bodies) note_publisher(header.step, header.worker, body);
+    if (replica_.complete() && header.step == replica_.step()) {
+        replica_.mark(message.bodies);
+    } else if (header.step >= replica_.step()) {
+        auto states = std::get<StateMessage>(decode_world(message.bytes).message);
+        replica_.note(header.step, std::move(states.bodies), std::move(states.contacts),
+                      std::move(states.springs));
+    }
     settle();
+}
+
+// The first counts, as with records.
+void LockstepExchange::note_publisher(std::uint64_t step, std::uint32_t worker, std::uint32_t body) {
+    if (step < replica_.step() || body >= own_.size()) return;
+    std::vector<std::uint32_t>& of = publisher_[step];
+    of.resize(own_.size(), kApplication);
+    if (of[body] == kApplication) of[body] = worker;
+}
+
+std::vector<std::uint32_t> LockstepExchange::publishers(std::uint64_t step) const {
+    const auto of = publisher_.find(step);
+    if (of == publisher_.end()) return {};
+    std::vector<std::uint32_t> all = of->second;
+    std::ranges::sort(all);
+    all.erase(std::ranges::unique(all).begin(), all.end());
+    std::erase(all, kApplication);
+    return all;
+}
+
+void LockstepExchange::take(const WorldHeader& header, PartMessage&& message) {
+    if (header.step < replica_.step()) return;
+    std::deque<Part>& parts = parts_[header.worker];
+    if (parts.size() < kMostParts) {
+        parts.push_back({header.step, message.gave_up, std::move(message.bytes)});
+    } else {
+        parts.assign(1, {header.step, true, {}});  // it tells what nobody needs
+    }
+}
+
+void LockstepExchange::members_within(const std::vector<std::uint32_t>& workers) {
+    partner_lost_ = partner_lost_ || std::ranges::any_of(partners_, [&](std::uint32_t partner) {
+                        return partner != self_ && std::ranges::find(workers, partner) == workers.end();
+                    });
+}
+
+void LockstepExchange::tell(const StepChannel& channel, std::uint32_t to, bool gave_up,
+                            std::vector<std::uint8_t>&& bytes) {
+    channel.send(encode({self_, 0, replica_.step()}, PartMessage{to, gave_up, std::move(bytes)}));
+    if (channel.flush) channel.flush(false);
+}
+
+std::vector<std::uint8_t> LockstepExchange::hear(const StepChannel& channel, std::uint32_t from) {
+    const std::uint64_t now = replica_.step();
+    for (;;) {
+        for (const std::uint32_t partner : partners_) {
+            std::deque<Part>& parts = parts_[partner];
+            while (!parts.empty() && parts.front().step < now) parts.pop_front();
+            if (std::ranges::any_of(parts,
+                                    [&](const Part& part) { return part.gave_up && part.step == now; }))
+                throw NotTogether("worker " + std::to_string(partner) + " gave up");
+        }
+        if (partner_lost_) throw NotTogether("a worker is lost");
+        std::deque<Part>& parts = parts_[from];
+        if (!parts.empty() && parts.front().step == now) {
+            std::vector<std::uint8_t> bytes = std::move(parts.front().bytes);
+            parts.pop_front();
+            return bytes;
+        }
+        channel.flush(true);
+    }
+}
+
+// Whether the step was done so.
+bool LockstepExchange::step_together(const StepChannel& channel) {
+    partners_ = publishers(replica_.step());
+    const auto self = std::ranges::find(partners_, self_);
+    if (!may_together_ || partners_.size() < 2 || self == partners_.end()) return false;
+    partner_lost_ = false;
+    members_within(members_);
+    const bool may = channel.flush && !partner_lost_ && repeated_ != replica_.step();
+    try {
+        if (!may) throw NotTogether("this one cannot");
+        std::vector<int> of;
+        for (const std::uint32_t publisher : publisher_[replica_.step()]) {
+            const auto at = std::ranges::find(partners_, publisher);
+            of.push_back(at == partners_.end() ? 0 : static_cast<int>(at - partners_.begin()));
+        }
+        Together together(*this, channel, static_cast<int>(self - partners_.begin()), std::move(of));
+        replica_.world().step_together(together);
+        return true;
+    } catch (const NotTogether&) {
+    } catch (const DecodeError&) {  // of a part that is none
+    }
+    tell(channel, kApplication, true, {});
+    if (may) replica_.world().rewind(before_);
+    return false;
 }
 
 void LockstepExchange::take(SnapshotMessage&& message) {
@@ -108,8 +251,10 @@ void LockstepExchange::own(const Ownership& ownership) {
 }
 
 void LockstepExchange::take_over(const Ownership& ownership) {
-    if (ownership.step + 1 == replica_.step() && !replica_.whole())
+    if (ownership.step + 1 == replica_.step() && !replica_.whole()) {
         replica_.undo(before_, published_, springs_);
+        repeated_ = replica_.step();
+    }
     if (ownership.step != replica_.step())
         throw DecodeError("found bodies of step " + std::to_string(ownership.step) + ", expected step " +
                           std::to_string(replica_.step()));
@@ -140,18 +285,24 @@ void LockstepExchange::follow() {
 }
 
 bool LockstepExchange::ready() const {
-    return replica_.whole() && !done() && std::find(own_.begin(), own_.end(), 1) != own_.end();
+    if (!replica_.whole() || done()) return false;
+    if (std::find(own_.begin(), own_.end(), 1) != own_.end()) return true;
+    // The others wait for one that has given away all that it had, too.
+    const std::vector<std::uint32_t> partners = publishers(replica_.step());
+    return may_together_ && partners.size() > 1 && std::ranges::find(partners, self_) != partners.end();
 }
 
-void LockstepExchange::step() {
+void LockstepExchange::step(const StepChannel& channel) {
     World& world = replica_.world();
     replica_.begin();
     for (int i = 0; i < world.bodies(); ++i) world.set_own(i, own_[static_cast<std::size_t>(i)] != 0);
     list_owned();
     before_ = world.snapshot();
-    world.step();
+    const bool complete = step_together(channel);
+    if (!complete) world.step();
     published_ = own_;
-    replica_.stepped(published_);
+    replica_.stepped(published_, complete);
+    publisher_.erase(publisher_.begin(), publisher_.lower_bound(replica_.step()));
     unpublished_ = true;
 }
 
@@ -164,6 +315,8 @@ std::vector<std::uint8_t> LockstepExchange::publish(std::uint32_t epoch, const S
     world.contact_records(message.contacts);
     world.spring_records(message.springs);
     springs_ = message.springs;
+    for (const WorldRecord& record : message.bodies)
+        note_publisher(replica_.step(), self_, static_cast<std::uint32_t>(record.body));
     std::vector<std::uint8_t> bytes = encode({self_, epoch, replica_.step()}, message);
     unpublished_ = false;
     settle();

@@ -100,6 +100,11 @@ void Replica::sort_contacts(Known& known) const {
 bool Replica::advance(bool along) {
     if (!whole_) {
         if (!all_known(step_)) return false;
+        whole_ = true;
+        if (complete_) {
+            known_.erase(known_.begin(), known_.upper_bound(step_));
+            return true;
+        }
         Known& known = at(step_);
         sort_contacts(known);
         for (const WorldRecord& record : known.bodies) world_.restore(record);
@@ -108,6 +113,7 @@ bool Replica::advance(bool along) {
         if (!along || !all_known(step_ + 1)) return false;
         begin();
         ++step_;
+        complete_ = false;
         Known& known = at(step_);
         sort_contacts(known);
         world_.rewind({step_, std::move(known.bodies), std::move(known.contacts), std::move(known.springs),
@@ -118,32 +124,41 @@ bool Replica::advance(bool along) {
     return true;
 }
 
-void Replica::stepped(std::span<const std::uint8_t> own) {
+void Replica::stepped(std::span<const std::uint8_t> own, bool complete) {
     ++step_;
-    whole_ = false;
+    whole_ = false, complete_ = complete;
     Known& known = at(step_);
     for (int i = 0; i < world_.bodies(); ++i)
         if (own[static_cast<std::size_t>(i)] != 0) mark(known, step_, i);
+}
+
+void Replica::mark(std::span<const std::uint32_t> bodies) {
+    Known& known = at(step_);
+    for (const std::uint32_t body : bodies)
+        if (body < known.body.size()) mark(known, step_, static_cast<int>(body));
 }
 
 void Replica::undo(const WorldSnapshot& before, std::span<const std::uint8_t> own,
                    const std::vector<SpringRecord>& springs) {
     Known& known = at(step_);
     for (int i = 0; i < world_.bodies(); ++i)
-        if (own[static_cast<std::size_t>(i)] != 0) known.bodies.push_back(world_.record(i));
+        if (own[static_cast<std::size_t>(i)] != 0 ||
+            (complete_ && known.body[static_cast<std::size_t>(i)] != 0))  // of others only marked
+            known.bodies.push_back(world_.record(i));
     const WorldSnapshot now = world_.snapshot();
     known.contacts.insert(known.contacts.end(), now.contacts.begin(), now.contacts.end());
-    known.springs.insert(known.springs.end(), springs.begin(), springs.end());
+    const std::vector<SpringRecord>& held = complete_ ? now.springs : springs;
+    known.springs.insert(known.springs.end(), held.begin(), held.end());
     world_.rewind(before);
     --step_;
-    whole_ = true;
+    whole_ = true, complete_ = false;
 }
 
 void Replica::jump(const WorldSnapshot& snapshot) {
     if (snapshot.step > 0) begin_at(snapshot.step - 1);
     world_.rewind(snapshot);
     step_ = snapshot.step;
-    whole_ = true;
+    whole_ = true, complete_ = false;
     known_.erase(known_.begin(), known_.upper_bound(step_));
 }
 

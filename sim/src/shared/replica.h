@@ -55,8 +55,12 @@ public:
     /// Applies the events before a step.
     void begin() { begin_at(step_); }
     void begin_at(std::uint64_t step);
-    /// After a step of the world: marks the records of own bodies as present.
-    void stepped(std::span<const std::uint8_t> own);
+    /// After a step of the world: marks the records of own bodies as present. complete: the copy has all bodies as they are, so
+    /// that of what others publish it has to know no more than that they did.
+    void stepped(std::span<const std::uint8_t> own, bool complete);
+    [[nodiscard]] bool complete() const noexcept { return complete_; }
+    /// These bodies' records of the step that a complete copy is at were published.
+    void mark(std::span<const std::uint32_t> bodies);
     /// Goes back to the snapshot taken before the step that stepped() ended. What was published of that step
     /// stays known: the bodies `own`, these springs, and the world's contacts.
     void undo(const WorldSnapshot& before, std::span<const std::uint8_t> own,
@@ -80,7 +84,7 @@ private:
     World world_;
     SceneClock clock_;
     std::uint64_t step_ = 0;
-    bool whole_ = true;
+    bool whole_ = true, complete_ = false;
     std::map<std::uint64_t, Known> known_;  // of this step and later ones
 };
 

@@ -1,10 +1,20 @@
 #pragma once
+#include <functional>
 #include <memory>
 
 #include "messages/world_messages.h"
 #include "shared/columns.h"
 
 namespace sim {
+
+/// How a step that several do together tells and hears.
+struct StepChannel {
+    std::function<void(std::vector<std::uint8_t>&&)>
+        send;  ///< an encoded message to the application, which relays it
+    /// Has what was sent go out; wait: and returns once something has come and was taken. Empty: this worker cannot wait within a
+    /// step, so it does each alone.
+    std::function<void(bool wait)> flush;
+};
 
 /// How one worker keeps its copy of the world consistent with the others': one implementation per Pace. Uses
 /// no clock, no sockets and no load balancing. A body is own, foreign, or given (handed over, but not yet
@@ -14,8 +24,13 @@ public:
     virtual ~ReplicaProtocol() = default;
 
     /// A state or update message of another worker, in the order in which that one sent them.
-    virtual void take(const WorldHeader& header, StateMessage&& message) { (void)header, (void)message; }
+    virtual void take(const WorldHeader& header, PackedStates&& message) { (void)header, (void)message; }
     virtual void take(const WorldHeader& header, PackedUpdates&& message) { (void)header, (void)message; }
+    /// What another worker tells of a step that it does together with this one. May come within step().
+    virtual void take(const WorldHeader& header, PartMessage&& message) { (void)header, (void)message; }
+    virtual void members_within(const std::vector<std::uint32_t>& workers) {
+        (void)workers;
+    }  ///< come within step()
     virtual void take(SnapshotMessage&& message) {
         (void)message;
     }  ///< once, before the first step of one who joins late
@@ -29,7 +44,8 @@ public:
     /// Whether the next step can be done now: its inputs have arrived and the bound allows it. False if
     /// done(), or if no body is own (lockstep then follows what the others publish, see follow).
     [[nodiscard]] virtual bool ready() const = 0;
-    virtual void step() = 0;  ///< requires ready()
+    /// Requires ready(). In lockstep with others, by the channel, if that can wait.
+    virtual void step(const StepChannel& channel) = 0;
     /// Message of the step just done: StateMessage or UpdateMessage, encoded. Called once after step().
     [[nodiscard]] virtual std::vector<std::uint8_t> publish(std::uint32_t epoch,
                                                             const StepReport& report) = 0;

@@ -33,6 +33,7 @@ SharedWorldWorker::SharedWorldWorker(const SceneMessage& scene)
 
 void SharedWorldWorker::take(const WorldHeader& header, WorldMessage&& message) {
     if (left_ || ended_) return;
+    if (within_) return take_within(header, std::move(message));
     std::visit([&](auto&& m) { take_message(header, std::forward<decltype(m)>(m)); }, std::move(message));
     if (left_ || ended_) return;
     exchange_->follow();
@@ -65,7 +66,20 @@ void SharedWorldWorker::take_message(const WorldHeader& header, SnapshotMessage&
     exchange_->take(std::move(message));
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, StateMessage&& message) {
+// What is not of the step waits until that is done; but it may say that others will not go on with it.
+void SharedWorldWorker::take_within(const WorldHeader& header, WorldMessage&& message) {
+    if (auto* part = std::get_if<PartMessage>(&message)) return exchange_->take(header, std::move(*part));
+    if (const auto* members = std::get_if<Members>(&message)) exchange_->members_within(members->workers);
+    if (std::holds_alternative<EndOfRun>(message) || std::holds_alternative<Refusal>(message))
+        exchange_->members_within({});
+    deferred_.push_back({header, std::move(message)});
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, PartMessage&& message) {
+    exchange_->take(header, std::move(message));
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, PackedStates&& message) {
     market_.heard(header.worker, header.step, header.epoch, message.report);
     exchange_->take(header, std::move(message));
 }
@@ -123,10 +137,12 @@ std::string SharedWorldWorker::waits_for() const {
     return who;
 }
 
-void SharedWorldWorker::step() {
+void SharedWorldWorker::step(const std::function<void(bool)>& flush) {
     lead_ = exchange_->lead();
-    stepping_ = true;
-    exchange_->step();
+    stepping_ = within_ = true;
+    exchange_->step(
+        {[this](std::vector<std::uint8_t>&& bytes) { queue_.push_back(std::move(bytes)); }, flush});
+    within_ = false;
 }
 
 double SharedWorldWorker::work() const {
@@ -142,6 +158,9 @@ void SharedWorldWorker::worked(const Times& times) {
     market_.worked(exchange_->steps_done(), times.seconds, work(), exchange_->own_bodies());
     stepping_ = false;
     publish(times);
+    for (Deferred& deferred : std::exchange(deferred_, {}))
+        take(deferred.header, std::move(deferred.message));
+    if (left_ || ended_) return;
     if (draining_) return leave();
     trade();
     exchange_->follow();

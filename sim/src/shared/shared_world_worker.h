@@ -6,9 +6,9 @@ namespace sim {
 
 /// One worker, without clock or transport: the same code runs behind ZeroMQ and on simulated processors.
 ///
-///   take() ... whenever a message comes, but not between step() and worked()
-///   if (ready()) { step(); worked(times); }
-///   outgoing() after each of these
+///   take() ... whenever a message comes, but between step() and worked() only in flush
+///   if (ready()) { step(flush); worked(times); }
+///   outgoing() after each of these, and in flush
 class SharedWorldWorker {
 public:
     explicit SharedWorldWorker(const SceneMessage& scene);  ///< from the first message
@@ -16,7 +16,9 @@ public:
     /// Handles a message relayed by the application, decoded. Throws DecodeError if it is inconsistent.
     void take(const WorldHeader& header, WorldMessage&& message);
     [[nodiscard]] bool ready() const;
-    void step();
+    /// flush(wait): called where the step tells others, and where it needs what they tell. Sends outgoing(); wait: and
+    /// returns once something has come and was given to take(). Without it the step is done alone.
+    void step(const std::function<void(bool wait)>& flush = {});
     struct Times {  ///< of a step, see WorkerStep
         double seconds = 0, waited_s = 0, processor_s = 0;
     };
@@ -38,7 +40,9 @@ private:
     void take_message(const WorldHeader& header, Members&& message);
     void take_message(const WorldHeader& header, Ownership&& message);
     void take_message(const WorldHeader& header, SnapshotMessage&& message);
-    void take_message(const WorldHeader& header, StateMessage&& message);
+    void take_message(const WorldHeader& header, PackedStates&& message);
+    void take_message(const WorldHeader& header, PartMessage&& message);
+    void take_within(const WorldHeader& header, WorldMessage&& message);
     void take_message(const WorldHeader& header, PackedUpdates&& message);
     void take_message(const WorldHeader& header, Offer&& message);
     void take_message(const WorldHeader& header, OfferAnswer&& message);
@@ -69,7 +73,12 @@ private:
     std::optional<std::uint64_t> offered_at_;  // step
     // Whose offers were accepted and whose bodies have not come; the step up to which this worker goes on.
     std::map<std::uint32_t, std::uint64_t> sellers_;
-    bool stepping_ = false, draining_ = false, left_ = false, ended_ = false;
+    struct Deferred {
+        WorldHeader header;
+        WorldMessage message;
+    };
+    std::vector<Deferred> deferred_;  // came within a step
+    bool within_ = false, stepping_ = false, draining_ = false, left_ = false, ended_ = false;
 };
 
 }  // namespace sim

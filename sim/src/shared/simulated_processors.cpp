@@ -1,9 +1,14 @@
 #include <algorithm>
+#include <condition_variable>
 #include <deque>
+#include <exception>
+#include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "shared/coordinator.h"
@@ -27,7 +32,80 @@ struct Turn {
     std::optional<SharedWorldWorker::Times> ended;  // the step under way ends
     std::vector<Bytes> messages;
     bool drain = false;
-    bool step = false;  // at last
+    bool step = false;                       // at last
+    std::vector<std::vector<Bytes>> within;  // what came to each wait of it
+};
+
+/// A step of a worker that may wait in its midst for messages: a thread of its own, which runs while its owner waits for it,
+/// and the other way round.
+class WaitingStep {
+public:
+    WaitingStep() = default;
+    ~WaitingStep() { abandon(); }
+    WaitingStep(const WaitingStep&) = delete;
+    WaitingStep& operator=(const WaitingStep&) = delete;
+
+    /// Runs the step until it waits or ends. Throws what it threw.
+    void begin(std::function<void(WaitingStep&)> work) {
+        abandon();
+        state_ = State::running;
+        thread_ = std::thread([this, work = std::move(work)] {
+            try {
+                start_s_ = thread_processor_s();
+                work(*this);
+            } catch (const Abandoned&) {
+            } catch (...) {
+                failure_ = std::current_exception();
+            }
+            give(State::ended);
+        });
+        wait_for_it();
+    }
+    void go_on() {
+        give(State::running);
+        wait_for_it();
+    }
+    [[nodiscard]] bool waits() const { return state_ == State::waiting; }
+
+    /// Within the step: processor time since it began or went on [s].
+    [[nodiscard]] double spent_s() const { return thread_processor_s() - start_s_; }
+    void wait() {
+        give(State::waiting);
+        std::unique_lock lock(mutex_);
+        turned_.wait(lock, [this] { return state_ != State::waiting; });
+        if (state_ == State::abandoned) throw Abandoned{};
+        start_s_ = thread_processor_s();
+    }
+
+private:
+    enum class State { none, running, waiting, ended, abandoned };
+    struct Abandoned {};
+    void give(State state) {
+        const std::lock_guard lock(mutex_);
+        state_ = state;
+        turned_.notify_all();
+    }
+    void wait_for_it() {
+        {
+            std::unique_lock lock(mutex_);
+            turned_.wait(lock, [this] { return state_ != State::running; });
+        }
+        if (state_ != State::ended) return;
+        thread_.join();
+        if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+    }
+    void abandon() {
+        if (!thread_.joinable()) return;
+        give(State::abandoned);
+        thread_.join();
+    }
+
+    std::thread thread_;
+    std::mutex mutex_;
+    std::condition_variable turned_;
+    State state_ = State::none;
+    std::exception_ptr failure_;
+    double start_s_ = 0;
 };
 
 double cost_of(const std::function<void()>& work) {
@@ -59,7 +137,11 @@ struct Processor {
     double handled = 0;                         // [s] spent on messages since its last step
     double waited = 0;                          // [s] idle since its last step
     bool stepping = false, drain = false;
-    double step_cost = 0;
+    double step_cost = 0, told_cost = 0;  // of the step; of the part under way, charged already
+    double slow = 1;                      // of the step under way
+    std::unique_ptr<WaitingStep> step = std::make_unique<WaitingStep>();
+    std::vector<std::vector<Bytes>> within;  // of the step under way
+    std::vector<Bytes> come;                 // to its last wait
     bool killed = false, stopped = false, cut = false;
     double silent_since = 0;  // when one of these began
     // Repeated alone:
@@ -98,6 +180,9 @@ private:
     void run_worker(std::size_t number);
     [[nodiscard]] Turn turn_of(Processor& p);
     void start_step(std::size_t number);
+    void charge(Processor& p, double spent);
+    void go_on(std::size_t number);
+    void after_part(Processor& p);
     [[nodiscard]] double repeat_alone(const Processor& p) const;
     void repeat_alone(DistributedResult& result) const;
     void send(Processor& p);
@@ -107,7 +192,7 @@ private:
     SimulatedProcessors how_;
     DistributedObserver* observer_;
     Coordinator meeting_;
-    std::vector<Processor> processors_;
+    std::deque<Processor> processors_;  // steps refer to theirs
     std::size_t next_failure_ = 0;
     double now_ = 0, started_ = -1, ended_ = 0;
 };
@@ -146,7 +231,7 @@ Machine::Event Machine::next() const {
         if (!p.outbox.empty()) offer(Event::Kind::application, p.outbox.front().time, i);
         if (!p.runs()) continue;
         const bool startable = p.worker && p.worker->ready();
-        if (p.stepping || p.drain || startable) {
+        if (!p.step->waits() && (p.stepping || p.drain || startable)) {
             offer(Event::Kind::worker, p.free_at, i);
         } else if (!p.inbox.empty()) {
             offer(Event::Kind::worker, std::max(p.free_at, p.inbox.front().time), i);
@@ -198,6 +283,7 @@ double Machine::factor(std::size_t number) const {
 
 void Machine::run_worker(std::size_t number) {
     Processor& p = processors_[number];
+    if (p.step->waits()) return go_on(number);
     Turn turn = turn_of(p);
     const bool there = p.worker != nullptr;
     const double spent = cost_of([&] { handle(p.worker, turn); });
@@ -209,8 +295,9 @@ void Machine::run_worker(std::size_t number) {
     if (p.worker) p.drain = false;
     send(p);
     turn.step = p.worker && p.worker->ready();
-    if (turn.step) start_step(number);
+    const bool step = turn.step;
     if (how_.repeat_alone) p.turns.push_back(std::move(turn));
+    if (step) start_step(number);
 }
 
 Turn Machine::turn_of(Processor& p) {
@@ -230,13 +317,56 @@ Turn Machine::turn_of(Processor& p) {
 
 void Machine::start_step(std::size_t number) {
     Processor& p = processors_[number];
-    const double slow = factor(number);
+    p.slow = factor(number);
     if (started_ < 0) started_ = p.free_at;
-    const double spent = cost_of([&] { p.worker->step(); });
-    p.spent_s += spent;
-    p.step_cost = how_.modelled ? how_.seconds_per_work * p.worker->work() : spent * how_.slowdown;
-    p.step_cost *= slow;
-    p.free_at += p.step_cost;
+    p.step_cost = p.told_cost = 0;
+    p.within.clear();
+    // What a part of the step took is charged when it tells something, and when it ends.
+    p.step->begin([this, number](WaitingStep& step) {
+        Processor& own = processors_[number];
+        own.worker->step([&](bool wait) {
+            charge(own, step.spent_s());
+            send(own);
+            if (!wait) return;
+            step.wait();
+            for (const Bytes& bytes : own.come) {
+                DecodedWorldMessage decoded = decode_for_worker(*bytes);
+                own.worker->take(decoded.header, std::move(decoded.message));
+            }
+        });
+        charge(own, step.spent_s());
+    });
+    after_part(p);
+}
+
+void Machine::charge(Processor& p, double spent) {
+    const double fresh = spent - std::exchange(p.told_cost, spent);
+    p.spent_s += fresh;
+    if (how_.modelled) return;
+    p.step_cost += fresh * how_.slowdown * p.slow;
+    p.free_at += fresh * how_.slowdown * p.slow;
+}
+
+void Machine::go_on(std::size_t number) {
+    Processor& p = processors_[number];
+    p.waited += std::max(0.0, now_ - p.free_at);
+    p.free_at = std::max(p.free_at, now_);
+    p.come.clear();
+    for (; !p.inbox.empty() && p.inbox.front().time <= now_; p.inbox.pop_front())
+        p.come.push_back(std::move(p.inbox.front().bytes));
+    if (how_.repeat_alone) p.within.push_back(p.come);
+    p.told_cost = 0;
+    p.step->go_on();
+    after_part(p);
+}
+
+void Machine::after_part(Processor& p) {
+    if (p.step->waits()) return;
+    if (how_.modelled) {
+        p.step_cost = how_.seconds_per_work * p.worker->work() * p.slow;
+        p.free_at += p.step_cost;
+    }
+    if (how_.repeat_alone) p.turns.back().within = std::move(p.within);
     p.stepping = true;
 }
 
@@ -261,7 +391,18 @@ double Machine::repeat_alone(const Processor& p) const {
         if (there) spent += handled;
         if (worker)
             for (const std::vector<std::uint8_t>& bytes : worker->outgoing()) sent += bytes.size();
-        if (turn.step) spent += cost_of([&] { worker->step(); });
+        if (!turn.step) continue;
+        std::size_t next = 0;
+        spent += cost_of([&] {
+            worker->step([&](bool wait) {
+                for (const std::vector<std::uint8_t>& bytes : worker->outgoing()) sent += bytes.size();
+                if (!wait) return;
+                for (const Bytes& bytes : turn.within.at(next++)) {
+                    DecodedWorldMessage decoded = decode_for_worker(*bytes);
+                    worker->take(decoded.header, std::move(decoded.message));
+                }
+            });
+        });
     }
     if (sent != p.sent)
         throw std::logic_error("simulated processors: a worker did otherwise when it was alone");

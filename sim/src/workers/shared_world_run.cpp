@@ -301,7 +301,8 @@ DistributedResult run_distributed(const WorldScene& scene, const DistributedSett
     if (from && settings.pace != Pace::lockstep) throw InputError("", "a state out of step", "lockstep");
     DistributedSettings own = settings;
     own.market.trade =
-        settings.market.trade && launch.verify == 1;  // times differ, and so would their offers
+        settings.market.trade && launch.verify == 1;         // times differ, and so would their offers
+    own.together = settings.together && launch.verify == 1;  // who check each other compute for themselves
     return SharedWorldRun(scene, own, launch, observer, from).run();
 }
 

@@ -54,6 +54,18 @@ public:
         : socket_(socket), pulse_(pulse), worker_(scene), header_{scene.worker, 0, 0} {}
 
     int serve() {
+        try {
+            return serve_steps();
+        } catch (const Gone&) {
+            return 1;
+        }
+    }
+    void report(const std::string& what) { send(encode(header_, WorkerFailure{what})); }
+
+private:
+    struct Gone {};  ///< the application, within a step
+
+    int serve_steps() {
         while (!worker_.ended() && !pulse_.application_gone()) {
             take_all();
             if (drain_asked && !std::exchange(draining_, true)) worker_.drain();
@@ -65,9 +77,6 @@ public:
         if (pulse_.application_gone()) return 1;
         return refused_ ? 1 : 0;
     }
-    void report(const std::string& what) { send(encode(header_, WorkerFailure{what})); }
-
-private:
     void take_all() {
         zmq::message_t frame;
         while (through_signals([&] { return socket_.recv(frame, zmq::recv_flags::dontwait); })) {
@@ -83,11 +92,24 @@ private:
     void step() {
         const double waited = seconds_since(idle_since_), factor = worker_.slowing();
         const Clock::time_point start = Clock::now();
-        worker_.step();
-        if (factor > 1) sleep_for((factor - 1) * seconds_since(start));
+        waited_within_ = 0;
+        worker_.step([this](bool wait) { flush(wait); });
+        const double worked = seconds_since(start) - waited_within_;
+        if (factor > 1) sleep_for((factor - 1) * worked);
         const double processor = thread_processor_s();
-        worker_.worked({seconds_since(start), waited, processor - std::exchange(told_processor_, processor)});
+        worker_.worked({std::max(factor, 1.0) * worked, waited + waited_within_,
+                        processor - std::exchange(told_processor_, processor)});
         idle_since_ = Clock::now();
+    }
+    /// Within a step: until something came.
+    void flush(bool must_wait) {
+        send_all();
+        if (!must_wait) return;
+        const Clock::time_point start = Clock::now();
+        wait();
+        waited_within_ += seconds_since(start);
+        if (pulse_.application_gone()) throw Gone{};
+        take_all();
     }
     void send_all() {
         for (const std::vector<std::uint8_t>& bytes : worker_.outgoing()) send(bytes);
@@ -112,6 +134,7 @@ private:
     SharedWorldWorker worker_;
     WorldHeader header_;
     bool draining_ = false, refused_ = false;
+    double waited_within_ = 0;  ///< the step under way
     Clock::time_point idle_since_ = Clock::now();
     double told_processor_ = thread_processor_s();
 };
