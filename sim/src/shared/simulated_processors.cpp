@@ -1,14 +1,17 @@
+#include <ucontext.h>
+#ifdef __SANITIZE_ADDRESS__
+#include <sanitizer/common_interface_defs.h>
+#endif
+
 #include <algorithm>
-#include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <exception>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <utility>
 
 #include "shared/coordinator.h"
@@ -36,8 +39,7 @@ struct Turn {
     std::vector<std::vector<Bytes>> within;  // what came to each wait of it
 };
 
-/// A step of a worker that may wait in its midst for messages: a thread of its own, which runs while its owner waits for it,
-/// and the other way round.
+/// A step of a worker that may wait in its midst for messages: on a stack of its own, which its owner leaves and comes back to.
 class WaitingStep {
 public:
     WaitingStep() = default;
@@ -48,31 +50,23 @@ public:
     /// Runs the step until it waits or ends. Throws what it threw.
     void begin(std::function<void(WaitingStep&)> work) {
         abandon();
-        state_ = State::running;
-        thread_ = std::thread([this, work = std::move(work)] {
-            try {
-                start_s_ = thread_processor_s();
-                work(*this);
-            } catch (const Abandoned&) {
-            } catch (...) {
-                failure_ = std::current_exception();
-            }
-            give(State::ended);
-        });
-        wait_for_it();
+        if (stack_.empty()) stack_.resize(kStackBytes);
+        work_ = std::move(work);
+        if (getcontext(&inside_) != 0) throw std::runtime_error("a context cannot be made");
+        inside_.uc_stack.ss_sp = stack_.data(), inside_.uc_stack.ss_size = stack_.size();
+        inside_.uc_link = nullptr;
+        const auto self = reinterpret_cast<std::uintptr_t>(this);
+        makecontext(&inside_, reinterpret_cast<void (*)()>(&WaitingStep::run), 2,
+                    static_cast<unsigned>(self >> 32), static_cast<unsigned>(self));
+        enter(State::running);
     }
-    void go_on() {
-        give(State::running);
-        wait_for_it();
-    }
+    void go_on() { enter(State::running); }
     [[nodiscard]] bool waits() const { return state_ == State::waiting; }
 
     /// Within the step: processor time since it began or went on [s].
     [[nodiscard]] double spent_s() const { return thread_processor_s() - start_s_; }
     void wait() {
-        give(State::waiting);
-        std::unique_lock lock(mutex_);
-        turned_.wait(lock, [this] { return state_ != State::waiting; });
+        leave(State::waiting);
         if (state_ == State::abandoned) throw Abandoned{};
         start_s_ = thread_processor_s();
     }
@@ -80,29 +74,57 @@ public:
 private:
     enum class State { none, running, waiting, ended, abandoned };
     struct Abandoned {};
-    void give(State state) {
-        const std::lock_guard lock(mutex_);
-        state_ = state;
-        turned_.notify_all();
-    }
-    void wait_for_it() {
-        {
-            std::unique_lock lock(mutex_);
-            turned_.wait(lock, [this] { return state_ != State::running; });
+    static constexpr std::size_t kStackBytes = 1 << 20;
+
+    static void run(unsigned high, unsigned low) {
+        auto& self = *reinterpret_cast<WaitingStep*>(static_cast<std::uintptr_t>(high) << 32 | low);
+        end_switch(nullptr, &self.outer_stack_, &self.outer_bytes_);
+        try {
+            self.start_s_ = thread_processor_s();
+            self.work_(self);
+        } catch (const Abandoned&) {
+        } catch (...) {
+            self.failure_ = std::current_exception();
         }
-        if (state_ != State::ended) return;
-        thread_.join();
+        self.leave(State::ended);
+    }
+    void enter(State state) {
+        state_ = state;
+        void* fake = nullptr;
+        begin_switch(&fake, stack_.data(), stack_.size());
+        (void)swapcontext(&outside_, &inside_);
+        end_switch(fake, nullptr, nullptr);
         if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
     }
-    void abandon() {
-        if (!thread_.joinable()) return;
-        give(State::abandoned);
-        thread_.join();
+    void leave(State state) {
+        state_ = state;
+        void* fake = nullptr;
+        begin_switch(state == State::ended ? nullptr : &fake, outer_stack_, outer_bytes_);
+        (void)swapcontext(&inside_, &outside_);
+        end_switch(fake, &outer_stack_, &outer_bytes_);
+    }
+    void abandon() noexcept {
+        if (state_ == State::waiting) enter(State::abandoned);
+    }
+    // The address sanitizer has to know on which stack it is.
+    static void begin_switch([[maybe_unused]] void** fake, [[maybe_unused]] const void* stack,
+                             [[maybe_unused]] std::size_t bytes) {
+#ifdef __SANITIZE_ADDRESS__
+        __sanitizer_start_switch_fiber(fake, stack, bytes);
+#endif
+    }
+    static void end_switch([[maybe_unused]] void* fake, [[maybe_unused]] const void** stack,
+                           [[maybe_unused]] std::size_t* bytes) {
+#ifdef __SANITIZE_ADDRESS__
+        __sanitizer_finish_switch_fiber(fake, stack, bytes);
+#endif
     }
 
-    std::thread thread_;
-    std::mutex mutex_;
-    std::condition_variable turned_;
+    std::function<void(WaitingStep&)> work_;
+    ucontext_t inside_{}, outside_{};
+    std::vector<char> stack_;
+    const void* outer_stack_ = nullptr;
+    std::size_t outer_bytes_ = 0;
     State state_ = State::none;
     std::exception_ptr failure_;
     double start_s_ = 0;
