@@ -8,14 +8,14 @@
 // itself, out of the same bits: before it they tell each other the velocities of the bodies on their side. So every contact sees
 // the velocities that it would see if one swept all, and impulses need not be told. A substep has four such meetings.
 //
-// Only islands of which nobody has to know everything within a step: no impacts, no rebounds, nothing that is pushed out of
-// what it came deep into, no forces but those of soft springs, which all pull alike.
+// Only islands of which nobody has to know everything within a step: no impacts, no rebounds, no forces but those of soft
+// springs, which all pull alike.
 
 namespace sim {
 namespace {
 
 bool rests(const Manifold& manifold) {
-    if (manifold.points[0].begins >= 0 || manifold.emerging) return false;
+    if (manifold.points[0].begins >= 0) return false;
     return manifold.restitution == 0 ||
            std::all_of(manifold.points.begin(), manifold.points.begin() + manifold.count,
                        [](const ManifoldPoint& p) { return p.normal_impulse > 0; });
@@ -126,6 +126,8 @@ bool IslandSolver::begin_together(const Island& island, const ContactScene& scen
             if (side.body >= 0) spring_bodies_.push_back(static_cast<std::uint32_t>(side.body));
     std::ranges::sort(spring_bodies_);
     spring_bodies_.erase(std::ranges::unique(spring_bodies_).begin(), spring_bodies_.end());
+    any_emerging_ = std::ranges::any_of(
+        island.manifolds, [this](int m) { return (*manifolds_)[static_cast<std::size_t>(m)].emerging; });
     note_start();
     advance();
     for (const Border& border : borders_)
@@ -229,6 +231,18 @@ void IslandSolver::meet_springs() {
     }
     for (const std::uint32_t body : spring_bodies_)
         if (!is_own_body(body)) load_velocities(rows_of_[body]);
+}
+
+bool IslandSolver::any_of_all(bool here) {
+    with_->tell_all({static_cast<std::uint8_t>(here)});
+    for (int p = 0; p < with_->count(); ++p) {
+        if (p == with_->self()) continue;
+        const Partners::Bytes heard = with_->hear(p);
+        ByteReader in(heard);
+        here = in.flag() || here;
+        in.expect_end();
+    }
+    return here;
 }
 
 template <typename Body>

@@ -144,7 +144,7 @@ void IslandSolver::substep(bool last) {
     contacts(&Solver::sweep<Push::soft>, Told::velocities);
     pushes_out_ = false;
     if (any_emerging_) run(), pushes_out_ = may_push_out();
-    if (pushes_out_) bodies(&Solver::keep), contacts(&Solver::sweep<Push::all>);
+    if (pushes_out_) bodies(&Solver::keep), contacts(&Solver::sweep<Push::all>, Told::velocities);
     contacts(&Solver::give_to_move);
     bodies(&Solver::move);
     if (pushes_out_ || any_rebound_ || !impacts_.empty()) contacts(&Solver::follow_rows);
@@ -222,7 +222,14 @@ void IslandSolver::warm_start(ContactRows& c) {
 }
 
 // Positions move with velocities that also push emerging bodies out; the velocities themselves never see it.
-bool IslandSolver::may_push_out() const {
+bool IslandSolver::may_push_out() {
+    if (with_) {
+        bool here = false;
+        for (std::size_t b = 0; b < blocks_.size(); ++b)
+            if (sweeps(blocks_[b]))
+                for (const ContactRows& c : contacts_in(blocks_[b])) here = here || (c.emerging && c.now < 0);
+        return any_of_all(here);
+    }
     std::atomic<bool> any = false;
     crew().each(contacts_.size(), 64, [&](int, std::size_t first, std::size_t last) {
         for (const ContactRows& c : std::span(contacts_).subspan(first, last - first))

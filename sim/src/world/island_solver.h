@@ -482,7 +482,7 @@ private:
     enum class Push { none, soft, all };
     template <Push kPush>
     void sweep(const IslandBlocks::Block& block);
-    [[nodiscard]] bool may_push_out() const;
+    [[nodiscard]] bool may_push_out();
     void keep(const IslandBlocks::Block& slab);
     void speeds(const Rows& rows, float (&v)[3]) const;
     void push_by(const Rows& rows, const float (&impulse)[3]);
@@ -542,6 +542,7 @@ private:
     void run_together();
     void meet(const Border& border, Told told);
     void meet_springs();
+    [[nodiscard]] bool any_of_all(bool here);
     void write_motion(ByteWriter& out, std::uint32_t body) const;
     void read_motion(ByteReader& in, std::uint32_t body);
     void turn_frame_on(BodyRows& rows);
