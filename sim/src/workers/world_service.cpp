@@ -19,6 +19,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr int kPollMs = 50;
+constexpr double kLongestWithin = 5;  // that a step waits for others [s]; then it is done alone
 
 volatile std::sig_atomic_t drain_asked = 0;
 
@@ -101,7 +102,7 @@ private:
                         processor - std::exchange(told_processor_, processor)});
         idle_since_ = Clock::now();
     }
-    /// Within a step: until something came.
+    /// Within a step: until something came, or what others do not tell has been waited for long enough.
     void flush(bool must_wait) {
         send_all();
         if (!must_wait) return;
@@ -110,6 +111,7 @@ private:
         waited_within_ += seconds_since(start);
         if (pulse_.application_gone()) throw Gone{};
         take_all();
+        if (waited_within_ > kLongestWithin) worker_.stop_waiting();
     }
     void send_all() {
         for (const std::vector<std::uint8_t>& bytes : worker_.outgoing()) send(bytes);

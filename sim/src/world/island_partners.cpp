@@ -201,7 +201,7 @@ void IslandSolver::meet(const Border& border, Told told) {
         if (told == Told::states) load_velocities(rows);
         read_floats(in, speeds_of(body));
         if (told == Told::places)
-            for (int k = 0; k < 3; ++k) rows.place[k] = in.number<double>();
+            for (int k = 0; k < 3; ++k) rows.place[k] = read_finite(in);
     }
     in.expect_end();
     if (later) turn_rows(blocks_[border.block]);
@@ -309,7 +309,7 @@ void IslandSolver::write_paths(ByteWriter& out) const {
 
 void IslandSolver::read_paths(ByteReader& in, int partner) {
     each_body_of(partner, [&](const BodyRows& rows) {
-        read(in, (*paths_)[static_cast<std::size_t>(rows.body - bodies_->data())]);
+        read(in, (*paths_)[static_cast<std::size_t>(rows.body - bodies_->data())], settings_->dt);
     });
 }
 

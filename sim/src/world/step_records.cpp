@@ -1,10 +1,12 @@
 #include "world/step_records.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace sim {
 namespace {
 
 constexpr std::uint8_t kAtLimit = 1, kLimitedNow = 2;
-constexpr std::uint32_t kMostLegs = 1 << 16;
 
 void write_vector(ByteWriter& out, const Eigen::Vector3f& v) {
     write_floats(out, {v.data(), 3});
@@ -13,12 +15,17 @@ void read_vector(ByteReader& in, Eigen::Vector3f& v) {
     read_floats(in, {v.data(), 3});
 }
 
+[[noreturn]] void refuse_infinite() {
+    throw DecodeError("a number that is not finite in a part of a step");
+}
+
 void write_numbers(ByteWriter& out, const double* numbers, Eigen::Index count) {
     out.append({reinterpret_cast<const std::uint8_t*>(numbers), static_cast<std::size_t>(count) * 8});
 }
 void read_numbers(ByteReader& in, double* numbers, Eigen::Index count) {
     const std::size_t bytes = static_cast<std::size_t>(count) * 8;
     if (bytes > 0) std::memcpy(numbers, in.take(bytes).data(), bytes);
+    if (!std::all_of(numbers, numbers + count, [](double x) { return std::isfinite(x); })) refuse_infinite();
 }
 
 // A sample of a body, or -1.
@@ -32,6 +39,21 @@ int read_sample(ByteReader& in, int body, const std::vector<MovingBody>& bodies)
 }
 
 }  // namespace
+
+void write_floats(ByteWriter& out, std::span<const float> floats) {
+    out.append({reinterpret_cast<const std::uint8_t*>(floats.data()), floats.size_bytes()});
+}
+
+void read_floats(ByteReader& in, std::span<float> floats) {
+    std::memcpy(floats.data(), in.take(floats.size_bytes()).data(), floats.size_bytes());
+    if (!std::ranges::all_of(floats, [](float x) { return std::isfinite(x); })) refuse_infinite();
+}
+
+double read_finite(ByteReader& in) {
+    double number = 0;
+    read_numbers(in, &number, 1);
+    return number;
+}
 
 void write(ByteWriter& out, const Manifold& m) {
     out.number(m.a), out.number(m.b);
@@ -58,14 +80,17 @@ void read(ByteReader& in, Manifold& m, const std::vector<MovingBody>& bodies, st
         throw DecodeError("a contact of " + std::to_string(m.count) + " points between bodies " +
                           std::to_string(m.a) + " and " + std::to_string(m.b) + " of " +
                           std::to_string(count));
-    for (float* x : {&m.friction, &m.restitution, &m.impulse_reach}) *x = in.number<float>();
+    for (float* x : {&m.friction, &m.restitution, &m.impulse_reach}) read_floats(in, {x, 1});
     for (int i = 0; i < m.count; ++i) {
         ManifoldPoint& p = m.points[static_cast<std::size_t>(i)];
-        p.feature = in.number<std::uint32_t>(), p.separation = in.number<float>();
+        p.feature = in.number<std::uint32_t>();
+        read_floats(in, {&p.separation, 1});
         for (Eigen::Vector3f* v : {&p.normal, &p.arm_a, &p.arm_b, &p.rest_a, &p.rest_b, &p.friction_impulse})
             read_vector(in, *v);
         p.sample_a = read_sample(in, m.a, bodies), p.sample_b = read_sample(in, m.b, bodies);
-        for (float* x : {&p.begins, &p.gap, &p.normal_impulse}) *x = in.number<float>();
+        p.begins = in.number<float>();  // infinite: it does not happen
+        if (std::isnan(p.begins)) refuse_infinite();
+        for (float* x : {&p.gap, &p.normal_impulse}) read_floats(in, {x, 1});
     }
 }
 
@@ -80,7 +105,7 @@ void write_impulses(ByteWriter& out, const Manifold& m) {
 void read_impulses(ByteReader& in, Manifold& m) {
     for (int i = 0; i < m.count; ++i) {
         ManifoldPoint& p = m.points[static_cast<std::size_t>(i)];
-        p.normal_impulse = in.number<float>();
+        read_floats(in, {&p.normal_impulse, 1});
         read_vector(in, p.friction_impulse);
     }
 }
@@ -105,7 +130,6 @@ void read(ByteReader& in, MovingBody& body) {
 
 void write(ByteWriter& out, const BodyPath& path) {
     out.count(path.legs.size());
-    out.number(path.end);
     for (const BodyPath::Leg& leg : path.legs) {
         out.number(leg.start);
         write_numbers(out, leg.position.data(), 3), write_numbers(out, leg.orientation.coeffs().data(), 4);
@@ -113,19 +137,19 @@ void write(ByteWriter& out, const BodyPath& path) {
     }
 }
 
-void read(ByteReader& in, BodyPath& path) {
-    const std::uint32_t legs = in.count(8 * 14);
-    if (legs < 1 || legs > kMostLegs) throw DecodeError("a path of " + std::to_string(legs) + " legs");
-    path.legs.resize(legs);
-    path.end = in.number<double>();
+void read(ByteReader& in, BodyPath& path, double dt) {
+    path.legs.resize(in.count(8 * 14));
+    path.end = dt;
     double before = -1;
     for (BodyPath::Leg& leg : path.legs) {
-        leg.start = in.number<double>();
-        if (!(leg.start > before)) throw DecodeError("legs of a path that do not ascend");
+        leg.start = read_finite(in);
+        if (!(leg.start > before && leg.start < dt))
+            throw DecodeError("legs of a path that do not ascend within the step");
         before = leg.start;
         read_numbers(in, leg.position.data(), 3), read_numbers(in, leg.orientation.coeffs().data(), 4);
         read_numbers(in, leg.velocity.data(), 3), read_numbers(in, leg.momentum.data(), 3);
     }
+    if (path.legs.empty() || path.legs.front().start < 0) throw DecodeError("a path without a beginning");
 }
 
 }  // namespace sim

@@ -6,7 +6,7 @@
 namespace sim {
 
 // What partners tell each other of a step (partners.h): numbers as they lie in memory. Readers throw DecodeError for bytes that
-// are missing, and for places outside of what is there; numbers themselves are taken as they are.
+// are missing, for places outside of what is there, and for numbers that are not finite: such a step is done alone.
 
 void write(ByteWriter& out, const Manifold& manifold);  ///< of planes, all points
 /// `bodies`, `planes`: of the world, which bounds what it may name.
@@ -20,13 +20,10 @@ void write(ByteWriter& out, const MovingBody& body);
 void read(ByteReader& in, MovingBody& body);
 
 void write(ByteWriter& out, const BodyPath& path);
-void read(ByteReader& in, BodyPath& path);
+void read(ByteReader& in, BodyPath& path, double dt);  ///< over a step of dt [s]
 
-inline void write_floats(ByteWriter& out, std::span<const float> floats) {
-    out.append({reinterpret_cast<const std::uint8_t*>(floats.data()), floats.size_bytes()});
-}
-inline void read_floats(ByteReader& in, std::span<float> floats) {
-    std::memcpy(floats.data(), in.take(floats.size_bytes()).data(), floats.size_bytes());
-}
+void write_floats(ByteWriter& out, std::span<const float> floats);
+void read_floats(ByteReader& in, std::span<float> floats);
+[[nodiscard]] double read_finite(ByteReader& in);
 
 }  // namespace sim

@@ -236,7 +236,7 @@ void WorldContacts::hear(const ContactScene& scene, const Partners::Bytes& bytes
         read(in, heard_.emplace_back(), scene.bodies, scene.planes.size());
     for (std::uint32_t n = in.count(16); n > 0; --n) {
         const int a = body(), b = body();
-        found.meetings.push_back({a, b, in.number<double>(), false});
+        found.meetings.push_back({a, b, read_finite(in), false});
     }
     for (std::uint32_t n = in.count(4); n > 0; --n) found.woken.push_back(body());
     for (std::uint32_t n = in.count(4); n > 0; --n) watched_[static_cast<std::size_t>(body())] = 1;

@@ -80,7 +80,11 @@ void World::Implementation::solve_together(const Solve& solve, bool first) {
     if (!divided) return;
     Outcome& outcome = outcomes[static_cast<std::size_t>(divided->bodies.front())];
     const std::uint64_t limits = part.deformations_limited();
-    if (!part.end_together()) throw NotTogether("an island has to be solved directly");
+    if (!part.end_together()) {  // it has to be solved directly: by each, from its start
+        const Island& whole = *std::exchange(divided, nullptr);
+        begin_again(whole);
+        return solve(whole, one, scene);
+    }
     outcome = {};
     outcome.limited = limits - part.limited_before();
     outcome.outside = part.take_outside_impulse();
@@ -148,7 +152,7 @@ void World::Implementation::share_paths() {
         if (p == with->self()) continue;
         const Partners::Bytes heard = with->hear(p);
         ByteReader in(heard);
-        by_one(p, [&](BodyPath& path) { read(in, path); });
+        by_one(p, [&](BodyPath& path) { read(in, path, settings.dt); });
         if (divided) part.read_paths(in, p);
         in.expect_end();
     }

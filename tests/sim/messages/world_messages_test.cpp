@@ -133,7 +133,8 @@ std::vector<sim::WorldMessage> samples() {
                                {7}},
             sim::Offer{2, 9, {1, 2}, {0.001f, 0.002f}},
             sim::OfferAnswer{1, 9, true},
-            sim::Handover{2, 9, records, {0, 1}, {5, 6}}};
+            sim::Handover{2, 9, records, {0, 1}, {5, 6}},
+            sim::PartMessage{1, false, {1, 2, 3}}};
 }
 
 const sim::WorldHeader kHeader{3, 8, 1234567890123};
