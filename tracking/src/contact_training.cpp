@@ -116,9 +116,9 @@ struct ContactExamples {
 };
 
 bool flagged_between(const std::vector<double>& flags, double from_s, double to_s) {
-    constexpr double kNearS = 0.05;
-    const auto next = std::lower_bound(flags.begin(), flags.end(), from_s - kNearS);
-    return next != flags.end() && *next <= to_s + kNearS;
+    constexpr double kAroundS = 0.05;
+    const auto next = std::lower_bound(flags.begin(), flags.end(), from_s - kAroundS);
+    return next != flags.end() && *next <= to_s + kAroundS;
 }
 
 /// The tip's path without what is flagged.

@@ -5,6 +5,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "parameter_check.h"
 #include "random_stream.h"
 #include "text_cursor.h"
 #include "tip_path.h"
@@ -16,38 +17,32 @@ namespace {
 constexpr double kClosest = 0.030;  // s between two strokes of a stick
 const Eigen::Vector3d kTipAxis(0, 0, -1);
 
-void require(bool holds, const std::string& found, const std::string& expected) {
-    if (!holds) throw std::invalid_argument("drummer: found " + found + ", expected " + expected);
-}
-
-void require_within(double value, double least, double most, const std::string& what) {
-    require(value >= least && value <= most, what + " " + std::to_string(value),
-            "from " + std::to_string(least) + " to " + std::to_string(most));
-}
+constexpr ParameterCheck kDrummer{"drummer"};
 
 void check(const DrummerParameters& p, double duration_s) {
-    require_within(p.rate_hz, 1, 1e5, "rate_hz");
-    require_within(duration_s, 1 / p.rate_hz, 36000, "duration");
-    require_within(p.stick_length_m, 0.05, 2, "stick_length_m");
-    require_within(p.rise_m, 0.01, 0.9 * p.stick_length_m, "rise_m");
-    require_within(p.restitution, 0.05, 1, "restitution");
-    require_within(p.depth_m, 1e-4, 0.05, "depth_m");
-    require_within(p.noise_m, 0, 1, "noise_m");
-    require_within(p.noise_rad, 0, 1, "noise_rad");
+    kDrummer.require_within(p.rate_hz, 1, 1e5, "rate_hz");
+    kDrummer.require_within(duration_s, 1 / p.rate_hz, 36000, "duration");
+    kDrummer.require_within(p.stick_length_m, 0.05, 2, "stick_length_m");
+    kDrummer.require_within(p.rise_m, 0.01, 0.9 * p.stick_length_m, "rise_m");
+    kDrummer.require_within(p.restitution, 0.05, 1, "restitution");
+    kDrummer.require_within(p.depth_m, 1e-4, 0.05, "depth_m");
+    kDrummer.require_within(p.noise_m, 0, 1, "noise_m");
+    kDrummer.require_within(p.noise_rad, 0, 1, "noise_rad");
 }
 
 void check(const Stroke& stroke, double duration_s, const DrummerParameters& p) {
     const bool word = !stroke.stick.empty() && stroke.stick.find_first_of(" \t,\"'") == std::string::npos &&
                       first_unprintable(stroke.stick) == std::string::npos;
-    require(word, "stick name " + in_quotes(stroke.stick), "a word");
-    require_within(stroke.t_s, 0, duration_s, "stroke time");
-    require(stroke.target.allFinite() && stroke.target.norm() <= 100, "a target far away",
-            "one within 100 m");
-    require(std::abs(stroke.normal.norm() - 1) < 1e-6,
-            "a normal of length " + std::to_string(stroke.normal.norm()), "length 1");
-    require_within(stroke.speed_mps, 0.2, 25, "stroke speed");
+    kDrummer.require(word, "stick name " + in_quotes(stroke.stick), "a word");
+    kDrummer.require_within(stroke.t_s, 0, duration_s, "stroke time");
+    kDrummer.require(stroke.target.allFinite() && stroke.target.norm() <= 100, "a target far away",
+                     "one within 100 m");
+    kDrummer.require(std::abs(stroke.normal.norm() - 1) < 1e-6,
+                     "a normal of length " + std::to_string(stroke.normal.norm()), "length 1");
+    kDrummer.require_within(stroke.speed_mps, 0.2, 25, "stroke speed");
     if (stroke.kind == StrokeKind::feint)
-        require_within(stroke.turn_height_m, 0.001, 0.9 * p.stick_length_m - p.rise_m / 2, "turn_height_m");
+        kDrummer.require_within(stroke.turn_height_m, 0.001, 0.9 * p.stick_length_m - p.rise_m / 2,
+                                "turn_height_m");
 }
 
 std::map<std::string, std::vector<Stroke>> by_stick(const std::vector<Stroke>& score) {
@@ -57,10 +52,10 @@ std::map<std::string, std::vector<Stroke>> by_stick(const std::vector<Stroke>& s
         std::stable_sort(strokes.begin(), strokes.end(),
                          [](const Stroke& a, const Stroke& b) { return a.t_s < b.t_s; });
         for (std::size_t i = 1; i < strokes.size(); ++i)
-            require(strokes[i].t_s - strokes[i - 1].t_s >= kClosest,
-                    "strokes of stick '" + name + "' at " + std::to_string(strokes[i - 1].t_s) + " and " +
-                        std::to_string(strokes[i].t_s) + " s",
-                    "at least 30 ms between a stick's strokes");
+            kDrummer.require(strokes[i].t_s - strokes[i - 1].t_s >= kClosest,
+                             "strokes of stick '" + name + "' at " + std::to_string(strokes[i - 1].t_s) +
+                                 " and " + std::to_string(strokes[i].t_s) + " s",
+                             "at least 30 ms between a stick's strokes");
     }
     return sticks;
 }
@@ -72,8 +67,9 @@ PoseSample pose_at(const TipPath& path, double t, double length) {
     const Eigen::Vector3d behind = Eigen::Vector3d(0, 0.25, 1).normalized();
     const Eigen::Vector3d tip = path.at(t);
     const Eigen::Vector3d to_hand = path.foot_at(t) + length * behind - tip;
-    require(to_hand.norm() > 0.05 * length, "a tip that meets the hand at " + std::to_string(t) + " s",
-            "a lower rise or a longer stick");
+    kDrummer.require(to_hand.norm() > 0.05 * length,
+                     "a tip that meets the hand at " + std::to_string(t) + " s",
+                     "a lower rise or a longer stick");
     const Eigen::Vector3d back = to_hand.normalized();
     PoseSample sample;
     sample.t_s = t;
@@ -104,7 +100,7 @@ StickTrace play(const std::string& name, const TipPath& path, double duration_s,
 
 Trace synthesise(const std::vector<Stroke>& score, double duration_s, const DrummerParameters& parameters) {
     check(parameters, duration_s);
-    require(!score.empty(), "an empty score", "at least one stroke");
+    kDrummer.require(!score.empty(), "an empty score", "at least one stroke");
     for (const Stroke& stroke : score) check(stroke, duration_s, parameters);
     Trace trace;
     trace.rate_hz = parameters.rate_hz;

@@ -60,7 +60,7 @@ void for_each_block(Model& model, const Take& take) {
 /// Calls take(number, least, greatest) for the numbers of all sticks' trust, in the file's order.
 template <class Model, class Take>
 void for_each_number(Model& model, const Take& take) {
-    constexpr double kMost = 1e12, kMostLog = Trust::kMostLog;
+    constexpr double kMost = 1e12, kMostLogRadius = Trust::kMostLog;
     for (auto& trust : model.trust)
         for (auto& lead : trust.leads) {
             for (auto* sums : {&lead.position, &lead.shaft}) {
@@ -72,8 +72,8 @@ void for_each_number(Model& model, const Take& take) {
             }
             take(lead.regions.errors, 0, kMost);
             take(lead.regions.mean, 0, kMost);
-            take(lead.regions.radii.log_50, -kMostLog, kMostLog);
-            take(lead.regions.radii.log_95, -kMostLog, kMostLog);
+            take(lead.regions.radii.log_50, -kMostLogRadius, kMostLogRadius);
+            take(lead.regions.radii.log_95, -kMostLogRadius, kMostLogRadius);
         }
 }
 

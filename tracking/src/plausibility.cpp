@@ -17,10 +17,10 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kSmallRange = 0.1, kSlow = 0.5, kLargeRange = 3, kFast = 30;  // m, m/s
-constexpr std::size_t kFewest = 1000;      // accelerations, and pairs of poses, for a judgement
-constexpr double kStrongestShare = 0.002;  // share of the accelerations
-constexpr double kOneSided = 0.45;         // length of the mean of unit vectors
-constexpr double kPair = 1.0 / 30;         // s between poses that are compared
+constexpr std::size_t kFewestValues = 1000;  // accelerations, and pairs of poses, for a judgement
+constexpr double kStrongestShare = 0.002;    // share of the accelerations
+constexpr double kOneSided = 0.45;           // length of the mean of unit vectors
+constexpr double kPair = 1.0 / 30;           // s between poses that are compared
 constexpr double kMostlyExplained = 0.5, kMuchBetter = 0.25;
 constexpr std::size_t kFirstMirrored = 2, kLastMirrored = 4;  // among readings()
 constexpr double kWrongSide = 0.05, kShortestArm = 0.03;      // m
@@ -101,7 +101,7 @@ std::vector<Vector3d> accelerations(const Trace& trace) {
 
 void judge_gravity(const Trace& trace, std::vector<std::string>& lines) {
     std::vector<Vector3d> all = accelerations(trace);
-    if (all.size() < kFewest) return;
+    if (all.size() < kFewestValues) return;
     const auto count =
         std::max<std::ptrdiff_t>(20, std::lround(kStrongestShare * static_cast<double>(all.size())));
     std::nth_element(all.begin(), all.begin() + count, all.end(),
@@ -118,7 +118,7 @@ void judge_gravity(const Trace& trace, std::vector<std::string>& lines) {
 }
 
 /// Another way in which the same components may have been meant.
-struct Reading {
+struct OtherReading {
     const char* what;
     std::function<Matrix3d(const Quaterniond&)> matrix;
 };
@@ -133,8 +133,8 @@ Matrix3d turned(const Quaterniond& q, double quarter) {
     return Eigen::AngleAxisd(quarter * std::numbers::pi / 2, Vector3d::UnitX()) * q.toRotationMatrix();
 }
 
-const std::vector<Reading>& readings() {
-    static const std::vector<Reading> all = {
+const std::vector<OtherReading>& readings() {
+    static const std::vector<OtherReading> all = {
         {"as given", [](const Quaterniond& q) { return q.toRotationMatrix(); }},
         {"inverse (world to body)", [](const Quaterniond& q) { return q.conjugate().toRotationMatrix(); }},
         {"mirrored in x", [](const Quaterniond& q) { return mirrored(q, 0); }},
@@ -170,7 +170,7 @@ struct Turning {
     std::size_t count = 0;
 };
 
-Turning turning_of(const StickTrace& stick, const Reading& reading) {
+Turning turning_of(const StickTrace& stick, const OtherReading& reading) {
     Turning turning;
     Matrix3d normal = 1e-12 * Matrix3d::Identity();  // keeps r finite where the stick does not turn
     Vector3d right = Vector3d::Zero();
@@ -189,7 +189,7 @@ Turning turning_of(const StickTrace& stick, const Reading& reading) {
 }
 
 /// Share of the sum of squared motions that turning about a point of each stick explains.
-double explained(const Trace& trace, const Reading& reading, std::size_t& count) {
+double explained(const Trace& trace, const OtherReading& reading, std::size_t& count) {
     double all = 0, left = 0;
     count = 0;
     for (const StickTrace& stick : trace.sticks) {
@@ -208,7 +208,7 @@ std::string per_cent(double share) {
 void judge_orientation(const Trace& trace, std::vector<std::string>& lines) {
     std::size_t count = 0;
     const double given = explained(trace, readings().front(), count);
-    if (count < kFewest) return;
+    if (count < kFewestValues) return;
     double best = 0;
     std::size_t which = 0;
     for (std::size_t i = 1; i < readings().size(); ++i) {
@@ -279,7 +279,7 @@ void judge_sides(const Trace& trace, std::vector<std::string>& lines) {
     if (ahead.norm() < kAhead) return;
     const Vector3d to_the_right = ahead.normalized().cross(Vector3d::UnitY());
     const std::vector<double> apart = apart_along(*left, *right, to_the_right);
-    if (apart.size() < kFewest || quantile(apart, 0.5) > -kWrongSide) return;
+    if (apart.size() < kFewestValues || quantile(apart, 0.5) > -kWrongSide) return;
     const auto wrong = std::count_if(apart.begin(), apart.end(), [](double way) { return way < 0; });
     const double share = static_cast<double>(wrong) / static_cast<double>(apart.size());
     if (share < kMostOfTheTime) return;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "parameter_check.h"
 #include "random_stream.h"
 #include "tracking/predictor.h"
 #include "tracking/rotation.h"
@@ -15,14 +16,7 @@ namespace {
 constexpr double kLongestShift = 0.45;  // of a period: neighbours that shift towards each other stay apart
 constexpr double kMostSamples = 2e7;    // of a stick
 
-void require(bool holds, const std::string& found, const std::string& expected) {
-    if (!holds) throw std::invalid_argument("sensor: found " + found + ", expected " + expected);
-}
-
-void require_within(double value, double least, double most, const std::string& what) {
-    require(value >= least && value <= most, what + " " + std::to_string(value),
-            "from " + std::to_string(least) + " to " + std::to_string(most));
-}
+constexpr ParameterCheck kSensor{"sensor"};
 
 /// Each fault's own random numbers. Every sample takes the same number from each, whether the fault is on
 /// or not, so that the k-th sample's draws depend on k alone.
@@ -66,8 +60,8 @@ Schedule uniform_schedule(const StickTrace& stick, double rate_hz) {
     const double t0 = stick.samples.front().t_s, t_end = stick.samples.back().t_s;
     const double count =
         std::floor((t_end - t0) * rate_hz * (1 + 1e-12)) + 1;  // the last one despite rounding
-    require(count <= kMostSamples, std::to_string(count) + " samples of stick '" + stick.name + "'",
-            "at most 20000000; lower the rate");
+    kSensor.require(count <= kMostSamples, std::to_string(count) + " samples of stick '" + stick.name + "'",
+                    "at most 20000000; lower the rate");
     Schedule schedule;
     schedule.t_s.reserve(static_cast<std::size_t>(count));
     for (double k = 0; k < count; ++k) schedule.t_s.push_back(std::min(t0 + k / rate_hz, t_end));
@@ -182,22 +176,23 @@ private:
 }  // namespace
 
 void SensorModel::check() const {
-    if (rate_hz != 0) require_within(rate_hz, 0.1, 1e5, "rate_hz");
-    require_within(jitter_s, 0, 1, "jitter_s");
-    require_within(drop_out, 0, 0.9, "drop_out");
-    require_within(burst, 1, 1e6, "burst");
-    require(drop_out / (1 - drop_out) <= burst * (1 + 1e-12),
-            "drop_out " + std::to_string(drop_out) + " in bursts of " + std::to_string(burst),
-            "bursts of at least drop_out / (1 - drop_out) = " + std::to_string(drop_out / (1 - drop_out)));
-    require_within(noise_m, 0, 1, "noise_m");
-    require_within(noise_rad, 0, 1, "noise_rad");
-    require_within(quantum_m, 0, 1, "quantum_m");
-    require_within(quantum_rad, 0, 1, "quantum_rad");
-    require_within(outlier, 0, 1, "outlier");
-    require_within(outlier_m, 0, 100, "outlier_m");
-    require_within(latency_s, 0, 10, "latency_s");
-    require_within(duplicate, 0, 1, "duplicate");
-    require_within(late, 0, 0.5, "late");
+    if (rate_hz != 0) kSensor.require_within(rate_hz, 0.1, 1e5, "rate_hz");
+    kSensor.require_within(jitter_s, 0, 1, "jitter_s");
+    kSensor.require_within(drop_out, 0, 0.9, "drop_out");
+    kSensor.require_within(burst, 1, 1e6, "burst");
+    kSensor.require(
+        drop_out / (1 - drop_out) <= burst * (1 + 1e-12),
+        "drop_out " + std::to_string(drop_out) + " in bursts of " + std::to_string(burst),
+        "bursts of at least drop_out / (1 - drop_out) = " + std::to_string(drop_out / (1 - drop_out)));
+    kSensor.require_within(noise_m, 0, 1, "noise_m");
+    kSensor.require_within(noise_rad, 0, 1, "noise_rad");
+    kSensor.require_within(quantum_m, 0, 1, "quantum_m");
+    kSensor.require_within(quantum_rad, 0, 1, "quantum_rad");
+    kSensor.require_within(outlier, 0, 1, "outlier");
+    kSensor.require_within(outlier_m, 0, 100, "outlier_m");
+    kSensor.require_within(latency_s, 0, 10, "latency_s");
+    kSensor.require_within(duplicate, 0, 1, "duplicate");
+    kSensor.require_within(late, 0, 0.5, "late");
 }
 
 std::optional<PoseSample> pose_at(const StickTrace& stick, double t_s) {

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kMostContactLoss = 0.7;  // of the shares': a network that knows less would silence strokes
 
-constexpr std::size_t kSightings = 30, kMostExamples = 300000, kMostValidation = 30000;
+constexpr std::size_t kSightingsOfStick = 30, kMostExamples = 300000, kMostValidation = 30000;
 constexpr double kUsualRateHz = 60, kNoiseM = 0.25e-3;
 constexpr Eigen::Index kBatch = 256;
 constexpr double kRate = 2e-3, kWarmUpSteps = 500;
@@ -41,11 +41,11 @@ double duration_of(std::span<const TrainingStick> sticks, bool held_out) {
 
 /// `all`: also of the sticks held out.
 Examples learning_examples(std::span<const TrainingStick> sticks, std::uint64_t seed, bool all) {
-    const double expected =
-        (duration_of(sticks, false) + (all ? duration_of(sticks, true) : 0)) * kSightings * kUsualRateHz;
+    const double expected = (duration_of(sticks, false) + (all ? duration_of(sticks, true) : 0)) *
+                            kSightingsOfStick * kUsualRateHz;
     const double share = std::min(1.0, static_cast<double>(kMostExamples) / (1.1 * expected));
     ExampleCollector collector(kMostExamples);
-    for (std::size_t k = 0; k < kSightings; ++k)
+    for (std::size_t k = 0; k < kSightingsOfStick; ++k)
         for (std::size_t i = 0; i < sticks.size(); ++i) {
             if (sticks[i].held_out && !all) continue;
             const Sighting sighting = random_sighting(mixed_seed(seed, k, i), false);
