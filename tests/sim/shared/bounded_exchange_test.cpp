@@ -42,7 +42,7 @@ public:
     // One worker does a step if it may.
     bool step(std::size_t w) {
         if (!exchanges_[w]->ready()) return false;
-        exchanges_[w]->step();
+        exchanges_[w]->step({});
         age_ = std::max(age_, exchanges_[w]->ghost_age());
         const std::vector<std::uint8_t> bytes = exchanges_[w]->publish(0, {});
         for (std::size_t i = 0; i < inbox_.size(); ++i)
