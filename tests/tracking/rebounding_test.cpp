@@ -76,8 +76,8 @@ TEST(Rebounding, SurfaceIsAFadingVelocityThatRebounds) {
         of_surface += std::pow(surface->predict(4 / kHz).position.y() - truth, 2);
         of_path += std::pow(path->predict(4 / kHz).position.y() - truth, 2);
     }
-    // Half of the predictions 4 samples ahead of these strokes cross a turn, which the path alone carries on through.
-    EXPECT_LT(of_surface, 0.5 * of_path);
+    // A seventh of the predictions 4 samples ahead crosses the low, which the path alone carries on through; at the top both err alike.
+    EXPECT_LT(of_surface, 0.75 * of_path);
 }
 
 TEST(Rebounding, LeavesAloneWhatPassesTheLows) {

@@ -19,7 +19,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr int kPollMs = 50;
-constexpr double kLongestWithin = 5;  // that a step waits for others [s]; then it is done alone
+constexpr double kLongestWithin = 2;  // that a step waits for others [s]; then it is done alone
 
 volatile std::sig_atomic_t drain_asked = 0;
 

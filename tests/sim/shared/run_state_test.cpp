@@ -147,12 +147,16 @@ TEST(RunState, WorkersGoOnInLockstepAlsoInAnotherNumberAndAsOneProcess) {
     for (const int workers : {2, 3, 1}) {
         const sim::RunState from = sim::decode_run_state(two.saved.at(20), scene);
         Seen after(20);
-        const sim::DistributedResult again =
+        sim::DistributedResult again =
             run_distributed(scene, settings, sim_test::processes(workers), after, &from);
         for (const auto& [step, hash] : after.hashes) ASSERT_EQ(hash, alone.hashes.at(step)) << step;
         EXPECT_EQ(again.steps, 60u);
         EXPECT_EQ(after.saved.size(), 2u);
         if (workers != 2) continue;
+        // By whom a plane's impulse is counted differs, so it is summed in another order: the first step is done by each alone.
+        EXPECT_LT((again.outside_impulse - whole.outside_impulse).norm(),
+                  1e-12 * whole.outside_impulse.norm());
+        again.outside_impulse = whole.outside_impulse;
         EXPECT_EQ(text_of(again), text_of(whole));
         EXPECT_EQ(again.records, whole.records);
         EXPECT_EQ(again.cross_contacts, whole.cross_contacts);
