@@ -18,7 +18,7 @@ namespace {
 
 using namespace rendering;
 
-std::string message_of(const std::string& device) {
+std::string refusal_of(const std::string& device) {
     try {
         const audio::AlsaOutput output(device, 0.004);
     } catch (const std::runtime_error& refused) {
@@ -29,7 +29,7 @@ std::string message_of(const std::string& device) {
 
 TEST(AlsaOutput, ADeviceThatIsNotThereIsAClearErrorOfOneLine) {
     for (const std::string device : {"hw:77", "no_such_device", "pipewire"}) {
-        const std::string message = message_of(device);
+        const std::string message = refusal_of(device);
         if (device == "pipewire" && message == "opened") continue;  // PipeWire runs here
         EXPECT_EQ(message.find("ALSA: device `" + device + "`: found "), 0U) << message;
         EXPECT_EQ(message.find('\n'), std::string::npos);

@@ -23,7 +23,7 @@ using jack_server::Program;
 using rendering::note;
 
 constexpr int kKey = 38;
-constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kMillisecond = 1'000'000;
 
 void write(const std::filesystem::path& file, const std::string& text) {
     std::ofstream(file) << text;
@@ -89,7 +89,7 @@ Performance perform() {
         rendering::kOrchestra, {rendering::voice("drum")},
         {.longest_s = 5, .midi_port = "strokes", .midi_connect = "DrumGizmo:drumgizmo_midiin"});
     EXPECT_NE(live.device().find("-> DrumGizmo:drumgizmo_midiin"), std::string::npos) << live.device();
-    const std::int64_t epoch = audio::monotonic_ns() + 300 * kMs;
+    const std::int64_t epoch = audio::monotonic_ns() + 300 * kMillisecond;
     live.start(epoch);
     std::vector<std::int64_t> planned;
     for (std::uint64_t id = 1; id <= 20; ++id) {
@@ -103,7 +103,7 @@ Performance perform() {
         EXPECT_TRUE(live.schedule(each));
         performance.disturbed |= !live.cancel(each.id);
     }
-    audio::sleep_until_ns(planned.back() + 200 * kMs);
+    audio::sleep_until_ns(planned.back() + 200 * kMillisecond);
     (void)live.finish(0, 0);
     listener.stop();
     performance.planned = planned.size();

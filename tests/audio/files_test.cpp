@@ -97,9 +97,9 @@ struct MidiEvent {
     bool operator==(const MidiEvent&) const = default;
 };
 
-long number(const std::vector<unsigned char>& data, std::size_t at, std::size_t count) {
+long number(const std::vector<unsigned char>& data, std::size_t at, std::size_t bytes) {
     long value = 0;
-    for (std::size_t i = 0; i < count; ++i) value = value * 256 + data.at(at + i);
+    for (std::size_t i = 0; i < bytes; ++i) value = value * 256 + data.at(at + i);
     return value;
 }
 

@@ -31,7 +31,7 @@ using rendering::kOrchestra;
 using rendering::note;
 using rendering::voice;
 
-constexpr std::int64_t kSecond = audio::kSampleRate;
+constexpr std::int64_t kOneSecond = audio::kSampleRate;
 constexpr std::int64_t kMs = 1'000'000;
 
 /// Runs where jackd is installed and starts.
@@ -132,10 +132,10 @@ TEST_F(JackOutput, SoundThatArrivesIsTheRecordingAtItsDueTime) {
     const std::int64_t epoch = audio::monotonic_ns() + 100 * kMs;
     live.start(epoch);
     wait_until(epoch + 2500 * kMs);
-    const std::vector<float>& samples = kept.finish(live, 0, 4 * kSecond);
+    const std::vector<float>& samples = kept.finish(live, 0, 4 * kOneSecond);
     listener.stop();
-    EXPECT_EQ(samples,
-              rendering::render({voice("cymbal", {}, 0.3), voice("drum", {}, 0.8)}, notes, 0, 4 * kSecond));
+    EXPECT_EQ(samples, rendering::render({voice("cymbal", {}, 0.3), voice("drum", {}, 0.8)}, notes, 0,
+                                         4 * kOneSecond));
     const auto in_time = static_cast<std::int64_t>(live.take_blocks().size()) * live.block_size();
     std::vector<std::int64_t> shifts;
     int missing = 0;
@@ -256,8 +256,8 @@ TEST_F(JackOutput, ServerThatEndsLeavesTheRecordingWhole) {
     wait_until(epoch + 200 * kMs);
     server.end();
     wait_until(epoch + 700 * kMs);
-    EXPECT_EQ(kept.finish(live, kSecond, kSecond),
-              rendering::render({voice("drum")}, notes, kSecond, kSecond));
+    EXPECT_EQ(kept.finish(live, kOneSecond, kOneSecond),
+              rendering::render({voice("drum")}, notes, kOneSecond, kOneSecond));
     EXPECT_NE(live.device().find("the server ended"), std::string::npos) << live.device();
 }
 

@@ -10,10 +10,10 @@ namespace {
 
 using namespace rendering;
 
-constexpr std::int64_t kBlock = 64;
+constexpr std::int64_t kBlockSamples = 64;
 constexpr std::int64_t kSpacing =
-    200 * kBlock + 1;                   // 267 ms, so that each note falls one sample later in its block
-constexpr int kNotes = 2 * kBlock + 1;  // every phase twice
+    200 * kBlockSamples + 1;  // 267 ms, so that each note falls one sample later in its block
+constexpr int kNotes = 2 * kBlockSamples + 1;  // every phase twice
 
 /// Voices whose softest note ends, at exactly zero, within the spacing.
 audio::Voice short_voice(const std::string& instrument) {
@@ -28,13 +28,13 @@ TEST_P(Onset, FirstSampleIsTheOnsetAtEveryPhaseOfTheBlockAndBeforeItIsExactSilen
         for (int i = 0; i < kNotes; ++i)
             notes.push_back(note(static_cast<std::uint64_t>(i + 1), 64 + i * kSpacing, speed));
         const auto sound = left(render({short_voice(GetParam())}, notes, kNotes * kSpacing, 0));
-        std::int64_t sounded = -kBlock;  // the last sample before the onset that is not 0
+        std::int64_t sounded = -kBlockSamples;  // the last sample before the onset that is not 0
         std::size_t next = 0;
         for (std::int64_t i = 0; i < std::ssize(sound); ++i) {
             const double x = sound[static_cast<std::size_t>(i)];
             if (next < notes.size() && i == notes[next].onset_sample) {
                 ASSERT_NE(x, 0) << speed << " m/s, onset " << i;
-                ASSERT_LT(sounded, i - kBlock)
+                ASSERT_LT(sounded, i - kBlockSamples)
                     << "the note before is to be silent a block ahead of the onset";
                 ++next;
             }
@@ -58,9 +58,10 @@ TEST_P(Onset, AStrokeSoundsTheSameAtEveryPhaseOfTheBlock) {
     Parameters parameters{{"decay_s", 0.05}, {"variation", 0}};
     if (GetParam() == "drum") parameters.insert(parameters.end(), {{"bend_cents", 0}, {"snare", 0.5}});
     std::vector<audio::Note> notes;
-    for (int i = 0; i < kBlock; ++i)
+    for (int i = 0; i < kBlockSamples; ++i)
         notes.push_back(note(static_cast<std::uint64_t>(i + 1), 64 + i * kSpacing, 8));
-    const auto sound = left(render({voice(GetParam(), parameters, 0)}, notes, kBlock * kSpacing + kBlock, 0));
+    const auto sound =
+        left(render({voice(GetParam(), parameters, 0)}, notes, kBlockSamples * kSpacing + kBlockSamples, 0));
     for (const audio::Note& each : notes) {
         for (std::int64_t i = 0; i < kSpacing; ++i) {
             // Modes come to rest 100 dB below full scale, at the end of a block: up to 32 of them, 1e-5 each.

@@ -15,7 +15,7 @@ namespace {
 
 using namespace rendering;
 
-std::string message_of(const std::function<void()>& action) {
+std::string error_of(const std::function<void()>& action) {
     try {
         action();
     } catch (const std::runtime_error& error) {
@@ -81,13 +81,13 @@ TEST(Orchestra, EachInstrumentSoundsFiniteAtBothEndsOfEveryParameter) {
 }
 
 TEST(Orchestra, UnknownInstrumentNamesTheKnownOnes) {
-    const std::string message = message_of([] { audio::Performance(kOrchestra, {voice("gong")}); });
+    const std::string message = error_of([] { audio::Performance(kOrchestra, {voice("gong")}); });
     EXPECT_NE(message.find("`gong`"), message.npos) << message;
     EXPECT_NE(message.find("drum, bell, string, cymbal"), message.npos) << message;
 }
 
 TEST(Orchestra, UnknownRepeatedOrOutOfRangeParametersAreRuntimeErrorsThatSayWhatIsExpected) {
-    const auto message = message_of([] { audio::Performance(kOrchestra, {voice("bell", {{"pitch", 3}})}); });
+    const auto message = error_of([] { audio::Performance(kOrchestra, {voice("bell", {{"pitch", 3}})}); });
     EXPECT_NE(message.find("`pitch`"), message.npos) << message;
     EXPECT_NE(message.find("frequency_hz, decay_s"), message.npos) << message;
     const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -105,20 +105,20 @@ TEST(Orchestra, PanOrGainOutOfRangeIsARuntimeError) {
 }
 
 TEST(Orchestra, AMissingFileIsARuntimeErrorWithItsName) {
-    const std::string message = message_of([] { audio::Performance("no/such.orc", {}); });
+    const std::string message = error_of([] { audio::Performance("no/such.orc", {}); });
     EXPECT_NE(message.find("no/such.orc"), message.npos);
 }
 
 TEST_F(OwnOrchestra, AFileThatDoesNotCompileIsARuntimeErrorWithCsoundsMessage) {
     const auto file = write("instr one\n a1 nosuchopcode 3\nendin\n");
-    const std::string message = message_of([&] { audio::Performance(file, {}); });
+    const std::string message = error_of([&] { audio::Performance(file, {}); });
     EXPECT_NE(message.find(file.string()), message.npos) << message;
     EXPECT_NE(message.find("nosuchopcode"), message.npos) << message;
 }
 
 TEST_F(OwnOrchestra, AnotherSampleRateIsARuntimeError) {
     const auto file = write("instr one\nendin\n", "sr = 44100\nksmps = 64\n");
-    const std::string message = message_of([&] { audio::Performance(file, {}); });
+    const std::string message = error_of([&] { audio::Performance(file, {}); });
     EXPECT_NE(message.find("44100"), message.npos) << message;
 }
 
@@ -151,7 +151,7 @@ TEST_F(OwnOrchestra, AnInstrumentThatFailsIsReportedByFinishAndTheProgramGoesOn)
 
 TEST(OrchestraParser, BadLinesAreReportedWithFileAndLine) {
     const auto parse = [](const char* text) {
-        return message_of([=] { (void)audio::parse_instruments(text, "x.orc"); });
+        return error_of([=] { (void)audio::parse_instruments(text, "x.orc"); });
     };
     EXPECT_EQ(parse("sr = 1\n;@ drum\n").find("x.orc:2:1: error: found parameter ``, expected"), 0U);
     EXPECT_EQ(parse(";@ 1drum a 1 0 2\n").find("x.orc:1:1: error: found instrument `1drum`"), 0U);

@@ -16,10 +16,10 @@ namespace {
 
 using namespace rendering;
 
-audio::Note stroke(std::uint64_t id, std::int64_t onset, int velocity) {
+audio::Note stroke_at(std::uint64_t id, std::int64_t onset, int velocity) {
     return note(id, onset, 8 * std::pow(velocity / 127.0, 1 / 0.7));
 }
-audio::Voice sampled(const std::filesystem::path& file) {
+audio::Voice sampled_file(const std::filesystem::path& file) {
     audio::Voice made = voice("drum", {}, 0);
     made.samples = samples_of(file);
     return made;
@@ -53,7 +53,7 @@ void write_drumgizmo(const SampleFolder& folder) {
 TEST(SoundFont, LayersOfTheDrumPresetAreHeardFromTheOnset) {
     const SampleFolder folder;
     const auto file = folder.text("one.sf2", sound_font());
-    const auto sound = left(render({sampled(file)}, {stroke(1, 1001, 127), stroke(2, 3003, 40)}));
+    const auto sound = left(render({sampled_file(file)}, {stroke_at(1, 1001, 127), stroke_at(2, 3003, 40)}));
     EXPECT_EQ(sound.at(1000), 0);
     for (int i = 0; i < 200; ++i)
         ASSERT_EQ(sound.at(1001 + static_cast<std::size_t>(i)), (16384 - 64 * i) / 32768.0);
@@ -69,7 +69,7 @@ TEST(SoundFont, ALoopGoesOnThroughTheRelease) {
     std::string font = sound_font();
     const std::size_t zone = font.find("igen") + 8 + 3 * 4;
     font.replace(zone, 8, std::string("\x36\0\1\0\x26\0\0\0", 8));
-    const auto sound = left(render({sampled(folder.text("loop.sf2", font))}, {stroke(1, 1000, 127)}));
+    const auto sound = left(render({sampled_file(folder.text("loop.sf2", font))}, {stroke_at(1, 1000, 127)}));
     for (int i = 0; i < 600; ++i) {
         const double level = (16384 - 64 * (i % 200)) / 32768.0;
         ASSERT_NEAR(sound.at(1000 + static_cast<std::size_t>(i)),
@@ -81,9 +81,9 @@ TEST(SoundFont, ALoopGoesOnThroughTheRelease) {
 TEST(DrumGizmo, MainChannelsOfTheMappedInstrumentAreHeardInTheirPlaces) {
     const SampleFolder folder;
     write_drumgizmo(folder);
-    audio::Voice snare = sampled(folder / "kit.xml");
+    audio::Voice snare = sampled_file(folder / "kit.xml");
     snare.pan = 0.5;
-    const auto sound = render({snare}, {stroke(1, 100, 127), stroke(2, 2000, 10)});
+    const auto sound = render({snare}, {stroke_at(1, 100, 127), stroke_at(2, 2000, 10)});
     const double centre = std::sqrt(0.5);
     EXPECT_NEAR(sound.at(200), 0.5 * centre, 1e-7);   // left: the first channel
     EXPECT_NEAR(sound.at(201), 0.25 * centre, 1e-7);  // right: the second

@@ -11,7 +11,7 @@ namespace {
 
 using namespace rendering;
 
-std::vector<double> strike(const audio::Voice& sound, double speed, double place = 0.3, int zone = 0) {
+std::vector<double> struck(const audio::Voice& sound, double speed, double place = 0.3, int zone = 0) {
     return left(render({sound}, {note(1, 0, speed, 0, place, zone)}, 48000));
 }
 
@@ -62,7 +62,7 @@ TEST_P(Sound, LoudnessRisesWithSpeedByAbout40DbFrom0Point2To8MetresASecond) {
     double before = -1000;
     std::vector<double> levels;
     for (const double speed : {0.2, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 5.0, 8.0}) {
-        levels.push_back(loudness_db(strike(voice(GetParam()), speed)));
+        levels.push_back(loudness_db(struck(voice(GetParam()), speed)));
         EXPECT_GT(levels.back(), before + 1) << speed << " m/s";
         before = levels.back();
     }
@@ -74,7 +74,7 @@ TEST_P(Sound, LoudnessRisesWithSpeedByAbout40DbFrom0Point2To8MetresASecond) {
 TEST_P(Sound, BrightnessRisesWithSpeed) {
     double before = 0;
     for (const double speed : {0.3, 1.0, 3.0, 8.0}) {
-        const double centroid = centroid_hz(strike(voice(GetParam()), speed));
+        const double centroid = centroid_hz(struck(voice(GetParam()), speed));
         EXPECT_GT(centroid, before * 1.01) << speed << " m/s";
         before = centroid;
     }
@@ -109,7 +109,7 @@ TEST_P(Sound, EndsInExactSilenceWithoutAStep) {
 }
 
 TEST_P(Sound, HasNoOffset) {
-    const auto sound = strike(voice(GetParam()), 5);
+    const auto sound = struck(voice(GetParam()), 5);
     double sum = 0, peak = 0;
     for (const double x : sound) sum += x, peak = std::max(peak, std::abs(x));
     EXPECT_LT(std::abs(sum) / static_cast<double>(sound.size()),
@@ -117,9 +117,9 @@ TEST_P(Sound, HasNoOffset) {
 }
 
 TEST_P(Sound, ZonesAndPlacesDiffer) {
-    const auto plain = strike(voice(GetParam()), 3, 0.2);
-    EXPECT_NE(plain, strike(voice(GetParam()), 3, 0.9));
-    EXPECT_EQ(plain == strike(voice(GetParam()), 3, 0.2, 1),
+    const auto plain = struck(voice(GetParam()), 3, 0.2);
+    EXPECT_NE(plain, struck(voice(GetParam()), 3, 0.9));
+    EXPECT_EQ(plain == struck(voice(GetParam()), 3, 0.2, 1),
               GetParam() == "string");  // a string has one zone
 }
 
@@ -130,11 +130,11 @@ TEST(Pitch, BellsAndStringsAreWithin2CentsFrom55To4000Hz) {
     for (const double frequency : {55.0, 110.0, 261.6256, 997.0, 2093.0, 3951.07}) {
         for (const double set : {0.0, 1.0, 2.0, 3.0}) {
             const auto bell =
-                strike(voice("bell", {{"frequency_hz", frequency}, {"decay_s", 6}, {"partials", set}}), 2);
+                struck(voice("bell", {{"frequency_hz", frequency}, {"decay_s", 6}, {"partials", set}}), 2);
             EXPECT_NEAR(cents_off(bell, 4800, 14400, frequency), 0, 2)
                 << "bell " << set << ", " << frequency << " Hz";
         }
-        const auto string = strike(voice("string", {{"frequency_hz", frequency}, {"decay_s", 4}}), 2);
+        const auto string = struck(voice("string", {{"frequency_hz", frequency}, {"decay_s", 4}}), 2);
         EXPECT_NEAR(cents_off(string, 4800, 14400, frequency), 0, 2) << "string, " << frequency << " Hz";
     }
 }
@@ -142,7 +142,7 @@ TEST(Pitch, BellsAndStringsAreWithin2CentsFrom55To4000Hz) {
 TEST(Pitch, StringPartialsFollowTheStiffStringLawWithin2Cents) {
     const double f = 220, b = 0.0005;
     const auto sound =
-        strike(voice("string", {{"frequency_hz", f}, {"inharmonicity", b}, {"damping", 0.2}}), 5);
+        struck(voice("string", {{"frequency_hz", f}, {"inharmonicity", b}, {"damping", 0.2}}), 5);
     for (const int n : {2, 3, 5}) {
         const double expected = n * f * std::sqrt((1 + b * n * n) / (1 + b));
         EXPECT_NEAR(cents_off(sound, 4800, 9600, expected), 0, 2) << "partial " << n;
@@ -152,17 +152,17 @@ TEST(Pitch, StringPartialsFollowTheStiffStringLawWithin2Cents) {
 TEST(Pitch, DrumsSettleWithin10CentsAndStartHigherWhenStruckHarder) {
     for (const double frequency : {55.0, 120.0, 300.0}) {
         const auto drum = voice("drum", {{"frequency_hz", frequency}, {"decay_s", 2}, {"bend_cents", 100}});
-        const auto hard = strike(drum, 8, 0.0), soft = strike(drum, 0.5, 0.0);
+        const auto hard = struck(drum, 8, 0.0), soft = struck(drum, 0.5, 0.0);
         EXPECT_NEAR(cents_off(hard, 28800, 9600, frequency), 0, 10) << frequency;
         EXPECT_NEAR(cents_off(soft, 28800, 9600, frequency), 0, 10) << frequency;
     }
     const auto drum = voice("drum", {{"frequency_hz", 300}, {"decay_s", 2}, {"bend_cents", 100}});
-    EXPECT_GT(cents_off(strike(drum, 8, 0), 480, 2400, 300),
-              cents_off(strike(drum, 1, 0), 480, 2400, 300) + 20);
+    EXPECT_GT(cents_off(struck(drum, 8, 0), 480, 2400, 300),
+              cents_off(struck(drum, 1, 0), 480, 2400, 300) + 20);
 }
 
 TEST(Pitch, KettledrumSoundsItsPrincipalToneFifthAndOctave) {
-    const auto sound = strike(
+    const auto sound = struck(
         voice("drum", {{"frequency_hz", 110}, {"kettle", 1}, {"decay_s", 4}, {"bend_cents", 0}}), 3, 0.8);
     for (const double ratio : {1.0, 1.5, 1.98, 2.44})
         EXPECT_NEAR(cents_off(sound, 4800, 19200, 110 * ratio), 0, 10) << ratio;
@@ -173,7 +173,7 @@ TEST(StruckPlace, TheCentreOfADrumHasNoNodalDiameters) {
         voice("drum", {{"bend_cents", 0}, {"decay_s", 3}, {"frequency_hz", 200}, {"attack", 0}});
     const double f11 = 200 * 3.831706 / 2.404826;  // mode (1,1)
     const auto share = [&](double place) {
-        const auto sound = strike(drum, 3, place);
+        const auto sound = struck(drum, 3, place);
         return std::abs(fourier(sound, 0, 19200, f11)) / std::abs(fourier(sound, 0, 19200, 200));
     };
     EXPECT_LT(share(0), 0.15 * share(0.7));
@@ -181,13 +181,13 @@ TEST(StruckPlace, TheCentreOfADrumHasNoNodalDiameters) {
 
 TEST(StruckPlace, AStringStruckAtHalfItsLengthLacksEvenPartials) {
     const auto sound =
-        strike(voice("string", {{"strike_point", 0.5}, {"attack", 0}, {"inharmonicity", 0}}), 3, 0);
+        struck(voice("string", {{"strike_point", 0.5}, {"attack", 0}, {"inharmonicity", 0}}), 3, 0);
     EXPECT_LT(std::abs(fourier(sound, 0, 19200, 440)), 0.01 * std::abs(fourier(sound, 0, 19200, 220)));
 }
 
 TEST(Decay, TheFirstPartialFallsBy60DbInDecaySeconds) {
     for (const double decay : {0.5, 2.0}) {
-        const auto sound = strike(voice("string", {{"decay_s", decay}, {"attack", 0}}), 5);
+        const auto sound = struck(voice("string", {{"decay_s", decay}, {"attack", 0}}), 5);
         const double early = std::abs(fourier(sound, 4800, 4800, 220)),
                      late = std::abs(fourier(sound, 14400, 4800, 220));
         EXPECT_NEAR(20 * std::log10(early / late), 60 * 0.2 / decay, 0.1);  // 0.2 s apart

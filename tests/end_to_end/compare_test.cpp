@@ -28,13 +28,13 @@ TEST(Compare, TwoBundledTracesGiveTheSameFilesTwiceAndSayWhichPredictorWins) {
     EXPECT_NE(first.out.find("errs least"), std::string::npos);
     EXPECT_EQ(first.out, second.out);
     EXPECT_EQ(read_tree(folder / "a", {}), read_tree(folder / "b", {}));
-    const auto json = nlohmann::json::parse(read(folder / "a" / "compare.json"));
+    const auto document = nlohmann::json::parse(read(folder / "a" / "compare.json"));
     std::map<std::string, int> rows;
-    for (const auto& row : json["results"]) ++rows[row["predictor"]];
+    for (const auto& row : document["results"]) ++rows[row["predictor"]];
     for (const char* predictor :
          {"difference", "thesis", "cv", "singer:alpha=3,q=1e10", "naive", "cv*", "naive*"})
         EXPECT_EQ(rows[predictor], 2 * 2 * 2) << predictor;  // two traces of two sticks at two leads
-    EXPECT_EQ(read_csv(folder / "a" / "compare.csv").size(), json["results"].size());
+    EXPECT_EQ(read_csv(folder / "a" / "compare.csv").size(), document["results"].size());
 }
 
 TEST(Compare, WhatPredictWroteScoresAsThePredictorItself) {
@@ -60,8 +60,8 @@ TEST(Compare, WhatPredictWroteScoresAsThePredictorItself) {
     ASSERT_EQ(compared.status, 0) << compared.err;
     std::map<std::string, double> rms, tip;
     int rows = 0;
-    const auto json = nlohmann::json::parse(read(folder / "out" / "compare.json"));
-    for (const auto& row : json["results"]) {
+    const auto document = nlohmann::json::parse(read(folder / "out" / "compare.json"));
+    for (const auto& row : document["results"]) {
         rows += row["predictor"] == "mine";
         if (row["trace"] != roll || row["lead_s"].get<double>() < 0.05 || row["stick"] != "right") continue;
         rms[row["predictor"]] = row["rms_mm"];
@@ -94,9 +94,9 @@ TEST(Compare, AnExperimentRepeatsItFromAnywhereAndRefusesOtherBytes) {
     EXPECT_EQ(read_tree(folder / "a", {}), read_tree(folder / "b", {}));
 
     // Of what it says of itself.
-    const auto json = nlohmann::json::parse(read(folder / "a" / "compare.json"));
+    const auto document = nlohmann::json::parse(read(folder / "a" / "compare.json"));
     std::set<std::string> inputs;
-    for (const auto& input : json["inputs"]) inputs.insert(fs::path(input["file"]).filename());
+    for (const auto& input : document["inputs"]) inputs.insert(fs::path(input["file"]).filename());
     EXPECT_EQ(inputs,
               (std::set<std::string>{"general.model", "mine.csv", "flourish.csv", "feints.csv", "roll.csv"}));
     std::map<std::string, std::pair<double, int>> squares;
@@ -108,7 +108,7 @@ TEST(Compare, AnExperimentRepeatsItFromAnywhereAndRefusesOtherBytes) {
             std::stod(row.at("error_mm")), 2e-4)
             << "four digits";
     }
-    for (const auto& row : json["results"]) {
+    for (const auto& row : document["results"]) {
         const auto& [sum, count] =
             squares.at(row["trace"].get<std::string>() + row["stick"].get<std::string>() +
                        row["predictor"].get<std::string>());

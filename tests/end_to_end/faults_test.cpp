@@ -25,9 +25,9 @@ long stride() {
 /// A product that holds times: only its shape is the same on every run.
 std::string shape_of(const std::string& name, const std::string& text) {
     if (name.ends_with(".json")) {
-        const auto json = nlohmann::json::parse(text, nullptr, false);
-        std::string keys = json.is_discarded() ? "broken" : "";
-        for (const auto& [key, value] : json.items()) keys += key + " ";
+        const auto document = nlohmann::json::parse(text, nullptr, false);
+        std::string keys = document.is_discarded() ? "broken" : "";
+        for (const auto& [key, value] : document.items()) keys += key + " ";
         return keys;
     }
     if (name == "times.csv" ||

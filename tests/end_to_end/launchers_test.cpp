@@ -20,7 +20,7 @@ const std::string kScene =
     "[[body]]\nname = \"b\"\nradius = 0.5\nfidelity = \"rigid\"\nposition = [0, 1, 0]\n"
     "grid = { count = [2, 2, 2], step = [1.2, 1.2, 1.2] }\n[[plane]]\n";
 
-const std::string kProgram = std::string("MUSICWORLD=") + MUSICWORLD_PROGRAM;
+const std::string kProgramPath = std::string("MUSICWORLD=") + MUSICWORLD_PROGRAM;
 
 std::string launcher(const std::string& name) {
     return bundled("launchers/" + name).string();
@@ -60,7 +60,7 @@ TEST(Launchers, TheSshScriptRunsASceneWithAWorkerAHost) {
     write_program(folder / "ssh", "while [ \"$1\" = -o ]; do shift 2; done\nshift\nexec sh -c \"$*\"\n");
     const Ended ended =
         run_command({"bash", launcher("ssh.sh"), folder / "scene.toml", folder / "out", "first", "second"},
-                    {"PATH=" + (folder / "").string() + ":/usr/bin:/bin", kProgram, "ADDRESS=127.0.0.1",
+                    {"PATH=" + (folder / "").string() + ":/usr/bin:/bin", kProgramPath, "ADDRESS=127.0.0.1",
                      "PORT=" + port()});
     expect_two_workers(ended, folder / "out");
 }
@@ -73,7 +73,7 @@ TEST(Launchers, TheSlurmScriptRunsASceneWithAWorkerATask) {
                   "for task in $(seq $SLURM_NTASKS); do \"$@\" & done\nwait\n");
     const Ended ended = run_command(
         {"bash", launcher("slurm.sh"), folder / "scene.toml", folder / "out"},
-        {"PATH=" + (folder / "").string() + ":/usr/bin:/bin", kProgram,
+        {"PATH=" + (folder / "").string() + ":/usr/bin:/bin", kProgramPath,
          "SLURM_JOB_ID=" + std::to_string(getpid()), "SLURM_NTASKS=2", "SLURMD_NODENAME=127.0.0.1"});
     expect_two_workers(ended, folder / "out");
     EXPECT_FALSE(fs::exists(folder / ("out/keys-" + std::to_string(getpid()))));  // keys go with the job

@@ -29,18 +29,19 @@ Json json_of(const std::vector<std::string>& arguments) {
 }
 
 TEST(Modes, JsonHasTheKeysOfTheContractAndAll81EigenvaluesOfOneElement) {
-    const Json json = json_of(modes_of("1,2,3", {"--json"}));
-    EXPECT_EQ(json["size_m"], Json({1.0, 2.0, 3.0}));
-    EXPECT_EQ(json["young_pa"], 1.0);
-    EXPECT_EQ(json["poisson"], 0.3);
-    EXPECT_EQ(json["density_kg_m3"], 1.0);
-    EXPECT_EQ(json["elements_per_side"], 1);
-    const std::vector<double> eigenvalues = json["eigenvalues_rad2_s2"], frequencies = json["frequencies_hz"],
-                              errors = json["discretisation_error"];
+    const Json document = json_of(modes_of("1,2,3", {"--json"}));
+    EXPECT_EQ(document["size_m"], Json({1.0, 2.0, 3.0}));
+    EXPECT_EQ(document["young_pa"], 1.0);
+    EXPECT_EQ(document["poisson"], 0.3);
+    EXPECT_EQ(document["density_kg_m3"], 1.0);
+    EXPECT_EQ(document["elements_per_side"], 1);
+    const std::vector<double> eigenvalues = document["eigenvalues_rad2_s2"],
+                              frequencies = document["frequencies_hz"],
+                              errors = document["discretisation_error"];
     ASSERT_EQ(eigenvalues.size(), 81U);
     ASSERT_EQ(frequencies.size(), 81U);
     ASSERT_EQ(errors.size(), 81U);
-    ASSERT_EQ(json["kinds"].size(), 81U);
+    ASSERT_EQ(document["kinds"].size(), 81U);
     EXPECT_TRUE(std::is_sorted(eigenvalues.begin(), eigenvalues.end()));
     for (std::size_t i = 0; i < 6; ++i) EXPECT_LT(std::abs(eigenvalues[i]), 1e-12 * eigenvalues.back());
     for (std::size_t i = 6; i < 81; ++i) {
@@ -67,11 +68,11 @@ TEST(Modes, EigenvaluesAreThoseOfTheReferenceTo1em9) {
 }
 
 TEST(Modes, CountSaysWhatItCutAndFractionsAreNumbers) {
-    const Json json = json_of(modes_of("1/2,1/2,1/2", {"--json", "--count", "12"}));
-    EXPECT_EQ(json["eigenvalues_rad2_s2"].size(), 18U);
-    EXPECT_EQ(json["cut"], Json({{"count", 12}, {"below", 11}, {"above", 14}}));
+    const Json document = json_of(modes_of("1/2,1/2,1/2", {"--json", "--count", "12"}));
+    EXPECT_EQ(document["eigenvalues_rad2_s2"].size(), 18U);
+    EXPECT_EQ(document["cut"], Json({{"count", 12}, {"below", 11}, {"above", 14}}));
     // 12 G / (rho L^2)
-    EXPECT_NEAR(json["eigenvalues_rad2_s2"][6].get<double>(), 12 / 2.6 / 0.25, 1e-10);
+    EXPECT_NEAR(document["eigenvalues_rad2_s2"][6].get<double>(), 12 / 2.6 / 0.25, 1e-10);
     const Ended table = run(modes_of("1/2,1/2,1/2", {"--count", "12"}));
     EXPECT_NE(table.out.find("whole groups end at 11 and 14"), std::string::npos) << table.out;
     EXPECT_NE(table.out.find("stretching"), std::string::npos);
@@ -80,11 +81,11 @@ TEST(Modes, CountSaysWhatItCutAndFractionsAreNumbers) {
 
 // A sphere's five lowest modes are Lamb's torsional ones: omega R sqrt(rho / G) = 2.5011.
 TEST(Modes, EstimatedErrorOfASphereLeadsToLambsFrequency) {
-    const Json json =
+    const Json document =
         json_of(modes_of("2,2,2", {"--json", "--shape", "ellipsoid", "--elements", "2", "--count", "5"}));
     const double exact = 2.50113 * std::sqrt(1 / 2.6) / (2 * M_PI);
     for (std::size_t i = 6; i < 11; ++i) {
-        const double frequency = json["frequencies_hz"][i], error = json["discretisation_error"][i];
+        const double frequency = document["frequencies_hz"][i], error = document["discretisation_error"][i];
         EXPECT_NEAR(frequency / (1 + error) / exact, 1, 2e-3) << error;
         EXPECT_GT(error, 1e-3);
     }

@@ -14,12 +14,6 @@ namespace end_to_end {
 namespace fs = std::filesystem;
 namespace {
 
-const std::string kExample = "exec:python3 '" + bundled("predictors/difference.py").string() + "'";
-
-bool has_python() {
-    return std::system("python3 -c '' 2>/dev/null") == 0;
-}
-
 using Rows = std::vector<std::map<std::string, std::string>>;
 
 void expect_near(const Rows& own, const Rows& external, double tolerance) {
@@ -44,7 +38,7 @@ TEST(Predictors, TheExampleInPythonPredictsAndPlaysLikeDifference) {
     const std::string trace = (folder / "trace.csv").string();
     write(trace, cut_trace(read(bundled("traces/flourish.csv")), 2));
     for (const auto& [name, predictor] :
-         {std::pair<std::string, std::string>{"own", "difference"}, {"external", kExample}}) {
+         {std::pair<std::string, std::string>{"own", "difference"}, {"external", python_example()}}) {
         const std::string rows = (folder / (name + ".csv")).string();
         const Ended predicted =
             run({"predict", trace, "--predictor", predictor, "--lead", "1/15", "--out", rows});

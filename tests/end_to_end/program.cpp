@@ -208,4 +208,12 @@ fs::path bundled(const std::string& name) {
     return fs::path(MUSICWORLD_SOURCE_DIR) / "assets" / name;
 }
 
+bool has_python() {
+    return std::system("python3 -c '' 2>/dev/null") == 0;
+}
+
+std::string python_example() {
+    return "exec:python3 '" + bundled("predictors/difference.py").string() + "'";
+}
+
 }  // namespace end_to_end

@@ -67,4 +67,7 @@ std::pair<double, double> time_span(const std::string& text);
 
 std::filesystem::path bundled(const std::string& name);  ///< a file of assets/
 
+bool has_python();
+std::string python_example();  ///< a predictor: the bundled example in Python
+
 }  // namespace end_to_end

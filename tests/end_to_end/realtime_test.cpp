@@ -24,7 +24,7 @@ std::vector<std::string> in_time(const std::string& command, const fs::path& out
 }
 
 /// The processes of `musicworld sensor` that a process has started.
-std::vector<int> sensors_of(int parent) {
+std::vector<int> sensors_below(int parent) {
     std::vector<int> found;
     std::error_code error;
     for (const fs::directory_entry& entry : fs::directory_iterator("/proc", error)) {
@@ -89,9 +89,9 @@ TEST(Realtime, AKilledSensorIsStartedAgainAndThePlayGoesOn) {
     const Folder folder;
     Started started(in_time("play", folder / "played", {"--realtime", "--seconds", "6", "--no-frames"}),
                     folder / "");
-    ASSERT_TRUE(happens([&] { return sensors_of(started.pid()).size() == 2; }));
+    ASSERT_TRUE(happens([&] { return sensors_below(started.pid()).size() == 2; }));
     std::this_thread::sleep_for(std::chrono::milliseconds(2500));
-    const std::vector<int> sensors = sensors_of(started.pid());
+    const std::vector<int> sensors = sensors_below(started.pid());
     ASSERT_EQ(sensors.size(), 2U);
     kill(sensors[0], SIGKILL);
     const Ended ended = started.wait();
@@ -103,18 +103,12 @@ TEST(Realtime, AKilledSensorIsStartedAgainAndThePlayGoesOn) {
         << read(folder / "played/departures.csv");
 }
 
-const std::string kExample = "exec:python3 '" + bundled("predictors/difference.py").string() + "'";
-
-bool has_python() {
-    return std::system("python3 -c '' 2>/dev/null") == 0;
-}
-
 TEST(Realtime, APredictorOfOnesOwnStrikesAsOfflineButForDelays) {
     if (!has_python()) GTEST_SKIP() << "needs python3";
     const Folder folder;
     const Ended ended =
         run(in_time("play", folder / "played",
-                    {"--realtime", "--seconds", "2.5", "--no-frames", "--predictor", kExample}));
+                    {"--realtime", "--seconds", "2.5", "--no-frames", "--predictor", python_example()}));
     ASSERT_EQ(ended.status, 0) << ended.err;
     const Json summary = Json::parse(read(folder / "played/summary.json"));
     EXPECT_GT(summary.at("strikes").at("released"), 0);
@@ -164,7 +158,7 @@ TEST(Realtime, InterruptedItFinishesWhatItHas) {
     const Folder folder;
     Started started(in_time("play", folder / "played", {"--realtime", "--seconds", "60", "--no-frames"}),
                     folder / "");
-    ASSERT_TRUE(happens([&] { return sensors_of(started.pid()).size() == 2; }));
+    ASSERT_TRUE(happens([&] { return sensors_below(started.pid()).size() == 2; }));
     std::this_thread::sleep_for(std::chrono::milliseconds(2500));
     kill(started.pid(), SIGINT);
     const Ended ended = started.wait();
@@ -179,8 +173,8 @@ TEST(Realtime, AProgramThatIsKilledLeavesNoProcessAndNoMemoryBehind) {
     const Folder folder;
     Started started(in_time("play", folder / "played", {"--realtime", "--seconds", "60", "--no-frames"}),
                     folder / "");
-    ASSERT_TRUE(happens([&] { return sensors_of(started.pid()).size() == 2; }));
-    const std::vector<int> sensors = sensors_of(started.pid());
+    ASSERT_TRUE(happens([&] { return sensors_below(started.pid()).size() == 2; }));
+    const std::vector<int> sensors = sensors_below(started.pid());
     kill(started.pid(), SIGKILL);
     (void)started.wait();
     for (const int sensor : sensors) EXPECT_TRUE(happens([&] { return !alive(sensor); })) << sensor;

@@ -27,7 +27,7 @@ std::string box_obj() {
     return mesh.text();
 }
 
-std::string ball_obj() {
+std::string sphere_obj() {
     meshgen::ObjMesh mesh{"ball", {}};
     meshgen::sphere(mesh.part("ball"), {0, 0, 0}, 1, 96);
     return mesh.text();
@@ -114,7 +114,7 @@ void expect_box_silhouette(render::Renderer& renderer, const Affine3f& world_fro
 
 TEST(Picture, ABallOfRadius40CentimetresAt3MetresCoversTheDiscOfItsTangentCone) {
     const TemporaryFolder folder;
-    render::Renderer renderer(silhouette_scene({folder.write("ball.obj", ball_obj())}));
+    render::Renderer renderer(silhouette_scene({folder.write("ball.obj", sphere_obj())}));
     const Affine3f place = Eigen::Translation3f(0, 1, 0) * Eigen::Scaling(0.4f);
     const double radius = kFocal * 0.4 / std::sqrt(3.0 * 3.0 - 0.4 * 0.4);
     const double area = std::numbers::pi * radius * radius;

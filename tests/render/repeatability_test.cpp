@@ -8,12 +8,12 @@
 
 namespace {
 
-const std::string kMeshes = MUSICWORLD_SOURCE_DIR "/assets/meshes/";
+const std::string kMeshFolder = MUSICWORLD_SOURCE_DIR "/assets/meshes/";
 
 render::SceneDescription small_kit() {
     render::SceneDescription scene;
     for (const char* name : {"drum", "cymbal", "stick", "stand"})
-        scene.objects.push_back({name, kMeshes + name + ".obj", {}});
+        scene.objects.push_back({name, kMeshFolder + name + ".obj", {}});
     scene.objects[1].look.body = {{0.8f, 0.5f, 0.2f}, 1, 0.3f, 0.8f};
     scene.width = 240;
     scene.height = 180;

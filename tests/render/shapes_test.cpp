@@ -12,7 +12,7 @@
 
 namespace {
 
-const std::string kMeshes = MUSICWORLD_SOURCE_DIR "/assets/meshes/";
+const std::string kAssets = MUSICWORLD_SOURCE_DIR "/assets/meshes/";
 
 using Place = std::array<long, 3>;  // tenths of a micrometre
 
@@ -22,7 +22,7 @@ Place place(const Eigen::Vector3d& v) {
 
 TEST(Shapes, TheCommittedFilesAreTheGeneratorsOutputByteForByte) {
     for (const meshgen::ObjMesh& mesh : meshgen::all_shapes()) {
-        std::ifstream file(kMeshes + mesh.name + ".obj", std::ios::binary);
+        std::ifstream file(kAssets + mesh.name + ".obj", std::ios::binary);
         std::ostringstream bytes;
         bytes << file.rdbuf();
         EXPECT_TRUE(bytes.str() == mesh.text())
@@ -80,7 +80,7 @@ TEST(Shapes, TheFilesLoadWithTheirPartsAndStayWithinTheirTriangles) {
                                                                 {"stick", {"wood", "tip"}},
                                                                 {"mallet", {"wood", "tip"}}};
     for (const auto& [name, expected] : parts) {
-        const render::Mesh mesh = render::load_mesh(kMeshes + name + ".obj");
+        const render::Mesh mesh = render::load_mesh(kAssets + name + ".obj");
         std::set<std::string> names;
         for (const render::MeshPart& part : mesh.parts) names.insert(part.material);
         EXPECT_EQ(names, expected);
@@ -91,7 +91,7 @@ TEST(Shapes, TheFilesLoadWithTheirPartsAndStayWithinTheirTriangles) {
 TEST(Shapes, InstrumentsFillTheUnitCubeAndNothingMore) {
     constexpr float kText = 1e-6f;  // six decimals
     for (const char* name : {"drum", "cymbal", "bar", "string", "string_frame", "bell"}) {
-        const Eigen::AlignedBox3f bounds = render::load_mesh(kMeshes + name + ".obj").bounds();
+        const Eigen::AlignedBox3f bounds = render::load_mesh(kAssets + name + ".obj").bounds();
         EXPECT_LE(bounds.max().maxCoeff(), 1 + kText) << name;
         EXPECT_GE(bounds.min().minCoeff(), -1 - kText) << name;
         if (std::string(name) == "bell") continue;  // smaller: it is open below
@@ -114,14 +114,14 @@ TEST(Shapes, TheBeadsCentreIs40CentimetresBeforeTheHandAndItsRadius6Or20Millimet
                 EXPECT_NEAR((position - Eigen::Vector3d(0, 0, -0.40)).norm(), radius, 1e-12);
             }
         }
-        const render::Mesh loaded = render::load_mesh(kMeshes + mesh.name + ".obj");
+        const render::Mesh loaded = render::load_mesh(kAssets + mesh.name + ".obj");
         EXPECT_NEAR(loaded.bounds().max().z(), 0.06, 1e-6);
         EXPECT_NEAR(loaded.bounds().min().z(), -0.40 - radius, 1e-6);
     }
 }
 
 TEST(Shapes, TheStandReachesFromTheOriginToFeetOfRadius25CentimetresOneBelow) {
-    const Eigen::AlignedBox3f bounds = render::load_mesh(kMeshes + "stand.obj").bounds();
+    const Eigen::AlignedBox3f bounds = render::load_mesh(kAssets + "stand.obj").bounds();
     EXPECT_NEAR(bounds.max().y(), 0, 1e-6);
     EXPECT_NEAR(bounds.min().y(), -1, 1e-6);
     double reach = 0;

@@ -17,10 +17,10 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr const char* kFilter = "cv:q=1e7,decay=8,r=0.5,gate=5";
-const Vector3d kShaft = Vector3d::UnitY();
+const Vector3d kShaftAxis = Vector3d::UnitY();
 
 Arbitrated arbitrated(const PathModel& model, double memory_s = 0) {
-    return {make_predictor(kFilter), model, kShaft, memory_s};
+    return {make_predictor(kFilter), model, kShaftAxis, memory_s};
 }
 
 /// Right for constant velocity upwards: takes the fading back.

@@ -64,7 +64,7 @@ std::string replay(const std::vector<Frame>& frames) {
     return replay(frames, static_cast<std::uint32_t>(frames.size()));
 }
 
-void expect_refused(const std::string& bytes, const std::string& start, const std::string& found) {
+void expect_replay_refused(const std::string& bytes, const std::string& start, const std::string& found) {
     try {
         static_cast<void>(parse_trace(bytes, "r.bsor"));
         FAIL() << "read: " << found;
@@ -128,24 +128,25 @@ TEST(Bsor, FaultsAreRefusedWithTheirByte) {
     const std::size_t frames = good.size() - 5 - 2 * 92;
     std::string bytes = good;
     bytes[4] = 2;
-    expect_refused(bytes, "r.bsor:byte 4: error: found format version 2", "expected version 1");
-    expect_refused(good.substr(0, frames + 100), "r.bsor:byte " + std::to_string(frames - 4) + ":",
-                   "2 frames");
-    expect_refused(good.substr(0, 9), "r.bsor:byte 9:", "end of the file");
-    expect_refused(replay({{1}, {2}}, 0xFFFFFFFFu), "r.bsor:byte " + std::to_string(frames - 4) + ":",
-                   "4294967295 frames");
+    expect_replay_refused(bytes, "r.bsor:byte 4: error: found format version 2", "expected version 1");
+    expect_replay_refused(good.substr(0, frames + 100), "r.bsor:byte " + std::to_string(frames - 4) + ":",
+                          "2 frames");
+    expect_replay_refused(good.substr(0, 9), "r.bsor:byte 9:", "end of the file");
+    expect_replay_refused(replay({{1}, {2}}, 0xFFFFFFFFu), "r.bsor:byte " + std::to_string(frames - 4) + ":",
+                          "4294967295 frames");
     bytes = good;
     bytes[6] = bytes[7] = bytes[8] = bytes[9] = '\xFF';
-    expect_refused(bytes, "r.bsor:byte 6:", "4294967295 bytes");
-    expect_refused(replay({{1}}), "r.bsor:byte ", "at least two");
-    expect_refused(replay({{1, std::nan("")}, {2}}), "r.bsor:byte " + std::to_string(frames + 64) + ":",
-                   "1000 m");
-    expect_refused(replay({{1, std::nan("")}, {1.01}}), "r.bsor:byte ", "1 frames after the start-up");
-    expect_refused(replay({{1, 2000}, {2, 2000}}), "r.bsor:byte " + std::to_string(frames + 64) + ":",
-                   "1000 m");
-    expect_refused(replay({{1, 0, 0.1}, {2, 0, 0.1}}), "r.bsor:byte " + std::to_string(frames + 76) + ":",
-                   "a quaternion");
-    expect_refused(replay({{1}, {std::nan("")}}), "r.bsor:byte " + std::to_string(frames + 92) + ":", "time");
+    expect_replay_refused(bytes, "r.bsor:byte 6:", "4294967295 bytes");
+    expect_replay_refused(replay({{1}}), "r.bsor:byte ", "at least two");
+    expect_replay_refused(replay({{1, std::nan("")}, {2}}),
+                          "r.bsor:byte " + std::to_string(frames + 64) + ":", "1000 m");
+    expect_replay_refused(replay({{1, std::nan("")}, {1.01}}), "r.bsor:byte ", "1 frames after the start-up");
+    expect_replay_refused(replay({{1, 2000}, {2, 2000}}), "r.bsor:byte " + std::to_string(frames + 64) + ":",
+                          "1000 m");
+    expect_replay_refused(replay({{1, 0, 0.1}, {2, 0, 0.1}}),
+                          "r.bsor:byte " + std::to_string(frames + 76) + ":", "a quaternion");
+    expect_replay_refused(replay({{1}, {std::nan("")}}), "r.bsor:byte " + std::to_string(frames + 92) + ":",
+                          "time");
 }
 
 TEST(Bsor, FiveHundredMutationsEachAreReadAsValidTracesOrRefusedWithTheirByte) {

@@ -19,7 +19,7 @@ using Eigen::Vector3d;
 constexpr double kNoise = 0.25e-3;   // r=0.25
 constexpr double kV0 = 1, kA0 = 10;  // v0=1000 and the default a0=1e4
 constexpr std::array<double, 3> kLeads = {0, 1.0 / 30, 1.0 / 15};
-constexpr double kStep = 1.0 / 60;
+constexpr double kPeriod = 1.0 / 60;
 
 /// Tells the filter the spread of the start: the first sample's own noise for the position.
 std::string with_start(const std::string& specification) {
@@ -51,7 +51,7 @@ const Case kExact[] = {{"cv:q=1e8", {{2, 0, 1e2}}},
 const Case kImm = {"imm:alpha=3,q1=1e9,q2=3e10,q3=1e12,rate=10", {{3, 3, 1e3}, {3, 3, 3e4}, {3, 3, 1e6}}, 10};
 
 double step_length(bool uneven, RandomStream& random) {
-    return uneven ? 0.002 + 0.03 * random.uniform() : kStep;
+    return uneven ? 0.002 + 0.03 * random.uniform() : kPeriod;
 }
 
 double square(const Vector3d& error, const Matrix3d& covariance) {
@@ -149,7 +149,7 @@ private:
     bool uneven_;
     RandomStream& random_;
     World world_;
-    double t_ = 3, last_dt_ = kStep;
+    double t_ = 3, last_dt_ = kPeriod;
     std::vector<double> innovation_;
     std::array<std::vector<double>, 3> position_, velocity_;
 };
@@ -216,15 +216,15 @@ std::vector<double> rotation_squares(const Case& c, double lead, std::size_t ste
     };
     std::vector<double> squares;
     for (std::size_t k = 0; k <= steps; ++k) {
-        PoseSample sample = position_sample(static_cast<double>(k) * kStep, Vector3d::Zero());
+        PoseSample sample = position_sample(static_cast<double>(k) * kPeriod, Vector3d::Zero());
         sample.has_orientation = true;
         sample.orientation = exponential(random.normal_vector(kNoise / kLever)) * q;
         (void)predictor->correct(sample);
-        const Quaterniond truth = turned(q, world.after(lead, kStep, random));
+        const Quaterniond truth = turned(q, world.after(lead, kPeriod, random));
         if (k > 0)
             squares.push_back(square(logarithm(truth * predictor->predict(lead).orientation.conjugate()),
                                      predictor->covariance(lead)->rotation));
-        world.advance(kStep, random);
+        world.advance(kPeriod, random);
         q = turned(q, world);
         world.x.row(0).setZero();
     }

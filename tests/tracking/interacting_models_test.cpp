@@ -14,8 +14,8 @@ using Real = long double;
 using Matrix = Eigen::Matrix<Real, 3, 3>;
 using Vector = Eigen::Matrix<Real, 3, 1>;
 
-constexpr Real kAlpha = 3, kRate = 10, kVariance = 0.25e-3L * 0.25e-3L;
-constexpr std::array<Real, 3> kDensity = {1e3L, 3e4L, 1e6L};
+constexpr Real kDecayRate = 3, kRate = 10, kVariance = 0.25e-3L * 0.25e-3L;
+constexpr std::array<Real, 3> kDensities = {1e3L, 3e4L, 1e6L};
 
 /// The docstring of InteractingModels word for word, with whole matrices for each axis and mode in long
 /// double, Q by quadrature.
@@ -59,9 +59,10 @@ public:
 
 private:
     static Matrix transition(Real dt) {
-        const Real e = std::exp(-kAlpha * dt);
+        const Real e = std::exp(-kDecayRate * dt);
         Matrix f;
-        f << 1, dt, (kAlpha * dt - 1 + e) / (kAlpha * kAlpha), 0, 1, (1 - e) / kAlpha, 0, 0, e;
+        f << 1, dt, (kDecayRate * dt - 1 + e) / (kDecayRate * kDecayRate), 0, 1, (1 - e) / kDecayRate, 0, 0,
+            e;
         return f;
     }
     /// The integral of r r^T over [0, dt], r the last column of F, by Gauss and Legendre's rule with five
@@ -101,7 +102,7 @@ private:
             }
             const Matrix f = transition(dt);
             mean = (f * mean).eval();
-            spread = (f * spread * f.transpose() + kDensity[j] * noise(dt)).eval();
+            spread = (f * spread * f.transpose() + kDensities[j] * noise(dt)).eval();
             const Real s = spread(0, 0) + kVariance, innovation = z - mean(0);
             const Vector k = spread.col(0) / s;
             likelihood[j] *= std::exp(-innovation * innovation / (2 * s)) / std::sqrt(s);

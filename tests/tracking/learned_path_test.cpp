@@ -17,7 +17,7 @@ using Eigen::AngleAxisd;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-const Vector3d kShaft(0, 1, 0);
+const Vector3d kAlongShaft(0, 1, 0);
 
 PoseSample sample_at(double t_s, const Vector3d& position, const Quaterniond& orientation) {
     return {t_s, position, orientation, true};
@@ -33,7 +33,7 @@ PoseSample stroke(int i, double phase = 0) {
 }
 
 Learned learned(std::size_t hidden = 24, std::uint64_t seed = 5) {
-    return {model_of_random_weights(hidden, seed), kShaft};
+    return {model_of_random_weights(hidden, seed), kAlongShaft};
 }
 
 void feed_strokes(Learned& predictor, int count) {
@@ -74,7 +74,7 @@ TEST(LearnedPath, GoesThroughTheNetworksAnswersAndItsVelocityIsItsSlope) {
     PathMeans outputs;
     for (Eigen::Index i = 0; i < outputs.size(); ++i)
         outputs[i] = 0.02F * static_cast<float>(std::sin(1.7 * i));
-    const LearnedPath path(frame, outputs, Quaterniond::FromTwoVectors(kShaft, frame.direction));
+    const LearnedPath path(frame, outputs, Quaterniond::FromTwoVectors(kAlongShaft, frame.direction));
     for (std::size_t l = 0; l < kNodes; ++l) {
         const auto at = static_cast<Eigen::Index>(6 * l);
         const Vector3d added = frame.speed * frame.to_world(outputs.segment<3>(at).cast<double>());
@@ -82,15 +82,16 @@ TEST(LearnedPath, GoesThroughTheNetworksAnswersAndItsVelocityIsItsSlope) {
         EXPECT_LT((pose.position - frame.faded_position(kPathLeads[l]) - added).norm(), 1e-14);
         const Vector3d shaft = frame.faded_direction(kPathLeads[l]) +
                                frame.speed / 0.4 * frame.to_world(outputs.segment<3>(at + 3).cast<double>());
-        EXPECT_LT((pose.orientation * kShaft - shaft.normalized()).norm(), 1e-12);
+        EXPECT_LT((pose.orientation * kAlongShaft - shaft.normalized()).norm(), 1e-12);
     }
     constexpr double kStep = 1e-6;  // a difference over it errs by its square times the third derivative
     for (const double lead : {0.005, 0.02, 0.05, 0.09, 0.12, 0.149, 0.2, 0.5}) {
         const PosePrediction before = path.after(lead - kStep), at = path.after(lead),
                              after = path.after(lead + kStep);
         EXPECT_LT((at.velocity - (after.position - before.position) / (2 * kStep)).norm(), 1e-6) << lead;
-        const Vector3d turning = at.angular_velocity.cross(at.orientation * kShaft);
-        const Vector3d turned = (after.orientation * kShaft - before.orientation * kShaft) / (2 * kStep);
+        const Vector3d turning = at.angular_velocity.cross(at.orientation * kAlongShaft);
+        const Vector3d turned =
+            (after.orientation * kAlongShaft - before.orientation * kAlongShaft) / (2 * kStep);
         EXPECT_LT((turning - turned).norm(), 1e-5) << lead;
     }
     EXPECT_EQ(path.after(0).position, frame.position);
@@ -119,7 +120,7 @@ TEST(LearnedPath, EvaluatesTheNetworkThatItsModelStates) {
 }
 
 TEST(LearnedPath, WithoutAnswersIsTheFadingVelocity) {
-    Learned zero(model_of_zeros(), kShaft);
+    Learned zero(model_of_zeros(), kAlongShaft);
     const Vector3d v(1.5, -0.5, 0.25);
     const Quaterniond q(AngleAxisd(0.4, Vector3d::UnitZ()));
     for (int i = 0; i <= 40; ++i) (void)zero.correct(sample_at(i / 60.0, i / 60.0 * v, q));
@@ -217,7 +218,7 @@ TEST(Learned, MeansTheSameAtAnyRateWhereTheMotionIsStraight) {
     PathModel model = model_of_random_weights(24, 5);
     constexpr auto kPeriods = static_cast<Eigen::Index>(StickHistory::kInputs - StickHistory::kPeriods - 1);
     model.layers[0].weights.middleCols(kPeriods, StickHistory::kPeriods).setZero();
-    Learned slow(model, kShaft), fast(model, kShaft);
+    Learned slow(model, kAlongShaft), fast(model, kAlongShaft);
     const auto at = [](double t) { return PoseSample{t, Vector3d(1, 0.5, -0.3) * t}; };
     for (int i = 0; i <= 40; ++i) (void)slow.correct(at(i / 40.0));
     for (int i = 0; i <= 250; ++i) (void)fast.correct(at(i / 250.0));

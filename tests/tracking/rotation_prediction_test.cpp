@@ -25,7 +25,7 @@ PoseSample turned(double t, const Quaterniond& q) {
     return sample;
 }
 
-double angle_between(const Quaterniond& a, const Quaterniond& b) {
+double turn_between(const Quaterniond& a, const Quaterniond& b) {
     return logarithm(a * b.conjugate()).norm();
 }
 
@@ -67,7 +67,7 @@ TEST_P(Turning, ConstantRatesAboutAnyAxisArePredictedTo1e9thOfARadian) {
             (void)predictor->correct(turned(i / turn.rate_hz, random.uniform() < 0.3 ? negated(q) : q));
         }
         const PosePrediction ahead = predictor->predict(kLead);
-        worst = std::max(worst, angle_between(ahead.orientation, turn.at(samples / turn.rate_hz + kLead)));
+        worst = std::max(worst, turn_between(ahead.orientation, turn.at(samples / turn.rate_hz + kLead)));
         worst_rate = std::max(worst_rate, (ahead.angular_velocity - turn.w).norm());
     }
     std::printf("%-20s constant rates: %.2g rad, %.2g rad/s\n", GetParam(), worst, worst_rate);
@@ -102,7 +102,7 @@ TEST(Orientation, FiltersAreStableOnTurnsOfUpTo2Point3RadiansASample) {
             for (int i = 0; i <= 3600; ++i)
                 (void)predictor->correct(turned(i / 60.0, exponential(w * (i / 60.0))));
             const PosePrediction ahead = predictor->predict(kLead);
-            EXPECT_LT(angle_between(ahead.orientation, exponential(w * (60 + kLead))), 1e-9)
+            EXPECT_LT(turn_between(ahead.orientation, exponential(w * (60 + kLead))), 1e-9)
                 << name << ' ' << a_sample;
         }
 }
@@ -171,7 +171,7 @@ double worst_tumbling(const std::string& name, int rate, double lead) {
         const auto i = static_cast<std::size_t>(k * every);
         (void)predictor->correct(turned(static_cast<double>(i) / 960, path[i]));
         if (k >= rate)
-            worst = std::max(worst, angle_between(predictor->predict(lead).orientation, path[i + ahead]));
+            worst = std::max(worst, turn_between(predictor->predict(lead).orientation, path[i + ahead]));
     }
     return worst;
 }
@@ -271,7 +271,7 @@ TEST(Orientation, IncrementalRotationsAndEulerAnglesThroughGimbalLockPredictAsQu
                 (void)a->correct(quaternions.sticks[0].samples[i]);
                 (void)b->correct(other.sticks[0].samples[i]);
                 worst = std::max(worst,
-                                 angle_between(a->predict(kLead).orientation, b->predict(kLead).orientation));
+                                 turn_between(a->predict(kLead).orientation, b->predict(kLead).orientation));
             }
         }
         std::printf("%s: predictions differ by at most %.2g rad\n", form, worst);
@@ -314,13 +314,13 @@ TEST(Orientation, ThatDropsOutIsTurnedOnMeanwhileAndLessCertain) {
             }
             // Ten samples are up to 1/6 s more than a lead.
             EXPECT_LT(
-                angle_between(predictor->predict(kLead).orientation, turn.at(last / turn.rate_hz + kLead)),
+                turn_between(predictor->predict(kLead).orientation, turn.at(last / turn.rate_hz + kLead)),
                 1e-8)
                 << name;
             EXPECT_GT(predictor->covariance(kLead)->rotation(0, 0), before) << name;
             const double back = (last + 1) / turn.rate_hz;
             (void)predictor->correct(turned(back, turn.at(back)));
-            EXPECT_LT(angle_between(predictor->predict(kLead).orientation, turn.at(back + kLead)), 1e-8)
+            EXPECT_LT(turn_between(predictor->predict(kLead).orientation, turn.at(back + kLead)), 1e-8)
                 << name;
         }
     }

@@ -31,7 +31,7 @@ Trace read(const std::string& text, const ColumnMap& map) {
     return read_tables({{text, "fuzz.txt", "stick"}}, map);
 }
 
-void expect_refused(const std::string& text, const ColumnMap& map, const std::string& what) {
+void expect_table_refused(const std::string& text, const ColumnMap& map, const std::string& what) {
     try {
         static_cast<void>(read(text, map));
         FAIL() << "read: " << what;
@@ -152,28 +152,28 @@ TEST(Tables, AStickThatTurnsThrough90DegreesOfItsMiddleEulerAngleStaysContinuous
 
 TEST(Tables, FaultsAreRefusedWithTheirPlace) {
     const std::string head = "Time,X,Y,Z\n";
-    expect_refused(head + "0,1,2,3\n1,1,x,3\n", positions(), "fuzz.txt:3:5: error: found 'x'");
-    expect_refused(head + "0,1,2,3\n1,1,,3\n", positions(), "fuzz.txt:3:5:");
-    expect_refused(head + "0,1,2,3\n1,1,2\n", positions(), "fuzz.txt:3:6: error: found 3 columns");
-    expect_refused(head + "0,1,2,3\n0,1,2,3\n", positions(), "fuzz.txt:3:1: error: found time");
-    expect_refused("Time,X,Y,Q\n0,1,2,3\n", positions(), "fuzz.txt:1:1: error: found no column 'Z'");
-    expect_refused("Time,X,Y,Z,Z\n0,1,2,3,4\n", positions(), "#4 or #5");
-    expect_refused(head + "0,1,2,3\n", positions(), "at least two samples");
-    expect_refused(head, positions(), "no rows");
-    expect_refused("", positions(), "no header");
-    expect_refused(head + "0,1,2,3\n1,1,2,2000\n", positions(), "fuzz.txt:3:7:");
-    expect_refused(head + "1e9,1,2,3\n1000000001,1,2,3\n", positions(), "count from the first row");
+    expect_table_refused(head + "0,1,2,3\n1,1,x,3\n", positions(), "fuzz.txt:3:5: error: found 'x'");
+    expect_table_refused(head + "0,1,2,3\n1,1,,3\n", positions(), "fuzz.txt:3:5:");
+    expect_table_refused(head + "0,1,2,3\n1,1,2\n", positions(), "fuzz.txt:3:6: error: found 3 columns");
+    expect_table_refused(head + "0,1,2,3\n0,1,2,3\n", positions(), "fuzz.txt:3:1: error: found time");
+    expect_table_refused("Time,X,Y,Q\n0,1,2,3\n", positions(), "fuzz.txt:1:1: error: found no column 'Z'");
+    expect_table_refused("Time,X,Y,Z,Z\n0,1,2,3,4\n", positions(), "#4 or #5");
+    expect_table_refused(head + "0,1,2,3\n", positions(), "at least two samples");
+    expect_table_refused(head, positions(), "no rows");
+    expect_table_refused("", positions(), "no header");
+    expect_table_refused(head + "0,1,2,3\n1,1,2,2000\n", positions(), "fuzz.txt:3:7:");
+    expect_table_refused(head + "1e9,1,2,3\n1000000001,1,2,3\n", positions(), "count from the first row");
     ColumnMap frames = positions();
     frames.columns.erase("t");
-    expect_refused(head + "0,1,2,3\n1,1,2,3\n", frames, "--rate");
+    expect_table_refused(head + "0,1,2,3\n1,1,2,3\n", frames, "--rate");
     ColumnMap matrix = positions();
     std::string names = "Time,X,Y,Z";
     for (const char* m : {"m00", "m01", "m02", "m10", "m11", "m12", "m20", "m21", "m22"}) {
         matrix.columns[m] = m;
         names += std::string(",") + m;
     }
-    expect_refused(names + "\n0,1,2,3,1,0,0,0,1,0,0,0,-1\n", matrix, "determinant -1");
-    expect_refused(names + "\n0,1,2,3,1,0,0,0,1,0,0,0.5,1\n", matrix, "rotation matrix");
+    expect_table_refused(names + "\n0,1,2,3,1,0,0,0,1,0,0,0,-1\n", matrix, "determinant -1");
+    expect_table_refused(names + "\n0,1,2,3,1,0,0,0,1,0,0,0.5,1\n", matrix, "rotation matrix");
 }
 
 TEST(Tables, MapsThatCannotBeAreRefused) {

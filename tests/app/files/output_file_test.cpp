@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using Kind = app::OutputPlace::Kind;
 
-std::string text_of(const fs::path& file) {
+std::string content_of(const fs::path& file) {
     std::ifstream in(file, std::ios::binary);
     return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
@@ -65,13 +65,13 @@ TEST(OutputFile, IsThereWhenItIsFinishedAndLeavesNothingOtherwise) {
     {
         const app::OutputFile out(file);
         app::write_file(out.partial(), std::string("half"));
-        EXPECT_EQ(text_of(file), "old");
+        EXPECT_EQ(content_of(file), "old");
     }
-    EXPECT_EQ(text_of(file), "old");
+    EXPECT_EQ(content_of(file), "old");
     app::OutputFile out(file);
     app::write_file(out.partial(), std::string("new"));
     out.finish();
-    EXPECT_EQ(text_of(file), "new");
+    EXPECT_EQ(content_of(file), "new");
     EXPECT_EQ(count_in(here.path()), 1u);
     EXPECT_THROW(app::write_finished_file("/dev/full", std::string("x")), std::runtime_error);
     EXPECT_TRUE(fs::is_character_file("/dev/full"));
@@ -81,7 +81,7 @@ TEST(OutputFile, WithoutAWriteLeavesThePartialFileThatWasThere) {
     const TemporaryFolder here;
     here.write("file.partial", "of an earlier run");
     { const app::OutputFile out(here.path() / "file"); }
-    EXPECT_EQ(text_of(here.path() / "file.partial"), "of an earlier run");
+    EXPECT_EQ(content_of(here.path() / "file.partial"), "of an earlier run");
 }
 
 /// What lies at FILE.partial and is no file is another's.
@@ -90,7 +90,7 @@ TEST(OutputFile, WritesThroughNoLinkThatWasLaid) {
     const fs::path victim = here.write("victim", "mine");
     fs::create_symlink("victim", here.path() / "file.partial");
     EXPECT_THROW(app::OutputFile(here.path() / "file"), app::BadInput);
-    EXPECT_EQ(text_of(victim), "mine");
+    EXPECT_EQ(content_of(victim), "mine");
 }
 
 TEST(PutInPlace, CopiesToAnotherFileSystem) {
@@ -107,8 +107,8 @@ TEST(PutInPlace, CopiesToAnotherFileSystem) {
     fs::create_directory(here.path() / "stage");
     here.write("stage/one", "1");
     app::put_in_place(here.path() / "stage", here.path() / "folder");
-    EXPECT_EQ(text_of(other / "file"), "text");
-    EXPECT_EQ(text_of(other / "folder/one"), "1");
+    EXPECT_EQ(content_of(other / "file"), "text");
+    EXPECT_EQ(content_of(other / "folder/one"), "1");
     EXPECT_EQ(count_in(other), 2u);
     EXPECT_EQ(count_in(here.path()), 2u) << "the links alone";
 
@@ -116,9 +116,9 @@ TEST(PutInPlace, CopiesToAnotherFileSystem) {
     fs::create_directory(other / "file.partial");
     std::ofstream(other / "file.partial/mine") << "mine";
     EXPECT_THROW(app::put_in_place(here.write("staged", "new"), here.path() / "file"), app::BadInput);
-    EXPECT_EQ(text_of(other / "file.partial/mine"), "mine");
-    EXPECT_EQ(text_of(other / "file"), "text");
-    EXPECT_EQ(text_of(here.path() / "staged"), "new");
+    EXPECT_EQ(content_of(other / "file.partial/mine"), "mine");
+    EXPECT_EQ(content_of(other / "file"), "text");
+    EXPECT_EQ(content_of(here.path() / "staged"), "new");
     fs::remove_all(other);
 }
 
@@ -136,7 +136,7 @@ TEST(PutInPlace, AFolderThatMayBeWrittenButNotReadDoes) {
     }
     ASSERT_EQ(seteuid(0), 0);
     EXPECT_EQ(failure, "");
-    EXPECT_EQ(text_of(here.path() / "file"), "text");
+    EXPECT_EQ(content_of(here.path() / "file"), "text");
 }
 
 /// As standard output of a program that a server started.

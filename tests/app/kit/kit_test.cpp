@@ -38,7 +38,7 @@ midi_note = 80
 zones = [{ name = "side" }, { name = "crown", radius = [0, 0.2], midi_note = 81 }]
 )";
 
-struct Malformed {
+struct MalformedKit {
     const char* what;
     std::string text;
     const char* place;  // LINE:COLUMN
@@ -128,7 +128,7 @@ TEST(Kit, AKitThatIsNoFileIsBadInput) {
 }
 
 TEST(Kit, MalformedKitsEndInBadInputAtThePlace) {
-    const std::vector<Malformed> cases = {
+    const std::vector<MalformedKit> cases = {
         {"syntax", "name = ", "1:8", "a syntax error"},
         {"unclosed text", "name = \"a\n", "1:", "a syntax error"},
         {"a key twice", "name = \"a\"\nname = \"b\"\n", "2:", "a syntax error"},
@@ -221,7 +221,7 @@ TEST(Kit, MalformedKitsEndInBadInputAtThePlace) {
         {"nested too deeply", "a = " + std::string(2000, '[') + std::string(2000, ']') + "\n",
          "1:", "a syntax error"},
     };
-    for (const Malformed& bad : cases) {
+    for (const MalformedKit& bad : cases) {
         const WrittenKit written(bad.text);
         try {
             (void)written.read();

@@ -158,12 +158,12 @@ protected:
     RealtimeResult run;
 };
 
-constexpr double kRounding = 1e-12;
+constexpr double kRoundingM = 1e-12;
 
 TEST_F(DrawnErrors, AreThoseOfThePoseShown) {
     const auto errors = drawn_errors(run, tracks, 5);
     ASSERT_EQ(errors.size(), 30U);
-    for (const DrawnError& error : errors) EXPECT_NEAR(error.error_m, 0.002, kRounding);
+    for (const DrawnError& error : errors) EXPECT_NEAR(error.error_m, 0.002, kRoundingM);
     EXPECT_NEAR(rms_mm(errors, 0, 10), 2, 1e-9);
 }
 
@@ -174,7 +174,7 @@ TEST_F(DrawnErrors, OfAMissedFrameAreThoseOfThePictureThatStaysOn) {
     ASSERT_EQ(errors.size(), 30U);
     EXPECT_NEAR(errors[10].error_m, std::hypot(1.0 / 30, 0.002), 1e-8);
     EXPECT_NEAR(errors[11].error_m, std::hypot(2.0 / 30, 0.002), 1e-8);
-    EXPECT_NEAR(errors[12].error_m, 0.002, kRounding);
+    EXPECT_NEAR(errors[12].error_m, 0.002, kRoundingM);
     EXPECT_GT(rms_mm(errors, 0.3, 0.4), 20);
     EXPECT_NEAR(rms_mm(errors, 0.5, 1), 2, 1e-9);
 }
@@ -194,7 +194,7 @@ TEST_F(DrawnErrors, FollowTheLapsOfALoopedTrace) {
     miss(15);  // the picture of the lap before, still on the screen, says nothing of this lap
     const auto errors = drawn_errors(run, tracks, 5);
     ASSERT_EQ(errors.size(), 29U);
-    for (const DrawnError& error : errors) EXPECT_NEAR(error.error_m, 0.002, kRounding);
+    for (const DrawnError& error : errors) EXPECT_NEAR(error.error_m, 0.002, kRoundingM);
 }
 
 TEST_F(DrawnErrors, KnowNoTruthInGapsAndBeforeTheFirstPicture) {

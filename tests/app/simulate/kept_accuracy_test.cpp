@@ -17,7 +17,7 @@ const std::string kBall =
     "[[plane]]\n[[body]]\nname = \"ball\"\nradius = 0.5\nmaterial = \"m\"\nposition = [0, 0.52, 0]\n"
     "velocity = [0, -1, 0]\n";
 
-SimulateOptions steps_of(const WrittenScene& scene, std::uint64_t steps) {
+SimulateOptions measured_steps(const WrittenScene& scene, std::uint64_t steps) {
     SimulateOptions options;
     options.scene = scene.file();
     options.steps = steps;
@@ -26,7 +26,7 @@ SimulateOptions steps_of(const WrittenScene& scene, std::uint64_t steps) {
 
 TEST(KeptAccuracy, ItsStepsAreTheScenesTimeAndItsSummaryHoldsTheEstimate) {
     const WrittenScene scene(kBall);
-    const json r = json::parse(format_simulate(simulate(steps_of(scene, 18))));
+    const json r = json::parse(format_simulate(simulate(measured_steps(scene, 18))));
     const json& accuracy = r["accuracy"];
     EXPECT_EQ(accuracy["asked"], 0.05);
     const int parts = accuracy["step_parts"];
@@ -47,7 +47,7 @@ TEST(KeptAccuracy, ItsStepsAreTheScenesTimeAndItsSummaryHoldsTheEstimate) {
 
 TEST(KeptAccuracy, TheOptionStandsInForTheScenesAndAStepThatIsGivenStays) {
     const WrittenScene scene(kBall);
-    SimulateOptions options = steps_of(scene, 18);
+    SimulateOptions options = measured_steps(scene, 18);
     options.accuracy = 0.3;
     options.dt_s = 1.0 / 120;
     const SimulateResult r = simulate(options);
@@ -58,20 +58,20 @@ TEST(KeptAccuracy, TheOptionStandsInForTheScenesAndAStepThatIsGivenStays) {
     options.accuracy.reset();
     EXPECT_TRUE(json::parse(format_simulate(simulate(options)))["accuracy"].is_object());
     const WrittenScene plain("[[body]]\nname = \"ball\"\nradius = 0.5\n");
-    EXPECT_TRUE(json::parse(format_simulate(simulate(steps_of(plain, 2))))["accuracy"].is_null());
+    EXPECT_TRUE(json::parse(format_simulate(simulate(measured_steps(plain, 2))))["accuracy"].is_null());
 }
 
 TEST(KeptAccuracy, AFolderThatCannotBeIsRefusedBeforeAnyTrial) {
     const WrittenScene scene(kBall);
-    SimulateOptions options = steps_of(scene, 1'000'000'000);  // trials of which would take days
+    SimulateOptions options = measured_steps(scene, 1'000'000'000);  // trials of which would take days
     options.out = scene.file();
     EXPECT_THROW((void)simulate(options), BadInput);
 }
 
 TEST(KeptAccuracy, WorkersComputeWhatWasChosenForOneProcess) {
     const WrittenScene scene(kBall);
-    const SimulateResult alone = simulate(steps_of(scene, 12));
-    SimulateOptions options = steps_of(scene, 12);
+    const SimulateResult alone = simulate(measured_steps(scene, 12));
+    SimulateOptions options = measured_steps(scene, 12);
     options.workers.emplace();
     options.workers->count = 2;
     options.workers->simulated.emplace();
@@ -109,7 +109,7 @@ TEST(Simulate, AModalBodyThatSpinsTooFastForModesWithoutCentrifugalLoadIsNamed) 
             "[settings]\ngravity = [0, 0, 0]\n[material.m]\nyoung_pa = 1e6\ndensity_kg_m3 = 1000\n[[body]]\n"
             "name = \"bar\"\nsize = [1, 0.1, 0.1]\nfidelity = \"modal\"\nmaterial = \"m\"\nspin = [0, " +
             std::to_string(spin) + ", 0]\n");
-        return json::parse(format_simulate(simulate(steps_of(scene, 3))));
+        return json::parse(format_simulate(simulate(measured_steps(scene, 3))));
     };
     // rho w^2 a^2 / (3 E) = 0.01: w = 10.95 rad/s.
     EXPECT_TRUE(spun(10)["spun"].empty());

@@ -14,8 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Seen : sim::DistributedObserver {
-    explicit Seen(std::uint64_t step) : saved_at(step) {}
+struct HalfWay : sim::DistributedObserver {
+    explicit HalfWay(std::uint64_t step) : saved_at(step) {}
     void at(std::uint64_t step, const sim::World& world) override { hashes[step] = world.state_hash(); }
     void done(std::uint64_t step, const std::function<sim::RunState()>& state) override {
         if (step == saved_at) saved = sim::encode(state());
@@ -35,17 +35,17 @@ TEST(SimulateThreads, EveryBundledSceneHasTheBitsOfOneThread) {
         const std::size_t bodies = scene.world.bodies.size();
         settings.steps = bodies > 1000 ? 32 : bodies > 300 ? 60 : 80;
         const std::uint64_t half = settings.steps / 2;
-        Seen one(half);
+        HalfWay one(half);
         (void)sim::run_alone(scene, settings, one);
         for (const int threads : {2, 3, 4, 7}) {
             if (bodies > 1000 && threads != 3) continue;  // takes long
-            Seen seen(half);
+            HalfWay seen(half);
             (void)sim::run_alone(scene, settings, seen, nullptr, threads);
             ASSERT_EQ(seen.hashes, one.hashes) << threads << " threads";
             ASSERT_EQ(seen.saved.size(), one.saved.size());
             // On with one thread more than it began with.
             const sim::RunState from = sim::decode_run_state(seen.saved, scene);
-            Seen after(0);
+            HalfWay after(0);
             (void)sim::run_alone(scene, settings, after, &from, threads + 1);
             for (const auto& [step, hash] : after.hashes) ASSERT_EQ(hash, one.hashes.at(step)) << step;
         }

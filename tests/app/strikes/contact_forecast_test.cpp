@@ -13,7 +13,7 @@ using tracking::ContactTimes;
 
 constexpr int kBin = 6;  // in which the contact comes, if there is one
 constexpr double kContactS = (kBin + 0.5) * ContactTimes::kBinS;
-constexpr double kReachS = 1.0 / 15;
+constexpr double kForecastReachS = 1.0 / 15;
 
 /// Says: a contact in that bin with probability `p`, else none.
 std::shared_ptr<const tracking::PathModel> saying(double p) {
@@ -34,7 +34,7 @@ std::shared_ptr<const tracking::PathModel> saying(double p) {
 }
 
 /// A tip at `height_m` over the floor, which sinks at 1 m/s and moves along it at 0.5 m/s.
-ContactForecast::Forecast forecast(double p, double height_m = 0.1, double reach_s = kReachS) {
+ContactForecast::Forecast forecast(double p, double height_m = 0.1, double reach_s = kForecastReachS) {
     tracking::TipView tip;
     tip.tip = {0, height_m, 0};
     tip.velocity = {0.5, -1, 0};
@@ -46,7 +46,8 @@ ContactForecast::Forecast forecast(double p, double height_m = 0.1, double reach
     return ContactForecast(saying(p)).after(tip, predicted, floor, reach_s);
 }
 
-std::optional<ContactForecast::Path> expected(double p, double height_m = 0.1, double reach_s = kReachS) {
+std::optional<ContactForecast::Path> expected(double p, double height_m = 0.1,
+                                              double reach_s = kForecastReachS) {
     return forecast(p, height_m, reach_s).strike;
 }
 

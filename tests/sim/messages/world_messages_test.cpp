@@ -107,7 +107,7 @@ sim::StepReport report() {
             {1, -2, 3}, {{quarantined, 2, 77, "velocity"}, {limited, 1, 77, {}}, {broken, 0, 76, {}}}};
 }
 
-std::vector<sim::WorldMessage> samples() {
+std::vector<sim::WorldMessage> world_samples() {
     Rng rng(6);
     std::vector<sim::WorldRecord> records = {record(rng, 0, 12), record(rng, 1, 0), record(rng, 2, 6)};
     const std::vector<sim::SpringRecord> springs = {
@@ -162,7 +162,7 @@ TEST(WorldMessages, WordsOfPeersBecomePrintableWhereTheyArrive) {
 }
 
 TEST(WorldMessages, EveryTypeComesBackAndIsTheSameWhenWrittenAgain) {
-    for (const sim::WorldMessage& message : samples()) {
+    for (const sim::WorldMessage& message : world_samples()) {
         const std::vector<std::uint8_t> bytes = sim::encode(kHeader, message);
         const sim::DecodedWorldMessage back = sim::decode_world(bytes);
         EXPECT_EQ(back.message.index(), message.index());
@@ -282,7 +282,7 @@ TEST(WorldMessages, ChecksumIsCrc32cByInstructionAndByTable) {
     EXPECT_EQ(sim::crc32c(long_one), sim::crc32c_by_table(long_one));
 }
 
-void seal(std::vector<std::uint8_t>& bytes) {
+void seal_world(std::vector<std::uint8_t>& bytes) {
     if (bytes.size() < 32) return;
     const auto length = static_cast<std::uint32_t>(bytes.size());
     std::memcpy(bytes.data() + 8, &length, 4);
@@ -312,12 +312,12 @@ TEST(WorldMessages, TenThousandMutationsAreRefusedOrDecodeToAMessageThatCanBeWri
     const int count = std::getenv("MUSICWORLD_LONG") ? 1000000 : 10000;
     Rng rng(15);
     std::vector<std::vector<std::uint8_t>> good;
-    for (const sim::WorldMessage& message : samples()) good.push_back(sim::encode(kHeader, message));
+    for (const sim::WorldMessage& message : world_samples()) good.push_back(sim::encode(kHeader, message));
     int refused = 0, accepted = 0;
     for (int i = 0; i < count; ++i) {
         std::vector<std::uint8_t> bytes = good[rng() % good.size()];
         bytes = damaged(std::move(bytes), rng);
-        if (i % 4) seal(bytes);  // mostly past the checksum, so that the fields' own checks are met
+        if (i % 4) seal_world(bytes);  // mostly past the checksum, so that the fields' own checks are met
         read_as_worker(bytes);
         try {
             const sim::DecodedWorldMessage back = sim::decode_world(bytes);
@@ -334,7 +334,7 @@ TEST(WorldMessages, TenThousandMutationsAreRefusedOrDecodeToAMessageThatCanBeWri
 }
 
 TEST(WorldMessages, AnUnsealedChangeOfAnyByteIsRefused) {
-    const std::vector<std::uint8_t> good = sim::encode(kHeader, samples()[11]);
+    const std::vector<std::uint8_t> good = sim::encode(kHeader, world_samples()[11]);
     for (std::size_t i = 0; i < good.size(); ++i) {
         std::vector<std::uint8_t> bad = good;
         bad[i] ^= 0x10;

@@ -17,15 +17,15 @@ const std::vector<double> kExponents = {0.1, 0.6, 1, 1.4, 1.9};
 const std::vector<Vector3d> kSemiAxes = {{1, 1, 1},      {1, 0.3, 1},   {1, 0.1, 1}, {0.3, 1, 0.3},
                                          {1, 0.5, 0.25}, {0.1, 0.1, 1}, {1, 1, 0.1}};
 
-double dual_pair(double u, double w, double p) {
+double dual_norm(double u, double w, double p) {
     const double q = p / (p - 1), large = std::max(u, w);
     if (large == 0) return 0;
     return large * std::pow(1 + std::pow(std::min(u, w) / large, q), 1 / q);
 }
 
 // Largest n . y over the body for n = m / semi-axes, by the dual norm: knows nothing of the gauge's gradient.
-double support(const sim::Superquadric& s, const Vector3d& m) {
-    return dual_pair(dual_pair(m.x(), m.z(), 2 / s.e2), m.y(), 2 / s.e1);
+double support_by_dual(const sim::Superquadric& s, const Vector3d& m) {
+    return dual_norm(dual_norm(m.x(), m.z(), 2 / s.e2), m.y(), 2 / s.e1);
 }
 
 // Depth of a point of the positive octant: the least distance from a bearing plane, by brute force over
@@ -66,12 +66,12 @@ private:
 
     void add(const Vector3d& m) {
         const Vector3d n = m.cwiseQuotient(shape_.semi_axes);
-        planes_.push_back({m, n.normalized(), support(shape_, m) / n.norm()});
+        planes_.push_back({m, n.normalized(), support_by_dual(shape_, m) / n.norm()});
     }
 
     [[nodiscard]] double gap(const Vector3d& r, const Vector3d& m) const {
         const Vector3d n = m.cwiseQuotient(shape_.semi_axes);
-        return (support(shape_, m) - n.dot(r)) / n.norm();
+        return (support_by_dual(shape_, m) - n.dot(r)) / n.norm();
     }
 
     [[nodiscard]] double refined(const Vector3d& r, Vector3d m) const {

@@ -20,10 +20,10 @@ double enclosed_volume(const sim::SurfaceMesh& mesh) {
     return six / 6;
 }
 
-const sim::Superquadric kShapes[] = {{{0.5, 0.5, 0.5}, 1, 1},     {{0.2, 0.1, 0.3}, 1, 1},
-                                     {{0.2, 0.1, 0.2}, 0.1, 1},   {{0.2, 0.1, 0.3}, 0.1, 0.1},
-                                     {{0.1, 0.4, 0.2}, 0.5, 1.5}, {{0.3, 0.3, 0.1}, 1.9, 1.9},
-                                     {{0.3, 0.2, 0.1}, 1, 0.2}};
+const sim::Superquadric kMeshedShapes[] = {{{0.5, 0.5, 0.5}, 1, 1},     {{0.2, 0.1, 0.3}, 1, 1},
+                                           {{0.2, 0.1, 0.2}, 0.1, 1},   {{0.2, 0.1, 0.3}, 0.1, 0.1},
+                                           {{0.1, 0.4, 0.2}, 0.5, 1.5}, {{0.3, 0.3, 0.1}, 1.9, 1.9},
+                                           {{0.3, 0.2, 0.1}, 1, 0.2}};
 
 TEST(SurfaceMesh, ThesisMeshesHave360TrianglesOn182VerticesAnd48On26) {
     const sim::SurfaceMesh body = sim::surface_mesh({}, 360), limb = sim::surface_mesh({}, 48);
@@ -59,7 +59,7 @@ TEST(SurfaceMesh, EveryEdgeIsSharedByTwoTrianglesOfOppositeSense) {
 }
 
 TEST(SurfaceMesh, EnclosedVolumeTendsToTheClosedFormAsTheMeshGetsFiner) {
-    for (const sim::Superquadric& shape : kShapes) {
+    for (const sim::Superquadric& shape : kMeshedShapes) {
         const double exact = sim::volume_moments(sim::Gauge(shape)).volume;
         const double coarse = enclosed_volume(sim::surface_mesh({shape, {}}, 360)) / exact;
         const double fine = enclosed_volume(sim::surface_mesh({shape, {}}, 20000)) / exact;
@@ -74,7 +74,7 @@ TEST(SurfaceMesh, EnclosedVolumeTendsToTheClosedFormAsTheMeshGetsFiner) {
 }
 
 TEST(SurfaceMesh, VerticesAndFeaturesLieOnTheSurfaceWithItsOutwardNormals) {
-    for (const sim::Superquadric& shape : kShapes) {
+    for (const sim::Superquadric& shape : kMeshedShapes) {
         const sim::Gauge gauge(shape);
         const sim::SurfaceMesh mesh = sim::surface_mesh({shape, {}}, 360);
         ASSERT_EQ(mesh.normals.size(), mesh.vertices.size());

@@ -33,10 +33,10 @@ TEST(GaugeSupport, IsOnTheSurfaceAndFurthestOfAll) {
         }
 }
 
-struct Posed {
+struct PosedHull {
     BodyKind kind;
     PosedBody body;
-    explicit Posed(const WorldBody& definition) : kind(make_body_kind(definition, {})) {
+    explicit PosedHull(const WorldBody& definition) : kind(make_body_kind(definition, {})) {
         body.kind = &kind;
         body.set(definition.world_from_body.translation(),
                  Eigen::Quaterniond(definition.world_from_body.rotation()),
@@ -44,7 +44,7 @@ struct Posed {
     }
 };
 
-ConvexDistance distance(const Posed& a, const Posed& b) {
+ConvexDistance distance(const PosedHull& a, const PosedHull& b) {
     const ConvexBody of_a(a.body), of_b(b.body);
     return distance_between({&of_a, a.body.position, a.body.rotation},
                             {&of_b, b.body.position, b.body.rotation}, 1e-9);
@@ -54,7 +54,7 @@ TEST(ConvexDistance, OfBallsIsExactNearFarAndOverlapping) {
     for (const Fidelity fidelity : {Fidelity::rigid, Fidelity::linear, Fidelity::modal})
         for (const double gap : {-0.05, 0.0, 1e-6, 0.3, 100.0}) {
             const Vector3d way = Vector3d(1, 2, -2) / 3;
-            const Posed a(world_test::ball((0.7 + gap) * way, fidelity, 0.5)),
+            const PosedHull a(world_test::ball((0.7 + gap) * way, fidelity, 0.5)),
                 b(world_test::ball({0, 0, 0}, Fidelity::rigid, 0.2));
             const ConvexDistance d = distance(a, b);
             ASSERT_TRUE(d.apart);
@@ -64,7 +64,7 @@ TEST(ConvexDistance, OfBallsIsExactNearFarAndOverlapping) {
 }
 
 TEST(ConvexDistance, OfACardBesideABallIsThatToItsEdgeAndNotToThePlaneOfItsFace) {
-    const Posed card(world_test::box({0, 0, 0}, {0.1, 0.005, 0.1})),
+    const PosedHull card(world_test::box({0, 0, 0}, {0.1, 0.005, 0.1})),
         ball(world_test::ball({0.5, 0.02, 0}, Fidelity::rigid, 0.01));
     const ConvexDistance d = distance(ball, card);
     ASSERT_TRUE(d.apart);
@@ -78,7 +78,7 @@ TEST(ConvexDistance, OfEllipsoidsIsTheLeastOverManyDirections) {
         WorldBody p = world_test::ball(2 * any_direction(random)), q = world_test::ball({0, 0, 0});
         p.shape.base.semi_axes = {0.2, 0.4, 0.6}, q.shape.base.semi_axes = {0.7, 0.3, 0.5};
         p.world_from_body.linear() = Eigen::AngleAxisd(i, any_direction(random)).toRotationMatrix();
-        const Posed a(p), b(q);
+        const PosedHull a(p), b(q);
         const ConvexDistance d = distance(a, b);
         ASSERT_TRUE(d.apart);
         // A plane parts them by at most the distance, and by all of it along the normal.
