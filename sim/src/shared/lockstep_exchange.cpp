@@ -11,7 +11,8 @@
 namespace sim {
 namespace {
 
-constexpr std::size_t kMostParts = 4096;  // of one worker that wait here; a step needs 4 a substep
+constexpr std::uint64_t kStepsAlone = 64;  // after one in which another told nothing, or nothing that can be
+constexpr std::size_t kMostParts = 4096;   // of one worker that wait here; a step needs 4 a substep
 
 // Every worker has a whole replica. A step from t to t + 1 needs every body's exact record at t. Those who published the
 // records of t do it together (world/partners.h): they all know who they are. Who cannot, or finds that another cannot, tells the
@@ -60,6 +61,7 @@ private:
     void note_publisher(std::uint64_t step, std::uint32_t worker, std::uint32_t body);
     [[nodiscard]] std::vector<std::uint32_t> publishers(std::uint64_t step) const;
     [[nodiscard]] bool step_together(const StepChannel& channel);
+    void wait_for_none();
     void tell(const StepChannel& channel, std::uint32_t to, bool gave_up, std::vector<std::uint8_t>&& bytes);
     [[nodiscard]] std::vector<std::uint8_t> hear(const StepChannel& channel, std::uint32_t from);
     void set_own(int body, bool own);
@@ -89,6 +91,7 @@ private:
     bool partner_lost_ = false;
     std::map<std::uint32_t, std::deque<Part>> parts_;  // that others told, by them
     std::optional<std::uint64_t> repeated_;            // a step that only this worker does again
+    std::uint64_t alone_until_ = 0;                    // step
 };
 
 class LockstepExchange::Together final : public Partners {
@@ -166,7 +169,7 @@ std::vector<std::uint32_t> LockstepExchange::publishers(std::uint64_t step) cons
 }
 
 void LockstepExchange::take(const WorldHeader& header, PartMessage&& message) {
-    if (header.step < replica_.step()) return;
+    if (header.step != replica_.step()) return;  // of a step that is done; nobody is further than that
     std::deque<Part>& parts = parts_[header.worker];
     if (parts.size() < kMostParts) {
         parts.push_back({header.step, message.gave_up, std::move(message.bytes)});
@@ -176,9 +179,15 @@ void LockstepExchange::take(const WorldHeader& header, PartMessage&& message) {
 }
 
 void LockstepExchange::members_within(const std::vector<std::uint32_t>& workers) {
+    if (workers.empty()) wait_for_none();
     partner_lost_ = partner_lost_ || std::ranges::any_of(partners_, [&](std::uint32_t partner) {
                         return partner != self_ && std::ranges::find(workers, partner) == workers.end();
                     });
+}
+
+// What came of waiting, or of what others told, may come of it again.
+void LockstepExchange::wait_for_none() {
+    alone_until_ = replica_.step() + kStepsAlone;
 }
 
 void LockstepExchange::tell(const StepChannel& channel, std::uint32_t to, bool gave_up,
@@ -193,13 +202,12 @@ std::vector<std::uint8_t> LockstepExchange::hear(const StepChannel& channel, std
         for (const std::uint32_t partner : partners_) {
             std::deque<Part>& parts = parts_[partner];
             while (!parts.empty() && parts.front().step < now) parts.pop_front();
-            if (std::ranges::any_of(parts,
-                                    [&](const Part& part) { return part.gave_up && part.step == now; }))
+            if (std::ranges::any_of(parts, &Part::gave_up))
                 throw NotTogether("worker " + std::to_string(partner) + " gave up");
         }
         if (partner_lost_) throw NotTogether("a worker is lost");
         std::deque<Part>& parts = parts_[from];
-        if (!parts.empty() && parts.front().step == now) {
+        if (!parts.empty()) {
             std::vector<std::uint8_t> bytes = std::move(parts.front().bytes);
             parts.pop_front();
             return bytes;
@@ -215,7 +223,8 @@ bool LockstepExchange::step_together(const StepChannel& channel) {
     if (!may_together_ || partners_.size() < 2 || self == partners_.end()) return false;
     partner_lost_ = false;
     members_within(members_);
-    const bool may = channel.flush && !partner_lost_ && repeated_ != replica_.step();
+    const bool may =
+        channel.flush && !partner_lost_ && repeated_ != replica_.step() && replica_.step() >= alone_until_;
     try {
         if (!may) throw NotTogether("this one cannot");
         std::vector<int> of;
@@ -228,6 +237,7 @@ bool LockstepExchange::step_together(const StepChannel& channel) {
         return true;
     } catch (const NotTogether&) {
     } catch (const DecodeError&) {  // of a part that is none
+        wait_for_none();
     }
     tell(channel, kApplication, true, {});
     if (may) replica_.world().rewind(before_);
