@@ -20,7 +20,7 @@ public:
     /// returns once something has come and was given to take(). Without it the step is done alone.
     void step(const std::function<void(bool wait)>& flush = {});
     void stop_waiting() { exchange_->members_within({}); }  ///< within flush: the step is done alone
-    struct Times {  ///< of a step, see WorkerStep
+    struct Times {                                          ///< of a step, see WorkerStep
         double seconds = 0, waited_s = 0, processor_s = 0;
     };
     /// After step(). Queues the message to publish, then balances the load.

@@ -180,7 +180,7 @@ class Machine {
 public:
     Machine(const WorldScene& scene, const DistributedSettings& settings, const SimulatedProcessors& how,
             DistributedObserver& observer)
-        : how_(how), observer_(&observer), meeting_(scene, settings, observer) {
+        : how_(how), meeting_(scene, settings, observer) {
         std::stable_sort(how_.failures.begin(), how_.failures.end(),
                          [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
     }
@@ -212,7 +212,6 @@ private:
     [[nodiscard]] std::string stuck() const;
 
     SimulatedProcessors how_;
-    DistributedObserver* observer_;
     Coordinator meeting_;
     std::deque<Processor> processors_;  // steps refer to theirs
     std::size_t next_failure_ = 0;
