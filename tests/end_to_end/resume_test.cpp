@@ -106,7 +106,14 @@ TEST(Resume, TwoWorkersInLockstepGoOnToTheSameFilesAlsoAsThree) {
             EXPECT_EQ(summary["workers"], 3);
             products["summary.json"] = whole.at("summary.json");
         }
-        EXPECT_EQ(products, whole);
+        // What workers told each other is counted, too: the first step after a start each does alone.
+        auto expected = whole;
+        for (auto* of : {&products, &expected}) {
+            json summary = json::parse(of->at("summary.json"));
+            EXPECT_EQ(summary.erase("bytes_per_body_step"), 1u);
+            (*of)["summary.json"] = summary.dump();
+        }
+        EXPECT_EQ(products, expected);
     }
 }
 
