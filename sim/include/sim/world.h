@@ -220,9 +220,8 @@ class Partners;
 
 /// How a world is shared with worlds of other processes that hold the same bodies.
 enum class Sharing {
-    alone,    ///< not at all
-    islands,  ///< every island with an own body is solved whole; other bodies' records are restored
-    pairs     ///< only own bodies are stepped, among ghosts that are placed for each step and move with them
+    alone,  ///< every body is stepped, whoever owns it
+    pairs   ///< only own bodies are stepped, among ghosts that are placed for each step and move with them
 };
 
 struct QuarantinedBody {  ///< taken out of the world
@@ -271,8 +270,8 @@ public:
     World& operator=(World&&) noexcept;
 
     void step();  ///< by settings().dt; allocates nothing once its buffers have grown
-    /// step() of a world that is shared by islands, by several who each have it whole, with the same bits. Throws NotTogether or
-    /// DecodeError where it comes to no end so: the world has to go back to the step's start (rewind) then.
+    /// step() by several who each have all of this world, with the same bits; by one, if there is no other. Throws NotTogether
+    /// or DecodeError where it comes to no end so: the world is as it was before then.
     void step_together(Partners& with);
     /// So many threads share out the steps of a world that is not shared, at first one: this one and helpers that sleep between
     /// steps. No result depends on how many. Throws std::invalid_argument below 1.

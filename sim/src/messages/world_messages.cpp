@@ -12,7 +12,7 @@ namespace sim {
 namespace {
 
 constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'W'};
-constexpr std::uint16_t kStateType = 11, kUpdateType = 12;
+constexpr std::uint16_t kUpdateType = 12;
 constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kChecksumBytes = 4, kAppliedBytes = 12;
 constexpr std::size_t kMishapBytes = 17;  // at least
 constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64, kLongestHost = 255;
@@ -178,8 +178,9 @@ void write_body(ByteWriter& out, const PartMessage& m) {
     out.count(m.bytes.size());
     out.append(m.bytes);
 }
-void write_body(ByteWriter&, const PackedStates&) {
-    throw std::invalid_argument("a state message that is packed already");
+void write_body(ByteWriter& out, const PublishedMessage& m) {
+    write(out, m.report);
+    write_numbers(out, m.bodies);
 }
 
 void read_body(ByteReader& in, JoinRequest& m) {
@@ -235,8 +236,9 @@ void read_body(ByteReader& in, PartMessage& m) {
     const std::span<const std::uint8_t> bytes = in.take(in.count(1));
     m.bytes.assign(bytes.begin(), bytes.end());
 }
-void read_body(ByteReader&, PackedStates&) {
-    throw DecodeError("a message of no known type");
+void read_body(ByteReader& in, PublishedMessage& m) {
+    m.report = read_report(in);
+    read_numbers(in, m.bodies);
 }
 void read_body(ByteReader&, PackedUpdates&) {
     throw DecodeError("a message of no known type");
@@ -300,10 +302,23 @@ std::uint16_t read_header(std::span<const std::uint8_t> bytes, WorldHeader& head
     return type;
 }
 
+/// Of a message whose header has been read.
+WorldMessage read_message(std::uint16_t type, std::span<const std::uint8_t> bytes) {
+    ByteReader body(bytes.subspan(kHeaderBytes, bytes.size() - kHeaderBytes - kChecksumBytes));
+    try {
+        WorldMessage message = read_message(std::size_t{type}, body);
+        body.expect_end();
+        return message;
+    } catch (const std::invalid_argument& e) {
+        throw DecodeError(e.what());
+    }
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> encode(const WorldHeader& header, const WorldMessage& message) {
     ByteWriter out;
+    if (const auto* part = std::get_if<PartMessage>(&message)) out.bytes().reserve(64 + part->bytes.size());
     for (const std::uint8_t letter : kMagic) out.number(letter);
     out.number(kWorldProtocol);
     out.number(static_cast<std::uint16_t>(message.index() + 1));
@@ -318,49 +333,27 @@ std::vector<std::uint8_t> encode(const WorldHeader& header, const WorldMessage& 
     return std::move(out.bytes());
 }
 
-namespace {
-
-// Whose they are; all else is checked where they are read.
-PackedStates packed_states(std::vector<std::uint8_t>&& bytes) {
-    PackedStates packed;
-    ByteReader in(std::span<const std::uint8_t>(bytes).subspan(kHeaderBytes,
-                                                               bytes.size() - kHeaderBytes - kChecksumBytes));
-    packed.report = read_report(in);
-    find_records(in, packed.bodies);
-    packed.bytes = std::move(bytes);
-    return packed;
-}
-
-}  // namespace
-
-DecodedWorldMessage decode_for_worker(std::vector<std::uint8_t> bytes) {
+DecodedWorldMessage decode_for_worker(std::span<const std::uint8_t> bytes) {
     WorldHeader header;
     const std::uint16_t type = read_header(bytes, header);
-    if (type == kStateType) return {header, packed_states(std::move(bytes))};
-    if (type != kUpdateType) return decode_world(bytes);
+    if (type != kUpdateType) return {header, read_message(type, bytes)};
     PackedUpdates packed;
-    const std::span<const std::uint8_t> all = std::span(bytes).first(bytes.size() - kChecksumBytes);
+    packed.bytes.assign(bytes.begin(), bytes.end());
+    const std::span<const std::uint8_t> all =
+        std::span<const std::uint8_t>(packed.bytes).first(bytes.size() - kChecksumBytes);
     ByteReader in(all.subspan(kHeaderBytes));
     packed.report = read_report(in);
     find_updates(in, all, packed.bodies);
     packed.crossed = read_crossed(in);
     read_numbers(in, packed.broken);
     in.expect_end();
-    packed.bytes = std::move(bytes);
     return {header, std::move(packed)};
 }
 
 DecodedWorldMessage decode_world(std::span<const std::uint8_t> bytes) {
     WorldHeader header;
     const std::uint16_t type = read_header(bytes, header);
-    ByteReader body(bytes.subspan(kHeaderBytes, bytes.size() - kHeaderBytes - kChecksumBytes));
-    try {
-        WorldMessage message = read_message(type, body);
-        body.expect_end();
-        return {header, std::move(message)};
-    } catch (const std::invalid_argument& e) {
-        throw DecodeError(e.what());
-    }
+    return {header, read_message(type, bytes)};
 }
 
 }  // namespace sim

@@ -15,7 +15,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 7
+//   4       2      version, 8
 //   6       2      type
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
@@ -44,6 +44,7 @@ namespace sim {
 //   14 answer     worker  u32 to, u32 number, flag accepted
 //   15 handover   worker  u32 to, u32 number, list of record, list of applied
 //   16 part       worker  u32 to, flag gave up, list of u8
+//   17 published  app     report, list of u32 (bodies)
 //
 //   report      60 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
 //               cross contacts, own; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
@@ -77,7 +78,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kWorldProtocol = 7;  ///< version
+constexpr std::uint16_t kWorldProtocol = 8;  ///< version
 
 struct WorldHeader {
     std::uint32_t worker = kApplication;
@@ -149,9 +150,9 @@ struct SnapshotMessage {
     WorldSnapshot snapshot;
 };
 
-// Worker to all, through the application, after each step.
+// Worker to the application after each step, which passes it on.
 
-/// Lockstep. All own bodies, and the contacts and constraints that belong to them.
+/// Lockstep. All own bodies, and the contacts and constraints that belong to them. Passed on to those who own nothing.
 struct StateMessage {
     StepReport report;
     std::vector<WorldRecord> bodies;
@@ -174,11 +175,11 @@ struct UpdateMessage {
     std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
 };
 
-/// A StateMessage as a worker gets it: of a step that it has done together with the sender it needs no more than whose they are.
-struct PackedStates {
+/// A StateMessage as those get it who own something, with the sender's header: they do all steps themselves, and need no more
+/// than that the sender is there. The report is without its mishaps.
+struct PublishedMessage {
     StepReport report;
     std::vector<std::uint32_t> bodies;
-    std::vector<std::uint8_t> bytes;  ///< the whole message
 };
 
 /// An UpdateMessage as a worker gets it: of hundreds of bodies it needs the few that are near, so states are
@@ -232,15 +233,15 @@ struct PartMessage {
 
 using WorldMessage = std::variant<JoinRequest, WorldBeat, Drained, WorkerFailure, SceneMessage, Refusal,
                                   EndOfRun, Members, Ownership, SnapshotMessage, StateMessage, UpdateMessage,
-                                  Offer, OfferAnswer, Handover, PartMessage, PackedStates, PackedUpdates>;
+                                  Offer, OfferAnswer, Handover, PartMessage, PublishedMessage, PackedUpdates>;
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const WorldHeader& header, const WorldMessage& message);
 struct DecodedWorldMessage {
     WorldHeader header;
     WorldMessage message;
 };
-/// The same, for workers: state and update messages as PackedStates and PackedUpdates (encode does not take these).
-[[nodiscard]] DecodedWorldMessage decode_for_worker(std::vector<std::uint8_t> bytes);
+/// The same, for workers: update messages as PackedUpdates (which encode does not take).
+[[nodiscard]] DecodedWorldMessage decode_for_worker(std::span<const std::uint8_t> bytes);
 /// Throws DecodeError for anything that encode cannot have written.
 [[nodiscard]] DecodedWorldMessage decode_world(std::span<const std::uint8_t> bytes);
 

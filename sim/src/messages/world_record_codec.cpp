@@ -188,15 +188,6 @@ std::vector<WorldRecord> read_world_records(ByteReader& in) {
     return records;
 }
 
-void find_records(ByteReader& in, std::vector<std::uint32_t>& bodies) {
-    bodies.resize(in.count(kSmallestRecord));
-    for (std::uint32_t& body : bodies) {
-        const BodyAndModes which = read_body_and_modes(in);
-        body = which.body;
-        (void)in.take(kSmallestRecord - 4 + 16 * static_cast<std::size_t>(which.modes));
-    }
-}
-
 std::vector<ContactRecord> read_contact_records(ByteReader& in) {
     std::vector<ContactRecord> contacts(in.count(kSmallestContact));
     for (ContactRecord& c : contacts) c = read_contact(in);

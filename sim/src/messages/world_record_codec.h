@@ -23,7 +23,6 @@ void write(ByteWriter& out, const std::vector<ContactRecord>& contacts);
 void write(ByteWriter& out, const std::vector<SpringRecord>& springs);
 void write(ByteWriter& out, const WorldSnapshot& snapshot);
 [[nodiscard]] std::vector<WorldRecord> read_world_records(ByteReader& in);  ///< all readers throw DecodeError
-void find_records(ByteReader& in, std::vector<std::uint32_t>& bodies);  ///< passes records; whose they are
 [[nodiscard]] std::vector<ContactRecord> read_contact_records(ByteReader& in);
 [[nodiscard]] std::vector<SpringRecord> read_spring_records(ByteReader& in);
 [[nodiscard]] WorldSnapshot read_snapshot(ByteReader& in);

@@ -26,6 +26,8 @@ public:
     void take(SnapshotMessage&& message) override;
     void members(const std::vector<std::uint32_t>& workers) override;
     void own(const Ownership& ownership) override;
+    // Who came to the last step by taking bodies over has to say so.
+    [[nodiscard]] bool owes() const override { return at_end() && own_bodies() > 0 && published_ < step_; }
     [[nodiscard]] bool ready() const override;
     void step(const StepChannel& channel) override;
     [[nodiscard]] std::vector<std::uint8_t> publish(std::uint32_t epoch, const StepReport& report) override;
@@ -73,6 +75,7 @@ private:
     BodyCosts costs_;
     ColumnWatch columns_;
     ForeignBodies foreign_;
+    std::uint64_t published_ = 0;  // step
     std::uint64_t step_ = 0;
     std::vector<std::uint32_t> owner_;  // as registered
     std::set<std::uint32_t> owners_;    // who has any
@@ -415,6 +418,7 @@ std::vector<std::uint8_t> BoundedExchange::publish(std::uint32_t epoch, const St
     message.bodies.resize(count);
     message.crossed.swap(crossed_), crossed_.clear();
     message.broken.swap(broken_), broken_.clear();
+    published_ = step_;
     return encode({self_, epoch, step_}, outgoing_);
 }
 

@@ -1,8 +1,11 @@
 #include "shared/coordinator.h"
 
 #include <algorithm>
+#include <set>
+#include <utility>
 
 #include "shared/initial_partition.h"
+#include "shared/replica_protocol.h"
 #include "world/manifold.h"
 
 namespace sim {
@@ -59,12 +62,15 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
 
 void Coordinator::go_to(const RunState& from) {
     goes_on_ = true;
-    view_.jump(from.world);
+    WorldSnapshot world = from.world;
+    if (settings_.pace == Pace::lockstep)
+        for (const auto& [worker, impulse] : from.outside) world.outside += impulse;
+    view_.jump(world);
     for (const WorldRecord& record : from.world.bodies) {
         Body& body = bodies_[static_cast<std::size_t>(record.body)];
         body.record = record, body.step = from.world.step;
     }
-    outside_ = from.outside;
+    if (settings_.pace == Pace::bounded) outside_ = from.outside;
     result_ = from.result;
     for (const QuarantinedBody& q : std::exchange(result_.quarantined, {})) quarantined_[q.body] = q;
     for (const FirstStep& first : std::exchange(result_.limited, {})) limited_[first.number] = first.step;
@@ -73,6 +79,8 @@ void Coordinator::go_to(const RunState& from) {
 
 RunState Coordinator::state() const {
     RunState state{view_.snapshot(), result_, outside_};
+    if (settings_.pace == Pace::lockstep)
+        state.outside[0] = std::exchange(state.world.outside, Eigen::Vector3d::Zero());
     state.result.steps = view_.step();
     name_mishaps(state.result);
     return state;
@@ -151,7 +159,7 @@ void Coordinator::start() {
         observer_->at(0, World(scene_.world));
         WorldSnapshot snapshot = view_.snapshot();
         for (const std::uint32_t member : members_) {
-            snapshot.outside = outside_[member];
+            if (settings_.pace == Pace::bounded) snapshot.outside = outside_[member];
             send({member}, SnapshotMessage{snapshot});
         }
     }
@@ -314,8 +322,7 @@ bool Coordinator::is_too_much(Sender& sender, std::size_t bytes) const {
     if (std::exchange(sender.messages_at, view_.step()) != view_.step())
         sender.messages = sender.message_bytes = 0;
     sender.message_bytes += bytes;
-    const std::size_t parts =
-        settings_.pace == Pace::lockstep ? 32 * static_cast<std::size_t>(scene_.world.settings.substeps) : 0;
+    const std::size_t parts = settings_.pace == Pace::lockstep ? most_parts(scene_) : 0;
     return ++sender.messages > kMessages + parts + 8 * steps * members_.size() ||
            sender.message_bytes > kRepeated * steps * static_cast<std::size_t>(largest_message(scene_));
 }
@@ -434,7 +441,7 @@ void Coordinator::take_state(const WorldHeader& header, std::span<const std::uin
     for (const WorldRecord& record : message.bodies)
         publish(bodies_[static_cast<std::size_t>(record.body)], WorldRecord(record), header.step);
     report(header, message.report, message.bodies.size(), bytes.size());
-    pass_on(header, bytes);
+    pass_on(header, bytes, message);
     view_.take(header.step, std::move(message));
     advance();
 }
@@ -531,6 +538,26 @@ void Coordinator::pass_on(const WorldHeader& header, std::span<const std::uint8_
     kept_.emplace_back(header.step, copy);
 }
 
+// Who owns something does the steps itself.
+void Coordinator::pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes,
+                          const StateMessage& states) {
+    const auto copy = shared(bytes);
+    std::vector<std::uint32_t> with, without;
+    std::set<std::uint32_t> owners;
+    for (const Body& body : bodies_) owners.insert(body.owner);
+    for (const std::uint32_t member : members_)
+        if (member != header.worker) (owners.contains(member) ? with : without).push_back(member);
+    if (!without.empty()) queue_.push_back({std::move(without), copy});
+    kept_.emplace_back(header.step, copy);
+    if (with.empty()) return;
+    PublishedMessage published{states.report, {}};
+    published.report.mishaps.clear();
+    for (const WorldRecord& record : states.bodies)
+        published.bodies.push_back(static_cast<std::uint32_t>(record.body));
+    queue_.push_back(
+        {std::move(with), std::make_shared<const std::vector<std::uint8_t>>(encode(header, published))});
+}
+
 void Coordinator::report(const WorldHeader& header, const StepReport& report, std::size_t records,
                          std::size_t bytes) {
     Sender& sender = senders_[header.worker];
@@ -550,7 +577,7 @@ void Coordinator::report(const WorldHeader& header, const StepReport& report, st
     result_.records += records;
     result_.largest_lead = std::max(result_.largest_lead, step.lead);
     result_.largest_ghost_age = std::max(result_.largest_ghost_age, step.ghost_age);
-    outside_[header.worker] = report.outside_impulse;
+    if (settings_.pace == Pace::bounded) outside_[header.worker] = report.outside_impulse;
     for (const Mishap& m : report.mishaps) {
         const int number = static_cast<int>(m.number);
         if (m.kind == Mishap::Kind::quarantined)
@@ -591,7 +618,7 @@ void Coordinator::end(bool rest) {
     result_.rest_reached = rest;
     result_.counts = view_.world().counts();
     name_mishaps(result_);
-    result_.outside_impulse.setZero();
+    result_.outside_impulse = view_.world().outside_impulse();  // in bounded pace zero
     for (const auto& [worker, impulse] : outside_) result_.outside_impulse += impulse;
     send(members_, EndOfRun{});
 }

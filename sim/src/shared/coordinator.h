@@ -79,7 +79,8 @@ private:
     void take_part(const WorldHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
     void take_dealing(const WorldHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
     void report(const WorldHeader& header, const StepReport& report, std::size_t records, std::size_t bytes);
-    void pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes);
+    void pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes);  ///< bounded
+    void pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes, const StateMessage& states);
     void refuse(std::uint32_t worker, const std::string& why);
     void expel(std::uint32_t worker, const std::string& why);
     [[nodiscard]] bool is_too_much(Sender& sender, std::size_t bytes) const;
@@ -134,7 +135,7 @@ private:
     std::map<int, std::uint64_t> limited_, broken_;
     std::vector<std::pair<std::uint32_t, std::vector<int>>>
         orphans_;  // by the lost worker that owned them; if none was left
-    std::map<std::uint32_t, Eigen::Vector3d> outside_;  // of each worker since its start
+    std::map<std::uint32_t, Eigen::Vector3d> outside_;  // bounded: of each worker since its start
     DistributedResult result_;
 };
 

@@ -6,35 +6,38 @@
 #include "shared/body_costs.h"
 #include "shared/replica.h"
 #include "shared/replica_protocol.h"
+#include "world/island_blocks.h"
 #include "world/partners.h"
 
 namespace sim {
 namespace {
 
 constexpr std::uint64_t kStepsAlone = 64;  // after one in which another told nothing, or nothing that can be
-constexpr std::size_t kMostParts = 4096;   // of one worker that wait here; a step needs 4 a substep
 
-// Every worker has a whole replica. A step from t to t + 1 needs every body's exact record at t. Those who published the
-// records of t do it together (world/partners.h): they all know who they are. Who cannot, or finds that another cannot, tells the
-// others so and does it alone: it solves each island with an own body. Either way a worker publishes own records at t + 1, with the
-// same bits, and is at t + 1 when the others' are there.
+// Every worker has a whole replica, and whoever owns something does every step for all bodies. Those who published the records
+// of t do the step from t to t + 1 together (world/partners.h): they all know who they are. Who cannot, or finds that another
+// cannot, tells the others so and does it alone, all of it. Either way a worker publishes own records at t + 1, with the same
+// bits, and goes on when all bodies were published there: nobody is further than one step from another. Who owns nothing
+// copies what the others publish, or, where that was not sent to it, listens to what they tell each other.
 //
 // Ownership comes with a record at some step s, the last that was published. Nobody can be further than
 // s + 1, and a worker that is already there waits for these bodies:
 //   s = own step        they are own from here on
-//   s = own step - 1    the step is undone and repeated with them; the other bodies get the same bits again
+//   s = own step - 1    they are own, and published at the own step, too
 //   s > own step        waits until this worker is there
 class LockstepExchange final : public ReplicaProtocol {
 public:
     explicit LockstepExchange(const SceneMessage& scene);
 
     using ReplicaProtocol::take;
-    void take(const WorldHeader& header, PackedStates&& message) override;
+    void take(const WorldHeader& header, StateMessage&& message) override;
+    void take(const WorldHeader& header, PublishedMessage&& message) override;
     void take(const WorldHeader& header, PartMessage&& message) override;
     void take(SnapshotMessage&& message) override;
     void members(const std::vector<std::uint32_t>& workers) override { members_ = workers; }
     void members_within(const std::vector<std::uint32_t>& workers) override;
     void own(const Ownership& ownership) override;
+    [[nodiscard]] bool owes() const override { return owes_; }
     [[nodiscard]] bool ready() const override;
     void step(const StepChannel& channel) override;
     [[nodiscard]] std::vector<std::uint8_t> publish(std::uint32_t epoch, const StepReport& report) override;
@@ -60,6 +63,7 @@ private:
 
     void note_publisher(std::uint64_t step, std::uint32_t worker, std::uint32_t body);
     [[nodiscard]] std::vector<std::uint32_t> publishers(std::uint64_t step) const;
+    [[nodiscard]] bool owns_any() const { return std::ranges::find(own_, 1) != own_.end(); }
     [[nodiscard]] bool step_together(const StepChannel& channel);
     void wait_for_none();
     void tell(const StepChannel& channel, std::uint32_t to, bool gave_up, std::vector<std::uint8_t>&& bytes);
@@ -74,23 +78,22 @@ private:
     Replica replica_;
     BodyCosts costs_;
     ColumnWatch columns_;
-    std::vector<std::uint32_t> owner_;     // as registered
-    std::vector<std::uint8_t> own_;        // now; with bodies that come in the next step
-    std::vector<int> owned_;               // that are there, ascending
-    std::deque<Ownership> later_;          // own ones of later steps
-    bool unpublished_ = false;             // between step() and publish()
-    WorldSnapshot before_;                 // of the last step, after its events
-    std::vector<std::uint8_t> published_;  // what was own in the last step
-    std::vector<SpringRecord> springs_;    // published of the last step
+    std::vector<std::uint32_t> owner_;  // as registered
+    std::vector<std::uint8_t> own_;     // now; with bodies that come in the next step
+    std::vector<int> owned_;            // that are there, ascending
+    std::deque<Ownership> later_;       // own ones of later steps
+    bool unpublished_ = false;          // between step() and publish()
+    bool owes_ = false;
+    WorldMessage outgoing_ = StateMessage{};
     // Together.
     const bool may_together_;
+    const std::size_t most_parts_;  // of one worker that wait here
     std::vector<std::uint32_t> members_;
     std::map<std::uint64_t, std::vector<std::uint32_t>>
         publisher_;                        // of each body's record, by steps; kApplication: none
     std::vector<std::uint32_t> partners_;  // of the step under way
     bool partner_lost_ = false;
     std::map<std::uint32_t, std::deque<Part>> parts_;  // that others told, by them
-    std::optional<std::uint64_t> repeated_;            // a step that only this worker does again
     std::uint64_t alone_until_ = 0;                    // step
 };
 
@@ -103,7 +106,9 @@ public:
     void tell(int partner, Bytes&& bytes) override {
         exchange_.tell(channel_, worker(partner), false, std::move(bytes));
     }
-    void tell_all(Bytes&& bytes) override { exchange_.tell(channel_, kApplication, false, std::move(bytes)); }
+    void tell_all(Bytes&& bytes) override {
+        if (self() >= 0) exchange_.tell(channel_, kApplication, false, std::move(bytes));
+    }
     [[nodiscard]] Bytes hear(int partner) override { return exchange_.hear(channel_, worker(partner)); }
 
 private:
@@ -114,16 +119,25 @@ private:
     const StepChannel& channel_;
 };
 
+/// Whoever does a step alone.
+class Alone final : public Partners {
+public:
+    Alone() : Partners(0, 1, {}) {}
+    void tell(int, Bytes&&) override {}
+    void tell_all(Bytes&&) override {}
+    [[nodiscard]] Bytes hear(int) override { throw NotTogether("there is no other"); }
+};
+
 LockstepExchange::LockstepExchange(const SceneMessage& scene)
     : self_(scene.worker),
       steps_(scene.settings.steps),
       replica_(scene.scene),
       costs_(replica_.clock().bodies()),
       columns_(scene.scene),
-      may_together_(scene.settings.together) {
+      may_together_(scene.settings.together),
+      most_parts_(most_parts(scene.scene)) {
     owner_.assign(static_cast<std::size_t>(replica_.clock().bodies()), kApplication);
     own_.assign(owner_.size(), 0);
-    published_ = own_;
 }
 
 void LockstepExchange::list_owned() {
@@ -138,15 +152,16 @@ void LockstepExchange::set_own(int body, bool own) {
     if (own) costs_.forget(body);
 }
 
-void LockstepExchange::take(const WorldHeader& header, PackedStates&& message) {
+void LockstepExchange::take(const WorldHeader& header, StateMessage&& message) {
+    for (const WorldRecord& record : message.bodies)
+        note_publisher(header.step, header.worker, static_cast<std::uint32_t>(record.body));
+    replica_.note(header.step, std::move(message));
+    settle();
+}
+
+void LockstepExchange::take(const WorldHeader& header, PublishedMessage&& message) {
     for (const std::uint32_t body : message.bodies) note_publisher(header.step, header.worker, body);
-    if (replica_.complete() && header.step == replica_.step()) {
-        replica_.mark(message.bodies);
-    } else if (header.step >= replica_.step()) {
-        auto states = std::get<StateMessage>(decode_world(message.bytes).message);
-        replica_.note(header.step, std::move(states.bodies), std::move(states.contacts),
-                      std::move(states.springs));
-    }
+    replica_.mark(header.step, message.bodies);
     settle();
 }
 
@@ -171,7 +186,7 @@ std::vector<std::uint32_t> LockstepExchange::publishers(std::uint64_t step) cons
 void LockstepExchange::take(const WorldHeader& header, PartMessage&& message) {
     if (header.step != replica_.step()) return;  // of a step that is done; nobody is further than that
     std::deque<Part>& parts = parts_[header.worker];
-    if (parts.size() < kMostParts) {
+    if (parts.size() < most_parts_) {
         parts.push_back({header.step, message.gave_up, std::move(message.bytes)});
     } else {
         parts.assign(1, {header.step, true, {}});  // it tells what nobody needs
@@ -220,27 +235,27 @@ std::vector<std::uint8_t> LockstepExchange::hear(const StepChannel& channel, std
 bool LockstepExchange::step_together(const StepChannel& channel) {
     partners_ = publishers(replica_.step());
     const auto self = std::ranges::find(partners_, self_);
-    if (!may_together_ || partners_.size() < 2 || self == partners_.end()) return false;
+    const bool listens = self == partners_.end();
+    if (!may_together_ || partners_.size() < 2) return false;
     partner_lost_ = false;
     members_within(members_);
-    const bool may =
-        channel.flush && !partner_lost_ && repeated_ != replica_.step() && replica_.step() >= alone_until_;
     try {
-        if (!may) throw NotTogether("this one cannot");
+        if (!channel.flush || partner_lost_ || replica_.step() < alone_until_)
+            throw NotTogether("this one cannot");
         std::vector<int> of;
         for (const std::uint32_t publisher : publisher_[replica_.step()]) {
             const auto at = std::ranges::find(partners_, publisher);
             of.push_back(at == partners_.end() ? 0 : static_cast<int>(at - partners_.begin()));
         }
-        Together together(*this, channel, static_cast<int>(self - partners_.begin()), std::move(of));
+        Together together(*this, channel, listens ? -1 : static_cast<int>(self - partners_.begin()),
+                          std::move(of));
         replica_.world().step_together(together);
         return true;
     } catch (const NotTogether&) {
     } catch (const DecodeError&) {  // of a part that is none
         wait_for_none();
     }
-    tell(channel, kApplication, true, {});
-    if (may) replica_.world().rewind(before_);
+    if (!listens) tell(channel, kApplication, true, {});
     return false;
 }
 
@@ -250,25 +265,24 @@ void LockstepExchange::take(SnapshotMessage&& message) {
 }
 
 void LockstepExchange::own(const Ownership& ownership) {
+    std::vector<std::uint32_t> bodies;
     for (const WorldRecord& record : ownership.bodies) {
-        owner_[static_cast<std::size_t>(record.body)] = ownership.owner;
+        bodies.push_back(static_cast<std::uint32_t>(record.body));
+        owner_[bodies.back()] = ownership.owner;
         if (ownership.owner != self_) set_own(record.body, false);
     }
-    std::vector<WorldRecord> records = ownership.bodies;
-    replica_.note(ownership.step, std::move(records), {}, {});
+    replica_.mark(ownership.step, bodies);
     if (ownership.owner == self_) later_.push_back(ownership);
     settle();
 }
 
 void LockstepExchange::take_over(const Ownership& ownership) {
-    if (ownership.step + 1 == replica_.step() && !replica_.whole()) {
-        replica_.undo(before_, published_, springs_);
-        repeated_ = replica_.step();
-    }
-    if (ownership.step != replica_.step())
+    if (ownership.step + 1 < replica_.step() || (ownership.step < replica_.step() && replica_.whole()))
         throw DecodeError("found bodies of step " + std::to_string(ownership.step) + ", expected step " +
                           std::to_string(replica_.step()));
-    for (const WorldRecord& record : ownership.bodies) set_own(record.body, true);
+    for (const WorldRecord& record : ownership.bodies)
+        if (owner_[static_cast<std::size_t>(record.body)] == self_) set_own(record.body, true);
+    owes_ = owes_ || ownership.step < replica_.step();
 }
 
 // Takes whatever has become possible: ownership of this step, a whole step.
@@ -285,8 +299,7 @@ void LockstepExchange::settle() {
             break;
         }
         list_owned();
-        const bool owner = std::find(own_.begin(), own_.end(), 1) != own_.end();
-        changed = replica_.advance(!owner && !done()) || changed;
+        changed = replica_.advance(!owns_any() && !done()) || changed;
     }
 }
 
@@ -296,10 +309,10 @@ void LockstepExchange::follow() {
 
 bool LockstepExchange::ready() const {
     if (!replica_.whole() || done()) return false;
-    if (std::find(own_.begin(), own_.end(), 1) != own_.end()) return true;
+    if (owns_any()) return true;
     // The others wait for one that has given away all that it had, too.
     const std::vector<std::uint32_t> partners = publishers(replica_.step());
-    return may_together_ && partners.size() > 1 && std::ranges::find(partners, self_) != partners.end();
+    return replica_.misses_records() || std::ranges::find(partners, self_) != partners.end();
 }
 
 void LockstepExchange::step(const StepChannel& channel) {
@@ -307,28 +320,30 @@ void LockstepExchange::step(const StepChannel& channel) {
     replica_.begin();
     for (int i = 0; i < world.bodies(); ++i) world.set_own(i, own_[static_cast<std::size_t>(i)] != 0);
     list_owned();
-    before_ = world.snapshot();
-    const bool complete = step_together(channel);
-    if (!complete) world.step();
-    published_ = own_;
-    replica_.stepped(published_, complete);
+    if (!step_together(channel)) {
+        Alone alone;
+        world.step_together(alone);
+    }
+    replica_.stepped();
     publisher_.erase(publisher_.begin(), publisher_.lower_bound(replica_.step()));
     unpublished_ = true;
 }
 
 std::vector<std::uint8_t> LockstepExchange::publish(std::uint32_t epoch, const StepReport& report) {
     const World& world = replica_.world();
-    StateMessage message;
-    message.report = report;
-    message.bodies.reserve(owned_.size());
-    for (const int body : owned_) message.bodies.push_back(world.record(body));
-    world.contact_records(message.contacts);
-    world.spring_records(message.springs);
-    springs_ = message.springs;
-    for (const WorldRecord& record : message.bodies)
-        note_publisher(replica_.step(), self_, static_cast<std::uint32_t>(record.body));
-    std::vector<std::uint8_t> bytes = encode({self_, epoch, replica_.step()}, message);
-    unpublished_ = false;
+    auto& states = std::get<StateMessage>(outgoing_);
+    states.report = report;
+    states.bodies.resize(owned_.size());
+    std::vector<std::uint32_t> bodies(owned_.begin(), owned_.end());
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        world.record(owned_[i], states.bodies[i]);
+        note_publisher(replica_.step(), self_, bodies[i]);
+    }
+    world.contact_records(states.contacts);
+    world.spring_records(states.springs);
+    replica_.mark(replica_.step(), bodies);
+    unpublished_ = owes_ = false;
+    std::vector<std::uint8_t> bytes = encode({self_, epoch, replica_.step()}, outgoing_);
     settle();
     return bytes;
 }
@@ -352,6 +367,14 @@ Handover LockstepExchange::give(const std::vector<std::uint32_t>& bodies) {
 }
 
 }  // namespace
+
+std::size_t most_parts(const WorldScene& scene) {
+    // Of an island that is shared out, in a substep, see IslandSolver::substep, and in the step besides; of all islands.
+    constexpr std::size_t kOfSubstep = 16, kOfIsland = 2, kOfStep = 128;
+    const std::size_t bodies = scene.world.bodies.size() + scene.later.size(),
+                      substeps = static_cast<std::size_t>(scene.world.settings.substeps);
+    return kOfStep + (kOfIsland + kOfSubstep * substeps) * (1 + bodies / kLeastDivided);
+}
 
 std::unique_ptr<ReplicaProtocol> make_lockstep_exchange(const SceneMessage& scene) {
     return std::make_unique<LockstepExchange>(scene);

@@ -46,7 +46,6 @@ int SceneClock::moving(std::uint64_t step) const {
 }
 
 Replica::Replica(const WorldScene& scene) : world_(scene.world), clock_(scene) {
-    world_.share(Sharing::islands);
     for (int i = 0; i < world_.bodies(); ++i) world_.set_own(i, false);
 }
 
@@ -58,107 +57,85 @@ void Replica::begin_at(std::uint64_t step) {
 
 Replica::Known& Replica::at(std::uint64_t step) {
     Known& known = known_[step];
-    if (known.body.empty()) known.body.assign(static_cast<std::size_t>(clock_.bodies()), 0);
+    if (known.body.empty()) known.body.assign(static_cast<std::size_t>(clock_.bodies()), kUnknown);
     return known;
+}
+
+const Replica::Known* Replica::find(std::uint64_t step) const {
+    const auto found = known_.find(step);
+    return found == known_.end() ? nullptr : &found->second;
 }
 
 void Replica::mark(Known& known, std::uint64_t step, int body) const {
     std::uint8_t& there = known.body[static_cast<std::size_t>(body)];
-    if (there == 0 && clock_.moves_at(body, step)) ++known.moving;
-    there = 1;
+    if (there != kUnknown || !clock_.moves_at(body, step)) return;
+    there = kPublished;
+    ++known.published;
 }
 
-void Replica::note(std::uint64_t step, std::vector<WorldRecord>&& bodies,
-                   std::vector<ContactRecord>&& contacts, std::vector<SpringRecord>&& springs) {
+void Replica::mark(std::uint64_t step, std::span<const std::uint32_t> bodies) {
     if (step < step_ || (step == step_ && whole_)) return;
     Known& known = at(step);
-    for (WorldRecord& record : bodies) {
-        if (known.body[static_cast<std::size_t>(record.body)] != 0) continue;
-        if (!clock_.moves_at(record.body, step)) continue;
+    for (const std::uint32_t body : bodies)
+        if (body < known.body.size()) mark(known, step, static_cast<int>(body));
+}
+
+void Replica::note(std::uint64_t step, StateMessage&& states) {
+    if (step < step_ || (step == step_ && whole_)) return;
+    Known& known = at(step);
+    for (WorldRecord& record : states.bodies) {
         mark(known, step, record.body);
-        known.bodies.push_back(std::move(record));
+        if (known.body[static_cast<std::size_t>(record.body)] != kPublished) continue;
+        known.body[static_cast<std::size_t>(record.body)] = kRecorded;
+        ++known.recorded;
+        known.records.bodies.push_back(std::move(record));
     }
-    known.contacts.insert(known.contacts.end(), contacts.begin(), contacts.end());
-    known.springs.insert(known.springs.end(), springs.begin(), springs.end());
+    auto& [at_step, bodies, contacts, springs, outside] = known.records;
+    contacts.insert(contacts.end(), states.contacts.begin(), states.contacts.end());
+    springs.insert(springs.end(), states.springs.begin(), states.springs.end());
+    at_step = step, outside = states.report.outside_impulse;
 }
 
-bool Replica::all_known(std::uint64_t step) const {
-    const auto found = known_.find(step);
-    return (found == known_.end() ? 0 : found->second.moving) == clock_.moving(step);
+bool Replica::misses_records() const {
+    const Known* next = find(step_ + 1);
+    return next && next->recorded < next->published;
 }
 
-void Replica::sort_contacts(Known& known) const {
+void Replica::sort_contacts(std::vector<ContactRecord>& contacts) {
     auto key = [](const ContactRecord& c) { return std::pair(c.a, c.b); };
-    std::sort(known.contacts.begin(), known.contacts.end(),
-              [&](const ContactRecord& a, const ContactRecord& b) { return key(a) < key(b); });
-    known.contacts.erase(
-        std::unique(known.contacts.begin(), known.contacts.end(),
-                    [&](const ContactRecord& a, const ContactRecord& b) { return key(a) == key(b); }),
-        known.contacts.end());
+    std::ranges::sort(contacts, {}, key);
+    contacts.erase(std::ranges::unique(contacts, {}, key).begin(), contacts.end());
 }
 
 bool Replica::advance(bool along) {
     if (!whole_) {
-        if (!all_known(step_)) return false;
-        whole_ = true;
-        if (complete_) {
-            known_.erase(known_.begin(), known_.upper_bound(step_));
-            return true;
-        }
-        Known& known = at(step_);
-        sort_contacts(known);
-        for (const WorldRecord& record : known.bodies) world_.restore(record);
-        world_.restore_contacts(known.contacts, known.springs);
+        const Known* now = find(step_);
+        if ((now ? now->published : 0) < clock_.moving(step_)) return false;
     } else {
-        if (!along || !all_known(step_ + 1)) return false;
+        const Known* next = find(step_ + 1);
+        if (!along || (next ? next->recorded : 0) < clock_.moving(step_ + 1)) return false;
         begin();
         ++step_;
-        complete_ = false;
-        Known& known = at(step_);
-        sort_contacts(known);
-        world_.rewind({step_, std::move(known.bodies), std::move(known.contacts), std::move(known.springs),
-                       world_.outside_impulse()});
+        WorldSnapshot& records = at(step_).records;
+        records.step = step_;
+        sort_contacts(records.contacts);
+        world_.rewind(records);
     }
     whole_ = true;
     known_.erase(known_.begin(), known_.upper_bound(step_));
     return true;
 }
 
-void Replica::stepped(std::span<const std::uint8_t> own, bool complete) {
+void Replica::stepped() {
     ++step_;
-    whole_ = false, complete_ = complete;
-    Known& known = at(step_);
-    for (int i = 0; i < world_.bodies(); ++i)
-        if (own[static_cast<std::size_t>(i)] != 0) mark(known, step_, i);
-}
-
-void Replica::mark(std::span<const std::uint32_t> bodies) {
-    Known& known = at(step_);
-    for (const std::uint32_t body : bodies)
-        if (body < known.body.size()) mark(known, step_, static_cast<int>(body));
-}
-
-void Replica::undo(const WorldSnapshot& before, std::span<const std::uint8_t> own,
-                   const std::vector<SpringRecord>& springs) {
-    Known& known = at(step_);
-    for (int i = 0; i < world_.bodies(); ++i)
-        if (own[static_cast<std::size_t>(i)] != 0 ||
-            (complete_ && known.body[static_cast<std::size_t>(i)] != 0))  // of others only marked
-            known.bodies.push_back(world_.record(i));
-    const WorldSnapshot now = world_.snapshot();
-    known.contacts.insert(known.contacts.end(), now.contacts.begin(), now.contacts.end());
-    const std::vector<SpringRecord>& held = complete_ ? now.springs : springs;
-    known.springs.insert(known.springs.end(), held.begin(), held.end());
-    world_.rewind(before);
-    --step_;
-    whole_ = true, complete_ = false;
+    whole_ = false;
 }
 
 void Replica::jump(const WorldSnapshot& snapshot) {
     if (snapshot.step > 0) begin_at(snapshot.step - 1);
     world_.rewind(snapshot);
     step_ = snapshot.step;
-    whole_ = true, complete_ = false;
+    whole_ = true;
     known_.erase(known_.begin(), known_.upper_bound(step_));
 }
 

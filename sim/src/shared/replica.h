@@ -34,8 +34,8 @@ private:
     std::vector<std::uint8_t> moves_;
 };
 
-/// A copy of a world in lockstep. Exact records of its bodies come from other workers or from its own steps.
-/// It is whole when it has every moving body's record of its step.
+/// A copy of a world in lockstep, exact at its step: by its own steps, or of the records that others publish. It is whole when
+/// every moving body was published at its step, so that all others are there, too.
 class Replica {
 public:
     explicit Replica(const WorldScene& scene);  ///< at the start
@@ -47,44 +47,37 @@ public:
     [[nodiscard]] bool whole() const noexcept { return whole_; }         ///< see above
 
     /// Stores what was published of step `step`. The first record of a body counts.
-    void note(std::uint64_t step, std::vector<WorldRecord>&& bodies, std::vector<ContactRecord>&& contacts,
-              std::vector<SpringRecord>&& springs);
-    /// Becomes whole if every record of its step has arrived. If it is whole, `along` is set and every
+    void note(std::uint64_t step, StateMessage&& states);
+    /// These bodies were published at a step, or own ones will be.
+    void mark(std::uint64_t step, std::span<const std::uint32_t> bodies);
+    /// Becomes whole if every body of its step was published. If it is whole, `along` is set and every
     /// record of the next step has arrived, it goes there by copying. Returns whether anything changed.
     bool advance(bool along);
+    /// Whether bodies of the next step are known to be published, whose records have not come and will not.
+    [[nodiscard]] bool misses_records() const;
     /// Applies the events before a step.
     void begin() { begin_at(step_); }
     void begin_at(std::uint64_t step);
-    /// After a step of the world: marks the records of own bodies as present. complete: the copy has all bodies as they are, so
-    /// that of what others publish it has to know no more than that they did.
-    void stepped(std::span<const std::uint8_t> own, bool complete);
-    [[nodiscard]] bool complete() const noexcept { return complete_; }
-    /// These bodies' records of the step that a complete copy is at were published.
-    void mark(std::span<const std::uint32_t> bodies);
-    /// Goes back to the snapshot taken before the step that stepped() ended. What was published of that step
-    /// stays known: the bodies `own`, these springs, and the world's contacts.
-    void undo(const WorldSnapshot& before, std::span<const std::uint8_t> own,
-              const std::vector<SpringRecord>& springs);
+    void stepped();  ///< after a step of the world
     /// Goes to the end of a later step by its snapshot.
     void jump(const WorldSnapshot& snapshot);
 
 private:
+    enum : std::uint8_t { kUnknown, kPublished, kRecorded };
     struct Known {
-        std::vector<std::uint8_t> body;  // whether its record is there
-        int moving = 0;                  // how many of them move and are there
-        std::vector<WorldRecord> bodies;
-        std::vector<ContactRecord> contacts;
-        std::vector<SpringRecord> springs;
+        std::vector<std::uint8_t> body;   // which of these
+        int published = 0, recorded = 0;  // of the moving ones
+        WorldSnapshot records;
     };
     Known& at(std::uint64_t step);
     void mark(Known& known, std::uint64_t step, int body) const;
-    [[nodiscard]] bool all_known(std::uint64_t step) const;
-    void sort_contacts(Known& known) const;
+    [[nodiscard]] const Known* find(std::uint64_t step) const;
+    static void sort_contacts(std::vector<ContactRecord>& contacts);
 
     World world_;
     SceneClock clock_;
     std::uint64_t step_ = 0;
-    bool whole_ = true, complete_ = false;
+    bool whole_ = true;
     std::map<std::uint64_t, Known> known_;  // of this step and later ones
 };
 

@@ -24,7 +24,8 @@ public:
     virtual ~ReplicaProtocol() = default;
 
     /// A state or update message of another worker, in the order in which that one sent them.
-    virtual void take(const WorldHeader& header, PackedStates&& message) { (void)header, (void)message; }
+    virtual void take(const WorldHeader& header, StateMessage&& message) { (void)header, (void)message; }
+    virtual void take(const WorldHeader& header, PublishedMessage&& message) { (void)header, (void)message; }
     virtual void take(const WorldHeader& header, PackedUpdates&& message) { (void)header, (void)message; }
     /// What another worker tells of a step that it does together with this one. May come within step().
     virtual void take(const WorldHeader& header, PartMessage&& message) { (void)header, (void)message; }
@@ -37,16 +38,18 @@ public:
     /// The members now. Workers that left own nothing from here on; Ownership messages say who owns their
     /// bodies.
     virtual void members(const std::vector<std::uint32_t>& workers) = 0;
-    /// Registered owners. Becomes effective at the message's step: may make this worker repeat its last step
-    /// (lockstep), or take bodies over that are some steps away (bounded).
+    /// Registered owners. Becomes effective at the message's step: this worker may have to publish its last step once more
+    /// (lockstep, owes()), or take bodies over that are some steps away (bounded).
     virtual void own(const Ownership& ownership) = 0;
+    /// Bodies came to this worker after its last step, which nobody has published of them.
+    [[nodiscard]] virtual bool owes() const = 0;
 
     /// Whether the next step can be done now: its inputs have arrived and the bound allows it. False if
-    /// done(), or if no body is own (lockstep then follows what the others publish, see follow).
+    /// done(), or if no body is own (lockstep then follows what the others publish, see follow, where it can).
     [[nodiscard]] virtual bool ready() const = 0;
     /// Requires ready(). In lockstep with others, by the channel, if that can wait.
     virtual void step(const StepChannel& channel) = 0;
-    /// Message of the step just done: StateMessage or UpdateMessage, encoded. Called once after step().
+    /// Message of the step just done: StateMessage or UpdateMessage, encoded. Called once after step(), and where it owes().
     [[nodiscard]] virtual std::vector<std::uint8_t> publish(std::uint32_t epoch,
                                                             const StepReport& report) = 0;
     /// Without own bodies: advances as far as the others' messages allow.
@@ -70,6 +73,9 @@ public:
     [[nodiscard]] virtual int ghost_age() const = 0;  ///< of the oldest used in the last step
     [[nodiscard]] virtual const World& world() const = 0;
 };
+
+/// No worker tells more parts of one step (PartMessage).
+[[nodiscard]] std::size_t most_parts(const WorldScene& scene);
 
 [[nodiscard]] std::unique_ptr<ReplicaProtocol> make_lockstep_exchange(const SceneMessage& scene);
 [[nodiscard]] std::unique_ptr<ReplicaProtocol> make_bounded_exchange(const SceneMessage& scene);

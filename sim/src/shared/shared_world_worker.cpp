@@ -9,13 +9,14 @@ namespace {
 std::vector<Mishap> mishaps_of(const World& world, std::uint64_t step) {
     std::vector<Mishap> mishaps;
     for (const QuarantinedBody& q : world.quarantined())
-        if (q.step == step)
+        if (q.step == step && world.own(q.body))
             mishaps.push_back({Mishap::Kind::quarantined, static_cast<std::uint32_t>(q.body), step, q.what});
-    for (const auto& [kind, told] : {std::pair(Mishap::Kind::limited, &world.limited()),
-                                     std::pair(Mishap::Kind::broken, &world.broken())})
-        for (const FirstStep& first : *told)
-            if (first.step == step)
-                mishaps.push_back({kind, static_cast<std::uint32_t>(first.number), step, {}});
+    for (const FirstStep& first : world.limited())
+        if (first.step == step && world.own(first.number))
+            mishaps.push_back({Mishap::Kind::limited, static_cast<std::uint32_t>(first.number), step, {}});
+    for (const FirstStep& first : world.broken())
+        if (first.step == step)
+            mishaps.push_back({Mishap::Kind::broken, static_cast<std::uint32_t>(first.number), step, {}});
     return mishaps;
 }
 
@@ -55,10 +56,7 @@ void SharedWorldWorker::take_message(const WorldHeader& header, Ownership&& mess
     exchange_->own(message);
     market_.registered(header.epoch, message);
     if (message.traded) sellers_.erase(message.from);
-    // Who came to the last step by taking bodies over has to say so, once.
-    if (exchange_->at_end() && exchange_->own_bodies() > 0 && published_ < exchange_->steps_done() &&
-        !stepping_ && bounded_)
-        publish({});
+    if (exchange_->owes() && !stepping_) publish({});
 }
 
 void SharedWorldWorker::take_message(const WorldHeader& header, SnapshotMessage&& message) {
@@ -79,7 +77,12 @@ void SharedWorldWorker::take_message(const WorldHeader& header, PartMessage&& me
     exchange_->take(header, std::move(message));
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, PackedStates&& message) {
+void SharedWorldWorker::take_message(const WorldHeader& header, StateMessage&& message) {
+    market_.heard(header.worker, header.step, header.epoch, message.report);
+    exchange_->take(header, std::move(message));
+}
+
+void SharedWorldWorker::take_message(const WorldHeader& header, PublishedMessage&& message) {
     market_.heard(header.worker, header.step, header.epoch, message.report);
     exchange_->take(header, std::move(message));
 }
@@ -179,7 +182,6 @@ void SharedWorldWorker::publish(const Times& times) {
     report.own = static_cast<std::uint32_t>(exchange_->own_bodies());
     report.outside_impulse = world.outside_impulse();
     report.mishaps = mishaps_of(world, exchange_->steps_done());
-    published_ = exchange_->steps_done();
     queue_.push_back(exchange_->publish(epoch_, report));
 }
 

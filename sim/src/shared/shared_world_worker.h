@@ -41,7 +41,8 @@ private:
     void take_message(const WorldHeader& header, Members&& message);
     void take_message(const WorldHeader& header, Ownership&& message);
     void take_message(const WorldHeader& header, SnapshotMessage&& message);
-    void take_message(const WorldHeader& header, PackedStates&& message);
+    void take_message(const WorldHeader& header, StateMessage&& message);
+    void take_message(const WorldHeader& header, PublishedMessage&& message);
     void take_message(const WorldHeader& header, PartMessage&& message);
     void take_within(const WorldHeader& header, WorldMessage&& message);
     void take_message(const WorldHeader& header, PackedUpdates&& message);
@@ -66,8 +67,7 @@ private:
     bool bounded_;
     std::vector<std::vector<std::uint8_t>> queue_;
     std::uint32_t epoch_ = 0;
-    std::uint64_t published_ = 0;  // step
-    int lead_ = 0;                 // at the start of the step
+    int lead_ = 0;  // at the start of the step
     // Bounded pace: sold bodies change owners at a step that neither side has passed, so no body skips a
     // step: the one after the buyer's. The buyer waits there; the seller goes on to it.
     std::uint64_t handover_step_ = 0;

@@ -10,7 +10,7 @@ WorldView::WorldView(const WorldScene& scene, Pace pace) : pace_(pace), replica_
 }
 
 void WorldView::take(std::uint64_t step, StateMessage&& message) {
-    replica_.note(step, std::move(message.bodies), std::move(message.contacts), std::move(message.springs));
+    replica_.note(step, std::move(message));
 }
 
 void WorldView::take(std::uint64_t step, const std::vector<Update>& updates) {

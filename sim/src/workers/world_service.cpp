@@ -82,7 +82,7 @@ private:
         zmq::message_t frame;
         while (through_signals([&] { return socket_.recv(frame, zmq::recv_flags::dontwait); })) {
             const auto* bytes = frame.data<std::uint8_t>();
-            DecodedWorldMessage m = decode_for_worker({bytes, bytes + frame.size()});
+            DecodedWorldMessage m = decode_for_worker({bytes, frame.size()});
             if (const auto* refusal = std::get_if<Refusal>(&m.message)) {
                 std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
                 refused_ = true;

@@ -36,27 +36,37 @@ Eigen::Vector3d IslandSolver::in_world(const ContactRows& c, const Eigen::Vector
 
 // Prepares a direct solution; false: a factorisation takes more than so many multiply-adds. Stiff springs are solved directly
 // all the same, with sweeps over the contacts.
-bool IslandSolver::begin_direct(double most, bool must) {
-    if (!must && is_too_dear(most) && springs_are_soft()) return false;
+bool IslandSolver::may_go_directly(double most, bool must) {
+    if (!must && is_too_dear(most) && springs_soft_) return false;
     sizes_.clear();
-    std::uint32_t at = 0, wide = 0;
-    for (BodyRows& rows : rows_of_) {
-        sizes_.push_back(6 + rows.body->kind->modes);
-        rows.at = at;
-        at += static_cast<std::uint32_t>(sizes_.back());
-    }
-    auto couple = [this](bool with_contacts) {
+    for (const BodyRows& rows : rows_of_) sizes_.push_back(6 + rows.body->kind->modes);
+    auto couple_manifold = [this](const Manifold& m) {
+        factor_.couple(local(m.a), m.b < kFirstPlane ? local(m.b) : -1);
+    };
+    auto couple = [&](bool with_contacts) {
         factor_.begin(sizes_);
-        if (with_contacts)
-            for (const ContactRows& c : contacts_) factor_.couple(c.side[0].body, c.side[1].body);
+        if (with_contacts && found_again_)
+            for (const Manifold& m : found_) couple_manifold(m);
+        else if (with_contacts)
+            for (const int m : island_->manifolds)
+                couple_manifold((*manifolds_)[static_cast<std::size_t>(m)]);
         for (const SpringRows& s : springs_) factor_.couple(s.side[0].body, s.side[1].body);
     };
     couple(true);
-    with_contacts_ = factor_.least_cost() <= most && std::isfinite(factor_.analyse(most));
-    if (!with_contacts_) {
-        if (!must && springs_are_soft()) return false;
-        couple(false);
-        (void)factor_.analyse(std::numeric_limits<double>::infinity());
+    with_contacts_ = factor_.least_cost() <= most && std::isfinite(factor_cost_ = factor_.analyse(most));
+    if (with_contacts_) return true;
+    if (!must && springs_soft_) return false;
+    couple(false);
+    factor_cost_ = factor_.analyse(std::numeric_limits<double>::infinity());
+    return true;
+}
+
+bool IslandSolver::begin_direct(double most, bool must) {
+    if (!may_go_directly(most, must)) return false;
+    std::uint32_t at = 0, wide = 0;
+    for (std::size_t i = 0; i < rows_of_.size(); ++i) {
+        rows_of_[i].at = at;
+        at += static_cast<std::uint32_t>(sizes_[i]);
     }
     direct_ = true;
     for (auto* list : {&wide_y_, &wide_start_, &wide_free_, &wide_held_, &gradient_, &step_})
@@ -440,8 +450,10 @@ bool IslandSolver::springs_are_soft() {
     });
 }
 
-// Their forces, over the substep, where nothing holds: given before the bodies move.
+// Their forces where nothing holds, over half of a substep: once before the bodies move, once after, before what contacts
+// do to velocities (velocity Verlet).
 void IslandSolver::pull_springs() {
+    const double half = h_ / 2;
     for (SpringRows& s : springs_) {
         write_spring(s);
         const PointConstraint& held = s.constraint->definition;
@@ -449,9 +461,9 @@ void IslandSolver::pull_springs() {
         float v[3];
         speeds(s, v);
         const Eigen::Vector3d speed(v[0], v[1], v[2]);
-        s.moved.setZero();
-        s.impulse = -h_ * held.stiffness * s.gap -
-                    2 * held.damping_ratio * h_ * std::sqrt(held.stiffness / own) * speed;
+        s.moved = s.impulse;  // both halves: of a substep
+        s.impulse = -half * held.stiffness * s.gap -
+                    2 * held.damping_ratio * half * std::sqrt(held.stiffness / own) * speed;
         const float p[3] = {float(s.impulse[0]), float(s.impulse[1]), float(s.impulse[2])};
         push_by(s, p);
         const Eigen::Vector3d impulse = in_world(s, s.impulse);

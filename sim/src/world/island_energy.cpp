@@ -148,10 +148,13 @@ double IslandSolver::with_springs(double sum) const {
     for (const SpringRows& s : springs_) {
         const PointConstraint& held = s.constraint->definition;
         if (std::isinf(held.stiffness)) continue;  // the ends are together
+        // What velocity Verlet keeps exactly: with a spring softer by w / 4.
+        const double kept =
+            direct_ || contacts_.empty() ? 1 : 1 - h_ * h_ * held.stiffness * mobility_of(s) / 4;
         const Eigen::Quaterniond turned =
             held.body_b < 0 ? Eigen::Quaterniond::Identity()
                             : (*bodies_)[static_cast<std::size_t>(held.body_b)].state.orientation;
-        sum += held.stiffness / 2 *
+        sum += kept * held.stiffness / 2 *
                s.point->gap(end(held.body_a, s.point->a), end(held.body_b, s.point->b), turned).squaredNorm();
     }
     return sum;

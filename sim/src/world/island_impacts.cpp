@@ -94,13 +94,19 @@ bool IslandSolver::is_elsewhere(const ContactRows& c, double time) const {
     return apart.norm() > kSlow * size_of(c);
 }
 
-// The contacts of each body.
+// The contacts of each body; together those that this partner sweeps, and all impacts.
 void IslandSolver::list_contacts() {
     first_contact_.assign(rows_of_.size() + 1, 0);
     auto each = [this](auto visit) {
-        for (std::size_t i = 0; i < contacts_.size(); ++i)
+        auto visit_contact = [&](std::size_t i) {
             for (const Side& side : contacts_[i].side)
                 if (side.body >= 0) visit(static_cast<std::size_t>(side.body), i);
+        };
+        if (!with_)
+            for (std::size_t i = 0; i < contacts_.size(); ++i) visit_contact(i);
+        for (std::size_t b = 0; with_ && b < blocks_.size(); ++b)
+            for (std::size_t i = blocks_[b].first; i < blocks_[b].last; ++i)
+                if (sweeps(blocks_[b]) || (parts_[b].impacts && contacts_[i].firm)) visit_contact(i);
     };
     each([this](std::size_t body, std::size_t) { ++first_contact_[body + 1]; });
     for (std::size_t i = 1; i < first_contact_.size(); ++i) first_contact_[i] += first_contact_[i - 1];
@@ -425,11 +431,13 @@ void IslandSolver::stretch_gap(ContactRows& c) const {
 // Frames follow bodies that turned, with what is written in them: rows, and the way so far. Rows of contacts that rebound
 // follow the place where they act, too.
 void IslandSolver::turn_frames(const IslandBlocks::Block& slab) {
-    for (const std::uint32_t body : blocks_.bodies_of(slab.slab)) turn_frame_on(rows_of_[body]);
+    for (const std::uint32_t body : blocks_.bodies_of(slab.slab)) {
+        rows_of_[body].turned = false;
+        turn_frame_on(rows_of_[body]);
+    }
 }
 
 void IslandSolver::turn_frame_on(BodyRows& rows) {
-    rows.turned = false;
     const Eigen::Vector3d& root = rows.body->kind->root_inertia;
     if (root.maxCoeff() - root.minCoeff() < 1e-6 * root.maxCoeff()) return;  // alike in all frames
     const Eigen::Matrix3d now = rows.body->state.orientation.toRotationMatrix();

@@ -59,10 +59,11 @@ void IslandSolver::begin(const Island& island) {
         HeldConstraint& held = (*constraints_)[static_cast<std::size_t>(c)];
         for (int i = 0; i < held.count; ++i) add_spring(held, held.points[static_cast<std::size_t>(i)]);
     }
+    springs_soft_ = springs_are_soft();
     pushed_.clear();
     for (std::size_t i = 0; i < rows_of_.size() && !forces_->empty(); ++i) begin_forces(static_cast<int>(i));
     if (!with_ && (!springs_.empty() || contacts_.empty()))
-        (void)begin_direct(among_ghosts() ? 0 : most_with_springs(), springs_.empty());
+        (void)begin_direct(among_ghosts() ? 0 : most_at_first(), springs_.empty());
 }
 
 void IslandSolver::begin_body(BodyRows& rows) {
@@ -136,10 +137,11 @@ void IslandSolver::add_contacts(const Island& island) {
     for (Window& window : windows_) window.next_turn.assign(rows_of_.size(), 0);
     crew().each(parts_.size(), 1, [this](int thread, std::size_t first, std::size_t last) {
         for (std::size_t b = first; b < last; ++b)
-            if (with_ && !sweeps(blocks_[b]))
-                parts_[b].contacts = blocks_[b].last;  // another partner's
+            if (const bool others = with_ && !sweeps(blocks_[b]); others && !parts_[b].impacts)
+                parts_[b].contacts = blocks_[b].last;
             else
-                fill_part(blocks_.manifolds_of(b), windows_[static_cast<std::size_t>(thread)], parts_[b]);
+                fill_part(blocks_.manifolds_of(b), windows_[static_cast<std::size_t>(thread)], parts_[b],
+                          others);
     });
     std::size_t next = 0;
     for (const Part& part : parts_) {  // `contacts`: their end by now
@@ -179,8 +181,8 @@ void IslandSolver::stiffen(const Island& island) {
     }
 }
 
-// A block's contacts, by turns within windows.
-void IslandSolver::fill_part(std::span<const int> manifolds, Window& window, Part& part) {
+// A block's contacts, by turns within windows; of one that another partner sweeps only impacts.
+void IslandSolver::fill_part(std::span<const int> manifolds, Window& window, Part& part, bool impacts_alone) {
     auto turns_of = [&](int id) -> int* {
         if (id >= kFirstPlane || local(id) < 0) return nullptr;
         return &window.next_turn[static_cast<std::size_t>(local(id))];
@@ -189,7 +191,7 @@ void IslandSolver::fill_part(std::span<const int> manifolds, Window& window, Par
         Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
         int* const next[] = {turns_of(manifold.a), turns_of(manifold.b)};
         for (int i = 0; i < manifold.count; ++i) {
-            if (window.contacts.size() == kWindow) flush(window, part);
+            if (window.contacts.size() == kWindow) flush(window, part, impacts_alone);
             int turn = 0;
             for (const int* of : next)
                 if (of) turn = std::max(turn, *of);
@@ -198,20 +200,28 @@ void IslandSolver::fill_part(std::span<const int> manifolds, Window& window, Par
             window.contacts.push_back({&manifold, i, turn});
         }
     }
-    flush(window, part);
+    flush(window, part, impacts_alone);
 }
 
 // Adds the window's contacts by turn, each turn's in order of ids, and begins anew.
-void IslandSolver::flush(Window& window, Part& part) {
+void IslandSolver::flush(Window& window, Part& part, bool impacts_alone) {
     std::array<int, kWindow + 1> first{};
     std::array<const Turn*, kWindow> by_turn;
     for (const Turn& t : window.contacts) ++first[static_cast<std::size_t>(t.turn) + 1];
     for (std::size_t t = 1; t < first.size(); ++t) first[t] += first[t - 1];
     for (const Turn& t : window.contacts)
         by_turn[static_cast<std::size_t>(first[static_cast<std::size_t>(t.turn)]++)] = &t;
-    for (std::size_t i = 0; i < window.contacts.size(); ++i)
-        fill_contact(contacts_[part.contacts++], *by_turn[i]->manifold,
-                     by_turn[i]->manifold->points[static_cast<std::size_t>(by_turn[i]->point)], part);
+    for (std::size_t i = 0; i < window.contacts.size(); ++i) {
+        ContactRows& c = contacts_[part.contacts++];
+        Manifold& manifold = *by_turn[i]->manifold;
+        if (!impacts_alone || manifold.points[0].begins >= 0) {
+            fill_contact(c, manifold, manifold.points[static_cast<std::size_t>(by_turn[i]->point)], part);
+            continue;
+        }
+        c.firm = false;
+        for (const int id : {manifold.a, manifold.b})
+            (void)reserve_rows(id < kFirstPlane ? local(id) : -1, part.floats);
+    }
     for (const Turn& t : window.contacts)
         for (const int id : {t.manifold->a, t.manifold->b})
             if (id < kFirstPlane && local(id) >= 0) window.next_turn[static_cast<std::size_t>(local(id))] = 0;

@@ -131,24 +131,36 @@ void IslandSolver::substep(bool last) {
     begin_times(substep_ * h_);
     set_forces();
     if (carried_) contacts(&Solver::see_driven);
+    if (with_) begin_borders();
     if (substep_ > 0 && !contacts_.empty())
         bodies(&Solver::turn_frames), contacts(&Solver::turn_rows, Told::skipped);
     bodies(&Solver::load_velocities);
+    Told border = Told::states;
     if (any_bounce_ || !impacts_.empty() || !springs_.empty()) {
         run();
+        if (with_ && meet_everywhere()) border = Told::velocities;
+        const Eigen::Vector3d outside = outside_;
         if (any_bounce_ || !impacts_.empty()) strike();
-        if (with_) meet_springs();
         pull_springs();
+        if (with_ && with_->self() != 0) outside_ = outside;  // one counts what all do alike
     }
-    contacts(&Solver::warm_start, Told::states);
+    contacts(&Solver::warm_start, border);
     contacts(&Solver::sweep<Push::soft>, Told::velocities);
     pushes_out_ = false;
     if (any_emerging_) run(), pushes_out_ = may_push_out();
     if (pushes_out_) bodies(&Solver::keep), contacts(&Solver::sweep<Push::all>, Told::velocities);
     contacts(&Solver::give_to_move);
     bodies(&Solver::move);
-    if (pushes_out_ || any_rebound_ || !impacts_.empty()) contacts(&Solver::follow_rows);
-    contacts(&Solver::sweep<Push::none>, Told::places);
+    if (!springs_.empty()) {
+        run();
+        if (with_) meet_bodies(spring_bodies_, true);
+        const Eigen::Vector3d outside = outside_;
+        pull_springs();
+        if (with_ && with_->self() != 0) outside_ = outside;
+    }
+    const bool follow = pushes_out_ || any_rebound_ || !impacts_.empty();
+    if (follow) contacts(&Solver::follow_rows, Told::places);
+    contacts(&Solver::sweep<Push::none>, follow ? Told::velocities : Told::places);
     contacts(&Solver::sweep<Push::none>, Told::velocities);
     if (any_rebound_) contacts(&Solver::note_work);
     if (any_rebound_ && last) contacts(&Solver::restitute);

@@ -105,7 +105,8 @@ struct Island {
 /// Where bodies have moved by more than kSlow of their size since contacts were found, these are found again
 /// (IslandContacts): the step goes on as a new one would begin. So do islands of thin bodies that met unforeseen (may_follow).
 /// Where a factorisation is too dear, springs alone are factorised, and solved in turn with sweeps over the contacts; if all
-/// are soft (springs_are_soft) they are forces, held over each substep of the sweeps (symplectic Euler).
+/// are soft (springs_are_soft) they are forces, as they always are among contacts: half of a substep's before bodies move, half
+/// after (velocity Verlet).
 /// Islands without either, where a timed force acts, go directly, too: a constant force then moves a body exactly.
 ///
 /// Deterministic: sweeps go over springs, then contacts, in an order that is a function of the bodies and their places alone
@@ -126,7 +127,9 @@ public:
     // One island by several partners, island_partners.cpp.
     /// Begins it and sweeps the part that is this partner's. false, and nothing done: it is not one that is shared out. The
     /// same at all.
-    [[nodiscard]] bool begin_together(const Island& island, const ContactScene& scene, Partners& with);
+    /// shares: how much of it each should do.
+    [[nodiscard]] bool begin_together(const Island& island, const ContactScene& scene, Partners& with,
+                                      const std::vector<double>& shares);
     void write_part(ByteWriter& out) const;       ///< what came of this part
     void read_part(ByteReader& in, int partner);  ///< of another's
     /// Once all parts are there. false: the island has to be solved otherwise.
@@ -162,6 +165,8 @@ public:
     void add_crossed(const CrossImpulse& more);
     /// Forgets the crossed impulses of a body whose island is solved once more.
     void forget_crossed(int body);
+    /// Multiply-adds of all direct solutions since the start, about.
+    [[nodiscard]] double effort() const noexcept { return effort_; }
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
     [[nodiscard]] std::uint64_t limited_before() const noexcept {
         return limited_before_;
@@ -303,8 +308,8 @@ private:
     };
     [[nodiscard]] Part part_of(std::span<const int> manifolds) const;
     void add_contacts(const Island& island);
-    void fill_part(std::span<const int> manifolds, Window& window, Part& part);
-    void flush(Window& window, Part& part);
+    void fill_part(std::span<const int> manifolds, Window& window, Part& part, bool impacts_alone);
+    void flush(Window& window, Part& part, bool impacts_alone);
     void add_contact(Manifold& manifold, ManifoldPoint& point);
     void fill_contact(ContactRows& contact, Manifold& manifold, ManifoldPoint& point, Part& part);
     void note(const Part& part) noexcept;
@@ -410,10 +415,16 @@ private:
     void write_spring(SpringRows& spring);
 
     // Directly; direct_solution.cpp.
+    /// Whether contacts of so many multiply-adds at most, or springs alone, are factorised; factor_ is ready for it then.
+    [[nodiscard]] bool may_go_directly(double most, bool must = false);
     bool begin_direct(double most, bool must = false);
     [[nodiscard]] bool is_too_dear(double most) const;
     [[nodiscard]] double most_with_springs() const noexcept {
         return kMostWithSprings * static_cast<double>(rows_of_.size());
+    }
+    // Sweeps do for soft springs among contacts, too.
+    [[nodiscard]] double most_at_first() const noexcept {
+        return springs_soft_ && !contacts_.empty() ? most_with_contacts() : most_with_springs();
     }
     [[nodiscard]] bool springs_are_soft();
     void pull_springs();
@@ -530,7 +541,6 @@ private:
         std::vector<std::uint32_t> own, theirs;  // bodies in its contacts, ascending
     };
     [[nodiscard]] bool is_plain(const Island& island) const;
-    [[nodiscard]] bool may_be_direct(double most);
     void cut();
     void find_border(Border& border, std::size_t own_slab);
     [[nodiscard]] bool sweeps(const IslandBlocks::Block& block) const noexcept {
@@ -540,11 +550,17 @@ private:
         return blocks_.slab_of(body) >= first_slab_ && blocks_.slab_of(body) < last_slab_;
     }
     void run_together();
-    void meet(const Border& border, Told told);
-    void meet_springs();
+    void order_turns();
+    [[nodiscard]] std::span<float> speeds_of(std::uint32_t body);
+    void tell(const Border& border, Told told);
+    void hear(const Border& border, Told told);
+    void begin_borders();
+    void meet_borders(Told told);
+    void meet_bodies(const std::vector<std::uint32_t>& bodies, bool moved);
+    [[nodiscard]] bool meet_everywhere();
     [[nodiscard]] bool any_of_all(bool here);
     void write_motion(ByteWriter& out, std::uint32_t body) const;
-    void read_motion(ByteReader& in, std::uint32_t body);
+    void read_motion(ByteReader& in, std::uint32_t body, bool begins);
     void turn_frame_on(BodyRows& rows);
     template <typename Body>
     void each_body_of(int partner, Body visit) const;
@@ -555,12 +571,22 @@ private:
     void forget_island();
 
     Partners* with_ = nullptr;                    // this island is solved together
+    std::vector<double> shares_;                  // of it
     std::vector<std::size_t> cuts_;               // first slab of each partner, and their number
     int part_ = 0;                                // this partner's number
     std::size_t first_slab_ = 0, last_slab_ = 0;  // own ones
     std::array<Border, 2> borders_;               // below, above
-    std::vector<std::uint32_t> spring_bodies_;
-    float missed_ = 0;  // most of residual() in all parts
+    /// A block that is swept; of a border when what its other side tells has come, or, before, what that needs is told.
+    struct BlockTurn {
+        std::size_t block;
+        int border;  // or -1
+        bool tells;
+    };
+    std::vector<BlockTurn> turns_;
+    std::vector<std::size_t> blocks_left_;  // without a turn yet
+    std::vector<std::uint32_t> spring_bodies_, meeting_bodies_;
+    float missed_ = 0;                         // most of residual() in all parts
+    std::vector<Eigen::Vector3d> outside_of_;  // of each part, as outside_
 
     const WorldSettings* settings_;
     std::vector<MovingBody>* bodies_;
@@ -599,6 +625,7 @@ private:
     std::vector<int> next_of_;                // per island body
     std::vector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
+    bool springs_soft_ = true;                              // as the step begins
     std::vector<std::size_t> impacts_;                      // contacts, of fast pairs
     std::vector<Hit> hits_;                                 // of the substep, by time
     std::vector<int> hit_bodies_;                           // of the impact that is being solved
@@ -639,6 +666,8 @@ private:
     std::uint64_t limited_before_ = 0;
     std::vector<Before> before_;  // per world body, the last island's when the step began
     BlockCholesky factor_;
+    double factor_cost_ = 0,
+           effort_ = 0;      // multiply-adds: of a factorisation; of direct solutions since the start
     bool factored_ = false;  // rows and springs have not changed since
     std::vector<int> sizes_;
     std::vector<DirectContact> direct_contacts_;

@@ -74,6 +74,14 @@ bool limit_deformation(MovingBody& body) {
     return true;
 }
 
+double loose_radius(const BodyKind& kind, const Eigen::VectorXd& q) {
+    const double radius = kind.surface.bounding_radius() * (1 + 1e-5);
+    if (kind.modes == 0) return radius;
+    const double bent = kind.linear() ? kind.gradient_bound.dot(q.cwiseAbs()) * radius
+                                      : 1.25 * kind.shape_bound.dot(q.cwiseAbs());
+    return radius + bent;
+}
+
 double point_speed(const MovingBody& body) noexcept {
     double speed = body.state.velocity.norm() + body.state.angular_momentum.norm() /
                                                     body.kind->mass.inertia.minCoeff() *

@@ -25,7 +25,7 @@ struct MovingBody {
     Eigen::VectorXd modal_force;                                                        ///< [N kg^-1/2]
 
     bool own = true;       ///< stepped here; else a copy of another world's body
-    bool unposed = false;  ///< `posed` is older than `state`
+    bool unposed = false;  ///< the shape of `posed` is older than `state`: found to be far from what matters
     bool watched = false;  ///< impulses of other own bodies that move are summed in `given`
     bool was_given = false;
     StepImpulse given;
@@ -78,6 +78,8 @@ void move_freely(MovingBody& body, const WorldSettings& settings);
 bool limit_deformation(MovingBody& body);
 constexpr double kGradientLimit = 0.5;
 
+/// Radius of a ball about the centre that holds the body's samples and surface, however they are posed [m].
+[[nodiscard]] double loose_radius(const BodyKind& kind, const Eigen::VectorXd& q);
 /// An upper bound of the speed of the body's samples at rest shape [m/s].
 [[nodiscard]] double point_speed(const MovingBody& body) noexcept;
 

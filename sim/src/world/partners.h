@@ -6,8 +6,8 @@
 
 namespace sim {
 
-/// A step that was begun together is not finished so. Whoever gets this takes its world back to the step's start, and does
-/// the step alone: that needs nobody else, and has the same bits.
+/// A step that was begun together is not finished so. Whoever gets this does the step alone: that needs nobody else, and has
+/// the same bits.
 struct NotTogether : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
@@ -19,7 +19,7 @@ class Partners {
 public:
     using Bytes = std::vector<std::uint8_t>;
 
-    /// Number of this one, and who finds the contacts of each body; of further bodies the first does.
+    /// Number of this one, -1 of who only listens, and who finds the contacts of each body; of further bodies the first does.
     Partners(int self, int count, std::vector<int> of) : self_(self), count_(count), of_(std::move(of)) {}
     virtual ~Partners() = default;
     Partners(const Partners&) = delete;
@@ -31,7 +31,7 @@ public:
         return static_cast<std::size_t>(body) < of_.size() ? of_[static_cast<std::size_t>(body)] : 0;
     }
     virtual void tell(int partner, Bytes&& bytes) = 0;
-    virtual void tell_all(Bytes&& bytes) = 0;  ///< the others
+    virtual void tell_all(Bytes&& bytes) = 0;  ///< the others; who only listens tells nothing
     /// The next of what this partner told; waits for it. Throws NotTogether if it does not come.
     [[nodiscard]] virtual Bytes hear(int partner) = 0;
 

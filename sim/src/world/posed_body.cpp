@@ -20,10 +20,14 @@ Lanes larger(Lanes a, Lanes b) {
 
 }  // namespace
 
-void PosedBody::set(const Eigen::Vector3d& at, const Eigen::Quaterniond& orientation,
-                    const Eigen::VectorXd& q) {
+void PosedBody::place(const Eigen::Vector3d& at, const Eigen::Quaterniond& orientation) {
     position = at;
     rotation = orientation.toRotationMatrix();
+}
+
+void PosedBody::set(const Eigen::Vector3d& at, const Eigen::Quaterniond& orientation,
+                    const Eigen::VectorXd& q) {
+    place(at, orientation);
     half_box = kind->half_box.cast<float>();
     radius = static_cast<float>(kind->surface.bounding_radius());
     sample_reach = 0;

@@ -1,6 +1,7 @@
 #include "world/step_records.h"
 
-#include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 
 namespace sim {
@@ -8,15 +9,52 @@ namespace {
 
 constexpr std::uint8_t kAtLimit = 1, kLimitedNow = 2;
 
-void write_vector(ByteWriter& out, const Eigen::Vector3f& v) {
-    write_floats(out, {v.data(), 3});
+/// Throws if one is not finite. Without branches, since there are many.
+template <typename Number, typename Bits>
+void expect_finite(const Number* numbers, std::size_t count, Bits exponent) {
+    Bits any = 0;
+    for (std::size_t i = 0; i < count; ++i)
+        any |= static_cast<Bits>((std::bit_cast<Bits>(numbers[i]) & exponent) == exponent);
+    if (any != 0) throw DecodeError("a number that is not finite in a part of a step");
 }
-void read_vector(ByteReader& in, Eigen::Vector3f& v) {
-    read_floats(in, {v.data(), 3});
+void expect_finite(const float* numbers, std::size_t count) {
+    expect_finite<float, std::uint32_t>(numbers, count, 0x7f800000u);
+}
+void expect_finite(const double* numbers, std::size_t count) {
+    expect_finite<double, std::uint64_t>(numbers, count, 0x7ff0000000000000u);
 }
 
-[[noreturn]] void refuse_infinite() {
-    throw DecodeError("a number that is not finite in a part of a step");
+/// A point: its integers, then all else.
+struct PackedPoint {
+    std::uint32_t feature;
+    std::int32_t sample_a, sample_b;
+    float begins;
+    std::array<float, 21> numbers;  // six vectors, then what is one number
+};
+static_assert(sizeof(PackedPoint) == 100 && std::is_trivially_copyable_v<PackedPoint>);
+
+template <typename Point>  // may be const
+auto vectors_of(Point& p) {
+    return std::array{&p.normal, &p.arm_a, &p.arm_b, &p.rest_a, &p.rest_b, &p.friction_impulse};
+}
+
+PackedPoint packed(const ManifoldPoint& p) {
+    PackedPoint out{p.feature, p.sample_a, p.sample_b, p.begins, {}};
+    std::size_t at = 0;
+    for (const Eigen::Vector3f* vector : vectors_of(p))
+        for (int k = 0; k < 3; ++k) out.numbers[at++] = (*vector)[k];
+    for (const float number : {p.separation, p.gap, p.normal_impulse}) out.numbers[at++] = number;
+    return out;
+}
+
+void unpack(const PackedPoint& from, ManifoldPoint& p) {
+    if (!std::isinf(from.begins)) expect_finite(&from.begins, 1);  // infinite: it does not happen
+    expect_finite(from.numbers.data(), from.numbers.size());
+    p.feature = from.feature, p.sample_a = from.sample_a, p.sample_b = from.sample_b, p.begins = from.begins;
+    std::size_t at = 0;
+    for (Eigen::Vector3f* vector : vectors_of(p))
+        for (int k = 0; k < 3; ++k) (*vector)[k] = from.numbers[at++];
+    for (float* number : {&p.separation, &p.gap, &p.normal_impulse}) *number = from.numbers[at++];
 }
 
 void write_numbers(ByteWriter& out, const double* numbers, Eigen::Index count) {
@@ -25,17 +63,15 @@ void write_numbers(ByteWriter& out, const double* numbers, Eigen::Index count) {
 void read_numbers(ByteReader& in, double* numbers, Eigen::Index count) {
     const std::size_t bytes = static_cast<std::size_t>(count) * 8;
     if (bytes > 0) std::memcpy(numbers, in.take(bytes).data(), bytes);
-    if (!std::all_of(numbers, numbers + count, [](double x) { return std::isfinite(x); })) refuse_infinite();
+    expect_finite(numbers, static_cast<std::size_t>(count));
 }
 
 // A sample of a body, or -1.
-int read_sample(ByteReader& in, int body, const std::vector<MovingBody>& bodies) {
-    const int sample = in.number<std::int32_t>();
+void expect_sample(int sample, int body, const std::vector<MovingBody>& bodies) {
     const int samples = body < kFirstPlane ? bodies[static_cast<std::size_t>(body)].kind->samples : 0;
     if (sample < -1 || sample >= samples)
         throw DecodeError("a contact at sample " + std::to_string(sample) + ", expected one below " +
                           std::to_string(samples));
-    return sample;
 }
 
 }  // namespace
@@ -46,7 +82,7 @@ void write_floats(ByteWriter& out, std::span<const float> floats) {
 
 void read_floats(ByteReader& in, std::span<float> floats) {
     std::memcpy(floats.data(), in.take(floats.size_bytes()).data(), floats.size_bytes());
-    if (!std::ranges::all_of(floats, [](float x) { return std::isfinite(x); })) refuse_infinite();
+    expect_finite(floats.data(), floats.size());
 }
 
 double read_finite(ByteReader& in) {
@@ -59,15 +95,9 @@ void write(ByteWriter& out, const Manifold& m) {
     out.number(m.a), out.number(m.b);
     out.number(static_cast<std::uint8_t>(m.count)), out.number<std::uint8_t>(m.emerging);
     for (const float x : {m.friction, m.restitution, m.impulse_reach}) out.number(x);
-    for (int i = 0; i < m.count; ++i) {
-        const ManifoldPoint& p = m.points[static_cast<std::size_t>(i)];
-        out.number(p.feature), out.number(p.separation);
-        for (const Eigen::Vector3f* v :
-             {&p.normal, &p.arm_a, &p.arm_b, &p.rest_a, &p.rest_b, &p.friction_impulse})
-            write_vector(out, *v);
-        out.number(p.sample_a), out.number(p.sample_b);
-        for (const float x : {p.begins, p.gap, p.normal_impulse}) out.number(x);
-    }
+    for (int i = 0; i < m.count; ++i)
+        out.append(std::bit_cast<std::array<std::uint8_t, sizeof(PackedPoint)>>(
+            packed(m.points[static_cast<std::size_t>(i)])));
 }
 
 void read(ByteReader& in, Manifold& m, const std::vector<MovingBody>& bodies, std::size_t planes) {
@@ -83,30 +113,34 @@ void read(ByteReader& in, Manifold& m, const std::vector<MovingBody>& bodies, st
     for (float* x : {&m.friction, &m.restitution, &m.impulse_reach}) read_floats(in, {x, 1});
     for (int i = 0; i < m.count; ++i) {
         ManifoldPoint& p = m.points[static_cast<std::size_t>(i)];
-        p.feature = in.number<std::uint32_t>();
-        read_floats(in, {&p.separation, 1});
-        for (Eigen::Vector3f* v : {&p.normal, &p.arm_a, &p.arm_b, &p.rest_a, &p.rest_b, &p.friction_impulse})
-            read_vector(in, *v);
-        p.sample_a = read_sample(in, m.a, bodies), p.sample_b = read_sample(in, m.b, bodies);
-        p.begins = in.number<float>();  // infinite: it does not happen
-        if (std::isnan(p.begins)) refuse_infinite();
-        for (float* x : {&p.gap, &p.normal_impulse}) read_floats(in, {x, 1});
+        unpack(std::bit_cast<PackedPoint>(in.bytes<sizeof(PackedPoint)>()), p);
+        expect_sample(p.sample_a, m.a, bodies), expect_sample(p.sample_b, m.b, bodies);
     }
+}
+
+std::uint64_t skip_manifold(ByteReader& in) {
+    Manifold m;
+    m.a = in.number<std::int32_t>(), m.b = in.number<std::int32_t>();
+    m.count = in.number<std::uint8_t>();
+    (void)in.take(13 + sizeof(PackedPoint) * static_cast<std::size_t>(m.count));
+    return m.key();
 }
 
 void write_impulses(ByteWriter& out, const Manifold& m) {
     for (int i = 0; i < m.count; ++i) {
         const ManifoldPoint& p = m.points[static_cast<std::size_t>(i)];
-        out.number(p.normal_impulse);
-        write_vector(out, p.friction_impulse);
+        const Eigen::Vector3f& friction = p.friction_impulse;
+        write_floats(out, std::array{p.normal_impulse, friction[0], friction[1], friction[2]});
     }
 }
 
 void read_impulses(ByteReader& in, Manifold& m) {
     for (int i = 0; i < m.count; ++i) {
         ManifoldPoint& p = m.points[static_cast<std::size_t>(i)];
-        read_floats(in, {&p.normal_impulse, 1});
-        read_vector(in, p.friction_impulse);
+        std::array<float, 4> impulses;
+        read_floats(in, impulses);
+        p.normal_impulse = impulses[0];
+        p.friction_impulse = {impulses[1], impulses[2], impulses[3]};
     }
 }
 

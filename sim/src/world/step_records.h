@@ -11,6 +11,8 @@ namespace sim {
 void write(ByteWriter& out, const Manifold& manifold);  ///< of planes, all points
 /// `bodies`, `planes`: of the world, which bounds what it may name.
 void read(ByteReader& in, Manifold& manifold, const std::vector<MovingBody>& bodies, std::size_t planes);
+/// Passes one over; its key.
+[[nodiscard]] std::uint64_t skip_manifold(ByteReader& in);
 
 void write_impulses(ByteWriter& out, const Manifold& manifold);
 void read_impulses(ByteReader& in, Manifold& manifold);

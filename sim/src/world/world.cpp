@@ -15,8 +15,6 @@ namespace {
 
 constexpr double kStillTime = 0.5;  // [s]
 
-constexpr double kWorkOfPair = 0.5, kWorkOfPoint = 0.75;  // of a body that touches nothing
-
 void stop_body(MovingBody& body) {
     body.state.velocity.setZero();
     body.state.angular_momentum.setZero();
@@ -85,7 +83,7 @@ void World::Implementation::quarantine(int id, const std::string& what) {
     body.state.position = body.posed.position;
     body.state.orientation = Eigen::Quaterniond(body.posed.rotation);
     body.state.q.setZero();
-    if (body.own) quarantined.push_back({id, counts.steps, what});
+    if (body.own || sharing == Sharing::alone) quarantined.push_back({id, counts.steps, what});
     // What it did to others may be as broken as it is.
     std::erase_if(contacts.manifolds(), [id](const Manifold& m) { return m.a == id || m.b == id; });
     drop_constraints(id);
@@ -160,7 +158,6 @@ void World::Implementation::join(int a, int b) {
 }
 
 void World::Implementation::gather() {
-    if (sharing == Sharing::islands) return gather_islands();
     if (sharing == Sharing::pairs) return gather_pairs();
     here.clear();
     for (std::size_t i = 0; i < bodies.size(); ++i)
@@ -285,7 +282,10 @@ void World::Implementation::count_work() {
         body.work = body.moves() && !body.asleep ? 1 : 0;
     }
     cross_contacts = counts.contacts = 0;
-    auto own = [this](int id) { return id < kFirstPlane && bodies[static_cast<std::size_t>(id)].own; };
+    auto own = [this](int id) {
+        const auto at = static_cast<std::size_t>(id);
+        return id < kFirstPlane && (owned_by_this.empty() ? bodies[at].own : owned_by_this[at] != 0);
+    };
     for (const Manifold& m : contacts.manifolds()) {
         if (!own(m.a) && !own(m.b)) continue;
         counts.contacts += m.count;
@@ -299,13 +299,12 @@ void World::Implementation::count_work() {
     }
 }
 
-// Whether anything happens in this step; in islands that others solve, too, so that contacts are forgotten
-// everywhere at once.
+// Whether anything happens in this step.
 bool World::Implementation::any_awake() const {
-    auto awake = [](const MovingBody& body) { return body.travels || (body.moves() && !body.asleep); };
-    if (sharing == Sharing::islands) return std::any_of(bodies.begin(), bodies.end(), awake);
-    return std::any_of(here.begin(), here.end(),
-                       [&](int i) { return awake(bodies[static_cast<std::size_t>(i)]); });
+    return std::any_of(here.begin(), here.end(), [this](int i) {
+        const MovingBody& body = bodies[static_cast<std::size_t>(i)];
+        return body.travels || (body.moves() && !body.asleep);
+    });
 }
 
 void World::Implementation::set_threads(std::unique_ptr<Crew> crew) {
@@ -319,6 +318,7 @@ void World::Implementation::set_threads(std::unique_ptr<Crew> crew) {
 
 void World::Implementation::step() {
     const FlushDenormals flush;
+    solving = false;
     solver().cross(sharing == Sharing::pairs);
     outside_before = outside;
     ++counts.steps;
@@ -334,29 +334,38 @@ void World::Implementation::step() {
         end_motions();
         return dismiss_ghosts();
     }
+    if (with) find_near();
     crew().each(here.size(), 16, [this](int, std::size_t first, std::size_t end) {
         for (std::size_t i = first; i < end; ++i) {
             MovingBody& body = bodies[static_cast<std::size_t>(here[i])];
-            if (body.moves() && (!body.asleep || body.unposed)) pose(body);
             body.was_given = false;
+            if (!body.moves() || (body.asleep && !body.unposed)) continue;
+            if (!with || near[static_cast<std::size_t>(here[i])] != 0) {
+                pose(body);
+            } else {
+                body.posed.place(body.state.position, body.state.orientation);
+                body.unposed = true;
+            }
         }
     });
     const auto [fallbacks_before, impacts_before] = std::pair(contacts.fallbacks(), contacts.impacts());
-    contacts.find(contact_scene(crew()), with);
+    effort.resize(constraints.size()), effort_told = effort;
+    contacts.find(
+        contact_scene(crew()), with, [this](ByteWriter& out) { write_efforts(out); },
+        [this](ByteReader& in, int partner) { read_efforts(in, partner); });
     find_islands();
     held_before.resize(constraints.size());
     for (std::size_t c = 0; c < constraints.size(); ++c) held_before[c] = constraints[c].holds;
     const auto [limited_before, broken_before] =
         std::pair(counts.deformations_limited, counts.constraints_broken);
     solve_islands();
-    if (with) end_together();
+    with = nullptr;  // what is left each does for itself
     tell_broken(broken_before);
     tell_limited(limited_before);
     put_to_sleep();
     count_work();
     quarantine_results();
     end_motions();
-    if (sharing == Sharing::islands) forget_foreign_contacts();
     dismiss_ghosts();
     counts.pairs = contacts.pairs();
     counts.inverse_fallbacks += contacts.fallbacks() - fallbacks_before;
@@ -400,6 +409,10 @@ World& World::operator=(World&&) noexcept = default;
 
 void World::step() {
     implementation_->step();
+}
+
+void World::step_together(Partners& with) {
+    implementation_->step_together(with);
 }
 
 int World::add_body(const WorldBody& body) {

@@ -91,7 +91,8 @@ void wake_group(std::vector<MovingBody>& bodies, int body) {
     }
 }
 
-void WorldContacts::find(const ContactScene& scene, Partners* with) {
+void WorldContacts::find(const ContactScene& scene, Partners* with, const WriteAside& write_aside,
+                         const ReadAside& read_aside) {
     std::swap(before_, manifolds_);
     reach_.resize(scene.bodies.size());
     paths_.resize(scene.bodies.size());
@@ -99,7 +100,7 @@ void WorldContacts::find(const ContactScene& scene, Partners* with) {
     while (narrow_.size() < static_cast<std::size_t>(scene.crew.size()))
         narrow_.push_back(std::make_unique<NarrowPhase>());
     known_.clear();
-    while (find_once(scene, with)) {
+    while (find_once(scene, with, write_aside, read_aside)) {
     }
 }
 
@@ -132,9 +133,8 @@ void WorldContacts::set_reach(const ContactScene& scene, int id) {
 }
 
 void WorldContacts::set_box(const ContactScene& scene, std::size_t i) {
-    const int id = scene.here[i];
+    const int id = posed_[i];
     const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
-    set_reach(scene, id);
     const Reach& reach = reach_[static_cast<std::size_t>(id)];
     const Eigen::Vector3d half =
         body.posed.half_aabb.array() + reach.turned + reach.rung + kSlop * smallest_half(body);
@@ -143,13 +143,22 @@ void WorldContacts::set_box(const ContactScene& scene, std::size_t i) {
                          body.travels || (body.moves() && !body.asleep)};
 }
 
-bool WorldContacts::find_once(const ContactScene& scene, Partners* with) {
+bool WorldContacts::find_once(const ContactScene& scene, Partners* with, const WriteAside& write_aside,
+                              const ReadAside& read_aside) {
     meetings_.clear();
     followed_.assign(scene.bodies.size(), kNotFollowed);
     watched_.assign(scene.bodies.size(), 0);
     const std::size_t count = scene.here.size();
-    broad_.boxes().resize(count);
+    posed_.clear();
+    for (const int id : scene.here)
+        if (const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
+            !body.moves() || !body.unposed)
+            posed_.push_back(id);
+    broad_.boxes().resize(posed_.size());
     scene.crew.each(count, 64, [&](int, std::size_t first, std::size_t last) {
+        for (std::size_t i = first; i < last; ++i) set_reach(scene, scene.here[i]);
+    });
+    scene.crew.each(posed_.size(), 64, [&](int, std::size_t first, std::size_t last) {
         for (std::size_t i = first; i < last; ++i) set_box(scene, i);
     });
     const auto& pairs = broad_.find(scene.crew);
@@ -163,7 +172,7 @@ bool WorldContacts::find_once(const ContactScene& scene, Partners* with) {
             find(scene, pairs, found_[p], with);
         }
     });
-    if (with) share(scene, *with);
+    if (with) share(scene, *with, write_aside, read_aside);
     gather(scene, parts);
     bool woke = false;
     for (std::size_t p = 0; p < parts; ++p)
@@ -192,7 +201,8 @@ void WorldContacts::find(const ContactScene& scene, const std::vector<std::pair<
 }
 
 // What all partners found, in the order of keys, as if one thread had.
-void WorldContacts::share(const ContactScene& scene, Partners& with) {
+void WorldContacts::share(const ContactScene& scene, Partners& with, const WriteAside& write_aside,
+                          const ReadAside& read_aside) {
     Found& found = found_.front();
     ByteWriter out;
     out.bytes().reserve(160 * found.manifolds.size() + 64);
@@ -207,33 +217,49 @@ void WorldContacts::share(const ContactScene& scene, Partners& with) {
     for (std::size_t i = 0; i < watched_.size() && watched > 0; ++i)
         if (watched_[i] != 0) out.number(static_cast<std::uint32_t>(i));
     out.number(found.pairs);
+    if (write_aside) write_aside(out);
     with.tell_all(std::move(out.bytes()));
-    heard_.clear();
-    std::swap(heard_, found.manifolds);
-    for (int p = 0; p < with.count(); ++p)
-        if (p != with.self()) hear(scene, with.hear(p));
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
-    order.reserve(heard_.size());
-    for (const Manifold& m : heard_) order.emplace_back(m.key(), static_cast<std::uint32_t>(order.size()));
-    std::ranges::sort(order);
-    found.manifolds.clear();
-    for (const auto& [key, at] : order) found.manifolds.push_back(heard_[at]);
+    std::swap(own_found_, found.manifolds);
+    told_.clear();
+    for (std::size_t i = 0; i < own_found_.size(); ++i) told_.push_back({own_found_[i].key(), {}, i});
+    heard_.resize(static_cast<std::size_t>(with.count()));
+    for (int p = 0; p < with.count(); ++p) {
+        if (p == with.self()) continue;
+        Partners::Bytes& heard = heard_[static_cast<std::size_t>(p)];
+        heard = with.hear(p);
+        ByteReader in(heard);
+        hear(scene, in, heard);
+        if (read_aside) read_aside(in, p);
+        in.expect_end();
+    }
+    std::ranges::sort(told_, {}, &Told::key);
+    found.manifolds.resize(told_.size());
+    for (std::size_t i = 0; i < told_.size(); ++i) {
+        if (told_[i].bytes.empty()) {
+            found.manifolds[i] = own_found_[told_[i].own];
+        } else {
+            ByteReader in(told_[i].bytes);
+            read(in, found.manifolds[i], scene.bodies, scene.planes.size());
+        }
+    }
     std::ranges::sort(found.meetings, {}, [](const Meeting& m) { return std::pair(m.a, m.b); });
     for (const Meeting& m : found.meetings)
         for (const int id : {m.a, m.b}) follow(scene, id, scene.bodies[static_cast<std::size_t>(id)].state);
 }
 
-void WorldContacts::hear(const ContactScene& scene, const Partners::Bytes& bytes) {
+void WorldContacts::hear(const ContactScene& scene, ByteReader& in, std::span<const std::uint8_t> bytes) {
     Found& found = found_.front();
-    ByteReader in(bytes);
     const std::uint32_t count = static_cast<std::uint32_t>(scene.bodies.size());
     auto body = [&] {
         const auto id = in.number<std::uint32_t>();
         if (id >= count) throw DecodeError("body " + std::to_string(id) + " of " + std::to_string(count));
         return static_cast<int>(id);
     };
-    for (std::uint32_t n = in.count(22); n > 0; --n)
-        read(in, heard_.emplace_back(), scene.bodies, scene.planes.size());
+    for (std::uint32_t n = in.count(22); n > 0; --n) {
+        const std::span<const std::uint8_t> from = bytes.last(in.left());
+        const std::uint64_t key = skip_manifold(in);
+        told_.push_back({key, from.first(from.size() - in.left()), 0});
+    }
     for (std::uint32_t n = in.count(16); n > 0; --n) {
         const int a = body(), b = body();
         found.meetings.push_back({a, b, read_finite(in), false});
@@ -241,7 +267,6 @@ void WorldContacts::hear(const ContactScene& scene, const Partners::Bytes& bytes
     for (std::uint32_t n = in.count(4); n > 0; --n) found.woken.push_back(body());
     for (std::uint32_t n = in.count(4); n > 0; --n) watched_[static_cast<std::size_t>(body())] = 1;
     found.pairs += in.number<std::int32_t>();
-    in.expect_end();
 }
 
 // What all threads found, in the order of keys.

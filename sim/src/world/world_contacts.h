@@ -1,6 +1,9 @@
 #pragma once
+#include <functional>
 #include <memory>
+#include <span>
 
+#include "bytes/byte_codec.h"
 #include "world/body_path.h"
 #include "world/broad_phase.h"
 #include "world/crew.h"
@@ -43,8 +46,12 @@ struct ContactScene {
 /// already meets again where it is kInside deep in each other, a little deeper every time.
 class WorldContacts {
 public:
+    /// What partners tell each other besides.
+    using WriteAside = std::function<void(ByteWriter&)>;
+    using ReadAside = std::function<void(ByteReader&, int partner)>;
     /// with: partners, each of whom finds those of its bodies and tells the others.
-    void find(const ContactScene& scene, Partners* with = nullptr);
+    void find(const ContactScene& scene, Partners* with = nullptr, const WriteAside& write = {},
+              const ReadAside& read = {});
 
     /// After a solve (`solved`: the bodies that went through it; `started`: the states of all that move, before): contacts for what the paths really taken lead to. Adds at most one impact a body and
     /// lists it; the worlds' islands then are solved again. Empty: nothing unforeseen.
@@ -58,6 +65,8 @@ public:
     /// Whether unforeseen() looks at any path: of all bodies near.
     [[nodiscard]] bool any_left_path(const ContactScene& scene,
                                      const std::vector<std::uint8_t>& solved) const;
+    /// After find(), whether it came to an end or not: the contacts before it.
+    void go_back() noexcept { std::swap(before_, manifolds_); }
     /// Of several impacts of a pair within the step only the last is one of its past in the next.
     void keep_last();
     /// The pair's manifold in this step, if it has one; the first of several.
@@ -99,12 +108,12 @@ private:
         std::vector<int> woken;
         int pairs = 0;
     };
-    bool find_once(const ContactScene& scene, Partners* with);
+    bool find_once(const ContactScene& scene, Partners* with, const WriteAside& write, const ReadAside& read);
     void set_box(const ContactScene& scene, std::size_t i);
     void find(const ContactScene& scene, const std::vector<std::pair<int, int>>& pairs, Found& found,
               const Partners* with);
-    void share(const ContactScene& scene, Partners& with);
-    void hear(const ContactScene& scene, const Partners::Bytes& bytes);
+    void share(const ContactScene& scene, Partners& with, const WriteAside& write, const ReadAside& read);
+    void hear(const ContactScene& scene, ByteReader& in, std::span<const std::uint8_t> bytes);
     void gather(const ContactScene& scene, std::size_t parts);
     void meet_pair(const ContactScene& scene, int i, int j, Found& found);
     [[nodiscard]] bool pass_by(const ContactScene& scene, int i, int j) const;
@@ -130,11 +139,19 @@ private:
     BroadPhase broad_;
     std::vector<std::unique_ptr<NarrowPhase>> narrow_;  // of each thread
     std::vector<Found> found_;
+    std::vector<int> posed_;                    // of scene.here, those whose shape is known
     std::vector<Reach> reach_;                  // of each body
     std::vector<Manifold> manifolds_, before_;  // by ascending keys
     std::vector<Manifold> added_;               // to them
-    std::vector<Manifold> heard_;               // of partners
-    std::vector<BodyPath> paths_;               // of each body
+    std::vector<Partners::Bytes> heard_;        // of partners
+    struct Told {
+        std::uint64_t key;
+        std::span<const std::uint8_t> bytes;  // of a partner's message
+        std::size_t own;                      // place among own_found_, where there are none
+    };
+    std::vector<Told> told_;  // manifolds
+    std::vector<Manifold> own_found_;
+    std::vector<BodyPath> paths_;  // of each body
     enum : std::uint8_t { kNotFollowed, kBeingFollowed, kFollowed };
     std::vector<std::uint8_t> followed_;  // paths_ holds the free motion of this step; by any thread
     std::vector<std::uint8_t> watched_;   // has a contact that turns on: see unforeseen; by any thread

@@ -10,7 +10,8 @@
 
 namespace sim {
 
-constexpr std::size_t kBodiesAPiece = 32;  ///< of what threads take at once
+constexpr double kWorkOfPair = 0.5, kWorkOfPoint = 0.75;  ///< of a body that touches nothing
+constexpr std::size_t kBodiesAPiece = 32;                 ///< of what threads take at once
 
 /// What world.cpp (one world's step) and world_sharing.cpp (several worlds of the same bodies) work on.
 struct World::Implementation {
@@ -39,7 +40,6 @@ struct World::Implementation {
     struct Outcome {
         Eigen::Vector3d outside = Eigen::Vector3d::Zero();
         std::uint64_t limited = 0, broken = 0;
-        bool counts = true;               // `outside` here: of partners who know it all one does
         bool carried = false;             // IslandSolver::is_carried
         bool found = false;               // contacts, within the step
         std::vector<Manifold> manifolds;  // those
@@ -60,12 +60,40 @@ struct World::Implementation {
     std::vector<int> here;  // bodies that take part in the step, ascending
 
     // Together, world_together.cpp.
-    Partners* with = nullptr;             ///< of this step
-    std::vector<std::uint8_t> own_alone;  ///< own of each body, outside of such steps
-    const Island* divided = nullptr;      ///< island that all sweep a part of
-    void step_together(Partners& with);
-    void end_together() noexcept;
     using Solve = std::function<void(const Island&, IslandSolver&, const ContactScene&)>;
+    Partners* with = nullptr;                 ///< of this step
+    std::vector<std::uint8_t> owned_by_this;  ///< own of each body, while such a step counts them all
+    struct Sleep {
+        bool asleep;
+        int still_steps, group;
+    };
+    std::vector<Sleep> sleep_before;  ///< of each body, when the step began
+    bool solving = false;             ///< the step has come so far
+    std::vector<std::uint8_t> near;   ///< of each body: this partner's may meet it
+    void find_near();                 ///< fills `near`
+    void pose_the_rest();             ///< as the step began
+    struct Divided {
+        const Island* island;
+        IslandSolver* part;
+    };
+    std::vector<Divided> divided;  ///< islands of which all sweep a part
+    std::vector<double> effort,    ///< of each constraint: what solving its island took last time, as cost_of
+        effort_told;               ///< as its body's owner knows it
+    std::vector<double> spare;     ///< of each partner: what it should still do, in the step
+    std::vector<int> solved_by;    ///< of an island's first body: which partner solves it
+    std::vector<std::pair<double, const Island*>> dear;  ///< small islands that take long
+    void write_efforts(ByteWriter& out) const;
+    void read_efforts(ByteReader& in, int partner);
+    [[nodiscard]] double cost_of(const Island& island) const;
+    void plan_islands();
+    [[nodiscard]] int solver_of(const Island& island) const {
+        return solved_by[static_cast<std::size_t>(island.bodies.front())];
+    }
+    IslandSolver& part_solver(std::size_t part);
+    bool end_divided(const Divided& d, const Solve& solve, const ContactScene& scene);
+    void step_together(Partners& with);
+    void restore_own() noexcept;
+    void go_back(const WorldCounts& counts_before);
     void solve_together(const Solve& solve, bool first);
     [[nodiscard]] bool is_by_one(const Island& island) const;
     void write_result(ByteWriter& out, const Island& island) const;
@@ -74,10 +102,8 @@ struct World::Implementation {
 
     // Sharing.
     Sharing sharing = Sharing::alone;
-    BroadPhase neighbours;                        // loose boxes, to find what may reach own islands
-    std::vector<double> reaches, quick, fastest;  // islands: of each body, each fast one, each set
-    std::vector<int> owned;                       // pairs: own and fixed bodies, ascending
-    std::vector<int> placed;                      // pairs: ghosts of the next step
+    std::vector<int> owned;   // pairs: own and fixed bodies, ascending
+    std::vector<int> placed;  // pairs: ghosts of the next step
     int cross_contacts = 0;
     struct LooseBall {
         Eigen::Vector3d center;
@@ -110,18 +136,14 @@ struct World::Implementation {
     void end_motions();
     void find_forces();  // and who they wake
     [[nodiscard]] bool is_forced(int body) const;
-    void gather();          // who takes part in the step
-    void gather_islands();  // who may reach an own body's island
-    void join_neighbours(const std::vector<double>& reach);
-    void list_owned();               ///< fills `owned`
-    void gather_pairs();             // own bodies and the ghosts that were placed
-    void forget_foreign_contacts();  ///< at the end of a step
+    void gather();        // who takes part in the step
+    void list_owned();    ///< fills `owned`
+    void gather_pairs();  // own bodies and the ghosts that were placed
     void stop_at_planes(MovingBody& body, const Eigen::Vector3d& before) const;
     void dismiss_ghosts();  ///< at the end of a step
     void find_islands();    ///< of contacts and constraints
     void solve_islands();   ///< in order of ids, again where something unforeseen meets
     void start_solving();   ///< notes what solve_again goes back to
-    [[nodiscard]] bool is_solved(const Island& island) const;
     void solve_island(const Island& island, bool follow, IslandSolver& by, const ContactScene& scene);
     /// Calls solve(island, solver, scene) for those in `to_solve`. first: of the step's rounds.
     void share_islands(const Solve& solve, bool first);

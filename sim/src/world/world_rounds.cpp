@@ -7,7 +7,8 @@
 namespace sim {
 namespace {
 
-constexpr int kRounds = 24;  // then what still meets is held apart
+constexpr double kEffortInWork = 2500;  // multiply-adds that take as long as a body that touches nothing
+constexpr int kRounds = 24;             // then what still meets is held apart
 
 struct Kick {
     Eigen::Vector3d impulse, place;
@@ -47,12 +48,8 @@ ContactScene World::Implementation::contact_scene(Crew& by) {
     return {settings, planes, joined, bodies, here, sharing == Sharing::pairs, by};
 }
 
-// islands: others' bodies, too, as own ones may meet them unforeseen.
-bool World::Implementation::is_solved(const Island& island) const {
-    return is_own(island) || sharing == Sharing::islands;
-}
-
 void World::Implementation::start_solving() {
+    solving = true;
     started.resize(bodies.size());
     at_limit_before.resize(bodies.size());
     outcomes.resize(bodies.size());
@@ -86,16 +83,19 @@ void World::Implementation::solve_island(const Island& island, bool follow, Isla
                                          const ContactScene& scene) {
     Outcome& outcome = outcomes[static_cast<std::size_t>(island.bodies.front())];
     outcome.outside.setZero(), outcome.limited = outcome.broken = 0, outcome.found = false;
-    outcome.counts = !with || with->of(island.bodies.front()) == with->self();
     outcome.carried = by.is_carried(island);
     if (island.manifolds.empty() && island.constraints.empty() && !is_forced(island.bodies.front()))
         return move_alone(island.bodies.front());
     const std::uint64_t limits = by.deformations_limited(), breaks = by.constraints_broken();
+    const double effort_before = by.effort();
     by.solve(island, scene, follow && by.may_follow(island));
     if (const std::vector<Manifold>* found = by.found()) outcome.found = true, outcome.manifolds = *found;
     outcome.limited = by.deformations_limited() - limits;
     outcome.broken = by.constraints_broken() - breaks;
     outcome.outside = by.take_outside_impulse();
+    for (const int c : island.constraints)
+        effort[static_cast<std::size_t>(c)] =
+            (by.effort() - effort_before) / kEffortInWork / static_cast<double>(island.constraints.size());
     for (const int id : island.bodies) {
         const MovingBody& body = bodies[static_cast<std::size_t>(id)];
         solved[static_cast<std::size_t>(id)] = 1;
@@ -156,7 +156,7 @@ void World::Implementation::solve_again() {
     for (std::size_t i = 0; i < islands_used; ++i) {
         const bool any = std::any_of(islands[i].bodies.begin(), islands[i].bodies.end(),
                                      [this](int id) { return again[static_cast<std::size_t>(id)] != 0; });
-        if (!any || !is_solved(islands[i])) continue;
+        if (!any || !is_own(islands[i])) continue;
         to_solve.push_back(&islands[i]);
         for (const int id : islands[i].bodies) solver().forget_crossed(id);
     }
@@ -217,11 +217,10 @@ void World::Implementation::hold_apart(const WorldContacts::Meeting& meeting) {
 void World::Implementation::sum_outcomes() {
     bool breaks = false;
     for (std::size_t i = 0; i < islands_used; ++i) {
-        if (!is_solved(islands[i])) continue;
+        if (!is_own(islands[i])) continue;
         const Outcome& outcome = outcomes[static_cast<std::size_t>(islands[i].bodies.front())];
         breaks = breaks || outcome.broken > 0;
-        if (!is_own(islands[i])) continue;
-        if (outcome.counts) outside += outcome.outside;
+        outside += outcome.outside;
         counts.deformations_limited += outcome.limited;
         counts.constraints_broken += outcome.broken;
     }
@@ -234,8 +233,8 @@ void World::Implementation::solve_islands() {
     int awake = 0;
     to_solve.clear();
     for (std::size_t i = 0; i < islands_used; ++i) {
-        if (!is_solved(islands[i])) continue;
-        awake += is_own(islands[i]);
+        if (!is_own(islands[i])) continue;
+        ++awake;
         to_solve.push_back(&islands[i]);
     }
     share_islands([this](const Island& island, IslandSolver& by,
@@ -259,7 +258,7 @@ void World::Implementation::solve_islands() {
         solve_again();
     }
     for (std::size_t i = 0; i < islands_used; ++i) {
-        if (!is_solved(islands[i])) continue;
+        if (!is_own(islands[i])) continue;
         const Outcome& outcome = outcomes[static_cast<std::size_t>(islands[i].bodies.front())];
         if (outcome.found) contacts.replace(islands[i].bodies, outcome.manifolds);
     }

@@ -3,21 +3,10 @@
 
 #include "world/world_implementation.h"
 
-// What several worlds of the same bodies, each of which owns some, need of a World. `islands`: whole islands
-// are solved wherever one of their bodies is own, out of exact states, so all owners get the same bits.
-// `pairs`: own bodies among ghosts.
+// What several worlds of the same bodies, each of which owns some, need of a World.
 
 namespace sim {
 namespace {
-
-// Radius of a ball about the centre that holds the body's samples and surface, however they are posed.
-double loose_radius(const BodyKind& kind, const Eigen::VectorXd& q) {
-    const double radius = kind.surface.bounding_radius() * (1 + 1e-5);
-    if (kind.modes == 0) return radius;
-    const double bent = kind.linear() ? kind.gradient_bound.dot(q.cwiseAbs()) * radius
-                                      : 1.25 * kind.shape_bound.dot(q.cwiseAbs());
-    return radius + bent;
-}
 
 void push(MovingBody& body, double dt, const StepImpulse& impulse) {
     if (!std::exchange(body.pushed, true))
@@ -55,84 +44,11 @@ int first_mover(const std::vector<MovingBody>& bodies, const PointConstraint& c)
 
 }  // namespace
 
-// Joins bodies whose loose boxes overlap; reach: how far beyond itself a body may come, and touch [m].
-void World::Implementation::join_neighbours(const std::vector<double>& reach) {
-    auto& boxes = neighbours.boxes();
-    boxes.clear();
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-        const MovingBody& body = bodies[i];
-        if (!body.moves() && quick[i] == 0) continue;
-        const double half = loose_radius(*body.kind, body.state.q) + reach[i];
-        boxes.push_back({body.state.position.array() - half, body.state.position.array() + half,
-                         static_cast<int>(i), !body.asleep});
-    }
-    for (const auto& [a, b] : neighbours.find(crew())) join(a, b);
-}
-
-// Bodies that may be in an island with an own body: joined by overlapping loose boxes, constraints, or having
-// fallen asleep together. A superset of the islands is enough: what is left out can neither touch nor wake an
-// own body in this step. What a fast body hits may fly off at up to twice its speed, and hit others in the
-// same step: sets with a fast body reach that far, and so do those that they reach.
-void World::Implementation::gather_islands() {
-    start_union();
-    reaches.resize(bodies.size());
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-        const MovingBody& body = bodies[i];
-        reaches[i] = contact_reach(body, settings);
-        if (body.moves() && body.asleep && body.sleep_group >= 0) join(static_cast<int>(i), body.sleep_group);
-    }
-    for (const HeldConstraint& c : constraints) {
-        const int a = c.definition.body_a, b = c.definition.body_b;
-        if (c.holds && b >= 0 && bodies[static_cast<std::size_t>(a)].moves() &&
-            bodies[static_cast<std::size_t>(b)].moves())
-            join(a, b);
-    }
-    quick.assign(bodies.size(), 0);
-    for (std::size_t i = 0; i < bodies.size(); ++i)
-        if ((bodies[i].moves() || bodies[i].travels) &&
-            reaches[i] > (kSlow + kSlop) * smallest_half(bodies[i].posed))
-            quick[i] = reaches[i];
-    join_neighbours(reaches);
-    for (bool any = true; any;) {
-        any = false;
-        fastest.assign(bodies.size(), 0);
-        for (std::size_t i = 0; i < bodies.size(); ++i) {
-            double& most = fastest[static_cast<std::size_t>(root(static_cast<int>(i)))];
-            most = std::max(most, quick[i]);
-        }
-        for (std::size_t i = 0; i < bodies.size(); ++i) {
-            const double most = 2 * fastest[static_cast<std::size_t>(root(static_cast<int>(i)))];
-            if (most > reaches[i] && bodies[i].moves()) any = true, reaches[i] = most;
-        }
-        if (any) join_neighbours(reaches);
-    }
-    place.assign(bodies.size(), 0);
-    for (std::size_t i = 0; i < bodies.size(); ++i)
-        if (bodies[i].own && bodies[i].moves())
-            place[static_cast<std::size_t>(root(static_cast<int>(i)))] = 1;
-    here.clear();
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-        if (bodies[i].quarantined) continue;
-        if (bodies[i].fixed || place[static_cast<std::size_t>(root(static_cast<int>(i)))] != 0)
-            here.push_back(static_cast<int>(i));
-    }
-}
-
 void World::Implementation::gather_pairs() {
     std::sort(placed.begin(), placed.end());
     here.clear();
     std::merge(owned.begin(), owned.end(), placed.begin(), placed.end(), std::back_inserter(here));
     std::erase_if(here, [this](int i) { return bodies[static_cast<std::size_t>(i)].quarantined; });
-}
-
-// Contacts of islands that were not solved here come from where they were.
-void World::Implementation::forget_foreign_contacts() {
-    std::erase_if(contacts.manifolds(), [this](const Manifold& m) {
-        const int id =
-            bodies[static_cast<std::size_t>(m.a)].fixed ? m.b : m.a;  // some may be quarantined by now
-        const int island = place[static_cast<std::size_t>(root(id))];
-        return island < 0 || !is_own(islands[static_cast<std::size_t>(island)]);
-    });
 }
 
 void World::Implementation::dismiss_ghosts() {

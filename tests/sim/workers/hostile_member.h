@@ -61,7 +61,7 @@ private:
         zmq::message_t frame;
         if (!socket.recv(frame)) return;
         const auto* bytes = frame.data<std::uint8_t>();
-        sim::DecodedWorldMessage m = sim::decode_for_worker({bytes, bytes + frame.size()});
+        sim::DecodedWorldMessage m = sim::decode_for_worker({bytes, frame.size()});
         given_up_ = given_up_ || std::holds_alternative<sim::Refusal>(m.message);
         if (const auto* scene = std::get_if<sim::SceneMessage>(&m.message)) {
             number_ = scene->worker;

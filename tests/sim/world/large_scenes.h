@@ -58,4 +58,81 @@ inline sim::WorldDefinition random_scene(unsigned seed) {
     return world;
 }
 
+/// Bodies of all kinds and shapes that nothing makes rebound, thrown and spinning into a narrow box, some tied by soft springs:
+/// soon one island, with impacts in many steps, whose frames turn.
+inline sim::WorldDefinition heap(unsigned seed) {
+    Draw draw(seed);
+    sim::WorldDefinition world = on_floor();
+    world.settings.substeps = 2 + draw.below(4);
+    for (const double side : {-1.0, 1.0}) {
+        world.planes.push_back({Eigen::Vector3d(side, 0, 0), -4.4});
+        world.planes.push_back({Eigen::Vector3d(0, 0, side), -1.3});
+    }
+    const int bodies = 120 + draw.below(60);
+    for (int i = 0; i < bodies; ++i) {
+        const Eigen::Vector3d at(-3.9 + 1.02 * (i % 8), 0.5 + 0.9 * (i / 24), -0.95 + 0.95 * (i / 8 % 3));
+        const int kind = draw.below(4);
+        sim::WorldBody body = kind == 0   ? box(at, {0.45, 0.25, 0.3}, 300)
+                              : kind == 1 ? ball(at, sim::Fidelity::rigid, 0.45)
+                              : kind == 2 ? ball(at, sim::Fidelity::linear, 0.45)
+                                          : ball(at, sim::Fidelity::modal, 0.45);
+        if (kind > 0) body.shape.base.semi_axes[draw.below(3)] *= 0.7;
+        body.velocity = draw.between(0, 6) * draw.direction();
+        body.angular_velocity = draw.between(0, 20) * draw.direction();
+        world.bodies.push_back(body);
+    }
+    for (int i = 0; i < 4; ++i) {
+        sim::PointConstraint tie;
+        tie.name = "tie";
+        tie.body_a = draw.below(bodies - 1), tie.body_b = i % 2 == 0 ? tie.body_a + 1 : -1;
+        if (i % 2 == 1) tie.point_b = world.bodies[std::size_t(tie.body_a)].world_from_body.translation();
+        tie.point_a = {0.2, 0, 0};
+        tie.stiffness = 300, tie.damping_ratio = 0.1;
+        world.constraints.push_back(tie);
+    }
+    return world;
+}
+
+// Piles, sleepers that are woken, constraints that tie and break, in one small box.
+inline sim::WorldDefinition sleepers_and_ties() {
+    sim::WorldDefinition d;
+    d.settings.sleep_speed = 0.1;
+    d.planes.push_back({Eigen::Vector3d::UnitY(), 0, 0.5, 0});
+    auto add = [&d](const Eigen::Vector3d& at, const Eigen::Vector3d& velocity, sim::Fidelity fidelity,
+                    double restitution) {
+        sim::WorldBody body;
+        body.name = "body " + std::to_string(d.bodies.size());
+        body.shape.base.semi_axes = Eigen::Vector3d(0.5, 0.4, 0.45);
+        body.shape.base.e1 = body.shape.base.e2 = 0.3;
+        body.material = {1e6, 0.3, 300};
+        body.fidelity.fidelity = fidelity;
+        body.fidelity.modes = 12;
+        body.triangles = 180;
+        body.restitution = restitution;
+        body.damping_alpha = 0.5;
+        body.world_from_body.translation() = at;
+        body.velocity = velocity;
+        d.bodies.push_back(body);
+    };
+    // Two piles apart, and one body that comes down on the second when most of both sleep.
+    for (int i = 0; i < 4; ++i) add({0.3 * (i % 2), 0.5 + 0.9 * i, 0}, {0, 0, 0}, sim::Fidelity::modal, 0);
+    for (int i = 0; i < 4; ++i)
+        add({4 + 0.3 * (i % 2), 0.5 + 0.9 * i, 0.2}, {0, 0, 0},
+            i % 2 ? sim::Fidelity::linear : sim::Fidelity::rigid, 0.3);
+    add({50, 0.5, 0.1}, {-24, 45, 0}, sim::Fidelity::modal, 0.5);
+    add({1, 6, 3}, {0, 0, 0}, sim::Fidelity::modal, 0);
+    add({1, 7, 3}, {0, 0, 0}, sim::Fidelity::modal, 0);
+    sim::PointConstraint hanging;
+    hanging.name = "hanging";
+    hanging.body_a = 9, hanging.point_a = {0, 0.4, 0}, hanging.point_b = {1, 6.4, 3};
+    hanging.stiffness = 2e4, hanging.breaking_force = 3000;
+    d.constraints.push_back(hanging);
+    sim::PointConstraint tied;
+    tied.name = "tied";
+    tied.body_a = 9, tied.point_a = {0.5, 0, 0}, tied.body_b = 10, tied.point_b = {0.5, 0, 0};
+    tied.stiffness = 1e4;
+    d.constraints.push_back(tied);
+    return d;
+}
+
 }  // namespace world_test

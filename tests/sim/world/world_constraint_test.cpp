@@ -53,6 +53,37 @@ TEST(WorldConstraint, AHangingBodyStretchesItsSpringByItsWeight) {
     }
 }
 
+// A body with modes that slides on a floor without friction: its contact is swept, and the spring is a force in the sweeps.
+// Closed form: cos(omega t); velocity Verlet is ahead by omega^2 h^2 / 24 of it (Hairer, Lubich, Wanner 2006, I.1.4).
+TEST(WorldConstraint, ASoftSpringOfASlidingBodyKeepsItsPeriodAndEnergy) {
+    for (const double k : {2e3, 2e4, 1.5e5}) {
+        SCOPED_TRACE(k);
+        sim::WorldDefinition definition = on_floor();
+        definition.planes[0].friction = 0;
+        sim::WorldBody body = ball({0.3, 0.5, 0}, Fidelity::modal);
+        body.material.young_pa = 1e9;
+        body.friction = 0;
+        definition.bodies.push_back(body);
+        definition.constraints.push_back(to_place(0, {0, 0, 0}, {0, 0.5, 0}, k));
+        definition.constraints[0].damping_ratio = 0;
+        sim::World world(definition);
+        const double mass = world.rigid_mass(0).mass, omega = std::sqrt(k / mass),
+                     h = definition.settings.dt / definition.settings.substeps,
+                     ahead = 1 + std::pow(omega * h, 2) / 24;
+        double furthest = 0, largest = 0;
+        const int steps = 240;
+        for (int i = 0; i < steps; ++i) {
+            world.step();
+            const double x = world.state(0).position.x();
+            furthest = std::max(furthest, std::abs(x - 0.3 * std::cos(omega * ahead * world.time_s())));
+            if (i > 3 * steps / 4) largest = std::max(largest, std::abs(x));
+        }
+        EXPECT_LT(furthest, 0.02 * 0.3);
+        EXPECT_GT(largest, 0.98 * 0.3 * std::cos(omega * definition.settings.dt / 2))
+            << "between steps it is further out";
+    }
+}
+
 TEST(WorldConstraint, ConflictingConstraintsMeetInTheMiddleByTheirStiffness) {
     sim::WorldDefinition definition = weightless();
     definition.settings.sleeping = false;
