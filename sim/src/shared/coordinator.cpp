@@ -314,16 +314,16 @@ void Coordinator::expel(std::uint32_t worker, const std::string& why) {
 }
 
 // Between two steps of all bodies a member does at most `bound` + 1 steps, and makes or answers an offer for each
-// step of each member; in lockstep it repeats a step when it gets bodies of a lost one. What is relayed or kept
+// step of each member; in lockstep it publishes a step again when it gets bodies of a lost one. What is relayed or kept
 // for later members is bounded by this.
 bool Coordinator::is_too_much(Sender& sender, std::size_t bytes) const {
     constexpr std::size_t kMessages = 256, kRepeated = 8;
     const auto steps = static_cast<std::size_t>(settings_.bound) + 2;
     if (std::exchange(sender.messages_at, view_.step()) != view_.step())
-        sender.messages = sender.message_bytes = 0;
+        sender.messages = sender.message_bytes = sender.offered = 0;
     sender.message_bytes += bytes;
     const std::size_t parts = settings_.pace == Pace::lockstep ? most_parts(scene_) : 0;
-    return ++sender.messages > kMessages + parts + 8 * steps * members_.size() ||
+    return ++sender.messages > kMessages + parts + 8 * steps * members_.size() + sender.offered ||
            sender.message_bytes > kRepeated * steps * static_cast<std::size_t>(largest_message(scene_));
 }
 
@@ -353,7 +353,10 @@ void Coordinator::take_message(const WorldHeader& header, std::span<const std::u
     if (auto* update = std::get_if<UpdateMessage>(&message))
         return take_update(header, bytes, std::move(*update));
     if (auto* handover = std::get_if<Handover>(&message)) return take_handover(header, std::move(*handover));
-    if (const auto* offer = std::get_if<Offer>(&message)) return take_dealing(header, bytes, offer->to);
+    if (const auto* offer = std::get_if<Offer>(&message)) {
+        if (is_member(offer->to)) ++senders_[offer->to].offered;
+        return take_dealing(header, bytes, offer->to);
+    }
     if (const auto* answer = std::get_if<OfferAnswer>(&message))
         return take_dealing(header, bytes, answer->to);
     if (const auto* part = std::get_if<PartMessage>(&message)) return take_part(header, bytes, part->to);

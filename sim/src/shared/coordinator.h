@@ -63,7 +63,7 @@ private:
         bool refused = false;               ///< something, and it was noted
         bool settled = false;               ///< bounded: has published the last step again
         std::uint64_t messages_at = 0;      ///< steps of all bodies since which these were sent:
-        std::size_t messages = 0, message_bytes = 0;
+        std::size_t messages = 0, message_bytes = 0, offered = 0;  ///< offered: to it, to be answered
     };
     struct Group {
         std::uint32_t owner;

@@ -34,7 +34,11 @@ public:
     void take(const WorldHeader& header, PublishedMessage&& message) override;
     void take(const WorldHeader& header, PartMessage&& message) override;
     void take(SnapshotMessage&& message) override;
-    void members(const std::vector<std::uint32_t>& workers) override { members_ = workers; }
+    void members(const std::vector<std::uint32_t>& workers) override {
+        members_ = workers;
+        std::erase_if(parts_,
+                      [&](const auto& of) { return std::ranges::find(workers, of.first) == workers.end(); });
+    }
     void members_within(const std::vector<std::uint32_t>& workers) override;
     void own(const Ownership& ownership) override;
     [[nodiscard]] bool owes() const override { return owes_; }
@@ -184,8 +188,11 @@ std::vector<std::uint32_t> LockstepExchange::publishers(std::uint64_t step) cons
 }
 
 void LockstepExchange::take(const WorldHeader& header, PartMessage&& message) {
-    if (header.step != replica_.step()) return;  // of a step that is done; nobody is further than that
+    // Others may be in the next step already, where nobody waits for one that owned nothing.
+    const std::uint64_t now = replica_.step();
+    if (header.step < now || header.step > now + 1) return;
     std::deque<Part>& parts = parts_[header.worker];
+    while (!parts.empty() && parts.front().step < now) parts.pop_front();
     if (parts.size() < most_parts_) {
         parts.push_back({header.step, message.gave_up, std::move(message.bytes)});
     } else {
@@ -217,12 +224,12 @@ std::vector<std::uint8_t> LockstepExchange::hear(const StepChannel& channel, std
         for (const std::uint32_t partner : partners_) {
             std::deque<Part>& parts = parts_[partner];
             while (!parts.empty() && parts.front().step < now) parts.pop_front();
-            if (std::ranges::any_of(parts, &Part::gave_up))
+            if (std::ranges::any_of(parts, [now](const Part& p) { return p.gave_up && p.step == now; }))
                 throw NotTogether("worker " + std::to_string(partner) + " gave up");
         }
         if (partner_lost_) throw NotTogether("a worker is lost");
         std::deque<Part>& parts = parts_[from];
-        if (!parts.empty()) {
+        if (!parts.empty() && parts.front().step == now) {
             std::vector<std::uint8_t> bytes = std::move(parts.front().bytes);
             parts.pop_front();
             return bytes;
@@ -370,7 +377,7 @@ Handover LockstepExchange::give(const std::vector<std::uint32_t>& bodies) {
 
 std::size_t most_parts(const WorldScene& scene) {
     // Of an island that is shared out, in a substep, see IslandSolver::substep, and in the step besides; of all islands.
-    constexpr std::size_t kOfSubstep = 16, kOfIsland = 2, kOfStep = 128;
+    constexpr std::size_t kOfSubstep = 18, kOfIsland = 2, kOfStep = 128;
     const std::size_t bodies = scene.world.bodies.size() + scene.later.size(),
                       substeps = static_cast<std::size_t>(scene.world.settings.substeps);
     return kOfStep + (kOfIsland + kOfSubstep * substeps) * (1 + bodies / kLeastDivided);

@@ -164,6 +164,7 @@ void SharedWorldWorker::worked(const Times& times) {
     for (Deferred& deferred : std::exchange(deferred_, {}))
         take(deferred.header, std::move(deferred.message));
     if (left_ || ended_) return;
+    if (exchange_->owes()) publish({});
     if (draining_) return leave();
     trade();
     exchange_->follow();

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint64_t kStepsKept =
     10'000;                             // by which a member may be behind the others and still be checked
-constexpr int kMostMessagesAStep = 64;  // it is repeated when other members are lost
+constexpr int kMostMessagesAStep = 64;  // it is published again when other members are lost
 constexpr std::size_t kMostWaiting = 100'000;  // states of a member, about 25 MB of hashes
 constexpr std::size_t kMostBytes = 256 << 20;  // of a team's waiting states
 

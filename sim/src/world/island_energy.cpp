@@ -30,7 +30,7 @@ void IslandSolver::note_start() {
         energy_before_ += m.energy, scale_ += m.scale;
         fastest_ = std::max(fastest_, m.speed), smallest_ = std::min(smallest_, m.size);
     }
-    energy_before_ = with_springs(energy_before_);
+    energy_before_ = with_springs(energy_before_, direct_);
 }
 
 void IslandSolver::go_back() {
@@ -52,7 +52,7 @@ void IslandSolver::go_back() {
 // that is not enough, it came from outside, and is taken from all of it. Not of bodies that others compute, too, at their own
 // pace: what they were told stands.
 void IslandSolver::calm() {
-    const double gained = energy() - energy_before_;
+    const double gained = energy(direct_) - energy_before_;
     if (!(gained > kMostGained * scale_)) return;
     Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), centre = momentum, turning = momentum;
     double mass = 0;
@@ -119,17 +119,17 @@ double IslandSolver::energy_of(const MovingBody& body) const {
            (s.q_dot.squaredNorm() + s.q.cwiseProduct(body.kind->basis.omega).squaredNorm()) / 2;
 }
 
-// With that of springs [J]; summed in the order of ids.
-double IslandSolver::energy() {
+// With that of springs [J], as of a direct solution or of sweeps; summed in the order of ids.
+double IslandSolver::energy(bool directly) {
     each_body([this](BodyRows& rows) {
         measures_[static_cast<std::size_t>(&rows - rows_of_.data())].energy = energy_of(*rows.body);
     });
     double sum = 0;
     for (const Measure& m : measures_) sum += m.energy;
-    return with_springs(sum);
+    return with_springs(sum, directly);
 }
 
-double IslandSolver::with_springs(double sum) const {
+double IslandSolver::with_springs(double sum, bool directly) const {
     auto end = [this](int id, const Eigen::Vector3d& rest) -> Eigen::Vector3d {
         if (id < 0) return rest;
         const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
@@ -150,7 +150,7 @@ double IslandSolver::with_springs(double sum) const {
         if (std::isinf(held.stiffness)) continue;  // the ends are together
         // What velocity Verlet keeps exactly: with a spring softer by w / 4.
         const double kept =
-            direct_ || contacts_.empty() ? 1 : 1 - h_ * h_ * held.stiffness * mobility_of(s) / 4;
+            directly || contacts_.empty() ? 1 : 1 - h_ * h_ * held.stiffness * mobility_of(s) / 4;
         const Eigen::Quaterniond turned =
             held.body_b < 0 ? Eigen::Quaterniond::Identity()
                             : (*bodies_)[static_cast<std::size_t>(held.body_b)].state.orientation;

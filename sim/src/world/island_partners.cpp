@@ -6,7 +6,7 @@
 // A large island by several partners, each in its own memory. Its slabs (IslandBlocks) are shared out in runs of
 // neighbours. What lies within a run is swept by one partner; what crosses a border between two runs by both, each for
 // itself, out of the same bits: before it they tell each other the velocities of the bodies on their side. So every contact sees
-// the velocities that it would see if one swept all, and impulses need not be told. A substep has four such meetings.
+// the velocities that it would see if one swept all, and impulses need not be told. A substep has four such meetings or more.
 //
 // Impacts, which are few, each partner computes for itself, all of the island's, once their bodies have been told.
 //

@@ -411,9 +411,15 @@ IslandSolver::End IslandSolver::end_of(int body, const Eigen::Vector3d& rest, fl
     Eigen::Vector3d point = rest;
     if (kind.modes > 0) {
         kind.shapes_at(rest.cast<float>(), shapes);
-        for (int axis = 0; axis < 3; ++axis)
-            for (int k = 0; k < kind.modes; ++k)
-                point[axis] += static_cast<double>(shapes[axis * kind.mode_width + k]) * b.state.q[k];
+        for (int k = 0; k < kind.modes; ++k) {
+            double q = b.state.q[k];
+            if (modes_ahead_ && local(body) >= 0)  // under what acts so far, held over the substep
+                q += h_ * of_substep(kind).held.root_compliance[k] *
+                     static_cast<double>(y_.data()[rows_of_[static_cast<std::size_t>(local(body))].offset +
+                                                   8 + static_cast<std::uint32_t>(k)]);
+            for (int axis = 0; axis < 3; ++axis)
+                point[axis] += static_cast<double>(shapes[axis * kind.mode_width + k]) * q;
+        }
     }
     const Eigen::Vector3d arm = b.state.orientation * point;
     const Eigen::Vector3d& centre =

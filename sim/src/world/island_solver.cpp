@@ -36,12 +36,13 @@ void IslandSolver::solve(const Island& island, const ContactScene& scene, bool f
     if (!direct_ && (uneven || is_far_from_solved()) && begin_direct(most)) {
         // Of contacts that contradict each other the exact answer is worse than sweeps that give up: where nothing
         // else may give energy, it shows by that.
-        const double swept = energy();
+        const double swept = energy(true);
         go_back();
         begin_direct(most);
+        note_start();
         advance();
-        const double gained = energy() - std::max(swept, energy_before_);
-        if (!may_gain() && !(gained < kWorse * scale_)) go_back(), advance();
+        const double gained = energy(true) - std::max(swept, energy_before_);
+        if (!may_gain() && !(gained < kWorse * scale_)) go_back(), note_start(), advance();
     }
     // Joints alone give back what they take, within a step or over several.
     if (!may_gain() && !any_told_ && (springs_.empty() || !island.manifolds.empty())) calm();
@@ -155,7 +156,9 @@ void IslandSolver::substep(bool last) {
         run();
         if (with_) meet_bodies(spring_bodies_, true);
         const Eigen::Vector3d outside = outside_;
+        modes_ahead_ = true;
         pull_springs();
+        modes_ahead_ = false;
         if (with_ && with_->self() != 0) outside_ = outside;
     }
     const bool follow = pushes_out_ || any_rebound_ || !impacts_.empty();

@@ -273,9 +273,9 @@ private:
     void note_start();
     void go_back();  ///< to it
     void calm();
-    [[nodiscard]] double energy();
+    [[nodiscard]] double energy(bool directly);
     [[nodiscard]] double energy_of(const MovingBody& body) const;
-    [[nodiscard]] double with_springs(double sum) const;
+    [[nodiscard]] double with_springs(double sum, bool directly) const;
     [[nodiscard]] bool is_far_from_solved() const;
     [[nodiscard]] bool is_uneven() const;
     [[nodiscard]] bool may_gain() const;  // energy, from without
@@ -625,10 +625,11 @@ private:
     std::vector<int> next_of_;                // per island body
     std::vector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
-    bool springs_soft_ = true;                              // as the step begins
-    std::vector<std::size_t> impacts_;                      // contacts, of fast pairs
-    std::vector<Hit> hits_;                                 // of the substep, by time
-    std::vector<int> hit_bodies_;                           // of the impact that is being solved
+    bool springs_soft_ = true;          // as the step begins
+    bool modes_ahead_ = false;          // springs' ends are where the substep takes them, with their modes
+    std::vector<std::size_t> impacts_;  // contacts, of fast pairs
+    std::vector<Hit> hits_;             // of the substep, by time
+    std::vector<int> hit_bodies_;       // of the impact that is being solved
     std::vector<std::size_t> striking_, struck_;            // contacts, now and since it began
     std::vector<std::size_t> holding_;                      // springs
     std::vector<std::size_t> contacts_of_, first_contact_;  // body by body, and where each begins

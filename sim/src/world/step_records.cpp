@@ -110,6 +110,9 @@ void read(ByteReader& in, Manifold& m, const std::vector<MovingBody>& bodies, st
         throw DecodeError("a contact of " + std::to_string(m.count) + " points between bodies " +
                           std::to_string(m.a) + " and " + std::to_string(m.b) + " of " +
                           std::to_string(count));
+    if (!bodies[static_cast<std::size_t>(m.a)].moves() &&
+        (on_plane || !bodies[static_cast<std::size_t>(m.b)].moves()))
+        throw DecodeError("a contact of what does not move");
     for (float* x : {&m.friction, &m.restitution, &m.impulse_reach}) read_floats(in, {x, 1});
     for (int i = 0; i < m.count; ++i) {
         ManifoldPoint& p = m.points[static_cast<std::size_t>(i)];

@@ -12,7 +12,8 @@ namespace {
 // several samples, whose normals differ by more.
 constexpr double kNormalTurn = 0.004, kBentNormalTurn = 0.05;  // [rad]
 
-constexpr std::size_t kLeastPart = 16;  // bodies whose contacts a thread finds at once
+constexpr std::uint32_t kMostPairs = 1 << 22;  // of one partner
+constexpr std::size_t kLeastPart = 16;         // bodies whose contacts a thread finds at once
 
 double smallest_half(const MovingBody& body) {
     return sim::smallest_half(body.posed);
@@ -262,11 +263,16 @@ void WorldContacts::hear(const ContactScene& scene, ByteReader& in, std::span<co
     }
     for (std::uint32_t n = in.count(16); n > 0; --n) {
         const int a = body(), b = body();
+        const bool any = scene.bodies[static_cast<std::size_t>(a)].moves() ||
+                         scene.bodies[static_cast<std::size_t>(b)].moves();
+        if (a >= b || !any) throw DecodeError("a meeting of what does not meet");
         found.meetings.push_back({a, b, read_finite(in), false});
     }
     for (std::uint32_t n = in.count(4); n > 0; --n) found.woken.push_back(body());
     for (std::uint32_t n = in.count(4); n > 0; --n) watched_[static_cast<std::size_t>(body())] = 1;
-    found.pairs += in.number<std::int32_t>();
+    const auto pairs = in.number<std::uint32_t>();
+    if (pairs > kMostPairs) throw DecodeError(std::to_string(pairs) + " pairs");
+    found.pairs += static_cast<int>(pairs);
 }
 
 // What all threads found, in the order of keys.

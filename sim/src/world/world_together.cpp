@@ -1,8 +1,8 @@
 #include "world/step_records.h"
 #include "world/world_implementation.h"
 
-// A step by several partners (partners.h): each finds the contacts of its bodies and solves the islands whose first body is
-// its own, and all sweep a part of a large one (island_partners.cpp). Everything else each does for itself, as if alone. What is
+// A step by several partners (partners.h): each finds the contacts of its bodies and solves some of the small islands
+// (plan_islands), and all sweep a part of each large one (island_partners.cpp). Everything else each does for itself, as if alone. What is
 // found and solved they tell each other, so that the worlds are the same again.
 //
 // A partner that does not go on with the others goes back to where the step began; what changed by then is known.
@@ -63,8 +63,12 @@ void World::Implementation::find_near() {
     constexpr double kRounding = 1.001;  // poses are in single precision
     const auto ball_of = [this](int id) {
         const MovingBody& body = bodies[static_cast<std::size_t>(id)];
+        // A sleeper may be woken, and falls then.
+        const double falls =
+            body.asleep ? settings.dt * settings.dt * std::abs(body.gravity_scale) * settings.gravity.norm()
+                        : 0;
         const double radius =
-            kRounding * (loose_radius(*body.kind, body.state.q) + contact_reach(body, settings));
+            kRounding * (loose_radius(*body.kind, body.state.q) + contact_reach(body, settings) + falls);
         return Eigen::AlignedBox3d((body.state.position.array() - radius).matrix(),
                                    (body.state.position.array() + radius).matrix());
     };
@@ -195,7 +199,7 @@ void World::Implementation::solve_together(const Solve& solve, bool first) {
 
 // Whether it is solved by that.
 bool World::Implementation::end_divided(const Divided& d, const Solve& solve, const ContactScene& scene) {
-    const std::uint64_t limits = d.part->deformations_limited();
+    const std::uint64_t limits = d.part->deformations_limited(), breaks = d.part->constraints_broken();
     if (!d.part->end_together()) {  // it has to be solved directly: by each, from its start
         begin_again(*d.island);
         solve(*d.island, solver(), scene);
@@ -204,6 +208,7 @@ bool World::Implementation::end_divided(const Divided& d, const Solve& solve, co
     Outcome& outcome = outcomes[static_cast<std::size_t>(d.island->bodies.front())];
     outcome = {};
     outcome.limited = limits - d.part->limited_before();
+    outcome.broken = d.part->constraints_broken() - breaks;
     outcome.outside = d.part->take_outside_impulse();
     for (const int id : d.island->bodies) solved[static_cast<std::size_t>(id)] = 1;
     for (const int c : d.island->constraints) effort[static_cast<std::size_t>(c)] = 0;

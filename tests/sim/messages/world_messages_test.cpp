@@ -134,7 +134,8 @@ std::vector<sim::WorldMessage> world_samples() {
             sim::Offer{2, 9, {1, 2}, {0.001f, 0.002f}},
             sim::OfferAnswer{1, 9, true},
             sim::Handover{2, 9, records, {0, 1}, {5, 6}},
-            sim::PartMessage{1, false, {1, 2, 3}}};
+            sim::PartMessage{1, false, {1, 2, 3}},
+            sim::PublishedMessage{report(), {3, 1, 2}}};
 }
 
 const sim::WorldHeader kHeader{3, 8, 1234567890123};

@@ -88,6 +88,7 @@ inline sim::WorldDefinition heap(unsigned seed) {
         if (i % 2 == 1) tie.point_b = world.bodies[std::size_t(tie.body_a)].world_from_body.translation();
         tie.point_a = {0.2, 0, 0};
         tie.stiffness = 300, tie.damping_ratio = 0.1;
+        tie.collide = i % 2 == 1;
         world.constraints.push_back(tie);
     }
     return world;

@@ -94,6 +94,19 @@ void step_alone(sim::World& world) {
     world.step_together(one);
 }
 
+/// A step of worlds of the same bodies; returns how often one told something to one other alone.
+int step_all(std::vector<sim::World>& worlds, const std::vector<int>& whose) {
+    Mail mail(int(worlds.size()));
+    std::vector<std::thread> threads;
+    for (int p = 0; p < mail.count(); ++p)
+        threads.emplace_back([&, p] {
+            ThreadPartner partner(mail, p, whose, -1);
+            worlds[std::size_t(p)].step_together(partner);
+        });
+    for (std::thread& thread : threads) thread.join();
+    return mail.told;
+}
+
 struct Steps {
     std::vector<std::uint64_t> hashes;
     std::vector<sim::WorldCounts> counts;
@@ -232,6 +245,33 @@ TEST(Partners, HeapsThatAreThrownTogetherHaveTheBitsOfOneWorld) {
     EXPECT_GT(with_impacts, 4);
 }
 
+// A tie that breaks in an island that is swept together: its bodies meet from then on.
+TEST(Partners, TiesThatBreakInAHeapBreakForAll) {
+    sim::WorldDefinition definition = heap(1);
+    for (sim::PointConstraint& tie : definition.constraints) tie.collide = false;
+    sim::World lying(definition);
+    for (int i = 0; i < 90; ++i) lying.step();
+    for (sim::PointConstraint& tie : definition.constraints) tie.breaking_force = 20;
+    sim::World one(definition);
+    one.rewind(lying.snapshot());
+    std::vector<sim::World> worlds;
+    for (int p = 0; p < 2; ++p) worlds.emplace_back(definition).rewind(lying.snapshot());
+    std::vector<int> whose;
+    for (int i = 0; i < one.bodies(); ++i) whose.push_back(i < 80 ? 0 : 1);
+    int told = 0;
+    for (int step = 0; step < 10; ++step) {
+        one.step();
+        told += step_all(worlds, whose);
+        for (const sim::World& world : worlds) {
+            ASSERT_EQ(world.state_hash(), one.state_hash()) << step;
+            EXPECT_EQ(world.counts().constraints_broken, one.counts().constraints_broken) << step;
+            EXPECT_EQ(world.broken().size(), one.broken().size()) << step;
+        }
+    }
+    EXPECT_GT(one.counts().constraints_broken, 0u);
+    EXPECT_GT(told, 0) << "it is swept together";
+}
+
 TEST(Partners, BodiesThatSleepWakeAndBreakLooseHaveTheBitsOfOneWorld) {
     const sim::WorldDefinition definition = sleepers_and_ties();
     const Steps one = alone(definition, 700);
@@ -261,6 +301,66 @@ TEST(Partners, AStepInWhichOneFallsSilentIsDoneAlone) {
                     [](int step, int partner) { return partner == step % 3 ? step / 2 : -1; });
     EXPECT_EQ(several.hashes, one.hashes);
     EXPECT_GT(several.alone, 5);
+}
+
+// A world that was rewound has not posed those that sleep: one that is woken falls onto the next.
+TEST(Partners, SleepersThatARewoundWorldWakesMeetThoseOfOthers) {
+    sim::WorldDefinition definition = on_floor();
+    definition.settings.sleep_speed = 0.1;
+    for (int i = 0; i < 2; ++i)
+        definition.bodies.push_back(ball({0, 0.25 + 0.5034 * i, 0}, sim::Fidelity::rigid, 0.25, 300));
+    definition.bodies.push_back(ball({0, 3, 0}, sim::Fidelity::rigid, 0.2, 300));
+    const sim::World start(definition);
+    sim::WorldSnapshot asleep = start.snapshot();
+    asleep.step = 1;
+    for (int i = 0; i < 2; ++i) {
+        asleep.bodies[std::size_t(i)].asleep = true;
+        asleep.bodies[std::size_t(i)].sleep_group = i;
+    }
+    asleep.bodies[2].state.position.y() = 1.22;
+    asleep.bodies[2].state.velocity.y() = -2;
+    sim::World one(definition);
+    one.rewind(asleep);
+    std::vector<sim::World> worlds;
+    for (int p = 0; p < 2; ++p) worlds.emplace_back(definition).rewind(asleep);
+    int met = 0;
+    for (int step = 0; step < 20; ++step) {
+        one.step();
+        met = std::max(met, one.counts().contacts);
+        (void)step_all(worlds, {0, 1, 1});
+        for (const sim::World& world : worlds) ASSERT_EQ(world.state_hash(), one.state_hash()) << step;
+    }
+    EXPECT_GE(met, 3);
+}
+
+// Places of bodies that are there, but do not move.
+TEST(Partners, ContactsOfWhatDoesNotMoveAreRefused) {
+    sim::WorldDefinition definition = on_floor();
+    definition.bodies = {box({0, 0.5, 0}, {0.5, 0.5, 0.5}), box({0, 1.4, 0}, {0.4, 0.4, 0.4})};
+    definition.bodies[0].fixed = true;
+    definition.bodies.push_back(box({5, 0.4, 0}, {0.4, 0.4, 0.4}));
+    std::vector<sim::World> worlds;
+    for (int p = 0; p < 2; ++p) worlds.emplace_back(definition);
+    Mail mail(2);
+    int refused = 0;
+    std::vector<std::thread> threads;
+    for (int p = 0; p < 2; ++p)
+        threads.emplace_back([&, p] {
+            // The first contact's first body, after their number: body 2 on the plane becomes body 0.
+            ThreadPartner partner(mail, p, {0, 0, 1}, -1, [&](sim::Partners::Bytes& bytes) {
+                if (p == 0 && bytes.size() > 8) bytes[4] = 0;
+            });
+            try {
+                worlds[std::size_t(p)].step_together(partner);
+            } catch (const std::runtime_error&) {
+                mail.give_up();
+                refused += p == 0;
+                step_alone(worlds[std::size_t(p)]);
+            }
+        });
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(refused, 1);
+    EXPECT_EQ(worlds[0].state_hash(), worlds[1].state_hash());
 }
 
 // Numbers may be lies; places, counts and what is not finite are found, and then the world is what it was.
