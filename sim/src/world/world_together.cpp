@@ -118,7 +118,7 @@ IslandSolver& World::Implementation::part_solver(std::size_t part) {
     return solver;
 }
 
-// What solving an island takes, about; in microseconds on a machine of 2025, but only shares matter.
+// What solving an island takes, about, in units of World::work: only shares matter.
 double World::Implementation::cost_of(const Island& island) const {
     double cost = 1 + static_cast<double>(island.bodies.size());
     for (const int m : island.manifolds)
