@@ -249,6 +249,8 @@ Json workers_of(const SimulateResult& r) {
             {"bodies_reowned", r.bodies_reowned},
             {"trades", r.trades},
             {"bytes_per_body_step", r.body_steps > 0 ? Json(double(r.bytes) / double(r.body_steps)) : Json()},
+            {"linked_bytes_per_body_step",
+             r.body_steps > 0 ? Json(double(r.bytes_linked) / double(r.body_steps)) : Json()},
             {"largest_lead", r.largest_lead},
             {"largest_ghost_age", r.largest_ghost_age},
             {"refused_messages", r.refused_messages}};

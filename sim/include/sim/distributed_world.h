@@ -84,15 +84,17 @@ struct DistributedResult {    ///< of a whole run
     double elapsed_s = 0;  ///< from the first step's start to the last one's end, of the clock that was used
     double cpu_s = 0;      ///< processor time of all workers' steps, see WorkerStep
     int workers = 0;       ///< the largest number at a time
-    int lost = 0, left = 0;                       ///< workers that died; that handed over and left
-    int bodies_reowned = 0;                       ///< bodies of those, given to other workers
-    std::uint64_t migrations = 0;                 ///< bodies that changed hands by trade
-    std::uint64_t trades = 0;                     ///< accepted offers
-    std::uint64_t cross_contacts = 0;             ///< points, summed over steps
-    std::uint64_t bytes = 0, bytes_states = 0;    ///< sent by workers; of them state or update records
-    std::uint64_t records = 0;                    ///< state or update records sent
-    std::uint64_t refused_messages = 0;           ///< malformed or stale ones
-    int largest_lead = 0, largest_ghost_age = 0;  ///< [steps]
+    int lost = 0, left = 0;            ///< workers that died; that handed over and left
+    int bodies_reowned = 0;            ///< bodies of those, given to other workers
+    std::uint64_t migrations = 0;      ///< bodies that changed hands by trade
+    std::uint64_t trades = 0;          ///< accepted offers
+    std::uint64_t cross_contacts = 0;  ///< points, summed over steps
+    std::uint64_t bytes = 0,
+                  bytes_states = 0;      ///< sent by workers, every copy; of them state or update records
+    std::uint64_t bytes_linked = 0;      ///< of them from worker to worker, not by way of the application
+    std::uint64_t records = 0;           ///< state or update records sent
+    std::uint64_t refused_messages = 0;  ///< malformed or stale ones
+    int largest_lead = 0, largest_ghost_age = 0;                ///< [steps]
     Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< see World::outside_impulse
     WorldCounts counts;                                         ///< summed over workers
     std::vector<QuarantinedBody> quarantined;                   ///< in order of steps; so are the next two

@@ -14,14 +14,16 @@ namespace {
 constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'W'};
 constexpr std::uint16_t kUpdateType = 12;
 constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kChecksumBytes = 4, kAppliedBytes = 12;
-constexpr std::size_t kMishapBytes = 17;  // at least
-constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64, kLongestHost = 255;
+constexpr std::size_t kMishapBytes = 17, kPeerBytes = 44;  // at least
+constexpr std::uint64_t kMostLinked = std::uint64_t{1} << 40;
+constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64, kLongestHost = 255, kLongestKey = 40;
 
 // What several messages hold.
 
 void write(ByteWriter& out, const StepReport& r) {
     for (const float x : {r.seconds, r.smoothed_s, r.waited_s, r.processor_s}) out.number(x);
     for (const std::uint32_t n : {r.lead, r.ghost_age, r.cross_contacts, r.own}) out.number(n);
+    out.number(r.linked);
     out.matrix(r.outside_impulse);
     out.count(r.mishaps.size());
     for (const Mishap& m : r.mishaps) {
@@ -58,6 +60,8 @@ StepReport read_report(ByteReader& in) {
     }
     for (std::uint32_t* n : {&r.lead, &r.ghost_age, &r.cross_contacts, &r.own})
         *n = in.number<std::uint32_t>();
+    r.linked = in.number<std::uint64_t>();
+    if (r.linked > kMostLinked) throw DecodeError("a report of more bytes than can be");
     in.matrix(r.outside_impulse);
     if (!r.outside_impulse.allFinite()) throw DecodeError("a report that is not finite");
     r.mishaps.resize(in.count(kMishapBytes));
@@ -121,6 +125,10 @@ void read_numbers(ByteReader& in, std::vector<std::uint32_t>& numbers) {
     numbers.resize(in.count(4));
     for (std::uint32_t& number : numbers) number = in.number<std::uint32_t>();
 }
+void read_bytes(ByteReader& in, std::vector<std::uint8_t>& bytes) {
+    const std::span<const std::uint8_t> all = in.take(in.count(1));
+    bytes.assign(all.begin(), all.end());
+}
 void write_body(ByteWriter& out, const Members& m) {
     write_numbers(out, m.workers);
 }
@@ -173,7 +181,6 @@ void write_body(ByteWriter& out, const Handover& m) {
 }
 
 void write_body(ByteWriter& out, const PartMessage& m) {
-    out.number(m.to);
     out.number<std::uint8_t>(m.gave_up);
     out.count(m.bytes.size());
     out.append(m.bytes);
@@ -181,6 +188,28 @@ void write_body(ByteWriter& out, const PartMessage& m) {
 void write_body(ByteWriter& out, const PublishedMessage& m) {
     write(out, m.report);
     write_numbers(out, m.bodies);
+}
+void write_body(ByteWriter& out, const RelayMessage& m) {
+    write_numbers(out, m.to);
+    out.count(m.part.size());
+    out.append(m.part);
+}
+void write_body(ByteWriter& out, const PeersMessage& m) {
+    out.count(m.peers.size());
+    for (const PeersMessage::Peer& peer : m.peers) {
+        out.number(peer.worker);
+        out.text(peer.endpoint.substr(0, kLongestHost));
+        out.text(peer.key.substr(0, kLongestKey));
+        out.append(peer.says);
+        out.append(peer.hears);
+    }
+}
+void write_body(ByteWriter& out, const LinkBeat& m) {
+    out.number<std::uint8_t>(m.hears);
+}
+void write_body(ByteWriter& out, const ReachMessage& m) {
+    out.text(m.endpoint.substr(0, kLongestHost));
+    out.text(m.key.substr(0, kLongestKey));
 }
 
 void read_body(ByteReader& in, JoinRequest& m) {
@@ -231,14 +260,32 @@ void read_body(ByteReader& in, UpdateMessage& m) {
     read_numbers(in, m.broken);
 }
 void read_body(ByteReader& in, PartMessage& m) {
-    m.to = in.number<std::uint32_t>();
     m.gave_up = in.flag();
-    const std::span<const std::uint8_t> bytes = in.take(in.count(1));
-    m.bytes.assign(bytes.begin(), bytes.end());
+    read_bytes(in, m.bytes);
 }
 void read_body(ByteReader& in, PublishedMessage& m) {
     m.report = read_report(in);
     read_numbers(in, m.bodies);
+}
+void read_body(ByteReader& in, RelayMessage& m) {
+    read_numbers(in, m.to);
+    read_bytes(in, m.part);
+}
+void read_body(ByteReader& in, PeersMessage& m) {
+    m.peers.resize(in.count(kPeerBytes));
+    for (PeersMessage::Peer& peer : m.peers) {
+        peer.worker = in.number<std::uint32_t>();
+        peer.endpoint = read_words(in, kLongestHost);
+        peer.key = read_words(in, kLongestKey);
+        peer.says = in.bytes<16>(), peer.hears = in.bytes<16>();
+    }
+}
+void read_body(ByteReader& in, LinkBeat& m) {
+    m.hears = in.flag();
+}
+void read_body(ByteReader& in, ReachMessage& m) {
+    m.endpoint = read_words(in, kLongestHost);
+    m.key = read_words(in, kLongestKey);
 }
 void read_body(ByteReader&, PackedUpdates&) {
     throw DecodeError("a message of no known type");

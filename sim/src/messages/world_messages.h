@@ -15,7 +15,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 8
+//   4       2      version, 9
 //   6       2      type
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
@@ -43,11 +43,15 @@ namespace sim {
 //   13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds}
 //   14 answer     worker  u32 to, u32 number, flag accepted
 //   15 handover   worker  u32 to, u32 number, list of record, list of applied
-//   16 part       worker  u32 to, flag gave up, list of u8
+//   16 part       worker  flag gave up, list of u8
 //   17 published  app     report, list of u32 (bodies)
+//   18 relay      worker  list of u32 (to), list of u8 (a part, encoded)
+//   19 peers      app     list of {u32 worker, texts endpoint, key, 16 bytes: what it says, 16 bytes: what it hears}
+//   20 link       worker  flag hears
+//   21 reach      worker  texts endpoint, key
 //
-//   report      60 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
-//               cross contacts, own; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
+//   report      68 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
+//               cross contacts, own; u64 linked; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
 //   applied     12 bytes: u32 worker, u64 step
 //   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8 broken),
 //               u16 still steps, i32 sleep group, v3 position, f64 orientation w x y z, v3 velocity,
@@ -78,7 +82,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kWorldProtocol = 8;  ///< version
+constexpr std::uint16_t kWorldProtocol = 9;  ///< version
 
 struct WorldHeader {
     std::uint32_t worker = kApplication;
@@ -99,6 +103,7 @@ struct StepReport {
     float seconds = 0, smoothed_s = 0, waited_s = 0, processor_s = 0;  ///< see WorkerStep
     std::uint32_t lead = 0, ghost_age = 0, cross_contacts = 0;
     std::uint32_t own = 0;
+    std::uint64_t linked = 0;  ///< bytes that it sent to other workers directly, since its last report
     Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< since this worker's start
     std::vector<Mishap> mishaps;                                ///< of the step
 };
@@ -223,17 +228,42 @@ struct Handover {
     std::vector<std::uint64_t> applied;
 };
 
-/// Lockstep, within the step that begins at the header's: what a worker tells one other, or all (to: kApplication), with whom it
-/// does the step together (world/partners.h). gave_up: nothing more of this step comes from it.
+/// Lockstep, within the step that begins at the header's: what a worker tells others with whom it does the step together
+/// (world/partners.h). gave_up: nothing more of this step comes from it. Worker to worker, see workers/peer_links.h.
 struct PartMessage {
-    std::uint32_t to = kApplication;
     bool gave_up = false;
     std::vector<std::uint8_t> bytes;
+};
+/// To the application: a part for those whom its sender cannot reach.
+struct RelayMessage {
+    std::vector<std::uint32_t> to;
+    std::vector<std::uint8_t> part;  ///< encoded
+};
+
+/// To the application: where other workers reach this one, once it listens there. Printable ASCII, whatever was sent.
+struct ReachMessage {
+    std::string endpoint;  ///< at most 255 characters
+    std::string key;       ///< public, of CURVE; empty: none
+};
+/// From the application: how to reach others. Once one can be reached, it is told to those that were before, and they to it.
+/// Every pair has two secrets, by which each knows the other one.
+struct PeersMessage {
+    struct Peer {
+        std::uint32_t worker = 0;
+        std::string endpoint, key;
+        Secret says = {}, hears = {};
+    };
+    std::vector<Peer> peers;
+};
+/// Worker to worker, every 0.1 s. hears: the sender has heard from the other one not long ago.
+struct LinkBeat {
+    bool hears = false;
 };
 
 using WorldMessage = std::variant<JoinRequest, WorldBeat, Drained, WorkerFailure, SceneMessage, Refusal,
                                   EndOfRun, Members, Ownership, SnapshotMessage, StateMessage, UpdateMessage,
-                                  Offer, OfferAnswer, Handover, PartMessage, PublishedMessage, PackedUpdates>;
+                                  Offer, OfferAnswer, Handover, PartMessage, PublishedMessage, RelayMessage,
+                                  PeersMessage, LinkBeat, ReachMessage, PackedUpdates>;
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const WorldHeader& header, const WorldMessage& message);
 struct DecodedWorldMessage {

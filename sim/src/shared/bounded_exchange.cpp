@@ -24,7 +24,7 @@ public:
     using ReplicaProtocol::take;
     void take(const WorldHeader& header, PackedUpdates&& message) override;
     void take(SnapshotMessage&& message) override;
-    void members(const std::vector<std::uint32_t>& workers) override;
+    void members(const std::vector<std::uint32_t>& workers, std::uint32_t epoch) override;
     void own(const Ownership& ownership) override;
     // Who came to the last step by taking bodies over has to say so.
     [[nodiscard]] bool owes() const override { return at_end() && own_bodies() > 0 && published_ < step_; }
@@ -206,7 +206,7 @@ void BoundedExchange::take(SnapshotMessage&& message) {
     come_to(message.snapshot.step);
 }
 
-void BoundedExchange::members(const std::vector<std::uint32_t>& workers) {
+void BoundedExchange::members(const std::vector<std::uint32_t>& workers, std::uint32_t) {
     for (const std::uint32_t was : members_)
         if (std::find(workers.begin(), workers.end(), was) == workers.end()) known_[was] = kForever;
     members_ = workers;

@@ -124,6 +124,7 @@ std::uint32_t Coordinator::join(const JoinRequest& request) {
         send({worker}, EndOfRun{});
     } else if (started_) {
         catch_up(worker);
+        ++epoch_;
         send(members_, Members{members_});
         while (!orphans_.empty()) {
             const auto orphans = std::move(orphans_.back());
@@ -359,7 +360,8 @@ void Coordinator::take_message(const WorldHeader& header, std::span<const std::u
     }
     if (const auto* answer = std::get_if<OfferAnswer>(&message))
         return take_dealing(header, bytes, answer->to);
-    if (const auto* part = std::get_if<PartMessage>(&message)) return take_part(header, bytes, part->to);
+    if (auto* reach = std::get_if<ReachMessage>(&message)) return take_reach(header, std::move(*reach));
+    if (auto* relay = std::get_if<RelayMessage>(&message)) return take_relay(header, std::move(*relay));
     if (std::holds_alternative<WorldBeat>(message)) return;
     if (const auto* failure = std::get_if<WorkerFailure>(&message)) return lose(worker, failure->what);
     if (std::holds_alternative<Drained>(message)) {
@@ -370,14 +372,34 @@ void Coordinator::take_message(const WorldHeader& header, std::span<const std::u
     refuse(worker, "found a message that no worker sends, expected one of a worker");
 }
 
-void Coordinator::take_part(const WorldHeader& header, std::span<const std::uint8_t> bytes,
-                            std::uint32_t to) {
-    if (settings_.pace != Pace::lockstep || to == header.worker)
-        return refuse(header.worker, "found a part of a step that nobody waits for");
-    if (to != kApplication) return take_dealing(header, bytes, to);
-    std::vector<std::uint32_t> others = members_;
-    std::erase(others, header.worker);
-    if (!others.empty()) queue_.push_back({std::move(others), shared(bytes)});
+void Coordinator::take_relay(const WorldHeader& header, RelayMessage&& message) {
+    const DecodedWorldMessage part = decode_world(message.part);
+    if (settings_.pace != Pace::lockstep || !std::holds_alternative<PartMessage>(part.message) ||
+        part.header.worker != header.worker || part.header.step > settings_.steps)
+        return expel(header.worker, "found a message to others that is no part of a step");
+    std::vector<std::uint32_t> to;
+    for (const std::uint32_t member : members_)
+        if (member != header.worker && std::ranges::find(message.to, member) != message.to.end())
+            to.push_back(member);
+    if (!to.empty()) queue_.push_back({std::move(to), shared(message.part)});
+}
+
+// Tells those with whom it may do steps together, and it of them.
+void Coordinator::take_reach(const WorldHeader& header, ReachMessage&& message) {
+    Sender& here = senders_[header.worker];
+    if (settings_.pace != Pace::lockstep || !settings_.together || message.endpoint.empty() ||
+        !here.reach.endpoint.empty())
+        return refuse(header.worker, "found a link that nobody waits for");
+    here.reach = std::move(message);
+    PeersMessage all;
+    for (const std::uint32_t other : members_) {
+        const ReachMessage& there = senders_[other].reach;
+        if (other == header.worker || there.endpoint.empty()) continue;
+        const Secret says = make_secret(), hears = make_secret();
+        all.peers.push_back({other, there.endpoint, there.key, says, hears});
+        send({other}, PeersMessage{{{header.worker, here.reach.endpoint, here.reach.key, hears, says}}});
+    }
+    if (!all.peers.empty()) send({header.worker}, all);
 }
 
 void Coordinator::take_dealing(const WorldHeader& header, std::span<const std::uint8_t> bytes,
@@ -446,7 +468,6 @@ void Coordinator::take_state(const WorldHeader& header, std::span<const std::uin
     report(header, message.report, message.bodies.size(), bytes.size());
     pass_on(header, bytes, message);
     view_.take(header.step, std::move(message));
-    advance();
 }
 
 void Coordinator::take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes,
@@ -481,7 +502,6 @@ void Coordinator::take_update(const WorldHeader& header, std::span<const std::ui
     report(header, message.report, message.bodies.size(), bytes.size());
     if (!sender.settled) pass_on(header, bytes);
     if (!last || sender.settled) view_.take(header.step, message.bodies);
-    advance();
 }
 
 // What sleeps is not published again until it wakes. (Bodies that the sender did not know to be its own when
@@ -572,7 +592,8 @@ void Coordinator::report(const WorldHeader& header, const StepReport& report, st
     step.processor_s = report.processor_s;
     step.bodies = static_cast<int>(report.own);
     step.lead = static_cast<int>(report.lead), step.ghost_age = static_cast<int>(report.ghost_age);
-    step.bytes = std::exchange(sender.bytes, 0);
+    step.bytes = std::exchange(sender.bytes, 0) + report.linked;
+    result_.bytes += report.linked, result_.bytes_linked += report.linked;
     step.cross_contacts = static_cast<int>(report.cross_contacts);
     result_.cpu_s += report.processor_s;
     result_.cross_contacts += report.cross_contacts;

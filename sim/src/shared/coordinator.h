@@ -13,8 +13,9 @@ namespace sim {
 [[nodiscard]] std::int64_t largest_message(const WorldScene& scene);
 
 /// Coordinator of a shared world, without clock or transport: keeps membership and the register of owners,
-/// relays messages, and assembles the view of the whole world. All traffic goes through it, so all workers
-/// see one order of events: a worker is reachable for all or for none, and each body has one owner.
+/// passes messages on, and assembles the view of the whole world. All workers hear of members, owners and what was published
+/// in one order: a worker is a member for all or for none, and each body has one owner. What workers in lockstep tell each
+/// other within a step goes from one to the other; to those that cannot be reached it is passed on here.
 ///
 /// Bodies that do not move have no owner. Bodies that are added later have owners from the start, effective
 /// from the step before which they are added.
@@ -32,8 +33,10 @@ public:
     std::uint32_t join(const JoinRequest& request);
     void start();  ///< assigns the bodies to the members present
     /// Handles a member's message, encoded. A message that is malformed, stale, or about bodies of others
-    /// is counted and dropped. A member that sends far more of them than steps need is lost.
+    /// is counted and dropped. A member that sends far more of them than steps need is lost. Then advance(), before the next.
     void take(std::uint32_t worker, std::span<const std::uint8_t> bytes);
+    /// Goes on with the view, by what was published. Others may be told of it before, see outgoing().
+    void advance();
     void lose(std::uint32_t worker,
               const std::string& why);  ///< its bodies go to the others; its later messages are dropped
     /// Removes the member whose bodies hold up the others: the one that owns a body of which the oldest state
@@ -64,6 +67,7 @@ private:
         bool settled = false;               ///< bounded: has published the last step again
         std::uint64_t messages_at = 0;      ///< steps of all bodies since which these were sent:
         std::size_t messages = 0, message_bytes = 0, offered = 0;  ///< offered: to it, to be answered
+        ReachMessage reach;
     };
     struct Group {
         std::uint32_t owner;
@@ -76,7 +80,8 @@ private:
     void take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes, UpdateMessage&& message);
     void extend_sleep(const WorldHeader& header);
     void take_handover(const WorldHeader& header, Handover&& message);
-    void take_part(const WorldHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
+    void take_reach(const WorldHeader& header, ReachMessage&& message);
+    void take_relay(const WorldHeader& header, RelayMessage&& message);
     void take_dealing(const WorldHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
     void report(const WorldHeader& header, const StepReport& report, std::size_t records, std::size_t bytes);
     void pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes);  ///< bounded
@@ -103,7 +108,6 @@ private:
                         const Handover* handed = nullptr);
     [[nodiscard]] Ownership ownership(const Group& group) const;
     void catch_up(std::uint32_t worker);
-    void advance();
     void release();
     void end(bool rest);
     void name_mishaps(DistributedResult& result) const;

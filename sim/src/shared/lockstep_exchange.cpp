@@ -34,11 +34,7 @@ public:
     void take(const WorldHeader& header, PublishedMessage&& message) override;
     void take(const WorldHeader& header, PartMessage&& message) override;
     void take(SnapshotMessage&& message) override;
-    void members(const std::vector<std::uint32_t>& workers) override {
-        members_ = workers;
-        std::erase_if(parts_,
-                      [&](const auto& of) { return std::ranges::find(workers, of.first) == workers.end(); });
-    }
+    void members(const std::vector<std::uint32_t>& workers, std::uint32_t epoch) override;
     void members_within(const std::vector<std::uint32_t>& workers) override;
     void own(const Ownership& ownership) override;
     [[nodiscard]] bool owes() const override { return owes_; }
@@ -65,12 +61,15 @@ private:
         std::vector<std::uint8_t> bytes;
     };
 
-    void note_publisher(std::uint64_t step, std::uint32_t worker, std::uint32_t body);
+    void note_publisher(const WorldHeader& header, std::uint32_t body);
     [[nodiscard]] std::vector<std::uint32_t> publishers(std::uint64_t step) const;
+    [[nodiscard]] bool all_know_this() const;
     [[nodiscard]] bool owns_any() const { return std::ranges::find(own_, 1) != own_.end(); }
     [[nodiscard]] bool step_together(const StepChannel& channel);
     void wait_for_none();
-    void tell(const StepChannel& channel, std::uint32_t to, bool gave_up, std::vector<std::uint8_t>&& bytes);
+    void look_for_lost(const std::vector<std::uint32_t>& workers);
+    void tell(const StepChannel& channel, std::vector<std::uint32_t> to, bool gave_up,
+              std::vector<std::uint8_t>&& bytes);
     [[nodiscard]] std::vector<std::uint8_t> hear(const StepChannel& channel, std::uint32_t from);
     void set_own(int body, bool own);
     void take_over(const Ownership& ownership);
@@ -91,11 +90,15 @@ private:
     WorldMessage outgoing_ = StateMessage{};
     // Together.
     const bool may_together_;
-    const std::size_t most_parts_;  // of one worker that wait here
-    std::vector<std::uint32_t> members_;
-    std::map<std::uint64_t, std::vector<std::uint32_t>>
-        publisher_;                        // of each body's record, by steps; kApplication: none
-    std::vector<std::uint32_t> partners_;  // of the step under way
+    const std::size_t most_parts_;               // of one worker that wait here
+    std::vector<std::uint32_t> others_;          // members, without this one
+    std::optional<std::uint32_t> member_since_;  // epoch
+    struct Publishers {
+        std::vector<std::uint32_t> of;                 // each body's record; kApplication: none
+        std::map<std::uint32_t, std::uint32_t> epoch;  // that they knew
+    };
+    std::map<std::uint64_t, Publishers> publisher_;  // by steps
+    std::vector<std::uint32_t> partners_;            // of the step under way
     bool partner_lost_ = false;
     std::map<std::uint32_t, std::deque<Part>> parts_;  // that others told, by them
     std::uint64_t alone_until_ = 0;                    // step
@@ -108,10 +111,10 @@ public:
           exchange_(exchange),
           channel_(channel) {}
     void tell(int partner, Bytes&& bytes) override {
-        exchange_.tell(channel_, worker(partner), false, std::move(bytes));
+        exchange_.tell(channel_, {worker(partner)}, false, std::move(bytes));
     }
     void tell_all(Bytes&& bytes) override {
-        if (self() >= 0) exchange_.tell(channel_, kApplication, false, std::move(bytes));
+        if (self() >= 0) exchange_.tell(channel_, exchange_.others_, false, std::move(bytes));
     }
     [[nodiscard]] Bytes hear(int partner) override { return exchange_.hear(channel_, worker(partner)); }
 
@@ -158,29 +161,37 @@ void LockstepExchange::set_own(int body, bool own) {
 
 void LockstepExchange::take(const WorldHeader& header, StateMessage&& message) {
     for (const WorldRecord& record : message.bodies)
-        note_publisher(header.step, header.worker, static_cast<std::uint32_t>(record.body));
+        note_publisher(header, static_cast<std::uint32_t>(record.body));
     replica_.note(header.step, std::move(message));
     settle();
 }
 
 void LockstepExchange::take(const WorldHeader& header, PublishedMessage&& message) {
-    for (const std::uint32_t body : message.bodies) note_publisher(header.step, header.worker, body);
+    for (const std::uint32_t body : message.bodies) note_publisher(header, body);
     replica_.mark(header.step, message.bodies);
     settle();
 }
 
 // The first counts, as with records.
-void LockstepExchange::note_publisher(std::uint64_t step, std::uint32_t worker, std::uint32_t body) {
-    if (step < replica_.step() || body >= own_.size()) return;
-    std::vector<std::uint32_t>& of = publisher_[step];
+void LockstepExchange::note_publisher(const WorldHeader& header, std::uint32_t body) {
+    if (header.step < replica_.step() || body >= own_.size()) return;
+    auto& [of, epoch] = publisher_[header.step];
     of.resize(own_.size(), kApplication);
-    if (of[body] == kApplication) of[body] = worker;
+    if (of[body] != kApplication) return;
+    of[body] = header.worker;
+    epoch.try_emplace(header.worker, header.epoch);
+}
+
+// Whether those who do the step together knew of this worker when they published what it begins with. It can listen only then.
+bool LockstepExchange::all_know_this() const {
+    const auto& epoch = publisher_.at(replica_.step()).epoch;
+    return std::ranges::all_of(epoch, [this](const auto& of) { return of.second >= member_since_; });
 }
 
 std::vector<std::uint32_t> LockstepExchange::publishers(std::uint64_t step) const {
     const auto of = publisher_.find(step);
     if (of == publisher_.end()) return {};
-    std::vector<std::uint32_t> all = of->second;
+    std::vector<std::uint32_t> all = of->second.of;
     std::ranges::sort(all);
     all.erase(std::ranges::unique(all).begin(), all.end());
     std::erase(all, kApplication);
@@ -200,8 +211,20 @@ void LockstepExchange::take(const WorldHeader& header, PartMessage&& message) {
     }
 }
 
+void LockstepExchange::members(const std::vector<std::uint32_t>& workers, std::uint32_t epoch) {
+    if (!member_since_) member_since_ = epoch;
+    others_ = workers;
+    std::erase(others_, self_);
+    std::erase_if(parts_,
+                  [&](const auto& of) { return std::ranges::find(workers, of.first) == workers.end(); });
+}
+
 void LockstepExchange::members_within(const std::vector<std::uint32_t>& workers) {
     if (workers.empty()) wait_for_none();
+    look_for_lost(workers);
+}
+
+void LockstepExchange::look_for_lost(const std::vector<std::uint32_t>& workers) {
     partner_lost_ = partner_lost_ || std::ranges::any_of(partners_, [&](std::uint32_t partner) {
                         return partner != self_ && std::ranges::find(workers, partner) == workers.end();
                     });
@@ -212,9 +235,9 @@ void LockstepExchange::wait_for_none() {
     alone_until_ = replica_.step() + kStepsAlone;
 }
 
-void LockstepExchange::tell(const StepChannel& channel, std::uint32_t to, bool gave_up,
+void LockstepExchange::tell(const StepChannel& channel, std::vector<std::uint32_t> to, bool gave_up,
                             std::vector<std::uint8_t>&& bytes) {
-    channel.send(encode({self_, 0, replica_.step()}, PartMessage{to, gave_up, std::move(bytes)}));
+    channel.send(std::move(to), encode({self_, 0, replica_.step()}, PartMessage{gave_up, std::move(bytes)}));
     if (channel.flush) channel.flush(false);
 }
 
@@ -245,12 +268,13 @@ bool LockstepExchange::step_together(const StepChannel& channel) {
     const bool listens = self == partners_.end();
     if (!may_together_ || partners_.size() < 2) return false;
     partner_lost_ = false;
-    members_within(members_);
+    look_for_lost(others_);
     try {
-        if (!channel.flush || partner_lost_ || replica_.step() < alone_until_)
+        if (!channel.flush || partner_lost_ || replica_.step() < alone_until_ ||
+            (listens && !all_know_this()))
             throw NotTogether("this one cannot");
         std::vector<int> of;
-        for (const std::uint32_t publisher : publisher_[replica_.step()]) {
+        for (const std::uint32_t publisher : publisher_[replica_.step()].of) {
             const auto at = std::ranges::find(partners_, publisher);
             of.push_back(at == partners_.end() ? 0 : static_cast<int>(at - partners_.begin()));
         }
@@ -262,7 +286,7 @@ bool LockstepExchange::step_together(const StepChannel& channel) {
     } catch (const DecodeError&) {  // of a part that is none
         wait_for_none();
     }
-    if (!listens) tell(channel, kApplication, true, {});
+    if (!listens) tell(channel, others_, true, {});
     return false;
 }
 
@@ -344,7 +368,7 @@ std::vector<std::uint8_t> LockstepExchange::publish(std::uint32_t epoch, const S
     std::vector<std::uint32_t> bodies(owned_.begin(), owned_.end());
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         world.record(owned_[i], states.bodies[i]);
-        note_publisher(replica_.step(), self_, bodies[i]);
+        note_publisher({self_, epoch, replica_.step()}, bodies[i]);
     }
     world.contact_records(states.contacts);
     world.spring_records(states.springs);

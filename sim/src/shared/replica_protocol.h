@@ -9,8 +9,8 @@ namespace sim {
 
 /// How a step that several do together tells and hears.
 struct StepChannel {
-    std::function<void(std::vector<std::uint8_t>&&)>
-        send;  ///< an encoded message to the application, which relays it
+    /// An encoded message to other workers.
+    std::function<void(std::vector<std::uint32_t>&& to, std::vector<std::uint8_t>&&)> send;
     /// Has what was sent go out; wait: and returns once something has come and was taken. Empty: this worker cannot wait within a
     /// step, so it does each alone.
     std::function<void(bool wait)> flush;
@@ -35,9 +35,9 @@ public:
     virtual void take(SnapshotMessage&& message) {
         (void)message;
     }  ///< once, before the first step of one who joins late
-    /// The members now. Workers that left own nothing from here on; Ownership messages say who owns their
-    /// bodies.
-    virtual void members(const std::vector<std::uint32_t>& workers) = 0;
+    /// The members now, and the epoch in which the application says so. Workers that left own nothing from here on;
+    /// Ownership messages say who owns their bodies.
+    virtual void members(const std::vector<std::uint32_t>& workers, std::uint32_t epoch) = 0;
     /// Registered owners. Becomes effective at the message's step: this worker may have to publish its last step once more
     /// (lockstep, owes()), or take bodies over that are some steps away (bounded).
     virtual void own(const Ownership& ownership) = 0;

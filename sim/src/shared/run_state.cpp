@@ -12,7 +12,7 @@ namespace {
 
 //   snapshot as in world_messages.h
 //   f64 elapsed s, cpu s; i32 workers, lost, left, bodies reowned, largest lead, largest ghost age;
-//   u64 migrations, trades, cross contacts, bytes, bytes of states, records, refused messages
+//   u64 migrations, trades, cross contacts, bytes, bytes of states, of links, records, refused messages
 //   i32 contacts, pairs, islands, asleep; u64 inverse fallbacks, deformations limited, constraints broken, impacts,
 //   solved again, held apart
 //   list of quarantined {u32 body, u64 step, text}; lists of limited and of broken {u32 number, u64 step}
@@ -28,7 +28,7 @@ void visit_numbers(Result& r, Visit visit) {
     visit(r.workers), visit(r.lost), visit(r.left), visit(r.bodies_reowned);
     visit(r.largest_lead), visit(r.largest_ghost_age);
     visit(r.migrations), visit(r.trades), visit(r.cross_contacts), visit(r.bytes), visit(r.bytes_states);
-    visit(r.records), visit(r.refused_messages);
+    visit(r.bytes_linked), visit(r.records), visit(r.refused_messages);
     auto& n = r.counts;
     visit(n.contacts), visit(n.pairs), visit(n.islands), visit(n.asleep);
     visit(n.inverse_fallbacks), visit(n.deformations_limited), visit(n.constraints_broken), visit(n.impacts);

@@ -42,8 +42,8 @@ void SharedWorldWorker::take(const WorldHeader& header, WorldMessage&& message) 
 }
 
 void SharedWorldWorker::take_message(const WorldHeader& header, Members&& message) {
-    (void)header;
-    exchange_->members(message.workers);
+    epoch_ = header.epoch;
+    exchange_->members(message.workers, epoch_);
     std::erase_if(sellers_, [&message](const auto& seller) {
         return std::find(message.workers.begin(), message.workers.end(), seller.first) ==
                message.workers.end();
@@ -143,8 +143,10 @@ std::string SharedWorldWorker::waits_for() const {
 void SharedWorldWorker::step(const std::function<void(bool)>& flush) {
     lead_ = exchange_->lead();
     stepping_ = within_ = true;
-    exchange_->step(
-        {[this](std::vector<std::uint8_t>&& bytes) { queue_.push_back(std::move(bytes)); }, flush});
+    exchange_->step({[this](std::vector<std::uint32_t>&& to, std::vector<std::uint8_t>&& bytes) {
+                         if (!to.empty()) queue_.push_back({std::move(to), std::move(bytes)});
+                     },
+                     flush});
     within_ = false;
 }
 
@@ -180,10 +182,11 @@ void SharedWorldWorker::publish(const Times& times) {
     report.lead = static_cast<std::uint32_t>(std::max(0, lead_));
     report.ghost_age = static_cast<std::uint32_t>(std::max(0, exchange_->ghost_age()));
     report.cross_contacts = static_cast<std::uint32_t>(world.cross_contacts());
+    report.linked = times.linked;
     report.own = static_cast<std::uint32_t>(exchange_->own_bodies());
     report.outside_impulse = world.outside_impulse();
     report.mishaps = mishaps_of(world, exchange_->steps_done());
-    queue_.push_back(exchange_->publish(epoch_, report));
+    queue_.push_back({{}, exchange_->publish(epoch_, report)});
 }
 
 // Between steps, after states are on their way: one offer a step, and another when bodies are handed over.
@@ -226,10 +229,10 @@ void SharedWorldWorker::leave() {
 }
 
 void SharedWorldWorker::send(const WorldMessage& message) {
-    queue_.push_back(encode({self_, epoch_, exchange_->steps_done()}, message));
+    queue_.push_back({{}, encode({self_, epoch_, exchange_->steps_done()}, message)});
 }
 
-std::vector<std::vector<std::uint8_t>> SharedWorldWorker::outgoing() {
+std::vector<SharedWorldWorker::Outgoing> SharedWorldWorker::outgoing() {
     return std::exchange(queue_, {});
 }
 

@@ -22,11 +22,22 @@ public:
     void stop_waiting() { exchange_->members_within({}); }  ///< within flush: the step is done alone
     struct Times {                                          ///< of a step, see WorkerStep
         double seconds = 0, waited_s = 0, processor_s = 0;
+        std::uint64_t linked = 0;  ///< bytes that were sent to other workers directly, since the step before
     };
     /// After step(). Queues the message to publish, then balances the load.
     void worked(const Times& times);
-    /// Encoded messages to the application, in order; empties the queue.
-    [[nodiscard]] std::vector<std::vector<std::uint8_t>> outgoing();
+    struct Outgoing {
+        std::vector<std::uint32_t> to;  ///< workers; empty: to the application
+        std::vector<std::uint8_t> bytes;
+    };
+    /// Encoded messages, in order; empties the queue.
+    [[nodiscard]] std::vector<Outgoing> outgoing();
+    /// Of a message to others: what the application is asked to pass on to those that cannot be reached.
+    [[nodiscard]] std::vector<std::uint8_t> relayed(std::vector<std::uint32_t> to,
+                                                    std::vector<std::uint8_t> bytes) const {
+        return encode({self_, epoch_, exchange_->steps_done()},
+                      RelayMessage{std::move(to), std::move(bytes)});
+    }
     /// Hands all bodies over, after the step if one is under way; then left() becomes true.
     void drain();
     [[nodiscard]] bool left() const noexcept { return left_; }
@@ -65,7 +76,7 @@ private:
     std::unique_ptr<ReplicaProtocol> exchange_;
     Market market_;
     bool bounded_;
-    std::vector<std::vector<std::uint8_t>> queue_;
+    std::vector<Outgoing> queue_;
     std::uint32_t epoch_ = 0;
     int lead_ = 0;  // at the start of the step
     // Bounded pace: sold bodies change owners at a step that neither side has passed, so no body skips a

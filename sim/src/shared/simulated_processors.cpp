@@ -28,6 +28,7 @@ using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
 struct Arrival {
     double time;
     Bytes bytes;
+    std::vector<std::uint32_t> to = {};  // other workers; empty: the application
 };
 
 /// What a worker does in one go. The same turns make the same of a worker, wherever it runs.
@@ -154,7 +155,7 @@ void handle(std::unique_ptr<SharedWorldWorker>& worker, const Turn& turn) {
 struct Processor {
     std::unique_ptr<SharedWorldWorker> worker;  // with the scene
     std::deque<Arrival> inbox;                  // by ascending times
-    std::deque<Arrival> outbox;                 // times at which the application gets them
+    std::deque<Arrival> outbox;                 // by times of sending
     double free_at = 0;                         // when what it does now ends
     double handled = 0;                         // [s] spent on messages since its last step
     double waited = 0;                          // [s] idle since its last step
@@ -168,14 +169,15 @@ struct Processor {
     double silent_since = 0;  // when one of these began
     // Repeated alone:
     std::vector<Turn> turns;
-    double spent_s = 0;    // this thread's, once the worker was there
-    std::size_t sent = 0;  // bytes
+    double spent_s = 0;                       // this thread's, once the worker was there
+    std::size_t sent = 0;                     // bytes
+    std::size_t linked = 0, linked_told = 0;  // of them to other workers, in all; and of its last report
     [[nodiscard]] bool silent() const { return killed || stopped || cut; }
     [[nodiscard]] bool runs() const { return !killed && !stopped; }
 };
 
 // Everything happens in the order of simulated time; what happens at one time in the order: failures,
-// messages to the application by worker, workers by number.
+// messages by the worker that sent them, workers by number.
 class Machine {
 public:
     Machine(const WorldScene& scene, const DistributedSettings& settings, const SimulatedProcessors& how,
@@ -189,13 +191,15 @@ public:
 
 private:
     struct Event {
-        enum class Kind { failure, silence, application, worker, none } kind = Kind::none;
+        enum class Kind { failure, silence, message, worker, none } kind = Kind::none;
         double time = 0;
         std::size_t who = 0;
     };
 
     void join();
     void deliver();
+    void put(std::uint32_t to, double time, const Bytes& bytes);
+    void hand_on(std::size_t from);
     [[nodiscard]] Event next() const;
     void happen(const Event& event);
     void fail(const SimulatedProcessors::Failure& failure);
@@ -227,13 +231,28 @@ void Machine::join() {
     (void)meeting_.join(request);
 }
 
-// What the application sends arrives half a latency later.
+// What the application sends arrives half a latency later, as what was sent to it: both are between two workers.
 void Machine::deliver() {
     for (const Coordinator::Outgoing& message : meeting_.outgoing())
-        for (const std::uint32_t to : message.to) {
-            Processor& p = processors_.at(to);
-            if (!p.cut && !p.killed) p.inbox.push_back({now_ + how_.latency_s / 2, message.bytes});
-        }
+        for (const std::uint32_t to : message.to) put(to, now_ + how_.latency_s / 2, message.bytes);
+}
+
+void Machine::put(std::uint32_t to, double time, const Bytes& bytes) {
+    Processor& p = processors_.at(to);
+    if (p.cut || p.killed) return;
+    const auto later = std::ranges::upper_bound(p.inbox, time, {}, &Arrival::time);
+    p.inbox.insert(later, {time, bytes});
+}
+
+// The next of what a worker sent: a message leaves when its time has come, so that a failure before that keeps it.
+void Machine::hand_on(std::size_t from) {
+    const Arrival message = std::move(processors_[from].outbox.front());
+    processors_[from].outbox.pop_front();
+    if (message.to.empty()) {
+        meeting_.take(static_cast<std::uint32_t>(from), *message.bytes);
+        meeting_.advance();
+    }
+    for (const std::uint32_t to : message.to) put(to, now_ + how_.latency_s / 2, message.bytes);
 }
 
 Machine::Event Machine::next() const {
@@ -249,7 +268,7 @@ Machine::Event Machine::next() const {
         const auto& members = meeting_.members();
         if (p.silent() && std::find(members.begin(), members.end(), i) != members.end())
             offer(Event::Kind::silence, p.silent_since + how_.silence_s, i);
-        if (!p.outbox.empty()) offer(Event::Kind::application, p.outbox.front().time, i);
+        if (!p.outbox.empty()) offer(Event::Kind::message, p.outbox.front().time, i);
         if (!p.runs()) continue;
         const bool startable = p.worker && p.worker->ready();
         if (!p.step->waits() && (p.stepping || p.drain || startable)) {
@@ -266,12 +285,7 @@ void Machine::happen(const Event& event) {
     if (event.kind == Event::Kind::failure) fail(how_.failures[next_failure_++]);
     if (event.kind == Event::Kind::silence)
         meeting_.lose(static_cast<std::uint32_t>(event.who), "not heard of for a while");
-    if (event.kind == Event::Kind::application) {
-        Processor& p = processors_[event.who];
-        const Bytes bytes = p.outbox.front().bytes;
-        p.outbox.pop_front();
-        meeting_.take(static_cast<std::uint32_t>(event.who), *bytes);
-    }
+    if (event.kind == Event::Kind::message) hand_on(event.who);
     if (event.kind == Event::Kind::worker) run_worker(event.who);
     // If no worker is left, the application's own process continues.
     if (meeting_.members().empty() && !meeting_.finished()) join();
@@ -327,7 +341,8 @@ Turn Machine::turn_of(Processor& p) {
     p.free_at = now_;
     if (std::exchange(p.stepping, false)) {
         const double seconds = p.step_cost + std::exchange(p.handled, 0);
-        turn.ended = {seconds, std::exchange(p.waited, 0), seconds};
+        turn.ended = {seconds, std::exchange(p.waited, 0), seconds,
+                      p.linked - std::exchange(p.linked_told, p.linked)};
         ended_ = now_;
     }
     for (; !p.inbox.empty() && p.inbox.front().time <= now_; p.inbox.pop_front())
@@ -393,11 +408,13 @@ void Machine::after_part(Processor& p) {
 
 void Machine::send(Processor& p) {
     if (!p.worker) return;
-    for (std::vector<std::uint8_t>& bytes : p.worker->outgoing()) {
-        p.sent += bytes.size();
-        if (!p.cut)
-            p.outbox.push_back({p.free_at + how_.latency_s / 2,
-                                std::make_shared<const std::vector<std::uint8_t>>(std::move(bytes))});
+    for (SharedWorldWorker::Outgoing& message : p.worker->outgoing()) {
+        p.sent += message.bytes.size();
+        p.linked += message.to.size() * message.bytes.size();
+        if (p.cut) continue;
+        p.outbox.push_back({p.free_at + how_.latency_s / 2,
+                            std::make_shared<const std::vector<std::uint8_t>>(std::move(message.bytes)),
+                            std::move(message.to)});
     }
 }
 
@@ -411,12 +428,14 @@ double Machine::repeat_alone(const Processor& p) const {
         const double handled = cost_of([&] { handle(worker, turn); });
         if (there) spent += handled;
         if (worker)
-            for (const std::vector<std::uint8_t>& bytes : worker->outgoing()) sent += bytes.size();
+            for (const SharedWorldWorker::Outgoing& message : worker->outgoing())
+                sent += message.bytes.size();
         if (!turn.step) continue;
         std::size_t next = 0;
         spent += cost_of([&] {
             worker->step([&](bool wait) {
-                for (const std::vector<std::uint8_t>& bytes : worker->outgoing()) sent += bytes.size();
+                for (const SharedWorldWorker::Outgoing& message : worker->outgoing())
+                    sent += message.bytes.size();
                 if (!wait) return;
                 for (const Bytes& bytes : turn.within.at(next++)) {
                     DecodedWorldMessage decoded = decode_for_worker(*bytes);

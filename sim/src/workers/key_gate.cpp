@@ -8,7 +8,9 @@
 namespace sim {
 namespace {
 
-constexpr std::size_t kRequestFrames = 7;  // version, id, domain, address, identity, mechanism, key
+// Two of the envelope; version, id, domain, address, identity, mechanism, key.
+constexpr std::size_t kRequestFrames = 9, kIdAt = 3, kMechanismAt = 7, kKeyAt = 8;
+constexpr std::size_t kMostKeysWaiting = 1000;
 constexpr int kKeyLookMs = 50;
 
 std::string bytes_of(const std::string& key) {
@@ -19,8 +21,9 @@ std::string bytes_of(const std::string& key) {
 
 }  // namespace
 
-KeyGate::KeyGate(zmq::context_t& context, const std::vector<std::string>& allowed)
-    : socket_(context, zmq::socket_type::rep) {
+KeyGate::KeyGate(zmq::context_t& context, const std::vector<std::string>& allowed,
+                 std::chrono::milliseconds patience)
+    : patience_(patience), socket_(context, zmq::socket_type::router) {
     for (const std::string& key : allowed) allowed_.push_back(bytes_of(key));
     socket_.set(zmq::sockopt::linger, 0);
     socket_.set(zmq::sockopt::rcvtimeo, kKeyLookMs);
@@ -33,28 +36,52 @@ KeyGate::~KeyGate() {
     thread_.join();
 }
 
+void KeyGate::allow(const std::string& key) {
+    const std::lock_guard lock(mutex_);
+    allowed_.push_back(bytes_of(key));
+}
+
 void KeyGate::serve(const std::stop_token& stop) {
     block_signals();
     while (!stop.stop_requested()) {
         try {
-            std::vector<zmq::message_t> request(1);
-            if (!socket_.recv(request.back())) continue;
-            while (request.back().more()) (void)socket_.recv(request.emplace_back());
-            answer(request);
+            Frames request(1);
+            if (socket_.recv(request.back())) {
+                while (request.back().more()) (void)socket_.recv(request.emplace_back());
+                take(std::move(request));
+            }
+            const auto now = std::chrono::steady_clock::now();
+            std::erase_if(waiting_, [&](const Waiting& waiting) {
+                const bool known = knows(waiting.request), ends = known || now > waiting.until;
+                if (ends) answer(waiting.request, known);
+                return ends;
+            });
         } catch (const zmq::error_t& e) {
             if (e.num() != EINTR) return;  // the context is going
         }
     }
 }
 
-void KeyGate::answer(std::vector<zmq::message_t>& request) {
-    const bool curve = request.size() == kRequestFrames && request[5].to_string_view() == "CURVE";
-    const bool known =
-        curve && std::find(allowed_.begin(), allowed_.end(), request[6].to_string_view()) != allowed_.end();
+void KeyGate::take(Frames&& request) {
+    const bool known = knows(request);
+    if (known || patience_.count() == 0 || waiting_.size() >= kMostKeysWaiting)
+        answer(request, known);
+    else
+        waiting_.push_back({std::move(request), std::chrono::steady_clock::now() + patience_});
+}
+
+bool KeyGate::knows(const Frames& request) {
+    if (request.size() != kRequestFrames || request[kMechanismAt].to_string_view() != "CURVE") return false;
+    const std::lock_guard lock(mutex_);
+    return std::ranges::find(allowed_, request[kKeyAt].to_string_view()) != allowed_.end();
+}
+
+void KeyGate::answer(const Frames& request, bool known) {
     refused_ += !known;
-    const std::string id = request.size() > 1 ? request[1].to_string() : "";
-    const std::array<std::string, 6> reply = {"1.0", id, known ? "200" : "400", known ? "OK" : "no such key",
-                                              "",    ""};
+    if (request.size() <= kIdAt) return;
+    const std::array<std::string, 8> reply = {
+        request[0].to_string(),       "", "1.0", request[kIdAt].to_string(), known ? "200" : "400",
+        known ? "OK" : "no such key", "", ""};
     for (std::size_t i = 0; i < reply.size(); ++i)
         socket_.send(zmq::buffer(reply[i]),
                      i + 1 < reply.size() ? zmq::send_flags::sndmore : zmq::send_flags::none);

@@ -54,8 +54,15 @@ public:
         worker_->worked({seconds_since(start), 0, spent});
         return true;
     }
+    /// To the application: what it tells others is passed on by that.
     [[nodiscard]] std::vector<std::vector<std::uint8_t>> outgoing() {
-        return worker_ ? worker_->outgoing() : std::vector<std::vector<std::uint8_t>>();
+        std::vector<std::vector<std::uint8_t>> all;
+        if (!worker_) return all;
+        for (SharedWorldWorker::Outgoing& message : worker_->outgoing())
+            all.push_back(message.to.empty()
+                              ? std::move(message.bytes)
+                              : worker_->relayed(std::move(message.to), std::move(message.bytes)));
+        return all;
     }
 
 private:
@@ -126,7 +133,11 @@ private:
 
     void advance() {
         const bool worked = here_ && here_->work();
-        for (WorkerGate::Event& event : gate_.wait(worked ? 0ms : kWait)) take(event);
+        for (WorkerGate::Event& event : gate_.wait(worked ? 0ms : kWait)) {
+            take(event);
+            pass_on();  // at once: others wait for it
+            meeting_.advance();
+        }
         look_after_children();
         if (meeting_.members().empty() && !meeting_.finished()) take_over();
         look_after_progress();
@@ -238,7 +249,7 @@ private:
             more = false;
             if (here_)
                 for (const std::vector<std::uint8_t>& bytes : here_->outgoing())
-                    meeting_.take(here_->number(), bytes), more = true;
+                    meeting_.take(here_->number(), bytes), meeting_.advance(), more = true;
         }
         for (const Coordinator::Outgoing& out : teams_.outgoing()) gate_.send(out.to, out.bytes);
         std::erase_if(admitted_, [this](std::uint32_t worker) {

@@ -2,10 +2,14 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
+#include <exception>
+#include <filesystem>
 
 #include "sim/errors.h"
 
@@ -14,7 +18,29 @@ namespace {
 
 constexpr const char* kPrefix = "/musicworld-";
 constexpr const char* kSocket = "/workers";
+constexpr const char* kPeer = "/peer-";   // and its process
 constexpr std::size_t kLongestPath = 99;  // a Unix socket's path has 107 characters at most
+
+/// Of `endpoint`, if SocketFolder made it; else empty.
+std::string folder_of(const std::string& endpoint) {
+    const std::string scheme = "ipc://";
+    if (!endpoint.starts_with(scheme) || !endpoint.ends_with(kSocket)) return {};
+    const std::string folder =
+        endpoint.substr(scheme.size(), endpoint.size() - scheme.size() - std::strlen(kSocket));
+    return folder.rfind('/') == folder.rfind(kPrefix) ? folder : std::string();
+}
+
+/// With its sockets, and nothing else.
+void remove_folder(const std::string& folder) noexcept {
+    try {
+        for (const auto& entry : std::filesystem::directory_iterator(folder))
+            if (const std::string name = "/" + entry.path().filename().string();
+                name == kSocket || name.starts_with(kPeer))
+                unlink(entry.path().c_str());
+    } catch (const std::exception&) {  // another one removed it
+    }
+    rmdir(folder.c_str());
+}
 
 }  // namespace
 
@@ -31,8 +57,7 @@ SocketFolder::SocketFolder() {
 }
 
 SocketFolder::~SocketFolder() {
-    unlink((path_ + kSocket).c_str());
-    rmdir(path_.c_str());
+    remove_folder(path_);
 }
 
 std::uint32_t application_of(const std::string& endpoint) noexcept {
@@ -45,13 +70,21 @@ std::uint32_t application_of(const std::string& endpoint) noexcept {
     return process;
 }
 
+std::string peer_socket(const std::string& endpoint) {
+    const std::string folder = folder_of(endpoint);
+    return folder.empty() ? folder : "ipc://" + folder + kPeer + std::to_string(getpid());
+}
+
+bool is_peer_socket(const std::string& peer, const std::string& endpoint) {
+    const std::string folder = folder_of(endpoint), start = "ipc://" + folder + kPeer;
+    return !folder.empty() && peer.starts_with(start) && peer.size() > start.size() &&
+           std::all_of(peer.begin() + static_cast<std::ptrdiff_t>(start.size()), peer.end(),
+                       [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
 void remove_left_socket(const std::string& endpoint) noexcept {
-    if (!endpoint.starts_with("ipc://") || !endpoint.ends_with(kSocket)) return;
-    const std::string socket = endpoint.substr(std::strlen("ipc://"));
-    const std::string folder = socket.substr(0, socket.size() - std::strlen(kSocket));
-    if (folder.rfind('/') != folder.rfind(kPrefix)) return;
-    unlink(socket.c_str());
-    rmdir(folder.c_str());
+    const std::string folder = folder_of(endpoint);
+    if (!folder.empty()) remove_folder(folder);
 }
 
 }  // namespace sim

@@ -165,7 +165,7 @@ void Teams::agree(std::uint32_t number, Step& at, std::set<std::uint32_t>& liars
         if (agreed.bytes.empty())
             meeting_.lose(number, "more of its members' states wait for others than can be kept");
         else
-            meeting_.take(number, agreed.bytes);
+            meeting_.take(number, agreed.bytes), meeting_.advance();
     }
 }
 

@@ -107,7 +107,7 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
     int status = 1;
     if (wait_for_answer(socket, pulse, frame)) {
         if (is_of_a_world(frame)) {
-            status = serve_world(socket, pulse, frame);
+            status = serve_world({context, socket, pulse, endpoint, keys}, frame);
         } else
             try {
                 status = KitWorker(socket, pulse).serve(frame);

@@ -7,11 +7,14 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <optional>
 #include <utility>
 
+#include "shared/coordinator.h"
 #include "shared/shared_world_worker.h"
 #include "sim/errors.h"
 #include "workers/elapsed.h"
+#include "workers/peer_links.h"
 #include "world/processor_time.h"
 
 namespace sim {
@@ -19,6 +22,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr int kPollMs = 50;
+constexpr std::size_t kMostPartsInOneGo = 4096;
 constexpr double kLongestWithin = 2;  // that a step waits for others [s]; then it is done alone
 
 volatile std::sig_atomic_t drain_asked = 0;
@@ -51,8 +55,14 @@ void sleep_for(double seconds) {
 
 class WorldService {
 public:
-    WorldService(zmq::socket_t& socket, Pulse& pulse, const SceneMessage& scene)
-        : socket_(socket), pulse_(pulse), worker_(scene), header_{scene.worker, 0, 0} {}
+    WorldService(const WorldLink& link, const SceneMessage& scene)
+        : socket_(link.socket), pulse_(link.pulse), worker_(scene), header_{scene.worker, 0, 0} {
+        if (scene.settings.pace != Pace::lockstep || !scene.settings.together) return;
+        links_.emplace(link.context,
+                       PeerLinks::Settings{scene.worker, link.endpoint, link.keys,
+                                           largest_message(scene.scene), most_parts(scene.scene)});
+        if (links_->reach()) send(encode(header_, *links_->reach()));
+    }
 
     int serve() {
         try {
@@ -87,19 +97,36 @@ private:
                 std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
                 refused_ = true;
             }
-            worker_.take(m.header, std::move(m.message));
+            if (links_) follow(m.message);
+            if (!std::holds_alternative<PeersMessage>(m.message))
+                worker_.take(m.header, std::move(m.message));
         }
+        // A bounded number, so that who floods does not hold this up.
+        for (std::size_t i = 0; links_ && i < kMostPartsInOneGo; ++i) {
+            std::optional<DecodedWorldMessage> part = links_->receive(Clock::now());
+            if (!part) break;
+            worker_.take(part->header, std::move(part->message));
+        }
+        if (links_) links_->look(Clock::now());
+    }
+    /// What the application says of the other workers.
+    void follow(const WorldMessage& message) {
+        if (const auto* peers = std::get_if<PeersMessage>(&message)) links_->add(*peers, Clock::now());
+        if (const auto* members = std::get_if<Members>(&message)) links_->keep(members->workers);
     }
     void step() {
         const double waited = seconds_since(idle_since_), factor = worker_.slowing();
         const Clock::time_point start = Clock::now();
         waited_within_ = 0;
+        if (links_) links_->begin_step(start);
         worker_.step([this](bool wait) { flush(wait); });
         const double worked = seconds_since(start) - waited_within_;
         if (factor > 1) sleep_for((factor - 1) * worked);
         const double processor = thread_processor_s();
+        const std::uint64_t linked = links_ ? links_->sent() : 0;
         worker_.worked({std::max(factor, 1.0) * worked, waited + waited_within_,
-                        processor - std::exchange(told_processor_, processor)});
+                        processor - std::exchange(told_processor_, processor),
+                        linked - std::exchange(told_linked_, linked)});
         idle_since_ = Clock::now();
     }
     /// Within a step: until something came, or what others do not tell has been waited for long enough.
@@ -114,7 +141,14 @@ private:
         if (waited_within_ > kLongestWithin) worker_.stop_waiting();
     }
     void send_all() {
-        for (const std::vector<std::uint8_t>& bytes : worker_.outgoing()) send(bytes);
+        for (SharedWorldWorker::Outgoing& message : worker_.outgoing()) {
+            if (message.to.empty()) {
+                send(message.bytes);
+                continue;
+            }
+            if (links_) message.to = links_->send(message.to, message.bytes);
+            if (!message.to.empty()) send(worker_.relayed(std::move(message.to), std::move(message.bytes)));
+        }
     }
     /// The application may be busy, with pictures, and take what it can.
     void send(const std::vector<std::uint8_t>& bytes) {
@@ -123,9 +157,10 @@ private:
     }
     /// Until something comes, or a signal, or a look at the application is due.
     void wait() {
-        zmq::pollitem_t item{socket_.handle(), 0, ZMQ_POLLIN, 0};
+        std::array<zmq::pollitem_t, 2> items = {
+            {{socket_.handle(), 0, ZMQ_POLLIN, 0}, {links_ ? links_->handle() : nullptr, 0, ZMQ_POLLIN, 0}}};
         try {
-            zmq::poll(&item, 1, std::chrono::milliseconds(kPollMs));
+            zmq::poll(items.data(), links_ ? 2 : 1, std::chrono::milliseconds(kPollMs));
         } catch (const zmq::error_t& e) {
             if (e.num() != EINTR) throw;
         }
@@ -134,6 +169,8 @@ private:
     zmq::socket_t& socket_;
     Pulse& pulse_;
     SharedWorldWorker worker_;
+    std::optional<PeerLinks> links_;  ///< in lockstep
+    std::uint64_t told_linked_ = 0;   ///< of what was sent on them [bytes]
     WorldHeader header_;
     bool draining_ = false, refused_ = false;
     double waited_within_ = 0;  ///< the step under way
@@ -141,10 +178,10 @@ private:
     double told_processor_ = thread_processor_s();
 };
 
-int serve_scene(zmq::socket_t& socket, Pulse& pulse, const SceneMessage& scene) {
-    pulse.join_world(scene.worker);
+int serve_scene(const WorldLink& link, const SceneMessage& scene) {
+    link.pulse.join_world(scene.worker);
     listen_for_drain();
-    WorldService service(socket, pulse, scene);
+    WorldService service(link, scene);
     try {
         return service.serve();
     } catch (const std::exception& e) {
@@ -155,13 +192,13 @@ int serve_scene(zmq::socket_t& socket, Pulse& pulse, const SceneMessage& scene) 
 
 }  // namespace
 
-int serve_world(zmq::socket_t& socket, Pulse& pulse, zmq::message_t& first) {
+int serve_world(const WorldLink& link, const zmq::message_t& first) {
     const DecodedWorldMessage m = decode_world({first.data<std::uint8_t>(), first.size()});
     if (const auto* refusal = std::get_if<Refusal>(&m.message)) {
         std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
         return 1;
     }
-    if (const auto* scene = std::get_if<SceneMessage>(&m.message)) return serve_scene(socket, pulse, *scene);
+    if (const auto* scene = std::get_if<SceneMessage>(&m.message)) return serve_scene(link, *scene);
     return std::holds_alternative<EndOfRun>(m.message) ? 0 : 1;
 }
 

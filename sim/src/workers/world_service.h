@@ -3,10 +3,19 @@
 
 namespace sim {
 
-/// Serves a world: a SharedWorldWorker behind a socket. `first`: the application's answer to the request to
+/// By which a worker's process and the application are connected.
+struct WorldLink {
+    zmq::context_t& context;
+    zmq::socket_t& socket;  ///< to the application, at `endpoint`
+    Pulse& pulse;
+    const std::string& endpoint;
+    const std::optional<WorkerKeys>& keys;
+};
+
+/// Serves a world: a SharedWorldWorker behind sockets. `first`: the application's answer to the request to
 /// join. SIGTERM and SIGINT drain. Returns the exit status: 0 at the run's end or when drained, 1 when
 /// refused or when the application is gone.
-[[nodiscard]] int serve_world(zmq::socket_t& socket, Pulse& pulse, zmq::message_t& first);
+[[nodiscard]] int serve_world(const WorldLink& link, const zmq::message_t& first);
 
 /// The encoded JoinRequest, a worker's first message.
 [[nodiscard]] std::vector<std::uint8_t> join_request(const Secret& secret);

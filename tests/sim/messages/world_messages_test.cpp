@@ -100,11 +100,17 @@ sim::WorldScene scene() {
 
 sim::StepReport report() {
     using enum sim::Mishap::Kind;
-    return {0.001f,     0.002f,
-            0.0003f,    0.0011f,
-            3,          2,
-            17,         25,
-            {1, -2, 3}, {{quarantined, 2, 77, "velocity"}, {limited, 1, 77, {}}, {broken, 0, 76, {}}}};
+    return {0.001f,
+            0.002f,
+            0.0003f,
+            0.0011f,
+            3,
+            2,
+            17,
+            25,
+            123456,
+            {1, -2, 3},
+            {{quarantined, 2, 77, "velocity"}, {limited, 1, 77, {}}, {broken, 0, 76, {}}}};
 }
 
 std::vector<sim::WorldMessage> world_samples() {
@@ -134,8 +140,12 @@ std::vector<sim::WorldMessage> world_samples() {
             sim::Offer{2, 9, {1, 2}, {0.001f, 0.002f}},
             sim::OfferAnswer{1, 9, true},
             sim::Handover{2, 9, records, {0, 1}, {5, 6}},
-            sim::PartMessage{1, false, {1, 2, 3}},
-            sim::PublishedMessage{report(), {3, 1, 2}}};
+            sim::PartMessage{false, {1, 2, 3}},
+            sim::PublishedMessage{report(), {3, 1, 2}},
+            sim::RelayMessage{{2, 1}, {7, 8, 9}},
+            sim::PeersMessage{{{2, "tcp://10.0.0.2:4000", std::string(40, 'k'), {1, 2}, {3, 4}}}},
+            sim::LinkBeat{true},
+            sim::ReachMessage{"ipc:///tmp/musicworld-7-abcdef/peer-9", ""}};
 }
 
 const sim::WorldHeader kHeader{3, 8, 1234567890123};

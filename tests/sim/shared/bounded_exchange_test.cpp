@@ -28,7 +28,7 @@ public:
             members.push_back(scene.worker);
             exchanges_.push_back(make_bounded_exchange(scene));
         }
-        for (auto& e : exchanges_) e->members(members);
+        for (auto& e : exchanges_) e->members(members, 0);
         for (int w = 0; w < workers; ++w) {
             Ownership ownership;
             ownership.owner = static_cast<std::uint32_t>(w);

@@ -59,12 +59,15 @@ void run_with_a_liar(Pace pace, unsigned seed, int messages, int& sent) {
                 worker->worked({.seconds = 1e-3 * (number + 1)});
                 idle = 0;
             }
-            for (std::vector<std::uint8_t>& bytes : worker->outgoing()) {
+            for (SharedWorldWorker::Outgoing& message : worker->outgoing()) {
+                std::vector<std::uint8_t> bytes =
+                    message.to.empty() ? message.bytes : worker->relayed(message.to, message.bytes);
                 const bool lies = number == 0 && turn > 5 && damaged < messages && random() % 4 == 0;
                 for (unsigned n = lies ? 1 + random() % 3 : 0; n > 0; --n)
                     bytes[12 + random() % (bytes.size() - 16)] = static_cast<std::uint8_t>(random());
                 if (lies) seal(bytes), ++damaged;
                 meeting.take(number, bytes);
+                meeting.advance();
             }
         }
     }

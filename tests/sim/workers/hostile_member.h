@@ -81,7 +81,9 @@ private:
             worker_->worked({.seconds = 1e-3});
             ++steps_;
         }
-        for (const std::vector<std::uint8_t>& bytes : worker_->outgoing()) {
+        for (const sim::SharedWorldWorker::Outgoing& message : worker_->outgoing()) {
+            const std::vector<std::uint8_t> bytes =
+                message.to.empty() ? message.bytes : worker_->relayed(message.to, message.bytes);
             const sim::DecodedWorldMessage m = sim::decode_world(bytes);
             if (std::holds_alternative<sim::StateMessage>(m.message) ||
                 std::holds_alternative<sim::UpdateMessage>(m.message))

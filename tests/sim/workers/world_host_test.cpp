@@ -42,6 +42,7 @@ TEST(SharedWorldRun, OneAndThreeProcessesComeToTheSameBitsAsOneWorldAndLeaveNone
         EXPECT_EQ(watcher.hash, hash_alone(scene, 80));
         EXPECT_EQ(result.workers, count);
         EXPECT_EQ(result.lost, 0);
+        EXPECT_EQ(result.bytes_linked > 0, count > 1);
         EXPECT_TRUE(children_of(getpid()).empty());
     }
 }

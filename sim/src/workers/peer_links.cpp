@@ -1,0 +1,266 @@
+#include "workers/peer_links.h"
+
+#include <netdb.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "workers/socket_folder.h"
+
+namespace sim {
+namespace {
+
+using namespace std::chrono_literals;
+constexpr auto kLinkBeatEvery = 100ms, kLinkSilence = 500ms;
+constexpr auto kLinkPatience = 5s;  // until the application has told this one of a peer, too
+constexpr int kMostPartsWaiting = 1000, kMostToSend = 20'000;
+constexpr int kReconnectMs = 50, kReconnectMostMs = 2000;
+constexpr std::size_t kPreambleBytes = 24;
+constexpr std::size_t kMostInOneGo = 256;  // refused or beats
+
+/// The address by which this machine reaches HOST of tcp://HOST:PORT; empty: none that another machine could use.
+std::string local_address_to(const std::string& endpoint) {
+    const std::size_t colon = endpoint.rfind(':');
+    std::string host = endpoint.substr(std::strlen("tcp://"), colon - std::strlen("tcp://"));
+    if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+    addrinfo hints{};
+    hints.ai_socktype = SOCK_DGRAM;
+    addrinfo* found = nullptr;
+    if (getaddrinfo(host.c_str(), endpoint.c_str() + colon + 1, &hints, &found) != 0) return {};
+    std::string address;
+    for (const addrinfo* at = found; at && address.empty(); at = at->ai_next) {
+        // Nothing is sent: this only chooses a route.
+        const int probe = socket(at->ai_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+        sockaddr_storage own{};
+        socklen_t size = sizeof own;
+        std::array<char, NI_MAXHOST> name{};
+        if (probe >= 0 && connect(probe, at->ai_addr, at->ai_addrlen) == 0 &&
+            getsockname(probe, reinterpret_cast<sockaddr*>(&own), &size) == 0 &&
+            getnameinfo(reinterpret_cast<const sockaddr*>(&own), size, name.data(), name.size(), nullptr, 0,
+                        NI_NUMERICHOST) == 0)
+            address = name.data();
+        if (probe >= 0) close(probe);
+    }
+    freeaddrinfo(found);
+    return address.find('%') == std::string::npos ? address : std::string();
+}
+
+}  // namespace
+
+PeerLinks::PeerLinks(zmq::context_t& context, const Settings& settings)
+    : settings_(settings), context_(context), listens_(context, zmq::socket_type::pull) {
+    try {
+        bind(context);
+    } catch (const zmq::error_t&) {
+        reach_.reset();  // all is told by way of the application
+    }
+}
+
+PeerLinks::~PeerLinks() {
+    listens_.close();
+}
+
+void PeerLinks::bind(zmq::context_t& context) {
+    listens_.set(zmq::sockopt::linger, 0);
+    listens_.set(zmq::sockopt::rcvhwm, kMostPartsWaiting);
+    listens_.set(zmq::sockopt::maxmsgsize, settings_.largest);
+    const std::string& application = settings_.application;
+    if (application.starts_with("ipc://")) {
+        const std::string beside = peer_socket(application);
+        if (beside.empty()) return;
+        listens_.bind(beside);
+        reach_ = {beside, ""};
+        return;
+    }
+    const std::string address = local_address_to(application);
+    if (address.empty()) return;
+    const bool six = address.find(':') != std::string::npos;
+    if (settings_.keys) {
+        gate_ = std::make_unique<KeyGate>(context, std::vector<std::string>{}, kLinkPatience);
+        listens_.set(zmq::sockopt::zap_domain, KeyGate::kDomain);
+        listens_.set(zmq::sockopt::curve_server, true);
+        listens_.set(zmq::sockopt::curve_secretkey, settings_.keys->pair.secret);
+    }
+    listens_.set(zmq::sockopt::ipv6, six);
+    listens_.bind("tcp://" + (six ? "[" + address + "]" : address) + ":*");
+    reach_ = {listens_.get(zmq::sockopt::last_endpoint), settings_.keys ? settings_.keys->pair.shown : ""};
+}
+
+// A member that lies must not make others connect to what is none of its.
+bool PeerLinks::may_connect(const PeersMessage::Peer& peer) const {
+    if (settings_.application.starts_with("ipc://"))
+        return is_peer_socket(peer.endpoint, settings_.application);
+    if (!peer.endpoint.starts_with("tcp://") || peer.key.empty() != !settings_.keys) return false;
+    try {
+        check_endpoint(peer.endpoint, settings_.keys.has_value());
+    } catch (const std::invalid_argument&) {
+        return false;
+    }
+    return peer.endpoint.find('*') == std::string::npos;
+}
+
+void PeerLinks::add(const PeersMessage& message, Clock::time_point now) {
+    if (!reach_) return;
+    for (const PeersMessage::Peer& peer : message.peers) {
+        if (peer.worker == settings_.self || peers_.contains(peer.worker) || !may_connect(peer)) continue;
+        try {
+            connect(peer);
+            beat(peers_.at(peer.worker), now);
+        } catch (const zmq::error_t&) {
+            peers_.erase(peer.worker);  // it cannot be reached
+        }
+    }
+}
+
+void PeerLinks::connect(const PeersMessage::Peer& peer) {
+    Peer& to = peers_[peer.worker];
+    to.says = peer.says, to.hears = peer.hears;
+    to.socket = zmq::socket_t(context_, zmq::socket_type::push);
+    to.socket.set(zmq::sockopt::linger, 0);
+    to.socket.set(zmq::sockopt::sndhwm, kMostToSend);
+    to.socket.set(zmq::sockopt::reconnect_ivl, kReconnectMs);
+    to.socket.set(zmq::sockopt::reconnect_ivl_max, kReconnectMostMs);
+    to.socket.set(zmq::sockopt::ipv6, true);
+    if (settings_.keys) {
+        to.socket.set(zmq::sockopt::curve_serverkey, peer.key);
+        to.socket.set(zmq::sockopt::curve_publickey, settings_.keys->pair.shown);
+        to.socket.set(zmq::sockopt::curve_secretkey, settings_.keys->pair.secret);
+        gate_->allow(peer.key);
+    }
+    to.socket.connect(peer.endpoint);
+    who_says_[peer.says] = peer.worker;
+}
+
+void PeerLinks::keep(const std::vector<std::uint32_t>& members) {
+    std::erase_if(peers_, [&](const auto& peer) {
+        if (std::ranges::find(members, peer.first) != members.end()) return false;
+        who_says_.erase(peer.second.says);
+        return true;
+    });
+}
+
+bool PeerLinks::is_up(std::uint32_t worker, Clock::time_point now) const {
+    const auto peer = peers_.find(worker);
+    return peer != peers_.end() && peer->second.heard_by && now - *peer->second.heard_by < kLinkSilence;
+}
+
+void PeerLinks::look(Clock::time_point now) {
+    if (now - beaten_ < kLinkBeatEvery) return;
+    beaten_ = now;
+    for (auto& [worker, peer] : peers_) beat(peer, now);
+}
+
+void PeerLinks::beat(Peer& peer, Clock::time_point now) {
+    const bool hears = peer.heard && now - *peer.heard < kLinkSilence && !peer.floods;
+    const std::vector<std::uint8_t> bytes = encode({settings_.self, 0, 0}, LinkBeat{hears});
+    (void)send(peer, zmq::message_t(bytes.data(), bytes.size()));
+}
+
+void PeerLinks::begin_step(Clock::time_point now) {
+    for (auto& [worker, peer] : peers_) peer.direct = is_up(worker, now);
+}
+
+// What cannot be sent is lost: the other one sees it by the count.
+bool PeerLinks::send(Peer& peer, const zmq::message_t& message) {
+    std::array<std::uint8_t, kPreambleBytes> preamble{};
+    const std::uint64_t count = ++peer.count_sent;
+    std::ranges::copy(peer.hears, preamble.begin());
+    std::memcpy(preamble.data() + sizeof(Secret), &count, sizeof count);
+    zmq::message_t copy;
+    copy.copy(const_cast<zmq::message_t&>(message));  // shares the bytes
+    sent_ += message.size() + kPreambleBytes;
+    return peer.socket.send(zmq::buffer(preamble), zmq::send_flags::sndmore | zmq::send_flags::dontwait) &&
+           peer.socket.send(copy, zmq::send_flags::dontwait);
+}
+
+std::vector<std::uint32_t> PeerLinks::send(const std::vector<std::uint32_t>& to,
+                                           const std::vector<std::uint8_t>& bytes) {
+    std::vector<std::uint32_t> others;
+    const zmq::message_t message(bytes.data(), bytes.size());
+    for (const std::uint32_t worker : to) {
+        const auto peer = peers_.find(worker);
+        if (peer == peers_.end() || !peer->second.direct)
+            others.push_back(worker);
+        else
+            (void)send(peer->second, message);
+    }
+    return others;
+}
+
+std::optional<DecodedWorldMessage> PeerLinks::receive(Clock::time_point now) {
+    zmq::message_t preamble, message;
+    for (std::size_t i = 0; heard_.empty() && i < kMostInOneGo; ++i) {
+        if (!listens_.recv(preamble, zmq::recv_flags::dontwait)) break;
+        bool two = preamble.more() && listens_.recv(message, zmq::recv_flags::dontwait).has_value();
+        while (two && message.more() && listens_.recv(message, zmq::recv_flags::dontwait)) two = false;
+        if (two && preamble.size() == kPreambleBytes)
+            take(preamble, message, now);
+        else
+            ++refused_;
+    }
+    if (heard_.empty()) return std::nullopt;
+    DecodedWorldMessage next = std::move(heard_.front());
+    heard_.pop_front();
+    return next;
+}
+
+void PeerLinks::take(const zmq::message_t& preamble, const zmq::message_t& message, Clock::time_point now) {
+    Secret secret;
+    std::uint64_t count = 0;
+    std::memcpy(secret.data(), preamble.data(), secret.size());
+    std::memcpy(&count, preamble.data<std::uint8_t>() + secret.size(), sizeof count);
+    const auto who = who_says_.find(secret);
+    Peer* peer = who == who_says_.end() ? nullptr : &peers_.at(who->second);
+    if (!peer || peer->floods) {
+        ++refused_;
+        return;
+    }
+    take_from(who->second, *peer, count, message, now);
+}
+
+void PeerLinks::take_from(std::uint32_t worker, Peer& peer, std::uint64_t count,
+                          const zmq::message_t& message, Clock::time_point now) {
+    const bool missed = count != std::exchange(peer.count_heard, count) + 1, first = !peer.heard;
+    peer.heard = now;
+    try {
+        DecodedWorldMessage m = decode_world({message.data<std::uint8_t>(), message.size()});
+        const auto* beats = std::get_if<LinkBeat>(&m.message);
+        if (m.header.worker != worker || (!beats && !std::holds_alternative<PartMessage>(m.message)))
+            throw DecodeError("found what no worker tells another, expected a part or a beat");
+        if (!beats && std::exchange(peer.step, m.header.step) != m.header.step) peer.parts = 0;
+        if (!beats && ++peer.parts > 2 * settings_.most_parts) {
+            std::fprintf(stderr,
+                         "worker: worker %u tells more than a step needs; its link is not heard any more\n",
+                         worker);
+            peer.floods = true;
+            return miss(worker, peer, peer.step);
+        }
+        if (missed) miss(worker, peer, peer.step);
+        if (beats) {
+            if (beats->hears)
+                peer.heard_by = now;
+            else
+                peer.heard_by.reset();
+        } else if (m.header.step >= peer.skip_until) {
+            heard_.push_back(std::move(m));
+        }
+    } catch (const DecodeError&) {
+        ++refused_;
+        miss(worker, peer, peer.step);
+    }
+    if (first) beat(peer, now);
+}
+
+// Something of this step, the one before or the next one.
+void PeerLinks::miss(std::uint32_t worker, Peer& peer, std::uint64_t step) {
+    for (std::uint64_t of = step > 0 ? step - 1 : 0; of <= step + 1; ++of)
+        heard_.push_back({{worker, 0, of}, PartMessage{true, {}}});
+    peer.skip_until = step + 2;
+}
+
+}  // namespace sim

@@ -1,0 +1,97 @@
+#pragma once
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+#include <zmq.hpp>
+
+#include "messages/world_messages.h"
+#include "workers/curve_keys.h"
+#include "workers/key_gate.h"
+
+namespace sim {
+
+/// What one worker tells others directly, and hears from them. Each binds one socket, on which it hears from all (PULL), and
+/// connects another to every one that the application has told it of (PUSH). A message has two frames: 16 bytes that only these
+/// two and the application know, and a count of the messages on this link (u64, from 1); then the message itself.
+///
+/// A link serves while the other one says that it hears (LinkBeat): so a worker that cannot be reached in one direction, or falls
+/// silent, is told by way of the application. That is decided once a step, so that what is told of a step comes one way, in
+/// order. Where a count is missed something is lost: no more of that step is taken from this worker, but that it gave up.
+///
+/// Bad peers: a message without the right secret is dropped and counted, one that is no part or beat likewise; who tells far more of
+/// one step than steps need is heard no more, and has to tell it by way of the application. No message is larger than `largest`, kMostPartsWaiting of each connection wait, then it is held
+/// back.
+class PeerLinks {
+public:
+    using Clock = std::chrono::steady_clock;
+    struct Settings {
+        std::uint32_t self = 0;
+        std::string application;         ///< its endpoint
+        std::optional<WorkerKeys> keys;  ///< of this worker; with them links are encrypted
+        std::int64_t largest = 0;        ///< message [bytes]
+        std::size_t most_parts = 0;      ///< that one worker tells of a step
+    };
+    /// Listens beside the application's socket in its private folder, or, over TCP, at the address by which this machine
+    /// reaches the application. If it cannot, reach() is empty.
+    PeerLinks(zmq::context_t& context, const Settings& settings);
+    ~PeerLinks();
+    PeerLinks(const PeerLinks&) = delete;
+    PeerLinks& operator=(const PeerLinks&) = delete;
+
+    [[nodiscard]] const std::optional<ReachMessage>& reach() const noexcept { return reach_; }
+    void add(const PeersMessage& message, Clock::time_point now);
+    void keep(const std::vector<std::uint32_t>& members);  ///< forgets the others
+
+    void look(Clock::time_point now);        ///< sends heartbeats if they are due; call it often
+    void begin_step(Clock::time_point now);  ///< decides who is told directly in this step
+    /// Sends to those that are told directly; returns the others.
+    [[nodiscard]] std::vector<std::uint32_t> send(const std::vector<std::uint32_t>& to,
+                                                  const std::vector<std::uint8_t>& bytes);
+    [[nodiscard]] std::optional<DecodedWorldMessage> receive(Clock::time_point now);  ///< a part
+    [[nodiscard]] void* handle() { return listens_.handle(); }                        ///< to poll
+
+    [[nodiscard]] bool is_up(std::uint32_t worker, Clock::time_point now) const;
+    [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }  ///< messages
+    [[nodiscard]] std::uint64_t sent() const noexcept { return sent_; }        ///< bytes, of every copy
+
+private:
+    struct Peer {
+        zmq::socket_t socket;
+        Secret says = {}, hears = {};
+        std::uint64_t count_sent = 0, count_heard = 0;
+        std::optional<Clock::time_point> heard, heard_by;  ///< from it; that it says so of this one
+        bool direct = false;                               ///< in this step
+        std::uint64_t step = 0, skip_until = 0;            ///< of its last part; steps below are not taken
+        std::size_t parts = 0;                             ///< of that step
+        bool floods = false;
+    };
+
+    void bind(zmq::context_t& context);
+    [[nodiscard]] bool may_connect(const PeersMessage::Peer& peer) const;
+    void connect(const PeersMessage::Peer& peer);
+    void set_keys(zmq::socket_t& socket) const;
+    bool send(Peer& peer, const zmq::message_t& message);
+    void beat(Peer& peer, Clock::time_point now);
+    void take(const zmq::message_t& preamble, const zmq::message_t& message, Clock::time_point now);
+    void take_from(std::uint32_t worker, Peer& peer, std::uint64_t count, const zmq::message_t& message,
+                   Clock::time_point now);
+    void miss(std::uint32_t worker, Peer& peer, std::uint64_t step);
+
+    Settings settings_;
+    zmq::context_t& context_;
+    std::unique_ptr<KeyGate> gate_;
+    zmq::socket_t listens_;
+    std::optional<ReachMessage> reach_;
+    std::map<std::uint32_t, Peer> peers_;
+    std::map<Secret, std::uint32_t> who_says_;
+    std::deque<DecodedWorldMessage> heard_;
+    Clock::time_point beaten_{};
+    std::uint64_t refused_ = 0, sent_ = 0;
+};
+
+}  // namespace sim
