@@ -230,7 +230,7 @@ void read_update(ByteReader& all, Update& u) {
     read_halves(in, u.impulse.modal);
 }
 
-int read_body_number(ByteReader& in) {
+int read_body_number(SmallReader& in) {
     const auto body = in.number<std::uint32_t>();
     if (body >= kMostWorldBodies) throw DecodeError("a body's number beyond the largest");
     return static_cast<int>(body);
@@ -246,6 +246,7 @@ void write(ByteWriter& out, const std::vector<Update>& updates) {
 
 void write(ByteWriter& out, const std::vector<CrossImpulse>& crossed) {
     out.count(crossed.size());
+    out.bytes().reserve(out.bytes().size() + crossed.size() * kCrossed);
     for (const CrossImpulse& c : crossed) {
         out.number(static_cast<std::uint32_t>(c.own));
         out.number(static_cast<std::uint32_t>(c.ghost));
@@ -256,14 +257,14 @@ void write(ByteWriter& out, const std::vector<CrossImpulse>& crossed) {
     }
 }
 
-std::vector<Update> read_updates(ByteReader& in) {
-    std::vector<Update> updates(in.count(kSmallestUpdate));
+void read_updates(ByteReader& in, std::vector<Update>& updates) {
+    updates.resize(in.count(kSmallestUpdate));
     for (Update& u : updates) read_update(in, u);
-    return updates;
 }
 
-std::vector<CrossImpulse> read_crossed(ByteReader& in) {
-    std::vector<CrossImpulse> crossed(in.count(kCrossed));
+std::vector<CrossImpulse> read_crossed(ByteReader& all) {
+    std::vector<CrossImpulse> crossed(all.count(kCrossed));
+    SmallReader in(all.take(kCrossed * crossed.size()));
     for (CrossImpulse& c : crossed) {
         c.own = read_body_number(in), c.ghost = read_body_number(in);
         const auto blow = in.number<std::uint8_t>();

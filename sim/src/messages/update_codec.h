@@ -10,7 +10,8 @@ namespace sim {
 
 void write(ByteWriter& out, const std::vector<Update>& updates);
 void write(ByteWriter& out, const std::vector<CrossImpulse>& crossed);
-[[nodiscard]] std::vector<Update> read_updates(ByteReader& in);        ///< throws DecodeError
+/// Into the storage that is there. Throws DecodeError.
+void read_updates(ByteReader& in, std::vector<Update>& updates);
 [[nodiscard]] std::vector<CrossImpulse> read_crossed(ByteReader& in);  ///< throws DecodeError
 
 /// The same number with a float's precision, towards zero, as it arrives elsewhere. By its bits: GCC 12 leaves out a conversion to

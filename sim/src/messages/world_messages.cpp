@@ -255,7 +255,7 @@ void read_body(ByteReader& in, StateMessage& m) {
 }
 void read_body(ByteReader& in, UpdateMessage& m) {
     m.report = read_report(in);
-    m.bodies = read_updates(in);
+    read_updates(in, m.bodies);
     m.crossed = read_crossed(in);
     read_numbers(in, m.broken);
 }
@@ -314,14 +314,13 @@ void read_body(ByteReader& in, Handover& m) {
     read_applied(in, m.sources, m.applied);
 }
 
-/// The variant's alternative of index `type` - 1.
+/// The variant's alternative of index `type` - 1; what is there of that type is overwritten, so that its storage serves again.
 template <std::size_t I = 0>
-WorldMessage read_message(std::size_t type, ByteReader& in) {
+void read_message(std::size_t type, ByteReader& in, WorldMessage& into) {
     if constexpr (I < std::variant_size_v<WorldMessage>) {
-        if (type != I + 1) return read_message<I + 1>(type, in);
-        std::variant_alternative_t<I, WorldMessage> m;
-        read_body(in, m);
-        return m;
+        if (type != I + 1) return read_message<I + 1>(type, in, into);
+        auto* m = std::get_if<I>(&into);
+        read_body(in, m ? *m : into.emplace<I>());
     } else {
         throw DecodeError("message type " + std::to_string(type) + ", expected 1 to " + std::to_string(I));
     }
@@ -350,12 +349,11 @@ std::uint16_t read_header(std::span<const std::uint8_t> bytes, WorldHeader& head
 }
 
 /// Of a message whose header has been read.
-WorldMessage read_message(std::uint16_t type, std::span<const std::uint8_t> bytes) {
+void read_message(std::uint16_t type, std::span<const std::uint8_t> bytes, WorldMessage& into) {
     ByteReader body(bytes.subspan(kHeaderBytes, bytes.size() - kHeaderBytes - kChecksumBytes));
     try {
-        WorldMessage message = read_message(std::size_t{type}, body);
+        read_message(std::size_t{type}, body, into);
         body.expect_end();
-        return message;
     } catch (const std::invalid_argument& e) {
         throw DecodeError(e.what());
     }
@@ -381,10 +379,13 @@ std::vector<std::uint8_t> encode(const WorldHeader& header, const WorldMessage& 
 }
 
 DecodedWorldMessage decode_for_worker(std::span<const std::uint8_t> bytes) {
-    WorldHeader header;
-    const std::uint16_t type = read_header(bytes, header);
-    if (type != kUpdateType) return {header, read_message(type, bytes)};
-    PackedUpdates packed;
+    DecodedWorldMessage decoded;
+    const std::uint16_t type = read_header(bytes, decoded.header);
+    if (type != kUpdateType) {
+        read_message(type, bytes, decoded.message);
+        return decoded;
+    }
+    auto& packed = decoded.message.emplace<PackedUpdates>();
     packed.bytes.assign(bytes.begin(), bytes.end());
     const std::span<const std::uint8_t> all =
         std::span<const std::uint8_t>(packed.bytes).first(bytes.size() - kChecksumBytes);
@@ -394,13 +395,18 @@ DecodedWorldMessage decode_for_worker(std::span<const std::uint8_t> bytes) {
     packed.crossed = read_crossed(in);
     read_numbers(in, packed.broken);
     in.expect_end();
-    return {header, std::move(packed)};
+    return decoded;
 }
 
 DecodedWorldMessage decode_world(std::span<const std::uint8_t> bytes) {
-    WorldHeader header;
-    const std::uint16_t type = read_header(bytes, header);
-    return {header, read_message(type, bytes)};
+    DecodedWorldMessage decoded;
+    decode_world(bytes, decoded);
+    return decoded;
+}
+
+void decode_world(std::span<const std::uint8_t> bytes, DecodedWorldMessage& into) {
+    const std::uint16_t type = read_header(bytes, into.header);
+    read_message(type, bytes, into.message);
 }
 
 }  // namespace sim

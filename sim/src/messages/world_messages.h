@@ -176,7 +176,7 @@ struct Update {
 struct UpdateMessage {
     StepReport report;
     std::vector<Update> bodies;         ///< own, ascending
-    std::vector<CrossImpulse> crossed;  ///< of own bodies with others' in the last step, as floats
+    std::vector<CrossImpulse> crossed;  ///< of own bodies with others' in the last step, as floats; ascending
     std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
 };
 
@@ -274,5 +274,7 @@ struct DecodedWorldMessage {
 [[nodiscard]] DecodedWorldMessage decode_for_worker(std::span<const std::uint8_t> bytes);
 /// Throws DecodeError for anything that encode cannot have written.
 [[nodiscard]] DecodedWorldMessage decode_world(std::span<const std::uint8_t> bytes);
+/// The same, into the storage of the last one; what is there after a DecodeError is of no use.
+void decode_world(std::span<const std::uint8_t> bytes, DecodedWorldMessage& into);
 
 }  // namespace sim

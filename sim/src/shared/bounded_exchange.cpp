@@ -340,6 +340,7 @@ void BoundedExchange::keep_crossed() {
         felt_[c.own].touched = step_;
         crossed_.push_back(c);
     }
+    std::ranges::sort(crossed_, {}, [](const CrossImpulse& c) { return std::pair(c.own, c.ghost); });
     const auto touches = [this](const CrossImpulse& c) -> Touch& {
         return touched_[owner_[static_cast<std::size_t>(c.ghost)]];
     };

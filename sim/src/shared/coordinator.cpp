@@ -336,23 +336,24 @@ void Coordinator::take(std::uint32_t worker, std::span<const std::uint8_t> bytes
     if (is_too_much(senders_[worker], bytes.size()))
         return expel(worker, "found more messages than steps need");
     try {
-        DecodedWorldMessage decoded = decode_world(bytes);
+        DecodedWorldMessage& decoded = senders_[worker].decoded;
+        decode_world(bytes, decoded);
         if (decoded.header.worker != worker || decoded.header.epoch > epoch_ ||
             decoded.header.step > settings_.steps)
             return expel(worker, "found another worker's number, or a step or epoch to come");
-        take_message(decoded.header, bytes, std::move(decoded.message));
+        take_message(decoded.header, bytes, decoded.message);
     } catch (const DecodeError& error) {
         expel(worker, error.what());
     }
 }
 
 void Coordinator::take_message(const WorldHeader& header, std::span<const std::uint8_t> bytes,
-                               WorldMessage&& message) {
+                               WorldMessage& message) {
     const std::uint32_t worker = header.worker;
     if (auto* state = std::get_if<StateMessage>(&message))
         return take_state(header, bytes, std::move(*state));
     if (auto* update = std::get_if<UpdateMessage>(&message))
-        return take_update(header, bytes, std::move(*update));
+        return take_update(header, bytes, *update);
     if (auto* handover = std::get_if<Handover>(&message)) return take_handover(header, std::move(*handover));
     if (const auto* offer = std::get_if<Offer>(&message)) {
         if (is_member(offer->to)) ++senders_[offer->to].offered;
@@ -450,9 +451,9 @@ bool Coordinator::own_contacts(std::uint32_t worker, const StateMessage& message
                        [&](const SpringRecord& s) { return owns_constraint(worker, s.constraint); });
 }
 
-void Coordinator::publish(Body& body, WorldRecord&& record, std::uint64_t step) {
+void Coordinator::publish(Body& body, const WorldRecord& record, std::uint64_t step) {
     if (step < body.step) return;
-    body.record = std::move(record);
+    body.record = record;
     body.step = step;
 }
 
@@ -464,14 +465,14 @@ void Coordinator::take_state(const WorldHeader& header, std::span<const std::uin
     if (!own_contacts(header.worker, message))
         return expel(header.worker, "found contacts that are not its to publish");
     for (const WorldRecord& record : message.bodies)
-        publish(bodies_[static_cast<std::size_t>(record.body)], WorldRecord(record), header.step);
+        publish(bodies_[static_cast<std::size_t>(record.body)], record, header.step);
     report(header, message.report, message.bodies.size(), bytes.size());
     pass_on(header, bytes, message);
     view_.take(header.step, std::move(message));
 }
 
 void Coordinator::take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes,
-                              UpdateMessage&& message) {
+                              const UpdateMessage& message) {
     Sender& sender = senders_[header.worker];
     // Of the last step there are two: as done, for the others, and with what came late, for the view.
     const bool last = header.step == settings_.steps, settled = last && sender.step == header.step;
@@ -492,11 +493,10 @@ void Coordinator::take_update(const WorldHeader& header, std::span<const std::ui
     sender.settled = settled;
     for (const std::uint32_t c : message.broken) view_.break_constraint(static_cast<int>(c));
     for (const Update& update : message.bodies) {
-        WorldRecord record;
-        record.body = static_cast<int>(update.body);
-        record.state = update.state;
-        record.asleep = update.asleep, record.quarantined = update.quarantined;
-        publish(bodies_[update.body], std::move(record), header.step);
+        record_.body = static_cast<int>(update.body);
+        record_.state = update.state;
+        record_.asleep = update.asleep, record_.quarantined = update.quarantined;
+        publish(bodies_[update.body], record_, header.step);
     }
     if (!last || sender.settled) extend_sleep(header);
     report(header, message.report, message.bodies.size(), bytes.size());
@@ -534,8 +534,8 @@ void Coordinator::take_handover(const WorldHeader& header, Handover&& message) {
     if (std::adjacent_find(bodies.begin(), bodies.end()) != bodies.end())
         return refuse(header.worker, "found a body twice");
     view_.take(header.step, message.bodies);
-    for (WorldRecord& record : message.bodies)
-        publish(bodies_[static_cast<std::size_t>(record.body)], std::move(record), header.step);
+    for (const WorldRecord& record : message.bodies)
+        publish(bodies_[static_cast<std::size_t>(record.body)], record, header.step);
     const bool traded = is_member(message.to) && message.to != header.worker;
     if (traded) {
         ++result_.trades;

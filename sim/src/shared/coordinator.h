@@ -68,6 +68,7 @@ private:
         std::uint64_t messages_at = 0;      ///< steps of all bodies since which these were sent:
         std::size_t messages = 0, message_bytes = 0, offered = 0;  ///< offered: to it, to be answered
         ReachMessage reach;
+        DecodedWorldMessage decoded;  ///< the last, for its storage
     };
     struct Group {
         std::uint32_t owner;
@@ -75,9 +76,9 @@ private:
         std::vector<int> bodies;
     };
 
-    void take_message(const WorldHeader& header, std::span<const std::uint8_t> bytes, WorldMessage&& message);
+    void take_message(const WorldHeader& header, std::span<const std::uint8_t> bytes, WorldMessage& message);
     void take_state(const WorldHeader& header, std::span<const std::uint8_t> bytes, StateMessage&& message);
-    void take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes, UpdateMessage&& message);
+    void take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes, const UpdateMessage& message);
     void extend_sleep(const WorldHeader& header);
     void take_handover(const WorldHeader& header, Handover&& message);
     void take_reach(const WorldHeader& header, ReachMessage&& message);
@@ -96,7 +97,7 @@ private:
     [[nodiscard]] bool fits(const std::vector<Mishap>& mishaps) const;
     [[nodiscard]] bool owns_constraint(std::uint32_t worker, int constraint) const;
     [[nodiscard]] bool own_contacts(std::uint32_t worker, const StateMessage& message) const;
-    static void publish(Body& body, WorldRecord&& record, std::uint64_t step);
+    static void publish(Body& body, const WorldRecord& record, std::uint64_t step);
 
     void remove(std::uint32_t worker);
     void share_out(const std::vector<int>& bodies, std::uint32_t from, const Handover* handed = nullptr);
@@ -124,6 +125,7 @@ private:
     std::vector<std::vector<int>> lots_;         // tied together
     std::vector<Eigen::Vector3d> first_places_;  // of each
     std::vector<Body> bodies_;
+    WorldRecord record_;  // of an update that is being taken
     std::vector<std::uint32_t> members_;
     std::map<std::uint32_t, Sender> senders_;
     std::uint32_t next_worker_ = 0, epoch_ = 0;

@@ -163,13 +163,15 @@ void ForeignBodies::extrapolate(int body, std::uint64_t now) {
     }
 }
 
-ForeignBall ForeignBodies::ball(int body, std::uint64_t now) const {
+ForeignBall ForeignBodies::ball(int body, std::uint64_t now) {
+    for (int there = static_cast<int>(radius_.size()); there < world_->bodies(); ++there)
+        radius_.push_back(1.02 * world_->most_radius(there));
     const Newest& newest = newest_[static_cast<std::size_t>(body)];
     const PackedUpdates::Glance& s = newest.glance;
     const double age = s.asleep ? 0 : (static_cast<double>(now) - static_cast<double>(newest.step)) * dt_;
     const double speed = s.velocity.norm(), fall = gravity_ * (std::abs(age) + dt_);
     return {body, s.position + age * s.velocity,
-            1.02 * world_->most_radius(body) + dt_ * (speed + fall) + fall * std::abs(age)};
+            radius_[static_cast<std::size_t>(body)] + dt_ * (speed + fall) + fall * std::abs(age)};
 }
 
 }  // namespace sim

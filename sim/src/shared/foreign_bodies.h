@@ -43,7 +43,7 @@ public:
     /// What is returned holds until the next call.
     [[nodiscard]] const Ghost& at(int body, std::uint64_t now);
     /// A ball that holds the body over the step after `now`.
-    [[nodiscard]] ForeignBall ball(int body, std::uint64_t now) const;
+    [[nodiscard]] ForeignBall ball(int body, std::uint64_t now);
     [[nodiscard]] bool known(int body) const { return newest_[static_cast<std::size_t>(body)].known; }
     [[nodiscard]] std::uint64_t newest(int body) const {
         return newest_[static_cast<std::size_t>(body)].step;
@@ -88,7 +88,9 @@ private:
     std::size_t keep_;
     std::map<std::uint32_t, std::vector<Heard>> heard_;  // by worker; a step's place is its remainder
     std::vector<Newest> newest_;                         // by body
-    std::map<int, Told> rest_;                           // of bodies that were registered, or told to sleep
+    std::vector<double>
+        radius_;                // likewise, of those that are there: of a ball that holds it, deformed or not
+    std::map<int, Told> rest_;  // of bodies that were registered, or told to sleep
     // Of the ghost that is being made:
     Told told_;
     Ghost ghost_;

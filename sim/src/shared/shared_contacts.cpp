@@ -7,10 +7,13 @@ namespace {
 
 const std::vector<CrossImpulse> kNothing;
 
+std::pair<int, int> pair_of(const CrossImpulse& c) {
+    return {c.own, c.ghost};
+}
+
 const CrossImpulse* find(const std::vector<CrossImpulse>& crossed, int own, int ghost) {
-    const auto found = std::ranges::find_if(
-        crossed, [&](const CrossImpulse& c) { return c.own == own && c.ghost == ghost; });
-    return found == crossed.end() ? nullptr : &*found;
+    const auto found = std::ranges::lower_bound(crossed, std::pair(own, ghost), {}, pair_of);
+    return found == crossed.end() || pair_of(*found) != std::pair(own, ghost) ? nullptr : &*found;
 }
 
 }  // namespace
@@ -82,8 +85,9 @@ void SharedContacts::put_right(const CrossImpulse* found, const CrossImpulse* to
 // What the owners of a body, then (`mine`) and of what it touched (`theirs`) found.
 void SharedContacts::compare(const std::vector<CrossImpulse>& mine, const std::vector<CrossImpulse>& theirs,
                              const Occasion& of, int body) {
-    for (const CrossImpulse& found : mine)
-        if (found.own == body && owner(found.ghost, of.step) == of.worker)
+    const auto own = std::ranges::equal_range(mine, body, {}, &CrossImpulse::own);
+    for (const CrossImpulse& found : own)
+        if (owner(found.ghost, of.step) == of.worker)
             put_right(&found, find(theirs, found.ghost, body), of);
     for (const CrossImpulse& told : theirs)
         if (told.ghost == body && !find(mine, body, told.own)) put_right(nullptr, &told, of);

@@ -15,25 +15,27 @@ void WorldView::take(std::uint64_t step, StateMessage&& message) {
 
 void WorldView::take(std::uint64_t step, const std::vector<Update>& updates) {
     for (const Update& update : updates) {
-        WorldRecord record;
-        record.body = static_cast<int>(update.body);
-        record.state = update.state;
-        record.asleep = update.asleep, record.quarantined = update.quarantined;
-        keep(record.body, {step, record, update.asleep || update.still});
+        record_.body = static_cast<int>(update.body);
+        record_.state = update.state;
+        record_.asleep = update.asleep, record_.quarantined = update.quarantined;
+        keep(step, record_, update.asleep || update.still);
     }
 }
 
 void WorldView::take(std::uint64_t step, const std::vector<WorldRecord>& records) {
     if (pace_ == Pace::lockstep) return;
-    for (const WorldRecord& record : records) keep(record.body, {step, record, record.asleep});
+    for (const WorldRecord& record : records) keep(step, record, record.asleep);
 }
 
-void WorldView::keep(int body, Published&& published) {
-    auto& all = published_[static_cast<std::size_t>(body)];
-    if (published.step <= step_) return;
-    const auto at = std::lower_bound(all.begin(), all.end(), published.step,
-                                     [](const Published& p, std::uint64_t step) { return p.step < step; });
-    if (at != all.end() && at->step == published.step) return;
+void WorldView::keep(std::uint64_t step, const WorldRecord& record, bool still) {
+    auto& all = published_[static_cast<std::size_t>(record.body)];
+    if (step <= step_) return;
+    const auto at = std::ranges::lower_bound(all, step, {}, &Published::step);
+    if (at != all.end() && at->step == step) return;
+    if (spare_.empty()) spare_.emplace_back();
+    Published published(std::move(spare_.back()));
+    spare_.pop_back();
+    published.step = step, published.record = record, published.still = still;
     all.insert(at, std::move(published));
 }
 
@@ -75,13 +77,14 @@ void WorldView::show(int body, std::uint64_t step) {
     if (!all.empty() && all.front().step == step) {
         world.restore(all.front().record);
         still_[static_cast<std::size_t>(body)] = all.front().still;
-        all.pop_front();
+        spare_.push_back(std::move(all.front()));
+        all.erase(all.begin());
         return;
     }
-    WorldRecord record = world.record(body);
-    if (record.asleep || record.quarantined) return;
-    world.extrapolate(body, record.state, nullptr);
-    world.restore(record);
+    world.record(body, record_);
+    if (record_.asleep || record_.quarantined) return;
+    world.extrapolate(body, record_.state, nullptr);
+    world.restore(record_);
 }
 
 bool WorldView::at_rest() const {
@@ -89,9 +92,8 @@ bool WorldView::at_rest() const {
     if (clock().events_left()) return false;
     if (pace_ == Pace::lockstep) return world.all_asleep();
     for (int i = 0; i < world.bodies(); ++i) {
-        const WorldRecord record = world.record(i);
-        const bool rests = record.asleep || record.quarantined || still_[static_cast<std::size_t>(i)] != 0;
-        if (clock().moves(i) && !rests) return false;
+        const bool rests = world.asleep(i) || still_[static_cast<std::size_t>(i)] != 0;
+        if (clock().moves(i) && !rests && !world.record(i).quarantined) return false;
     }
     return true;
 }

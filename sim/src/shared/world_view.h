@@ -1,5 +1,4 @@
 #pragma once
-#include <deque>
 #include <vector>
 
 #include "shared/replica.h"
@@ -32,18 +31,20 @@ public:
 
 private:
     struct Published {
-        std::uint64_t step;
+        std::uint64_t step = 0;
         WorldRecord record;
-        bool still;
+        bool still = false;
     };
-    void keep(int body, Published&& published);
+    void keep(std::uint64_t step, const WorldRecord& record, bool still);
     [[nodiscard]] bool advance_bounded();
     void show(int body, std::uint64_t step);
 
     Pace pace_;
     Replica replica_;
     std::uint64_t step_ = 0;
-    std::vector<std::deque<Published>> published_;  // bounded: of each body, by ascending steps
+    std::vector<std::vector<Published>> published_;  // bounded: of each body, by ascending steps
+    std::vector<Published> spare_;                   // for their storage
+    WorldRecord record_;                             // that is being kept or shown
     std::vector<std::uint8_t> still_, released_;
 };
 
