@@ -60,7 +60,7 @@ struct Shared {
 };
 
 /// Encodes and sends as fast as the receiver takes them.
-void send_updates(zmq::socket_t& socket, const sim::WorldMessage& message, Shared& shared) {
+void send_updates(zmq::socket_t& socket, const sim::WorkerMessage& message, Shared& shared) {
     for (std::uint64_t step = 0; !shared.stop;) {
         if (shared.sent - shared.received >= kAhead) {
             std::this_thread::sleep_for(20us);
@@ -76,7 +76,7 @@ void receive_updates(zmq::socket_t& socket, Shared& shared) {
     zmq::message_t frame;
     while (!shared.stop) {
         if (!socket.recv(frame) || frame.size() < 100) continue;  // a ROUTER's frame of the identity
-        (void)sim::decode_world({frame.data<std::uint8_t>(), frame.size()});
+        (void)sim::decode_message({frame.data<std::uint8_t>(), frame.size()});
         ++shared.received;
     }
 }
@@ -95,7 +95,7 @@ Throughput measured(const Shared& shared, const ThroughputSettings& settings) {
 }
 
 /// The sender is connected to a worker that listens: ROUTER, as the application has.
-Throughput in_one_hop(const ThroughputSettings& settings, const sim::WorldMessage& message) {
+Throughput in_one_hop(const ThroughputSettings& settings, const sim::WorkerMessage& message) {
     const Keys keys;
     zmq::context_t there, here;
     zmq::socket_t receiver(there, zmq::socket_type::router);
@@ -130,7 +130,7 @@ void pass_on(sim::WorkerGate& gate, Shared& shared) {
     }
 }
 
-Throughput through_application(const ThroughputSettings& settings, const sim::WorldMessage& message) {
+Throughput through_application(const ThroughputSettings& settings, const sim::WorkerMessage& message) {
     const Keys keys;
     sim::WorkerGate::Settings open{"tcp://127.0.0.1:*", std::nullopt, 3600};
     open.most_waiting = 100'000;
@@ -160,13 +160,13 @@ Throughput through_application(const ThroughputSettings& settings, const sim::Wo
 }  // namespace
 
 Throughput measure_update_throughput(const ThroughputSettings& settings) {
-    const sim::WorldMessage message = updates(settings);
+    const sim::WorkerMessage message = updates(settings);
     const std::vector<std::uint8_t> bytes = sim::encode({}, message);
     Throughput t =
         settings.through_application ? through_application(settings, message) : in_one_hop(settings, message);
     t.bytes_per_update = double(bytes.size()) / settings.bodies;
     t.encode_ns = ns_each(settings.bodies, [&] { (void)sim::encode({}, message); });
-    t.decode_ns = ns_each(settings.bodies, [&] { (void)sim::decode_world(bytes); });
+    t.decode_ns = ns_each(settings.bodies, [&] { (void)sim::decode_message(bytes); });
     return t;
 }
 

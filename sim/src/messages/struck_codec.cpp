@@ -7,7 +7,8 @@
 namespace sim {
 namespace {
 
-constexpr std::uint32_t kLongestStruckName = 1024;
+constexpr std::uint32_t kLongestStruckName = 1024, kMostStruckBodies = 1u << 20;
+constexpr std::size_t kSmallestAssignment = 400, kStruckRecordBytes = 120;
 constexpr std::size_t kImpulseBytes = 60, kNodeBytes = 56, kStateBytes = 112, kContactBytes = 133,
                       kZoneBytes = 36;
 
@@ -115,8 +116,6 @@ BodyOutcome::PathContact read_contact(ByteReader& in, std::uint32_t body) {
     }
     return found;
 }
-
-}  // namespace
 
 void write(ByteWriter& out, const BodyDefinition& b) {
     out.text(b.name);
@@ -254,6 +253,70 @@ BodyOutcome read_outcome(ByteReader& in, std::uint32_t epoch) {
             throw DecodeError("a contact on a path that was not swept");
     }
     return outcome;
+}
+
+}  // namespace
+
+void write(ByteWriter& out, const StruckAssign& m) {
+    out.number(m.epoch);
+    out.count(m.bodies.size());
+    for (const StruckAssignment& a : m.bodies) {
+        write(out, a.definition);
+        write_record(out, a.body, m.epoch, a.record.state);
+        out.number<std::uint8_t>(a.record.stepped);
+        out.number(a.record.t_s);
+    }
+}
+
+void write(ByteWriter& out, const StruckStep& m) {
+    out.number(m.epoch);
+    out.number(m.step);
+    out.count(m.bodies.size());
+    for (const std::uint32_t body : m.bodies) out.number(body);
+    write(out, m.request);
+}
+
+void write(ByteWriter& out, const StruckAnswer& m) {
+    out.number(m.epoch);
+    out.number(m.step);
+    out.count(m.outcomes.size());
+    for (const BodyOutcome& outcome : m.outcomes) write(out, outcome, m.epoch);
+}
+
+StruckAssign read_struck_assign(ByteReader& in) {
+    StruckAssign m;
+    m.epoch = in.number<std::uint32_t>();
+    m.bodies.resize(in.count(kSmallestAssignment));
+    for (StruckAssignment& a : m.bodies) {
+        a.definition = read_definition(in);
+        check_body(a.definition);
+        a.record.state = read_record(in, a.body, m.epoch);
+        a.record.stepped = in.flag();
+        a.record.t_s = in.number<double>();
+        if (a.body >= kMostStruckBodies || !(std::abs(a.record.t_s) <= kTimeLimit_s))
+            throw DecodeError("a record out of range");
+    }
+    return m;
+}
+
+StruckStep read_struck_step(ByteReader& in) {
+    StruckStep m;
+    m.epoch = in.number<std::uint32_t>();
+    m.step = in.number<std::uint64_t>();
+    m.bodies.resize(in.count(4));
+    for (std::uint32_t& body : m.bodies) body = in.number<std::uint32_t>();
+    m.request = read_request(in);
+    check_request(m.request, kMostStruckBodies);
+    return m;
+}
+
+StruckAnswer read_struck_answer(ByteReader& in) {
+    StruckAnswer m;
+    m.epoch = in.number<std::uint32_t>();
+    m.step = in.number<std::uint64_t>();
+    m.outcomes.resize(in.count(kStruckRecordBytes));
+    for (BodyOutcome& outcome : m.outcomes) outcome = read_outcome(in, m.epoch);
+    return m;
 }
 
 }  // namespace sim

@@ -1,18 +1,15 @@
 #pragma once
+#include "bytes/byte_codec.h"
 #include "messages/struck_messages.h"
 
 namespace sim {
 
-// The parts of a message's body; see struck_messages.h for the layout.
+void write(ByteWriter& out, const StruckAssign& message);
+void write(ByteWriter& out, const StruckStep& message);
+void write(ByteWriter& out, const StruckAnswer& message);
 
-void write(ByteWriter& out, const BodyDefinition& body);
-void write(ByteWriter& out, const StepRequest& request);
-void write(ByteWriter& out, const BodyOutcome& outcome, std::uint32_t epoch);
-void write_record(ByteWriter& out, std::uint32_t body, std::uint32_t epoch, const ModalState& state);
-
-[[nodiscard]] BodyDefinition read_definition(ByteReader& in);  ///< all readers throw DecodeError
-[[nodiscard]] StepRequest read_request(ByteReader& in);
-[[nodiscard]] BodyOutcome read_outcome(ByteReader& in, std::uint32_t epoch);
-[[nodiscard]] ModalState read_record(ByteReader& in, std::uint32_t& body, std::uint32_t epoch);
+[[nodiscard]] StruckAssign read_struck_assign(ByteReader& in);  ///< all readers throw DecodeError
+[[nodiscard]] StruckStep read_struck_step(ByteReader& in);
+[[nodiscard]] StruckAnswer read_struck_answer(ByteReader& in);
 
 }  // namespace sim

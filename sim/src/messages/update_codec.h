@@ -2,11 +2,11 @@
 #include <bit>
 #include <cmath>
 
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 
 namespace sim {
 
-// Quantised states and the impulses between workers; see world_messages.h for layout and errors.
+// Quantised states and the impulses between workers; see worker_messages.h for layout and errors.
 
 void write(ByteWriter& out, const std::vector<Update>& updates);
 void write(ByteWriter& out, const std::vector<CrossImpulse>& crossed);

@@ -1,9 +1,9 @@
 #pragma once
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 
 namespace sim {
 
-// Records of bodies, contacts and constraints, exact; see world_messages.h for the layout.
+// Records of bodies, contacts and constraints, exact; see worker_messages.h for the layout.
 
 constexpr std::uint32_t kMostWorldBodies = 1u << 24;
 

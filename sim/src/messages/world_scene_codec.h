@@ -1,5 +1,5 @@
 #pragma once
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 
 namespace sim {
 

@@ -22,7 +22,7 @@ public:
     explicit BoundedExchange(const SceneMessage& scene);
 
     using ReplicaProtocol::take;
-    void take(const WorldHeader& header, PackedUpdates&& message) override;
+    void take(const MessageHeader& header, PackedUpdates&& message) override;
     void take(SnapshotMessage&& message) override;
     void members(const std::vector<std::uint32_t>& workers, std::uint32_t epoch) override;
     void own(const Ownership& ownership) override;
@@ -90,7 +90,7 @@ private:
     std::vector<int> near_;
     std::vector<CrossImpulse> crossed_;              // in the last step
     WorldRecord record_;                             // of the body that is being told of
-    WorldMessage outgoing_ = UpdateMessage{};        // kept for its storage
+    WorkerMessage outgoing_ = UpdateMessage{};       // kept for its storage
     std::vector<std::uint32_t> breakable_, broken_;  // constraints; those that broke in the last step
     std::map<int, Felt> felt_;                       // of own bodies that touch others'
     std::vector<std::uint8_t> told_asleep_;
@@ -183,7 +183,7 @@ void BoundedExchange::come_to(std::uint64_t step) {
     if (world_.bodies() != before) list();
 }
 
-void BoundedExchange::take(const WorldHeader& header, PackedUpdates&& message) {
+void BoundedExchange::take(const MessageHeader& header, PackedUpdates&& message) {
     std::uint64_t &known = known_[header.worker], &told = told_[header.worker];
     if (header.step <= told || known == kForever) return;  // what was told stands
     told = header.step, known = std::max(known, told);

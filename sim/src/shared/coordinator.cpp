@@ -86,7 +86,7 @@ RunState Coordinator::state() const {
     return state;
 }
 
-void Coordinator::send(std::vector<std::uint32_t> to, const WorldMessage& message) {
+void Coordinator::send(std::vector<std::uint32_t> to, const WorkerMessage& message) {
     if (to.empty()) return;
     const std::vector<std::uint8_t> bytes = encode({kApplication, epoch_, view_.step()}, message);
     queue_.push_back({std::move(to), shared(bytes)});
@@ -336,8 +336,8 @@ void Coordinator::take(std::uint32_t worker, std::span<const std::uint8_t> bytes
     if (is_too_much(senders_[worker], bytes.size()))
         return expel(worker, "found more messages than steps need");
     try {
-        DecodedWorldMessage& decoded = senders_[worker].decoded;
-        decode_world(bytes, decoded);
+        DecodedMessage& decoded = senders_[worker].decoded;
+        decode_message(bytes, decoded);
         if (decoded.header.worker != worker || decoded.header.epoch > epoch_ ||
             decoded.header.step > settings_.steps)
             return expel(worker, "found another worker's number, or a step or epoch to come");
@@ -347,13 +347,12 @@ void Coordinator::take(std::uint32_t worker, std::span<const std::uint8_t> bytes
     }
 }
 
-void Coordinator::take_message(const WorldHeader& header, std::span<const std::uint8_t> bytes,
-                               WorldMessage& message) {
+void Coordinator::take_message(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                               WorkerMessage& message) {
     const std::uint32_t worker = header.worker;
     if (auto* state = std::get_if<StateMessage>(&message))
         return take_state(header, bytes, std::move(*state));
-    if (auto* update = std::get_if<UpdateMessage>(&message))
-        return take_update(header, bytes, *update);
+    if (auto* update = std::get_if<UpdateMessage>(&message)) return take_update(header, bytes, *update);
     if (auto* handover = std::get_if<Handover>(&message)) return take_handover(header, std::move(*handover));
     if (const auto* offer = std::get_if<Offer>(&message)) {
         if (is_member(offer->to)) ++senders_[offer->to].offered;
@@ -363,7 +362,7 @@ void Coordinator::take_message(const WorldHeader& header, std::span<const std::u
         return take_dealing(header, bytes, answer->to);
     if (auto* reach = std::get_if<ReachMessage>(&message)) return take_reach(header, std::move(*reach));
     if (auto* relay = std::get_if<RelayMessage>(&message)) return take_relay(header, std::move(*relay));
-    if (std::holds_alternative<WorldBeat>(message)) return;
+    if (std::holds_alternative<Beat>(message)) return;
     if (const auto* failure = std::get_if<WorkerFailure>(&message)) return lose(worker, failure->what);
     if (std::holds_alternative<Drained>(message)) {
         observer_->note(name(worker) + " leaves");
@@ -373,8 +372,8 @@ void Coordinator::take_message(const WorldHeader& header, std::span<const std::u
     refuse(worker, "found a message that no worker sends, expected one of a worker");
 }
 
-void Coordinator::take_relay(const WorldHeader& header, RelayMessage&& message) {
-    const DecodedWorldMessage part = decode_world(message.part);
+void Coordinator::take_relay(const MessageHeader& header, RelayMessage&& message) {
+    const DecodedMessage part = decode_message(message.part);
     if (settings_.pace != Pace::lockstep || !std::holds_alternative<PartMessage>(part.message) ||
         part.header.worker != header.worker || part.header.step > settings_.steps)
         return expel(header.worker, "found a message to others that is no part of a step");
@@ -386,7 +385,7 @@ void Coordinator::take_relay(const WorldHeader& header, RelayMessage&& message) 
 }
 
 // Tells those with whom it may do steps together, and it of them.
-void Coordinator::take_reach(const WorldHeader& header, ReachMessage&& message) {
+void Coordinator::take_reach(const MessageHeader& header, ReachMessage&& message) {
     Sender& here = senders_[header.worker];
     if (settings_.pace != Pace::lockstep || !settings_.together || message.endpoint.empty() ||
         !here.reach.endpoint.empty())
@@ -403,7 +402,7 @@ void Coordinator::take_reach(const WorldHeader& header, ReachMessage&& message) 
     if (!all.peers.empty()) send({header.worker}, all);
 }
 
-void Coordinator::take_dealing(const WorldHeader& header, std::span<const std::uint8_t> bytes,
+void Coordinator::take_dealing(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                                std::uint32_t to) {
     if (to == header.worker) return refuse(header.worker, "found a dealing with itself");
     if (is_member(to)) queue_.push_back({{to}, shared(bytes)});  // else it has left meanwhile
@@ -457,7 +456,7 @@ void Coordinator::publish(Body& body, const WorldRecord& record, std::uint64_t s
     body.step = step;
 }
 
-void Coordinator::take_state(const WorldHeader& header, std::span<const std::uint8_t> bytes,
+void Coordinator::take_state(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                              StateMessage&& message) {
     if (settings_.pace != Pace::lockstep || header.step == 0 || header.step > view_.step() + 1 ||
         !fits(header.worker, message.bodies) || !fits(message.report.mishaps))
@@ -471,7 +470,7 @@ void Coordinator::take_state(const WorldHeader& header, std::span<const std::uin
     view_.take(header.step, std::move(message));
 }
 
-void Coordinator::take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes,
+void Coordinator::take_update(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                               const UpdateMessage& message) {
     Sender& sender = senders_[header.worker];
     // Of the last step there are two: as done, for the others, and with what came late, for the view.
@@ -506,7 +505,7 @@ void Coordinator::take_update(const WorldHeader& header, std::span<const std::ui
 
 // What sleeps is not published again until it wakes. (Bodies that the sender did not know to be its own when
 // it wrote this are left out.)
-void Coordinator::extend_sleep(const WorldHeader& header) {
+void Coordinator::extend_sleep(const MessageHeader& header) {
     std::vector<WorldRecord> asleep;
     for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
         Body& body = bodies_[static_cast<std::size_t>(i)];
@@ -518,7 +517,7 @@ void Coordinator::extend_sleep(const WorldHeader& header) {
     view_.take(header.step, asleep);
 }
 
-void Coordinator::take_handover(const WorldHeader& header, Handover&& message) {
+void Coordinator::take_handover(const MessageHeader& header, Handover&& message) {
     const auto later = [&](std::uint64_t step) { return step > header.step; };
     if (!fits(header.worker, message.bodies) || std::ranges::any_of(message.applied, later))
         return refuse(header.worker, "found bodies that are not its to hand over");
@@ -553,7 +552,7 @@ void Coordinator::take_handover(const WorldHeader& header, Handover&& message) {
     advance();
 }
 
-void Coordinator::pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes) {
+void Coordinator::pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes) {
     const auto copy = shared(bytes);
     std::vector<std::uint32_t> others = members_;
     std::erase(others, header.worker);
@@ -562,7 +561,7 @@ void Coordinator::pass_on(const WorldHeader& header, std::span<const std::uint8_
 }
 
 // Who owns something does the steps itself.
-void Coordinator::pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes,
+void Coordinator::pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                           const StateMessage& states) {
     const auto copy = shared(bytes);
     std::vector<std::uint32_t> with, without;
@@ -581,7 +580,7 @@ void Coordinator::pass_on(const WorldHeader& header, std::span<const std::uint8_
         {std::move(with), std::make_shared<const std::vector<std::uint8_t>>(encode(header, published))});
 }
 
-void Coordinator::report(const WorldHeader& header, const StepReport& report, std::size_t records,
+void Coordinator::report(const MessageHeader& header, const StepReport& report, std::size_t records,
                          std::size_t bytes) {
     Sender& sender = senders_[header.worker];
     sender.step = std::max(sender.step, header.step);

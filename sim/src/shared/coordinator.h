@@ -68,7 +68,7 @@ private:
         std::uint64_t messages_at = 0;      ///< steps of all bodies since which these were sent:
         std::size_t messages = 0, message_bytes = 0, offered = 0;  ///< offered: to it, to be answered
         ReachMessage reach;
-        DecodedWorldMessage decoded;  ///< the last, for its storage
+        DecodedMessage decoded;  ///< the last, for its storage
     };
     struct Group {
         std::uint32_t owner;
@@ -76,17 +76,21 @@ private:
         std::vector<int> bodies;
     };
 
-    void take_message(const WorldHeader& header, std::span<const std::uint8_t> bytes, WorldMessage& message);
-    void take_state(const WorldHeader& header, std::span<const std::uint8_t> bytes, StateMessage&& message);
-    void take_update(const WorldHeader& header, std::span<const std::uint8_t> bytes, const UpdateMessage& message);
-    void extend_sleep(const WorldHeader& header);
-    void take_handover(const WorldHeader& header, Handover&& message);
-    void take_reach(const WorldHeader& header, ReachMessage&& message);
-    void take_relay(const WorldHeader& header, RelayMessage&& message);
-    void take_dealing(const WorldHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
-    void report(const WorldHeader& header, const StepReport& report, std::size_t records, std::size_t bytes);
-    void pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes);  ///< bounded
-    void pass_on(const WorldHeader& header, std::span<const std::uint8_t> bytes, const StateMessage& states);
+    void take_message(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                      WorkerMessage& message);
+    void take_state(const MessageHeader& header, std::span<const std::uint8_t> bytes, StateMessage&& message);
+    void take_update(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                     const UpdateMessage& message);
+    void extend_sleep(const MessageHeader& header);
+    void take_handover(const MessageHeader& header, Handover&& message);
+    void take_reach(const MessageHeader& header, ReachMessage&& message);
+    void take_relay(const MessageHeader& header, RelayMessage&& message);
+    void take_dealing(const MessageHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
+    void report(const MessageHeader& header, const StepReport& report, std::size_t records,
+                std::size_t bytes);
+    void pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes);  ///< bounded
+    void pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                 const StateMessage& states);
     void refuse(std::uint32_t worker, const std::string& why);
     void expel(std::uint32_t worker, const std::string& why);
     [[nodiscard]] bool is_too_much(Sender& sender, std::size_t bytes) const;
@@ -115,7 +119,7 @@ private:
     void go_to(const RunState& from);
     [[nodiscard]] RunState state() const;
 
-    void send(std::vector<std::uint32_t> to, const WorldMessage& message);
+    void send(std::vector<std::uint32_t> to, const WorkerMessage& message);
 
     WorldScene scene_;
     DistributedSettings settings_;

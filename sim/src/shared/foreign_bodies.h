@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 
 namespace sim {
 

@@ -30,9 +30,9 @@ public:
     explicit LockstepExchange(const SceneMessage& scene);
 
     using ReplicaProtocol::take;
-    void take(const WorldHeader& header, StateMessage&& message) override;
-    void take(const WorldHeader& header, PublishedMessage&& message) override;
-    void take(const WorldHeader& header, PartMessage&& message) override;
+    void take(const MessageHeader& header, StateMessage&& message) override;
+    void take(const MessageHeader& header, PublishedMessage&& message) override;
+    void take(const MessageHeader& header, PartMessage&& message) override;
     void take(SnapshotMessage&& message) override;
     void members(const std::vector<std::uint32_t>& workers, std::uint32_t epoch) override;
     void members_within(const std::vector<std::uint32_t>& workers) override;
@@ -61,7 +61,7 @@ private:
         std::vector<std::uint8_t> bytes;
     };
 
-    void note_publisher(const WorldHeader& header, std::uint32_t body);
+    void note_publisher(const MessageHeader& header, std::uint32_t body);
     [[nodiscard]] std::vector<std::uint32_t> publishers(std::uint64_t step) const;
     [[nodiscard]] bool all_know_this() const;
     [[nodiscard]] bool owns_any() const { return std::ranges::find(own_, 1) != own_.end(); }
@@ -87,7 +87,7 @@ private:
     std::deque<Ownership> later_;       // own ones of later steps
     bool unpublished_ = false;          // between step() and publish()
     bool owes_ = false;
-    WorldMessage outgoing_ = StateMessage{};
+    WorkerMessage outgoing_ = StateMessage{};
     // Together.
     const bool may_together_;
     const std::size_t most_parts_;               // of one worker that wait here
@@ -159,21 +159,21 @@ void LockstepExchange::set_own(int body, bool own) {
     if (own) costs_.forget(body);
 }
 
-void LockstepExchange::take(const WorldHeader& header, StateMessage&& message) {
+void LockstepExchange::take(const MessageHeader& header, StateMessage&& message) {
     for (const WorldRecord& record : message.bodies)
         note_publisher(header, static_cast<std::uint32_t>(record.body));
     replica_.note(header.step, std::move(message));
     settle();
 }
 
-void LockstepExchange::take(const WorldHeader& header, PublishedMessage&& message) {
+void LockstepExchange::take(const MessageHeader& header, PublishedMessage&& message) {
     for (const std::uint32_t body : message.bodies) note_publisher(header, body);
     replica_.mark(header.step, message.bodies);
     settle();
 }
 
 // The first counts, as with records.
-void LockstepExchange::note_publisher(const WorldHeader& header, std::uint32_t body) {
+void LockstepExchange::note_publisher(const MessageHeader& header, std::uint32_t body) {
     if (header.step < replica_.step() || body >= own_.size()) return;
     auto& [of, epoch] = publisher_[header.step];
     of.resize(own_.size(), kApplication);
@@ -198,7 +198,7 @@ std::vector<std::uint32_t> LockstepExchange::publishers(std::uint64_t step) cons
     return all;
 }
 
-void LockstepExchange::take(const WorldHeader& header, PartMessage&& message) {
+void LockstepExchange::take(const MessageHeader& header, PartMessage&& message) {
     // Others may be in the next step already, where nobody waits for one that owned nothing.
     const std::uint64_t now = replica_.step();
     if (header.step < now || header.step > now + 1) return;

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 #include "shared/columns.h"
 
 namespace sim {

@@ -2,7 +2,7 @@
 #include <functional>
 #include <memory>
 
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 #include "shared/columns.h"
 
 namespace sim {
@@ -24,11 +24,13 @@ public:
     virtual ~ReplicaProtocol() = default;
 
     /// A state or update message of another worker, in the order in which that one sent them.
-    virtual void take(const WorldHeader& header, StateMessage&& message) { (void)header, (void)message; }
-    virtual void take(const WorldHeader& header, PublishedMessage&& message) { (void)header, (void)message; }
-    virtual void take(const WorldHeader& header, PackedUpdates&& message) { (void)header, (void)message; }
+    virtual void take(const MessageHeader& header, StateMessage&& message) { (void)header, (void)message; }
+    virtual void take(const MessageHeader& header, PublishedMessage&& message) {
+        (void)header, (void)message;
+    }
+    virtual void take(const MessageHeader& header, PackedUpdates&& message) { (void)header, (void)message; }
     /// What another worker tells of a step that it does together with this one. May come within step().
-    virtual void take(const WorldHeader& header, PartMessage&& message) { (void)header, (void)message; }
+    virtual void take(const MessageHeader& header, PartMessage&& message) { (void)header, (void)message; }
     virtual void members_within(const std::vector<std::uint32_t>& workers) {
         (void)workers;
     }  ///< come within step()

@@ -10,7 +10,7 @@
 namespace sim {
 namespace {
 
-//   snapshot as in world_messages.h
+//   snapshot as in worker_messages.h
 //   f64 elapsed s, cpu s; i32 workers, lost, left, bodies reowned, largest lead, largest ghost age;
 //   u64 migrations, trades, cross contacts, bytes, bytes of states, of links, records, refused messages
 //   i32 contacts, pairs, islands, asleep; u64 inverse fallbacks, deformations limited, constraints broken, impacts,

@@ -32,7 +32,7 @@ SharedWorldWorker::SharedWorldWorker(const SceneMessage& scene)
         if (!event.slowing.empty()) events_.push_back(event);
 }
 
-void SharedWorldWorker::take(const WorldHeader& header, WorldMessage&& message) {
+void SharedWorldWorker::take(const MessageHeader& header, WorkerMessage&& message) {
     if (left_ || ended_) return;
     if (within_) return take_within(header, std::move(message));
     std::visit([&](auto&& m) { take_message(header, std::forward<decltype(m)>(m)); }, std::move(message));
@@ -41,7 +41,7 @@ void SharedWorldWorker::take(const WorldHeader& header, WorldMessage&& message) 
     if (!stepping_) trade();  // the next step may have to wait for the buyer
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, Members&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, Members&& message) {
     epoch_ = header.epoch;
     exchange_->members(message.workers, epoch_);
     std::erase_if(sellers_, [&message](const auto& seller) {
@@ -51,7 +51,7 @@ void SharedWorldWorker::take_message(const WorldHeader& header, Members&& messag
     market_.members(message.workers);
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, Ownership&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, Ownership&& message) {
     epoch_ = header.epoch;
     exchange_->own(message);
     market_.registered(header.epoch, message);
@@ -59,13 +59,13 @@ void SharedWorldWorker::take_message(const WorldHeader& header, Ownership&& mess
     if (exchange_->owes() && !stepping_) publish({});
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, SnapshotMessage&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, SnapshotMessage&& message) {
     (void)header;
     exchange_->take(std::move(message));
 }
 
 // What is not of the step waits until that is done; but it may say that others will not go on with it.
-void SharedWorldWorker::take_within(const WorldHeader& header, WorldMessage&& message) {
+void SharedWorldWorker::take_within(const MessageHeader& header, WorkerMessage&& message) {
     if (auto* part = std::get_if<PartMessage>(&message)) return exchange_->take(header, std::move(*part));
     if (const auto* members = std::get_if<Members>(&message)) exchange_->members_within(members->workers);
     if (std::holds_alternative<EndOfRun>(message) || std::holds_alternative<Refusal>(message))
@@ -73,53 +73,53 @@ void SharedWorldWorker::take_within(const WorldHeader& header, WorldMessage&& me
     deferred_.push_back({header, std::move(message)});
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, PartMessage&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, PartMessage&& message) {
     exchange_->take(header, std::move(message));
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, StateMessage&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, StateMessage&& message) {
     market_.heard(header.worker, header.step, header.epoch, message.report);
     exchange_->take(header, std::move(message));
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, PublishedMessage&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, PublishedMessage&& message) {
     market_.heard(header.worker, header.step, header.epoch, message.report);
     exchange_->take(header, std::move(message));
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, PackedUpdates&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, PackedUpdates&& message) {
     market_.heard(header.worker, header.step, header.epoch, message.report);
     exchange_->take(header, std::move(message));
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, Offer&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, Offer&& message) {
     OfferAnswer answer = {header.worker, message.number, false};
     if (!draining_ && !exchange_->at_end()) answer = market_.answer(header.worker, message);
     if (answer.accepted && bounded_) sellers_[header.worker] = exchange_->steps_done() + 1;
     send(answer);
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, OfferAnswer&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, OfferAnswer&& message) {
     market_.answered(header.worker, message);
     handover_step_ = header.step + 1;
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, EndOfRun&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, EndOfRun&& message) {
     (void)header, (void)message;
     ended_ = true;
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, Refusal&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, Refusal&& message) {
     (void)header, (void)message;
     ended_ = true;
 }
 
-void SharedWorldWorker::take_message(const WorldHeader& header, WorldBeat&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, Beat&& message) {
     (void)header, (void)message;
 }
 
 template <typename Other>
-void SharedWorldWorker::take_message(const WorldHeader& header, Other&& message) {
+void SharedWorldWorker::take_message(const MessageHeader& header, Other&& message) {
     (void)header, (void)message;
     throw DecodeError("found a message that no worker gets, expected one for a worker");
 }
@@ -228,7 +228,7 @@ void SharedWorldWorker::leave() {
     left_ = true;
 }
 
-void SharedWorldWorker::send(const WorldMessage& message) {
+void SharedWorldWorker::send(const WorkerMessage& message) {
     queue_.push_back({{}, encode({self_, epoch_, exchange_->steps_done()}, message)});
 }
 

@@ -14,7 +14,7 @@ public:
     explicit SharedWorldWorker(const SceneMessage& scene);  ///< from the first message
 
     /// Handles a message relayed by the application, decoded. Throws DecodeError if it is inconsistent.
-    void take(const WorldHeader& header, WorldMessage&& message);
+    void take(const MessageHeader& header, WorkerMessage&& message);
     [[nodiscard]] bool ready() const;
     /// flush(wait): called where the step tells others, and where it needs what they tell. Sends outgoing(); wait: and
     /// returns once something has come and was given to take(). Without it the step is done alone.
@@ -49,23 +49,23 @@ public:
     [[nodiscard]] double work() const;  ///< work of the last step, in units of World::work
 
 private:
-    void take_message(const WorldHeader& header, Members&& message);
-    void take_message(const WorldHeader& header, Ownership&& message);
-    void take_message(const WorldHeader& header, SnapshotMessage&& message);
-    void take_message(const WorldHeader& header, StateMessage&& message);
-    void take_message(const WorldHeader& header, PublishedMessage&& message);
-    void take_message(const WorldHeader& header, PartMessage&& message);
-    void take_within(const WorldHeader& header, WorldMessage&& message);
-    void take_message(const WorldHeader& header, PackedUpdates&& message);
-    void take_message(const WorldHeader& header, Offer&& message);
-    void take_message(const WorldHeader& header, OfferAnswer&& message);
-    void take_message(const WorldHeader& header, EndOfRun&& message);
-    void take_message(const WorldHeader& header, Refusal&& message);
-    void take_message(const WorldHeader& header, WorldBeat&& message);
+    void take_message(const MessageHeader& header, Members&& message);
+    void take_message(const MessageHeader& header, Ownership&& message);
+    void take_message(const MessageHeader& header, SnapshotMessage&& message);
+    void take_message(const MessageHeader& header, StateMessage&& message);
+    void take_message(const MessageHeader& header, PublishedMessage&& message);
+    void take_message(const MessageHeader& header, PartMessage&& message);
+    void take_within(const MessageHeader& header, WorkerMessage&& message);
+    void take_message(const MessageHeader& header, PackedUpdates&& message);
+    void take_message(const MessageHeader& header, Offer&& message);
+    void take_message(const MessageHeader& header, OfferAnswer&& message);
+    void take_message(const MessageHeader& header, EndOfRun&& message);
+    void take_message(const MessageHeader& header, Refusal&& message);
+    void take_message(const MessageHeader& header, Beat&& message);
     template <typename Other>
-    void take_message(const WorldHeader& header, Other&& message);
+    void take_message(const MessageHeader& header, Other&& message);
 
-    void send(const WorldMessage& message);
+    void send(const WorkerMessage& message);
     void publish(const Times& times);
     void trade();
     [[nodiscard]] bool hand_over();
@@ -86,8 +86,8 @@ private:
     // Whose offers were accepted and whose bodies have not come; the step up to which this worker goes on.
     std::map<std::uint32_t, std::uint64_t> sellers_;
     struct Deferred {
-        WorldHeader header;
-        WorldMessage message;
+        MessageHeader header;
+        WorkerMessage message;
     };
     std::vector<Deferred> deferred_;  // came within a step
     bool within_ = false, stepping_ = false, draining_ = false, left_ = false, ended_ = false;

@@ -141,7 +141,7 @@ double cost_of(const std::function<void()>& work) {
 void handle(std::unique_ptr<SharedWorldWorker>& worker, const Turn& turn) {
     if (turn.ended) worker->worked(*turn.ended);
     for (const Bytes& bytes : turn.messages) {
-        DecodedWorldMessage decoded = decode_for_worker(*bytes);
+        DecodedMessage decoded = decode_for_worker(*bytes);
         if (const auto* scene = std::get_if<SceneMessage>(&decoded.message)) {
             worker = std::make_unique<SharedWorldWorker>(*scene);
         } else if (worker) {
@@ -366,7 +366,7 @@ void Machine::start_step(std::size_t number) {
             if (!wait) return;
             step.wait();
             for (const Bytes& bytes : own.come) {
-                DecodedWorldMessage decoded = decode_for_worker(*bytes);
+                DecodedMessage decoded = decode_for_worker(*bytes);
                 own.worker->take(decoded.header, std::move(decoded.message));
             }
         });
@@ -438,7 +438,7 @@ double Machine::repeat_alone(const Processor& p) const {
                     sent += message.bytes.size();
                 if (!wait) return;
                 for (const Bytes& bytes : turn.within.at(next++)) {
-                    DecodedWorldMessage decoded = decode_for_worker(*bytes);
+                    DecodedMessage decoded = decode_for_worker(*bytes);
                     worker->take(decoded.header, std::move(decoded.message));
                 }
             });

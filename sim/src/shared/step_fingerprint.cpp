@@ -4,7 +4,7 @@
 #include <cstring>
 #include <string_view>
 
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 #include "sim/distributed_world.h"
 
 namespace sim {
@@ -65,7 +65,7 @@ std::uint64_t step_fingerprint() {
     static const std::uint64_t fingerprint = [] {
         Hash hash;
         hash.add(std::string_view(__VERSION__));
-        hash.add(kWorldProtocol);
+        hash.add(kProtocol);
 #ifdef MUSICWORLD_BASELINE
         hash.add(std::string_view("x86-64"));
 #else

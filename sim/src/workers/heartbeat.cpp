@@ -8,8 +8,7 @@
 #include <condition_variable>
 #include <mutex>
 
-#include "messages/struck_messages.h"
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 #include "workers/signal_mask.h"
 #include "workers/socket_folder.h"
 
@@ -69,9 +68,8 @@ bool Pulse::application_process_ended() const noexcept {
 void Pulse::send_beat(zmq::socket_t& socket) const {
     const std::int64_t worker = worker_;
     const std::vector<std::uint8_t> bytes =
-        worker == kNoWorld
-            ? encode(Heartbeat{secret_})
-            : encode(WorldHeader{static_cast<std::uint32_t>(worker), 0, 0}, WorldBeat{secret_});
+        encode(MessageHeader{worker == kNoMember ? kApplication : static_cast<std::uint32_t>(worker), 0, 0},
+               Beat{secret_});
     (void)socket.send(zmq::buffer(bytes), zmq::send_flags::dontwait);
 }
 
@@ -86,11 +84,11 @@ void Pulse::beat(zmq::context_t& context, const std::optional<WorkerKeys>& keys,
     while (!stop.stop_requested()) {
         send_beat(socket);
         const Clock::time_point now = Clock::now();
-        if (drain(socket) || worker_ == kNoWorld || now - looked > kBeatPaused) heard = now;
+        if (drain(socket) || worker_ == kNoMember || now - looked > kBeatPaused) heard = now;
         looked = now;
         if (!gone_ && (application_process_ended() || (application_ == 0 && now - heard > kBeatSilence)))
             ended = now, gone_ = true;
-        if (gone_ && worker_ != kNoWorld && now - ended > kBeatEndWithin) {
+        if (gone_ && worker_ != kNoMember && now - ended > kBeatEndWithin) {
             remove_left_socket(endpoint_);
             _exit(1);
         }

@@ -192,7 +192,7 @@ std::vector<std::uint32_t> PeerLinks::send(const std::vector<std::uint32_t>& to,
     return others;
 }
 
-std::optional<DecodedWorldMessage> PeerLinks::receive(Clock::time_point now) {
+std::optional<DecodedMessage> PeerLinks::receive(Clock::time_point now) {
     zmq::message_t preamble, message;
     for (std::size_t i = 0; heard_.empty() && i < kMostInOneGo; ++i) {
         if (!listens_.recv(preamble, zmq::recv_flags::dontwait)) break;
@@ -204,7 +204,7 @@ std::optional<DecodedWorldMessage> PeerLinks::receive(Clock::time_point now) {
             ++refused_;
     }
     if (heard_.empty()) return std::nullopt;
-    DecodedWorldMessage next = std::move(heard_.front());
+    DecodedMessage next = std::move(heard_.front());
     heard_.pop_front();
     return next;
 }
@@ -228,7 +228,7 @@ void PeerLinks::take_from(std::uint32_t worker, Peer& peer, std::uint64_t count,
     const bool missed = count != std::exchange(peer.count_heard, count) + 1, first = !peer.heard;
     peer.heard = now;
     try {
-        DecodedWorldMessage m = decode_world({message.data<std::uint8_t>(), message.size()});
+        DecodedMessage m = decode_message({message.data<std::uint8_t>(), message.size()});
         const auto* beats = std::get_if<LinkBeat>(&m.message);
         if (m.header.worker != worker || (!beats && !std::holds_alternative<PartMessage>(m.message)))
             throw DecodeError("found what no worker tells another, expected a part or a beat");

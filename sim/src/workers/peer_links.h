@@ -9,7 +9,7 @@
 #include <vector>
 #include <zmq.hpp>
 
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 #include "workers/curve_keys.h"
 #include "workers/key_gate.h"
 
@@ -52,8 +52,8 @@ public:
     /// Sends to those that are told directly; returns the others.
     [[nodiscard]] std::vector<std::uint32_t> send(const std::vector<std::uint32_t>& to,
                                                   const std::vector<std::uint8_t>& bytes);
-    [[nodiscard]] std::optional<DecodedWorldMessage> receive(Clock::time_point now);  ///< a part
-    [[nodiscard]] void* handle() { return listens_.handle(); }                        ///< to poll
+    [[nodiscard]] std::optional<DecodedMessage> receive(Clock::time_point now);  ///< a part
+    [[nodiscard]] void* handle() { return listens_.handle(); }                   ///< to poll
 
     [[nodiscard]] bool is_up(std::uint32_t worker, Clock::time_point now) const;
     [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }  ///< messages
@@ -89,7 +89,7 @@ private:
     std::optional<ReachMessage> reach_;
     std::map<std::uint32_t, Peer> peers_;
     std::map<Secret, std::uint32_t> who_says_;
-    std::deque<DecodedWorldMessage> heard_;
+    std::deque<DecodedMessage> heard_;
     Clock::time_point beaten_{};
     std::uint64_t refused_ = 0, sent_ = 0;
 };

@@ -37,7 +37,7 @@ public:
 
     void take(const std::vector<std::uint8_t>& bytes) {
         const double processor = thread_processor_s();
-        DecodedWorldMessage m = decode_for_worker(bytes);
+        DecodedMessage m = decode_for_worker(bytes);
         if (const auto* scene = std::get_if<SceneMessage>(&m.message))
             worker_.emplace(*scene);
         else if (worker_)

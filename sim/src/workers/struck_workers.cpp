@@ -13,12 +13,16 @@ namespace {
 
 using namespace std::chrono_literals;
 constexpr auto kStruckPoll = 20ms;
-constexpr auto kStruckSilence = 1s;
 constexpr auto kStruckAnswerWithin = 30s;
 constexpr auto kStopWithin = 1s;
-constexpr auto kStruckPaused = 250ms;  // a longer gap between two looks is ours, not the workers' silence
 constexpr int kStruckMostWorkers = 256;
 constexpr std::int64_t kStruckLargestMessage = 64 << 20;
+
+WorkerGate::Settings struck_gate() {
+    WorkerGate::Settings settings;
+    settings.largest_message = kStruckLargestMessage;
+    return settings;
+}
 
 }  // namespace
 
@@ -29,34 +33,25 @@ StruckWorkers::StruckWorkers(std::vector<BodyDefinition> bodies, const WorkerLau
       answered_(definitions_.size(), 0),
       here_(definitions_.size()),
       join_within_(launch.join_within_s),
-      router_(context_, zmq::socket_type::router) {
+      gate_(struck_gate()) {
     if (launch.count < 0 || launch.count > kStruckMostWorkers) {
         throw InputError("", std::to_string(launch.count) + " workers",
                          "0 to " + std::to_string(kStruckMostWorkers));
     }
     for (const BodyDefinition& definition : definitions_) check_body(definition);
     report_.count = launch.count;
-    bind();
-    slots_.reserve(launch.count);
-    for (int i = 0; i < launch.count; ++i)
-        slots_.push_back(Slot{WorkerProcess(launch, folder_.endpoint()), {}, true, {}, {}, {}});
-    wait_for_hellos();
+    slots_.reserve(static_cast<std::size_t>(launch.count));
+    for (int i = 0; i < launch.count; ++i) {
+        slots_.push_back({WorkerProcess(launch, gate_.private_endpoint()), false, true, {}, {}});
+        gate_.expect(slots_.back().process.secret());
+    }
+    wait_for_joins();
     share_out();
 }
 
-void StruckWorkers::bind() {
-    router_.set(zmq::sockopt::linger, 0);
-    router_.set(zmq::sockopt::sndhwm, 1000);
-    router_.set(zmq::sockopt::rcvhwm, 10000);
-    router_.set(zmq::sockopt::sndtimeo, 1000);
-    router_.set(zmq::sockopt::maxmsgsize, kStruckLargestMessage);
-    router_.set(zmq::sockopt::router_mandatory, true);
-    router_.bind(folder_.endpoint());
-}
-
-void StruckWorkers::wait_for_hellos() {
+void StruckWorkers::wait_for_joins() {
     const Clock::time_point start = Clock::now();
-    const auto missing = [](const Slot& slot) { return slot.alive && slot.identity.empty(); };
+    const auto missing = [](const Slot& slot) { return slot.alive && !slot.joined; };
     while (std::any_of(slots_.begin(), slots_.end(), missing)) {
         receive(kStruckPoll);
         for (Slot& slot : slots_) {
@@ -82,9 +77,8 @@ void StruckWorkers::share_out() {
 }
 
 StruckWorkers::~StruckWorkers() {
-    for (Slot& slot : slots_) {
-        if (slot.alive && !send(slot, Stop{})) slot.process.kill();
-    }
+    for (const Slot& slot : slots_)
+        if (slot.alive) send(slot, EndOfRun{});
     const Clock::time_point deadline = Clock::now() + kStopWithin;
     const auto running = [](Slot& slot) { return !slot.process.has_ended(); };
     while (std::any_of(slots_.begin(), slots_.end(), running) && Clock::now() < deadline)
@@ -137,77 +131,55 @@ StepRequest StruckWorkers::request_for(const std::vector<std::uint32_t>& bodies)
 
 void StruckWorkers::dispatch(Slot& slot, const std::vector<std::uint32_t>& bodies) {
     slot.pending.push_back({epoch_, bodies, Clock::now()});
-    send(slot, Step{epoch_, step_, bodies, request_for(bodies)});
+    send(slot, StruckStep{epoch_, step_, bodies, request_for(bodies)});
 }
 
 void StruckWorkers::assign(Slot& slot, const std::vector<std::uint32_t>& bodies) {
-    Assign message{++epoch_, {}};
+    StruckAssign message{++epoch_, {}};
     std::vector<std::uint32_t> unanswered;
     for (const std::uint32_t b : bodies) {
         message.bodies.push_back({b, definitions_[b], records_[b]});
         slot.bodies.push_back(b);
         if (answered_[b] < step_) unanswered.push_back(b);
     }
-    if (send(slot, message) && request_ && !unanswered.empty()) dispatch(slot, unanswered);
+    send(slot, message);
+    if (request_ && !unanswered.empty()) dispatch(slot, unanswered);
 }
 
-bool StruckWorkers::send(Slot& slot, const Message& message) {
-    const std::vector<std::uint8_t> bytes = encode(message);
-    try {
-        if (router_.send(zmq::buffer(slot.identity), zmq::send_flags::sndmore) &&
-            router_.send(zmq::buffer(bytes), zmq::send_flags::none)) {
-            return true;
-        }
-    } catch (const zmq::error_t&) {  // gone, or its queue is full
-    }
-    lose(slot);
-    return false;
+void StruckWorkers::send(const Slot& slot, const WorkerMessage& message) {
+    const auto number = static_cast<std::uint32_t>(&slot - slots_.data());
+    gate_.send({number}, std::make_shared<const std::vector<std::uint8_t>>(encode({}, message)));
 }
 
 void StruckWorkers::receive(std::chrono::milliseconds timeout) {
-    zmq::pollitem_t item{router_.handle(), 0, ZMQ_POLLIN, 0};
-    try {
-        zmq::poll(&item, 1, timeout);
-        zmq::message_t identity, frame;
-        while (router_.recv(identity, zmq::recv_flags::dontwait)) {
-            if (!identity.more()) continue;
-            if (!router_.recv(frame, zmq::recv_flags::dontwait)) continue;
-            const bool single = !frame.more();
-            while (frame.more()) (void)router_.recv(frame, zmq::recv_flags::dontwait);
-            if (single) take(identity.to_string(), frame);
-        }
-    } catch (const zmq::error_t& e) {
-        if (e.num() != EINTR) throw;
-    }
+    for (const WorkerGate::Event& event : gate_.wait(timeout)) take(event);
 }
 
-void StruckWorkers::take(const std::string& identity, const zmq::message_t& frame) {
-    const auto named =
-        std::find_if(slots_.begin(), slots_.end(), [&](const Slot& s) { return s.identity == identity; });
-    const auto process = [&](const Secret& secret) {
-        return std::find_if(slots_.begin(), slots_.end(),
-                            [&](const Slot& s) { return s.alive && s.process.secret() == secret; });
-    };
+void StruckWorkers::take(const WorkerGate::Event& event) {
+    if (event.kind == WorkerGate::Event::Kind::asks_to_join) return join(event);
+    Slot& slot = slots_[event.worker];
+    if (!slot.alive) return;
+    if (event.kind == WorkerGate::Event::Kind::lost) return lose(slot);
     try {
-        Message message = decode({frame.data<std::uint8_t>(), frame.size()});
-        if (const auto* hello = std::get_if<Hello>(&message)) {
-            const auto slot = process(hello->secret);
-            if (slot == slots_.end() || !slot->identity.empty()) return;
-            slot->identity = identity;
-            send(*slot, Welcome{});
-        } else if (const auto* heartbeat = std::get_if<Heartbeat>(&message)) {
-            const auto slot = process(heartbeat->secret);
-            if (slot != slots_.end()) slot->heard = Clock::now();
-        } else if (named != slots_.end() && named->alive) {
-            auto* answer = std::get_if<Answer>(&message);
-            answer ? accept(*named, *answer) : lose(*named);
-        }
+        DecodedMessage m = decode_message(event.bytes);
+        auto* answer = std::get_if<StruckAnswer>(&m.message);
+        answer ? accept(slot, *answer) : lose(slot);
     } catch (const DecodeError&) {
-        if (named != slots_.end() && named->alive) lose(*named);  // from anyone else it is noise
+        lose(slot);
     }
 }
 
-bool StruckWorkers::fits(const Pending& pending, const Answer& answer) const {
+void StruckWorkers::join(const WorkerGate::Event& event) {
+    const auto slot = std::ranges::find_if(slots_, [&](const Slot& s) {
+        return s.alive && !s.joined && s.process.secret() == event.request.secret;
+    });
+    if (slot == slots_.end()) return gate_.refuse(event.stranger, "this play has workers of its own only");
+    gate_.admit(event.stranger, static_cast<std::uint32_t>(slot - slots_.begin()), event.request.secret);
+    slot->joined = true;
+    send(*slot, StruckAssign{});
+}
+
+bool StruckWorkers::fits(const Pending& pending, const StruckAnswer& answer) const {
     if (pending.epoch != answer.epoch || answer.step != step_ ||
         pending.bodies.size() != answer.outcomes.size())
         return false;
@@ -221,8 +193,7 @@ bool StruckWorkers::fits(const Pending& pending, const Answer& answer) const {
     return true;
 }
 
-void StruckWorkers::accept(Slot& slot, Answer& answer) {
-    slot.heard = Clock::now();
+void StruckWorkers::accept(Slot& slot, StruckAnswer& answer) {
     const auto pending = std::find_if(slot.pending.begin(), slot.pending.end(),
                                       [&](const Pending& p) { return request_ && fits(p, answer); });
     if (pending == slot.pending.end()) return lose(slot);
@@ -237,16 +208,11 @@ void StruckWorkers::accept(Slot& slot, Answer& answer) {
 
 void StruckWorkers::look_after_workers() {
     const Clock::time_point now = Clock::now();
-    const bool paused = now - std::exchange(last_look_, now) > kStruckPaused;
     for (Slot& slot : slots_) {
         if (!slot.alive) continue;
-        if (paused) slot.heard = now;
-        bool lost = slot.process.has_ended();
-        for (const Pending& pending : slot.pending) {
-            lost = lost || now - std::max(slot.heard, pending.since) > kStruckSilence ||
-                   now - pending.since > kStruckAnswerWithin;
-        }
-        if (lost) lose(slot);
+        const bool late = std::ranges::any_of(
+            slot.pending, [&](const Pending& pending) { return now - pending.since > kStruckAnswerWithin; });
+        if (slot.process.has_ended() || late) lose(slot);
     }
 }
 
@@ -254,6 +220,7 @@ void StruckWorkers::lose(Slot& slot) {
     if (!slot.alive) return;
     slot.alive = false;
     slot.process.kill();
+    gate_.dismiss(static_cast<std::uint32_t>(&slot - slots_.data()));
     ++report_.lost;
     report_.bodies_reowned += static_cast<int>(slot.bodies.size());
     orphans_.insert(orphans_.end(), slot.bodies.begin(), slot.bodies.end());
@@ -271,14 +238,8 @@ void StruckWorkers::settle_losses() {
         if (living.empty()) return own_here(bodies);
         std::vector<std::vector<std::uint32_t>> shares(living.size());
         for (const std::uint32_t body : bodies) shares[next_slot_++ % shares.size()].push_back(body);
-        for (std::size_t i = 0; i < living.size(); ++i) {
-            if (shares[i].empty()) continue;
-            if (living[i]->alive) {
-                assign(*living[i], shares[i]);
-            } else {
-                orphans_.insert(orphans_.end(), shares[i].begin(), shares[i].end());
-            }
-        }
+        for (std::size_t i = 0; i < living.size(); ++i)
+            if (!shares[i].empty()) assign(*living[i], shares[i]);
     }
 }
 

@@ -2,19 +2,17 @@
 #include <chrono>
 #include <string>
 #include <vector>
-#include <zmq.hpp>
 
-#include "messages/struck_messages.h"
-#include "workers/socket_folder.h"
+#include "workers/worker_gate.h"
 #include "workers/worker_process.h"
 
 namespace sim {
 
-/// Bodies shared out to worker processes. One thread: all traffic happens inside step(), construction and
+/// Bodies shared out to worker processes, which join through a WorkerGate; what they say is taken within step(), construction and
 /// destruction.
 ///
 /// The application holds every body's definition and its record after the last answer. A worker that exits,
-/// does not say hello in time, is silent for 1 s while an answer is awaited, breaks the protocol or does not answer within 30 s is
+/// does not join in time, is silent for 1 s, breaks the protocol or does not answer within 30 s is
 /// killed; its bodies are assigned, from those records, to the other workers in turn (to this process when
 /// none is left), and the step is asked for again for those of them that had not been answered. Records are
 /// exact, each body's step depends on nothing else, and merge() orders by body: the reply has the same bits
@@ -37,24 +35,22 @@ private:
     };
     struct Slot {
         WorkerProcess process;
-        std::string identity;  ///< ROUTER's name for it; empty until its hello
-        bool alive = true;
-        Clock::time_point heard = Clock::now();
+        bool joined = false, alive = true;
         std::vector<std::uint32_t> bodies;
         std::vector<Pending> pending;
     };
 
-    void bind();
-    void wait_for_hellos();
+    void wait_for_joins();
     void share_out();
     void dispatch(Slot& slot, const std::vector<std::uint32_t>& bodies);
     void assign(Slot& slot, const std::vector<std::uint32_t>& bodies);
     [[nodiscard]] StepRequest request_for(const std::vector<std::uint32_t>& bodies) const;
-    bool send(Slot& slot, const Message& message);
+    void send(const Slot& slot, const WorkerMessage& message);
     void receive(std::chrono::milliseconds timeout);
-    void take(const std::string& identity, const zmq::message_t& frame);
-    void accept(Slot& slot, Answer& answer);
-    [[nodiscard]] bool fits(const Pending& pending, const Answer& answer) const;
+    void take(const WorkerGate::Event& event);
+    void join(const WorkerGate::Event& event);
+    void accept(Slot& slot, StruckAnswer& answer);
+    [[nodiscard]] bool fits(const Pending& pending, const StruckAnswer& answer) const;
     void look_after_workers();
     void lose(Slot& slot);
     void settle_losses();
@@ -74,12 +70,9 @@ private:
     double last_t_s_ = 0;
     std::uint32_t epoch_ = 0;
     std::size_t next_slot_ = 0;
-    Clock::time_point last_look_;
     WorkerReport report_;
-    SocketFolder folder_;
-    zmq::context_t context_;
-    zmq::socket_t router_;
-    std::vector<Slot> slots_;  ///< last: processes end before the socket and its folder go
+    WorkerGate gate_;
+    std::vector<Slot> slots_;  ///< by members' numbers; last: processes end before the gate goes
 };
 
 }  // namespace sim

@@ -79,7 +79,7 @@ void Teams::take(std::uint32_t member, const std::vector<std::uint8_t>& bytes) {
 }
 
 void Teams::take_checked(std::uint32_t member, std::uint32_t number, const std::vector<std::uint8_t>& bytes) {
-    DecodedWorldMessage m = decode_world(bytes);
+    DecodedMessage m = decode_message(bytes);
     if (std::holds_alternative<Drained>(m.message)) {
         observer_.note("member " + std::to_string(member) + " leaves");
         ++left_;

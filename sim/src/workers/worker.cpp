@@ -1,9 +1,13 @@
+#include <unistd.h>
+
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
+#include <span>
 
-#include "messages/struck_messages.h"
+#include "messages/worker_messages.h"
 #include "sim/distributed_world.h"
 #include "sim/errors.h"
 #include "struck/stepped_body.h"
@@ -23,6 +27,10 @@ void send(zmq::socket_t& socket, const std::vector<std::uint8_t>& bytes) {
     (void)socket.send(zmq::buffer(bytes), zmq::send_flags::none);
 }
 
+std::span<const std::uint8_t> bytes_of(const zmq::message_t& frame) {
+    return {frame.data<std::uint8_t>(), frame.size()};
+}
+
 /// False after a while without a message.
 bool receive(zmq::socket_t& socket, zmq::message_t& frame) {
     try {
@@ -33,42 +41,44 @@ bool receive(zmq::socket_t& socket, zmq::message_t& frame) {
     }
 }
 
-/// Serves a kit's StruckWorkers.
+/// Serves a play's StruckWorkers.
 class KitWorker {
 public:
     KitWorker(zmq::socket_t& socket, const Pulse& pulse) : socket_(socket), pulse_(pulse) {}
 
-    /// `frame`: the first message. 0 when told to stop, 1 when the application is gone.
-    int serve(zmq::message_t& frame) {
+    /// `first`: the answer to the request to join. 0 when told to stop, 1 when the application is gone.
+    int serve(DecodedMessage&& first) {
+        WorkerMessage message = std::move(first.message);
+        zmq::message_t frame;
         do {
-            const Message message = decode({frame.data<std::uint8_t>(), frame.size()});
-            if (std::holds_alternative<Stop>(message)) return 0;
+            if (std::holds_alternative<EndOfRun>(message)) return 0;
             std::visit([this](const auto& m) { handle(m); }, message);
             while (!pulse_.application_gone() && !receive(socket_, frame)) {
             }
+            if (!pulse_.application_gone()) message = decode_message(bytes_of(frame)).message;
         } while (!pulse_.application_gone());
         return 1;
     }
 
 private:
-    void handle(const Welcome&) {}
-    void handle(const Assign& assign) {
-        for (const Assignment& a : assign.bodies)
+    void handle(const StruckAssign& assign) {
+        for (const StruckAssignment& a : assign.bodies)
             bodies_.insert_or_assign(a.body, SteppedBody(a.body, a.definition, a.record));
     }
-    void handle(const Step& step) {
-        Answer answer{step.epoch, step.step, std::vector<BodyOutcome>(step.bodies.size())};
+    void handle(const StruckStep& step) {
+        StruckAnswer answer{step.epoch, step.step, std::vector<BodyOutcome>(step.bodies.size())};
         for (std::size_t i = 0; i < step.bodies.size(); ++i) {
             const auto found = bodies_.find(step.bodies[i]);
             if (found == bodies_.end())
                 throw DecodeError("a step of body " + std::to_string(step.bodies[i]) + ", not assigned");
             found->second.step(step.request, answer.outcomes[i]);
         }
-        send(socket_, encode(answer));
+        send(socket_, encode({}, answer));
     }
+    void handle(const Beat&) {}
     template <typename Other>
     void handle(const Other&) {
-        throw DecodeError("a message that only workers send");
+        throw DecodeError("a message that no worker of a play gets");
     }
 
     zmq::socket_t& socket_;
@@ -76,7 +86,7 @@ private:
     std::map<std::uint32_t, SteppedBody> bodies_;
 };
 
-/// Until the application has answered: whether it is a world's shows then.
+/// Until the application has answered.
 bool wait_for_answer(zmq::socket_t& socket, const Pulse& pulse, zmq::message_t& frame) {
     const auto started = std::chrono::steady_clock::now();
     while (!pulse.application_gone() && std::chrono::steady_clock::now() - started < kAnswerWithin)
@@ -91,30 +101,39 @@ Secret own_secret() {
     return secret ? *secret : make_secret();
 }
 
-bool is_of_a_world(const zmq::message_t& frame) {
-    return frame.to_string_view().starts_with("MWSW");
+std::vector<std::uint8_t> join_request(const Secret& secret) {
+    std::array<char, 256> host{};
+    gethostname(host.data(), host.size() - 1);
+    return encode(MessageHeader{}, JoinRequest{step_fingerprint(), secret, host.data()});
 }
 
-/// Asks a world first, so that a kit's application takes that for noise.
+/// By the application's answer: it has a world or a play.
+int serve(const WorldLink& link, DecodedMessage&& first) {
+    if (const auto* scene = std::get_if<SceneMessage>(&first.message)) return serve_world(link, *scene);
+    if (std::holds_alternative<StruckAssign>(first.message)) {
+        link.pulse.joined(first.header.worker);
+        return KitWorker(link.socket, link.pulse).serve(std::move(first));
+    }
+    if (const auto* refusal = std::get_if<Refusal>(&first.message))
+        std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
+    return std::holds_alternative<EndOfRun>(first.message) ? 0 : 1;
+}
+
 int serve(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys) {
     zmq::socket_t socket = connect_worker(context, endpoint, keys, kLingerMs);
     socket.set(zmq::sockopt::rcvtimeo, kLookMs);
     const Secret secret = own_secret();
     Pulse pulse(context, endpoint, keys, secret);
     send(socket, join_request(secret));
-    send(socket, encode(Hello{secret}));
     zmq::message_t frame;
     int status = 1;
     if (wait_for_answer(socket, pulse, frame)) {
-        if (is_of_a_world(frame)) {
-            status = serve_world({context, socket, pulse, endpoint, keys}, frame);
-        } else
-            try {
-                status = KitWorker(socket, pulse).serve(frame);
-            } catch (const DecodeError& e) {
-                send(socket, encode(Failure{e.what()}));
-                throw WorkerError(std::string("bad message: ") + e.what());
-            }
+        try {
+            status = serve({context, socket, pulse, endpoint, keys}, decode_message(bytes_of(frame)));
+        } catch (const DecodeError& e) {
+            send(socket, encode({}, WorkerFailure{e.what()}));
+            throw WorkerError(std::string("bad message: ") + e.what());
+        }
     } else if (!pulse.application_gone()) {
         throw WorkerError("no answer from " + endpoint + " within 10 s");
     }

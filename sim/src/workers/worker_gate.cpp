@@ -28,24 +28,21 @@ constexpr auto kHandshakeWithin = 5s;
 
 enum class Type : std::uint16_t { join = 1, beat = 2 };
 
-bool is_world(const zmq::message_t& frame) {
+bool is_ours(const zmq::message_t& frame) {
     return frame.size() >= 12 && frame.to_string_view().starts_with("MWSW");
-}
-bool is_kit(const zmq::message_t& frame) {
-    return frame.to_string_view().starts_with("MWSM");
 }
 bool is(const zmq::message_t& frame, Type type) {
     std::uint16_t found = 0;
-    if (is_world(frame)) std::memcpy(&found, frame.data<std::uint8_t>() + 6, sizeof found);
+    if (is_ours(frame)) std::memcpy(&found, frame.data<std::uint8_t>() + 6, sizeof found);
     return found == static_cast<std::uint16_t>(type);
 }
 
-DecodedWorldMessage decoded(const zmq::message_t& frame) {
-    return decode_world({frame.data<std::uint8_t>(), frame.size()});
+DecodedMessage decoded(const zmq::message_t& frame) {
+    return decode_message({frame.data<std::uint8_t>(), frame.size()});
 }
 
-zmq::message_t framed(const WorldMessage& message) {
-    const std::vector<std::uint8_t> bytes = encode(WorldHeader{}, message);
+zmq::message_t framed(const WorkerMessage& message) {
+    const std::vector<std::uint8_t> bytes = encode(MessageHeader{}, message);
     return {bytes.data(), bytes.size()};
 }
 
@@ -226,7 +223,6 @@ void WorkerGate::take(std::string&& identity, const zmq::message_t& frame) {
     if (is(frame, Type::beat)) return take_beat(identity, frame);
     const auto known = numbers_.find(identity);
     if (known == numbers_.end()) return take_from_stranger(std::move(identity), frame);
-    if (is_kit(frame)) return;  // a worker asks both kinds of application at first
     Member& member = members_.at(known->second);
     member.heard = Clock::now();
     if (member.lost) return;
@@ -239,8 +235,8 @@ void WorkerGate::take(std::string&& identity, const zmq::message_t& frame) {
 
 void WorkerGate::take_beat(const std::string& identity, const zmq::message_t& frame) {
     try {
-        const DecodedWorldMessage m = decoded(frame);
-        const Secret secret = std::get<WorldBeat>(m.message).secret;
+        const DecodedMessage m = decoded(frame);
+        const Secret secret = std::get<Beat>(m.message).secret;
         const auto found = std::find_if(members_.begin(), members_.end(), [&secret](const auto& member) {
             return member.second.secret == secret && secret != Secret{};
         });
@@ -250,7 +246,7 @@ void WorkerGate::take_beat(const std::string& identity, const zmq::message_t& fr
         }
         found->second.heard = Clock::now();
         found->second.beats_from = identity;
-        zmq::message_t answer = framed(WorldBeat{});
+        zmq::message_t answer = framed(Beat{});
         send_to(identity, answer);
     } catch (const DecodeError&) {
         ++refused_messages_;
@@ -258,11 +254,10 @@ void WorkerGate::take_beat(const std::string& identity, const zmq::message_t& fr
 }
 
 void WorkerGate::take_from_stranger(std::string&& identity, const zmq::message_t& frame) {
-    if (is_kit(frame)) return;
     const char* why = "not a member, or given up";
     try {
         if (frame.size() > kLargestOfAStranger) throw DecodeError("a stranger's message that is too long");
-        DecodedWorldMessage m = decoded(frame);
+        DecodedMessage m = decoded(frame);
         if (auto* request = std::get_if<JoinRequest>(&m.message)) {
             if (may_join(request->secret)) {
                 Event event;
@@ -300,7 +295,7 @@ void WorkerGate::beat_unasked() {
     beaten_ = Clock::now();
     for (auto& [worker, member] : members_) {
         if (member.lost || member.beats_from.empty()) continue;
-        zmq::message_t beat = framed(WorldBeat{});
+        zmq::message_t beat = framed(Beat{});
         send_to(member.beats_from, beat);
     }
 }

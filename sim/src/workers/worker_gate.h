@@ -11,7 +11,7 @@
 #include <vector>
 #include <zmq.hpp>
 
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 #include "workers/curve_keys.h"
 #include "workers/key_gate.h"
 #include "workers/listening.h"

@@ -1,7 +1,6 @@
 #include "workers/world_service.h"
 
 #include <signal.h>
-#include <unistd.h>
 
 #include <array>
 #include <chrono>
@@ -92,7 +91,7 @@ private:
         zmq::message_t frame;
         while (through_signals([&] { return socket_.recv(frame, zmq::recv_flags::dontwait); })) {
             const auto* bytes = frame.data<std::uint8_t>();
-            DecodedWorldMessage m = decode_for_worker({bytes, frame.size()});
+            DecodedMessage m = decode_for_worker({bytes, frame.size()});
             if (const auto* refusal = std::get_if<Refusal>(&m.message)) {
                 std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
                 refused_ = true;
@@ -103,14 +102,14 @@ private:
         }
         // A bounded number, so that who floods does not hold this up.
         for (std::size_t i = 0; links_ && i < kMostPartsInOneGo; ++i) {
-            std::optional<DecodedWorldMessage> part = links_->receive(Clock::now());
+            std::optional<DecodedMessage> part = links_->receive(Clock::now());
             if (!part) break;
             worker_.take(part->header, std::move(part->message));
         }
         if (links_) links_->look(Clock::now());
     }
     /// What the application says of the other workers.
-    void follow(const WorldMessage& message) {
+    void follow(const WorkerMessage& message) {
         if (const auto* peers = std::get_if<PeersMessage>(&message)) links_->add(*peers, Clock::now());
         if (const auto* members = std::get_if<Members>(&message)) links_->keep(members->workers);
     }
@@ -171,15 +170,17 @@ private:
     SharedWorldWorker worker_;
     std::optional<PeerLinks> links_;  ///< in lockstep
     std::uint64_t told_linked_ = 0;   ///< of what was sent on them [bytes]
-    WorldHeader header_;
+    MessageHeader header_;
     bool draining_ = false, refused_ = false;
     double waited_within_ = 0;  ///< the step under way
     Clock::time_point idle_since_ = Clock::now();
     double told_processor_ = thread_processor_s();
 };
 
-int serve_scene(const WorldLink& link, const SceneMessage& scene) {
-    link.pulse.join_world(scene.worker);
+}  // namespace
+
+int serve_world(const WorldLink& link, const SceneMessage& scene) {
+    link.pulse.joined(scene.worker);
     listen_for_drain();
     WorldService service(link, scene);
     try {
@@ -188,24 +189,6 @@ int serve_scene(const WorldLink& link, const SceneMessage& scene) {
         service.report(e.what());
         throw;
     }
-}
-
-}  // namespace
-
-int serve_world(const WorldLink& link, const zmq::message_t& first) {
-    const DecodedWorldMessage m = decode_world({first.data<std::uint8_t>(), first.size()});
-    if (const auto* refusal = std::get_if<Refusal>(&m.message)) {
-        std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
-        return 1;
-    }
-    if (const auto* scene = std::get_if<SceneMessage>(&m.message)) return serve_scene(link, *scene);
-    return std::holds_alternative<EndOfRun>(m.message) ? 0 : 1;
-}
-
-std::vector<std::uint8_t> join_request(const Secret& secret) {
-    std::array<char, 256> host{};
-    gethostname(host.data(), host.size() - 1);
-    return encode(WorldHeader{}, JoinRequest{step_fingerprint(), secret, host.data()});
 }
 
 }  // namespace sim

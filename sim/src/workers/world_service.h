@@ -1,4 +1,5 @@
 #pragma once
+#include "messages/worker_messages.h"
 #include "workers/heartbeat.h"
 
 namespace sim {
@@ -12,12 +13,8 @@ struct WorldLink {
     const std::optional<WorkerKeys>& keys;
 };
 
-/// Serves a world: a SharedWorldWorker behind sockets. `first`: the application's answer to the request to
-/// join. SIGTERM and SIGINT drain. Returns the exit status: 0 at the run's end or when drained, 1 when
-/// refused or when the application is gone.
-[[nodiscard]] int serve_world(const WorldLink& link, const zmq::message_t& first);
-
-/// The encoded JoinRequest, a worker's first message.
-[[nodiscard]] std::vector<std::uint8_t> join_request(const Secret& secret);
+/// Serves a world: a SharedWorldWorker behind sockets. SIGTERM and SIGINT drain. Returns the exit status: 0 at the run's
+/// end or when drained, 1 when refused or when the application is gone.
+[[nodiscard]] int serve_world(const WorldLink& link, const SceneMessage& scene);
 
 }  // namespace sim

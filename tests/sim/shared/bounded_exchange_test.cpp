@@ -71,7 +71,7 @@ public:
                 exchanges_[w]->own(*sent.sold);
                 continue;
             }
-            DecodedWorldMessage message = decode_for_worker(sent.bytes);
+            DecodedMessage message = decode_for_worker(sent.bytes);
             exchanges_[w]->take(message.header, std::get<PackedUpdates>(std::move(message.message)));
         }
     }

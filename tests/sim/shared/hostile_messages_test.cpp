@@ -39,7 +39,7 @@ void run_with_a_liar(Pace pace, unsigned seed, int messages, int& sent) {
     auto deliver = [&] {
         for (const Coordinator::Outgoing& out : meeting.outgoing())
             for (const std::uint32_t to : out.to) {
-                DecodedWorldMessage message = decode_for_worker(*out.bytes);
+                DecodedMessage message = decode_for_worker(*out.bytes);
                 if (const auto* scene = std::get_if<SceneMessage>(&message.message))
                     workers[to] = std::make_unique<SharedWorldWorker>(*scene);
                 else if (workers.count(to) > 0)

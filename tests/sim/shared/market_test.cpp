@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 #include "shared_scenes.h"
 
 using namespace world_test;

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 #include "shared/shared_world_worker.h"
 #include "workers/heartbeat.h"
 
@@ -48,7 +48,7 @@ private:
             const bool honest = steps_ < honest_steps_ || habit_ == Habit::lies;
             if ((honest || habit_ != Habit::is_silent) &&
                 Clock::now() - beaten > std::chrono::milliseconds(50)) {
-                send(beats, sim::encode({number_, 0, 0}, sim::WorldBeat{secret}));
+                send(beats, sim::encode({number_, 0, 0}, sim::Beat{secret}));
                 beaten = Clock::now();
             }
             honest ? serve(socket) : be_hostile(socket);
@@ -61,7 +61,7 @@ private:
         zmq::message_t frame;
         if (!socket.recv(frame)) return;
         const auto* bytes = frame.data<std::uint8_t>();
-        sim::DecodedWorldMessage m = sim::decode_for_worker({bytes, frame.size()});
+        sim::DecodedMessage m = sim::decode_for_worker({bytes, frame.size()});
         given_up_ = given_up_ || std::holds_alternative<sim::Refusal>(m.message);
         if (const auto* scene = std::get_if<sim::SceneMessage>(&m.message)) {
             number_ = scene->worker;
@@ -70,7 +70,7 @@ private:
             worker_->take(m.header, std::move(m.message));
         }
     }
-    [[nodiscard]] std::vector<std::uint8_t> moved(sim::DecodedWorldMessage&& m) const {
+    [[nodiscard]] std::vector<std::uint8_t> moved(sim::DecodedMessage&& m) const {
         if (auto* state = std::get_if<sim::StateMessage>(&m.message))
             for (sim::WorldRecord& record : state->bodies) record.state.position.x() += 1e-4;
         return sim::encode(m.header, m.message);
@@ -84,12 +84,12 @@ private:
         for (const sim::SharedWorldWorker::Outgoing& message : worker_->outgoing()) {
             const std::vector<std::uint8_t> bytes =
                 message.to.empty() ? message.bytes : worker_->relayed(message.to, message.bytes);
-            const sim::DecodedWorldMessage m = sim::decode_world(bytes);
+            const sim::DecodedMessage m = sim::decode_message(bytes);
             if (std::holds_alternative<sim::StateMessage>(m.message) ||
                 std::holds_alternative<sim::UpdateMessage>(m.message))
                 states_ = bytes;
             send(socket,
-                 habit_ == Habit::lies && steps_ > honest_steps_ ? moved(sim::decode_world(bytes)) : bytes);
+                 habit_ == Habit::lies && steps_ > honest_steps_ ? moved(sim::decode_message(bytes)) : bytes);
         }
     }
     void be_hostile(zmq::socket_t& socket) {

@@ -34,12 +34,12 @@ struct End {
     }
     void take() {
         links.look(Clock::now());
-        while (std::optional<sim::DecodedWorldMessage> part = links.receive(Clock::now()))
+        while (std::optional<sim::DecodedMessage> part = links.receive(Clock::now()))
             parts.push_back(std::move(*part));
     }
     zmq::context_t context;
     sim::PeerLinks links;
-    std::vector<sim::DecodedWorldMessage> parts;
+    std::vector<sim::DecodedMessage> parts;
 };
 
 std::vector<std::uint8_t> part(std::uint32_t worker, std::uint64_t step, std::uint8_t content) {
@@ -100,7 +100,7 @@ TEST_F(Links, TellOthersInOrderOnceTheseSayThatTheyHear) {
         EXPECT_EQ(one_.links.send({3, 2}, part(1, 6, i)), std::vector<std::uint32_t>{3});
     ASSERT_TRUE(comes([&] { return two_.parts.size() == 10; }, [&] { two_.take(); }));
     for (std::uint8_t i = 0; i < 10; ++i) {
-        const sim::DecodedWorldMessage& m = two_.parts[i];
+        const sim::DecodedMessage& m = two_.parts[i];
         EXPECT_EQ(m.header.worker, 1u);
         EXPECT_EQ(m.header.step, 6u);
         EXPECT_EQ(std::get<sim::PartMessage>(m.message).bytes, std::vector<std::uint8_t>{i});
@@ -140,7 +140,7 @@ TEST_F(Links, TakeOnlyPartsAndBeatsOfWhoKnowsTheSecret) {
         send_as_one(kOfOne, 1'000'000 + refused, bytes);
         ASSERT_TRUE(comes([&] { return two_.links.refused() == refused + 1; }, [&] { two_.take(); }));
         ++refused;
-        for (const sim::DecodedWorldMessage& m : two_.parts)
+        for (const sim::DecodedMessage& m : two_.parts)
             EXPECT_TRUE(std::get<sim::PartMessage>(m.message).gave_up);
         EXPECT_FALSE(two_.parts.empty());
     }
@@ -158,7 +158,7 @@ TEST_F(Links, OfAStepOfWhichAPartWasLostNoMoreIsTaken) {
     std::set<std::uint64_t> gave_up;
     ASSERT_TRUE(comes(
         [&] {
-            for (const sim::DecodedWorldMessage& m : std::exchange(two_.parts, {})) {
+            for (const sim::DecodedMessage& m : std::exchange(two_.parts, {})) {
                 const auto& p = std::get<sim::PartMessage>(m.message);
                 if (p.gave_up)
                     gave_up.insert(m.header.step);
@@ -181,7 +181,7 @@ TEST_F(Links, WhoTellsMoreThanAStepNeedsIsHeardNoMoreAndLearnsIt) {
     EXPECT_TRUE(comes([&] { return !one_.links.is_up(2, Clock::now()); }, [&] { one_.take(), two_.take(); }));
     std::size_t parts = 0;
     bool gave_up = false;
-    for (const sim::DecodedWorldMessage& m : two_.parts) {
+    for (const sim::DecodedMessage& m : two_.parts) {
         const bool last = std::get<sim::PartMessage>(m.message).gave_up;
         parts += !last, gave_up = gave_up || last;
     }

@@ -120,7 +120,7 @@ private:
     static std::vector<std::uint8_t> message(std::mt19937& random) {
         switch (random() % 4) {
             case 0:
-                return sim::encode({static_cast<std::uint32_t>(random() % 8), 0, 0}, sim::WorldBeat{{1}});
+                return sim::encode({static_cast<std::uint32_t>(random() % 8), 0, 0}, sim::Beat{{1}});
             case 1:
                 return sim::encode({static_cast<std::uint32_t>(random() % 8), 0, 0}, sim::Drained{});
             case 2:

@@ -12,7 +12,7 @@
 #include <thread>
 #include <zmq.hpp>
 
-#include "messages/struck_messages.h"
+#include "messages/worker_messages.h"
 #include "processes.h"
 #include "test_kit.h"
 
@@ -122,10 +122,11 @@ TEST(StruckWorkers, GarbageAndForgedMessagesToItsSocketDoNoHarm) {
         std::vector<std::uint8_t> noise(rng() % 300);
         for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(rng());
         stranger.send(zmq::buffer(noise), i % 3 ? zmq::send_flags::none : zmq::send_flags::sndmore);
-        for (const sim::Message& forged : {sim::Message(sim::Hello{}), sim::Message(sim::Stop{}),
-                                           sim::Message(sim::Answer{1, static_cast<std::uint64_t>(i), {}})}) {
-            stranger.send(zmq::buffer(sim::encode(forged)), zmq::send_flags::none);
-        }
+        for (const sim::WorkerMessage& forged :
+             {sim::WorkerMessage(sim::JoinRequest{0, {}, "forged"}), sim::WorkerMessage(sim::EndOfRun{}),
+              sim::WorkerMessage(sim::Beat{}),
+              sim::WorkerMessage(sim::StruckAnswer{1, static_cast<std::uint64_t>(i), {}})})
+            stranger.send(zmq::buffer(sim::encode({}, forged)), zmq::send_flags::none);
     });
     EXPECT_EQ(pool->report().lost, 0);
 }

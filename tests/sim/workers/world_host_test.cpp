@@ -10,7 +10,7 @@
 
 #include "hostile_member.h"
 #include "key_folder.h"
-#include "messages/world_messages.h"
+#include "messages/worker_messages.h"
 #include "network_namespace.h"
 #include "processes.h"
 #include "sim/distributed_world.h"

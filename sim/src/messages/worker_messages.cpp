@@ -1,0 +1,431 @@
+#include "messages/worker_messages.h"
+
+#include <array>
+#include <cmath>
+
+#include "messages/crc32c.h"
+#include "messages/struck_codec.h"
+#include "messages/update_codec.h"
+#include "messages/world_record_codec.h"
+#include "messages/world_scene_codec.h"
+
+namespace sim {
+namespace {
+
+constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'W'};
+constexpr std::uint16_t kUpdateType = 12;
+constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kChecksumBytes = 4, kAppliedBytes = 12;
+constexpr std::size_t kMishapBytes = 17, kPeerBytes = 44;  // at least
+constexpr std::uint64_t kMostLinked = std::uint64_t{1} << 40;
+constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64, kLongestHost = 255, kLongestKey = 40;
+
+// What several messages hold.
+
+void write(ByteWriter& out, const StepReport& r) {
+    for (const float x : {r.seconds, r.smoothed_s, r.waited_s, r.processor_s}) out.number(x);
+    for (const std::uint32_t n : {r.lead, r.ghost_age, r.cross_contacts, r.own}) out.number(n);
+    out.number(r.linked);
+    out.matrix(r.outside_impulse);
+    out.count(r.mishaps.size());
+    for (const Mishap& m : r.mishaps) {
+        out.number(static_cast<std::uint8_t>(m.kind));
+        out.number(m.number);
+        out.number(m.step);
+        out.text(m.what.substr(0, kLongestReason));
+    }
+}
+
+/// What a peer says of itself goes into reports and onto terminals: printable ASCII, a question mark for any
+/// other byte.
+std::string read_words(ByteReader& in, std::uint32_t longest) {
+    std::string text = in.text(longest);
+    for (char& c : text)
+        if (c < ' ' || c > '~') c = '?';
+    return text;
+}
+
+Mishap read_mishap(ByteReader& in) {
+    const auto kind = in.number<std::uint8_t>();
+    if (kind > static_cast<std::uint8_t>(Mishap::Kind::broken))
+        throw DecodeError("a mishap of kind " + std::to_string(kind) + ", expected at most 2");
+    Mishap m{static_cast<Mishap::Kind>(kind), in.number<std::uint32_t>(), in.number<std::uint64_t>(), {}};
+    m.what = read_words(in, kLongestReason);
+    return m;
+}
+
+StepReport read_report(ByteReader& in) {
+    StepReport r;
+    for (float* x : {&r.seconds, &r.smoothed_s, &r.waited_s, &r.processor_s}) {
+        *x = in.number<float>();
+        if (!(*x >= 0 && *x <= 1e9f)) throw DecodeError("a report of a time out of range");
+    }
+    for (std::uint32_t* n : {&r.lead, &r.ghost_age, &r.cross_contacts, &r.own})
+        *n = in.number<std::uint32_t>();
+    r.linked = in.number<std::uint64_t>();
+    if (r.linked > kMostLinked) throw DecodeError("a report of more bytes than can be");
+    in.matrix(r.outside_impulse);
+    if (!r.outside_impulse.allFinite()) throw DecodeError("a report that is not finite");
+    r.mishaps.resize(in.count(kMishapBytes));
+    for (Mishap& m : r.mishaps) m = read_mishap(in);
+    return r;
+}
+
+void write_applied(ByteWriter& out, const std::vector<std::uint32_t>& sources,
+                   const std::vector<std::uint64_t>& applied) {
+    if (sources.size() != applied.size())
+        throw std::invalid_argument(std::to_string(sources.size()) + " sources with " +
+                                    std::to_string(applied.size()) + " steps");
+    out.count(sources.size());
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+        out.number(sources[i]);
+        out.number(applied[i]);
+    }
+}
+
+void read_applied(ByteReader& in, std::vector<std::uint32_t>& sources, std::vector<std::uint64_t>& applied) {
+    sources.resize(in.count(kAppliedBytes));
+    applied.resize(sources.size());
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+        sources[i] = in.number<std::uint32_t>();
+        applied[i] = in.number<std::uint64_t>();
+    }
+}
+
+std::string shortened(const std::string& text) {
+    return text.substr(0, kLongestText);
+}
+
+// Bodies of messages, in order of types.
+
+void write_body(ByteWriter& out, const JoinRequest& m) {
+    out.number(m.fingerprint);
+    out.append(m.secret);
+    out.text(m.host.substr(0, kLongestHost));
+}
+void write_body(ByteWriter& out, const Beat& m) {
+    out.append(m.secret);
+}
+void write_body(ByteWriter&, const Drained&) {}
+void write_body(ByteWriter& out, const WorkerFailure& m) {
+    out.text(shortened(m.what));
+}
+void write_body(ByteWriter& out, const SceneMessage& m) {
+    out.number(m.worker);
+    write(out, m.scene);
+    write(out, m.settings);
+}
+void write_body(ByteWriter& out, const Refusal& m) {
+    out.text(shortened(m.why));
+}
+void write_body(ByteWriter&, const EndOfRun&) {}
+void write_numbers(ByteWriter& out, const std::vector<std::uint32_t>& numbers) {
+    out.count(numbers.size());
+    for (const std::uint32_t number : numbers) out.number(number);
+}
+void read_numbers(ByteReader& in, std::vector<std::uint32_t>& numbers) {
+    numbers.resize(in.count(4));
+    for (std::uint32_t& number : numbers) number = in.number<std::uint32_t>();
+}
+void read_bytes(ByteReader& in, std::vector<std::uint8_t>& bytes) {
+    const std::span<const std::uint8_t> all = in.take(in.count(1));
+    bytes.assign(all.begin(), all.end());
+}
+void write_body(ByteWriter& out, const Members& m) {
+    write_numbers(out, m.workers);
+}
+void write_body(ByteWriter& out, const Ownership& m) {
+    out.number(m.owner);
+    out.number(m.from);
+    out.number<std::uint8_t>(m.traded);
+    out.number(m.step);
+    write(out, m.bodies);
+    write_applied(out, m.sources, m.applied);
+}
+void write_body(ByteWriter& out, const SnapshotMessage& m) {
+    write(out, m.snapshot);
+}
+void write_body(ByteWriter& out, const StateMessage& m) {
+    write(out, m.report);
+    write(out, m.bodies);
+    write(out, m.contacts);
+    write(out, m.springs);
+}
+void write_body(ByteWriter& out, const UpdateMessage& m) {
+    write(out, m.report);
+    write(out, m.bodies);
+    write(out, m.crossed);
+    write_numbers(out, m.broken);
+}
+void write_body(ByteWriter& out, const StruckAssign& m) {
+    write(out, m);
+}
+void write_body(ByteWriter& out, const StruckStep& m) {
+    write(out, m);
+}
+void write_body(ByteWriter& out, const StruckAnswer& m) {
+    write(out, m);
+}
+void write_body(ByteWriter&, const PackedUpdates&) {
+    throw std::invalid_argument("an update message that is packed already");
+}
+void write_body(ByteWriter& out, const Offer& m) {
+    if (m.bodies.size() != m.cost_s.size()) throw std::invalid_argument("an offer without all costs");
+    out.number(m.to);
+    out.number(m.number);
+    out.count(m.bodies.size());
+    for (std::size_t i = 0; i < m.bodies.size(); ++i) {
+        out.number(m.bodies[i]);
+        out.number(m.cost_s[i]);
+    }
+}
+void write_body(ByteWriter& out, const OfferAnswer& m) {
+    out.number(m.to);
+    out.number(m.number);
+    out.number<std::uint8_t>(m.accepted);
+}
+void write_body(ByteWriter& out, const Handover& m) {
+    out.number(m.to);
+    out.number(m.number);
+    write(out, m.bodies);
+    write_applied(out, m.sources, m.applied);
+}
+
+void write_body(ByteWriter& out, const PartMessage& m) {
+    out.number<std::uint8_t>(m.gave_up);
+    out.count(m.bytes.size());
+    out.append(m.bytes);
+}
+void write_body(ByteWriter& out, const PublishedMessage& m) {
+    write(out, m.report);
+    write_numbers(out, m.bodies);
+}
+void write_body(ByteWriter& out, const RelayMessage& m) {
+    write_numbers(out, m.to);
+    out.count(m.part.size());
+    out.append(m.part);
+}
+void write_body(ByteWriter& out, const PeersMessage& m) {
+    out.count(m.peers.size());
+    for (const PeersMessage::Peer& peer : m.peers) {
+        out.number(peer.worker);
+        out.text(peer.endpoint.substr(0, kLongestHost));
+        out.text(peer.key.substr(0, kLongestKey));
+        out.append(peer.says);
+        out.append(peer.hears);
+    }
+}
+void write_body(ByteWriter& out, const LinkBeat& m) {
+    out.number<std::uint8_t>(m.hears);
+}
+void write_body(ByteWriter& out, const ReachMessage& m) {
+    out.text(m.endpoint.substr(0, kLongestHost));
+    out.text(m.key.substr(0, kLongestKey));
+}
+
+void read_body(ByteReader& in, JoinRequest& m) {
+    m.fingerprint = in.number<std::uint64_t>();
+    m.secret = in.bytes<16>();
+    m.host = read_words(in, kLongestHost);
+}
+void read_body(ByteReader& in, Beat& m) {
+    m.secret = in.bytes<16>();
+}
+void read_body(ByteReader&, Drained&) {}
+void read_body(ByteReader& in, WorkerFailure& m) {
+    m.what = read_words(in, kLongestText);
+}
+void read_body(ByteReader& in, SceneMessage& m) {
+    m.worker = in.number<std::uint32_t>();
+    m.scene = read_scene(in);
+    m.settings = read_settings(in);
+}
+void read_body(ByteReader& in, Refusal& m) {
+    m.why = read_words(in, kLongestText);
+}
+void read_body(ByteReader&, EndOfRun&) {}
+void read_body(ByteReader& in, Members& m) {
+    read_numbers(in, m.workers);
+}
+void read_body(ByteReader& in, Ownership& m) {
+    m.owner = in.number<std::uint32_t>();
+    m.from = in.number<std::uint32_t>();
+    m.traded = in.flag();
+    m.step = in.number<std::uint64_t>();
+    m.bodies = read_world_records(in);
+    read_applied(in, m.sources, m.applied);
+}
+void read_body(ByteReader& in, SnapshotMessage& m) {
+    m.snapshot = read_snapshot(in);
+}
+void read_body(ByteReader& in, StateMessage& m) {
+    m.report = read_report(in);
+    m.bodies = read_world_records(in);
+    m.contacts = read_contact_records(in);
+    m.springs = read_spring_records(in);
+}
+void read_body(ByteReader& in, UpdateMessage& m) {
+    m.report = read_report(in);
+    read_updates(in, m.bodies);
+    m.crossed = read_crossed(in);
+    read_numbers(in, m.broken);
+}
+void read_body(ByteReader& in, PartMessage& m) {
+    m.gave_up = in.flag();
+    read_bytes(in, m.bytes);
+}
+void read_body(ByteReader& in, PublishedMessage& m) {
+    m.report = read_report(in);
+    read_numbers(in, m.bodies);
+}
+void read_body(ByteReader& in, RelayMessage& m) {
+    read_numbers(in, m.to);
+    read_bytes(in, m.part);
+}
+void read_body(ByteReader& in, PeersMessage& m) {
+    m.peers.resize(in.count(kPeerBytes));
+    for (PeersMessage::Peer& peer : m.peers) {
+        peer.worker = in.number<std::uint32_t>();
+        peer.endpoint = read_words(in, kLongestHost);
+        peer.key = read_words(in, kLongestKey);
+        peer.says = in.bytes<16>(), peer.hears = in.bytes<16>();
+    }
+}
+void read_body(ByteReader& in, LinkBeat& m) {
+    m.hears = in.flag();
+}
+void read_body(ByteReader& in, ReachMessage& m) {
+    m.endpoint = read_words(in, kLongestHost);
+    m.key = read_words(in, kLongestKey);
+}
+void read_body(ByteReader& in, StruckAssign& m) {
+    m = read_struck_assign(in);
+}
+void read_body(ByteReader& in, StruckStep& m) {
+    m = read_struck_step(in);
+}
+void read_body(ByteReader& in, StruckAnswer& m) {
+    m = read_struck_answer(in);
+}
+void read_body(ByteReader&, PackedUpdates&) {
+    throw DecodeError("a message of no known type");
+}
+void read_body(ByteReader& in, Offer& m) {
+    m.to = in.number<std::uint32_t>();
+    m.number = in.number<std::uint32_t>();
+    m.bodies.resize(in.count(8));
+    m.cost_s.resize(m.bodies.size());
+    for (std::size_t i = 0; i < m.bodies.size(); ++i) {
+        m.bodies[i] = in.number<std::uint32_t>();
+        m.cost_s[i] = in.number<float>();
+        if (m.bodies[i] >= kMostWorldBodies || !(m.cost_s[i] >= 0 && m.cost_s[i] <= 1e9f))
+            throw DecodeError("an offer out of range");
+    }
+}
+void read_body(ByteReader& in, OfferAnswer& m) {
+    m.to = in.number<std::uint32_t>();
+    m.number = in.number<std::uint32_t>();
+    m.accepted = in.flag();
+}
+void read_body(ByteReader& in, Handover& m) {
+    m.to = in.number<std::uint32_t>();
+    m.number = in.number<std::uint32_t>();
+    m.bodies = read_world_records(in);
+    read_applied(in, m.sources, m.applied);
+}
+
+/// The variant's alternative of index `type` - 1; what is there of that type is overwritten, so that its storage serves again.
+template <std::size_t I = 0>
+void read_message(std::size_t type, ByteReader& in, WorkerMessage& into) {
+    if constexpr (I < std::variant_size_v<WorkerMessage>) {
+        if (type != I + 1) return read_message<I + 1>(type, in, into);
+        auto* m = std::get_if<I>(&into);
+        read_body(in, m ? *m : into.emplace<I>());
+    } else {
+        throw DecodeError("message type " + std::to_string(type) + ", expected 1 to " + std::to_string(I));
+    }
+}
+
+void expect(const char* what, std::uint64_t found, std::uint64_t expected) {
+    if (found == expected) return;
+    throw DecodeError(std::string(what) + " " + std::to_string(found) + ", expected " +
+                      std::to_string(expected));
+}
+
+/// Checks length and checksum; returns the type.
+std::uint16_t read_header(std::span<const std::uint8_t> bytes, MessageHeader& header) {
+    if (bytes.size() < kHeaderBytes + kChecksumBytes)
+        throw DecodeError("a message of " + std::to_string(bytes.size()) + " bytes");
+    ByteReader in(bytes.first(kHeaderBytes)), trailer(bytes.last(kChecksumBytes));
+    for (const std::uint8_t letter : kMagic) expect("first letters:", in.number<std::uint8_t>(), letter);
+    expect("version", in.number<std::uint16_t>(), kProtocol);
+    const auto type = in.number<std::uint16_t>();
+    expect("length", in.number<std::uint32_t>(), bytes.size());
+    expect("checksum", trailer.number<std::uint32_t>(), crc32c(bytes.first(bytes.size() - kChecksumBytes)));
+    header.worker = in.number<std::uint32_t>();
+    header.epoch = in.number<std::uint32_t>();
+    header.step = in.number<std::uint64_t>();
+    return type;
+}
+
+/// Of a message whose header has been read.
+void read_message(std::uint16_t type, std::span<const std::uint8_t> bytes, WorkerMessage& into) {
+    ByteReader body(bytes.subspan(kHeaderBytes, bytes.size() - kHeaderBytes - kChecksumBytes));
+    try {
+        read_message(std::size_t{type}, body, into);
+        body.expect_end();
+    } catch (const std::invalid_argument& e) {
+        throw DecodeError(e.what());
+    }
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encode(const MessageHeader& header, const WorkerMessage& message) {
+    ByteWriter out;
+    if (const auto* part = std::get_if<PartMessage>(&message)) out.bytes().reserve(64 + part->bytes.size());
+    for (const std::uint8_t letter : kMagic) out.number(letter);
+    out.number(kProtocol);
+    out.number(static_cast<std::uint16_t>(message.index() + 1));
+    out.number<std::uint32_t>(0);
+    out.number(header.worker);
+    out.number(header.epoch);
+    out.number(header.step);
+    std::visit([&](const auto& m) { write_body(out, m); }, message);
+    const auto length = static_cast<std::uint32_t>(out.bytes().size() + kChecksumBytes);
+    std::memcpy(out.bytes().data() + kLengthAt, &length, sizeof length);
+    out.number(crc32c(out.bytes()));
+    return std::move(out.bytes());
+}
+
+DecodedMessage decode_for_worker(std::span<const std::uint8_t> bytes) {
+    DecodedMessage decoded;
+    const std::uint16_t type = read_header(bytes, decoded.header);
+    if (type != kUpdateType) {
+        read_message(type, bytes, decoded.message);
+        return decoded;
+    }
+    auto& packed = decoded.message.emplace<PackedUpdates>();
+    packed.bytes.assign(bytes.begin(), bytes.end());
+    const std::span<const std::uint8_t> all =
+        std::span<const std::uint8_t>(packed.bytes).first(bytes.size() - kChecksumBytes);
+    ByteReader in(all.subspan(kHeaderBytes));
+    packed.report = read_report(in);
+    find_updates(in, all, packed.bodies);
+    packed.crossed = read_crossed(in);
+    read_numbers(in, packed.broken);
+    in.expect_end();
+    return decoded;
+}
+
+DecodedMessage decode_message(std::span<const std::uint8_t> bytes) {
+    DecodedMessage decoded;
+    decode_message(bytes, decoded);
+    return decoded;
+}
+
+void decode_message(std::span<const std::uint8_t> bytes, DecodedMessage& into) {
+    const std::uint16_t type = read_header(bytes, into.header);
+    read_message(type, bytes, into.message);
+}
+
+}  // namespace sim

@@ -1,0 +1,284 @@
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "bytes/byte_codec.h"
+#include "messages/secret.h"
+#include "messages/struck_messages.h"
+#include "sim/distributed_world.h"
+
+namespace sim {
+
+// Messages between applications and their workers, and among these: of a world that is simulated together, and of the struck bodies
+// of a play. One ZeroMQ frame each, little-endian, no padding.
+//
+//   offset  bytes
+//   0       4      "MWSW"
+//   4       2      version, 9
+//   6       2      type
+//   8       4      length of the whole message
+//   12      4      worker: sender; 0xffffffff the application
+//   16      4      epoch of ownership, as the sender knows it
+//   20      8      step: number of steps that the sender has done
+//   28      ...    body, by type
+//   end-4   4      CRC-32C (Castagnoli, reflected) of everything before
+//
+// f64, f32, f16 are IEEE numbers bit by bit, v3 = 3 f64, w3 = 3 f32, flag = u8 of 0 or 1, text = u32 length
+// and bytes, list = u32 count and the elements, b/m = u32: body below 2^24, and number of modes (at most
+// 128) times 2^24.
+//
+//    1 join       worker  u64 fingerprint, 16 bytes: its secret, text host
+//    2 beat       both    16 bytes: the worker's secret; zeros from the application
+//    3 drained    worker  nothing
+//    4 failure    worker  text
+//    5 scene      app     u32 worker, scene, settings
+//    6 refusal    app     text
+//    7 end        app     nothing
+//    8 members    app     list of u32
+//    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of applied
+//   10 snapshot   app     u64 step, list of record, list of contact, list of spring, v3 outside impulse
+//   11 state      worker  report, list of record, list of contact, list of spring
+//   12 update     worker  report, lists of update, crossed, u32 (constraints that broke)
+//   13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds}
+//   14 answer     worker  u32 to, u32 number, flag accepted
+//   15 handover   worker  u32 to, u32 number, list of record, list of applied
+//   16 part       worker  flag gave up, list of u8
+//   17 published  app     report, list of u32 (bodies)
+//   18 relay      worker  list of u32 (to), list of u8 (a part, encoded)
+//   19 peers      app     list of {u32 worker, texts endpoint, key, 16 bytes: what it says, 16 bytes: what it hears}
+//   20 link       worker  flag hears
+//   21 reach      worker  texts endpoint, key
+//   22 to 24 of struck bodies, see struck_messages.h; of the others a play and its workers use 1, 2, 4, 6 and 7
+//
+//   report      68 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
+//               cross contacts, own; u64 linked; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
+//   applied     12 bytes: u32 worker, u64 step
+//   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8 broken),
+//               u16 still steps, i32 sleep group, v3 position, f64 orientation w x y z, v3 velocity,
+//               v3 angular momentum, f64 q[m], f64 q'[m]
+//   contact     10 + 32 n bytes: u32 a, u32 b, u8 (1 emerging),
+//               u8 n points of {u32 feature, w3 arm, f32 normal impulse, w3 friction impulse}
+//   spring      17 bytes: u32 constraint, flag holds, w3 impulse
+//   update      36 + 4 m bytes, 84 with 12 modes; if held, 12 + 2 m more, 120 in all:
+//               b/m, u8 (1 asleep, 2 still, 4 quarantined, 8 held, and 16 times E), w3 position,
+//               7 bytes orientation, 3 f16 velocity, 3 i16 angular momentum in units of
+//               2^(4 E - 44) kg m^2/s, f16 q[m], f16 q'[m]; held: 3 f16 linear, 3 f16 angular, f16 modal[m]
+//   crossed     45 bytes: u32 own, u32 other, flag blow, w3 linear on own, w3 angular on own, w3 angular on other
+//   scene, settings: see world_scene_codec.cpp
+//
+// The 7 bytes of an orientation: 56 bits, lowest first: which of x, y, z, w is largest in size (2 bits; it is
+// made positive and follows from the others), the other three in that order, each 18 bits, 0 to 2^18 - 1 for
+// -1/sqrt 2 to 1/sqrt 2.
+//
+// Largest quantisation errors of an update: position 2^-24 of each coordinate; orientation 1.9e-5 rad;
+// angular momentum 1/4095 of its largest coordinate (plus 2^-45 kg m^2/s; range 2.1e9); f16 2^-11 of each
+// number (plus 3e-8; range 65504).
+//
+// A state that is not finite or beyond 1e7 m or 1e6 m/s is broken; World takes the body out at the next
+// step. Its numbers do not travel: zeros stand for them (and w = 1 for the orientation; in an update the
+// angular momentum is -32768 three times), and the decoder sets the position to NaN.
+//
+// Decoders check length, checksum, counts, flags, that every number is finite and in range, that nothing is
+// left over, and a scene as World would; else they throw DecodeError.
+
+constexpr std::uint32_t kApplication = 0xffffffff;
+constexpr std::uint16_t kProtocol = 9;  ///< version
+
+struct MessageHeader {
+    std::uint32_t worker = kApplication;
+    std::uint32_t epoch = 0;
+    std::uint64_t step = 0;  ///< the sender's: number of steps it has done
+};
+
+/// What happened to an own body or constraint for the first time.
+struct Mishap {
+    enum class Kind : std::uint8_t { quarantined, limited, broken } kind = Kind::quarantined;
+    std::uint32_t number = 0;  ///< of the body; of the constraint that broke
+    std::uint64_t step = 0;
+    std::string what;  ///< quarantined: which value
+};
+
+/// A worker's report of its last step, in every state and update message.
+struct StepReport {
+    float seconds = 0, smoothed_s = 0, waited_s = 0, processor_s = 0;  ///< see WorkerStep
+    std::uint32_t lead = 0, ghost_age = 0, cross_contacts = 0;
+    std::uint32_t own = 0;
+    std::uint64_t linked = 0;  ///< bytes that it sent to other workers directly, since its last report
+    Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< since this worker's start
+    std::vector<Mishap> mishaps;                                ///< of the step
+};
+
+// Worker to application.
+struct JoinRequest {
+    std::uint64_t fingerprint = 0;
+    Secret secret = {};
+    std::string host;  ///< printable ASCII, whatever was sent; at most 255 characters
+};
+struct Beat {  ///< both ways, every 0.1 s
+    Secret secret = {};
+};
+struct Drained {};      ///< worker: has given away all it owned and leaves
+struct WorkerFailure {  ///< worker: cannot go on
+    std::string what;
+};
+
+// Application to one worker.
+
+struct SceneMessage {
+    std::uint32_t worker = 0;  ///< number of the joining worker
+    WorldScene scene;
+    DistributedSettings settings;
+};
+struct Refusal {  ///< of a join; or the worker was given up
+    std::string why;
+};
+struct EndOfRun {};
+
+// Application to all workers.
+struct Members {
+    std::vector<std::uint32_t> workers;
+};
+/// Registered ownership: `owner` steps these bodies from the end of step `step` on. The header's epoch is the
+/// new one.
+struct Ownership {
+    std::uint32_t owner = 0;
+    std::uint32_t from = kApplication;  ///< the owner before; kApplication: none
+    bool traded = false;                ///< to a buyer; else at the start, after a loss, or as one drains
+    std::uint64_t step = 0;
+    std::vector<WorldRecord> bodies;  ///< exact; without a handover in bounded pace as last published
+    /// Bounded, of what was handed over: the states include what came of these workers' messages up to these steps.
+    std::vector<std::uint32_t> sources;
+    std::vector<std::uint64_t> applied;
+};
+/// Everything at the end of a step that all have done, for a worker that joins late, or a run that goes on from there.
+struct SnapshotMessage {
+    WorldSnapshot snapshot;
+};
+
+// Worker to the application after each step, which passes it on.
+
+/// Lockstep. All own bodies, and the contacts and constraints that belong to them. Passed on to those who own nothing.
+struct StateMessage {
+    StepReport report;
+    std::vector<WorldRecord> bodies;
+    std::vector<ContactRecord> contacts;
+    std::vector<SpringRecord> springs;
+};
+
+/// Bounded. One body's state, quantised: at most 120 bytes with 12 modes.
+struct Update {
+    std::uint32_t body = 0;
+    bool asleep = false, still = false, quarantined = false;
+    WorldBodyState state;
+    bool held = false;    ///< whether `impulse` is there
+    StepImpulse impulse;  ///< from the owner's other bodies, the mean of a step; linear, angular, modal
+};
+struct UpdateMessage {
+    StepReport report;
+    std::vector<Update> bodies;         ///< own, ascending
+    std::vector<CrossImpulse> crossed;  ///< of own bodies with others' in the last step, as floats; ascending
+    std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
+};
+
+/// A StateMessage as those get it who own something, with the sender's header: they do all steps themselves, and need no more
+/// than that the sender is there. The report is without its mishaps.
+struct PublishedMessage {
+    StepReport report;
+    std::vector<std::uint32_t> bodies;
+};
+
+/// An UpdateMessage as a worker gets it: of hundreds of bodies it needs the few that are near, so states are
+/// read one by one when they are needed.
+struct PackedUpdates {
+    struct Place {
+        std::uint32_t body, offset;
+    };
+    StepReport report;
+    std::vector<std::uint32_t> broken;
+    std::vector<CrossImpulse> crossed;
+    std::vector<std::uint8_t> bytes;
+    std::vector<Place> bodies;  ///< in bytes; ascending
+
+    /// Throw DecodeError.
+    void update(std::uint32_t offset, Update& into) const;
+    /// The part of an update that is needed to find near bodies.
+    struct Glance {
+        Eigen::Vector3d position, velocity;  ///< [m], [m/s]
+        bool asleep, quarantined;
+    };
+    [[nodiscard]] Glance glance(std::uint32_t offset) const;  ///< of the update at `offset`
+};
+
+// Worker to worker, through the application. The market.
+struct Offer {
+    std::uint32_t to = 0, number = 0;  ///< number: of the seller's offers
+    std::vector<std::uint32_t> bodies;
+    std::vector<float> cost_s;  ///< of each, at the seller
+};
+struct OfferAnswer {
+    std::uint32_t to = 0, number = 0;
+    bool accepted = false;
+};
+/// To the application, which registers it or gives the bodies back: exact states at the end of the header's
+/// step.
+struct Handover {
+    std::uint32_t to = 0, number = 0;
+    std::vector<WorldRecord> bodies;
+    std::vector<std::uint32_t> sources;  ///< see Ownership
+    std::vector<std::uint64_t> applied;
+};
+
+/// Lockstep, within the step that begins at the header's: what a worker tells others with whom it does the step together
+/// (world/partners.h). gave_up: nothing more of this step comes from it. Worker to worker, see workers/peer_links.h.
+struct PartMessage {
+    bool gave_up = false;
+    std::vector<std::uint8_t> bytes;
+};
+/// To the application: a part for those whom its sender cannot reach.
+struct RelayMessage {
+    std::vector<std::uint32_t> to;
+    std::vector<std::uint8_t> part;  ///< encoded
+};
+
+/// To the application: where other workers reach this one, once it listens there. Printable ASCII, whatever was sent.
+struct ReachMessage {
+    std::string endpoint;  ///< at most 255 characters
+    std::string key;       ///< public, of CURVE; empty: none
+};
+/// From the application: how to reach others. Once one can be reached, it is told to those that were before, and they to it.
+/// Every pair has two secrets, by which each knows the other one.
+struct PeersMessage {
+    struct Peer {
+        std::uint32_t worker = 0;
+        std::string endpoint, key;
+        Secret says = {}, hears = {};
+    };
+    std::vector<Peer> peers;
+};
+/// Worker to worker, every 0.1 s. hears: the sender has heard from the other one not long ago.
+struct LinkBeat {
+    bool hears = false;
+};
+
+using WorkerMessage =
+    std::variant<JoinRequest, Beat, Drained, WorkerFailure, SceneMessage, Refusal, EndOfRun, Members,
+                 Ownership, SnapshotMessage, StateMessage, UpdateMessage, Offer, OfferAnswer, Handover,
+                 PartMessage, PublishedMessage, RelayMessage, PeersMessage, LinkBeat, ReachMessage,
+                 StruckAssign, StruckStep, StruckAnswer, PackedUpdates>;
+
+[[nodiscard]] std::vector<std::uint8_t> encode(const MessageHeader& header, const WorkerMessage& message);
+struct DecodedMessage {
+    MessageHeader header;
+    WorkerMessage message;
+};
+/// The same, for workers: update messages as PackedUpdates (which encode does not take).
+[[nodiscard]] DecodedMessage decode_for_worker(std::span<const std::uint8_t> bytes);
+/// Throws DecodeError for anything that encode cannot have written.
+[[nodiscard]] DecodedMessage decode_message(std::span<const std::uint8_t> bytes);
+/// The same, into the storage of the last one; what is there after a DecodeError is of no use.
+void decode_message(std::span<const std::uint8_t> bytes, DecodedMessage& into);
+
+}  // namespace sim

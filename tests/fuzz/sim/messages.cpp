@@ -1,0 +1,48 @@
+// Messages between an application and its workers, as each reads them. Version, length and checksum are made right, so that
+// what lies behind them is reached.
+#include <cstring>
+#include <variant>
+#include <vector>
+
+#include "fuzz_target.h"
+#include "messages/crc32c.h"
+#include "messages/worker_messages.h"
+
+namespace {
+
+void seal(std::vector<std::uint8_t>& bytes) {
+    if (bytes.size() < 32) return;
+    std::memcpy(bytes.data() + 4, &sim::kProtocol, sizeof sim::kProtocol);
+    const auto length = static_cast<std::uint32_t>(bytes.size());
+    std::memcpy(bytes.data() + 8, &length, sizeof length);
+    const std::uint32_t sum = sim::crc32c(std::span(bytes).first(bytes.size() - 4));
+    std::memcpy(bytes.data() + bytes.size() - 4, &sum, sizeof sum);
+}
+
+/// A worker reads the updates that it needs later.
+void read_later(const sim::PackedUpdates& packed) {
+    sim::Update update;
+    for (const sim::PackedUpdates::Place& place : packed.bodies) {
+        (void)packed.glance(place.offset);
+        packed.update(place.offset, update);
+    }
+}
+
+}  // namespace
+
+void fuzz(std::string_view text) {
+    std::vector<std::uint8_t> bytes(text.begin(), text.end());
+    seal(bytes);
+    try {
+        const sim::DecodedMessage m = sim::decode_message(bytes);
+        const std::vector<std::uint8_t> written = sim::encode(m.header, m.message);
+        require(sim::encode(m.header, sim::decode_message(written).message) == written,
+                "a message that reads back to another");
+    } catch (const sim::DecodeError&) {
+    }
+    try {
+        const sim::DecodedMessage m = sim::decode_for_worker(bytes);
+        if (const auto* packed = std::get_if<sim::PackedUpdates>(&m.message)) read_later(*packed);
+    } catch (const sim::DecodeError&) {
+    }
+}
