@@ -13,7 +13,7 @@ class SharedWorldWorker {
 public:
     explicit SharedWorldWorker(const SceneMessage& scene);  ///< from the first message
 
-    /// Handles a message relayed by the application, decoded. Throws DecodeError if it is inconsistent.
+    /// Handles a message of the application or of another worker, decoded. Throws DecodeError if it is inconsistent.
     void take(const MessageHeader& header, WorkerMessage&& message);
     [[nodiscard]] bool ready() const;
     /// flush(wait): called where the step tells others, and where it needs what they tell. Sends outgoing(); wait: and
