@@ -205,7 +205,9 @@ void LockstepExchange::take(const MessageHeader& header, PartMessage&& message) 
     std::deque<Part>& parts = parts_[header.worker];
     while (!parts.empty() && parts.front().step < now) parts.pop_front();
     if (parts.size() < most_parts_) {
-        parts.push_back({header.step, message.gave_up, std::move(message.bytes)});
+        // Parts of one step come one way, in order; those of the next may overtake them on another.
+        const auto later = std::ranges::upper_bound(parts, header.step, {}, &Part::step);
+        parts.insert(later, {header.step, message.gave_up, std::move(message.bytes)});
     } else {
         parts.assign(1, {header.step, true, {}});  // it tells what nobody needs
     }

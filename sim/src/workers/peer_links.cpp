@@ -19,6 +19,7 @@ using namespace std::chrono_literals;
 constexpr auto kLinkBeatEvery = 100ms, kLinkSilence = 500ms;
 constexpr auto kLinkPatience = 5s;  // until the application has told this one of a peer, too
 constexpr int kMostPartsWaiting = 1000, kMostToSend = 20'000;
+constexpr int kLinkLingerMs = 200;
 constexpr int kReconnectMs = 50, kReconnectMostMs = 2000;
 constexpr std::size_t kPreambleBytes = 24;
 constexpr std::size_t kMostInOneGo = 256;  // refused or beats
@@ -121,7 +122,7 @@ void PeerLinks::connect(const PeersMessage::Peer& peer) {
     Peer& to = peers_[peer.worker];
     to.says = peer.says, to.hears = peer.hears;
     to.socket = zmq::socket_t(context_, zmq::socket_type::push);
-    to.socket.set(zmq::sockopt::linger, 0);
+    to.socket.set(zmq::sockopt::linger, kLinkLingerMs);  // of who leaves: its last step's parts
     to.socket.set(zmq::sockopt::sndhwm, kMostToSend);
     to.socket.set(zmq::sockopt::reconnect_ivl, kReconnectMs);
     to.socket.set(zmq::sockopt::reconnect_ivl_max, kReconnectMostMs);
@@ -232,6 +233,7 @@ void PeerLinks::take_from(std::uint32_t worker, Peer& peer, std::uint64_t count,
         const auto* beats = std::get_if<LinkBeat>(&m.message);
         if (m.header.worker != worker || (!beats && !std::holds_alternative<PartMessage>(m.message)))
             throw DecodeError("found what no worker tells another, expected a part or a beat");
+        if (m.header.step > settings_.steps) throw DecodeError("found a step after the last");
         if (!beats && std::exchange(peer.step, m.header.step) != m.header.step) peer.parts = 0;
         if (!beats && ++peer.parts > 2 * settings_.most_parts) {
             std::fprintf(stderr,
@@ -258,8 +260,8 @@ void PeerLinks::take_from(std::uint32_t worker, Peer& peer, std::uint64_t count,
 
 // Something of this step, the one before or the next one.
 void PeerLinks::miss(std::uint32_t worker, Peer& peer, std::uint64_t step) {
-    for (std::uint64_t of = step > 0 ? step - 1 : 0; of <= step + 1; ++of)
-        heard_.push_back({{worker, 0, of}, PartMessage{true, {}}});
+    for (const std::uint64_t after : {0, 1, 2})
+        if (step + after > 0) heard_.push_back({{worker, 0, step + after - 1}, PartMessage{true, {}}});
     peer.skip_until = step + 2;
 }
 

@@ -35,6 +35,7 @@ public:
         std::optional<WorkerKeys> keys;  ///< of this worker; with them links are encrypted
         std::int64_t largest = 0;        ///< message [bytes]
         std::size_t most_parts = 0;      ///< that one worker tells of a step
+        std::uint64_t steps = 0;         ///< of the run
     };
     /// Listens beside the application's socket in its private folder, or, over TCP, at the address by which this machine
     /// reaches the application. If it cannot, reach() is empty.

@@ -57,9 +57,9 @@ public:
     WorldService(const WorldLink& link, const SceneMessage& scene)
         : socket_(link.socket), pulse_(link.pulse), worker_(scene), header_{scene.worker, 0, 0} {
         if (scene.settings.pace != Pace::lockstep || !scene.settings.together) return;
-        links_.emplace(link.context,
-                       PeerLinks::Settings{scene.worker, link.endpoint, link.keys,
-                                           largest_message(scene.scene), most_parts(scene.scene)});
+        links_.emplace(link.context, PeerLinks::Settings{scene.worker, link.endpoint, link.keys,
+                                                         largest_message(scene.scene),
+                                                         most_parts(scene.scene), scene.settings.steps});
         if (links_->reach()) send(encode(header_, *links_->reach()));
     }
 

@@ -19,13 +19,14 @@ using namespace std::chrono_literals;
 using Clock = sim::PeerLinks::Clock;
 
 constexpr std::size_t kMostParts = 20;
+constexpr std::uint64_t kSteps = 1000;
 constexpr sim::Secret kOfOne = {1}, kOfTwo = {2};
 
 /// Links of a worker. Two in one process have a context each, and the second one's socket another name.
 struct End {
     explicit End(std::uint32_t self, const std::string& application,
                  const std::optional<sim::WorkerKeys>& keys = {})
-        : links(context, {self, application, keys, 1 << 20, kMostParts}) {}
+        : links(context, {self, application, keys, 1 << 20, kMostParts, kSteps}) {}
     /// Takes what is there, for a while; parts are kept.
     void live(Clock::duration time) {
         for (const Clock::time_point start = Clock::now(); Clock::now() - start < time;
@@ -135,7 +136,12 @@ TEST_F(Links, TakeOnlyPartsAndBeatsOfWhoKnowsTheSecret) {
     EXPECT_TRUE(two_.parts.empty());
     // What a member itself may send: each is refused, and no more of that step taken.
     std::uint64_t refused = two_.links.refused();
-    for (const auto& bytes : {part(3, 5, 7), sim::encode({1, 0, 5}, sim::Drained{}), damaged, {}}) {
+    for (const auto& bytes : {part(3, 5, 7),
+                              sim::encode({1, 0, 5}, sim::Drained{}),
+                              damaged,
+                              {},
+                              part(1, kSteps + 1, 7),
+                              part(1, ~std::uint64_t{0} - 1, 7)}) {
         two_.parts.clear();
         send_as_one(kOfOne, 1'000'000 + refused, bytes);
         ASSERT_TRUE(comes([&] { return two_.links.refused() == refused + 1; }, [&] { two_.take(); }));
