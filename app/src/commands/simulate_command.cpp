@@ -31,7 +31,7 @@ void print_workers(const SimulateResult& r) {
                r.body_steps > 0 ? double(r.bytes) / double(r.body_steps) : 0.0,
                counted(r.cross_contacts, "contact"), counted(r.migrations, "body"));
     if (r.lost + r.left > 0)
-        fmt::print("{} lost, {} left; {} went to others\n", counted(r.lost, "worker"), r.left,
+        fmt::print("{} lost, {} left early; {} went to others\n", counted(r.lost, "worker"), r.left,
                    counted(r.bodies_reowned, "body"));
 }
 

@@ -5,8 +5,6 @@
 namespace sim {
 
 /// CRC-32C (Castagnoli, as in iSCSI, RFC 3720): reflected, polynomial 0x1EDC6F41, start and final complement.
-/// By the processor's instruction where the build may use it, else by a table; the same value.
 [[nodiscard]] std::uint32_t crc32c(std::span<const std::uint8_t> bytes) noexcept;
-[[nodiscard]] std::uint32_t crc32c_by_table(std::span<const std::uint8_t> bytes) noexcept;
 
 }  // namespace sim

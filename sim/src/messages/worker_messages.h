@@ -116,6 +116,8 @@ struct JoinRequest {
     std::uint64_t fingerprint = 0;
     Secret secret = {};
     std::string host;  ///< printable ASCII, whatever was sent; at most 255 characters
+    std::string address =
+        {};  ///< not sent: IP address of its connection, as the application sees it; empty: none
 };
 struct Beat {  ///< both ways, every 0.1 s
     Secret secret = {};

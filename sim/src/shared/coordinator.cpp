@@ -29,6 +29,17 @@ std::shared_ptr<const std::vector<std::uint8_t>> shared(std::span<const std::uin
     return std::make_shared<const std::vector<std::uint8_t>>(bytes.begin(), bytes.end());
 }
 
+bool is_of_one_machine(const std::string& address) {
+    return address.starts_with("127.") || address == "::1";
+}
+
+/// Whether a worker whose connection comes from this address can listen there.
+bool may_listen(const std::string& address, const std::string& endpoint) {
+    if (address.empty()) return endpoint.starts_with("ipc://");
+    const bool six = address.find(':') != std::string::npos;
+    return endpoint.starts_with("tcp://" + (six ? "[" + address + "]" : address) + ":");
+}
+
 std::string name(std::uint32_t worker) {
     return "worker " + std::to_string(worker);
 }
@@ -93,6 +104,8 @@ void Coordinator::send(std::vector<std::uint32_t> to, const WorkerMessage& messa
 }
 
 std::vector<Coordinator::Outgoing> Coordinator::outgoing() {
+    for (const std::uint32_t worker : std::exchange(gone_, {}))
+        senders_[worker].decoded = {}, senders_[worker].reach = {};
     return std::exchange(queue_, {});
 }
 
@@ -118,7 +131,7 @@ std::uint32_t Coordinator::join(const JoinRequest& request) {
     send({worker}, SceneMessage{worker, scene_, settings_});
     observer_->note(name(worker) + " joins" + (request.host.empty() ? "" : " from " + request.host));
     members_.push_back(worker);
-    senders_[worker];
+    senders_[worker].address = request.address;
     result_.workers = std::max(result_.workers, static_cast<int>(members_.size()));
     if (finished_) {
         send({worker}, EndOfRun{});
@@ -275,6 +288,7 @@ void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from, 
 
 void Coordinator::remove(std::uint32_t worker) {
     std::erase(members_, worker);
+    gone_.push_back(worker);
     if (started_) send(members_, Members{members_});
     share_out(owned_by(worker), worker);
     advance();
@@ -387,14 +401,17 @@ void Coordinator::take_relay(const MessageHeader& header, RelayMessage&& message
 // Tells those with whom it may do steps together, and it of them.
 void Coordinator::take_reach(const MessageHeader& header, ReachMessage&& message) {
     Sender& here = senders_[header.worker];
-    if (settings_.pace != Pace::lockstep || !settings_.together || message.endpoint.empty() ||
-        !here.reach.endpoint.empty())
+    if (settings_.pace != Pace::lockstep || !settings_.together || !here.reach.endpoint.empty())
         return refuse(header.worker, "found a link that nobody waits for");
+    // Behind a translation of addresses nobody finds it; and a member must not have others connect to somebody else.
+    if (!may_listen(here.address, message.endpoint)) return;
     here.reach = std::move(message);
     PeersMessage all;
     for (const std::uint32_t other : members_) {
-        const ReachMessage& there = senders_[other].reach;
-        if (other == header.worker || there.endpoint.empty()) continue;
+        const auto& [there, address] = std::tie(senders_[other].reach, senders_[other].address);
+        if (other == header.worker || there.endpoint.empty() || address.empty() != here.address.empty() ||
+            is_of_one_machine(address) != is_of_one_machine(here.address))
+            continue;
         const Secret says = make_secret(), hears = make_secret();
         all.peers.push_back({other, there.endpoint, there.key, says, hears});
         send({other}, PeersMessage{{{header.worker, here.reach.endpoint, here.reach.key, hears, says}}});

@@ -67,6 +67,7 @@ private:
         bool settled = false;               ///< bounded: has published the last step again
         std::uint64_t messages_at = 0;      ///< steps of all bodies since which these were sent:
         std::size_t messages = 0, message_bytes = 0, offered = 0;  ///< offered: to it, to be answered
+        std::string address;                                       ///< see JoinRequest
         ReachMessage reach;
         DecodedMessage decoded;  ///< the last, for its storage
     };
@@ -129,7 +130,8 @@ private:
     std::vector<std::vector<int>> lots_;         // tied together
     std::vector<Eigen::Vector3d> first_places_;  // of each
     std::vector<Body> bodies_;
-    WorldRecord record_;  // of an update that is being taken
+    WorldRecord record_;               // of an update that is being taken
+    std::vector<std::uint32_t> gone_;  // whose messages need no storage any more
     std::vector<std::uint32_t> members_;
     std::map<std::uint32_t, Sender> senders_;
     std::uint32_t next_worker_ = 0, epoch_ = 0;

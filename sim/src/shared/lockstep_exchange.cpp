@@ -51,6 +51,7 @@ public:
     [[nodiscard]] int own_bodies() const override { return static_cast<int>(owned_.size()); }
     [[nodiscard]] int lead() const override { return replica_.whole() ? 0 : 1; }
     [[nodiscard]] int ghost_age() const override { return 0; }
+    [[nodiscard]] bool was_alone() const override { return was_alone_; }
     [[nodiscard]] const World& world() const override { return replica_.world(); }
 
 private:
@@ -99,7 +100,7 @@ private:
     };
     std::map<std::uint64_t, Publishers> publisher_;  // by steps
     std::vector<std::uint32_t> partners_;            // of the step under way
-    bool partner_lost_ = false;
+    bool partner_lost_ = false, was_alone_ = false;
     std::map<std::uint32_t, std::deque<Part>> parts_;  // that others told, by them
     std::uint64_t alone_until_ = 0;                    // step
 };
@@ -199,9 +200,10 @@ std::vector<std::uint32_t> LockstepExchange::publishers(std::uint64_t step) cons
 }
 
 void LockstepExchange::take(const MessageHeader& header, PartMessage&& message) {
-    // Others may be in the next step already, where nobody waits for one that owned nothing.
+    // Others may be in the next step already; nobody waits for one that owns nothing.
+    constexpr std::uint64_t kFollows = 16;
     const std::uint64_t now = replica_.step();
-    if (header.step < now || header.step > now + 1) return;
+    if (header.step < now || header.step > now + (owns_any() ? 1 : kFollows)) return;
     std::deque<Part>& parts = parts_[header.worker];
     while (!parts.empty() && parts.front().step < now) parts.pop_front();
     if (parts.size() < most_parts_) {
@@ -321,6 +323,7 @@ void LockstepExchange::take_over(const Ownership& ownership) {
 // Takes whatever has become possible: ownership of this step, a whole step.
 void LockstepExchange::settle() {
     if (unpublished_) return;
+    publisher_.erase(publisher_.begin(), publisher_.lower_bound(replica_.step()));
     for (bool changed = true; changed;) {
         changed = false;
         for (std::size_t i = 0; i < later_.size(); ++i) {
@@ -353,7 +356,9 @@ void LockstepExchange::step(const StepChannel& channel) {
     replica_.begin();
     for (int i = 0; i < world.bodies(); ++i) world.set_own(i, own_[static_cast<std::size_t>(i)] != 0);
     list_owned();
-    if (!step_together(channel)) {
+    const bool together = step_together(channel);
+    was_alone_ = !together && partners_.size() > 1;
+    if (!together) {
         Alone alone;
         world.step_together(alone);
     }

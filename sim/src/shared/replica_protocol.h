@@ -73,6 +73,8 @@ public:
     [[nodiscard]] virtual int own_bodies() const = 0;
     [[nodiscard]] virtual int lead() const = 0;       ///< steps ahead of the slowest owner, now
     [[nodiscard]] virtual int ghost_age() const = 0;  ///< of the oldest used in the last step
+    /// Lockstep: the last step was done alone, as something kept it from being done with the others.
+    [[nodiscard]] virtual bool was_alone() const { return false; }
     [[nodiscard]] virtual const World& world() const = 0;
 };
 

@@ -87,8 +87,7 @@ void SharedContacts::compare(const std::vector<CrossImpulse>& mine, const std::v
                              const Occasion& of, int body) {
     const auto own = std::ranges::equal_range(mine, body, {}, &CrossImpulse::own);
     for (const CrossImpulse& found : own)
-        if (owner(found.ghost, of.step) == of.worker)
-            put_right(&found, find(theirs, found.ghost, body), of);
+        if (owner(found.ghost, of.step) == of.worker) put_right(&found, find(theirs, found.ghost, body), of);
     for (const CrossImpulse& told : theirs)
         if (told.ghost == body && !find(mine, body, told.own)) put_right(nullptr, &told, of);
 }

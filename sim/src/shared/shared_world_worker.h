@@ -46,6 +46,7 @@ public:
     [[nodiscard]] std::uint64_t steps_done() const { return exchange_->steps_done(); }  ///< by this worker
     /// Why ready() is false, in words.
     [[nodiscard]] std::string waits_for() const;
+    [[nodiscard]] bool was_alone() const { return exchange_->was_alone(); }  ///< see ReplicaProtocol
     [[nodiscard]] double work() const;  ///< work of the last step, in units of World::work
 
 private:

@@ -244,7 +244,7 @@ void Machine::put(std::uint32_t to, double time, const Bytes& bytes) {
     p.inbox.insert(later, {time, bytes});
 }
 
-// The next of what a worker sent: a message leaves when its time has come, so that a failure before that keeps it.
+// The next of what a worker sent: a message leaves when its time has come, so that a cut before that keeps it.
 void Machine::hand_on(std::size_t from) {
     const Arrival message = std::move(processors_[from].outbox.front());
     processors_[from].outbox.pop_front();

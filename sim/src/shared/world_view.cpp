@@ -18,6 +18,7 @@ void WorldView::take(std::uint64_t step, const std::vector<Update>& updates) {
         record_.body = static_cast<int>(update.body);
         record_.state = update.state;
         record_.asleep = update.asleep, record_.quarantined = update.quarantined;
+        record_.at_limit = false, record_.still_steps = 0, record_.sleep_group = -1;  // are not told
         keep(step, record_, update.asleep || update.still);
     }
 }

@@ -67,7 +67,7 @@ std::map<std::string, std::string> read_secrets(const fs::path& file,
     for (const auto& [word, key] : read_lines(file)) keys[word] = key;
     for (const std::string& word : expected)
         if (!is_key(keys[word]))
-            refuse(file.string() + " without a " + word + " key", "40 characters of Z85");
+            refuse(file.string() + " without the key '" + word + "'", "40 characters of Z85");
     return keys;
 }
 

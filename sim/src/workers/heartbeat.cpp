@@ -5,6 +5,7 @@
 
 #include <cerrno>
 #include <chrono>
+#include <cstdio>
 #include <condition_variable>
 #include <mutex>
 
@@ -89,6 +90,7 @@ void Pulse::beat(zmq::context_t& context, const std::optional<WorkerKeys>& keys,
         if (!gone_ && (application_process_ended() || (application_ == 0 && now - heard > kBeatSilence)))
             ended = now, gone_ = true;
         if (gone_ && worker_ != kNoMember && now - ended > kBeatEndWithin) {
+            std::fputs("worker: the application is gone, or has given this worker up\n", stderr);
             remove_left_socket(endpoint_);
             _exit(1);
         }

@@ -41,6 +41,12 @@ void KeyGate::allow(const std::string& key) {
     allowed_.push_back(bytes_of(key));
 }
 
+void KeyGate::disallow(const std::string& key) {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = std::ranges::find(allowed_, bytes_of(key)); found != allowed_.end())
+        allowed_.erase(found);
+}
+
 void KeyGate::serve(const std::stop_token& stop) {
     block_signals();
     while (!stop.stop_requested()) {
@@ -76,11 +82,13 @@ bool KeyGate::knows(const Frames& request) {
     return std::ranges::find(allowed_, request[kKeyAt].to_string_view()) != allowed_.end();
 }
 
+// 300: for now; the peer tries again. 400: never.
 void KeyGate::answer(const Frames& request, bool known) {
     refused_ += !known;
     if (request.size() <= kIdAt) return;
+    const char* status = known ? "200" : patience_.count() > 0 ? "300" : "400";
     const std::array<std::string, 8> reply = {
-        request[0].to_string(),       "", "1.0", request[kIdAt].to_string(), known ? "200" : "400",
+        request[0].to_string(),       "", "1.0", request[kIdAt].to_string(), status,
         known ? "OK" : "no such key", "", ""};
     for (std::size_t i = 0; i < reply.size(); ++i)
         socket_.send(zmq::buffer(reply[i]),

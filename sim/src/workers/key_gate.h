@@ -17,14 +17,15 @@ class KeyGate {
 public:
     static constexpr const char* kDomain = "musicworld";
 
-    /// patience: for so long a peer waits whose key may yet be allowed.
+    /// patience: for so long a peer waits whose key may yet be allowed; then it is turned away and may try again.
     KeyGate(zmq::context_t& context, const std::vector<std::string>& allowed,
             std::chrono::milliseconds patience = {});
     ~KeyGate();
     KeyGate(const KeyGate&) = delete;
     KeyGate& operator=(const KeyGate&) = delete;
 
-    void allow(const std::string& key);  ///< from now on, too; any thread
+    void allow(const std::string& key);     ///< from now on, too; any thread
+    void disallow(const std::string& key);  ///< takes one allow() of it back
 
     [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }  ///< handshakes
 

@@ -1,5 +1,6 @@
 #include "workers/peer_links.h"
 
+#include <arpa/inet.h>
 #include <netdb.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -11,14 +12,18 @@
 #include <utility>
 
 #include "workers/socket_folder.h"
+#include "workers/through_signals.h"
 
 namespace sim {
 namespace {
 
 using namespace std::chrono_literals;
-constexpr auto kLinkBeatEvery = 100ms, kLinkSilence = 500ms;
-constexpr auto kLinkPatience = 5s;  // until the application has told this one of a peer, too
-constexpr int kMostPartsWaiting = 1000, kMostToSend = 20'000;
+constexpr auto kLinkBeatEvery = 100ms;
+constexpr auto kLinkSilence = 10s;  // of who does a long step
+constexpr auto kLinkDoubt = 500ms;
+// Until the application has told this one of a peer, too; then that tries again, once the handshake's time is over.
+constexpr auto kLinkPatience = 4s, kLinkHandshake = 5s;
+constexpr int kMostPartsWaiting = 100, kMostToSend = 20'000;
 constexpr int kLinkLingerMs = 200;
 constexpr int kReconnectMs = 50, kReconnectMostMs = 2000;
 constexpr std::size_t kPreambleBytes = 24;
@@ -51,6 +56,15 @@ std::string local_address_to(const std::string& endpoint) {
     return address.find('%') == std::string::npos ? address : std::string();
 }
 
+/// Whether it is tcp://ADDRESS:PORT by numbers: to look up a name would hold up every socket of this process.
+bool is_numeric(const std::string& endpoint) {
+    std::string host = endpoint.substr(std::strlen("tcp://"), endpoint.rfind(':') - std::strlen("tcp://"));
+    if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+    in6_addr address{};
+    return endpoint.back() != '*' && (inet_pton(AF_INET, host.c_str(), &address) == 1 ||
+                                      inet_pton(AF_INET6, host.c_str(), &address) == 1);
+}
+
 }  // namespace
 
 PeerLinks::PeerLinks(zmq::context_t& context, const Settings& settings)
@@ -69,6 +83,8 @@ PeerLinks::~PeerLinks() {
 void PeerLinks::bind(zmq::context_t& context) {
     listens_.set(zmq::sockopt::linger, 0);
     listens_.set(zmq::sockopt::rcvhwm, kMostPartsWaiting);
+    listens_.set(zmq::sockopt::handshake_ivl,
+                 static_cast<int>(std::chrono::milliseconds(kLinkHandshake).count()));
     listens_.set(zmq::sockopt::maxmsgsize, settings_.largest);
     const std::string& application = settings_.application;
     if (application.starts_with("ipc://")) {
@@ -88,7 +104,7 @@ void PeerLinks::bind(zmq::context_t& context) {
         listens_.set(zmq::sockopt::curve_secretkey, settings_.keys->pair.secret);
     }
     listens_.set(zmq::sockopt::ipv6, six);
-    listens_.bind("tcp://" + (six ? "[" + address + "]" : address) + ":*");
+    listening_.emplace(context, listens_, "tcp://" + (six ? "[" + address + "]" : address) + ":*");
     reach_ = {listens_.get(zmq::sockopt::last_endpoint), settings_.keys ? settings_.keys->pair.shown : ""};
 }
 
@@ -102,25 +118,26 @@ bool PeerLinks::may_connect(const PeersMessage::Peer& peer) const {
     } catch (const std::invalid_argument&) {
         return false;
     }
-    return peer.endpoint.find('*') == std::string::npos;
+    return is_numeric(peer.endpoint);
 }
 
-void PeerLinks::add(const PeersMessage& message, Clock::time_point now) {
+void PeerLinks::add(const PeersMessage& message) {
     if (!reach_) return;
     for (const PeersMessage::Peer& peer : message.peers) {
         if (peer.worker == settings_.self || peers_.contains(peer.worker) || !may_connect(peer)) continue;
         try {
             connect(peer);
-            beat(peers_.at(peer.worker), now);
-        } catch (const zmq::error_t&) {
-            peers_.erase(peer.worker);  // it cannot be reached
+            beat(peers_.at(peer.worker));
+        } catch (const zmq::error_t&) {  // it cannot be reached
+            who_says_.erase(peer.says);
+            peers_.erase(peer.worker);
         }
     }
 }
 
 void PeerLinks::connect(const PeersMessage::Peer& peer) {
     Peer& to = peers_[peer.worker];
-    to.says = peer.says, to.hears = peer.hears;
+    to.says = peer.says, to.hears = peer.hears, to.key = peer.key;
     to.socket = zmq::socket_t(context_, zmq::socket_type::push);
     to.socket.set(zmq::sockopt::linger, kLinkLingerMs);  // of who leaves: its last step's parts
     to.socket.set(zmq::sockopt::sndhwm, kMostToSend);
@@ -141,29 +158,39 @@ void PeerLinks::keep(const std::vector<std::uint32_t>& members) {
     std::erase_if(peers_, [&](const auto& peer) {
         if (std::ranges::find(members, peer.first) != members.end()) return false;
         who_says_.erase(peer.second.says);
+        if (gate_) gate_->disallow(peer.second.key);
         return true;
     });
 }
 
-bool PeerLinks::is_up(std::uint32_t worker, Clock::time_point now) const {
+bool PeerLinks::is_up(std::uint32_t worker) const {
     const auto peer = peers_.find(worker);
-    return peer != peers_.end() && peer->second.heard_by && now - *peer->second.heard_by < kLinkSilence;
+    return peer != peers_.end() && peer->second.heard && peer->second.hears_this && !peer->second.closed;
 }
 
 void PeerLinks::look(Clock::time_point now) {
     if (now - beaten_ < kLinkBeatEvery) return;
     beaten_ = now;
-    for (auto& [worker, peer] : peers_) beat(peer, now);
+    for (auto& [worker, peer] : peers_) {
+        if (peer.heard && now - *peer.heard > kLinkSilence) peer.heard.reset();
+        beat(peer);
+    }
+    if (listening_) listening_->look();
 }
 
-void PeerLinks::beat(Peer& peer, Clock::time_point now) {
-    const bool hears = peer.heard && now - *peer.heard < kLinkSilence && !peer.floods;
+void PeerLinks::doubt(Clock::time_point now) {
+    for (auto& [worker, peer] : peers_)
+        if (peer.heard && now - *peer.heard > kLinkDoubt) peer.heard.reset(), beat(peer);
+}
+
+void PeerLinks::beat(Peer& peer) {
+    const bool hears = peer.heard && !peer.closed;
     const std::vector<std::uint8_t> bytes = encode({settings_.self, 0, 0}, LinkBeat{hears});
     (void)send(peer, zmq::message_t(bytes.data(), bytes.size()));
 }
 
-void PeerLinks::begin_step(Clock::time_point now) {
-    for (auto& [worker, peer] : peers_) peer.direct = is_up(worker, now);
+void PeerLinks::begin_step() {
+    for (auto& [worker, peer] : peers_) peer.direct = is_up(worker);
 }
 
 // What cannot be sent is lost: the other one sees it by the count.
@@ -174,9 +201,12 @@ bool PeerLinks::send(Peer& peer, const zmq::message_t& message) {
     std::memcpy(preamble.data() + sizeof(Secret), &count, sizeof count);
     zmq::message_t copy;
     copy.copy(const_cast<zmq::message_t&>(message));  // shares the bytes
-    sent_ += message.size() + kPreambleBytes;
-    return peer.socket.send(zmq::buffer(preamble), zmq::send_flags::sndmore | zmq::send_flags::dontwait) &&
-           peer.socket.send(copy, zmq::send_flags::dontwait);
+    using enum zmq::send_flags;
+    const auto first = [&] {
+        return peer.socket.send(zmq::buffer(preamble), sndmore | dontwait).has_value();
+    };
+    const auto second = [&] { return peer.socket.send(copy, dontwait).has_value(); };
+    return through_signals(first) && through_signals(second);
 }
 
 std::vector<std::uint32_t> PeerLinks::send(const std::vector<std::uint32_t>& to,
@@ -187,18 +217,21 @@ std::vector<std::uint32_t> PeerLinks::send(const std::vector<std::uint32_t>& to,
         const auto peer = peers_.find(worker);
         if (peer == peers_.end() || !peer->second.direct)
             others.push_back(worker);
-        else
-            (void)send(peer->second, message);
+        else if (send(peer->second, message))
+            sent_ += bytes.size() + kPreambleBytes;
     }
     return others;
 }
 
 std::optional<DecodedMessage> PeerLinks::receive(Clock::time_point now) {
     zmq::message_t preamble, message;
+    const auto next_frame = [this](zmq::message_t& frame) {
+        return through_signals([&] { return listens_.recv(frame, zmq::recv_flags::dontwait).has_value(); });
+    };
     for (std::size_t i = 0; heard_.empty() && i < kMostInOneGo; ++i) {
-        if (!listens_.recv(preamble, zmq::recv_flags::dontwait)) break;
-        bool two = preamble.more() && listens_.recv(message, zmq::recv_flags::dontwait).has_value();
-        while (two && message.more() && listens_.recv(message, zmq::recv_flags::dontwait)) two = false;
+        if (!next_frame(preamble)) break;
+        bool two = preamble.more() && next_frame(message);
+        while (two && message.more() && next_frame(message)) two = false;
         if (two && preamble.size() == kPreambleBytes)
             take(preamble, message, now);
         else
@@ -216,46 +249,44 @@ void PeerLinks::take(const zmq::message_t& preamble, const zmq::message_t& messa
     std::memcpy(secret.data(), preamble.data(), secret.size());
     std::memcpy(&count, preamble.data<std::uint8_t>() + secret.size(), sizeof count);
     const auto who = who_says_.find(secret);
-    Peer* peer = who == who_says_.end() ? nullptr : &peers_.at(who->second);
-    if (!peer || peer->floods) {
+    if (who == who_says_.end() || peers_.at(who->second).closed) {
         ++refused_;
         return;
     }
-    take_from(who->second, *peer, count, message, now);
-}
-
-void PeerLinks::take_from(std::uint32_t worker, Peer& peer, std::uint64_t count,
-                          const zmq::message_t& message, Clock::time_point now) {
-    const bool missed = count != std::exchange(peer.count_heard, count) + 1, first = !peer.heard;
+    const std::uint32_t worker = who->second;
+    Peer& peer = peers_.at(worker);
+    const bool first = !peer.heard;
     peer.heard = now;
+    peer.lost = count != std::exchange(peer.count_heard, count) + 1 || peer.lost;
     try {
-        DecodedMessage m = decode_message({message.data<std::uint8_t>(), message.size()});
-        const auto* beats = std::get_if<LinkBeat>(&m.message);
-        if (m.header.worker != worker || (!beats && !std::holds_alternative<PartMessage>(m.message)))
-            throw DecodeError("found what no worker tells another, expected a part or a beat");
-        if (m.header.step > settings_.steps) throw DecodeError("found a step after the last");
-        if (!beats && std::exchange(peer.step, m.header.step) != m.header.step) peer.parts = 0;
-        if (!beats && ++peer.parts > 2 * settings_.most_parts) {
-            std::fprintf(stderr,
-                         "worker: worker %u tells more than a step needs; its link is not heard any more\n",
-                         worker);
-            peer.floods = true;
-            return miss(worker, peer, peer.step);
-        }
-        if (missed) miss(worker, peer, peer.step);
-        if (beats) {
-            if (beats->hears)
-                peer.heard_by = now;
-            else
-                peer.heard_by.reset();
-        } else if (m.header.step >= peer.skip_until) {
-            heard_.push_back(std::move(m));
-        }
-    } catch (const DecodeError&) {
+        read(worker, peer, message);
+    } catch (const DecodeError& wrong) {
         ++refused_;
+        std::fprintf(stderr, "worker: worker %u is heard no more on its link: %s\n", worker, wrong.what());
+        peer.closed = true;
         miss(worker, peer, peer.step);
     }
-    if (first) beat(peer, now);
+    if (first || peer.closed) beat(peer);
+}
+
+void PeerLinks::read(std::uint32_t worker, Peer& peer, const zmq::message_t& message) {
+    DecodedMessage m = decode_message({message.data<std::uint8_t>(), message.size()});
+    const auto* beats = std::get_if<LinkBeat>(&m.message);
+    if (m.header.worker != worker || (!beats && !std::holds_alternative<PartMessage>(m.message)))
+        throw DecodeError("found what no worker tells another, expected a part or a beat");
+    if (beats) {
+        peer.hears_this = beats->hears;
+        if (peer.lost) miss(worker, peer, peer.step);  // of what somebody may be waiting for
+        return;
+    }
+    const std::uint64_t step = m.header.step;
+    if (step < peer.step || step > settings_.steps)
+        throw DecodeError("found a part of step " + std::to_string(step) + ", expected one of " +
+                          std::to_string(peer.step) + " to " + std::to_string(settings_.steps));
+    if (std::exchange(peer.step, step) != step) peer.parts = 0;
+    if (++peer.parts > 2 * settings_.most_parts) throw DecodeError("found more parts than a step needs");
+    if (std::exchange(peer.lost, false)) miss(worker, peer, step);
+    if (step >= peer.skip_until) heard_.push_back(std::move(m));
 }
 
 // Something of this step, the one before or the next one.

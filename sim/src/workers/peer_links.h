@@ -12,6 +12,7 @@
 #include "messages/worker_messages.h"
 #include "workers/curve_keys.h"
 #include "workers/key_gate.h"
+#include "workers/listening.h"
 
 namespace sim {
 
@@ -19,13 +20,15 @@ namespace sim {
 /// connects another to every one that the application has told it of (PUSH). A message has two frames: 16 bytes that only these
 /// two and the application know, and a count of the messages on this link (u64, from 1); then the message itself.
 ///
-/// A link serves while the other one says that it hears (LinkBeat): so a worker that cannot be reached in one direction, or falls
-/// silent, is told by way of the application. That is decided once a step, so that what is told of a step comes one way, in
-/// order. Where a count is missed something is lost: no more of that step is taken from this worker, but that it gave up.
+/// A link serves while the other one says that it hears (LinkBeat), and was heard itself not long ago, or before a step that took
+/// longer: so a worker that cannot be reached in one direction is told by way of the application. That is decided once a step, so
+/// that what is told of a step comes one way, in order. Where a count is missed something is lost: of the step in which that
+/// shows no more is taken from this worker, but that it gave up.
 ///
-/// Bad peers: a message without the right secret is dropped and counted, one that is no part or beat likewise; who tells far more of
-/// one step than steps need is heard no more, and has to tell it by way of the application. No message is larger than `largest`, kMostPartsWaiting of each connection wait, then it is held
-/// back.
+/// Bad peers: a message without the right secret is dropped. Who sends what is no part or beat, parts of steps that are over or after
+/// the last, or more parts of one step than steps need, is heard no more on this link, and has to tell by way of the application.
+/// No message is larger than `largest`; kMostPartsWaiting of each connection wait, then it is held back. Over TCP as many connections
+/// are taken as Listening allows.
 class PeerLinks {
 public:
     using Clock = std::chrono::steady_clock;
@@ -45,48 +48,52 @@ public:
     PeerLinks& operator=(const PeerLinks&) = delete;
 
     [[nodiscard]] const std::optional<ReachMessage>& reach() const noexcept { return reach_; }
-    void add(const PeersMessage& message, Clock::time_point now);
+    void add(const PeersMessage& message);
     void keep(const std::vector<std::uint32_t>& members);  ///< forgets the others
 
-    void look(Clock::time_point now);        ///< sends heartbeats if they are due; call it often
-    void begin_step(Clock::time_point now);  ///< decides who is told directly in this step
+    void look(Clock::time_point now);  ///< sends heartbeats if they are due; call it often
+    void begin_step();                 ///< decides who is told directly in this step
+    /// A step was not done together: who has not been heard for a while may be out of reach.
+    void doubt(Clock::time_point now);
     /// Sends to those that are told directly; returns the others.
     [[nodiscard]] std::vector<std::uint32_t> send(const std::vector<std::uint32_t>& to,
                                                   const std::vector<std::uint8_t>& bytes);
     [[nodiscard]] std::optional<DecodedMessage> receive(Clock::time_point now);  ///< a part
     [[nodiscard]] void* handle() { return listens_.handle(); }                   ///< to poll
 
-    [[nodiscard]] bool is_up(std::uint32_t worker, Clock::time_point now) const;
+    [[nodiscard]] bool is_up(std::uint32_t worker) const;
     [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }  ///< messages
-    [[nodiscard]] std::uint64_t sent() const noexcept { return sent_; }        ///< bytes, of every copy
+    [[nodiscard]] std::uint64_t sent() const noexcept { return sent_; }  ///< bytes of parts, of every copy
 
 private:
     struct Peer {
         zmq::socket_t socket;
         Secret says = {}, hears = {};
         std::uint64_t count_sent = 0, count_heard = 0;
-        std::optional<Clock::time_point> heard, heard_by;  ///< from it; that it says so of this one
-        bool direct = false;                               ///< in this step
-        std::uint64_t step = 0, skip_until = 0;            ///< of its last part; steps below are not taken
-        std::size_t parts = 0;                             ///< of that step
-        bool floods = false;
+        std::string key;
+        std::optional<Clock::time_point> heard;  ///< last
+        bool hears_this = false;                 ///< as it says
+        bool direct = false;                     ///< in this step
+        bool lost = false;                       ///< something of the step of its next part
+        std::uint64_t step = 0, skip_until = 0;  ///< of its last part; steps below are not taken
+        std::size_t parts = 0;                   ///< of that step
+        bool closed = false;                     ///< it is bad
     };
 
     void bind(zmq::context_t& context);
     [[nodiscard]] bool may_connect(const PeersMessage::Peer& peer) const;
     void connect(const PeersMessage::Peer& peer);
-    void set_keys(zmq::socket_t& socket) const;
-    bool send(Peer& peer, const zmq::message_t& message);
-    void beat(Peer& peer, Clock::time_point now);
+    static bool send(Peer& peer, const zmq::message_t& message);
+    void beat(Peer& peer);
     void take(const zmq::message_t& preamble, const zmq::message_t& message, Clock::time_point now);
-    void take_from(std::uint32_t worker, Peer& peer, std::uint64_t count, const zmq::message_t& message,
-                   Clock::time_point now);
+    void read(std::uint32_t worker, Peer& peer, const zmq::message_t& message);
     void miss(std::uint32_t worker, Peer& peer, std::uint64_t step);
 
     Settings settings_;
     zmq::context_t& context_;
     std::unique_ptr<KeyGate> gate_;
     zmq::socket_t listens_;
+    std::optional<Listening> listening_;
     std::optional<ReachMessage> reach_;
     std::map<std::uint32_t, Peer> peers_;
     std::map<Secret, std::uint32_t> who_says_;

@@ -14,6 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 constexpr auto kStruckPoll = 20ms;
 constexpr auto kStruckAnswerWithin = 30s;
+constexpr auto kStruckPaused = 250ms;  // a longer gap between two looks is ours, not the workers' delay
 constexpr auto kStopWithin = 1s;
 constexpr int kStruckMostWorkers = 256;
 constexpr std::int64_t kStruckLargestMessage = 64 << 20;
@@ -208,8 +209,11 @@ void StruckWorkers::accept(Slot& slot, StruckAnswer& answer) {
 
 void StruckWorkers::look_after_workers() {
     const Clock::time_point now = Clock::now();
+    const bool paused = now - std::exchange(looked_, now) > kStruckPaused;
     for (Slot& slot : slots_) {
         if (!slot.alive) continue;
+        for (Pending& pending : slot.pending)
+            if (paused) pending.since = now;
         const bool late = std::ranges::any_of(
             slot.pending, [&](const Pending& pending) { return now - pending.since > kStruckAnswerWithin; });
         if (slot.process.has_ended() || late) lose(slot);

@@ -70,6 +70,7 @@ private:
     double last_t_s_ = 0;
     std::uint32_t epoch_ = 0;
     std::size_t next_slot_ = 0;
+    Clock::time_point looked_;
     WorkerReport report_;
     WorkerGate gate_;
     std::vector<Slot> slots_;  ///< by members' numbers; last: processes end before the gate goes

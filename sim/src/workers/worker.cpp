@@ -137,7 +137,10 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
     } else if (!pulse.application_gone()) {
         throw WorkerError("no answer from " + endpoint + " within 10 s");
     }
-    if (status != 0 && pulse.application_gone()) remove_left_socket(endpoint);
+    if (status != 0 && pulse.application_gone()) {
+        std::fprintf(stderr, "worker: the application is gone, or has given this worker up\n");
+        remove_left_socket(endpoint);
+    }
     return status;
 }
 

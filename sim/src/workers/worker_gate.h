@@ -21,7 +21,7 @@ namespace sim {
 
 /// The application's ROUTER socket on a thread of its own, so that heartbeats are answered and silence is
 /// noticed while the application is busy. A peer is a stranger (known by its ROUTER identity) until it is
-/// admitted under a worker's number. Strangers can only ask to join: other messages of a world are answered
+/// admitted under a worker's number. Strangers can only ask to join: other messages of a worker are answered
 /// with a refusal, anything else is dropped and counted.
 ///
 /// What peers may cost:

@@ -14,6 +14,7 @@
 #include "sim/errors.h"
 #include "workers/elapsed.h"
 #include "workers/peer_links.h"
+#include "workers/through_signals.h"
 #include "world/processor_time.h"
 
 namespace sim {
@@ -33,18 +34,6 @@ void listen_for_drain() {
     action.sa_flags = static_cast<int>(SA_RESETHAND);
     sigaction(SIGTERM, &action, nullptr);
     sigaction(SIGINT, &action, nullptr);
-}
-
-/// A ZeroMQ call, again if a signal interrupts it.
-template <typename Call>
-auto through_signals(const Call& call) {
-    for (;;) {
-        try {
-            return call();
-        } catch (const zmq::error_t& e) {
-            if (e.num() != EINTR) throw;
-        }
-    }
 }
 
 /// Sleeps through a signal too.
@@ -110,15 +99,16 @@ private:
     }
     /// What the application says of the other workers.
     void follow(const WorkerMessage& message) {
-        if (const auto* peers = std::get_if<PeersMessage>(&message)) links_->add(*peers, Clock::now());
+        if (const auto* peers = std::get_if<PeersMessage>(&message)) links_->add(*peers);
         if (const auto* members = std::get_if<Members>(&message)) links_->keep(members->workers);
     }
     void step() {
         const double waited = seconds_since(idle_since_), factor = worker_.slowing();
         const Clock::time_point start = Clock::now();
         waited_within_ = 0;
-        if (links_) links_->begin_step(start);
+        if (links_) links_->begin_step();
         worker_.step([this](bool wait) { flush(wait); });
+        if (links_ && worker_.was_alone()) links_->doubt(Clock::now());
         const double worked = seconds_since(start) - waited_within_;
         if (factor > 1) sleep_for((factor - 1) * worked);
         const double processor = thread_processor_s();
@@ -134,10 +124,11 @@ private:
         if (!must_wait) return;
         const Clock::time_point start = Clock::now();
         wait();
-        waited_within_ += seconds_since(start);
         if (pulse_.application_gone()) throw Gone{};
         take_all();
-        if (waited_within_ > kLongestWithin) worker_.stop_waiting();
+        waited_within_ += seconds_since(start);
+        if (waited_within_ < kLongestWithin) return;
+        worker_.stop_waiting();
     }
     void send_all() {
         for (SharedWorldWorker::Outgoing& message : worker_.outgoing()) {

@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <deque>
 #include <random>
+#include <set>
 
 #include "messages/crc32c.h"
 #include "shared/coordinator.h"
@@ -107,6 +108,43 @@ TEST_P(Damage, OfAFloodingMemberIsBounded) {
     EXPECT_LT(sent, 600u);  // in lockstep as many again as a step that is done together needs
     EXPECT_LT(relayed, 2u << 20);
     EXPECT_NE(record.notes.find("more messages than steps need"), std::string::npos) << record.notes;
+}
+
+// Or behind a translation of addresses: others are not told to connect to somebody else.
+TEST(Reach, IsToldOnlyOfTheAddressThatAWorkerComesFromAndToThoseThatCanUseIt) {
+    DistributedSettings settings;
+    settings.steps = 10;
+    world_test::Record record;
+    Coordinator meeting(world_test::busy_scene(), settings, record);
+    const auto joins = [&](const char* address) {
+        JoinRequest request;
+        request.address = address;
+        return meeting.join(request);
+    };
+    const std::uint32_t one = joins("10.0.0.1"), two = joins("10.0.0.2"), six = joins("2001:db8::7"),
+                        here = joins("127.0.0.1"), local = joins(""), other = joins("");
+    (void)meeting.outgoing();
+    const auto tells = [&](std::uint32_t worker, const char* endpoint) {
+        meeting.take(worker, encode({worker, 0, 0}, ReachMessage{endpoint, ""}));
+        std::set<std::uint32_t> told;
+        for (const Coordinator::Outgoing& out : meeting.outgoing()) {
+            EXPECT_TRUE(std::holds_alternative<PeersMessage>(decode_message(*out.bytes).message));
+            told.insert(out.to.begin(), out.to.end());
+        }
+        return told;
+    };
+    using Told = std::set<std::uint32_t>;
+    EXPECT_EQ(tells(one, "tcp://10.0.0.1:4000"), Told{});
+    for (const char* lie :
+         {"tcp://10.0.0.1:4000", "tcp://10.0.0.22:4000", "tcp://name:4000", "ipc:///tmp/x", ""})
+        EXPECT_EQ(tells(two, lie), Told{}) << lie;
+    EXPECT_EQ(tells(two, "tcp://10.0.0.2:4001"), (Told{one, two}));
+    EXPECT_EQ(tells(two, "tcp://10.0.0.2:4002"), Told{}) << "once";
+    EXPECT_EQ(tells(six, "tcp://[2001:db8::7]:4000"), (Told{one, two, six}));
+    EXPECT_EQ(tells(here, "tcp://127.0.0.1:4000"), Told{}) << "nobody else is on that machine";
+    EXPECT_EQ(tells(local, "tcp://10.0.0.1:4000"), Told{});
+    EXPECT_EQ(tells(local, "ipc:///tmp/musicworld-1-abcdef/peer-7"), Told{});
+    EXPECT_EQ(tells(other, "ipc:///tmp/musicworld-1-abcdef/peer-8"), (Told{local, other}));
 }
 
 INSTANTIATE_TEST_SUITE_P(Paces, Damage, testing::Values(Pace::lockstep, Pace::bounded), [](const auto& pace) {

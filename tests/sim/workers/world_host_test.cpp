@@ -170,6 +170,25 @@ TEST(SharedWorldRun, AMemberThatFloodsAnotherWithOffersIsGivenUpAndTheBitsStay) 
         << testing::PrintToString(watcher.notes);
 }
 
+TEST(SharedWorldRun, AMemberThatFloodsTheLinksAndTellsNoPartsTakesNoWorkerOfOursWithIt) {
+    const sim::WorldScene scene = heap(18);
+    sim::DistributedLaunch launch;
+    launch.listen = "tcp://127.0.0.1:*", launch.expect = 3;
+    launch.longest_step_s = 10;
+    std::optional<HostileMember> hostile;
+    std::vector<sim::WorkerProcess> workers;
+    workers.reserve(2);
+    launch.listening = [&](const std::string& endpoint) {
+        hostile.emplace(endpoint, HostileMember::Habit::floods_links, 0);
+        for (int i = 0; i < 2; ++i) workers.push_back(start_elsewhere(endpoint));
+    };
+    Watcher watcher;
+    const sim::DistributedResult result = sim::run_distributed(scene, lockstep(100), launch, watcher);
+    EXPECT_EQ(watcher.hash, hash_alone(scene, 100));
+    EXPECT_EQ(result.lost, hostile->given_up() ? 1 : 0);
+    for (sim::WorkerProcess& worker : workers) EXPECT_TRUE(comes_true([&] { return worker.has_ended(); }));
+}
+
 TEST(SharedWorldRun, AStrangerThatJoinsAndFallsSilentTakesNoWorkerOfOursWithIt) {
     const sim::WorldScene scene = heap(9);
     Watcher watcher;
