@@ -124,7 +124,9 @@ bool PeerLinks::may_connect(const PeersMessage::Peer& peer) const {
 void PeerLinks::add(const PeersMessage& message) {
     if (!reach_) return;
     for (const PeersMessage::Peer& peer : message.peers) {
-        if (peer.worker == settings_.self || peers_.contains(peer.worker) || !may_connect(peer)) continue;
+        if (peer.worker == settings_.self || peers_.contains(peer.worker) || !may_connect(peer) ||
+            few_descriptors_left())
+            continue;
         try {
             connect(peer);
             beat(peers_.at(peer.worker));
