@@ -18,7 +18,8 @@ while IFS=: read -r pattern folder; do
     found=$(grep -rlE "^ *# *include *[<\"]($pattern)" app tracking sim render audio --include='*.h' --include='*.cpp' | grep -vE "^($folder)/")
     [ -n "$found" ] && complain "$pattern belongs to $folder alone: $found"
 done <<'LIST'
-GL/|assimp/|spng|isa-l/:render
+GL/|assimp/|spng:render
+isa-l/:render|sim
 csound|sndfile:audio
 bson/|fpzip:tracking
 Spectra/:sim
