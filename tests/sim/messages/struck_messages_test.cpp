@@ -3,8 +3,8 @@
 #include <random>
 
 #include "damaged_bytes.h"
-#include "messages/crc32c.h"
 #include "messages/worker_messages.h"
+#include "sealed_message.h"
 #include "test_kit.h"
 
 namespace {
@@ -41,14 +41,6 @@ TEST(StruckMessages, ABodysStateRecordIs120Bytes) {
     EXPECT_EQ(sim::encode({}, two).size() - sim::encode({}, one).size() - empty_lists, 120u);
 }
 
-void seal_struck(std::vector<std::uint8_t>& bytes) {
-    if (bytes.size() < 32) return;
-    const auto length = static_cast<std::uint32_t>(bytes.size());
-    std::memcpy(bytes.data() + 8, &length, 4);
-    const std::uint32_t crc = sim::crc32c({bytes.data(), bytes.size() - 4});
-    std::memcpy(bytes.data() + bytes.size() - 4, &crc, 4);
-}
-
 TEST(StruckMessages, TwentyThousandMutationsAreRefusedOrDecodeToSomethingThatEncodesToTheSameBytes) {
     std::mt19937 rng(15);
     const std::vector<sim::WorkerMessage> messages = struck_samples();
@@ -56,7 +48,7 @@ TEST(StruckMessages, TwentyThousandMutationsAreRefusedOrDecodeToSomethingThatEnc
     for (int i = 0; i < 20000; ++i) {
         std::vector<std::uint8_t> bytes = sim::encode({}, messages[rng() % messages.size()]);
         bytes = damaged(std::move(bytes), rng);
-        if (i % 4) seal_struck(bytes);  // mostly past the checksum, so that the fields' own checks are met
+        if (i % 4) sim_test::seal(bytes);  // mostly past the checksum, so that the fields' own checks are met
         try {
             const sim::DecodedMessage back = sim::decode_message(bytes);
             EXPECT_EQ(sim::encode(back.header, back.message), bytes);

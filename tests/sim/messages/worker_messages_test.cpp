@@ -8,6 +8,7 @@
 #include "damaged_bytes.h"
 #include "messages/crc32c.h"
 #include "messages/update_codec.h"
+#include "sealed_message.h"
 #include "world/manifold.h"
 #include "world_bodies.h"
 
@@ -304,14 +305,6 @@ TEST(WorkerMessages, ChecksumIsCrc32c) {
         EXPECT_EQ(sim::crc32c(std::span(all).last(n)), crc32c_by_bits(std::span(all).last(n))) << n;
 }
 
-void seal_world(std::vector<std::uint8_t>& bytes) {
-    if (bytes.size() < 32) return;
-    const auto length = static_cast<std::uint32_t>(bytes.size());
-    std::memcpy(bytes.data() + 8, &length, 4);
-    const std::uint32_t crc = sim::crc32c({bytes.data(), bytes.size() - 4});
-    std::memcpy(bytes.data() + bytes.size() - 4, &crc, 4);
-}
-
 /// As a worker reads it, piece by piece: refuses what it cannot read, never reads beyond the end.
 void read_as_worker(const std::vector<std::uint8_t>& bytes) {
     try {
@@ -339,7 +332,7 @@ TEST(WorkerMessages, TenThousandMutationsAreRefusedOrDecodeToAMessageThatCanBeWr
     for (int i = 0; i < count; ++i) {
         std::vector<std::uint8_t> bytes = good[rng() % good.size()];
         bytes = damaged(std::move(bytes), rng);
-        if (i % 4) seal_world(bytes);  // mostly past the checksum, so that the fields' own checks are met
+        if (i % 4) sim_test::seal(bytes);  // mostly past the checksum, so that the fields' own checks are met
         read_as_worker(bytes);
         try {
             const sim::DecodedMessage back = sim::decode_message(bytes);

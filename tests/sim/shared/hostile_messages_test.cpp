@@ -5,7 +5,7 @@
 #include <random>
 #include <set>
 
-#include "messages/crc32c.h"
+#include "sealed_message.h"
 #include "shared/coordinator.h"
 #include "shared/shared_world_worker.h"
 #include "shared_scenes.h"
@@ -17,14 +17,6 @@ namespace sim {
 namespace {
 
 class Damage : public testing::TestWithParam<Pace> {};
-
-void seal(std::vector<std::uint8_t>& bytes) {
-    if (bytes.size() < 32) return;
-    const auto length = static_cast<std::uint32_t>(bytes.size());
-    std::memcpy(bytes.data() + 8, &length, sizeof length);
-    const std::uint32_t sum = crc32c(std::span(bytes).first(bytes.size() - 4));
-    std::memcpy(bytes.data() + bytes.size() - 4, &sum, sizeof sum);
-}
 
 // Three workers, of which the first lies; the others have to finish with every body.
 void run_with_a_liar(Pace pace, unsigned seed, int messages, int& sent) {
@@ -66,7 +58,7 @@ void run_with_a_liar(Pace pace, unsigned seed, int messages, int& sent) {
                 const bool lies = number == 0 && turn > 5 && damaged < messages && random() % 4 == 0;
                 for (unsigned n = lies ? 1 + random() % 3 : 0; n > 0; --n)
                     bytes[12 + random() % (bytes.size() - 16)] = static_cast<std::uint8_t>(random());
-                if (lies) seal(bytes), ++damaged;
+                if (lies) sim_test::seal(bytes), ++damaged;
                 meeting.take(number, bytes);
                 meeting.advance();
             }

@@ -87,6 +87,27 @@ protected:
         (void)forger_->send(zmq::buffer(preamble), zmq::send_flags::sndmore);
         (void)forger_->send(zmq::buffer(bytes), zmq::send_flags::none);
     }
+    struct Heard {
+        std::map<std::uint64_t, std::vector<std::uint8_t>> parts;  ///< contents, by steps
+        std::set<std::uint64_t> gave_up;                           ///< steps
+    };
+    /// What two_ hears until a part of this step.
+    Heard heard_until(std::uint64_t last) {
+        Heard heard;
+        EXPECT_TRUE(comes(
+            [&] {
+                for (const sim::DecodedMessage& m : std::exchange(two_.parts, {})) {
+                    const auto& p = std::get<sim::PartMessage>(m.message);
+                    if (p.gave_up)
+                        heard.gave_up.insert(m.header.step);
+                    else
+                        heard.parts[m.header.step].push_back(p.bytes.at(0));
+                }
+                return heard.parts.contains(last);
+            },
+            [&] { two_.take(); }));
+        return heard;
+    }
     const std::string application_ = "tcp://127.0.0.1:9";
     End one_{1, application_}, two_{2, application_};
     std::optional<zmq::socket_t> forger_;
@@ -174,21 +195,8 @@ TEST_F(Links, OfTheStepAfterAGapThatABeatShowsNothingIsTaken) {
     send_as_one(kOfOne, kFrom + 4, part(1, 100, 2));  // not its first
     send_as_one(kOfOne, kFrom + 5, part(1, 100, 3));
     send_as_one(kOfOne, kFrom + 6, part(1, 102, 4));
-    std::vector<std::uint8_t> heard;
-    std::set<std::uint64_t> gave_up;
-    ASSERT_TRUE(comes(
-        [&] {
-            for (const sim::DecodedMessage& m : std::exchange(two_.parts, {})) {
-                const auto& p = std::get<sim::PartMessage>(m.message);
-                if (p.gave_up)
-                    gave_up.insert(m.header.step);
-                else
-                    heard.push_back(p.bytes.at(0));
-            }
-            return !heard.empty() && heard.back() == 4;
-        },
-        [&] { two_.take(); }));
-    EXPECT_EQ(heard, (std::vector<std::uint8_t>{1, 4}));
+    const auto [heard, gave_up] = heard_until(102);
+    EXPECT_EQ(heard, (std::map<std::uint64_t, std::vector<std::uint8_t>>{{52, {1}}, {102, {4}}}));
     for (const std::uint64_t step : {51, 52, 53, 99, 100, 101}) EXPECT_TRUE(gave_up.contains(step)) << step;
 }
 
@@ -200,20 +208,7 @@ TEST_F(Links, OfAStepOfWhichAPartWasLostNoMoreIsTaken) {
     for (std::uint64_t i : {1, 2, 4, 5}) send_as_one(kOfOne, kFrom + i, part(1, 60, std::uint8_t(i)));
     send_as_one(kOfOne, kFrom + 6, part(1, 61, 6));
     send_as_one(kOfOne, kFrom + 7, part(1, 62, 7));
-    std::map<std::uint64_t, std::vector<std::uint8_t>> heard;
-    std::set<std::uint64_t> gave_up;
-    ASSERT_TRUE(comes(
-        [&] {
-            for (const sim::DecodedMessage& m : std::exchange(two_.parts, {})) {
-                const auto& p = std::get<sim::PartMessage>(m.message);
-                if (p.gave_up)
-                    gave_up.insert(m.header.step);
-                else
-                    heard[m.header.step].push_back(p.bytes.at(0));
-            }
-            return heard.contains(62);
-        },
-        [&] { two_.take(); }));
+    const auto [heard, gave_up] = heard_until(62);
     EXPECT_EQ(heard, (std::map<std::uint64_t, std::vector<std::uint8_t>>{{60, {1, 2}}, {62, {7}}}));
     for (const std::uint64_t step : {49, 50, 51, 59, 60, 61}) EXPECT_TRUE(gave_up.contains(step)) << step;
     EXPECT_FALSE(gave_up.contains(62));
