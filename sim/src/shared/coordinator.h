@@ -25,9 +25,10 @@ public:
     Coordinator(const WorldScene& scene, const DistributedSettings& settings, DistributedObserver& observer,
                 const RunState* from = nullptr);
 
+    using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
     struct Outgoing {
         std::vector<std::uint32_t> to;
-        std::shared_ptr<const std::vector<std::uint8_t>> bytes;
+        Bytes bytes;
     };
     /// Admits a worker and returns its number. Queues its scene, then the present ownership and states.
     std::uint32_t join(const JoinRequest& request);
@@ -77,6 +78,8 @@ private:
         std::vector<int> bodies;
     };
 
+    [[nodiscard]] static Bytes shared(std::span<const std::uint8_t> bytes);
+    [[nodiscard]] static std::string name(std::uint32_t worker);
     void take_message(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                       WorkerMessage& message);
     void take_state(const MessageHeader& header, std::span<const std::uint8_t> bytes, StateMessage&& message);

@@ -1,0 +1,341 @@
+#include <algorithm>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "shared/coordinator.h"
+#include "shared/replica_protocol.h"
+#include "world/manifold.h"
+
+// What members say.
+
+namespace sim {
+namespace {
+
+bool is_of_one_machine(const std::string& address) {
+    return address.starts_with("127.") || address == "::1";
+}
+
+/// Whether a worker whose connection comes from this address can listen there.
+bool may_listen(const std::string& address, const std::string& endpoint) {
+    if (address.empty()) return endpoint.starts_with("ipc://");
+    const bool six = address.find(':') != std::string::npos;
+    return endpoint.starts_with("tcp://" + (six ? "[" + address + "]" : address) + ":");
+}
+
+}  // namespace
+
+void Coordinator::refuse(std::uint32_t worker, const std::string& why) {
+    ++result_.refused_messages;
+    const auto sender = senders_.find(worker);
+    if (sender == senders_.end() || std::exchange(sender->second.refused, true)) return;
+    observer_->note("a message of " + name(worker) + " is refused: " + why);
+}
+
+// A member that publishes what cannot be: the others would wait for its step for ever.
+void Coordinator::expel(std::uint32_t worker, const std::string& why) {
+    refuse(worker, why);
+    lose(worker, "its message was refused: " + why);
+}
+
+// Between two steps of all bodies a member does at most `bound` + 1 steps, and makes or answers an offer for each
+// step of each member; in lockstep it publishes a step again when it gets bodies of a lost one. What is relayed or kept
+// for later members is bounded by this.
+bool Coordinator::is_too_much(Sender& sender, std::size_t bytes) const {
+    constexpr std::size_t kMessages = 256, kRepeated = 8;
+    const auto steps = static_cast<std::size_t>(settings_.bound) + 2;
+    if (std::exchange(sender.messages_at, view_.step()) != view_.step())
+        sender.messages = sender.message_bytes = sender.offered = 0;
+    sender.message_bytes += bytes;
+    const std::size_t parts = settings_.pace == Pace::lockstep ? most_parts(scene_) : 0;
+    return ++sender.messages > kMessages + parts + 8 * steps * members_.size() + sender.offered ||
+           sender.message_bytes > kRepeated * steps * static_cast<std::size_t>(largest_message(scene_));
+}
+
+void Coordinator::take(std::uint32_t worker, std::span<const std::uint8_t> bytes) {
+    if (finished_) return;
+    if (!is_member(worker)) return refuse(worker, "found a worker that is no member, expected a member");
+    result_.bytes += bytes.size();
+    senders_[worker].bytes += bytes.size();
+    if (is_too_much(senders_[worker], bytes.size()))
+        return expel(worker, "found more messages than steps need");
+    try {
+        DecodedMessage& decoded = senders_[worker].decoded;
+        decode_message(bytes, decoded);
+        if (decoded.header.worker != worker || decoded.header.epoch > epoch_ ||
+            decoded.header.step > settings_.steps)
+            return expel(worker, "found another worker's number, or a step or epoch to come");
+        take_message(decoded.header, bytes, decoded.message);
+    } catch (const DecodeError& error) {
+        expel(worker, error.what());
+    }
+}
+
+void Coordinator::take_message(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                               WorkerMessage& message) {
+    const std::uint32_t worker = header.worker;
+    if (auto* state = std::get_if<StateMessage>(&message))
+        return take_state(header, bytes, std::move(*state));
+    if (auto* update = std::get_if<UpdateMessage>(&message)) return take_update(header, bytes, *update);
+    if (auto* handover = std::get_if<Handover>(&message)) return take_handover(header, std::move(*handover));
+    if (const auto* offer = std::get_if<Offer>(&message)) {
+        if (is_member(offer->to)) ++senders_[offer->to].offered;
+        return take_dealing(header, bytes, offer->to);
+    }
+    if (const auto* answer = std::get_if<OfferAnswer>(&message))
+        return take_dealing(header, bytes, answer->to);
+    if (auto* reach = std::get_if<ReachMessage>(&message)) return take_reach(header, std::move(*reach));
+    if (auto* relay = std::get_if<RelayMessage>(&message)) return take_relay(header, std::move(*relay));
+    if (std::holds_alternative<Beat>(message)) return;
+    if (const auto* failure = std::get_if<WorkerFailure>(&message)) return lose(worker, failure->what);
+    if (std::holds_alternative<Drained>(message)) {
+        observer_->note(name(worker) + " leaves");
+        ++result_.left;
+        return remove(worker);
+    }
+    refuse(worker, "found a message that no worker sends, expected one of a worker");
+}
+
+void Coordinator::take_relay(const MessageHeader& header, RelayMessage&& message) {
+    const DecodedMessage part = decode_message(message.part);
+    if (settings_.pace != Pace::lockstep || !std::holds_alternative<PartMessage>(part.message) ||
+        part.header.worker != header.worker || part.header.step > settings_.steps)
+        return expel(header.worker, "found a message to others that is no part of a step");
+    std::vector<std::uint32_t> to;
+    for (const std::uint32_t member : members_)
+        if (member != header.worker && std::ranges::find(message.to, member) != message.to.end())
+            to.push_back(member);
+    if (!to.empty()) queue_.push_back({std::move(to), shared(message.part)});
+}
+
+// Tells those with whom it may do steps together, and it of them.
+void Coordinator::take_reach(const MessageHeader& header, ReachMessage&& message) {
+    Sender& here = senders_[header.worker];
+    if (settings_.pace != Pace::lockstep || !settings_.together || !here.reach.endpoint.empty())
+        return refuse(header.worker, "found a link that nobody waits for");
+    // Behind a translation of addresses nobody finds it; and a member must not have others connect to somebody else.
+    if (!may_listen(here.address, message.endpoint)) return;
+    here.reach = std::move(message);
+    PeersMessage all;
+    for (const std::uint32_t other : members_) {
+        const auto& [there, address] = std::tie(senders_[other].reach, senders_[other].address);
+        if (other == header.worker || there.endpoint.empty() || address.empty() != here.address.empty() ||
+            is_of_one_machine(address) != is_of_one_machine(here.address))
+            continue;
+        const Secret says = make_secret(), hears = make_secret();
+        all.peers.push_back({other, there.endpoint, there.key, says, hears});
+        send({other}, PeersMessage{{{header.worker, here.reach.endpoint, here.reach.key, hears, says}}});
+    }
+    if (!all.peers.empty()) send({header.worker}, all);
+}
+
+void Coordinator::take_dealing(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                               std::uint32_t to) {
+    if (to == header.worker) return refuse(header.worker, "found a dealing with itself");
+    if (is_member(to)) queue_.push_back({{to}, shared(bytes)});  // else it has left meanwhile
+}
+
+bool Coordinator::fits(std::uint32_t body, Eigen::Index modes) const {
+    return body < bodies_.size() && bodies_[body].record.state.q.size() == modes;
+}
+
+// Whether these are the worker's bodies, as they may be.
+bool Coordinator::fits(std::uint32_t worker, const std::vector<WorldRecord>& records) const {
+    return std::all_of(records.begin(), records.end(), [&](const WorldRecord& r) {
+        const auto body = static_cast<std::uint32_t>(r.body);
+        return owns(worker, body) && fits(body, r.state.q.size()) && r.sleep_group >= -1 &&
+               r.sleep_group <= r.body;
+    });
+}
+
+bool Coordinator::fits(const std::vector<Mishap>& mishaps) const {
+    return std::all_of(mishaps.begin(), mishaps.end(), [this](const Mishap& m) {
+        return m.number < (m.kind == Mishap::Kind::broken ? scene_.world.constraints.size() : bodies_.size());
+    });
+}
+
+bool Coordinator::owns_constraint(std::uint32_t worker, int constraint) const {
+    if (constraint < 0 || constraint >= static_cast<int>(scene_.world.constraints.size())) return false;
+    const PointConstraint& c = scene_.world.constraints[static_cast<std::size_t>(constraint)];
+    const int first = view_.clock().moves(c.body_a) || c.body_b < 0 ? c.body_a : c.body_b;
+    return owns(worker, static_cast<std::uint32_t>(first));
+}
+
+// Contacts and constraints travel with their first body that moves.
+bool Coordinator::own_contacts(std::uint32_t worker, const StateMessage& message) const {
+    const auto bodies = static_cast<int>(bodies_.size());
+    const auto planes = static_cast<int>(scene_.world.planes.size());
+    const bool contacts =
+        std::all_of(message.contacts.begin(), message.contacts.end(), [&](const ContactRecord& c) {
+            const bool b = c.b >= kFirstPlane ? c.b - kFirstPlane < planes : c.b < bodies;
+            if (c.a < 0 || c.a >= bodies || c.b <= c.a || !b) return false;
+            const int first = view_.clock().moves(c.a) ? c.a : c.b;
+            return owns(worker, static_cast<std::uint32_t>(first));
+        });
+    return contacts &&
+           std::all_of(message.springs.begin(), message.springs.end(),
+                       [&](const SpringRecord& s) { return owns_constraint(worker, s.constraint); });
+}
+
+void Coordinator::publish(Body& body, const WorldRecord& record, std::uint64_t step) {
+    if (step < body.step) return;
+    body.record = record;
+    body.step = step;
+}
+
+void Coordinator::take_state(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                             StateMessage&& message) {
+    if (settings_.pace != Pace::lockstep || header.step == 0 || header.step > view_.step() + 1 ||
+        !fits(header.worker, message.bodies) || !fits(message.report.mishaps))
+        return expel(header.worker, "found states that are not its to publish");
+    if (!own_contacts(header.worker, message))
+        return expel(header.worker, "found contacts that are not its to publish");
+    for (const WorldRecord& record : message.bodies)
+        publish(bodies_[static_cast<std::size_t>(record.body)], record, header.step);
+    report(header, message.report, message.bodies.size(), bytes.size());
+    pass_on(header, bytes, message);
+    view_.take(header.step, std::move(message));
+}
+
+void Coordinator::take_update(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                              const UpdateMessage& message) {
+    Sender& sender = senders_[header.worker];
+    // Of the last step there are two: as done, for the others, and with what came late, for the view.
+    const bool last = header.step == settings_.steps, settled = last && sender.step == header.step;
+    const bool own = std::all_of(message.bodies.begin(), message.bodies.end(), [&](const Update& u) {
+        return owns(header.worker, u.body) && fits(u.body, u.state.q.size()) &&
+               (!u.held || fits(u.body, u.impulse.modal.size()));
+    });
+    const bool crossed = std::ranges::all_of(message.crossed, [&](const CrossImpulse& c) {
+        return owns(header.worker, static_cast<std::uint32_t>(c.own)) &&
+               c.ghost < static_cast<int>(bodies_.size()) && view_.clock().moves_at(c.ghost, header.step);
+    });
+    const bool constraints = std::ranges::all_of(
+        message.broken, [&](std::uint32_t c) { return owns_constraint(header.worker, static_cast<int>(c)); });
+    if (settings_.pace != Pace::bounded || !own || !crossed || !constraints ||
+        !fits(message.report.mishaps) || header.step < sender.step ||
+        (header.step == sender.step && header.step != settings_.steps))
+        return expel(header.worker, "found states that are not its to publish");
+    sender.settled = settled;
+    for (const std::uint32_t c : message.broken) view_.break_constraint(static_cast<int>(c));
+    for (const Update& update : message.bodies) {
+        record_.body = static_cast<int>(update.body);
+        record_.state = update.state;
+        record_.asleep = update.asleep, record_.quarantined = update.quarantined;
+        publish(bodies_[update.body], record_, header.step);
+    }
+    if (!last || sender.settled) extend_sleep(header);
+    report(header, message.report, message.bodies.size(), bytes.size());
+    if (!sender.settled) pass_on(header, bytes);
+    if (!last || sender.settled) view_.take(header.step, message.bodies);
+}
+
+// What sleeps is not published again until it wakes. (Bodies that the sender did not know to be its own when
+// it wrote this are left out.)
+void Coordinator::extend_sleep(const MessageHeader& header) {
+    std::vector<WorldRecord> asleep;
+    for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
+        Body& body = bodies_[static_cast<std::size_t>(i)];
+        if (body.owner != header.worker || body.epoch > header.epoch || body.step >= header.step) continue;
+        if (!body.record.asleep || !view_.clock().moves_at(i, header.step)) continue;
+        body.step = header.step;
+        asleep.push_back(body.record);
+    }
+    view_.take(header.step, asleep);
+}
+
+void Coordinator::take_handover(const MessageHeader& header, Handover&& message) {
+    const auto later = [&](std::uint64_t step) { return step > header.step; };
+    if (!fits(header.worker, message.bodies) || std::ranges::any_of(message.applied, later))
+        return refuse(header.worker, "found bodies that are not its to hand over");
+    std::vector<int> bodies;
+    for (const WorldRecord& record : message.bodies) {
+        // In lockstep what is handed over was published before, with its contacts.
+        if (settings_.pace == Pace::lockstep &&
+            header.step > bodies_[static_cast<std::size_t>(record.body)].step)
+            return refuse(header.worker, "found bodies that it has not published");
+        bodies.push_back(record.body);
+    }
+    std::sort(bodies.begin(), bodies.end());
+    if (std::adjacent_find(bodies.begin(), bodies.end()) != bodies.end())
+        return refuse(header.worker, "found a body twice");
+    view_.take(header.step, message.bodies);
+    for (const WorldRecord& record : message.bodies)
+        publish(bodies_[static_cast<std::size_t>(record.body)], record, header.step);
+    const bool traded = is_member(message.to) && message.to != header.worker;
+    if (traded) {
+        ++result_.trades;
+        result_.migrations += bodies.size();
+        register_owner(bodies, message.to, header.worker, &message);
+    } else if (message.to == kApplication && members_.size() > 1) {
+        // Of one who leaves: not back to it.
+        const std::vector<std::uint32_t> all = members_;
+        std::erase(members_, header.worker);
+        share_out(bodies, header.worker, &message);
+        members_ = all;
+    } else {
+        register_owner(bodies, header.worker, header.worker, &message);
+    }
+    advance();
+}
+
+void Coordinator::pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes) {
+    const auto copy = shared(bytes);
+    std::vector<std::uint32_t> others = members_;
+    std::erase(others, header.worker);
+    if (!others.empty()) queue_.push_back({std::move(others), copy});
+    kept_.emplace_back(header.step, copy);
+}
+
+// Who owns something does the steps itself.
+void Coordinator::pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                          const StateMessage& states) {
+    const auto copy = shared(bytes);
+    std::vector<std::uint32_t> with, without;
+    std::set<std::uint32_t> owners;
+    for (const Body& body : bodies_) owners.insert(body.owner);
+    for (const std::uint32_t member : members_)
+        if (member != header.worker) (owners.contains(member) ? with : without).push_back(member);
+    if (!without.empty()) queue_.push_back({std::move(without), copy});
+    kept_.emplace_back(header.step, copy);
+    if (with.empty()) return;
+    PublishedMessage published{states.report, {}};
+    published.report.mishaps.clear();
+    for (const WorldRecord& record : states.bodies)
+        published.bodies.push_back(static_cast<std::uint32_t>(record.body));
+    queue_.push_back(
+        {std::move(with), std::make_shared<const std::vector<std::uint8_t>>(encode(header, published))});
+}
+
+void Coordinator::report(const MessageHeader& header, const StepReport& report, std::size_t records,
+                         std::size_t bytes) {
+    Sender& sender = senders_[header.worker];
+    sender.step = std::max(sender.step, header.step);
+    WorkerStep step;
+    step.worker = static_cast<int>(header.worker);
+    step.step = header.step;
+    step.seconds = report.seconds, step.smoothed_s = report.smoothed_s, step.waited_s = report.waited_s;
+    step.processor_s = report.processor_s;
+    step.bodies = static_cast<int>(report.own);
+    step.lead = static_cast<int>(report.lead), step.ghost_age = static_cast<int>(report.ghost_age);
+    step.bytes = std::exchange(sender.bytes, 0) + report.linked;
+    result_.bytes += report.linked, result_.bytes_linked += report.linked;
+    step.cross_contacts = static_cast<int>(report.cross_contacts);
+    result_.cpu_s += report.processor_s;
+    result_.cross_contacts += report.cross_contacts;
+    result_.bytes_states += bytes;
+    result_.records += records;
+    result_.largest_lead = std::max(result_.largest_lead, step.lead);
+    result_.largest_ghost_age = std::max(result_.largest_ghost_age, step.ghost_age);
+    if (settings_.pace == Pace::bounded) outside_[header.worker] = report.outside_impulse;
+    for (const Mishap& m : report.mishaps) {
+        const int number = static_cast<int>(m.number);
+        if (m.kind == Mishap::Kind::quarantined)
+            quarantined_.try_emplace(number, QuarantinedBody{number, m.step, m.what});
+        else
+            (m.kind == Mishap::Kind::limited ? limited_ : broken_).try_emplace(number, m.step);
+    }
+    observer_->worked(step);
+}
+
+}  // namespace sim
