@@ -73,15 +73,27 @@ void Columns::assign(std::span<const std::optional<Eigen::Vector3d>> places,
         return std::pair(std::isfinite(h) ? h : -1e300, i);
     };
     std::ranges::sort(there, {}, height);
+    // What stands, by the column over which its middle is: whatever is near enough is there or in one of the eight around.
+    std::unordered_map<Column, std::vector<std::size_t>, Column::Hash> over;
+    const auto stands = [&](std::size_t i) {
+        const Eigen::Vector2d at = across(*places[i]);
+        over[{whole(at.x()), whole(at.y())}].push_back(i);
+    };
+    for (const std::size_t i : standing) stands(i);
     for (const std::size_t i : there) {
         const Eigen::Vector2d at = across(*places[i]);
+        const Column here{whole(at.x()), whole(at.y())};
         std::optional<std::size_t> under;
-        for (const std::size_t j : standing)
-            if (height(j) < height(i) && (!under || height(*under) < height(j)) &&
-                (across(*places[j]) - at).norm() <= kSoft && may_be_in(at, *columns[j]))
-                under = j;
-        columns[i] = under ? *columns[*under] : Column{whole(at.x()), whole(at.y())};
-        standing.push_back(i);
+        for (const Step& step : kAround) {
+            const auto near = over.find({here.x + step.x, here.y + step.y});
+            if (near == over.end()) continue;
+            for (const std::size_t j : near->second)
+                if (height(j) < height(i) && (!under || height(*under) < height(j)) &&
+                    (across(*places[j]) - at).norm() <= kSoft && may_be_in(at, *columns[j]))
+                    under = j;
+        }
+        columns[i] = under ? *columns[*under] : here;
+        stands(i);
     }
 }
 

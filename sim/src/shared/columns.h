@@ -19,6 +19,13 @@ namespace sim {
 struct Column {
     int x = 0, y = 0;
     auto operator<=>(const Column&) const = default;
+    struct Hash {
+        std::size_t operator()(const Column& column) const noexcept {
+            return (static_cast<std::size_t>(static_cast<unsigned>(column.x)) << 32U ^
+                    static_cast<unsigned>(column.y)) *
+                   0x9e3779b97f4a7c15U;
+        }
+    };
 };
 
 /// Cuts space into columns along gravity. Their side is the mean diameter of the scene's bodies that move [m],
@@ -69,18 +76,12 @@ public:
 
 private:
     [[nodiscard]] int count(const Column& column, std::uint32_t worker) const;
-    struct Hash {
-        std::size_t operator()(const Column& column) const noexcept {
-            return (static_cast<std::size_t>(static_cast<unsigned>(column.x)) << 32U ^
-                    static_cast<unsigned>(column.y)) *
-                   0x9e3779b97f4a7c15U;
-        }
-    };
     struct Middle {
         double x = 0, y = 0, bodies = 0;
     };
     std::uint32_t self_;
-    std::unordered_map<Column, std::vector<std::pair<std::uint32_t, int>>, Hash> there_;  // owner, bodies
+    std::unordered_map<Column, std::vector<std::pair<std::uint32_t, int>>, Column::Hash>
+        there_;  // owner, bodies
     std::map<std::uint32_t, Middle> middles_;
     std::vector<Lot> lots_;
 };

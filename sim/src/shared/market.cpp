@@ -16,7 +16,7 @@ namespace {
 // Above the average of the others, as a share of it, for so many steps in a row. Bodies that meet cost more, and
 // a processor may be unsteady, which comes and goes; one that became slower stays so.
 constexpr double kFar = 0.5;
-constexpr int kFarSteps = 5;
+constexpr int kFarSteps = 20;
 constexpr double kNear = 0.03;      // until then, as a share of the average of all
 constexpr double kFarBodies = 1.5;  // by at least so many bodies' cost
 // From turn to turn. A sale is registered within some five steps of its turn's first, so two sales are ten steps apart or
@@ -151,7 +151,10 @@ void Market::take_turn() {
         sum += then.smoothed;
     }
     if (all.empty()) return;
-    const double most = (1 + settings_.dead_band) * sum / static_cast<double>(workers_.size());
+    const double mean = sum / static_cast<double>(workers_.size()), most = (1 + settings_.dead_band) * mean;
+    const Worker::Mark& own = workers_.at(self_).marks[(turn - 1) % 2];
+    const double excess = own.step == step_ - turn_steps_ ? own.smoothed - mean : 0;
+    lasting_ = std::min(excess, std::exchange(excess_, excess));
     std::erase_if(sellers, [most](const auto& seller) { return seller.first <= most; });
     std::ranges::sort(sellers, std::greater());
     if (!sellers.empty() && turn % kHomeTurns != 0) {
@@ -265,6 +268,7 @@ void Market::sell(Holdings& holdings, const Neighbours& neighbours) {
     // What makes the buyer as slow as the average, or one lot; from there on work flows through it.
     if (free_ && theirs < mean) limit = std::min(limit, std::max(mean - theirs + carried_, lot_cost));
     if (free_) limit = std::min(limit, due);
+    const double together = std::min({due, lasting_, (smoothed() - theirs) / 2});  // of several columns
     if (spreads_) limit = std::max(limit, lot_cost);
     if (free_ && !spreads_) {
         if (go_.judged_at == 0) go_ = {step_ + kJudgeSteps, kGo * smoothed(), 0, smoothed()};
@@ -281,7 +285,8 @@ void Market::sell(Holdings& holdings, const Neighbours& neighbours) {
             if (!best || order > best->first) best = {order, i};
         }
         if (best) put_in(holdings, best->second);
-        more = best && free_;
+        more = best.has_value();
+        if (!free_) limit = together;
     }
     carried_ = free_ ? std::clamp(limit - offer_cost_, 0.0, lot_cost) : 0;
 }

@@ -95,8 +95,10 @@ private:
     std::map<std::uint32_t, Worker> workers_;  // members, with this one
     std::uint64_t turn_steps_;                 // from turn to turn
     std::uint64_t step_ = 0, not_before_ = 0;
-    Turn turn_ = Turn::none;                   // this worker's in this step
-    double work_ = 0;                          // own, of a step; smoothed over few steps
+    Turn turn_ = Turn::none;  // this worker's in this step
+    double excess_ = 0;       // over the average, as told when the turn before the last began [s]
+    double lasting_ = 0;      // the least of the last two such [s]
+    double work_ = 0;         // own, of a step; smoothed over few steps
     double many_seconds_ = 0, many_work_ = 0;  // of a step; smoothed over many
     double steps_known_ = 0;                   // of these
     bool free_ = false;                        // to sell more than a column
