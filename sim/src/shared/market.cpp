@@ -132,30 +132,38 @@ bool Market::above(const Worker& worker) const {
 }
 
 void Market::mark(Worker& worker, std::uint64_t step, double smoothed) const {
-    if (step % turn_steps_ == 0) worker.marks[step / turn_steps_ % 2] = {step, smoothed};
+    if (step % turn_steps_ == 0) worker.marks[step / turn_steps_ % worker.marks.size()] = {step, smoothed};
 }
 
-// By what all reported when the turn before began, so that all agree on whose it is.
+// By what all reported when the two turns before began, so that all agree on whose it is. What costs little later, as bodies that
+// meet early, is not sold for.
 void Market::take_turn() {
     turn_ = Turn::none;
+    lasting_ = 0;
     const std::uint64_t turn = step_ / turn_steps_;
     if (step_ % turn_steps_ != 0 || turn < 2) return;
     std::vector<std::uint32_t> all;
-    std::vector<std::pair<double, std::uint32_t>> sellers;  // seconds, number
-    double sum = 0;
-    for (const auto& [number, worker] : workers_) {
-        const Worker::Mark& then = worker.marks[(turn - 1) % 2];
-        if (then.step != step_ - turn_steps_) continue;  // owned nothing
+    std::array<std::map<std::uint32_t, double>, 2> shares;  // of the average
+    for (std::uint64_t before : {1, 2}) {
+        std::map<std::uint32_t, double>& share = shares[before - 1];
+        double sum = 0;
+        for (const auto& [number, worker] : workers_) {
+            const Worker::Mark& then = worker.marks[(turn - before) % worker.marks.size()];
+            if (then.step != step_ - before * turn_steps_) continue;  // owned nothing
+            share[number] = then.smoothed;
+            sum += then.smoothed;
+        }
+        for (auto& of : share) of.second *= static_cast<double>(workers_.size()) / sum;
+    }
+    std::vector<std::pair<double, std::uint32_t>> sellers;  // share, number
+    for (const auto& [number, share] : shares[0]) {
         all.push_back(number);
-        sellers.emplace_back(then.smoothed, number);
-        sum += then.smoothed;
+        const auto before = shares[1].find(number);
+        const double lasting = before == shares[1].end() ? 0 : std::min(share, before->second);
+        if (lasting > 1 + settings_.dead_band) sellers.emplace_back(lasting, number);
+        if (number == self_) lasting_ = lasting - 1;
     }
     if (all.empty()) return;
-    const double mean = sum / static_cast<double>(workers_.size()), most = (1 + settings_.dead_band) * mean;
-    const Worker::Mark& own = workers_.at(self_).marks[(turn - 1) % 2];
-    const double excess = own.step == step_ - turn_steps_ ? own.smoothed - mean : 0;
-    lasting_ = std::min(excess, std::exchange(excess_, excess));
-    std::erase_if(sellers, [most](const auto& seller) { return seller.first <= most; });
     std::ranges::sort(sellers, std::greater());
     if (!sellers.empty() && turn % kHomeTurns != 0) {
         const std::size_t others = sellers.size() - 1;
@@ -268,7 +276,7 @@ void Market::sell(Holdings& holdings, const Neighbours& neighbours) {
     // What makes the buyer as slow as the average, or one lot; from there on work flows through it.
     if (free_ && theirs < mean) limit = std::min(limit, std::max(mean - theirs + carried_, lot_cost));
     if (free_) limit = std::min(limit, due);
-    const double together = std::min({due, lasting_, (smoothed() - theirs) / 2});  // of several columns
+    const double together = std::min(lasting_ * mean, (smoothed() - theirs) / 2);  // of several columns
     if (spreads_) limit = std::max(limit, lot_cost);
     if (free_ && !spreads_) {
         if (go_.judged_at == 0) go_ = {step_ + kJudgeSteps, kGo * smoothed(), 0, smoothed()};

@@ -69,7 +69,7 @@ private:
             std::uint64_t step = 0;
             double smoothed = 0;
         };
-        std::array<Mark, 2> marks = {};  // of its reports, where the last two turns began
+        std::array<Mark, 3> marks = {};  // of its reports, where the last three turns began
     };
     enum class Turn { none, sale, home };
     enum class Sale { none, offered, accepted };
