@@ -455,6 +455,8 @@ bool IslandSolver::springs_are_soft() {
 void IslandSolver::pull_springs() {
     const double half = h_ / 2;
     for (SpringRows& s : springs_) {
+        if (with_ && !concerns_this(s)) continue;
+        const Eigen::Vector3d outside = outside_;
         write_spring(s);
         const PointConstraint& held = s.constraint->definition;
         const double own = mobility_of(s);
@@ -469,6 +471,7 @@ void IslandSolver::pull_springs() {
         const Eigen::Vector3d impulse = in_world(s, s.impulse);
         if (s.told) tell(s, -1, impulse, p, s.place);
         apply(s, impulse, s.place, outside_);
+        if (with_ && !counts_here(s)) outside_ = outside;
     }
 }
 

@@ -140,6 +140,7 @@ void IslandSolver::strike(const Hit& hit) {
     for (const Side& side : seed.side)
         if (side.body >= 0) time = std::max(time, rows_of_[static_cast<std::size_t>(side.body)].time);
     any_struck_ = true;
+    const Eigen::Vector3d outside = outside_;
     hit_bodies_.clear(), struck_.clear();
     for (const Side& side : seed.side)
         if (side.body >= 0) reach(side.body, time);
@@ -167,6 +168,7 @@ void IslandSolver::strike(const Hit& hit) {
         for (float& half : c.at_move) half *= 0.5f;  // directly
         c.largest = c.taken = c.approach = 0;
     }
+    if (with_ && !counts_here(seed)) outside_ = outside;
 }
 
 // Takes a body into the impact.

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <optional>
 
 #include "world/island_solver.h"
 #include "world/step_records.h"
@@ -8,7 +9,8 @@
 // itself, out of the same bits: before it they tell each other the velocities of the bodies on their side. So every contact sees
 // the velocities that it would see if one swept all, and impulses need not be told. A substep has four such meetings or more.
 //
-// Impacts, which are few, each partner computes for itself, all of the island's, once their bodies have been told.
+// Impacts and soft springs are few. Bodies that they join are a group; what they do to it each partner computes for itself that has one of
+// its bodies or a slab beside one, once these have been told.
 //
 // Only islands of which nobody has to know more within a step: no rebounds, no forces but those of soft springs, which all
 // pull alike.
@@ -89,25 +91,95 @@ void IslandSolver::cut() {
     if (const int self = with_->self(); self >= 0)
         first_slab_ = cuts_[static_cast<std::size_t>(self)],
         last_slab_ = cuts_[static_cast<std::size_t>(self) + 1];
-    auto owner = [&](std::size_t slab) {
-        std::size_t p = 0;
-        while (cuts_[p + 1] <= slab) ++p;
-        return static_cast<int>(p);
-    };
+    owner_of_slab_.resize(slabs);
+    for (std::size_t p = 0; p < partners; ++p)
+        for (std::size_t slab = cuts_[p]; slab < cuts_[p + 1]; ++slab)
+            owner_of_slab_[slab] = static_cast<int>(p);
     for (Border& border : borders_) border.partner = -1;
     turns_.clear();
     if (first_slab_ == last_slab_) return;
     if (first_slab_ > 0) {
-        borders_[0].partner = owner(first_slab_ - 1);
+        borders_[0].partner = owner_of_slab_[first_slab_ - 1];
         borders_[0].block = blocks_.interface_after(first_slab_ - 1);
         find_border(borders_[0], first_slab_);
     }
     if (last_slab_ < slabs) {
-        borders_[1].partner = owner(last_slab_);
+        borders_[1].partner = owner_of_slab_[last_slab_];
         borders_[1].block = blocks_.interface_after(last_slab_ - 1);
         find_border(borders_[1], last_slab_ - 1);
     }
     order_turns();
+}
+
+// Which bodies springs and impacts join, whom that concerns, and in which substeps impacts are due.
+void IslandSolver::find_groups(const Island& island) {
+    const std::size_t partners = cuts_.size() - 1;
+    std::vector<int>& root_of = next_of_;
+    root_of.resize(rows_of_.size());
+    for (std::size_t i = 0; i < root_of.size(); ++i) root_of[i] = static_cast<int>(i);
+    auto root = [&](int body) {
+        while (root_of[static_cast<std::size_t>(body)] != body)
+            body = root_of[static_cast<std::size_t>(body)] =
+                root_of[static_cast<std::size_t>(root_of[static_cast<std::size_t>(body)])];
+        return body;
+    };
+    group_of_.assign(rows_of_.size(), -1);
+    due_.clear(), spring_bodies_.clear();
+    auto join = [&](int a, int b) {  // 0: in a group
+        for (const int body : {a, b})
+            if (body >= 0) group_of_[static_cast<std::size_t>(body)] = 0;
+        if (a < 0 || b < 0) return;
+        const int first = root(a), second = root(b);
+        root_of[static_cast<std::size_t>(std::max(first, second))] = std::min(first, second);
+    };
+    auto moving = [this](int id) { return id >= 0 && id < kFirstPlane ? local(id) : -1; };
+    for (const int c : island.constraints) {
+        const PointConstraint& held = (*constraints_)[static_cast<std::size_t>(c)].definition;
+        const int a = moving(held.body_a), b = moving(held.body_b);
+        join(a, b);
+        for (const int body : {a, b})
+            if (body >= 0) spring_bodies_.push_back(static_cast<std::uint32_t>(body));
+    }
+    keep_once(spring_bodies_);
+    for (const int m : island.manifolds) {
+        const Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        if (!is_impact(manifold)) continue;
+        const int a = moving(manifold.a), b = moving(manifold.b);
+        join(a, b);
+        const int substep = substep_of(manifold.points[0]);
+        for (const int body : {a, b})
+            if (body >= 0) due_.push_back({substep, static_cast<std::uint32_t>(body)});
+    }
+    std::ranges::sort(due_, {}, [](const Due& due) { return std::pair(due.substep, due.body); });
+    // Each group's number at its root, which is its first body.
+    int groups = 0;
+    for (std::size_t i = 0; i < group_of_.size(); ++i) {
+        if (group_of_[i] < 0) continue;
+        const int first = root(static_cast<int>(i));
+        group_of_[i] = first == static_cast<int>(i) ? groups++ : group_of_[static_cast<std::size_t>(first)];
+    }
+    concerned_.assign(static_cast<std::size_t>(groups) * partners, 0);
+    for (std::size_t i = 0; i < group_of_.size(); ++i) {
+        if (group_of_[i] < 0) continue;
+        const std::size_t slab = blocks_.slab_of(i), from = slab > 0 ? slab - 1 : 0,
+                          until = std::min(slab + 1, blocks_.slabs() - 1);
+        for (std::size_t s = from; s <= until; ++s)
+            concerned_[static_cast<std::size_t>(group_of_[i]) * partners +
+                       static_cast<std::size_t>(owner_of_slab_[s])] = 1;
+    }
+}
+
+// Whether a partner computes what springs and impacts do to a body.
+bool IslandSolver::concerns(std::uint32_t body, int partner) const {
+    return partner >= 0 && group_of_[body] >= 0 &&
+           concerned_[static_cast<std::size_t>(group_of_[body]) * (cuts_.size() - 1) +
+                      static_cast<std::size_t>(partner)] != 0;
+}
+
+bool IslandSolver::concerns_this(const Manifold& manifold) const {
+    for (const int id : {manifold.a, manifold.b})
+        if (id < kFirstPlane && local(id) >= 0) return concerns(static_cast<std::uint32_t>(local(id)), part_);
+    return false;
 }
 
 void IslandSolver::find_border(Border& border, std::size_t own_slab) {
@@ -135,11 +207,6 @@ bool IslandSolver::begin_together(const Island& island, const ContactScene& scen
         forget_island();
         return false;
     }
-    spring_bodies_.clear();
-    for (const SpringRows& s : springs_)
-        for (const Side& side : s.side)
-            if (side.body >= 0) spring_bodies_.push_back(static_cast<std::uint32_t>(side.body));
-    keep_once(spring_bodies_);
     any_emerging_ = std::ranges::any_of(
         island.manifolds, [this](int m) { return (*manifolds_)[static_cast<std::size_t>(m)].emerging; });
     note_start();
@@ -289,60 +356,63 @@ void IslandSolver::meet_borders(Told told) {
         if (border.partner >= 0) hear(border, told);
 }
 
-// Tells all others how own ones of these bodies move, and takes it of theirs, wherever they are; with the frames, which follow
-// bodies by steps. As the substep begins, or after they moved.
+// Tells those whom it concerns how own ones of these bodies move, and hears it of theirs; with the frames, which follow bodies by
+// steps. As the substep begins, or after they moved.
 void IslandSolver::meet_bodies(const std::vector<std::uint32_t>& bodies, bool moved) {
-    if (substep_ > 0 || moved) {
-        ByteWriter out;
+    const bool told = substep_ > 0 || moved;
+    auto each_for = [&](int owner, int partner, auto visit) {
         for (const std::uint32_t body : bodies)
-            if (is_own_body(body)) {
-                write_motion(out, body);
-                out.matrix(rows_of_[body].frame);
-                if (moved) write_floats(out, speeds_of(body));
-            }
-        with_->tell_all(std::move(out.bytes()));
-        for (int p = 0; p < with_->count(); ++p) {
-            if (p == with_->self()) continue;
-            const Partners::Bytes heard = with_->hear(p);
-            ByteReader in(heard);
-            for (const std::uint32_t body : bodies) {
-                const std::size_t slab = blocks_.slab_of(body);
-                if (slab < cuts_[static_cast<std::size_t>(p)] ||
-                    slab >= cuts_[static_cast<std::size_t>(p) + 1])
-                    continue;
-                read_motion(in, body, false);
-                BodyRows& rows = rows_of_[body];
-                Eigen::Matrix3d frame;
-                for (double& x : frame.reshaped()) x = read_finite(in);
-                rows.turned = rows.turned || frame != rows.frame;
-                rows.frame = frame;
-                rows.body_from_world = frame.transpose().cast<float>();
-                if (!moved) continue;
-                read_floats(in, speeds_of(body));
-                rows.place = rows.body->state.position;
-            }
-            in.expect_end();
-        }
+            if (owner_of_slab_[blocks_.slab_of(body)] == owner && concerns(body, partner)) visit(body);
+    };
+    for (int p = 0; told && p < with_->count(); ++p) {
+        if (p == part_) continue;
+        ByteWriter out;
+        each_for(part_, p, [&](std::uint32_t body) {
+            write_motion(out, body);
+            out.matrix(rows_of_[body].frame);
+            if (moved) write_floats(out, speeds_of(body));
+        });
+        if (!out.bytes().empty()) with_->tell(p, std::move(out.bytes()));
     }
-    for (const std::uint32_t body : bodies)
-        if (!moved && !is_own_body(body)) load_velocities(rows_of_[body]);
+    for (int p = 0; p < with_->count(); ++p) {
+        if (p == part_) continue;
+        std::optional<Partners::Bytes> heard;
+        std::optional<ByteReader> in;
+        each_for(p, part_, [&](std::uint32_t body) {
+            BodyRows& rows = rows_of_[body];
+            if (told && !heard) heard = with_->hear(p), in.emplace(*heard);
+            if (told) read_meeting(*in, body, moved);
+            if (!moved) load_velocities(rows);
+        });
+        if (in) in->expect_end();
+    }
+}
+
+void IslandSolver::read_meeting(ByteReader& in, std::uint32_t body, bool moved) {
+    read_motion(in, body, false);
+    BodyRows& rows = rows_of_[body];
+    Eigen::Matrix3d frame;
+    for (double& x : frame.reshaped()) x = read_finite(in);
+    rows.turned = rows.turned || frame != rows.frame;
+    rows.frame = frame;
+    rows.body_from_world = frame.transpose().cast<float>();
+    if (!moved) return;
+    read_floats(in, speeds_of(body));
+    rows.place = rows.body->state.position;
 }
 
 // Before impacts and springs: the bodies of both, and, if there is any impact in this substep, which is returned, what is beside
 // the borders.
 bool IslandSolver::meet_everywhere() {
     meeting_bodies_ = spring_bodies_;
-    auto is_due = [this](std::size_t contact) { return contacts_[contact].begins == substep_; };
-    for (const std::size_t i : impacts_)
-        for (const Side& side : contacts_[i].side)
-            if (is_due(i) && side.body >= 0) meeting_bodies_.push_back(static_cast<std::uint32_t>(side.body));
+    const auto due = std::ranges::equal_range(due_, substep_, {}, &Due::substep);
+    for (const Due& of : due) meeting_bodies_.push_back(of.body);
     keep_once(meeting_bodies_);
-    const bool any = std::ranges::any_of(impacts_, is_due);
-    if (any) meet_borders(Told::states);
+    if (!due.empty()) meet_borders(Told::states);
     if (!meeting_bodies_.empty()) meet_bodies(meeting_bodies_, false);
     for (const std::size_t i : impacts_)
-        if (is_due(i) && substep_ > 0) write_contact(contacts_[i]);
-    return any;
+        if (contacts_[i].begins == substep_ && substep_ > 0) write_contact(contacts_[i]);
+    return !due.empty();
 }
 
 bool IslandSolver::any_of_all(bool here) {
@@ -381,6 +451,8 @@ void IslandSolver::write_part(ByteWriter& out) const {
         for (const int m : blocks_.manifolds_of(b))
             write_impulses(out, (*manifolds_)[static_cast<std::size_t>(m)]);
     });
+    for (const SpringRows& s : springs_)
+        if (counts_here(s)) out.matrix(s.moved), out.matrix(s.impulse), write_floats(out, {s.k[0], 9});
 }
 
 void IslandSolver::read_part(ByteReader& in, int partner) {
@@ -392,12 +464,18 @@ void IslandSolver::read_part(ByteReader& in, int partner) {
         for (const int m : blocks_.manifolds_of(b))
             read_impulses(in, (*manifolds_)[static_cast<std::size_t>(m)]);
     });
+    for (SpringRows& s : springs_) {
+        if (owner_of_slab_[blocks_.slab_of(static_cast<std::size_t>(first_body(s)))] != partner) continue;
+        for (Eigen::Vector3d* half : {&s.moved, &s.impulse})
+            for (double& p : *half) p = read_finite(in);
+        read_floats(in, {s.k[0], 9});
+    }
 }
 
 bool IslandSolver::end_together() {
     const bool far = static_cast<double>(missed_) > kMissedAtRest * smallest_ + kMissedShare * fastest_,
                uneven = is_uneven_island();
-    const bool otherwise = impacts_.empty() && (far || uneven) &&
+    const bool otherwise = !any_impacts_ && (far || uneven) &&
                            may_go_directly(uneven ? most_with_springs() : most_with_contacts());
     if (!otherwise) {
         if (with_->self() >= 0) outside_of_[static_cast<std::size_t>(with_->self())] = outside_;

@@ -101,7 +101,7 @@ IslandSolver::Part IslandSolver::part_of(std::span<const int> manifolds) const {
 // The contacts' rows, in the order of blocks.
 void IslandSolver::add_contacts(const Island& island) {
     blocks_.divide(crew(), places_, island.manifolds, *manifolds_, local_);
-    if (with_) cut();
+    if (with_) cut(), find_groups(island);
     sums_.assign(blocks_.slabs(), {});
     parts_.resize(blocks_.size());
     crew().each(parts_.size(), 1, [this](int, std::size_t first, std::size_t last) {
@@ -127,6 +127,7 @@ void IslandSolver::add_contacts(const Island& island) {
     jacobians_used_ = all.floats;
     springs_.clear(), impacts_.clear(), first_contact_.clear();
     any_told_ = direct_ = any_bounce_ = any_struck_ = any_rebound_ = any_emerging_ = false;
+    any_impacts_ = all.impacts;
     first_crossed_ = crossed_.size();
     contacts_.resize(all.contacts);
     for (auto* list : {&striking_, &struck_}) list->reserve(all.contacts);
@@ -181,7 +182,7 @@ void IslandSolver::stiffen(const Island& island) {
     }
 }
 
-// A block's contacts, by turns within windows; of one that another partner sweeps only impacts.
+// A block's contacts, by turns within windows; of one that another partner sweeps only impacts that concern this one.
 void IslandSolver::fill_part(std::span<const int> manifolds, Window& window, Part& part, bool impacts_alone) {
     auto turns_of = [&](int id) -> int* {
         if (id >= kFirstPlane || local(id) < 0) return nullptr;
@@ -214,7 +215,7 @@ void IslandSolver::flush(Window& window, Part& part, bool impacts_alone) {
     for (std::size_t i = 0; i < window.contacts.size(); ++i) {
         ContactRows& c = contacts_[part.contacts++];
         Manifold& manifold = *by_turn[i]->manifold;
-        if (!impacts_alone || manifold.points[0].begins >= 0) {
+        if (!impacts_alone || (manifold.points[0].begins >= 0 && concerns_this(manifold))) {
             fill_contact(c, manifold, manifold.points[static_cast<std::size_t>(by_turn[i]->point)], part);
             continue;
         }
@@ -319,13 +320,19 @@ void IslandSolver::finish_rows(Rows& rows) {
         }
 }
 
+// In which an impact is due.
+int IslandSolver::substep_of(const ManifoldPoint& point) const {
+    return static_cast<int>(std::min(static_cast<double>(point.begins) * settings_->substeps / settings_->dt,
+                                     settings_->substeps - 1.));
+}
+
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     Part part;
     part.floats = jacobians_used_;
     fill_contact(contacts_.emplace_back(), manifold, point, part);
     jacobians_used_ = part.floats;
     note(part);
-    if (contacts_.back().firm) impacts_.push_back(contacts_.size() - 1);
+    if (contacts_.back().firm) impacts_.push_back(contacts_.size() - 1), any_impacts_ = true;
 }
 
 // part: where its rows begin among jacobians_, and what it is then noted in.
@@ -354,8 +361,7 @@ void IslandSolver::fill_contact(ContactRows& c, Manifold& manifold, ManifoldPoin
     c.impulse[1] = point.friction_impulse.dot(c.tangent[0]);
     c.impulse[2] = point.friction_impulse.dot(c.tangent[1]);
     if (!c.firm) return;
-    c.begins =
-        static_cast<int>(std::min(c.starts * settings_->substeps / settings_->dt, settings_->substeps - 1.));
+    c.begins = substep_of(point);
     c.over = std::isinf(c.starts);
 }
 

@@ -70,13 +70,13 @@ bool IslandSolver::may_gain() const {
 }
 
 bool IslandSolver::is_far_from_solved() const {
-    return impacts_.empty() && !any_struck_ && !among_ghosts() &&
+    return !any_impacts_ && !any_struck_ && !among_ghosts() &&
            residual() > kMissedAtRest * smallest_ + kMissedShare * fastest_;
 }
 
 // Whether bodies touch much lighter ones, nothing else.
 bool IslandSolver::is_uneven() const {
-    if (!impacts_.empty() || any_struck_ || among_ghosts()) return false;
+    if (any_impacts_ || any_struck_ || among_ghosts()) return false;
     std::atomic<bool> uneven = false;
     crew().each(contacts_.size(), 64, [&](int, std::size_t first, std::size_t last) {
         for (const ContactRows& c : std::span(contacts_).subspan(first, last - first)) {
@@ -137,13 +137,11 @@ void IslandSolver::substep(bool last) {
         bodies(&Solver::turn_frames), contacts(&Solver::turn_rows, Told::skipped);
     bodies(&Solver::load_velocities);
     Told border = Told::states;
-    if (any_bounce_ || !impacts_.empty() || !springs_.empty()) {
+    if (any_bounce_ || any_impacts_ || !springs_.empty()) {
         run();
         if (with_ && meet_everywhere()) border = Told::velocities;
-        const Eigen::Vector3d outside = outside_;
-        if (any_bounce_ || !impacts_.empty()) strike();
+        if (any_bounce_ || any_impacts_) strike();
         pull_springs();
-        if (with_ && with_->self() != 0) outside_ = outside;  // one counts what all do alike
     }
     contacts(&Solver::warm_start, border);
     contacts(&Solver::sweep<Push::soft>, Told::velocities);
@@ -155,13 +153,11 @@ void IslandSolver::substep(bool last) {
     if (!springs_.empty()) {
         run();
         if (with_) meet_bodies(spring_bodies_, true);
-        const Eigen::Vector3d outside = outside_;
         modes_ahead_ = true;
         pull_springs();
         modes_ahead_ = false;
-        if (with_ && with_->self() != 0) outside_ = outside;
     }
-    const bool follow = pushes_out_ || any_rebound_ || !impacts_.empty();
+    const bool follow = pushes_out_ || any_rebound_ || any_impacts_;
     if (follow) contacts(&Solver::follow_rows, Told::places);
     contacts(&Solver::sweep<Push::none>, follow ? Told::velocities : Told::places);
     contacts(&Solver::sweep<Push::none>, Told::velocities);

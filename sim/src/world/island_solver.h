@@ -308,6 +308,7 @@ private:
     };
     [[nodiscard]] Part part_of(std::span<const int> manifolds) const;
     void add_contacts(const Island& island);
+    [[nodiscard]] int substep_of(const ManifoldPoint& point) const;
     void fill_part(std::span<const int> manifolds, Window& window, Part& part, bool impacts_alone);
     void flush(Window& window, Part& part, bool impacts_alone);
     void add_contact(Manifold& manifold, ManifoldPoint& point);
@@ -556,11 +557,25 @@ private:
     void hear(const Border& border, Told told);
     void begin_borders();
     void meet_borders(Told told);
+    void find_groups(const Island& island);
+    [[nodiscard]] bool concerns(std::uint32_t body, int partner) const;
+    [[nodiscard]] bool concerns_this(const Manifold& manifold) const;
+    [[nodiscard]] bool concerns_this(const Rows& rows) const {
+        return concerns(static_cast<std::uint32_t>(first_body(rows)), part_);
+    }
+    /// Of two or more who compute the same, one adds up what comes from outside.
+    [[nodiscard]] bool counts_here(const Rows& rows) const {
+        return is_own_body(static_cast<std::size_t>(first_body(rows)));
+    }
+    [[nodiscard]] static int first_body(const Rows& rows) {
+        return rows.side[rows.side[0].body >= 0 ? 0 : 1].body;
+    }
     void meet_bodies(const std::vector<std::uint32_t>& bodies, bool moved);
     [[nodiscard]] bool meet_everywhere();
     [[nodiscard]] bool any_of_all(bool here);
     void write_motion(ByteWriter& out, std::uint32_t body) const;
     void read_motion(ByteReader& in, std::uint32_t body, bool begins);
+    void read_meeting(ByteReader& in, std::uint32_t body, bool moved);
     void turn_frame_on(BodyRows& rows);
     template <typename Body>
     void each_body_of(int partner, Body visit) const;
@@ -584,6 +599,16 @@ private:
     };
     std::vector<BlockTurn> turns_;
     std::vector<std::size_t> blocks_left_;  // without a turn yet
+    std::vector<int> owner_of_slab_;        // which partner
+    /// Bodies that springs and impacts of the step join, directly or over others: each body's group, or -1, and of each group which
+    /// partners compute what these do to it: those whose slabs, or whose neighbouring slabs, it is in.
+    std::vector<int> group_of_;
+    std::vector<std::uint8_t> concerned_;  // [group][partner]
+    struct Due {
+        int substep;
+        std::uint32_t body;
+    };
+    std::vector<Due> due_;  // bodies of impacts, ascending
     std::vector<std::uint32_t> spring_bodies_, meeting_bodies_;
     float missed_ = 0;                         // most of residual() in all parts
     std::vector<Eigen::Vector3d> outside_of_;  // of each part, as outside_
@@ -627,7 +652,8 @@ private:
     std::vector<SpringRows> springs_;
     bool springs_soft_ = true;          // as the step begins
     bool modes_ahead_ = false;          // springs' ends are where the substep takes them, with their modes
-    std::vector<std::size_t> impacts_;  // contacts, of fast pairs
+    std::vector<std::size_t> impacts_;  // contacts, of fast pairs; together those that concern this partner
+    bool any_impacts_ = false;          // in the island
     std::vector<Hit> hits_;             // of the substep, by time
     std::vector<int> hit_bodies_;       // of the impact that is being solved
     std::vector<std::size_t> striking_, struck_;            // contacts, now and since it began
