@@ -231,6 +231,28 @@ TEST(Simulate, WorkersThatCheckEachOtherGiveTheBitsOfOneProcessAndImpossibleChec
                    "--verify 3");
 }
 
+TEST(Simulate, ThreadsOfWorkersChangeNoBitInLockstepAndEndARunOutOfStep) {
+    const std::vector<std::string> scene = {"simulate", "benchmark100", "--steps", "40", "--json"};
+    const auto run_with = [&scene](const std::vector<std::string>& more) {
+        std::vector<std::string> words = scene;
+        words.insert(words.end(), more.begin(), more.end());
+        const Ended ended = run(words);
+        EXPECT_EQ(ended.status, 0) << ended.err;
+        return json::parse(ended.out);
+    };
+    const json alone = run_with({});
+    for (const char* verify : {"1", "2"})
+        EXPECT_EQ(run_with({"--workers", "2", "--threads", "3", "--verify", verify})["state_hash"],
+                  alone["state_hash"])
+            << verify;
+    const json apart = run_with({"--workers", "2", "--threads", "3", "--mode", "async"});
+    EXPECT_EQ(apart["workers_lost"], 0);
+    EXPECT_EQ(apart["steps"], 40);
+    std::vector<std::string> simulated = scene;
+    simulated.insert(simulated.end(), {"--workers", "2", "--threads", "3", "--processors", "simulated"});
+    expect_refused(run(simulated), "--threads 3");
+}
+
 TEST(Simulate, TheLinesThatItPrintsForWorkersElsewhereMakeThemJoin) {
     const Folder folder;
     write(folder / "scene.toml", kScene);

@@ -4,6 +4,8 @@ namespace app {
 
 class Command;
 
+constexpr int kMostThreads = 256;  ///< that share out a step
+
 // Each adds a command to the program.
 void add_bench_command(Command& program);  ///< becomes musicworld_bench, a program beside this one
 void add_compare_command(Command& program);

@@ -21,8 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMostThreads = 256;
-
 void print_workers(const SimulateResult& r) {
     const WorkerOptions& o = *r.worker_options;
     fmt::print("{}, {}, {}: {:.1f} bytes per body and step, {} between workers, {} traded\n",
@@ -122,9 +120,10 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
         ->excludes(blur);
     command.option("--resume", o->resume, as::text("DIR"),
                    "Instead of SCENE: go on with the interrupted run in this folder, with its options");
-    command.option("--threads", o->threads, as::whole(1, kMostThreads),
-                   "Threads that share out each step, without workers; default: one a processor core, 8 at "
-                   "most. No result depends on how many");
+    command.option(
+        "--threads", o->threads, as::whole(1, kMostThreads),
+        "Threads that share out each step; default: one a processor core, 8 at most. With --workers those of "
+        "each that is started here, see `worker`; default 1. No result depends on how many");
     add_worker_options(command, o->workers);
     command.flag(
         "--allow-quarantine", o->allow_quarantine,

@@ -64,12 +64,17 @@ void add_worker_command(Command& program) {
     Command command = program.command("worker", "Join a simulation, from this host or any other");
     struct Options {
         std::string endpoint, key;
+        int threads = 1;
     };
     auto o = std::make_shared<Options>();
     command.required("--connect", o->endpoint, as::text("ENDPOINT"),
                      "ZeroMQ endpoint of the application: tcp://ADDRESS:PORT");
     command.option("--key", o->key, as::text("FILE"), "This worker's key, made by `musicworld keys`");
-    command.runs([o] { throw ExitStatus{sim::run_worker(o->endpoint, o->key)}; });
+    command.option(
+        "--threads", o->threads, as::whole(1, kMostThreads),
+        "Threads that share out the steps of a simulation that it does by itself: all with --mode async, "
+        "with --mode sync those done alone");
+    command.runs([o] { throw ExitStatus{sim::run_worker(o->endpoint, o->key, o->threads)}; });
 }
 
 void add_sensor_command(Command& program) {

@@ -64,9 +64,11 @@ void print_how_to_join(const std::string& endpoint, const fs::path& keys) {
         tell(fmt::format("listening: musicworld worker --connect {}{}", endpoint, key));
 }
 
-sim::DistributedLaunch launch_of(const WorkerOptions& workers) {
+sim::DistributedLaunch launch_of(const WorkerOptions& workers, int threads) {
     sim::DistributedLaunch launch;
-    launch.processes = {fs::read_symlink("/proc/self/exe").string(), {"worker"}, workers.count};
+    launch.processes = {fs::read_symlink("/proc/self/exe").string(),
+                        {"worker", "--threads", std::to_string(threads)},
+                        workers.count};
     launch.listen = workers.listen;
     launch.expect = workers.expect;
     launch.verify = workers.verify;
@@ -86,7 +88,8 @@ sim::DistributedResult run(const Scene& scene, const SimulateOptions& options,
                               options.threads.value_or(int(worthwhile_threads())));
     if (options.workers->simulated)
         return sim::simulate_processors(scene, settings, *options.workers->simulated, observer);
-    return sim::run_distributed(scene, settings, launch_of(*options.workers), observer, from);
+    return sim::run_distributed(scene, settings, launch_of(*options.workers, options.threads.value_or(1)),
+                                observer, from);
 }
 
 /// Changes what is left to a scene's accuracy.
@@ -102,10 +105,11 @@ KeptAccuracy keep(double accuracy, const SimulateOptions& options, std::uint64_t
 }
 
 void check(const SimulateOptions& options, const Scene& scene) {
-    if (options.threads && options.workers)
-        throw BadInput(fmt::format(
-            "error: found --threads {} with workers, expected one of both; a worker computes with one thread",
-            *options.threads));
+    if (options.threads && options.workers && (options.workers->simulated || options.workers->count == 0))
+        throw BadInput(
+            fmt::format("error: found --threads {} without a worker process that is started here, expected "
+                        "--workers N; whoever starts others tells them: musicworld worker --threads {}",
+                        *options.threads, *options.threads));
     if (options.until_rest && !scene.world.settings.sleeping)
         throw BadInput(fmt::format(
             "{}: error: found sleeping = false, expected true for --until rest; change one of them",

@@ -69,7 +69,7 @@ struct WorkerStep {
     double seconds = 0;      ///< worked, without waiting, by the clock that the run uses
     double smoothed_s = 0;   ///< the same, as smoothed for load balancing
     double waited_s = 0;     ///< waited before it, for other workers
-    /// Processor time of the thread that steps, with what it did for other workers since the step before; on
+    /// Processor time of the thread that steps (of a worker with several threads: of its process), with what it did for other workers since the step before; on
     /// simulated processors theirs.
     double processor_s = 0;
     int bodies = 0;     ///< own
@@ -210,9 +210,10 @@ DistributedResult simulate_processors(const WorldScene& scene, const Distributed
 void make_keys(const std::filesystem::path& folder, const std::vector<std::string>& workers);
 
 /// A worker's process: joins the application at `endpoint`, of a world or of a kit, and serves until the run
-/// ends. SIGTERM or SIGINT: hands its bodies over and leaves. `key`: file made by make_keys, empty: none.
+/// ends. SIGTERM or SIGINT: hands its bodies over and leaves. `key`: file made by make_keys, empty: none. `threads` share out
+/// the steps of a world that it does by itself, as World::use_threads: all out of step, in lockstep those done alone.
 /// Returns the exit status. Throws InputError for an endpoint or key that is refused, WorkerError
 /// if nobody answers.
-[[nodiscard]] int run_worker(const std::string& endpoint, const std::filesystem::path& key);
+[[nodiscard]] int run_worker(const std::string& endpoint, const std::filesystem::path& key, int threads = 1);
 
 }  // namespace sim

@@ -273,8 +273,8 @@ public:
     /// step() by several who each have all of this world, with the same bits; by one, if there is no other. Throws NotTogether
     /// or DecodeError where it comes to no end so: the world is as it was before then.
     void step_together(Partners& with);
-    /// So many threads share out the steps of a world that is not shared, at first one: this one and helpers that sleep between
-    /// steps. No result depends on how many. Throws std::invalid_argument below 1.
+    /// So many threads share out the world's steps, at first one: this one and helpers that sleep between steps. (What several
+    /// partners do together, each does with one.) No result depends on how many. Throws std::invalid_argument below 1.
     void use_threads(int threads);
     /// Instead, for benchmarks: this thread does alone what so many would share out, and times each piece of it. The
     /// processor time of steps less what saved_by_threads_s() grows by is then their critical path among so many

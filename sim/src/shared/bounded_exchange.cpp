@@ -42,6 +42,7 @@ public:
     [[nodiscard]] int lead() const override;
     [[nodiscard]] int ghost_age() const override { return ghost_age_; }
     [[nodiscard]] const World& world() const override { return world_; }
+    void use_threads(int threads) override { world_.use_threads(threads); }
 
 private:
     struct Felt {                   // what other bodies of this worker do to an own one

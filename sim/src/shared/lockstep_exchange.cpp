@@ -53,6 +53,7 @@ public:
     [[nodiscard]] int ghost_age() const override { return 0; }
     [[nodiscard]] bool was_alone() const override { return was_alone_; }
     [[nodiscard]] const World& world() const override { return replica_.world(); }
+    void use_threads(int threads) override { replica_.world().use_threads(threads); }
 
 private:
     class Together;

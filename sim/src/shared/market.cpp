@@ -135,13 +135,13 @@ void Market::mark(Worker& worker, std::uint64_t step, double smoothed) const {
     if (step % turn_steps_ == 0) worker.marks[step / turn_steps_ % worker.marks.size()] = {step, smoothed};
 }
 
-// By what all reported when the two turns before began, so that all agree on whose it is. What costs little later, as bodies that
-// meet early, is not sold for.
+// By what all reported when the two turns before began, so that all agree on whose it is: what is above the average for a
+// few steps only is not sold for.
 void Market::take_turn() {
     turn_ = Turn::none;
     lasting_ = 0;
     const std::uint64_t turn = step_ / turn_steps_;
-    if (step_ % turn_steps_ != 0 || turn < 2) return;
+    if (step_ % turn_steps_ != 0 || turn < 3) return;
     std::vector<std::uint32_t> all;
     std::array<std::map<std::uint32_t, double>, 2> shares;  // of the average
     for (std::uint64_t before : {1, 2}) {
@@ -153,6 +153,7 @@ void Market::take_turn() {
             share[number] = then.smoothed;
             sum += then.smoothed;
         }
+        if (!(sum > 0)) return;
         for (auto& of : share) of.second *= static_cast<double>(workers_.size()) / sum;
     }
     std::vector<std::pair<double, std::uint32_t>> sellers;  // share, number

@@ -28,9 +28,9 @@ namespace sim {
 /// become slower than both declines; sold work counts for the buyer at once, and reports written before the
 /// registration (older epoch) are ignored, otherwise stale figures would sell the same work twice. Trade is
 /// free while somebody owns nothing, or once a worker has been far above the average for some steps, until it
-/// is near it. Else those above the average take turns, the slowest first, every 16 steps (more only for bounds above
-/// 15), and sell one column. Whose turn it is follows from what all reported of the step in which the turn before
-/// began, which everybody has heard by then.
+/// is near it. Else those above the average in each of the last two turns take turns, the slowest first, every 16 steps
+/// (more only for bounds above 15), and sell what of it was above the average in both, one column at least. Whose turn it
+/// is follows from what all reported of the steps in which the two turns before began, which everybody has heard by then.
 ///
 /// Bodies that have come to lie among another worker's go home to it: lots that make the border shorter are
 /// given away although times are level, if the other stays level. For this all take turns, too: every fourth turn, and
@@ -96,9 +96,8 @@ private:
     std::uint64_t turn_steps_;                 // from turn to turn
     std::uint64_t step_ = 0, not_before_ = 0;
     Turn turn_ = Turn::none;  // this worker's in this step
-    double excess_ = 0;       // over the average, as told when the turn before the last began [s]
-    double lasting_ = 0;      // the least of the last two such [s]
-    double work_ = 0;         // own, of a step; smoothed over few steps
+    double lasting_ = 0;  // what both of the last two turns began with above the average, as a share of it
+    double work_ = 0;     // own, of a step; smoothed over few steps
     double many_seconds_ = 0, many_work_ = 0;  // of a step; smoothed over many
     double steps_known_ = 0;                   // of these
     bool free_ = false;                        // to sell more than a column

@@ -76,6 +76,7 @@ public:
     /// Lockstep: the last step was done alone, as something kept it from being done with the others.
     [[nodiscard]] virtual bool was_alone() const { return false; }
     [[nodiscard]] virtual const World& world() const = 0;
+    virtual void use_threads(int threads) = 0;  ///< see World::use_threads
 };
 
 /// No worker tells more parts of one step (PartMessage).

@@ -19,6 +19,7 @@ public:
     /// flush(wait): called where the step tells others, and where it needs what they tell. Sends outgoing(); wait: and
     /// returns once something has come and was given to take(). Without it the step is done alone.
     void step(const std::function<void(bool wait)>& flush = {});
+    void use_threads(int threads) { exchange_->use_threads(threads); }  ///< see World::use_threads
     void stop_waiting() { exchange_->members_within({}); }  ///< within flush: the step is done alone
     struct Times {                                          ///< of a step, see WorkerStep
         double seconds = 0, waited_s = 0, processor_s = 0;

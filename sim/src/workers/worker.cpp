@@ -119,7 +119,8 @@ int serve(const WorldLink& link, DecodedMessage&& first) {
     return std::holds_alternative<EndOfRun>(first.message) ? 0 : 1;
 }
 
-int serve(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys) {
+int serve(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys,
+          int threads) {
     zmq::socket_t socket = connect_worker(context, endpoint, keys, kLingerMs);
     socket.set(zmq::sockopt::rcvtimeo, kLookMs);
     const Secret secret = own_secret();
@@ -129,7 +130,8 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
     int status = 1;
     if (wait_for_answer(socket, pulse, frame)) {
         try {
-            status = serve({context, socket, pulse, endpoint, keys}, decode_message(bytes_of(frame)));
+            status =
+                serve({context, socket, pulse, endpoint, keys, threads}, decode_message(bytes_of(frame)));
         } catch (const DecodeError& e) {
             send(socket, encode({}, WorkerFailure{e.what()}));
             throw WorkerError(std::string("bad message: ") + e.what());
@@ -150,13 +152,13 @@ int run_worker(const std::string& endpoint) {
     return run_worker(endpoint, {});
 }
 
-int run_worker(const std::string& endpoint, const std::filesystem::path& key) {
+int run_worker(const std::string& endpoint, const std::filesystem::path& key, int threads) {
     std::optional<WorkerKeys> keys;
     if (!key.empty()) keys = read_worker_keys(key);
     check_endpoint(endpoint, keys.has_value());
     try {
         zmq::context_t context;
-        return serve(context, endpoint, keys);
+        return serve(context, endpoint, keys, threads);
     } catch (const std::exception& e) {
         std::fprintf(stderr, "worker: %s\n", e.what());
     }

@@ -44,7 +44,12 @@ void sleep_for(double seconds) {
 class WorldService {
 public:
     WorldService(const WorldLink& link, const SceneMessage& scene)
-        : socket_(link.socket), pulse_(link.pulse), worker_(scene), header_{scene.worker, 0, 0} {
+        : socket_(link.socket),
+          pulse_(link.pulse),
+          threads_(link.threads),
+          worker_(scene),
+          header_{scene.worker, 0, 0} {
+        worker_.use_threads(threads_);
         if (scene.settings.pace != Pace::lockstep || !scene.settings.together) return;
         links_.emplace(link.context, PeerLinks::Settings{scene.worker, link.endpoint, link.keys,
                                                          largest_message(scene.scene),
@@ -111,12 +116,15 @@ private:
         if (links_ && worker_.was_alone()) links_->doubt(Clock::now());
         const double worked = seconds_since(start) - waited_within_;
         if (factor > 1) sleep_for((factor - 1) * worked);
-        const double processor = thread_processor_s();
+        const double processor = processor_s();
         const std::uint64_t linked = links_ ? links_->sent() : 0;
         worker_.worked({std::max(factor, 1.0) * worked, waited + waited_within_,
                         processor - std::exchange(told_processor_, processor),
                         linked - std::exchange(told_linked_, linked)});
         idle_since_ = Clock::now();
+    }
+    [[nodiscard]] double processor_s() const {
+        return threads_ == 1 ? thread_processor_s() : process_processor_s();
     }
     /// Within a step: until something came, or what others do not tell has been waited for long enough.
     void flush(bool must_wait) {
@@ -158,6 +166,7 @@ private:
 
     zmq::socket_t& socket_;
     Pulse& pulse_;
+    int threads_;  ///< of a step
     SharedWorldWorker worker_;
     std::optional<PeerLinks> links_;  ///< in lockstep
     std::uint64_t told_linked_ = 0;   ///< of what was sent on them [bytes]
@@ -165,7 +174,7 @@ private:
     bool draining_ = false, refused_ = false;
     double waited_within_ = 0;  ///< the step under way
     Clock::time_point idle_since_ = Clock::now();
-    double told_processor_ = thread_processor_s();
+    double told_processor_ = processor_s();
 };
 
 }  // namespace

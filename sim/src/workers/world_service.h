@@ -11,6 +11,7 @@ struct WorldLink {
     Pulse& pulse;
     const std::string& endpoint;
     const std::optional<WorkerKeys>& keys;
+    int threads;  ///< of a step
 };
 
 /// Serves a world: a SharedWorldWorker behind sockets. SIGTERM and SIGINT drain. Returns the exit status: 0 at the run's

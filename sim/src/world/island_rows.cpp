@@ -150,6 +150,8 @@ void IslandSolver::add_contacts(const Island& island) {
         for (; next < part.contacts; ++next)
             if (part.impacts && contacts_[next].firm) impacts_.push_back(next);
     }
+    if (told_crossed_)
+        for (ContactRows& c : contacts_) note_told(c);
 }
 
 void IslandSolver::note(const Part& part) noexcept {
@@ -282,8 +284,7 @@ void IslandSolver::write_rows(const Place& place, const Eigen::Matrix3f& directi
 
 // Place in crossed_ of an own body's contact with a ghost, else -1.
 int IslandSolver::note_pair(const Manifold& manifold) {
-    if (!told_crossed_ || manifold.b >= kFirstPlane || local(manifold.a) < 0 || local(manifold.b) < 0)
-        return -1;
+    if (manifold.b >= kFirstPlane || local(manifold.a) < 0 || local(manifold.b) < 0) return -1;
     const MovingBody &a = (*bodies_)[static_cast<std::size_t>(manifold.a)],
                      &b = (*bodies_)[static_cast<std::size_t>(manifold.b)];
     if (a.own == b.own) return -1;
@@ -293,6 +294,11 @@ int IslandSolver::note_pair(const Manifold& manifold) {
         if (crossed_[i].own == own && crossed_[i].ghost == ghost) return static_cast<int>(i);
     crossed_.emplace_back(own, ghost);
     return static_cast<int>(crossed_.size()) - 1;
+}
+
+void IslandSolver::note_told(ContactRows& c) {
+    c.pair = note_pair(*c.manifold);
+    c.told = note_told(c, true) || c.pair >= 0;
 }
 
 // Impulses of planes and fixed bodies are not recorded: a worker with a ghost of the body computes them.
@@ -331,6 +337,7 @@ void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     part.floats = jacobians_used_;
     fill_contact(contacts_.emplace_back(), manifold, point, part);
     jacobians_used_ = part.floats;
+    if (told_crossed_) note_told(contacts_.back());
     note(part);
     if (contacts_.back().firm) impacts_.push_back(contacts_.size() - 1), any_impacts_ = true;
 }
@@ -347,8 +354,6 @@ void IslandSolver::fill_contact(ContactRows& c, Manifold& manifold, ManifoldPoin
     // Only what comes together rebounds, not what rests and rings.
     c.restitution = point.normal_impulse > 0 ? 0 : manifold.restitution;
     c.firm = c.starts >= 0;
-    c.pair = note_pair(manifold);
-    c.told = note_told(c, true) || c.pair >= 0;
     set_tangents(point.normal, c.tangent);
     write_contact(c);
     c.separation = c.now = point.separation;

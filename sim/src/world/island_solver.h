@@ -478,6 +478,7 @@ private:
     [[nodiscard]] Side reserve_rows(int body, std::size_t& used) const;  // of jacobians_
     void write_rows(const Place& place, const Eigen::Matrix3f& directions, float sign, const Side& side);
     void finish_rows(Rows& rows);
+    void note_told(ContactRows& c);
     bool note_told(const Rows& rows, bool contact);  // notes it in any_told_, too
     [[nodiscard]] const BodyKind::Substep& of_substep(const BodyKind& kind) const noexcept {
         return kind.substeps[static_cast<std::size_t>(level_)];

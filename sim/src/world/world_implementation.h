@@ -28,8 +28,7 @@ struct World::Implementation {
     std::vector<std::unique_ptr<IslandSolver>> solvers;  // one a thread
     std::unique_ptr<Crew> all = std::make_unique<Crew>();
     Crew alone;
-    /// Who shares the work of a step: of a shared world one thread.
-    [[nodiscard]] Crew& crew() noexcept { return sharing == Sharing::alone ? *all : alone; }
+    [[nodiscard]] Crew& crew() noexcept { return *all; }  ///< who shares the work of a step
     [[nodiscard]] IslandSolver& solver() const noexcept { return *solvers.front(); }
     void set_threads(std::unique_ptr<Crew> crew);
     std::vector<Island> islands;

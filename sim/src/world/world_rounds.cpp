@@ -108,15 +108,16 @@ void World::Implementation::share_islands(const Solve& solve, bool first_round) 
     if (with) return solve_together(solve, first_round);
     Crew& by = crew();
     const ContactScene shared = contact_scene(by), single = contact_scene(alone);
-    if (by.size() == 1) {
-        for (const Island* island : to_solve) solve(*island, solver(), single);
+    // Among ghosts one solver notes what is given to them.
+    if (by.size() == 1 || sharing == Sharing::pairs) {
+        for (const Island* island : to_solve) solve(*island, solver(), is_by_one(*island) ? single : shared);
         return;
     }
     for (const Island* island : to_solve)
-        if (island->bodies.size() >= kLeastDivided) solve(*island, solver(), shared);
+        if (!is_by_one(*island)) solve(*island, solver(), shared);
     small.clear();
     std::ranges::copy_if(to_solve, std::back_inserter(small),
-                         [](const Island* island) { return island->bodies.size() < kLeastDivided; });
+                         [this](const Island* island) { return is_by_one(*island); });
     // The longest first, so that none is left to one thread at the end: those with constraints are solved directly.
     const auto size = [](const Island* island) {
         return (island->constraints.empty() ? 1 : 100) * island->bodies.size() + island->manifolds.size();

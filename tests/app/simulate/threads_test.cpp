@@ -52,7 +52,7 @@ TEST(SimulateThreads, EveryBundledSceneHasTheBitsOfOneThread) {
     }
 }
 
-TEST(SimulateThreads, AreRefusedWithWorkers) {
+TEST(SimulateThreads, AreRefusedWithoutAWorkerProcessThatStartsHere) {
     SimulateOptions options;
     options.scene = assets_folder() / "scenes" / "joints.toml";
     options.threads = 2;

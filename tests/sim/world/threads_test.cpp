@@ -52,6 +52,51 @@ TEST(Threads, TwentyRandomScenesHaveTheBitsOfOneThread) {
     }
 }
 
+/// Own bodies among ghosts, which another world tells: states, and what the two gave each other, after each step.
+std::vector<std::uint64_t> hashes_among_ghosts(const sim::WorldDefinition& definition, int steps,
+                                               int threads) {
+    sim::World whole(definition), part(definition);
+    part.use_threads(threads);
+    part.share(sim::Sharing::pairs);
+    std::vector<int> own, ghosts;
+    for (int i = 0; i < part.bodies(); ++i) {
+        const sim::WorldBody& body = definition.bodies[std::size_t(i)];
+        if (!body.moves()) continue;
+        const bool is_own = body.world_from_body.translation().x() < 3;
+        part.set_own(i, is_own);
+        part.watch(i, is_own);
+        (is_own ? own : ghosts).push_back(i);
+    }
+    std::vector<std::uint64_t> all;
+    const auto add = [&all](const auto& numbers) {
+        for (const double x : numbers) all.push_back(std::bit_cast<std::uint64_t>(x));
+    };
+    std::size_t crossed = 0, given = 0;
+    for (int step = 0; step < steps; ++step) {
+        for (const int body : ghosts) part.place_ghost(body, whole.state(body), nullptr, whole.asleep(body));
+        part.step(), whole.step();
+        for (const int body : own) {
+            const sim::WorldBodyState s = part.state(body);
+            add(s.position), add(s.velocity), add(s.angular_momentum), add(s.q);
+            if (const sim::StepImpulse* by_others = part.impulse(body)) ++given, add(by_others->linear);
+        }
+        for (const sim::CrossImpulse& c : part.cross_impulses()) {
+            ++crossed;
+            all.push_back(std::uint64_t(c.own) << 32 | std::uint32_t(c.ghost));
+            add(c.linear), add(c.angular_own), add(c.angular_ghost);
+        }
+    }
+    EXPECT_GT(crossed, 5u * std::size_t(steps));
+    EXPECT_GT(given, 5u * std::size_t(steps));
+    return all;
+}
+
+TEST(Threads, AWorldAmongGhostsHasTheBitsOfOneThread) {
+    const std::vector<std::uint64_t> one = hashes_among_ghosts(pile(), 40, 1);
+    for (const int threads : kCounts)
+        ASSERT_EQ(hashes_among_ghosts(pile(), 40, threads), one) << threads << " threads";
+}
+
 TEST(Threads, TheirNumberMayChangeInMidRun) {
     const sim::WorldDefinition definition = pile();
     sim::World world(definition);
