@@ -105,7 +105,12 @@ KeptAccuracy keep(double accuracy, const SimulateOptions& options, std::uint64_t
 }
 
 void check(const SimulateOptions& options, const Scene& scene) {
-    if (options.threads && options.workers && (options.workers->simulated || options.workers->count == 0))
+    if (options.threads && options.workers && options.workers->simulated)
+        throw BadInput(
+            fmt::format("error: found --threads {} with --processors, expected one of both: each simulated "
+                        "processor has one thread",
+                        *options.threads));
+    if (options.threads && options.workers && options.workers->count == 0)
         throw BadInput(
             fmt::format("error: found --threads {} without a worker process that is started here, expected "
                         "--workers N; whoever starts others tells them: musicworld worker --threads {}",

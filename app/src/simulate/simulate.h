@@ -45,9 +45,11 @@ struct SimulateOptions {
         0;  ///< open for this share of the frame interval, up to the frame's time; 0: no motion blur
     bool progress = false;
     std::optional<WorkerOptions> workers;  ///< none: all in this process
-    std::optional<int> threads;    ///< that share out each step there; none: one a processor core, 8 at most
-    std::uint64_t checkpoint = 0;  ///< steps after which one is saved in `out`; 0: none
-    bool goes_on = false;          ///< from the checkpoint in `out`
+    std::optional<int>
+        threads;  ///< that share out each step there; none: one a processor core, 8 at most. Of
+                  ///< workers: each one's; none: one
+    std::uint64_t checkpoint = 0;    ///< steps after which one is saved in `out`; 0: none
+    bool goes_on = false;            ///< from the checkpoint in `out`
     std::vector<std::string> words;  ///< of the command: what a checkpoint says of it
 };
 

@@ -46,7 +46,7 @@ struct MarketSettings {  ///< of the load balancing, thesis 2.4
     bool trade = true;
     std::uint64_t from_step = 0;  ///< no offers before the seller's step
     double smoothing_steps = 20;  ///< time constant of the smoothed seconds per work [steps]
-    double dead_band = 0.05;      ///< share of the average by which a worker must be slower to offer
+    double dead_band = 0.1;       ///< share of the average by which a worker must be slower to offer
 };
 
 struct DistributedSettings {  ///< of a run; refused settings throw std::invalid_argument

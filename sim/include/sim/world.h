@@ -351,7 +351,7 @@ public:
     void kick(int body, const Eigen::Vector3d& linear, const Eigen::Vector3d& angular);
     /// One step of a body that touches nothing but planes, which stop it, under gravity and `held`.
     void extrapolate(int body, WorldBodyState& state, const StepImpulse* held);
-    /// Records what other own bodies that move and constraints give an own body.
+    /// Records what other own bodies that move and constraints give an own body of a world shared by pairs.
     void watch(int body, bool watched);
     /// Every pair of an own body and a ghost that gave each other an impulse in the last step.
     [[nodiscard]] const std::vector<CrossImpulse>& cross_impulses() const noexcept;

@@ -19,9 +19,9 @@ constexpr double kFar = 0.5;
 constexpr int kFarSteps = 20;
 constexpr double kNear = 0.03;      // until then, as a share of the average of all
 constexpr double kFarBodies = 1.5;  // by at least so many bodies' cost
-// From turn to turn. A sale is registered within some five steps of its turn's first, so two sales are ten steps apart or
+// From turn to turn. A sale is registered within some five steps of its turn's first, so two sales are twenty steps apart or
 // more.
-constexpr int kTurnSteps = 16;
+constexpr int kTurnSteps = 25;
 constexpr std::uint64_t kHomeTurns = 4;  // of so many turns one is for bodies that go home, at least
 constexpr int kAmong = 3;                // sides a body by which the border becomes shorter, at least
 constexpr std::uint64_t kDeclinedSteps = 3, kNothingSteps = 5;  // to the next offer
@@ -277,7 +277,8 @@ void Market::sell(Holdings& holdings, const Neighbours& neighbours) {
     // What makes the buyer as slow as the average, or one lot; from there on work flows through it.
     if (free_ && theirs < mean) limit = std::min(limit, std::max(mean - theirs + carried_, lot_cost));
     if (free_) limit = std::min(limit, due);
-    const double together = std::min(lasting_ * mean, (smoothed() - theirs) / 2);  // of several columns
+    const double together =
+        std::min({lasting_ * mean, smoothed() - mean, (smoothed() - theirs) / 2});  // of several columns
     if (spreads_) limit = std::max(limit, lot_cost);
     if (free_ && !spreads_) {
         if (go_.judged_at == 0) go_ = {step_ + kJudgeSteps, kGo * smoothed(), 0, smoothed()};

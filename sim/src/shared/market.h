@@ -28,8 +28,8 @@ namespace sim {
 /// become slower than both declines; sold work counts for the buyer at once, and reports written before the
 /// registration (older epoch) are ignored, otherwise stale figures would sell the same work twice. Trade is
 /// free while somebody owns nothing, or once a worker has been far above the average for some steps, until it
-/// is near it. Else those above the average in each of the last two turns take turns, the slowest first, every 16 steps
-/// (more only for bounds above 15), and sell what of it was above the average in both, one column at least. Whose turn it
+/// is near it. Else those above the average in each of the last two turns take turns, the slowest first, every 25 steps
+/// (more only for bounds above 24), and sell what of it was above the average in both, one column at least. Whose turn it
 /// is follows from what all reported of the steps in which the two turns before began, which everybody has heard by then.
 ///
 /// Bodies that have come to lie among another worker's go home to it: lots that make the border shorter are
@@ -100,10 +100,10 @@ private:
     double work_ = 0;     // own, of a step; smoothed over few steps
     double many_seconds_ = 0, many_work_ = 0;  // of a step; smoothed over many
     double steps_known_ = 0;                   // of these
-    bool free_ = false;                        // to sell more than a column
+    bool free_ = false;                        // to sell out of turn
     bool spreads_ = false;                     // free, because somebody owned nothing
     int far_steps_ = 0;                        // in a row
-    // What was sold since a worker began to sell more than a column, and whether it helps.
+    // What was sold since a worker began to sell out of turn, and whether it helps.
     struct Go {
         std::uint64_t judged_at = 0;  // 0: none
         double most = 0, sold = 0;    // [s]

@@ -94,7 +94,7 @@ bool IslandSolver::is_elsewhere(const ContactRows& c, double time) const {
     return apart.norm() > kSlow * size_of(c);
 }
 
-// The contacts of each body; together those that this partner sweeps, and all impacts.
+// The contacts of each body; together those that this partner sweeps, and all impacts that concern it.
 void IslandSolver::list_contacts() {
     first_contact_.assign(rows_of_.size() + 1, 0);
     auto each = [this](auto visit) {

@@ -28,7 +28,8 @@ struct World::Implementation {
     std::vector<std::unique_ptr<IslandSolver>> solvers;  // one a thread
     std::unique_ptr<Crew> all = std::make_unique<Crew>();
     Crew alone;
-    [[nodiscard]] Crew& crew() noexcept { return *all; }  ///< who shares the work of a step
+    /// Who shares the work of a step: of one by several partners one thread of each.
+    [[nodiscard]] Crew& crew() noexcept { return with ? alone : *all; }
     [[nodiscard]] IslandSolver& solver() const noexcept { return *solvers.front(); }
     void set_threads(std::unique_ptr<Crew> crew);
     std::vector<Island> islands;

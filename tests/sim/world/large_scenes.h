@@ -91,6 +91,14 @@ inline sim::WorldDefinition heap(unsigned seed) {
         tie.collide = i % 2 == 1;
         world.constraints.push_back(tie);
     }
+    // In the midst one stands still: what strikes it gets an impulse from outside.
+    int still = 36;
+    const auto is_tied = [&still](const sim::PointConstraint& tie) {
+        return tie.body_a == still || tie.body_b == still;
+    };
+    while (std::ranges::any_of(world.constraints, is_tied)) ++still;
+    sim::WorldBody& fixed = world.bodies[std::size_t(still)];
+    fixed.fixed = true, fixed.velocity.setZero(), fixed.angular_velocity.setZero();
     return world;
 }
 

@@ -78,12 +78,16 @@ std::vector<std::uint64_t> hashes_among_ghosts(const sim::WorldDefinition& defin
         for (const int body : own) {
             const sim::WorldBodyState s = part.state(body);
             add(s.position), add(s.velocity), add(s.angular_momentum), add(s.q);
-            if (const sim::StepImpulse* by_others = part.impulse(body)) ++given, add(by_others->linear);
+            if (const sim::StepImpulse* by_others = part.impulse(body)) {
+                ++given;
+                add(by_others->linear), add(by_others->angular), add(by_others->modal);
+            }
         }
         for (const sim::CrossImpulse& c : part.cross_impulses()) {
             ++crossed;
             all.push_back(std::uint64_t(c.own) << 32 | std::uint32_t(c.ghost));
             add(c.linear), add(c.angular_own), add(c.angular_ghost);
+            all.push_back(c.blow);
         }
     }
     EXPECT_GT(crossed, 5u * std::size_t(steps));
