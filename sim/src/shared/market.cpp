@@ -16,7 +16,7 @@ namespace {
 // Above the average of the others, as a share of it, for so many steps in a row. Bodies that meet cost more, and
 // a processor may be unsteady, which comes and goes; one that became slower stays so.
 constexpr double kFar = 0.5;
-constexpr int kFarSteps = 20;
+constexpr int kFarSteps = 10;
 constexpr double kNear = 0.03;      // until then, as a share of the average of all
 constexpr double kFarBodies = 1.5;  // by at least so many bodies' cost
 // From turn to turn. A sale is registered within some five steps of its turn's first, so two sales are twenty steps apart or
@@ -135,8 +135,8 @@ void Market::mark(Worker& worker, std::uint64_t step, double smoothed) const {
     if (step % turn_steps_ == 0) worker.marks[step / turn_steps_ % worker.marks.size()] = {step, smoothed};
 }
 
-// By what all reported when the two turns before began, so that all agree on whose it is: what is above the average for a
-// few steps only is not sold for.
+// By what all reported when the turn before began, so that all agree on whose it is. Several columns are sold only for what was
+// above the average in the turn before that, too.
 void Market::take_turn() {
     turn_ = Turn::none;
     lasting_ = 0;
@@ -160,9 +160,8 @@ void Market::take_turn() {
     for (const auto& [number, share] : shares[0]) {
         all.push_back(number);
         const auto before = shares[1].find(number);
-        const double lasting = before == shares[1].end() ? 0 : std::min(share, before->second);
-        if (lasting > 1 + settings_.dead_band) sellers.emplace_back(lasting, number);
-        if (number == self_) lasting_ = lasting - 1;
+        if (share > 1 + settings_.dead_band) sellers.emplace_back(share, number);
+        if (number == self_ && before != shares[1].end()) lasting_ = std::min(share, before->second) - 1;
     }
     if (all.empty()) return;
     std::ranges::sort(sellers, std::greater());

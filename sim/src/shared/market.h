@@ -28,9 +28,9 @@ namespace sim {
 /// become slower than both declines; sold work counts for the buyer at once, and reports written before the
 /// registration (older epoch) are ignored, otherwise stale figures would sell the same work twice. Trade is
 /// free while somebody owns nothing, or once a worker has been far above the average for some steps, until it
-/// is near it. Else those above the average in each of the last two turns take turns, the slowest first, every 25 steps
-/// (more only for bounds above 24), and sell what of it was above the average in both, one column at least. Whose turn it
-/// is follows from what all reported of the steps in which the two turns before began, which everybody has heard by then.
+/// is near it. Else those above the average take turns, the slowest first, every 25 steps (more only for bounds above
+/// 24), and sell one column, or several if they were above it when each of the last two turns began. Whose turn it is
+/// follows from what all reported of the step in which the turn before began, which everybody has heard by then.
 ///
 /// Bodies that have come to lie among another worker's go home to it: lots that make the border shorter are
 /// given away although times are level, if the other stays level. For this all take turns, too: every fourth turn, and
