@@ -183,9 +183,6 @@ TEST(Resume, WhateverCallFailsWhileACheckpointIsSavedTheRunEndsWholeOrGoesOnToTh
 #ifdef MUSICWORLD_SANITIZED
     GTEST_SKIP() << "the sanitizer must be the first library";
 #endif
-#ifdef MUSICWORLD_SANITIZED
-    GTEST_SKIP() << "the sanitizer must be the first library";
-#endif
     const Folder folder;
     const fs::path out = folder / "work/out";
     const Words command = {"simulate", "joints",   "--steps", "12",    "--checkpoint", "3", "--out",
