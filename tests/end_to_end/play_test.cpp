@@ -319,18 +319,20 @@ TEST(Play, NoFeintThatTurns25MsBeforeTheReleasePointSoundsAndWithoutCancellingSo
 TEST(Play, AWorkerThatIsKilledChangesNothingButTheSummary) {
     const Folder folder;
     const auto trace = bundled("traces/roll.csv");
+    const auto begun = std::chrono::steady_clock::now();
     ASSERT_EQ(run(play(trace, folder / "undisturbed", {"--workers", "2", "--no-frames"})).status, 0);
+    const auto whole = std::chrono::steady_clock::now() - begun;
     bool lost = false;
     for (int attempt = 0; attempt < 20 && !lost; ++attempt) {
         Started started(play(trace, folder / "killed", {"--workers", "2", "--no-frames"}), folder / "");
         const std::string find = "pgrep -P " + std::to_string(started.pid()) + " -f 'worker --connect' > " +
                                  (folder / "pids").string();
-        // Kill as soon as one is there, later at every attempt, so that one falls into the run whatever the
-        // machine's speed.
-        for (int i = 0; i < 400 && read(folder / "pids").empty(); ++i) {
+        // Kill as soon as one is there, at every attempt later by a share of an undisturbed run, so that one falls into the
+        // part with workers whatever the machine's speed.
+        for (int i = 0; i < 4000 && read(folder / "pids").empty(); ++i) {
             if (std::system(find.c_str()) != 0) std::this_thread::sleep_for(std::chrono::milliseconds(5));
         }
-        std::this_thread::sleep_for(std::chrono::milliseconds(15 * attempt));
+        std::this_thread::sleep_for(attempt * whole / 20);
         const int victim = std::atoi(read(folder / "pids").c_str());
         if (victim > 0) kill(victim, SIGKILL);
         write(folder / "pids", "");
@@ -338,6 +340,8 @@ TEST(Play, AWorkerThatIsKilledChangesNothingButTheSummary) {
         ASSERT_EQ(ended.status, 0) << ended.err;
         const Json workers = summary(folder / "killed").at("workers");
         lost = workers.at("lost").get<int>() > 0 && workers.at("bodies_reowned").get<int>() > 0;
+        EXPECT_EQ(ended.out.find(" lost; ") != ended.out.npos, workers.at("lost").get<int>() > 0)
+            << ended.out;
         expect_same_products(folder / "undisturbed", folder / "killed");
     }
     EXPECT_TRUE(lost);

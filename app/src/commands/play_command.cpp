@@ -99,6 +99,12 @@ void print_left_out(const PlayResult& result) {
                    counted(result.pedal_moves_left_out, "move"), result.options.pedals->string());
 }
 
+void print_lost(const PlayResult& result) {
+    if (result.workers_lost > 0)
+        fmt::print("{} lost; {} went to others\n", counted(result.workers_lost, "worker"),
+                   counted(result.bodies_reowned, "body"));
+}
+
 void play_offline(const PlayOptions& options) {
     const PlayResult result = play(options);
     const StrikeScore& s = result.score;
@@ -109,6 +115,7 @@ void play_offline(const PlayOptions& options) {
     print_if_apart(result);
     print_if_loud(result, true);
     print_left_out(result);
+    print_lost(result);
     print_places(result);
     throw_if_any(result.failures, options.out);
 }
@@ -122,6 +129,7 @@ void play_in_time(const RealtimeOptions& options) {
     print_if_apart(outcome.play);
     print_if_loud(outcome.play, false);
     print_left_out(outcome.play);
+    print_lost(outcome.play);
     if (const OfflineComparison& offline = outcome.offline; offline.offline_strikes > 0)
         fmt::print("{} offline: {} here, {} unexplained ({})\n", counted(offline.offline_strikes, "strike"),
                    counted(offline.departures.size(), "departure"), offline.unexplained(),

@@ -234,15 +234,6 @@ std::uint32_t Market::buyer(const Neighbours& neighbours) const {
     return best;
 }
 
-// Whether a worker has a faster neighbour.
-bool Market::passes_on(std::uint32_t worker, const Neighbours& neighbours) const {
-    const auto near = neighbours.find(worker);
-    return near != neighbours.end() && std::ranges::any_of(near->second, [&](std::uint32_t other) {
-               const auto found = workers_.find(other);
-               return found != workers_.end() && found->second.smoothed < workers_.at(worker).smoothed;
-           });
-}
-
 int Market::sellers(std::uint32_t buyer, const Neighbours& neighbours) const {
     const auto near = neighbours.find(buyer);
     const double mean = average();
@@ -270,9 +261,9 @@ void Market::sell(Holdings& holdings, const Neighbours& neighbours) {
     const double theirs = workers_.at(offer_.to).smoothed, mean = average();
     const double lot_cost = smoothed() / static_cast<double>(holdings.lots().size());
     const double due = (smoothed() - mean) / sellers(offer_.to, neighbours) + carried_;
-    // Then both take as long; or the buyer as long as this one before, if it can pass work on.
-    const double most = (smoothed() - theirs) / (!free_ && passes_on(offer_.to, neighbours) ? 1 : 2);
-    double limit = most;
+    // What the buyer accepts, as answer() has it.
+    const double level = 1 + settings_.dead_band;
+    double limit = std::max((level * smoothed() - theirs) / (1 + level), level * mean - theirs);
     // What makes the buyer as slow as the average, or one lot; from there on work flows through it.
     if (free_ && theirs < mean) limit = std::min(limit, std::max(mean - theirs + carried_, lot_cost));
     if (free_) limit = std::min(limit, due);

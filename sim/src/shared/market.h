@@ -83,7 +83,6 @@ private:
     void watch_level();
     void judge();
     [[nodiscard]] std::uint32_t buyer(const Neighbours& neighbours) const;
-    [[nodiscard]] bool passes_on(std::uint32_t worker, const Neighbours& neighbours) const;
     [[nodiscard]] int sellers(std::uint32_t buyer, const Neighbours& neighbours) const;
     void sell(Holdings& holdings, const Neighbours& neighbours);
     void send_home(Holdings& holdings, const Neighbours& neighbours);

@@ -68,7 +68,9 @@ TEST(PlayRealtime, ALoopedTraceSoundsAsPlannedToTheSampleAndDepartsFromOfflineOn
     const TemporaryFolder folder;
     const bool thorough = std::getenv("MUSICWORLD_LONG") != nullptr;
     const fs::path trace = thorough ? find_trace("flourish") : cut_flourish(folder, 2.2);
-    const RealtimeOutcome outcome = run(options_of(folder, trace, thorough ? 60 : 5.2));
+    RealtimeOutcome outcome = run(options_of(folder, trace, thorough ? 60 : 5.2));
+    if (outcome.realtime.notes.size() < 20)  // a machine so slow that strikes come too late to sound
+        outcome = run(options_of(folder, trace, 40));
     EXPECT_GE(outcome.realtime.laps, 3U);
     ASSERT_GE(outcome.realtime.notes.size(), 20U);
     // The recording is what the offline sound makes of the same notes: every onset where events.csv says.

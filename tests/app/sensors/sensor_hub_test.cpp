@@ -218,16 +218,20 @@ TEST(SensorHub, TellsOfAStallAndLosesNoSample) {
     const TemporaryFolder folder;
     const fs::path file = folder.write("short.csv", cut_of("roll", 0, 1.5));
     app::SensorOptions options = options_for("trace:" + file.string(), {"right"});
+    // The sensor has begun by then, and the stall is seen by a test that is held up for half of it.
+    options.epoch_ns += 2'000'000'000;
     options.stall_at_s = 0.5;
-    options.stall_s = 0.3;
+    options.stall_s = 1;
     SensorHub hub(options);
     Watched seen;
     watch_until(hub, 1, seen, [&] { return seen.count(Kind::ended) == 1; });
-    ASSERT_GE(seen.count(Kind::silent), 1u);
-    ASSERT_GE(seen.count(Kind::back), 1u);
-    EXPECT_TRUE(seen.events[0].message.starts_with("sensor right: silent for 0.")) << seen.events[0].message;
-    EXPECT_NE(seen.events[0].message.find("(last sample at 0."), std::string::npos) << seen.events[0].message;
-    EXPECT_TRUE(seen.events[1].message.starts_with("sensor right: back after 0.")) << seen.events[1].message;
+    // Silences of a machine that is held up may be among them.
+    const std::string messages = seen.all_messages();
+    const std::size_t silent = messages.find("sensor right: silent for 0."),
+                      back = messages.find("sensor right: back after ", silent);
+    EXPECT_NE(silent, std::string::npos) << messages;
+    EXPECT_NE(back, std::string::npos) << messages;
+    EXPECT_NE(messages.find("(last sample at 0.", silent), std::string::npos) << messages;
     EXPECT_EQ(hub.newest(0)->samples, 180u);
 }
 
