@@ -222,6 +222,7 @@ void RealtimeRun::take(const std::vector<std::uint32_t>& moved, std::int64_t tak
     pipeline_->take(s, moved);
     for (const TipRest& rest : pipeline_->take_tip_rests()) choke(rest);
     const std::int64_t handed_ns = now_ns();
+    const double fixed_when_handed = fixed_s();
     const auto contact_ns = taken_ns + to_ns(pipeline_->times().simulation - simulated);
     for (const std::uint32_t stick : moved) {
         const tracking::StickState& state = sticks_[stick].state();
@@ -237,7 +238,7 @@ void RealtimeRun::take(const std::vector<std::uint32_t>& moved, std::int64_t tak
                                    .contact_ns = contact_ns,
                                    .handed_ns = handed_ns,
                                    .skipped = state.samples - samples_seen_[stick] - 1,
-                                   .late_s = fixed - (s + options_.play.release_margin_s)});
+                                   .late_s = fixed_when_handed - (s + options_.play.release_margin_s)});
         samples_seen_[stick] = state.samples;
         (void)sound_lead_.measured(to_s(handed_ns - due_ns));
     }
