@@ -178,7 +178,7 @@ void explain(Divergence& divergence, const Strike& strike, const RealtimeResult&
 /// lap's clock, against the offline strike of the same stick and instrument next to it (30 ms). Equal: the same
 /// outcome, the same onset to the sample and the same speed (within a millionth). A difference is explained by
 /// the greatest delay met by samples of any stick (the bodies are common to all) between two seconds before the
-/// strike was first predicted and its decision: samples that came later than they could still change the sound
+/// strike was first predicted and its decision: samples whose notes were handed over too late to change all the sound
 /// (late_s > 0), or were never seen; or by the end of the run within its lap.
 OfflineComparison compare_with_offline(const std::vector<LapStrikes>& laps, const RealtimeResult& realtime,
                                        const RealtimeSession& session) {

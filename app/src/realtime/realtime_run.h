@@ -27,7 +27,7 @@ struct LapStrikes {
 /// a StrikePipeline of their own, so that each lap is what an offline run of the trace is; strikes pending when a
 /// lap ends are played.
 ///
-/// A sample that comes so late that the sound it may change is fixed already changes what lies behind that
+/// A sample whose notes are handed over so late that the sound it may change is fixed already changes what lies behind that
 /// (SampleTiming::late_s).
 class RealtimeRun {
 public:

@@ -153,7 +153,7 @@ void Market::take_turn() {
             share[number] = then.smoothed;
             sum += then.smoothed;
         }
-        if (!(sum > 0)) return;
+        if (before == 1 && !(sum > 0)) return;
         for (auto& of : share) of.second *= static_cast<double>(workers_.size()) / sum;
     }
     std::vector<std::pair<double, std::uint32_t>> sellers;  // share, number
@@ -234,6 +234,15 @@ std::uint32_t Market::buyer(const Neighbours& neighbours) const {
     return best;
 }
 
+// Whether a worker has a faster neighbour.
+bool Market::passes_on(std::uint32_t worker, const Neighbours& neighbours) const {
+    const auto near = neighbours.find(worker);
+    return near != neighbours.end() && std::ranges::any_of(near->second, [&](std::uint32_t other) {
+               const auto found = workers_.find(other);
+               return found != workers_.end() && found->second.smoothed < workers_.at(worker).smoothed;
+           });
+}
+
 int Market::sellers(std::uint32_t buyer, const Neighbours& neighbours) const {
     const auto near = neighbours.find(buyer);
     const double mean = average();
@@ -261,15 +270,18 @@ void Market::sell(Holdings& holdings, const Neighbours& neighbours) {
     const double theirs = workers_.at(offer_.to).smoothed, mean = average();
     const double lot_cost = smoothed() / static_cast<double>(holdings.lots().size());
     const double due = (smoothed() - mean) / sellers(offer_.to, neighbours) + carried_;
-    // What the buyer accepts, as answer() has it.
-    const double level = 1 + settings_.dead_band;
-    double limit = std::max((level * smoothed() - theirs) / (1 + level), level * mean - theirs);
+    // Then both take as long; or the buyer as long as this one before, if it can pass work on; but no more than the buyer
+    // accepts, as answer() has it.
+    const double level = 1 + settings_.dead_band,
+                 accepted = std::max((level * smoothed() - theirs) / (1 + level), level * mean - theirs);
+    double limit =
+        std::min(accepted, (smoothed() - theirs) / (!free_ && passes_on(offer_.to, neighbours) ? 1 : 2));
     // What makes the buyer as slow as the average, or one lot; from there on work flows through it.
     if (free_ && theirs < mean) limit = std::min(limit, std::max(mean - theirs + carried_, lot_cost));
     if (free_) limit = std::min(limit, due);
     const double together =
         std::min({lasting_ * mean, smoothed() - mean, (smoothed() - theirs) / 2});  // of several columns
-    if (spreads_) limit = std::max(limit, lot_cost);
+    if (spreads_) limit = std::min(std::max(limit, lot_cost), accepted);
     if (free_ && !spreads_) {
         if (go_.judged_at == 0) go_ = {step_ + kJudgeSteps, kGo * smoothed(), 0, smoothed()};
         limit = std::min(limit, go_.most - go_.sold);

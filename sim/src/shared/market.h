@@ -24,12 +24,12 @@ namespace sim {
 /// neighbour of neighbours is below the average, everybody is one. Of the columns those are sold that make the
 /// border to the buyer shorter, or longer by the least.
 ///
-/// Departures: an offer never makes the buyer slower than the seller or than the average; a buyer that would
-/// become slower than both declines; sold work counts for the buyer at once, and reports written before the
+/// Departures: an offer makes the buyer slower than the seller, and than the average, by no more than the dead band; a buyer
+/// that would become slower declines; sold work counts for the buyer at once, and reports written before the
 /// registration (older epoch) are ignored, otherwise stale figures would sell the same work twice. Trade is
 /// free while somebody owns nothing, or once a worker has been far above the average for some steps, until it
 /// is near it. Else those above the average take turns, the slowest first, every 25 steps (more only for bounds above
-/// 24), and sell one column, or several if they were above it when each of the last two turns began. Whose turn it is
+/// 24), and sell one column, or several if they were above it when each of the two turns before this one began. Whose turn it is
 /// follows from what all reported of the step in which the turn before began, which everybody has heard by then.
 ///
 /// Bodies that have come to lie among another worker's go home to it: lots that make the border shorter are
@@ -83,6 +83,7 @@ private:
     void watch_level();
     void judge();
     [[nodiscard]] std::uint32_t buyer(const Neighbours& neighbours) const;
+    [[nodiscard]] bool passes_on(std::uint32_t worker, const Neighbours& neighbours) const;
     [[nodiscard]] int sellers(std::uint32_t buyer, const Neighbours& neighbours) const;
     void sell(Holdings& holdings, const Neighbours& neighbours);
     void send_home(Holdings& holdings, const Neighbours& neighbours);
@@ -95,8 +96,8 @@ private:
     std::uint64_t turn_steps_;                 // from turn to turn
     std::uint64_t step_ = 0, not_before_ = 0;
     Turn turn_ = Turn::none;  // this worker's in this step
-    double lasting_ = 0;  // what both of the last two turns began with above the average, as a share of it
-    double work_ = 0;     // own, of a step; smoothed over few steps
+    double lasting_ = 0;      // above the average when both turns before this one began, as a share of it
+    double work_ = 0;         // own, of a step; smoothed over few steps
     double many_seconds_ = 0, many_work_ = 0;  // of a step; smoothed over many
     double steps_known_ = 0;                   // of these
     bool free_ = false;                        // to sell out of turn

@@ -9,8 +9,8 @@
 // itself, out of the same bits: before it they tell each other the velocities of the bodies on their side. So every contact sees
 // the velocities that it would see if one swept all, and impulses need not be told. A substep has four such meetings or more.
 //
-// Impacts and soft springs are few. Bodies that they join are a group; what they do to it each partner computes for itself that has one of
-// its bodies or a slab beside one, once these have been told.
+// Impacts and soft springs are few. Bodies that they join are a group. Each partner that has one of a group's bodies, or a slab beside
+// one, is told how the group moves, and computes what impacts and springs do to it.
 //
 // Only islands of which nobody has to know more within a step: no rebounds, no forces but those of soft springs, which all
 // pull alike.

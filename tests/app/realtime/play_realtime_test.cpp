@@ -68,17 +68,24 @@ TEST(PlayRealtime, ALoopedTraceSoundsAsPlannedToTheSampleAndDepartsFromOfflineOn
     const TemporaryFolder folder;
     const bool thorough = std::getenv("MUSICWORLD_LONG") != nullptr;
     const fs::path trace = thorough ? find_trace("flourish") : cut_flourish(folder, 2.2);
-    // A slow machine plays some strikes too late to sound, and makes changes to notes that were rendered already.
+    // A machine that holds up the run at some moment: strikes come too late to sound, or are changed when they are rendered already.
     const auto held_up = [](const RealtimeOutcome& outcome) {
-        return outcome.realtime.refused_changes > 0 || outcome.realtime.notes.size() < 20;
+        return std::ranges::any_of(outcome.realtime.samples, [](const SampleTiming& sample) {
+            return sample.late_s > 0 || sample.skipped > 0;
+        });
     };
     RealtimeOutcome outcome = run(options_of(folder, trace, thorough ? 60 : 5.2));
     for (int more = 0; more < 3 && held_up(outcome); ++more)
         outcome = run(options_of(folder, trace, thorough ? 60 : 5.2));
-    if (held_up(outcome)) GTEST_SKIP() << "a machine that holds up every run cannot run this test";
+    if (!held_up(outcome)) {
+        EXPECT_EQ(outcome.realtime.refused_changes, 0U);
+        ASSERT_GE(outcome.realtime.notes.size(), 20U);
+    }
     EXPECT_GE(outcome.realtime.laps, 3U);
     // The recording is what the offline sound makes of the same notes: every onset where events.csv says.
-    EXPECT_TRUE(std::ranges::equal(outcome.play.audio, offline_sound(outcome)));
+    if (outcome.realtime.refused_changes == 0) {
+        EXPECT_TRUE(std::ranges::equal(outcome.play.audio, offline_sound(outcome)));
+    }
     for (const NoteTiming& note : outcome.realtime.notes) {
         const Strike& strike = outcome.play.strikes[note.strike];
         EXPECT_EQ(strike.id, note.played.id);

@@ -71,6 +71,7 @@ public:
             if (!offer) continue;
             offered = *offer;
             const sim::OfferAnswer answer = markets_[offer->to].answer(w, *offer);
+            EXPECT_TRUE(answer.accepted) << "step " << step_ << ", " << w << " to " << offer->to;
             markets_[w].answered(offer->to, {w, offer->number, answer.accepted});
             if (!markets_[w].hand_over()) continue;
             sim::Ownership ownership;
