@@ -1,5 +1,6 @@
 #include "audio/own_orchestra.h"
 
+#include <algorithm>
 #include <vector>
 
 #include "audio/samples.h"
