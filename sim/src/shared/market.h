@@ -24,8 +24,8 @@ namespace sim {
 /// neighbour of neighbours is below the average, everybody is one. Of the columns those are sold that make the
 /// border to the buyer shorter, or longer by the least.
 ///
-/// Departures: an offer makes the buyer slower than the seller, and than the average, by no more than the dead band; a buyer
-/// that would become slower declines; sold work counts for the buyer at once, and reports written before the
+/// Departures: an offer makes the buyer slower than the slower of the seller and the average by no more than the dead band;
+/// a buyer that would become slower declines; sold work counts for the buyer at once, and reports written before the
 /// registration (older epoch) are ignored, otherwise stale figures would sell the same work twice. Trade is
 /// free while somebody owns nothing, or once a worker has been far above the average for some steps, until it
 /// is near it. Else those above the average take turns, the slowest first, every 25 steps (more only for bounds above
