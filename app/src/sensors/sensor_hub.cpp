@@ -135,6 +135,18 @@ void SensorHub::fail(const Sensor& sensor, const std::string& why) {
     add(SensorEvent::Kind::failed, sensor.sticks, "failed: " + why);
 }
 
+/// What came since the last look, which ends a silence.
+void SensorHub::hear(std::size_t index, const std::optional<tracking::StickState>& state) {
+    SeenStick& stick = seen_[index];
+    if (!state || state->samples == stick.samples) return;
+    if (stick.silent_since_ns != 0)
+        add(SensorEvent::Kind::back, {index},
+            fmt::format("back after {:.2f} s", to_s(state->read_ns - stick.silent_since_ns)));
+    stick.silent_since_ns = 0;
+    stick.samples = state->samples;
+    stick.heard_ns = std::max(stick.heard_ns, state->read_ns);
+}
+
 /// Silence and its end: no state for 100 ms or 3 intervals between samples, whichever is longer.
 void SensorHub::watch_stick(std::size_t index) {
     const SensorReport report = memory_[index]->report.read().value_or(SensorReport{});
@@ -145,18 +157,10 @@ void SensorHub::watch_stick(std::size_t index) {
     if (report.pid != stick.pid) stick.heard_ns = now;  // it has just begun
     stick.pid = report.pid;
     stick.heard_ns = std::max({stick.heard_ns, report.quiet_until_ns, options_.epoch_ns});
-    const std::uint64_t samples = state ? state->samples : 0;
-    if (samples != stick.samples) {
-        if (stick.silent_since_ns != 0)
-            add(SensorEvent::Kind::back, {index},
-                fmt::format("back after {:.2f} s", to_s(state->read_ns - stick.silent_since_ns)));
-        stick.silent_since_ns = 0;
-        stick.samples = samples;
-        stick.heard_ns = std::max(stick.heard_ns, state->read_ns);
-    }
+    hear(index, state);
     const std::int64_t patience =
-        samples == 0 ? kFirstSampleWithinNs
-                     : std::max(kLeastSilenceNs, to_ns(kSilentIntervals * report.interval_s));
+        stick.samples == 0 ? kFirstSampleWithinNs
+                           : std::max(kLeastSilenceNs, to_ns(kSilentIntervals * report.interval_s));
     if (stick.silent_since_ns != 0 || now - stick.heard_ns <= patience) return;
     stick.silent_since_ns = stick.heard_ns;
     add(SensorEvent::Kind::silent, {index},
@@ -229,6 +233,7 @@ void SensorHub::look_after(Sensor& sensor) {
     if (sensor.pid > 0) return;
     const SensorReport report = report_of(sensor);
     sensor.over = true;
+    for (const std::size_t stick : sensor.sticks) hear(stick, memory_[stick]->state.read());
     if (report.phase == SensorPhase::ended)
         add(SensorEvent::Kind::ended, sensor.sticks,
             fmt::format("the source has ended{}",

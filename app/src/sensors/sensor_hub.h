@@ -89,6 +89,7 @@ private:
     [[noreturn]] void fail_start(const std::string& message);
     void add(SensorEvent::Kind kind, const std::vector<std::size_t>& sticks, const std::string& text);
     void fail(const Sensor& sensor, const std::string& why);
+    void hear(std::size_t index, const std::optional<tracking::StickState>& state);
     void watch_stick(std::size_t index);
     void watch_clock(std::size_t index);
     void watch_clocks_of(const Sensor& sensor);

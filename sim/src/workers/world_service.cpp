@@ -100,10 +100,7 @@ private:
             if (!part) break;
             worker_.take(part->header, std::move(part->message));
         }
-        if (!links_) return;
-        links_->look(Clock::now());
-        if (links_->refused() > 0 && !std::exchange(noted_refused_, true))
-            std::fputs("worker: what came on a link to other workers was refused\n", stderr);
+        if (links_) links_->look(Clock::now());
     }
     /// What the application says of the other workers.
     void follow(const WorkerMessage& message) {
@@ -174,7 +171,7 @@ private:
     std::optional<PeerLinks> links_;  ///< in lockstep
     std::uint64_t told_linked_ = 0;   ///< of what was sent on them [bytes]
     MessageHeader header_;
-    bool draining_ = false, refused_ = false, noted_refused_ = false;
+    bool draining_ = false, refused_ = false;
     double waited_within_ = 0;  ///< the step under way
     Clock::time_point idle_since_ = Clock::now();
     double told_processor_ = processor_s();

@@ -218,7 +218,8 @@ TEST(SensorHub, TellsOfAStallAndLosesNoSample) {
     const TemporaryFolder folder;
     const fs::path file = folder.write("short.csv", cut_of("roll", 0, 1.5));
     app::SensorOptions options = options_for("trace:" + file.string(), {"right"});
-    // The sensor has begun by then, and the stall is seen by a test that is held up for half of it.
+    // The sensor has begun by then, and the stall is seen by a test that is held up for half of it. It lasts to the
+    // source's end: that what came ends the silence is told before that the source has ended.
     options.epoch_ns += 2'000'000'000;
     options.stall_at_s = 0.5;
     options.stall_s = 1;
