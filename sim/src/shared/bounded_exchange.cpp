@@ -8,6 +8,7 @@
 #include "shared/replica.h"
 #include "shared/replica_protocol.h"
 #include "shared/shared_contacts.h"
+#include "shared/structures.h"
 
 namespace sim {
 namespace {
@@ -425,10 +426,12 @@ std::vector<std::uint8_t> BoundedExchange::publish(std::uint32_t epoch, const St
 }
 
 Holdings BoundedExchange::holdings() {
-    return columns_.holdings(self_, world_, owner_, costs_, [this](int body) {
+    const auto place = [this](int body) {
         const bool told = !world_.own(body) && foreign_.known(body);
         return told ? foreign_.last_position(body) : world_.state(body).position;
-    });
+    };
+    return columns_.holdings(self_, world_, owner_, costs_, place,
+                             structures(world_, owned_, columns_.side()));
 }
 
 Handover BoundedExchange::give(const std::vector<std::uint32_t>& bodies) {

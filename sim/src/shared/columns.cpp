@@ -6,6 +6,7 @@
 
 #include "shape/generalized_surface.h"
 #include "shared/initial_partition.h"
+#include "shared/structures.h"
 
 namespace sim {
 namespace {
@@ -165,23 +166,30 @@ ColumnWatch::ColumnWatch(const WorldScene& scene)
     : columns_(scene), lots_(joined_lots(scene)), column_(lots_.size()) {}
 
 Holdings ColumnWatch::holdings(std::uint32_t self, const World& world, std::span<const std::uint32_t> owner,
-                               const BodyCosts& costs, const std::function<Eigen::Vector3d(int)>& place) {
+                               const BodyCosts& costs, const std::function<Eigen::Vector3d(int)>& place,
+                               const std::vector<std::vector<int>>& structures) {
     const auto there = [&](int body) {
         return body < world.bodies() && owner[static_cast<std::size_t>(body)] != kApplication;
     };
-    std::vector<std::optional<Eigen::Vector3d>> places(lots_.size());
-    for (std::size_t i = 0; i < lots_.size(); ++i) {
+    struct Middle {
         Eigen::Vector3d sum = Eigen::Vector3d::Zero();
         int bodies = 0;
+    };
+    const std::vector<int> first = joined_by(structures, lots_);
+    std::vector<Middle> middles(lots_.size());
+    for (std::size_t i = 0; i < lots_.size(); ++i)
         for (const int body : lots_[i])
-            if (there(body)) sum += place(body), ++bodies;
-        if (bodies > 0) places[i] = sum / bodies;
-    }
+            if (Middle& middle = middles[static_cast<std::size_t>(first[i])]; there(body))
+                middle.sum += place(body), ++middle.bodies;
+    std::vector<std::optional<Eigen::Vector3d>> places(lots_.size());
+    for (std::size_t i = 0; i < lots_.size(); ++i)
+        if (middles[i].bodies > 0) places[i] = middles[i].sum / middles[i].bodies;
     columns_.assign(places, column_);
     Holdings holdings(self);
     const double leaves = columns_.side() / kLiesSeconds;
     for (std::size_t i = 0; i < lots_.size(); ++i) {
-        if (!places[i]) continue;
+        if (!places[static_cast<std::size_t>(first[i])]) continue;
+        column_[i] = column_[static_cast<std::size_t>(first[i])];
         Holdings::Lot own{*column_[i], {}, 0, true};
         for (const int body : lots_[i]) {
             if (!there(body)) continue;

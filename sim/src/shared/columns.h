@@ -87,14 +87,17 @@ private:
 };
 
 /// The columns of a run's bodies, followed. Bodies that constraints tie together are in the column of their
-/// middle.
+/// middle, and so are those of a structure.
 class ColumnWatch {
 public:
     explicit ColumnWatch(const WorldScene& scene);
-    /// `owner`: of each body, kApplication for none; `place`: centre of a body of the world [m].
+    /// Mean diameter of bodies [m].
+    [[nodiscard]] double side() const noexcept { return columns_.side(); }
+    /// `owner`: of each body, kApplication for none; `place`: centre of a body of the world [m]; `structures`: see there.
     [[nodiscard]] Holdings holdings(std::uint32_t self, const World& world,
                                     std::span<const std::uint32_t> owner, const BodyCosts& costs,
-                                    const std::function<Eigen::Vector3d(int)>& place);
+                                    const std::function<Eigen::Vector3d(int)>& place,
+                                    const std::vector<std::vector<int>>& structures = {});
 
 private:
     Columns columns_;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "shared/initial_partition.h"
+#include "shared/structures.h"
 
 namespace sim {
 namespace {
@@ -53,7 +54,7 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
         bodies_.push_back({kApplication, born, std::move(record), 0});
     }
     // A run that goes on shares out as from its start.
-    first_places_ = places();
+    first_places_ = places(lots_);
     if (from) go_to(*from);
 }
 
@@ -173,11 +174,13 @@ void Coordinator::start() {
         orphans_.emplace_back(kApplication, std::move(all));
     } else {
         const int workers = settings_.all_to_first ? 1 : static_cast<int>(members_.size());
-        const std::vector<int> first = first_owners(columns_, lots_, first_places_, workers);
+        const std::vector<std::vector<int>> lots = whole_lots();
+        const std::vector<int> first = first_owners(
+            columns_, lots, settings_.pace == Pace::lockstep ? first_places_ : places(lots), workers);
         std::vector<std::vector<int>> bodies(members_.size());
-        for (std::size_t i = 0; i < lots_.size(); ++i) {
+        for (std::size_t i = 0; i < lots.size(); ++i) {
             auto& mine = bodies[static_cast<std::size_t>(first[i])];
-            mine.insert(mine.end(), lots_[i].begin(), lots_[i].end());
+            mine.insert(mine.end(), lots[i].begin(), lots[i].end());
         }
         for (std::size_t i = 0; i < members_.size(); ++i)
             register_owner(bodies[i], members_[i], kApplication);
@@ -231,10 +234,26 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
     }
 }
 
+// In bounded pace what a structure joins is one.
+std::vector<std::vector<int>> Coordinator::whole_lots() const {
+    if (settings_.pace == Pace::lockstep) return lots_;
+    std::vector<int> there;
+    for (int i = 0; i < view_.world().bodies(); ++i)
+        if (view_.clock().moves(i)) there.push_back(i);
+    const std::vector<int> first = joined_by(structures(view_.world(), there, columns_.side()), lots_);
+    std::vector<std::vector<int>> lots(lots_.size());
+    for (std::size_t i = 0; i < lots_.size(); ++i) {
+        std::vector<int>& lot = lots[static_cast<std::size_t>(first[i])];
+        lot.insert(lot.end(), lots_[i].begin(), lots_[i].end());
+    }
+    std::erase_if(lots, [](const std::vector<int>& lot) { return lot.empty(); });
+    return lots;
+}
+
 // Of each lot.
-std::vector<Eigen::Vector3d> Coordinator::places() const {
+std::vector<Eigen::Vector3d> Coordinator::places(const std::vector<std::vector<int>>& lots) const {
     std::vector<Eigen::Vector3d> places;
-    for (const std::vector<int>& lot : lots_) {
+    for (const std::vector<int>& lot : lots) {
         Eigen::Vector3d sum = Eigen::Vector3d::Zero();
         for (const int body : lot) sum += bodies_[static_cast<std::size_t>(body)].record.state.position;
         places.emplace_back(sum / static_cast<double>(lot.size()));
@@ -252,13 +271,14 @@ void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from, 
     std::map<std::uint32_t, std::size_t> count;
     std::size_t all = bodies.size();
     for (const std::uint32_t worker : members_) all += count[worker] = owned_by(worker).size();
-    const std::vector<Eigen::Vector3d> all_places = places();
+    const std::vector<std::vector<int>> lots = whole_lots();
+    const std::vector<Eigen::Vector3d> all_places = places(lots);
     const std::vector<std::optional<Eigen::Vector3d>> where(all_places.begin(), all_places.end());
-    std::vector<std::optional<Column>> column(lots_.size());
+    std::vector<std::optional<Column>> column(lots.size());
     columns_.assign(where, column);
     std::map<Column, std::vector<int>> stands;
-    for (std::size_t i = 0; i < lots_.size(); ++i)
-        for (const int body : lots_[i])
+    for (std::size_t i = 0; i < lots.size(); ++i)
+        for (const int body : lots[i])
             if (std::binary_search(bodies.begin(), bodies.end(), body)) stands[*column[i]].push_back(body);
     std::map<std::uint32_t, std::vector<int>> shares;
     auto to = count.end();

@@ -110,7 +110,8 @@ private:
     void remove(std::uint32_t worker);
     void share_out(const std::vector<int>& bodies, std::uint32_t from, const Handover* handed = nullptr);
     [[nodiscard]] std::vector<int> owned_by(std::uint32_t worker) const;
-    [[nodiscard]] std::vector<Eigen::Vector3d> places() const;
+    [[nodiscard]] std::vector<std::vector<int>> whole_lots() const;
+    [[nodiscard]] std::vector<Eigen::Vector3d> places(const std::vector<std::vector<int>>& lots) const;
     [[nodiscard]] std::vector<Group> groups(const std::vector<int>& bodies) const;
     /// sold: by this handover.
     void register_owner(const std::vector<int>& bodies, std::uint32_t owner, std::uint32_t from,

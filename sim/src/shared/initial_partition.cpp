@@ -1,9 +1,10 @@
 #include "shared/initial_partition.h"
 
 #include <algorithm>
-#include <numeric>
 #include <span>
 #include <utility>
+
+#include "shared/disjoint_sets.h"
 
 namespace sim {
 namespace {
@@ -60,23 +61,17 @@ void bisect(std::span<Site> some, int first, int workers, std::map<Column, int>&
 
 std::vector<std::vector<int>> joined_lots(const WorldScene& scene) {
     const std::size_t bodies = scene.world.bodies.size() + scene.later.size();
-    std::vector<int> root(bodies);
-    std::iota(root.begin(), root.end(), 0);
-    auto find = [&root](int body) {
-        while (root[static_cast<std::size_t>(body)] != body) body = root[static_cast<std::size_t>(body)];
-        return body;
-    };
+    DisjointSets sets(bodies);
     auto moves = [&](int body) { return body >= 0 && body_of(scene, body).moves(); };
     for (const PointConstraint& c : scene.world.constraints) {
         if (!moves(c.body_a) || !moves(c.body_b)) continue;
-        const int a = find(c.body_a), b = find(c.body_b);
-        root[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+        sets.join(c.body_a, c.body_b);
     }
     std::vector<std::vector<int>> lots;
     std::vector<std::size_t> lot_of(bodies);
     for (int i = 0; i < static_cast<int>(bodies); ++i) {
         if (!moves(i)) continue;
-        const int first = find(i);
+        const int first = sets.first(i);
         if (first == i) lot_of[static_cast<std::size_t>(i)] = lots.size(), lots.emplace_back();
         lots[lot_of[static_cast<std::size_t>(first)]].push_back(i);
     }
