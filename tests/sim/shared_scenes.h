@@ -31,7 +31,7 @@ inline sim::WorldScene busy_scene(int balls = 14) {
     post.fixed = true;
     scene.world.bodies.push_back(post);
     for (int i = 0; i < 3; ++i) {
-        scene.world.bodies.push_back(ball({0.7 * (i + 1), 3.5, -2}, sim::Fidelity::rigid, 0.25));
+        scene.world.bodies.push_back(ball({0.7 * (i + 1), 3.5, -2}, sim::Fidelity::rigid, 0.32));
         sim::PointConstraint link;
         link.name = "link";
         link.body_a = balls + i, link.point_a = {i == 0 ? 0.2 : 0.35, 0, 0};

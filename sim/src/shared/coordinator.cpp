@@ -9,18 +9,11 @@
 namespace sim {
 namespace {
 
-// Records of all bodies before their first step: those of `world`, and of those to come, which it has not yet.
-std::vector<WorldRecord> first_records(const WorldScene& scene, const World& world) {
-    std::vector<WorldRecord> records;
-    for (int i = 0; i < world.bodies(); ++i) records.push_back(world.record(i));
-    WorldDefinition empty;
-    empty.settings = scene.world.settings;
-    World to_come(empty);
-    for (const WorldBody& body : scene.later) {
-        records.push_back(to_come.record(to_come.add_body(body)));
-        records.back().body = static_cast<int>(records.size()) - 1;
-    }
-    return records;
+// All bodies before their first step, also those to come.
+World with_later(const WorldScene& scene) {
+    World world(scene.world);
+    for (const WorldBody& body : scene.later) (void)world.add_body(body);
+    return world;
 }
 
 }  // namespace
@@ -49,10 +42,11 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
       view_(scene, settings.pace),
       columns_(scene),
       lots_(joined_lots(scene)) {
-    for (WorldRecord& record : first_records(scene, view_.world())) {
-        const std::uint64_t born = view_.clock().born(static_cast<int>(bodies_.size()));
-        bodies_.push_back({kApplication, born, std::move(record), 0});
-    }
+    const World all = with_later(scene);
+    for (int i = 0; i < all.bodies(); ++i)
+        bodies_.push_back({kApplication, view_.clock().born(i), all.record(i), 0});
+    if (settings_.pace == Pace::bounded && !are_alike(all, lots_, structures_now()))
+        one_owner_ = true, settings_.market.trade = false;
     // A run that goes on shares out as from its start.
     first_places_ = places(lots_);
     if (from) go_to(*from);
@@ -156,6 +150,9 @@ void Coordinator::catch_up(std::uint32_t worker) {
 
 void Coordinator::start() {
     started_ = true;
+    if (one_owner_ && members_.size() > 1)
+        observer_->note(
+            "one worker steps all bodies: they are too unlike in mass or length to be shared out of step; in lockstep they are");
     if (goes_on_) {
         observer_->at(0, World(scene_.world));
         WorldSnapshot snapshot = view_.snapshot();
@@ -234,13 +231,18 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
     }
 }
 
-// In bounded pace what a structure joins is one.
-std::vector<std::vector<int>> Coordinator::whole_lots() const {
-    if (settings_.pace == Pace::lockstep) return lots_;
+std::vector<std::vector<int>> Coordinator::structures_now() const {
     std::vector<int> there;
     for (int i = 0; i < view_.world().bodies(); ++i)
         if (view_.clock().moves(i)) there.push_back(i);
-    const std::vector<int> first = joined_by(structures(view_.world(), there, columns_.side()), lots_);
+    return structures(view_.world(), there, columns_.side());
+}
+
+// In bounded pace what a structure joins is one.
+std::vector<std::vector<int>> Coordinator::whole_lots() const {
+    if (settings_.pace == Pace::lockstep) return lots_;
+    std::vector<int> first(lots_.size());
+    if (!one_owner_) first = joined_by(structures_now(), lots_);
     std::vector<std::vector<int>> lots(lots_.size());
     for (std::size_t i = 0; i < lots_.size(); ++i) {
         std::vector<int>& lot = lots[static_cast<std::size_t>(first[i])];

@@ -111,6 +111,7 @@ private:
     void share_out(const std::vector<int>& bodies, std::uint32_t from, const Handover* handed = nullptr);
     [[nodiscard]] std::vector<int> owned_by(std::uint32_t worker) const;
     [[nodiscard]] std::vector<std::vector<int>> whole_lots() const;
+    [[nodiscard]] std::vector<std::vector<int>> structures_now() const;
     [[nodiscard]] std::vector<Eigen::Vector3d> places(const std::vector<std::vector<int>>& lots) const;
     [[nodiscard]] std::vector<Group> groups(const std::vector<int>& bodies) const;
     /// sold: by this handover.
@@ -132,6 +133,7 @@ private:
     WorldView view_;
     Columns columns_;
     std::vector<std::vector<int>> lots_;         // tied together
+    bool one_owner_ = false;                     // bounded: of all bodies, see are_alike
     std::vector<Eigen::Vector3d> first_places_;  // of each
     std::vector<Body> bodies_;
     WorldRecord record_;               // of an update that is being taken

@@ -2,17 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 
+#include "shape/superquadric.h"
 #include "shared/disjoint_sets.h"
 
 namespace sim {
 namespace {
 
-constexpr double kSlowShare = 0.25;             // of sqrt(g size)
-constexpr double kBeside = 0.02;             // of the size
-constexpr std::size_t kOwnPerForeign = 4;  // bodies of a structure, at least, for each of others that touches it
+constexpr double kSlowShare = 0.25;  // of sqrt(g size)
+constexpr double kBeside = 0.02;     // of the size
+constexpr std::size_t kOwnPerForeign =
+    4;  // bodies of a structure, at least, for each of others that touches it
 
 struct SlowBody {
     int body;
@@ -22,8 +25,11 @@ struct SlowBody {
 Eigen::AlignedBox3d box_around(const World& world, int body, const WorldBodyState& state) {
     const GeneralizedSuperquadric& shape = world.definition(body).shape;
     Eigen::Vector3d half = Eigen::Vector3d::Constant(world.most_radius(body));
-    if (shape.bumps.empty())
-        half = state.orientation.toRotationMatrix().cwiseAbs() * shape.base.semi_axes;
+    if (shape.bumps.empty()) {
+        const Gauge gauge(shape.base);
+        const Eigen::Matrix3d axes = state.orientation.toRotationMatrix().transpose();  // the world's
+        for (int i = 0; i < 3; ++i) half[i] = axes.col(i).dot(gauge.support(axes.col(i)));
+    }
     return {state.position - half, state.position + half};
 }
 
@@ -59,6 +65,24 @@ std::vector<std::vector<int>> structures(const World& world, std::span<const int
         result.push_back(std::move(some));
     }
     return result;
+}
+
+bool are_alike(const World& world, const std::vector<std::vector<int>>& lots,
+               const std::vector<std::vector<int>>& structures) {
+    std::set<int> in_structure;
+    for (const std::vector<int>& bodies : structures) in_structure.insert(bodies.begin(), bodies.end());
+    double lightest = std::numeric_limits<double>::infinity(), shortest = lightest, heaviest = 0, longest = 0;
+    for (const std::vector<int>& lot : lots) {
+        if (std::ranges::any_of(lot, [&](int body) { return in_structure.contains(body); })) continue;
+        double mass = 0, length = 0;
+        for (const int body : lot) {
+            mass = std::max(mass, world.rigid_mass(body).mass);
+            length = std::max(length, world.definition(body).shape.base.semi_axes.maxCoeff());
+        }
+        lightest = std::min(lightest, mass), heaviest = std::max(heaviest, mass);
+        shortest = std::min(shortest, length), longest = std::max(longest, length);
+    }
+    return heaviest <= kMostUnlikeMass * lightest && longest <= kMostUnlikeLength * shortest;
 }
 
 std::vector<int> joined_by(const std::vector<std::vector<int>>& structures,

@@ -20,6 +20,14 @@ constexpr std::size_t kMostInStructure = 64;
 [[nodiscard]] std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies,
                                                        double size);
 
+/// Whether bounded pace may give a scene's lots to several workers, as it does if they are alike, but for those in a structure:
+/// the heaviest bodies of any two differ by at most a factor of kMostUnlikeMass, the longest by kMostUnlikeLength. A body is held
+/// up by what other workers told some steps ago; the heavier it is than what holds it, or the more workers' bodies it lies
+/// on, the larger is the answer that comes late, until it grows from step to step. `world` has all bodies of the lots.
+constexpr double kMostUnlikeMass = 4, kMostUnlikeLength = 3;
+[[nodiscard]] bool are_alike(const World& world, const std::vector<std::vector<int>>& lots,
+                             const std::vector<std::vector<int>>& structures);
+
 /// Of each lot the first one that it shares a structure with, directly or through others; itself, if with none.
 [[nodiscard]] std::vector<int> joined_by(const std::vector<std::vector<int>>& structures,
                                          const std::vector<std::vector<int>>& lots);

@@ -297,7 +297,8 @@ void IslandSolver::reflect() {
         ContactRows& c = contacts_[i];
         for (float& p : c.impulse) p *= scale;
         apply(c, c.impulse, outside_);
-        if (c.pair >= 0 && c.impulse[0] != 0) crossed_[static_cast<std::size_t>(c.pair)].blow = true;
+        if (c.pair >= 0 && c.impulse[0] != 0 && c.restitution > 0)
+            crossed_[static_cast<std::size_t>(c.pair)].blow = true;
         std::fill_n(c.impulse, 3, 0.f);
     }
     for (const std::size_t i : holding_) {
