@@ -152,7 +152,8 @@ void Coordinator::start() {
     started_ = true;
     if (one_owner_ && members_.size() > 1)
         observer_->note(
-            "one worker steps all bodies: they are too unlike in mass or length to be shared out of step; in lockstep they are");
+            "one worker steps all bodies: they are too unlike in mass or length to be shared out of step; in "
+            "lockstep they are");
     if (goes_on_) {
         observer_->at(0, World(scene_.world));
         WorldSnapshot snapshot = view_.snapshot();

@@ -1,0 +1,203 @@
+#include "shared/structures.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numbers>
+#include <numeric>
+
+#include "shared_scenes.h"
+
+using namespace world_test;
+
+namespace {
+
+using Bodies = std::vector<std::vector<int>>;
+
+std::vector<int> all_of(const sim::World& world) {
+    std::vector<int> bodies(static_cast<std::size_t>(world.bodies()));
+    std::iota(bodies.begin(), bodies.end(), 0);
+    return bodies;
+}
+
+Bodies structures_of(const sim::WorldDefinition& definition, double size = 1) {
+    const sim::World world(definition);
+    return sim::structures(world, all_of(world), size);
+}
+
+/// A beam over pillars of boxes of this side.
+sim::WorldDefinition gate(double side, int pillars, int high, double from_x = 0) {
+    sim::WorldDefinition d = on_floor();
+    const Eigen::Vector3d half = Eigen::Vector3d::Constant(side / 2);
+    for (int i = 0; i < pillars; ++i)
+        for (int k = 0; k < high; ++k)
+            d.bodies.push_back(box({from_x + 2 * side * i, side * (k + 0.5), 0}, half, 1000));
+    const double length = side * (2 * pillars - 1);
+    d.bodies.push_back(
+        box({from_x + side * (pillars - 1), side * (high + 0.5), 0}, {length / 2, side / 2, side / 2}, 1000));
+    return d;
+}
+
+/// How far a body of the world is from where the scene has it, at most [m].
+class Moved : public Record {
+public:
+    void at(std::uint64_t step, const sim::World& world) override {
+        Record::at(step, world);
+        for (int i = 0; i < world.bodies(); ++i) {
+            const sim::WorldBody& body = world.definition(i);
+            most = std::max(most, (world.state(i).position - body.world_from_body.translation()).norm());
+            fastest = std::max(fastest, world.state(i).velocity.norm());
+        }
+    }
+    double most = 0, fastest = 0;
+};
+
+sim::DistributedSettings bounded(std::uint64_t steps, int bound) {
+    sim::DistributedSettings settings = lockstep(steps);
+    settings.pace = sim::Pace::bounded, settings.bound = bound;
+    return settings;
+}
+
+}  // namespace
+
+TEST(Structures, AreBodiesOnAndBesideEachOther) {
+    EXPECT_EQ(structures_of(gate(1, 3, 4)).size(), 1u);
+    EXPECT_EQ(structures_of(gate(1, 3, 4))[0].size(), 13u);
+    sim::WorldDefinition d = on_floor();
+    for (const double gap : {0.01, 0.03}) {  // of a size of 1 m: 2 %
+        d.bodies = {box({0, 0.5, 0}, {0.5, 0.5, 0.5}), box({1 + gap, 0.5, 0}, {0.5, 0.5, 0.5})};
+        EXPECT_EQ(structures_of(d).size(), gap < 0.02 ? 1u : 0u) << gap;
+    }
+}
+
+// The box around a ball is the same however the ball is turned.
+TEST(Structures, BoxesAroundBodiesFollowTheirShapeAndTurn) {
+    Draw draw(5);
+    for (int trial = 0; trial < 50; ++trial) {
+        sim::WorldDefinition d = on_floor();
+        for (const double x : {0.0, 1.05}) {
+            d.bodies.push_back(ball({x, 0.5, 0}));
+            d.bodies.back().world_from_body.rotate(
+                Eigen::AngleAxisd(draw.between(0, 3),
+                                  Eigen::Vector3d(draw.between(-1, 1), draw.between(-1, 1), 1).normalized()));
+        }
+        EXPECT_TRUE(structures_of(d).empty());
+    }
+    // A board reaches 0.9 m to either side, and turned by a quarter as far the other way.
+    for (const bool turned : {false, true}) {
+        sim::WorldDefinition d = on_floor();
+        d.bodies = {box({0, 0.1, 0}, {0.9, 0.1, 0.1}), box({1, 0.1, 0}, {0.1, 0.1, 0.1})};
+        if (turned)
+            d.bodies[0].world_from_body.rotate(
+                Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitY()));
+        EXPECT_EQ(structures_of(d).size(), turned ? 0u : 1u);
+    }
+}
+
+TEST(Structures, AreSlowSmallAndHardlyTouchedByOthers) {
+    sim::WorldDefinition d = gate(1, 3, 4);
+    for (sim::WorldBody& body : d.bodies) body.velocity = {2, 0, 0};  // a quarter of sqrt(9.81): 0.78 m/s
+    EXPECT_TRUE(structures_of(d).empty());
+    for (const int pillars : {15, 16, 17}) {
+        const Bodies found = structures_of(gate(1, pillars, 4));
+        EXPECT_EQ(found.size(), pillars * 4u + 1 <= sim::kMostInStructure ? 1u : 0u) << pillars;
+    }
+    // Two pillars of a beam that another owner has: a body of others touches four own ones at each.
+    for (const int high : {4, 3}) {
+        const sim::WorldDefinition shared = gate(1, 2, high);
+        sim::World world(shared);
+        const int beam = world.bodies() - 1;
+        world.share(sim::Sharing::pairs);
+        world.set_own(beam, false);
+        std::vector<int> own = all_of(world), near;
+        own.pop_back();
+        const sim::WorldBodyState state = sim::World(shared).state(beam);
+        world.near_own({{beam, state.position, 4}}, near);
+        ASSERT_EQ(near, std::vector<int>{beam});
+        world.place_ghost(beam, state, nullptr);
+        world.step();
+        ASSERT_EQ(world.cross_impulses().size(), 2u);
+        EXPECT_EQ(sim::structures(world, own, 1).size(), high == 4 ? 2u : 0u);
+    }
+}
+
+TEST(Structures, JoinLotsDirectlyAndThroughOthers) {
+    const std::vector<std::vector<int>> lots = {{0, 3}, {1}, {2}, {4, 6}, {5}};
+    EXPECT_EQ(sim::joined_by({}, lots), (std::vector<int>{0, 1, 2, 3, 4}));
+    EXPECT_EQ(sim::joined_by({{2, 3}, {0, 6}}, lots), (std::vector<int>{0, 1, 0, 0, 4}));
+}
+
+TEST(Structures, BodiesThatDifferMuchInMassOrLengthAreUnlikeUnlessAStructureHasThem) {
+    const auto alike = [](const std::vector<sim::WorldBody>& bodies, const Bodies& structures = {}) {
+        sim::WorldDefinition d = on_floor();
+        d.bodies = bodies;
+        const sim::World world(d);
+        Bodies lots;
+        for (const int body : all_of(world)) lots.push_back({body});
+        return sim::are_alike(world, lots, structures);
+    };
+    const sim::WorldBody small = ball({0, 1, 0}), heavy = ball({0, 3, 0}, sim::Fidelity::rigid, 0.5, 410),
+                         nearly = ball({0, 3, 0}, sim::Fidelity::rigid, 0.5, 390),
+                         long_one = box({0, 5, 0}, {1.6, 0.1, 0.1}, 800);
+    EXPECT_TRUE(alike({}));
+    EXPECT_TRUE(alike({small, nearly}));
+    EXPECT_FALSE(alike({small, heavy}));
+    EXPECT_FALSE(alike({small, long_one}));
+    EXPECT_TRUE(alike({small, heavy, long_one}, {{1, 2}}));
+}
+
+// What several workers hold boundedly out of step sways, and falls. So it is all at one of them, whoever comes and goes.
+TEST(Structures, StandOutOfStepAsInOneProcessAndAreNeverSoldInParts) {
+    for (const double side : {0.05, 0.4})
+        for (const int workers : {2, 5}) {
+            sim::WorldScene scene;
+            scene.world = gate(side, 4, 5);
+            for (const sim::WorldBody& body : gate(side, 3, 3, 20 * side).bodies)
+                scene.world.bodies.push_back(body);
+            scene.world.settings.dt = 1.0 / 120;
+            double half_way = 0;
+            for (const int killed : {-1, 0, 1}) {
+                Moved record;
+                sim::SimulatedProcessors how = processors(workers);
+                if (killed >= 0) {
+                    how.failures = {{half_way, killed, sim::SimulatedProcessors::Failure::Kind::kill}};
+                    how.silence_s = half_way / 8;
+                }
+                const sim::DistributedResult result =
+                    sim::simulate_processors(scene, bounded(480, 4), how, record);
+                half_way = result.elapsed_s / 2;
+                EXPECT_EQ(result.steps, 480u);
+                EXPECT_EQ(result.lost, killed < 0 ? 0 : 1);
+                EXPECT_LT(record.most, 0.02 * side) << side << " " << workers;  // settles by less
+                for (const Record::Move& move : record.moves)
+                    EXPECT_TRUE(move.bodies == 21 || move.bodies == 10 || move.bodies == 31) << move.bodies;
+            }
+        }
+}
+
+// Each worker would answer for the whole of the board, some steps late: it was thrown up at 50 m/s and more.
+TEST(Structures, ABoardThatFallsOnAHeapIsNotThrownUpOutOfStep) {
+    sim::WorldScene scene;
+    scene.world = on_floor();
+    Draw draw(3);
+    for (int i = 0; i < 75; ++i)
+        scene.world.bodies.push_back(
+            ball({0.12 * (i % 5) + draw.between(-0.005, 0.005), 0.06 + 0.12 * (i / 25),
+                  0.12 * (i / 5 % 5) + draw.between(-0.005, 0.005)},
+                 sim::Fidelity::rigid, 0.05, 1000));
+    scene.world.bodies.push_back(box({0.24, 0.6, 0.24}, {0.3, 0.1, 0.3}, 1000));
+    for (const bool here : {true, false}) {
+        if (!here) {
+            scene.later = {scene.world.bodies.back()};
+            scene.world.bodies.pop_back();
+            scene.events = {{20, {}, 0, 1, {}}};
+        }
+        Moved record;
+        const sim::DistributedResult result =
+            sim::simulate_processors(scene, bounded(120, 4), processors(5), record);
+        EXPECT_EQ(result.steps, 120u);
+        EXPECT_EQ(result.trades, 0u);
+        EXPECT_NE(record.notes.find("too unlike"), std::string::npos) << record.notes;
+        EXPECT_LT(record.fastest, 5);  // falls by 0.35 m: 2.6 m/s, and slides down
+    }
+}
