@@ -117,7 +117,7 @@ int keep_steps(int bound) {
 // steady they stand. Where few touch it matters less than waiting does.
 std::uint64_t touching_lead(int bound, int pairs) {
     constexpr int kFewPairs = 8;
-    return static_cast<std::uint64_t>(std::max(1, bound / 4)) * (pairs <= kFewPairs ? 2 : 1);
+    return static_cast<std::uint64_t>(std::clamp(bound / 4, 1, 4)) * (pairs <= kFewPairs ? 2 : 1);
 }
 
 // A running mean, by a step's impulse (nullptr: none) with this weight.

@@ -49,6 +49,7 @@ void IslandSolver::begin(const Island& island) {
         places_[static_cast<std::size_t>(&rows - rows_of_.data())] = {
             rows.place, 2 * rows.body->kind->half_box.maxCoeff()};
     });
+    part_rebounds(island);
     y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
     std::fill_n(moved_.data(), offset, 0.f);
 
@@ -64,6 +65,28 @@ void IslandSolver::begin(const Island& island) {
     for (std::size_t i = 0; i < rows_of_.size() && !forces_->empty(); ++i) begin_forces(static_cast<int>(i));
     if (!with_ && (!springs_.empty() || contacts_.empty()))
         (void)begin_direct(among_ghosts() ? 0 : most_at_first(), springs_.empty());
+}
+
+void IslandSolver::part_rebounds(const Island& island) {
+    const auto is_ghost = [](const BodyRows& rows) { return !rows.body->own; };
+    if (std::ranges::none_of(rows_of_, is_ghost)) return;
+    contacts_with_.assign(rows_of_.size(), 0);
+    const auto each_of = [this](const Manifold& m, const auto& what) {
+        for (const int id : {m.a, m.b})
+            if (id < kFirstPlane && local(id) >= 0) what(static_cast<std::size_t>(local(id)));
+    };
+    for (const int m : island.manifolds)
+        each_of((*manifolds_)[static_cast<std::size_t>(m)],
+                [this](std::size_t body) { ++contacts_with_[body]; });
+    for (const int number : island.manifolds) {
+        Manifold& m = (*manifolds_)[static_cast<std::size_t>(number)];
+        bool own = false, ghost = false, alone = true;
+        each_of(m, [&](std::size_t body) {
+            (is_ghost(rows_of_[body]) ? ghost : own) = true;
+            alone = alone && contacts_with_[body] == 1;
+        });
+        if (own && ghost && !alone) m.restitution = 0;
+    }
 }
 
 void IslandSolver::begin_body(BodyRows& rows) {
