@@ -28,6 +28,10 @@ void print_workers(const SimulateResult& r) {
                o.pace == sim::Pace::bounded ? fmt::format("bound {}", o.bound) : "lockstep",
                r.body_steps > 0 ? double(r.bytes) / double(r.body_steps) : 0.0,
                counted(r.cross_contacts, "contact"), counted(r.migrations, "body"));
+    if (r.one_owner && r.workers > 1)
+        fmt::print(
+            "one worker stepped all bodies: they differ too much in mass or length to be shared out of step; "
+            "--mode sync shares them\n");
     if (r.lost + r.left > 0)
         fmt::print("{} lost, {} left early; {} went to others\n", counted(r.lost, "worker"), r.left,
                    counted(r.bodies_reowned, "body"));

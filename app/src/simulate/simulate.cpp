@@ -257,6 +257,7 @@ Json workers_of(const SimulateResult& r) {
             {"workers_left", r.left},
             {"bodies_reowned", r.bodies_reowned},
             {"trades", r.trades},
+            {"one_owner", r.one_owner},
             {"bytes_per_body_step", r.body_steps > 0 ? Json(double(r.bytes) / double(r.body_steps)) : Json()},
             {"linked_bytes_per_body_step",
              r.body_steps > 0 ? Json(double(r.bytes_linked) / double(r.body_steps)) : Json()},

@@ -99,7 +99,9 @@ struct DistributedResult {    ///< of a whole run
     WorldCounts counts;                                         ///< summed over workers
     std::vector<QuarantinedBody> quarantined;                   ///< in order of steps; so are the next two
     std::vector<FirstStep> limited, broken;                     ///< see World::limited and World::broken
-    bool rest_reached = false;                                  ///< until_rest: every body came to rest
+    bool one_owner =
+        false;  ///< bounded: one worker stepped all bodies, which are too unlike to be shared out
+    bool rest_reached = false;  ///< until_rest: every body came to rest
     /// SimulatedProcessors::repeat_alone: the workers' processor time in turns over that of the same work one worker
     /// after the other: elapsed_s, as far as it is work, is too long by this factor.
     double cold_caches = 1;

@@ -45,11 +45,11 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
     const World all = with_later(scene);
     for (int i = 0; i < all.bodies(); ++i)
         bodies_.push_back({kApplication, view_.clock().born(i), all.record(i), 0});
-    if (settings_.pace == Pace::bounded && !are_alike(all, lots_, structures_now()))
-        one_owner_ = true, settings_.market.trade = false;
     // A run that goes on shares out as from its start.
     first_places_ = places(lots_);
     if (from) go_to(*from);
+    result_.one_owner = settings_.pace == Pace::bounded && !are_alike(all, lots_, structures_now());
+    if (result_.one_owner) settings_.market.trade = false;
 }
 
 void Coordinator::go_to(const RunState& from) {
@@ -150,10 +150,6 @@ void Coordinator::catch_up(std::uint32_t worker) {
 
 void Coordinator::start() {
     started_ = true;
-    if (one_owner_ && members_.size() > 1)
-        observer_->note(
-            "one worker steps all bodies: they are too unlike in mass or length to be shared out of step; in "
-            "lockstep they are");
     if (goes_on_) {
         observer_->at(0, World(scene_.world));
         WorldSnapshot snapshot = view_.snapshot();
@@ -243,7 +239,7 @@ std::vector<std::vector<int>> Coordinator::structures_now() const {
 std::vector<std::vector<int>> Coordinator::whole_lots() const {
     if (settings_.pace == Pace::lockstep) return lots_;
     std::vector<int> first(lots_.size());
-    if (!one_owner_) first = joined_by(structures_now(), lots_);
+    if (!result_.one_owner) first = joined_by(structures_now(), lots_);
     std::vector<std::vector<int>> lots(lots_.size());
     for (std::size_t i = 0; i < lots_.size(); ++i) {
         std::vector<int>& lot = lots[static_cast<std::size_t>(first[i])];

@@ -133,7 +133,6 @@ private:
     WorldView view_;
     Columns columns_;
     std::vector<std::vector<int>> lots_;         // tied together
-    bool one_owner_ = false;                     // bounded: of all bodies, see are_alike
     std::vector<Eigen::Vector3d> first_places_;  // of each
     std::vector<Body> bodies_;
     WorldRecord record_;               // of an update that is being taken

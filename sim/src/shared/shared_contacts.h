@@ -17,7 +17,7 @@ namespace sim {
 /// (I' - I) / 2; the other body by the opposite, so momentum is kept to the last bit. (Both solve the interface and
 /// split the difference: an additive Schwarz method, here a step late: chaotic relaxation, Chazan and Miranker 1969.)
 ///
-/// A blow (an impact, a rebound) is not split: two owners may see it in different steps, and half of each would be no
+/// A blow (a rebound) is not split: two owners may see it in different steps, and half of each would be no
 /// rebound. It counts as who saw it first has it, of two in one step the owner of the body with the lower number;
 /// the other body is put right as a whole. A blow that one owner sees is the first one of the last `window` steps that the
 /// other one saw and that was not yet paired. This follows from the messages of these steps alone, so whoever compares finds
