@@ -203,7 +203,7 @@ struct StepImpulse {
 /// Impulses that an own body and a ghost gave each other in one step.
 struct CrossImpulse {
     int own, ghost;
-    bool blow = false;                                 ///< they rebounded from each other
+    bool blow = false;                                 ///< they rebounded, or were stopped where they met
     Eigen::Vector3d linear = Eigen::Vector3d::Zero();  ///< on the own body; the ghost's is opposite [N s]
     Eigen::Vector3d angular_own = Eigen::Vector3d::Zero();    ///< about its centre, world axes [N m s]
     Eigen::Vector3d angular_ghost = Eigen::Vector3d::Zero();  ///< likewise of the ghost

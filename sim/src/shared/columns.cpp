@@ -178,9 +178,11 @@ Holdings ColumnWatch::holdings(std::uint32_t self, const World& world, std::span
     const std::vector<int> first = joined_by(structures, lots_);
     std::vector<Middle> middles(lots_.size());
     for (std::size_t i = 0; i < lots_.size(); ++i)
-        for (const int body : lots_[i])
-            if (Middle& middle = middles[static_cast<std::size_t>(first[i])]; there(body))
-                middle.sum += place(body), ++middle.bodies;
+        for (const int body : lots_[i]) {
+            if (!there(body)) continue;
+            Middle& middle = middles[static_cast<std::size_t>(first[i])];
+            middle.sum += place(body), ++middle.bodies;
+        }
     std::vector<std::optional<Eigen::Vector3d>> places(lots_.size());
     for (std::size_t i = 0; i < lots_.size(); ++i)
         if (middles[i].bodies > 0) places[i] = middles[i].sum / middles[i].bodies;

@@ -45,7 +45,7 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
     const World all = with_later(scene);
     for (int i = 0; i < all.bodies(); ++i)
         bodies_.push_back({kApplication, view_.clock().born(i), all.record(i), 0});
-    // A run that goes on shares out as from its start.
+    // In lockstep a run that goes on shares out as from its start.
     first_places_ = places(lots_);
     if (from) go_to(*from);
     result_.one_owner = settings_.pace == Pace::bounded && !are_alike(all, lots_, structures_now());
@@ -280,10 +280,12 @@ void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from, 
         for (const int body : lots[i])
             if (std::binary_search(bodies.begin(), bodies.end(), body)) stands[*column[i]].push_back(body);
     std::map<std::uint32_t, std::vector<int>> shares;
+    const auto bodies_of = [](const auto& c) { return c.second; };
     auto to = count.end();
     for (const auto& [at, some] : stands) {
         if (to == count.end() || to->second * members_.size() >= all)
-            to = std::ranges::min_element(count, {}, [](const auto& c) { return c.second; });
+            to = result_.one_owner ? std::ranges::max_element(count, {}, bodies_of)
+                                   : std::ranges::min_element(count, {}, bodies_of);
         to->second += some.size();
         auto& share = shares[to->first];
         share.insert(share.end(), some.begin(), some.end());

@@ -57,7 +57,10 @@ SharedContacts::Shares SharedContacts::shares(const CrossImpulse* found, const C
     } else if (const int ahead = blows_ahead(low, high, step); here == lower_here ? ahead < 0 : ahead > 0) {
         counts_here = counts_there = false;  // the other one saw it before
     }
-    return {here ? (counts_here ? 0.0 : -1.0) : -0.5, there ? (counts_there ? 1.0 : 0.0) : 0.5};
+    // Of a rebound and what is none one counts whole, too: half of the other would be more than either.
+    if (found && told && here != there) counts_here = here ? counts_here : !counts_there;
+    if (found && told) return counts_here ? Shares{0, 0} : Shares{-1, 1};
+    return {counts_here ? 0.0 : -1.0, counts_there ? 1.0 : 0.0};
 }
 
 // The first sale of a body at or after the end of a step.

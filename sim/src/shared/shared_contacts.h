@@ -20,7 +20,7 @@ namespace sim {
 /// A blow (a rebound) is not split: two owners may see it in different steps, and half of each would be no
 /// rebound. It counts as who saw it first has it, of two in one step the owner of the body with the lower number;
 /// the other body is put right as a whole. A blow that one owner sees is the first one of the last `window` steps that the
-/// other one saw and that was not yet paired. This follows from the messages of these steps alone, so whoever compares finds
+/// other one saw and that was not yet paired. If in a step only one of two finds a blow, that or the other's counts, as a whole. This follows from the messages of these steps alone, so whoever compares finds
 /// the same, also for a body that was just bought.
 class SharedContacts {
 public:

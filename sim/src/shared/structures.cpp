@@ -12,10 +12,9 @@
 namespace sim {
 namespace {
 
-constexpr double kSlowShare = 0.25;  // of sqrt(g size)
-constexpr double kBeside = 0.02;     // of the size
-constexpr std::size_t kOwnPerForeign =
-    4;  // bodies of a structure, at least, for each of others that touches it
+constexpr double kSlowShare = 0.25;        // of sqrt(g size)
+constexpr double kBeside = 0.02;           // of the size
+constexpr std::size_t kOwnPerForeign = 4;  // bodies of a structure for each other that touches it
 
 struct SlowBody {
     int body;
@@ -87,10 +86,11 @@ bool are_alike(const World& world, const std::vector<std::vector<int>>& lots,
 
 std::vector<int> joined_by(const std::vector<std::vector<int>>& structures,
                            const std::vector<std::vector<int>>& lots) {
-    std::map<int, int> lot_of;
-    for (std::size_t i = 0; i < lots.size(); ++i)
-        for (const int body : lots[i]) lot_of[body] = static_cast<int>(i);
     DisjointSets sets(lots.size());
+    std::map<int, int> lot_of;
+    if (!structures.empty())
+        for (std::size_t i = 0; i < lots.size(); ++i)
+            for (const int body : lots[i]) lot_of[body] = static_cast<int>(i);
     for (const std::vector<int>& bodies : structures)
         for (const int body : bodies) sets.join(lot_of.at(bodies.front()), lot_of.at(body));
     std::vector<int> first;

@@ -15,16 +15,17 @@ constexpr std::size_t kMostInStructure = 64;
 ///
 /// `size`: mean diameter of bodies [m]. Slow: by less than a quarter of sqrt(g size), the speed of a fall by half of it. Side
 /// by side: boxes around the bodies' rest shapes, along the world's axes, are at most 2 % of it apart. As of the end of the
-/// world's last step. Each has two bodies or more, ascending. O(n log n) but for bodies one behind the other along x.
+/// world's last step. Each has two bodies or more, ascending; without gravity there are none. O(n log n) but for bodies one behind the other along x.
 /// `bodies` move and are there.
 [[nodiscard]] std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies,
                                                        double size);
 
-/// Whether bounded pace may give a scene's lots to several workers, as it does if they are alike, but for those in a structure:
-/// the heaviest bodies of any two differ by at most a factor of kMostUnlikeMass, the longest by kMostUnlikeLength. A body is held
-/// up by what other workers told some steps ago; the heavier it is than what holds it, or the more workers' bodies it lies
-/// on, the larger is the answer that comes late, until it grows from step to step. `world` has all bodies of the lots.
+/// Factors by which bodies that are shared out may differ.
 constexpr double kMostUnlikeMass = 4, kMostUnlikeLength = 3;
+/// Whether lots that are in no structure are alike: by the heaviest and the longest body of each. Others bounded pace gives to one
+/// worker. A body is held up by what other workers told some steps ago; the heavier it is than what holds it, or the more
+/// workers' bodies it lies on, the larger is the answer that comes late, until it grows from step to step. `world` has
+/// all bodies of the lots.
 [[nodiscard]] bool are_alike(const World& world, const std::vector<std::vector<int>>& lots,
                              const std::vector<std::vector<int>>& structures);
 

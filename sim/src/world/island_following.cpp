@@ -100,6 +100,7 @@ void IslandSolver::take_found(double most) {
     contacts_.clear(), impacts_.clear(), first_contact_.clear();
     any_impacts_ = false;
     any_bounce_ = any_rebound_ = any_emerging_ = false;
+    part_rebounds(true);
     for (Manifold& m : found_)
         for (std::size_t i = 0; i < static_cast<std::size_t>(m.count); ++i) add_contact(m, m.points[i]);
     for (SpringRows& s : springs_)

@@ -49,7 +49,7 @@ void IslandSolver::begin(const Island& island) {
         places_[static_cast<std::size_t>(&rows - rows_of_.data())] = {
             rows.place, 2 * rows.body->kind->half_box.maxCoeff()};
     });
-    part_rebounds(island);
+    part_rebounds(false);
     y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
     std::fill_n(moved_.data(), offset, 0.f);
 
@@ -67,25 +67,30 @@ void IslandSolver::begin(const Island& island) {
         (void)begin_direct(among_ghosts() ? 0 : most_at_first(), springs_.empty());
 }
 
-void IslandSolver::part_rebounds(const Island& island) {
+void IslandSolver::part_rebounds(bool found_again) {
     const auto is_ghost = [](const BodyRows& rows) { return !rows.body->own; };
-    if (std::ranges::none_of(rows_of_, is_ghost)) return;
-    contacts_with_.assign(rows_of_.size(), 0);
-    const auto each_of = [this](const Manifold& m, const auto& what) {
-        for (const int id : {m.a, m.b})
-            if (id < kFirstPlane && local(id) >= 0) what(static_cast<std::size_t>(local(id)));
+    if (!told_crossed_ || std::ranges::none_of(rows_of_, is_ghost)) return;
+    const std::size_t count = found_again ? found_.size() : island_->manifolds.size();
+    const auto manifold = [&](std::size_t i) -> Manifold& {
+        return found_again ? found_[i] : (*manifolds_)[static_cast<std::size_t>(island_->manifolds[i])];
     };
-    for (const int m : island.manifolds)
-        each_of((*manifolds_)[static_cast<std::size_t>(m)],
-                [this](std::size_t body) { ++contacts_with_[body]; });
-    for (const int number : island.manifolds) {
-        Manifold& m = (*manifolds_)[static_cast<std::size_t>(number)];
-        bool own = false, ghost = false, alone = true;
-        each_of(m, [&](std::size_t body) {
-            (is_ghost(rows_of_[body]) ? ghost : own) = true;
-            alone = alone && contacts_with_[body] == 1;
-        });
-        if (own && ghost && !alone) m.restitution = 0;
+    const auto moves = [this](int body) { return body < kFirstPlane && local(body) >= 0; };
+    const auto partners = [this](int body) -> int& {
+        return partners_[static_cast<std::size_t>(local(body))];
+    };
+    partners_.assign(rows_of_.size(), 0);
+    for (std::size_t i = 0; i < count; ++i) {
+        const Manifold& m = manifold(i);
+        const bool again = i > 0 && manifold(i - 1).a == m.a && manifold(i - 1).b == m.b;
+        if (!again && moves(m.a) && moves(m.b)) ++partners(m.a), ++partners(m.b);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        Manifold& m = manifold(i);
+        if (!moves(m.a) || !moves(m.b) || (partners(m.a) == 1 && partners(m.b) == 1)) continue;
+        const auto ghost = [&](int body) {
+            return is_ghost(rows_of_[static_cast<std::size_t>(local(body))]);
+        };
+        if (ghost(m.a) != ghost(m.b)) m.restitution = 0;
     }
 }
 

@@ -524,9 +524,10 @@ private:
     [[nodiscard]] bool step_modes(const BodyRows& rows);  // whether a deformation was held
     void keep_impulses();
     int note_pair(const Manifold& manifold);
-    /// Bodies of two owners rebound if they touch nothing else. Each owner sees the other's bodies as they were some steps ago: in
-    /// a heap they would rebound from what is no longer there, and gain energy.
-    void part_rebounds(const Island& island);
+    /// Bodies of two owners rebound if they touch no other body that moves, as far as this world knows. Each owner sees the other's
+    /// bodies as they were some steps ago: in a heap they would rebound from what is no longer there, and gain energy.
+    /// found_again: in a substep, see find_again.
+    void part_rebounds(bool found_again);
     /// Whether the island goes on at other workers: it is swept, as all of it would be.
     [[nodiscard]] bool among_ghosts() const noexcept { return crossed_.size() > first_crossed_; }
 
@@ -702,7 +703,7 @@ private:
     bool factored_ = false;  // rows and springs have not changed since
     std::vector<int> sizes_;
     std::vector<DirectContact> direct_contacts_;
-    std::vector<int> contacts_with_;  // of each body, part_rebounds
+    std::vector<int> partners_;  // of each body, part_rebounds
     AlignedDoubles wide_rows_, wide_y_, wide_start_, wide_free_, wide_held_, gradient_, step_;
     struct End0 {
         Eigen::Vector3d position;

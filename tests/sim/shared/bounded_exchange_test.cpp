@@ -332,6 +332,30 @@ TEST(BoundedExchange, HeapsOfBodiesThatReboundComeToRest) {
     }
 }
 
+// Who owns the stack sees that it touches more than the ball, and finds no rebound; who owns the ball does not, and finds one.
+TEST(BoundedExchange, ABallThatFallsOnAnothersStackGainsNoEnergy) {
+    for (const double e : {0.5, 0.8, 1.0})
+        for (int start = 0; start < 6; ++start) {
+            WorldDefinition d = world_test::on_floor();
+            for (int i = 0; i < 3; ++i) d.bodies.push_back(world_test::box({0, 0.5 + i, 0}, {0.5, 0.5, 0.5}));
+            d.bodies.push_back(world_test::ball({0.02, 4.4 + 0.013 * start, 0}));
+            for (WorldBody& body : d.bodies) body.restitution = e;
+            // Before the impact its own weight gives it sqrt(2 g 0.9 m); above all it is never faster than this upwards.
+            const double impact = std::sqrt(2 * 9.81 * (d.bodies[3].world_from_body.translation().y() - 3.5));
+            for (const int steps : {30, 40, 60}) {
+                Crew crew(d, 2, 4, static_cast<std::uint64_t>(steps), {1, 1, 1, 0});
+                if (start % 2)
+                    crew.run_at_random(static_cast<unsigned>(start + 1));
+                else
+                    crew.run_in_turn(0);
+                EXPECT_LT(crew.state(3).velocity.y(), 1.02 * impact) << e << " " << start << " " << steps;
+                double energy = 0;
+                for (int b = 0; b < 4; ++b) energy += crew.state(b).velocity.squaredNorm() / 2;
+                EXPECT_LT(energy, 1.05 * impact * impact / 2) << e << " " << start << " " << steps;
+            }
+        }
+}
+
 // What was found before a sale is compared after it.
 TEST(BoundedExchange, PilesWhoseBodiesAreSoldAllTheTimeKeepTheirMomentum) {
     for (const unsigned seed : {1u, 2u, 3u, 4u, 5u, 6u}) {

@@ -199,5 +199,14 @@ TEST(Structures, ABoardThatFallsOnAHeapIsNotThrownUpOutOfStep) {
         EXPECT_EQ(result.trades, 0u);
         EXPECT_TRUE(result.one_owner);
         EXPECT_LT(record.fastest, 5);  // falls by 0.35 m: 2.6 m/s, and slides down
+        // Whoever leaves, also before the board comes: all bodies go to one other worker.
+        sim::SimulatedProcessors how = processors(5);
+        for (int worker = 0; worker < 4; ++worker)
+            how.failures.push_back({result.elapsed_s * (worker + 1) / 24, worker,
+                                    sim::SimulatedProcessors::Failure::Kind::drain});
+        Moved drained;
+        EXPECT_EQ(sim::simulate_processors(scene, bounded(120, 4), how, drained).steps, 120u);
+        EXPECT_EQ(drained.own[4], 76);
+        EXPECT_LT(drained.fastest, 5);
     }
 }
