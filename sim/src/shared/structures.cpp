@@ -68,20 +68,27 @@ std::vector<std::vector<int>> structures(const World& world, std::span<const int
 
 bool are_alike(const World& world, const std::vector<std::vector<int>>& lots,
                const std::vector<std::vector<int>>& structures) {
+    struct Range {
+        double least = std::numeric_limits<double>::infinity(), most = 0;
+        void add(double value) { least = std::min(least, value), most = std::max(most, value); }
+        [[nodiscard]] bool within(double factor, const Range& of) const {
+            return most <= factor * of.least && of.most <= factor * least;
+        }
+    };
     std::set<int> in_structure;
     for (const std::vector<int>& bodies : structures) in_structure.insert(bodies.begin(), bodies.end());
-    double lightest = std::numeric_limits<double>::infinity(), shortest = lightest, heaviest = 0, longest = 0;
+    Range mass, length, free_mass, free_length;
     for (const std::vector<int>& lot : lots) {
-        if (std::ranges::any_of(lot, [&](int body) { return in_structure.contains(body); })) continue;
-        double mass = 0, length = 0;
+        Range masses, lengths;
         for (const int body : lot) {
-            mass = std::max(mass, world.rigid_mass(body).mass);
-            length = std::max(length, world.definition(body).shape.base.semi_axes.maxCoeff());
+            masses.add(world.rigid_mass(body).mass);
+            lengths.add(world.definition(body).shape.base.semi_axes.maxCoeff());
         }
-        lightest = std::min(lightest, mass), heaviest = std::max(heaviest, mass);
-        shortest = std::min(shortest, length), longest = std::max(longest, length);
+        mass.add(masses.most), length.add(lengths.most);
+        if (std::ranges::any_of(lot, [&](int body) { return in_structure.contains(body); })) continue;
+        free_mass.add(masses.most), free_length.add(lengths.most);
     }
-    return heaviest <= kMostUnlikeMass * lightest && longest <= kMostUnlikeLength * shortest;
+    return free_mass.within(kMostUnlikeMass, mass) && free_length.within(kMostUnlikeLength, length);
 }
 
 std::vector<int> joined_by(const std::vector<std::vector<int>>& structures,

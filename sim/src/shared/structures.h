@@ -22,7 +22,7 @@ constexpr std::size_t kMostInStructure = 64;
 
 /// Factors by which bodies that are shared out may differ.
 constexpr double kMostUnlikeMass = 4, kMostUnlikeLength = 3;
-/// Whether lots that are in no structure are alike: by the heaviest and the longest body of each. Others bounded pace gives to one
+/// Whether lots that are in no structure are like each other and like those that are: by the heaviest and the longest body of each. Others bounded pace gives to one
 /// worker. A body is held up by what other workers told some steps ago; the heavier it is than what holds it, or the more
 /// workers' bodies it lies on, the larger is the answer that comes late, until it grows from step to step. `world` has
 /// all bodies of the lots.
