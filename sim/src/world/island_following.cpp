@@ -31,6 +31,7 @@ bool IslandSolver::may_follow(const Island& island) const {
     bool thin = false;
     for (const int id : island.bodies) {
         const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
+        if (told_crossed_ && !body.own) return false;  // swept, as all of it would be
         const double least = kSlow * body.kind->half_box.minCoeff();
         if ((body.state.velocity.norm() + turning_speed(body)) * shortest > least) return false;
         thin = thin || dt * dt * settings_->gravity.norm() > least;

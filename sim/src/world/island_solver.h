@@ -122,7 +122,7 @@ public:
     void solve(const Island& island, const ContactScene& scene, bool follow = false);
     /// Whether an island in which bodies met unforeseen can be followed: solved directly, in substeps in which none of its
     /// bodies moves by more than kSlow of its size, contacts found again in each. Islands of bodies so small or thin that
-    /// weight alone takes one further than that in a step, unless they are too fast.
+    /// weight alone takes one further than that in a step, unless they are too fast, or go on at other workers.
     [[nodiscard]] bool may_follow(const Island& island) const;
     // One island by several partners, island_partners.cpp.
     /// Begins it and sweeps the part that is this partner's. false, and nothing done: it is not one that is shared out. The
