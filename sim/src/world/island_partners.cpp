@@ -24,9 +24,10 @@ bool is_impact(const Manifold& manifold) {
     return manifold.points[0].begins >= 0;
 }
 
-bool rests(const Manifold& manifold) {
-    return manifold.restitution == 0 ||
-           std::all_of(manifold.points.begin(), manifold.points.begin() + manifold.count,
+bool rests(Manifold& manifold) {
+    if (manifold.restitution == 0) return true;
+    unpack(manifold);
+    return std::all_of(manifold.points.begin(), manifold.points.begin() + manifold.count,
                        [](const ManifoldPoint& p) { return p.normal_impulse > 0; });
 }
 
@@ -40,14 +41,14 @@ void keep_once(std::vector<std::uint32_t>& bodies) {
 
 // Impacts of what does not rebound stay with their pairs.
 bool IslandSolver::is_plain(const Island& island) const {
-    auto manifold = [this](int m) -> const Manifold& { return (*manifolds_)[static_cast<std::size_t>(m)]; };
+    auto manifold = [this](int m) -> Manifold& { return (*manifolds_)[static_cast<std::size_t>(m)]; };
     const bool impacts = std::ranges::any_of(island.manifolds, is_impact, manifold);
     return island.bodies.size() >= kLeastDivided && forces_->empty() && !told_crossed_ &&
            !is_carried(island) &&
            std::ranges::none_of(island.bodies,
                                 [this](int id) { return (*bodies_)[static_cast<std::size_t>(id)].pushed; }) &&
            std::ranges::all_of(
-               island.manifolds, [&](const Manifold& m) { return impacts ? m.restitution == 0 : rests(m); },
+               island.manifolds, [&](Manifold& m) { return impacts ? m.restitution == 0 : rests(m); },
                manifold);
 }
 

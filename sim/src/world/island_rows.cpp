@@ -5,6 +5,7 @@
 
 #include "world/island_solver.h"
 #include "world/row_kernels.h"
+#include "world/step_records.h"
 
 // What an island's rows are made of; island_solver.cpp sweeps over them.
 
@@ -192,9 +193,10 @@ void IslandSolver::note(const Part& part) noexcept {
 // its centre would run on through what it strikes. The speed: half of its thinnest half extent in the time of its slowest mode, 1 / omega.
 void IslandSolver::stiffen(const Island& island) {
     for (const int m : island.manifolds) {
-        const Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
         const ManifoldPoint& point = manifold.points[0];
         if (!(point.begins >= 0) || std::isinf(point.begins)) continue;
+        unpack(manifold);
         auto velocity_of = [this](int id) -> Eigen::Vector3d {
             if (id >= kFirstPlane) return Eigen::Vector3d::Zero();
             return (*bodies_)[static_cast<std::size_t>(id)].state.velocity;
@@ -220,6 +222,7 @@ void IslandSolver::fill_part(std::span<const int> manifolds, Window& window, Par
     };
     for (const int m : manifolds) {
         Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        if (!impacts_alone || manifold.points[0].begins >= 0) unpack(manifold);
         int* const next[] = {turns_of(manifold.a), turns_of(manifold.b)};
         for (int i = 0; i < manifold.count; ++i) {
             if (window.contacts.size() == kWindow) flush(window, part, impacts_alone);

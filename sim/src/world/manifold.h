@@ -11,11 +11,11 @@ struct ManifoldPoint {
     std::uint32_t feature =
         0;                 ///< sample of a, or sample of b with the top bit set: the same from step to step
     float separation = 0;  ///< negative: overlap [m]
+    float begins = -1;     ///< of an impact: its time since the step's start [s]; else -1
     Eigen::Vector3f normal;
     Eigen::Vector3f arm_a, arm_b;      ///< from the centres to the contact, half-way through the overlap [m]
     int sample_a = -1, sample_b = -1;  ///< which of the samples, or -1: see rest
     Eigen::Vector3f rest_a, rest_b;    ///< places in the rest shapes, of a body whose sample is -1
-    float begins = -1;                 ///< of an impact: its time since the step's start [s]; else -1
     float gap = 0;                     ///< of an impact, then [m]
     float normal_impulse = 0;          ///< of the last substep, to start the next from [N s]
     Eigen::Vector3f friction_impulse = Eigen::Vector3f::Zero();
@@ -27,10 +27,13 @@ constexpr int kManifoldPoints = 4;
 struct Manifold {
     int a = 0, b = 0;  ///< bodies, a < b; b >= kFirstPlane: plane b - kFirstPlane
     int count = 0;
-    std::array<ManifoldPoint, kManifoldPoints> points;
     float friction = 0, restitution = 0;
-    bool emerging = false;    ///< came deep into each other, and still overlap
     float impulse_reach = 0;  ///< how far from a point its last impulse may have been, see take_impulses [m]
+    bool emerging = false;    ///< came deep into each other, and still overlap
+    /// Where a partner's messages have the points, of which only `begins` of the first is here, and the impulses that came of
+    /// them; see unpack (step_records.h). nullptr: they are here.
+    const std::uint8_t *packed_points = nullptr, *packed_impulses = nullptr;
+    std::array<ManifoldPoint, kManifoldPoints> points;
     [[nodiscard]] std::uint64_t key() const noexcept {  ///< orders pairs by (a, b)
         return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);
     }

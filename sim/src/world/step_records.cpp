@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 namespace sim {
 namespace {
@@ -48,13 +49,20 @@ PackedPoint packed(const ManifoldPoint& p) {
 }
 
 void unpack(const PackedPoint& from, ManifoldPoint& p) {
-    if (!std::isinf(from.begins)) expect_finite(&from.begins, 1);  // infinite: it does not happen
-    expect_finite(from.numbers.data(), from.numbers.size());
     p.feature = from.feature, p.sample_a = from.sample_a, p.sample_b = from.sample_b, p.begins = from.begins;
     std::size_t at = 0;
     for (Eigen::Vector3f* vector : vectors_of(p))
         for (int k = 0; k < 3; ++k) (*vector)[k] = from.numbers[at++];
     for (float* number : {&p.separation, &p.gap, &p.normal_impulse}) *number = from.numbers[at++];
+}
+
+constexpr std::size_t kBytesOfImpulses = 16;  // of a point
+
+void set_impulses(const std::uint8_t* from, ManifoldPoint& point) {
+    std::array<float, 4> impulses;
+    std::memcpy(impulses.data(), from, kBytesOfImpulses);
+    point.normal_impulse = impulses[0];
+    point.friction_impulse = {impulses[1], impulses[2], impulses[3]};
 }
 
 void write_numbers(ByteWriter& out, const double* numbers, Eigen::Index count) {
@@ -64,6 +72,12 @@ void read_numbers(ByteReader& in, double* numbers, Eigen::Index count) {
     const std::size_t bytes = static_cast<std::size_t>(count) * 8;
     if (bytes > 0) std::memcpy(numbers, in.take(bytes).data(), bytes);
     expect_finite(numbers, static_cast<std::size_t>(count));
+}
+
+PackedPoint point_at(const std::uint8_t* bytes) {
+    PackedPoint point;
+    std::memcpy(&point, bytes, sizeof point);
+    return point;
 }
 
 // A sample of a body, or -1.
@@ -114,11 +128,23 @@ void read(ByteReader& in, Manifold& m, const std::vector<MovingBody>& bodies, st
         (on_plane || !bodies[static_cast<std::size_t>(m.b)].moves()))
         throw DecodeError("a contact of what does not move");
     for (float* x : {&m.friction, &m.restitution, &m.impulse_reach}) read_floats(in, {x, 1});
-    for (int i = 0; i < m.count; ++i) {
-        ManifoldPoint& p = m.points[static_cast<std::size_t>(i)];
-        unpack(std::bit_cast<PackedPoint>(in.bytes<sizeof(PackedPoint)>()), p);
+    m.packed_points = in.take(sizeof(PackedPoint) * static_cast<std::size_t>(m.count)).data();
+    m.packed_impulses = nullptr;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(m.count); ++i) {
+        const PackedPoint p = point_at(m.packed_points + i * sizeof(PackedPoint));
+        if (i == 0) m.points[0].begins = p.begins;
+        if (!std::isinf(p.begins)) expect_finite(&p.begins, 1);  // infinite: it does not happen
+        expect_finite(p.numbers.data(), p.numbers.size());
         expect_sample(p.sample_a, m.a, bodies), expect_sample(p.sample_b, m.b, bodies);
     }
+}
+
+void unpack_points(Manifold& m) {
+    const auto count = static_cast<std::size_t>(m.count);
+    const std::uint8_t* from = std::exchange(m.packed_points, nullptr);
+    for (std::size_t i = 0; i < count; ++i) unpack(point_at(from + i * sizeof(PackedPoint)), m.points[i]);
+    if (const std::uint8_t* impulses = std::exchange(m.packed_impulses, nullptr))
+        for (std::size_t i = 0; i < count; ++i) set_impulses(impulses + i * kBytesOfImpulses, m.points[i]);
 }
 
 std::uint64_t skip_manifold(ByteReader& in) {
@@ -138,12 +164,15 @@ void write_impulses(ByteWriter& out, const Manifold& m) {
 }
 
 void read_impulses(ByteReader& in, Manifold& m) {
-    for (int i = 0; i < m.count; ++i) {
-        ManifoldPoint& p = m.points[static_cast<std::size_t>(i)];
-        std::array<float, 4> impulses;
-        read_floats(in, impulses);
-        p.normal_impulse = impulses[0];
-        p.friction_impulse = {impulses[1], impulses[2], impulses[3]};
+    const auto count = static_cast<std::size_t>(m.count);
+    const std::uint8_t* from = in.take(kBytesOfImpulses * count).data();
+    std::array<float, 4 * kManifoldPoints> numbers{};
+    std::memcpy(numbers.data(), from, kBytesOfImpulses * count);
+    expect_finite(numbers.data(), numbers.size());
+    if (m.packed_points) {
+        m.packed_impulses = from;
+    } else {
+        for (std::size_t i = 0; i < count; ++i) set_impulses(from + i * kBytesOfImpulses, m.points[i]);
     }
 }
 

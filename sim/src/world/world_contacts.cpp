@@ -95,6 +95,8 @@ void wake_group(std::vector<MovingBody>& bodies, int body) {
 void WorldContacts::find(const ContactScene& scene, Partners* with, const WriteAside& write_aside,
                          const ReadAside& read_aside) {
     std::swap(before_, manifolds_);
+    std::swap(kept_before_, kept_);
+    kept_.clear();
     reach_.resize(scene.bodies.size());
     paths_.resize(scene.bodies.size());
     first_.resize(scene.bodies.size());
@@ -220,29 +222,29 @@ void WorldContacts::share(const ContactScene& scene, Partners& with, const Write
     out.number(found.pairs);
     if (write_aside) write_aside(out);
     with.tell_all(std::move(out.bytes()));
-    std::swap(own_found_, found.manifolds);
-    told_.clear();
-    for (std::size_t i = 0; i < own_found_.size(); ++i) told_.push_back({own_found_[i].key(), {}, i});
-    heard_.resize(static_cast<std::size_t>(with.count()));
+    told_.clear(), runs_.clear();
+    for (std::size_t i = 0; i < found.manifolds.size(); ++i)
+        told_.push_back({found.manifolds[i].key(), {}, i});
+    runs_.push_back(told_.size());
     for (int p = 0; p < with.count(); ++p) {
         if (p == with.self()) continue;
-        Partners::Bytes& heard = heard_[static_cast<std::size_t>(p)];
-        heard = with.hear(p);
+        const std::span<const std::uint8_t> heard = keep(with.hear(p));
         ByteReader in(heard);
         hear(scene, in, heard);
         if (read_aside) read_aside(in, p);
         in.expect_end();
     }
-    std::ranges::sort(told_, {}, &Told::key);
-    found.manifolds.resize(told_.size());
+    merge_told();
+    all_found_.resize(told_.size());
     for (std::size_t i = 0; i < told_.size(); ++i) {
         if (told_[i].bytes.empty()) {
-            found.manifolds[i] = own_found_[told_[i].own];
+            all_found_[i] = found.manifolds[told_[i].own];
         } else {
             ByteReader in(told_[i].bytes);
-            read(in, found.manifolds[i], scene.bodies, scene.planes.size());
+            read(in, all_found_[i], scene.bodies, scene.planes.size());
         }
     }
+    std::swap(all_found_, found.manifolds);
     std::ranges::sort(found.meetings, {}, [](const Meeting& m) { return std::pair(m.a, m.b); });
     for (const Meeting& m : found.meetings)
         for (const int id : {m.a, m.b}) follow(scene, id, scene.bodies[static_cast<std::size_t>(id)].state);
@@ -260,7 +262,10 @@ void WorldContacts::hear(const ContactScene& scene, ByteReader& in, std::span<co
         const std::span<const std::uint8_t> from = bytes.last(in.left());
         const std::uint64_t key = skip_manifold(in);
         told_.push_back({key, from.first(from.size() - in.left()), 0});
+        if (told_.size() > runs_.back() + 1 && key <= told_[told_.size() - 2].key)
+            throw DecodeError("contacts that do not ascend");
     }
+    runs_.push_back(told_.size());
     for (std::uint32_t n = in.count(16); n > 0; --n) {
         const int a = body(), b = body();
         const bool any = scene.bodies[static_cast<std::size_t>(a)].moves() ||
@@ -273,6 +278,24 @@ void WorldContacts::hear(const ContactScene& scene, ByteReader& in, std::span<co
     const auto pairs = in.number<std::uint32_t>();
     if (pairs > kMostPairs) throw DecodeError(std::to_string(pairs) + " pairs");
     found.pairs += static_cast<int>(pairs);
+}
+
+// Each run ascends: neighbours are merged until one is left.
+void WorldContacts::merge_told() {
+    const auto at = [this](std::size_t place) { return told_.begin() + static_cast<std::ptrdiff_t>(place); };
+    while (runs_.size() > 1) {
+        std::size_t first = 0, kept = 0;
+        for (std::size_t r = 0; r < runs_.size(); r += 2) {
+            const std::size_t middle = runs_[r], last = runs_[std::min(r + 1, runs_.size() - 1)];
+            std::ranges::inplace_merge(at(first), at(middle), at(last), {}, &Told::key);
+            runs_[kept++] = first = last;
+        }
+        runs_.resize(kept);
+    }
+}
+
+void WorldContacts::unpack_all() {
+    for (Manifold& m : manifolds_) unpack(m);
 }
 
 // What all threads found, in the order of keys.
@@ -314,10 +337,12 @@ void ContactScene::set_surface(Manifold& manifold) const {
 }
 
 // Keys must ascend from call to call.
-const Manifold* WorldContacts::last(std::uint64_t key, Found& found) const {
+const Manifold* WorldContacts::last(std::uint64_t key, Found& found) {
     std::size_t& next = found.next_before;
     while (next < before_.size() && before_[next].key() < key) ++next;
-    return next < before_.size() && before_[next].key() == key ? &before_[next] : nullptr;
+    if (next >= before_.size() || before_[next].key() != key) return nullptr;
+    unpack(before_[next]);
+    return &before_[next];
 }
 
 // Whether the balls that hold two bodies pass each other. Paths under gravity bend by g dt^2 / 8.
@@ -412,7 +437,7 @@ void WorldContacts::wake(const ContactScene& scene, int i, int j, Found& found) 
         if (scene.bodies[static_cast<std::size_t>(id)].asleep) found.woken.push_back(id);
 }
 
-void WorldContacts::meet_planes(const ContactScene& scene, int i, Found& found) const {
+void WorldContacts::meet_planes(const ContactScene& scene, int i, Found& found) {
     const MovingBody& body = scene.bodies[static_cast<std::size_t>(i)];
     if (!body.moves() || body.asleep) return;
     const Reach& reach = reach_[static_cast<std::size_t>(i)];

@@ -66,15 +66,23 @@ public:
     [[nodiscard]] bool any_left_path(const ContactScene& scene,
                                      const std::vector<std::uint8_t>& solved) const;
     /// After find(), whether it came to an end or not: the contacts before it.
-    void go_back() noexcept { std::swap(before_, manifolds_); }
+    void go_back() noexcept {
+        std::swap(before_, manifolds_);
+        std::swap(kept_before_, kept_);
+    }
+    /// Keeps what a partner told until the contacts of this step are those of none: their points and impulses may be in it.
+    /// Returns it.
+    std::span<const std::uint8_t> keep(Partners::Bytes&& heard) { return kept_.emplace_back(std::move(heard)); }
+    /// Takes all points out of what partners told.
+    void unpack_all();
     /// Of several impacts of a pair within the step only the last is one of its past in the next.
     void keep_last();
     /// The pair's manifold in this step, if it has one; the first of several.
-    [[nodiscard]] const Manifold* find_now(int a, int b) {
+    [[nodiscard]] Manifold* find_now(int a, int b) {
         return find_now(static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b));
     }
     /// Impulses of the last step again, for a manifold whose island is solved once more.
-    void rewarm(Manifold& manifold) const;
+    void rewarm(Manifold& manifold);
     /// Replaces the contacts of an island's bodies (ascending ids) by those that it found within the step.
     void replace(const std::vector<int>& bodies, const std::vector<Manifold>& by);
     /// From now on in this step the pair counts as one that has a contact.
@@ -114,6 +122,7 @@ private:
               const Partners* with);
     void share(const ContactScene& scene, Partners& with, const WriteAside& write, const ReadAside& read);
     void hear(const ContactScene& scene, ByteReader& in, std::span<const std::uint8_t> bytes);
+    void merge_told();
     void gather(const ContactScene& scene, std::size_t parts);
     void meet_pair(const ContactScene& scene, int i, int j, Found& found);
     [[nodiscard]] bool pass_by(const ContactScene& scene, int i, int j) const;
@@ -122,9 +131,9 @@ private:
     void meet_fast(const ContactScene& scene, int i, int j, const Manifold* before, Found& found);
     void watch_turning(int i, int j, double least);
     static void wake(const ContactScene& scene, int i, int j, Found& found);
-    void meet_planes(const ContactScene& scene, int i, Found& found) const;
-    const Manifold* last(std::uint64_t key, Found& found) const;
-    [[nodiscard]] const Manifold* find_last(std::uint64_t key) const;
+    void meet_planes(const ContactScene& scene, int i, Found& found);
+    const Manifold* last(std::uint64_t key, Found& found);
+    [[nodiscard]] const Manifold* find_last(std::uint64_t key);
     [[nodiscard]] Manifold* find_now(std::uint64_t key);
     [[nodiscard]] int impacts_of(int i, int j) const;  // of a pair in this step
 
@@ -143,14 +152,15 @@ private:
     std::vector<Reach> reach_;                  // of each body
     std::vector<Manifold> manifolds_, before_;  // by ascending keys
     std::vector<Manifold> added_;               // to them
-    std::vector<Partners::Bytes> heard_;        // of partners
+    std::vector<Partners::Bytes> kept_, kept_before_;  // that have points of manifolds_, of before_
     struct Told {
         std::uint64_t key;
         std::span<const std::uint8_t> bytes;  // of a partner's message
-        std::size_t own;                      // place among own_found_, where there are none
+        std::size_t own;                      // place among those found here, where there are none
     };
-    std::vector<Told> told_;  // manifolds
-    std::vector<Manifold> own_found_;
+    std::vector<Told> told_;         // manifolds, in runs of one partner each, then by ascending keys
+    std::vector<std::size_t> runs_;  // where each ends
+    std::vector<Manifold> all_found_;
     std::vector<BodyPath> paths_;  // of each body
     enum : std::uint8_t { kNotFollowed, kBeingFollowed, kFollowed };
     std::vector<std::uint8_t> followed_;  // paths_ holds the free motion of this step; by any thread

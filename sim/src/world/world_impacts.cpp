@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "world/step_records.h"
 #include "world/world_contacts.h"
 
 // Fast pairs: impacts on paths of free motion, and on those really taken.
@@ -34,10 +35,12 @@ bool by_key(const Manifold& a, const Manifold& b) {
 
 }  // namespace
 
-const Manifold* WorldContacts::find_last(std::uint64_t key) const {
+const Manifold* WorldContacts::find_last(std::uint64_t key) {
     const auto at = std::lower_bound(before_.begin(), before_.end(), key,
                                      [](const Manifold& m, std::uint64_t k) { return m.key() < k; });
-    return at != before_.end() && at->key() == key ? &*at : nullptr;
+    if (at == before_.end() || at->key() != key) return nullptr;
+    unpack(*at);
+    return &*at;
 }
 
 Manifold* WorldContacts::find_now(std::uint64_t key) {
@@ -53,7 +56,8 @@ int WorldContacts::impacts_of(int i, int j) const {
     return static_cast<int>(count);
 }
 
-void WorldContacts::rewarm(Manifold& manifold) const {
+void WorldContacts::rewarm(Manifold& manifold) {
+    unpack(manifold);
     for (ManifoldPoint& point : manifold.points) point.normal_impulse = 0, point.friction_impulse.setZero();
     const Manifold* before = find_last(manifold.key());
     if (before && manifold.points[0].begins < 0) take_impulses(*before, manifold.impulse_reach, manifold);

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "world/step_records.h"
 #include "world/world_implementation.h"
 
 // Solves a step's islands, and those again in which bodies meet what nobody foresaw.
@@ -197,8 +198,8 @@ void World::Implementation::hold_apart(const WorldContacts::Meeting& meeting) {
             body.state.velocity = leg.velocity, body.state.angular_momentum = leg.momentum;
         }
     }
-    const Manifold* manifold = contacts.find_now(meeting.a, meeting.b);
-    if (manifold) {
+    if (Manifold* manifold = contacts.find_now(meeting.a, meeting.b)) {
+        unpack(*manifold);
         const Kick kick = stop_approach(at(meeting.a), at(meeting.b), manifold->points[0]);
         for (const int id : {meeting.a, meeting.b}) {
             const int other = id == meeting.a ? meeting.b : meeting.a;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "world/step_records.h"
 #include "world/world_implementation.h"
 
 // What several worlds of the same bodies, each of which owns some, need of a World.
@@ -107,9 +108,11 @@ void World::restore(const WorldRecord& record) {
 void World::contact_records(std::vector<ContactRecord>& out) const {
     const auto& bodies = implementation_->bodies;
     out.clear();
-    for (const Manifold& m : implementation_->contacts.manifolds()) {
+    for (Manifold& m : implementation_->contacts.manifolds()) {
         const int first = bodies[static_cast<std::size_t>(m.a)].fixed ? m.b : m.a;
-        if (bodies[static_cast<std::size_t>(first)].own) out.push_back(record_of(m));
+        if (!bodies[static_cast<std::size_t>(first)].own) continue;
+        unpack(m);
+        out.push_back(record_of(m));
     }
 }
 
@@ -157,7 +160,8 @@ void World::restore_contacts(const std::vector<ContactRecord>& foreign,
 }
 
 WorldSnapshot World::snapshot() const {
-    const Implementation& w = *implementation_;
+    Implementation& w = *implementation_;
+    w.contacts.unpack_all();
     WorldSnapshot s;
     s.step = w.counts.steps;
     s.bodies.reserve(w.bodies.size());

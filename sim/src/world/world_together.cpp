@@ -187,8 +187,7 @@ void World::Implementation::solve_together(const Solve& solve, bool first) {
     with->tell_all(std::move(out.bytes()));
     for (int p = 0; p < with->count(); ++p) {
         if (p == with->self()) continue;
-        const Partners::Bytes heard = with->hear(p);
-        ByteReader in(heard);
+        ByteReader in(contacts.keep(with->hear(p)));
         for (const Divided& d : divided) d.part->read_part(in, p);
         for (const Island* island : to_solve)
             if (is_by_one(*island) && solver_of(*island) == p) read_result(in, *island);
@@ -248,7 +247,7 @@ void World::Implementation::read_result(ByteReader& in, const Island& island) {
     outcome.found = in.flag();
     if (outcome.found) {
         outcome.manifolds.resize(in.count(22));
-        for (Manifold& m : outcome.manifolds) read(in, m, bodies, planes.size());
+        for (Manifold& m : outcome.manifolds) read(in, m, bodies, planes.size()), unpack(m);
     }
     for (const int m : island.manifolds) read_impulses(in, contacts.manifolds()[static_cast<std::size_t>(m)]);
     for (const int c : island.constraints) {
