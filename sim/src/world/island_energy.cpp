@@ -19,18 +19,27 @@ void IslandSolver::note_start() {
         const MovingBody& body = *rows.body;
         Before& before = before_[static_cast<std::size_t>(&body - bodies_->data())];
         before.state = body.state, before.at_limit = body.at_limit;
-        const double size = body.kind->half_box.minCoeff();
-        measures_[static_cast<std::size_t>(&rows - rows_of_.data())] = {
-            energy_of(body),
-            body.kind->mass.mass * (body.state.velocity.squaredNorm() / 2 + settings_->gravity.norm() * size),
-            body.state.velocity.norm(), 2 * size};
+        measures_[static_cast<std::size_t>(&rows - rows_of_.data())] = measure(body);
     });
+    note_springs();
+    sum_start();
+}
+
+IslandSolver::Measure IslandSolver::measure(const MovingBody& body) const {
+    const double speed = body.state.velocity.squaredNorm();
+    const double weight = settings_->gravity.norm() * body.kind->half_box.minCoeff();
+    return {energy_of(body), body.kind->mass.mass * (speed / 2 + weight), body.state.velocity.norm(),
+            size_of(body)};
+}
+
+// In the order of ids.
+void IslandSolver::sum_start() {
     energy_before_ = fastest_ = scale_ = 0, smallest_ = 1;
     for (const Measure& m : measures_) {
         energy_before_ += m.energy, scale_ += m.scale;
         fastest_ = std::max(fastest_, m.speed), smallest_ = std::min(smallest_, m.size);
     }
-    energy_before_ = with_springs(energy_before_, direct_);
+    for (const double e : springs_before_) energy_before_ += e;
 }
 
 void IslandSolver::go_back() {
@@ -51,8 +60,8 @@ void IslandSolver::go_back() {
 // taken from their motion against the rigid motion of them all, so that linear and angular momentum are kept; where
 // that is not enough, it came from outside, and is taken from all of it. Not of bodies that others compute, too, at their own
 // pace: what they were told stands.
-void IslandSolver::calm() {
-    const double gained = energy(direct_) - energy_before_;
+void IslandSolver::calm(double energy) {
+    const double gained = energy - energy_before_;
     if (!(gained > kMostGained * scale_)) return;
     Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), centre = momentum, turning = momentum;
     double mass = 0;
@@ -130,6 +139,18 @@ double IslandSolver::energy(bool directly) {
 }
 
 double IslandSolver::with_springs(double sum, bool directly) const {
+    for (const SpringRows& s : springs_) sum += energy_of(s, directly);
+    return sum;
+}
+
+void IslandSolver::note_springs() {
+    springs_before_.clear();
+    for (const SpringRows& s : springs_) springs_before_.push_back(energy_of(s, direct_));
+}
+
+double IslandSolver::energy_of(const SpringRows& s, bool directly) const {
+    const PointConstraint& held = s.constraint->definition;
+    if (std::isinf(held.stiffness)) return 0;  // the ends are together
     auto end = [this](int id, const Eigen::Vector3d& rest) -> Eigen::Vector3d {
         if (id < 0) return rest;
         const MovingBody& body = (*bodies_)[static_cast<std::size_t>(id)];
@@ -145,19 +166,14 @@ double IslandSolver::with_springs(double sum, bool directly) const {
         }
         return body.state.position + body.state.orientation * point;
     };
-    for (const SpringRows& s : springs_) {
-        const PointConstraint& held = s.constraint->definition;
-        if (std::isinf(held.stiffness)) continue;  // the ends are together
-        // What velocity Verlet keeps exactly: with a spring softer by w / 4.
-        const double kept =
-            directly || contacts_.empty() ? 1 : 1 - h_ * h_ * held.stiffness * mobility_of(s) / 4;
-        const Eigen::Quaterniond turned =
-            held.body_b < 0 ? Eigen::Quaterniond::Identity()
-                            : (*bodies_)[static_cast<std::size_t>(held.body_b)].state.orientation;
-        sum += kept * held.stiffness / 2 *
-               s.point->gap(end(held.body_a, s.point->a), end(held.body_b, s.point->b), turned).squaredNorm();
-    }
-    return sum;
+    // What velocity Verlet keeps exactly: with a spring softer by w / 4.
+    const double kept =
+        directly || contacts_.empty() ? 1 : 1 - h_ * h_ * held.stiffness * mobility_of(s) / 4;
+    const Eigen::Quaterniond turned =
+        held.body_b < 0 ? Eigen::Quaterniond::Identity()
+                        : (*bodies_)[static_cast<std::size_t>(held.body_b)].state.orientation;
+    return kept * held.stiffness / 2 *
+           s.point->gap(end(held.body_a, s.point->a), end(held.body_b, s.point->b), turned).squaredNorm();
 }
 
 }  // namespace sim

@@ -40,9 +40,8 @@ void keep_once(std::vector<std::uint32_t>& bodies) {
 }  // namespace
 
 // Impacts of what does not rebound stay with their pairs.
-bool IslandSolver::is_plain(const Island& island) const {
+bool IslandSolver::is_plain(const Island& island, bool impacts) const {
     auto manifold = [this](int m) -> Manifold& { return (*manifolds_)[static_cast<std::size_t>(m)]; };
-    const bool impacts = std::ranges::any_of(island.manifolds, is_impact, manifold);
     return island.bodies.size() >= kLeastDivided && forces_->empty() && !told_crossed_ &&
            !is_carried(island) &&
            std::ranges::none_of(island.bodies,
@@ -52,14 +51,10 @@ bool IslandSolver::is_plain(const Island& island) const {
                manifold);
 }
 
-// As is_uneven, of all contacts.
-bool IslandSolver::is_uneven_island() const {
-    return std::ranges::any_of(island_->manifolds, [this](int m) {
-        const Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
-        if (manifold.b >= kFirstPlane || local(manifold.a) < 0 || local(manifold.b) < 0) return false;
-        auto mass = [this](int id) { return (*bodies_)[static_cast<std::size_t>(id)].kind->mass.mass; };
-        return std::max(mass(manifold.a) / mass(manifold.b), mass(manifold.b) / mass(manifold.a)) > kUneven;
-    });
+bool IslandSolver::is_uneven(const Manifold& manifold) const {
+    if (manifold.b >= kFirstPlane || local(manifold.a) < 0 || local(manifold.b) < 0) return false;
+    auto mass = [this](int id) { return (*bodies_)[static_cast<std::size_t>(id)].kind->mass.mass; };
+    return std::max(mass(manifold.a) / mass(manifold.b), mass(manifold.b) / mass(manifold.a)) > kUneven;
 }
 
 // Slabs in runs, of contacts as the partners' shares.
@@ -126,6 +121,7 @@ void IslandSolver::find_groups(const Island& island) {
     };
     group_of_.assign(rows_of_.size(), -1);
     due_.clear(), spring_bodies_.clear();
+    if (island.constraints.empty() && !any_impacts_) return;
     auto join = [&](int a, int b) {  // 0: in a group
         for (const int body : {a, b})
             if (body >= 0) group_of_[static_cast<std::size_t>(body)] = 0;
@@ -177,6 +173,13 @@ bool IslandSolver::concerns(std::uint32_t body, int partner) const {
                       static_cast<std::size_t>(partner)] != 0;
 }
 
+bool IslandSolver::is_used(std::uint32_t body) const {
+    if (!island_->constraints.empty() || is_own_body(body) || concerns(body, part_)) return true;
+    return std::ranges::any_of(borders_, [body](const Border& border) {
+        return border.partner >= 0 && std::ranges::binary_search(border.theirs, body);
+    });
+}
+
 bool IslandSolver::concerns_this(const Manifold& manifold) const {
     for (const int id : {manifold.a, manifold.b})
         if (id < kFirstPlane && local(id) >= 0) return concerns(static_cast<std::uint32_t>(local(id)), part_);
@@ -199,7 +202,10 @@ void IslandSolver::find_border(Border& border, std::size_t own_slab) {
 bool IslandSolver::begin_together(const Island& island, const ContactScene& scene, Partners& with,
                                   const std::vector<double>& shares) {
     scene_ = &scene, island_ = &island, follow_ = carried_ = false;
-    if (!is_plain(island)) return false;
+    any_impacts_ = std::ranges::any_of(island.manifolds, is_impact, [this](int m) -> const Manifold& {
+        return (*manifolds_)[static_cast<std::size_t>(m)];
+    });
+    if (!is_plain(island, any_impacts_)) return false;
     with_ = &with, part_ = with.self(), shares_ = shares;
     outside_of_.assign(static_cast<std::size_t>(with.count()), Eigen::Vector3d::Zero());
     begin(island);
@@ -210,16 +216,22 @@ bool IslandSolver::begin_together(const Island& island, const ContactScene& scen
     }
     any_emerging_ = std::ranges::any_of(
         island.manifolds, [this](int m) { return (*manifolds_)[static_cast<std::size_t>(m)].emerging; });
-    note_start();
+    outside_before_ = outside_, limited_before_ = limited_;
+    measures_.resize(rows_of_.size()), energy_after_.resize(rows_of_.size());
+    each_own_body([this](std::size_t body) { measures_[body] = measure(*rows_of_[body].body); });
+    note_springs();
     advance();
     meet_borders(Told::velocities);  // for residual()
-    missed_ = 0;
-    for (std::size_t b = 0; b < blocks_.size(); ++b)
-        if (sweeps(blocks_[b]))
-            for (const ContactRows& c : contacts_in(blocks_[b])) {
-                missed_ = std::max(missed_, residual(c));
-                keep_impulse(c, *c.point);
-            }
+    missed_ = 0, uneven_ = false;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+        if (!sweeps(blocks_[b])) continue;
+        for (const ContactRows& c : contacts_in(blocks_[b])) {
+            missed_ = std::max(missed_, residual(c));
+            uneven_ = uneven_ || is_uneven(*c.manifold);
+            keep_impulse(c, *c.point);
+        }
+    }
+    each_own_body([this](std::size_t body) { energy_after_[body] = energy_of(*rows_of_[body].body); });
     return true;
 }
 
@@ -447,7 +459,13 @@ void IslandSolver::write_part(ByteWriter& out) const {
     out.number(missed_);
     out.number(limited_ - limited_before_);
     out.matrix(outside_);
-    each_body_of(part_, [&](const BodyRows& rows) { write(out, *rows.body); });
+    out.number<std::uint8_t>(uneven_);
+    each_body_of(part_, [&](const BodyRows& rows) {
+        write(out, *rows.body);
+        const auto body = static_cast<std::size_t>(&rows - rows_of_.data());
+        const Measure& before = measures_[body];
+        for (const double x : {before.energy, before.scale, before.speed, energy_after_[body]}) out.number(x);
+    });
     each_block_of(part_, [&](std::size_t b) {
         for (const int m : blocks_.manifolds_of(b))
             write_impulses(out, (*manifolds_)[static_cast<std::size_t>(m)]);
@@ -460,7 +478,15 @@ void IslandSolver::read_part(ByteReader& in, int partner) {
     missed_ = std::max(missed_, in.number<float>());
     limited_ += in.number<std::uint64_t>();
     for (double& p : outside_of_[static_cast<std::size_t>(partner)]) p = read_finite(in);
-    each_body_of(partner, [&](const BodyRows& rows) { read(in, *rows.body); });
+    uneven_ = in.flag() || uneven_;
+    each_body_of(partner, [&](const BodyRows& rows) {
+        read(in, *rows.body);
+        const auto body = static_cast<std::size_t>(&rows - rows_of_.data());
+        Measure& before = measures_[body];
+        for (double* x : {&before.energy, &before.scale, &before.speed, &energy_after_[body]})
+            *x = read_finite(in);
+        before.size = size_of(*rows.body);
+    });
     each_block_of(partner, [&](std::size_t b) {
         for (const int m : blocks_.manifolds_of(b))
             read_impulses(in, (*manifolds_)[static_cast<std::size_t>(m)]);
@@ -474,15 +500,17 @@ void IslandSolver::read_part(ByteReader& in, int partner) {
 }
 
 bool IslandSolver::end_together() {
-    const bool far = static_cast<double>(missed_) > kMissedAtRest * smallest_ + kMissedShare * fastest_,
-               uneven = is_uneven_island();
-    const bool otherwise = !any_impacts_ && (far || uneven) &&
-                           may_go_directly(uneven ? most_with_springs() : most_with_contacts());
+    sum_start();
+    const bool far = static_cast<double>(missed_) > kMissedAtRest * smallest_ + kMissedShare * fastest_;
+    const bool otherwise = !any_impacts_ && (far || uneven_) &&
+                           may_go_directly(uneven_ ? most_with_springs() : most_with_contacts());
     if (!otherwise) {
         if (with_->self() >= 0) outside_of_[static_cast<std::size_t>(with_->self())] = outside_;
         outside_.setZero();
         for (const Eigen::Vector3d& part : outside_of_) outside_ += part;
-        calm();
+        double energy = 0;
+        for (const double e : energy_after_) energy += e;
+        calm(with_springs(energy, direct_));
         keep_spring_impulses();
     }
     forget_island();

@@ -41,21 +41,20 @@ void IslandSolver::begin(const Island& island) {
     for (std::size_t i = 0; i < rows_of_.size(); ++i) {
         MovingBody& body = (*bodies_)[static_cast<std::size_t>(island.bodies[i])];
         local_[static_cast<std::size_t>(island.bodies[i])] = static_cast<int>(i);
-        rows_of_[i].body = &body, rows_of_[i].offset = offset;
+        rows_of_[i].body = &body, rows_of_[i].offset = offset, rows_of_[i].width = body.kind->width;
         offset += static_cast<std::uint32_t>(body.kind->width);
     }
     places_.resize(rows_of_.size());
     each_body([this](BodyRows& rows) {
-        begin_body(rows);
         places_[static_cast<std::size_t>(&rows - rows_of_.data())] = {
-            rows.place, 2 * rows.body->kind->half_box.maxCoeff()};
+            rows.body->state.position, 2 * rows.body->kind->half_box.maxCoeff()};
     });
     part_rebounds(false);
     y_.resize(offset), start_.resize(offset), moved_.resize(offset), kept_.resize(offset);
     std::fill_n(moved_.data(), offset, 0.f);
 
     found_again_ = false, fresh_ = true;
-    note_places();
+    if (!with_) note_places();
     add_contacts(island);
     for (const int c : island.constraints) {
         HeldConstraint& held = (*constraints_)[static_cast<std::size_t>(c)];
@@ -97,7 +96,6 @@ void IslandSolver::part_rebounds(bool found_again) {
 
 void IslandSolver::begin_body(BodyRows& rows) {
     MovingBody& body = *rows.body;
-    rows.width = body.kind->width;
     rows.place = body.state.position, rows.time = 0, rows.frame = body.posed.rotation;
     rows.body_from_world = body.posed.rotation.transpose().cast<float>();
     rows.rotation = body.substep_rotation;
@@ -131,10 +129,16 @@ IslandSolver::Part IslandSolver::part_of(std::span<const int> manifolds) const {
 void IslandSolver::add_contacts(const Island& island) {
     blocks_.divide(crew(), places_, island.manifolds, *manifolds_, local_);
     if (with_) cut(), find_groups(island);
+    each_body([this](BodyRows& rows) {
+        if (!with_ || is_used(static_cast<std::uint32_t>(&rows - rows_of_.data()))) begin_body(rows);
+    });
     sums_.assign(blocks_.slabs(), {});
     parts_.resize(blocks_.size());
-    crew().each(parts_.size(), 1, [this](int, std::size_t first, std::size_t last) {
-        for (std::size_t b = first; b < last; ++b) parts_[b] = part_of(blocks_.manifolds_of(b));
+    const bool all_blocks = !with_ || any_impacts_;
+    crew().each(parts_.size(), 1, [&](int, std::size_t first, std::size_t last) {
+        for (std::size_t b = first; b < last; ++b)
+            parts_[b] =
+                all_blocks || sweeps(blocks_[b]) ? part_of(blocks_.manifolds_of(b)) : Part{};
     });
     Part all;
     for (std::size_t b = 0; b < parts_.size(); ++b) {

@@ -45,7 +45,7 @@ void IslandSolver::solve(const Island& island, const ContactScene& scene, bool f
         if (!may_gain() && !(gained < kWorse * scale_)) go_back(), note_start(), advance();
     }
     // Joints alone give back what they take, within a step or over several.
-    if (!may_gain() && !any_told_ && (springs_.empty() || !island.manifolds.empty())) calm();
+    if (!may_gain() && !any_told_ && (springs_.empty() || !island.manifolds.empty())) calm(energy(direct_));
     end_forces();
     keep_impulses();
     forget_island();

@@ -130,6 +130,11 @@ public:
     /// shares: how much of it each should do.
     [[nodiscard]] bool begin_together(const Island& island, const ContactScene& scene, Partners& with,
                                       const std::vector<double>& shares);
+    /// Calls visit(id) for the bodies of this part.
+    template <typename Visit>
+    void each_body_here(Visit visit) const {
+        each_own_body([&](std::size_t body) { visit(island_->bodies[body]); });
+    }
     void write_part(ByteWriter& out) const;       ///< what came of this part
     void read_part(ByteReader& in, int partner);  ///< of another's
     /// Once all parts are there. false: the island has to be solved otherwise.
@@ -271,10 +276,13 @@ private:
     void start_following();
     [[nodiscard]] bool moves_little() const;
     void note_start();
-    void go_back();  ///< to it
-    void calm();
+    void sum_start();  ///< of measures_
+    void go_back();    ///< to it
+    void calm(double energy);  ///< of the island, after the step
     [[nodiscard]] double energy(bool directly);
     [[nodiscard]] double energy_of(const MovingBody& body) const;
+    [[nodiscard]] double energy_of(const SpringRows& spring, bool directly) const;
+    void note_springs();
     [[nodiscard]] double with_springs(double sum, bool directly) const;
     [[nodiscard]] bool is_far_from_solved() const;
     [[nodiscard]] bool is_uneven() const;
@@ -546,7 +554,7 @@ private:
         std::size_t block = 0;                   // of blocks_
         std::vector<std::uint32_t> own, theirs;  // bodies in its contacts, ascending
     };
-    [[nodiscard]] bool is_plain(const Island& island) const;
+    [[nodiscard]] bool is_plain(const Island& island, bool impacts) const;
     void cut();
     void find_border(Border& border, std::size_t own_slab);
     [[nodiscard]] bool sweeps(const IslandBlocks::Block& block) const noexcept {
@@ -568,6 +576,8 @@ private:
     [[nodiscard]] bool concerns_this(const Rows& rows) const {
         return concerns(static_cast<std::uint32_t>(first_body(rows)), part_);
     }
+    /// Whether a body has rows here: who sweeps others leaves it alone.
+    [[nodiscard]] bool is_used(std::uint32_t body) const;
     /// Of two or more who compute the same, one adds up what comes from outside.
     [[nodiscard]] bool counts_here(const Rows& rows) const {
         return is_own_body(static_cast<std::size_t>(first_body(rows)));
@@ -584,9 +594,14 @@ private:
     void turn_frame_on(BodyRows& rows);
     template <typename Body>
     void each_body_of(int partner, Body visit) const;
+    template <typename Visit>
+    void each_own_body(Visit visit) const {
+        for (std::size_t s = first_slab_; s < last_slab_; ++s)
+            for (const std::uint32_t body : blocks_.bodies_of(s)) visit(static_cast<std::size_t>(body));
+    }
     template <typename Block>
     void each_block_of(int partner, Block visit) const;
-    [[nodiscard]] bool is_uneven_island() const;
+    [[nodiscard]] bool is_uneven(const Manifold& manifold) const;
     void keep_spring_impulses();
     void forget_island();
 
@@ -616,6 +631,7 @@ private:
     std::vector<Due> due_;  // bodies of impacts, ascending
     std::vector<std::uint32_t> spring_bodies_, meeting_bodies_;
     float missed_ = 0;                         // most of residual() in all parts
+    bool uneven_ = false;                      // a contact of them, as is_uneven()
     std::vector<Eigen::Vector3d> outside_of_;  // of each part, as outside_
 
     const WorldSettings* settings_;
@@ -693,7 +709,13 @@ private:
     struct Measure {
         double energy, scale, speed, size;
     };
+    [[nodiscard]] Measure measure(const MovingBody& body) const;
+    [[nodiscard]] static double size_of(const MovingBody& body) {
+        return 2 * body.kind->half_box.minCoeff();
+    }
     std::vector<Measure> measures_;  // per island body, of energy() and note_start()
+    std::vector<double> springs_before_;  // their energies, as the step began
+    std::vector<double> energy_after_;    // per island body, together
     Eigen::Vector3d outside_before_ = Eigen::Vector3d::Zero();
     std::uint64_t limited_before_ = 0;
     std::vector<Before> before_;  // per world body, the last island's when the step began

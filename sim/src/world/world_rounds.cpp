@@ -175,6 +175,7 @@ void World::Implementation::solve_again() {
 // The last resort: the island stops where the bodies meet, as it moves then, and these stop approaching each
 // other.
 void World::Implementation::hold_apart(const WorldContacts::Meeting& meeting) {
+    results_checked = false;
     auto at = [this](int id) -> MovingBody& { return bodies[static_cast<std::size_t>(id)]; };
     // Joined bodies would be torn apart: what they meet, they meet in the next step.
     for (const int id : {meeting.a, meeting.b})

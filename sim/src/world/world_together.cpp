@@ -41,7 +41,7 @@ void World::Implementation::restore_own() noexcept {
 // Others are heard from when contacts are being found or islands solved. (What is quarantined by then would be again.)
 void World::Implementation::go_back(const WorldCounts& counts_before) {
     for (const auto& solver : solvers) solver->give_up();
-    contacts.go_back();
+    if (finding) contacts.go_back();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         MovingBody& body = bodies[i];
         if (solving && body.moves() && !body.asleep)
@@ -166,6 +166,10 @@ void World::Implementation::plan_islands() {
 void World::Implementation::solve_together(const Solve& solve, bool first) {
     plan_islands();
     divided.clear();
+    bool breaks = false;
+    const auto check = [&](int id) {
+        breaks = breaks || !what_is_broken(bodies[static_cast<std::size_t>(id)]).empty();
+    };
     IslandSolver& one = solver();
     const ContactScene scene = contact_scene(alone);
     ByteWriter out;
@@ -175,15 +179,19 @@ void World::Implementation::solve_together(const Solve& solve, bool first) {
         if (first && part.begin_together(*island, scene, *with, spare)) {
             divided.push_back({island, &part});
             if (with->self() >= 0) part.write_part(out);
+            part.each_body_here(check);
         } else {
             solve(*island, one, scene);
+            std::ranges::for_each(island->bodies, check);
         }
     }
     for (const Island* island : to_solve)
         if (is_by_one(*island) && solver_of(*island) == with->self()) {
             solve(*island, one, scene);
+            std::ranges::for_each(island->bodies, check);
             write_result(out, *island);
         }
+    out.number<std::uint8_t>(breaks);
     with->tell_all(std::move(out.bytes()));
     for (int p = 0; p < with->count(); ++p) {
         if (p == with->self()) continue;
@@ -191,8 +199,10 @@ void World::Implementation::solve_together(const Solve& solve, bool first) {
         for (const Divided& d : divided) d.part->read_part(in, p);
         for (const Island* island : to_solve)
             if (is_by_one(*island) && solver_of(*island) == p) read_result(in, *island);
+        breaks = in.flag() || breaks;
         in.expect_end();
     }
+    results_checked = first && !breaks;
     std::erase_if(divided, [&](const Divided& d) { return !end_divided(d, solve, scene); });
 }
 
@@ -201,6 +211,7 @@ bool World::Implementation::end_divided(const Divided& d, const Solve& solve, co
     const std::uint64_t limits = d.part->deformations_limited(), breaks = d.part->constraints_broken();
     if (!d.part->end_together()) {  // it has to be solved directly: by each, from its start
         begin_again(*d.island);
+        results_checked = false;
         solve(*d.island, solver(), scene);
         return false;
     }
