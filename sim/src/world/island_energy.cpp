@@ -60,9 +60,9 @@ void IslandSolver::go_back() {
 // taken from their motion against the rigid motion of them all, so that linear and angular momentum are kept; where
 // that is not enough, it came from outside, and is taken from all of it. Not of bodies that others compute, too, at their own
 // pace: what they were told stands.
-void IslandSolver::calm(double energy) {
+bool IslandSolver::calm(double energy) {
     const double gained = energy - energy_before_;
-    if (!(gained > kMostGained * scale_)) return;
+    if (!(gained > kMostGained * scale_)) return false;
     Eigen::Vector3d momentum = Eigen::Vector3d::Zero(), centre = momentum, turning = momentum;
     double mass = 0;
     for (const BodyRows& rows : rows_of_) {
@@ -115,6 +115,7 @@ void IslandSolver::calm(double energy) {
         s.angular_momentum = turn + left * (s.angular_momentum - turn);
         s.q_dot *= left;
     }
+    return true;
 }
 
 // Kinetic and potential, with that of modes [J].
@@ -167,8 +168,7 @@ double IslandSolver::energy_of(const SpringRows& s, bool directly) const {
         return body.state.position + body.state.orientation * point;
     };
     // What velocity Verlet keeps exactly: with a spring softer by w / 4.
-    const double kept =
-        directly || contacts_.empty() ? 1 : 1 - h_ * h_ * held.stiffness * mobility_of(s) / 4;
+    const double kept = directly || !any_contacts_ ? 1 : 1 - h_ * h_ * held.stiffness * mobility_of(s) / 4;
     const Eigen::Quaterniond turned =
         held.body_b < 0 ? Eigen::Quaterniond::Identity()
                         : (*bodies_)[static_cast<std::size_t>(held.body_b)].state.orientation;

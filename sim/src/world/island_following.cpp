@@ -104,6 +104,7 @@ void IslandSolver::take_found(double most) {
     part_rebounds(true);
     for (Manifold& m : found_)
         for (std::size_t i = 0; i < static_cast<std::size_t>(m.count); ++i) add_contact(m, m.points[i]);
+    any_contacts_ = !contacts_.empty();
     for (SpringRows& s : springs_)
         for (Side& side : s.side) side = reserve_rows(side.body, jacobians_used_);
     (void)begin_direct(most, true);

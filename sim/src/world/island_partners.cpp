@@ -174,7 +174,8 @@ bool IslandSolver::concerns(std::uint32_t body, int partner) const {
 }
 
 bool IslandSolver::is_used(std::uint32_t body) const {
-    if (!island_->constraints.empty() || is_own_body(body) || concerns(body, part_)) return true;
+    if (!island_->constraints.empty() || blocks_.reaches_further()) return true;
+    if (is_own_body(body) || concerns(body, part_)) return true;
     return std::ranges::any_of(borders_, [body](const Border& border) {
         return border.partner >= 0 && std::ranges::binary_search(border.theirs, body);
     });
@@ -217,7 +218,7 @@ bool IslandSolver::begin_together(const Island& island, const ContactScene& scen
     any_emerging_ = std::ranges::any_of(
         island.manifolds, [this](int m) { return (*manifolds_)[static_cast<std::size_t>(m)].emerging; });
     outside_before_ = outside_, limited_before_ = limited_;
-    measures_.resize(rows_of_.size()), energy_after_.resize(rows_of_.size());
+    measures_.resize(rows_of_.size());
     each_own_body([this](std::size_t body) { measures_[body] = measure(*rows_of_[body].body); });
     note_springs();
     advance();
@@ -227,11 +228,13 @@ bool IslandSolver::begin_together(const Island& island, const ContactScene& scen
         if (!sweeps(blocks_[b])) continue;
         for (const ContactRows& c : contacts_in(blocks_[b])) {
             missed_ = std::max(missed_, residual(c));
-            uneven_ = uneven_ || is_uneven(*c.manifold);
             keep_impulse(c, *c.point);
         }
+        uneven_ = uneven_ || std::ranges::any_of(blocks_.manifolds_of(b), [this](int m) {
+                      return is_uneven((*manifolds_)[static_cast<std::size_t>(m)]);
+                  });
     }
-    each_own_body([this](std::size_t body) { energy_after_[body] = energy_of(*rows_of_[body].body); });
+    each_own_body([this](std::size_t body) { measures_[body].after = energy_of(*rows_of_[body].body); });
     return true;
 }
 
@@ -463,8 +466,8 @@ void IslandSolver::write_part(ByteWriter& out) const {
     each_body_of(part_, [&](const BodyRows& rows) {
         write(out, *rows.body);
         const auto body = static_cast<std::size_t>(&rows - rows_of_.data());
-        const Measure& before = measures_[body];
-        for (const double x : {before.energy, before.scale, before.speed, energy_after_[body]}) out.number(x);
+        const Measure& m = measures_[body];
+        for (const double x : {m.energy, m.scale, m.speed, m.after}) out.number(x);
     });
     each_block_of(part_, [&](std::size_t b) {
         for (const int m : blocks_.manifolds_of(b))
@@ -482,10 +485,9 @@ void IslandSolver::read_part(ByteReader& in, int partner) {
     each_body_of(partner, [&](const BodyRows& rows) {
         read(in, *rows.body);
         const auto body = static_cast<std::size_t>(&rows - rows_of_.data());
-        Measure& before = measures_[body];
-        for (double* x : {&before.energy, &before.scale, &before.speed, &energy_after_[body]})
-            *x = read_finite(in);
-        before.size = size_of(*rows.body);
+        Measure& m = measures_[body];
+        for (double* x : {&m.energy, &m.scale, &m.speed, &m.after}) *x = read_finite(in);
+        m.size = size_of(*rows.body);
     });
     each_block_of(partner, [&](std::size_t b) {
         for (const int m : blocks_.manifolds_of(b))
@@ -501,6 +503,7 @@ void IslandSolver::read_part(ByteReader& in, int partner) {
 
 bool IslandSolver::end_together() {
     sum_start();
+    calmed_ = false;
     const bool far = static_cast<double>(missed_) > kMissedAtRest * smallest_ + kMissedShare * fastest_;
     const bool otherwise = !any_impacts_ && (far || uneven_) &&
                            may_go_directly(uneven_ ? most_with_springs() : most_with_contacts());
@@ -509,8 +512,8 @@ bool IslandSolver::end_together() {
         outside_.setZero();
         for (const Eigen::Vector3d& part : outside_of_) outside_ += part;
         double energy = 0;
-        for (const double e : energy_after_) energy += e;
-        calm(with_springs(energy, direct_));
+        for (const Measure& m : measures_) energy += m.after;
+        if (springs_.empty() || any_contacts_) calmed_ = calm(with_springs(energy, direct_));
         keep_spring_impulses();
     }
     forget_island();

@@ -63,7 +63,7 @@ void IslandSolver::begin(const Island& island) {
     springs_soft_ = springs_are_soft();
     pushed_.clear();
     for (std::size_t i = 0; i < rows_of_.size() && !forces_->empty(); ++i) begin_forces(static_cast<int>(i));
-    if (!with_ && (!springs_.empty() || contacts_.empty()))
+    if (!with_ && (!springs_.empty() || !any_contacts_))
         (void)begin_direct(among_ghosts() ? 0 : most_at_first(), springs_.empty());
 }
 
@@ -137,8 +137,7 @@ void IslandSolver::add_contacts(const Island& island) {
     const bool all_blocks = !with_ || any_impacts_;
     crew().each(parts_.size(), 1, [&](int, std::size_t first, std::size_t last) {
         for (std::size_t b = first; b < last; ++b)
-            parts_[b] =
-                all_blocks || sweeps(blocks_[b]) ? part_of(blocks_.manifolds_of(b)) : Part{};
+            parts_[b] = all_blocks || sweeps(blocks_[b]) ? part_of(blocks_.manifolds_of(b)) : Part{};
     });
     Part all;
     for (std::size_t b = 0; b < parts_.size(); ++b) {
@@ -160,7 +159,7 @@ void IslandSolver::add_contacts(const Island& island) {
     jacobians_used_ = all.floats;
     springs_.clear(), impacts_.clear(), first_contact_.clear();
     any_told_ = direct_ = any_bounce_ = any_struck_ = any_rebound_ = any_emerging_ = false;
-    any_impacts_ = all.impacts;
+    any_impacts_ = all.impacts, any_contacts_ = !island.manifolds.empty();
     first_crossed_ = crossed_.size();
     contacts_.resize(all.contacts);
     for (auto* list : {&striking_, &struck_}) list->reserve(all.contacts);

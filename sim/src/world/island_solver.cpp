@@ -45,7 +45,8 @@ void IslandSolver::solve(const Island& island, const ContactScene& scene, bool f
         if (!may_gain() && !(gained < kWorse * scale_)) go_back(), note_start(), advance();
     }
     // Joints alone give back what they take, within a step or over several.
-    if (!may_gain() && !any_told_ && (springs_.empty() || !island.manifolds.empty())) calm(energy(direct_));
+    if (!may_gain() && !any_told_ && (springs_.empty() || !island.manifolds.empty()))
+        (void)calm(energy(direct_));
     end_forces();
     keep_impulses();
     forget_island();
@@ -133,7 +134,7 @@ void IslandSolver::substep(bool last) {
     set_forces();
     if (carried_) contacts(&Solver::see_driven);
     if (with_) begin_borders();
-    if (substep_ > 0 && !contacts_.empty())
+    if (substep_ > 0 && any_contacts_)
         bodies(&Solver::turn_frames), contacts(&Solver::turn_rows, Told::skipped);
     bodies(&Solver::load_velocities);
     Told border = Told::states;
@@ -183,7 +184,7 @@ void IslandSolver::load_velocities(BodyRows& rows) {
     const BodyKind& kind = *body.kind;
     const WorldBodyState& s = body.state;
     rows.place = s.position, rows.time = 0;
-    if (contacts_.empty()) {
+    if (!any_contacts_) {
         rows.frame = s.orientation.toRotationMatrix();
         rows.body_from_world = rows.frame.transpose().cast<float>();
     }

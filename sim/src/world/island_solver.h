@@ -130,15 +130,20 @@ public:
     /// shares: how much of it each should do.
     [[nodiscard]] bool begin_together(const Island& island, const ContactScene& scene, Partners& with,
                                       const std::vector<double>& shares);
-    /// Calls visit(id) for the bodies of this part.
+    /// Calls visit(id) for the bodies of a partner's part.
     template <typename Visit>
-    void each_body_here(Visit visit) const {
-        each_own_body([&](std::size_t body) { visit(island_->bodies[body]); });
+    void each_id_of(int partner, Visit visit) const {
+        each_body_of(partner, [&](const BodyRows& rows) {
+            visit(island_->bodies[static_cast<std::size_t>(&rows - rows_of_.data())]);
+        });
     }
     void write_part(ByteWriter& out) const;       ///< what came of this part
     void read_part(ByteReader& in, int partner);  ///< of another's
     /// Once all parts are there. false: the island has to be solved otherwise.
     [[nodiscard]] bool end_together();
+    [[nodiscard]] bool calmed() const noexcept {
+        return calmed_;
+    }                         ///< by that: states are no more those of the parts
     void give_up() noexcept;  ///< what was begun together
     /// Writes the paths of the bodies of this part; takes those of another's.
     void write_paths(ByteWriter& out) const;
@@ -276,9 +281,9 @@ private:
     void start_following();
     [[nodiscard]] bool moves_little() const;
     void note_start();
-    void sum_start();  ///< of measures_
-    void go_back();    ///< to it
-    void calm(double energy);  ///< of the island, after the step
+    void sum_start();          ///< of measures_
+    void go_back();            ///< to it
+    bool calm(double energy);  ///< of the island, after the step; whether it took any
     [[nodiscard]] double energy(bool directly);
     [[nodiscard]] double energy_of(const MovingBody& body) const;
     [[nodiscard]] double energy_of(const SpringRows& spring, bool directly) const;
@@ -433,7 +438,7 @@ private:
     }
     // Sweeps do for soft springs among contacts, too.
     [[nodiscard]] double most_at_first() const noexcept {
-        return springs_soft_ && !contacts_.empty() ? most_with_contacts() : most_with_springs();
+        return springs_soft_ && any_contacts_ ? most_with_contacts() : most_with_springs();
     }
     [[nodiscard]] bool springs_are_soft();
     void pull_springs();
@@ -632,6 +637,7 @@ private:
     std::vector<std::uint32_t> spring_bodies_, meeting_bodies_;
     float missed_ = 0;                         // most of residual() in all parts
     bool uneven_ = false;                      // a contact of them, as is_uneven()
+    bool calmed_ = false;                      // see calmed()
     std::vector<Eigen::Vector3d> outside_of_;  // of each part, as outside_
 
     const WorldSettings* settings_;
@@ -669,14 +675,14 @@ private:
     std::vector<Window> windows_;             // of each thread
     std::vector<Phase> phases_;               // that run() will do
     std::vector<int> next_of_;                // per island body
-    std::vector<ContactRows> contacts_;
+    std::vector<ContactRows> contacts_;       // together those of this part, and impacts that concern it
     std::vector<SpringRows> springs_;
     bool springs_soft_ = true;          // as the step begins
     bool modes_ahead_ = false;          // springs' ends are where the substep takes them, with their modes
     std::vector<std::size_t> impacts_;  // contacts, of fast pairs; together those that concern this partner
-    bool any_impacts_ = false;          // in the island
-    std::vector<Hit> hits_;             // of the substep, by time
-    std::vector<int> hit_bodies_;       // of the impact that is being solved
+    bool any_contacts_ = false, any_impacts_ = false;       // in the island
+    std::vector<Hit> hits_;                                 // of the substep, by time
+    std::vector<int> hit_bodies_;                           // of the impact that is being solved
     std::vector<std::size_t> striking_, struck_;            // contacts, now and since it began
     std::vector<std::size_t> holding_;                      // springs
     std::vector<std::size_t> contacts_of_, first_contact_;  // body by body, and where each begins
@@ -705,17 +711,15 @@ private:
         WorldBodyState state;
         bool at_limit;
     };
-    double energy_before_ = 0, fastest_ = 0, smallest_ = 0, scale_ = 0;  // see note_start
+    double energy_before_ = 0, fastest_ = 0, smallest_ = 0, scale_ = 0;  // see sum_start
     struct Measure {
         double energy, scale, speed, size;
+        double after = 0;  // energy at the end, together
     };
     [[nodiscard]] Measure measure(const MovingBody& body) const;
-    [[nodiscard]] static double size_of(const MovingBody& body) {
-        return 2 * body.kind->half_box.minCoeff();
-    }
-    std::vector<Measure> measures_;  // per island body, of energy() and note_start()
+    [[nodiscard]] static double size_of(const MovingBody& body) { return 2 * body.kind->half_box.minCoeff(); }
+    std::vector<Measure> measures_;       // per island body, of energy() and note_start()
     std::vector<double> springs_before_;  // their energies, as the step began
-    std::vector<double> energy_after_;    // per island body, together
     Eigen::Vector3d outside_before_ = Eigen::Vector3d::Zero();
     std::uint64_t limited_before_ = 0;
     std::vector<Before> before_;  // per world body, the last island's when the step began

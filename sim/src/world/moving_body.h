@@ -6,30 +6,31 @@ namespace sim {
 
 /// A body of a World, with its state between steps.
 struct MovingBody {
+    // What every pass over all bodies asks for comes first, in one line of the cache.
     const BodyKind* kind = nullptr;
     bool fixed = false, quarantined = false, asleep = false;
-    std::vector<MotionKey> motion;  ///< prescribed; such a body counts as fixed, but for its velocity
-    bool travels = false;           ///< by that, in this step
-    double gravity_scale = 1;
+    bool travels = false;  ///< by `motion`, in this step
+    bool own = true;       ///< stepped here; else a copy of another world's body
+    bool unposed = false;  ///< the shape of `posed` is older than `state`: found to be far from what matters
+    bool pushed = false;   ///< forces act in the next step: the user's, or of bodies elsewhere
+    bool watched = false;  ///< impulses of other own bodies that move are summed in `given`
+    bool was_given = false;
+    bool at_limit = false;  ///< its deformation was held in the last substep: contacts find its modes stiff
+    bool limited_now = false;  ///< in any substep of the step that is being done
+    int still_steps = 0;       ///< since it was faster than the sleep speed, at most kMostStillSteps
+    int sleep_group = -1;      ///< first body of those that fell asleep together
     float friction = 0, restitution = 0;
+    double gravity_scale = 1;
+    double work = 0;                 ///< see World::work
+    std::uint64_t limited_step = 0;  ///< first step in which it was; 0: never
+
     WorldBodyState state;
     PosedBody posed;
     FreeRotation substep_rotation{Eigen::Vector3d::Ones(), 0}, step_rotation{Eigen::Vector3d::Ones(), 0};
-    bool at_limit = false;  ///< its deformation was held in the last substep: contacts find its modes stiff
-    bool limited_now = false;        ///< in any substep of the step that is being done
-    std::uint64_t limited_step = 0;  ///< first step in which it was; 0: never
-    int still_steps = 0;             ///< since it was faster than the sleep speed, at most kMostStillSteps
-    int sleep_group = -1;            ///< first body of those that fell asleep together
-    bool pushed = false;             ///< forces act in the next step: the user's, or of bodies elsewhere
     Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();  ///< world axes
     Eigen::VectorXd modal_force;                                                        ///< [N kg^-1/2]
-
-    bool own = true;       ///< stepped here; else a copy of another world's body
-    bool unposed = false;  ///< the shape of `posed` is older than `state`: found to be far from what matters
-    bool watched = false;  ///< impulses of other own bodies that move are summed in `given`
-    bool was_given = false;
     StepImpulse given;
-    double work = 0;  ///< see World::work
+    std::vector<MotionKey> motion;  ///< prescribed; such a body counts as fixed, but for its velocity
 
     [[nodiscard]] bool moves() const noexcept { return !fixed && !quarantined; }  ///< takes part in steps
 };

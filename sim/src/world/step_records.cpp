@@ -189,8 +189,13 @@ void read(ByteReader& in, MovingBody& body) {
     WorldBodyState& s = body.state;
     const auto flags = in.number<std::uint8_t>();
     body.at_limit = flags & kAtLimit, body.limited_now = flags & kLimitedNow;
-    read_numbers(in, s.position.data(), 3), read_numbers(in, s.orientation.coeffs().data(), 4);
-    read_numbers(in, s.velocity.data(), 3), read_numbers(in, s.angular_momentum.data(), 3);
+    using Rigid = std::array<double, 13>;
+    const auto rigid = std::bit_cast<Rigid>(in.bytes<sizeof(Rigid)>());
+    expect_finite(rigid.data(), rigid.size());
+    s.position = Eigen::Vector3d::Map(rigid.data());
+    s.orientation.coeffs() = Eigen::Vector4d::Map(rigid.data() + 3);
+    s.velocity = Eigen::Vector3d::Map(rigid.data() + 7);
+    s.angular_momentum = Eigen::Vector3d::Map(rigid.data() + 10);
     read_numbers(in, s.q.data(), s.q.size()), read_numbers(in, s.q_dot.data(), s.q_dot.size());
 }
 

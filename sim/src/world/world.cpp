@@ -100,12 +100,7 @@ void World::Implementation::drop_constraints(int body) {
 // Bodies whose state or forces are not finite, or absurd, take no further part. Before anything else in a
 // step, before they can touch another body.
 void World::Implementation::quarantine_broken() {
-    const bool any = any_broken([this](const MovingBody& body) {
-        const auto id = static_cast<int>(&body - bodies.data());
-        return body.moves() && body.own && (!with || with->of(id) == with->self());
-    });
-    if (!any) return;
-    if (with) throw NotTogether("a body is broken");
+    if (!any_broken([](const MovingBody& body) { return body.moves() && body.own; })) return;
     for (const int i : here) {
         const MovingBody& body = bodies[static_cast<std::size_t>(i)];
         if (!body.moves() || !body.own) continue;
@@ -130,8 +125,7 @@ bool World::Implementation::any_broken(Concerned concerned) {
 // After a step: bodies that it broke, before any reader sees them.
 void World::Implementation::quarantine_results() {
     // Asleep: not of an island that was solved.
-    const bool any =
-        !results_checked && any_broken([](const MovingBody& body) { return body.moves(); });
+    const bool any = !results_checked && any_broken([](const MovingBody& body) { return body.moves(); });
     for (std::size_t i = 0; i < islands_used; ++i) {
         if (!is_own(islands[i])) continue;
         for (const int id : islands[i].bodies) {
@@ -323,7 +317,7 @@ void World::Implementation::set_threads(std::unique_ptr<Crew> crew) {
 
 void World::Implementation::step() {
     const FlushDenormals flush;
-    finding = solving = results_checked = false;
+    solving = results_checked = false;
     solver().cross(sharing == Sharing::pairs);
     outside_before = outside;
     ++counts.steps;
@@ -355,7 +349,6 @@ void World::Implementation::step() {
     });
     const auto [fallbacks_before, impacts_before] = std::pair(contacts.fallbacks(), contacts.impacts());
     effort.resize(constraints.size()), effort_told = effort;
-    finding = true;
     contacts.find(
         contact_scene(crew()), with, [this](ByteWriter& out) { write_efforts(out); },
         [this](ByteReader& in, int partner) { read_efforts(in, partner); });

@@ -292,6 +292,8 @@ void WorldContacts::merge_told() {
         }
         runs_.resize(kept);
     }
+    if (std::ranges::adjacent_find(told_, {}, &Told::key) != told_.end())
+        throw DecodeError("a contact that two found");
 }
 
 void WorldContacts::unpack_all() {

@@ -70,9 +70,10 @@ public:
         std::swap(before_, manifolds_);
         std::swap(kept_before_, kept_);
     }
-    /// Keeps what a partner told until the contacts of this step are those of none: their points and impulses may be in it.
-    /// Returns it.
-    std::span<const std::uint8_t> keep(Partners::Bytes&& heard) { return kept_.emplace_back(std::move(heard)); }
+    /// Keeps what a partner told until the end of the next step, as contacts of this one may have their points in it. Returns it.
+    std::span<const std::uint8_t> keep(Partners::Bytes&& heard) {
+        return kept_.emplace_back(std::move(heard));
+    }
     /// Takes all points out of what partners told.
     void unpack_all();
     /// Of several impacts of a pair within the step only the last is one of its past in the next.
@@ -148,10 +149,10 @@ private:
     BroadPhase broad_;
     std::vector<std::unique_ptr<NarrowPhase>> narrow_;  // of each thread
     std::vector<Found> found_;
-    std::vector<int> posed_;                    // of scene.here, those whose shape is known
-    std::vector<Reach> reach_;                  // of each body
-    std::vector<Manifold> manifolds_, before_;  // by ascending keys
-    std::vector<Manifold> added_;               // to them
+    std::vector<int> posed_;                           // of scene.here, those whose shape is known
+    std::vector<Reach> reach_;                         // of each body
+    std::vector<Manifold> manifolds_, before_;         // by ascending keys
+    std::vector<Manifold> added_;                      // to them
     std::vector<Partners::Bytes> kept_, kept_before_;  // that have points of manifolds_, of before_
     struct Told {
         std::uint64_t key;

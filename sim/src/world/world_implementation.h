@@ -68,8 +68,8 @@ struct World::Implementation {
         int still_steps, group;
     };
     std::vector<Sleep> sleep_before;  ///< of each body, when the step began
-    bool finding = false, solving = false;  ///< the step has come so far
-    bool results_checked = false;           ///< no partner found a broken body in what it solved
+    bool solving = false;             ///< the step has come so far
+    bool results_checked = false;     ///< as they came: no body is broken
     std::vector<std::uint8_t> near;   ///< of each body: this partner's may meet it
     void find_near();                 ///< fills `near`
     void pose_the_rest();             ///< as the step began

@@ -2,8 +2,8 @@
 #include "world/world_implementation.h"
 
 // A step by several partners (partners.h): each finds the contacts of its bodies and solves some of the small islands
-// (plan_islands), and all sweep a part of each large one (island_partners.cpp). Everything else each does for itself, as if alone. What is
-// found and solved they tell each other, so that the worlds are the same again.
+// (plan_islands), and all sweep a part of each large one (island_partners.cpp). What is found and solved they tell each other, with
+// energies, so that the worlds are the same again. Islands and sleep each finds for itself, as if alone.
 //
 // A partner that does not go on with the others goes back to where the step began; what changed by then is known.
 
@@ -41,7 +41,7 @@ void World::Implementation::restore_own() noexcept {
 // Others are heard from when contacts are being found or islands solved. (What is quarantined by then would be again.)
 void World::Implementation::go_back(const WorldCounts& counts_before) {
     for (const auto& solver : solvers) solver->give_up();
-    if (finding) contacts.go_back();
+    contacts.go_back();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         MovingBody& body = bodies[i];
         if (solving && body.moves() && !body.asleep)
@@ -179,7 +179,7 @@ void World::Implementation::solve_together(const Solve& solve, bool first) {
         if (first && part.begin_together(*island, scene, *with, spare)) {
             divided.push_back({island, &part});
             if (with->self() >= 0) part.write_part(out);
-            part.each_body_here(check);
+            if (with->self() >= 0) part.each_id_of(with->self(), check);
         } else {
             solve(*island, one, scene);
             std::ranges::for_each(island->bodies, check);
@@ -191,15 +191,14 @@ void World::Implementation::solve_together(const Solve& solve, bool first) {
             std::ranges::for_each(island->bodies, check);
             write_result(out, *island);
         }
-    out.number<std::uint8_t>(breaks);
     with->tell_all(std::move(out.bytes()));
     for (int p = 0; p < with->count(); ++p) {
         if (p == with->self()) continue;
         ByteReader in(contacts.keep(with->hear(p)));
-        for (const Divided& d : divided) d.part->read_part(in, p);
+        for (const Divided& d : divided) d.part->read_part(in, p), d.part->each_id_of(p, check);
         for (const Island* island : to_solve)
-            if (is_by_one(*island) && solver_of(*island) == p) read_result(in, *island);
-        breaks = in.flag() || breaks;
+            if (is_by_one(*island) && solver_of(*island) == p)
+                read_result(in, *island), std::ranges::for_each(island->bodies, check);
         in.expect_end();
     }
     results_checked = first && !breaks;
@@ -215,6 +214,7 @@ bool World::Implementation::end_divided(const Divided& d, const Solve& solve, co
         solve(*d.island, solver(), scene);
         return false;
     }
+    if (d.part->calmed()) results_checked = false;
     Outcome& outcome = outcomes[static_cast<std::size_t>(d.island->bodies.front())];
     outcome = {};
     outcome.limited = limits - d.part->limited_before();

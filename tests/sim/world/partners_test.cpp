@@ -118,7 +118,24 @@ struct Steps {
     Eigen::Vector3d outside = Eigen::Vector3d::Zero();
     int alone = 0;         ///< steps that were not finished together
     int with_impacts = 0;  ///< steps with impacts in which an island was swept together
+    std::vector<sim::ContactRecord> contacts = {};  ///< at the end
 };
+
+void expect_same(const std::vector<sim::ContactRecord>& found,
+                 const std::vector<sim::ContactRecord>& expected) {
+    ASSERT_EQ(found.size(), expected.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        const sim::ContactRecord &one = found[i], &other = expected[i];
+        ASSERT_EQ(std::tuple(one.a, one.b, one.count, one.emerging),
+                  std::tuple(other.a, other.b, other.count, other.emerging));
+        for (std::size_t k = 0; k < std::size_t(one.count); ++k) {
+            EXPECT_EQ(one.points[k].feature, other.points[k].feature);
+            EXPECT_EQ(one.points[k].arm_a, other.points[k].arm_a);
+            EXPECT_EQ(one.points[k].normal_impulse, other.points[k].normal_impulse);
+            EXPECT_EQ(one.points[k].friction_impulse, other.points[k].friction_impulse);
+        }
+    }
+}
 
 Steps alone(const sim::WorldDefinition& definition, int steps) {
     Steps run;
@@ -129,6 +146,7 @@ Steps alone(const sim::WorldDefinition& definition, int steps) {
         run.counts.push_back(world.counts());
     }
     run.outside = world.outside_impulse();
+    run.contacts = world.snapshot().contacts;
     return run;
 }
 
@@ -175,6 +193,8 @@ Steps together(const sim::WorldDefinition& definition, int steps, int partners, 
     run.outside = worlds[0].outside_impulse();
     for (const sim::World& world : worlds)
         EXPECT_EQ(world.outside_impulse(), run.outside) << "each knows all";
+    run.contacts = worlds[0].snapshot().contacts;
+    for (const sim::World& world : worlds) expect_same(world.snapshot().contacts, run.contacts);
     return run;
 }
 
@@ -189,6 +209,7 @@ void expect_same_bits(const sim::WorldDefinition& definition, int steps, bool al
             [&](int step, int body) { return (body * 7 + step / 10) % partners; }, kNeverSilent);
         for (std::size_t i = 0; i < one.hashes.size() && i < several.hashes.size(); ++i)
             ASSERT_EQ(several.hashes[i], one.hashes[i]) << "step " << i;
+        expect_same(several.contacts, one.contacts);
         EXPECT_EQ(several.counts.back().pairs, one.counts.back().pairs);
         EXPECT_EQ(several.counts.back().asleep, one.counts.back().asleep);
         EXPECT_EQ(several.counts.back().solved_again, one.counts.back().solved_again);
@@ -297,6 +318,59 @@ TEST(Partners, BodiesThatSleepWakeAndBreakLooseHaveTheBitsOfOneWorld) {
         EXPECT_EQ(several.hashes, one.hashes) << partners;
         EXPECT_EQ(several.alone, 0);
     }
+}
+
+// One is broken as the step begins, one leaves the world's range within it: nobody's neighbours notice, whoever owns them.
+TEST(Partners, BrokenBodiesAreTakenOutByAll) {
+    sim::WorldDefinition definition = pile();
+    for (sim::WorldBody& body : definition.bodies)
+        body.restitution = 0, body.motion.clear(), body.velocity.setZero();
+    definition.bodies.push_back(ball({0, 1e7 - 5, 0}, sim::Fidelity::rigid));
+    const int away = int(definition.bodies.size()) - 1, within = 17;
+    definition.bodies.back().velocity.y() = 100;  // out of range in the fourth step
+    sim::World one(definition);
+    std::vector<sim::World> worlds;
+    for (int p = 0; p < 3; ++p) worlds.emplace_back(definition);
+    std::vector<int> whose;
+    for (int i = 0; i < one.bodies(); ++i) whose.push_back(i % 3);
+    for (int step = 0; step < 20; ++step) {
+        if (step == 10) {
+            sim::WorldBodyState state = one.state(within);
+            state.q_dot[2] = 1e200;
+            one.set_state(within, state);
+            for (sim::World& world : worlds) world.set_state(within, state);
+        }
+        one.step();
+        Mail mail(3);
+        std::vector<std::thread> threads;
+        std::atomic<int> gave_up = 0;
+        for (int p = 0; p < 3; ++p)
+            threads.emplace_back([&, p] {
+                ThreadPartner partner(mail, p, whose, -1);
+                try {
+                    worlds[std::size_t(p)].step_together(partner);
+                } catch (const sim::NotTogether&) {
+                    ++gave_up;
+                    mail.give_up();
+                    step_alone(worlds[std::size_t(p)]);
+                }
+            });
+        for (std::thread& thread : threads) thread.join();
+        EXPECT_EQ(gave_up, 0) << step;
+        for (const sim::World& world : worlds) {
+            ASSERT_EQ(world.state_hash(), one.state_hash()) << step;
+            ASSERT_EQ(world.quarantined().size(), one.quarantined().size()) << step;
+        }
+    }
+    ASSERT_EQ(one.quarantined().size(), 2u);
+    EXPECT_EQ(one.quarantined()[0].body, away);
+    EXPECT_EQ(one.quarantined()[1].body, within);
+    for (const sim::World& world : worlds)
+        for (std::size_t i = 0; i < 2; ++i) {
+            EXPECT_EQ(world.quarantined()[i].body, one.quarantined()[i].body);
+            EXPECT_EQ(world.quarantined()[i].step, one.quarantined()[i].step);
+            EXPECT_EQ(world.quarantined()[i].what, one.quarantined()[i].what);
+        }
 }
 
 TEST(Partners, AStepInWhichOneFallsSilentIsDoneAlone) {
