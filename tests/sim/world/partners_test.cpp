@@ -117,6 +117,7 @@ struct Steps {
     std::vector<sim::WorldCounts> counts;
     Eigen::Vector3d outside = Eigen::Vector3d::Zero();
     int alone = 0;         ///< steps that were not finished together
+    int told = 0;          ///< by one to one other: of islands that are swept together
     int with_impacts = 0;  ///< steps with impacts in which an island was swept together
     std::vector<sim::ContactRecord> contacts = {};  ///< at the end
 };
@@ -137,9 +138,10 @@ void expect_same(const std::vector<sim::ContactRecord>& found,
     }
 }
 
-Steps alone(const sim::WorldDefinition& definition, int steps) {
+Steps alone(const sim::WorldDefinition& definition, int steps, const sim::WorldSnapshot* from = nullptr) {
     Steps run;
     sim::World world(definition);
+    if (from) world.rewind(*from);
     for (int i = 0; i < steps; ++i) {
         world.step();
         run.hashes.push_back(world.state_hash());
@@ -153,9 +155,13 @@ Steps alone(const sim::WorldDefinition& definition, int steps) {
 /// By partners, and one who only listens. of(step, body): whose it is then. silent(step, partner): messages after which that one
 /// gives up in the step, or -1.
 template <typename Of, typename Silent>
-Steps together(const sim::WorldDefinition& definition, int steps, int partners, Of of, Silent silent) {
+Steps together(const sim::WorldDefinition& definition, int steps, int partners, Of of, Silent silent,
+               const sim::WorldSnapshot* from = nullptr) {
     std::vector<sim::World> worlds;  // last that of the listener
-    for (int p = 0; p <= partners; ++p) worlds.emplace_back(definition);
+    for (int p = 0; p <= partners; ++p) {
+        worlds.emplace_back(definition);
+        if (from) worlds.back().rewind(*from);
+    }
     Steps run;
     for (int i = 0; i < steps; ++i) {
         Mail mail(partners);
@@ -181,7 +187,7 @@ Steps together(const sim::WorldDefinition& definition, int steps, int partners, 
                 }
             });
         for (std::thread& thread : threads) thread.join();
-        run.alone += gave_up > 0;
+        run.alone += gave_up > 0, run.told += mail.told;
         const std::uint64_t before = run.counts.empty() ? 0 : run.counts.back().impacts;
         run.with_impacts += mail.told > 0 && worlds[0].counts().impacts > before;
         run.hashes.push_back(worlds[0].state_hash());
@@ -271,6 +277,26 @@ TEST(Partners, HeapsThatAreThrownTogetherHaveTheBitsOfOneWorld) {
         }
     }
     EXPECT_GT(with_impacts, 4);
+}
+
+// More partners than slabs: some sweep nothing, but see the same energies of soft springs.
+TEST(Partners, AHeapThatLiesWithTiesHasTheBitsOfOneWorldForAnyNumber) {
+    sim::WorldDefinition definition = heap(1);
+    for (sim::WorldBody& body : definition.bodies) body.restitution = 0;
+    sim::World lying(definition);
+    for (int i = 0; i < 150; ++i) lying.step();
+    const sim::WorldSnapshot from = lying.snapshot();
+    const Steps one = alone(definition, 40, &from);
+    for (const int partners : {2, 9}) {
+        const Steps several = together(
+            definition, 40, partners, [&](int step, int body) { return (body + step / 7) % partners; },
+            kNeverSilent, &from);
+        ASSERT_EQ(several.hashes, one.hashes) << partners << " partners";
+        expect_same(several.contacts, one.contacts);
+        EXPECT_EQ(several.alone, 0);
+        EXPECT_GT(several.told, 0) << "it is swept together";
+        EXPECT_LT(several.with_impacts, 40) << "parts without contacts";
+    }
 }
 
 // A tie that breaks in an island that is swept together: its bodies meet from then on.
