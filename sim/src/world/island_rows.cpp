@@ -109,11 +109,12 @@ void IslandSolver::begin_body(BodyRows& rows) {
     path.inertia = body.kind->mass.inertia;
 }
 
-// What a block's contacts need.
-IslandSolver::Part IslandSolver::part_of(std::span<const int> manifolds) const {
+// What a block's contacts need. impacts_alone: see fill_part.
+IslandSolver::Part IslandSolver::part_of(std::span<const int> manifolds, bool impacts_alone) const {
     Part part;
     for (const int m : manifolds) {
         const Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        if (impacts_alone && !is_impact_here(manifold)) continue;
         std::size_t width = 0;
         for (const int id : {manifold.a, manifold.b})
             if (id < kFirstPlane && local(id) >= 0)
@@ -134,10 +135,12 @@ void IslandSolver::add_contacts(const Island& island) {
     });
     sums_.assign(blocks_.slabs(), {});
     parts_.resize(blocks_.size());
-    const bool all_blocks = !with_ || any_impacts_;
     crew().each(parts_.size(), 1, [&](int, std::size_t first, std::size_t last) {
         for (std::size_t b = first; b < last; ++b)
-            parts_[b] = all_blocks || sweeps(blocks_[b]) ? part_of(blocks_.manifolds_of(b)) : Part{};
+            if (const bool others = with_ && !sweeps(blocks_[b]); !others || any_impacts_)
+                parts_[b] = part_of(blocks_.manifolds_of(b), others);
+            else
+                parts_[b] = {};
     });
     Part all;
     for (std::size_t b = 0; b < parts_.size(); ++b) {
@@ -159,13 +162,14 @@ void IslandSolver::add_contacts(const Island& island) {
     jacobians_used_ = all.floats;
     springs_.clear(), impacts_.clear(), first_contact_.clear();
     any_told_ = direct_ = any_bounce_ = any_struck_ = any_rebound_ = any_emerging_ = false;
-    any_impacts_ = all.impacts, any_contacts_ = !island.manifolds.empty();
+    if (!with_) any_impacts_ = all.impacts;
+    any_contacts_ = !island.manifolds.empty();
     first_crossed_ = crossed_.size();
     contacts_.resize(all.contacts);
     for (auto* list : {&striking_, &struck_}) list->reserve(all.contacts);
     hits_.reserve(all.contacts), contacts_of_.reserve(2 * all.contacts);
     first_contact_.reserve(rows_of_.size() + 1), hit_bodies_.reserve(rows_of_.size());
-    if (all.impacts) stiffen(island);
+    if (any_impacts_) stiffen(island);
     windows_.resize(static_cast<std::size_t>(crew().size()));
     for (Window& window : windows_) window.next_turn.assign(rows_of_.size(), 0);
     crew().each(parts_.size(), 1, [this](int thread, std::size_t first, std::size_t last) {
@@ -225,7 +229,7 @@ void IslandSolver::fill_part(std::span<const int> manifolds, Window& window, Par
     };
     for (const int m : manifolds) {
         Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
-        if (!impacts_alone || manifold.points[0].begins >= 0) unpack(manifold);
+        if (!impacts_alone || is_impact_here(manifold)) unpack(manifold);
         int* const next[] = {turns_of(manifold.a), turns_of(manifold.b)};
         for (int i = 0; i < manifold.count; ++i) {
             if (window.contacts.size() == kWindow) flush(window, part, impacts_alone);
@@ -249,15 +253,10 @@ void IslandSolver::flush(Window& window, Part& part, bool impacts_alone) {
     for (const Turn& t : window.contacts)
         by_turn[static_cast<std::size_t>(first[static_cast<std::size_t>(t.turn)]++)] = &t;
     for (std::size_t i = 0; i < window.contacts.size(); ++i) {
-        ContactRows& c = contacts_[part.contacts++];
         Manifold& manifold = *by_turn[i]->manifold;
-        if (!impacts_alone || (manifold.points[0].begins >= 0 && concerns_this(manifold))) {
-            fill_contact(c, manifold, manifold.points[static_cast<std::size_t>(by_turn[i]->point)], part);
-            continue;
-        }
-        c.firm = false;
-        for (const int id : {manifold.a, manifold.b})
-            (void)reserve_rows(id < kFirstPlane ? local(id) : -1, part.floats);
+        if (impacts_alone && !is_impact_here(manifold)) continue;
+        fill_contact(contacts_[part.contacts++], manifold,
+                     manifold.points[static_cast<std::size_t>(by_turn[i]->point)], part);
     }
     for (const Turn& t : window.contacts)
         for (const int id : {t.manifold->a, t.manifold->b})

@@ -319,7 +319,7 @@ private:
         std::vector<Turn> contacts;
         std::vector<int> next_turn;  // per island body, 0 between windows
     };
-    [[nodiscard]] Part part_of(std::span<const int> manifolds) const;
+    [[nodiscard]] Part part_of(std::span<const int> manifolds, bool impacts_alone) const;
     void add_contacts(const Island& island);
     [[nodiscard]] int substep_of(const ManifoldPoint& point) const;
     void fill_part(std::span<const int> manifolds, Window& window, Part& part, bool impacts_alone);
@@ -578,6 +578,9 @@ private:
     void find_groups(const Island& island);
     [[nodiscard]] bool concerns(std::uint32_t body, int partner) const;
     [[nodiscard]] bool concerns_this(const Manifold& manifold) const;
+    [[nodiscard]] bool is_impact_here(const Manifold& manifold) const {
+        return manifold.points[0].begins >= 0 && concerns_this(manifold);
+    }
     [[nodiscard]] bool concerns_this(const Rows& rows) const {
         return concerns(static_cast<std::uint32_t>(first_body(rows)), part_);
     }

@@ -211,8 +211,16 @@ void WorldContacts::share(const ContactScene& scene, Partners& with, const Write
     out.bytes().reserve(160 * found.manifolds.size() + 64);
     out.count(found.manifolds.size());
     for (const Manifold& m : found.manifolds) write(out, m);
+    told_impacts_.resize(found.meetings.size());
+    find_impacts(scene, found.meetings, told_impacts_);
     out.count(found.meetings.size());
-    for (const Meeting& m : found.meetings) out.number(m.a), out.number(m.b), out.number(m.time);
+    for (std::size_t i = 0; i < found.meetings.size(); ++i) {
+        Meeting& m = found.meetings[i];
+        m.told = static_cast<int>(i);
+        out.number(m.a), out.number(m.b), out.number(m.time);
+        out.number<std::uint8_t>(told_impacts_[i].count > 0);
+        if (told_impacts_[i].count > 0) write(out, told_impacts_[i]);
+    }
     out.count(found.woken.size());
     for (const int id : found.woken) out.number(id);
     const auto watched = static_cast<std::size_t>(std::ranges::count(watched_, 1));
@@ -246,8 +254,6 @@ void WorldContacts::share(const ContactScene& scene, Partners& with, const Write
     }
     std::swap(all_found_, found.manifolds);
     std::ranges::sort(found.meetings, {}, [](const Meeting& m) { return std::pair(m.a, m.b); });
-    for (const Meeting& m : found.meetings)
-        for (const int id : {m.a, m.b}) follow(scene, id, scene.bodies[static_cast<std::size_t>(id)].state);
 }
 
 void WorldContacts::hear(const ContactScene& scene, ByteReader& in, std::span<const std::uint8_t> bytes) {
@@ -266,12 +272,17 @@ void WorldContacts::hear(const ContactScene& scene, ByteReader& in, std::span<co
             throw DecodeError("contacts that do not ascend");
     }
     runs_.push_back(told_.size());
-    for (std::uint32_t n = in.count(16); n > 0; --n) {
+    for (std::uint32_t n = in.count(17); n > 0; --n) {
         const int a = body(), b = body();
         const bool any = scene.bodies[static_cast<std::size_t>(a)].moves() ||
                          scene.bodies[static_cast<std::size_t>(b)].moves();
         if (a >= b || !any) throw DecodeError("a meeting of what does not meet");
-        found.meetings.push_back({a, b, read_finite(in), false});
+        found.meetings.push_back({a, b, read_finite(in), false, static_cast<int>(told_impacts_.size())});
+        Manifold& impact = told_impacts_.emplace_back();
+        if (!in.flag()) continue;
+        read(in, impact, scene.bodies, scene.planes.size());
+        if (impact.a != a || impact.b != b || !(impact.points[0].begins >= 0))
+            throw DecodeError("an impact that is not of its meeting");
     }
     for (std::uint32_t n = in.count(4); n > 0; --n) found.woken.push_back(body());
     for (std::uint32_t n = in.count(4); n > 0; --n) watched_[static_cast<std::size_t>(body())] = 1;

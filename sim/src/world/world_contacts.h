@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <functional>
 #include <memory>
 #include <span>
@@ -59,6 +60,7 @@ public:
         int a, b;
         double time;    ///< since the step's start [s]
         bool touching;  ///< had a contact already, and still went on inside
+        int told = -1;  ///< number of its impact that a partner told; -1: none did
     };
     const std::vector<Meeting>& unforeseen(const ContactScene& scene, const std::vector<std::uint8_t>& solved,
                                            const std::vector<WorldBodyState>& started);
@@ -142,7 +144,10 @@ private:
     [[nodiscard]] Impact foresee(const ContactScene& scene, int i, int j);
     void follow(const ContactScene& scene, int i, const WorldBodyState& from);
     void accept_impacts(const ContactScene& scene);
-    bool add_impact(const ContactScene& scene, const Meeting& meeting);
+    void find_impacts(const ContactScene& scene, std::span<const Meeting> meetings,
+                      std::span<Manifold> impacts);
+    void find_impact(const ContactScene& scene, const Meeting& meeting, std::size_t thread,
+                     Manifold& manifold);
     [[nodiscard]] bool left_path(const ContactScene& scene, int i) const;
     void meet_unforeseen(const ContactScene& scene, int i, int j);
 
@@ -161,7 +166,7 @@ private:
     };
     std::vector<Told> told_;         // manifolds, in runs of one partner each, then by ascending keys
     std::vector<std::size_t> runs_;  // where each ends
-    std::vector<Manifold> all_found_;
+    std::vector<Manifold> all_found_, told_impacts_;
     std::vector<BodyPath> paths_;  // of each body
     enum : std::uint8_t { kNotFollowed, kBeingFollowed, kFollowed };
     std::vector<std::uint8_t> followed_;  // paths_ holds the free motion of this step; by any thread
@@ -169,7 +174,7 @@ private:
     std::vector<double> first_;           // of each body: time of its first impact
     std::vector<Meeting> meetings_;
     std::vector<std::uint64_t> known_;  // pairs
-    PosedBody at_[2];                   // where an impact is
+    std::vector<std::array<PosedBody, 2>> at_;  // of each thread, where an impact is
     int pairs_ = 0;
     std::uint64_t impacts_ = 0;
 };

@@ -98,11 +98,24 @@ void WorldContacts::accept_impacts(const ContactScene& scene) {
         }
     std::erase_if(meetings_, [&](const Meeting& m) {
         return m.time > substep + std::min(first_[static_cast<std::size_t>(m.a)],
-                                           first_[static_cast<std::size_t>(m.b)]) ||
-               !add_impact(scene, m);
+                                           first_[static_cast<std::size_t>(m.b)]);
     });
+    added_.resize(meetings_.size());
+    find_impacts(scene, meetings_, added_);
+    std::size_t found = 0;
+    for (std::size_t i = 0; i < meetings_.size(); ++i) {
+        const Meeting& m = meetings_[i];
+        const Manifold& impact = m.told < 0 ? added_[i] : told_impacts_[static_cast<std::size_t>(m.told)];
+        if (impact.count == 0) continue;
+        watch_turning(m.a, m.b,
+                      kSlow * size_of(scene.bodies[static_cast<std::size_t>(m.a)],
+                                      scene.bodies[static_cast<std::size_t>(m.b)]));
+        added_[found] = impact, meetings_[found++] = m;
+    }
+    meetings_.resize(found), added_.resize(found);
+    impacts_ += found;
     // Those that were added, into their places.
-    added_.assign(manifolds_.begin() + sorted, manifolds_.end());
+    manifolds_.insert(manifolds_.end(), added_.begin(), added_.end());
     std::sort(added_.begin(), added_.end(), by_key);
     auto to = manifolds_.end(), from = manifolds_.begin() + sorted;
     for (; !added_.empty(); --to) {
@@ -112,26 +125,39 @@ void WorldContacts::accept_impacts(const ContactScene& scene) {
     }
 }
 
+// Of those meetings whose impacts nobody told.
+void WorldContacts::find_impacts(const ContactScene& scene, std::span<const Meeting> meetings,
+                                 std::span<Manifold> impacts) {
+    at_.resize(static_cast<std::size_t>(scene.crew.size()));
+    scene.crew.each(meetings.size(), 4, [&](int thread, std::size_t first, std::size_t last) {
+        for (std::size_t i = first; i < last; ++i)
+            if (meetings[i].told < 0)
+                find_impact(scene, meetings[i], static_cast<std::size_t>(thread), impacts[i]);
+    });
+}
+
 // The contact of a pair where its paths bring it at a time. Its separation now is what its rows, which stand
-// still over the step, close until then. false: it has none there.
-bool WorldContacts::add_impact(const ContactScene& scene, const Meeting& meeting) {
+// still over the step, close until then. Without points: it has none there.
+void WorldContacts::find_impact(const ContactScene& scene, const Meeting& meeting, std::size_t thread,
+                                Manifold& manifold) {
     const int ids[2] = {meeting.a, meeting.b};
     BodyPath::Way way[2];
     for (std::size_t side = 0; side < 2; ++side) {
         const auto id = static_cast<std::size_t>(ids[side]);
         const BodyPath::Pose pose = paths_[id].at(meeting.time);
-        at_[side].kind = scene.bodies[id].kind;
-        at_[side].set(pose.position, pose.orientation, scene.bodies[id].state.q);
+        PosedBody& posed = at_[thread][side];
+        posed.kind = scene.bodies[id].kind;
+        posed.set(pose.position, pose.orientation, scene.bodies[id].state.q);
         way[side] = paths_[id].until(meeting.time);
     }
     const MovingBody &a = scene.bodies[static_cast<std::size_t>(meeting.a)],
                      &b = scene.bodies[static_cast<std::size_t>(meeting.b)];
-    Manifold manifold;
+    manifold = {};
     manifold.a = meeting.a, manifold.b = meeting.b;
     const float margin = static_cast<float>(kSlow * size_of(a, b));
-    narrow_.front()->pair(at_[0], at_[1], {margin, find_last(manifold.key()), scene.among_ghosts, true},
-                          manifold);
-    if (manifold.count == 0) return false;
+    narrow_[thread]->pair(at_[thread][0], at_[thread][1],
+                          {margin, find_last(manifold.key()), scene.among_ghosts, true}, manifold);
+    if (manifold.count == 0) return;
     for (std::size_t i = 0; i < static_cast<std::size_t>(manifold.count); ++i) {
         ManifoldPoint& p = manifold.points[i];
         const Eigen::Vector3d n = p.normal.cast<double>();
@@ -146,10 +172,6 @@ bool WorldContacts::add_impact(const ContactScene& scene, const Meeting& meeting
     }
     manifold.emerging = false;
     scene.set_surface(manifold);
-    watch_turning(meeting.a, meeting.b, kSlow * size_of(a, b));
-    ++impacts_;
-    manifolds_.push_back(manifold);
-    return true;
 }
 
 void WorldContacts::replace(const std::vector<int>& bodies, const std::vector<Manifold>& by) {
