@@ -5,12 +5,20 @@
 namespace sim {
 namespace {
 
-constexpr double kThickness = 2;  // of a slab, mean diameters
-constexpr double kLonger = 1.1;   // than the axis before it, so much an axis has to be
+// Of a slab, in mean diameters: the least of these beyond which no contact reaches, or the last.
+constexpr std::array kThickness{1.25, 1.5, 1.75, 2.};
+constexpr double kLonger = 1.1;  // than the axis before it, so much an axis has to be
+
+// Its bodies' places in the island, -1 for what does not move.
+std::pair<int, int> bodies_in(const Manifold& manifold, const std::vector<int>& local) {
+    const auto place = [&](int id) { return id < kFirstPlane ? local[static_cast<std::size_t>(id)] : -1; };
+    return {place(manifold.a), place(manifold.b)};
+}
 
 }  // namespace
 
-void IslandBlocks::set_slabs(std::span<const Body> bodies) {
+void IslandBlocks::set_slabs(std::span<const Body> bodies, std::span<const int> manifolds,
+                             const std::vector<Manifold>& all, const std::vector<int>& local) {
     slab_of_.assign(bodies.size(), 0);
     std::size_t slabs = 1;
     if (bodies.size() >= kLeastDivided) {
@@ -24,8 +32,19 @@ void IslandBlocks::set_slabs(std::span<const Body> bodies) {
         int axis = 0;
         for (int k = 1; k < 3; ++k)
             if (length[k] > kLonger * length[axis]) axis = k;
-        const double thickness = std::max(kThickness * sum / static_cast<double>(bodies.size()),
-                                          length[axis] / static_cast<double>(kMostSlabs - 1));
+        const double diameter = sum / static_cast<double>(bodies.size());
+        double furthest = 0;
+        for (const int m : manifolds) {
+            const auto [a, b] = bodies_in(all[static_cast<std::size_t>(m)], local);
+            if (a >= 0 && b >= 0)
+                furthest = std::max(furthest, std::abs(bodies[static_cast<std::size_t>(a)].place[axis] -
+                                                       bodies[static_cast<std::size_t>(b)].place[axis]));
+        }
+        const auto enough =
+            std::ranges::find_if(kThickness, [&](double share) { return share * diameter > furthest; });
+        const double thickness =
+            std::max((enough == kThickness.end() ? kThickness.back() : *enough) * diameter,
+                     length[axis] / static_cast<double>(kMostSlabs - 1));
         const double first = std::floor(low[axis] / thickness);
         for (std::size_t i = 0; i < bodies.size(); ++i) {
             const double at = std::floor(bodies[i].place[axis] / thickness) - first;
@@ -55,7 +74,7 @@ void IslandBlocks::add_block(std::uint32_t slab, std::uint32_t slabs) {
 
 void IslandBlocks::divide(Crew& crew, std::span<const Body> bodies, std::span<const int> manifolds,
                           const std::vector<Manifold>& all, const std::vector<int>& local) {
-    set_slabs(bodies);
+    set_slabs(bodies, manifolds, all, local);
     const auto count = static_cast<std::uint32_t>(slabs());
     blocks_.clear();
     blocks_of_.fill(0);
@@ -68,11 +87,11 @@ void IslandBlocks::divide(Crew& crew, std::span<const Body> bodies, std::span<co
         for (std::uint32_t s = 0; s < count; ++s) ++blocks_of_[s];
     }
     const auto block_of = [&](const Manifold& m) -> std::uint32_t {
-        const auto slab = [&](int id) {
-            const int at = id < kFirstPlane ? local[static_cast<std::size_t>(id)] : -1;
-            return at < 0 ? -1 : static_cast<int>(slab_of_[static_cast<std::size_t>(at)]);
+        const auto [first, second] = bodies_in(m, local);
+        const auto slab = [this](int body) {
+            return body < 0 ? -1 : static_cast<int>(slab_of_[static_cast<std::size_t>(body)]);
         };
-        const int a = slab(m.a), b = slab(m.b);
+        const int a = slab(first), b = slab(second);
         const int low = a < 0 ? b : b < 0 ? a : std::min(a, b), high = std::max(a, b);
         const auto from = static_cast<std::uint32_t>(std::max(low, 0));
         if (low == high) return from;

@@ -14,8 +14,9 @@ constexpr std::size_t kMostSlabs = 64;
 /// with the domain decomposed (as Preclik and Ruede 2015 part theirs, but without splitting bodies: every contact sees the
 /// newest velocities).
 ///
-/// Space is cut square to the axis along which the island is longest, into slabs two mean diameters of its bodies thick, at
-/// multiples of that from the world's origin, so that what rests keeps its slab. Contacts of bodies in one slab are its
+/// Space is cut square to the axis along which the island is longest, into slabs as thin as contacts between their bodies allow,
+/// in steps from one and a quarter to two mean diameters of the bodies, at multiples of that from the world's origin, so that
+/// what rests keeps its slab. Contacts of bodies in one slab are its
 /// interior, those of bodies in neighbouring slabs an interface. Swept are, each by ids: all interiors, interfaces after
 /// even slabs, those after odd ones, and what reaches further (long bodies among small ones). Blocks without a slab in common
 /// commute; those with one keep this order, so the result is to the bit that of one thread which does block after block,
@@ -126,7 +127,8 @@ private:
                                         bool of_bodies) const;
     void begin(const Block& block, const Phase& phase, bool of_bodies) const;
     void end(const Block& block, const Phase& phase, bool of_bodies);
-    void set_slabs(std::span<const Body> bodies);
+    void set_slabs(std::span<const Body> bodies, std::span<const int> manifolds,
+                   const std::vector<Manifold>& all, const std::vector<int>& local);
     void add_block(std::uint32_t slab, std::uint32_t slabs);
 
     std::vector<Block> blocks_;

@@ -368,7 +368,7 @@ int IslandSolver::substep_of(const ManifoldPoint& point) const {
 void IslandSolver::add_contact(Manifold& manifold, ManifoldPoint& point) {
     Part part;
     part.floats = jacobians_used_;
-    fill_contact(contacts_.emplace_back(), manifold, point, part);
+    fill_contact(contacts_.extend(), manifold, point, part);
     jacobians_used_ = part.floats;
     if (told_crossed_) note_told(contacts_.back());
     note(part);

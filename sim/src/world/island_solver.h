@@ -10,6 +10,7 @@
 #include "world/block_cholesky.h"
 #include "world/island_blocks.h"
 #include "world/island_contacts.h"
+#include "world/kept_vector.h"
 #include "world/partners.h"
 
 namespace sim {
@@ -669,8 +670,8 @@ private:
     };
     std::vector<Pushed> pushed_;
 
-    std::vector<BodyRows> rows_of_;  // per island body
-    std::vector<int> local_;         // world body -> island body or -1
+    KeptVector<BodyRows> rows_of_;  // per island body
+    std::vector<int> local_;        // world body -> island body or -1
     IslandBlocks blocks_;
     std::vector<IslandBlocks::Body> places_;  // of the bodies, to divide them
     std::vector<Sums> sums_;                  // of each slab
@@ -678,7 +679,7 @@ private:
     std::vector<Window> windows_;             // of each thread
     std::vector<Phase> phases_;               // that run() will do
     std::vector<int> next_of_;                // per island body
-    std::vector<ContactRows> contacts_;       // together those of this part, and impacts that concern it
+    KeptVector<ContactRows> contacts_;        // together those of this part, and impacts that concern it
     std::vector<SpringRows> springs_;
     bool springs_soft_ = true;          // as the step begins
     bool modes_ahead_ = false;          // springs' ends are where the substep takes them, with their modes

@@ -252,8 +252,8 @@ void World::Implementation::put_to_sleep() {
         bool still = settings.sleeping && !outcomes[static_cast<std::size_t>(island.bodies.front())].carried;
         for (const int id : island.bodies) {
             MovingBody& body = bodies[static_cast<std::size_t>(id)];
-            const bool slow = body.state.velocity.norm() < settings.sleep_speed &&
-                              point_speed(body) < settings.sleep_speed;
+            const bool slow =
+                body.state.velocity.norm() < settings.sleep_speed && point_speed(body) < settings.sleep_speed;
             body.still_steps = slow ? std::min(body.still_steps + 1, kMostStillSteps) : 0;
             still = still && body.still_steps >= wanted;
             // What bodies of another world touch can rest only with them.

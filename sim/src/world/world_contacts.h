@@ -173,7 +173,7 @@ private:
     std::vector<std::uint8_t> watched_;   // has a contact that turns on: see unforeseen; by any thread
     std::vector<double> first_;           // of each body: time of its first impact
     std::vector<Meeting> meetings_;
-    std::vector<std::uint64_t> known_;  // pairs
+    std::vector<std::uint64_t> known_;          // pairs
     std::vector<std::array<PosedBody, 2>> at_;  // of each thread, where an impact is
     int pairs_ = 0;
     std::uint64_t impacts_ = 0;
