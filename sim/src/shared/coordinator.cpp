@@ -159,7 +159,7 @@ void Coordinator::start() {
         }
     }
     observer_->at(view_.step(), view_.world());
-    observer_->ready(view_.step(), view_.world());
+    tell_ready();
     send(members_, Members{members_});
     if (members_.empty()) {  // all lost before: the next to join gets everything
         std::vector<int> all;
@@ -331,9 +331,14 @@ void Coordinator::advance() {
         const World& world = view_.world();
         if (settings_.pace == Pace::lockstep) observer_->done(view_.step(), [this] { return state(); });
         observer_->at(view_.step(), world);
-        observer_->ready(view_.step(), world);
+        tell_ready();
         std::erase_if(kept_, [this](const auto& kept) { return kept.first + kept_steps_ <= view_.step(); });
     }
+}
+
+void Coordinator::tell_ready() {
+    if (view_.step() < settings_.steps) view_.begin();
+    observer_->ready(view_.step(), view_.world());
 }
 
 // A body that came to a worker after its last step is published no more.

@@ -35,10 +35,6 @@ void SceneClock::apply(World& world, std::uint64_t step) {
     }
 }
 
-bool SceneClock::moves_at(int body, std::uint64_t step) const {
-    return moves(body) && (body < first_later_ || born(body) < step);
-}
-
 int SceneClock::moving(std::uint64_t step) const {
     int count = moving_at_first_;
     for (int i = first_later_; i < bodies(); ++i) count += moves_at(i, step);

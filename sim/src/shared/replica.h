@@ -22,7 +22,13 @@ public:
     [[nodiscard]] bool moves(int body) const { return moves_[static_cast<std::size_t>(body)] != 0; }
     /// Number of moving bodies that exist at the end of step `step`.
     [[nodiscard]] int moving(std::uint64_t step) const;
-    [[nodiscard]] bool moves_at(int body, std::uint64_t step) const;
+    /// Whether the body takes part in the steps up to this one.
+    [[nodiscard]] bool there_at(int body, std::uint64_t step) const {
+        return body < first_later_ || born(body) < step;
+    }
+    [[nodiscard]] bool moves_at(int body, std::uint64_t step) const {
+        return moves(body) && there_at(body, step);
+    }
 
 private:
     WorldScene scene_;

@@ -88,6 +88,12 @@ void WorldView::show(int body, std::uint64_t step) {
     world.restore(record_);
 }
 
+WorldSnapshot WorldView::snapshot() const {
+    WorldSnapshot snapshot = world().snapshot();
+    std::erase_if(snapshot.bodies, [this](const WorldRecord& r) { return !clock().there_at(r.body, step_); });
+    return snapshot;
+}
+
 bool WorldView::at_rest() const {
     const World& world = replica_.world();
     if (clock().events_left()) return false;

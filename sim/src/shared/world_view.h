@@ -21,13 +21,15 @@ public:
     void jump(const WorldSnapshot& snapshot);  ///< lockstep: to the end of a later step
     /// Advances by one step if all its states are known; returns whether it did.
     [[nodiscard]] bool advance();
+    /// Applies the events before the next step, as one world does.
+    void begin() { replica_.begin_at(step_); }
 
     [[nodiscard]] const World& world() const noexcept { return replica_.world(); }  ///< all bodies at step()
     [[nodiscard]] std::uint64_t step() const noexcept { return step_; }             ///< shown
     [[nodiscard]] const SceneClock& clock() const noexcept { return replica_.clock(); }
     /// Every body has been still for half a second and no event is left.
     [[nodiscard]] bool at_rest() const;
-    [[nodiscard]] WorldSnapshot snapshot() const { return replica_.world().snapshot(); }
+    [[nodiscard]] WorldSnapshot snapshot() const;  ///< without bodies that come in the next step
 
 private:
     struct Published {
