@@ -4,7 +4,7 @@
 #include <span>
 #include <utility>
 
-#include "shared/disjoint_sets.h"
+#include "world/disjoint_sets.h"
 
 namespace sim {
 namespace {

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "shape/superquadric.h"
-#include "shared/disjoint_sets.h"
+#include "world/disjoint_sets.h"
 
 namespace sim {
 namespace {

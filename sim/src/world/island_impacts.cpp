@@ -106,7 +106,7 @@ void IslandSolver::list_contacts() {
             for (std::size_t i = 0; i < contacts_.size(); ++i) visit_contact(i);
         for (std::size_t b = 0; with_ && b < blocks_.size(); ++b)
             for (std::size_t i = blocks_[b].first; i < blocks_[b].last; ++i)
-                if (sweeps(blocks_[b]) || (parts_[b].impacts && contacts_[i].firm)) visit_contact(i);
+                if (shares_.sweeps(blocks_[b]) || (parts_[b].impacts && contacts_[i].firm)) visit_contact(i);
     };
     each([this](std::size_t body, std::size_t) { ++first_contact_[body + 1]; });
     for (std::size_t i = 1; i < first_contact_.size(); ++i) first_contact_[i] += first_contact_[i - 1];

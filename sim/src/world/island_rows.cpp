@@ -129,7 +129,7 @@ IslandSolver::Part IslandSolver::part_of(std::span<const int> manifolds, bool im
 // The contacts' rows, in the order of blocks.
 void IslandSolver::add_contacts(const Island& island) {
     blocks_.divide(crew(), places_, island.manifolds, *manifolds_, local_);
-    if (with_) cut(), find_groups(island);
+    if (with_) shares_.divide(with_->self(), wanted_, *manifolds_, local_), find_groups();
     each_body([this](BodyRows& rows) {
         if (!with_ || is_used(static_cast<std::uint32_t>(&rows - rows_of_.data()))) begin_body(rows);
     });
@@ -137,7 +137,7 @@ void IslandSolver::add_contacts(const Island& island) {
     parts_.resize(blocks_.size());
     crew().each(parts_.size(), 1, [&](int, std::size_t first, std::size_t last) {
         for (std::size_t b = first; b < last; ++b)
-            if (const bool others = with_ && !sweeps(blocks_[b]); !others || any_impacts_)
+            if (const bool others = with_ && !shares_.sweeps(blocks_[b]); !others || any_impacts_)
                 parts_[b] = part_of(blocks_.manifolds_of(b), others);
             else
                 parts_[b] = {};
@@ -174,7 +174,7 @@ void IslandSolver::add_contacts(const Island& island) {
     for (Window& window : windows_) window.next_turn.assign(rows_of_.size(), 0);
     crew().each(parts_.size(), 1, [this](int thread, std::size_t first, std::size_t last) {
         for (std::size_t b = first; b < last; ++b)
-            if (const bool others = with_ && !sweeps(blocks_[b]); others && !parts_[b].impacts)
+            if (const bool others = with_ && !shares_.sweeps(blocks_[b]); others && !parts_[b].impacts)
                 parts_[b].contacts = blocks_[b].last;
             else
                 fill_part(blocks_.manifolds_of(b), windows_[static_cast<std::size_t>(thread)], parts_[b],

@@ -238,7 +238,7 @@ bool IslandSolver::may_push_out() {
     if (with_) {
         bool here = false;
         for (std::size_t b = 0; b < blocks_.size(); ++b)
-            if (sweeps(blocks_[b]))
+            if (shares_.sweeps(blocks_[b]))
                 for (const ContactRows& c : contacts_in(blocks_[b])) here = here || (c.emerging && c.now < 0);
         return any_of_all(here);
     }

@@ -10,6 +10,7 @@
 #include "world/block_cholesky.h"
 #include "world/island_blocks.h"
 #include "world/island_contacts.h"
+#include "world/island_shares.h"
 #include "world/kept_vector.h"
 #include "world/partners.h"
 
@@ -134,9 +135,7 @@ public:
     /// Calls visit(id) for the bodies of a partner's part.
     template <typename Visit>
     void each_id_of(int partner, Visit visit) const {
-        each_body_of(partner, [&](const BodyRows& rows) {
-            visit(island_->bodies[static_cast<std::size_t>(&rows - rows_of_.data())]);
-        });
+        shares_.each_body_of(partner, [&](std::size_t body) { visit(island_->bodies[body]); });
     }
     void write_part(ByteWriter& out) const;       ///< what came of this part
     void read_part(ByteReader& in, int partner);  ///< of another's
@@ -555,41 +554,27 @@ private:
     }
 
     // Together.
-    struct Border {
-        int partner = -1;                        // none
-        std::size_t block = 0;                   // of blocks_
-        std::vector<std::uint32_t> own, theirs;  // bodies in its contacts, ascending
-    };
+    using Border = IslandShares::Border;
     [[nodiscard]] bool is_plain(const Island& island, bool impacts) const;
-    void cut();
-    void find_border(Border& border, std::size_t own_slab);
-    [[nodiscard]] bool sweeps(const IslandBlocks::Block& block) const noexcept {
-        return first_slab_ < last_slab_ && block.slab < last_slab_ && block.slab + block.slabs > first_slab_;
-    }
-    [[nodiscard]] bool is_own_body(std::size_t body) const {
-        return blocks_.slab_of(body) >= first_slab_ && blocks_.slab_of(body) < last_slab_;
-    }
     void run_together();
-    void order_turns();
     [[nodiscard]] std::span<float> speeds_of(std::uint32_t body);
     void tell(const Border& border, Told told);
     void hear(const Border& border, Told told);
     void begin_borders();
     void meet_borders(Told told);
-    void find_groups(const Island& island);
-    [[nodiscard]] bool concerns(std::uint32_t body, int partner) const;
+    void find_groups();
     [[nodiscard]] bool concerns_this(const Manifold& manifold) const;
     [[nodiscard]] bool is_impact_here(const Manifold& manifold) const {
         return manifold.points[0].begins >= 0 && concerns_this(manifold);
     }
     [[nodiscard]] bool concerns_this(const Rows& rows) const {
-        return concerns(static_cast<std::uint32_t>(first_body(rows)), part_);
+        return shares_.concerns(static_cast<std::size_t>(first_body(rows)), shares_.self());
     }
     /// Whether a body has rows here: who sweeps others leaves it alone.
     [[nodiscard]] bool is_used(std::uint32_t body) const;
     /// Of two or more who compute the same, one adds up what comes from outside.
     [[nodiscard]] bool counts_here(const Rows& rows) const {
-        return is_own_body(static_cast<std::size_t>(first_body(rows)));
+        return shares_.has(static_cast<std::size_t>(first_body(rows)));
     }
     [[nodiscard]] static int first_body(const Rows& rows) {
         return rows.side[rows.side[0].body >= 0 ? 0 : 1].body;
@@ -601,38 +586,16 @@ private:
     void read_motion(ByteReader& in, std::uint32_t body, bool begins);
     void read_meeting(ByteReader& in, std::uint32_t body, bool moved);
     void turn_frame_on(BodyRows& rows);
-    template <typename Body>
-    void each_body_of(int partner, Body visit) const;
-    template <typename Visit>
-    void each_own_body(Visit visit) const {
-        for (std::size_t s = first_slab_; s < last_slab_; ++s)
-            for (const std::uint32_t body : blocks_.bodies_of(s)) visit(static_cast<std::size_t>(body));
+    [[nodiscard]] BodyPath& path_of(std::size_t body) const {
+        return (*paths_)[static_cast<std::size_t>(island_->bodies[body])];
     }
-    template <typename Block>
-    void each_block_of(int partner, Block visit) const;
     [[nodiscard]] bool is_uneven(const Manifold& manifold) const;
     void keep_spring_impulses();
     void forget_island();
 
-    Partners* with_ = nullptr;                    // this island is solved together
-    std::vector<double> shares_;                  // of it
-    std::vector<std::size_t> cuts_;               // first slab of each partner, and their number
-    int part_ = 0;                                // this partner's number
-    std::size_t first_slab_ = 0, last_slab_ = 0;  // own ones
-    std::array<Border, 2> borders_;               // below, above
-    /// A block that is swept; of a border when what its other side tells has come, or, before, what that needs is told.
-    struct BlockTurn {
-        std::size_t block;
-        int border;  // or -1
-        bool tells;
-    };
-    std::vector<BlockTurn> turns_;
-    std::vector<std::size_t> blocks_left_;  // without a turn yet
-    std::vector<int> owner_of_slab_;        // which partner
-    /// Bodies that springs and impacts of the step join, directly or over others: each body's group, or -1, and of each group which
-    /// partners compute what these do to it: those whose slabs, or whose neighbouring slabs, it is in.
-    std::vector<int> group_of_;
-    std::vector<std::uint8_t> concerned_;  // [group][partner]
+    Partners* with_ = nullptr;                 // this island is solved together
+    std::vector<double> wanted_;               // shares of it
+    std::vector<std::pair<int, int>> joined_;  // bodies, by springs and impacts
     struct Due {
         int substep;
         std::uint32_t body;
@@ -673,6 +636,7 @@ private:
     KeptVector<BodyRows> rows_of_;  // per island body
     std::vector<int> local_;        // world body -> island body or -1
     IslandBlocks blocks_;
+    IslandShares shares_{blocks_};            // together
     std::vector<IslandBlocks::Body> places_;  // of the bodies, to divide them
     std::vector<Sums> sums_;                  // of each slab
     std::vector<Part> parts_;                 // of each block

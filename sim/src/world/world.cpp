@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -144,18 +143,6 @@ bool World::Implementation::is_own(const Island& island) const {
                        [this](int id) { return bodies[static_cast<std::size_t>(id)].own; });
 }
 
-int World::Implementation::root(int body) {
-    while (parent[static_cast<std::size_t>(body)] != body)
-        body = parent[static_cast<std::size_t>(body)] =
-            parent[static_cast<std::size_t>(parent[static_cast<std::size_t>(body)])];
-    return body;
-}
-
-void World::Implementation::join(int a, int b) {
-    const int ra = root(a), rb = root(b);
-    parent[static_cast<std::size_t>(std::max(ra, rb))] = std::min(ra, rb);
-}
-
 void World::Implementation::gather() {
     if (sharing == Sharing::pairs) return gather_pairs();
     here.clear();
@@ -163,13 +150,8 @@ void World::Implementation::gather() {
         if (!bodies[i].quarantined) here.push_back(static_cast<int>(i));
 }
 
-void World::Implementation::start_union() {
-    parent.resize(bodies.size());
-    std::iota(parent.begin(), parent.end(), 0);
-}
-
 void World::Implementation::find_islands() {
-    start_union();
+    sets.reset(bodies.size());
     auto moves = [this](int id) {
         return id >= 0 && id < kFirstPlane && bodies[static_cast<std::size_t>(id)].moves();
     };
@@ -190,15 +172,15 @@ void World::Implementation::find_islands() {
                            moves(manifolds[m].b) ? manifolds[m].b : -1};
     });
     for (const auto& [a, b] : touching)
-        if (a >= 0 && b >= 0) join(a, b);
+        if (a >= 0 && b >= 0) sets.join(a, b);
     for (const HeldConstraint& c : constraints)
         if (held_here(c) && moves(c.definition.body_a) && moves(c.definition.body_b))
-            join(c.definition.body_a, c.definition.body_b);
+            sets.join(c.definition.body_a, c.definition.body_b);
     // An island's place is that of its first body.
     place.assign(bodies.size(), -1);
     islands_used = 0;
     auto island_of = [&](int id) -> Island& {
-        int& at = place[static_cast<std::size_t>(root(id))];
+        int& at = place[static_cast<std::size_t>(sets.first(id))];
         if (at < 0) {
             at = static_cast<int>(islands_used++);
             if (islands.size() < islands_used) islands.emplace_back();

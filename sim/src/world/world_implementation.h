@@ -5,6 +5,7 @@
 
 #include "sim/world.h"
 #include "world/crew.h"
+#include "world/disjoint_sets.h"
 #include "world/island_solver.h"
 #include "world/world_contacts.h"
 
@@ -33,7 +34,8 @@ struct World::Implementation {
     [[nodiscard]] IslandSolver& solver() const noexcept { return *solvers.front(); }
     void set_threads(std::unique_ptr<Crew> crew);
     std::vector<Island> islands;
-    std::vector<int> parent, place;             // union-find; a root's island
+    DisjointSets sets;                          ///< of bodies that contacts and constraints join
+    std::vector<int> place;                     ///< of a set's first body: the island
     std::vector<std::pair<int, int>> touching;  // of each contact: bodies that move, or -1
     std::size_t islands_used = 0;
     /// What a solve changed besides the bodies' states, kept of every island at its first body.
@@ -126,9 +128,6 @@ struct World::Implementation {
     void quarantine_broken();                               ///< before the step
     void quarantine_results();                              ///< after the step
     [[nodiscard]] bool is_own(const Island& island) const;  ///< has an own body
-    int root(int body);                                     ///< of its set, union-find
-    void join(int a, int b);                                ///< union-find
-    void start_union();                                     ///< union-find: each body alone
     [[nodiscard]] bool any_awake() const;
     void place_driven(MovingBody& body);
     void set_driven(MovingBody& body, const BodyPath::Pose& now, const Eigen::Vector3d& velocity,

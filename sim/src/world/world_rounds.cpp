@@ -180,10 +180,11 @@ void World::Implementation::hold_apart(const WorldContacts::Meeting& meeting) {
     // Joined bodies would be torn apart: what they meet, they meet in the next step.
     for (const int id : {meeting.a, meeting.b})
         if (at(id).moves() &&
-            !islands[static_cast<std::size_t>(place[static_cast<std::size_t>(root(id))])].constraints.empty())
+            !islands[static_cast<std::size_t>(place[static_cast<std::size_t>(sets.first(id))])]
+                 .constraints.empty())
             return;
     auto island_of = [this](int id) -> const Island& {
-        return islands[static_cast<std::size_t>(place[static_cast<std::size_t>(root(id))])];
+        return islands[static_cast<std::size_t>(place[static_cast<std::size_t>(sets.first(id))])];
     };
     for (const int id : {meeting.a, meeting.b}) {
         if (!at(id).moves()) continue;

@@ -12,7 +12,7 @@ using sim::Fidelity;
 
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnyielding = std::numeric_limits<double>::infinity();
 
 /// The total energy over its first value, at most, as a share of `scale` [J].
 double most_gained(sim::World& world, double seconds, double dt, double scale) {
@@ -73,7 +73,7 @@ double drift(const sim::World& world, const sim::WorldDefinition& definition, do
 TEST(Joints, GiveNoEnergyAtAnySizeStepOrStiffness) {
     for (const double size : {0.01, 0.1, 1.0, 10.0})
         for (const double dt : {1.0 / 30, 1.0 / 60, 1.0 / 480})
-            for (const double stiffness : {1e3, 1e6, 1e9, kInfinity})
+            for (const double stiffness : {1e3, 1e6, 1e9, kUnyielding})
                 for (const int count : {1, 2, 8}) {
                     sim::WorldDefinition definition = row_of_balls(count, size, stiffness);
                     definition.settings.dt = dt;
@@ -156,7 +156,7 @@ TEST(Joints, GiveNoEnergyToWhatWhipsAndCollides) {
 }
 
 TEST(Joints, BodiesThatAreJoinedReboundAsOne) {
-    for (const double stiffness : {1e6, 1e9, kInfinity}) {
+    for (const double stiffness : {1e6, 1e9, kUnyielding}) {
         sim::WorldDefinition definition = on_floor();
         definition.planes[0].restitution = 0.5;
         for (const double x : {0.0, 0.3})
@@ -183,7 +183,7 @@ TEST(Joints, ATopKeepsItsEnergyFor10Seconds) {
                 Eigen::AngleAxisd(-0.4, Eigen::Vector3d::UnitZ()).toRotationMatrix();
             definition.bodies[0].angular_velocity =
                 60 * Eigen::Vector3d(std::sin(0.4), std::cos(0.4), 0);  // about its own axis
-            definition.constraints.push_back(joint(0, {0, -size, 0}, -1, {0, 0, 0}, kInfinity));
+            definition.constraints.push_back(joint(0, {0, -size, 0}, -1, {0, 0, 0}, kUnyielding));
             sim::World world(definition);
             const double spin = world.energy().kinetic;
             EXPECT_LT(most_gained(world, 10, dt, spin), 1e-3) << size << " m, " << dt << " s";
@@ -192,7 +192,7 @@ TEST(Joints, ATopKeepsItsEnergyFor10Seconds) {
 
 TEST(Joints, AChainOf20CarriesAThousandfoldWeightAndStretchesUnder1Percent) {
     for (const double size : {0.01, 0.1, 1.0}) {
-        sim::WorldDefinition definition = row_of_balls(20, size, kInfinity);
+        sim::WorldDefinition definition = row_of_balls(20, size, kUnyielding);
         for (int i = 0; i < 20; ++i) {  // hanging
             definition.bodies[static_cast<std::size_t>(i)].world_from_body.translation() =
                 Eigen::Vector3d(0, -(i + 0.5) * size, 0);
