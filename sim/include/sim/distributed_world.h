@@ -132,7 +132,7 @@ public:
     virtual void done(std::uint64_t step, const std::function<RunState()>& state) { (void)step, (void)state; }
     /// `world`: all bodies at the end of step `step` (0: the start), exact in lockstep, else as published.
     virtual void at(std::uint64_t step, const World& world) { (void)step, (void)world; }
-    /// After at(), perhaps more than once: `world` as the next step begins, with the events before it.
+    /// After at(), perhaps more than once: `world` as the next step begins, with the events before it; after the last step as it ended.
     virtual void ready(std::uint64_t step, const World& world) { (void)step, (void)world; }
     virtual void worked(const WorkerStep& step) { (void)step; }             ///< a worker has published a step
     virtual void moved(std::uint64_t step, int bodies, int from, int to) {  ///< from -1: none

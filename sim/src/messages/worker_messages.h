@@ -17,7 +17,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 9
+//   4       2      version, 10
 //   6       2      type
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
@@ -85,7 +85,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kProtocol = 9;  ///< version
+constexpr std::uint16_t kProtocol = 10;  ///< version
 
 struct MessageHeader {
     std::uint32_t worker = kApplication;

@@ -231,7 +231,7 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
 std::vector<std::vector<int>> Coordinator::structures_now() const {
     std::vector<int> there;
     for (int i = 0; i < view_.world().bodies(); ++i)
-        if (view_.clock().moves(i)) there.push_back(i);
+        if (view_.clock().moves_at(i, view_.step())) there.push_back(i);
     return structures(view_.world(), there, columns_.side());
 }
 

@@ -38,7 +38,6 @@ public:
     void take(std::uint32_t worker, std::span<const std::uint8_t> bytes);
     /// Goes on with the view, by what was published. Others may be told of it before, see outgoing().
     void advance();
-    void tell_ready();
     void lose(std::uint32_t worker,
               const std::string& why);  ///< its bodies go to the others; its later messages are dropped
     /// Removes the member whose bodies hold up the others: the one that owns a body of which the oldest state
@@ -120,6 +119,7 @@ private:
                         const Handover* handed = nullptr);
     [[nodiscard]] Ownership ownership(const Group& group) const;
     void catch_up(std::uint32_t worker);
+    void tell_ready();
     void release();
     void end(bool rest);
     void name_mishaps(DistributedResult& result) const;

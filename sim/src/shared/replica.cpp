@@ -25,14 +25,16 @@ SceneClock::SceneClock(const WorldScene& scene) {
     first_later_ = static_cast<int>(scene.world.bodies.size());
 }
 
-void SceneClock::apply(World& world, std::uint64_t step) {
+bool SceneClock::apply(World& world, std::uint64_t step) {
     busy_ = static_cast<double>(step) * world.settings().dt < busy_until_s_;
+    const std::size_t before = next_;
     for (; next_ < scene_.events.size() && scene_.events[next_].step <= step; ++next_) {
         const WorldEvent& event = scene_.events[next_];
         for (const int constraint : event.removed)
             if (world.constraint_holds(constraint)) world.remove_constraint(constraint);
         for (std::size_t i = event.first; i < event.end; ++i) (void)world.add_body(scene_.later[i]);
     }
+    return next_ > before;
 }
 
 int SceneClock::moving(std::uint64_t step) const {
@@ -45,10 +47,11 @@ Replica::Replica(const WorldScene& scene) : world_(scene.world), clock_(scene) {
     for (int i = 0; i < world_.bodies(); ++i) world_.set_own(i, false);
 }
 
-void Replica::begin_at(std::uint64_t step) {
+bool Replica::begin_at(std::uint64_t step) {
     const int before = world_.bodies();
-    clock_.apply(world_, step);
+    const bool any = clock_.apply(world_, step);
     for (int i = before; i < world_.bodies(); ++i) world_.set_own(i, false);
+    return any;
 }
 
 Replica::Known& Replica::at(std::uint64_t step) {

@@ -12,8 +12,8 @@ class SceneClock {
 public:
     explicit SceneClock(const WorldScene& scene);  ///< at the start
 
-    /// Applies the events due before step `step` + 1: removes constraints that still hold, adds bodies.
-    void apply(World& world, std::uint64_t step);
+    /// Applies the events due before step `step` + 1: removes constraints that still hold, adds bodies. Whether there were any.
+    bool apply(World& world, std::uint64_t step);
     /// Events, or forces and prescribed motions that have not ended.
     [[nodiscard]] bool events_left() const noexcept { return next_ < scene_.events.size() || busy_; }
     [[nodiscard]] int bodies() const noexcept { return static_cast<int>(born_.size()); }  ///< with later ones
@@ -61,9 +61,9 @@ public:
     bool advance(bool along);
     /// Whether bodies of the next step are known to be published, whose records have not come and will not.
     [[nodiscard]] bool misses_records() const;
-    /// Applies the events before a step.
-    void begin() { begin_at(step_); }
-    void begin_at(std::uint64_t step);
+    /// Applies the events before a step; whether there were any.
+    bool begin() { return begin_at(step_); }
+    bool begin_at(std::uint64_t step);
     void stepped();  ///< after a step of the world
     /// Goes to the end of a later step by its snapshot.
     void jump(const WorldSnapshot& snapshot);

@@ -50,9 +50,9 @@ void WorldView::jump(const WorldSnapshot& snapshot) {
 }
 
 bool WorldView::advance() {
-    if (pace_ == Pace::bounded) return advance_bounded();
-    if (!replica_.advance(true)) return false;
-    step_ = replica_.step();
+    if (pace_ == Pace::bounded ? !advance_bounded() : !replica_.advance(true)) return false;
+    if (pace_ == Pace::lockstep) step_ = replica_.step();
+    events_now_ = false;
     return true;
 }
 
@@ -98,6 +98,7 @@ bool WorldView::at_rest() const {
     const World& world = replica_.world();
     if (clock().events_left()) return false;
     if (pace_ == Pace::lockstep) return world.all_asleep();
+    if (events_now_) return false;
     for (int i = 0; i < world.bodies(); ++i) {
         const bool rests = world.asleep(i) || still_[static_cast<std::size_t>(i)] != 0;
         if (clock().moves(i) && !rests && !world.record(i).quarantined) return false;

@@ -22,7 +22,7 @@ public:
     /// Advances by one step if all its states are known; returns whether it did.
     [[nodiscard]] bool advance();
     /// Applies the events before the next step, as one world does.
-    void begin() { replica_.begin_at(step_); }
+    void begin() { events_now_ = replica_.begin_at(step_) || events_now_; }
 
     [[nodiscard]] const World& world() const noexcept { return replica_.world(); }  ///< all bodies at step()
     [[nodiscard]] std::uint64_t step() const noexcept { return step_; }             ///< shown
@@ -48,6 +48,7 @@ private:
     std::vector<Published> spare_;                   // for their storage
     WorldRecord record_;                             // that is being kept or shown
     std::vector<std::uint8_t> still_, released_;
+    bool events_now_ = false;  // before the next step: what they woke was still when it was published
 };
 
 }  // namespace sim

@@ -15,8 +15,8 @@ constexpr std::size_t kMostSlabs = 64;
 /// newest velocities).
 ///
 /// Space is cut square to the axis along which the island is longest, into slabs as thin as contacts between their bodies allow,
-/// in steps from one and a quarter to two mean diameters of the bodies, at multiples of that from the world's origin, so that
-/// what rests keeps its slab. Contacts of bodies in one slab are its
+/// in steps from one and a quarter to two mean diameters of the bodies, at multiples of that from the world's origin: what
+/// rests keeps its slab while no contact reaches further. Contacts of bodies in one slab are its
 /// interior, those of bodies in neighbouring slabs an interface. Swept are, each by ids: all interiors, interfaces after
 /// even slabs, those after odd ones, and what reaches further (long bodies among small ones). Blocks without a slab in common
 /// commute; those with one keep this order, so the result is to the bit that of one thread which does block after block,

@@ -158,9 +158,10 @@ void IslandShares::group(std::size_t bodies, std::span<const std::pair<int, int>
     }
 }
 
-bool IslandShares::uses(std::uint32_t body) const {
+bool IslandShares::uses(std::size_t body) const {
     return has(body) || concerns(body, self_) || std::ranges::any_of(borders_, [body](const Border& border) {
-               return border.partner >= 0 && std::ranges::binary_search(border.theirs, body);
+               return border.partner >= 0 &&
+                      std::ranges::binary_search(border.theirs, static_cast<std::uint32_t>(body));
            });
 }
 

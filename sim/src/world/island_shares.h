@@ -12,8 +12,8 @@ namespace sim {
 /// Sorts them and keeps one of each.
 void keep_once(std::vector<std::uint32_t>& bodies);
 
-/// Which of an island's slabs each of several partners sweeps, in which order this one sweeps its blocks, and whom impacts and
-/// springs concern. A function of the island and the shares alone, so the same at all partners.
+/// Which of an island's slabs each of several partners sweeps, and whom impacts and springs concern: a function of the island and
+/// the shares alone, so the same at all. And in which order this one sweeps its blocks.
 class IslandShares {
 public:
     explicit IslandShares(const IslandBlocks& blocks) : blocks_(&blocks) {}
@@ -63,7 +63,7 @@ public:
                           static_cast<std::size_t>(partner)] != 0;
     }
     /// Whether this partner has anything to do with a body.
-    [[nodiscard]] bool uses(std::uint32_t body) const;
+    [[nodiscard]] bool uses(std::size_t body) const;
     /// Calls visit(slab) for a partner's; none of who only listens.
     template <typename Visit>
     void each_slab_of(int partner, Visit visit) const {
@@ -81,6 +81,7 @@ public:
     /// Calls visit(block) for those of which a partner tells; of those that two sweep one does.
     template <typename Visit>
     void each_block_of(int partner, Visit visit) const {
+        if (partner < 0) return;
         const auto p = static_cast<std::size_t>(partner);
         for (std::size_t b = 0; b < blocks_->size(); ++b)
             if ((*blocks_)[b].slab >= cuts_[p] && (*blocks_)[b].slab < cuts_[p + 1]) visit(b);

@@ -211,15 +211,19 @@ void WorldContacts::share(const ContactScene& scene, Partners& with, const Write
     out.bytes().reserve(160 * found.manifolds.size() + 64);
     out.count(found.manifolds.size());
     for (const Manifold& m : found.manifolds) write(out, m);
-    told_impacts_.resize(found.meetings.size());
+    // What wakes bodies is found again; what is late among own meetings is among all.
+    note_first(scene, found.meetings);
+    for (Meeting& m : found.meetings)
+        if (!found.woken.empty() || is_late(scene, m)) m.told = kNoImpact;
+    told_impacts_.clear(), told_impacts_.resize(found.meetings.size());
     find_impacts(scene, found.meetings, told_impacts_);
     out.count(found.meetings.size());
     for (std::size_t i = 0; i < found.meetings.size(); ++i) {
         Meeting& m = found.meetings[i];
-        m.told = static_cast<int>(i);
+        m.told = told_impacts_[i].count > 0 ? static_cast<int>(i) : kNoImpact;
         out.number(m.a), out.number(m.b), out.number(m.time);
-        out.number<std::uint8_t>(told_impacts_[i].count > 0);
-        if (told_impacts_[i].count > 0) write(out, told_impacts_[i]);
+        out.number<std::uint8_t>(m.told != kNoImpact);
+        if (m.told != kNoImpact) write(out, told_impacts_[i]);
     }
     out.count(found.woken.size());
     for (const int id : found.woken) out.number(id);
@@ -253,7 +257,10 @@ void WorldContacts::share(const ContactScene& scene, Partners& with, const Write
         }
     }
     std::swap(all_found_, found.manifolds);
-    std::ranges::sort(found.meetings, {}, [](const Meeting& m) { return std::pair(m.a, m.b); });
+    const auto pair_of = [](const Meeting& m) { return std::pair(m.a, m.b); };
+    std::ranges::sort(found.meetings, {}, pair_of);
+    if (std::ranges::adjacent_find(found.meetings, {}, pair_of) != found.meetings.end())
+        throw DecodeError("a meeting that two found");
 }
 
 void WorldContacts::hear(const ContactScene& scene, ByteReader& in, std::span<const std::uint8_t> bytes) {
@@ -277,11 +284,18 @@ void WorldContacts::hear(const ContactScene& scene, ByteReader& in, std::span<co
         const bool any = scene.bodies[static_cast<std::size_t>(a)].moves() ||
                          scene.bodies[static_cast<std::size_t>(b)].moves();
         if (a >= b || !any) throw DecodeError("a meeting of what does not meet");
-        found.meetings.push_back({a, b, read_finite(in), false, static_cast<int>(told_impacts_.size())});
-        Manifold& impact = told_impacts_.emplace_back();
+        const double time = read_finite(in);
+        if (!(time >= 0 && time <= scene.settings.dt)) throw DecodeError("a meeting that is not in the step");
+        found.meetings.push_back({a, b, time, false, kNoImpact});
         if (!in.flag()) continue;
+        found.meetings.back().told = static_cast<int>(told_impacts_.size());
+        Manifold& impact = told_impacts_.emplace_back();
         read(in, impact, scene.bodies, scene.planes.size());
-        if (impact.a != a || impact.b != b || !(impact.points[0].begins >= 0))
+        unpack(impact);
+        const auto points = std::span(impact.points).first(static_cast<std::size_t>(impact.count));
+        if (impact.a != a || impact.b != b || !std::ranges::all_of(points, [&](const ManifoldPoint& p) {
+                return p.begins == static_cast<float>(time);
+            }))
             throw DecodeError("an impact that is not of its meeting");
     }
     for (std::uint32_t n = in.count(4); n > 0; --n) found.woken.push_back(body());

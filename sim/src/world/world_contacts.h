@@ -50,17 +50,19 @@ public:
     /// What partners tell each other besides.
     using WriteAside = std::function<void(ByteWriter&)>;
     using ReadAside = std::function<void(ByteReader&, int partner)>;
-    /// with: partners, each of whom finds those of its bodies and tells the others.
+    /// with: partners, each of whom finds those of its bodies, with the impacts that meetings lead to, and tells the others.
     void find(const ContactScene& scene, Partners* with = nullptr, const WriteAside& write = {},
               const ReadAside& read = {});
 
     /// After a solve (`solved`: the bodies that went through it; `started`: the states of all that move, before): contacts for what the paths really taken lead to. Adds at most one impact a body and
     /// lists it; the worlds' islands then are solved again. Empty: nothing unforeseen.
+    enum : int { kToBeFound = -1, kNoImpact = -2 };
     struct Meeting {
         int a, b;
         double time;    ///< since the step's start [s]
         bool touching;  ///< had a contact already, and still went on inside
-        int told = -1;  ///< number of its impact that a partner told; -1: none did
+        /// Place among told_impacts_, as the partner found it whose the pair is; or one of these:
+        int told = kToBeFound;
     };
     const std::vector<Meeting>& unforeseen(const ContactScene& scene, const std::vector<std::uint8_t>& solved,
                                            const std::vector<WorldBodyState>& started);
@@ -144,6 +146,8 @@ private:
     [[nodiscard]] Impact foresee(const ContactScene& scene, int i, int j);
     void follow(const ContactScene& scene, int i, const WorldBodyState& from);
     void accept_impacts(const ContactScene& scene);
+    void note_first(const ContactScene& scene, std::span<const Meeting> meetings);
+    [[nodiscard]] bool is_late(const ContactScene& scene, const Meeting& meeting) const;
     void find_impacts(const ContactScene& scene, std::span<const Meeting> meetings,
                       std::span<Manifold> impacts);
     void find_impact(const ContactScene& scene, const Meeting& meeting, std::size_t thread,
@@ -166,8 +170,9 @@ private:
     };
     std::vector<Told> told_;         // manifolds, in runs of one partner each, then by ascending keys
     std::vector<std::size_t> runs_;  // where each ends
-    std::vector<Manifold> all_found_, told_impacts_;
-    std::vector<BodyPath> paths_;  // of each body
+    std::vector<Manifold> all_found_;
+    std::vector<Manifold> told_impacts_;  // of meetings, own ones and those of partners
+    std::vector<BodyPath> paths_;         // of each body
     enum : std::uint8_t { kNotFollowed, kBeingFollowed, kFollowed };
     std::vector<std::uint8_t> followed_;  // paths_ holds the free motion of this step; by any thread
     std::vector<std::uint8_t> watched_;   // has a contact that turns on: see unforeseen; by any thread

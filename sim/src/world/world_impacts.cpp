@@ -84,28 +84,37 @@ Impact WorldContacts::foresee(const ContactScene& scene, int i, int j) {
                           paths_[static_cast<std::size_t>(j)], kTouching * size_of(a, b));
 }
 
-// Keeps of a moving body's meetings those within a substep of its first, which may keep it from the others, and
-// of these those that are contacts.
-void WorldContacts::accept_impacts(const ContactScene& scene) {
-    const double substep = scene.settings.dt / scene.settings.substeps;
-    const auto sorted = static_cast<std::ptrdiff_t>(manifolds_.size());
-    for (const Meeting& m : meetings_)
+// The time of each moving body's first meeting.
+void WorldContacts::note_first(const ContactScene& scene, std::span<const Meeting> meetings) {
+    for (const Meeting& m : meetings)
         for (const int id : {m.a, m.b}) first_[static_cast<std::size_t>(id)] = 1e300;
-    for (const Meeting& m : meetings_)
+    for (const Meeting& m : meetings)
         for (const int id : {m.a, m.b}) {
             double& first = first_[static_cast<std::size_t>(id)];
             if (scene.bodies[static_cast<std::size_t>(id)].moves()) first = std::min(first, m.time);
         }
-    std::erase_if(meetings_, [&](const Meeting& m) {
-        return m.time > substep + std::min(first_[static_cast<std::size_t>(m.a)],
-                                           first_[static_cast<std::size_t>(m.b)]);
-    });
+}
+
+// By more than a substep after the first of those that were noted.
+bool WorldContacts::is_late(const ContactScene& scene, const Meeting& m) const {
+    return m.time >
+           scene.settings.dt / scene.settings.substeps +
+               std::min(first_[static_cast<std::size_t>(m.a)], first_[static_cast<std::size_t>(m.b)]);
+}
+
+// Keeps of a moving body's meetings those within a substep of its first, which may keep it from the others, and
+// of these those that are contacts.
+void WorldContacts::accept_impacts(const ContactScene& scene) {
+    const auto sorted = static_cast<std::ptrdiff_t>(manifolds_.size());
+    note_first(scene, meetings_);
+    std::erase_if(meetings_, [&](const Meeting& m) { return m.told == kNoImpact || is_late(scene, m); });
     added_.resize(meetings_.size());
     find_impacts(scene, meetings_, added_);
     std::size_t found = 0;
     for (std::size_t i = 0; i < meetings_.size(); ++i) {
         const Meeting& m = meetings_[i];
-        const Manifold& impact = m.told < 0 ? added_[i] : told_impacts_[static_cast<std::size_t>(m.told)];
+        const Manifold& impact =
+            m.told == kToBeFound ? added_[i] : told_impacts_[static_cast<std::size_t>(m.told)];
         if (impact.count == 0) continue;
         watch_turning(m.a, m.b,
                       kSlow * size_of(scene.bodies[static_cast<std::size_t>(m.a)],
@@ -125,13 +134,13 @@ void WorldContacts::accept_impacts(const ContactScene& scene) {
     }
 }
 
-// Of those meetings whose impacts nobody told.
+// Of those that are to be found.
 void WorldContacts::find_impacts(const ContactScene& scene, std::span<const Meeting> meetings,
                                  std::span<Manifold> impacts) {
-    at_.resize(static_cast<std::size_t>(scene.crew.size()));
+    at_.resize(std::max(at_.size(), static_cast<std::size_t>(scene.crew.size())));
     scene.crew.each(meetings.size(), 4, [&](int thread, std::size_t first, std::size_t last) {
         for (std::size_t i = first; i < last; ++i)
-            if (meetings[i].told < 0)
+            if (meetings[i].told == kToBeFound)
                 find_impact(scene, meetings[i], static_cast<std::size_t>(thread), impacts[i]);
     });
 }

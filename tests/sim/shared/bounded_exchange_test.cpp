@@ -332,6 +332,33 @@ TEST(BoundedExchange, HeapsOfBodiesThatReboundComeToRest) {
     }
 }
 
+// What an event wakes was still when it was published.
+TEST(BoundedExchange, UntilRestARunGoesOnWhenItsLastEventReleasesASleeper) {
+    WorldScene scene;
+    scene.world = world_test::on_floor();
+    scene.world.settings.sleep_speed = 0.1;
+    scene.world.bodies = {world_test::ball({0, 3, 0}), world_test::ball({3, 0.5, 0})};
+    PointConstraint rope;
+    rope.name = "rope", rope.body_a = 0, rope.body_b = -1, rope.point_b = {0, 3, 0};
+    scene.world.constraints = {rope};
+    scene.events = {{200, {0}, 0, 0, {}}};
+    DistributedSettings settings = world_test::lockstep(2000);
+    settings.pace = Pace::bounded, settings.until_rest = true;
+    struct Asleep : world_test::Record {
+        void at(std::uint64_t step, const World& world) override {
+            if (step == 200) asleep_at_event = world.all_asleep();
+            height = world.state(0).position.y();
+        }
+        bool asleep_at_event = false;
+        double height = 0;
+    } record;
+    const DistributedResult result = simulate_processors(scene, settings, world_test::processors(2), record);
+    EXPECT_TRUE(record.asleep_at_event) << "else this shows nothing";
+    EXPECT_TRUE(result.rest_reached);
+    EXPECT_GT(result.steps, 230u) << "it falls for more than half a second";
+    EXPECT_LT(record.height, 0.6);
+}
+
 // Who owns the stack sees that it touches more than the ball, and finds no rebound; who owns the ball does not, and finds one.
 TEST(BoundedExchange, ABallThatFallsOnAnothersStackGainsNoEnergy) {
     for (const double e : {0.5, 0.8, 1.0})

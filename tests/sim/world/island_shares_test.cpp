@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <random>
@@ -21,14 +22,14 @@ struct Strewn {
     IslandBlocks blocks;
     Crew crew;
 
-    explicit Strewn(unsigned seed) {
+    /// contacts: how far at most they reach along x, 0: by the seed, within two diameters.
+    explicit Strewn(unsigned seed, double contacts = 0) {
         std::mt19937 random(seed);
         auto between = [&](double low, double high) {
             return std::uniform_real_distribution<double>(low, high)(random);
         };
         const int count = std::uniform_int_distribution<int>(100, 400)(random);
-        // Contacts within two diameters: slabs are so thick that none reaches beyond the next one.
-        const double length = between(1, 80), reach = between(0.5, 1.99);
+        const double length = between(1, 80), reach = contacts > 0 ? contacts : between(0.5, 1.99);
         for (int i = 0; i < count; ++i) {
             bodies.push_back({{between(0, length), between(0, 1), 0}, 1});
             local.push_back(i);
@@ -56,6 +57,25 @@ std::vector<double> random_shares(unsigned seed) {
         share = std::max(0., std::uniform_real_distribution<double>(-0.5, 1)(random));
     if (seed % 10 == 0) std::ranges::fill(shares, 0);
     return shares;
+}
+
+TEST(IslandBlocks, SlabsAreAsThinAsContactsAllow) {
+    for (unsigned seed = 0; seed < 20; ++seed)
+        for (const auto& [reach, thickness] :
+             {std::pair(0.7, 1.25), {1.24, 1.25}, {1.45, 1.5}, {1.7, 1.75}, {1.99, 2.}}) {
+            const Strewn island(seed, reach);
+            EXPECT_FALSE(island.blocks.reaches_further());
+            for (std::size_t i = 0; i < island.bodies.size(); ++i)
+                for (std::size_t j = 0; j < i; ++j) {
+                    const auto slab = [&](std::size_t body) {
+                        return std::floor(island.bodies[body].place.x() / thickness);
+                    };
+                    // At multiples from the origin. (Two hundred bodies and more on 80 m do have contacts of nearly that length.)
+                    ASSERT_EQ(slab(i) - slab(j),
+                              double(island.blocks.slab_of(i)) - double(island.blocks.slab_of(j)))
+                        << reach << " " << seed;
+                }
+        }
 }
 
 TEST(IslandShares, EveryBodyAndBlockHasOneOwnerAndThoseOfItsSlabsSweepIt) {

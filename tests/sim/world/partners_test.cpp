@@ -470,6 +470,78 @@ TEST(Partners, ContactsOfWhatDoesNotMoveAreRefused) {
     EXPECT_EQ(worlds[0].state_hash(), worlds[1].state_hash());
 }
 
+namespace {
+/// Two pairs of balls that are about to collide, one pair a partner. Damage: to what the second hears of the first one's pair.
+struct Collisions {
+    std::vector<sim::World> worlds;
+    int refused = 0;
+    std::size_t told = 0;  // bytes of the message
+
+    explicit Collisions(const Damage& damage) {
+        sim::WorldDefinition definition = weightless();
+        for (const double x : {0., 20.})
+            for (const double side : {-1., 1.}) {
+                definition.bodies.push_back(ball({x + 0.6 * side, 0, 0}, sim::Fidelity::rigid, 0.5));
+                definition.bodies.back().velocity = {-20 * side, 0, 0};
+            }
+        for (int p = 0; p < 2; ++p) worlds.emplace_back(definition);
+        Mail mail(2);
+        std::vector<std::thread> threads;
+        for (int p = 0; p < 2; ++p)
+            threads.emplace_back([&, p] {
+                bool first = true;
+                ThreadPartner partner(mail, p, {0, 0, 1, 1}, -1, [&, p](sim::Partners::Bytes& bytes) {
+                    if (p == 1 && std::exchange(first, false)) told = bytes.size(), damage(bytes);
+                });
+                try {
+                    worlds[std::size_t(p)].step_together(partner);
+                } catch (const std::runtime_error&) {
+                    mail.give_up();
+                    refused += p == 1;
+                    step_alone(worlds[std::size_t(p)]);
+                }
+            });
+        for (std::thread& thread : threads) thread.join();
+    }
+    [[nodiscard]] bool equal() const { return worlds[0].state_hash() == worlds[1].state_hash(); }
+};
+}  // namespace
+
+// What is heard begins with no contact, 4 bytes, and one meeting, 4: its bodies, 4 each, its time, 8, whether its impact
+// follows, 1, and that as a contact: bodies, counts and numbers, 22, then its point, 100: after 12 when it begins, 4.
+TEST(Partners, ImpactsAreTakenFromWhoFoundThemUnlessTheyCannotBe) {
+    constexpr std::size_t kA = 8, kB = 12, kTime = 16, kFlag = 24, kImpact = 25, kBegins = 59,
+                          kEnd = 147;
+    Collisions whole([](sim::Partners::Bytes&) {});
+    ASSERT_GE(whole.told, kEnd);
+    EXPECT_TRUE(whole.equal());
+    EXPECT_EQ(whole.refused, 0);
+    EXPECT_LT(whole.worlds[1].state(0).velocity.norm(), 19) << "else nothing meets";
+    const auto is_refused = [](const Damage& damage) {
+        const Collisions run(damage);
+        EXPECT_TRUE(run.equal());  // done alone
+        return run.refused == 1;
+    };
+    EXPECT_TRUE(is_refused([](sim::Partners::Bytes& bytes) {
+        bytes[kFlag] = 0;
+        bytes.erase(bytes.begin() + kImpact, bytes.begin() + kEnd);
+    })) << "who is told of no impact believes it, and other islands come of that";
+    EXPECT_TRUE(is_refused([](sim::Partners::Bytes& bytes) { bytes[kTime + 7] |= 0x80; }))
+        << "before the step";
+    EXPECT_TRUE(is_refused([](sim::Partners::Bytes& bytes) { bytes[kTime + 7] = 0x40; })) << "after it";
+    EXPECT_TRUE(is_refused([](sim::Partners::Bytes& bytes) { bytes[kFlag] = 2; })) << "neither yes nor no";
+    EXPECT_TRUE(is_refused([](sim::Partners::Bytes& bytes) { bytes[kImpact + 4] = 2; })) << "of another pair";
+    EXPECT_TRUE(is_refused([](sim::Partners::Bytes& bytes) { bytes[kBegins + 2] ^= 0x01; }))
+        << "at another time";
+    EXPECT_TRUE(is_refused([](sim::Partners::Bytes& bytes) {
+        const float never = std::numeric_limits<float>::infinity();
+        std::memcpy(bytes.data() + kBegins, &never, sizeof never);
+    })) << "never";
+    EXPECT_TRUE(is_refused([](sim::Partners::Bytes& bytes) {
+        bytes[kA] = bytes[kImpact] = 2, bytes[kB] = bytes[kImpact + 4] = 3;
+    })) << "of a pair that the hearer found, too";
+}
+
 // Numbers may be lies; places, counts and what is not finite are found, and then the world is what it was.
 TEST(Partners, DamagedPartsEndTheStepAndCrashNobody) {
     std::mt19937 random(5);
