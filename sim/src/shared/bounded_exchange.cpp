@@ -281,6 +281,8 @@ void BoundedExchange::take_over(const Ownership& ownership) {
             if (!compared.empty()) contacts_.took(body, compared);
         } else {
             set_own(body, true);
+            if (owned_.empty())
+                come_to(step_);  // its event may be due, and nothing else takes this worker on
         }
     }
     list();

@@ -30,7 +30,7 @@ void WorldView::take(std::uint64_t step, const std::vector<WorldRecord>& records
 
 void WorldView::keep(std::uint64_t step, const WorldRecord& record, bool still) {
     auto& all = published_[static_cast<std::size_t>(record.body)];
-    if (step <= step_) return;
+    if (step <= step_ || !clock().there_at(record.body, step)) return;
     const auto at = std::ranges::lower_bound(all, step, {}, &Published::step);
     if (at != all.end() && at->step == step) return;
     if (spare_.empty()) spare_.emplace_back();

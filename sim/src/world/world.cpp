@@ -56,6 +56,7 @@ int World::Implementation::add(const WorldBody& definition) {
     definitions.push_back(definition);
     bodies.push_back(std::move(body));
     definition.motion.empty() ? pose(bodies.back()) : place_driven(bodies.back());
+    list_owned();
     return static_cast<int>(bodies.size()) - 1;
 }
 
