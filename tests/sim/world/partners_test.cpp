@@ -510,8 +510,7 @@ struct Collisions {
 // What is heard begins with no contact, 4 bytes, and one meeting, 4: its bodies, 4 each, its time, 8, whether its impact
 // follows, 1, and that as a contact: bodies, counts and numbers, 22, then its point, 100: after 12 when it begins, 4.
 TEST(Partners, ImpactsAreTakenFromWhoFoundThemUnlessTheyCannotBe) {
-    constexpr std::size_t kA = 8, kB = 12, kTime = 16, kFlag = 24, kImpact = 25, kBegins = 59,
-                          kEnd = 147;
+    constexpr std::size_t kA = 8, kB = 12, kTime = 16, kFlag = 24, kImpact = 25, kBegins = 59, kEnd = 147;
     Collisions whole([](sim::Partners::Bytes&) {});
     ASSERT_GE(whole.told, kEnd);
     EXPECT_TRUE(whole.equal());
