@@ -440,6 +440,29 @@ TEST(Partners, SleepersThatARewoundWorldWakesMeetThoseOfOthers) {
     EXPECT_GE(met, 3);
 }
 
+namespace {
+/// A step of two worlds, of which one hears what is damaged; how often that one refuses it. Both then do the step alone.
+int step_with_damage(std::vector<sim::World>& worlds, const std::vector<int>& whose, int hearer,
+                     const Damage& damage) {
+    Mail mail(2);
+    int refused = 0;
+    std::vector<std::thread> threads;
+    for (int p = 0; p < 2; ++p)
+        threads.emplace_back([&, p] {
+            ThreadPartner partner(mail, p, whose, -1, p == hearer ? damage : Damage{});
+            try {
+                worlds[std::size_t(p)].step_together(partner);
+            } catch (const std::runtime_error&) {
+                mail.give_up();
+                refused += p == hearer;
+                step_alone(worlds[std::size_t(p)]);
+            }
+        });
+    for (std::thread& thread : threads) thread.join();
+    return refused;
+}
+}  // namespace
+
 // Places of bodies that are there, but do not move.
 TEST(Partners, ContactsOfWhatDoesNotMoveAreRefused) {
     sim::WorldDefinition definition = on_floor();
@@ -448,24 +471,10 @@ TEST(Partners, ContactsOfWhatDoesNotMoveAreRefused) {
     definition.bodies.push_back(box({5, 0.4, 0}, {0.4, 0.4, 0.4}));
     std::vector<sim::World> worlds;
     for (int p = 0; p < 2; ++p) worlds.emplace_back(definition);
-    Mail mail(2);
-    int refused = 0;
-    std::vector<std::thread> threads;
-    for (int p = 0; p < 2; ++p)
-        threads.emplace_back([&, p] {
-            // The first contact's first body, after their number: body 2 on the plane becomes body 0.
-            ThreadPartner partner(mail, p, {0, 0, 1}, -1, [&](sim::Partners::Bytes& bytes) {
-                if (p == 0 && bytes.size() > 8) bytes[4] = 0;
-            });
-            try {
-                worlds[std::size_t(p)].step_together(partner);
-            } catch (const std::runtime_error&) {
-                mail.give_up();
-                refused += p == 0;
-                step_alone(worlds[std::size_t(p)]);
-            }
-        });
-    for (std::thread& thread : threads) thread.join();
+    // The first contact's first body, after their number: body 2 on the plane becomes body 0.
+    const int refused = step_with_damage(worlds, {0, 0, 1}, 0, [](sim::Partners::Bytes& bytes) {
+        if (bytes.size() > 8) bytes[4] = 0;
+    });
     EXPECT_EQ(refused, 1);
     EXPECT_EQ(worlds[0].state_hash(), worlds[1].state_hash());
 }
@@ -485,23 +494,10 @@ struct Collisions {
                 definition.bodies.back().velocity = {-20 * side, 0, 0};
             }
         for (int p = 0; p < 2; ++p) worlds.emplace_back(definition);
-        Mail mail(2);
-        std::vector<std::thread> threads;
-        for (int p = 0; p < 2; ++p)
-            threads.emplace_back([&, p] {
-                bool first = true;
-                ThreadPartner partner(mail, p, {0, 0, 1, 1}, -1, [&, p](sim::Partners::Bytes& bytes) {
-                    if (p == 1 && std::exchange(first, false)) told = bytes.size(), damage(bytes);
-                });
-                try {
-                    worlds[std::size_t(p)].step_together(partner);
-                } catch (const std::runtime_error&) {
-                    mail.give_up();
-                    refused += p == 1;
-                    step_alone(worlds[std::size_t(p)]);
-                }
-            });
-        for (std::thread& thread : threads) thread.join();
+        bool first = true;
+        refused = step_with_damage(worlds, {0, 0, 1, 1}, 1, [&](sim::Partners::Bytes& bytes) {
+            if (std::exchange(first, false)) told = bytes.size(), damage(bytes);
+        });
     }
     [[nodiscard]] bool equal() const { return worlds[0].state_hash() == worlds[1].state_hash(); }
 };
