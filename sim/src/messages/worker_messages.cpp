@@ -132,6 +132,7 @@ void read_bytes(ByteReader& in, std::vector<std::uint8_t>& bytes) {
 }
 void write_body(ByteWriter& out, const Members& m) {
     write_numbers(out, m.workers);
+    out.number<std::uint8_t>(m.owners_follow);
 }
 void write_body(ByteWriter& out, const Ownership& m) {
     out.number(m.owner);
@@ -172,6 +173,7 @@ void write_body(ByteWriter& out, const Offer& m) {
     if (m.bodies.size() != m.cost_s.size()) throw std::invalid_argument("an offer without all costs");
     out.number(m.to);
     out.number(m.number);
+    out.number<std::uint8_t>(m.gathers);
     out.count(m.bodies.size());
     for (std::size_t i = 0; i < m.bodies.size(); ++i) {
         out.number(m.bodies[i]);
@@ -214,6 +216,10 @@ void write_body(ByteWriter& out, const PeersMessage& m) {
         out.append(peer.hears);
     }
 }
+void write_body(ByteWriter& out, const Gather& m) {
+    out.number(m.to);
+    write_numbers(out, m.bodies);
+}
 void write_body(ByteWriter& out, const LinkBeat& m) {
     out.number<std::uint8_t>(m.hears);
 }
@@ -245,6 +251,7 @@ void read_body(ByteReader& in, Refusal& m) {
 void read_body(ByteReader&, EndOfRun&) {}
 void read_body(ByteReader& in, Members& m) {
     read_numbers(in, m.workers);
+    m.owners_follow = in.flag();
 }
 void read_body(ByteReader& in, Ownership& m) {
     m.owner = in.number<std::uint32_t>();
@@ -290,6 +297,10 @@ void read_body(ByteReader& in, PeersMessage& m) {
         peer.says = in.bytes<16>(), peer.hears = in.bytes<16>();
     }
 }
+void read_body(ByteReader& in, Gather& m) {
+    m.to = in.number<std::uint32_t>();
+    read_numbers(in, m.bodies);
+}
 void read_body(ByteReader& in, LinkBeat& m) {
     m.hears = in.flag();
 }
@@ -312,6 +323,7 @@ void read_body(ByteReader&, PackedUpdates&) {
 void read_body(ByteReader& in, Offer& m) {
     m.to = in.number<std::uint32_t>();
     m.number = in.number<std::uint32_t>();
+    m.gathers = in.flag();
     m.bodies.resize(in.count(8));
     m.cost_s.resize(m.bodies.size());
     for (std::size_t i = 0; i < m.bodies.size(); ++i) {

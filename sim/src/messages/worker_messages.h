@@ -17,7 +17,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 10
+//   4       2      version, 11
 //   6       2      type
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
@@ -37,12 +37,12 @@ namespace sim {
 //    5 scene      app     u32 worker, scene, settings
 //    6 refusal    app     text
 //    7 end        app     nothing
-//    8 members    app     list of u32
+//    8 members    app     list of u32, flag owners follow
 //    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of applied
 //   10 snapshot   app     u64 step, list of record, list of contact, list of spring, v3 outside impulse
 //   11 state      worker  report, list of record, list of contact, list of spring
 //   12 update     worker  report, lists of update, crossed, u32 (constraints that broke)
-//   13 offer      worker  u32 to, u32 number, list of {u32 body, f32 seconds}
+//   13 offer      worker  u32 to, u32 number, flag gathers, list of {u32 body, f32 seconds}
 //   14 answer     worker  u32 to, u32 number, flag accepted
 //   15 handover   worker  u32 to, u32 number, list of record, list of applied
 //   16 part       worker  flag gave up, list of u8
@@ -52,6 +52,7 @@ namespace sim {
 //   20 link       worker  flag hears
 //   21 reach      worker  texts endpoint, key
 //   22 to 24 of struck bodies, see struck_messages.h; of the others a play and its workers use 1, 2, 4, 6 and 7
+//   25 gather    app     u32 to, list of u32 (bodies)
 //
 //   report      68 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
 //               cross contacts, own; u64 linked; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
@@ -85,7 +86,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kProtocol = 10;  ///< version
+constexpr std::uint16_t kProtocol = 11;  ///< version
 
 struct MessageHeader {
     std::uint32_t worker = kApplication;
@@ -142,6 +143,7 @@ struct EndOfRun {};
 // Application to all workers.
 struct Members {
     std::vector<std::uint32_t> workers;
+    bool owners_follow = false;  ///< of bodies that nobody owns now; then the same without this
 };
 /// Registered ownership: `owner` steps these bodies from the end of step `step` on. The header's epoch is the
 /// new one.
@@ -219,6 +221,7 @@ struct Offer {
     std::uint32_t to = 0, number = 0;  ///< number: of the seller's offers
     std::vector<std::uint32_t> bodies;
     std::vector<float> cost_s;  ///< of each, at the seller
+    bool gathers = false;       ///< as the application asked, see Gather: whatever it costs
 };
 struct OfferAnswer {
     std::uint32_t to = 0, number = 0;
@@ -231,6 +234,13 @@ struct Handover {
     std::vector<WorldRecord> bodies;
     std::vector<std::uint32_t> sources;  ///< see Ownership
     std::vector<std::uint64_t> applied;
+};
+
+/// From the application, in bounded pace: these bodies belong to a structure (shared/structures.h) of which another worker has
+/// most; their owner offers them to it.
+struct Gather {
+    std::uint32_t to = 0;
+    std::vector<std::uint32_t> bodies;
 };
 
 /// Lockstep, within the step that begins at the header's: what a worker tells others with whom it does the step together
@@ -269,7 +279,7 @@ using WorkerMessage =
     std::variant<JoinRequest, Beat, Drained, WorkerFailure, SceneMessage, Refusal, EndOfRun, Members,
                  Ownership, SnapshotMessage, StateMessage, UpdateMessage, Offer, OfferAnswer, Handover,
                  PartMessage, PublishedMessage, RelayMessage, PeersMessage, LinkBeat, ReachMessage,
-                 StruckAssign, StruckStep, StruckAnswer, PackedUpdates>;
+                 StruckAssign, StruckStep, StruckAnswer, Gather, PackedUpdates>;
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const MessageHeader& header, const WorkerMessage& message);
 struct DecodedMessage {

@@ -25,7 +25,7 @@ public:
     using ReplicaProtocol::take;
     void take(const MessageHeader& header, PackedUpdates&& message) override;
     void take(SnapshotMessage&& message) override;
-    void members(const std::vector<std::uint32_t>& workers, std::uint32_t epoch) override;
+    void members(const Members& message, std::uint32_t epoch) override;
     void own(const Ownership& ownership) override;
     // Who came to the last step by taking bodies over has to say so.
     [[nodiscard]] bool owes() const override { return at_end() && own_bodies() > 0 && published_ < step_; }
@@ -84,6 +84,7 @@ private:
     std::vector<std::uint8_t> own_;
     std::vector<int> owned_, others_;  // there, ascending; moving ones of others
     std::vector<std::uint32_t> members_;
+    bool owners_follow_ = true;  // not all owners are known
     SharedContacts contacts_;
     std::map<std::uint32_t, std::uint64_t> known_;  // workers: step that they have done
     std::map<std::uint32_t, std::uint64_t> told_;   // workers: step of their last message
@@ -208,10 +209,11 @@ void BoundedExchange::take(SnapshotMessage&& message) {
     come_to(message.snapshot.step);
 }
 
-void BoundedExchange::members(const std::vector<std::uint32_t>& workers, std::uint32_t) {
+void BoundedExchange::members(const Members& message, std::uint32_t) {
     for (const std::uint32_t was : members_)
-        if (std::find(workers.begin(), workers.end(), was) == workers.end()) known_[was] = kForever;
-    members_ = workers;
+        if (std::ranges::find(message.workers, was) == message.workers.end()) known_[was] = kForever;
+    members_ = message.workers;
+    owners_follow_ = message.owners_follow;
 }
 
 void BoundedExchange::own(const Ownership& ownership) {
@@ -293,6 +295,7 @@ bool BoundedExchange::owns_any(std::uint32_t worker) const {
 }
 
 std::uint64_t BoundedExchange::slowest() const {
+    if (owners_follow_) return 0;  // whoever that may be
     std::uint64_t slowest = kForever;
     for (const std::uint32_t worker : members_) {
         if (worker == self_ || !owns_any(worker)) continue;
@@ -307,7 +310,7 @@ int BoundedExchange::lead() const {
 }
 
 bool BoundedExchange::ready() const {
-    if (owned_.empty()) return false;
+    if (owned_.empty() || owners_follow_) return false;
     if (at_end()) return !settled_ && slowest() >= settings_.steps;
     if (lead() > settings_.bound) return false;
     return std::all_of(touched_.begin(), touched_.end(), [&](const auto& t) {
@@ -432,8 +435,13 @@ Holdings BoundedExchange::holdings() {
         const bool told = !world_.own(body) && foreign_.known(body);
         return told ? foreign_.last_position(body) : world_.state(body).position;
     };
+    std::vector<OthersBody> others;
+    for (const int body : others_)
+        if (is_flat(world_.definition(body)) && foreign_.known(body))
+            others.push_back({body, foreign_.at(body, step_).state});
+    const double outlook = structure_outlook(settings_.bound, world_.settings().dt);
     return columns_.holdings(self_, world_, owner_, costs_, place,
-                             structures(world_, owned_, columns_.side()));
+                             structures(world_, owned_, columns_.side(), outlook, others));
 }
 
 Handover BoundedExchange::give(const std::vector<std::uint32_t>& bodies) {

@@ -9,6 +9,8 @@
 namespace sim {
 namespace {
 
+constexpr std::uint64_t kGatherEvery = 2, kGatherPatience = 16;  // steps
+
 // All bodies before their first step, also those to come.
 World with_later(const WorldScene& scene) {
     World world(scene.world);
@@ -160,7 +162,7 @@ void Coordinator::start() {
     }
     observer_->at(view_.step(), view_.world());
     tell_ready();
-    send(members_, Members{members_});
+    send(members_, Members{members_, true});
     if (members_.empty()) {  // all lost before: the next to join gets everything
         std::vector<int> all;
         for (const std::vector<int>& lot : lots_) all.insert(all.end(), lot.begin(), lot.end());
@@ -179,6 +181,7 @@ void Coordinator::start() {
         for (std::size_t i = 0; i < members_.size(); ++i)
             register_owner(bodies[i], members_[i], kApplication);
     }
+    send(members_, Members{members_});
     advance();
 }
 
@@ -228,18 +231,24 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
     }
 }
 
-std::vector<std::vector<int>> Coordinator::structures_now() const {
+std::vector<int> Coordinator::there_now() const {
     std::vector<int> there;
     for (int i = 0; i < view_.world().bodies(); ++i)
         if (view_.clock().moves_at(i, view_.step())) there.push_back(i);
-    return structures(view_.world(), there, columns_.side());
+    return there;
+}
+
+std::vector<std::vector<int>> Coordinator::structures_now(double within_s) const {
+    return structures(view_.world(), there_now(), columns_.side(), within_s);
 }
 
 // In bounded pace what a structure joins is one.
 std::vector<std::vector<int>> Coordinator::whole_lots() const {
     if (settings_.pace == Pace::lockstep) return lots_;
     std::vector<int> first(lots_.size());
-    if (!result_.one_owner) first = joined_by(structures_now(), lots_);
+    if (!result_.one_owner)
+        first =
+            joined_by(structures_now(structure_outlook(settings_.bound, scene_.world.settings.dt)), lots_);
     std::vector<std::vector<int>> lots(lots_.size());
     for (std::size_t i = 0; i < lots_.size(); ++i) {
         std::vector<int>& lot = lots[static_cast<std::size_t>(first[i])];
@@ -296,8 +305,9 @@ void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from, 
 void Coordinator::remove(std::uint32_t worker) {
     std::erase(members_, worker);
     gone_.push_back(worker);
-    if (started_) send(members_, Members{members_});
+    if (started_) send(members_, Members{members_, true});
     share_out(owned_by(worker), worker);
+    if (started_) send(members_, Members{members_});
     advance();
 }
 
@@ -329,7 +339,10 @@ void Coordinator::advance() {
         if (settings_.pace == Pace::bounded) release();
         if (!view_.advance()) return;
         const World& world = view_.world();
-        if (settings_.pace == Pace::lockstep) observer_->done(view_.step(), [this] { return state(); });
+        if (settings_.pace == Pace::lockstep)
+            observer_->done(view_.step(), [this] { return state(); });
+        else
+            gather();
         observer_->at(view_.step(), world);
         tell_ready();
         std::erase_if(kept_, [this](const auto& kept) { return kept.first + kept_steps_ <= view_.step(); });
@@ -339,6 +352,43 @@ void Coordinator::advance() {
 void Coordinator::tell_ready() {
     if (view_.step() < settings_.steps) view_.begin();
     observer_->ready(view_.step(), view_.world());
+}
+
+// Structures that form while several own them: whoever has most of one is to have all of it. What is not flat lies as well
+// where several hold it.
+void Coordinator::gather() {
+    if (result_.one_owner || members_.size() < 2 || view_.step() % kGatherEvery != 0) return;
+    std::vector<int> flat = there_now();
+    std::erase_if(flat, [this](int body) { return !is_flat(view_.world().definition(body)); });
+    const std::vector<std::vector<int>> found = structures(
+        view_.world(), flat, columns_.side(), structure_outlook(settings_.bound, scene_.world.settings.dt));
+    if (found.empty()) return;
+    const std::vector<int> first = joined_by(found, lots_);
+    std::map<int, std::map<std::uint32_t, std::vector<std::uint32_t>>> owners;  // bodies of each
+    for (std::size_t i = 0; i < lots_.size(); ++i)
+        for (const int body : lots_[i])
+            owners[first[i]][owner(body)].push_back(static_cast<std::uint32_t>(body));
+    for (auto& [lot, shares] : owners) {
+        if (shares.size() < 2) continue;
+        const auto most =
+            std::ranges::max_element(shares, {}, [](const auto& share) { return share.second.size(); });
+        for (auto& [from, bodies] : shares)
+            if (from != most->first) ask_for(from, std::move(bodies), most->first);
+    }
+}
+
+// Unless it was asked not long ago: a sale takes some steps.
+void Coordinator::ask_for(std::uint32_t from, std::vector<std::uint32_t>&& bodies, std::uint32_t to) {
+    const std::uint64_t patience = kGatherPatience + 2 * static_cast<std::uint64_t>(settings_.bound);
+    std::erase_if(bodies, [&](std::uint32_t body) {
+        std::uint64_t& asked = bodies_[body].asked_at;
+        if (!view_.clock().moves_at(static_cast<int>(body), view_.step()) ||
+            (asked > 0 && view_.step() < asked + patience))
+            return true;
+        asked = view_.step();
+        return false;
+    });
+    if (!bodies.empty() && is_member(from) && is_member(to)) send({from}, Gather{to, std::move(bodies)});
 }
 
 // A body that came to a worker after its last step is published no more.

@@ -61,6 +61,8 @@ private:
         std::uint64_t step = 0;   ///< of the record
         WorldRecord record;       ///< last published
         std::uint32_t epoch = 0;  ///< of its owner
+        std::uint64_t asked_at =
+            0;  ///< step of the view in which its owner was asked to give it away, see Gather
     };
     struct Sender {
         std::uint64_t step = 0, bytes = 0;  ///< last published; sent since
@@ -111,7 +113,8 @@ private:
     void share_out(const std::vector<int>& bodies, std::uint32_t from, const Handover* handed = nullptr);
     [[nodiscard]] std::vector<int> owned_by(std::uint32_t worker) const;
     [[nodiscard]] std::vector<std::vector<int>> whole_lots() const;
-    [[nodiscard]] std::vector<std::vector<int>> structures_now() const;
+    [[nodiscard]] std::vector<int> there_now() const;
+    [[nodiscard]] std::vector<std::vector<int>> structures_now(double within_s = 0) const;
     [[nodiscard]] std::vector<Eigen::Vector3d> places(const std::vector<std::vector<int>>& lots) const;
     [[nodiscard]] std::vector<Group> groups(const std::vector<int>& bodies) const;
     /// sold: by this handover.
@@ -121,6 +124,8 @@ private:
     void catch_up(std::uint32_t worker);
     void tell_ready();
     void release();
+    void gather();
+    void ask_for(std::uint32_t from, std::vector<std::uint32_t>&& bodies, std::uint32_t to);
     void end(bool rest);
     void name_mishaps(DistributedResult& result) const;
     void go_to(const RunState& from);

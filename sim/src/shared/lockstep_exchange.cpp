@@ -34,7 +34,7 @@ public:
     void take(const MessageHeader& header, PublishedMessage&& message) override;
     void take(const MessageHeader& header, PartMessage&& message) override;
     void take(SnapshotMessage&& message) override;
-    void members(const std::vector<std::uint32_t>& workers, std::uint32_t epoch) override;
+    void members(const Members& message, std::uint32_t epoch) override;
     void members_within(const std::vector<std::uint32_t>& workers) override;
     void own(const Ownership& ownership) override;
     [[nodiscard]] bool owes() const override { return owes_; }
@@ -216,7 +216,8 @@ void LockstepExchange::take(const MessageHeader& header, PartMessage&& message) 
     }
 }
 
-void LockstepExchange::members(const std::vector<std::uint32_t>& workers, std::uint32_t epoch) {
+void LockstepExchange::members(const Members& message, std::uint32_t epoch) {
+    const std::vector<std::uint32_t>& workers = message.workers;
     if (!member_since_) member_since_ = epoch;
     others_ = workers;
     std::erase(others_, self_);

@@ -331,7 +331,7 @@ std::optional<Offer> Market::make_offer(Holdings holdings) {
     double sum = 0;
     for (const Holdings::Lot& lot : holdings.lots()) sum += std::max(0.0, lot.cost);
     for (Holdings::Lot& lot : holdings.lots()) lot.cost *= sum > 0 ? smoothed() / sum : 1;
-    offer_ = {self_, next_number_, {}, {}};
+    offer_ = {self_, next_number_, {}, {}, false};
     offer_cost_ = 0;
     const Neighbours neighbours = holdings.neighbours();
     if (wants_less()) {
@@ -343,6 +343,17 @@ std::optional<Offer> Market::make_offer(Holdings holdings) {
     if (offer_.bodies.empty()) not_before_ = std::max(not_before_, step_ + kNothingSteps);
     if (offer_.bodies.empty()) return std::nullopt;
     ++next_number_;
+    sale_ = Sale::offered;
+    return offer_;
+}
+
+std::optional<Offer> Market::make_offer(const Gather& asked) {
+    const Worker& self = workers_.at(self_);
+    if (asked.to == self_ || !workers_.contains(asked.to) || asked.bodies.empty()) return std::nullopt;
+    const double each = self.own > 0 ? self.smoothed / self.own : 0;
+    offer_ = {asked.to, next_number_++, asked.bodies,
+              std::vector<float>(asked.bodies.size(), static_cast<float>(each)), true};
+    offer_cost_ = each * static_cast<double>(asked.bodies.size());
     sale_ = Sale::offered;
     return offer_;
 }
@@ -375,6 +386,7 @@ OfferAnswer Market::answer(std::uint32_t seller, const Offer& offer) {
     double after = smoothed() + cost;
     for (const auto& promise : promises_) after += promise.second;
     answer.accepted =
+        offer.gathers ||
         after <= (1 + settings_.dead_band) * std::max(found->second.smoothed - cost, average()) * (1 + 1e-6);
     if (answer.accepted) promises_[seller] = cost;
     return answer;

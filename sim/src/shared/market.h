@@ -51,6 +51,9 @@ public:
     [[nodiscard]] bool wants_to_sell() const;
     /// An offer of some of own lots, which are all that this worker has; none if no lot fits.
     [[nodiscard]] std::optional<Offer> make_offer(Holdings holdings);
+    [[nodiscard]] bool is_selling() const { return sale_ != Sale::none; }
+    /// An offer of these own bodies to a member, whatever they cost there.
+    [[nodiscard]] std::optional<Offer> make_offer(const Gather& asked);
     void answered(std::uint32_t worker, const OfferAnswer& answer);
     /// The offer that was accepted, if one was; counts as handed over.
     [[nodiscard]] std::optional<Offer> hand_over();

@@ -39,7 +39,7 @@ public:
     }  ///< once, before the first step of one who joins late
     /// The members now, and the epoch in which the application says so. Workers that left own nothing from here on;
     /// Ownership messages say who owns their bodies.
-    virtual void members(const std::vector<std::uint32_t>& workers, std::uint32_t epoch) = 0;
+    virtual void members(const Members& message, std::uint32_t epoch) = 0;
     /// Registered owners. Becomes effective at the message's step: this worker may have to publish its last step once more
     /// (lockstep, owes()), or take bodies over that are some steps away (bounded).
     virtual void own(const Ownership& ownership) = 0;

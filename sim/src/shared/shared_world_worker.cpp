@@ -43,7 +43,7 @@ void SharedWorldWorker::take(const MessageHeader& header, WorkerMessage&& messag
 
 void SharedWorldWorker::take_message(const MessageHeader& header, Members&& message) {
     epoch_ = header.epoch;
-    exchange_->members(message.workers, epoch_);
+    exchange_->members(message, epoch_);
     std::erase_if(sellers_, [&message](const auto& seller) {
         return std::find(message.workers.begin(), message.workers.end(), seller.first) ==
                message.workers.end();
@@ -102,6 +102,11 @@ void SharedWorldWorker::take_message(const MessageHeader& header, Offer&& messag
 void SharedWorldWorker::take_message(const MessageHeader& header, OfferAnswer&& message) {
     market_.answered(header.worker, message);
     handover_step_ = header.step + 1;
+}
+
+void SharedWorldWorker::take_message(const MessageHeader& header, Gather&& message) {
+    (void)header;
+    gathers_.push_back(std::move(message));
 }
 
 void SharedWorldWorker::take_message(const MessageHeader& header, EndOfRun&& message) {
@@ -194,8 +199,23 @@ void SharedWorldWorker::trade() {
     const bool sold = hand_over();
     if (!sold && offered_at_ == exchange_->steps_done()) return;
     offered_at_ = exchange_->steps_done();
-    if (draining_ || exchange_->at_end() || !market_.wants_to_sell()) return;
-    if (const std::optional<Offer> offer = market_.make_offer(exchange_->holdings())) send(*offer);
+    if (draining_ || exchange_->at_end()) return;
+    if (const std::optional<Offer> offer = make_offer()) send(*offer);
+}
+
+// What was asked for first.
+std::optional<Offer> SharedWorldWorker::make_offer() {
+    while (!gathers_.empty() && !market_.is_selling()) {
+        Gather asked = std::move(gathers_.front());
+        gathers_.pop_front();
+        const World& world = exchange_->world();
+        std::erase_if(asked.bodies, [&world](std::uint32_t body) {
+            return body >= static_cast<std::uint32_t>(world.bodies()) || !world.own(static_cast<int>(body));
+        });
+        if (const std::optional<Offer> offer = market_.make_offer(asked)) return offer;
+    }
+    if (!market_.wants_to_sell()) return std::nullopt;
+    return market_.make_offer(exchange_->holdings());
 }
 
 bool SharedWorldWorker::hand_over() {

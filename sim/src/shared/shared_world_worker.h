@@ -1,4 +1,6 @@
 #pragma once
+#include <deque>
+
 #include "shared/market.h"
 #include "shared/replica_protocol.h"
 
@@ -61,6 +63,7 @@ private:
     void take_message(const MessageHeader& header, PackedUpdates&& message);
     void take_message(const MessageHeader& header, Offer&& message);
     void take_message(const MessageHeader& header, OfferAnswer&& message);
+    void take_message(const MessageHeader& header, Gather&& message);
     void take_message(const MessageHeader& header, EndOfRun&& message);
     void take_message(const MessageHeader& header, Refusal&& message);
     void take_message(const MessageHeader& header, Beat&& message);
@@ -70,6 +73,7 @@ private:
     void send(const WorkerMessage& message);
     void publish(const Times& times);
     void trade();
+    [[nodiscard]] std::optional<Offer> make_offer();
     [[nodiscard]] bool hand_over();
     void leave();
 
@@ -87,6 +91,7 @@ private:
     std::optional<std::uint64_t> offered_at_;  // step
     // Whose offers were accepted and whose bodies have not come; the step up to which this worker goes on.
     std::map<std::uint32_t, std::uint64_t> sellers_;
+    std::deque<Gather> gathers_;  // to be offered
     struct Deferred {
         MessageHeader header;
         WorkerMessage message;

@@ -16,9 +16,15 @@ constexpr double kSlowShare = 0.25;        // of sqrt(g size)
 constexpr double kBeside = 0.02;           // of the size
 constexpr std::size_t kOwnPerForeign = 4;  // bodies of a structure for each other that touches it
 
-struct SlowBody {
+constexpr double kFlatExponent = 0.5;   // up to this one a side has a flat middle
+constexpr double kUpright = 0.966;      // cosine of 15 degrees
+constexpr double kUprightShare = 0.75;  // of a structure's bodies, of those that may be more
+constexpr int kMostAhead = 8, kOutlookSteps = 8;
+
+struct Candidate {
     int body;
-    Eigen::AlignedBox3d box;
+    bool own, slow, flat, upright;
+    Eigen::AlignedBox3d box, path;  // path: where it will be, too
 };
 
 Eigen::AlignedBox3d box_around(const World& world, int body, const WorldBodyState& state) {
@@ -32,36 +38,75 @@ Eigen::AlignedBox3d box_around(const World& world, int body, const WorldBodyStat
     return {state.position - half, state.position + half};
 }
 
+/// Whether a flat body lies or stands on one of its sides.
+bool is_upright(const WorldBody& body, const Eigen::Quaterniond& orientation, const Eigen::Vector3d& up) {
+    const Eigen::Vector3d own_up = (orientation.conjugate() * up).cwiseAbs();
+    const bool around = body.shape.base.e2 <= kFlatExponent;  // else only its ends are flat
+    return (around ? own_up.maxCoeff() : own_up.y()) >= kUpright;
+}
+
 }  // namespace
 
-std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies, double size) {
-    const double slow_speed = kSlowShare * std::sqrt(world.settings().gravity.norm() * size);
-    std::vector<SlowBody> slow;
-    for (const int body : bodies) {
-        const WorldBodyState state = world.state(body);
-        if (state.velocity.norm() < slow_speed && state.position.allFinite())
-            slow.push_back({body, box_around(world, body, state)});
-    }
-    std::ranges::sort(slow, {}, [](const SlowBody& s) { return std::pair(s.box.min().x(), s.body); });
+bool is_flat(const WorldBody& body) {
+    return std::min(body.shape.base.e1, body.shape.base.e2) <= kFlatExponent;
+}
+
+double structure_outlook(int bound, double dt) {
+    return dt * (kOutlookSteps + 2 * std::min(bound, kMostAhead));
+}
+
+std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies, double size,
+                                         double within_s, std::span<const OthersBody> others) {
+    const Eigen::Vector3d& gravity = world.settings().gravity;
+    const Eigen::Vector3d up = -gravity.normalized();
+    const double slow_speed = kSlowShare * std::sqrt(gravity.norm() * size);
+    std::vector<Candidate> candidates;
+    const auto add = [&](int body, bool own, const WorldBodyState& state) {
+        const bool flat = within_s > 0 && slow_speed > 0 && is_flat(world.definition(body));
+        const bool slow = own && state.velocity.norm() < slow_speed;
+        if ((!slow && !flat) || !state.position.allFinite() || !state.velocity.allFinite()) return;
+        const bool upright =
+            is_flat(world.definition(body)) && is_upright(world.definition(body), state.orientation, up);
+        Candidate c{body, own, slow, flat, upright, box_around(world, body, state), {}};
+        c.path = c.box;
+        if (flat) c.path.extend(c.box.translated(within_s * (state.velocity + within_s / 2 * gravity)));
+        candidates.push_back(c);
+    };
+    for (const int body : bodies) add(body, true, world.state(body));
+    for (const OthersBody& other : others) add(other.body, false, other.state);
+    std::ranges::sort(candidates, {}, [](const Candidate& c) { return std::pair(c.path.min().x(), c.body); });
     DisjointSets sets(static_cast<std::size_t>(world.bodies()));
     const double near = kBeside * size;
-    for (std::size_t i = 0; i < slow.size(); ++i)
-        for (std::size_t j = i + 1; j < slow.size(); ++j) {
-            if (slow[j].box.min().x() > slow[i].box.max().x() + near) break;
-            if (slow[i].box.squaredExteriorDistance(slow[j].box) <= near * near)
-                sets.join(slow[i].body, slow[j].body);
+    const auto belong_together = [&](const Candidate& a, const Candidate& b) {
+        return (a.slow && b.slow && a.box.squaredExteriorDistance(b.box) <= near * near) ||
+               (a.flat && b.flat && a.path.squaredExteriorDistance(b.path) <= near * near);
+    };
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+        for (std::size_t j = i + 1; j < candidates.size(); ++j) {
+            if (candidates[j].path.min().x() > candidates[i].path.max().x() + near) break;
+            if (belong_together(candidates[i], candidates[j]))
+                sets.join(candidates[i].body, candidates[j].body);
         }
-    std::map<int, std::vector<int>> found;
-    for (const SlowBody& s : slow) found[sets.first(s.body)].push_back(s.body);
-    std::map<int, std::set<int>> foreign;  // that touch each
-    for (const CrossImpulse& c : world.cross_impulses()) foreign[sets.first(c.own)].insert(c.ghost);
+    struct Found {
+        std::vector<int> own;
+        std::size_t all = 0, upright = 0;
+        std::set<int> touching;  // bodies of others
+    };
+    std::map<int, Found> found;
+    for (const Candidate& c : candidates) {
+        Found& of = found[sets.first(c.body)];
+        if (c.own) of.own.push_back(c.body);
+        ++of.all, of.upright += c.upright;
+    }
+    for (const CrossImpulse& c : world.cross_impulses()) found[sets.first(c.own)].touching.insert(c.ghost);
     std::vector<std::vector<int>> result;
-    for (auto& [first, some] : found) {
-        if (some.size() < 2 || some.size() > kMostInStructure ||
-            kOwnPerForeign * foreign[first].size() > some.size())
+    for (auto& [first, of] : found) {
+        const bool stands = static_cast<double>(of.upright) >= kUprightShare * static_cast<double>(of.all);
+        if (of.own.size() < 2 || of.all > (stands ? kMostStanding : kMostInStructure) ||
+            kOwnPerForeign * of.touching.size() > of.own.size())
             continue;
-        std::ranges::sort(some);
-        result.push_back(std::move(some));
+        std::ranges::sort(of.own);
+        result.push_back(std::move(of.own));
     }
     return result;
 }

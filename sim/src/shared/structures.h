@@ -6,19 +6,34 @@
 
 namespace sim {
 
-/// Most bodies of a structure.
-constexpr std::size_t kMostInStructure = 64;
+/// Most bodies of a structure; of one that stands, three quarters of it flat and upright, as it was built.
+constexpr std::size_t kMostInStructure = 64, kMostStanding = 256;
+
+/// A body of another owner, as last told.
+struct OthersBody {
+    int body;
+    WorldBodyState state;
+};
 
 /// Structures among an owner's bodies, for bounded pace: bodies side by side or on each other that are slow, kMostInStructure
-/// at most, touched by at most a quarter as many of other owners' bodies. They stay on one worker: what several hold keeps swaying by some
+/// or kMostStanding at most, touched by at most a quarter as many of other owners' bodies. They stay on one worker: what several hold keeps swaying by some
 /// centimetres a second, which a heap may and what has to stand may not.
 ///
 /// `size`: mean diameter of bodies [m]. Slow: by less than a quarter of sqrt(g size), the speed of a fall by half of it. Side
 /// by side: boxes around the bodies' rest shapes, along the world's axes, are at most 2 % of it apart. As of the end of the
 /// world's last step. Each has two bodies or more, ascending; without gravity there are none. O(n log n) but for bodies one behind the other along x.
 /// `bodies` move and are there.
+///
+/// within_s: bodies with flat sides (is_flat) also belong together where they will come to lie on or beside each other: where
+/// the boxes that they pass through in this time, as they move now and fall, are as near. So what falls into place has one
+/// owner before it meets. `others`: bodies of other owners that count with these then, and are not in the result.
 [[nodiscard]] std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies,
-                                                       double size);
+                                                       double size, double within_s = 0,
+                                                       std::span<const OthersBody> others = {});
+/// Whether a body has sides on which something can stand, as boxes and cylinders have, and balls have not.
+[[nodiscard]] bool is_flat(const WorldBody& body);
+/// What a run of this bound takes as within_s [s]: workers may be so far apart, and a body takes some steps to change owners.
+[[nodiscard]] double structure_outlook(int bound, double dt);
 
 /// Factors by which bodies that are shared out may differ.
 constexpr double kMostUnlikeMass = 4, kMostUnlikeLength = 3;
