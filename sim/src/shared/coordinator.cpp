@@ -50,7 +50,8 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
     // In lockstep a run that goes on shares out as from its start.
     first_places_ = places(lots_);
     if (from) go_to(*from);
-    result_.one_owner = settings_.pace == Pace::bounded && !are_alike(all, lots_, structures_now());
+    result_.one_owner = settings_.pace == Pace::bounded &&
+                        !are_alike(all, lots_, structures(view_.world(), there_now(), columns_.side()));
     if (result_.one_owner) settings_.market.trade = false;
 }
 
@@ -238,17 +239,25 @@ std::vector<int> Coordinator::there_now() const {
     return there;
 }
 
-std::vector<std::vector<int>> Coordinator::structures_now(double within_s) const {
-    return structures(view_.world(), there_now(), columns_.side(), within_s);
+double Coordinator::outlook() const {
+    return structure_outlook(settings_.bound, scene_.world.settings.dt);
+}
+
+// The world as shown, with all that is still to come where it will.
+World Coordinator::world_to_come() const {
+    World all = with_later(scene_);
+    for (const int body : there_now()) all.restore(view_.world().record(body));
+    return all;
 }
 
 // In bounded pace what a structure joins is one.
 std::vector<std::vector<int>> Coordinator::whole_lots() const {
     if (settings_.pace == Pace::lockstep) return lots_;
-    std::vector<int> first(lots_.size());
-    if (!result_.one_owner)
-        first =
-            joined_by(structures_now(structure_outlook(settings_.bound, scene_.world.settings.dt)), lots_);
+    std::vector<int> first(lots_.size()), bodies;
+    if (!result_.one_owner) {
+        for (const std::vector<int>& lot : lots_) bodies.insert(bodies.end(), lot.begin(), lot.end());
+        first = joined_by(structures(world_to_come(), bodies, columns_.side(), outlook()), lots_);
+    }
     std::vector<std::vector<int>> lots(lots_.size());
     for (std::size_t i = 0; i < lots_.size(); ++i) {
         std::vector<int>& lot = lots[static_cast<std::size_t>(first[i])];
@@ -360,8 +369,7 @@ void Coordinator::gather() {
     if (result_.one_owner || members_.size() < 2 || view_.step() % kGatherEvery != 0) return;
     std::vector<int> flat = there_now();
     std::erase_if(flat, [this](int body) { return !is_flat(view_.world().definition(body)); });
-    const std::vector<std::vector<int>> found = structures(
-        view_.world(), flat, columns_.side(), structure_outlook(settings_.bound, scene_.world.settings.dt));
+    const std::vector<std::vector<int>> found = structures(view_.world(), flat, columns_.side(), outlook());
     if (found.empty()) return;
     const std::vector<int> first = joined_by(found, lots_);
     std::map<int, std::map<std::uint32_t, std::vector<std::uint32_t>>> owners;  // bodies of each
@@ -381,11 +389,11 @@ void Coordinator::gather() {
 void Coordinator::ask_for(std::uint32_t from, std::vector<std::uint32_t>&& bodies, std::uint32_t to) {
     const std::uint64_t patience = kGatherPatience + 2 * static_cast<std::uint64_t>(settings_.bound);
     std::erase_if(bodies, [&](std::uint32_t body) {
-        std::uint64_t& asked = bodies_[body].asked_at;
+        Body& b = bodies_[body];
         if (!view_.clock().moves_at(static_cast<int>(body), view_.step()) ||
-            (asked > 0 && view_.step() < asked + patience))
+            (b.asked_at > 0 && view_.step() < b.asked_at + patience))
             return true;
-        asked = view_.step();
+        b.asked_at = view_.step(), b.asked_to = to;
         return false;
     });
     if (!bodies.empty() && is_member(from) && is_member(to)) send({from}, Gather{to, std::move(bodies)});

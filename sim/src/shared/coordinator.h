@@ -61,8 +61,9 @@ private:
         std::uint64_t step = 0;   ///< of the record
         WorldRecord record;       ///< last published
         std::uint32_t epoch = 0;  ///< of its owner
-        std::uint64_t asked_at =
-            0;  ///< step of the view in which its owner was asked to give it away, see Gather
+        // Its owner was asked to give it to this worker, in this step of the view; see Gather. 0: never.
+        std::uint64_t asked_at = 0;
+        std::uint32_t asked_to = kApplication;
     };
     struct Sender {
         std::uint64_t step = 0, bytes = 0;  ///< last published; sent since
@@ -106,6 +107,7 @@ private:
     [[nodiscard]] bool fits(std::uint32_t worker, const std::vector<WorldRecord>& records) const;
     [[nodiscard]] bool fits(const std::vector<Mishap>& mishaps) const;
     [[nodiscard]] bool owns_constraint(std::uint32_t worker, int constraint) const;
+    [[nodiscard]] bool asked_for(const Offer& offer) const;
     [[nodiscard]] bool own_contacts(std::uint32_t worker, const StateMessage& message) const;
     static void publish(Body& body, const WorldRecord& record, std::uint64_t step);
 
@@ -114,7 +116,8 @@ private:
     [[nodiscard]] std::vector<int> owned_by(std::uint32_t worker) const;
     [[nodiscard]] std::vector<std::vector<int>> whole_lots() const;
     [[nodiscard]] std::vector<int> there_now() const;
-    [[nodiscard]] std::vector<std::vector<int>> structures_now(double within_s = 0) const;
+    [[nodiscard]] double outlook() const;  ///< see structures
+    [[nodiscard]] World world_to_come() const;
     [[nodiscard]] std::vector<Eigen::Vector3d> places(const std::vector<std::vector<int>>& lots) const;
     [[nodiscard]] std::vector<Group> groups(const std::vector<int>& bodies) const;
     /// sold: by this handover.

@@ -79,6 +79,8 @@ void Coordinator::take_message(const MessageHeader& header, std::span<const std:
     if (auto* update = std::get_if<UpdateMessage>(&message)) return take_update(header, bytes, *update);
     if (auto* handover = std::get_if<Handover>(&message)) return take_handover(header, std::move(*handover));
     if (const auto* offer = std::get_if<Offer>(&message)) {
+        if (offer->gathers && !asked_for(*offer))
+            return refuse(worker, "found bodies for a structure that nobody asked for");
         if (is_member(offer->to)) ++senders_[offer->to].offered;
         return take_dealing(header, bytes, offer->to);
     }
@@ -151,6 +153,12 @@ bool Coordinator::fits(std::uint32_t worker, const std::vector<WorldRecord>& rec
 bool Coordinator::fits(const std::vector<Mishap>& mishaps) const {
     return std::all_of(mishaps.begin(), mishaps.end(), [this](const Mishap& m) {
         return m.number < (m.kind == Mishap::Kind::broken ? scene_.world.constraints.size() : bodies_.size());
+    });
+}
+
+bool Coordinator::asked_for(const Offer& offer) const {
+    return std::ranges::all_of(offer.bodies, [&](std::uint32_t body) {
+        return body < bodies_.size() && bodies_[body].asked_at > 0 && bodies_[body].asked_to == offer.to;
     });
 }
 

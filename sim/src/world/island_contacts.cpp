@@ -52,7 +52,9 @@ void IslandContacts::find_pair(const ContactScene& scene, const Manifold* before
     } else {
         const PosedBody& b = posed(scene, manifold.b);
         const double margin = (kSlop + kSlow) * std::min(smallest_half(a), smallest_half(b));
-        narrow_.pair(a, b, {static_cast<float>(margin), before, scene.among_ghosts}, manifold);
+        const bool may_part = scene.may_part(scene.bodies[static_cast<std::size_t>(manifold.a)],
+                                             scene.bodies[static_cast<std::size_t>(manifold.b)]);
+        narrow_.pair(a, b, {static_cast<float>(margin), before, may_part}, manifold);
     }
     scene.set_surface(manifold);
 }

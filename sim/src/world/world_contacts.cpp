@@ -422,7 +422,8 @@ void WorldContacts::meet_near(const ContactScene& scene, int i, int j, double ma
                      &b = scene.bodies[static_cast<std::size_t>(j)];
     Manifold& manifold = found.manifolds.emplace_back();
     manifold.a = i, manifold.b = j;
-    found.narrow->pair(a.posed, b.posed, {static_cast<float>(margin), before, scene.among_ghosts}, manifold);
+    found.narrow->pair(a.posed, b.posed, {static_cast<float>(margin), before, scene.may_part(a, b)},
+                       manifold);
     if (manifold.count == 0) {
         found.manifolds.pop_back();
         return;

@@ -26,7 +26,11 @@ struct ContactScene {
     Crew& crew;  ///< shares the work
 
     [[nodiscard]] bool may_meet(const std::pair<int, int>& pair) const;  ///< a < b
-    void set_surface(Manifold& manifold) const;                          ///< friction and restitution
+    /// Whether one may have been put into the other: ghosts, and bodies that came from another owner, are where others say.
+    [[nodiscard]] bool may_part(const MovingBody& a, const MovingBody& b) const noexcept {
+        return among_ghosts && (!a.own || !b.own || a.arrived || b.arrived);
+    }
+    void set_surface(Manifold& manifold) const;  ///< friction and restitution
 };
 
 /// Finds the contacts of a step: broad phase over the bounds that free motion sweeps, narrow phase,

@@ -165,7 +165,7 @@ void WorldContacts::find_impact(const ContactScene& scene, const Meeting& meetin
     manifold.a = meeting.a, manifold.b = meeting.b;
     const float margin = static_cast<float>(kSlow * size_of(a, b));
     narrow_[thread]->pair(at_[thread][0], at_[thread][1],
-                          {margin, find_last(manifold.key()), scene.among_ghosts, true}, manifold);
+                          {margin, find_last(manifold.key()), scene.may_part(a, b), true}, manifold);
     if (manifold.count == 0) return;
     for (std::size_t i = 0; i < static_cast<std::size_t>(manifold.count); ++i) {
         ManifoldPoint& p = manifold.points[i];

@@ -105,8 +105,9 @@ struct World::Implementation {
 
     // Sharing.
     Sharing sharing = Sharing::alone;
-    std::vector<int> owned;   // pairs: own and fixed bodies, ascending
-    std::vector<int> placed;  // pairs: ghosts of the next step
+    std::vector<int> owned;    // pairs: own and fixed bodies, ascending
+    std::vector<int> placed;   // pairs: ghosts of the next step
+    std::vector<int> arrived;  // bodies that are own since the last step
     int cross_contacts = 0;
     struct LooseBall {
         Eigen::Vector3d center;

@@ -55,6 +55,8 @@ void World::Implementation::gather_pairs() {
 void World::Implementation::dismiss_ghosts() {
     for (const int i : placed) bodies[static_cast<std::size_t>(i)].pushed = false;
     placed.clear();
+    for (const int i : arrived) bodies[static_cast<std::size_t>(i)].arrived = false;
+    arrived.clear();
 }
 
 void World::share(Sharing sharing) {
@@ -74,6 +76,8 @@ void World::set_own(int body, bool own) {
     if (b.own == own) return;
     b.own = own;
     b.watched = b.was_given = b.pushed = false;
+    b.arrived = own;
+    if (own) implementation_->arrived.push_back(body);
     implementation_->list_owned();
 }
 

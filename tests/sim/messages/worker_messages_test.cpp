@@ -130,7 +130,7 @@ std::vector<sim::WorkerMessage> world_samples() {
             sim::SceneMessage{3, scene(), settings},
             sim::Refusal{"another processor"},
             sim::EndOfRun{},
-            sim::Members{{0, 1, 5}},
+            sim::Members{{0, 1, 5}, true},
             sim::Ownership{1, 0, true, 77, records, {2, 3}, {70, 71}},
             sim::SnapshotMessage{{99, records, contacts, springs}},
             sim::StateMessage{report(), records, contacts, springs},
@@ -138,7 +138,7 @@ std::vector<sim::WorkerMessage> world_samples() {
                                {update(rng, 12, true), update(rng, 12, false), update(rng, 0, true)},
                                {crossed(rng, 4, 7, false), crossed(rng, 5, 2, true)},
                                {7}},
-            sim::Offer{2, 9, {1, 2}, {0.001f, 0.002f}},
+            sim::Offer{2, 9, {1, 2}, {0.001f, 0.002f}, true},
             sim::OfferAnswer{1, 9, true},
             sim::Handover{2, 9, records, {0, 1}, {5, 6}},
             sim::PartMessage{false, {1, 2, 3}},
@@ -146,7 +146,8 @@ std::vector<sim::WorkerMessage> world_samples() {
             sim::RelayMessage{{2, 1}, {7, 8, 9}},
             sim::PeersMessage{{{2, "tcp://10.0.0.2:4000", std::string(40, 'k'), {1, 2}, {3, 4}}}},
             sim::LinkBeat{true},
-            sim::ReachMessage{"ipc:///tmp/musicworld-7-abcdef/peer-9", ""}};
+            sim::ReachMessage{"ipc:///tmp/musicworld-7-abcdef/peer-9", ""},
+            sim::Gather{2, {5, 7}}};
 }
 
 const sim::MessageHeader kHeader{3, 8, 1234567890123};

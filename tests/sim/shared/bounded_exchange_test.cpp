@@ -28,7 +28,7 @@ public:
             members.push_back(scene.worker);
             exchanges_.push_back(make_bounded_exchange(scene));
         }
-        for (auto& e : exchanges_) e->members(members, 0);
+        for (auto& e : exchanges_) e->members({members}, 0);
         for (int w = 0; w < workers; ++w) {
             Ownership ownership;
             ownership.owner = static_cast<std::uint32_t>(w);
@@ -386,6 +386,27 @@ TEST(BoundedExchange, BodiesThatAnEventAddsTakePartWhoeverOwnsThem) {
             EXPECT_LT((record.now[3] - expected.state(3).position).norm(), 0.01) << step << " " << workers;
             EXPECT_NEAR(record.now[4].y(), expected.state(4).position.y(), 0.01) << step << " " << workers;
         }
+}
+
+// One that went ahead while the others' bodies had no owners took steps without bound, and met bodies that nobody moved.
+TEST(BoundedExchange, NobodyBeginsBeforeAllOwnersAreKnown) {
+    SceneMessage scene;
+    scene.scene.world = world_test::on_floor();
+    scene.scene.world.bodies = {world_test::ball({0, 1, 0}), world_test::ball({0.1, 3, 0})};
+    scene.settings.pace = Pace::bounded, scene.settings.bound = 1, scene.settings.steps = 100;
+    const auto exchange = make_bounded_exchange(scene);
+    exchange->members({{0, 1}, true}, 1);
+    for (const std::uint32_t owner : {0u, 1u}) {
+        Ownership ownership;
+        ownership.owner = owner;
+        ownership.bodies = {exchange->world().record(static_cast<int>(owner))};
+        exchange->own(ownership);
+        EXPECT_FALSE(exchange->ready());
+    }
+    exchange->members({{0, 1}, false}, 3);
+    int steps = 0;
+    for (; exchange->ready() && steps < 100; ++steps) exchange->step({});
+    EXPECT_EQ(steps, 2);  // one ahead of who has done none, and then waits
 }
 
 // Who owns the stack sees that it touches more than the ball, and finds no rebound; who owns the ball does not, and finds one.

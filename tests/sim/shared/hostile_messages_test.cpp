@@ -102,6 +102,23 @@ TEST_P(Damage, OfAFloodingMemberIsBounded) {
     EXPECT_NE(record.notes.find("more messages than steps need"), std::string::npos) << record.notes;
 }
 
+// Offers for a structure are accepted whatever they cost, so only those count that the application asked for.
+TEST(Offers, ForAStructureThatNobodyAskedForReachNobody) {
+    DistributedSettings settings;
+    settings.pace = Pace::bounded, settings.bound = 2, settings.steps = 60;
+    world_test::Record record;
+    Coordinator meeting(world_test::busy_scene(), settings, record);
+    for (int i = 0; i < 2; ++i) (void)meeting.join({});
+    meeting.start();
+    (void)meeting.outgoing();
+    const std::uint32_t own = meeting.owner(0) == 0 ? 0 : 1;
+    for (const bool gathers : {true, false}) {
+        meeting.take(0, encode({0, 0, 0}, Offer{1, 1, {own}, {0.1F}, gathers}));
+        EXPECT_EQ(meeting.outgoing().size(), gathers ? 0u : 1u);
+        EXPECT_EQ(meeting.result().refused_messages, 1u);
+    }
+}
+
 // Or behind a translation of addresses: others are not told to connect to somebody else.
 TEST(Reach, IsToldOnlyOfTheAddressThatAWorkerComesFromAndToThoseThatCanUseIt) {
     DistributedSettings settings;

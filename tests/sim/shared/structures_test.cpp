@@ -98,10 +98,16 @@ TEST(Structures, AreSlowSmallAndHardlyTouchedByOthers) {
     sim::WorldDefinition d = gate(1, 3, 4);
     for (sim::WorldBody& body : d.bodies) body.velocity = {2, 0, 0};  // a quarter of sqrt(9.81): 0.78 m/s
     EXPECT_TRUE(structures_of(d).empty());
-    for (const int pillars : {15, 16, 17}) {
-        const Bodies found = structures_of(gate(1, pillars, 4));
-        EXPECT_EQ(found.size(), pillars * 4u + 1 <= sim::kMostInStructure ? 1u : 0u) << pillars;
-    }
+    // One that stands may have more than one whose bodies lie turned by 20 degrees.
+    for (const bool turned : {false, true})
+        for (const int pillars : {15, 16, 63, 64}) {
+            sim::WorldDefinition pillars_on_floor = gate(1, pillars, 4);
+            for (sim::WorldBody& body : pillars_on_floor.bodies)
+                if (turned) body.world_from_body.rotate(Eigen::AngleAxisd(0.35, Eigen::Vector3d::UnitX()));
+            const std::size_t most = turned ? sim::kMostInStructure : sim::kMostStanding;
+            EXPECT_EQ(structures_of(pillars_on_floor).size(), pillars * 4u + 1 <= most ? 1u : 0u)
+                << turned << pillars;
+        }
     // Two pillars of a beam that another owner has: a body of others touches four own ones at each.
     for (const int high : {4, 3}) {
         const sim::WorldDefinition shared = gate(1, 2, high);
@@ -119,6 +125,36 @@ TEST(Structures, AreSlowSmallAndHardlyTouchedByOthers) {
         ASSERT_EQ(world.cross_impulses().size(), 2u);
         EXPECT_EQ(sim::structures(world, own, 1).size(), high == 4 ? 2u : 0u);
     }
+}
+
+// Boxes one above the other, half a side apart: within 0.2 s each falls by 0.2 m, to where the next one is.
+TEST(Structures, AreAlsoFlatBodiesThatFallIntoPlace) {
+    sim::WorldDefinition d = on_floor();
+    for (int i = 0; i < 4; ++i) d.bodies.push_back(box({0, 1 + 1.15 * i, 0}, {0.5, 0.5, 0.5}));
+    d.bodies.push_back(box({1.1, 1, 0}, {0.5, 0.5, 0.5}));  // beside them, and falls so
+    const auto found = [&](double within_s) {
+        const sim::World world(d);
+        return sim::structures(world, all_of(world), 1, within_s);
+    };
+    EXPECT_TRUE(found(0).empty());
+    EXPECT_TRUE(found(0.1).empty());  // by 0.05 m
+    EXPECT_EQ(found(0.2), (Bodies{{0, 1, 2, 3}}));
+    d.bodies[4].velocity = {-0.6, 0, 0};
+    EXPECT_EQ(found(0.2), (Bodies{{0, 1, 2, 3, 4}}));
+    for (sim::WorldBody& body : d.bodies) body.velocity.y() -= 10;  // however fast
+    EXPECT_EQ(found(0.2), (Bodies{{0, 1, 2, 3, 4}}));
+    // Others' bodies count, but are not given.
+    const sim::World world(d);
+    const std::vector<int> own = {0, 1};
+    const std::vector<sim::OthersBody> others = {{2, world.state(2)}, {3, world.state(3)}};
+    EXPECT_EQ(sim::structures(world, own, 1, 0.2, others), (Bodies{{0, 1}}));
+    std::vector<sim::OthersBody> many(sim::kMostStanding - 1, others[0]);
+    EXPECT_TRUE(sim::structures(world, own, 1, 0.2, many).empty());
+    // Nothing can stand on balls. Drums stand on their ends, and lie on their sides.
+    for (sim::WorldBody& body : d.bodies) body.shape.base.e1 = body.shape.base.e2 = 1;
+    EXPECT_TRUE(found(0.2).empty());
+    for (sim::WorldBody& body : d.bodies) body.shape.base.e1 = 0.1;
+    EXPECT_EQ(found(0.2), (Bodies{{0, 1, 2, 3, 4}}));
 }
 
 TEST(Structures, JoinLotsDirectlyAndThroughOthers) {
@@ -174,6 +210,88 @@ TEST(Structures, StandOutOfStepAsInOneProcessAndAreNeverSoldInParts) {
                     EXPECT_TRUE(move.bodies == 21 || move.bodies == 10 || move.bodies == 31) << move.bodies;
             }
         }
+}
+
+// Also where bodies come so deep into each other, at 4 m/s, that ghosts would be parted.
+TEST(Structures, AWorkerThatOwnsAllStepsThemAsOneProcess) {
+    sim::WorldDefinition d = on_floor();
+    d.settings.dt = 1.0 / 120;
+    for (int i = 0; i < 16; ++i)
+        d.bodies.push_back(
+            box({0.204 * (i % 4) + 0.05 * (i / 4 % 2), 0.15 + 0.35 * (i / 4), 0}, {0.1, 0.05, 0.05}, 1000));
+    sim::World alone(d), shared(d);
+    shared.share(sim::Sharing::pairs);
+    for (int step = 0; step < 240; ++step) {
+        alone.step(), shared.step();
+        ASSERT_EQ(alone.state_hash(), shared.state_hash()) << step;
+    }
+}
+
+// Rows of a wall that fall onto each other from so high that they are no structure at first, and others that events add: they
+// came to several owners, swayed, sank into each other, and fell.
+TEST(Structures, ThatFormOutOfStepAreGatheredByOneWorkerAndStandAsInOneProcess) {
+    int gathered = 0;
+    for (const bool added : {false, true})
+        for (const double side : {0.1, 0.4})
+            for (const int bound : {1, 8}) {
+                sim::WorldScene scene;
+                scene.world = on_floor();
+                scene.world.settings.dt = 1.0 / 120;
+                const Eigen::Vector3d half(side, side / 2, side / 2);
+                for (int row = 0; row < 4; ++row)
+                    for (int i = 0; i < 4; ++i) {
+                        // Too far apart to belong together as they begin.
+                        const sim::WorldBody brick =
+                            box({2.1 * side * i + side * (row % 2) / 2,
+                                 side * (row + 0.5 + 0.4 * (added ? 1 : row + 1)), 0},
+                                half, 1000);
+                        if (added && row > 0) {
+                            scene.later.push_back(brick);
+                            const std::size_t n = scene.later.size();
+                            scene.events.push_back({20 + 10 * n, {}, n - 1, n, {}});
+                        } else {
+                            scene.world.bodies.push_back(brick);
+                        }
+                    }
+                const std::uint64_t steps = 600;
+                const sim::World expected = alone(scene, steps);
+                double end = 0;
+                for (const int killed : {-1, 0, 1}) {
+                    SCOPED_TRACE(std::to_string(added) + " " + std::to_string(side) + " " +
+                                 std::to_string(bound) + " " + std::to_string(killed));
+                    struct Last : Record {
+                        void at(std::uint64_t step, const sim::World& world) override {
+                            Record::at(step, world);
+                            if (step != 600) return;
+                            for (int i = 0; i < world.bodies(); ++i)
+                                places.push_back(world.state(i).position);
+                        }
+                        std::vector<Eigen::Vector3d> places;
+                    } record;
+                    sim::SimulatedProcessors how = processors(3);
+                    sim::DistributedSettings settings = bounded(steps, bound);
+                    settings.market.trade = side < 0.2;  // with and without balancing
+                    if (killed >= 0) {
+                        // While it falls.
+                        how.failures = {{end / 12, killed, sim::SimulatedProcessors::Failure::Kind::kill}};
+                        how.silence_s = end / 100;
+                    }
+                    const sim::DistributedResult result =
+                        sim::simulate_processors(scene, settings, how, record);
+                    end = killed < 0 ? result.elapsed_s : end;
+                    EXPECT_EQ(result.steps, steps);
+                    ASSERT_EQ(record.places.size(), 16u);
+                    for (int i = 0; i < 16; ++i)
+                        EXPECT_LT((record.places[std::size_t(i)] - expected.state(i).position).norm(),
+                                  (killed < 0 ? 0.1 : 0.25) * side)
+                            << i;
+                    const auto owners = std::ranges::count_if(
+                        record.own, [](const auto& worker) { return worker.second > 0; });
+                    EXPECT_EQ(owners, 1);
+                    gathered += static_cast<int>(result.trades);
+                }
+            }
+    EXPECT_GT(gathered, 10);
 }
 
 // Each worker would answer for the whole of the board, some steps late: it was thrown up at 50 m/s and more.
