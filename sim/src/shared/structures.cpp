@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kSlowShare = 0.25;        // of sqrt(g size)
 constexpr double kBeside = 0.02;           // of the size
+constexpr double kMayMeet = 0.1;           // likewise, of paths: bodies that land turn a little
 constexpr std::size_t kOwnPerForeign = 4;  // bodies of a structure for each other that touches it
 
 constexpr double kFlatExponent = 0.5;   // up to this one a side has a flat middle
@@ -76,9 +77,9 @@ std::vector<std::vector<int>> structures(const World& world, std::span<const int
     for (const OthersBody& other : others) add(other.body, false, other.state);
     std::ranges::sort(candidates, {}, [](const Candidate& c) { return std::pair(c.path.min().x(), c.body); });
     DisjointSets sets(static_cast<std::size_t>(world.bodies()));
-    const double near = kBeside * size;
+    const double beside = kBeside * size, near = kMayMeet * size;
     const auto belong_together = [&](const Candidate& a, const Candidate& b) {
-        return (a.slow && b.slow && a.box.squaredExteriorDistance(b.box) <= near * near) ||
+        return (a.slow && b.slow && a.box.squaredExteriorDistance(b.box) <= beside * beside) ||
                (a.flat && b.flat && a.path.squaredExteriorDistance(b.path) <= near * near);
     };
     for (std::size_t i = 0; i < candidates.size(); ++i)

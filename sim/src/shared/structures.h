@@ -25,7 +25,7 @@ struct OthersBody {
 /// `bodies` move and are there.
 ///
 /// within_s: bodies with flat sides (is_flat) also belong together where they will come to lie on or beside each other: where
-/// the boxes that they pass through in this time, as they move now and fall, are as near. So what falls into place has one
+/// the boxes that they pass through in this time, as they move now and fall, are at most 10 % of the size apart. So what falls into place has one
 /// owner before it meets. `others`: bodies of other owners that count with these then, and are not in the result.
 [[nodiscard]] std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies,
                                                        double size, double within_s = 0,

