@@ -76,6 +76,7 @@ private:
     SceneClock clock_;
     BodyCosts costs_;
     ColumnWatch columns_;
+    PlannedStructures planned_;
     ForeignBodies foreign_;
     std::uint64_t published_ = 0;  // step
     std::uint64_t step_ = 0;
@@ -141,6 +142,8 @@ BoundedExchange::BoundedExchange(const SceneMessage& scene)
       clock_(scene.scene),
       costs_(clock_.bodies()),
       columns_(scene.scene),
+      planned_(scene.scene, with_later(scene.scene), columns_.side(),
+               structure_outlook(scene.settings.bound, scene.scene.world.settings.dt)),
       foreign_(world_, self_, clock_.bodies(), keep_steps(scene.settings.bound)),
       contacts_(world_, foreign_, self_, {own_, owner_}, keep_steps(scene.settings.bound),
                 blow_window(scene.settings.bound)) {
@@ -439,9 +442,10 @@ Holdings BoundedExchange::holdings() {
     for (const int body : others_)
         if (is_flat(world_.definition(body)) && foreign_.known(body))
             others.push_back({body, foreign_.at(body, step_).state});
-    const double outlook = structure_outlook(settings_.bound, world_.settings().dt);
-    return columns_.holdings(self_, world_, owner_, costs_, place,
-                             structures(world_, owned_, columns_.side(), outlook, others));
+    std::vector<std::vector<int>> whole = structures(
+        world_, owned_, columns_.side(), structure_outlook(settings_.bound, world_.settings().dt), others);
+    planned_.add_unfinished(world_.bodies(), whole);
+    return columns_.holdings(self_, world_, owner_, costs_, place, whole);
 }
 
 Handover BoundedExchange::give(const std::vector<std::uint32_t>& bodies) {

@@ -4,19 +4,11 @@
 #include <utility>
 
 #include "shared/initial_partition.h"
-#include "shared/structures.h"
 
 namespace sim {
 namespace {
 
 constexpr std::uint64_t kGatherEvery = 2, kGatherPatience = 16;  // steps
-
-// All bodies before their first step, also those to come.
-World with_later(const WorldScene& scene) {
-    World world(scene.world);
-    for (const WorldBody& body : scene.later) (void)world.add_body(body);
-    return world;
-}
 
 }  // namespace
 
@@ -53,6 +45,9 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
     result_.one_owner = settings_.pace == Pace::bounded &&
                         !are_alike(all, lots_, structures(view_.world(), there_now(), columns_.side()));
     if (result_.one_owner) settings_.market.trade = false;
+    if (settings_.pace == Pace::lockstep) return;
+    planned_.emplace(scene_, all, columns_.side(),
+                     structure_outlook(settings_.bound, scene_.world.settings.dt));
 }
 
 void Coordinator::go_to(const RunState& from) {
@@ -239,25 +234,19 @@ std::vector<int> Coordinator::there_now() const {
     return there;
 }
 
-double Coordinator::outlook() const {
-    return structure_outlook(settings_.bound, scene_.world.settings.dt);
-}
-
-// The world as shown, with all that is still to come where it will.
-World Coordinator::world_to_come() const {
-    World all = with_later(scene_);
-    for (const int body : there_now()) all.restore(view_.world().record(body));
-    return all;
+// Now, soon, and as planned.
+std::vector<std::vector<int>> Coordinator::structures_of(const std::vector<int>& bodies) const {
+    std::vector<std::vector<int>> found = structures(
+        view_.world(), bodies, columns_.side(), structure_outlook(settings_.bound, scene_.world.settings.dt));
+    planned_->add_unfinished(view_.world().bodies(), found);
+    return found;
 }
 
 // In bounded pace what a structure joins is one.
 std::vector<std::vector<int>> Coordinator::whole_lots() const {
     if (settings_.pace == Pace::lockstep) return lots_;
-    std::vector<int> first(lots_.size()), bodies;
-    if (!result_.one_owner) {
-        for (const std::vector<int>& lot : lots_) bodies.insert(bodies.end(), lot.begin(), lot.end());
-        first = joined_by(structures(world_to_come(), bodies, columns_.side(), outlook()), lots_);
-    }
+    std::vector<int> first(lots_.size());
+    if (!result_.one_owner) first = joined_by(structures_of(there_now()), lots_);
     std::vector<std::vector<int>> lots(lots_.size());
     for (std::size_t i = 0; i < lots_.size(); ++i) {
         std::vector<int>& lot = lots[static_cast<std::size_t>(first[i])];
@@ -369,7 +358,7 @@ void Coordinator::gather() {
     if (result_.one_owner || members_.size() < 2 || view_.step() % kGatherEvery != 0) return;
     std::vector<int> flat = there_now();
     std::erase_if(flat, [this](int body) { return !is_flat(view_.world().definition(body)); });
-    const std::vector<std::vector<int>> found = structures(view_.world(), flat, columns_.side(), outlook());
+    const std::vector<std::vector<int>> found = structures_of(flat);
     if (found.empty()) return;
     const std::vector<int> first = joined_by(found, lots_);
     std::map<int, std::map<std::uint32_t, std::vector<std::uint32_t>>> owners;  // bodies of each

@@ -5,6 +5,7 @@
 
 #include "shared/columns.h"
 #include "shared/shared_contacts.h"
+#include "shared/structures.h"
 #include "shared/world_view.h"
 
 namespace sim {
@@ -116,8 +117,7 @@ private:
     [[nodiscard]] std::vector<int> owned_by(std::uint32_t worker) const;
     [[nodiscard]] std::vector<std::vector<int>> whole_lots() const;
     [[nodiscard]] std::vector<int> there_now() const;
-    [[nodiscard]] double outlook() const;  ///< see structures
-    [[nodiscard]] World world_to_come() const;
+    [[nodiscard]] std::vector<std::vector<int>> structures_of(const std::vector<int>& bodies) const;
     [[nodiscard]] std::vector<Eigen::Vector3d> places(const std::vector<std::vector<int>>& lots) const;
     [[nodiscard]] std::vector<Group> groups(const std::vector<int>& bodies) const;
     /// sold: by this handover.
@@ -141,6 +141,7 @@ private:
     DistributedObserver* observer_;
     WorldView view_;
     Columns columns_;
+    std::optional<PlannedStructures> planned_;
     std::vector<std::vector<int>> lots_;         // tied together
     std::vector<Eigen::Vector3d> first_places_;  // of each
     std::vector<Body> bodies_;

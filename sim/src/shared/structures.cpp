@@ -46,6 +46,16 @@ bool is_upright(const WorldBody& body, const Eigen::Quaterniond& orientation, co
     return (around ? own_up.maxCoeff() : own_up.y()) >= kUpright;
 }
 
+/// Whether a body's centre is in another's box: they come one after the other, and fall from there.
+bool come_to_one_place(const World& all, const std::vector<int>& bodies) {
+    std::vector<Eigen::AlignedBox3d> boxes;
+    for (const int body : bodies) boxes.push_back(box_around(all, body, all.state(body)));
+    for (std::size_t i = 0; i < boxes.size(); ++i)
+        for (std::size_t j = 0; j < boxes.size(); ++j)
+            if (i != j && boxes[i].contains(boxes[j].center())) return true;
+    return false;
+}
+
 }  // namespace
 
 bool is_flat(const WorldBody& body) {
@@ -110,6 +120,30 @@ std::vector<std::vector<int>> structures(const World& world, std::span<const int
         result.push_back(std::move(of.own));
     }
     return result;
+}
+
+World with_later(const WorldScene& scene) {
+    World world(scene.world);
+    for (const WorldBody& body : scene.later) (void)world.add_body(body);
+    return world;
+}
+
+PlannedStructures::PlannedStructures(const WorldScene& scene, const World& all, double size,
+                                     double within_s) {
+    if (scene.later.empty()) return;
+    std::vector<int> flat;
+    for (int i = 0; i < all.bodies(); ++i)
+        if (all.definition(i).moves() && is_flat(all.definition(i))) flat.push_back(i);
+    planned_ = structures(all, flat, size, within_s);
+    const auto first_later = static_cast<int>(scene.world.bodies.size());
+    std::erase_if(planned_, [&](const std::vector<int>& some) {
+        return some.back() < first_later || come_to_one_place(all, some);
+    });
+}
+
+void PlannedStructures::add_unfinished(int bodies, std::vector<std::vector<int>>& structures) const {
+    for (const std::vector<int>& planned : planned_)
+        if (planned.back() >= bodies) structures.push_back(planned);
 }
 
 bool are_alike(const World& world, const std::vector<std::vector<int>>& lots,

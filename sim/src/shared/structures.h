@@ -2,7 +2,7 @@
 #include <span>
 #include <vector>
 
-#include "sim/world.h"
+#include "sim/distributed_world.h"
 
 namespace sim {
 
@@ -30,6 +30,19 @@ struct OthersBody {
 [[nodiscard]] std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies,
                                                        double size, double within_s = 0,
                                                        std::span<const OthersBody> others = {});
+/// All bodies of a scene before their first step, also those to come.
+[[nodiscard]] World with_later(const WorldScene& scene);
+/// Structures of flat bodies that events complete, by where the bodies of `all` (with_later) are at first: those with bodies to
+/// come, none of them at the place of another, as of bodies that are poured.
+class PlannedStructures {
+public:
+    PlannedStructures(const WorldScene& scene, const World& all, double size, double within_s);
+    /// Adds those of which some bodies have not come to a world of so many.
+    void add_unfinished(int bodies, std::vector<std::vector<int>>& structures) const;
+
+private:
+    std::vector<std::vector<int>> planned_;
+};
 /// Whether a body has sides on which something can stand, as boxes and cylinders have, and balls have not.
 [[nodiscard]] bool is_flat(const WorldBody& body);
 /// What a run of this bound takes as within_s [s]: workers may be so far apart, and a body takes some steps to change owners.

@@ -157,6 +157,23 @@ TEST(Structures, AreAlsoFlatBodiesThatFallIntoPlace) {
     EXPECT_EQ(found(0.2), (Bodies{{0, 1, 2, 3, 4}}));
 }
 
+// A gate whose beam comes last; a shower of boxes from one place is none.
+TEST(Structures, ThatEventsCompleteArePlannedUntilAllHasCome) {
+    sim::WorldScene scene;
+    scene.world = gate(1, 2, 2);
+    scene.later = {scene.world.bodies.back()};
+    scene.world.bodies.pop_back();
+    for (const bool shower : {false, true}) {
+        if (shower) scene.later.assign(3, box({0, 9, 0}, {0.5, 0.5, 0.5}));
+        const sim::PlannedStructures planned(scene, sim::with_later(scene), 1, 0.2);
+        for (const int there : {4, 5}) {
+            Bodies found = {{7}};
+            planned.add_unfinished(there, found);
+            EXPECT_EQ(found, (!shower && there == 4 ? Bodies{{7}, {0, 1, 2, 3, 4}} : Bodies{{7}}));
+        }
+    }
+}
+
 TEST(Structures, JoinLotsDirectlyAndThroughOthers) {
     const std::vector<std::vector<int>> lots = {{0, 3}, {1}, {2}, {4, 6}, {5}};
     EXPECT_EQ(sim::joined_by({}, lots), (std::vector<int>{0, 1, 2, 3, 4}));
@@ -292,7 +309,7 @@ TEST(Structures, ThatFormOutOfStepAreGatheredByOneWorkerAndStandAsInOneProcess) 
                     gathered += static_cast<int>(result.trades);
                 }
             }
-    EXPECT_GT(gathered, 10);
+    EXPECT_GE(gathered, 3);  // others have one owner from the start
 }
 
 // Each worker would answer for the whole of the board, some steps late: it was thrown up at 50 m/s and more.
