@@ -143,7 +143,9 @@ struct EndOfRun {};
 // Application to all workers.
 struct Members {
     std::vector<std::uint32_t> workers;
-    bool owners_follow = false;  ///< of bodies that nobody owns now; then the same without this
+    /// Owners of some bodies are told next, then this message comes again without the flag. Until then nobody steps out of
+    /// step with others.
+    bool owners_follow = false;
 };
 /// Registered ownership: `owner` steps these bodies from the end of step `step` on. The header's epoch is the
 /// new one.

@@ -142,7 +142,7 @@ BoundedExchange::BoundedExchange(const SceneMessage& scene)
       clock_(scene.scene),
       costs_(clock_.bodies()),
       columns_(scene.scene),
-      planned_(scene.scene, with_later(scene.scene), columns_.side(),
+      planned_(scene.scene, columns_.side(),
                structure_outlook(scene.settings.bound, scene.scene.world.settings.dt)),
       foreign_(world_, self_, clock_.bodies(), keep_steps(scene.settings.bound)),
       contacts_(world_, foreign_, self_, {own_, owner_}, keep_steps(scene.settings.bound),
@@ -439,11 +439,16 @@ Holdings BoundedExchange::holdings() {
         return told ? foreign_.last_position(body) : world_.state(body).position;
     };
     std::vector<OthersBody> others;
-    for (const int body : others_)
-        if (is_flat(world_.definition(body)) && foreign_.known(body))
-            others.push_back({body, foreign_.at(body, step_).state});
-    std::vector<std::vector<int>> whole = structures(
-        world_, owned_, columns_.side(), structure_outlook(settings_.bound, world_.settings().dt), others);
+    for (const int body : others_) {
+        if (!is_flat(world_.definition(body)) || !foreign_.known(body)) continue;
+        const ForeignBodies::Ghost& ghost = foreign_.at(body, step_);
+        others.push_back({body, ghost.asleep, ghost.state});
+    }
+    std::vector<std::vector<int>> whole = structures(world_, owned_, columns_.side());
+    for (std::vector<int>& flat :
+         flat_structures(world_, owned_, columns_.side(),
+                         structure_outlook(settings_.bound, world_.settings().dt), others))
+        whole.push_back(std::move(flat));
     planned_.add_unfinished(world_.bodies(), whole);
     return columns_.holdings(self_, world_, owner_, costs_, place, whole);
 }

@@ -8,7 +8,7 @@
 namespace sim {
 namespace {
 
-constexpr std::uint64_t kGatherEvery = 2, kGatherPatience = 16;  // steps
+constexpr std::uint64_t kGatherEvery = 2;  // steps
 
 }  // namespace
 
@@ -46,8 +46,7 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
                         !are_alike(all, lots_, structures(view_.world(), there_now(), columns_.side()));
     if (result_.one_owner) settings_.market.trade = false;
     if (settings_.pace == Pace::lockstep) return;
-    planned_.emplace(scene_, all, columns_.side(),
-                     structure_outlook(settings_.bound, scene_.world.settings.dt));
+    planned_.emplace(scene_, columns_.side(), structure_outlook(settings_.bound, scene_.world.settings.dt));
 }
 
 void Coordinator::go_to(const RunState& from) {
@@ -117,12 +116,13 @@ std::uint32_t Coordinator::join(const JoinRequest& request) {
     } else if (started_) {
         catch_up(worker);
         ++epoch_;
-        send(members_, Members{members_});
+        send(members_, Members{members_, true});
         while (!orphans_.empty()) {
             const auto orphans = std::move(orphans_.back());
             orphans_.pop_back();
             share_out(orphans.second, orphans.first);
         }
+        send(members_, Members{members_});
     }
     return worker;
 }
@@ -216,7 +216,10 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
     for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = owner;
     for (const Group& group : groups(bodies)) {
         ++epoch_;
-        for (const int body : group.bodies) bodies_[static_cast<std::size_t>(body)].epoch = epoch_;
+        for (const int body : group.bodies) {
+            Body& b = bodies_[static_cast<std::size_t>(body)];
+            b.epoch = epoch_, b.asked_to = kApplication;
+        }
         Ownership message = ownership(group);
         message.from = from;
         message.traded = handed && handed->to == owner;
@@ -234,10 +237,11 @@ std::vector<int> Coordinator::there_now() const {
     return there;
 }
 
-// Now, soon, and as planned.
-std::vector<std::vector<int>> Coordinator::structures_of(const std::vector<int>& bodies) const {
-    std::vector<std::vector<int>> found = structures(
-        view_.world(), bodies, columns_.side(), structure_outlook(settings_.bound, scene_.world.settings.dt));
+// Now or soon, or once events have completed them.
+std::vector<std::vector<int>> Coordinator::flat_structures_now() const {
+    std::vector<std::vector<int>> found =
+        flat_structures(view_.world(), there_now(), columns_.side(),
+                        structure_outlook(settings_.bound, scene_.world.settings.dt));
     planned_->add_unfinished(view_.world().bodies(), found);
     return found;
 }
@@ -246,7 +250,12 @@ std::vector<std::vector<int>> Coordinator::structures_of(const std::vector<int>&
 std::vector<std::vector<int>> Coordinator::whole_lots() const {
     if (settings_.pace == Pace::lockstep) return lots_;
     std::vector<int> first(lots_.size());
-    if (!result_.one_owner) first = joined_by(structures_of(there_now()), lots_);
+    if (!result_.one_owner) {
+        std::vector<std::vector<int>> whole = flat_structures_now();
+        for (std::vector<int>& some : structures(view_.world(), there_now(), columns_.side()))
+            whole.push_back(std::move(some));
+        first = joined_by(whole, lots_);
+    }
     std::vector<std::vector<int>> lots(lots_.size());
     for (std::size_t i = 0; i < lots_.size(); ++i) {
         std::vector<int>& lot = lots[static_cast<std::size_t>(first[i])];
@@ -352,13 +361,11 @@ void Coordinator::tell_ready() {
     observer_->ready(view_.step(), view_.world());
 }
 
-// Structures that form while several own them: whoever has most of one is to have all of it. What is not flat lies as well
-// where several hold it.
+// Flat structures that form while several own them: whoever has most of one is to have all of it. Balls rest as well with
+// several owners.
 void Coordinator::gather() {
     if (result_.one_owner || members_.size() < 2 || view_.step() % kGatherEvery != 0) return;
-    std::vector<int> flat = there_now();
-    std::erase_if(flat, [this](int body) { return !is_flat(view_.world().definition(body)); });
-    const std::vector<std::vector<int>> found = structures_of(flat);
+    const std::vector<std::vector<int>> found = flat_structures_now();
     if (found.empty()) return;
     const std::vector<int> first = joined_by(found, lots_);
     std::map<int, std::map<std::uint32_t, std::vector<std::uint32_t>>> owners;  // bodies of each
@@ -376,7 +383,7 @@ void Coordinator::gather() {
 
 // Unless it was asked not long ago: a sale takes some steps.
 void Coordinator::ask_for(std::uint32_t from, std::vector<std::uint32_t>&& bodies, std::uint32_t to) {
-    const std::uint64_t patience = kGatherPatience + 2 * static_cast<std::uint64_t>(settings_.bound);
+    const std::uint64_t patience = gather_patience(settings_.bound);
     std::erase_if(bodies, [&](std::uint32_t body) {
         Body& b = bodies_[body];
         if (!view_.clock().moves_at(static_cast<int>(body), view_.step()) ||

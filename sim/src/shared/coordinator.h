@@ -108,7 +108,7 @@ private:
     [[nodiscard]] bool fits(std::uint32_t worker, const std::vector<WorldRecord>& records) const;
     [[nodiscard]] bool fits(const std::vector<Mishap>& mishaps) const;
     [[nodiscard]] bool owns_constraint(std::uint32_t worker, int constraint) const;
-    [[nodiscard]] bool asked_for(const Offer& offer) const;
+    [[nodiscard]] bool asked_for(std::uint32_t worker, const Offer& offer) const;
     [[nodiscard]] bool own_contacts(std::uint32_t worker, const StateMessage& message) const;
     static void publish(Body& body, const WorldRecord& record, std::uint64_t step);
 
@@ -117,7 +117,7 @@ private:
     [[nodiscard]] std::vector<int> owned_by(std::uint32_t worker) const;
     [[nodiscard]] std::vector<std::vector<int>> whole_lots() const;
     [[nodiscard]] std::vector<int> there_now() const;
-    [[nodiscard]] std::vector<std::vector<int>> structures_of(const std::vector<int>& bodies) const;
+    [[nodiscard]] std::vector<std::vector<int>> flat_structures_now() const;
     [[nodiscard]] std::vector<Eigen::Vector3d> places(const std::vector<std::vector<int>>& lots) const;
     [[nodiscard]] std::vector<Group> groups(const std::vector<int>& bodies) const;
     /// sold: by this handover.

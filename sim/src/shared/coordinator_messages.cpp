@@ -79,8 +79,11 @@ void Coordinator::take_message(const MessageHeader& header, std::span<const std:
     if (auto* update = std::get_if<UpdateMessage>(&message)) return take_update(header, bytes, *update);
     if (auto* handover = std::get_if<Handover>(&message)) return take_handover(header, std::move(*handover));
     if (const auto* offer = std::get_if<Offer>(&message)) {
-        if (offer->gathers && !asked_for(*offer))
-            return refuse(worker, "found bodies for a structure that nobody asked for");
+        if (offer->gathers && !asked_for(worker, *offer)) {  // not any more, or never: declined
+            const OfferAnswer no{worker, offer->number, false};
+            queue_.push_back({{worker}, shared(encode({offer->to, epoch_, view_.step()}, no))});
+            return;
+        }
         if (is_member(offer->to)) ++senders_[offer->to].offered;
         return take_dealing(header, bytes, offer->to);
     }
@@ -156,9 +159,10 @@ bool Coordinator::fits(const std::vector<Mishap>& mishaps) const {
     });
 }
 
-bool Coordinator::asked_for(const Offer& offer) const {
+// Since its bodies last changed owners.
+bool Coordinator::asked_for(std::uint32_t worker, const Offer& offer) const {
     return std::ranges::all_of(offer.bodies, [&](std::uint32_t body) {
-        return body < bodies_.size() && bodies_[body].asked_at > 0 && bodies_[body].asked_to == offer.to;
+        return owns(worker, body) && bodies_[body].asked_to == offer.to;
     });
 }
 

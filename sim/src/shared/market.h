@@ -25,7 +25,7 @@ namespace sim {
 /// border to the buyer shorter, or longer by the least.
 ///
 /// Departures: an offer makes the buyer slower than the slower of the seller and the average by no more than the dead band;
-/// a buyer that would become slower declines; sold work counts for the buyer at once, and reports written before the
+/// a buyer that would become slower declines (not what the application asked for, see Gather); sold work counts for the buyer at once, and reports written before the
 /// registration (older epoch) are ignored, otherwise stale figures would sell the same work twice. Trade is
 /// free while somebody owns nothing, or once a worker has been far above the average for some steps, until it
 /// is near it. Else those above the average take turns, the slowest first, every 25 steps (more only for bounds above
@@ -51,7 +51,7 @@ public:
     [[nodiscard]] bool wants_to_sell() const;
     /// An offer of some of own lots, which are all that this worker has; none if no lot fits.
     [[nodiscard]] std::optional<Offer> make_offer(Holdings holdings);
-    [[nodiscard]] bool is_selling() const { return sale_ != Sale::none; }
+    [[nodiscard]] bool is_selling() const { return sale_ != Sale::none; }  ///< an offer is under way
     /// An offer of these own bodies to a member, whatever they cost there.
     [[nodiscard]] std::optional<Offer> make_offer(const Gather& asked);
     void answered(std::uint32_t worker, const OfferAnswer& answer);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "shared/structures.h"
+
 namespace sim {
 namespace {
 
@@ -27,7 +29,10 @@ SharedWorldWorker::SharedWorldWorker(const SceneMessage& scene)
       exchange_(scene.settings.pace == Pace::lockstep ? make_lockstep_exchange(scene)
                                                       : make_bounded_exchange(scene)),
       market_(scene.worker, scene.settings.market, scene.settings.bound),
-      bounded_(scene.settings.pace == Pace::bounded) {
+      bounded_(scene.settings.pace == Pace::bounded),
+      // The step of the application's view is behind this worker's by the bound and one at most.
+      forgets_after_(gather_patience(scene.settings.bound) +
+                     static_cast<std::uint64_t>(scene.settings.bound) + 1) {
     for (const WorldEvent& event : scene.scene.events)
         if (!event.slowing.empty()) events_.push_back(event);
 }
@@ -104,9 +109,14 @@ void SharedWorldWorker::take_message(const MessageHeader& header, OfferAnswer&& 
     handover_step_ = header.step + 1;
 }
 
+// What was asked for last counts.
 void SharedWorldWorker::take_message(const MessageHeader& header, Gather&& message) {
-    (void)header;
-    gathers_.push_back(std::move(message));
+    for (Asked& before : gathers_)
+        std::erase_if(before.what.bodies, [&message](std::uint32_t body) {
+            return std::ranges::find(message.bodies, body) != message.bodies.end();
+        });
+    std::erase_if(gathers_, [](const Asked& asked) { return asked.what.bodies.empty(); });
+    gathers_.push_back({header.step, std::move(message)});
 }
 
 void SharedWorldWorker::take_message(const MessageHeader& header, EndOfRun&& message) {
@@ -203,16 +213,17 @@ void SharedWorldWorker::trade() {
     if (const std::optional<Offer> offer = make_offer()) send(*offer);
 }
 
-// What was asked for first.
+// What was asked for comes before what is dear.
 std::optional<Offer> SharedWorldWorker::make_offer() {
     while (!gathers_.empty() && !market_.is_selling()) {
-        Gather asked = std::move(gathers_.front());
+        Asked asked = std::move(gathers_.front());
         gathers_.pop_front();
+        if (exchange_->steps_done() > asked.step + forgets_after_) continue;
         const World& world = exchange_->world();
-        std::erase_if(asked.bodies, [&world](std::uint32_t body) {
+        std::erase_if(asked.what.bodies, [&world](std::uint32_t body) {
             return body >= static_cast<std::uint32_t>(world.bodies()) || !world.own(static_cast<int>(body));
         });
-        if (const std::optional<Offer> offer = market_.make_offer(asked)) return offer;
+        if (const std::optional<Offer> offer = market_.make_offer(asked.what)) return offer;
     }
     if (!market_.wants_to_sell()) return std::nullopt;
     return market_.make_offer(exchange_->holdings());

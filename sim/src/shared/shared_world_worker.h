@@ -82,6 +82,7 @@ private:
     std::unique_ptr<ReplicaProtocol> exchange_;
     Market market_;
     bool bounded_;
+    std::uint64_t forgets_after_;  // what it was asked for [steps]
     std::vector<Outgoing> queue_;
     std::uint32_t epoch_ = 0;
     int lead_ = 0;  // at the start of the step
@@ -91,7 +92,11 @@ private:
     std::optional<std::uint64_t> offered_at_;  // step
     // Whose offers were accepted and whose bodies have not come; the step up to which this worker goes on.
     std::map<std::uint32_t, std::uint64_t> sellers_;
-    std::deque<Gather> gathers_;  // to be offered
+    struct Asked {
+        std::uint64_t step;  // of the application's view
+        Gather what;
+    };
+    std::deque<Asked> gathers_;  // to be offered
     struct Deferred {
         MessageHeader header;
         WorkerMessage message;

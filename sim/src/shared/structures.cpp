@@ -14,18 +14,20 @@ namespace {
 
 constexpr double kSlowShare = 0.25;        // of sqrt(g size)
 constexpr double kBeside = 0.02;           // of the size
-constexpr double kMayMeet = 0.1;           // likewise, of paths: bodies that land turn a little
 constexpr std::size_t kOwnPerForeign = 4;  // bodies of a structure for each other that touches it
 
+constexpr double kMayMeet = 0.1;        // of the size: who lands turns, and goes a little aside
 constexpr double kFlatExponent = 0.5;   // up to this one a side has a flat middle
 constexpr double kUpright = 0.966;      // cosine of 15 degrees
 constexpr double kUprightShare = 0.75;  // of a structure's bodies, of those that may be more
-constexpr int kMostAhead = 8, kOutlookSteps = 8;
+constexpr int kMostAhead = 8, kOutlookSteps = 8, kLooks = 8;
 
 struct Candidate {
     int body;
-    bool own, slow, flat, upright;
-    Eigen::AlignedBox3d box, path;  // path: where it will be, too
+    bool own, slow, upright;
+    Eigen::AlignedBox3d box;
+    Eigen::AlignedBox3d path = {};  // boxes of all times that are looked at
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
 };
 
 Eigen::AlignedBox3d box_around(const World& world, int body, const WorldBodyState& state) {
@@ -62,63 +64,126 @@ bool is_flat(const WorldBody& body) {
     return std::min(body.shape.base.e1, body.shape.base.e2) <= kFlatExponent;
 }
 
+std::uint64_t gather_patience(int bound) {
+    return static_cast<std::uint64_t>(2 * (kOutlookSteps + bound));
+}
+
 double structure_outlook(int bound, double dt) {
     return dt * (kOutlookSteps + 2 * std::min(bound, kMostAhead));
 }
 
-std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies, double size,
-                                         double within_s, std::span<const OthersBody> others) {
-    const Eigen::Vector3d& gravity = world.settings().gravity;
-    const Eigen::Vector3d up = -gravity.normalized();
-    const double slow_speed = kSlowShare * std::sqrt(gravity.norm() * size);
-    std::vector<Candidate> candidates;
-    const auto add = [&](int body, bool own, const WorldBodyState& state) {
-        const bool flat = within_s > 0 && slow_speed > 0 && is_flat(world.definition(body));
-        const bool slow = own && state.velocity.norm() < slow_speed;
-        if ((!slow && !flat) || !state.position.allFinite() || !state.velocity.allFinite()) return;
-        const bool upright =
-            is_flat(world.definition(body)) && is_upright(world.definition(body), state.orientation, up);
-        Candidate c{body, own, slow, flat, upright, box_around(world, body, state), {}};
-        c.path = c.box;
-        if (flat) c.path.extend(c.box.translated(within_s * (state.velocity + within_s / 2 * gravity)));
-        candidates.push_back(c);
-    };
-    for (const int body : bodies) add(body, true, world.state(body));
-    for (const OthersBody& other : others) add(other.body, false, other.state);
+namespace {
+
+double slow_speed(const World& world, double size) {
+    return kSlowShare * std::sqrt(world.settings().gravity.norm() * size);
+}
+
+/// Joins what belongs together. Paths that are further apart along x than `near` are not asked for.
+template <typename Together>
+DisjointSets join(const World& world, std::vector<Candidate>& candidates, double near,
+                  const Together& together) {
     std::ranges::sort(candidates, {}, [](const Candidate& c) { return std::pair(c.path.min().x(), c.body); });
     DisjointSets sets(static_cast<std::size_t>(world.bodies()));
-    const double beside = kBeside * size, near = kMayMeet * size;
-    const auto belong_together = [&](const Candidate& a, const Candidate& b) {
-        return (a.slow && b.slow && a.box.squaredExteriorDistance(b.box) <= beside * beside) ||
-               (a.flat && b.flat && a.path.squaredExteriorDistance(b.path) <= near * near);
-    };
     for (std::size_t i = 0; i < candidates.size(); ++i)
         for (std::size_t j = i + 1; j < candidates.size(); ++j) {
             if (candidates[j].path.min().x() > candidates[i].path.max().x() + near) break;
-            if (belong_together(candidates[i], candidates[j]))
-                sets.join(candidates[i].body, candidates[j].body);
+            if (together(candidates[i], candidates[j])) sets.join(candidates[i].body, candidates[j].body);
         }
-    struct Found {
-        std::vector<int> own;
-        std::size_t all = 0, upright = 0;
-        std::set<int> touching;  // bodies of others
-    };
+    return sets;
+}
+
+struct Found {
+    std::vector<int> own;
+    std::size_t all = 0, upright = 0;
+    [[nodiscard]] bool is_structure() const {
+        const bool stands = static_cast<double>(upright) >= kUprightShare * static_cast<double>(all);
+        return own.size() >= 2 && all <= (stands ? kMostStanding : kMostInStructure);
+    }
+};
+
+std::map<int, Found> by_first(DisjointSets& sets, const std::vector<Candidate>& candidates) {
     std::map<int, Found> found;
     for (const Candidate& c : candidates) {
         Found& of = found[sets.first(c.body)];
         if (c.own) of.own.push_back(c.body);
         ++of.all, of.upright += c.upright;
     }
-    for (const CrossImpulse& c : world.cross_impulses()) found[sets.first(c.own)].touching.insert(c.ghost);
-    std::vector<std::vector<int>> result;
-    for (auto& [first, of] : found) {
-        const bool stands = static_cast<double>(of.upright) >= kUprightShare * static_cast<double>(of.all);
-        if (of.own.size() < 2 || of.all > (stands ? kMostStanding : kMostInStructure) ||
-            kOwnPerForeign * of.touching.size() > of.own.size())
-            continue;
-        std::ranges::sort(of.own);
-        result.push_back(std::move(of.own));
+    for (auto& [first, of] : found) std::ranges::sort(of.own);
+    return found;
+}
+
+/// Whether two come near each other: across gravity at the same time, along it whenever, as who falls first may be stopped.
+bool come_near(const Candidate& a, const Candidate& b, const Eigen::Vector3d& up, double within_s,
+               double size) {
+    const auto along = [&](const Eigen::AlignedBox3d& box) {
+        const double middle = up.dot(box.center()), half = up.cwiseAbs().dot(box.sizes()) / 2;
+        return std::pair(middle - half, middle + half);
+    };
+    const auto [low_a, high_a] = along(a.path);
+    const auto [low_b, high_b] = along(b.path);
+    if (low_a > high_b + kMayMeet * size || low_b > high_a + kMayMeet * size) return false;
+    const double near = (a.slow && b.slow ? kBeside : kMayMeet) * size;
+    for (int k = 0; k <= kLooks; ++k) {
+        Eigen::Vector3d apart =
+            b.box.center() - a.box.center() + within_s * k / kLooks * (b.velocity - a.velocity);
+        apart -= up.dot(apart) * up;
+        const Eigen::Vector3d gap = apart.cwiseAbs() - (a.box.sizes() + b.box.sizes()) / 2;
+        if (gap.cwiseMax(0).norm() <= near) return true;
     }
+    return false;
+}
+
+}  // namespace
+
+std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies, double size) {
+    const Eigen::Vector3d up = -world.settings().gravity.normalized();
+    std::vector<Candidate> slow;
+    for (const int body : bodies) {
+        const WorldBodyState state = world.state(body);
+        if (!(state.velocity.norm() < slow_speed(world, size)) || !state.position.allFinite()) continue;
+        const WorldBody& definition = world.definition(body);
+        slow.push_back({body, true, true,
+                        is_flat(definition) && is_upright(definition, state.orientation, up),
+                        box_around(world, body, state)});
+        slow.back().path = slow.back().box;
+    }
+    const double beside = kBeside * size;
+    DisjointSets sets = join(world, slow, beside, [beside](const Candidate& a, const Candidate& b) {
+        return a.box.squaredExteriorDistance(b.box) <= beside * beside;
+    });
+    std::map<int, std::set<int>> touching;  // bodies of others, each
+    for (const CrossImpulse& c : world.cross_impulses()) touching[sets.first(c.own)].insert(c.ghost);
+    std::vector<std::vector<int>> result;
+    for (auto& [first, of] : by_first(sets, slow))
+        if (of.is_structure() && kOwnPerForeign * touching[first].size() <= of.own.size())
+            result.push_back(std::move(of.own));
+    return result;
+}
+
+std::vector<std::vector<int>> flat_structures(const World& world, std::span<const int> bodies, double size,
+                                              double within_s, std::span<const OthersBody> others) {
+    const Eigen::Vector3d& gravity = world.settings().gravity;
+    if (gravity.isZero()) return {};
+    const Eigen::Vector3d up = -gravity.normalized();
+    std::vector<Candidate> flat;
+    const auto add = [&](int body, bool own, bool asleep, const WorldBodyState& state) {
+        const WorldBody& definition = world.definition(body);
+        if (!is_flat(definition) || !state.position.allFinite() || !state.velocity.allFinite()) return;
+        flat.push_back({body, own, state.velocity.norm() < slow_speed(world, size),
+                        is_upright(definition, state.orientation, up), box_around(world, body, state)});
+        Candidate& c = flat.back();
+        c.path = c.box, c.velocity = state.velocity;
+        c.path.extend(c.box.translated(within_s * state.velocity));
+        if (!asleep) c.path.extend(c.box.translated(within_s * (state.velocity + within_s / 2 * gravity)));
+    };
+    for (const int body : bodies) add(body, true, world.asleep(body), world.state(body));
+    for (const OthersBody& other : others) add(other.body, false, other.asleep, other.state);
+    DisjointSets sets = join(world, flat, kMayMeet * size, [&](const Candidate& a, const Candidate& b) {
+        return come_near(a, b, up, within_s, size);
+    });
+    std::vector<std::vector<int>> result;
+    for (auto& [first, of] : by_first(sets, flat))
+        if (of.is_structure()) result.push_back(std::move(of.own));
     return result;
 }
 
@@ -128,13 +193,13 @@ World with_later(const WorldScene& scene) {
     return world;
 }
 
-PlannedStructures::PlannedStructures(const WorldScene& scene, const World& all, double size,
-                                     double within_s) {
+PlannedStructures::PlannedStructures(const WorldScene& scene, double size, double within_s) {
     if (scene.later.empty()) return;
-    std::vector<int> flat;
+    const World all = with_later(scene);
+    std::vector<int> moving;
     for (int i = 0; i < all.bodies(); ++i)
-        if (all.definition(i).moves() && is_flat(all.definition(i))) flat.push_back(i);
-    planned_ = structures(all, flat, size, within_s);
+        if (all.definition(i).moves()) moving.push_back(i);
+    planned_ = flat_structures(all, moving, size, within_s);
     const auto first_later = static_cast<int>(scene.world.bodies.size());
     std::erase_if(planned_, [&](const std::vector<int>& some) {
         return some.back() < first_later || come_to_one_place(all, some);

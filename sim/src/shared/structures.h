@@ -6,37 +6,41 @@
 
 namespace sim {
 
-/// Most bodies of a structure; of one that stands, three quarters of it flat and upright, as it was built.
+/// Most bodies of a structure: 256 if at least three quarters of them are flat and upright, as in a wall, else 64.
 constexpr std::size_t kMostInStructure = 64, kMostStanding = 256;
 
-/// A body of another owner, as last told.
-struct OthersBody {
-    int body;
-    WorldBodyState state;
-};
-
-/// Structures among an owner's bodies, for bounded pace: bodies side by side or on each other that are slow, kMostInStructure
-/// or kMostStanding at most, touched by at most a quarter as many of other owners' bodies. They stay on one worker: what several hold keeps swaying by some
-/// centimetres a second, which a heap may and what has to stand may not.
+/// Structures among an owner's bodies, for bounded pace: bodies side by side or on each other that are slow, touched by at most
+/// a quarter as many of other owners' bodies. They stay on one worker: what several hold keeps swaying by some centimetres a
+/// second, which a heap may and what has to stand may not.
 ///
 /// `size`: mean diameter of bodies [m]. Slow: by less than a quarter of sqrt(g size), the speed of a fall by half of it. Side
 /// by side: boxes around the bodies' rest shapes, along the world's axes, are at most 2 % of it apart. As of the end of the
-/// world's last step. Each has two bodies or more, ascending; without gravity there are none. O(n log n) but for bodies one behind the other along x.
-/// `bodies` move and are there.
-///
-/// within_s: bodies with flat sides (is_flat) also belong together where they will come to lie on or beside each other: where
-/// the boxes that they pass through in this time, as they move now and fall, are at most 10 % of the size apart. So what falls into place has one
-/// owner before it meets. `others`: bodies of other owners that count with these then, and are not in the result.
+/// world's last step. Each has two bodies or more, ascending; without gravity there are none. O(n log n) but for bodies one
+/// behind the other along x. `bodies` move and are there.
 [[nodiscard]] std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies,
-                                                       double size, double within_s = 0,
-                                                       std::span<const OthersBody> others = {});
+                                                       double size);
+
+/// A body of another owner, where it is by now as far as is known.
+struct OthersBody {
+    int body;
+    bool asleep;
+    WorldBodyState state;
+};
+/// What flat bodies (is_flat) build, so that it has one owner before they meet: those belong together that come near each
+/// other within a time [s], as they move now: across gravity at the same time, along gravity whenever, as who falls first may
+/// be stopped. Near: at most 10 % of the size apart, across gravity 2 % if both are slow. `others` count, and are not in the
+/// result. The rest as for structures.
+[[nodiscard]] std::vector<std::vector<int>> flat_structures(const World& world, std::span<const int> bodies,
+                                                            double size, double within_s,
+                                                            std::span<const OthersBody> others = {});
+
 /// All bodies of a scene before their first step, also those to come.
 [[nodiscard]] World with_later(const WorldScene& scene);
-/// Structures of flat bodies that events complete, by where the bodies of `all` (with_later) are at first: those with bodies to
-/// come, none of them at the place of another, as of bodies that are poured.
+/// Flat structures that events complete, by where all bodies are at first: those with bodies to come, none of them at the place
+/// of another, as of bodies that are poured.
 class PlannedStructures {
 public:
-    PlannedStructures(const WorldScene& scene, const World& all, double size, double within_s);
+    PlannedStructures(const WorldScene& scene, double size, double within_s);
     /// Adds those of which some bodies have not come to a world of so many.
     void add_unfinished(int bodies, std::vector<std::vector<int>>& structures) const;
 
@@ -47,6 +51,8 @@ private:
 [[nodiscard]] bool is_flat(const WorldBody& body);
 /// What a run of this bound takes as within_s [s]: workers may be so far apart, and a body takes some steps to change owners.
 [[nodiscard]] double structure_outlook(int bound, double dt);
+/// Steps after which the application asks again for bodies of a structure (Gather); who was asked forgets it by then.
+[[nodiscard]] std::uint64_t gather_patience(int bound);
 
 /// Factors by which bodies that are shared out may differ.
 constexpr double kMostUnlikeMass = 4, kMostUnlikeLength = 3;

@@ -15,7 +15,7 @@ struct MovingBody {
     bool pushed = false;   ///< forces act in the next step: the user's, or of bodies elsewhere
     bool watched = false;  ///< impulses of other own bodies that move are summed in `given`
     bool was_given = false;
-    bool arrived = false;   ///< pairs: own since the last step
+    bool arrived = false;   ///< pairs: became own after the last step
     bool at_limit = false;  ///< its deformation was held in the last substep: contacts find its modes stiff
     bool limited_now = false;  ///< in any substep of the step that is being done
     int still_steps = 0;       ///< since it was faster than the sleep speed, at most kMostStillSteps

@@ -114,8 +114,15 @@ TEST(Offers, ForAStructureThatNobodyAskedForReachNobody) {
     const std::uint32_t own = meeting.owner(0) == 0 ? 0 : 1;
     for (const bool gathers : {true, false}) {
         meeting.take(0, encode({0, 0, 0}, Offer{1, 1, {own}, {0.1F}, gathers}));
-        EXPECT_EQ(meeting.outgoing().size(), gathers ? 0u : 1u);
-        EXPECT_EQ(meeting.result().refused_messages, 1u);
+        const std::vector<Coordinator::Outgoing> sent = meeting.outgoing();
+        ASSERT_EQ(sent.size(), 1u);
+        EXPECT_EQ(sent[0].to, std::vector<std::uint32_t>{gathers ? 0u : 1u});
+        const DecodedMessage message = decode_message(*sent[0].bytes);
+        const auto* answer = std::get_if<OfferAnswer>(&message.message);
+        ASSERT_EQ(answer != nullptr, gathers);
+        if (!answer) continue;
+        EXPECT_EQ(message.header.worker, 1u);  // as if that one had declined: the seller goes on
+        EXPECT_FALSE(answer->accepted);
     }
 }
 

@@ -128,33 +128,54 @@ TEST(Structures, AreSlowSmallAndHardlyTouchedByOthers) {
 }
 
 // Boxes one above the other: within 0.2 s each falls by 0.2 m, to where the next one is.
-TEST(Structures, AreAlsoFlatBodiesThatFallIntoPlace) {
+TEST(Structures, OfFlatBodiesAreAlsoThoseThatFallIntoPlace) {
     sim::WorldDefinition d = on_floor();
     for (int i = 0; i < 4; ++i) d.bodies.push_back(box({0, 1 + 1.2 * i, 0}, {0.5, 0.5, 0.5}));
     d.bodies.push_back(box({1.15, 1, 0}, {0.5, 0.5, 0.5}));  // beside them, and falls so
     const auto found = [&](double within_s) {
         const sim::World world(d);
-        return sim::structures(world, all_of(world), 1, within_s);
+        return sim::flat_structures(world, all_of(world), 1, within_s);
     };
-    EXPECT_TRUE(found(0).empty());
     EXPECT_TRUE(found(0.1).empty());  // by 0.05 m
     EXPECT_EQ(found(0.2), (Bodies{{0, 1, 2, 3}}));
-    d.bodies[4].velocity = {-0.6, 0, 0};
+    d.bodies[4].velocity = {-0.8, 0, 0};
     EXPECT_EQ(found(0.2), (Bodies{{0, 1, 2, 3, 4}}));
     for (sim::WorldBody& body : d.bodies) body.velocity.y() -= 10;  // however fast
     EXPECT_EQ(found(0.2), (Bodies{{0, 1, 2, 3, 4}}));
     // Others' bodies count, but are not given.
     const sim::World world(d);
     const std::vector<int> own = {0, 1};
-    const std::vector<sim::OthersBody> others = {{2, world.state(2)}, {3, world.state(3)}};
-    EXPECT_EQ(sim::structures(world, own, 1, 0.2, others), (Bodies{{0, 1}}));
-    std::vector<sim::OthersBody> many(sim::kMostStanding - 1, others[0]);
-    EXPECT_TRUE(sim::structures(world, own, 1, 0.2, many).empty());
+    const std::vector<sim::OthersBody> others = {{2, false, world.state(2)}, {3, false, world.state(3)}};
+    EXPECT_EQ(sim::flat_structures(world, own, 1, 0.2, others), (Bodies{{0, 1}}));
+    const std::vector<sim::OthersBody> many(sim::kMostStanding - 1, others[0]);
+    EXPECT_TRUE(sim::flat_structures(world, own, 1, 0.2, many).empty());
     // Nothing can stand on balls. Drums stand on their ends, and lie on their sides.
     for (sim::WorldBody& body : d.bodies) body.shape.base.e1 = body.shape.base.e2 = 1;
     EXPECT_TRUE(found(0.2).empty());
     for (sim::WorldBody& body : d.bodies) body.shape.base.e1 = 0.1;
     EXPECT_EQ(found(0.2), (Bodies{{0, 1, 2, 3, 4}}));
+    d.settings.gravity.setZero();
+    EXPECT_TRUE(found(0.2).empty());
+}
+
+// Bricks on a floor, a twentieth of their size apart, and one that flies past their corner: it is never near.
+TEST(Structures, OfFlatBodiesAreNotThoseThatLieApartOrPassBy) {
+    sim::WorldDefinition d = on_floor();
+    for (int i = 0; i < 9; ++i)
+        d.bodies.push_back(box({1.05 * (i % 3), 0.5, 1.05 * (i / 3)}, {0.5, 0.5, 0.5}));
+    d.bodies.push_back(box({6, 0.5, -2}, {0.5, 0.5, 0.5}));
+    const auto found = [&] {
+        const sim::World world(d);
+        return sim::flat_structures(world, all_of(world), 1, 0.2);
+    };
+    EXPECT_TRUE(found().empty());
+    d.bodies.back().velocity = {40, 0, 40};  // away from them
+    EXPECT_TRUE(found().empty());
+    d.bodies.back().world_from_body.translation() = Eigen::Vector3d(-6, 0.5, 4);
+    d.bodies.back().velocity = {40, 0, 40};  // passes at 4 m and more
+    EXPECT_TRUE(found().empty());
+    d.bodies.back().velocity = {40, 0, -20};  // right at them
+    EXPECT_EQ(found().size(), 1u);
 }
 
 // A gate whose beam comes last; a shower of boxes from one place is none.
@@ -165,7 +186,7 @@ TEST(Structures, ThatEventsCompleteArePlannedUntilAllHasCome) {
     scene.world.bodies.pop_back();
     for (const bool shower : {false, true}) {
         if (shower) scene.later.assign(3, box({0, 9, 0}, {0.5, 0.5, 0.5}));
-        const sim::PlannedStructures planned(scene, sim::with_later(scene), 1, 0.2);
+        const sim::PlannedStructures planned(scene, 1, 0.2);
         for (const int there : {4, 5}) {
             Bodies found = {{7}};
             planned.add_unfinished(there, found);
@@ -310,6 +331,30 @@ TEST(Structures, ThatFormOutOfStepAreGatheredByOneWorkerAndStandAsInOneProcess) 
                 }
             }
     EXPECT_GE(gathered, 3);  // others have one owner from the start
+}
+
+// The application sees the wall, and so does its owner, who would else sell it piece by piece, and get it back.
+TEST(Structures, AmongBallsAreNotSoldAndGatheredAgainForEver) {
+    sim::WorldScene scene;
+    scene.world = on_floor();
+    for (const double side : {-1.0, 1.0}) {
+        scene.world.planes.push_back({Eigen::Vector3d(side, 0, 0), -1.1});
+        scene.world.planes.push_back({Eigen::Vector3d(0, 0, side), -0.7});
+    }
+    for (int i = 0; i < 12; ++i)
+        scene.world.bodies.push_back(
+            box({0.41 * (i % 4) - 0.6 + 0.2 * (i / 4 % 2), 0.1 + 0.2 * (i / 4), 0}, {0.2, 0.1, 0.1}, 500));
+    for (int i = 0; i < 80; ++i)
+        scene.world.bodies.push_back(
+            ball({-0.9 + 0.23 * (i % 8), 0.12 + 0.23 * (i / 16), i / 8 % 2 ? 0.35 : -0.35},
+                 sim::Fidelity::rigid, 0.1, 500));
+    std::uint64_t trades[2];
+    for (const int late : {0, 1}) {
+        Moved record;
+        trades[late] =
+            sim::simulate_processors(scene, bounded(late ? 1200 : 600, 4), processors(3), record).trades;
+    }
+    EXPECT_LE(trades[1], trades[0] + 4);  // balls may still be sold; the wall went to and fro twelve times
 }
 
 // Each worker would answer for the whole of the board, some steps late: it was thrown up at 50 m/s and more.
