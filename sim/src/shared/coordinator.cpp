@@ -372,27 +372,29 @@ void Coordinator::gather() {
     for (std::size_t i = 0; i < lots_.size(); ++i)
         for (const int body : lots_[i])
             owners[first[i]][owner(body)].push_back(static_cast<std::uint32_t>(body));
-    for (auto& [lot, shares] : owners) {
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::uint32_t>> asked;  // from, to
+    for (const auto& [lot, shares] : owners) {
         if (shares.size() < 2) continue;
         const auto most =
             std::ranges::max_element(shares, {}, [](const auto& share) { return share.second.size(); });
-        for (auto& [from, bodies] : shares)
-            if (from != most->first) ask_for(from, std::move(bodies), most->first);
+        if (!is_member(most->first)) continue;
+        for (const auto& [from, bodies] : shares)
+            if (from != most->first && is_member(from))
+                std::ranges::copy_if(bodies, std::back_inserter(asked[{from, most->first}]),
+                                     [&](std::uint32_t body) { return ask_for(body, most->first); });
     }
+    for (auto& [who, bodies] : asked)
+        if (!bodies.empty()) send({who.first}, Gather{who.second, std::move(bodies)});
 }
 
 // Unless it was asked not long ago: a sale takes some steps.
-void Coordinator::ask_for(std::uint32_t from, std::vector<std::uint32_t>&& bodies, std::uint32_t to) {
-    const std::uint64_t patience = gather_patience(settings_.bound);
-    std::erase_if(bodies, [&](std::uint32_t body) {
-        Body& b = bodies_[body];
-        if (!view_.clock().moves_at(static_cast<int>(body), view_.step()) ||
-            (b.asked_at > 0 && view_.step() < b.asked_at + patience))
-            return true;
-        b.asked_at = view_.step(), b.asked_to = to;
+bool Coordinator::ask_for(std::uint32_t body, std::uint32_t to) {
+    Body& b = bodies_[body];
+    if (!view_.clock().moves_at(static_cast<int>(body), view_.step()) ||
+        (b.asked_at > 0 && view_.step() < b.asked_at + gather_patience(settings_.bound)))
         return false;
-    });
-    if (!bodies.empty() && is_member(from) && is_member(to)) send({from}, Gather{to, std::move(bodies)});
+    b.asked_at = view_.step(), b.asked_to = to;
+    return true;
 }
 
 // A body that came to a worker after its last step is published no more.

@@ -128,7 +128,7 @@ private:
     void tell_ready();
     void release();
     void gather();
-    void ask_for(std::uint32_t from, std::vector<std::uint32_t>&& bodies, std::uint32_t to);
+    [[nodiscard]] bool ask_for(std::uint32_t body, std::uint32_t to);
     void end(bool rest);
     void name_mishaps(DistributedResult& result) const;
     void go_to(const RunState& from);

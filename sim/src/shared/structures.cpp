@@ -58,22 +58,6 @@ bool come_to_one_place(const World& all, const std::vector<int>& bodies) {
     return false;
 }
 
-}  // namespace
-
-bool is_flat(const WorldBody& body) {
-    return std::min(body.shape.base.e1, body.shape.base.e2) <= kFlatExponent;
-}
-
-std::uint64_t gather_patience(int bound) {
-    return static_cast<std::uint64_t>(2 * (kOutlookSteps + bound));
-}
-
-double structure_outlook(int bound, double dt) {
-    return dt * (kOutlookSteps + 2 * std::min(bound, kMostAhead));
-}
-
-namespace {
-
 double slow_speed(const World& world, double size) {
     return kSlowShare * std::sqrt(world.settings().gravity.norm() * size);
 }
@@ -134,6 +118,18 @@ bool come_near(const Candidate& a, const Candidate& b, const Eigen::Vector3d& up
 }
 
 }  // namespace
+
+bool is_flat(const WorldBody& body) {
+    return std::min(body.shape.base.e1, body.shape.base.e2) <= kFlatExponent;
+}
+
+std::uint64_t gather_patience(int bound) {
+    return static_cast<std::uint64_t>(2 * (kOutlookSteps + bound));
+}
+
+double structure_outlook(int bound, double dt) {
+    return dt * (kOutlookSteps + 2 * std::min(bound, kMostAhead));
+}
 
 std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies, double size) {
     const Eigen::Vector3d up = -world.settings().gravity.normalized();

@@ -319,11 +319,15 @@ TEST(Structures, ThatFormOutOfStepAreGatheredByOneWorkerAndStandAsInOneProcess) 
                     end = killed < 0 ? result.elapsed_s : end;
                     EXPECT_EQ(result.steps, steps);
                     ASSERT_EQ(record.places.size(), 14u);
-                    for (int i = 0; i < 14; ++i)
-                        // What fell moved by a side and more.
-                        EXPECT_LT((record.places[std::size_t(i)] - expected.state(i).position).norm(),
-                                  0.25 * side)
-                            << i;
+                    for (int i = 0; i < 14; ++i) {
+                        const Eigen::Vector3d& place = record.places[std::size_t(i)];
+                        EXPECT_GT(place.y(), 0.4 * side) << i << " is in the floor";
+                        // What fell moved by a side and more. What a lost worker had goes on from rounded states, so where
+                        // bricks bounce it goes another way.
+                        if (killed < 0) {
+                            EXPECT_LT((place - expected.state(i).position).norm(), 0.25 * side) << i;
+                        }
+                    }
                     const auto owners = std::ranges::count_if(
                         record.own, [](const auto& worker) { return worker.second > 0; });
                     EXPECT_EQ(owners, 1);
