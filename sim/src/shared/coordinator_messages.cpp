@@ -161,7 +161,7 @@ bool Coordinator::fits(const std::vector<Mishap>& mishaps) const {
 
 // Since its bodies last changed owners.
 bool Coordinator::asked_for(std::uint32_t worker, const Offer& offer) const {
-    return std::ranges::all_of(offer.bodies, [&](std::uint32_t body) {
+    return !offer.bodies.empty() && std::ranges::all_of(offer.bodies, [&](std::uint32_t body) {
         return owns(worker, body) && bodies_[body].asked_to == offer.to;
     });
 }

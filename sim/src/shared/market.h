@@ -25,8 +25,9 @@ namespace sim {
 /// border to the buyer shorter, or longer by the least.
 ///
 /// Departures: an offer makes the buyer slower than the slower of the seller and the average by no more than the dead band;
-/// a buyer that would become slower declines (not what the application asked for, see Gather); sold work counts for the buyer at once, and reports written before the
-/// registration (older epoch) are ignored, otherwise stale figures would sell the same work twice. Trade is
+/// a buyer that would become slower declines (not what the application asked for, see Gather); sold work counts for the
+/// buyer at once, and reports written before the registration (older epoch) are ignored, otherwise stale figures would
+/// sell the same work twice. Trade is
 /// free while somebody owns nothing, or once a worker has been far above the average for some steps, until it
 /// is near it. Else those above the average take turns, the slowest first, every 25 steps (more only for bounds above
 /// 24), and sell one column, or several if they were above it when each of the two turns before this one began. Whose turn it is

@@ -112,16 +112,20 @@ TEST(Offers, ForAStructureThatNobodyAskedForReachNobody) {
     meeting.start();
     (void)meeting.outgoing();
     const std::uint32_t own = meeting.owner(0) == 0 ? 0 : 1;
-    for (const bool gathers : {true, false}) {
-        meeting.take(0, encode({0, 0, 0}, Offer{1, 1, {own}, {0.1F}, gathers}));
+    // Of a body, of none, and one as usual.
+    const std::vector<Offer> offers = {
+        {1, 1, {own}, {0.1F}, true}, {1, 2, {}, {}, true}, {1, 3, {own}, {0.1F}, false}};
+    for (const Offer& offer : offers) {
+        meeting.take(0, encode({0, 0, 0}, offer));
         const std::vector<Coordinator::Outgoing> sent = meeting.outgoing();
         ASSERT_EQ(sent.size(), 1u);
-        EXPECT_EQ(sent[0].to, std::vector<std::uint32_t>{gathers ? 0u : 1u});
+        EXPECT_EQ(sent[0].to, std::vector<std::uint32_t>{offer.gathers ? 0u : 1u});
         const DecodedMessage message = decode_message(*sent[0].bytes);
         const auto* answer = std::get_if<OfferAnswer>(&message.message);
-        ASSERT_EQ(answer != nullptr, gathers);
+        ASSERT_EQ(answer != nullptr, offer.gathers);
         if (!answer) continue;
         EXPECT_EQ(message.header.worker, 1u);  // as if that one had declined: the seller goes on
+        EXPECT_EQ(answer->number, offer.number);
         EXPECT_FALSE(answer->accepted);
     }
 }
