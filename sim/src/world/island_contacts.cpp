@@ -48,7 +48,7 @@ void IslandContacts::find_pair(const ContactScene& scene, const Manifold* before
     if (manifold.b >= kFirstPlane) {
         const WorldPlane& plane = scene.planes[static_cast<std::size_t>(manifold.b - kFirstPlane)];
         narrow_.plane(a, plane.normal, static_cast<float>(plane.normal.dot(a.position) - plane.offset),
-                      static_cast<float>((kSlop + kSlow) * smallest_half(a)), before, manifold);
+                      {static_cast<float>((kSlop + kSlow) * smallest_half(a)), before}, manifold);
     } else {
         const PosedBody& b = posed(scene, manifold.b);
         const double margin = (kSlop + kSlow) * std::min(smallest_half(a), smallest_half(b));

@@ -16,14 +16,15 @@ namespace {
 constexpr double kFrameTurn = 0.05;   // [rad]
 constexpr double kFastestRest = 0.1;  // slower approaches may be those of what rests [m/s]
 constexpr int kImpactSweeps = 30;
-constexpr float kSettled = 1e-6f;     // change of impulses in a sweep, share
-constexpr double kStandsStill = 0.1;  // of the smaller half extent, in what is left of the step
-constexpr double kTouches = 1e-3;     // of the smaller half extent: gap of what takes part in an impact
-constexpr int kPasses = 8;            // over a substep's impacts: of what rattles the rest does not rebound
-constexpr int kStrikeLevel = 2;       // so often a substep is halved for an impact, directly
-constexpr int kReflections = 200;     // of an impact
-constexpr float kRounding = 1e-6f;    // of speeds
-constexpr float kSlowest = 1e-4f;     // approach that is reflected, of the impact's first
+constexpr float kSettled = 1e-6f;  // change of impulses in a sweep, share
+// Of the smaller half extent: by so much surfaces that turn may leave the straight way in what is left of the step.
+constexpr double kStandsStill = 0.1;
+constexpr double kTouches = 1e-3;   // of the smaller half extent: gap of what takes part in an impact
+constexpr int kPasses = 8;          // over a substep's impacts: of what rattles the rest does not rebound
+constexpr int kStrikeLevel = 2;     // so often a substep is halved for an impact, directly
+constexpr int kReflections = 200;   // of an impact
+constexpr float kRounding = 1e-6f;  // of speeds
+constexpr float kSlowest = 1e-4f;   // approach that is reflected, of the impact's first
 
 double smallest_half(const BodyKind& kind) {
     return kind.definition.shape.base.semi_axes.minCoeff();
@@ -527,12 +528,13 @@ bool IslandSolver::goes_far(const ContactRows& c) const {
         if (side.body < 0) continue;
         const BodyKind& kind = *rows_of_[static_cast<std::size_t>(side.body)].body->kind;
         const float* y = y_.data() + side.y;
-        way +=
-            Eigen::Vector3d(y[3], y[4], y[5]).cwiseQuotient(kind.root_inertia).norm() * turn_reach_of(kind);
+        const double angle =
+            Eigen::Vector3d(y[3], y[4], y[5]).cwiseQuotient(kind.root_inertia).norm() * (remaining_ + h_);
+        way += angle * angle / 2 * turn_reach_of(kind);
         size = std::min(size, smallest_half(kind));
     }
-    if (!is_rigid(c)) way += static_cast<double>(std::hypot(v[1], v[2]));
-    return way * (remaining_ + h_) > kStandsStill * size;
+    if (!is_rigid(c)) way += static_cast<double>(std::hypot(v[1], v[2])) * (remaining_ + h_);
+    return way > kStandsStill * size;
 }
 
 }  // namespace sim

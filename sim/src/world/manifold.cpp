@@ -36,12 +36,13 @@ Lanes largest(Lanes a, Lanes b) {
 void PointChooser::load(const std::vector<ContactCandidate>& candidates, const Manifold* before) {
     count_ = candidates.size();
     const std::size_t padded = (count_ + kLanes - 1) / kLanes * kLanes;
-    for (LaneArray* array : {&separation_, &favour_, &x_, &y_}) array->resize(padded);
+    for (LaneArray* array : {&separation_, &closest_, &favour_, &x_, &y_}) array->resize(padded);
     for (std::size_t i = 0; i < padded; ++i) {
-        separation_.data()[i] = kFar;
+        separation_.data()[i] = closest_.data()[i] = kFar;
         favour_.data()[i] = 1;
         if (i >= count_) continue;
         separation_.data()[i] = candidates[i].separation;
+        closest_.data()[i] = candidates[i].closest;
         for (int j = 0; before && j < before->count; ++j)
             if (before->points[static_cast<std::size_t>(j)].feature == candidates[i].feature)
                 favour_.data()[i] = 1.2f;
@@ -65,11 +66,11 @@ void PointChooser::spread(const std::vector<ContactCandidate>& candidates, int f
     }
 }
 
-// The one that adds most length or area to the `count` chosen, of those with separations to `out`; -1 if none
+// The one that adds most length or area to the `count` chosen, of those that come to separations up to `out`; -1 if none
 // adds more than `apart` of width.
 int PointChooser::next(int count, float out, float apart) const {
     auto among = [&](std::size_t i, Lanes gain) {
-        return load_lanes(separation_.data() + i) > out ? lanes_of(0) : load_lanes(favour_.data() + i) * gain;
+        return load_lanes(closest_.data() + i) > out ? lanes_of(0) : load_lanes(favour_.data() + i) * gain;
     };
     auto area = [&](std::size_t i, Spot from, Spot to) {
         return (to.x - from.x) * (load_lanes(y_.data() + i) - from.y) -
@@ -100,7 +101,7 @@ int PointChooser::choose(const std::vector<ContactCandidate>& candidates, float 
     load(candidates, before);
     chosen[0] = deepest(tolerance / 8);
     if (count_ == 1 || chosen[0] < 0) return chosen[0] < 0 ? 0 : 1;
-    const float level = std::max(candidates[static_cast<std::size_t>(chosen[0])].separation, 0.f);
+    const float level = std::max(candidates[static_cast<std::size_t>(chosen[0])].closest, 0.f);
     spread(candidates, chosen[0]);
     int count = 1;
     for (const float out : {level + tolerance / 16, level + tolerance})

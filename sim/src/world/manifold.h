@@ -44,14 +44,15 @@ constexpr int kFirstPlane = 1 << 30;
 struct ContactCandidate {
     std::uint32_t feature;
     float separation;
-    Eigen::Vector3f normal;          ///< from b towards a
-    Eigen::Vector3f arm_a;           ///< from a's centre [m]
+    float closest;           ///< to which motion may bring it within the step: not below 0, if it is not yet
+    Eigen::Vector3f normal;  ///< from b towards a
+    Eigen::Vector3f arm_a;   ///< from a's centre [m]
     Eigen::Vector3f rest_a, rest_b;  ///< places in the rest shapes
 };
 
 /// Chooses up to four of a pair's candidates: the deepest (first of equals), the one furthest from it, the
 /// one that makes the largest triangle with both, the one that adds most on the other side of an edge; first
-/// of those that carry load (to tolerance / 16 beyond touching), then, while there are less than four, of
+/// of those that carry load (that come to tolerance / 16 beyond touching), then, while there are less than four, of
 /// those up to `tolerance`. Points that add less than tolerance / 2 of width do not count. Points of
 /// `before`, the pair's manifold in the last step (nullptr: none), have an advantage of tolerance / 8 in
 /// depth and a fifth in length and area: a flat contact keeps its points. Allocates only while its buffers
@@ -76,7 +77,7 @@ private:
     int next(int count, float out, float apart) const;
 
     std::size_t count_ = 0;
-    LaneArray separation_, favour_, x_, y_;  // of every candidate, whole lanes
+    LaneArray separation_, closest_, favour_, x_, y_;  // of every candidate, whole lanes
     Spot second_{}, third_{};
 };
 

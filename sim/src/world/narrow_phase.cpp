@@ -10,9 +10,9 @@
 namespace sim {
 namespace {
 
-// Of the size: a contact that begins deeper is one of bodies put inside each other. Slow pairs (kSlow) may be found after
-// they met.
-constexpr float kDeep = 0.11f;
+// Of the size: a contact that begins deeper is one of bodies put inside each other, until it is nearly out. Slow pairs (kSlow)
+// may be found after they met.
+constexpr float kDeep = 0.11f, kOut = 0.01f;
 // A body is in another if its centre is, or is nearer to it than this share of its own smallest half extent.
 constexpr double kBuried = 0.2;
 constexpr std::uint32_t kNearest = 0x7ffffffd;  // feature of the nearest points of a pair
@@ -37,10 +37,11 @@ bool is_buried(const PosedBody& body, const PosedBody& in) {
     return in.kind->surface.distance(centre).distance < kBuried * smallest_half(body);
 }
 
-void finish(const Manifold* before, float size, Manifold& manifold) {
+// begins: the bodies may have been put into each other since the last step.
+void finish(const Manifold* before, bool begins, float size, Manifold& manifold) {
     if (manifold.count == 0) return;
     const float deepest = -manifold.points[0].separation;
-    manifold.emerging = deepest > (before && before->emerging ? 0.01f : kDeep) * size;
+    manifold.emerging = before && before->emerging ? deepest > kOut * size : begins && deepest > kDeep * size;
     manifold.impulse_reach = 0.1f * size;
     if (before) take_impulses(*before, manifold.impulse_reach, manifold);
 }
@@ -101,7 +102,7 @@ void NarrowPhase::pair(const PosedBody& a, const PosedBody& b, const PairSearch&
     const float tolerance = kManifoldTolerance * size;
     if (smooth && (is_round(a) || is_round(b)) && nearest(a, b, search.margin)) {
         choose(tolerance, search.before);
-        return fill(size, search.before, manifold);
+        return fill(size, search.before, search.may_part, manifold);
     }
     float lowest = find_samples(a, b, search.margin);
     turn_a_ = a.rotation.cast<float>(), turn_b_ = b.rotation.cast<float>();
@@ -119,7 +120,7 @@ void NarrowPhase::pair(const PosedBody& a, const PosedBody& b, const PairSearch&
     add_samples(a, b, std::min(search.margin, PointChooser::reach(first, tolerance)));
     do choose(tolerance, search.before);
     while (!along && lowest <= 0 && measure_chosen(a, b, tolerance));
-    fill(size, search.before, manifold);
+    fill(size, search.before, search.may_part, manifold);
 }
 
 // Adds the nearest points if they are within the margin; whether the distance could be told at all.
@@ -132,7 +133,7 @@ bool NarrowPhase::nearest(const PosedBody& a, const PosedBody& b, float margin) 
     if (d.gap > static_cast<double>(margin)) return true;
     ContactCandidate& point = candidates_.emplace_back();
     point.feature = kNearest;
-    point.separation = static_cast<float>(d.gap);
+    point.separation = point.closest = static_cast<float>(d.gap);
     point.normal = d.normal.cast<float>();
     point.arm_a = (d.arm_a - 0.5 * d.gap * d.normal).cast<float>();
     point.rest_a = d.rest_a.cast<float>(), point.rest_b = d.rest_b.cast<float>();
@@ -195,7 +196,7 @@ bool NarrowPhase::measure_along_axis(const PosedBody& a, const PosedBody& b) {
         axis = d.normal;
         ContactCandidate& point = candidates_.emplace_back();
         point.feature = kNearest;
-        point.separation = static_cast<float>(separation(axis));
+        point.separation = point.closest = static_cast<float>(separation(axis));
         point.normal = axis.cast<float>();
         point.arm_a = (d.arm_a - 0.5 * d.gap * d.normal).cast<float>();
         point.rest_a = d.rest_a.cast<float>(), point.rest_b = d.rest_b.cast<float>();
@@ -248,7 +249,7 @@ ContactCandidate NarrowPhase::candidate_of(const PosedBody& a, const PosedBody& 
     const Eigen::Vector3f arm = place - 0.5f * contact.separation * normal;
     ContactCandidate point;
     point.feature = static_cast<std::uint32_t>(contact.sample) | (b_sampled ? kOfB : 0u);
-    point.separation = contact.separation;
+    point.separation = point.closest = contact.separation;
     point.rest_a = point.rest_b = contact.rest;
     point.normal = b_sampled ? Eigen::Vector3f(-normal) : normal;
     point.arm_a = b_sampled ? Eigen::Vector3f(arm - between_) : arm;
@@ -271,14 +272,17 @@ bool NarrowPhase::measure_chosen(const PosedBody& a, const PosedBody& b, float t
     return moved;
 }
 
-void NarrowPhase::plane(const PosedBody& a, const Eigen::Vector3d& plane_normal, float height, float margin,
-                        const Manifold* before, Manifold& manifold) {
+void NarrowPhase::plane(const PosedBody& a, const Eigen::Vector3d& plane_normal, float height,
+                        const PlaneSearch& search, Manifold& manifold) {
+    const float margin = search.margin;
     const Eigen::Vector3d down = -(a.rotation.transpose() * plane_normal);
     const Eigen::Vector3f n = -down.cast<float>();
     const float* x = a.sample_data();
     const int stride = a.kind->batches * kLanes;
     const Eigen::Matrix3f turn = a.rotation.cast<float>();
     const Eigen::Vector3f normal = plane_normal.cast<float>();
+    const auto moved = static_cast<float>(plane_normal.dot(search.moved));
+    const Eigen::Vector3f turned = (a.rotation.transpose() * plane_normal.cross(search.turned)).cast<float>();
     const float size = static_cast<float>(smallest_half(a)), tolerance = kManifoldTolerance * size;
     candidates_.clear();
     float lowest = margin;
@@ -297,33 +301,38 @@ void NarrowPhase::plane(const PosedBody& a, const Eigen::Vector3d& plane_normal,
         foot.feature = kFoot;
         foot.rest_a = foot.rest_b = point.rest.cast<float>();
         const Eigen::Vector3f place = turn * point.place.cast<float>();
-        foot.separation = normal.dot(place) + height;
+        foot.separation = foot.closest = normal.dot(place) + height;
         foot.normal = normal;
         foot.arm_a = place - 0.5f * foot.separation * normal;
         if (foot.separation < margin) candidates_.push_back(foot);
     }
-    for (int first = 0; first < (is_round(a) ? 0 : stride); first += kLanes) {
-        const Lanes s = n.x() * load_lanes(x + first) + n.y() * load_lanes(x + stride + first) +
-                        n.z() * load_lanes(x + 2 * stride + first) + height;
+    const int samples = is_round(a) ? 0 : stride;
+    auto along = [&](const Eigen::Vector3f& v, int first) -> Lanes {
+        return v.x() * load_lanes(x + first) + v.y() * load_lanes(x + stride + first) +
+               v.z() * load_lanes(x + 2 * stride + first);
+    };
+    for (int first = 0; first < samples; first += kLanes) {
+        const Lanes s = along(n, first) + height, later = s + (along(turned, first) + moved),
+                    least = later > 0 ? later : lanes_of(0), closest = s < least ? s : least;
         const float out = std::min(margin, PointChooser::reach(lowest, tolerance));
-        for (unsigned left = bits_of(s < out); left != 0; left &= left - 1) {
+        for (unsigned left = bits_of((s < margin) & (closest < out)); left != 0; left &= left - 1) {
             const int lane = std::countr_zero(left);
             if (first + lane >= a.kind->samples) break;
-            lowest = std::min(lowest, s[lane]);
+            lowest = std::min(lowest, closest[lane]);
             ContactCandidate& point = candidates_.emplace_back();
             point.feature = static_cast<std::uint32_t>(first + lane);
-            point.separation = s[lane];
+            point.separation = s[lane], point.closest = closest[lane];
             point.normal = normal;
             point.arm_a = turn * a.sample(first + lane) - 0.5f * s[lane] * normal;
             point.rest_a.setZero(), point.rest_b.setZero();
         }
     }
-    choose(tolerance, before);
-    fill(size, before, manifold);
+    choose(tolerance, search.before);
+    fill(size, search.before, false, manifold);
 }
 
 // The manifold's points out of the chosen candidates, with the impulses of the step before.
-void NarrowPhase::fill(float size, const Manifold* before, Manifold& manifold) {
+void NarrowPhase::fill(float size, const Manifold* before, bool may_part, Manifold& manifold) {
     manifold.count = count_;
     for (std::size_t i = 0; i < static_cast<std::size_t>(count_); ++i) {
         const ContactCandidate& from = candidates_[static_cast<std::size_t>(chosen_[i])];
@@ -341,7 +350,7 @@ void NarrowPhase::fill(float size, const Manifold* before, Manifold& manifold) {
         const int sample = static_cast<int>(from.feature & ~kOfB);
         if (is_sample(from.feature)) (from.feature & kOfB ? point.sample_b : point.sample_a) = sample;
     }
-    finish(before, size, manifold);
+    finish(before, !before || may_part, size, manifold);
 }
 
 // Up to four of the candidates.

@@ -13,6 +13,15 @@ struct PairSearch {
     bool nearest = false;              ///< with the nearest points of the pair, whatever the samples say
 };
 
+/// How near a plane a body's surface is looked for.
+struct PlaneSearch {
+    float margin;                      ///< largest separation [m]
+    const Manifold* before = nullptr;  ///< the pair's manifold in the last step
+    /// The body's motion over the step: places that it brings to the plane are chosen among those that touch.
+    Eigen::Vector3d moved = Eigen::Vector3d::Zero();   ///< its centre [m]
+    Eigen::Vector3d turned = Eigen::Vector3d::Zero();  ///< about it [rad]
+};
+
 /// Contact points of one pair of bodies, or of a body and a plane, as they are posed.
 ///
 /// Where one of a pair is round (convex_body.h: is_round) it touches with its nearest point, a single one,
@@ -27,8 +36,8 @@ class NarrowPhase {
 public:
     void pair(const PosedBody& a, const PosedBody& b, const PairSearch& search, Manifold& manifold);
     /// height: of the centre over the plane [m].
-    void plane(const PosedBody& a, const Eigen::Vector3d& normal, float height, float margin,
-               const Manifold* before, Manifold& manifold);
+    void plane(const PosedBody& a, const Eigen::Vector3d& normal, float height, const PlaneSearch& search,
+               Manifold& manifold);
     [[nodiscard]] std::uint64_t fallbacks() const noexcept { return finder_.fallbacks(); }
 
 private:
@@ -42,7 +51,7 @@ private:
                                                 std::size_t found) const;
     void choose(float tolerance, const Manifold* before);
     bool measure_chosen(const PosedBody& a, const PosedBody& b, float tolerance);
-    void fill(float size, const Manifold* before, Manifold& manifold);
+    void fill(float size, const Manifold* before, bool may_part, Manifold& manifold);
 
     Eigen::Matrix3f turn_a_, turn_b_;  // of the pair
     Eigen::Vector3f between_;          // from b's centre to a's

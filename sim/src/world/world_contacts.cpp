@@ -56,6 +56,13 @@ double separation_after(const Manifold& manifold, const MovingBody& a, const Mov
     return least;
 }
 
+// By how much the furthest place of a body that turns for so long leaves the straight way [m].
+double bulge(const MovingBody& body, double time) {
+    if (!body.moves() || body.asleep) return 0;
+    const double angle = time * spin_of(body, body.state.orientation, body.state.angular_momentum).norm();
+    return angle * angle / 2 * turn_reach_of(*body.kind);
+}
+
 // Whether the normal of a contact of two ellipsoids stands still until they touch.
 bool keeps_normal(const Manifold& manifold, const MovingBody& a, const MovingBody& b,
                   const Eigen::Vector3d& moved, double turned) {
@@ -431,26 +438,32 @@ void WorldContacts::meet_near(const ContactScene& scene, int i, int j, double ma
     scene.set_surface(manifold);
 }
 
-// What carried load a step ago mostly touches still.
+// What carried load a step ago mostly touches still. What has come into each other, too, is a contact, which pushes it out: an
+// impact only stops it, and leaves it to sink on where it turns.
 void WorldContacts::meet_fast(const ContactScene& scene, int i, int j, const Manifold* before, Found& found) {
     const MovingBody &a = scene.bodies[static_cast<std::size_t>(i)],
                      &b = scene.bodies[static_cast<std::size_t>(j)];
     const double size = std::min(smallest_half(a), smallest_half(b)), margin = (kSlop + kSlow) * size;
     std::vector<Manifold>& manifolds = found.manifolds;
-    const std::size_t count = manifolds.size();
-    bool touches = false;
-    if (before && carries(*before)) {
+    auto touches = [&](double depth) {
+        const std::size_t count = manifolds.size();
         meet_near(scene, i, j, margin, before, found);
-        touches = manifolds.size() > count;
-    }
-    if (!touches) {
+        if (manifolds.size() == count) return false;
+        if (static_cast<double>(-manifolds.back().points[0].separation) >= depth) return true;
+        manifolds.pop_back();
+        return false;
+    };
+    bool stays = before && carries(*before) && touches(-margin);
+    if (!stays) {
         const Impact impact = foresee(scene, i, j);
         if (!impact.meets) return;
-        found.meetings.push_back({i, j, impact.time, false});
-        return wake(scene, i, j, found);
+        const double dt = scene.settings.dt;
+        stays =
+            before && impact.at_once && bulge(a, dt) + bulge(b, dt) <= kSlow * size && touches(kSlop * size);
+        if (!stays) found.meetings.push_back({i, j, impact.time, false});
     }
     wake(scene, i, j, found);
-    watch_turning(i, j, kSlow * size);
+    if (stays) watch_turning(i, j, kSlow * size);
 }
 
 // Turning on, other places of a pair that touches may meet, even if this one holds nothing up.
@@ -469,6 +482,11 @@ void WorldContacts::meet_planes(const ContactScene& scene, int i, Found& found) 
     const MovingBody& body = scene.bodies[static_cast<std::size_t>(i)];
     if (!body.moves() || body.asleep) return;
     const Reach& reach = reach_[static_cast<std::size_t>(i)];
+    // Free motion without weight, which the plane holds.
+    const double dt = scene.settings.dt;
+    const Eigen::Vector3d moved = dt * body.state.velocity,
+                          turned = dt * spin_of(body, body.state.orientation, body.state.angular_momentum);
+    const bool fast = moved.norm() + reach.turned > kSlow * smallest_half(body);
     for (std::size_t p = 0; p < scene.planes.size(); ++p) {
         const WorldPlane& plane = scene.planes[p];
         const double height = plane.normal.dot(body.posed.position) - plane.offset;
@@ -478,8 +496,9 @@ void WorldContacts::meet_planes(const ContactScene& scene, int i, Found& found) 
         ++found.pairs;
         Manifold& manifold = found.manifolds.emplace_back();
         manifold.a = i, manifold.b = kFirstPlane + static_cast<int>(p);
-        found.narrow->plane(body.posed, plane.normal, static_cast<float>(height), static_cast<float>(margin),
-                            last(manifold.key(), found), manifold);
+        PlaneSearch search{static_cast<float>(margin), last(manifold.key(), found)};
+        if (fast) search.moved = moved, search.turned = turned;
+        found.narrow->plane(body.posed, plane.normal, static_cast<float>(height), search, manifold);
         if (manifold.count == 0) {
             found.manifolds.pop_back();
             continue;
