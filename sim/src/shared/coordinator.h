@@ -145,7 +145,6 @@ private:
     std::vector<std::vector<int>> lots_;         // tied together
     std::vector<Eigen::Vector3d> first_places_;  // of each
     std::vector<Body> bodies_;
-    WorldRecord record_;               // of an update that is being taken
     std::vector<std::uint32_t> gone_;  // whose messages need no storage any more
     std::vector<std::uint32_t> members_;
     std::map<std::uint32_t, Sender> senders_;

@@ -231,10 +231,10 @@ void Coordinator::take_update(const MessageHeader& header, std::span<const std::
     sender.settled = settled;
     for (const std::uint32_t c : message.broken) view_.break_constraint(static_cast<int>(c));
     for (const Update& update : message.bodies) {
-        record_.body = static_cast<int>(update.body);
-        record_.state = update.state;
-        record_.asleep = update.asleep, record_.quarantined = update.quarantined;
-        publish(bodies_[update.body], record_, header.step);
+        Body& body = bodies_[update.body];
+        if (header.step < body.step) continue;
+        assign(body.record, update);
+        body.step = header.step;
     }
     if (!last || sender.settled) extend_sleep(header);
     report(header, message.report, message.bodies.size(), bytes.size());

@@ -13,31 +13,42 @@ void WorldView::take(std::uint64_t step, StateMessage&& message) {
     replica_.note(step, std::move(message));
 }
 
+void assign(WorldRecord& record, const Update& update) {
+    record.body = static_cast<int>(update.body);
+    record.state = update.state;
+    record.asleep = update.asleep, record.quarantined = update.quarantined;
+    record.at_limit = false, record.still_steps = 0, record.sleep_group = -1;
+}
+
 void WorldView::take(std::uint64_t step, const std::vector<Update>& updates) {
-    for (const Update& update : updates) {
-        record_.body = static_cast<int>(update.body);
-        record_.state = update.state;
-        record_.asleep = update.asleep, record_.quarantined = update.quarantined;
-        record_.at_limit = false, record_.still_steps = 0, record_.sleep_group = -1;  // are not told
-        keep(step, record_, update.asleep || update.still);
-    }
+    for (const Update& update : updates)
+        if (Published* place = place_for(static_cast<int>(update.body), step)) {
+            assign(place->record, update);
+            place->still = update.asleep || update.still;
+        }
 }
 
 void WorldView::take(std::uint64_t step, const std::vector<WorldRecord>& records) {
     if (pace_ == Pace::lockstep) return;
-    for (const WorldRecord& record : records) keep(step, record, record.asleep);
+    for (const WorldRecord& record : records)
+        if (Published* place = place_for(record.body, step)) {
+            place->record = record;
+            place->still = record.asleep;
+        }
 }
 
-void WorldView::keep(std::uint64_t step, const WorldRecord& record, bool still) {
-    auto& all = published_[static_cast<std::size_t>(record.body)];
-    if (step <= step_ || !clock().there_at(record.body, step)) return;
+// nullptr: it is there, or will not be shown.
+WorldView::Published* WorldView::place_for(int body, std::uint64_t step) {
+    auto& all = published_[static_cast<std::size_t>(body)];
+    if (step <= step_ || !clock().there_at(body, step)) return nullptr;
     const auto at = std::ranges::lower_bound(all, step, {}, &Published::step);
-    if (at != all.end() && at->step == step) return;
-    if (spare_.empty()) spare_.emplace_back();
-    Published published(std::move(spare_.back()));
+    if (at != all.end() && (*at)->step == step) return nullptr;
+    if (spare_.empty()) spare_.push_back(&places_.emplace_back());
+    Published* place = spare_.back();
     spare_.pop_back();
-    published.step = step, published.record = record, published.still = still;
-    all.insert(at, std::move(published));
+    place->step = step;
+    all.insert(at, place);
+    return place;
 }
 
 void WorldView::break_constraint(int constraint) {
@@ -61,7 +72,7 @@ bool WorldView::advance_bounded() {
     for (int i = 0; i < clock().bodies(); ++i) {
         const auto& all = published_[static_cast<std::size_t>(i)];
         if (released_[static_cast<std::size_t>(i)] == 0 && clock().moves_at(i, next) &&
-            (all.empty() || all.back().step < next))
+            (all.empty() || all.back()->step < next))
             return false;
     }
     replica_.begin_at(step_);
@@ -75,10 +86,10 @@ bool WorldView::advance_bounded() {
 void WorldView::show(int body, std::uint64_t step) {
     auto& all = published_[static_cast<std::size_t>(body)];
     World& world = replica_.world();
-    if (!all.empty() && all.front().step == step) {
-        world.restore(all.front().record);
-        still_[static_cast<std::size_t>(body)] = all.front().still;
-        spare_.push_back(std::move(all.front()));
+    if (!all.empty() && all.front()->step == step) {
+        world.restore(all.front()->record);
+        still_[static_cast<std::size_t>(body)] = all.front()->still;
+        spare_.push_back(all.front());
         all.erase(all.begin());
         return;
     }

@@ -1,9 +1,13 @@
 #pragma once
+#include <deque>
 #include <vector>
 
 #include "shared/replica.h"
 
 namespace sim {
+
+/// The record of an update, without what updates do not tell.
+void assign(WorldRecord& record, const Update& update);
 
 /// All bodies as published, step by step: exact in lockstep. In bounded pace a body that was not published at
 /// a step (it was changing owners) is extrapolated from its last state.
@@ -37,16 +41,17 @@ private:
         WorldRecord record;
         bool still = false;
     };
-    void keep(std::uint64_t step, const WorldRecord& record, bool still);
+    [[nodiscard]] Published* place_for(int body, std::uint64_t step);
     [[nodiscard]] bool advance_bounded();
     void show(int body, std::uint64_t step);
 
     Pace pace_;
     Replica replica_;
     std::uint64_t step_ = 0;
-    std::vector<std::vector<Published>> published_;  // bounded: of each body, by ascending steps
-    std::vector<Published> spare_;                   // for their storage
-    WorldRecord record_;                             // that is being kept or shown
+    std::vector<std::vector<Published*>> published_;  // bounded: of each body, by ascending steps
+    std::deque<Published> places_;                    // of all
+    std::vector<Published*> spare_;                   // of these
+    WorldRecord record_;                              // that is being shown
     std::vector<std::uint8_t> still_, released_;
     bool events_now_ = false;  // before the next step: what they woke was still when it was published
 };
