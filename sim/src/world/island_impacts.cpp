@@ -17,7 +17,8 @@ constexpr double kFrameTurn = 0.05;   // [rad]
 constexpr double kFastestRest = 0.1;  // slower approaches may be those of what rests [m/s]
 constexpr int kImpactSweeps = 30;
 constexpr float kSettled = 1e-6f;  // change of impulses in a sweep, share
-// Of the smaller half extent: by so much surfaces that turn may leave the straight way in what is left of the step.
+// Of the smaller half extent: by so much surfaces that turn may leave the straight way in what is left of the step, and those of
+// bodies with modes slide.
 constexpr double kStandsStill = 0.1;
 constexpr double kTouches = 1e-3;   // of the smaller half extent: gap of what takes part in an impact
 constexpr int kPasses = 8;          // over a substep's impacts: of what rattles the rest does not rebound

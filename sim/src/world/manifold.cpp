@@ -1,5 +1,6 @@
 #include "world/manifold.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace sim {
@@ -49,10 +50,13 @@ void PointChooser::load(const std::vector<ContactCandidate>& candidates, const M
     }
 }
 
-int PointChooser::deepest(float advantage) {
+// Of those that come to separations up to `out`.
+int PointChooser::deepest(float out, float advantage) const {
     return best(count_, -kFar, [&](std::size_t i) {
-        const Lanes favour = load_lanes(favour_.data() + i);
-        return (favour > 1 ? lanes_of(advantage) : lanes_of(0)) - load_lanes(separation_.data() + i);
+        const Lanes favour = load_lanes(favour_.data() + i), closest = load_lanes(closest_.data() + i);
+        const Lanes depth =
+            (favour > 1 ? lanes_of(advantage) : lanes_of(0)) - load_lanes(separation_.data() + i);
+        return closest > out ? lanes_of(-kFar) : depth;
     });
 }
 
@@ -99,9 +103,11 @@ int PointChooser::choose(const std::vector<ContactCandidate>& candidates, float 
                          const Manifold* before, std::array<int, kManifoldPoints>& chosen) {
     if (candidates.empty()) return 0;
     load(candidates, before);
-    chosen[0] = deepest(tolerance / 8);
+    const float least = std::ranges::min_element(candidates, {}, &ContactCandidate::closest)->closest;
+    chosen[0] = deepest(reach(least, tolerance), tolerance / 8);
     if (count_ == 1 || chosen[0] < 0) return chosen[0] < 0 ? 0 : 1;
-    const float level = std::max(candidates[static_cast<std::size_t>(chosen[0])].closest, 0.f);
+    const float level = std::clamp(candidates[static_cast<std::size_t>(chosen[0])].closest, 0.f,
+                                   std::max(least + tolerance / 8, 0.f));
     spread(candidates, chosen[0]);
     int count = 1;
     for (const float out : {level + tolerance / 16, level + tolerance})

@@ -44,9 +44,10 @@ constexpr int kFirstPlane = 1 << 30;
 struct ContactCandidate {
     std::uint32_t feature;
     float separation;
-    float closest;           ///< to which motion may bring it within the step: not below 0, if it is not yet
-    Eigen::Vector3f normal;  ///< from b towards a
-    Eigen::Vector3f arm_a;   ///< from a's centre [m]
+    /// Least separation that the motion of the step brings it to, not below 0; of what is inside already, its separation.
+    float closest;
+    Eigen::Vector3f normal;          ///< from b towards a
+    Eigen::Vector3f arm_a;           ///< from a's centre [m]
     Eigen::Vector3f rest_a, rest_b;  ///< places in the rest shapes
 };
 
@@ -62,7 +63,7 @@ public:
     /// Their places among the candidates; returns how many.
     int choose(const std::vector<ContactCandidate>& candidates, float tolerance, const Manifold* before,
                std::array<int, kManifoldPoints>& chosen);
-    /// No candidate further out than this can be chosen if one lies at `lowest`.
+    /// No candidate that comes no closer than this can be chosen if one comes to `lowest`.
     [[nodiscard]] static float reach(float lowest, float tolerance) noexcept {
         return std::max(lowest + tolerance / 8, 0.f) + tolerance;
     }
@@ -72,7 +73,7 @@ private:
         float x, y;  // from the first, across its normal
     };
     void load(const std::vector<ContactCandidate>& candidates, const Manifold* before);
-    int deepest(float advantage);
+    int deepest(float out, float advantage) const;
     void spread(const std::vector<ContactCandidate>& candidates, int first);
     int next(int count, float out, float apart) const;
 

@@ -10,9 +10,7 @@
 namespace sim {
 namespace {
 
-// Of the size: a contact that begins deeper is one of bodies put inside each other, until it is nearly out. Slow pairs (kSlow)
-// may be found after they met.
-constexpr float kDeep = 0.11f, kOut = 0.01f;
+constexpr float kOut = 0.01f;  // of the size: bodies put inside each other emerge until they are nearly out
 // A body is in another if its centre is, or is nearer to it than this share of its own smallest half extent.
 constexpr double kBuried = 0.2;
 constexpr std::uint32_t kNearest = 0x7ffffffd;  // feature of the nearest points of a pair
@@ -41,7 +39,8 @@ bool is_buried(const PosedBody& body, const PosedBody& in) {
 void finish(const Manifold* before, bool begins, float size, Manifold& manifold) {
     if (manifold.count == 0) return;
     const float deepest = -manifold.points[0].separation;
-    manifold.emerging = before && before->emerging ? deepest > kOut * size : begins && deepest > kDeep * size;
+    manifold.emerging = before && before->emerging ? deepest > kOut * size
+                                                   : begins && deepest > static_cast<float>(kDeep) * size;
     manifold.impulse_reach = 0.1f * size;
     if (before) take_impulses(*before, manifold.impulse_reach, manifold);
 }
@@ -328,7 +327,7 @@ void NarrowPhase::plane(const PosedBody& a, const Eigen::Vector3d& plane_normal,
         }
     }
     choose(tolerance, search.before);
-    fill(size, search.before, false, manifold);
+    fill(size, search.before, search.may_part, manifold);
 }
 
 // The manifold's points out of the chosen candidates, with the impulses of the step before.

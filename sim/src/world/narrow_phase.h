@@ -17,6 +17,7 @@ struct PairSearch {
 struct PlaneSearch {
     float margin;                      ///< largest separation [m]
     const Manifold* before = nullptr;  ///< the pair's manifold in the last step
+    bool may_part = false;             ///< the body may be put into the plane at any time
     /// The body's motion over the step: places that it brings to the plane are chosen among those that touch.
     Eigen::Vector3d moved = Eigen::Vector3d::Zero();   ///< its centre [m]
     Eigen::Vector3d turned = Eigen::Vector3d::Zero();  ///< about it [rad]
@@ -68,6 +69,9 @@ private:
 /// Smallest semi-axis [m].
 [[nodiscard]] double smallest_half(const PosedBody& body) noexcept;
 
+/// Of the smaller half extent: a contact that begins deeper is one of bodies put inside each other. Slow pairs (kSlow) may be
+/// found after they met.
+constexpr double kDeep = 0.11;
 constexpr double kSlop = 0.005;  ///< of the smaller half extent: contacts exist from here on
 
 }  // namespace sim

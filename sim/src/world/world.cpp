@@ -156,11 +156,13 @@ void World::Implementation::find_islands() {
     auto moves = [this](int id) {
         return id >= 0 && id < kFirstPlane && bodies[static_cast<std::size_t>(id)].moves();
     };
-    auto held_here = [&](const HeldConstraint& c) {
+    // What broke since the step began joins until it ends: an island that is solved again begins as it was.
+    auto held_here = [&](std::size_t constraint) {
+        const HeldConstraint& c = constraints[constraint];
         const int a = c.definition.body_a, b = c.definition.body_b;
         const bool away =
             sharing == Sharing::pairs && !bodies[static_cast<std::size_t>(moves(a) ? a : std::max(b, 0))].own;
-        return c.holds && !away;
+        return (solving ? springs_before[constraint].holds : c.holds) && !away;
     };
     auto is_here = [this](int id) {
         return sharing == Sharing::alone || std::binary_search(here.begin(), here.end(), id);
@@ -174,9 +176,10 @@ void World::Implementation::find_islands() {
     });
     for (const auto& [a, b] : touching)
         if (a >= 0 && b >= 0) sets.join(a, b);
-    for (const HeldConstraint& c : constraints)
-        if (held_here(c) && moves(c.definition.body_a) && moves(c.definition.body_b))
-            sets.join(c.definition.body_a, c.definition.body_b);
+    for (std::size_t c = 0; c < constraints.size(); ++c)
+        if (const PointConstraint& held = constraints[c].definition;
+            held_here(c) && moves(held.body_a) && moves(held.body_b))
+            sets.join(held.body_a, held.body_b);
     // An island's place is that of its first body.
     place.assign(bodies.size(), -1);
     islands_used = 0;
@@ -199,7 +202,7 @@ void World::Implementation::find_islands() {
     for (std::size_t c = 0; c < constraints.size(); ++c) {
         const PointConstraint& held = constraints[c].definition;
         const int id = moves(held.body_a) ? held.body_a : moves(held.body_b) ? held.body_b : -1;
-        if (!held_here(constraints[c]) || id < 0) continue;
+        if (!held_here(c) || id < 0) continue;
         const MovingBody& first = bodies[static_cast<std::size_t>(id)];
         if (is_here(id) && !first.asleep) island_of(id).constraints.push_back(static_cast<int>(c));
     }

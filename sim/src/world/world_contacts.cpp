@@ -56,13 +56,6 @@ double separation_after(const Manifold& manifold, const MovingBody& a, const Mov
     return least;
 }
 
-// By how much the furthest place of a body that turns for so long leaves the straight way [m].
-double bulge(const MovingBody& body, double time) {
-    if (!body.moves() || body.asleep) return 0;
-    const double angle = time * spin_of(body, body.state.orientation, body.state.angular_momentum).norm();
-    return angle * angle / 2 * turn_reach_of(*body.kind);
-}
-
 // Whether the normal of a contact of two ellipsoids stands still until they touch.
 bool keeps_normal(const Manifold& manifold, const MovingBody& a, const MovingBody& b,
                   const Eigen::Vector3d& moved, double turned) {
@@ -438,28 +431,40 @@ void WorldContacts::meet_near(const ContactScene& scene, int i, int j, double ma
     scene.set_surface(manifold);
 }
 
-// What carried load a step ago mostly touches still. What has come into each other, too, is a contact, which pushes it out: an
-// impact only stops it, and leaves it to sink on where it turns.
+// By how much places on a body's surface leave the straight way within the step, as it turns now [m].
+double WorldContacts::bulge(const ContactScene& scene, int id) const {
+    const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
+    const double reach = turn_reach_of(*body.kind);
+    double turned = reach_[static_cast<std::size_t>(id)].turned;
+    if (!(turned > 0) || !(reach > 0)) return 0;
+    if (!body.travels)  // closer than that bound
+        turned = scene.settings.dt * reach *
+                 spin_of(body, body.state.orientation, body.state.angular_momentum).norm();
+    return turned * turned / (2 * reach);
+}
+
+// What carried load a step ago mostly touches still. What is in each other and had a contact then, or so deep that it was put
+// there, is a contact, too, which pushes it out: an impact only stops it, and leaves it to sink on where it turns. But not where
+// it turns so fast that no contact stands still over the step.
 void WorldContacts::meet_fast(const ContactScene& scene, int i, int j, const Manifold* before, Found& found) {
     const MovingBody &a = scene.bodies[static_cast<std::size_t>(i)],
                      &b = scene.bodies[static_cast<std::size_t>(j)];
     const double size = std::min(smallest_half(a), smallest_half(b)), margin = (kSlop + kSlow) * size;
     std::vector<Manifold>& manifolds = found.manifolds;
-    auto touches = [&](double depth) {
+    auto touches = [&](double separation) {
         const std::size_t count = manifolds.size();
         meet_near(scene, i, j, margin, before, found);
         if (manifolds.size() == count) return false;
-        if (static_cast<double>(-manifolds.back().points[0].separation) >= depth) return true;
+        if (static_cast<double>(manifolds.back().points[0].separation) <= separation) return true;
         manifolds.pop_back();
         return false;
     };
-    bool stays = before && carries(*before) && touches(-margin);
+    bool stays = before && carries(*before) && touches(margin);
     if (!stays) {
         const Impact impact = foresee(scene, i, j);
         if (!impact.meets) return;
-        const double dt = scene.settings.dt;
-        stays =
-            before && impact.at_once && bulge(a, dt) + bulge(b, dt) <= kSlow * size && touches(kSlop * size);
+        stays = impact.at_once && bulge(scene, i) + bulge(scene, j) <= kSlow * size &&
+                touches(-(before ? kSlop : kDeep) * size);
         if (!stays) found.meetings.push_back({i, j, impact.time, false});
     }
     wake(scene, i, j, found);
@@ -496,7 +501,8 @@ void WorldContacts::meet_planes(const ContactScene& scene, int i, Found& found) 
         ++found.pairs;
         Manifold& manifold = found.manifolds.emplace_back();
         manifold.a = i, manifold.b = kFirstPlane + static_cast<int>(p);
-        PlaneSearch search{static_cast<float>(margin), last(manifold.key(), found)};
+        PlaneSearch search{static_cast<float>(margin), last(manifold.key(), found),
+                           scene.may_part(body, body)};
         if (fast) search.moved = moved, search.turned = turned;
         found.narrow->plane(body.posed, plane.normal, static_cast<float>(height), search, manifold);
         if (manifold.count == 0) {

@@ -43,8 +43,8 @@ struct ContactScene {
 /// up to d / (r_a + r_b): where such a contact is not touched yet, would stop the free motion, and may turn, the
 /// pair is treated as a fast one.
 ///
-/// A fast pair that carries no load, and has not come into each other before, has its time of impact on the paths of free motion
-/// (time_of_impact.h): none, no contact; else its contact is found where the bodies are then, as one that begins at that time
+/// A fast pair that carries no load has its time of impact on the paths of free motion (time_of_impact.h), unless it is in each
+/// other as the step begins, and had a contact a step ago or was put there (meet_fast): none, no contact; else its contact is found where the bodies are then, as one that begins at that time
 /// (IslandSolver: impacts). Of a body's impacts those later than a substep after its first are left to
 /// unforeseen(), which runs after the islands have been solved: it follows the paths really taken of bodies
 /// that left the foreseen ones, or touch and turn, and adds the contacts that they lead to. A pair that touches
@@ -138,6 +138,7 @@ private:
     void meet_near(const ContactScene& scene, int i, int j, double margin, const Manifold* before,
                    Found& found) const;
     void meet_fast(const ContactScene& scene, int i, int j, const Manifold* before, Found& found);
+    [[nodiscard]] double bulge(const ContactScene& scene, int id) const;
     void watch_turning(int i, int j, double least);
     static void wake(const ContactScene& scene, int i, int j, Found& found);
     void meet_planes(const ContactScene& scene, int i, Found& found);

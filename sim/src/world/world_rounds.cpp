@@ -153,19 +153,12 @@ void World::Implementation::begin_again(const Island& island) {
 }
 
 void World::Implementation::solve_again() {
-    const auto goes_back = [this](const Island& island) {
-        return std::ranges::any_of(island.bodies,
-                                   [this](int id) { return again[static_cast<std::size_t>(id)] != 0; });
-    };
-    // What broke holds again, and joins its bodies to one island.
-    for (std::size_t i = 0; i < islands_used; ++i)
-        if (goes_back(islands[i]))
-            for (const int c : islands[i].constraints)
-                (void)restore_spring(springs_before[static_cast<std::size_t>(c)]);
     find_islands();
     to_solve.clear();
     for (std::size_t i = 0; i < islands_used; ++i) {
-        if (!goes_back(islands[i]) || !is_own(islands[i])) continue;
+        const bool any = std::any_of(islands[i].bodies.begin(), islands[i].bodies.end(),
+                                     [this](int id) { return again[static_cast<std::size_t>(id)] != 0; });
+        if (!any || !is_own(islands[i])) continue;
         to_solve.push_back(&islands[i]);
         for (const int id : islands[i].bodies) solver().forget_crossed(id);
     }
