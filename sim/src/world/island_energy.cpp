@@ -55,24 +55,10 @@ void IslandSolver::go_back() {
     begin(*island_);
 }
 
-// Whether anything of the island touches or hangs on what does not move in it.
-bool IslandSolver::is_held() const {
-    const auto outside = [this](int id) { return id < 0 || id >= kFirstPlane || local(id) < 0; };
-    const auto joins = [&](const Manifold& m) { return outside(m.a) || outside(m.b); };
-    return (found_again_ ? std::ranges::any_of(found_, joins)
-                         : std::ranges::any_of(
-                               island_->manifolds,
-                               [&](int m) { return joins((*manifolds_)[static_cast<std::size_t>(m)]); })) ||
-           std::ranges::any_of(island_->constraints, [&](int c) {
-               const PointConstraint& held = (*constraints_)[static_cast<std::size_t>(c)].definition;
-               return outside(held.body_a) || outside(held.body_b);
-           });
-}
-
 // Bodies that only contacts and joints hold have no more energy after a step than before it: contacts that are found anew, and overlaps
 // that are taken back, would give some at each step, and what leans would start to slide. What they got beyond kMostGained is
 // taken from their motion against the rigid motion of them all, so that linear and angular momentum are kept; where
-// that is not enough and something from outside holds them, it came from there, and is taken from all of it. Not of bodies that others compute, too, at their own
+// that is not enough, it came from outside, and is taken from all of it. Not of bodies that others compute, too, at their own
 // pace: what they were told stands.
 bool IslandSolver::calm(double energy) {
     const double gained = energy - energy_before_;
@@ -118,7 +104,7 @@ bool IslandSolver::calm(double energy) {
         return sum;
     };
     const bool enough = motion() >= gained;
-    if (!enough && is_held()) velocity.setZero(), spin.setZero();
+    if (!enough) velocity.setZero(), spin.setZero();
     const double left = std::sqrt(std::max(0., 1 - gained / motion()));
     for (const BodyRows& rows : rows_of_) {
         WorldBodyState& s = rows.body->state;

@@ -283,7 +283,6 @@ private:
     void note_start();
     void sum_start();  ///< of measures_
     void go_back();    ///< to it
-    [[nodiscard]] bool is_held() const;
     bool calm(double energy);  ///< of the island, after the step; whether it took any
     [[nodiscard]] double energy(bool directly);
     [[nodiscard]] double energy_of(const MovingBody& body) const;
