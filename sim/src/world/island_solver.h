@@ -281,8 +281,8 @@ private:
     void start_following();
     [[nodiscard]] bool moves_little() const;
     void note_start();
-    void sum_start();  ///< of measures_
-    void go_back();    ///< to it
+    void sum_start();          ///< of measures_
+    void go_back();            ///< to it
     bool calm(double energy);  ///< of the island, after the step; whether it took any
     [[nodiscard]] double energy(bool directly);
     [[nodiscard]] double energy_of(const MovingBody& body) const;
