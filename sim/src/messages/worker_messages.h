@@ -86,7 +86,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kProtocol = 11;  ///< version
+constexpr std::uint16_t kProtocol = 12;  ///< version, of messages and of how worlds step
 
 struct MessageHeader {
     std::uint32_t worker = kApplication;
