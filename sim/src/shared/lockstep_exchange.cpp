@@ -2,6 +2,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "shared/body_costs.h"
 #include "shared/replica.h"
@@ -85,7 +86,9 @@ private:
     ColumnWatch columns_;
     std::vector<std::uint32_t> owner_;  // as registered
     std::vector<std::uint8_t> own_;     // now; with bodies that come in the next step
-    std::vector<int> owned_;            // that are there, ascending
+    std::vector<int> owned_;            // that are there, ascending; as of so many bodies, and own_:
+    int listed_ = 0;
+    bool own_changed_ = false;
     std::deque<Ownership> later_;       // own ones of later steps
     bool unpublished_ = false;          // between step() and publish()
     bool owes_ = false;
@@ -150,13 +153,17 @@ LockstepExchange::LockstepExchange(const SceneMessage& scene)
 }
 
 void LockstepExchange::list_owned() {
+    const int there = replica_.world().bodies();
+    if (!std::exchange(own_changed_, false) && there == listed_) return;
+    listed_ = there;
     owned_.clear();
-    for (int i = 0; i < replica_.world().bodies(); ++i)
+    for (int i = 0; i < there; ++i)
         if (own_[static_cast<std::size_t>(i)] != 0) owned_.push_back(i);
 }
 
 void LockstepExchange::set_own(int body, bool own) {
     own_[static_cast<std::size_t>(body)] = own;
+    own_changed_ = true;
     if (body < replica_.world().bodies()) replica_.world().set_own(body, own);
     if (own) costs_.forget(body);
 }

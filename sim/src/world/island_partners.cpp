@@ -86,7 +86,8 @@ bool IslandSolver::concerns_this(const Manifold& manifold) const {
 }
 
 bool IslandSolver::begin_together(const Island& island, const ContactScene& scene, Partners& with,
-                                  const std::vector<double>& shares) {
+                                  const std::vector<double>& shares,
+                                  const std::function<void(int id)>& changes) {
     scene_ = &scene, island_ = &island, follow_ = carried_ = false;
     any_impacts_ = std::ranges::any_of(island.manifolds, is_impact, [this](int m) -> const Manifold& {
         return (*manifolds_)[static_cast<std::size_t>(m)];
@@ -100,6 +101,8 @@ bool IslandSolver::begin_together(const Island& island, const ContactScene& scen
         forget_island();
         return false;
     }
+    for (std::size_t i = 0; i < rows_of_.size(); ++i)
+        if (is_used(static_cast<std::uint32_t>(i))) changes(island.bodies[i]);
     any_emerging_ = std::ranges::any_of(
         island.manifolds, [this](int m) { return (*manifolds_)[static_cast<std::size_t>(m)].emerging; });
     outside_before_ = outside_, limited_before_ = limited_;

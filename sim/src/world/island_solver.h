@@ -1,6 +1,7 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <numbers>
 #include <span>
 #include <vector>
@@ -129,9 +130,10 @@ public:
     // One island by several partners, island_partners.cpp.
     /// Begins it and sweeps the part that is this partner's. false, and nothing done: it is not one that is shared out. The
     /// same at all.
-    /// shares: how much of it each should do.
+    /// shares: how much of it each should do. changes: called before with each body whose state this partner changes.
     [[nodiscard]] bool begin_together(const Island& island, const ContactScene& scene, Partners& with,
-                                      const std::vector<double>& shares);
+                                      const std::vector<double>& shares,
+                                      const std::function<void(int id)>& changes);
     /// Calls visit(id) for the bodies of a partner's part.
     template <typename Visit>
     void each_id_of(int partner, Visit visit) const {

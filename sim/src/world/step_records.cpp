@@ -80,9 +80,8 @@ PackedPoint point_at(const std::uint8_t* bytes) {
     return point;
 }
 
-// A sample of a body, or -1.
-void expect_sample(int sample, int body, const std::vector<MovingBody>& bodies) {
-    const int samples = body < kFirstPlane ? bodies[static_cast<std::size_t>(body)].kind->samples : 0;
+// A sample of a body that has so many, or -1.
+void expect_sample(int sample, int samples) {
     if (sample < -1 || sample >= samples)
         throw DecodeError("a contact at sample " + std::to_string(sample) + ", expected one below " +
                           std::to_string(samples));
@@ -130,12 +129,16 @@ void read(ByteReader& in, Manifold& m, const std::vector<MovingBody>& bodies, st
     for (float* x : {&m.friction, &m.restitution, &m.impulse_reach}) read_floats(in, {x, 1});
     m.packed_points = in.take(sizeof(PackedPoint) * static_cast<std::size_t>(m.count)).data();
     m.packed_impulses = nullptr;
+    const auto samples_of = [&](int body) {
+        return body < kFirstPlane ? bodies[static_cast<std::size_t>(body)].kind->samples : 0;
+    };
+    const int samples_a = samples_of(m.a), samples_b = samples_of(m.b);
     for (std::size_t i = 0; i < static_cast<std::size_t>(m.count); ++i) {
         const PackedPoint p = point_at(m.packed_points + i * sizeof(PackedPoint));
         if (i == 0) m.points[0].begins = p.begins;
         if (!std::isinf(p.begins)) expect_finite(&p.begins, 1);  // infinite: it does not happen
         expect_finite(p.numbers.data(), p.numbers.size());
-        expect_sample(p.sample_a, m.a, bodies), expect_sample(p.sample_b, m.b, bodies);
+        expect_sample(p.sample_a, samples_a), expect_sample(p.sample_b, samples_b);
     }
 }
 

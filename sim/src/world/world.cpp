@@ -55,6 +55,7 @@ int World::Implementation::add(const WorldBody& definition) {
     body.given.modal = zero;
     definitions.push_back(definition);
     bodies.push_back(std::move(body));
+    all_whole = false;
     definition.motion.empty() ? pose(bodies.back()) : place_driven(bodies.back());
     list_owned();
     return static_cast<int>(bodies.size()) - 1;
@@ -100,6 +101,7 @@ void World::Implementation::drop_constraints(int body) {
 // Bodies whose state or forces are not finite, or absurd, take no further part. Before anything else in a
 // step, before they can touch another body.
 void World::Implementation::quarantine_broken() {
+    if (std::exchange(all_whole, true)) return;
     if (!any_broken([](const MovingBody& body) { return body.moves() && body.own; })) return;
     for (const int i : here) {
         const MovingBody& body = bodies[static_cast<std::size_t>(i)];
@@ -462,6 +464,7 @@ void World::set_state(int body, const WorldBodyState& state) {
     MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
     check_state(state, b.kind->modes, b.fixed);
     b.state = state;
+    implementation_->all_whole = false;
     const double norm = state.orientation.norm();
     if (norm > 0.5 && norm < 2) b.state.orientation.coeffs() /= norm;
     if (b.fixed) {
@@ -476,6 +479,7 @@ void World::apply_force(int body, const Eigen::Vector3d& force, const Eigen::Vec
     if (!b.pushed) b.force.setZero(), b.torque.setZero(), b.modal_force.setZero();
     const Eigen::Matrix3d r = b.state.orientation.toRotationMatrix();
     b.pushed = true;
+    implementation_->all_whole = false;
     b.force += force;
     b.torque += (r * b.posed.deformed(point_body)).cross(force);
     if (b.kind->modes > 0)

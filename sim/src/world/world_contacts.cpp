@@ -176,7 +176,7 @@ bool WorldContacts::find_once(const ContactScene& scene, Partners* with, const W
         }
     });
     if (with) share(scene, *with, write_aside, read_aside);
-    gather(scene, parts);
+    gather(scene, parts, with != nullptr);
     bool woke = false;
     for (std::size_t p = 0; p < parts; ++p)
         for (const int id : found_[p].woken) wake_group(scene.bodies, id), woke = true;
@@ -215,8 +215,9 @@ void WorldContacts::share(const ContactScene& scene, Partners& with, const Write
     note_first(scene, found.meetings);
     for (Meeting& m : found.meetings)
         if (!found.woken.empty() || is_late(scene, m)) m.told = kNoImpact;
-    told_impacts_.clear(), told_impacts_.resize(found.meetings.size());
-    find_impacts(scene, found.meetings, told_impacts_);
+    told_impacts_.resize(found.meetings.size());
+    for (Manifold& impact : told_impacts_) impact.count = 0;
+    find_impacts(scene, found.meetings, {told_impacts_.data(), told_impacts_.size()});
     out.count(found.meetings.size());
     for (std::size_t i = 0; i < found.meetings.size(); ++i) {
         Meeting& m = found.meetings[i];
@@ -256,7 +257,6 @@ void WorldContacts::share(const ContactScene& scene, Partners& with, const Write
             read(in, all_found_[i], scene.bodies, scene.planes.size());
         }
     }
-    std::swap(all_found_, found.manifolds);
     const auto pair_of = [](const Meeting& m) { return std::pair(m.a, m.b); };
     std::ranges::sort(found.meetings, {}, pair_of);
     if (std::ranges::adjacent_find(found.meetings, {}, pair_of) != found.meetings.end())
@@ -289,7 +289,7 @@ void WorldContacts::hear(const ContactScene& scene, ByteReader& in, std::span<co
         found.meetings.push_back({a, b, time, false, kNoImpact});
         if (!in.flag()) continue;
         found.meetings.back().told = static_cast<int>(told_impacts_.size());
-        Manifold& impact = told_impacts_.emplace_back();
+        Manifold& impact = told_impacts_.extend();
         read(in, impact, scene.bodies, scene.planes.size());
         unpack(impact);
         const auto points = std::span(impact.points).first(static_cast<std::size_t>(impact.count));
@@ -326,7 +326,7 @@ void WorldContacts::unpack_all() {
 }
 
 // What all threads found, in the order of keys.
-void WorldContacts::gather(const ContactScene& scene, std::size_t parts) {
+void WorldContacts::gather(const ContactScene& scene, std::size_t parts, bool shared) {
     pairs_ = 0;
     std::size_t sum = 0;
     for (std::size_t p = 0; p < parts; ++p) {
@@ -334,6 +334,7 @@ void WorldContacts::gather(const ContactScene& scene, std::size_t parts) {
         meetings_.insert(meetings_.end(), found_[p].meetings.begin(), found_[p].meetings.end());
         found_[p].next_before = std::exchange(sum, sum + found_[p].manifolds.size());  // where they go
     }
+    if (shared) return std::swap(manifolds_, all_found_);
     if (parts == 1) return std::swap(manifolds_, found_[0].manifolds);
     manifolds_.resize(sum);
     scene.crew.each(parts, 1, [this](int, std::size_t first, std::size_t last) {

@@ -8,6 +8,7 @@
 #include "world/body_path.h"
 #include "world/broad_phase.h"
 #include "world/crew.h"
+#include "world/kept_vector.h"
 #include "world/narrow_phase.h"
 #include "world/partners.h"
 #include "world/time_of_impact.h"
@@ -132,7 +133,7 @@ private:
     void share(const ContactScene& scene, Partners& with, const WriteAside& write, const ReadAside& read);
     void hear(const ContactScene& scene, ByteReader& in, std::span<const std::uint8_t> bytes);
     void merge_told();
-    void gather(const ContactScene& scene, std::size_t parts);
+    void gather(const ContactScene& scene, std::size_t parts, bool shared);
     void meet_pair(const ContactScene& scene, int i, int j, Found& found);
     [[nodiscard]] bool pass_by(const ContactScene& scene, int i, int j) const;
     void meet_near(const ContactScene& scene, int i, int j, double margin, const Manifold* before,
@@ -166,7 +167,7 @@ private:
     std::vector<int> posed_;                           // of scene.here, those whose shape is known
     std::vector<Reach> reach_;                         // of each body
     std::vector<Manifold> manifolds_, before_;         // by ascending keys
-    std::vector<Manifold> added_;                      // to them
+    KeptVector<Manifold> added_;                       // to them
     std::vector<Partners::Bytes> kept_, kept_before_;  // that have points of manifolds_, of before_
     struct Told {
         std::uint64_t key;
@@ -176,7 +177,7 @@ private:
     std::vector<Told> told_;         // manifolds, in runs of one partner each, then by ascending keys
     std::vector<std::size_t> runs_;  // where each ends
     std::vector<Manifold> all_found_;
-    std::vector<Manifold> told_impacts_;  // of meetings, own ones and those of partners
+    KeptVector<Manifold> told_impacts_;  // of meetings, own ones and those of partners
     std::vector<BodyPath> paths_;         // of each body
     enum : std::uint8_t { kNotFollowed, kBeingFollowed, kFollowed };
     std::vector<std::uint8_t> followed_;  // paths_ holds the free motion of this step; by any thread

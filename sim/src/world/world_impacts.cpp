@@ -109,7 +109,7 @@ void WorldContacts::accept_impacts(const ContactScene& scene) {
     note_first(scene, meetings_);
     std::erase_if(meetings_, [&](const Meeting& m) { return m.told == kNoImpact || is_late(scene, m); });
     added_.resize(meetings_.size());
-    find_impacts(scene, meetings_, added_);
+    find_impacts(scene, meetings_, {added_.data(), added_.size()});
     std::size_t found = 0;
     for (std::size_t i = 0; i < meetings_.size(); ++i) {
         const Meeting& m = meetings_[i];
@@ -127,10 +127,10 @@ void WorldContacts::accept_impacts(const ContactScene& scene) {
     manifolds_.insert(manifolds_.end(), added_.begin(), added_.end());
     std::sort(added_.begin(), added_.end(), by_key);
     auto to = manifolds_.end(), from = manifolds_.begin() + sorted;
-    for (; !added_.empty(); --to) {
-        const bool old = from != manifolds_.begin() && by_key(added_.back(), *std::prev(from));
-        *std::prev(to) = old ? *--from : added_.back();
-        if (!old) added_.pop_back();
+    for (std::size_t left = added_.size(); left > 0; --to) {
+        const bool old = from != manifolds_.begin() && by_key(added_[left - 1], *std::prev(from));
+        *std::prev(to) = old ? *--from : added_[left - 1];
+        if (!old) --left;
     }
 }
 

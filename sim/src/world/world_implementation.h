@@ -49,6 +49,7 @@ struct World::Implementation {
     std::vector<Outcome> outcomes;
     std::vector<WorldBodyState> started;        // of bodies that are solved, when the step began
     std::vector<std::uint8_t> at_limit_before;  // at_limit of bodies, then
+    std::vector<std::uint8_t> noted;            // of each body: both are known
     std::vector<SpringRecord> springs_before;   // then
     std::vector<std::uint8_t> solved,
         again;  // of each body: its island went through the solver, and has to once more
@@ -72,6 +73,7 @@ struct World::Implementation {
     std::vector<Sleep> sleep_before;  ///< of each body, when the step began
     bool solving = false;             ///< the step has come so far
     bool results_checked = false;     ///< as they came: no body is broken
+    bool all_whole = false;           ///< no own body is broken: nothing has changed them since that was seen
     std::vector<std::uint8_t> near;   ///< of each body: this partner's may meet it
     void find_near();                 ///< fills `near`
     void pose_the_rest();             ///< as the step began
@@ -85,6 +87,7 @@ struct World::Implementation {
     std::vector<double> spare;     ///< of each partner: what it should still do, in the step
     std::vector<int> solved_by;    ///< of an island's first body: which partner solves it
     std::vector<std::pair<double, const Island*>> dear;  ///< small islands that take long
+    std::vector<std::vector<const Island*>> solves;      ///< each partner which of the small islands
     void write_efforts(ByteWriter& out) const;
     void read_efforts(ByteReader& in, int partner);
     [[nodiscard]] double cost_of(const Island& island) const;
@@ -144,7 +147,9 @@ struct World::Implementation {
     void dismiss_ghosts();  ///< at the end of a step
     void find_islands();    ///< of contacts and constraints
     void solve_islands();   ///< in order of ids, again where something unforeseen meets
-    void start_solving();   ///< notes what solve_again goes back to
+    void start_solving();   ///< notes what solve_again goes back to; with partners each body once it changes
+    void note_started(int body);
+    void note_before_reading(int body);  ///< the same; leaves anything in its state
     void solve_island(const Island& island, bool follow, IslandSolver& by, const ContactScene& scene);
     /// Calls solve(island, solver, scene) for those in `to_solve`. first: of the step's rounds.
     void share_islands(const Solve& solve, bool first);

@@ -56,19 +56,32 @@ void World::Implementation::start_solving() {
     outcomes.resize(bodies.size());
     solved.assign(bodies.size(), 0);
     again.assign(bodies.size(), 0);
+    noted.assign(bodies.size(), 0);
     // Of others' bodies alone, too: own ones may meet them unforeseen.
-    for (std::size_t i = 0; i < islands_used; ++i) {
+    for (std::size_t i = 0; i < islands_used && !with; ++i) {
         const std::vector<int>& of_island = islands[i].bodies;
         crew().each(of_island.size(), kBodiesAPiece, [&](int, std::size_t first, std::size_t end) {
-            for (std::size_t k = first; k < end; ++k) {
-                const auto at = static_cast<std::size_t>(of_island[k]);
-                started[at] = bodies[at].state;
-                at_limit_before[at] = bodies[at].at_limit;
-            }
+            for (std::size_t k = first; k < end; ++k) note_started(of_island[k]);
         });
     }
     springs_before.clear();
     for (std::size_t c = 0; c < constraints.size(); ++c) springs_before.push_back(spring_record(c));
+}
+
+void World::Implementation::note_started(int id) {
+    const auto at = static_cast<std::size_t>(id);
+    if (std::exchange(noted[at], 1) != 0) return;
+    started[at] = bodies[at].state;
+    at_limit_before[at] = bodies[at].at_limit;
+}
+
+void World::Implementation::note_before_reading(int id) {
+    const auto at = static_cast<std::size_t>(id);
+    MovingBody& body = bodies[at];
+    if (started[at].q.size() != body.state.q.size()) return note_started(id);  // the first time
+    if (std::exchange(noted[at], 1) != 0) return;
+    std::swap(started[at], body.state);
+    at_limit_before[at] = body.at_limit;
 }
 
 void World::Implementation::move_alone(int id) {

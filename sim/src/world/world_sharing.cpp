@@ -75,6 +75,7 @@ void World::set_own(int body, bool own) {
     MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
     if (b.own == own) return;
     b.own = own;
+    implementation_->all_whole = false;
     b.watched = b.was_given = b.pushed = false;
     b.arrived = own;
     if (own) implementation_->arrived.push_back(body);
@@ -101,6 +102,7 @@ WorldRecord World::record(int body) const {
 void World::restore(const WorldRecord& record) {
     MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(record.body));
     b.state = record.state;
+    implementation_->all_whole = false;
     b.asleep = record.asleep, b.at_limit = record.at_limit;
     b.still_steps = record.still_steps, b.sleep_group = record.sleep_group;
     b.pushed = b.was_given = false;
@@ -273,6 +275,7 @@ void World::kick(int body, const Eigen::Vector3d& linear, const Eigen::Vector3d&
     MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
     if (!b.moves()) return;
     if (b.asleep) wake(body);
+    implementation_->all_whole = false;
     b.state.velocity += linear / b.kind->mass.mass, b.state.angular_momentum += angular;
 }
 

@@ -44,7 +44,7 @@ void World::Implementation::go_back(const WorldCounts& counts_before) {
     contacts.go_back();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         MovingBody& body = bodies[i];
-        if (solving && body.moves() && !body.asleep)
+        if (solving && noted[i] != 0)
             body.state = started[i], body.at_limit = at_limit_before[i] != 0;
         body.limited_now = false;
         body.asleep = sleep_before[i].asleep && !body.quarantined;
@@ -56,6 +56,7 @@ void World::Implementation::go_back(const WorldCounts& counts_before) {
     if (changed) set_joined();
     counts = counts_before, outside = outside_before;
     end_motions();
+    all_whole = false;
 }
 
 // In a box about all of this partner's.
@@ -161,6 +162,10 @@ void World::Implementation::plan_islands() {
         *most -= cost;
     }
     for (double& s : spare) s = std::max(s, 0.);
+    solves.resize(partners);
+    for (auto& islands_of : solves) islands_of.clear();
+    for (const Island* island : to_solve)
+        if (is_by_one(*island)) solves[static_cast<std::size_t>(solver_of(*island))].push_back(island);
 }
 
 void World::Implementation::solve_together(const Solve& solve, bool first) {
@@ -170,23 +175,26 @@ void World::Implementation::solve_together(const Solve& solve, bool first) {
     const auto check = [&](int id) {
         breaks = breaks || !what_is_broken(bodies[static_cast<std::size_t>(id)]).empty();
     };
+    const auto note = [this](int id) { note_started(id); };
     IslandSolver& one = solver();
     const ContactScene scene = contact_scene(alone);
     ByteWriter out;
     for (const Island* island : to_solve) {
         if (is_by_one(*island)) continue;
         IslandSolver& part = part_solver(divided.size());
-        if (first && part.begin_together(*island, scene, *with, spare)) {
+        if (first && part.begin_together(*island, scene, *with, spare, note)) {
             divided.push_back({island, &part});
             if (with->self() >= 0) part.write_part(out);
             if (with->self() >= 0) part.each_id_of(with->self(), check);
         } else {
+            std::ranges::for_each(island->bodies, note);
             solve(*island, one, scene);
             std::ranges::for_each(island->bodies, check);
         }
     }
-    for (const Island* island : to_solve)
-        if (is_by_one(*island) && solver_of(*island) == with->self()) {
+    if (with->self() >= 0)
+        for (const Island* island : solves[static_cast<std::size_t>(with->self())]) {
+            std::ranges::for_each(island->bodies, note);
             solve(*island, one, scene);
             std::ranges::for_each(island->bodies, check);
             write_result(out, *island);
@@ -195,10 +203,15 @@ void World::Implementation::solve_together(const Solve& solve, bool first) {
     for (int p = 0; p < with->count(); ++p) {
         if (p == with->self()) continue;
         ByteReader in(contacts.keep(with->hear(p)));
-        for (const Divided& d : divided) d.part->read_part(in, p), d.part->each_id_of(p, check);
-        for (const Island* island : to_solve)
-            if (is_by_one(*island) && solver_of(*island) == p)
-                read_result(in, *island), std::ranges::for_each(island->bodies, check);
+        for (const Divided& d : divided) {
+            d.part->each_id_of(p, [this](int id) { note_before_reading(id); });
+            d.part->read_part(in, p);
+            d.part->each_id_of(p, check);
+        }
+        for (const Island* island : solves[static_cast<std::size_t>(p)]) {
+            read_result(in, *island);
+            std::ranges::for_each(island->bodies, check);
+        }
         in.expect_end();
     }
     results_checked = first && !breaks;
@@ -247,7 +260,10 @@ void World::Implementation::write_result(ByteWriter& out, const Island& island) 
 }
 
 void World::Implementation::read_result(ByteReader& in, const Island& island) {
-    for (const int id : island.bodies) read(in, bodies[static_cast<std::size_t>(id)]);
+    for (const int id : island.bodies) {
+        note_before_reading(id);
+        read(in, bodies[static_cast<std::size_t>(id)]);
+    }
     Outcome& outcome = outcomes[static_cast<std::size_t>(island.bodies.front())];
     outcome.carried = solver().is_carried(island);
     outcome.limited = in.number<std::uint64_t>(), outcome.broken = in.number<std::uint64_t>();
