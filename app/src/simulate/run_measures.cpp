@@ -38,7 +38,8 @@ std::string panel(const WorkerHistory& history, bool seconds) {
 
 }  // namespace
 
-MomentumWatch::MomentumWatch(const sim::WorldScene& scene, const sim::World& world) : scene_(scene) {
+MomentumWatch::MomentumWatch(const sim::WorldScene& scene, const sim::World& world, bool rounded)
+    : scene_(scene), rounded_(rounded) {
     closed_ = scene.world.planes.empty() && scene.events.empty() && scene.world.forces.empty();
     for (const sim::PointConstraint& c : scene.world.constraints) closed_ = closed_ && c.body_b >= 0;
     for (int body = 0; closed_ && body < world.bodies(); ++body) {
@@ -58,6 +59,7 @@ void MomentumWatch::look(const sim::World& world) {
     largest_.scale = std::max(largest_.scale, sum);
     gained_ = world.momentum() - momentum_ - brought(world);
     if (!closed_) return;
+    if (rounded_) largest_.linear = largest_.angular = 0;
     largest_.linear = std::max(largest_.linear, (gained_ - weight_ * world.time_s()).norm());
     if (weight_.isZero())
         largest_.angular = std::max(largest_.angular, (world.angular_momentum() - angular_momentum_).norm());

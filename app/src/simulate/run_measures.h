@@ -16,12 +16,13 @@ namespace app {
 /// acts, else at the end with what the world counted (World::outside_impulse).
 class MomentumWatch {
 public:
-    MomentumWatch(const sim::WorldScene& scene, const sim::World& world);
+    /// rounded: states are, but the last (bounded pace), so that only those count.
+    MomentumWatch(const sim::WorldScene& scene, const sim::World& world, bool rounded);
     void look(const sim::World& world);  ///< now and then, and at the end
     /// `outside`: the impulse since the start, if it is known. None: unknown.
     [[nodiscard]] std::optional<MomentumDrift> drift(const std::optional<Eigen::Vector3d>& outside) const;
 
-    struct Largest {  ///< seen so far: of MomentumDrift, where nothing but gravity acts
+    struct Largest {  ///< seen so far, or now where rounded: of MomentumDrift, where nothing but gravity acts
         double linear = 0, angular = 0, scale = 0;
     };
     [[nodiscard]] const Largest& largest() const { return largest_; }
@@ -31,6 +32,7 @@ private:
     [[nodiscard]] Eigen::Vector3d brought(const sim::World& world) const;
 
     const sim::WorldScene& scene_;
+    bool rounded_;
     bool closed_ = false;  ///< nothing acts from outside but gravity
     Eigen::Vector3d weight_ = Eigen::Vector3d::Zero(), momentum_, angular_momentum_;
     Eigen::Vector3d gained_ = Eigen::Vector3d::Zero();  ///< since the start, but by bodies that came later

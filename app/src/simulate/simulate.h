@@ -55,7 +55,7 @@ struct SimulateOptions {
 
 /// Momentum that came from nowhere.
 struct MomentumDrift {
-    double linear = 0;              ///< largest seen; at the end where more than gravity acted [kg m/s]
+    double linear = 0;  ///< largest seen; at the end where more than gravity acted, or out of step [kg m/s]
     std::optional<double> angular;  ///< largest seen [kg m^2/s]; known where nothing at all acted
     double scale = 0;               ///< largest sum of |m v| over the bodies [kg m/s]
 

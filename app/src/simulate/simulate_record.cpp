@@ -162,7 +162,7 @@ SimulateResult SimulateRecord::finish(const sim::DistributedResult& run, const W
 }
 
 void SimulateRecord::start(const sim::World& world) {
-    momentum_.emplace(scene_, world);
+    momentum_.emplace(scene_, world, options_.workers && options_.workers->pace == sim::Pace::bounded);
     result_.energy_start = world.energy();
     if (from_) go_on();
     if (!folder_) return;

@@ -17,7 +17,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 11
+//   4       2      version, 13
 //   6       2      type
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
@@ -86,7 +86,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kProtocol = 12;  ///< version, of messages and of how worlds step
+constexpr std::uint16_t kProtocol = 13;  ///< version, of messages and of how worlds step
 
 struct MessageHeader {
     std::uint32_t worker = kApplication;
@@ -166,7 +166,8 @@ struct SnapshotMessage {
 
 // Worker to the application after each step, which passes it on.
 
-/// Lockstep. All own bodies, and the contacts and constraints that belong to them. Passed on to those who own nothing.
+/// Lockstep: all own bodies, and the contacts and constraints that belong to them. Passed on to those who own nothing.
+/// Bounded: own bodies once more after the last step, exact, as what came late has put them right. For the application alone.
 struct StateMessage {
     StepReport report;
     std::vector<WorldRecord> bodies;

@@ -61,7 +61,7 @@ private:
     void place_ghosts();
     void keep_crossed();
     void feel();
-    void settle();
+    [[nodiscard]] std::vector<std::uint8_t> publish_last(std::uint32_t epoch, const StepReport& report) const;
     [[nodiscard]] std::uint64_t known(std::uint32_t worker) const {
         const auto found = known_.find(worker);
         return found == known_.end() ? 0 : found->second;
@@ -381,14 +381,11 @@ void BoundedExchange::feel() {
     }
 }
 
-// After the last step: states that what came late has put right. Nobody will hear of them but the application.
-void BoundedExchange::settle() {
-    std::fill(told_asleep_.begin(), told_asleep_.end(), std::uint8_t{0});
-    settled_ = true;
-}
-
 void BoundedExchange::step(const StepChannel&) {
-    if (at_end()) return settle();
+    if (at_end()) {
+        settled_ = true;
+        return;
+    }
     come_to(step_);
     place_ghosts();
     std::vector<std::uint32_t> breakable;
@@ -407,14 +404,23 @@ void BoundedExchange::tell(int body, Update& update) {
     world_.record(body, record_);
     update.body = static_cast<std::uint32_t>(body);
     update.asleep = record_.asleep, update.quarantined = record_.quarantined;
-    update.still = record_.asleep || record_.still_steps * world_.settings().dt >= 0.5 - 1e-9;
+    update.still = is_still(record_, world_.settings().dt);
     std::swap(update.state, record_.state);
     const auto felt = felt_.find(body);
     if (felt != felt_.end()) update.impulse = felt->second.mean;
     update.held = felt != felt_.end() && !update.impulse.is_zero();
 }
 
+// After the last step: exact states that what came late has put right. Nobody hears of them but the application.
+std::vector<std::uint8_t> BoundedExchange::publish_last(std::uint32_t epoch, const StepReport& report) const {
+    StateMessage message;
+    message.report = report;
+    for (const int body : owned_) message.bodies.push_back(world_.record(body));
+    return encode({self_, epoch, step_}, message);
+}
+
 std::vector<std::uint8_t> BoundedExchange::publish(std::uint32_t epoch, const StepReport& report) {
+    if (settled_) return publish_last(epoch, report);
     auto& message = std::get<UpdateMessage>(outgoing_);
     message.report = report;
     std::size_t count = 0;

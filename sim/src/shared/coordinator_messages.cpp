@@ -197,6 +197,7 @@ void Coordinator::publish(Body& body, const WorldRecord& record, std::uint64_t s
 
 void Coordinator::take_state(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                              StateMessage&& message) {
+    if (settings_.pace == Pace::bounded) return take_last(header, bytes, message);
     if (settings_.pace != Pace::lockstep || header.step == 0 || header.step > view_.step() + 1 ||
         !fits(header.worker, message.bodies) || !fits(message.report.mishaps))
         return expel(header.worker, "found states that are not its to publish");
@@ -211,9 +212,6 @@ void Coordinator::take_state(const MessageHeader& header, std::span<const std::u
 
 void Coordinator::take_update(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                               const UpdateMessage& message) {
-    Sender& sender = senders_[header.worker];
-    // Of the last step there are two: as done, for the others, and with what came late, for the view.
-    const bool last = header.step == settings_.steps, settled = last && sender.step == header.step;
     const bool own = std::all_of(message.bodies.begin(), message.bodies.end(), [&](const Update& u) {
         return owns(header.worker, u.body) && fits(u.body, u.state.q.size()) &&
                (!u.held || fits(u.body, u.impulse.modal.size()));
@@ -225,10 +223,8 @@ void Coordinator::take_update(const MessageHeader& header, std::span<const std::
     const bool constraints = std::ranges::all_of(
         message.broken, [&](std::uint32_t c) { return owns_constraint(header.worker, static_cast<int>(c)); });
     if (settings_.pace != Pace::bounded || !own || !crossed || !constraints ||
-        !fits(message.report.mishaps) || header.step < sender.step ||
-        (header.step == sender.step && header.step != settings_.steps))
+        !fits(message.report.mishaps) || header.step <= senders_[header.worker].step)
         return expel(header.worker, "found states that are not its to publish");
-    sender.settled = settled;
     for (const std::uint32_t c : message.broken) view_.break_constraint(static_cast<int>(c));
     for (const Update& update : message.bodies) {
         Body& body = bodies_[update.body];
@@ -236,10 +232,26 @@ void Coordinator::take_update(const MessageHeader& header, std::span<const std::
         assign(body.record, update);
         body.step = header.step;
     }
-    if (!last || sender.settled) extend_sleep(header);
+    // Of the last step the view shows what comes later.
+    const bool last = header.step == settings_.steps;
+    if (!last) extend_sleep(header);
     report(header, message.report, message.bodies.size(), bytes.size());
-    if (!sender.settled) pass_on(header, bytes);
-    if (!last || sender.settled) view_.take(header.step, message.bodies);
+    pass_on(header, bytes);
+    if (!last) view_.take(header.step, message.bodies);
+}
+
+// The last step once more, exact, with what came late.
+void Coordinator::take_last(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                            const StateMessage& message) {
+    Sender& sender = senders_[header.worker];
+    if (header.step != settings_.steps || header.step != sender.step || !message.contacts.empty() ||
+        !message.springs.empty() || !fits(header.worker, message.bodies) || !fits(message.report.mishaps))
+        return expel(header.worker, "found states that are not its to publish");
+    sender.settled = true;
+    for (const WorldRecord& record : message.bodies)
+        publish(bodies_[static_cast<std::size_t>(record.body)], record, header.step);
+    report(header, message.report, message.bodies.size(), bytes.size());
+    view_.take(header.step, message.bodies);
 }
 
 // What sleeps is not published again until it wakes. (Bodies that the sender did not know to be its own when

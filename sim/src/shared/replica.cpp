@@ -43,6 +43,10 @@ int SceneClock::moving(std::uint64_t step) const {
     return count;
 }
 
+bool is_still(const WorldRecord& record, double dt) noexcept {
+    return record.asleep || record.still_steps * dt >= 0.5 - 1e-9;
+}
+
 Replica::Replica(const WorldScene& scene) : world_(scene.world), clock_(scene) {
     for (int i = 0; i < world_.bodies(); ++i) world_.set_own(i, false);
 }

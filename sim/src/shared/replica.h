@@ -40,6 +40,9 @@ private:
     std::vector<std::uint8_t> moves_;
 };
 
+/// Whether it has slept, or been slow, for half a second, in steps of dt [s].
+[[nodiscard]] bool is_still(const WorldRecord& record, double dt) noexcept;
+
 /// A copy of a world in lockstep, exact at its step: by its own steps, or of the records that others publish. It is whole when
 /// every moving body was published at its step, so that all others are there, too.
 class Replica {

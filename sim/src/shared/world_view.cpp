@@ -33,7 +33,7 @@ void WorldView::take(std::uint64_t step, const std::vector<WorldRecord>& records
     for (const WorldRecord& record : records)
         if (Published* place = place_for(record.body, step)) {
             place->record = record;
-            place->still = record.asleep;
+            place->still = is_still(record, world().settings().dt);
         }
 }
 

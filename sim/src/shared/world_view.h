@@ -17,7 +17,7 @@ public:
 
     void take(std::uint64_t step, StateMessage&& message);              ///< lockstep
     void take(std::uint64_t step, const std::vector<Update>& updates);  ///< bounded
-    /// Records that were handed over instead of published.
+    /// Bounded: exact records, of what was handed over, and of the last step.
     void take(std::uint64_t step, const std::vector<WorldRecord>& records);
     /// Bounded: nothing more will be published of this body.
     void release(int body) { released_[static_cast<std::size_t>(body)] = 1; }
