@@ -30,7 +30,7 @@ public:
     MomentumObserver(const sim::WorldScene& scene, std::uint64_t steps) : scene_(scene), last_(steps) {}
 
     void at(std::uint64_t step, const sim::World& world) override {
-        if (step == 0) momentum_.emplace(scene_, world);
+        if (step == 0) momentum_.emplace(scene_, world, true);
         if (step % 10 == 0 || step == last_) momentum_->look(world);
     }
     /// `outside`: the impulse of what is no body.
