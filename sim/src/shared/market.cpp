@@ -47,7 +47,8 @@ void Market::members(const std::vector<std::uint32_t>& workers) {
     };
     std::erase_if(workers_, [&](const auto& w) { return w.first != self_ && !there(w.first); });
     std::erase_if(promises_, [&](const auto& p) { return !there(p.first); });
-    for (const std::uint32_t worker : workers) workers_[worker];
+    for (const std::uint32_t worker : workers)
+        if (const auto [entry, fresh] = workers_.try_emplace(worker); fresh) entry->second.answers = step_ == 0;
     // What was handed over is taken or comes back: its registration arrives in any case.
     if (!there(offer_.to)) sale_ = Sale::none;
 }
@@ -55,6 +56,7 @@ void Market::members(const std::vector<std::uint32_t>& workers) {
 void Market::heard(std::uint32_t worker, std::uint64_t step, std::uint32_t epoch, const StepReport& report) {
     const auto found = workers_.find(worker);
     if (found == workers_.end() || worker == self_) return;
+    found->second.answers = true;
     mark(found->second, step, report.smoothed_s);
     if (epoch < found->second.epoch) return;
     found->second.smoothed = report.smoothed_s;
@@ -360,6 +362,7 @@ std::optional<Offer> Market::make_offer(const Gather& asked) {
 
 void Market::answered(std::uint32_t worker, const OfferAnswer& answer) {
     if (sale_ != Sale::offered || worker != offer_.to || answer.number != offer_.number) return;
+    workers_[worker].answers = true;
     sale_ = answer.accepted ? Sale::accepted : Sale::none;
     if (!answer.accepted) carried_ = 0, not_before_ = std::max(not_before_, step_ + kDeclinedSteps);
 }

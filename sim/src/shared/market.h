@@ -53,6 +53,11 @@ public:
     /// An offer of some of own lots, which are all that this worker has; none if no lot fits.
     [[nodiscard]] std::optional<Offer> make_offer(Holdings holdings);
     [[nodiscard]] bool is_selling() const { return sale_ != Sale::none; }  ///< an offer is under way
+    /// Somebody owns nothing and was offered something: the next step is to wait for the answer, so that work is level after few
+    /// steps, however long messages take. Not for that of a worker that has just joined: it may still be making its world.
+    [[nodiscard]] bool awaits_answer() const {
+        return spreads_ && sale_ == Sale::offered && workers_.at(offer_.to).answers;
+    }
     /// An offer of these own bodies to a member, whatever they cost there.
     [[nodiscard]] std::optional<Offer> make_offer(const Gather& asked);
     void answered(std::uint32_t worker, const OfferAnswer& answer);
@@ -69,6 +74,7 @@ private:
         double smoothed = 0;      // [s]
         int own = 0;              // bodies
         std::uint32_t epoch = 0;  // reports from before do not count
+        bool answers = false;     // it was there at first, or was heard of since it joined
         struct Mark {
             std::uint64_t step = 0;
             double smoothed = 0;

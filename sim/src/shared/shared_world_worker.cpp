@@ -72,6 +72,8 @@ void SharedWorldWorker::take_message(const MessageHeader& header, SnapshotMessag
 // What is not of the step waits until that is done; but it may say that others will not go on with it.
 void SharedWorldWorker::take_within(const MessageHeader& header, WorkerMessage&& message) {
     if (auto* part = std::get_if<PartMessage>(&message)) return exchange_->take(header, std::move(*part));
+    // Whoever offers may wait for the answer, and this step for its part.
+    if (auto* offer = std::get_if<Offer>(&message)) return take_message(header, std::move(*offer));
     if (const auto* members = std::get_if<Members>(&message)) exchange_->members_within(members->workers);
     if (std::holds_alternative<EndOfRun>(message) || std::holds_alternative<Refusal>(message))
         exchange_->members_within({});
@@ -142,13 +144,14 @@ void SharedWorldWorker::take_message(const MessageHeader& header, Other&& messag
 bool SharedWorldWorker::ready() const {
     const bool bodies_are_due = std::ranges::any_of(
         sellers_, [this](const auto& seller) { return seller.second <= exchange_->steps_done(); });
-    return !left_ && !ended_ && !stepping_ && !bodies_are_due && exchange_->ready();
+    return !left_ && !ended_ && !stepping_ && !bodies_are_due && !market_.awaits_answer() && exchange_->ready();
 }
 
 std::string SharedWorldWorker::waits_for() const {
     if (ready()) return "nothing";
     if (left_ || ended_) return "nobody any more";
     if (exchange_->own_bodies() == 0) return "bodies";
+    if (market_.awaits_answer()) return "an answer to its offer";
     if (sellers_.empty()) return std::to_string(exchange_->lead()).append(" steps for the slowest");
     std::string who = "bodies from";
     for (const auto& [seller, step] : sellers_) who.append(" ").append(std::to_string(seller));

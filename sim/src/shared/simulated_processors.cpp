@@ -163,7 +163,6 @@ struct Processor {
     double step_cost = 0, told_cost = 0;  // of the step; of the part under way, charged already
     double slow = 1;                      // of the step under way
     std::unique_ptr<WaitingStep> step = std::make_unique<WaitingStep>();
-    std::vector<std::vector<Bytes>> within;  // of the step under way
     std::vector<Bytes> come;                 // to its last wait
     bool killed = false, stopped = false, cut = false;
     double silent_since = 0;  // when one of these began
@@ -356,7 +355,6 @@ void Machine::start_step(std::size_t number) {
     p.slow = factor(number);
     if (started_ < 0) started_ = p.free_at;
     p.step_cost = p.told_cost = 0;
-    p.within.clear();
     // What a part of the step took is charged when it tells something, and when it ends.
     p.step->begin([this, number](WaitingStep& step) {
         Processor& own = processors_[number];
@@ -390,7 +388,7 @@ void Machine::go_on(std::size_t number) {
     p.come.clear();
     for (; !p.inbox.empty() && p.inbox.front().time <= now_; p.inbox.pop_front())
         p.come.push_back(std::move(p.inbox.front().bytes));
-    if (how_.repeat_alone) p.within.push_back(p.come);
+    if (how_.repeat_alone) p.turns.back().within.push_back(p.come);
     p.told_cost = 0;
     p.step->go_on();
     after_part(p);
@@ -402,7 +400,6 @@ void Machine::after_part(Processor& p) {
         p.step_cost = how_.seconds_per_work * p.worker->work() * p.slow;
         p.free_at += p.step_cost;
     }
-    if (how_.repeat_alone) p.turns.back().within = std::move(p.within);
     p.stepping = true;
 }
 
@@ -432,17 +429,24 @@ double Machine::repeat_alone(const Processor& p) const {
                 sent += message.bytes.size();
         if (!turn.step) continue;
         std::size_t next = 0;
-        spent += cost_of([&] {
+        struct Unended {};
+        const auto step = [&] {
             worker->step([&](bool wait) {
                 for (const SharedWorldWorker::Outgoing& message : worker->outgoing())
                     sent += message.bytes.size();
                 if (!wait) return;
-                for (const Bytes& bytes : turn.within.at(next++)) {
+                if (next == turn.within.size()) throw Unended{};
+                for (const Bytes& bytes : turn.within[next++]) {
                     DecodedMessage decoded = decode_for_worker(*bytes);
                     worker->take(decoded.header, std::move(decoded.message));
                 }
             });
-        });
+        };
+        try {
+            spent += cost_of(step);
+        } catch (const Unended&) {  // it was killed, or the run ended
+            break;
+        }
     }
     if (sent != p.sent)
         throw std::logic_error("simulated processors: a worker did otherwise when it was alone");

@@ -257,6 +257,28 @@ TEST_P(MarketRun, AllOnOneIsLevelWithinTenStepsThenAtMostOneSaleInTwentyOrTen) {
             }
 }
 
+// Who owns all does not take steps while an answer is on its way.
+TEST_P(MarketRun, AllOnOneIsLevelWithinTenStepsHoweverLongMessagesTake) {
+    for (const int workers : {3, 10, 16})
+        for (const int wide : {6, 20})
+            for (const double latency : {2e-4, 2e-2}) {  // a step of one takes 30 to 400 us
+                const sim::WorldScene scene = at_rest(wide, wide == 6 ? 5 : 20);
+                sim::DistributedSettings settings;
+                settings.pace = GetParam();
+                settings.bound = GetParam() == sim::Pace::bounded ? 4 : 0;
+                settings.steps = 30;
+                settings.all_to_first = true;
+                settings.market.from_step = 10;
+                sim::SimulatedProcessors how = processors(workers);
+                how.latency_s = latency;
+                Record record;
+                (void)sim::simulate_processors(scene, settings, how, record);
+                const double column = double(workers) / double(scene.world.bodies.size());
+                EXPECT_LE(excess(record, workers, 20), std::max(0.15, 1.05 * column))
+                    << workers << " workers, " << scene.world.bodies.size() << " bodies, " << latency;
+            }
+}
+
 TEST_P(MarketRun, OneWorkerAtHalfSpeedCostsLittleWithBalancing) {
     const sim::WorldScene scene = at_rest(20, 10);
     for (const int slow : {0, 3}) {
