@@ -89,7 +89,8 @@ private:
     void take_state(const MessageHeader& header, std::span<const std::uint8_t> bytes, StateMessage&& message);
     void take_update(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                      const UpdateMessage& message);
-    void take_last(const MessageHeader& header, std::span<const std::uint8_t> bytes, const StateMessage& message);
+    void take_last(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                   const StateMessage& message);
     void extend_sleep(const MessageHeader& header);
     void take_handover(const MessageHeader& header, Handover&& message);
     void take_reach(const MessageHeader& header, ReachMessage&& message);

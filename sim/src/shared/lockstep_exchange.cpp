@@ -89,8 +89,8 @@ private:
     std::vector<int> owned_;            // that are there, ascending; as of so many bodies, and own_:
     int listed_ = 0;
     bool own_changed_ = false;
-    std::deque<Ownership> later_;       // own ones of later steps
-    bool unpublished_ = false;          // between step() and publish()
+    std::deque<Ownership> later_;  // own ones of later steps
+    bool unpublished_ = false;     // between step() and publish()
     bool owes_ = false;
     WorkerMessage outgoing_ = StateMessage{};
     // Together.

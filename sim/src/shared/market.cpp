@@ -48,7 +48,8 @@ void Market::members(const std::vector<std::uint32_t>& workers) {
     std::erase_if(workers_, [&](const auto& w) { return w.first != self_ && !there(w.first); });
     std::erase_if(promises_, [&](const auto& p) { return !there(p.first); });
     for (const std::uint32_t worker : workers)
-        if (const auto [entry, fresh] = workers_.try_emplace(worker); fresh) entry->second.answers = step_ == 0;
+        if (const auto [entry, fresh] = workers_.try_emplace(worker); fresh)
+            entry->second.answers = step_ == 0;
     // What was handed over is taken or comes back: its registration arrives in any case.
     if (!there(offer_.to)) sale_ = Sale::none;
 }

@@ -144,7 +144,8 @@ void SharedWorldWorker::take_message(const MessageHeader& header, Other&& messag
 bool SharedWorldWorker::ready() const {
     const bool bodies_are_due = std::ranges::any_of(
         sellers_, [this](const auto& seller) { return seller.second <= exchange_->steps_done(); });
-    return !left_ && !ended_ && !stepping_ && !bodies_are_due && !market_.awaits_answer() && exchange_->ready();
+    return !left_ && !ended_ && !stepping_ && !bodies_are_due && !market_.awaits_answer() &&
+           exchange_->ready();
 }
 
 std::string SharedWorldWorker::waits_for() const {

@@ -163,7 +163,7 @@ struct Processor {
     double step_cost = 0, told_cost = 0;  // of the step; of the part under way, charged already
     double slow = 1;                      // of the step under way
     std::unique_ptr<WaitingStep> step = std::make_unique<WaitingStep>();
-    std::vector<Bytes> come;                 // to its last wait
+    std::vector<Bytes> come;  // to its last wait
     bool killed = false, stopped = false, cut = false;
     double silent_since = 0;  // when one of these began
     // Repeated alone:

@@ -178,7 +178,7 @@ private:
     std::vector<std::size_t> runs_;  // where each ends
     std::vector<Manifold> all_found_;
     KeptVector<Manifold> told_impacts_;  // of meetings, own ones and those of partners
-    std::vector<BodyPath> paths_;         // of each body
+    std::vector<BodyPath> paths_;        // of each body
     enum : std::uint8_t { kNotFollowed, kBeingFollowed, kFollowed };
     std::vector<std::uint8_t> followed_;  // paths_ holds the free motion of this step; by any thread
     std::vector<std::uint8_t> watched_;   // has a contact that turns on: see unforeseen; by any thread

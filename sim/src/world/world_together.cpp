@@ -44,8 +44,7 @@ void World::Implementation::go_back(const WorldCounts& counts_before) {
     contacts.go_back();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         MovingBody& body = bodies[i];
-        if (solving && noted[i] != 0)
-            body.state = started[i], body.at_limit = at_limit_before[i] != 0;
+        if (solving && noted[i] != 0) body.state = started[i], body.at_limit = at_limit_before[i] != 0;
         body.limited_now = false;
         body.asleep = sleep_before[i].asleep && !body.quarantined;
         body.still_steps = sleep_before[i].still_steps, body.sleep_group = sleep_before[i].group;
