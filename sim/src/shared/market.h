@@ -58,6 +58,8 @@ public:
     [[nodiscard]] bool awaits_answer() const {
         return spreads_ && sale_ == Sale::offered && workers_.at(offer_.to).answers;
     }
+    /// The answer has not come for long: this worker's answers are not waited for before it is heard of again.
+    void stop_waiting() { workers_[offer_.to].answers = false; }
     /// An offer of these own bodies to a member, whatever they cost there.
     [[nodiscard]] std::optional<Offer> make_offer(const Gather& asked);
     void answered(std::uint32_t worker, const OfferAnswer& answer);

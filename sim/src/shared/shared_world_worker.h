@@ -23,7 +23,10 @@ public:
     void step(const std::function<void(bool wait)>& flush = {});
     void use_threads(int threads) { exchange_->use_threads(threads); }  ///< see World::use_threads
     void stop_waiting() { exchange_->members_within({}); }  ///< within flush: the step is done alone
-    struct Times {                                          ///< of a step, see WorkerStep
+    /// Whether only the answer to an offer keeps the next step from being done; and then it can be done without.
+    [[nodiscard]] bool awaits_answer() const { return market_.awaits_answer(); }
+    void stop_waiting_for_answer() { market_.stop_waiting(); }
+    struct Times {  ///< of a step, see WorkerStep
         double seconds = 0, waited_s = 0, processor_s = 0;
         std::uint64_t linked = 0;  ///< bytes that were sent to other workers directly, since the step before
     };

@@ -23,7 +23,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr int kPollMs = 50;
 constexpr std::size_t kMostPartsInOneGo = 4096;
-constexpr double kLongestWithin = 2;  // that a step waits for others [s]; then it is done alone
+constexpr double kLongestWithin = 2;       // that a step waits for others [s]; then it is done alone
+constexpr double kLongestForAnswer = 0.5;  // that the next step waits for the answer to an offer [s]
 
 volatile std::sig_atomic_t drain_asked = 0;
 
@@ -73,6 +74,7 @@ private:
         while (!worker_.ended() && !pulse_.application_gone()) {
             take_all();
             if (drain_asked && !std::exchange(draining_, true)) worker_.drain();
+            look_after_offer();
             if (!worker_.ended() && worker_.ready()) step();
             send_all();
             if (worker_.left()) return 0;
@@ -80,6 +82,15 @@ private:
         }
         if (pulse_.application_gone()) return 1;
         return refused_ ? 1 : 0;
+    }
+    /// Who does not answer does not hold up the run.
+    void look_after_offer() {
+        if (!worker_.awaits_answer())
+            offered_since_.reset();
+        else if (!offered_since_)
+            offered_since_ = Clock::now();
+        else if (seconds_since(*offered_since_) > kLongestForAnswer)
+            worker_.stop_waiting_for_answer();
     }
     void take_all() {
         zmq::message_t frame;
@@ -174,6 +185,7 @@ private:
     bool draining_ = false, refused_ = false;
     double waited_within_ = 0;  ///< the step under way
     Clock::time_point idle_since_ = Clock::now();
+    std::optional<Clock::time_point> offered_since_;  ///< the offer whose answer the next step waits for
     double told_processor_ = processor_s();
 };
 

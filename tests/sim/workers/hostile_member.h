@@ -23,7 +23,8 @@ public:
         offers,       ///< bodies to worker 0, as fast as they go out
         lies,         ///< of where its bodies are, by a tenth of a millimetre
         floods_links,  ///< of the others with what is no message, and withholds its parts of each step, from the first on
-        is_silent  ///< nothing, and no heartbeats
+        says_nothing,  ///< but heartbeats: it answers no offer
+        is_silent      ///< nothing, and no heartbeats
     };
     HostileMember(const std::string& endpoint, Habit habit, int honest_steps,
                   const std::optional<sim::WorkerKeys>& keys = {})

@@ -189,6 +189,33 @@ TEST(SharedWorldRun, AMemberThatFloodsTheLinksAndTellsNoPartsTakesNoWorkerOfOurs
     for (sim::WorkerProcess& worker : workers) EXPECT_TRUE(comes_true([&] { return worker.has_ended(); }));
 }
 
+// Whoever owns all waits for the answer to an offer, but not for long: else all would have waited for its bodies.
+TEST(SharedWorldRun, AMemberThatAnswersNoOfferTakesNoWorkerOfOursWithIt) {
+    const sim::WorldScene scene = heap(18);
+    for (const sim::Pace pace : {sim::Pace::lockstep, sim::Pace::bounded}) {
+        sim::DistributedLaunch launch = processes(1);
+        launch.listen = "tcp://127.0.0.1:*", launch.expect = 2;
+        launch.silence_s = 20, launch.longest_step_s = 5;
+        std::optional<HostileMember> hostile;
+        std::jthread later;
+        launch.listening = [&](const std::string& endpoint) {
+            later = std::jthread([&hostile, endpoint] {
+                std::this_thread::sleep_for(std::chrono::milliseconds(300));  // ours is first and owns all
+                hostile.emplace(endpoint, HostileMember::Habit::says_nothing, 0);
+            });
+        };
+        sim::DistributedSettings settings = lockstep(60);
+        settings.pace = pace, settings.bound = pace == sim::Pace::bounded ? 4 : 0;
+        settings.all_to_first = true;
+        Watcher watcher;
+        const sim::DistributedResult result = sim::run_distributed(scene, settings, launch, watcher);
+        later.join();
+        EXPECT_EQ(result.steps, 60u);
+        EXPECT_LE(result.lost, 1) << testing::PrintToString(
+            watcher.notes);  // 1: it came first on a busy machine
+    }
+}
+
 TEST(SharedWorldRun, AStrangerThatJoinsAndFallsSilentTakesNoWorkerOfOursWithIt) {
     const sim::WorldScene scene = heap(9);
     Watcher watcher;
