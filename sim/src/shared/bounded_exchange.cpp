@@ -383,7 +383,7 @@ void BoundedExchange::feel() {
 
 void BoundedExchange::step(const StepChannel&) {
     if (at_end()) {
-        settled_ = true;
+        settled_ = published_ == step_;  // else, having come here by taking bodies over, it says so first
         return;
     }
     come_to(step_);

@@ -401,7 +401,10 @@ bool Coordinator::ask_for(std::uint32_t body, std::uint32_t to) {
 void Coordinator::release() {
     for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
         const auto sender = senders_.find(owner(i));
-        if (sender != senders_.end() && sender->second.settled) view_.release(i);
+        if (sender == senders_.end() || !sender->second.settled) continue;
+        const Body& body = bodies_[static_cast<std::size_t>(i)];
+        if (body.step == settings_.steps) view_.take(body.step, {body.record});
+        view_.release(i);
     }
 }
 

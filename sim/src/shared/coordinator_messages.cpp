@@ -251,7 +251,7 @@ void Coordinator::take_last(const MessageHeader& header, std::span<const std::ui
     for (const WorldRecord& record : message.bodies)
         publish(bodies_[static_cast<std::size_t>(record.body)], record, header.step);
     report(header, message.report, message.bodies.size(), bytes.size());
-    view_.take(header.step, message.bodies);
+    view_.take(header.step, message.bodies, true);
 }
 
 // What sleeps is not published again until it wakes. (Bodies that the sender did not know to be its own when

@@ -81,8 +81,9 @@ void Market::registered(std::uint32_t epoch, const Ownership& ownership) {
     if (own_sale) cost = *std::exchange(handed_over_, std::nullopt);
     if (const auto promise = promises_.find(ownership.from);
         ownership.owner == self_ && promise != promises_.end()) {
-        cost = promise->second;
-        promises_.erase(promise);
+        cost = promise->second.front();
+        promise->second.pop_front();
+        if (promise->second.empty()) promises_.erase(promise);
     }
     if (from != workers_.end()) {
         from->second.epoch = epoch;
@@ -346,7 +347,7 @@ std::optional<Offer> Market::make_offer(Holdings holdings) {
     if (offer_.bodies.empty()) not_before_ = std::max(not_before_, step_ + kNothingSteps);
     if (offer_.bodies.empty()) return std::nullopt;
     ++next_number_;
-    sale_ = Sale::offered;
+    sale_ = Sale::offered, patient_ = true;
     return offer_;
 }
 
@@ -357,7 +358,7 @@ std::optional<Offer> Market::make_offer(const Gather& asked) {
     offer_ = {asked.to, next_number_++, asked.bodies,
               std::vector<float>(asked.bodies.size(), static_cast<float>(each)), true};
     offer_cost_ = each * static_cast<double>(asked.bodies.size());
-    sale_ = Sale::offered;
+    sale_ = Sale::offered, patient_ = true;
     return offer_;
 }
 
@@ -382,17 +383,20 @@ std::optional<Offer> Market::hand_over() {
 }
 
 OfferAnswer Market::answer(std::uint32_t seller, const Offer& offer) {
-    promises_.erase(seller);  // it has one offer at a time
     OfferAnswer answer{seller, offer.number, false};
     const auto found = workers_.find(seller);
     if (found == workers_.end()) return answer;
     const double cost = std::accumulate(offer.cost_s.begin(), offer.cost_s.end(), 0.0);
     double after = smoothed() + cost;
-    for (const auto& promise : promises_) after += promise.second;
+    for (const auto& [from, costs] : promises_) after = std::accumulate(costs.begin(), costs.end(), after);
     answer.accepted =
         offer.gathers ||
         after <= (1 + settings_.dead_band) * std::max(found->second.smoothed - cost, average()) * (1 + 1e-6);
-    if (answer.accepted) promises_[seller] = cost;
+    if (!answer.accepted) return answer;
+    // It has one offer at a time: the one before may be handed over, and not be registered here.
+    std::deque<double>& promised = promises_[seller];
+    promised.push_back(cost);
+    if (promised.size() > 2) promised.pop_front();
     return answer;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <vector>
@@ -56,10 +57,9 @@ public:
     /// Somebody owns nothing and was offered something: the next step is to wait for the answer, so that work is level after few
     /// steps, however long messages take. Not for that of a worker that has just joined: it may still be making its world.
     [[nodiscard]] bool awaits_answer() const {
-        return spreads_ && sale_ == Sale::offered && workers_.at(offer_.to).answers;
+        return spreads_ && sale_ == Sale::offered && patient_ && workers_.at(offer_.to).answers;
     }
-    /// The answer has not come for long: this worker's answers are not waited for before it is heard of again.
-    void stop_waiting() { workers_[offer_.to].answers = false; }
+    void stop_waiting() { patient_ = false; }  ///< for the answer to the offer that is under way
     /// An offer of these own bodies to a member, whatever they cost there.
     [[nodiscard]] std::optional<Offer> make_offer(const Gather& asked);
     void answered(std::uint32_t worker, const OfferAnswer& answer);
@@ -129,7 +129,9 @@ private:
     double offer_cost_ = 0;              // [s] here
     std::optional<double> handed_over_;  // of bodies whose registration has not come [s]
     std::uint32_t next_number_ = 0;
-    std::map<std::uint32_t, double> promises_;  // by seller: what it will cost here [s]
+    bool patient_ = true;  // see stop_waiting
+    /// By seller, in the order of its offers: what was accepted and is not registered, what it will cost here [s].
+    std::map<std::uint32_t, std::deque<double>> promises_;
 };
 
 }  // namespace sim

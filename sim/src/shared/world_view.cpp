@@ -28,21 +28,21 @@ void WorldView::take(std::uint64_t step, const std::vector<Update>& updates) {
         }
 }
 
-void WorldView::take(std::uint64_t step, const std::vector<WorldRecord>& records) {
+void WorldView::take(std::uint64_t step, const std::vector<WorldRecord>& records, bool last) {
     if (pace_ == Pace::lockstep) return;
     for (const WorldRecord& record : records)
-        if (Published* place = place_for(record.body, step)) {
+        if (Published* place = place_for(record.body, step, last)) {
             place->record = record;
             place->still = is_still(record, world().settings().dt);
         }
 }
 
 // nullptr: it is there, or will not be shown.
-WorldView::Published* WorldView::place_for(int body, std::uint64_t step) {
+WorldView::Published* WorldView::place_for(int body, std::uint64_t step, bool again) {
     auto& all = published_[static_cast<std::size_t>(body)];
     if (step <= step_ || !clock().there_at(body, step)) return nullptr;
     const auto at = std::ranges::lower_bound(all, step, {}, &Published::step);
-    if (at != all.end() && (*at)->step == step) return nullptr;
+    if (at != all.end() && (*at)->step == step) return again ? *at : nullptr;
     if (spare_.empty()) spare_.push_back(&places_.emplace_back());
     Published* place = spare_.back();
     spare_.pop_back();

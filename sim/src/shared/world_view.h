@@ -17,8 +17,8 @@ public:
 
     void take(std::uint64_t step, StateMessage&& message);              ///< lockstep
     void take(std::uint64_t step, const std::vector<Update>& updates);  ///< bounded
-    /// Bounded: exact records, of what was handed over, and of the last step.
-    void take(std::uint64_t step, const std::vector<WorldRecord>& records);
+    /// Bounded: exact records, of what was handed over, or of the last step; those replace what is there.
+    void take(std::uint64_t step, const std::vector<WorldRecord>& records, bool last = false);
     /// Bounded: nothing more will be published of this body.
     void release(int body) { released_[static_cast<std::size_t>(body)] = 1; }
     void break_constraint(int constraint);     ///< bounded: its owner reported the break
@@ -41,7 +41,7 @@ private:
         WorldRecord record;
         bool still = false;
     };
-    [[nodiscard]] Published* place_for(int body, std::uint64_t step);
+    [[nodiscard]] Published* place_for(int body, std::uint64_t step, bool again = false);
     [[nodiscard]] bool advance_bounded();
     void show(int body, std::uint64_t step);
 

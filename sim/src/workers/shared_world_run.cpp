@@ -46,7 +46,10 @@ public:
     }
     /// A step if one can be done; true if it was.
     bool work() {
-        if (!worker_ || worker_->ended() || !worker_->ready()) return false;
+        if (!worker_ || worker_->ended()) return false;
+        if (worker_->awaits_answer())
+            worker_->stop_waiting_for_answer();  // messages come between its steps alone
+        if (!worker_->ready()) return false;
         const Clock::time_point start = Clock::now();
         const double processor = thread_processor_s();
         worker_->step();

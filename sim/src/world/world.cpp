@@ -476,6 +476,7 @@ void World::set_state(int body, const WorldBodyState& state) {
 
 void World::apply_force(int body, const Eigen::Vector3d& force, const Eigen::Vector3d& point_body) {
     MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    if (b.unposed) implementation_->pose(b);
     if (!b.pushed) b.force.setZero(), b.torque.setZero(), b.modal_force.setZero();
     const Eigen::Matrix3d r = b.state.orientation.toRotationMatrix();
     b.pushed = true;

@@ -61,6 +61,7 @@ void World::Implementation::dismiss_ghosts() {
 
 void World::share(Sharing sharing) {
     implementation_->sharing = sharing;
+    implementation_->all_whole = false;
     implementation_->list_owned();
 }
 

@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <random>
 
+#include "shared/coordinator.h"
+#include "shared/shared_world_worker.h"
 #include "shared_scenes.h"
 
 using namespace world_test;
@@ -148,3 +150,60 @@ INSTANTIATE_TEST_SUITE_P(Paces, TradeFailures, testing::Values(sim::Pace::lockst
                          [](const auto& pace) {
                              return pace.param == sim::Pace::lockstep ? "Lockstep" : "Bounded";
                          });
+
+// Whoever then comes to the last step by taking the bodies over publishes it as others do, before its exact states.
+TEST(LastStep, OfBodiesWhoseOwnerIsLostOrLeavesAfterItIsDoneByWhoeverGetsThem) {
+    for (const bool drains : {false, true})
+        for (const int bodies : {1, 2}) {
+            SCOPED_TRACE(std::to_string(bodies) + (drains ? " bodies, drains" : " bodies, lost"));
+            sim::WorldScene scene;
+            for (int i = 0; i < bodies; ++i) {
+                scene.world.bodies.push_back(ball({3. * i, 0, 0}));
+                scene.world.bodies.back().name += std::to_string(i);
+            }
+            sim::DistributedSettings settings = lockstep(20);
+            settings.pace = sim::Pace::bounded, settings.bound = 4, settings.market.trade = false;
+            Record record;
+            sim::Coordinator meeting(scene, settings, record);
+            std::map<std::uint32_t, std::unique_ptr<sim::SharedWorldWorker>> workers;
+            for (int i = 0; i < 3; ++i) (void)meeting.join({});
+            const auto deliver = [&] {
+                for (const sim::Coordinator::Outgoing& out : meeting.outgoing())
+                    for (const std::uint32_t to : out.to) {
+                        sim::DecodedMessage m = sim::decode_for_worker(*out.bytes);
+                        if (const auto* with = std::get_if<sim::SceneMessage>(&m.message))
+                            workers[to] = std::make_unique<sim::SharedWorldWorker>(*with);
+                        else
+                            workers.at(to)->take(m.header, std::move(m.message));
+                    }
+            };
+            const auto send = [&](std::uint32_t number) {
+                for (const sim::SharedWorldWorker::Outgoing& out : workers.at(number)->outgoing())
+                    meeting.take(number, out.bytes), meeting.advance();
+            };
+            deliver();
+            meeting.start();
+            const std::uint32_t first = meeting.owner(0);
+            bool gone = false;
+            for (int turn = 0; turn < 200 && !meeting.finished(); ++turn) {
+                deliver();
+                for (auto& [number, worker] : workers) {
+                    const bool waits = number != first && !gone && worker->steps_done() >= 17;
+                    if ((number == first && gone) || waits) continue;
+                    if (worker->ready()) worker->step(), worker->worked({.seconds = 1e-3});
+                    send(number);
+                }
+                if (gone || workers.at(first)->steps_done() < 20) continue;
+                gone = true;
+                if (drains)
+                    workers.at(first)->drain(), send(first);
+                else
+                    meeting.lose(first, "killed");
+            }
+            EXPECT_TRUE(gone);
+            EXPECT_TRUE(meeting.finished()) << record.notes;
+            EXPECT_EQ(meeting.steps(), 20u);
+            EXPECT_EQ(meeting.result().lost, drains ? 0 : 1) << record.notes;
+            EXPECT_EQ(meeting.result().refused_messages, 0u) << record.notes;
+        }
+}
