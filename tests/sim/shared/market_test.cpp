@@ -195,6 +195,22 @@ sim::WorldScene at_rest(int wide, int deep) {
     return scene;
 }
 
+sim::DistributedSettings steps_of(sim::Pace pace, std::uint64_t steps) {
+    sim::DistributedSettings settings;
+    settings.pace = pace;
+    settings.bound = pace == sim::Pace::bounded ? 4 : 0;
+    settings.steps = steps;
+    return settings;
+}
+
+/// The first offer is made at the end of step 10.
+sim::DistributedSettings all_on_one(sim::Pace pace, std::uint64_t steps) {
+    sim::DistributedSettings settings = steps_of(pace, steps);
+    settings.all_to_first = true;
+    settings.market.from_step = 10;
+    return settings;
+}
+
 /// Of the smoothed times as last told, when all have done a step: the largest over the mean, less one.
 double excess(const Record& record, int workers, std::uint64_t step) {
     std::map<int, double> latest;
@@ -233,12 +249,7 @@ TEST_P(MarketRun, AllOnOneIsLevelWithinTenStepsThenAtMostOneSaleInTwentyOrTen) {
         for (const int wide : {6, 20})
             for (const bool steady : {true, false}) {
                 const sim::WorldScene scene = at_rest(wide, wide == 6 ? 5 : 20);
-                sim::DistributedSettings settings;
-                settings.pace = GetParam();
-                settings.bound = GetParam() == sim::Pace::bounded ? 4 : 0;
-                settings.steps = 300;
-                settings.all_to_first = true;
-                settings.market.from_step = 10;
+                const sim::DistributedSettings settings = all_on_one(GetParam(), 300);
                 sim::SimulatedProcessors how = processors(workers);
                 how.latency_s = 2e-6;
                 if (!steady) how.factor = unsteady;
@@ -249,7 +260,6 @@ TEST_P(MarketRun, AllOnOneIsLevelWithinTenStepsThenAtMostOneSaleInTwentyOrTen) {
                 const std::string what = std::to_string(workers) + " workers, " +
                                          std::to_string(scene.world.bodies.size()) + " bodies" +
                                          (steady ? "" : ", unsteady");
-                // The first offer is made at the end of step 10.
                 if (steady) {
                     EXPECT_LE(excess(record, workers, 21), std::max(0.15, 1.05 * column)) << what;
                 }
@@ -263,12 +273,7 @@ TEST_P(MarketRun, AllOnOneIsLevelWithinTenStepsHoweverLongMessagesTake) {
         for (const int wide : {6, 20})
             for (const double latency : {2e-4, 2e-2}) {  // a step of one takes 30 to 400 us
                 const sim::WorldScene scene = at_rest(wide, wide == 6 ? 5 : 20);
-                sim::DistributedSettings settings;
-                settings.pace = GetParam();
-                settings.bound = GetParam() == sim::Pace::bounded ? 4 : 0;
-                settings.steps = 30;
-                settings.all_to_first = true;
-                settings.market.from_step = 10;
+                const sim::DistributedSettings settings = all_on_one(GetParam(), 30);
                 sim::SimulatedProcessors how = processors(workers);
                 how.latency_s = latency;
                 Record record;
@@ -284,10 +289,7 @@ TEST_P(MarketRun, OneWorkerAtHalfSpeedCostsLittleWithBalancing) {
     for (const int slow : {0, 3}) {
         double elapsed[2];
         for (const bool trade : {false, true}) {
-            sim::DistributedSettings settings;
-            settings.pace = GetParam();
-            settings.bound = GetParam() == sim::Pace::bounded ? 4 : 0;
-            settings.steps = 800;
+            sim::DistributedSettings settings = steps_of(GetParam(), 800);
             settings.market.trade = trade;
             sim::SimulatedProcessors how = processors(5);
             how.latency_s = 2e-6;
