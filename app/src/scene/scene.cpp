@@ -77,7 +77,8 @@ void shape_keys(Fields& keys, sim::GeneralizedSuperquadric& shape) {
     keys.vector("size", size, {0.001, 100, "m"}, "Full extents along the body's axes; or `radius`.",
                 {.otherwise = "`radius` is needed", .example = "[0.4, 0.3, 0.4]"});
     keys.require(!radius || !size, "radius", "both radius and size", "one of them");
-    keys.require(radius || size, "size", "no key \"size\"", "[3 numbers, each from 0.001 to 100]");
+    keys.require(radius || size, "size", "no key \"size\"",
+                 "[3 numbers, each from 0.001 to 100], or \"radius\" of a ball");
     if (radius) size = Eigen::Vector3d::Constant(2 * *radius);
     if (size) shape.base.semi_axes = 0.5 * *size;
     keys.vector(

@@ -35,7 +35,7 @@ std::vector<std::string> Mishaps::lines() const {
     tell(broken, "constraint", "broken (above the breaking force)");
     tell(limited, "body", "held at the limit of deformation");
     tell(spun, "body",
-         "spun so fast that centrifugal load, which is left out, would stretch them by over 1 %");
+         "spun so fast that centrifugal load, which is left out, would be a stretch of over 1 %");
     return all;
 }
 

@@ -282,7 +282,7 @@ TEST(Scene, WrongOnesAreRefusedAtTheirPlaceInOneLine) {
         {"", ":1:1:", "no [[body]]"},
         {"[[body]]\n", ":1:1:", "no key \"name\""},
         {"[[body]]\nname = \"\"\nradius = 1\n", ":2:8:", "a name"},
-        {"[[body]]\nname = \"a\"\n", ":1:1:", "no key \"size\""},
+        {"[[body]]\nname = \"a\"\n", ":1:1:", "or \"radius\" of a ball"},
         {"[[body]]\nname = \"a\"\nradius = 1\nsize = [1, 1, 1]\n", ":3:10:", "one of them"},
         {"[[body]]\nname = \"a\"\nsize = [1, 0, 1]\n", ":3:12:", "each from 0.001"},
         {"[[body]]\nname = \"a\"\nradius = nan\n", ":3:10:", "a number from"},
