@@ -106,6 +106,7 @@ void write_body(ByteWriter& out, const Beat& m) {
     out.append(m.secret);
 }
 void write_body(ByteWriter&, const Drained&) {}
+void write_body(ByteWriter&, const Leaves&) {}
 void write_body(ByteWriter& out, const WorkerFailure& m) {
     out.text(shortened(m.what));
 }
@@ -237,6 +238,7 @@ void read_body(ByteReader& in, Beat& m) {
     m.secret = in.bytes<16>();
 }
 void read_body(ByteReader&, Drained&) {}
+void read_body(ByteReader&, Leaves&) {}
 void read_body(ByteReader& in, WorkerFailure& m) {
     m.what = read_words(in, kLongestText);
 }

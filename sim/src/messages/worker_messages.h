@@ -17,7 +17,7 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 13
+//   4       2      version, 14
 //   6       2      type
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
@@ -53,6 +53,7 @@ namespace sim {
 //   21 reach      worker  texts endpoint, key
 //   22 to 24 of struck bodies, see struck_messages.h; of the others a play and its workers use 1, 2, 4, 6 and 7
 //   25 gather    app     u32 to, list of u32 (bodies)
+//   26 leaves    worker  nothing
 //
 //   report      68 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
 //               cross contacts, own; u64 linked; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
@@ -86,7 +87,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kProtocol = 13;  ///< version, of messages and of how worlds step
+constexpr std::uint16_t kProtocol = 14;  ///< version, of messages and of how worlds step
 
 struct MessageHeader {
     std::uint32_t worker = kApplication;
@@ -124,6 +125,7 @@ struct Beat {  ///< both ways, every 0.1 s
     Secret secret = {};
 };
 struct Drained {};      ///< worker: has given away all it owned and leaves
+struct Leaves {};       ///< bounded, worker: wants to; gets a Gather for all it owns
 struct WorkerFailure {  ///< worker: cannot go on
     std::string what;
 };
@@ -152,7 +154,7 @@ struct Members {
 struct Ownership {
     std::uint32_t owner = 0;
     std::uint32_t from = kApplication;  ///< the owner before; kApplication: none
-    bool traded = false;                ///< to a buyer; else at the start, after a loss, or as one drains
+    bool traded = false;  ///< to a buyer; else at the start, after a loss, or as one drains in lockstep
     std::uint64_t step = 0;
     std::vector<WorldRecord> bodies;  ///< exact; without a handover in bounded pace as last published
     /// Bounded, of what was handed over: the states include what came of these workers' messages up to these steps.
@@ -240,7 +242,7 @@ struct Handover {
 };
 
 /// From the application, in bounded pace: these bodies belong to a structure (shared/structures.h) of which another worker has
-/// most; their owner offers them to it.
+/// most, or their owner leaves: it offers them to that one. To the application: there is no other, it hands over what it has.
 struct Gather {
     std::uint32_t to = 0;
     std::vector<std::uint32_t> bodies;
@@ -282,7 +284,7 @@ using WorkerMessage =
     std::variant<JoinRequest, Beat, Drained, WorkerFailure, SceneMessage, Refusal, EndOfRun, Members,
                  Ownership, SnapshotMessage, StateMessage, UpdateMessage, Offer, OfferAnswer, Handover,
                  PartMessage, PublishedMessage, RelayMessage, PeersMessage, LinkBeat, ReachMessage,
-                 StruckAssign, StruckStep, StruckAnswer, Gather, PackedUpdates>;
+                 StruckAssign, StruckStep, StruckAnswer, Gather, Leaves, PackedUpdates>;
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const MessageHeader& header, const WorkerMessage& message);
 struct DecodedMessage {

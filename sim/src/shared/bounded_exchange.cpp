@@ -27,8 +27,10 @@ public:
     void take(SnapshotMessage&& message) override;
     void members(const Members& message, std::uint32_t epoch) override;
     void own(const Ownership& ownership) override;
-    // Who came to the last step by taking bodies over has to say so.
-    [[nodiscard]] bool owes() const override { return at_end() && own_bodies() > 0 && published_ < step_; }
+    // Who came to the last step by taking bodies over has to say so, and where it is who goes on to a step in which bodies come.
+    [[nodiscard]] bool owes() const override {
+        return published_ < step_ && (owned_.empty() ? owners_.contains(self_) : at_end());
+    }
     [[nodiscard]] bool ready() const override;
     void step(const StepChannel& channel) override;
     [[nodiscard]] std::vector<std::uint8_t> publish(std::uint32_t epoch, const StepReport& report) override;
@@ -40,6 +42,7 @@ public:
     [[nodiscard]] bool at_end() const override { return step_ >= settings_.steps; }
     [[nodiscard]] bool done() const override { return at_end() && settled_; }
     [[nodiscard]] int own_bodies() const override { return static_cast<int>(owned_.size()); }
+    [[nodiscard]] bool has_nothing() const override { return owned_.empty() && later_.empty(); }
     [[nodiscard]] int lead() const override;
     [[nodiscard]] int ghost_age() const override { return ghost_age_; }
     [[nodiscard]] const World& world() const override { return world_; }

@@ -277,15 +277,11 @@ std::vector<Eigen::Vector3d> Coordinator::places(const std::vector<std::vector<i
 }
 
 // Neighbouring columns go to one worker, the one with the fewest bodies, until it has its share.
-void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from, const Handover* handed) {
-    for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = kApplication;
-    if (members_.empty()) {
-        if (!bodies.empty()) orphans_.emplace_back(from, bodies);
-        return;
-    }
+std::map<std::uint32_t, std::vector<int>> Coordinator::shares(
+    const std::vector<int>& bodies, const std::vector<std::uint32_t>& workers) const {
     std::map<std::uint32_t, std::size_t> count;
     std::size_t all = bodies.size();
-    for (const std::uint32_t worker : members_) all += count[worker] = owned_by(worker).size();
+    for (const std::uint32_t worker : workers) all += count[worker] = owned_by(worker).size();
     const std::vector<std::vector<int>> lots = whole_lots();
     const std::vector<Eigen::Vector3d> all_places = places(lots);
     const std::vector<std::optional<Eigen::Vector3d>> where(all_places.begin(), all_places.end());
@@ -295,26 +291,50 @@ void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from, 
     for (std::size_t i = 0; i < lots.size(); ++i)
         for (const int body : lots[i])
             if (std::binary_search(bodies.begin(), bodies.end(), body)) stands[*column[i]].push_back(body);
-    std::map<std::uint32_t, std::vector<int>> shares;
+    std::map<std::uint32_t, std::vector<int>> plan;
     const auto bodies_of = [](const auto& c) { return c.second; };
     auto to = count.end();
     for (const auto& [at, some] : stands) {
-        if (to == count.end() || to->second * members_.size() >= all)
+        if (to == count.end() || to->second * workers.size() >= all)
             to = result_.one_owner ? std::ranges::max_element(count, {}, bodies_of)
                                    : std::ranges::min_element(count, {}, bodies_of);
         to->second += some.size();
-        auto& share = shares[to->first];
+        auto& share = plan[to->first];
         share.insert(share.end(), some.begin(), some.end());
     }
-    for (const auto& [worker, share] : shares) register_owner(share, worker, from, handed);
+    return plan;
+}
+
+void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from, const Handover* handed) {
+    for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = kApplication;
+    if (members_.empty()) {
+        if (!bodies.empty()) orphans_.emplace_back(from, bodies);
+        return;
+    }
+    const std::vector<std::uint32_t> others = staying();
+    for (const auto& [worker, share] : shares(bodies, others.empty() ? members_ : others))
+        register_owner(share, worker, from, handed);
+}
+
+// Of those who do not leave; or who leaves last, if all do.
+std::vector<std::uint32_t> Coordinator::staying() const {
+    std::vector<std::uint32_t> workers;
+    std::ranges::copy_if(members_, std::back_inserter(workers),
+                         [this](std::uint32_t worker) { return !leaving_.contains(worker); });
+    if (workers.empty() && members_.size() > 1) workers.push_back(members_.back());
+    return workers;
 }
 
 void Coordinator::remove(std::uint32_t worker) {
     std::erase(members_, worker);
+    leaving_.erase(worker);
+    for (Body& body : bodies_)
+        if (body.asked_to == worker) body.asked_at = 0, body.asked_to = kApplication;
     gone_.push_back(worker);
     if (started_) send(members_, Members{members_, true});
     share_out(owned_by(worker), worker);
     if (started_) send(members_, Members{members_});
+    ask_who_leaves();
     advance();
 }
 
@@ -349,7 +369,7 @@ void Coordinator::advance() {
         if (settings_.pace == Pace::lockstep)
             observer_->done(view_.step(), [this] { return state(); });
         else
-            gather();
+            gather(), ask_who_leaves();
         observer_->at(view_.step(), world);
         tell_ready();
         std::erase_if(kept_, [this](const auto& kept) { return kept.first + kept_steps_ <= view_.step(); });
@@ -377,7 +397,7 @@ void Coordinator::gather() {
         if (shares.size() < 2) continue;
         const auto most =
             std::ranges::max_element(shares, {}, [](const auto& share) { return share.second.size(); });
-        if (!is_member(most->first)) continue;
+        if (!is_member(most->first) || leaving_.contains(most->first)) continue;  // it gives away what it has
         for (const auto& [from, bodies] : shares)
             if (from != most->first && is_member(from))
                 std::ranges::copy_if(bodies, std::back_inserter(asked[{from, most->first}]),
@@ -385,6 +405,25 @@ void Coordinator::gather() {
     }
     for (auto& [who, bodies] : asked)
         if (!bodies.empty()) send({who.first}, Gather{who.second, std::move(bodies)});
+}
+
+// For all that its owner has. Where nobody else stays it hands that over.
+void Coordinator::ask_who_leaves() {
+    const std::vector<std::uint32_t> others = staying();
+    for (const std::uint32_t worker : leaving_) {
+        if (others.empty()) {
+            send({worker}, Gather{kApplication, {}});
+            continue;
+        }
+        if (worker == others.back()) continue;  // the last
+        for (const auto& [to, share] : shares(owned_by(worker), others)) {
+            Gather asked{to, {}};
+            for (const int body : share)
+                if (ask_for(static_cast<std::uint32_t>(body), to))
+                    asked.bodies.push_back(static_cast<std::uint32_t>(body));
+            if (!asked.bodies.empty()) send({worker}, asked);
+        }
+    }
 }
 
 // Unless it was asked not long ago: a sale takes some steps.

@@ -2,6 +2,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <set>
 
 #include "shared/columns.h"
 #include "shared/shared_contacts.h"
@@ -115,6 +116,8 @@ private:
     static void publish(Body& body, const WorldRecord& record, std::uint64_t step);
 
     void remove(std::uint32_t worker);
+    [[nodiscard]] std::map<std::uint32_t, std::vector<int>> shares(
+        const std::vector<int>& bodies, const std::vector<std::uint32_t>& workers) const;
     void share_out(const std::vector<int>& bodies, std::uint32_t from, const Handover* handed = nullptr);
     [[nodiscard]] std::vector<int> owned_by(std::uint32_t worker) const;
     [[nodiscard]] std::vector<std::vector<int>> whole_lots() const;
@@ -130,6 +133,8 @@ private:
     void tell_ready();
     void release();
     void gather();
+    void ask_who_leaves();
+    [[nodiscard]] std::vector<std::uint32_t> staying() const;
     [[nodiscard]] bool ask_for(std::uint32_t body, std::uint32_t to);
     void end(bool rest);
     void name_mishaps(DistributedResult& result) const;
@@ -149,6 +154,7 @@ private:
     std::vector<Body> bodies_;
     std::vector<std::uint32_t> gone_;  // whose messages need no storage any more
     std::vector<std::uint32_t> members_;
+    std::set<std::uint32_t> leaving_;  // of these
     std::map<std::uint32_t, Sender> senders_;
     std::uint32_t next_worker_ = 0, epoch_ = 0;
     bool started_ = false, finished_ = false, goes_on_ = false;

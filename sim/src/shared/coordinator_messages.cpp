@@ -93,6 +93,10 @@ void Coordinator::take_message(const MessageHeader& header, std::span<const std:
     if (auto* relay = std::get_if<RelayMessage>(&message)) return take_relay(header, std::move(*relay));
     if (std::holds_alternative<Beat>(message)) return;
     if (const auto* failure = std::get_if<WorkerFailure>(&message)) return lose(worker, failure->what);
+    if (std::holds_alternative<Leaves>(message) && settings_.pace == Pace::bounded) {
+        if (leaving_.insert(worker).second) ask_who_leaves();
+        return;
+    }
     if (std::holds_alternative<Drained>(message)) {
         observer_->note(name(worker) + " leaves");
         ++result_.left;
@@ -288,7 +292,7 @@ void Coordinator::take_handover(const MessageHeader& header, Handover&& message)
         publish(bodies_[static_cast<std::size_t>(record.body)], record, header.step);
     const bool traded = is_member(message.to) && message.to != header.worker;
     if (traded) {
-        ++result_.trades;
+        if (!leaving_.contains(header.worker)) ++result_.trades;
         result_.migrations += bodies.size();
         register_owner(bodies, message.to, header.worker, &message);
     } else if (message.to == kApplication && members_.size() > 1) {

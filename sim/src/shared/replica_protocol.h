@@ -71,6 +71,8 @@ public:
     /// have done theirs: corrected by the impulses that arrived late.
     [[nodiscard]] virtual bool done() const = 0;
     [[nodiscard]] virtual int own_bodies() const = 0;
+    /// No body is own, or will be in some steps.
+    [[nodiscard]] virtual bool has_nothing() const { return own_bodies() == 0; }
     [[nodiscard]] virtual int lead() const = 0;       ///< steps ahead of the slowest owner, now
     [[nodiscard]] virtual int ghost_age() const = 0;  ///< of the oldest used in the last step
     /// Lockstep: the last step was done alone, as something kept it from being done with the others.

@@ -43,6 +43,7 @@ void SharedWorldWorker::take(const MessageHeader& header, WorkerMessage&& messag
     std::visit([&](auto&& m) { take_message(header, std::forward<decltype(m)>(m)); }, std::move(message));
     if (left_ || ended_) return;
     exchange_->follow();
+    if (exchange_->owes() && !stepping_) publish({});
     if (!stepping_) trade();  // the next step may have to wait for the buyer
 }
 
@@ -61,7 +62,6 @@ void SharedWorldWorker::take_message(const MessageHeader& header, Ownership&& me
     exchange_->own(message);
     market_.registered(header.epoch, message);
     if (message.traded) sellers_.erase(message.from);
-    if (exchange_->owes() && !stepping_) publish({});
 }
 
 void SharedWorldWorker::take_message(const MessageHeader& header, SnapshotMessage&& message) {
@@ -101,7 +101,8 @@ void SharedWorldWorker::take_message(const MessageHeader& header, PackedUpdates&
 
 void SharedWorldWorker::take_message(const MessageHeader& header, Offer&& message) {
     OfferAnswer answer = {header.worker, message.number, false};
-    if (!draining_ && !exchange_->at_end()) answer = market_.answer(header.worker, message);
+    if ((!draining_ || message.gathers) && !exchange_->at_end())
+        answer = market_.answer(header.worker, message);
     if (answer.accepted && bounded_) sellers_[header.worker] = exchange_->steps_done() + 1;
     send(answer);
 }
@@ -113,6 +114,10 @@ void SharedWorldWorker::take_message(const MessageHeader& header, OfferAnswer&& 
 
 // What was asked for last counts.
 void SharedWorldWorker::take_message(const MessageHeader& header, Gather&& message) {
+    if (message.to == kApplication) {
+        gives_up_ = draining_;
+        return;
+    }
     for (Asked& before : gathers_)
         std::erase_if(before.what.bodies, [&message](std::uint32_t body) {
             return std::ranges::find(message.bodies, body) != message.bodies.end();
@@ -186,7 +191,7 @@ void SharedWorldWorker::worked(const Times& times) {
         take(deferred.header, std::move(deferred.message));
     if (left_ || ended_) return;
     if (exchange_->owes()) publish({});
-    if (draining_) return leave();
+    if (draining_ && !bounded_) return leave();
     trade();
     exchange_->follow();
 }
@@ -208,12 +213,14 @@ void SharedWorldWorker::publish(const Times& times) {
     queue_.push_back({{}, exchange_->publish(epoch_, report)});
 }
 
-// Between steps, after states are on their way: one offer a step, and another when bodies are handed over.
+// Between steps, after states are on their way: one offer a step, and another when bodies are handed over. Who leaves offers whatever
+// it was asked for.
 void SharedWorldWorker::trade() {
     const bool sold = hand_over();
-    if (!sold && offered_at_ == exchange_->steps_done()) return;
+    if (may_leave()) return leave();
+    if (!sold && !draining_ && offered_at_ == exchange_->steps_done()) return;
     offered_at_ = exchange_->steps_done();
-    if (draining_ || exchange_->at_end()) return;
+    if (exchange_->at_end() && !draining_) return;
     if (const std::optional<Offer> offer = make_offer()) send(*offer);
 }
 
@@ -229,7 +236,7 @@ std::optional<Offer> SharedWorldWorker::make_offer() {
         });
         if (const std::optional<Offer> offer = market_.make_offer(asked.what)) return offer;
     }
-    if (!market_.wants_to_sell()) return std::nullopt;
+    if (draining_ || !market_.wants_to_sell()) return std::nullopt;
     return market_.make_offer(exchange_->holdings());
 }
 
@@ -244,8 +251,17 @@ bool SharedWorldWorker::hand_over() {
 }
 
 void SharedWorldWorker::drain() {
-    draining_ = true;
-    if (!stepping_ && !left_) leave();
+    if (left_ || std::exchange(draining_, true)) return;
+    if (bounded_)
+        send(Leaves{});
+    else if (!stepping_)
+        leave();
+}
+
+// Bounded: all is sold, or there is nobody to sell to.
+bool SharedWorldWorker::may_leave() const {
+    return draining_ && bounded_ &&
+           (gives_up_ || (exchange_->has_nothing() && sellers_.empty() && !market_.is_selling()));
 }
 
 // Bodies handed over without a buyer are distributed by the application.

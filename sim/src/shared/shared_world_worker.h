@@ -44,7 +44,8 @@ public:
         return encode({self_, epoch_, exchange_->steps_done()},
                       RelayMessage{std::move(to), std::move(bytes)});
     }
-    /// Hands all bodies over, after the step if one is under way; then left() becomes true.
+    /// Gives all bodies to others, then left() becomes true. In lockstep at once, or after the step if one is under way. In bounded pace
+    /// it goes on until they are sold: a body changes owners at a step that neither side has passed.
     void drain();
     [[nodiscard]] bool left() const noexcept { return left_; }
     [[nodiscard]] bool ended() const noexcept { return ended_; }  ///< EndOfRun or Refusal came
@@ -76,6 +77,7 @@ private:
     void send(const WorkerMessage& message);
     void publish(const Times& times);
     void trade();
+    [[nodiscard]] bool may_leave() const;
     [[nodiscard]] std::optional<Offer> make_offer();
     [[nodiscard]] bool hand_over();
     void leave();
@@ -105,7 +107,8 @@ private:
         WorkerMessage message;
     };
     std::vector<Deferred> deferred_;  // came within a step
-    bool within_ = false, stepping_ = false, draining_ = false, left_ = false, ended_ = false;
+    bool within_ = false, stepping_ = false, draining_ = false, gives_up_ = false, left_ = false,
+         ended_ = false;
 };
 
 }  // namespace sim

@@ -147,7 +147,7 @@ std::vector<sim::WorkerMessage> world_samples() {
             sim::PeersMessage{{{2, "tcp://10.0.0.2:4000", std::string(40, 'k'), {1, 2}, {3, 4}}}},
             sim::LinkBeat{true},
             sim::ReachMessage{"ipc:///tmp/musicworld-7-abcdef/peer-9", ""},
-            sim::Gather{2, {5, 7}}};
+            sim::Gather{2, {5, 7}}, sim::Leaves{}};
 }
 
 const sim::MessageHeader kHeader{3, 8, 1234567890123};

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <random>
 
+#include "falling_bodies.h"
 #include "shared/coordinator.h"
 #include "shared/shared_world_worker.h"
 #include "shared_scenes.h"
@@ -189,7 +190,7 @@ TEST(LastStep, OfBodiesWhoseOwnerIsLostOrLeavesAfterItIsDoneByWhoeverGetsThem) {
                 deliver();
                 for (auto& [number, worker] : workers) {
                     const bool waits = number != first && !gone && worker->steps_done() >= 17;
-                    if ((number == first && gone) || waits) continue;
+                    if ((number == first && gone && !drains) || waits) continue;
                     if (worker->ready()) worker->step(), worker->worked({.seconds = 1e-3});
                     send(number);
                 }
@@ -205,5 +206,44 @@ TEST(LastStep, OfBodiesWhoseOwnerIsLostOrLeavesAfterItIsDoneByWhoeverGetsThem) {
             EXPECT_EQ(meeting.steps(), 20u);
             EXPECT_EQ(meeting.result().lost, drains ? 0 : 1) << record.notes;
             EXPECT_EQ(meeting.result().refused_messages, 0u) << record.notes;
+        }
+}
+
+// Bodies of a worker that leaves change owners at a step that neither side has passed, like those that are sold.
+TEST(Leaving, OutOfStepKeepsTheMomentumWhoeverLeavesAndWhenever) {
+    sim::WorldScene scene;
+    scene.world = sim_bench::falling_balls(60);
+    double weight = 0;  // [N]
+    const sim::World world(scene.world);
+    for (int i = 0; i < world.bodies(); ++i)
+        if (scene.world.bodies[static_cast<std::size_t>(i)].moves())
+            weight += 9.81 * world.rigid_mass(i).mass;
+    sim::DistributedSettings settings = lockstep(120);
+    settings.pace = sim::Pace::bounded;
+    for (const int bound : {0, 1, 4, 16})
+        for (const int leave : {1, 2, 3}) {
+            settings.bound = bound;
+            sim::SimulatedProcessors how = processors();
+            how.count = 4;
+            Record unharmed;
+            const double whole = sim::simulate_processors(scene, settings, how, unharmed).elapsed_s;
+            for (int k = 0; k < leave; ++k)  // at once, or one after the other
+                how.failures.push_back(
+                    {whole * (0.2 + 0.17 * k * (bound % 4)), (bound + k) % how.count, Kind::drain});
+            if (leave == 2) how.failures.push_back({0.5 * whole, 0, Kind::join});
+            struct : Record {
+                Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
+                void at(std::uint64_t step, const sim::World& now) override {
+                    Record::at(step, now);
+                    momentum = now.momentum();
+                }
+            } record;
+            const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
+            SCOPED_TRACE(std::to_string(leave) + " leave, bound " + std::to_string(bound) + record.notes);
+            EXPECT_EQ(result.steps, settings.steps);
+            EXPECT_EQ(result.left, leave);
+            EXPECT_EQ(result.refused_messages, 0u);
+            // To rounding: impulses travel as floats, and owners give up what rounding leaves.
+            EXPECT_LT((record.momentum - result.outside_impulse).norm(), 1e-9 * weight * 120 / 60);
         }
 }
